@@ -1,0 +1,1 @@
+//! Exact predicates: written next.

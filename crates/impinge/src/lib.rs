@@ -1,0 +1,2 @@
+//! Exact collision detection for deforming meshes.
+pub mod exact;
