@@ -1,0 +1,186 @@
+//! The two determinants that everything else is made of, with exact signs.
+
+use super::Point;
+use robust::{Coord, Coord3D};
+
+/// The sign of an exactly known number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(i8)]
+pub enum Sign {
+    /// Less than zero.
+    Negative = -1,
+    /// Zero.
+    Zero = 0,
+    /// Greater than zero.
+    Positive = 1,
+}
+
+impl Sign {
+    /// The sign of a floating-point number; NaN counts as zero.
+    #[inline]
+    pub(super) fn of(x: f64) -> Self {
+        if x > 0.0 {
+            Self::Positive
+        } else if x < 0.0 {
+            Self::Negative
+        } else {
+            Self::Zero
+        }
+    }
+
+    /// Whether the number is zero.
+    #[inline]
+    #[must_use]
+    pub fn is_zero(self) -> bool {
+        self == Self::Zero
+    }
+
+    /// Whether both numbers are nonzero and of the same sign: two points strictly on one side.
+    #[inline]
+    pub(super) fn strictly_same(self, other: Self) -> bool {
+        self as i8 * other as i8 > 0
+    }
+
+    /// Whether the numbers are nonzero and of different signs: two points strictly apart.
+    #[inline]
+    pub(super) fn strictly_opposite(self, other: Self) -> bool {
+        (self as i8) * (other as i8) < 0
+    }
+}
+
+impl std::ops::Neg for Sign {
+    type Output = Self;
+
+    #[inline]
+    fn neg(self) -> Self {
+        match self {
+            Self::Negative => Self::Positive,
+            Self::Zero => Self::Zero,
+            Self::Positive => Self::Negative,
+        }
+    }
+}
+
+/// Whether no two of the signs are strictly opposite: all at least zero, or all at most zero.
+#[inline]
+pub(super) fn on_one_side(signs: &[Sign]) -> bool {
+    signs.iter().all(|&s| s != Sign::Negative) || signs.iter().all(|&s| s != Sign::Positive)
+}
+
+/// Whether all signs are nonzero and equal: all points strictly on one side of the plane.
+#[inline]
+pub(super) fn strictly_on_one_side(signs: &[Sign]) -> bool {
+    signs.iter().all(|&s| s == Sign::Positive) || signs.iter().all(|&s| s == Sign::Negative)
+}
+
+/// The exact sign of `|a-c  b-c|` in the plane: [`Sign::Positive`] when a, b, c turn to the left,
+/// [`Sign::Zero`] when they lie on one line (or coincide).
+///
+/// Coordinates must be [`in_range`](super::in_range).
+///
+/// ```
+/// use impinge::exact::{Sign, orient2d};
+/// assert_eq!(orient2d([0.0, 0.0], [1.0, 0.0], [0.0, 1.0]), Sign::Positive);
+/// assert_eq!(orient2d([0.1, 0.1], [0.2, 0.2], [0.3, 0.3]), Sign::Zero);
+/// ```
+#[inline]
+#[must_use]
+pub fn orient2d(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Sign {
+    let coord = |p: [f64; 2]| Coord { x: p[0], y: p[1] };
+    Sign::of(robust::orient2d(coord(a), coord(b), coord(c)))
+}
+
+/// 7 + 56 half-ulps, Shewchuk's bound for the first stage of `orient3d`, rounded up.
+const ORIENT3D_BOUND: f64 = 7.0 * HALF_ULP + 64.0 * HALF_ULP * HALF_ULP;
+
+/// The unit roundoff of `f64`, 2^-53.
+const HALF_ULP: f64 = f64::EPSILON / 2.0;
+
+/// The exact sign of the determinant with rows a-d, b-d, c-d: on which side of the plane through
+/// a, b, c the point d lies.
+///
+/// [`Sign::Positive`] when a, b, c appear clockwise as seen from d, [`Sign::Zero`] when all four
+/// lie in one plane. Coordinates must be [`in_range`](super::in_range).
+///
+/// ```
+/// use impinge::exact::{Sign, orient3d};
+/// let (a, b, c) = ([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
+/// assert_eq!(orient3d(&a, &b, &c, &[0.0, 0.0, -1.0]), Sign::Positive);
+/// assert_eq!(orient3d(&a, &b, &c, &[1e30, 5.0, 0.0]), Sign::Zero);
+/// assert_eq!(orient3d(&a, &b, &c, &[1e30, 5.0, 1e-40]), Sign::Negative);
+/// ```
+#[inline]
+#[must_use]
+pub fn orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
+    let [ax, ay, az] = [a[0] - d[0], a[1] - d[1], a[2] - d[2]];
+    let [bx, by, bz] = [b[0] - d[0], b[1] - d[1], b[2] - d[2]];
+    let [cx, cy, cz] = [c[0] - d[0], c[1] - d[1], c[2] - d[2]];
+    let (bc, cb) = (bx * cy, cx * by);
+    let (ca, ac) = (cx * ay, ax * cy);
+    let (ab, ba) = (ax * by, bx * ay);
+    let det = az * (bc - cb) + bz * (ca - ac) + cz * (ab - ba);
+    let permanent = az.abs() * (bc.abs() + cb.abs())
+        + bz.abs() * (ca.abs() + ac.abs())
+        + cz.abs() * (ab.abs() + ba.abs());
+    let bound = ORIENT3D_BOUND * permanent;
+    if det > bound {
+        return Sign::Positive;
+    }
+    if -det > bound {
+        return Sign::Negative;
+    }
+    // A difference is zero only when it is zero exactly and nothing underflows in range, so a
+    // zero permanent means that all six products are zero. Axis-aligned input ends here often.
+    if permanent == 0.0 {
+        return Sign::Zero;
+    }
+    orient3d_adaptive(a, b, c, d)
+}
+
+/// The stages of growing precision behind [`orient3d`], out of line because they are rare.
+#[cold]
+#[inline(never)]
+fn orient3d_adaptive(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
+    let coord = |p: &Point| Coord3D {
+        x: p[0],
+        y: p[1],
+        z: p[2],
+    };
+    Sign::of(robust::orient3d(coord(a), coord(b), coord(c), coord(d)))
+}
+
+/// A projection onto a coordinate plane: the axis that is dropped, as the two that stay.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Projection([usize; 2]);
+
+impl Projection {
+    /// The three projections.
+    pub(super) const ALL: [Self; 3] = [Self([0, 1]), Self([1, 2]), Self([2, 0])];
+
+    /// The two coordinates that stay.
+    #[inline]
+    pub(super) fn apply(self, p: &Point) -> [f64; 2] {
+        [p[self.0[0]], p[self.0[1]]]
+    }
+
+    /// The turn of the projected points.
+    #[inline]
+    pub(super) fn turn(self, a: &Point, b: &Point, c: &Point) -> Sign {
+        orient2d(self.apply(a), self.apply(b), self.apply(c))
+    }
+
+    /// A projection that keeps a, b, c apart from a line, and so is one-to-one on their plane;
+    /// none when the three lie on one line.
+    #[inline]
+    pub(super) fn injective(a: &Point, b: &Point, c: &Point) -> Option<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|projection| !projection.turn(a, b, c).is_zero())
+    }
+}
+
+/// Whether three points lie on one line (or coincide).
+#[inline]
+pub(super) fn collinear(a: &Point, b: &Point, c: &Point) -> bool {
+    Projection::injective(a, b, c).is_none()
+}

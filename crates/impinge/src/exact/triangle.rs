@@ -1,0 +1,101 @@
+//! Triangle against segment and triangle against triangle.
+
+use super::Point;
+use super::orientation::{Projection, Sign, on_one_side, orient2d, orient3d, strictly_on_one_side};
+use super::segment::{segments_intersect, segments_intersect_2d};
+
+/// The edges of a triangle as vertex numbers.
+const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
+
+/// Whether two closed triangles share a point.
+///
+/// Touching and coplanar overlap count; a degenerate triangle is the segment or the point that
+/// it is. Exact for coordinates [`in_range`](super::in_range); never panics.
+///
+/// Two triangles meet if and only if an edge of one meets the other: a point of both can be
+/// moved inside both, along the line (or over the plane) where they overlap, until it reaches an
+/// edge of one of them.
+///
+/// ```
+/// use impinge::exact::triangles_intersect;
+/// let a = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let touching = [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 0.0, 1.0]];
+/// let above = a.map(|[x, y, _]| [x, y, 1e-30]);
+/// assert!(triangles_intersect(&a, &touching));
+/// assert!(!triangles_intersect(&a, &above));
+/// ```
+#[must_use]
+pub fn triangles_intersect(a: &[Point; 3], b: &[Point; 3]) -> bool {
+    let b_sides = sides(a, b);
+    if strictly_on_one_side(&b_sides) {
+        return false;
+    }
+    let a_sides = sides(b, a);
+    if strictly_on_one_side(&a_sides) {
+        return false;
+    }
+    any_edge_meets(a, a_sides, b) || any_edge_meets(b, b_sides, a)
+}
+
+/// On which side of the plane of `triangle` each vertex of `other` lies. All zero when
+/// `triangle` is degenerate.
+fn sides(triangle: &[Point; 3], other: &[Point; 3]) -> [Sign; 3] {
+    let [p, q, r] = triangle;
+    other.each_ref().map(|vertex| orient3d(p, q, r, vertex))
+}
+
+/// Whether an edge of `a` meets `b`, where `sides` are those of `a` by the plane of `b`.
+fn any_edge_meets(a: &[Point; 3], sides: [Sign; 3], b: &[Point; 3]) -> bool {
+    EDGES
+        .iter()
+        .any(|&[i, j]| segment_meets_triangle_with_sides(&a[i], &a[j], sides[i], sides[j], b))
+}
+
+/// Whether the closed segment pq and the closed triangle share a point.
+pub(super) fn segment_meets_triangle(p: &Point, q: &Point, triangle: &[Point; 3]) -> bool {
+    let [a, b, c] = triangle;
+    let (p_side, q_side) = (orient3d(a, b, c, p), orient3d(a, b, c, q));
+    segment_meets_triangle_with_sides(p, q, p_side, q_side, triangle)
+}
+
+/// [`segment_meets_triangle`] with the sides of p and q by the triangle's plane already known.
+fn segment_meets_triangle_with_sides(
+    p: &Point,
+    q: &Point,
+    p_side: Sign,
+    q_side: Sign,
+    triangle: &[Point; 3],
+) -> bool {
+    if p_side.strictly_same(q_side) {
+        return false;
+    }
+    if p_side.is_zero() && q_side.is_zero() {
+        return segment_meets_triangle_in_plane(p, q, triangle);
+    }
+    // The segment meets the plane in one point. It lies in the triangle when the line pq passes
+    // all three edges on the same side (or touches them).
+    let [a, b, c] = triangle;
+    on_one_side(&[
+        orient3d(p, q, a, b),
+        orient3d(p, q, b, c),
+        orient3d(p, q, c, a),
+    ])
+}
+
+/// Segment against triangle when p and q lie in the triangle's plane, or the triangle has none.
+fn segment_meets_triangle_in_plane(p: &Point, q: &Point, triangle: &[Point; 3]) -> bool {
+    let [a, b, c] = triangle;
+    let Some(projection) = Projection::injective(a, b, c) else {
+        // A degenerate triangle is the union of its edges.
+        return EDGES
+            .iter()
+            .any(|&[i, j]| segments_intersect(p, q, &triangle[i], &triangle[j]));
+    };
+    let [a, b, c] = triangle.each_ref().map(|vertex| projection.apply(vertex));
+    let (p, q) = (projection.apply(p), projection.apply(q));
+    // Either the segment lies inside, and then so does p, or it meets an edge.
+    on_one_side(&[orient2d(a, b, p), orient2d(b, c, p), orient2d(c, a, p)])
+        || segments_intersect_2d(p, q, a, b)
+        || segments_intersect_2d(p, q, b, c)
+        || segments_intersect_2d(p, q, c, a)
+}
