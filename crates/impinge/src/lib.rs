@@ -1,2 +1,31 @@
-//! Exact collision detection for deforming meshes.
+//! Exact, real-time collision detection for deforming meshes.
+//!
+//! Bodies have fixed topology and positions that change every frame. A [`Detector`] answers
+//! which of their primitives intersect: between bodies and within one.
+//!
+//! * **Closed sets.** Touching counts, coplanar overlap counts, a degenerate triangle is the
+//!   segment or the point that it is.
+//! * **Exact.** A pair is reported if and only if the two primitives share a point when the given
+//!   coordinates are read as real numbers. There is no tolerance anywhere.
+//! * **The same bytes everywhere.** The answer is sorted and depends on the input alone: not on
+//!   method, backend, threads or memory.
+
+mod detector;
+mod error;
 pub mod exact;
+mod frame;
+mod naive;
+mod narrow;
+mod pairs;
+mod progress;
+mod query;
+mod scene;
+mod stats;
+
+pub use detector::{Backend, Detector, Method, Recluster, Settings};
+pub use error::Error;
+pub use pairs::{Pairs, Primitive, hash_rows};
+pub use progress::{CancelToken, Control, Progress};
+pub use query::{Query, SharedVertex};
+pub use scene::{Body, BodyId, Elements, Filter, Kind, Positions, Real, Scene};
+pub use stats::{Stage, Statistics};

@@ -1,0 +1,210 @@
+//! The frame loop: resolves a query, picks method and backend, sorts the answer.
+
+use std::time::Instant;
+
+use crate::error::Error;
+use crate::frame::Frame;
+use crate::naive;
+use crate::pairs::Pairs;
+use crate::progress::Control;
+use crate::query::Query;
+use crate::scene::Scene;
+use crate::stats::Statistics;
+
+/// How candidates are found. All methods give the same pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Method {
+    /// Groups fixed by topology; each frame only their boxes move. The fast one.
+    #[default]
+    Clusters,
+    /// The two-level grid of the paper: groups are what a cell holds, made anew each frame.
+    Cells,
+    /// Every box against every box: the oracle, quadratic in primitives.
+    Naive,
+}
+
+impl Method {
+    /// `"clusters"`, `"cells"` or `"naive"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Clusters => "clusters",
+            Method::Cells => "cells",
+            Method::Naive => "naive",
+        }
+    }
+}
+
+/// Where the work is done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Backend {
+    /// A GPU where there is one, else the CPU.
+    #[default]
+    Auto,
+    /// All cores, or as many threads as told.
+    Cpu,
+    /// A GPU; an error where there is none.
+    Gpu,
+}
+
+/// Whether a body that has flowed far from the pose in which it was clustered is clustered anew.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Recluster {
+    /// When the summed surface of its cluster boxes has grown enough for it to pay.
+    #[default]
+    Auto,
+    /// Never: no frame ever pays for it. Boxes may grow and frames get slower.
+    Never,
+}
+
+/// What a detector may be told.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// How candidates are found.
+    pub method: Method,
+    /// Where.
+    pub backend: Backend,
+    /// CPU threads; 0 means one a core.
+    pub threads: usize,
+    /// `Cells`: the density coefficient λ of the paper's equation (1), above 0.
+    pub lambda: f64,
+    /// `Cells`: the most primitives a group may hold, 1 to 64.
+    pub group_size: u32,
+    /// Bytes the detector may hold besides the answer; `None` for as many as it takes.
+    pub memory_budget: Option<u64>,
+    /// `Clusters`: whether bodies are clustered again.
+    pub recluster: Recluster,
+    /// GPU: part of an adapter's name, to choose among several.
+    pub device: Option<String>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings {
+            method: Method::default(),
+            backend: Backend::default(),
+            threads: 0,
+            lambda: 1.0,
+            group_size: 64,
+            memory_budget: None,
+            recluster: Recluster::default(),
+            device: None,
+        }
+    }
+}
+
+/// Finds intersecting pairs, frame after frame. Scratch memory lives here and is reused.
+///
+/// ```
+/// use impinge::{Backend, Detector, Query, Scene};
+/// # fn main() -> Result<(), impinge::Error> {
+/// let mut scene = Scene::new();
+/// let triangle = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let a = scene.add_triangles(&[[0, 1, 2]], &triangle)?;
+/// let b = scene.add_triangles(&[[0, 1, 2]], &triangle.map(|[x, y, z]| [x, z - 0.5, y]))?;
+/// let mut detector = Detector::new(Backend::Cpu)?;
+/// let pairs = detector.detect(&scene, &Query::between(a, b))?;
+/// assert_eq!(pairs.between(a, b).collect::<Vec<_>>(), [(0, 0)]);
+/// # Ok(()) }
+/// ```
+pub struct Detector {
+    settings: Settings,
+    frame: Frame,
+    pairs: Pairs,
+}
+
+impl Detector {
+    /// A detector with the default method on the given backend.
+    ///
+    /// # Errors
+    /// As [`with_settings`](Detector::with_settings).
+    pub fn new(backend: Backend) -> Result<Self, Error> {
+        Detector::with_settings(Settings {
+            backend,
+            ..Settings::default()
+        })
+    }
+
+    /// A detector with everything said.
+    ///
+    /// # Errors
+    /// A setting out of its range; no adapter for `Backend::Gpu`; threads that do not start.
+    pub fn with_settings(settings: Settings) -> Result<Self, Error> {
+        check(&settings)?;
+        Ok(Detector {
+            settings,
+            frame: Frame::default(),
+            pairs: Pairs::default(),
+        })
+    }
+
+    /// What it was told.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// All pairs that the query asks for, as things are in the scene now.
+    ///
+    /// # Errors
+    /// A stale id, refused positions, a memory budget too small for even one slab, a GPU failure.
+    pub fn detect(&mut self, scene: &Scene, query: &Query) -> Result<&Pairs, Error> {
+        self.detect_with(scene, query, &Control::new())
+    }
+
+    /// [`detect`](Detector::detect) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `detect`, and [`Error::Cancelled`].
+    pub fn detect_with(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        control: &Control<'_>,
+    ) -> Result<&Pairs, Error> {
+        let start = Instant::now();
+        self.frame.resolve(scene, query)?;
+        self.pairs.begin(&self.frame);
+        let (keys, stats) = self.pairs.parts_mut();
+        run(&self.settings, scene, &self.frame, control, keys, stats)?;
+        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
+        Ok(&self.pairs)
+    }
+}
+
+fn run(
+    settings: &Settings,
+    scene: &Scene,
+    frame: &Frame,
+    control: &Control<'_>,
+    keys: &mut Vec<u64>,
+    stats: &mut Statistics,
+) -> Result<(), Error> {
+    stats.method = settings.method.name();
+    stats.backend.push_str("cpu");
+    stats.n_threads = 1;
+    stats.n_slabs = 1;
+    match settings.method {
+        Method::Naive | Method::Clusters | Method::Cells => stats.time("naive", |stats| {
+            naive::run(scene, frame, control, keys, stats)
+        }),
+    }
+}
+
+fn check(settings: &Settings) -> Result<(), Error> {
+    let refuse = |setting, given: String, allowed| {
+        Err(Error::Setting {
+            setting,
+            given,
+            allowed,
+        })
+    };
+    if !(settings.lambda.is_finite() && settings.lambda > 0.0) {
+        return refuse("lambda", settings.lambda.to_string(), "a number above 0");
+    }
+    if !(1..=64).contains(&settings.group_size) {
+        return refuse("group size", settings.group_size.to_string(), "1 to 64");
+    }
+    if settings.threads > 1024 {
+        return refuse("threads", settings.threads.to_string(), "0 to 1024");
+    }
+    Ok(())
+}

@@ -1,0 +1,128 @@
+use crate::scene::BodyId;
+
+/// Everything that can go wrong, by name: which body, which index, and both numbers.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A position holds NaN or an infinity. Check the step that produced this vertex.
+    #[error("body {body}: vertex {vertex} has a non-finite position ({}, {}, {})", value[0], value[1], value[2])]
+    NonFinitePosition {
+        /// The body, or the one that was about to be added.
+        body: BodyId,
+        /// Index of the vertex within the body.
+        vertex: usize,
+        /// The position as given.
+        value: [f64; 3],
+    },
+    /// A coordinate lies outside the range in which the predicates are exact
+    /// (see [`exact::in_range`](crate::exact::in_range)). Rescale the scene.
+    #[error(
+        "body {body}: vertex {vertex} has the coordinate {value:e}, outside the exact range (0 or {} to {} in magnitude)",
+        crate::exact::MIN_MAGNITUDE,
+        crate::exact::MAX_MAGNITUDE
+    )]
+    CoordinateOutOfRange {
+        /// The body, or the one that was about to be added.
+        body: BodyId,
+        /// Index of the vertex within the body.
+        vertex: usize,
+        /// The offending coordinate.
+        value: f64,
+    },
+    /// A primitive names a vertex that does not exist. Check the index buffer's base.
+    #[error(
+        "body {body}: primitive {primitive} names vertex {index}, but there are {n_vertices} vertices"
+    )]
+    VertexIndexOutOfRange {
+        /// The body, or the one that was about to be added.
+        body: BodyId,
+        /// Index of the primitive within the body.
+        primitive: usize,
+        /// The vertex index it names.
+        index: u32,
+        /// How many vertices the body has.
+        n_vertices: usize,
+    },
+    /// New positions do not match the body's vertex count. Topology is fixed between re-meshings.
+    #[error("body {body}: {given} positions given, but it has {expected} vertices")]
+    WrongNumberOfPositions {
+        /// The body.
+        body: BodyId,
+        /// How many positions were given.
+        given: usize,
+        /// How many vertices the body has.
+        expected: usize,
+    },
+    /// Positions were asked for in a precision in which the body does not hold them.
+    #[error("body {body}: positions are stored as {stored}, not as {asked}")]
+    WrongPrecision {
+        /// The body.
+        body: BodyId,
+        /// How they are stored: `"f32"` or `"f64"`.
+        stored: &'static str,
+        /// What was asked for.
+        asked: &'static str,
+    },
+    /// The id names no body of this scene: it was removed, or belongs to another scene.
+    #[error("there is no body {body} in this scene (its slot holds generation {present})")]
+    UnknownBody {
+        /// The id as given.
+        body: BodyId,
+        /// The generation that the slot holds now; 0 when the slot was never used.
+        present: u32,
+    },
+    /// A query between two bodies names one body twice. Ask for `within` instead.
+    #[error("a query between body {body} and itself: ask for collisions within it instead")]
+    SameBody {
+        /// The body named twice.
+        body: BodyId,
+    },
+    /// More primitives or vertices than 32-bit indices can name.
+    #[error("{what}: {given} given, at most {limit} can be held")]
+    TooMany {
+        /// What there are too many of.
+        what: &'static str,
+        /// How many were given.
+        given: u64,
+        /// The most that can be held.
+        limit: u64,
+    },
+    /// A setting lies outside its range.
+    #[error("{setting}: {given} given, {allowed} allowed")]
+    Setting {
+        /// The setting's name.
+        setting: &'static str,
+        /// The value as given.
+        given: String,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// Even one slab at a time does not fit the memory budget. Raise the budget.
+    #[error("the memory budget is {budget} bytes, but {needed} bytes are needed for {what}")]
+    MemoryBudget {
+        /// What needs the memory.
+        what: &'static str,
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes allowed.
+        budget: u64,
+    },
+    /// The caller cancelled the run; the detector stays usable.
+    #[error("cancelled")]
+    Cancelled,
+    /// No GPU adapter fits what was asked for; the text lists those found.
+    #[error("no GPU adapter: {found}")]
+    NoAdapter {
+        /// What was looked for and what is there.
+        found: String,
+    },
+    /// The GPU refused: out of memory, a lost device, a shader that does not compile.
+    #[error("GPU: {what}")]
+    Gpu {
+        /// The driver's own words.
+        what: String,
+    },
+    /// The threads of the pool could not be started.
+    #[error("thread pool: {0}")]
+    Threads(String),
+}

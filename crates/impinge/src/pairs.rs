@@ -1,0 +1,202 @@
+//! The answer: sorted pairs, colliding primitives, a hash, statistics.
+
+use crate::frame::{Frame, owner_by_first};
+use crate::scene::{BodyId, Kind};
+use crate::stats::Statistics;
+
+/// One primitive of one body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Primitive {
+    /// The body.
+    pub body: BodyId,
+    /// Index of the primitive within the body.
+    pub primitive: u32,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct PairBody {
+    id: BodyId,
+    first: u32,
+    kind: Kind,
+}
+
+/// Every pair that intersects, sorted by `(body_a, primitive_a, body_b, primitive_b)`, where
+/// `body_a < body_b`, or within one body `primitive_a < primitive_b`.
+///
+/// The same input gives the same bytes on every method, backend, thread count and budget.
+#[derive(Debug, Clone, Default)]
+pub struct Pairs {
+    keys: Vec<u64>,
+    bodies: Vec<PairBody>,
+    stats: Statistics,
+}
+
+impl Pairs {
+    /// Takes over the frame's numbering; keys are filled in by the caller through `keys_mut`.
+    pub(crate) fn begin(&mut self, frame: &Frame) {
+        self.keys.clear();
+        self.bodies.clear();
+        self.bodies
+            .extend(frame.participants.iter().map(|participant| PairBody {
+                id: participant.id,
+                first: participant.first,
+                kind: participant.kind,
+            }));
+        self.stats.clear();
+    }
+
+    pub(crate) fn keys_mut(&mut self) -> &mut Vec<u64> {
+        &mut self.keys
+    }
+
+    pub(crate) fn parts_mut(&mut self) -> (&mut Vec<u64>, &mut Statistics) {
+        (&mut self.keys, &mut self.stats)
+    }
+
+    /// How many pairs there are.
+    pub fn len(&self) -> usize {
+        self.keys.len()
+    }
+
+    /// Whether nothing intersects.
+    pub fn is_empty(&self) -> bool {
+        self.keys.is_empty()
+    }
+
+    /// All pairs in order.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = (Primitive, Primitive)> + '_ {
+        self.keys.iter().map(|&key| {
+            (
+                self.primitive((key >> 32) as u32),
+                self.primitive(key as u32),
+            )
+        })
+    }
+
+    fn primitive(&self, global: u32) -> Primitive {
+        let body = self.bodies[owner_by_first(&self.bodies, global, |body| body.first)];
+        Primitive {
+            body: body.id,
+            primitive: global - body.first,
+        }
+    }
+
+    /// The range of global numbers of a body that took part.
+    fn numbers(&self, body: BodyId) -> Option<std::ops::Range<u64>> {
+        let ix = self
+            .bodies
+            .binary_search_by_key(&body, |held| held.id)
+            .ok()?;
+        let end = self
+            .bodies
+            .get(ix + 1)
+            .map_or(1 << 32, |next| u64::from(next.first));
+        Some(u64::from(self.bodies[ix].first)..end)
+    }
+
+    /// The keys whose lower primitive belongs to the range.
+    fn run(&self, numbers: &std::ops::Range<u64>) -> &[u64] {
+        let start = self.keys.partition_point(|&key| key >> 32 < numbers.start);
+        let end = self.keys.partition_point(|&key| key >> 32 < numbers.end);
+        &self.keys[start..end]
+    }
+
+    /// Pairs `(i, j)` of primitive `i` of `a` and primitive `j` of `b`, in the order in which they
+    /// are held. Empty when either did not take part.
+    pub fn between(&self, a: BodyId, b: BodyId) -> impl Iterator<Item = (u32, u32)> + '_ {
+        let swapped = b < a;
+        let (low, high) = if swapped { (b, a) } else { (a, b) };
+        let (low, high) = match (self.numbers(low), self.numbers(high)) {
+            (Some(low), Some(high)) if a != b => (low, high),
+            _ => (0..0, 0..0),
+        };
+        self.run(&low).iter().filter_map(move |&key| {
+            let j = key & u64::from(u32::MAX);
+            high.contains(&j).then(|| {
+                let (i, j) = (((key >> 32) - low.start) as u32, (j - high.start) as u32);
+                if swapped { (j, i) } else { (i, j) }
+            })
+        })
+    }
+
+    /// Pairs `(i, j)`, `i < j`, of primitives of one body.
+    pub fn within(&self, body: BodyId) -> impl Iterator<Item = (u32, u32)> + '_ {
+        let numbers = self.numbers(body).unwrap_or(0..0);
+        self.run(&numbers).iter().filter_map(move |&key| {
+            let j = key & u64::from(u32::MAX);
+            numbers.contains(&j).then(|| {
+                (
+                    ((key >> 32) - numbers.start) as u32,
+                    (j - numbers.start) as u32,
+                )
+            })
+        })
+    }
+
+    /// Rows `[body_a, primitive_a, body_b, primitive_b]` with bodies by their
+    /// [`index`](BodyId::index), sorted.
+    pub fn rows(&self) -> impl ExactSizeIterator<Item = [u32; 4]> + '_ {
+        self.iter().map(|(a, b)| {
+            [
+                a.body.index() as u32,
+                a.primitive,
+                b.body.index() as u32,
+                b.primitive,
+            ]
+        })
+    }
+
+    /// The primitives of a body that take part in any pair: sorted, each once.
+    pub fn colliding(&self, body: BodyId) -> Vec<u32> {
+        let Some(numbers) = self.numbers(body) else {
+            return Vec::new();
+        };
+        let mut colliding: Vec<u32> = self
+            .keys
+            .iter()
+            .flat_map(|&key| [key >> 32, key & u64::from(u32::MAX)])
+            .filter(|global| numbers.contains(global))
+            .map(|global| (global - numbers.start) as u32)
+            .collect();
+        colliding.sort_unstable();
+        colliding.dedup();
+        colliding
+    }
+
+    /// The bodies that took part, in order, and what they are made of.
+    pub fn bodies(&self) -> impl ExactSizeIterator<Item = (BodyId, Kind)> + '_ {
+        self.bodies.iter().map(|body| (body.id, body.kind))
+    }
+
+    /// A hash of the set of pairs that does not depend on their order: the wrapping sum of a
+    /// mixed 64-bit word a pair (finaliser of SplitMix64, Steele et al. 2014).
+    pub fn hash(&self) -> u64 {
+        hash_rows(self.rows())
+    }
+
+    /// How the answer was found: stages, counts, bytes.
+    pub fn stats(&self) -> &Statistics {
+        &self.stats
+    }
+
+    /// Two answers are the same when their pairs are.
+    pub fn same_as(&self, other: &Pairs) -> bool {
+        self.keys.len() == other.keys.len() && self.iter().eq(other.iter())
+    }
+}
+
+/// [`Pairs::hash`] of rows `[body_a, primitive_a, body_b, primitive_b]` that come from elsewhere.
+pub fn hash_rows(rows: impl IntoIterator<Item = [u32; 4]>) -> u64 {
+    rows.into_iter().fold(0u64, |sum, [body_a, a, body_b, b]| {
+        let low = mix(u64::from(body_a) << 32 | u64::from(a));
+        let high = mix(u64::from(body_b) << 32 | u64::from(b));
+        sum.wrapping_add(mix(low.rotate_left(17) ^ high.wrapping_mul(3)))
+    })
+}
+
+fn mix(mut x: u64) -> u64 {
+    x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}

@@ -1,0 +1,98 @@
+//! What is asked: which bodies, and what a shared vertex means.
+
+use std::collections::BTreeSet;
+
+use crate::scene::BodyId;
+
+/// How pairs of one body that share vertices are treated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum SharedVertex {
+    /// Pairs that share a vertex index are not reported.
+    #[default]
+    Skip,
+    /// They are reported when they meet in more than what they share. Triangles: sharing one
+    /// vertex, when the edge opposite it in one meets the other triangle; sharing an edge, when
+    /// they are coplanar and fold to the same side; sharing all three, always. Tetrahedra: when
+    /// the intersection is larger than the common vertex, edge or face.
+    Resolve,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Scope {
+    Between(BodyId, BodyId),
+    Within(BodyId),
+    /// All bodies: pairs of different bodies, pairs within one, or both.
+    All {
+        between: bool,
+        within: bool,
+    },
+}
+
+/// What is asked of a scene.
+///
+/// ```
+/// use impinge::{Query, SharedVertex};
+/// let query = Query::everything().shared_vertex(SharedVertex::Resolve);
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Query {
+    pub(crate) scope: Scope,
+    pub(crate) shared_vertex: SharedVertex,
+    pub(crate) ignored: BTreeSet<(BodyId, BodyId)>,
+}
+
+impl Query {
+    fn new(scope: Scope) -> Self {
+        Query {
+            scope,
+            shared_vertex: SharedVertex::default(),
+            ignored: BTreeSet::new(),
+        }
+    }
+
+    /// Pairs between two bodies. Named explicitly, they meet whatever their filters say.
+    pub fn between(a: BodyId, b: BodyId) -> Self {
+        Query::new(Scope::Between(a, b))
+    }
+
+    /// Pairs of different bodies, for all bodies whose [`Filter`](crate::Filter)s let them meet.
+    pub fn all() -> Self {
+        Query::new(Scope::All {
+            between: true,
+            within: false,
+        })
+    }
+
+    /// Self-collision of one body.
+    pub fn within(body: BodyId) -> Self {
+        Query::new(Scope::Within(body))
+    }
+
+    /// Self-collision of every body.
+    pub fn all_within() -> Self {
+        Query::new(Scope::All {
+            between: false,
+            within: true,
+        })
+    }
+
+    /// Pairs of different bodies and of one body, all together.
+    pub fn everything() -> Self {
+        Query::new(Scope::All {
+            between: true,
+            within: true,
+        })
+    }
+
+    /// The adjacency rule of self-collision.
+    pub fn shared_vertex(mut self, rule: SharedVertex) -> Self {
+        self.shared_vertex = rule;
+        self
+    }
+
+    /// Leaves out the pairs of these two bodies; with `a == b`, the self-collision of `a`.
+    pub fn ignore(mut self, a: BodyId, b: BodyId) -> Self {
+        self.ignored.insert((a.min(b), a.max(b)));
+        self
+    }
+}

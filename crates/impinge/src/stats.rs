@@ -1,0 +1,91 @@
+//! What a frame cost and what it went through.
+
+use std::time::Instant;
+
+/// Time spent in one stage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stage {
+    /// The stage's name, the same on every backend: `bounds`, `dispatch`, `pairing`, …
+    pub name: &'static str,
+    /// Wall time in milliseconds.
+    pub ms: f64,
+}
+
+/// Counts and times of one frame. The pairs never depend on any of this.
+#[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Statistics {
+    /// `"cpu"` or the GPU's name.
+    pub backend: String,
+    /// `"clusters"`, `"cells"` or `"naive"`.
+    pub method: &'static str,
+    /// Threads that worked.
+    pub n_threads: usize,
+    /// The stages in the order in which they ran.
+    pub stages: Vec<Stage>,
+    /// Wall time of the whole frame in milliseconds.
+    pub total_ms: f64,
+    /// `Cells`: cells of the first level along x, y, z.
+    pub grid: Option<[u32; 3]>,
+    /// `Cells`: cells that went through the second level.
+    pub n_subdivided: u64,
+    /// `Cells`: entries of the cell lists, a primitive counted once a cell.
+    pub n_entries: u64,
+    /// `Clusters`: clusters of all participants.
+    pub n_clusters: u64,
+    /// Pairs of groups that were paired.
+    pub n_work_items: u64,
+    /// Pairs whose boxes overlap and that the adjacency rule lets through.
+    pub n_candidates: u64,
+    /// Candidates that the floating-point filter left to exact arithmetic.
+    pub n_unsure: u64,
+    /// Bodies that were clustered in this frame, the first time included.
+    pub n_clustered: u64,
+    /// Of those, bodies clustered again because they had flowed away from their rest pose.
+    pub n_reclustered: u64,
+    /// Runs over parts of the work, 1 when the memory budget allowed for all at once.
+    pub n_slabs: u64,
+    /// Stages that were run again because a buffer had to grow.
+    pub n_reruns: u64,
+    /// Bytes that the detector holds, the answer not counted.
+    pub bytes_held: u64,
+}
+
+impl Statistics {
+    /// Forgets everything but the memory of the stage list.
+    pub(crate) fn clear(&mut self) {
+        let mut stages = std::mem::take(&mut self.stages);
+        let mut backend = std::mem::take(&mut self.backend);
+        stages.clear();
+        backend.clear();
+        *self = Statistics {
+            stages,
+            backend,
+            ..Statistics::default()
+        };
+    }
+
+    /// Adds time to a stage, which is appended at its first mention.
+    pub(crate) fn add_ms(&mut self, name: &'static str, ms: f64) {
+        match self.stages.iter_mut().find(|stage| stage.name == name) {
+            Some(stage) => stage.ms += ms,
+            None => self.stages.push(Stage { name, ms }),
+        }
+    }
+
+    /// Runs one stage and books its wall time.
+    pub(crate) fn time<T>(&mut self, name: &'static str, stage: impl FnOnce(&mut Self) -> T) -> T {
+        let start = Instant::now();
+        let result = stage(self);
+        self.add_ms(name, start.elapsed().as_secs_f64() * 1e3);
+        result
+    }
+
+    /// Milliseconds of a stage; 0 when it did not run.
+    pub fn stage_ms(&self, name: &str) -> f64 {
+        self.stages
+            .iter()
+            .find(|stage| stage.name == name)
+            .map_or(0.0, |stage| stage.ms)
+    }
+}
