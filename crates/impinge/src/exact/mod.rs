@@ -16,11 +16,15 @@
 //!
 //! `docs/exactness.md` derives every bound and draws every case.
 
+pub mod filter;
 mod orientation;
 mod segment;
 mod shared;
 mod tetrahedron;
 mod triangle;
+
+#[cfg(test)]
+mod tests;
 
 pub use orientation::{Sign, orient2d, orient3d};
 pub use shared::{

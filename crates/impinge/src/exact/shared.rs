@@ -16,6 +16,7 @@
 //! | 4 | | always |
 
 use super::Point;
+use super::filter::{shared_edge, shared_vertex};
 use super::orientation::{Projection, Sign, collinear, orient3d};
 use super::segment::{same, segments_intersect, strictly_between};
 use super::tetrahedron::{tetrahedra_intersect, triangle_tetrahedron_intersect};
@@ -216,6 +217,18 @@ fn padded<const N: usize>(points: &[Point]) -> [Point; N] {
 /// is not in conv(a) and not in conv(b), each ends in its face opposite v: so it must be that
 /// one of these two faces meets the other primitive, and, as v is in neither, that is enough.
 fn beyond_vertex(v: &Point, a: Points, b: Points) -> bool {
+    if let ([a0, a1], [b0, b1]) = (a.as_slice(), b.as_slice()) {
+        match shared_vertex(v, [a0, a1], [b0, b1]) {
+            (true, _) => return true,
+            (_, true) => return false,
+            _ => {}
+        }
+    }
+    if parted_by_face(v, a.as_slice(), b.as_slice())
+        || parted_by_face(v, b.as_slice(), a.as_slice())
+    {
+        return false;
+    }
     if hulls_meet(&[*v], a.as_slice()) {
         return parts_around(a).any(|part| beyond_vertex(v, part, b));
     }
@@ -224,6 +237,18 @@ fn beyond_vertex(v: &Point, a: Points, b: Points) -> bool {
     }
     hulls_meet(a.as_slice(), b.with(*v).as_slice())
         || hulls_meet(b.as_slice(), a.with(*v).as_slice())
+}
+
+/// Whether a face of the tetrahedron v, a that contains v has all of `b` strictly on its outer
+/// side. What the primitives have in common then lies in the plane, where v, b has v alone.
+fn parted_by_face(v: &Point, a: &[Point], b: &[Point]) -> bool {
+    let &[p, q, r] = a else { return false };
+    let orientation = orient3d(v, &p, &q, &r);
+    !orientation.is_zero()
+        && [[p, q], [q, r], [r, p]].iter().any(|[p, q]| {
+            b.iter()
+                .all(|point| orient3d(v, p, q, point).strictly_opposite(orientation))
+        })
 }
 
 /// When v lies in conv(a), conv(a) is the union of conv(v, f) over the faces f of a. Gives these
@@ -236,6 +261,11 @@ fn parts_around(a: Points) -> impl Iterator<Item = Points> {
 /// Whether conv(u, v, a) and conv(u, v, b) are more than the segment uv in common, with one or
 /// two points in each of `a` and `b`.
 fn beyond_edge(u: &Point, v: &Point, a: &[Point], b: &[Point]) -> bool {
+    if let ([p], [q]) = (a, b)
+        && shared_edge(u, v, p, q)
+    {
+        return false;
+    }
     if same(u, v) {
         return beyond_vertex(u, Points::from_slice(a), Points::from_slice(b));
     }

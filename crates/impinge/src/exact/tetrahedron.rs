@@ -1,6 +1,7 @@
 //! Tetrahedron against tetrahedron, triangle and point.
 
 use super::Point;
+use super::filter::tetrahedra_answer;
 use super::orientation::{Sign, orient3d};
 use super::triangle::triangles_intersect;
 
@@ -37,6 +38,11 @@ fn orientation(k: &[Point; 4]) -> Sign {
 /// ```
 #[must_use]
 pub fn tetrahedra_intersect(a: &[Point; 4], b: &[Point; 4]) -> bool {
+    tetrahedra_answer(a, b).unwrap_or_else(|| tetrahedra_intersect_by_signs(a, b))
+}
+
+/// [`tetrahedra_intersect`] by exact signs alone.
+pub(super) fn tetrahedra_intersect_by_signs(a: &[Point; 4], b: &[Point; 4]) -> bool {
     let (a_sign, b_sign) = (orientation(a), orientation(b));
     if separated_by_face(a, a_sign, b) || separated_by_face(b, b_sign, a) {
         return false;

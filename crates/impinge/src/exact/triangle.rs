@@ -1,6 +1,7 @@
 //! Triangle against segment and triangle against triangle.
 
 use super::Point;
+use super::filter::triangles_answer;
 use super::orientation::{Projection, Sign, on_one_side, orient2d, orient3d, strictly_on_one_side};
 use super::segment::{segments_intersect, segments_intersect_2d};
 
@@ -12,9 +13,7 @@ const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 /// Touching and coplanar overlap count; a degenerate triangle is the segment or the point that
 /// it is. Exact for coordinates [`in_range`](super::in_range); never panics.
 ///
-/// Two triangles meet if and only if an edge of one meets the other: a point of both can be
-/// moved inside both, along the line (or over the plane) where they overlap, until it reaches an
-/// edge of one of them.
+/// Most pairs are settled by the [`filter`](super::filter) in plain `f64`, the rest by signs.
 ///
 /// ```
 /// use impinge::exact::triangles_intersect;
@@ -26,6 +25,15 @@ const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 /// ```
 #[must_use]
 pub fn triangles_intersect(a: &[Point; 3], b: &[Point; 3]) -> bool {
+    triangles_answer(a, b).unwrap_or_else(|| triangles_intersect_by_signs(a, b))
+}
+
+/// [`triangles_intersect`] by exact signs alone.
+///
+/// Two triangles meet if and only if an edge of one meets the other: a point of both can be
+/// moved inside both, along the line (or over the plane) where they overlap, until it reaches an
+/// edge of one of them.
+pub(super) fn triangles_intersect_by_signs(a: &[Point; 3], b: &[Point; 3]) -> bool {
     let b_sides = sides(a, b);
     if strictly_on_one_side(&b_sides) {
         return false;

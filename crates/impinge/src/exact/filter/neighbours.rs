@@ -1,0 +1,66 @@
+//! Triangles of one body that share a vertex or an edge (`SharedVertex::Resolve`).
+
+use super::determinant::{Determinant, Normal, bit, difference};
+use super::{LANES, Point, TrianglePairs8, Verdict};
+
+/// Which lanes certainly intersect beyond the one vertex that they share, and which certainly do
+/// not. The shared vertex must be vertex 0 of both triangles, in every lane.
+///
+/// Unsure lanes go to
+/// [`triangles_intersect_beyond_shared`](crate::exact::triangles_intersect_beyond_shared).
+#[inline(always)]
+#[must_use]
+pub fn classify_shared_vertex(pairs: &TrianglePairs8) -> Verdict {
+    let (mut yes, mut no) = (0, 0);
+    for lane in 0..LANES {
+        let (a, b) = pairs.get(lane);
+        let (meet, miss) = shared_vertex(&a[0], [&a[1], &a[2]], [&b[1], &b[2]]);
+        yes |= bit(meet, lane);
+        no |= bit(miss, lane);
+    }
+    Verdict {
+        yes: yes as u8,
+        no: no as u8,
+    }
+}
+
+/// The lanes that certainly do not intersect beyond the edge that they share: those that are not
+/// coplanar. The edge must be vertices 0 and 1 of both triangles, in any order, in every lane.
+#[inline(always)]
+#[must_use]
+pub fn reject_shared_edge(pairs: &TrianglePairs8) -> u8 {
+    let mut no = 0;
+    for lane in 0..LANES {
+        let (a, b) = pairs.get(lane);
+        no |= bit(shared_edge(&a[0], &a[1], &a[2], &b[2]), lane);
+    }
+    no as u8
+}
+
+/// Whether the triangles v, a and v, b certainly meet, and certainly miss, beyond v.
+///
+/// Where one plane has the other triangle's two vertices strictly on one side, they miss. Where
+/// both planes part the other's vertices, each triangle contains the start of one ray from v along
+/// the line where the planes meet. With n_a, n_b the normals over (v, vertex 0, vertex 1) that ray
+/// has the direction n_a x n_b for a if vertex 0 of a is above b (else the opposite one), and for
+/// b if vertex 0 of b is *below* a: they meet if and only if exactly one of the two is above.
+#[inline(always)]
+pub(in super::super) fn shared_vertex(v: &Point, a: [&Point; 2], b: [&Point; 2]) -> (bool, bool) {
+    let (a, b) = (a.map(|p| difference(p, v)), b.map(|p| difference(p, v)));
+    let (normal_a, normal_b) = (Normal::new(&a[0], &a[1]), Normal::new(&b[0], &b[1]));
+    let [b0, b1] = b.map(|f| normal_a.dot(&f));
+    let [a0, a1] = a.map(|f| normal_b.dot(&f));
+    let part = a0.is_opposite(a1) & b0.is_opposite(b1);
+    let opposite = a0.seems_positive() != b0.seems_positive();
+    (
+        part & opposite,
+        a0.is_same(a1) | b0.is_same(b1) | (part & !opposite),
+    )
+}
+
+/// Whether the triangles u, v, p and u, v, q are certainly not coplanar, so that they share the
+/// edge uv and nothing else.
+#[inline(always)]
+pub(in super::super) fn shared_edge(u: &Point, v: &Point, p: &Point, q: &Point) -> bool {
+    Determinant::new(&difference(v, u), &difference(p, u), &difference(q, u)).is_sure()
+}
