@@ -2,6 +2,8 @@
 
 use std::time::Instant;
 
+use crate::cpu::clusters::{Clusters, Options};
+use crate::cpu::workers::Workers;
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::naive;
@@ -9,7 +11,6 @@ use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
 use crate::scene::Scene;
-use crate::stats::Statistics;
 
 /// How candidates are found. All methods give the same pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -100,7 +101,7 @@ impl Default for Settings {
 /// let mut scene = Scene::new();
 /// let triangle = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 /// let a = scene.add_triangles(&[[0, 1, 2]], &triangle)?;
-/// let b = scene.add_triangles(&[[0, 1, 2]], &triangle.map(|[x, y, z]| [x, z - 0.5, y]))?;
+/// let b = scene.add_triangles(&[[0, 1, 2]], &triangle.map(|[x, y, z]| [x, z + 0.25, y - 0.25]))?;
 /// let mut detector = Detector::new(Backend::Cpu)?;
 /// let pairs = detector.detect(&scene, &Query::between(a, b))?;
 /// assert_eq!(pairs.between(a, b).collect::<Vec<_>>(), [(0, 0)]);
@@ -110,6 +111,8 @@ pub struct Detector {
     settings: Settings,
     frame: Frame,
     pairs: Pairs,
+    workers: Workers,
+    clusters: Clusters,
 }
 
 impl Detector {
@@ -131,9 +134,11 @@ impl Detector {
     pub fn with_settings(settings: Settings) -> Result<Self, Error> {
         check(&settings)?;
         Ok(Detector {
+            workers: Workers::new(settings.threads)?,
             settings,
             frame: Frame::default(),
             pairs: Pairs::default(),
+            clusters: Clusters::new(),
         })
     }
 
@@ -164,28 +169,29 @@ impl Detector {
         self.frame.resolve(scene, query)?;
         self.pairs.begin(&self.frame);
         let (keys, stats) = self.pairs.parts_mut();
-        run(&self.settings, scene, &self.frame, control, keys, stats)?;
+        let settings = &self.settings;
+        stats.method = settings.method.name();
+        stats.backend.push_str("cpu");
+        stats.n_threads = self.workers.n();
+        match settings.method {
+            Method::Naive | Method::Cells => {
+                stats.time("naive", |stats| {
+                    naive::run(scene, &self.frame, control, keys, stats)
+                })?;
+            }
+            Method::Clusters => {
+                let options = Options {
+                    recluster: settings.recluster,
+                    memory_budget: settings.memory_budget,
+                };
+                let (frame, workers) = (&self.frame, &self.workers);
+                self.clusters
+                    .run(scene, frame, &options, workers, control, keys, stats)?;
+                stats.time("collect", |_| keys.sort_unstable());
+            }
+        }
         stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(&self.pairs)
-    }
-}
-
-fn run(
-    settings: &Settings,
-    scene: &Scene,
-    frame: &Frame,
-    control: &Control<'_>,
-    keys: &mut Vec<u64>,
-    stats: &mut Statistics,
-) -> Result<(), Error> {
-    stats.method = settings.method.name();
-    stats.backend.push_str("cpu");
-    stats.n_threads = 1;
-    stats.n_slabs = 1;
-    match settings.method {
-        Method::Naive | Method::Clusters | Method::Cells => stats.time("naive", |stats| {
-            naive::run(scene, frame, control, keys, stats)
-        }),
     }
 }
 

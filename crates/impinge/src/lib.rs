@@ -10,10 +10,12 @@
 //! * **The same bytes everywhere.** The answer is sorted and depends on the input alone: not on
 //!   method, backend, threads or memory.
 
+mod cpu;
 mod detector;
 mod error;
 pub mod exact;
 mod frame;
+mod grouping;
 mod naive;
 mod narrow;
 mod pairs;

@@ -542,6 +542,11 @@ impl Scene {
             .sum()
     }
 
+    /// Whether a slot is in use.
+    pub(crate) fn holds(&self, slot: usize) -> bool {
+        self.slots.get(slot).is_some_and(|held| held.body.is_some())
+    }
+
     /// The body in a slot that is known to be in use.
     #[inline]
     pub(crate) fn body_in(&self, slot: u32) -> &Body {

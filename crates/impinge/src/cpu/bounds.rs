@@ -1,0 +1,275 @@
+//! Stage `bounds`: the box of each cluster, of the tree above it, and of single primitives.
+//!
+//! In: positions and the unique vertices of each cluster. Out: a box a cluster and a tree node, as
+//! structures of arrays. A vertex is one 4-lane load and two instructions.
+//! Cost: every vertex of a body once for each cluster that has it (about 1.35 times a closed mesh).
+//! Invariant: a box holds all its vertices; f64 positions are rounded outward.
+
+use crate::grouping::GROUP;
+use crate::grouping::bounds::{Bounds, BoundsArray, round_down, round_up};
+#[cfg(not(target_arch = "x86_64"))]
+use crate::grouping::bounds::{greater, lesser};
+use crate::grouping::clusters::Clustering;
+use crate::grouping::hierarchy::Shape;
+use crate::scene::{Elements, Positions};
+
+use super::simd::LaneBounds;
+
+/// x, y, z and a fourth number that nobody looks at.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy)]
+struct Vec4(std::arch::x86_64::__m128);
+
+#[cfg(target_arch = "x86_64")]
+impl Vec4 {
+    #[inline(always)]
+    fn splat(x: f32) -> Self {
+        // SAFETY: SSE2 belongs to every x86-64 processor (here and below).
+        Vec4(unsafe { std::arch::x86_64::_mm_set1_ps(x) })
+    }
+
+    /// One vertex. All but the last are read as 16 bytes, the fourth number being the next
+    /// vertex's x.
+    #[inline(always)]
+    fn load(positions: &[[f32; 3]], vertex: usize) -> Self {
+        use std::arch::x86_64::*;
+        if vertex + 1 < positions.len() {
+            // SAFETY: 16 bytes from a vertex that has a successor lie within the slice.
+            Vec4(unsafe { _mm_loadu_ps(positions.as_ptr().add(vertex).cast()) })
+        } else {
+            let [x, y, z] = positions[vertex];
+            // SAFETY: SSE2.
+            Vec4(unsafe { _mm_set_ps(z, z, y, x) })
+        }
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        // SAFETY: SSE2.
+        Vec4(unsafe { std::arch::x86_64::_mm_min_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        // SAFETY: SSE2.
+        Vec4(unsafe { std::arch::x86_64::_mm_max_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn xyz(self) -> [f32; 3] {
+        let mut out = [0.0f32; 4];
+        // SAFETY: `out` holds 16 bytes.
+        unsafe { std::arch::x86_64::_mm_storeu_ps(out.as_mut_ptr(), self.0) };
+        [out[0], out[1], out[2]]
+    }
+
+    /// Four vertices as the rows of x, of y and of z.
+    #[inline(always)]
+    fn transpose([a, b, c, d]: [Self; 4]) -> [[f32; 4]; 3] {
+        use std::arch::x86_64::*;
+        let mut rows = [[0.0f32; 4]; 3];
+        // SAFETY: SSE2; each row holds 16 bytes.
+        unsafe {
+            let xy_ab = _mm_unpacklo_ps(a.0, b.0);
+            let xy_cd = _mm_unpacklo_ps(c.0, d.0);
+            let zw_ab = _mm_unpackhi_ps(a.0, b.0);
+            let zw_cd = _mm_unpackhi_ps(c.0, d.0);
+            _mm_storeu_ps(rows[0].as_mut_ptr(), _mm_movelh_ps(xy_ab, xy_cd));
+            _mm_storeu_ps(rows[1].as_mut_ptr(), _mm_movehl_ps(xy_cd, xy_ab));
+            _mm_storeu_ps(rows[2].as_mut_ptr(), _mm_movelh_ps(zw_ab, zw_cd));
+        }
+        rows
+    }
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+#[derive(Clone, Copy)]
+struct Vec4([f32; 4]);
+
+#[cfg(not(target_arch = "x86_64"))]
+impl Vec4 {
+    #[inline(always)]
+    fn splat(x: f32) -> Self {
+        Vec4([x; 4])
+    }
+
+    #[inline(always)]
+    fn load(positions: &[[f32; 3]], vertex: usize) -> Self {
+        let [x, y, z] = positions[vertex];
+        Vec4([x, y, z, z])
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Vec4(std::array::from_fn(|k| lesser(self.0[k], other.0[k])))
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Vec4(std::array::from_fn(|k| greater(self.0[k], other.0[k])))
+    }
+
+    #[inline(always)]
+    fn xyz(self) -> [f32; 3] {
+        [self.0[0], self.0[1], self.0[2]]
+    }
+
+    #[inline(always)]
+    fn transpose(vertices: [Self; 4]) -> [[f32; 4]; 3] {
+        std::array::from_fn(|axis| std::array::from_fn(|k| vertices[k].0[axis]))
+    }
+}
+
+/// The box of some vertices.
+#[inline]
+pub(crate) fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
+    match positions {
+        Positions::F32(positions) => {
+            let mut min = [Vec4::splat(f32::INFINITY); 2];
+            let mut max = [Vec4::splat(f32::NEG_INFINITY); 2];
+            let (twos, rest) = vertices.as_chunks::<2>();
+            // Two chains of minima hide the instruction's latency.
+            for two in twos {
+                for k in 0..2 {
+                    let vertex = Vec4::load(positions, two[k] as usize);
+                    min[k] = min[k].min(vertex);
+                    max[k] = max[k].max(vertex);
+                }
+            }
+            for &vertex in rest {
+                let vertex = Vec4::load(positions, vertex as usize);
+                min[0] = min[0].min(vertex);
+                max[0] = max[0].max(vertex);
+            }
+            Bounds {
+                min: min[0].min(min[1]).xyz(),
+                max: max[0].max(max[1]).xyz(),
+            }
+        }
+        Positions::F64(positions) => {
+            let mut min = [f64::INFINITY; 3];
+            let mut max = [f64::NEG_INFINITY; 3];
+            for &vertex in vertices {
+                let point = &positions[vertex as usize];
+                for axis in 0..3 {
+                    min[axis] = if point[axis] < min[axis] {
+                        point[axis]
+                    } else {
+                        min[axis]
+                    };
+                    max[axis] = if point[axis] > max[axis] {
+                        point[axis]
+                    } else {
+                        max[axis]
+                    };
+                }
+            }
+            Bounds {
+                min: min.map(round_down),
+                max: max.map(round_up),
+            }
+        }
+    }
+}
+
+/// The boxes of a cluster's primitives, a lane each; lanes past its size are emptied.
+pub(crate) fn of_cluster_primitives(
+    positions: &Positions,
+    clustering: &Clustering,
+    cluster: usize,
+    lanes: &mut LaneBounds,
+) {
+    let places = cluster * GROUP..cluster * GROUP + clustering.size(cluster);
+    match &clustering.corners {
+        Elements::Triangles(faces) => of_primitives(positions, &faces[places], lanes),
+        Elements::Tetrahedra(tets) => of_primitives(positions, &tets[places], lanes),
+    }
+}
+
+fn of_primitives<const N: usize>(
+    positions: &Positions,
+    corners: &[[u32; N]],
+    lanes: &mut LaneBounds,
+) {
+    match positions {
+        Positions::F32(positions) => {
+            let (fours, rest) = corners.as_chunks::<4>();
+            for (four_ix, four) in fours.iter().enumerate() {
+                let extent = four.each_ref().map(|corners| extent(positions, corners));
+                let min = Vec4::transpose(extent.map(|(min, _)| min));
+                let max = Vec4::transpose(extent.map(|(_, max)| max));
+                let lane = 4 * four_ix;
+                for axis in 0..3 {
+                    lanes.min[axis][lane..lane + 4].copy_from_slice(&min[axis]);
+                    lanes.max[axis][lane..lane + 4].copy_from_slice(&max[axis]);
+                }
+            }
+            let done = corners.len() - rest.len();
+            for (lane, corners) in (done..).zip(rest) {
+                let (min, max) = extent(positions, corners);
+                let (min, max) = (min.xyz(), max.xyz());
+                lanes.put(lane, &Bounds { min, max });
+            }
+        }
+        Positions::F64(_) => {
+            for (lane, corners) in corners.iter().enumerate() {
+                lanes.put(lane, &of_vertices(positions, corners));
+            }
+        }
+    }
+    if corners.len() < GROUP {
+        lanes.clear_from(corners.len());
+    }
+}
+
+#[inline(always)]
+fn extent<const N: usize>(positions: &[[f32; 3]], corners: &[u32; N]) -> (Vec4, Vec4) {
+    let first = Vec4::load(positions, corners[0] as usize);
+    corners[1..]
+        .iter()
+        .fold((first, first), |(min, max), &corner| {
+            let vertex = Vec4::load(positions, corner as usize);
+            (min.min(vertex), max.max(vertex))
+        })
+}
+
+/// The boxes of a tree, level by level, leaves first.
+#[derive(Debug, Default)]
+pub(crate) struct TreeBounds {
+    pub levels: Vec<BoundsArray>,
+}
+
+impl TreeBounds {
+    /// Room for the boxes of a shape.
+    pub fn resize(&mut self, shape: &Shape) {
+        self.levels
+            .resize_with(shape.n_levels(), BoundsArray::default);
+        for (level, boxes) in self.levels.iter_mut().enumerate() {
+            boxes.resize(shape.n_nodes(level));
+        }
+    }
+
+    /// Boxes of inner nodes from those of the leaves.
+    pub fn refit_above_leaves(&mut self, shape: &Shape) {
+        for level in 1..self.levels.len() {
+            let (below, above) = self.levels.split_at_mut(level);
+            let (children, nodes) = (&below[level - 1], &mut above[0]);
+            for node in 0..nodes.len() {
+                let mut bounds = Bounds::EMPTY;
+                for child in shape.children(level, node) {
+                    bounds.join(&children.at(child));
+                }
+                nodes.put(node, &bounds);
+            }
+        }
+    }
+
+    /// The box of everything.
+    pub fn root(&self) -> Bounds {
+        self.levels.last().map_or(Bounds::EMPTY, |root| root.at(0))
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.levels.iter().map(BoundsArray::bytes).sum()
+    }
+}

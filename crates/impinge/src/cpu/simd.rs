@@ -1,0 +1,294 @@
+//! Box tests, many at a time: AVX-512, AVX2, or plain loops that any compiler vectorises (NEON).
+//!
+//! A binary built for plain x86-64 finds out at run time what the processor has. Kernels are
+//! generic over [`Simd`] and wrapped once per instruction set by `dispatch!`; everything between wrapper
+//! and intrinsic is `inline(always)`, so a kernel is compiled whole for its set.
+//! The answers are bit masks of exact comparisons: no set can differ from another.
+
+use crate::grouping::GROUP;
+use crate::grouping::bounds::{Bounds, BoundsArray};
+
+/// The boxes of one group, a lane each; lanes past the group's size hold empty boxes.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub(crate) struct LaneBounds {
+    pub min: [[f32; GROUP]; 3],
+    pub max: [[f32; GROUP]; 3],
+}
+
+impl LaneBounds {
+    pub const EMPTY: LaneBounds = LaneBounds {
+        min: [[f32::INFINITY; GROUP]; 3],
+        max: [[f32::NEG_INFINITY; GROUP]; 3],
+    };
+
+    #[inline(always)]
+    pub fn at(&self, lane: usize) -> Bounds {
+        Bounds {
+            min: std::array::from_fn(|axis| self.min[axis][lane]),
+            max: std::array::from_fn(|axis| self.max[axis][lane]),
+        }
+    }
+
+    #[inline(always)]
+    pub fn put(&mut self, lane: usize, bounds: &Bounds) {
+        for axis in 0..3 {
+            self.min[axis][lane] = bounds.min[axis];
+            self.max[axis][lane] = bounds.max[axis];
+        }
+    }
+
+    pub fn clear_from(&mut self, lane: usize) {
+        for axis in 0..3 {
+            self.min[axis][lane..].fill(f32::INFINITY);
+            self.max[axis][lane..].fill(f32::NEG_INFINITY);
+        }
+    }
+}
+
+/// An instruction set: the box tests that kernels are made of.
+pub(crate) trait Simd: Copy {
+    /// Bit `k`: box `first + k` overlaps `query`, for `k` below 8.
+    fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32;
+
+    /// Bit `k`: lane `k` overlaps `query`; only lanes of `among` are looked at.
+    fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64;
+}
+
+/// Plain loops.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Portable;
+
+impl Simd for Portable {
+    #[inline(always)]
+    fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
+        let mut overlap = [1u8; 8];
+        for axis in 0..3 {
+            let min: &[f32; 8] = boxes.min[axis][first..].first_chunk().expect("padded");
+            let max: &[f32; 8] = boxes.max[axis][first..].first_chunk().expect("padded");
+            for k in 0..8 {
+                overlap[k] &=
+                    u8::from(min[k] <= query.max[axis]) & u8::from(query.min[axis] <= max[k]);
+            }
+        }
+        (0..8).fold(0, |mask, k| mask | u32::from(overlap[k]) << k)
+    }
+
+    #[inline(always)]
+    fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64 {
+        let mut mask = 0;
+        for chunk in 0..8 {
+            if among >> (8 * chunk) & 0xff == 0 {
+                continue;
+            }
+            let mut overlap = [1u8; 8];
+            for axis in 0..3 {
+                for (k, bit) in overlap.iter_mut().enumerate() {
+                    let lane = 8 * chunk + k;
+                    *bit &= u8::from(boxes.min[axis][lane] <= query.max[axis])
+                        & u8::from(query.min[axis] <= boxes.max[axis][lane]);
+                }
+            }
+            for (k, bit) in overlap.into_iter().enumerate() {
+                mask |= u64::from(bit) << (8 * chunk + k);
+            }
+        }
+        mask & among
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) use x86::{Avx2, Avx512};
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use std::arch::x86_64::*;
+
+    use super::{Bounds, BoundsArray, LaneBounds, Simd};
+    use crate::grouping::bounds::READ_AHEAD;
+
+    /// 256-bit registers. Only made where `avx2` was detected.
+    #[derive(Debug, Clone, Copy)]
+    pub(crate) struct Avx2(());
+
+    /// 512-bit registers and mask registers. Only made where `avx512f`, `avx512vl` and `avx512dq` were
+    /// detected.
+    #[derive(Debug, Clone, Copy)]
+    pub(crate) struct Avx512(());
+
+    impl Avx2 {
+        /// # Safety
+        /// The processor must have AVX2.
+        pub(crate) unsafe fn new() -> Self {
+            Avx2(())
+        }
+    }
+
+    impl Avx512 {
+        /// # Safety
+        /// The processor must have AVX-512 F, VL and DQ.
+        pub(crate) unsafe fn new() -> Self {
+            Avx512(())
+        }
+    }
+
+    impl Simd for Avx2 {
+        #[inline(always)]
+        fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
+            assert!(first + READ_AHEAD <= boxes.len() + READ_AHEAD);
+            // SAFETY: `Avx2` exists only where the processor has it; arrays are padded by
+            // `READ_AHEAD` past `len`, and `first <= len` was just asserted.
+            unsafe {
+                let mut all = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+                for axis in 0..3 {
+                    let min = _mm256_loadu_ps(boxes.min[axis].as_ptr().add(first));
+                    let max = _mm256_loadu_ps(boxes.max[axis].as_ptr().add(first));
+                    let low = _mm256_cmp_ps::<_CMP_LE_OQ>(min, _mm256_set1_ps(query.max[axis]));
+                    let high = _mm256_cmp_ps::<_CMP_LE_OQ>(_mm256_set1_ps(query.min[axis]), max);
+                    all = _mm256_and_ps(all, _mm256_and_ps(low, high));
+                }
+                _mm256_movemask_ps(all) as u32
+            }
+        }
+
+        #[inline(always)]
+        fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64 {
+            // SAFETY: `Avx2` exists only where the processor has it; lanes 8 c .. 8 c + 8 of 64
+            // lie within their array, which is aligned to 64 bytes.
+            unsafe {
+                let query_min = query.min.map(|x| _mm256_set1_ps(x));
+                let query_max = query.max.map(|x| _mm256_set1_ps(x));
+                let mut mask = 0u64;
+                for chunk in 0..8 {
+                    if (among >> (8 * chunk)) & 0xff == 0 {
+                        continue;
+                    }
+                    let mut all = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+                    for axis in 0..3 {
+                        let min = _mm256_load_ps(boxes.min[axis].as_ptr().add(8 * chunk));
+                        let max = _mm256_load_ps(boxes.max[axis].as_ptr().add(8 * chunk));
+                        let low = _mm256_cmp_ps::<_CMP_LE_OQ>(min, query_max[axis]);
+                        let high = _mm256_cmp_ps::<_CMP_LE_OQ>(query_min[axis], max);
+                        all = _mm256_and_ps(all, _mm256_and_ps(low, high));
+                    }
+                    mask |= u64::from(_mm256_movemask_ps(all) as u32) << (8 * chunk);
+                }
+                mask & among
+            }
+        }
+    }
+
+    impl Simd for Avx512 {
+        #[inline(always)]
+        fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
+            assert!(first + READ_AHEAD <= boxes.len() + READ_AHEAD);
+            // SAFETY: as for `Avx2`, with the mask comparisons of AVX-512 VL.
+            unsafe {
+                let mut all: __mmask8 = 0xff;
+                for axis in 0..3 {
+                    let min = _mm256_loadu_ps(boxes.min[axis].as_ptr().add(first));
+                    let max = _mm256_loadu_ps(boxes.max[axis].as_ptr().add(first));
+                    let query_max = _mm256_set1_ps(query.max[axis]);
+                    let query_min = _mm256_set1_ps(query.min[axis]);
+                    all = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(all, min, query_max);
+                    all = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(all, query_min, max);
+                }
+                u32::from(all)
+            }
+        }
+
+        #[inline(always)]
+        fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64 {
+            // SAFETY: `Avx512` exists only where the processor has it; lanes 16 c .. 16 c + 16 of
+            // 64 lie within their array, which is aligned to 64 bytes.
+            unsafe {
+                let query_min = query.min.map(|x| _mm512_set1_ps(x));
+                let query_max = query.max.map(|x| _mm512_set1_ps(x));
+                let mut mask = 0u64;
+                for chunk in 0..4 {
+                    let mut all = (among >> (16 * chunk)) as __mmask16;
+                    if all == 0 {
+                        continue;
+                    }
+                    for axis in 0..3 {
+                        let min = _mm512_load_ps(boxes.min[axis].as_ptr().add(16 * chunk));
+                        let max = _mm512_load_ps(boxes.max[axis].as_ptr().add(16 * chunk));
+                        all = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(all, min, query_max[axis]);
+                        all = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(all, query_min[axis], max);
+                    }
+                    mask |= u64::from(all) << (16 * chunk);
+                }
+                mask
+            }
+        }
+    }
+}
+
+/// The instruction sets that kernels are compiled for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Isa {
+    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+}
+
+impl Isa {
+    /// The best one that this processor has.
+    pub fn detect() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("avx512bw")
+                && is_x86_feature_detected!("bmi1")
+                && is_x86_feature_detected!("bmi2")
+                && is_x86_feature_detected!("popcnt")
+                && is_x86_feature_detected!("lzcnt")
+            {
+                return Isa::Avx512;
+            }
+            if is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("bmi1")
+                && is_x86_feature_detected!("bmi2")
+                && is_x86_feature_detected!("popcnt")
+                && is_x86_feature_detected!("lzcnt")
+            {
+                return Isa::Avx2;
+            }
+        }
+        Isa::Portable
+    }
+}
+
+/// Calls a kernel `fn kernel(simd: impl Simd, …)`, marked `inline(always)`, compiled for `$isa`.
+macro_rules! dispatch {
+    ($isa:expr, $kernel:path, ($($name:ident: $type:ty = $value:expr),* $(,)?) $(-> $result:ty)?) => {{
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2,bmi1,bmi2,popcnt,lzcnt")]
+        fn avx2($($name: $type),*) $(-> $result)? {
+            // SAFETY: the caller's features include AVX2.
+            $kernel(unsafe { $crate::cpu::simd::Avx2::new() }, $($name),*)
+        }
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,bmi1,bmi2,popcnt,lzcnt")]
+        fn avx512($($name: $type),*) $(-> $result)? {
+            // SAFETY: the caller's features include AVX-512 F, VL and DQ.
+            $kernel(unsafe { $crate::cpu::simd::Avx512::new() }, $($name),*)
+        }
+        match $isa {
+            $crate::cpu::simd::Isa::Portable => {
+                $kernel($crate::cpu::simd::Portable, $($value),*)
+            }
+            // SAFETY: an `Isa` is only ever one that `Isa::detect` found on this processor.
+            #[cfg(target_arch = "x86_64")]
+            $crate::cpu::simd::Isa::Avx2 => unsafe { avx2($($value),*) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            $crate::cpu::simd::Isa::Avx512 => unsafe { avx512($($value),*) },
+        }
+    }};
+}
+pub(crate) use dispatch;

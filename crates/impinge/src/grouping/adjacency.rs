@@ -1,0 +1,212 @@
+//! Who shares vertices with whom, as 64-bit masks fixed by topology.
+//!
+//! In self-collision nearly all box overlaps are between neighbours of one surface, which the
+//! adjacency rule keeps out. Since clusters never change, the rule is a mask a primitive, made
+//! once: bit `j` of the mask of primitive `i` says that `i` and lane `j` of the other cluster name a common
+//! vertex. A frame then clears neighbours from its candidate masks with one `and`.
+//!
+//! ```text
+//! cluster A, lane 5                 own cluster      0b…0101_0000   lanes that share a vertex
+//!                     neighbour B > A, entry (5, mask)  0b…0000_0011   lanes of B that do
+//! ```
+//!
+//! A vertex with very many primitives (the hub of a fan) would make these masks quadratic. Hubs are
+//! left out; the clusters that touch one are marked, and their candidates compare vertex ids.
+//!
+//! Cost: `O(n · valence)` once a topology; about 8 bytes a primitive for the own masks and about as much
+//! for those of neighbours, at most `HUB` entries a corner.
+
+use rayon::prelude::*;
+
+use super::GROUP;
+
+/// A vertex with more primitives than this is a hub.
+const HUB: u32 = 96;
+
+/// The masks of one body's clusters.
+#[derive(Debug)]
+pub(crate) struct Adjacency {
+    /// One mask a place of the order: lanes of the same cluster that share a vertex, itself included.
+    own: Vec<u64>,
+    /// Neighbour clusters of each cluster, higher numbers only.
+    neighbors: Vec<Neighbor>,
+    neighbor_starts: Vec<u32>,
+    lanes: Vec<u8>,
+    masks: Vec<u64>,
+    touches_hub: Vec<bool>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Neighbor {
+    cluster: u32,
+    /// First entry in `lanes` and `masks`; the next neighbour's is one past the last.
+    first: u32,
+}
+
+/// What one cluster contributes.
+struct Part {
+    own: Vec<u64>,
+    /// `(neighbour cluster, lane, mask)`, sorted.
+    entries: Vec<(u32, u8, u64)>,
+    touches_hub: bool,
+}
+
+impl Adjacency {
+    /// From the corners in cluster order.
+    pub fn new<const N: usize>(corners: &[[u32; N]]) -> Self {
+        let incidence = Incidence::new(corners);
+        let n_clusters = corners.len().div_ceil(GROUP);
+        let parts: Vec<Part> = (0..n_clusters)
+            .into_par_iter()
+            .with_min_len(32)
+            .map(|cluster| part(cluster, corners, &incidence))
+            .collect();
+        let mut adjacency = Adjacency {
+            own: Vec::with_capacity(corners.len()),
+            neighbors: Vec::new(),
+            neighbor_starts: vec![0],
+            lanes: Vec::new(),
+            masks: Vec::new(),
+            touches_hub: Vec::with_capacity(n_clusters),
+        };
+        for part in parts {
+            adjacency.own.extend_from_slice(&part.own);
+            adjacency.touches_hub.push(part.touches_hub);
+            let mut last = None;
+            for (cluster, lane, mask) in part.entries {
+                if last != Some(cluster) {
+                    last = Some(cluster);
+                    adjacency.neighbors.push(Neighbor {
+                        cluster,
+                        first: adjacency.lanes.len() as u32,
+                    });
+                }
+                adjacency.lanes.push(lane);
+                adjacency.masks.push(mask);
+            }
+            adjacency
+                .neighbor_starts
+                .push(adjacency.neighbors.len() as u32);
+        }
+        let end = adjacency.lanes.len() as u32;
+        adjacency.neighbors.push(Neighbor {
+            cluster: u32::MAX,
+            first: end,
+        });
+        adjacency
+    }
+
+    /// The own masks of a cluster's primitives, one a lane.
+    #[inline(always)]
+    pub fn own(&self, cluster: usize) -> &[u64] {
+        let end = self.own.len().min((cluster + 1) * GROUP);
+        &self.own[cluster * GROUP..end]
+    }
+
+    /// Lanes of cluster `a` that share vertices with lanes of cluster `b > a`, and those lanes' masks.
+    #[inline]
+    pub fn between(&self, a: usize, b: usize) -> impl Iterator<Item = (usize, u64)> + '_ {
+        let neighbors = self.neighbor_starts[a] as usize..self.neighbor_starts[a + 1] as usize;
+        let entries = neighbors
+            .clone()
+            .find(|&ix| self.neighbors[ix].cluster as usize == b)
+            .map_or(0..0, |ix| {
+                self.neighbors[ix].first as usize..self.neighbors[ix + 1].first as usize
+            });
+        self.lanes[entries.clone()]
+            .iter()
+            .zip(&self.masks[entries])
+            .map(|(&lane, &mask)| (lane as usize, mask))
+    }
+
+    /// Whether candidates of these two clusters must compare vertex ids, masks apart.
+    #[inline(always)]
+    pub fn needs_ids(&self, a: usize, b: usize) -> bool {
+        self.touches_hub[a] && self.touches_hub[b]
+    }
+
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.own[..])
+            + size_of_val(&self.neighbors[..])
+            + size_of_val(&self.neighbor_starts[..])
+            + size_of_val(&self.lanes[..])
+            + size_of_val(&self.masks[..])
+            + size_of_val(&self.touches_hub[..])
+    }
+}
+
+/// For each vertex, the places of the primitives that name it.
+struct Incidence {
+    starts: Vec<u32>,
+    places: Vec<u32>,
+}
+
+impl Incidence {
+    fn new<const N: usize>(corners: &[[u32; N]]) -> Self {
+        let flat = corners.as_flattened();
+        let n_vertices = flat.iter().max().map_or(0, |&last| last as usize + 1);
+        let mut counts = vec![0u32; n_vertices + 1];
+        for &vertex in flat {
+            counts[vertex as usize + 1] += 1;
+        }
+        // Hubs keep no places: their count is dropped before the sums are taken.
+        let hub: Vec<bool> = counts[1..].iter().map(|&count| count > HUB).collect();
+        let mut starts = counts;
+        for vertex in 0..n_vertices {
+            let count = if hub[vertex] { 0 } else { starts[vertex + 1] };
+            starts[vertex + 1] = starts[vertex] + count;
+        }
+        let mut next = starts.clone();
+        let mut places = vec![0u32; *starts.last().expect("never empty") as usize];
+        for (slot, &vertex) in flat.iter().enumerate() {
+            let vertex = vertex as usize;
+            if !hub[vertex] {
+                places[next[vertex] as usize] = (slot / N) as u32;
+                next[vertex] += 1;
+            }
+        }
+        Incidence { starts, places }
+    }
+
+    /// The places that name the vertex; none for a hub.
+    fn of(&self, vertex: u32) -> &[u32] {
+        let vertex = vertex as usize;
+        &self.places[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
+    }
+}
+
+fn part<const N: usize>(cluster: usize, corners: &[[u32; N]], incidence: &Incidence) -> Part {
+    let start = cluster * GROUP;
+    let group = &corners[start..corners.len().min(start + GROUP)];
+    let mut own = vec![0u64; group.len()];
+    let mut entries: Vec<(u32, u8, u64)> = Vec::new();
+    let mut touches_hub = false;
+    for (lane, primitive) in group.iter().enumerate() {
+        own[lane] |= 1 << lane;
+        for &vertex in primitive {
+            let places = incidence.of(vertex);
+            touches_hub |= places.is_empty();
+            for &place in places {
+                let (other, bit) = (place as usize / GROUP, 1u64 << (place as usize % GROUP));
+                if other == cluster {
+                    own[lane] |= bit;
+                } else if other > cluster {
+                    entries.push((other as u32, lane as u8, bit));
+                }
+            }
+        }
+    }
+    entries.sort_unstable_by_key(|&(other, lane, _)| (other, lane));
+    entries.dedup_by(|next, kept| {
+        let same = (next.0, next.1) == (kept.0, kept.1);
+        if same {
+            kept.2 |= next.2;
+        }
+        same
+    });
+    Part {
+        own,
+        entries,
+        touches_hub,
+    }
+}

@@ -1,0 +1,183 @@
+//! Axis-aligned boxes in single precision, rounded outward.
+//!
+//! A box may only grow by rounding, never shrink, so that boxes which do not overlap prove that
+//! what they hold cannot meet. Boxes of f32 positions are not rounded at all.
+
+/// A closed box. The empty one has `min > max` and overlaps nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Bounds {
+    pub min: [f32; 3],
+    pub max: [f32; 3],
+}
+
+impl Bounds {
+    pub const EMPTY: Bounds = Bounds {
+        min: [f32::INFINITY; 3],
+        max: [f32::NEG_INFINITY; 3],
+    };
+
+    #[inline(always)]
+    pub fn overlaps(&self, other: &Bounds) -> bool {
+        let mut overlap = true;
+        for axis in 0..3 {
+            overlap &= self.min[axis] <= other.max[axis] && other.min[axis] <= self.max[axis];
+        }
+        overlap
+    }
+
+    #[inline(always)]
+    pub fn join(&mut self, other: &Bounds) {
+        for axis in 0..3 {
+            self.min[axis] = lesser(self.min[axis], other.min[axis]);
+            self.max[axis] = greater(self.max[axis], other.max[axis]);
+        }
+    }
+
+    #[inline(always)]
+    pub fn intersection(&self, other: &Bounds) -> Bounds {
+        let mut both = *self;
+        for axis in 0..3 {
+            both.min[axis] = greater(self.min[axis], other.min[axis]);
+            both.max[axis] = lesser(self.max[axis], other.max[axis]);
+        }
+        both
+    }
+
+    /// The middle of the box; halves first, so that the sum cannot overflow.
+    #[inline]
+    pub fn center(&self) -> [f32; 3] {
+        std::array::from_fn(|axis| 0.5 * self.min[axis] + 0.5 * self.max[axis])
+    }
+
+    /// Half the surface: a measure of how often a box is met. In double precision, where the
+    /// squares of f32 extents cannot overflow.
+    #[inline]
+    pub fn half_area(&self) -> f64 {
+        let [x, y, z]: [f64; 3] =
+            std::array::from_fn(|k| (f64::from(self.max[k]) - f64::from(self.min[k])).max(0.0));
+        x * y + y * z + z * x
+    }
+}
+
+/// The minimum as one instruction: no care for NaN, which validation has kept out.
+#[inline(always)]
+pub(crate) fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The maximum as one instruction.
+#[inline(always)]
+pub(crate) fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The largest f32 that is at most `x`.
+#[inline]
+pub(crate) fn round_down(x: f64) -> f32 {
+    let nearest = x as f32;
+    if f64::from(nearest) > x {
+        nearest.next_down()
+    } else {
+        nearest
+    }
+}
+
+/// The smallest f32 that is at least `x`.
+#[inline]
+pub(crate) fn round_up(x: f64) -> f32 {
+    let nearest = x as f32;
+    if f64::from(nearest) < x {
+        nearest.next_up()
+    } else {
+        nearest
+    }
+}
+
+/// Boxes as a structure of arrays: six arrays, padded so that eight boxes can be read anywhere.
+///
+/// ```text
+/// min x | b0 b1 b2 b3 b4 b5 b6 b7 b8 … | padding: empty boxes |
+/// min y | …
+/// …
+/// max z | …
+/// ```
+#[derive(Debug, Clone, Default)]
+pub(crate) struct BoundsArray {
+    pub min: [Vec<f32>; 3],
+    pub max: [Vec<f32>; 3],
+    len: usize,
+}
+
+/// Boxes read at once; arrays are padded by as many.
+pub(crate) const READ_AHEAD: usize = 8;
+
+impl BoundsArray {
+    pub fn resize(&mut self, len: usize) {
+        self.len = len;
+        for axis in 0..3 {
+            self.min[axis].resize(len + READ_AHEAD, f32::INFINITY);
+            self.max[axis].resize(len + READ_AHEAD, f32::NEG_INFINITY);
+            self.min[axis][len..].fill(f32::INFINITY);
+            self.max[axis][len..].fill(f32::NEG_INFINITY);
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    #[inline(always)]
+    pub fn at(&self, ix: usize) -> Bounds {
+        Bounds {
+            min: [self.min[0][ix], self.min[1][ix], self.min[2][ix]],
+            max: [self.max[0][ix], self.max[1][ix], self.max[2][ix]],
+        }
+    }
+
+    #[inline(always)]
+    pub fn put(&mut self, ix: usize, bounds: &Bounds) {
+        for axis in 0..3 {
+            self.min[axis][ix] = bounds.min[axis];
+            self.max[axis][ix] = bounds.max[axis];
+        }
+    }
+
+    /// Write access to single boxes for several threads at once.
+    pub fn raw(&mut self) -> RawBoundsArray {
+        RawBoundsArray {
+            min: self.min.each_mut().map(|values| values.as_mut_ptr()),
+            max: self.max.each_mut().map(|values| values.as_mut_ptr()),
+        }
+    }
+
+    pub fn bytes(&self) -> usize {
+        6 * size_of::<f32>() * (self.len + READ_AHEAD)
+    }
+}
+
+/// Pointers into a [`BoundsArray`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RawBoundsArray {
+    min: [*mut f32; 3],
+    max: [*mut f32; 3],
+}
+
+// SAFETY: a pointer does nothing by itself; `put` says what its callers owe.
+unsafe impl Send for RawBoundsArray {}
+// SAFETY: as above.
+unsafe impl Sync for RawBoundsArray {}
+
+impl RawBoundsArray {
+    /// # Safety
+    /// `ix` must lie within the array, which must still live; nobody else may use that box meanwhile.
+    #[inline(always)]
+    pub unsafe fn put(self, ix: usize, bounds: &Bounds) {
+        for axis in 0..3 {
+            // SAFETY: said above.
+            unsafe {
+                self.min[axis].add(ix).write(bounds.min[axis]);
+                self.max[axis].add(ix).write(bounds.max[axis]);
+            }
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! The shape of a wide tree over leaves that lie in an order, and the order itself.
+//!
+//! Level 0 holds the leaves; a node of level `l` has up to eight children, neighbours in level
+//! `l - 1`; the top level holds the root. All leaves are equally deep and children share the leaves
+//! evenly, so the shape follows from the number of leaves alone:
+//!
+//! ```text
+//! level 2                 [ root ]
+//! level 1      [ 0..5 ]            [ 5..10 ]
+//! level 0   0  1  2  3  4       5  6  7  8  9
+//! ```
+//!
+//! The order comes from splitting at medians of the box centres along the longest axis, at the
+//! boundaries that the shape prescribes (a balanced k-d order; median splits made 5 times fewer
+//! cluster pairs than blocks along a Morton curve on the dragon, see `docs/performance.md`).
+//!
+//! Cost: `O(n log n)` once a topology. Invariant: an order is a permutation, whatever the input.
+
+use std::ops::Range;
+
+use rayon::join;
+
+/// Children a node has at most.
+pub(crate) const FANOUT: usize = 8;
+
+/// The tree's shape: for each level above the leaves, where each node's children start.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Shape {
+    n_leaves: usize,
+    /// `child_starts[l]` has one entry a node of level `l + 1`, and one past the last.
+    child_starts: Vec<Vec<u32>>,
+}
+
+impl Shape {
+    /// The shape over `n_leaves` leaves; without leaves there is no level at all.
+    pub fn new(n_leaves: usize) -> Self {
+        // How many leaves each node of the level holds, from the root down.
+        let mut leaf_starts: Vec<Vec<usize>> = Vec::new();
+        if n_leaves > 0 {
+            leaf_starts.push(vec![0, n_leaves]);
+        }
+        let mut capacity = 1;
+        while capacity < n_leaves {
+            capacity *= FANOUT;
+        }
+        let mut child_starts = Vec::new();
+        while capacity > 1 {
+            capacity /= FANOUT;
+            let parents = leaf_starts.last().expect("has a root");
+            let mut starts = vec![0];
+            let mut children = vec![0u32];
+            for parent in parents.windows(2) {
+                let held = parent[1] - parent[0];
+                let n_children = held.div_ceil(capacity);
+                starts.extend((1..=n_children).map(|k| parent[0] + held * k / n_children));
+                children.push(starts.len() as u32 - 1);
+            }
+            leaf_starts.push(starts);
+            child_starts.push(children);
+        }
+        child_starts.reverse();
+        Shape {
+            n_leaves,
+            child_starts,
+        }
+    }
+
+    /// Levels, leaves and root included.
+    pub fn n_levels(&self) -> usize {
+        match self.n_leaves {
+            0 => 0,
+            _ => self.child_starts.len() + 1,
+        }
+    }
+
+    /// Nodes of a level.
+    pub fn n_nodes(&self, level: usize) -> usize {
+        match level {
+            0 => self.n_leaves,
+            _ => self.child_starts[level - 1].len() - 1,
+        }
+    }
+
+    /// Children of a node of a level above 0, as a range of the level below.
+    #[inline(always)]
+    pub fn children(&self, level: usize, node: usize) -> Range<usize> {
+        let starts = &self.child_starts[level - 1];
+        starts[node] as usize..starts[node + 1] as usize
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.child_starts
+            .iter()
+            .map(|starts| size_of_val(&starts[..]))
+            .sum()
+    }
+}
+
+/// What is put in order: a centre and the number it stands for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Entry {
+    pub center: [f32; 3],
+    pub number: u32,
+}
+
+/// Entries below which a piece is not worth another thread.
+const PARALLEL_FROM: usize = 8 * 1024;
+
+/// Puts entries in the order of the shape, whose leaves hold `leaf_size` entries each, the last
+/// one what remains. Inside a leaf, entries stay split at medians down to `finest` of them.
+pub(crate) fn order(shape: &Shape, leaf_size: usize, finest: usize, entries: &mut [Entry]) {
+    debug_assert_eq!(shape.n_leaves, entries.len().div_ceil(leaf_size));
+    if shape.n_levels() > 0 {
+        let split = Split {
+            shape,
+            leaf_size,
+            finest,
+        };
+        split.nodes(shape.n_levels() - 1, 0..1, 0, entries);
+    }
+}
+
+struct Split<'a> {
+    shape: &'a Shape,
+    leaf_size: usize,
+    finest: usize,
+}
+
+impl Split<'_> {
+    /// Splits the entries of a run of neighbouring nodes; `first_leaf` is the run's first leaf.
+    fn nodes(&self, level: usize, nodes: Range<usize>, first_leaf: usize, entries: &mut [Entry]) {
+        if nodes.len() == 1 {
+            match level {
+                0 => halve(entries, self.finest),
+                _ => {
+                    let children = self.shape.children(level, nodes.start);
+                    self.nodes(level - 1, children, first_leaf, entries);
+                }
+            }
+            return;
+        }
+        let middle = nodes.start + nodes.len() / 2;
+        let middle_leaf = self.first_leaf(level, middle);
+        let cut = (middle_leaf - first_leaf) * self.leaf_size;
+        split_at(entries, cut);
+        let (low, high) = entries.split_at_mut(cut);
+        let parallel = low.len() + high.len() >= PARALLEL_FROM;
+        let mut low = || self.nodes(level, nodes.start..middle, first_leaf, low);
+        let mut high = || self.nodes(level, middle..nodes.end, middle_leaf, high);
+        if parallel {
+            join(low, high);
+        } else {
+            low();
+            high();
+        }
+    }
+
+    fn first_leaf(&self, level: usize, node: usize) -> usize {
+        (1..=level)
+            .rev()
+            .fold(node, |node, level| self.shape.children(level, node).start)
+    }
+}
+
+/// Halves a leaf's entries again and again, so that runs of `finest` lie close together.
+fn halve(entries: &mut [Entry], finest: usize) {
+    if entries.len() > finest {
+        let cut = (entries.len() / 2).next_multiple_of(finest);
+        split_at(entries, cut);
+        let (low, high) = entries.split_at_mut(cut);
+        halve(low, finest);
+        halve(high, finest);
+    }
+}
+
+/// Moves the `cut` entries that are lowest along the longest axis to the front. Ties are broken by
+/// number, so the two sets depend on nothing but the input.
+fn split_at(entries: &mut [Entry], cut: usize) {
+    if cut == 0 || cut >= entries.len() {
+        return;
+    }
+    let mut min = [f32::INFINITY; 3];
+    let mut max = [f32::NEG_INFINITY; 3];
+    for entry in &*entries {
+        for axis in 0..3 {
+            min[axis] = super::bounds::lesser(min[axis], entry.center[axis]);
+            max[axis] = super::bounds::greater(max[axis], entry.center[axis]);
+        }
+    }
+    let extent: [f64; 3] = std::array::from_fn(|k| f64::from(max[k]) - f64::from(min[k]));
+    let axis = (0..3).fold(0, |best, k| if extent[k] > extent[best] { k } else { best });
+    entries.select_nth_unstable_by(cut, |a, b| {
+        a.center[axis]
+            .total_cmp(&b.center[axis])
+            .then(a.number.cmp(&b.number))
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shapes_partition_their_leaves() {
+        for n_leaves in (0..600).chain([4095, 4096, 4097, 6250, 100_000]) {
+            let shape = Shape::new(n_leaves);
+            for level in 1..shape.n_levels() {
+                let mut next = 0;
+                for node in 0..shape.n_nodes(level) {
+                    let children = shape.children(level, node);
+                    assert_eq!(children.start, next);
+                    assert!((1..=FANOUT).contains(&children.len()), "{n_leaves} leaves");
+                    next = children.end;
+                }
+                assert_eq!(next, shape.n_nodes(level - 1));
+            }
+            if n_leaves > 0 {
+                assert_eq!(shape.n_nodes(shape.n_levels() - 1), 1);
+                assert_eq!(shape.n_nodes(0), n_leaves);
+            }
+        }
+    }
+
+    #[test]
+    fn orders_are_permutations_even_of_equal_centers() {
+        for n in [1usize, 63, 64, 65, 1000, 20_000] {
+            let leaves = Shape::new(n.div_ceil(64));
+            let mut entries: Vec<Entry> = (0..n as u32)
+                .map(|number| Entry {
+                    center: [(number % 7) as f32, 0.0, f32::from(number % 3 == 0)],
+                    number,
+                })
+                .collect();
+            order(&leaves, 64, 8, &mut entries);
+            let mut numbers: Vec<u32> = entries.iter().map(|entry| entry.number).collect();
+            numbers.sort_unstable();
+            assert!(numbers.into_iter().eq(0..n as u32));
+        }
+    }
+}

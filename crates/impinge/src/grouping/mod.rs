@@ -1,0 +1,10 @@
+//! How primitives are gathered into groups of at most 64, and how groups meet: what both
+//! backends share. This floor knows nobody.
+
+pub(crate) mod adjacency;
+pub(crate) mod bounds;
+pub(crate) mod clusters;
+pub(crate) mod hierarchy;
+
+/// The most primitives a group holds: one bit each in a 64-bit mask.
+pub(crate) const GROUP: usize = 64;
