@@ -1,1 +1,34 @@
-//! impinge-scenes
+//! Scenes with known structure, shared by tests, benches, demo and viewer.
+//!
+//! * Generators: [`surfaces`] (balls, tori, knots, cloth, boxes), [`solids`] (tetrahedra) and
+//!   [`soup`] (random primitives, on an integer lattice too, where everything is degenerate).
+//! * [`deform`]: positions as functions of the rest pose and of time, written into a buffer.
+//! * [`BuiltScene`]: bodies and the question asked of them, ready to be detected.
+//! * [`adversarial`]: scenes that break methods which are only fast on average.
+//! * [`data`]: where real meshes and published answers are looked for.
+//!
+//! Everything is deterministic: random generators take a seed, and nothing looks at the clock.
+//! Generators that use trigonometry may differ in the last bit between operating systems.
+//!
+//! ```
+//! use impinge_scenes::{BuiltScene, surfaces};
+//! # fn main() -> Result<(), impinge::Error> {
+//! let ball = surfaces::ball(1_000);
+//! let built = BuiltScene::two_body("balls", &ball, [0.9, 0.0, 0.0])?;
+//! assert_eq!(built.n_primitives(), 2_000);
+//! # Ok(()) }
+//! ```
+
+pub mod adversarial;
+mod built;
+pub mod data;
+pub mod deform;
+mod model;
+mod random;
+pub mod solids;
+pub mod soup;
+pub mod surfaces;
+
+pub use built::BuiltScene;
+pub use model::{MAX_PRIMITIVES, Model};
+pub use random::Random;

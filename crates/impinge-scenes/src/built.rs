@@ -1,0 +1,81 @@
+//! Bodies and the question asked of them.
+
+use impinge::{BodyId, Error, Query, Scene};
+
+use crate::model::Model;
+
+/// A scene ready to be detected.
+#[derive(Debug, Clone)]
+pub struct BuiltScene {
+    /// What it is called in tables.
+    pub name: String,
+    /// The bodies.
+    pub scene: Scene,
+    /// Their ids in the order in which they were added.
+    pub bodies: Vec<BodyId>,
+    /// What is asked.
+    pub query: Query,
+}
+
+impl BuiltScene {
+    /// A scene of models, and all pairs of different bodies asked for.
+    ///
+    /// # Errors
+    /// As [`Scene::add`].
+    pub fn all(
+        name: impl Into<String>,
+        models: impl IntoIterator<Item = Model>,
+    ) -> Result<Self, Error> {
+        let mut scene = Scene::new();
+        let bodies = models
+            .into_iter()
+            .map(|model| scene.add(model.elements, model.positions))
+            .collect::<Result<_, _>>()?;
+        Ok(BuiltScene {
+            name: name.into(),
+            scene,
+            bodies,
+            query: Query::all(),
+        })
+    }
+
+    /// Two bodies, and the pairs between them.
+    ///
+    /// # Errors
+    /// As [`Scene::add`].
+    pub fn between(name: impl Into<String>, a: Model, b: Model) -> Result<Self, Error> {
+        let mut built = BuiltScene::all(name, [a, b])?;
+        built.query = Query::between(built.bodies[0], built.bodies[1]);
+        Ok(built)
+    }
+
+    /// A model and its copy moved by `offset` (added in f32), and the pairs between them.
+    ///
+    /// # Errors
+    /// As [`Scene::add`].
+    pub fn two_body(
+        name: impl Into<String>,
+        model: &Model,
+        offset: [f32; 3],
+    ) -> Result<Self, Error> {
+        BuiltScene::between(name, model.clone(), model.translated(offset))
+    }
+
+    /// One body, and its self-collision.
+    ///
+    /// # Errors
+    /// As [`Scene::add`].
+    pub fn within(name: impl Into<String>, model: Model) -> Result<Self, Error> {
+        let mut built = BuiltScene::all(name, [model])?;
+        built.query = Query::within(built.bodies[0]);
+        Ok(built)
+    }
+
+    /// Primitives of all bodies together.
+    pub fn n_primitives(&self) -> usize {
+        self.scene
+            .bodies()
+            .map(|(_, body)| body.n_primitives())
+            .sum()
+    }
+}
