@@ -2,7 +2,9 @@
 
 use std::time::Instant;
 
-use crate::cpu::clusters::{Clusters, Options};
+use crate::cpu::Job;
+use crate::cpu::cells::{self, Cells};
+use crate::cpu::clusters::{self, Clusters};
 use crate::cpu::workers::Workers;
 use crate::error::Error;
 use crate::frame::Frame;
@@ -57,6 +59,19 @@ pub enum Recluster {
     Never,
 }
 
+/// The widest vector instructions that the CPU backend may use, where the processor has them.
+/// The pairs do not depend on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub enum InstructionSet {
+    /// Plain loops, vectorised by the compiler for the target's baseline.
+    Portable,
+    /// 256 bits on x86-64.
+    Avx2,
+    /// 512 bits on x86-64.
+    #[default]
+    Avx512,
+}
+
 /// What a detector may be told.
 #[derive(Debug, Clone)]
 pub struct Settings {
@@ -66,6 +81,8 @@ pub struct Settings {
     pub backend: Backend,
     /// CPU threads; 0 means one a core.
     pub threads: usize,
+    /// The widest vector instructions that the CPU backend may use.
+    pub instruction_set: InstructionSet,
     /// `Cells`: the density coefficient λ of the paper's equation (1), above 0.
     pub lambda: f64,
     /// `Cells`: the most primitives a group may hold, 1 to 64.
@@ -84,6 +101,7 @@ impl Default for Settings {
             method: Method::default(),
             backend: Backend::default(),
             threads: 0,
+            instruction_set: InstructionSet::default(),
             lambda: 1.0,
             group_size: 64,
             memory_budget: None,
@@ -113,6 +131,7 @@ pub struct Detector {
     pairs: Pairs,
     workers: Workers,
     clusters: Clusters,
+    cells: Cells,
 }
 
 impl Detector {
@@ -135,10 +154,11 @@ impl Detector {
         check(&settings)?;
         Ok(Detector {
             workers: Workers::new(settings.threads)?,
-            settings,
             frame: Frame::default(),
             pairs: Pairs::default(),
-            clusters: Clusters::new(),
+            clusters: Clusters::new(settings.instruction_set),
+            cells: Cells::new(settings.instruction_set),
+            settings,
         })
     }
 
@@ -173,20 +193,33 @@ impl Detector {
         stats.method = settings.method.name();
         stats.backend.push_str("cpu");
         stats.n_threads = self.workers.n();
+        let job = Job {
+            scene,
+            frame: &self.frame,
+            workers: &self.workers,
+            control,
+        };
         match settings.method {
-            Method::Naive | Method::Cells => {
+            Method::Naive => {
                 stats.time("naive", |stats| {
                     naive::run(scene, &self.frame, control, keys, stats)
                 })?;
             }
+            Method::Cells => {
+                let options = cells::Options {
+                    lambda: settings.lambda,
+                    group_size: settings.group_size,
+                    memory_budget: settings.memory_budget,
+                };
+                self.cells.run(job, &options, keys, stats)?;
+                stats.time("collect", |_| keys.sort_unstable());
+            }
             Method::Clusters => {
-                let options = Options {
+                let options = clusters::Options {
                     recluster: settings.recluster,
                     memory_budget: settings.memory_budget,
                 };
-                let (frame, workers) = (&self.frame, &self.workers);
-                self.clusters
-                    .run(scene, frame, &options, workers, control, keys, stats)?;
+                self.clusters.run(job, &options, keys, stats)?;
                 stats.time("collect", |_| keys.sort_unstable());
             }
         }

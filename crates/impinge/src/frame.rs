@@ -121,13 +121,6 @@ impl Frame {
         self.between && self.participants.len() > 1
     }
 
-    /// Whether pairs of any one participant are asked for.
-    pub fn any_within(&self) -> bool {
-        self.participants
-            .iter()
-            .any(|participant| participant.within)
-    }
-
     /// Whether pairs of these two different participants are asked for.
     #[inline]
     pub fn meets(&self, a_ix: usize, b_ix: usize) -> bool {

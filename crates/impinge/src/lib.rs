@@ -24,7 +24,7 @@ mod query;
 mod scene;
 mod stats;
 
-pub use detector::{Backend, Detector, Method, Recluster, Settings};
+pub use detector::{Backend, Detector, InstructionSet, Method, Recluster, Settings};
 pub use error::Error;
 pub use pairs::{Pairs, Primitive, hash_rows};
 pub use progress::{CancelToken, Control, Progress};

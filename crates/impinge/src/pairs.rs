@@ -32,7 +32,7 @@ pub struct Pairs {
 }
 
 impl Pairs {
-    /// Takes over the frame's numbering; keys are filled in by the caller through `keys_mut`.
+    /// Takes over the frame's numbering; the caller fills in keys through `parts_mut`.
     pub(crate) fn begin(&mut self, frame: &Frame) {
         self.keys.clear();
         self.bodies.clear();
@@ -43,10 +43,6 @@ impl Pairs {
                 kind: participant.kind,
             }));
         self.stats.clear();
-    }
-
-    pub(crate) fn keys_mut(&mut self) -> &mut Vec<u64> {
-        &mut self.keys
     }
 
     pub(crate) fn parts_mut(&mut self) -> (&mut Vec<u64>, &mut Statistics) {

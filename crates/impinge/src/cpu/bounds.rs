@@ -172,6 +172,32 @@ pub(crate) fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
     }
 }
 
+/// The box of all vertices of a body.
+pub(crate) fn of_all(positions: &Positions) -> Bounds {
+    match positions {
+        Positions::F32(positions) => {
+            let mut bounds = Bounds::EMPTY;
+            for &point in positions {
+                bounds.join(&Bounds {
+                    min: point,
+                    max: point,
+                });
+            }
+            bounds
+        }
+        Positions::F64(positions) => {
+            let mut bounds = Bounds::EMPTY;
+            for point in positions {
+                bounds.join(&Bounds {
+                    min: point.map(round_down),
+                    max: point.map(round_up),
+                });
+            }
+            bounds
+        }
+    }
+}
+
 /// The boxes of a cluster's primitives, a lane each; lanes past its size are emptied.
 pub(crate) fn of_cluster_primitives(
     positions: &Positions,

@@ -12,24 +12,25 @@
 
 use std::time::Instant;
 
-use crate::detector::Recluster;
+use crate::detector::{InstructionSet, Recluster};
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::grouping::GROUP;
-use crate::grouping::bounds::{Bounds, RawBoundsArray};
+use crate::grouping::bounds::RawBoundsArray;
 use crate::grouping::clusters::Clustering;
-use crate::grouping::hierarchy::{Entry, Shape, order};
 use crate::progress::Control;
-use crate::scene::{Body, Scene};
+use crate::scene::Body;
 use crate::stats::Statistics;
 
+use super::Job;
 use super::bounds::{self, TreeBounds};
-use super::dispatch::{self, NodePair, Tree};
+use super::dispatch::{self, NodePair};
 use super::narrow::Settler;
 use super::pairing::{self, WorkItem};
 use super::simd::{Isa, LaneBounds, Simd, dispatch};
+use super::top_level::TopLevel;
 use super::workers::Workers;
-use super::world::{BodyCache, BodyRef, Caches, World};
+use super::world::{BodyCache, Caches, World};
 
 /// Clusters that take part in one slab, at most, unless the budget says less.
 const SLAB_CLUSTERS: usize = 1 << 16;
@@ -46,7 +47,7 @@ const PAIRING_TASK: usize = 32;
 /// Primitives of all bodies together below which waking threads costs more than it saves.
 const PARALLEL_FROM: u64 = 60_000;
 /// How much the clusters' surface may grow against the body's before it is clustered again.
-const STALE: f64 = 1.5;
+pub(super) const STALE: f64 = 1.5;
 
 /// Caches and scratch of the method; kept from frame to frame.
 pub(crate) struct Clusters {
@@ -70,9 +71,9 @@ struct RefitTask {
 }
 
 impl Clusters {
-    pub fn new() -> Self {
+    pub fn new(allowed: InstructionSet) -> Self {
         Clusters {
-            isa: Isa::detect(),
+            isa: Isa::detect(allowed),
             caches: Vec::new(),
             top: TopLevel::default(),
             tasks: Vec::new(),
@@ -84,32 +85,24 @@ impl Clusters {
     }
 
     /// Appends the keys of all pairs that the frame asks for, unsorted.
-    #[allow(clippy::too_many_arguments)]
     pub fn run(
         &mut self,
-        scene: &Scene,
-        frame: &Frame,
+        job: Job<'_>,
         options: &Options,
-        workers: &Workers,
-        control: &Control<'_>,
         keys: &mut Vec<u64>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        self.scratches.resize_with(workers.n(), Settler::default);
-        stats.time("clustering", |stats| {
-            self.cluster(scene, frame, workers, control, stats)
-        })?;
+        self.scratches
+            .resize_with(job.workers.n(), Settler::default);
+        stats.time("clustering", |stats| self.cluster(job, stats))?;
         stats.time("bounds", |stats| {
-            self.refit(scene, frame, options, workers, stats);
+            self.refit(job, options, stats);
         });
-        self.slab.limit(options, self.bytes(), frame)?;
+        self.slab.limit(options, self.bytes(), job.frame)?;
         let isa = self.isa;
         dispatch!(isa, detect, (
             engine: &mut Clusters = self,
-            scene: &Scene = scene,
-            frame: &Frame = frame,
-            workers: &Workers = workers,
-            control: &Control<'_> = control,
+            job: Job<'_> = job,
             keys: &mut Vec<u64> = keys,
             stats: &mut Statistics = stats,
         ) -> Result<(), Error>)?;
@@ -129,14 +122,13 @@ impl Clusters {
     }
 
     /// Clusters bodies that are new or were re-meshed; forgets those that are gone.
-    fn cluster(
-        &mut self,
-        scene: &Scene,
-        frame: &Frame,
-        workers: &Workers,
-        control: &Control<'_>,
-        stats: &mut Statistics,
-    ) -> Result<(), Error> {
+    fn cluster(&mut self, job: Job<'_>, stats: &mut Statistics) -> Result<(), Error> {
+        let Job {
+            scene,
+            frame,
+            workers,
+            control,
+        } = job;
         let n_slots = frame
             .participants
             .last()
@@ -173,14 +165,13 @@ impl Clusters {
     }
 
     /// Boxes of what has moved; clusters anew what has flowed away from its clusters.
-    fn refit(
-        &mut self,
-        scene: &Scene,
-        frame: &Frame,
-        options: &Options,
-        workers: &Workers,
-        stats: &mut Statistics,
-    ) {
+    fn refit(&mut self, job: Job<'_>, options: &Options, stats: &mut Statistics) {
+        let Job {
+            scene,
+            frame,
+            workers,
+            ..
+        } = job;
         self.tasks.clear();
         for (ix, participant) in frame.participants.iter().enumerate() {
             let stamp = frame.body(scene, ix).positions_stamp();
@@ -199,7 +190,7 @@ impl Clusters {
                 self.tasks.extend(tasks);
             }
         }
-        self.refit_leaves(scene, frame, workers);
+        self.refit_leaves(job);
         for (ix, participant) in frame.participants.iter().enumerate() {
             let body = frame.body(scene, ix);
             let cache = self.caches[participant.id.index()]
@@ -229,8 +220,14 @@ impl Clusters {
         }
     }
 
-    fn refit_leaves(&mut self, scene: &Scene, frame: &Frame, workers: &Workers) {
-        let (tasks, caches) = (&self.tasks, &self.caches);
+    fn refit_leaves(&mut self, job: Job<'_>) {
+        let Job {
+            scene,
+            frame,
+            workers,
+            ..
+        } = job;
+        let (tasks, caches) = (&self.tasks, Some(&self.caches));
         let world = World {
             scene,
             frame,
@@ -239,8 +236,9 @@ impl Clusters {
         let refit = |_: &mut Settler, ix: usize| {
             let task = tasks[ix];
             let body = world.body(task.participant);
+            let clustering = &world.cache(task.participant).clustering;
             for cluster in task.first..task.end {
-                let vertices = body.clustering.vertices(cluster as usize);
+                let vertices = clustering.vertices(cluster as usize);
                 let bounds = bounds::of_vertices(body.positions, vertices);
                 // SAFETY: no two tasks name the same cluster of the same body, and nobody reads
                 // leaf boxes before all tasks are done.
@@ -366,7 +364,7 @@ impl Slab {
         let mut next = 0;
         for ix in 0..world.frame.participants.len() {
             self.firsts.push(next);
-            next += world.body(ix as u32).clustering.n_clusters() as u32;
+            next += world.cache(ix as u32).clustering.n_clusters() as u32;
         }
         self.slots.clear();
         self.slots.resize(next as usize, 0);
@@ -416,13 +414,16 @@ impl Slab {
 fn detect<S: Simd>(
     simd: S,
     engine: &mut Clusters,
-    scene: &Scene,
-    frame: &Frame,
-    workers: &Workers,
-    control: &Control<'_>,
+    job: Job<'_>,
     keys: &mut Vec<u64>,
     stats: &mut Statistics,
 ) -> Result<(), Error> {
+    let Job {
+        scene,
+        frame,
+        workers,
+        control,
+    } = job;
     let Clusters {
         isa,
         caches,
@@ -436,7 +437,7 @@ fn detect<S: Simd>(
     let world = World {
         scene,
         frame,
-        caches,
+        caches: Some(caches),
     };
     let start = Instant::now();
     slab.begin(world);
@@ -459,11 +460,9 @@ fn detect<S: Simd>(
                 clusters_between(simd, 0, 1, stack, &mut flusher)?;
             }
         } else {
-            top.refit(world);
-            dispatch::within(simd, top.tree(), body_stack, |i, j| {
-                let (a, b) = (top.order[i as usize], top.order[j as usize]);
-                let (a, b) = (a.min(b), a.max(b));
-                if a != b && frame.meets(a as usize, b as usize) {
+            top.refit(frame.participants.len(), |ix| world.cache(ix).bounds.root());
+            top.pairs(simd, body_stack, |a, b| {
+                if frame.meets(a as usize, b as usize) {
                     clusters_between(simd, a, b, stack, &mut flusher)?;
                 }
                 Ok(())
@@ -473,7 +472,7 @@ fn detect<S: Simd>(
     for (ix, participant) in frame.participants.iter().enumerate() {
         if participant.within {
             let ix = ix as u32;
-            let tree = world.body(ix).tree();
+            let tree = world.cache(ix).tree();
             dispatch::within(simd, tree, stack, |cluster_a, cluster_b| {
                 // Adjacency masks are kept with the lower cluster.
                 flusher.put(ix, ix, cluster_a.min(cluster_b), cluster_a.max(cluster_b))
@@ -504,7 +503,7 @@ fn clusters_between<S: Simd>(
     stack: &mut Vec<NodePair>,
     flusher: &mut Flusher<'_, '_>,
 ) -> Result<(), Error> {
-    let (tree_a, tree_b) = (flusher.world.body(a).tree(), flusher.world.body(b).tree());
+    let (tree_a, tree_b) = (flusher.world.cache(a).tree(), flusher.world.cache(b).tree());
     dispatch::between(simd, tree_a, tree_b, stack, |cluster_a, cluster_b| {
         flusher.put(a, b, cluster_a, cluster_b)
     })
@@ -553,17 +552,13 @@ impl Flusher<'_, '_> {
         let n_tasks = active.len().div_ceil(BOXES_TASK);
         self.workers.for_each(scratches, n_tasks, |_, task| {
             let end = active.len().min((task + 1) * BOXES_TASK);
-            for slot in task * BOXES_TASK..end {
-                let (participant, cluster) = active[slot];
+            let slots = task * BOXES_TASK..end;
+            for (slot, &(participant, cluster)) in slots.clone().zip(&active[slots]) {
                 let body = world.body(participant);
                 // SAFETY: each slot below `active.len()` is written by one task.
                 let lanes = unsafe { shared.at(slot) };
-                bounds::of_cluster_primitives(
-                    body.positions,
-                    body.clustering,
-                    cluster as usize,
-                    lanes,
-                );
+                let clustering = &world.cache(participant).clustering;
+                bounds::of_cluster_primitives(body.positions, clustering, cluster as usize, lanes);
             }
         });
         let control = self.control;
@@ -605,86 +600,4 @@ impl SharedBoxes {
         // SAFETY: said above.
         unsafe { &mut *self.0.add(slot) }
     }
-}
-
-/// A tree over the participants' boxes, for frames of more than two bodies. Its order is kept from
-/// frame to frame and made anew when bodies have moved apart from their neighbours in it.
-#[derive(Default)]
-struct TopLevel {
-    shape: Shape,
-    order: Vec<u32>,
-    bounds: TreeBounds,
-    entries: Vec<Entry>,
-    best_spread: f64,
-}
-
-impl TopLevel {
-    fn tree(&self) -> Tree<'_> {
-        Tree {
-            shape: &self.shape,
-            bounds: &self.bounds,
-        }
-    }
-
-    fn bytes(&self) -> usize {
-        self.shape.bytes()
-            + size_of_val(&self.order[..])
-            + size_of::<Entry>() * self.entries.capacity()
-            + self.bounds.bytes()
-    }
-
-    fn refit(&mut self, world: World<'_>) {
-        let n = world.frame.participants.len();
-        if self.order.len() != n {
-            self.shape = Shape::new(n);
-            self.bounds.resize(&self.shape);
-            self.order = (0..n as u32).collect();
-            self.best_spread = 0.0;
-        }
-        self.refit_boxes(world);
-        if self.spread() > STALE * self.best_spread {
-            self.entries.clear();
-            self.entries.extend((0..n as u32).map(|ix| {
-                let root: BodyRef<'_> = world.body(ix);
-                Entry {
-                    center: root.bounds.root().center(),
-                    number: ix,
-                }
-            }));
-            order(&self.shape, 1, 1, &mut self.entries);
-            for (place, entry) in self.entries.iter().enumerate() {
-                self.order[place] = entry.number;
-            }
-            self.refit_boxes(world);
-            self.best_spread = self.spread();
-        }
-        self.best_spread = self.best_spread.min(self.spread());
-    }
-
-    fn refit_boxes(&mut self, world: World<'_>) {
-        for (place, &ix) in self.order.iter().enumerate() {
-            let root = world.body(ix).bounds.root();
-            self.bounds.levels[0].put(place, &root);
-        }
-        self.bounds.refit_above_leaves(&self.shape);
-    }
-
-    /// The summed surface of the nodes above the leaves over that of the whole.
-    fn spread(&self) -> f64 {
-        let Some(parents) = self.bounds.levels.get(1) else {
-            return 0.0;
-        };
-        let areas = (0..parents.len()).map(|ix| area(&parents.at(ix)));
-        let whole = area(&self.bounds.root());
-        if whole > 0.0 {
-            areas.sum::<f64>() / whole
-        } else {
-            0.0
-        }
-    }
-}
-
-fn area(bounds: &Bounds) -> f64 {
-    let area = bounds.half_area();
-    if area.is_finite() { area } else { 0.0 }
 }

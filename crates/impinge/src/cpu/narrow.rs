@@ -233,7 +233,7 @@ fn fill(
 
 #[inline(always)]
 fn fill_side(side: &mut [[[f64; LANES]; 3]; 3], lane: usize, body: &BodyRef<'_>, place: u32) {
-    let crate::Elements::Triangles(faces) = &body.clustering.corners else {
+    let crate::Elements::Triangles(faces) = body.elements else {
         unreachable!("only triangles are batched");
     };
     let corners = &faces[place as usize];

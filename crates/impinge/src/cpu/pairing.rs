@@ -83,7 +83,7 @@ fn between_bodies<S: Simd>(
     boxes_b: &LaneBounds,
     settler: &mut Settler,
 ) {
-    let (a, b) = (world.body(item.a), world.body(item.b));
+    let (a, b) = (world.cache(item.a), world.cache(item.b));
     let (cluster_a, cluster_b) = (item.cluster_a as usize, item.cluster_b as usize);
     let both = a.bounds.levels[0]
         .at(cluster_a)
@@ -128,18 +128,18 @@ fn within_body<S: Simd>(
     boxes_b: &LaneBounds,
     settler: &mut Settler,
 ) {
-    let body = world.body(item.a);
-    let adjacency = body.clustering.adjacency();
+    let cache = world.cache(item.a);
+    let adjacency = cache.clustering.adjacency();
     let (cluster_a, cluster_b) = (item.cluster_a as usize, item.cluster_b as usize);
     let row = Row {
-        body,
+        body: world.body(item.a),
         a: item.a,
         first_a: item.cluster_a * GROUP as u32,
         first_b: item.cluster_b * GROUP as u32,
         needs_ids: adjacency.needs_ids(cluster_a, cluster_b),
         rule: world.frame.shared_vertex,
     };
-    let all_a = full(body.clustering.size(cluster_a));
+    let all_a = full(cache.clustering.size(cluster_a));
     if cluster_a == cluster_b {
         let own = adjacency.own(cluster_a);
         for (lane, &shared) in own.iter().enumerate() {
@@ -149,13 +149,13 @@ fn within_body<S: Simd>(
         }
         return;
     }
-    let leaves = &body.bounds.levels[0];
+    let leaves = &cache.bounds.levels[0];
     let both = leaves.at(cluster_a).intersection(&leaves.at(cluster_b));
     let lanes_a = simd.overlaps_64(boxes_a, &both, all_a);
     if lanes_a == 0 {
         return;
     }
-    let lanes_b = simd.overlaps_64(boxes_b, &both, full(body.clustering.size(cluster_b)));
+    let lanes_b = simd.overlaps_64(boxes_b, &both, full(cache.clustering.size(cluster_b)));
     if lanes_b == 0 {
         return;
     }

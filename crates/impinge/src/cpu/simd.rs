@@ -5,6 +5,7 @@
 //! and intrinsic is `inline(always)`, so a kernel is compiled whole for its set.
 //! The answers are bit masks of exact comparisons: no set can differ from another.
 
+use crate::detector::InstructionSet;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, BoundsArray};
 
@@ -235,11 +236,12 @@ pub(crate) enum Isa {
 }
 
 impl Isa {
-    /// The best one that this processor has.
-    pub fn detect() -> Self {
+    /// The best one that this processor has, and that is allowed.
+    pub fn detect(allowed: InstructionSet) -> Self {
         #[cfg(target_arch = "x86_64")]
         {
-            if is_x86_feature_detected!("avx512f")
+            if allowed >= InstructionSet::Avx512
+                && is_x86_feature_detected!("avx512f")
                 && is_x86_feature_detected!("avx512vl")
                 && is_x86_feature_detected!("avx512dq")
                 && is_x86_feature_detected!("avx512bw")
@@ -250,7 +252,8 @@ impl Isa {
             {
                 return Isa::Avx512;
             }
-            if is_x86_feature_detected!("avx2")
+            if allowed >= InstructionSet::Avx2
+                && is_x86_feature_detected!("avx2")
                 && is_x86_feature_detected!("bmi1")
                 && is_x86_feature_detected!("bmi2")
                 && is_x86_feature_detected!("popcnt")
@@ -259,6 +262,7 @@ impl Isa {
                 return Isa::Avx2;
             }
         }
+        let _ = allowed;
         Isa::Portable
     }
 }

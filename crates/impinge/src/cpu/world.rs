@@ -24,65 +24,77 @@ pub(crate) struct BodyCache {
 /// Caches by slot of the body.
 pub(crate) type Caches = Vec<Option<Box<BodyCache>>>;
 
-/// Everything that a frame reads.
+/// What the narrow stage reads, whatever the method.
 #[derive(Clone, Copy)]
 pub(crate) struct World<'a> {
     pub scene: &'a Scene,
     pub frame: &'a Frame,
-    pub caches: &'a Caches,
+    /// `Clusters` only: places of primitives are those of the clusters' orders.
+    pub caches: Option<&'a Caches>,
 }
 
-/// One participant, looked up.
+/// One participant, looked up. A *place* names a primitive: in the order of the clusters where there
+/// are any, else as the body numbers it.
 #[derive(Clone, Copy)]
 pub(crate) struct BodyRef<'a> {
     pub participant: &'a Participant,
     pub positions: &'a Positions,
-    pub clustering: &'a Clustering,
-    pub bounds: &'a TreeBounds,
+    /// The corners at each place.
+    pub elements: &'a Elements,
+    order: Option<&'a [u32]>,
 }
 
 impl<'a> World<'a> {
     #[inline(always)]
     pub fn body(&self, participant_ix: u32) -> BodyRef<'a> {
         let participant = &self.frame.participants[participant_ix as usize];
-        let slot = participant.id.slot();
-        let cache = self.caches[slot as usize]
-            .as_deref()
-            .expect("every participant was clustered");
+        let body = self.scene.body_in(participant.id.slot());
+        let clustering = self.caches.map(|_| &self.cache(participant_ix).clustering);
         BodyRef {
             participant,
-            positions: self.scene.body_in(slot).positions(),
-            clustering: &cache.clustering,
-            bounds: &cache.bounds,
+            positions: body.positions(),
+            elements: clustering.map_or(body.elements(), |clustering| &clustering.corners),
+            order: clustering.map(|clustering| &clustering.order[..]),
+        }
+    }
+
+    /// `Clusters` only: what is kept of a participant.
+    #[inline(always)]
+    pub fn cache(&self, participant_ix: u32) -> &'a BodyCache {
+        let slot = self.frame.participants[participant_ix as usize].id.index();
+        self.caches
+            .and_then(|caches| caches[slot].as_deref())
+            .expect("every participant was clustered")
+    }
+}
+
+impl BodyCache {
+    #[inline(always)]
+    pub fn tree(&self) -> Tree<'_> {
+        Tree {
+            shape: &self.clustering.shape,
+            bounds: &self.bounds,
         }
     }
 }
 
 impl<'a> BodyRef<'a> {
-    #[inline(always)]
-    pub fn tree(&self) -> Tree<'a> {
-        Tree {
-            shape: &self.clustering.shape,
-            bounds: self.bounds,
-        }
-    }
-
-    /// The global number of the primitive at a place of the order.
+    /// The global number of the primitive at a place.
     #[inline(always)]
     pub fn global(&self, place: u32) -> u32 {
-        self.participant.first + self.clustering.order[place as usize]
+        self.participant.first + self.order.map_or(place, |order| order[place as usize])
     }
 
     /// The vertex ids of the primitive at a place.
     #[inline(always)]
     pub fn corners(&self, place: u32) -> &'a [u32] {
-        self.clustering.corners.corners(place as usize)
+        self.elements.corners(place as usize)
     }
 
     /// The corners at a place in double precision; a triangle repeats its last one.
     #[inline(always)]
     pub fn points(&self, place: u32) -> [Point; 4] {
-        let corners: [u32; 4] = match &self.clustering.corners {
+        let corners: [u32; 4] = match self.elements {
             Elements::Triangles(faces) => {
                 let [a, b, c] = faces[place as usize];
                 [a, b, c, c]

@@ -4,6 +4,7 @@
 pub(crate) mod adjacency;
 pub(crate) mod bounds;
 pub(crate) mod clusters;
+pub(crate) mod grid;
 pub(crate) mod hierarchy;
 
 /// The most primitives a group holds: one bit each in a 64-bit mask.

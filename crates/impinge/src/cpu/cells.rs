@@ -1,0 +1,655 @@
+//! The method `Cells` on the CPU: the paper's two levels.
+//!
+//! ```text
+//! bounds      box of each body; where bodies overlap; primitives that reach there, and their boxes
+//! grid        eq. (1) resolution, eq. (3) ranges; count, prefix sum, scatter into cell lists
+//! dispatch    cells with primitives of bodies that meet; lists cut into groups of at most 64;
+//!             Cartesian product of groups, eq. (4): work items
+//! pairing     4x4x4 masks, transposed to membership; partners by OR; owner rule; boxes
+//! narrow      filters, then exact arithmetic
+//! ```
+//!
+//! Source: "Real-time Collision Detection with Two-level Spatial Hashing on GPU", section 3.
+//! Where we deviate: the owner rule in place of a hash table (nothing is lost or tested twice), and
+//! cell lists bounded by the number of primitives: a huge primitive would touch every cell, so the grid is made
+//! coarser until the lists hold at most [`MOST_ENTRIES_EACH`] entries a primitive. That keeps memory
+//! bounded; the price is more pairs a cell, and `n_reruns` and `grid` in the statistics tell it.
+
+use std::sync::Mutex;
+use std::time::Instant;
+
+use crate::detector::InstructionSet;
+use crate::error::Error;
+use crate::frame::Frame;
+use crate::grouping::GROUP;
+use crate::grouping::bounds::Bounds;
+use crate::grouping::grid::{FineRange, Grid, owns};
+use crate::narrow::share_vertex;
+use crate::progress::Control;
+use crate::query::SharedVertex;
+use crate::stats::Statistics;
+
+use super::Job;
+use super::bounds;
+use super::dispatch::NodePair;
+use super::narrow::{Candidate, Settler};
+use super::pairing::{Lanes, full};
+use super::simd::{Isa, Simd, dispatch};
+use super::top_level::TopLevel;
+use super::workers::Workers;
+use super::world::World;
+
+/// Entries of the cell lists a primitive, at most, on average.
+const MOST_ENTRIES_EACH: u64 = 16;
+/// Primitives whose boxes a task finds.
+const BOUNDS_TASK: usize = 4096;
+/// Work items of one slab, and of one task.
+const SLAB_ITEMS: usize = 1 << 18;
+const PAIRING_TASK: usize = 32;
+
+/// What the method is told.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Options {
+    pub lambda: f64,
+    pub group_size: u32,
+    pub memory_budget: Option<u64>,
+}
+
+/// A primitive that reaches the region.
+#[derive(Debug, Clone, Copy)]
+struct Kept {
+    bounds: Bounds,
+    range: FineRange,
+    participant: u32,
+    primitive: u32,
+}
+
+/// Two groups of one cell: runs of the cell lists.
+#[derive(Debug, Clone, Copy)]
+struct WorkItem {
+    cell: [u32; 3],
+    first_a: u32,
+    first_b: u32,
+    n_a: u8,
+    n_b: u8,
+}
+
+/// A task of the bounds stage: a run of one participant's primitives.
+#[derive(Debug, Clone, Copy)]
+struct BoundsTask {
+    participant: u32,
+    first: u32,
+    end: u32,
+}
+
+/// Scratch of the method; kept from frame to frame.
+pub(crate) struct Cells {
+    isa: Isa,
+    bodies: Vec<Bounds>,
+    /// For each participant, the box in which others may meet it.
+    reach: Vec<Bounds>,
+    top: TopLevel,
+    stack: Vec<NodePair>,
+    tasks: Vec<BoundsTask>,
+    parts: Vec<Mutex<Vec<Kept>>>,
+    kept: Vec<Kept>,
+    /// Where each cell's list starts, and one past the last.
+    starts: Vec<u32>,
+    /// The cell lists: places in `kept`, rising within a cell, so that a body's are together.
+    entries: Vec<u32>,
+    items: Vec<WorkItem>,
+    scratches: Vec<Settler>,
+}
+
+impl Cells {
+    pub fn new(allowed: InstructionSet) -> Self {
+        Cells {
+            isa: Isa::detect(allowed),
+            bodies: Vec::new(),
+            reach: Vec::new(),
+            top: TopLevel::default(),
+            stack: Vec::new(),
+            tasks: Vec::new(),
+            parts: Vec::new(),
+            kept: Vec::new(),
+            starts: Vec::new(),
+            entries: Vec::new(),
+            items: Vec::new(),
+            scratches: Vec::new(),
+        }
+    }
+
+    /// Appends the keys of all pairs that the frame asks for, unsorted.
+    pub fn run(
+        &mut self,
+        job: Job<'_>,
+        options: &Options,
+        keys: &mut Vec<u64>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        let Job {
+            scene,
+            frame,
+            workers,
+            control,
+        } = job;
+        self.scratches.resize_with(workers.n(), Settler::default);
+        for scratch in &mut self.scratches {
+            scratch.clear();
+        }
+        self.items.clear();
+        let world = World {
+            scene,
+            frame,
+            caches: None,
+        };
+        stats.time("bounds", |_| self.bounds(world, workers));
+        let Some(region) = self.region() else {
+            stats.n_slabs = 1;
+            return Ok(());
+        };
+        let grid = stats.time("grid", |stats| {
+            self.scatter(&region, options, control, stats)
+        })?;
+        stats.grid = Some(grid.resolution);
+        self.dispatch_items(world, grid, options, workers, control, stats)?;
+        for scratch in &self.scratches {
+            keys.extend_from_slice(&scratch.keys);
+            stats.n_candidates += scratch.n_candidates;
+            stats.n_unsure += scratch.n_unsure;
+        }
+        stats.n_entries = self.entries.len() as u64;
+        stats.bytes_held = self.bytes();
+        Ok(())
+    }
+
+    fn bytes(&self) -> u64 {
+        let parts: usize = self
+            .parts
+            .iter()
+            .map(|part| part.lock().map_or(0, |part| part.capacity()))
+            .sum();
+        let bytes = size_of::<Kept>() * (self.kept.capacity() + parts)
+            + size_of::<u32>() * (self.starts.capacity() + self.entries.capacity())
+            + size_of::<WorkItem>() * self.items.capacity()
+            + size_of::<Bounds>() * (self.bodies.capacity() + self.reach.capacity())
+            + self.top.bytes()
+            + self.scratches.iter().map(Settler::bytes).sum::<usize>();
+        bytes as u64
+    }
+
+    /// Boxes of bodies, where they reach each other, and the primitives that do.
+    fn bounds(&mut self, world: World<'_>, workers: &Workers) {
+        let frame = world.frame;
+        self.tasks.clear();
+        for (ix, participant) in frame.participants.iter().enumerate() {
+            let n = participant.n_primitives;
+            self.tasks
+                .extend((0..n).step_by(BOUNDS_TASK).map(|first| BoundsTask {
+                    participant: ix as u32,
+                    first,
+                    end: n.min(first.saturating_add(BOUNDS_TASK as u32)),
+                }));
+        }
+        self.parts
+            .resize_with(self.tasks.len().max(self.parts.len()), Mutex::default);
+        self.find_bodies(world);
+        self.find_reach(world);
+        let (tasks, parts, reach) = (&self.tasks, &self.parts, &self.reach);
+        workers.for_each(&mut self.scratches, tasks.len(), |_, task_ix| {
+            let task = tasks[task_ix];
+            let reach = &reach[task.participant as usize];
+            let body = world.body(task.participant);
+            let mut part = parts[task_ix].lock().expect("no task panics");
+            part.clear();
+            for primitive in task.first..task.end {
+                let bounds = bounds::of_vertices(body.positions, body.corners(primitive));
+                if bounds.overlaps(reach) {
+                    part.push(Kept {
+                        bounds,
+                        range: FineRange {
+                            lo: [0; 3],
+                            hi: [0; 3],
+                        },
+                        participant: task.participant,
+                        primitive,
+                    });
+                }
+            }
+        });
+        self.kept.clear();
+        for part in &mut self.parts[..self.tasks.len()] {
+            self.kept
+                .extend_from_slice(part.get_mut().expect("no task panics"));
+        }
+    }
+
+    fn find_bodies(&mut self, world: World<'_>) {
+        self.bodies.clear();
+        for ix in 0..world.frame.participants.len() {
+            let body = world.body(ix as u32);
+            self.bodies.push(match body.participant.n_primitives {
+                0 => Bounds::EMPTY,
+                _ => bounds::of_all(body.positions),
+            });
+        }
+    }
+
+    /// Reason for the discard that follows: a pair's boxes share a point, which lies in both bodies'
+    /// boxes, so each primitive meets the intersection of the two.
+    fn find_reach(&mut self, world: World<'_>) {
+        let frame = world.frame;
+        let Cells {
+            isa,
+            bodies,
+            reach,
+            top,
+            stack,
+            ..
+        } = self;
+        reach.clear();
+        reach.extend(
+            frame
+                .participants
+                .iter()
+                .zip(&*bodies)
+                .map(|(participant, bounds)| match participant.within {
+                    true => *bounds,
+                    false => Bounds::EMPTY,
+                }),
+        );
+        if frame.between() {
+            top.refit(bodies.len(), |ix| bodies[ix as usize]);
+            let bodies = &bodies[..];
+            dispatch!(*isa, reach_pairs, (
+                top: &TopLevel = top,
+                stack: &mut Vec<NodePair> = stack,
+                frame: &Frame = frame,
+                bodies: &[Bounds] = bodies,
+                reach: &mut [Bounds] = reach,
+            ));
+        }
+    }
+
+    /// The box of all reaches; none when nothing reaches anything.
+    fn region(&self) -> Option<Bounds> {
+        let mut region = Bounds::EMPTY;
+        for reach in &self.reach {
+            region.join(reach);
+        }
+        (!self.kept.is_empty()).then_some(region)
+    }
+
+    /// Finds the grid, counts, and scatters primitives into cell lists.
+    fn scatter(
+        &mut self,
+        region: &Bounds,
+        options: &Options,
+        control: &Control<'_>,
+        stats: &mut Statistics,
+    ) -> Result<Grid, Error> {
+        let n = self.kept.len() as u64;
+        let mut grid = Grid::new(region, n, options.lambda);
+        let mut most_entries = n.saturating_mul(MOST_ENTRIES_EACH).min(u64::from(u32::MAX));
+        let mut most_cells = u64::MAX;
+        if let Some(budget) = options.memory_budget {
+            // Boxes twice over (parts and kept), one entry each, one cell, one slab of items.
+            let fixed = 2 * n * size_of::<Kept>() as u64 + slab_bytes(options) + 4096;
+            let needed = fixed + 4 * n + 8;
+            if needed > budget {
+                return Err(Error::MemoryBudget {
+                    what: "primitives' boxes, cell lists and a slab of work items",
+                    needed,
+                    budget,
+                });
+            }
+            let room = (budget - fixed) / 4;
+            most_entries = most_entries.min((room / 2).max(n));
+            most_cells = room / 2;
+        }
+        loop {
+            control.step(0, 1)?;
+            let mut n_entries = 0;
+            for kept in &mut self.kept {
+                kept.range = grid.range(&kept.bounds);
+                n_entries += kept.range.n_coarse();
+            }
+            if n_entries <= most_entries && grid.n_cells() <= most_cells {
+                break;
+            }
+            let Some(coarser) = grid.coarser() else { break };
+            grid = coarser;
+            stats.n_reruns += 1;
+        }
+        let n_cells = grid.n_cells() as usize;
+        self.starts.clear();
+        self.starts.resize(n_cells + 1, 0);
+        for kept in &self.kept {
+            for_cells(&kept.range, |cell| self.starts[grid.index(cell) + 1] += 1);
+        }
+        for ix in 0..n_cells {
+            self.starts[ix + 1] += self.starts[ix];
+        }
+        let n_entries = self.starts[n_cells] as usize;
+        self.entries.clear();
+        self.entries.resize(n_entries, 0);
+        for (place, kept) in (0u32..).zip(&self.kept) {
+            // Each start moves to its list's end, which is the next list's start.
+            for_cells(&kept.range, |cell| {
+                let next = &mut self.starts[grid.index(cell)];
+                self.entries[*next as usize] = place;
+                *next += 1;
+            });
+        }
+        self.starts.copy_within(0..n_cells, 1);
+        self.starts[0] = 0;
+        Ok(grid)
+    }
+
+    /// Work items of all cells, a slab at a time.
+    fn dispatch_items(
+        &mut self,
+        world: World<'_>,
+        grid: Grid,
+        options: &Options,
+        workers: &Workers,
+        control: &Control<'_>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        let start = Instant::now();
+        let mut paired_ms = 0.0;
+        let most_items = slab_items(options);
+        let Cells {
+            isa,
+            kept,
+            starts,
+            entries,
+            items,
+            scratches,
+            ..
+        } = self;
+        let lists = Lists {
+            world,
+            kept,
+            entries,
+        };
+        let n_cells = grid.n_cells() as usize;
+        let mut cell = [0u32; 3];
+        for ix in 0..n_cells {
+            let list = starts[ix] as usize..starts[ix + 1] as usize;
+            let before = stats.n_work_items + items.len() as u64;
+            lists.product(list, options.group_size as usize, |a, b| {
+                if items.len() == most_items {
+                    let at = (ix as u64, n_cells as u64);
+                    paired_ms += pair(*isa, lists, items, scratches, workers, control, at)?;
+                    stats.n_work_items += items.len() as u64;
+                    stats.n_slabs += 1;
+                    items.clear();
+                }
+                items.push(WorkItem {
+                    cell,
+                    first_a: a.start as u32,
+                    first_b: b.start as u32,
+                    n_a: a.len() as u8,
+                    n_b: b.len() as u8,
+                });
+                Ok(())
+            })?;
+            stats.n_subdivided += u64::from(stats.n_work_items + items.len() as u64 > before);
+            cell = grid.next(cell);
+        }
+        let at = (n_cells as u64, n_cells as u64);
+        paired_ms += pair(*isa, lists, items, scratches, workers, control, at)?;
+        stats.n_work_items += items.len() as u64;
+        stats.n_slabs += 1;
+        items.clear();
+        let busy: f64 = scratches.iter().map(|s| s.busy.as_secs_f64() * 1e3).sum();
+        let narrow_ms = (busy / workers.n() as f64).min(paired_ms);
+        stats.add_ms("dispatch", start.elapsed().as_secs_f64() * 1e3 - paired_ms);
+        stats.add_ms("pairing", paired_ms - narrow_ms);
+        stats.add_ms("narrow", narrow_ms);
+        Ok(())
+    }
+}
+
+fn slab_items(options: &Options) -> usize {
+    match options.memory_budget {
+        None => SLAB_ITEMS,
+        // A small share of the budget; what is left over is for boxes and lists.
+        Some(budget) => {
+            (budget as usize / 16 / size_of::<WorkItem>()).clamp(PAIRING_TASK, SLAB_ITEMS)
+        }
+    }
+}
+
+fn slab_bytes(options: &Options) -> u64 {
+    (slab_items(options) * size_of::<WorkItem>()) as u64
+}
+
+#[inline(always)]
+fn reach_pairs<S: Simd>(
+    simd: S,
+    top: &TopLevel,
+    stack: &mut Vec<NodePair>,
+    frame: &Frame,
+    bodies: &[Bounds],
+    reach: &mut [Bounds],
+) {
+    let met = top.pairs(simd, stack, |a, b| {
+        let (a, b) = (a as usize, b as usize);
+        if frame.meets(a, b) {
+            let both = bodies[a].intersection(&bodies[b]);
+            reach[a].join(&both);
+            reach[b].join(&both);
+        }
+        Ok::<(), std::convert::Infallible>(())
+    });
+    let Ok(()) = met;
+}
+
+/// Calls back for each coarse cell of a range.
+#[inline(always)]
+fn for_cells(range: &FineRange, mut call: impl FnMut([u32; 3])) {
+    let (lo, hi) = range.coarse();
+    for z in lo[2]..=hi[2] {
+        for y in lo[1]..=hi[1] {
+            for x in lo[0]..=hi[0] {
+                call([x, y, z]);
+            }
+        }
+    }
+}
+
+/// The cell lists and what they name.
+#[derive(Clone, Copy)]
+struct Lists<'a> {
+    world: World<'a>,
+    kept: &'a [Kept],
+    entries: &'a [u32],
+}
+
+impl Lists<'_> {
+    /// Equation (4) for one cell: for all bodies that meet, all pairs of their groups.
+    fn product(
+        &self,
+        list: std::ops::Range<usize>,
+        group_size: usize,
+        mut emit: impl FnMut(std::ops::Range<usize>, std::ops::Range<usize>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let frame = self.world.frame;
+        let mut a = list.start;
+        while a < list.end {
+            let (ix_a, run_a) = self.run(a, list.end);
+            if frame.participants[ix_a].within && run_a.len() > 1 {
+                for group_a in groups(run_a.clone(), group_size) {
+                    for group_b in groups(group_a.start..run_a.end, group_size) {
+                        emit(group_a.clone(), group_b)?;
+                    }
+                }
+            }
+            let mut b = run_a.end;
+            while b < list.end && frame.between() {
+                let (ix_b, run_b) = self.run(b, list.end);
+                if frame.meets(ix_a, ix_b) {
+                    for group_a in groups(run_a.clone(), group_size) {
+                        for group_b in groups(run_b.clone(), group_size) {
+                            emit(group_a.clone(), group_b)?;
+                        }
+                    }
+                }
+                b = run_b.end;
+            }
+            a = run_a.end;
+        }
+        Ok(())
+    }
+
+    /// The participant at a place of a list, and the run of its entries from there on.
+    fn run(&self, start: usize, end: usize) -> (usize, std::ops::Range<usize>) {
+        let owner = |entry: u32| self.kept[entry as usize].participant;
+        let participant = owner(self.entries[start]);
+        let len = self.entries[start..end].partition_point(|&entry| owner(entry) == participant);
+        (participant as usize, start..start + len)
+    }
+}
+
+fn groups(
+    run: std::ops::Range<usize>,
+    group_size: usize,
+) -> impl Iterator<Item = std::ops::Range<usize>> {
+    run.clone()
+        .step_by(group_size)
+        .map(move |start| start..run.end.min(start + group_size))
+}
+
+/// Pairs and settles a slab of work items; returns the milliseconds it took.
+fn pair(
+    isa: Isa,
+    lists: Lists<'_>,
+    items: &[WorkItem],
+    scratches: &mut [Settler],
+    workers: &Workers,
+    control: &Control<'_>,
+    (done, total): (u64, u64),
+) -> Result<f64, Error> {
+    let start = Instant::now();
+    let n_tasks = items.len().div_ceil(PAIRING_TASK);
+    workers.for_each(scratches, n_tasks, |settler, task| {
+        if control.step(done, total).is_err() {
+            return;
+        }
+        let first = task * PAIRING_TASK;
+        let items = &items[first..items.len().min(first + PAIRING_TASK)];
+        dispatch!(isa, pair_items, (
+            lists: Lists<'_> = lists,
+            items: &[WorkItem] = items,
+            settler: &mut Settler = settler,
+        ));
+    });
+    control.step(done, total)?;
+    Ok(start.elapsed().as_secs_f64() * 1e3)
+}
+
+#[inline(always)]
+fn pair_items<S: Simd>(simd: S, lists: Lists<'_>, items: &[WorkItem], settler: &mut Settler) {
+    for item in items {
+        pair_item(lists, item, settler);
+        settler.settle_when_full(simd, lists.world);
+    }
+    settler.settle(simd, lists.world);
+}
+
+/// The second level of one work item.
+///
+/// ```text
+/// masks of B          bit s of row j: box j touches sub-cell s        (64 rows, a primitive each)
+/// membership of B     bit j of row s: the same, transposed            (64 rows, a sub-cell each)
+/// partners of i       OR of membership[s] over the sub-cells s of mask i
+/// ```
+#[inline(always)]
+fn pair_item(lists: Lists<'_>, item: &WorkItem, settler: &mut Settler) {
+    let (first_a, first_b) = (item.first_a as usize, item.first_b as usize);
+    let group_a = &lists.entries[first_a..first_a + usize::from(item.n_a)];
+    let group_b = &lists.entries[first_b..first_b + usize::from(item.n_b)];
+    let same_group = first_a == first_b;
+    let kept = |entry: u32| &lists.kept[entry as usize];
+    let mut membership = [0u64; GROUP];
+    for (row, &entry) in membership.iter_mut().zip(group_b) {
+        *row = kept(entry).range.occupancy(item.cell);
+    }
+    transpose(&mut membership);
+    // Sub-cells that hold nothing of B are culled: they add no partner.
+    let occupied = (0..GROUP).fold(0u64, |all, s| all | u64::from(membership[s] != 0) << s);
+    for (i, &entry_a) in group_a.iter().enumerate() {
+        let a = kept(entry_a);
+        let mask = a.range.occupancy(item.cell) & occupied;
+        let mut partners = Lanes(mask).fold(0u64, |partners, s| partners | membership[s]);
+        if same_group {
+            partners &= full(group_a.len()) & (u64::MAX << i << 1);
+        }
+        for j in Lanes(partners) {
+            let b = kept(group_b[j]);
+            if a.bounds.overlaps(&b.bounds) && owns(item.cell, &a.range, &b.range) {
+                put(lists.world, a, b, settler);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn put(world: World<'_>, a: &Kept, b: &Kept, settler: &mut Settler) {
+    if a.participant == b.participant {
+        let body = world.body(a.participant);
+        if share_vertex(body.corners(a.primitive), body.corners(b.primitive)) {
+            if world.frame.shared_vertex == SharedVertex::Resolve {
+                settler.settle_shared(&body, a.primitive, b.primitive);
+            }
+            return;
+        }
+    }
+    settler.push(Candidate {
+        a: a.participant,
+        b: b.participant,
+        place_a: a.primitive,
+        place_b: b.primitive,
+    });
+}
+
+/// Transposes a 64 x 64 bit matrix in place: six rounds that swap off-diagonal blocks of 32, 16, … 1
+/// (after Warren, Hacker's Delight, section 7-3).
+fn transpose(rows: &mut [u64; GROUP]) {
+    let mut width = 32;
+    let mut mask = 0x0000_0000_ffff_ffffu64;
+    while width > 0 {
+        let mut row = 0;
+        while row < GROUP {
+            let swapped = ((rows[row] >> width) ^ rows[row + width]) & mask;
+            rows[row] ^= swapped << width;
+            rows[row + width] ^= swapped;
+            row = (row + width + 1) & !width;
+        }
+        width /= 2;
+        mask ^= mask << width;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn transposing_moves_every_bit() {
+        let mut state = 1u64;
+        let rows: [u64; GROUP] = std::array::from_fn(|_| {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(99);
+            state
+        });
+        let mut transposed = rows;
+        transpose(&mut transposed);
+        for (i, row) in rows.iter().enumerate() {
+            for (j, column) in transposed.iter().enumerate() {
+                assert_eq!(row >> j & 1, column >> i & 1);
+            }
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! Which bodies' boxes meet, for frames of more than two bodies.
+
+use crate::grouping::bounds::Bounds;
+use crate::grouping::hierarchy::{Entry, Shape, order};
+
+use super::bounds::TreeBounds;
+use super::clusters::STALE;
+use super::dispatch::{self, NodePair, Tree};
+use super::simd::Simd;
+
+/// A tree over the participants' boxes, for frames of more than two bodies. Its order is kept from
+/// frame to frame and made anew when bodies have moved apart from their neighbours in it.
+#[derive(Default)]
+pub(crate) struct TopLevel {
+    shape: Shape,
+    order: Vec<u32>,
+    bounds: TreeBounds,
+    entries: Vec<Entry>,
+    best_spread: f64,
+}
+
+impl TopLevel {
+    /// Calls `emit(a, b)`, `a < b`, once for each pair of participants whose boxes overlap.
+    #[inline(always)]
+    pub fn pairs<S: Simd, E>(
+        &self,
+        simd: S,
+        stack: &mut Vec<NodePair>,
+        mut emit: impl FnMut(u32, u32) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let tree = Tree {
+            shape: &self.shape,
+            bounds: &self.bounds,
+        };
+        dispatch::within(simd, tree, stack, |i, j| {
+            let (a, b) = (self.order[i as usize], self.order[j as usize]);
+            if a == b {
+                return Ok(());
+            }
+            emit(a.min(b), a.max(b))
+        })
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.shape.bytes()
+            + size_of_val(&self.order[..])
+            + size_of::<Entry>() * self.entries.capacity()
+            + self.bounds.bytes()
+    }
+
+    /// Boxes of `n` participants as they are now.
+    pub fn refit(&mut self, n: usize, root: impl Fn(u32) -> Bounds) {
+        if self.order.len() != n {
+            self.shape = Shape::new(n);
+            self.bounds.resize(&self.shape);
+            self.order = (0..n as u32).collect();
+            self.best_spread = 0.0;
+        }
+        self.refit_boxes(&root);
+        if self.spread() > STALE * self.best_spread {
+            self.entries.clear();
+            self.entries.extend((0..n as u32).map(|ix| Entry {
+                center: root(ix).center(),
+                number: ix,
+            }));
+            order(&self.shape, 1, 1, &mut self.entries);
+            for (place, entry) in self.entries.iter().enumerate() {
+                self.order[place] = entry.number;
+            }
+            self.refit_boxes(&root);
+            self.best_spread = self.spread();
+        }
+        self.best_spread = self.best_spread.min(self.spread());
+    }
+
+    fn refit_boxes(&mut self, root: &impl Fn(u32) -> Bounds) {
+        for (place, &ix) in self.order.iter().enumerate() {
+            self.bounds.levels[0].put(place, &root(ix));
+        }
+        self.bounds.refit_above_leaves(&self.shape);
+    }
+
+    /// The summed surface of the nodes above the leaves over that of the whole.
+    fn spread(&self) -> f64 {
+        let Some(parents) = self.bounds.levels.get(1) else {
+            return 0.0;
+        };
+        let areas = (0..parents.len()).map(|ix| area(&parents.at(ix)));
+        let whole = area(&self.bounds.root());
+        if whole > 0.0 {
+            areas.sum::<f64>() / whole
+        } else {
+            0.0
+        }
+    }
+}
+
+fn area(bounds: &Bounds) -> f64 {
+    let area = bounds.half_area();
+    if area.is_finite() { area } else { 0.0 }
+}
