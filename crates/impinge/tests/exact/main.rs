@@ -2,6 +2,7 @@
 //! against published cases.
 
 mod generators;
+mod gpu_bound;
 mod oracle;
 mod published;
 
