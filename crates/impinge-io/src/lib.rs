@@ -1,1 +1,60 @@
-//! impinge-io
+//! Mesh files for impinge: surfaces, tetrahedra and sequences of positions in, coloured meshes out. Plain arrays on either
+//! side; this crate knows nothing of collision detection.
+//!
+//! ```no_run
+//! use impinge_io::{ColoredMesh, ReadOptions, read, write_ply};
+//! # fn main() -> Result<(), impinge_io::Error> {
+//! let bunny = read("bunny.ply".as_ref(), &ReadOptions { weld: true, ..ReadOptions::default() })?;
+//! let red = vec![[220, 40, 30]; bunny.n_primitives()];
+//! write_ply("red.ply".as_ref(), &[ColoredMesh {
+//!     positions: &bunny.positions,
+//!     elements: &bunny.elements,
+//!     primitive_colors: Some(&red),
+//!     colliding: None,
+//!     name: "bunny",
+//! }])?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # What readers keep
+//! - **Values.** Binary `float` coordinates stay f32. Coordinates in text are read as f64, correctly rounded, whatever
+//!   type a header declares; [`Positions::narrow_if_exact`] goes back to f32 where nothing is lost.
+//! - **Order.** Vertices and primitives keep the order of the file. A polygon of n corners becomes the fan of n - 2
+//!   triangles around its first corner, in its place; a strip, its triangles. (A fan covers a convex polygon exactly;
+//!   of one that is not convex it is only a triangulation of the same corners.)
+//! - **Everything that can collide.** Points and lines are counted and left out, and so are the triangles of a file that
+//!   has tetrahedra as well, unless [`ReadOptions::prefer`] says otherwise; see [`Summary`]. Hexahedra, prisms, pyramids and
+//!   curved (higher-order) cells are refused by name: leaving them out would lose collisions silently.
+//!
+//! # What readers refuse
+//! Indices out of range, coordinates that are not finite, files that end early, and headers that announce more than the
+//! file holds: each is an [`Error`] that names file, line or byte offset, and both numbers. Memory is reserved by what a
+//! file holds, not by what its header says.
+//!
+//! # Why the parsers are our own
+//! At the time of writing the published crates read text coordinates as f32 (or round them to it), merge or reorder primitives, cover one version
+//! of a format, or give no line with an error. XML, JSON, base64, zlib and LZ4 are left to crates.
+
+mod base64;
+mod binary;
+mod budget;
+mod collect;
+mod error;
+mod format;
+mod formats;
+mod mesh;
+mod read;
+mod sequence;
+mod text;
+mod write;
+
+pub use error::{Error, Location, Place};
+pub use format::Format;
+pub use mesh::{Elements, Mesh, Positions, Weld, weld};
+pub use read::{
+    Prefer, ReadOptions, Summary, read, read_bytes, read_bytes_with_summary, read_tetgen_bytes,
+    read_with_summary,
+};
+pub use sequence::{Sequence, SequenceFormat};
+pub use write::{ColoredMesh, Pc2Writer, write_glb, write_ply, write_vtu};

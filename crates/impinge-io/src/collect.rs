@@ -1,0 +1,166 @@
+//! Where every reader puts what it finds: positions, triangles, tetrahedra, and the counts of what was fanned or left out.
+
+use crate::error::{Error, Name, Place};
+use crate::mesh::{Elements, Mesh, Positions};
+use crate::{Prefer, ReadOptions, Summary};
+
+/// A mesh being read.
+#[derive(Debug)]
+pub(crate) struct Collector<'a> {
+    pub name: Name<'a>,
+    pub positions: Positions,
+    pub triangles: Vec<[u32; 3]>,
+    pub tetrahedra: Vec<[u32; 4]>,
+    pub n_fanned: u64,
+    pub n_lines: u64,
+    pub n_points: u64,
+    /// The corners of the polygon or strip at hand; kept to be reused.
+    pub corners: Vec<u32>,
+}
+
+impl<'a> Collector<'a> {
+    pub(crate) fn new(name: Name<'a>) -> Self {
+        Collector {
+            name,
+            positions: Positions::F64(Vec::new()),
+            triangles: Vec::new(),
+            tetrahedra: Vec::new(),
+            n_fanned: 0,
+            n_lines: 0,
+            n_points: 0,
+            corners: Vec::new(),
+        }
+    }
+
+    pub(crate) fn n_vertices(&self) -> u64 {
+        self.positions.len() as u64
+    }
+
+    /// Turns `index` of a file that counts from `first` into a vertex index.
+    pub(crate) fn vertex(&self, index: i64, first: i64, place: Place) -> Result<u32, Error> {
+        vertex_ix(self.name, index, first, self.n_vertices(), place)
+    }
+
+    /// Adds the polygon in [`corners`](Self::corners) as a fan around its first corner.
+    pub(crate) fn polygon(&mut self, place: Place) -> Result<(), Error> {
+        let [first, rest @ ..] = self.corners.as_slice() else {
+            return Err(self
+                .name
+                .count(place, "corners of a polygon, or more", 3, 0));
+        };
+        if rest.len() < 2 {
+            return Err(self.name.count(
+                place,
+                "corners of a polygon, or more",
+                3,
+                self.corners.len() as u64,
+            ));
+        }
+        self.n_fanned += u64::from(rest.len() > 2);
+        self.triangles
+            .extend(rest.windows(2).map(|edge| [*first, edge[0], edge[1]]));
+        Ok(())
+    }
+
+    /// Adds the strip in [`corners`](Self::corners): each corner makes a triangle with the two before it, every other one turned.
+    pub(crate) fn strip(&mut self) {
+        self.triangles
+            .extend(self.corners.windows(3).enumerate().map(|(ix, t)| {
+                if ix % 2 == 0 {
+                    [t[0], t[1], t[2]]
+                } else {
+                    [t[1], t[0], t[2]]
+                }
+            }));
+    }
+
+    /// Chooses the primitives that were asked for, checks that there are some, and welds if that was asked for.
+    pub(crate) fn finish(self, options: &ReadOptions) -> Result<(Mesh, Summary), Error> {
+        let (n_triangles, n_tetrahedra) =
+            (self.triangles.len() as u64, self.tetrahedra.len() as u64);
+        let (wanted, tetrahedra) = match options.prefer {
+            Prefer::Volume => ("triangles or tetrahedra", n_tetrahedra > 0),
+            Prefer::Triangles => ("triangles", false),
+            Prefer::Tetrahedra => ("tetrahedra", true),
+        };
+        let elements = if tetrahedra {
+            Elements::Tetrahedra(self.tetrahedra)
+        } else {
+            Elements::Triangles(self.triangles)
+        };
+        if elements.is_empty() {
+            return Err(Error::NoPrimitives {
+                file: self.name.0.to_owned(),
+                wanted,
+                n_vertices: self.positions.len() as u64,
+                n_triangles,
+                n_tetrahedra,
+                n_lines: self.n_lines,
+                n_points: self.n_points,
+            });
+        }
+        let mut mesh = Mesh {
+            positions: self.positions,
+            elements,
+        };
+        let n_welded = if options.weld {
+            crate::weld(&mut mesh)
+        } else {
+            0
+        };
+        let summary = Summary {
+            n_polygons_fanned: self.n_fanned,
+            n_lines_skipped: self.n_lines,
+            n_points_skipped: self.n_points,
+            n_triangles_skipped: if tetrahedra { n_triangles } else { 0 },
+            n_tetrahedra_skipped: if tetrahedra { 0 } else { n_tetrahedra },
+            n_welded: n_welded as u64,
+        };
+        Ok((mesh, summary))
+    }
+}
+
+/// Turns `index` of a file that counts from `first` into a vertex index below `n_vertices`.
+pub(crate) fn vertex_ix(
+    name: Name,
+    index: i64,
+    first: i64,
+    n_vertices: u64,
+    place: Place,
+) -> Result<u32, Error> {
+    index
+        .checked_sub(first)
+        .and_then(|ix| u32::try_from(ix).ok())
+        .filter(|&ix| u64::from(ix) < n_vertices)
+        .ok_or_else(|| Error::Index {
+            at: name.at(place),
+            index,
+            first,
+            n_vertices,
+        })
+}
+
+/// Checks that a number of vertices can be indexed by u32.
+pub(crate) fn check_n_vertices(name: Name, place: Place, n_vertices: u64) -> Result<(), Error> {
+    if n_vertices > u64::from(u32::MAX) {
+        return Err(name.too_large(place, "number of vertices", u64::from(u32::MAX), n_vertices));
+    }
+    Ok(())
+}
+
+/// Checks that a position is finite.
+pub(crate) fn finite(
+    name: Name,
+    place: Place,
+    vertex: usize,
+    position: [f64; 3],
+) -> Result<[f64; 3], Error> {
+    match position.iter().find(|c| !c.is_finite()) {
+        None => Ok(position),
+        Some(&value) => Err(Error::NotFinite {
+            at: name.at(place),
+            vertex: vertex as u64,
+            value,
+        }),
+    }
+}

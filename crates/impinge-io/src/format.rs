@@ -1,0 +1,73 @@
+//! Which formats there are, and which one a file has.
+
+use std::path::Path;
+
+use crate::error::Error;
+
+/// A format of meshes that [`read`](crate::read) knows. Text and binary flavours are told apart by content.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Format {
+    /// Wavefront OBJ (`.obj`).
+    Obj,
+    /// Stanford polygon file, ascii or binary of either byte order (`.ply`).
+    Ply,
+    /// Stereolithography, ascii or binary (`.stl`).
+    Stl,
+    /// Geomview OFF, text (`.off`, `.coff`, `.noff`).
+    Off,
+    /// glTF 2.0, JSON or binary container (`.gltf`, `.glb`).
+    Gltf,
+    /// Gmsh 2.x and 4.1, ascii or binary (`.msh`).
+    Msh,
+    /// Legacy VTK, ascii or binary (`.vtk`).
+    Vtk,
+    /// VTK XML unstructured grid (`.vtu`).
+    Vtu,
+    /// Medit, ascii (`.mesh`).
+    Medit,
+    /// TetGen, two files: `.node` and `.ele` (or `.face`).
+    Tetgen,
+}
+
+/// The extensions of [`Format::from_extension`], for messages.
+pub(crate) const KNOWN: &str =
+    "obj, ply, stl, off, coff, noff, gltf, glb, msh, vtk, vtu, mesh, node, ele, face";
+
+impl Format {
+    /// The format that files with this extension have (without the dot; case does not matter).
+    ///
+    /// ```
+    /// use impinge_io::Format;
+    /// assert_eq!(Format::from_extension("GLB"), Some(Format::Gltf));
+    /// assert_eq!(Format::from_extension("txt"), None);
+    /// ```
+    pub fn from_extension(extension: &str) -> Option<Self> {
+        Some(match extension.to_ascii_lowercase().as_str() {
+            "obj" => Format::Obj,
+            "ply" => Format::Ply,
+            "stl" => Format::Stl,
+            "off" | "coff" | "noff" => Format::Off,
+            "gltf" | "glb" => Format::Gltf,
+            "msh" => Format::Msh,
+            "vtk" => Format::Vtk,
+            "vtu" => Format::Vtu,
+            "mesh" => Format::Medit,
+            "node" | "ele" | "face" => Format::Tetgen,
+            _ => return None,
+        })
+    }
+
+    /// The format of the file at `path`, by its extension.
+    ///
+    /// # Errors
+    /// [`Error::UnknownFormat`] where the extension is none of those known.
+    pub fn from_path(path: &Path) -> Result<Self, Error> {
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        Self::from_extension(&extension).ok_or_else(|| Error::UnknownFormat {
+            path: path.to_owned(),
+            extension: extension.into_owned(),
+            known: KNOWN,
+        })
+    }
+}

@@ -1,0 +1,412 @@
+//! glTF 2.0 and GLB: all triangles of the default scene, placed by their nodes, as one body.
+//!
+//! Source: Khronos, "glTF 2.0 Specification". Triangles, strips and fans are read; points and lines are counted. Within a
+//! node, primitives that use the same positions share their vertices. Positions keep f32 where no node moves them; where one
+//! does, they are computed in f64 (each sum and product rounded to the nearest) and stay f64. Skins and morph targets are not applied: it is the rest pose.
+
+mod accessor;
+mod json;
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use self::accessor::Data;
+use self::json::{Node, Primitive, Root};
+use crate::ReadOptions;
+use crate::binary::{Cursor, Endian, Scalar};
+use crate::budget::Budget;
+use crate::collect::{Collector, check_n_vertices, finite, vertex_ix};
+use crate::error::{Error, Name, Place, shown};
+use crate::mesh::Positions;
+
+pub(crate) fn read<'a>(
+    bytes: &[u8],
+    name: Name<'a>,
+    folder: Option<&Path>,
+    options: &ReadOptions,
+) -> Result<Collector<'a>, Error> {
+    let (json, binary) = if bytes.starts_with(b"glTF") {
+        chunks(bytes, name)?
+    } else {
+        ((bytes, None), None)
+    };
+    let root = parse(json, name)?;
+    let scene = Scene {
+        name,
+        data: Data::new(
+            name,
+            &root,
+            binary,
+            folder,
+            Budget::new(options.max_expanded_bytes.max(16 * bytes.len() as u64)),
+        ),
+        root: &root,
+        is_f64: false,
+        f32s: Vec::new(),
+        f64s: Vec::new(),
+        parts: Collector::new(name),
+    };
+    scene.read()
+}
+
+/// The JSON of a file, and where it starts if that is in a GLB.
+type Json<'b> = (&'b [u8], Option<usize>);
+
+/// The JSON and binary chunks of a GLB file.
+fn chunks<'b>(bytes: &'b [u8], name: Name<'b>) -> Result<(Json<'b>, Option<&'b [u8]>), Error> {
+    let mut cursor = Cursor::new(name, bytes, 4, Endian::Little);
+    let version = cursor.count(Scalar::U32, "the version")?;
+    if version != 2 {
+        return Err(name.unsupported(Place::Byte(4), format!("GLB version {version} (2 is)")));
+    }
+    let length = cursor.count(Scalar::U32, "the length")?;
+    if length > bytes.len() as u64 {
+        return Err(name.truncated(
+            Place::File,
+            "a GLB file of this header",
+            length,
+            bytes.len() as u64,
+        ));
+    }
+    let mut chunk = |expected: &[u8; 4]| {
+        let at = cursor.place();
+        let length = cursor.count(Scalar::U32, "the length of a chunk")?;
+        let kind = cursor.take(4, 1, "the type of a chunk")?;
+        let start = cursor.offset();
+        let content = cursor.take(length, 1, "a chunk")?;
+        if kind != expected {
+            return Err(name.syntax(
+                at,
+                format!("the chunk {}", shown(expected.trim_ascii_end())),
+                shown(kind),
+            ));
+        }
+        Ok::<_, Error>((content, start, cursor.left()))
+    };
+    let (json, start, left) = chunk(b"JSON")?;
+    let binary = if left >= 8 {
+        Some(chunk(b"BIN\0")?.0)
+    } else {
+        None
+    };
+    Ok(((json, Some(start)), binary))
+}
+
+fn parse((json, start): Json, name: Name) -> Result<Root, Error> {
+    let root: Root = serde_json::from_slice(json).map_err(|error| {
+        let place = match start {
+            None => Place::Line(error.line() as u64),
+            // The JSON of a GLB is usually one line.
+            Some(start) => {
+                Place::Byte((start + if error.line() == 1 { error.column() } else { 0 }) as u64)
+            }
+        };
+        name.syntax(
+            place,
+            "glTF in JSON",
+            error.to_string().replace(['\n', '\r'], " "),
+        )
+    })?;
+    if !root.asset.version.starts_with("2.") {
+        return Err(name.unsupported(
+            Place::File,
+            format!(
+                "glTF version {} (2.x is)",
+                shown(root.asset.version.as_bytes())
+            ),
+        ));
+    }
+    const HARMLESS: [&str; 6] = [
+        "KHR_materials_",
+        "KHR_texture_",
+        "KHR_lights_",
+        "KHR_mesh_quantization",
+        "EXT_texture_",
+        "KHR_xmp",
+    ];
+    if let Some(extension) = root
+        .extensions_required
+        .iter()
+        .find(|extension| !HARMLESS.iter().any(|start| extension.starts_with(start)))
+    {
+        return Err(name.unsupported(
+            Place::File,
+            format!("the extension {}", shown(extension.as_bytes())),
+        ));
+    }
+    Ok(root)
+}
+
+/// A transformation: columns of x, y, z axes and the origin. `None` moves nothing.
+type Transform = Option<[[f64; 3]; 4]>;
+
+/// A scene being put together.
+struct Scene<'a, 'r> {
+    name: Name<'a>,
+    root: &'r Root,
+    data: Data<'a, 'r>,
+    /// Whether positions have become f64; those so far are in the vector of their type.
+    is_f64: bool,
+    f32s: Vec<[f32; 3]>,
+    f64s: Vec<[f64; 3]>,
+    parts: Collector<'a>,
+}
+
+impl<'a> Scene<'a, '_> {
+    fn read(mut self) -> Result<Collector<'a>, Error> {
+        let (name, root) = (self.name, self.root);
+        let roots: Vec<usize> = match root.scenes.get(root.scene.unwrap_or(0)) {
+            Some(scene) => scene.nodes.clone(),
+            None if root.scene.is_some() => {
+                return Err(index_error(
+                    name,
+                    "scene",
+                    root.scene.unwrap_or(0),
+                    root.scenes.len(),
+                ));
+            }
+            // A file without scenes is a library of nodes: all that are nobody's children.
+            None => {
+                let mut is_child = vec![false; root.nodes.len()];
+                for &child in root.nodes.iter().flat_map(|node| &node.children) {
+                    if let Some(is_child) = is_child.get_mut(child) {
+                        *is_child = true;
+                    }
+                }
+                (0..root.nodes.len())
+                    .filter(|&node| !is_child[node])
+                    .collect()
+            }
+        };
+        let mut is_visited = vec![false; root.nodes.len()];
+        let mut stack: Vec<(usize, Transform)> =
+            roots.into_iter().rev().map(|node| (node, None)).collect();
+        while let Some((node_ix, parent)) = stack.pop() {
+            let node = root
+                .nodes
+                .get(node_ix)
+                .ok_or_else(|| index_error(name, "node", node_ix, root.nodes.len()))?;
+            if std::mem::replace(&mut is_visited[node_ix], true) {
+                return Err(name.syntax(
+                    Place::File,
+                    "nodes that form a tree",
+                    format!("node {node_ix} twice"),
+                ));
+            }
+            if node.extensions.contains_key("EXT_mesh_gpu_instancing") {
+                return Err(
+                    name.unsupported(Place::File, "the extension 'EXT_mesh_gpu_instancing'")
+                );
+            }
+            let transform = compose(parent, local(node));
+            if let Some(mesh_ix) = node.mesh {
+                let mesh = root
+                    .meshes
+                    .get(mesh_ix)
+                    .ok_or_else(|| index_error(name, "mesh", mesh_ix, root.meshes.len()))?;
+                let mut bases = HashMap::new();
+                for primitive in &mesh.primitives {
+                    self.add(primitive, transform, &mut bases)?;
+                }
+            }
+            stack.extend(node.children.iter().rev().map(|&child| (child, transform)));
+        }
+        self.parts.positions = if self.is_f64 {
+            Positions::F64(self.f64s)
+        } else {
+            Positions::F32(self.f32s)
+        };
+        Ok(self.parts)
+    }
+
+    /// Adds a primitive; `bases` are the first vertices of the accessors that this node has used already.
+    fn add(
+        &mut self,
+        primitive: &Primitive,
+        transform: Transform,
+        bases: &mut HashMap<usize, (u64, u64)>,
+    ) -> Result<(), Error> {
+        const TRIANGLES: u32 = 4;
+        const STRIP: u32 = 5;
+        const FAN: u32 = 6;
+        let name = self.name;
+        let mode = primitive.mode.unwrap_or(TRIANGLES);
+        match mode {
+            0 => self.parts.n_points += 1,
+            1..=3 => self.parts.n_lines += 1,
+            TRIANGLES | STRIP | FAN => {}
+            _ => {
+                return Err(name.syntax(
+                    Place::File,
+                    "a mode of a primitive, 0 to 6",
+                    mode.to_string(),
+                ));
+            }
+        }
+        let Some(accessor) = primitive.attributes.position.filter(|_| mode >= TRIANGLES) else {
+            return Ok(());
+        };
+        let (base, n_vertices) = match bases.get(&accessor) {
+            Some(&base) => base,
+            None => {
+                let base = self.add_positions(accessor, transform)?;
+                bases.insert(accessor, base);
+                base
+            }
+        };
+        let indices = match primitive.indices {
+            Some(accessor) => self.data.indices(accessor)?,
+            None => {
+                self.data.charge(n_vertices, 8)?;
+                (0..n_vertices as i64).collect()
+            }
+        };
+        self.data.charge(indices.len() as u64, 16)?;
+        let corners = &mut self.parts.corners;
+        corners.clear();
+        for index in indices {
+            // The sum of both is a vertex that exists.
+            corners.push(base as u32 + vertex_ix(name, index, 0, n_vertices, Place::File)?);
+        }
+        match mode {
+            TRIANGLES if !corners.len().is_multiple_of(3) => {
+                let whole = corners.len().next_multiple_of(3) as u64;
+                return Err(name.count(
+                    Place::File,
+                    "indices of triangles",
+                    whole,
+                    corners.len() as u64,
+                ));
+            }
+            TRIANGLES => self
+                .parts
+                .triangles
+                .extend_from_slice(corners.as_chunks::<3>().0),
+            STRIP => self.parts.strip(),
+            _ if corners.len() < 3 => {}
+            _ => {
+                let first = corners[0];
+                self.parts.triangles.extend(
+                    corners[1..]
+                        .windows(2)
+                        .map(|edge| [first, edge[0], edge[1]]),
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the positions of an accessor; returns the first vertex and their number.
+    fn add_positions(
+        &mut self,
+        accessor: usize,
+        transform: Transform,
+    ) -> Result<(u64, u64), Error> {
+        let name = self.name;
+        let positions = self.data.positions(accessor)?;
+        let base = (self.f32s.len() + self.f64s.len()) as u64;
+        let n_vertices = positions.len() as u64;
+        check_n_vertices(name, Place::File, base + n_vertices)?;
+        self.data.charge(n_vertices, 24)?;
+        match (positions, transform) {
+            (Positions::F32(positions), None) if !self.is_f64 => {
+                for (ix, &position) in positions.iter().enumerate() {
+                    finite(
+                        name,
+                        Place::File,
+                        base as usize + ix,
+                        position.map(f64::from),
+                    )?;
+                }
+                self.f32s.extend(positions);
+            }
+            (positions, transform) => {
+                if !self.is_f64 {
+                    self.is_f64 = true;
+                    self.f64s = std::mem::take(&mut self.f32s)
+                        .into_iter()
+                        .map(|position| position.map(f64::from))
+                        .collect();
+                }
+                for (ix, position) in positions.to_f64().into_iter().enumerate() {
+                    let placed = transform.map_or(position, |columns| apply(&columns, position));
+                    self.f64s
+                        .push(finite(name, Place::File, base as usize + ix, placed)?);
+                }
+            }
+        }
+        Ok((base, n_vertices))
+    }
+}
+
+fn index_error(name: Name, what: &str, index: usize, n: usize) -> Error {
+    name.syntax(
+        Place::File,
+        format!("the index of a {what} below {n}"),
+        index.to_string(),
+    )
+}
+
+/// What a node does to what it holds.
+fn local(node: &Node) -> Transform {
+    if let Some(m) = node.matrix {
+        let columns = [
+            [m[0], m[1], m[2]],
+            [m[4], m[5], m[6]],
+            [m[8], m[9], m[10]],
+            [m[12], m[13], m[14]],
+        ];
+        return (columns != IDENTITY).then_some(columns);
+    }
+    let translation = node.translation.unwrap_or([0.0; 3]);
+    let [x, y, z, w] = node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);
+    let scale = node.scale.unwrap_or([1.0; 3]);
+    let rotation = [
+        [
+            1.0 - 2.0 * (y * y + z * z),
+            2.0 * (x * y + w * z),
+            2.0 * (x * z - w * y),
+        ],
+        [
+            2.0 * (x * y - w * z),
+            1.0 - 2.0 * (x * x + z * z),
+            2.0 * (y * z + w * x),
+        ],
+        [
+            2.0 * (x * z + w * y),
+            2.0 * (y * z - w * x),
+            1.0 - 2.0 * (x * x + y * y),
+        ],
+    ];
+    let [a, b, c] = [0, 1, 2].map(|axis| rotation[axis].map(|entry| entry * scale[axis]));
+    let columns = [a, b, c, translation];
+    (columns != IDENTITY).then_some(columns)
+}
+
+const IDENTITY: [[f64; 3]; 4] = [
+    [1.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [0.0, 0.0, 0.0],
+];
+
+/// The position behind a transformation.
+fn apply(columns: &[[f64; 3]; 4], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|row| {
+        columns[0][row] * x + columns[1][row] * y + columns[2][row] * z + columns[3][row]
+    })
+}
+
+/// First `local`, then `parent`.
+fn compose(parent: Transform, local: Transform) -> Transform {
+    let (Some(parent), Some(local)) = (parent, local) else {
+        return parent.or(local);
+    };
+    let linear = [parent[0], parent[1], parent[2], [0.0; 3]];
+    Some([
+        apply(&linear, local[0]),
+        apply(&linear, local[1]),
+        apply(&linear, local[2]),
+        apply(&parent, local[3]),
+    ])
+}

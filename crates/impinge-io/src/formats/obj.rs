@@ -1,0 +1,109 @@
+//! Wavefront OBJ: `v` and `f`; groups, materials, normals and texture coordinates are passed over.
+//!
+//! Source: Wavefront, "Advanced Visualizer" manual, appendix B1. A file is read as one body, its groups in their order. A
+//! face may name vertices that come later (positive indices); negative ones count back from the last vertex so far.
+
+use std::borrow::Cow;
+
+use crate::collect::{Collector, check_n_vertices, finite, vertex_ix};
+use crate::error::{Error, Name, Place};
+use crate::mesh::Positions;
+use crate::text::{Line, Text, number};
+
+pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error> {
+    let mut parts = Collector::new(name);
+    let mut positions: Vec<[f64; 3]> = Vec::new();
+    // The greatest index of all faces and where it is: checked once all vertices are known.
+    let mut greatest = (0, Place::File);
+    let mut text = Text::new(name, bytes);
+    while let Some(line) = text.line() {
+        let place = line.place();
+        let joined = joined(line, &mut text);
+        let mut words = Line {
+            bytes: &joined,
+            number: line.number,
+        }
+        .words();
+        match words.next() {
+            Some(b"v") => {
+                let mut position = [0.0; 3];
+                for (axis, c) in ["x", "y", "z"].into_iter().zip(&mut position) {
+                    let word = words
+                        .next()
+                        .ok_or_else(|| name.syntax(place, axis, "the end of the line"))?;
+                    *c = number(name, place, word, axis)?;
+                }
+                positions.push(finite(name, place, positions.len(), position)?);
+            }
+            Some(b"f") => {
+                parts.corners.clear();
+                for word in words {
+                    let index = corner(name, place, word)?;
+                    let n_so_far = positions.len() as u64;
+                    parts.corners.push(match index {
+                        1.. => {
+                            greatest = if index > greatest.0 {
+                                (index, place)
+                            } else {
+                                greatest
+                            };
+                            // One that does not fit is above the greatest number of vertices, so the check at the end finds it.
+                            u32::try_from(index - 1).unwrap_or(u32::MAX)
+                        }
+                        ..0 => vertex_ix(name, index, -(positions.len() as i64), n_so_far, place)?,
+                        0 => {
+                            return Err(Error::Index {
+                                at: name.at(place),
+                                index,
+                                first: 1,
+                                n_vertices: n_so_far,
+                            });
+                        }
+                    });
+                }
+                parts.polygon(place)?;
+            }
+            Some(b"l") => parts.n_lines += 1,
+            Some(b"p") => parts.n_points += 1,
+            Some(word @ (b"curv" | b"curv2" | b"surf" | b"vp")) => {
+                let word = String::from_utf8_lossy(word);
+                return Err(name.unsupported(
+                    place,
+                    format!("free-form geometry ('{word}'; only polygons are read)"),
+                ));
+            }
+            _ => {}
+        }
+    }
+    check_n_vertices(name, Place::File, positions.len() as u64)?;
+    parts.positions = Positions::F64(positions);
+    if greatest.0 > 0 {
+        parts.vertex(greatest.0, 1, greatest.1)?;
+    }
+    Ok(parts)
+}
+
+/// The vertex index of a corner: `7`, `7/1`, `7//3` or `7/1/3`.
+fn corner(name: Name, place: Place, word: &[u8]) -> Result<i64, Error> {
+    let end = word.iter().position(|&b| b == b'/').unwrap_or(word.len());
+    number(name, place, &word[..end], "a vertex index")
+}
+
+/// A line with the lines that it is continued on by a backslash at its end.
+fn joined<'t>(line: Line<'t>, text: &mut Text<'t>) -> Cow<'t, [u8]> {
+    let Some(start) = line.bytes.strip_suffix(b"\\") else {
+        return Cow::Borrowed(line.bytes);
+    };
+    let mut joined = start.to_vec();
+    while let Some(next) = text.line() {
+        joined.push(b' ');
+        match next.bytes.strip_suffix(b"\\") {
+            Some(part) => joined.extend_from_slice(part),
+            None => {
+                joined.extend_from_slice(next.bytes);
+                break;
+            }
+        }
+    }
+    Cow::Owned(joined)
+}

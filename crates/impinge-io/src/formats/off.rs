@@ -1,0 +1,119 @@
+//! Geomview OFF, text: `OFF`, `COFF`, `NOFF`, `STOFF` and mixtures; normals, colours and texture coordinates are passed over.
+//!
+//! Source: Geomview manual, "OFF Files". The keyword and the number of edges may be missing. Faces of one or two corners,
+//! which OFF uses for points and segments, are counted and left out.
+
+use crate::collect::{Collector, check_n_vertices, finite};
+use crate::error::{Error, Name, shown};
+use crate::mesh::Positions;
+use crate::text::{Line, Text, number};
+
+pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error> {
+    const COUNTS: &str = "the numbers of vertices and faces";
+    let mut parts = Collector::new(name);
+    let mut text = Text::new(name, bytes);
+    let mut header = text.need_content_line(b'#', "'OFF'")?;
+    let first = header.words().next().unwrap_or_default();
+    if first.ends_with(b"OFF") {
+        check_keyword(name, header, first)?;
+        let start = header
+            .bytes
+            .windows(3)
+            .position(|w| w == b"OFF")
+            .map_or(0, |ix| ix + 3);
+        header.bytes = &header.bytes[start..];
+        if header.is_blank() {
+            header = text.need_content_line(b'#', COUNTS)?;
+        }
+    }
+    let mut counts = [0u64; 2];
+    let mut words = header.words();
+    for count in &mut counts {
+        let word = words
+            .next()
+            .ok_or_else(|| name.syntax(header.place(), COUNTS, "the end of the line"))?;
+        *count = number(name, header.place(), word, COUNTS)?;
+    }
+    let [n_vertices, n_faces] = counts;
+    check_n_vertices(name, header.place(), n_vertices)?;
+
+    let mut positions = Vec::with_capacity(n_vertices.min(text.room(6)) as usize);
+    for _ in 0..n_vertices {
+        let Some(line) = text.content_line(b'#') else {
+            return Err(name.count(text.place(), "vertices", n_vertices, positions.len() as u64));
+        };
+        let mut words = line.words();
+        let mut position = [0.0; 3];
+        for (axis, c) in ["x", "y", "z"].into_iter().zip(&mut position) {
+            let word = words
+                .next()
+                .ok_or_else(|| name.syntax(line.place(), axis, "the end of the line"))?;
+            *c = number(name, line.place(), word, axis)?;
+        }
+        positions.push(finite(name, line.place(), positions.len(), position)?);
+    }
+    parts.positions = Positions::F64(positions);
+
+    parts.triangles.reserve(n_faces.min(text.room(8)) as usize);
+    for n_read in 0..n_faces {
+        let Some(line) = text.content_line(b'#') else {
+            return Err(name.count(text.place(), "faces", n_faces, n_read));
+        };
+        face(&mut parts, line)?;
+    }
+    Ok(parts)
+}
+
+/// Refuses the variants whose vertices are not `x y z` and something after it.
+fn check_keyword(name: Name, header: Line, keyword: &[u8]) -> Result<(), Error> {
+    let prefix = &keyword[..keyword.len() - 3];
+    if prefix.iter().any(|b| matches!(b, b'4' | b'n')) {
+        return Err(name.unsupported(
+            header.place(),
+            format!(
+                "the keyword {} (vertices have three coordinates here)",
+                shown(keyword)
+            ),
+        ));
+    }
+    if !matches!(
+        prefix,
+        b"" | b"C" | b"N" | b"CN" | b"ST" | b"STC" | b"STN" | b"STCN"
+    ) {
+        return Err(name.syntax(
+            header.place(),
+            "'OFF', 'COFF', 'NOFF', 'STOFF' or a mixture",
+            shown(keyword),
+        ));
+    }
+    if header.words().nth(1) == Some(b"BINARY") {
+        return Err(name.unsupported(header.place(), "binary OFF (text is)"));
+    }
+    Ok(())
+}
+
+/// A line `n i_1 … i_n`, perhaps with a colour after it.
+fn face(parts: &mut Collector, line: Line) -> Result<(), Error> {
+    let (name, place) = (parts.name, line.place());
+    let mut words = line.words();
+    let n_corners: u64 = number(
+        name,
+        place,
+        words.next().unwrap_or_default(),
+        "the number of corners",
+    )?;
+    parts.corners.clear();
+    for n_read in 0..n_corners {
+        let word = words
+            .next()
+            .ok_or_else(|| name.count(place, "corners", n_corners, n_read))?;
+        let corner = parts.vertex(number(name, place, word, "a vertex index")?, 0, place)?;
+        parts.corners.push(corner);
+    }
+    match n_corners {
+        1 => parts.n_points += 1,
+        2 => parts.n_lines += 1,
+        _ => parts.polygon(place)?,
+    }
+    Ok(())
+}

@@ -1,0 +1,341 @@
+//! VTU, the unstructured grid of VTK XML files: ascii, inline base64, and appended data raw or in base64; compressed by
+//! zlib or LZ4 or not at all. All pieces become one body.
+//!
+//! Source: VTK File Formats (Kitware), "XML file formats"; vtkXMLDataReader.cxx for the block header of compressed data.
+
+mod array;
+
+use roxmltree::{Document, Node};
+
+use self::array::Arrays;
+use super::cells;
+use crate::budget::Budget;
+use crate::collect::{Collector, check_n_vertices};
+use crate::error::{Error, Name, Place, shown};
+use crate::mesh::Positions;
+use crate::{ReadOptions, binary::Endian, binary::Scalar};
+
+pub(crate) fn read<'a>(
+    bytes: &[u8],
+    name: Name<'a>,
+    options: &ReadOptions,
+) -> Result<Collector<'a>, Error> {
+    let file = File::split(bytes, name)?;
+    let document = Document::parse(&file.xml).map_err(|error| {
+        let message = error.to_string().replace(['\n', '\r'], " ");
+        name.syntax(
+            Place::Line(u64::from(error.pos().row)),
+            "well-formed XML",
+            message,
+        )
+    })?;
+    let root = document.root_element();
+    if root.tag_name().name() != "VTKFile" {
+        return Err(name.syntax(
+            place(root),
+            "the element 'VTKFile'",
+            shown(root.tag_name().name().as_bytes()),
+        ));
+    }
+    let kind = root.attribute("type").unwrap_or_default();
+    if kind != "UnstructuredGrid" {
+        return Err(name.unsupported(
+            place(root),
+            format!(
+                "the VTK file type {} (UnstructuredGrid is)",
+                shown(kind.as_bytes())
+            ),
+        ));
+    }
+    let mut arrays = Arrays {
+        name,
+        xml: &file.xml,
+        appended: file.appended(&document)?,
+        endian: match root.attribute("byte_order") {
+            None | Some("LittleEndian") => Endian::Little,
+            Some("BigEndian") => Endian::Big,
+            Some(other) => {
+                return Err(name.syntax(
+                    place(root),
+                    "'LittleEndian' or 'BigEndian'",
+                    shown(other.as_bytes()),
+                ));
+            }
+        },
+        header: match root.attribute("header_type") {
+            None | Some("UInt32") => Scalar::U32,
+            Some("UInt64") => Scalar::U64,
+            Some(other) => {
+                return Err(name.syntax(
+                    place(root),
+                    "'UInt32' or 'UInt64'",
+                    shown(other.as_bytes()),
+                ));
+            }
+        },
+        compressor: match root.attribute("compressor") {
+            None | Some("") => None,
+            Some("vtkZLibDataCompressor") => Some(array::Compressor::Zlib),
+            Some("vtkLZ4DataCompressor") => Some(array::Compressor::Lz4),
+            Some(other) => {
+                return Err(name.unsupported(
+                    place(root),
+                    format!(
+                        "the compressor {} (zlib and LZ4 are)",
+                        shown(other.as_bytes())
+                    ),
+                ));
+            }
+        },
+        budget: Budget::new(options.max_expanded_bytes.max(4 * bytes.len() as u64)),
+    };
+    let mut parts = Collector::new(name);
+    let grid = child(root, "UnstructuredGrid")
+        .ok_or_else(|| name.syntax(place(root), "an element 'UnstructuredGrid'", "none"))?;
+    for piece in children(grid, "Piece") {
+        read_piece(&mut arrays, piece, &mut parts)?;
+    }
+    Ok(parts)
+}
+
+/// The place of an element.
+fn place(node: Node) -> Place {
+    Place::Byte(node.range().start as u64)
+}
+
+fn children<'a, 'x: 'a>(
+    node: Node<'a, 'x>,
+    tag: &'static str,
+) -> impl Iterator<Item = Node<'a, 'x>> {
+    node.children().filter(move |child| child.has_tag_name(tag))
+}
+
+fn child<'a, 'x: 'a>(node: Node<'a, 'x>, tag: &'static str) -> Option<Node<'a, 'x>> {
+    children(node, tag).next()
+}
+
+/// The two parts of a file: XML that a parser can read, and what is appended, which may be any bytes.
+struct File<'b> {
+    name: Name<'b>,
+    /// The file up to the appended data; offsets are those of the file. The end tags that were behind it are put back.
+    xml: String,
+    /// The bytes behind the `_` that starts the appended data, and the offset of the first.
+    behind: Option<(&'b [u8], usize)>,
+}
+
+/// The appended data.
+#[derive(Clone, Copy)]
+struct Appended<'b> {
+    bytes: &'b [u8],
+    /// Where they start in the file.
+    start: usize,
+    is_base64: bool,
+}
+
+impl<'b> File<'b> {
+    fn split(bytes: &'b [u8], name: Name<'b>) -> Result<Self, Error> {
+        const TAG: &[u8] = b"<AppendedData";
+        let text = |bytes: &[u8]| {
+            std::str::from_utf8(bytes)
+                .map(str::to_owned)
+                .map_err(|error| {
+                    name.syntax(
+                        Place::Byte(error.valid_up_to() as u64),
+                        "XML in UTF-8",
+                        "other bytes",
+                    )
+                })
+        };
+        let Some(tag) = find(bytes, TAG) else {
+            return Ok(File {
+                name,
+                xml: text(bytes)?,
+                behind: None,
+            });
+        };
+        let missing =
+            |what: &str| name.syntax(Place::Byte(tag as u64), what, "the end of the file");
+        let open = tag
+            + bytes[tag..]
+                .iter()
+                .position(|&b| b == b'>')
+                .ok_or_else(|| missing("'>'"))?;
+        let mut xml = text(&bytes[..=open])?;
+        let mut behind = None;
+        if xml.ends_with("/>") {
+            xml.push_str("</VTKFile>");
+        } else {
+            let mark = open
+                + bytes[open..]
+                    .iter()
+                    .position(|&b| b == b'_')
+                    .ok_or_else(|| missing("'_' and the appended data"))?;
+            behind = Some((&bytes[mark + 1..], mark + 1));
+            xml.push_str("</AppendedData></VTKFile>");
+        }
+        Ok(File { name, xml, behind })
+    }
+
+    fn appended(&self, document: &Document) -> Result<Option<Appended<'b>>, Error> {
+        let (Some((bytes, start)), Some(node)) =
+            (self.behind, child(document.root_element(), "AppendedData"))
+        else {
+            return Ok(None);
+        };
+        let is_base64 = match node.attribute("encoding") {
+            Some("raw") => false,
+            None | Some("base64") => true,
+            Some(other) => {
+                return Err(self.name.syntax(
+                    place(node),
+                    "'raw' or 'base64'",
+                    shown(other.as_bytes()),
+                ));
+            }
+        };
+        // Of base64 only what stands before the end tag can be meant; raw data may hold any bytes.
+        let end = if is_base64 {
+            bytes.iter().position(|&b| b == b'<').unwrap_or(bytes.len())
+        } else {
+            bytes.len()
+        };
+        Ok(Some(Appended {
+            bytes: &bytes[..end],
+            start,
+            is_base64,
+        }))
+    }
+}
+
+fn find(bytes: &[u8], tag: &[u8]) -> Option<usize> {
+    let mut from = 0;
+    while let Some(found) = bytes[from..].iter().position(|&b| b == tag[0]) {
+        from += found;
+        if bytes[from..].starts_with(tag) {
+            return Some(from);
+        }
+        from += 1;
+    }
+    None
+}
+
+/// Adds the points and cells of a piece.
+fn read_piece(arrays: &mut Arrays, piece: Node, parts: &mut Collector) -> Result<(), Error> {
+    let name = parts.name;
+    let number = |attribute: &str| {
+        let value = piece.attribute(attribute).unwrap_or_default();
+        value.trim().parse::<u64>().map_err(|_| {
+            name.syntax(
+                place(piece),
+                format!("a number in '{attribute}'"),
+                shown(value.as_bytes()),
+            )
+        })
+    };
+    let (n_points, n_cells) = (number("NumberOfPoints")?, number("NumberOfCells")?);
+    let first = parts.n_vertices();
+    check_n_vertices(name, place(piece), first.saturating_add(n_points))?;
+    if n_points > 0 {
+        let points = child(piece, "Points").and_then(|points| child(points, "DataArray"));
+        let points = points.ok_or_else(|| {
+            name.syntax(
+                place(piece),
+                "an element 'Points' with a 'DataArray'",
+                "none",
+            )
+        })?;
+        let values = arrays.read(points)?;
+        if values.len() as u64 != 3 * n_points {
+            return Err(name.count(
+                place(points),
+                "coordinates",
+                3 * n_points,
+                values.len() as u64,
+            ));
+        }
+        append(
+            &mut parts.positions,
+            values.positions(name, place(points), first)?,
+        );
+    }
+    if n_cells == 0 {
+        return Ok(());
+    }
+    let cells = child(piece, "Cells")
+        .ok_or_else(|| name.syntax(place(piece), "an element 'Cells'", "none"))?;
+    let mut array = |title: &str| {
+        let node =
+            children(cells, "DataArray").find(|array| array.attribute("Name") == Some(title));
+        let node = node.ok_or_else(|| {
+            name.syntax(
+                place(cells),
+                format!("a 'DataArray' named '{title}'"),
+                "none",
+            )
+        })?;
+        Ok::<_, Error>((arrays.read(node)?, place(node)))
+    };
+    let ((connectivity, connectivity_at), (offsets, offsets_at), (types, types_at)) =
+        (array("connectivity")?, array("offsets")?, array("types")?);
+    for (values, at, what) in [
+        (&offsets, offsets_at, "offsets of cells"),
+        (&types, types_at, "types of cells"),
+    ] {
+        if values.len() as u64 != n_cells {
+            return Err(name.count(at, what, n_cells, values.len() as u64));
+        }
+    }
+    let mut start = 0usize;
+    let mut indices = Vec::new();
+    for cell in 0..offsets.len() {
+        let offset = offsets.integer(cell);
+        let end = usize::try_from(offset)
+            .ok()
+            .filter(|end| (start..=connectivity.len()).contains(end));
+        let end = end.ok_or_else(|| {
+            name.syntax(
+                offsets_at,
+                format!(
+                    "an offset of cell {cell} from {start} to {}",
+                    connectivity.len()
+                ),
+                offset.to_string(),
+            )
+        })?;
+        indices.clear();
+        for ix in start..end {
+            let index = connectivity.integer(ix);
+            if u64::try_from(index).is_ok_and(|index| index < n_points) {
+                // Both are below 2^32: no overflow.
+                indices.push(index + first as i64);
+            } else {
+                return Err(Error::Index {
+                    at: name.at(connectivity_at),
+                    index,
+                    first: 0,
+                    n_vertices: n_points,
+                });
+            }
+        }
+        cells::put(parts, types.integer(cell), &indices, types_at)?;
+        start = end;
+    }
+    Ok(())
+}
+
+/// Adds `more` behind `positions`; they are f32 as long as all pieces are.
+fn append(positions: &mut Positions, more: Positions) {
+    if positions.is_empty() {
+        *positions = more;
+        return;
+    }
+    match (&mut *positions, more) {
+        (Positions::F32(all), Positions::F32(more)) => all.extend(more),
+        (Positions::F64(all), Positions::F64(more)) => all.extend(more),
+        (_, more) => {
+            let mut all = positions.to_f64();
+            all.extend(more.to_f64());
+            *positions = Positions::F64(all);
+        }
+    }
+}

@@ -1,0 +1,336 @@
+//! The arrays of a VTU file, whatever their storage.
+
+use std::borrow::Cow;
+
+use roxmltree::Node;
+
+use super::{Appended, place};
+use crate::base64;
+use crate::binary::{Endian, Scalar};
+use crate::budget::Budget;
+use crate::collect::finite;
+use crate::error::{Error, Name, Place, shown};
+use crate::mesh::Positions;
+use crate::text::Text;
+
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Compressor {
+    Zlib,
+    Lz4,
+}
+
+/// The numbers of an array.
+pub(super) enum Values<'b> {
+    Floats(Vec<f64>),
+    Integers(Vec<i64>),
+    Binary {
+        bytes: Cow<'b, [u8]>,
+        scalar: Scalar,
+        endian: Endian,
+    },
+}
+
+impl Values<'_> {
+    pub(super) fn len(&self) -> usize {
+        match self {
+            Values::Floats(values) => values.len(),
+            Values::Integers(values) => values.len(),
+            Values::Binary { bytes, scalar, .. } => bytes.len() / scalar.size(),
+        }
+    }
+
+    /// Value `ix`, which must exist, as an integer.
+    pub(super) fn integer(&self, ix: usize) -> i64 {
+        match self {
+            Values::Floats(values) => values[ix] as i64,
+            Values::Integers(values) => values[ix],
+            Values::Binary {
+                bytes,
+                scalar,
+                endian,
+            } => scalar.integer(&bytes[ix * scalar.size()..], *endian),
+        }
+    }
+
+    /// All values as positions; the first is that of vertex `first`.
+    pub(super) fn positions(
+        &self,
+        name: Name,
+        place: Place,
+        first: u64,
+    ) -> Result<Positions, Error> {
+        let checked = |positions: Vec<[f64; 3]>| {
+            for (ix, &position) in positions.iter().enumerate() {
+                finite(name, place, first as usize + ix, position)?;
+            }
+            Ok(Positions::F64(positions))
+        };
+        match self {
+            Values::Floats(values) => checked(values.as_chunks::<3>().0.to_vec()),
+            Values::Integers(values) => checked(
+                values
+                    .as_chunks::<3>()
+                    .0
+                    .iter()
+                    .map(|v| v.map(|c| c as f64))
+                    .collect(),
+            ),
+            Values::Binary {
+                bytes,
+                scalar,
+                endian,
+            } => super::super::positions(name, bytes, *scalar, *endian, |_| place),
+        }
+    }
+}
+
+/// What is needed to read an array of the file.
+pub(super) struct Arrays<'b> {
+    pub name: Name<'b>,
+    pub xml: &'b str,
+    pub appended: Option<Appended<'b>>,
+    pub endian: Endian,
+    /// The type of the numbers that stand before binary data.
+    pub header: Scalar,
+    pub compressor: Option<Compressor>,
+    pub budget: Budget,
+}
+
+/// Encoded bytes from some place on; how many of them are wanted shows only while reading.
+struct Encoded<'b> {
+    bytes: &'b [u8],
+    is_base64: bool,
+    at: Place,
+}
+
+impl<'b> Arrays<'b> {
+    /// Reads the `DataArray` at `node`.
+    pub(super) fn read(&mut self, node: Node) -> Result<Values<'b>, Error> {
+        let (name, at) = (self.name, place(node));
+        let kind = node.attribute("type").unwrap_or_default();
+        let scalar = match kind {
+            "Int8" => Scalar::I8,
+            "UInt8" => Scalar::U8,
+            "Int16" => Scalar::I16,
+            "UInt16" => Scalar::U16,
+            "Int32" => Scalar::I32,
+            "UInt32" => Scalar::U32,
+            "Int64" => Scalar::I64,
+            "UInt64" => Scalar::U64,
+            "Float32" => Scalar::F32,
+            "Float64" => Scalar::F64,
+            other => return Err(name.syntax(at, "a type of numbers", shown(other.as_bytes()))),
+        };
+        // Numbers hold no entities, so the text can be taken from the file itself, where offsets are known.
+        let text = node
+            .children()
+            .find(Node::is_text)
+            .map_or(0..0, |text| text.range());
+        let encoded = match node.attribute("format") {
+            None | Some("ascii") => return self.read_ascii(scalar, text),
+            Some("binary") => Encoded {
+                bytes: self.xml[text].as_bytes().trim_ascii(),
+                is_base64: true,
+                at,
+            },
+            Some("appended") => {
+                let appended = self
+                    .appended
+                    .ok_or_else(|| name.syntax(at, "an element 'AppendedData'", "none"))?;
+                let offset = node.attribute("offset").unwrap_or_default();
+                let offset = offset.trim().parse::<usize>().map_err(|_| {
+                    name.syntax(at, "a number in 'offset'", shown(offset.as_bytes()))
+                })?;
+                let bytes = appended.bytes.get(offset..).ok_or_else(|| {
+                    name.truncated(
+                        at,
+                        "the appended data",
+                        offset as u64,
+                        appended.bytes.len() as u64,
+                    )
+                })?;
+                Encoded {
+                    bytes,
+                    is_base64: appended.is_base64,
+                    at: Place::Byte((appended.start + offset) as u64),
+                }
+            }
+            Some(other) => {
+                return Err(name.syntax(
+                    at,
+                    "'ascii', 'binary' or 'appended'",
+                    shown(other.as_bytes()),
+                ));
+            }
+        };
+        let bytes = match self.compressor {
+            None => self.plain(&encoded)?,
+            Some(compressor) => Cow::Owned(self.compressed(&encoded, compressor)?),
+        };
+        if !bytes.len().is_multiple_of(scalar.size()) {
+            let whole = bytes.len().next_multiple_of(scalar.size());
+            return Err(name.count(
+                encoded.at,
+                format!("bytes of numbers of type {kind}"),
+                whole as u64,
+                bytes.len() as u64,
+            ));
+        }
+        Ok(Values::Binary {
+            bytes,
+            scalar,
+            endian: self.endian,
+        })
+    }
+
+    fn read_ascii(
+        &self,
+        scalar: Scalar,
+        range: std::ops::Range<usize>,
+    ) -> Result<Values<'b>, Error> {
+        let mut text =
+            Text::new(self.name, &self.xml.as_bytes()[range.clone()]).in_bytes(range.start);
+        if scalar.is_float() {
+            let mut values = Vec::new();
+            while text.peek_word().is_some() {
+                values.push(text.number("a number")?);
+            }
+            return Ok(Values::Floats(values));
+        }
+        let mut values = Vec::new();
+        while text.peek_word().is_some() {
+            values.push(text.number("an integer")?);
+        }
+        Ok(Values::Integers(values))
+    }
+
+    /// The first `n` bytes that `encoded` stands for, taken from the budget.
+    fn fetch(&mut self, encoded: &Encoded<'b>, n: u64, what: &str) -> Result<Cow<'b, [u8]>, Error> {
+        let (name, at) = (self.name, encoded.at);
+        self.budget
+            .charge(name, at, n.min(encoded.bytes.len() as u64), 1)?;
+        let most = usize::try_from(n).unwrap_or(usize::MAX);
+        let bytes = if encoded.is_base64 {
+            let wrong = |base64::Wrong(ix): base64::Wrong| {
+                name.syntax(
+                    at,
+                    "base64",
+                    format!(
+                        "{} at its byte {ix}",
+                        encoded
+                            .bytes
+                            .get(ix..)
+                            .map_or("the end".to_owned(), |rest| shown(
+                                &rest[..rest.len().min(1)]
+                            ))
+                    ),
+                )
+            };
+            Cow::Owned(base64::decode(encoded.bytes, most).map_err(wrong)?)
+        } else {
+            Cow::Borrowed(&encoded.bytes[..encoded.bytes.len().min(most)])
+        };
+        if (bytes.len() as u64) < n {
+            return Err(name.truncated(at, what, n, bytes.len() as u64));
+        }
+        Ok(bytes)
+    }
+
+    /// Data behind its length.
+    fn plain(&mut self, encoded: &Encoded<'b>) -> Result<Cow<'b, [u8]>, Error> {
+        let size = self.header.size();
+        let header = self.fetch(encoded, size as u64, "the length of an array")?;
+        let length = self.header.integer(&header, self.endian).unsigned_abs();
+        let all = self.fetch(encoded, length.saturating_add(size as u64), "an array")?;
+        Ok(match all {
+            Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[size..]),
+            Cow::Owned(mut bytes) => {
+                bytes.drain(..size);
+                Cow::Owned(bytes)
+            }
+        })
+    }
+
+    /// Compressed data behind its header: the number of blocks, the size of a block, that of the last one (0: it is whole),
+    /// then the compressed size of each.
+    fn compressed(
+        &mut self,
+        encoded: &Encoded<'b>,
+        compressor: Compressor,
+    ) -> Result<Vec<u8>, Error> {
+        let (name, at, size, endian) = (self.name, encoded.at, self.header.size(), self.endian);
+        let header = self.header;
+        let numbers = |bytes: &[u8]| -> Vec<u64> {
+            bytes
+                .chunks_exact(size)
+                .map(|bytes| header.integer(bytes, endian).unsigned_abs())
+                .collect()
+        };
+        let start =
+            numbers(&self.fetch(encoded, 3 * size as u64, "the header of compressed data")?);
+        let (n_blocks, block, last) = (start[0], start[1], start[2]);
+        if n_blocks == 0 {
+            return Ok(Vec::new());
+        }
+        let header_length = n_blocks.saturating_add(3).saturating_mul(size as u64);
+        let sizes =
+            numbers(&self.fetch(encoded, header_length, "the header of compressed data")?)
+                .split_off(3);
+        let length = sizes
+            .iter()
+            .fold(header_length, |sum, &size| sum.saturating_add(size));
+        let all = self.fetch(encoded, length, "compressed data")?;
+        // The sizes sum up to no more than was fetched, so they are small.
+        let mut rest = &all[header_length as usize..];
+        let mut out = Vec::new();
+        for (ix, &compressed) in (1..).zip(&sizes) {
+            let (bytes, behind) = rest.split_at(compressed as usize);
+            rest = behind;
+            let expected = if ix == n_blocks && last > 0 {
+                last
+            } else {
+                block
+            };
+            self.budget.charge(name, at, expected, 1)?;
+            // Neither method makes data longer than this; a header that says so lies, and no memory is reserved for it.
+            let most = compressed.saturating_mul(1100).saturating_add(64);
+            if expected > most {
+                return Err(name.too_large(
+                    at,
+                    format!("length of block {ix} out of {compressed} bytes"),
+                    most,
+                    expected,
+                ));
+            }
+            let block = decompress(bytes, expected as usize, compressor).map_err(|message| {
+                name.syntax(
+                    at,
+                    format!("a compressed block {ix} of {expected} bytes"),
+                    message,
+                )
+            })?;
+            if block.len() as u64 != expected {
+                return Err(name.count(
+                    at,
+                    format!("bytes in block {ix}"),
+                    expected,
+                    block.len() as u64,
+                ));
+            }
+            out.extend_from_slice(&block);
+        }
+        Ok(out)
+    }
+}
+
+/// Decompresses a block of at most `expected` bytes.
+fn decompress(bytes: &[u8], expected: usize, compressor: Compressor) -> Result<Vec<u8>, String> {
+    match compressor {
+        Compressor::Zlib => {
+            miniz_oxide::inflate::decompress_to_vec_zlib_with_limit(bytes, expected)
+                .map_err(|error| format!("zlib: {:?}", error.status))
+        }
+        Compressor::Lz4 => lz4_flex::block::decompress(bytes, expected)
+            .map_err(|error| format!("LZ4: {error}").replace('\n', " ")),
+    }
+}

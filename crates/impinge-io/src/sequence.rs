@@ -1,0 +1,500 @@
+//! Sequences of positions: point caches, and meshes in numbered files.
+
+use std::fs::{self, File};
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use crate::binary::{Cursor, Endian, Scalar, array};
+use crate::error::{Error, Name, Place, shown};
+use crate::mesh::Positions;
+use crate::read::{ReadOptions, collect_file};
+
+/// A format that holds the frames of a sequence in one file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum SequenceFormat {
+    /// PC2 point cache, little endian (`.pc2`).
+    Pc2,
+    /// Lightwave MDD, big endian (`.mdd`).
+    Mdd,
+}
+
+impl SequenceFormat {
+    /// The format that files with this extension have (without the dot; case does not matter).
+    pub fn from_extension(extension: &str) -> Option<Self> {
+        match extension.to_ascii_lowercase().as_str() {
+            "pc2" => Some(SequenceFormat::Pc2),
+            "mdd" => Some(SequenceFormat::Mdd),
+            _ => None,
+        }
+    }
+}
+
+/// The frames of a deforming mesh: positions alone, all of the same number of vertices. Opening reads the header (or, of
+/// numbered files, the first); a frame is read when it is asked for, in any order.
+#[derive(Debug)]
+pub struct Sequence {
+    name: String,
+    frames: Frames,
+    n_frames: usize,
+    n_points: usize,
+}
+
+#[derive(Debug)]
+enum Frames {
+    /// Frames of equal size from `start` on.
+    Cache {
+        source: Source,
+        start: u64,
+        endian: Endian,
+    },
+    /// A mesh file each.
+    Files(Vec<PathBuf>),
+}
+
+#[derive(Debug)]
+enum Source {
+    File(PathBuf, Mutex<File>),
+    Bytes(Vec<u8>),
+}
+
+/// What the header of a point cache says.
+struct Header {
+    n_points: u64,
+    n_frames: u64,
+    start: u64,
+    endian: Endian,
+}
+
+impl Sequence {
+    /// Opens a sequence:
+    /// - `run.pc2`, `run.mdd`: a point cache;
+    /// - `run_0010.ply`: that file and those whose number in this place (the last one in the name) is greater, in the order
+    ///   of their numbers, gaps allowed;
+    /// - `run_%04d.ply`, `run_%d.ply`: all files of that pattern, in the order of their numbers;
+    /// - `run_*.ply`, `run_??.ply`: all files whose name matches, ordered by name with runs of digits compared as numbers.
+    ///
+    /// Patterns stand for a part of the file's name, not of a folder's. Numbered files may have any mesh format; only
+    /// their positions are read, never welded (see [`Weld`](crate::Weld)).
+    ///
+    /// # Errors
+    /// As [`read`](crate::read); [`Error::Truncated`] where a cache is shorter than its header says.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        match SequenceFormat::from_extension(&extension) {
+            Some(format) => Self::open_cache(path, format),
+            None => Self::open_files(path),
+        }
+    }
+
+    /// Reads a point cache from bytes. `name` stands for the file in errors.
+    ///
+    /// # Errors
+    /// [`Error::Syntax`] or [`Error::Truncated`].
+    pub fn from_bytes(bytes: Vec<u8>, format: SequenceFormat, name: &str) -> Result<Self, Error> {
+        let header = Header::read(&bytes, bytes.len() as u64, format, Name(name))?;
+        Ok(Self::cache(header, Source::Bytes(bytes), name.to_owned()))
+    }
+
+    /// How many frames there are.
+    pub fn n_frames(&self) -> usize {
+        self.n_frames
+    }
+
+    /// How many vertices each frame has.
+    pub fn n_points(&self) -> usize {
+        self.n_points
+    }
+
+    /// The positions of frame `frame_ix`, counted from 0: f32 from a point cache, else as the file has them.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] where there is no such frame, or a numbered file has another number of vertices;
+    /// [`Error::NotFinite`]; as [`read`](crate::read) for numbered files.
+    pub fn frame(&self, frame_ix: usize) -> Result<Positions, Error> {
+        let mismatch = |file: &str, what: &str, expected: usize, found: usize| Error::Mismatch {
+            file: file.to_owned(),
+            what: what.to_owned(),
+            expected: expected as u64,
+            found: found as u64,
+        };
+        if frame_ix >= self.n_frames {
+            return Err(mismatch(
+                &self.name,
+                "frame index beyond the frames",
+                self.n_frames,
+                frame_ix,
+            ));
+        }
+        match &self.frames {
+            Frames::Cache {
+                source,
+                start,
+                endian,
+            } => self.cached_frame(source, *start, *endian, frame_ix),
+            Frames::Files(files) => {
+                let path = &files[frame_ix];
+                let positions =
+                    collect_file(path, &ReadOptions::default(), |parts| Ok(parts.positions))?;
+                if positions.len() != self.n_points {
+                    return Err(mismatch(
+                        &path.display().to_string(),
+                        "vertices of a frame",
+                        self.n_points,
+                        positions.len(),
+                    ));
+                }
+                Ok(positions)
+            }
+        }
+    }
+
+    fn open_cache(path: &Path, format: SequenceFormat) -> Result<Self, Error> {
+        let mut file = File::open(path).map_err(|source| Error::io(path, "open", source))?;
+        let length = file
+            .metadata()
+            .map_err(|source| Error::io(path, "read", source))?
+            .len();
+        let mut start = Vec::new();
+        file.by_ref()
+            .take(32)
+            .read_to_end(&mut start)
+            .map_err(|source| Error::io(path, "read", source))?;
+        let name = path.display().to_string();
+        let header = Header::read(&start, length, format, Name(&name))?;
+        Ok(Self::cache(
+            header,
+            Source::File(path.to_owned(), Mutex::new(file)),
+            name,
+        ))
+    }
+
+    fn cache(header: Header, source: Source, name: String) -> Self {
+        Sequence {
+            name,
+            // Counts of 31 bits.
+            n_frames: header.n_frames as usize,
+            n_points: header.n_points as usize,
+            frames: Frames::Cache {
+                source,
+                start: header.start,
+                endian: header.endian,
+            },
+        }
+    }
+
+    fn cached_frame(
+        &self,
+        source: &Source,
+        start: u64,
+        endian: Endian,
+        frame_ix: usize,
+    ) -> Result<Positions, Error> {
+        let size = self.n_points * 12;
+        let offset = start + frame_ix as u64 * size as u64;
+        let mut buffer = Vec::new();
+        let bytes = match source {
+            // The header was held against the length of the bytes.
+            Source::Bytes(bytes) => &bytes[offset as usize..offset as usize + size],
+            Source::File(path, file) => {
+                let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
+                buffer.resize(size, 0);
+                let read = file
+                    .seek(SeekFrom::Start(offset))
+                    .and_then(|_| file.read_exact(&mut buffer));
+                read.map_err(|source| Error::io(path, "read", source))?;
+                &buffer
+            }
+        };
+        let mut positions = Vec::with_capacity(self.n_points);
+        for (vertex, record) in bytes.chunks_exact(12).enumerate() {
+            let position = [0, 4, 8].map(|at| f32::from_le_bytes(array(&record[at..], endian)));
+            let place = Place::Byte(offset + vertex as u64 * 12);
+            crate::collect::finite(Name(&self.name), place, vertex, position.map(f64::from))?;
+            positions.push(position);
+        }
+        Ok(Positions::F32(positions))
+    }
+
+    fn open_files(path: &Path) -> Result<Self, Error> {
+        let files = numbered_files(path)?;
+        let n_points = collect_file(&files[0], &ReadOptions::default(), |parts| {
+            Ok(parts.positions.len())
+        })?;
+        Ok(Sequence {
+            name: path.display().to_string(),
+            n_frames: files.len(),
+            n_points,
+            frames: Frames::Files(files),
+        })
+    }
+}
+
+impl Header {
+    /// Reads the header at the start of a file of `length` bytes, and checks that all frames are there.
+    fn read(start: &[u8], length: u64, format: SequenceFormat, name: Name) -> Result<Self, Error> {
+        let endian = match format {
+            SequenceFormat::Pc2 => Endian::Little,
+            SequenceFormat::Mdd => Endian::Big,
+        };
+        let mut cursor = Cursor::new(name, start, 0, endian);
+        let header = match format {
+            SequenceFormat::Pc2 => {
+                let magic = cursor.take(12, 1, "the header")?;
+                if magic != b"POINTCACHE2\0" {
+                    return Err(name.syntax(Place::Byte(0), "'POINTCACHE2'", shown(magic)));
+                }
+                let version = cursor.integer(Scalar::I32, "the version")?;
+                if version != 1 {
+                    return Err(
+                        name.unsupported(Place::Byte(12), format!("PC2 version {version} (1 is)"))
+                    );
+                }
+                let n_points = cursor.count(Scalar::I32, "the number of points")?;
+                cursor.take(2, 4, "start and rate")?;
+                Header {
+                    n_points,
+                    n_frames: cursor.count(Scalar::I32, "the number of frames")?,
+                    start: 32,
+                    endian,
+                }
+            }
+            SequenceFormat::Mdd => {
+                let n_frames = cursor.count(Scalar::I32, "the number of frames")?;
+                let n_points = cursor.count(Scalar::I32, "the number of points")?;
+                Header {
+                    n_points,
+                    n_frames,
+                    start: 8 + 4 * n_frames,
+                    endian,
+                }
+            }
+        };
+        // Two counts of 31 bits and a factor of 12: below 2^66, so this may saturate.
+        let needed = (header.n_points * header.n_frames)
+            .saturating_mul(12)
+            .saturating_add(header.start);
+        if needed > length {
+            let what = format!(
+                "a sequence of {} frames of {} points",
+                header.n_frames, header.n_points
+            );
+            return Err(name.truncated(Place::File, what, needed, length));
+        }
+        Ok(header)
+    }
+}
+
+/// The files that `path` names: a first one, a printf pattern, or a glob pattern; at least one, in order.
+fn numbered_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
+    let shown_path = path.display().to_string();
+    let name = Name(&shown_path);
+    let wrong = |found: &str| {
+        name.syntax(
+            Place::File,
+            "a file name with a number, a '%d' or a '*' in it",
+            found,
+        )
+    };
+    let pattern = path
+        .file_name()
+        .and_then(|n| n.to_str())
+        .ok_or_else(|| wrong("none"))?;
+    let matcher = Matcher::new(pattern).ok_or_else(|| wrong(&format!("'{pattern}'")))?;
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let mut found = Vec::new();
+    let failed = |source| Error::io(folder, "list", source);
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let file_name = entry.map_err(failed)?.file_name();
+        if let Some(key) = file_name
+            .to_str()
+            .and_then(|candidate| matcher.key(candidate))
+        {
+            found.push((key, path.with_file_name(file_name)));
+        }
+    }
+    if found.is_empty() {
+        return Err(name.syntax(Place::File, "files of this name", "none"));
+    }
+    found.sort();
+    Ok(found.into_iter().map(|(_, path)| path).collect())
+}
+
+/// Which file names belong to a sequence.
+#[derive(Debug)]
+enum Matcher<'p> {
+    /// A number from `least` on, of at least `width` digits, between two texts.
+    Number {
+        prefix: &'p str,
+        suffix: &'p str,
+        width: usize,
+        least: u128,
+    },
+    Glob(&'p str),
+}
+
+impl<'p> Matcher<'p> {
+    fn new(pattern: &'p str) -> Option<Self> {
+        if let Some((prefix, rest)) = pattern.split_once('%') {
+            let (width, suffix) = rest.split_once('d')?;
+            let width = if width.is_empty() {
+                1
+            } else {
+                width.parse().ok()?
+            };
+            return Some(Matcher::Number {
+                prefix,
+                suffix,
+                width,
+                least: 0,
+            });
+        }
+        if pattern.contains(['*', '?']) {
+            return Some(Matcher::Glob(pattern));
+        }
+        // Digits of the extension are no frame number.
+        let stem = pattern.rfind('.').map_or(pattern, |dot| &pattern[..dot]);
+        let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
+        let start = stem[..end]
+            .rfind(|c: char| !c.is_ascii_digit())
+            .map_or(0, |before| {
+                // The character before the digits may take several bytes.
+                before + stem[before..].chars().next().map_or(1, char::len_utf8)
+            });
+        let least = stem[start..end].parse().ok()?;
+        Some(Matcher::Number {
+            prefix: &pattern[..start],
+            suffix: &pattern[end..],
+            width: end - start,
+            least,
+        })
+    }
+
+    /// What to sort a file name by; `None` where it does not belong.
+    fn key(&self, candidate: &str) -> Option<Vec<(u128, String)>> {
+        match *self {
+            Matcher::Number {
+                prefix,
+                suffix,
+                width,
+                least,
+            } => {
+                let digits = candidate.strip_prefix(prefix)?.strip_suffix(suffix)?;
+                let is_number = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit());
+                // Zeros only fill up to the width: 7 and 07 are not both of one sequence.
+                let is_padded =
+                    digits.len() == width || (digits.len() > width && !digits.starts_with('0'));
+                let number = digits
+                    .parse()
+                    .ok()
+                    .filter(|&number| is_number && is_padded && number >= least)?;
+                Some(vec![(number, String::new())])
+            }
+            Matcher::Glob(pattern) => {
+                matches_glob(pattern, candidate).then(|| natural_key(candidate))
+            }
+        }
+    }
+}
+
+/// Whether `name` is of the pattern: `*` stands for any text, `?` for one character.
+fn matches_glob(pattern: &str, name: &str) -> bool {
+    let (pattern, name): (Vec<char>, Vec<char>) =
+        (pattern.chars().collect(), name.chars().collect());
+    let (mut p, mut n) = (0, 0);
+    // The last star, and how far into the name it reaches so far.
+    let mut star: Option<(usize, usize)> = None;
+    while n < name.len() {
+        match pattern.get(p) {
+            Some('*') => {
+                star = Some((p, n));
+                p += 1;
+            }
+            Some(&c) if c == '?' || c == name[n] => {
+                p += 1;
+                n += 1;
+            }
+            _ => match star {
+                Some((at, reach)) => {
+                    star = Some((at, reach + 1));
+                    (p, n) = (at + 1, reach + 1);
+                }
+                None => return false,
+            },
+        }
+    }
+    pattern[p..].iter().all(|&c| c == '*')
+}
+
+/// Splits a name into texts and numbers, so that 9 comes before 10; each entry is a number and the text after it.
+fn natural_key(name: &str) -> Vec<(u128, String)> {
+    let mut key = vec![(0, String::new())];
+    let mut digits = String::new();
+    for c in name.chars().chain(['\0']) {
+        if c.is_ascii_digit() {
+            digits.push(c);
+            continue;
+        }
+        if !digits.is_empty() {
+            key.push((digits.parse().unwrap_or(u128::MAX), String::new()));
+            digits.clear();
+        }
+        if let Some((_, text)) = key.last_mut() {
+            text.push(c);
+        }
+    }
+    key
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_in_names() {
+        let first = Matcher::new("é7_run_0009.v2").unwrap();
+        let key = |name: &str| first.key(name).map(|key| key[0].0);
+        assert_eq!(key("é7_run_0009.v2"), Some(9));
+        assert_eq!(key("é7_run_0010.v2"), Some(10));
+        assert_eq!(key("é7_run_10000.v2"), Some(10000));
+        for other in [
+            "é7_run_0008.v2",
+            "é7_run_10.v2",
+            "é7_run_00010.v2",
+            "é7_run_0010.v3",
+            "é7_run_.v2",
+            "x",
+        ] {
+            assert_eq!(key(other), None, "{other}");
+        }
+        let printf = Matcher::new("a%03db").unwrap();
+        assert!(
+            printf.key("a001b").is_some()
+                && printf.key("a1b").is_none()
+                && printf.key("a1000b").is_some()
+        );
+        assert!(Matcher::new("none.ply").is_none());
+        assert!(Matcher::new("%s").is_none());
+    }
+
+    #[test]
+    fn globs_and_their_order() {
+        for (pattern, name, is_match) in [
+            ("a*b*c", "aXbYc", true),
+            ("a*b*c", "abbc", true),
+            ("a*c", "ab", false),
+            ("?é*", "xé", true),
+            ("??", "x", false),
+            ("*", "", true),
+        ] {
+            assert_eq!(matches_glob(pattern, name), is_match, "{pattern} {name}");
+        }
+        let mut names = ["f10.ply", "f9.ply", "f1b.ply", "f1.ply"];
+        names.sort_by_key(|name| natural_key(name));
+        assert_eq!(names, ["f1.ply", "f1b.ply", "f9.ply", "f10.ply"]);
+    }
+}

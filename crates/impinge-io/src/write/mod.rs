@@ -1,0 +1,91 @@
+//! Writing coloured meshes and point caches. A file appears under its name when it is complete, and not before.
+
+mod atomic;
+mod glb;
+mod pc2;
+mod ply;
+mod surface;
+mod vtu;
+
+pub use glb::write_glb;
+pub use pc2::Pc2Writer;
+pub use ply::write_ply;
+pub use vtu::write_vtu;
+
+use std::path::Path;
+
+use crate::error::{Error, Name, Place};
+use crate::mesh::{Elements, Positions};
+
+/// A body to be written.
+#[derive(Debug, Clone, Copy)]
+pub struct ColoredMesh<'a> {
+    /// Where the vertices are.
+    pub positions: &'a Positions,
+    /// The primitives.
+    pub elements: &'a Elements,
+    /// Red, green and blue (sRGB, 0 to 255) of each primitive; light grey where there are none.
+    pub primitive_colors: Option<&'a [[u8; 3]]>,
+    /// Whether each primitive collides; VTU alone has a place for it.
+    pub colliding: Option<&'a [bool]>,
+    /// The name of the body, for formats that have names.
+    pub name: &'a str,
+}
+
+/// The colour of a primitive that has none.
+const GREY: [u8; 3] = [200, 200, 200];
+
+impl ColoredMesh<'_> {
+    fn color(&self, primitive_ix: usize) -> [u8; 3] {
+        self.primitive_colors
+            .map_or(GREY, |colors| colors[primitive_ix])
+    }
+
+    /// Checks that numbers match and indices are in range, so that no file is written that can't be read.
+    fn check(&self, name: Name) -> Result<(), Error> {
+        let n_primitives = self.elements.len();
+        for (what, given) in [
+            ("colours of", self.primitive_colors.map(<[_]>::len)),
+            ("colliding flags of", self.colliding.map(<[_]>::len)),
+        ] {
+            if let Some(found) = given.filter(|&n| n != n_primitives) {
+                let what = format!("{what} the primitives of body '{}'", self.name);
+                return Err(Error::Mismatch {
+                    file: name.0.to_owned(),
+                    what,
+                    expected: n_primitives as u64,
+                    found: found as u64,
+                });
+            }
+        }
+        let n_vertices = self.positions.len() as u64;
+        if let Some(&index) = self
+            .elements
+            .indices()
+            .iter()
+            .max()
+            .filter(|&&ix| u64::from(ix) >= n_vertices)
+        {
+            return Err(Error::Index {
+                at: name.at(Place::File),
+                index: i64::from(index),
+                first: 0,
+                n_vertices,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Checks all bodies of a file.
+fn check(path: &Path, meshes: &[ColoredMesh]) -> Result<(), Error> {
+    let name = path.display().to_string();
+    meshes.iter().try_for_each(|mesh| mesh.check(Name(&name)))
+}
+
+/// Whether any body has f64 positions; one file has one type of number, and f64 holds both.
+fn any_f64(meshes: &[ColoredMesh]) -> bool {
+    meshes
+        .iter()
+        .any(|mesh| matches!(mesh.positions, Positions::F64(_)))
+}

@@ -1,0 +1,128 @@
+//! Writing PLY.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use super::atomic::AtomicFile;
+use super::surface::surface;
+use super::{ColoredMesh, any_f64, check};
+use crate::error::{Error, Name, Place};
+use crate::mesh::{Elements, Positions};
+
+/// Writes bodies into one binary PLY file, a colour for each face.
+///
+/// Vertices are those given, in their order, a body after the other, so what is read back has the same vertices and ids;
+/// a viewer must know colours of faces (MeshLab, CloudCompare, ParaView do; for others write GLB). Each face also has the
+/// property `body`, the number of its body. Of tetrahedra the surface goes into the element `face`, and all of them into an
+/// element `tetra` (lists of four indices, colour, body), which viewers pass over and [`read`](crate::read) takes.
+/// Positions are f32 where all bodies have f32, else f64: nothing is rounded.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Mismatch`] or [`Error::Index`] where a body does not fit together; [`Error::TooLarge`] beyond 2^31 - 1 vertices.
+pub fn write_ply(path: &Path, meshes: &[ColoredMesh]) -> Result<(), Error> {
+    check(path, meshes)?;
+    let name = path.display().to_string();
+    let n_vertices: u64 = meshes.iter().map(|mesh| mesh.positions.len() as u64).sum();
+    let limit = u64::from(i32::MAX.unsigned_abs());
+    if n_vertices > limit {
+        return Err(Name(&name).too_large(Place::File, "number of vertices", limit, n_vertices));
+    }
+    let wide = any_f64(meshes);
+    let surfaces: Vec<_> = meshes
+        .iter()
+        .map(|mesh| surface(mesh.positions, mesh.elements))
+        .collect();
+    let n_faces: usize = surfaces.iter().map(Vec::len).sum();
+    let n_tetrahedra: usize = meshes
+        .iter()
+        .map(|mesh| {
+            if let Elements::Tetrahedra(t) = mesh.elements {
+                t.len()
+            } else {
+                0
+            }
+        })
+        .sum();
+
+    let mut file = AtomicFile::create(path)?;
+    file.put(header(n_vertices, wide, n_faces, n_tetrahedra).as_bytes())?;
+    for mesh in meshes {
+        match mesh.positions {
+            Positions::F32(p) if !wide => p
+                .as_flattened()
+                .iter()
+                .try_for_each(|c| file.put(&c.to_le_bytes()))?,
+            Positions::F32(p) => p
+                .as_flattened()
+                .iter()
+                .try_for_each(|c| file.put(&f64::from(*c).to_le_bytes()))?,
+            Positions::F64(p) => p
+                .as_flattened()
+                .iter()
+                .try_for_each(|c| file.put(&c.to_le_bytes()))?,
+        }
+    }
+    let bodies = || {
+        meshes.iter().zip(0i32..).scan(0u32, |next, (mesh, body)| {
+            let first = *next;
+            // The sum of all is below 2^31.
+            *next += mesh.positions.len() as u32;
+            Some((mesh, body, first))
+        })
+    };
+    for ((mesh, body, first), faces) in bodies().zip(&surfaces) {
+        for &(face, primitive_ix) in faces {
+            put_primitive(&mut file, &face, first, mesh.color(primitive_ix), body)?;
+        }
+    }
+    for (mesh, body, first) in bodies() {
+        if let Elements::Tetrahedra(tetrahedra) = mesh.elements {
+            for (primitive_ix, tetrahedron) in tetrahedra.iter().enumerate() {
+                put_primitive(
+                    &mut file,
+                    tetrahedron,
+                    first,
+                    mesh.color(primitive_ix),
+                    body,
+                )?;
+            }
+        }
+    }
+    file.finish()
+}
+
+fn put_primitive(
+    file: &mut AtomicFile,
+    corners: &[u32],
+    first: u32,
+    color: [u8; 3],
+    body: i32,
+) -> Result<(), Error> {
+    file.put(&[corners.len() as u8])?;
+    for corner in corners {
+        file.put(&(first + corner).to_le_bytes())?;
+    }
+    file.put(&color)?;
+    file.put(&body.to_le_bytes())
+}
+
+fn header(n_vertices: u64, wide: bool, n_faces: usize, n_tetrahedra: usize) -> String {
+    let float = if wide { "double" } else { "float" };
+    let mut header = format!(
+        "ply\nformat binary_little_endian 1.0\ncomment written by impinge\nelement vertex {n_vertices}\n"
+    );
+    for axis in ["x", "y", "z"] {
+        // Writing to a string can't fail.
+        let _ = writeln!(header, "property {float} {axis}");
+    }
+    for (element, n) in [("face", n_faces), ("tetra", n_tetrahedra)] {
+        if n > 0 || element == "face" {
+            let _ = writeln!(
+                header,
+                "element {element} {n}\nproperty list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\n\
+                 property uchar blue\nproperty int body"
+            );
+        }
+    }
+    header + "end_header\n"
+}
