@@ -45,16 +45,20 @@ impl Grid {
     /// root), so that a flat cloth, with V = 0, is a grid of squares and a needle a row.
     pub fn new(region: &Bounds, n_primitives: u64, lambda: f64) -> Self {
         let extent: [f64; 3] = std::array::from_fn(|axis| {
-            (f64::from(region.max[axis]) - f64::from(region.min[axis])).clamp(0.0, f64::MAX)
+            (f64::from(region.max[axis]) - f64::from(region.min[axis])).clamp(0.0, 2f64.powi(129))
         });
         let wanted = (lambda * n_primitives as f64).clamp(1.0, MOST_CELLS as f64);
         let mut resolution = [1u32; 3];
         let mut along: Vec<usize> = (0..3).filter(|&axis| extent[axis] > 0.0).collect();
         while !along.is_empty() {
-            // Logarithms: the volume of a huge or tiny region is no f64.
-            let log_volume: f64 = along.iter().map(|&axis| extent[axis].ln()).sum();
-            let log_density = (wanted.ln() - log_volume) / along.len() as f64;
-            let cells = |axis: usize| (extent[axis].ln() + log_density).exp();
+            // Extents are at most 2^129 and at least 2^-149: their products are normal f64.
+            let volume: f64 = along.iter().map(|&axis| extent[axis]).product();
+            let density = match along.len() {
+                3 => (wanted / volume).cbrt(),
+                2 => (wanted / volume).sqrt(),
+                _ => wanted / volume,
+            };
+            let cells = |axis: usize| extent[axis] * density;
             match along.iter().position(|&axis| cells(axis) < 1.0) {
                 Some(thin) => {
                     along.remove(thin);
