@@ -1,2 +1,41 @@
-//! The program.
-fn main() {}
+//! The program `impinge`: the library from the command line.
+
+mod args;
+mod commands;
+mod detection;
+mod error;
+mod json;
+mod load;
+mod meshes;
+mod output;
+mod rows;
+mod values;
+mod watch;
+
+use std::io::{Write, stderr};
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::args::{Cli, Command};
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = watch::cancel_on_signal().and_then(|cancel| match cli.command {
+        Command::Demo(args) => commands::demo(&args, &cancel),
+        Command::Pairs(args) => commands::pairs(&args, &cancel),
+        Command::Within(args) => commands::within(&args, &cancel),
+        Command::Sequence(args) => commands::sequence(&args, &cancel),
+    });
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let code = error.exit_code();
+            if code != 0 {
+                // Where standard error is closed there is nobody left to tell.
+                let _ = writeln!(stderr(), "impinge: {}", error.line());
+            }
+            ExitCode::from(code)
+        }
+    }
+}

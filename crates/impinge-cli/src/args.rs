@@ -1,0 +1,272 @@
+//! The command line: what may be said, and its help.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::values::{FrameRange, MeshFile, RowsFile, body_numbers, bytes, lambda};
+
+/// Exact collision detection for deforming meshes of triangles and tetrahedra.
+#[derive(Debug, Parser)]
+#[command(name = "impinge", version, propagate_version = true, after_help = EXAMPLES)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  impinge demo                                  a built-in scene: no files needed
+  impinge pairs a.obj b.obj                     which primitives of two meshes meet
+  impinge self cloth.ply --weld                 where a mesh runs into itself
+  impinge sequence body.ply run.pc2 --self      the same, frame after frame
+
+Exit codes: 0 done, 2 bad usage, 1 any other error (one line on stderr).
+`impinge help COMMAND` explains a command.";
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a built-in scene of deforming bodies and show what is found, and how fast
+    #[command(after_help = DEMO_EXAMPLES)]
+    Demo(DemoArgs),
+    /// Find the pairs of primitives that meet, between all meshes given
+    #[command(after_help = PAIRS_EXAMPLES)]
+    Pairs(PairsArgs),
+    /// Find the pairs of primitives that meet within each mesh given
+    #[command(name = "self", after_help = SELF_EXAMPLES)]
+    Within(WithinArgs),
+    /// Follow a deforming mesh through the frames of a sequence
+    #[command(after_help = SEQUENCE_EXAMPLES)]
+    Sequence(SequenceArgs),
+}
+
+const DEMO_EXAMPLES: &str = "\
+Examples:
+  impinge demo
+  impinge demo --triangles 1000000 --frames 100
+  impinge demo --threads 1 --out frame.ply
+
+The mesh written shows the frame with the most pairs; colliding triangles have a colour a body.";
+
+const PAIRS_EXAMPLES: &str = "\
+Examples:
+  impinge pairs a.obj b.obj
+  impinge pairs a.stl b.ply c.msh --self --pairs pairs.npy
+  impinge pairs a.ply b.ply --json | jq .pairs
+  impinge pairs a.ply b.ply --repeat 100 --threads 2
+  impinge pairs a.ply b.ply c.ply --ignore 0,1 --out seen.glb
+
+Rows of --pairs are body_a, primitive_a, body_b, primitive_b (u32, sorted): bodies numbered
+from 0 as given, primitives as in the file.";
+
+const SELF_EXAMPLES: &str = "\
+Examples:
+  impinge self cow.off --weld
+  impinge self cow.off --weld --shared-vertex resolve --pairs pairs.csv
+  impinge self cloth.ply --out seen.ply
+
+Many files repeat a vertex for each face that uses it. Then neighbours share no vertex index and
+are reported wherever they touch: weld such files.";
+
+const SEQUENCE_EXAMPLES: &str = "\
+Examples:
+  impinge sequence body.ply run.pc2
+  impinge sequence body.ply run.pc2 --other floor.obj --self
+  impinge sequence body.obj frames_0001.obj --frames 10..20 --json
+  impinge sequence body.obj 'frames_%04d.obj' --json | head
+
+FRAMES is a .pc2 or .mdd file, the first of numbered mesh files, or a pattern of their names.
+Without --other, self-collision is what is asked for.";
+
+/// Who works, and how.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "How it is found")]
+pub struct DetectorArgs {
+    /// How candidates are found; all methods give the same pairs
+    #[arg(long, value_enum, default_value_t = MethodArg::Clusters)]
+    pub method: MethodArg,
+    /// Where the work is done
+    #[arg(long, value_enum, default_value_t = BackendArg::Auto)]
+    pub backend: BackendArg,
+    /// CPU threads [default: one a core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// Density coefficient of the grid of `--method cells`
+    #[arg(long, value_name = "X", value_parser = lambda, default_value = "1")]
+    pub lambda: f64,
+    /// The most primitives of a group of `--method cells`, 1 to 64
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64), default_value = "64")]
+    pub group_size: u32,
+    /// Memory for the detector besides the answer, such as 512M or 2GiB [default: what it takes]
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    pub memory_budget: Option<u64>,
+    /// Show no progress bar
+    #[arg(long)]
+    pub no_progress: bool,
+}
+
+/// What is asked of meshes from files.
+#[derive(Debug, Clone, Args)]
+pub struct AskArgs {
+    /// Pairs of one body that share a vertex: not reported, or where they meet in more than that
+    #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Skip)]
+    pub shared_vertex: SharedVertexArg,
+    /// Make vertices at the same position one, in each file by itself
+    #[arg(long)]
+    pub weld: bool,
+    /// Leave out the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
+    #[arg(long, value_name = "A,B", value_parser = body_numbers)]
+    pub ignore: Vec<(usize, usize)>,
+    /// Print JSON and nothing else
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What becomes of the answer for one set of meshes.
+#[derive(Debug, Clone, Args)]
+pub struct AnswerArgs {
+    /// Run N frames, positions rewritten before each, and show median times
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub repeat: NonZeroUsize,
+    /// Write the pairs (.npy or .csv)
+    #[arg(long, value_name = "FILE")]
+    pub pairs: Option<RowsFile>,
+    /// Write the meshes, colliding primitives coloured (.ply, .glb or .vtu)
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<MeshFile>,
+}
+
+#[derive(Debug, Args)]
+pub struct PairsArgs {
+    /// Mesh files, a body each
+    #[arg(value_name = "MESH", required = true, num_args = 2..)]
+    pub meshes: Vec<PathBuf>,
+    /// Find the pairs within each body as well
+    #[arg(long = "self")]
+    pub within: bool,
+    #[command(flatten)]
+    pub ask: AskArgs,
+    #[command(flatten)]
+    pub answer: AnswerArgs,
+    #[command(flatten)]
+    pub detector: DetectorArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct WithinArgs {
+    /// Mesh files, a body each
+    #[arg(value_name = "MESH", required = true)]
+    pub meshes: Vec<PathBuf>,
+    #[command(flatten)]
+    pub ask: AskArgs,
+    #[command(flatten)]
+    pub answer: AnswerArgs,
+    #[command(flatten)]
+    pub detector: DetectorArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct SequenceArgs {
+    /// The mesh that deforms: body 0
+    #[arg(value_name = "MESH")]
+    pub mesh: PathBuf,
+    /// Its positions, a frame after the other
+    #[arg(value_name = "FRAMES")]
+    pub sequence: PathBuf,
+    /// A mesh that stays where it is: body 1, 2, …
+    #[arg(long = "other", value_name = "MESH")]
+    pub others: Vec<PathBuf>,
+    /// Find the pairs within each body as well; implied where there is no --other
+    #[arg(long = "self")]
+    pub within: bool,
+    /// Frames from A up to, but not including, B, counted from 0; either may be left out
+    #[arg(long, value_name = "A..B", default_value = "..")]
+    pub frames: FrameRange,
+    #[command(flatten)]
+    pub ask: AskArgs,
+    #[command(flatten)]
+    pub detector: DetectorArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// Triangles of all bodies together
+    #[arg(long, value_name = "N", default_value = "120000", value_parser = clap::value_parser!(u32).range(1_000..=100_000_000))]
+    pub triangles: u32,
+    /// Frames to run
+    #[arg(long, value_name = "N", default_value = "300", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub frames: u32,
+    /// Where to write the coloured mesh (.ply, .glb or .vtu)
+    #[arg(long, value_name = "FILE", default_value = "out/demo.glb")]
+    pub out: MeshFile,
+    #[command(flatten)]
+    pub detector: DetectorArgs,
+}
+
+/// [`impinge::Method`] as an option.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MethodArg {
+    /// Groups fixed by topology; the fast one
+    Clusters,
+    /// The two-level grid
+    Cells,
+    /// Every box against every box; slow, and what the others are held against
+    Naive,
+}
+
+impl From<MethodArg> for impinge::Method {
+    fn from(method: MethodArg) -> Self {
+        match method {
+            MethodArg::Clusters => impinge::Method::Clusters,
+            MethodArg::Cells => impinge::Method::Cells,
+            MethodArg::Naive => impinge::Method::Naive,
+        }
+    }
+}
+
+/// [`impinge::Backend`] as an option.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BackendArg {
+    /// The fastest that is there
+    Auto,
+    /// The CPU
+    Cpu,
+}
+
+impl From<BackendArg> for impinge::Backend {
+    fn from(backend: BackendArg) -> Self {
+        match backend {
+            BackendArg::Auto => impinge::Backend::Auto,
+            BackendArg::Cpu => impinge::Backend::Cpu,
+        }
+    }
+}
+
+/// [`impinge::SharedVertex`] as an option.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SharedVertexArg {
+    /// Never reported
+    Skip,
+    /// Reported where they meet in more than what they share
+    Resolve,
+}
+
+impl From<SharedVertexArg> for impinge::SharedVertex {
+    fn from(rule: SharedVertexArg) -> Self {
+        match rule {
+            SharedVertexArg::Skip => impinge::SharedVertex::Skip,
+            SharedVertexArg::Resolve => impinge::SharedVertex::Resolve,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        super::Cli::command().debug_assert();
+    }
+}

@@ -1,0 +1,168 @@
+//! Running a detector as the command line says, and its times over many frames.
+
+use impinge::{BodyId, CancelToken, Control, Detector, Pairs, Positions, Query, Scene, Settings};
+
+use crate::args::{AskArgs, DetectorArgs};
+use crate::error::Error;
+use crate::watch::Watch;
+
+/// A detector as told.
+pub fn detector(args: &DetectorArgs) -> Result<Detector, Error> {
+    Ok(Detector::with_settings(settings(args))?)
+}
+
+/// What a detector is told.
+pub fn settings(args: &DetectorArgs) -> Settings {
+    Settings {
+        method: args.method.into(),
+        backend: args.backend.into(),
+        threads: args.threads.map_or(0, Into::into),
+        lambda: args.lambda,
+        group_size: args.group_size,
+        memory_budget: args.memory_budget,
+        ..Settings::default()
+    }
+}
+
+/// The question with its adjacency rule and the pairs of bodies to leave out.
+pub fn query(query: Query, args: &AskArgs, bodies: &[BodyId]) -> Result<Query, Error> {
+    let body = |number: usize| {
+        bodies.get(number).copied().ok_or_else(|| {
+            Error::Usage(format!(
+                "--ignore names body {number}, but {} bodies are given, numbered from 0",
+                bodies.len()
+            ))
+        })
+    };
+    args.ignore
+        .iter()
+        .try_fold(query.shared_vertex(args.shared_vertex.into()), |query, &(a, b)| {
+            Ok(query.ignore(body(a)?, body(b)?))
+        })
+}
+
+/// One detection, watched and stopped on request.
+pub fn detect<'d>(
+    detector: &'d mut Detector,
+    scene: &Scene,
+    query: &Query,
+    cancel: &CancelToken,
+    watch: &Watch,
+) -> Result<&'d Pairs, Error> {
+    let report = |progress| watch.report(progress);
+    let mut control = Control::new().cancel(cancel);
+    if watch.is_shown() {
+        control = control.progress(&report);
+    }
+    Ok(detector.detect_with(scene, query, &control)?)
+}
+
+/// The same frame `n_frames` times over, all positions rewritten before each one, so that nothing
+/// can be remembered from the frame before.
+pub fn repeat<'d>(
+    detector: &'d mut Detector,
+    scene: &mut Scene,
+    query: &Query,
+    n_frames: usize,
+    cancel: &CancelToken,
+    watch: &Watch,
+) -> Result<(&'d Pairs, Times), Error> {
+    let mut times = Times::default();
+    if n_frames > 1 {
+        let rest: Vec<(BodyId, Positions)> = scene
+            .bodies()
+            .map(|(id, body)| (id, body.positions().clone()))
+            .collect();
+        for _ in 1..n_frames {
+            let pairs = detect(detector, scene, query, cancel, watch)?;
+            times.add(pairs);
+            for (id, positions) in &rest {
+                set_positions(scene, *id, positions)?;
+            }
+        }
+    }
+    let pairs = detect(detector, scene, query, cancel, watch)?;
+    times.add(pairs);
+    Ok((pairs, times))
+}
+
+/// Moves a body's vertices, in whatever precision.
+pub fn set_positions(
+    scene: &mut Scene,
+    body: BodyId,
+    positions: &Positions,
+) -> Result<(), impinge::Error> {
+    match positions {
+        Positions::F32(positions) => scene.set_positions(body, positions),
+        Positions::F64(positions) => scene.set_positions(body, positions),
+    }
+}
+
+/// Wall times of frames in milliseconds, whole and by stage.
+#[derive(Debug, Clone, Default)]
+pub struct Times {
+    total: Vec<f64>,
+    /// A stage that a frame did not run counts as 0 there.
+    stages: Vec<(&'static str, Vec<f64>)>,
+}
+
+impl Times {
+    /// Adds the times of a frame.
+    pub fn add(&mut self, pairs: &Pairs) {
+        let stats = pairs.stats();
+        for stage in &stats.stages {
+            if !self.stages.iter().any(|(name, _)| *name == stage.name) {
+                self.stages.push((stage.name, vec![0.0; self.total.len()]));
+            }
+        }
+        for (name, ms) in &mut self.stages {
+            ms.push(stats.stage_ms(name));
+        }
+        self.total.push(stats.total_ms);
+    }
+
+    /// How many frames there were.
+    pub fn n_frames(&self) -> usize {
+        self.total.len()
+    }
+
+    /// The whole frame: the time that `percent` % of the frames did not exceed.
+    pub fn total_ms(&self, percent: u32) -> f64 {
+        percentile(&self.total, percent)
+    }
+
+    /// The median of each stage, in the order in which they ran.
+    pub fn stages_ms(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
+        self.stages
+            .iter()
+            .map(|(name, ms)| (*name, percentile(ms, 50)))
+    }
+}
+
+/// The percentile with linear interpolation between the two nearest ranks; 0 of no values.
+fn percentile(values: &[f64], percent: u32) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let Some(last) = sorted.len().checked_sub(1) else {
+        return 0.0;
+    };
+    let hundredths = last * percent.min(100) as usize;
+    let (low, part) = (hundredths / 100, hundredths % 100);
+    let high = (low + 1).min(last);
+    sorted[low] + (sorted[high] - sorted[low]) * part as f64 / 100.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles() {
+        assert_eq!(percentile(&[], 50), 0.0);
+        assert_eq!(percentile(&[3.0], 95), 3.0);
+        assert_eq!(percentile(&[4.0, 1.0, 2.0], 50), 2.0);
+        assert_eq!(percentile(&[4.0, 1.0, 2.0, 3.0], 50), 2.5);
+        assert_eq!(percentile(&[4.0, 1.0, 2.0, 3.0], 100), 4.0);
+        assert_eq!(percentile(&[4.0, 1.0, 2.0, 3.0], 0), 1.0);
+    }
+}

@@ -1,0 +1,81 @@
+//! The one error type of the program, and its exit codes.
+
+use std::io;
+use std::path::PathBuf;
+
+/// Everything that ends the program early.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// Options that do not fit together, or not what they are applied to.
+    #[error("{0}")]
+    Usage(String),
+    /// A mesh file that can't be read or written.
+    #[error(transparent)]
+    File(#[from] impinge_io::Error),
+    /// A file whose content the library refuses; `what` names it.
+    #[error("{what}: {source}")]
+    Refused {
+        what: String,
+        source: impinge::Error,
+    },
+    /// The detection failed, or was cancelled.
+    #[error(transparent)]
+    Detection(#[from] impinge::Error),
+    /// Rows of pairs, or the folder of an output file, could not be written.
+    #[error("{}: cannot write: {source}", .path.display())]
+    Write { path: PathBuf, source: io::Error },
+    /// What is printed could not be.
+    #[error("standard output: {0}")]
+    Output(#[from] io::Error),
+    /// Ctrl-C can't be listened to.
+    #[error("cannot listen to Ctrl-C: {0}")]
+    Signal(#[from] ctrlc::Error),
+    /// Two methods gave different answers: a defect of the library.
+    #[error("frame {frame}: {n_found} pairs by {method}, but {n_expected} by {reference}, or others: please report this")]
+    Disagreement {
+        frame: u32,
+        method: &'static str,
+        n_found: usize,
+        reference: &'static str,
+        n_expected: usize,
+    },
+}
+
+impl Error {
+    /// 2 for bad usage, 0 where the reader of our output went away (it has what it wanted), else 1.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::Usage(_) | Error::Detection(impinge::Error::Setting { .. }) => 2,
+            Error::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
+            _ => 1,
+        }
+    }
+
+    /// The message on one line.
+    pub fn line(&self) -> String {
+        let text = self.to_string();
+        let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+        lines.join("; ")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_take_one_line() {
+        let error = Error::Detection(impinge::Error::Gpu {
+            what: "shader:\n  line 3\n\n".to_owned(),
+        });
+        assert_eq!(error.line(), "GPU: shader:; line 3");
+    }
+
+    #[test]
+    fn codes() {
+        assert_eq!(Error::Usage(String::new()).exit_code(), 2);
+        assert_eq!(Error::Detection(impinge::Error::Cancelled).exit_code(), 1);
+        assert_eq!(Error::Output(io::ErrorKind::BrokenPipe.into()).exit_code(), 0);
+        assert_eq!(Error::Output(io::ErrorKind::StorageFull.into()).exit_code(), 1);
+    }
+}

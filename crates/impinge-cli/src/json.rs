@@ -1,0 +1,98 @@
+//! The answer as a JSON object.
+
+use impinge::{BodyId, Error, Pairs, Scene, Statistics};
+use serde_json::{Map, Value, json};
+
+use crate::detection::Times;
+
+/// `pairs`, `hash`, `backend`, `method`, `bodies`, `ms` and `stats`; times are medians.
+pub fn answer(
+    scene: &Scene,
+    bodies: &[(BodyId, &str)],
+    pairs: &Pairs,
+    times: &Times,
+) -> Result<Map<String, Value>, Error> {
+    let described: Vec<Value> = bodies
+        .iter()
+        .map(|&(id, name)| {
+            let body = scene.body(id)?;
+            Ok(json!({
+                "name": name,
+                "kind": body.kind().name(),
+                "primitives": body.n_primitives(),
+                "vertices": body.n_vertices(),
+                "colliding": pairs.colliding(id).len(),
+            }))
+        })
+        .collect::<Result<_, Error>>()?;
+    let stages: Map<String, Value> = times
+        .stages_ms()
+        .map(|(name, ms)| (name.to_owned(), ms.into()))
+        .collect();
+    let mut object = Map::new();
+    object.insert("pairs".into(), pairs.len().into());
+    object.insert("hash".into(), hash(pairs).into());
+    object.insert("backend".into(), pairs.stats().backend.as_str().into());
+    object.insert("method".into(), pairs.stats().method.into());
+    object.insert("bodies".into(), described.into());
+    object.insert(
+        "ms".into(),
+        json!({ "total": times.total_ms(50), "stages": stages }),
+    );
+    object.insert("stats".into(), counters(pairs.stats()));
+    Ok(object)
+}
+
+/// The hash as it is shown: 16 hexadecimal digits.
+pub fn hash(pairs: &Pairs) -> String {
+    format!("{:016x}", pairs.hash())
+}
+
+/// Every counter of the statistics under its own name.
+fn counters(stats: &Statistics) -> Value {
+    json!({
+        "n_threads": stats.n_threads,
+        "grid": stats.grid,
+        "n_subdivided": stats.n_subdivided,
+        "n_entries": stats.n_entries,
+        "n_clusters": stats.n_clusters,
+        "n_work_items": stats.n_work_items,
+        "n_candidates": stats.n_candidates,
+        "n_unsure": stats.n_unsure,
+        "n_clustered": stats.n_clustered,
+        "n_reclustered": stats.n_reclustered,
+        "n_slabs": stats.n_slabs,
+        "n_reruns": stats.n_reruns,
+        "bytes_held": stats.bytes_held,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The names of the fields, from the derived `Debug` of a value whose own values hold no colon.
+    fn fields(stats: &Statistics) -> Vec<String> {
+        let text = format!("{stats:?}");
+        let parts: Vec<&str> = text.split(": ").collect();
+        parts[..parts.len() - 1]
+            .iter()
+            .filter_map(|part| part.rsplit([' ', '{']).next())
+            .map(str::to_owned)
+            .collect()
+    }
+
+    #[test]
+    fn no_counter_is_left_out() {
+        let stats = Statistics::default();
+        let counters = counters(&stats);
+        let elsewhere = ["backend", "method", "stages", "total_ms"];
+        let expected: Vec<String> = fields(&stats)
+            .into_iter()
+            .filter(|field| !elsewhere.contains(&field.as_str()))
+            .collect();
+        let found: Vec<&String> = counters.as_object().unwrap().keys().collect();
+        assert!(expected.len() > 10);
+        assert_eq!(found, expected.iter().collect::<Vec<_>>());
+    }
+}

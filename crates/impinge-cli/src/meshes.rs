@@ -1,0 +1,92 @@
+//! Bodies as coloured meshes for a viewer.
+
+use impinge::{BodyId, Elements, Pairs, Positions, Scene};
+use impinge_io::{ColoredMesh, write_glb, write_ply, write_vtu};
+
+use crate::error::Error;
+use crate::values::{MeshFile, MeshFormat};
+
+/// Colliding primitives, a colour a body, over again after the last one.
+const COLLIDING: [[u8; 3]; 8] = [
+    [214, 39, 40],
+    [31, 119, 180],
+    [44, 160, 44],
+    [255, 127, 14],
+    [148, 103, 189],
+    [23, 190, 207],
+    [227, 119, 194],
+    [188, 189, 34],
+];
+
+/// All the others.
+const GREY: [u8; 3] = [200, 200, 200];
+
+/// Writes bodies as they are in the scene now; primitives that take part in a pair are coloured.
+pub fn write(
+    file: &MeshFile,
+    scene: &Scene,
+    bodies: &[(BodyId, &str)],
+    pairs: &Pairs,
+) -> Result<(), Error> {
+    let parts: Vec<Part> = bodies
+        .iter()
+        .zip(COLLIDING.iter().cycle())
+        .map(|(&(id, name), &color)| Part::new(scene, id, name, color, pairs))
+        .collect::<Result<_, _>>()?;
+    let meshes: Vec<ColoredMesh> = parts.iter().map(Part::mesh).collect();
+    match file.format {
+        MeshFormat::Ply => write_ply(&file.path, &meshes)?,
+        MeshFormat::Glb => write_glb(&file.path, &meshes)?,
+        MeshFormat::Vtu => write_vtu(&file.path, &meshes)?,
+    }
+    Ok(())
+}
+
+struct Part<'a> {
+    positions: impinge_io::Positions,
+    elements: impinge_io::Elements,
+    colors: Vec<[u8; 3]>,
+    colliding: Vec<bool>,
+    name: &'a str,
+}
+
+impl<'a> Part<'a> {
+    fn new(
+        scene: &Scene,
+        id: BodyId,
+        name: &'a str,
+        color: [u8; 3],
+        pairs: &Pairs,
+    ) -> Result<Self, Error> {
+        let body = scene.body(id)?;
+        let mut colors = vec![GREY; body.n_primitives()];
+        let mut colliding = vec![false; body.n_primitives()];
+        for primitive in pairs.colliding(id) {
+            colors[primitive as usize] = color;
+            colliding[primitive as usize] = true;
+        }
+        Ok(Part {
+            positions: match body.positions() {
+                Positions::F32(positions) => impinge_io::Positions::F32(positions.clone()),
+                Positions::F64(positions) => impinge_io::Positions::F64(positions.clone()),
+            },
+            elements: match body.elements() {
+                Elements::Triangles(faces) => impinge_io::Elements::Triangles(faces.clone()),
+                Elements::Tetrahedra(tets) => impinge_io::Elements::Tetrahedra(tets.clone()),
+            },
+            colors,
+            colliding,
+            name,
+        })
+    }
+
+    fn mesh(&self) -> ColoredMesh<'_> {
+        ColoredMesh {
+            positions: &self.positions,
+            elements: &self.elements,
+            primitive_colors: Some(&self.colors),
+            colliding: Some(&self.colliding),
+            name: self.name,
+        }
+    }
+}

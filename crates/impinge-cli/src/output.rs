@@ -1,0 +1,154 @@
+//! What is printed for people.
+
+use std::io::{self, StdoutLock, Write, stdout};
+
+use comfy_table::{CellAlignment, Table, presets};
+use impinge::{BodyId, Pairs, Scene};
+
+use crate::detection::Times;
+use crate::error::Error;
+use crate::json::hash;
+
+/// Standard output. A reader that goes away is an error here, not a panic.
+pub fn out() -> StdoutLock<'static> {
+    stdout().lock()
+}
+
+/// A number with a comma after every three digits.
+pub fn grouped(n: u64) -> String {
+    let digits = n.to_string();
+    let mut text = String::with_capacity(digits.len() * 4 / 3);
+    for (ix, digit) in digits.chars().enumerate() {
+        if ix > 0 && (digits.len() - ix) % 3 == 0 {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// `n` of something, in the plural where there is not one.
+pub fn counted(n: u64, one: &str) -> String {
+    format!("{} {one}{}", grouped(n), if n == 1 { "" } else { "s" })
+}
+
+/// Bytes in a unit that keeps the number short.
+pub fn shown_bytes(n: u64) -> String {
+    let mut unit = 1u64;
+    for name in ["bytes", "kB", "MB", "GB"] {
+        if n / unit < 1000 {
+            return match unit {
+                1 => format!("{n} {name}"),
+                _ => format!("{:.1} {name}", n as f64 / unit as f64),
+            };
+        }
+        unit *= 1000;
+    }
+    format!("{:.1} TB", n as f64 / unit as f64)
+}
+
+/// A table without rules; the columns named in `text` are flush left, all others right.
+pub fn table(header: &[&str], text: &[usize], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING);
+    table.set_header(header.to_vec());
+    table.add_rows(rows);
+    for (ix, column) in table.column_iter_mut().enumerate() {
+        column.set_padding((0, 2));
+        if !text.contains(&ix) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table.trim_fmt()
+}
+
+/// Bodies, stages and the pairs' count and hash.
+pub fn print_answer(
+    scene: &Scene,
+    bodies: &[(BodyId, &str)],
+    pairs: &Pairs,
+    times: &Times,
+) -> Result<(), Error> {
+    let mut to = out();
+    writeln!(to, "{}\n", body_table(scene, bodies, pairs)?)?;
+    writeln!(to, "{}\n", stage_table(times))?;
+    print_summary(&mut to, pairs)?;
+    Ok(())
+}
+
+/// A row a body.
+pub fn body_table(
+    scene: &Scene,
+    bodies: &[(BodyId, &str)],
+    pairs: &Pairs,
+) -> Result<String, Error> {
+    let mut rows = Vec::with_capacity(bodies.len());
+    for (ix, &(id, name)) in bodies.iter().enumerate() {
+        let body = scene.body(id)?;
+        rows.push(vec![
+            ix.to_string(),
+            name.to_owned(),
+            body.kind().name().to_owned(),
+            grouped(body.n_primitives() as u64),
+            grouped(body.n_vertices() as u64),
+            grouped(pairs.colliding(id).len() as u64),
+        ]);
+    }
+    let header = ["body", "name", "kind", "primitives", "vertices", "colliding"];
+    Ok(table(&header, &[1, 2], rows))
+}
+
+/// A row a stage, with the median of many frames.
+pub fn stage_table(times: &Times) -> String {
+    let shown = |ms: f64| format!("{ms:.3}");
+    let rows = times
+        .stages_ms()
+        .map(|(name, ms)| vec![name.to_owned(), shown(ms)])
+        .chain([vec!["total".to_owned(), shown(times.total_ms(50))]]);
+    let ms = match times.n_frames() {
+        1 => "ms".to_owned(),
+        n => format!("ms, median of {n}"),
+    };
+    table(&["stage", &ms], &[0], rows)
+}
+
+fn print_summary(to: &mut impl Write, pairs: &Pairs) -> io::Result<()> {
+    let stats = pairs.stats();
+    writeln!(
+        to,
+        "{}, hash {}",
+        counted(pairs.len() as u64, "pair"),
+        hash(pairs)
+    )?;
+    writeln!(
+        to,
+        "{} on {}, {}; {}, {} unsure; {} held",
+        stats.method,
+        stats.backend,
+        counted(stats.n_threads as u64, "thread"),
+        counted(stats.n_candidates, "candidate"),
+        grouped(stats.n_unsure),
+        shown_bytes(stats.bytes_held)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_in_groups() {
+        assert_eq!(grouped(0), "0");
+        assert_eq!(grouped(999), "999");
+        assert_eq!(grouped(1000), "1,000");
+        assert_eq!(grouped(1234567), "1,234,567");
+    }
+
+    #[test]
+    fn bytes_are_short() {
+        assert_eq!(shown_bytes(0), "0 bytes");
+        assert_eq!(shown_bytes(999), "999 bytes");
+        assert_eq!(shown_bytes(1500), "1.5 kB");
+        assert_eq!(shown_bytes(2_500_000_000_000), "2.5 TB");
+    }
+}

@@ -1,0 +1,233 @@
+//! Values of options: files by their extension, sizes with a suffix, ranges.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// A file for rows of pairs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RowsFile {
+    pub path: PathBuf,
+    pub format: RowsFormat,
+}
+
+/// How rows of pairs are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RowsFormat {
+    Npy,
+    Csv,
+}
+
+impl FromStr for RowsFile {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let format = match extension(text).as_str() {
+            "npy" => RowsFormat::Npy,
+            "csv" => RowsFormat::Csv,
+            _ => return Err("pairs are written as .npy or .csv".to_owned()),
+        };
+        Ok(RowsFile {
+            path: text.into(),
+            format,
+        })
+    }
+}
+
+/// A file for coloured meshes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MeshFile {
+    pub path: PathBuf,
+    pub format: MeshFormat,
+}
+
+/// How coloured meshes are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MeshFormat {
+    Ply,
+    Glb,
+    Vtu,
+}
+
+impl FromStr for MeshFile {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let format = match extension(text).as_str() {
+            "ply" => MeshFormat::Ply,
+            "glb" => MeshFormat::Glb,
+            "vtu" => MeshFormat::Vtu,
+            _ => return Err("meshes are written as .ply, .glb or .vtu".to_owned()),
+        };
+        Ok(MeshFile {
+            path: text.into(),
+            format,
+        })
+    }
+}
+
+fn extension(path: &str) -> String {
+    let extension = Path::new(path).extension().unwrap_or_default();
+    extension.to_string_lossy().to_ascii_lowercase()
+}
+
+/// Frames `start..end` of a sequence; `end` may be open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameRange {
+    pub start: usize,
+    pub end: Option<usize>,
+}
+
+impl FrameRange {
+    /// The frames that are there; `None` where the range reaches beyond them.
+    pub fn within(self, n_frames: usize) -> Option<Range<usize>> {
+        let end = self.end.unwrap_or(n_frames);
+        (self.start <= end && end <= n_frames).then_some(self.start..end)
+    }
+}
+
+impl FromStr for FrameRange {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || "expected A..B, A.. or ..B".to_owned();
+        let (start, end) = text.split_once("..").ok_or_else(expected)?;
+        let number = |text: &str| text.parse().map_err(|_| expected());
+        let start = if start.is_empty() { 0 } else { number(start)? };
+        let end = match end {
+            "" => None,
+            end => Some(number(end)?),
+        };
+        if end.is_some_and(|end| end <= start) {
+            return Err(format!("no frame lies in {text}"));
+        }
+        Ok(FrameRange { start, end })
+    }
+}
+
+/// A number above 0.
+pub fn lambda(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("expected a number above 0".to_owned()),
+    }
+}
+
+/// Two body numbers with a comma between them.
+pub fn body_numbers(text: &str) -> Result<(usize, usize), String> {
+    text.split_once(',')
+        .and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)))
+        .ok_or_else(|| "expected two body numbers, such as 0,1".to_owned())
+}
+
+/// A number of bytes with an optional suffix: `k`, `M`, `G`, `T` (or `KiB`, `MiB`, …) are powers of
+/// 1024, `kB`, `MB`, … powers of 1000, as GNU tools have it.
+pub fn bytes(text: &str) -> Result<u64, String> {
+    let expected = || "expected a number of bytes, such as 500000000, 512M, 2GiB or 1.5G".to_owned();
+    let split = text
+        .find(|c: char| !(c.is_ascii_digit() || c == '.'))
+        .unwrap_or(text.len());
+    let (number, suffix) = text.split_at(split);
+    let suffix = suffix.trim().to_ascii_lowercase();
+    let (power, rest) = match suffix.chars().next() {
+        None => (0, ""),
+        Some('b') => (0, suffix.as_str()),
+        Some(letter) => {
+            let power = "kmgt".find(letter).ok_or_else(expected)? + 1;
+            (power, &suffix[1..])
+        }
+    };
+    let base: u64 = match (power, rest) {
+        (0, "" | "b") => 1,
+        (1.., "" | "ib") => 1024,
+        (1.., "b") => 1000,
+        _ => return Err(expected()),
+    };
+    let unit = (0..power).fold(1u64, |unit, _| unit * base);
+    let whole = match number.split_once('.') {
+        None => number.parse::<u64>().ok(),
+        Some(_) if power == 0 => None,
+        Some((whole, part)) => return fraction(whole, part, unit).ok_or_else(expected),
+    };
+    whole
+        .and_then(|whole| whole.checked_mul(unit))
+        .ok_or_else(expected)
+}
+
+/// `whole.part` units, rounded down to whole bytes, in integers.
+fn fraction(whole: &str, part: &str, unit: u64) -> Option<u64> {
+    let digits = u32::try_from(part.len()).ok().filter(|n| (1..=9).contains(n))?;
+    let part: u64 = part.parse().ok()?;
+    let whole: u64 = whole.parse().ok()?;
+    let part = u128::from(part) * u128::from(unit) / 10u128.pow(digits);
+    let total = u128::from(whole) * u128::from(unit) + part;
+    u64::try_from(total).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_with_suffixes() {
+        for (text, value) in [
+            ("0", 0),
+            ("1234", 1234),
+            ("12B", 12),
+            ("4k", 4096),
+            ("4kB", 4000),
+            ("512M", 512 << 20),
+            ("2GiB", 2 << 30),
+            ("3 GB", 3_000_000_000),
+            ("1.5G", 3 << 29),
+            ("1T", 1 << 40),
+            ("18446744073709551615", u64::MAX),
+        ] {
+            assert_eq!(bytes(text), Ok(value), "{text}");
+        }
+        for text in [
+            "", "M", "-1", "1.5", "1.5B", "1x", "1kk", "1e9", "1..5G", ".5G", "1.G", "99999999T", "1bb",
+        ] {
+            assert!(bytes(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn frame_ranges() {
+        let parse = |text: &str| text.parse::<FrameRange>();
+        assert_eq!(parse("..").unwrap().within(5), Some(0..5));
+        assert_eq!(parse("2..").unwrap().within(5), Some(2..5));
+        assert_eq!(parse("2..").unwrap().within(1), None);
+        assert_eq!(parse("..3").unwrap().within(5), Some(0..3));
+        assert_eq!(parse("1..3").unwrap().within(2), None);
+        for text in ["", "3", "3..3", "4..3", "a..b", "..0", "-1..2"] {
+            assert!(parse(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn body_pairs() {
+        assert_eq!(body_numbers("0,1"), Ok((0, 1)));
+        assert_eq!(body_numbers("3, 3"), Ok((3, 3)));
+        for text in ["", "1", "1,", "1,2,3", "-1,2", "a,b"] {
+            assert!(body_numbers(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn files_by_extension() {
+        assert_eq!("a.NPY".parse::<RowsFile>().unwrap().format, RowsFormat::Npy);
+        assert_eq!("a.csv".parse::<RowsFile>().unwrap().format, RowsFormat::Csv);
+        assert!("a.txt".parse::<RowsFile>().is_err());
+        assert_eq!("a.b.vtu".parse::<MeshFile>().unwrap().format, MeshFormat::Vtu);
+        assert!("ply".parse::<MeshFile>().is_err());
+    }
+
+    #[test]
+    fn lambda_is_above_zero() {
+        assert_eq!(lambda("0.5"), Ok(0.5));
+        for text in ["0", "-1", "nan", "inf", "x"] {
+            assert!(lambda(text).is_err(), "{text}");
+        }
+    }
+}
