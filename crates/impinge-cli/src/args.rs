@@ -192,7 +192,7 @@ pub struct SequenceArgs {
 #[derive(Debug, Args)]
 pub struct DemoArgs {
     /// Triangles of all bodies together
-    #[arg(long, value_name = "N", default_value = "120000", value_parser = clap::value_parser!(u32).range(1_000..=100_000_000))]
+    #[arg(long, value_name = "N", default_value = "60000", value_parser = clap::value_parser!(u32).range(1_000..=100_000_000))]
     pub triangles: u32,
     /// Frames to run
     #[arg(long, value_name = "N", default_value = "300", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]

@@ -34,11 +34,10 @@ pub fn query(query: Query, args: &AskArgs, bodies: &[BodyId]) -> Result<Query, E
             ))
         })
     };
-    args.ignore
-        .iter()
-        .try_fold(query.shared_vertex(args.shared_vertex.into()), |query, &(a, b)| {
-            Ok(query.ignore(body(a)?, body(b)?))
-        })
+    args.ignore.iter().try_fold(
+        query.shared_vertex(args.shared_vertex.into()),
+        |query, &(a, b)| Ok(query.ignore(body(a)?, body(b)?)),
+    )
 }
 
 /// One detection, watched and stopped on request.

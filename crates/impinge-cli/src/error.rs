@@ -31,7 +31,9 @@ pub enum Error {
     #[error("cannot listen to Ctrl-C: {0}")]
     Signal(#[from] ctrlc::Error),
     /// Two methods gave different answers: a defect of the library.
-    #[error("frame {frame}: {n_found} pairs by {method}, but {n_expected} by {reference}, or others: please report this")]
+    #[error(
+        "frame {frame}: {n_found} pairs by {method}, but {n_expected} by {reference}, or others: please report this"
+    )]
     Disagreement {
         frame: u32,
         method: &'static str,
@@ -54,7 +56,11 @@ impl Error {
     /// The message on one line.
     pub fn line(&self) -> String {
         let text = self.to_string();
-        let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+        let lines: Vec<&str> = text
+            .lines()
+            .map(str::trim)
+            .filter(|line| !line.is_empty())
+            .collect();
         lines.join("; ")
     }
 }
@@ -75,7 +81,13 @@ mod tests {
     fn codes() {
         assert_eq!(Error::Usage(String::new()).exit_code(), 2);
         assert_eq!(Error::Detection(impinge::Error::Cancelled).exit_code(), 1);
-        assert_eq!(Error::Output(io::ErrorKind::BrokenPipe.into()).exit_code(), 0);
-        assert_eq!(Error::Output(io::ErrorKind::StorageFull.into()).exit_code(), 1);
+        assert_eq!(
+            Error::Output(io::ErrorKind::BrokenPipe.into()).exit_code(),
+            0
+        );
+        assert_eq!(
+            Error::Output(io::ErrorKind::StorageFull.into()).exit_code(),
+            1
+        );
     }
 }

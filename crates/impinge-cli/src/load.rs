@@ -39,7 +39,11 @@ impl Bodies {
     }
 
     /// Reads a file as one more body; where it is welded, tells how.
-    pub fn add(&mut self, path: &Path, loading: Loading<'_>) -> Result<(BodyId, Option<Weld>), Error> {
+    pub fn add(
+        &mut self,
+        path: &Path,
+        loading: Loading<'_>,
+    ) -> Result<(BodyId, Option<Weld>), Error> {
         go_on(loading.cancel)?;
         let name = path.display().to_string();
         let (mut mesh, summary) = read_with_summary(path, &ReadOptions::default())?;
@@ -54,7 +58,10 @@ impl Bodies {
         }
         // No coordinate changes its value here; half the memory is saved where all of them allow it.
         mesh.positions.narrow_if_exact();
-        let Mesh { positions, elements } = mesh;
+        let Mesh {
+            positions,
+            elements,
+        } = mesh;
         let id = self
             .scene
             .add(to_elements(elements), to_positions(positions))
@@ -71,8 +78,14 @@ impl Bodies {
 /// What a user should know about a file who looks at primitive numbers.
 fn note(name: &str, summary: &Summary, n_welded: usize) {
     for (n, what) in [
-        (summary.n_polygons_fanned, "polygons fanned into triangles: primitives are numbered after that"),
-        (summary.n_triangles_skipped, "triangles beside the tetrahedra left out"),
+        (
+            summary.n_polygons_fanned,
+            "polygons fanned into triangles: primitives are numbered after that",
+        ),
+        (
+            summary.n_triangles_skipped,
+            "triangles beside the tetrahedra left out",
+        ),
         (n_welded as u64, "vertices welded to others"),
     ] {
         if n > 0 {

@@ -19,7 +19,7 @@ pub fn grouped(n: u64) -> String {
     let digits = n.to_string();
     let mut text = String::with_capacity(digits.len() * 4 / 3);
     for (ix, digit) in digits.chars().enumerate() {
-        if ix > 0 && (digits.len() - ix) % 3 == 0 {
+        if ix > 0 && (digits.len() - ix).is_multiple_of(3) {
             text.push(',');
         }
         text.push(digit);
@@ -48,7 +48,11 @@ pub fn shown_bytes(n: u64) -> String {
 }
 
 /// A table without rules; the columns named in `text` are flush left, all others right.
-pub fn table(header: &[&str], text: &[usize], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+pub fn table(
+    header: &[&str],
+    text: &[usize],
+    rows: impl IntoIterator<Item = Vec<String>>,
+) -> String {
     let mut table = Table::new();
     table.load_style(presets::NOTHING);
     table.set_header(header.to_vec());
@@ -94,7 +98,14 @@ pub fn body_table(
             grouped(pairs.colliding(id).len() as u64),
         ]);
     }
-    let header = ["body", "name", "kind", "primitives", "vertices", "colliding"];
+    let header = [
+        "body",
+        "name",
+        "kind",
+        "primitives",
+        "vertices",
+        "colliding",
+    ];
     Ok(table(&header, &[1, 2], rows))
 }
 

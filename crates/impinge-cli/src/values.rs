@@ -123,7 +123,8 @@ pub fn body_numbers(text: &str) -> Result<(usize, usize), String> {
 /// A number of bytes with an optional suffix: `k`, `M`, `G`, `T` (or `KiB`, `MiB`, …) are powers of
 /// 1024, `kB`, `MB`, … powers of 1000, as GNU tools have it.
 pub fn bytes(text: &str) -> Result<u64, String> {
-    let expected = || "expected a number of bytes, such as 500000000, 512M, 2GiB or 1.5G".to_owned();
+    let expected =
+        || "expected a number of bytes, such as 500000000, 512M, 2GiB or 1.5G".to_owned();
     let split = text
         .find(|c: char| !(c.is_ascii_digit() || c == '.'))
         .unwrap_or(text.len());
@@ -156,7 +157,9 @@ pub fn bytes(text: &str) -> Result<u64, String> {
 
 /// `whole.part` units, rounded down to whole bytes, in integers.
 fn fraction(whole: &str, part: &str, unit: u64) -> Option<u64> {
-    let digits = u32::try_from(part.len()).ok().filter(|n| (1..=9).contains(n))?;
+    let digits = u32::try_from(part.len())
+        .ok()
+        .filter(|n| (1..=9).contains(n))?;
     let part: u64 = part.parse().ok()?;
     let whole: u64 = whole.parse().ok()?;
     let part = u128::from(part) * u128::from(unit) / 10u128.pow(digits);
@@ -186,7 +189,19 @@ mod tests {
             assert_eq!(bytes(text), Ok(value), "{text}");
         }
         for text in [
-            "", "M", "-1", "1.5", "1.5B", "1x", "1kk", "1e9", "1..5G", ".5G", "1.G", "99999999T", "1bb",
+            "",
+            "M",
+            "-1",
+            "1.5",
+            "1.5B",
+            "1x",
+            "1kk",
+            "1e9",
+            "1..5G",
+            ".5G",
+            "1.G",
+            "99999999T",
+            "1bb",
         ] {
             assert!(bytes(text).is_err(), "{text}");
         }
@@ -219,7 +234,10 @@ mod tests {
         assert_eq!("a.NPY".parse::<RowsFile>().unwrap().format, RowsFormat::Npy);
         assert_eq!("a.csv".parse::<RowsFile>().unwrap().format, RowsFormat::Csv);
         assert!("a.txt".parse::<RowsFile>().is_err());
-        assert_eq!("a.b.vtu".parse::<MeshFile>().unwrap().format, MeshFormat::Vtu);
+        assert_eq!(
+            "a.b.vtu".parse::<MeshFile>().unwrap().format,
+            MeshFormat::Vtu
+        );
         assert!("ply".parse::<MeshFile>().is_err());
     }
 

@@ -61,7 +61,9 @@ impl Watch {
         let bar = (wanted && stderr().is_terminal()).then(|| {
             let style = ProgressStyle::with_template(template)
                 .unwrap_or_else(|_| ProgressStyle::default_bar());
-            ProgressBar::new(length).with_style(style).with_message(what)
+            ProgressBar::new(length)
+                .with_style(style)
+                .with_message(what)
         });
         Watch {
             bar,

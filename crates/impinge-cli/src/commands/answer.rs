@@ -20,7 +20,14 @@ pub fn pairs(args: &PairsArgs, cancel: &CancelToken) -> Result<(), Error> {
     } else {
         Query::all()
     };
-    answer(asked, &args.meshes, &args.ask, &args.answer, &args.detector, cancel)
+    answer(
+        asked,
+        &args.meshes,
+        &args.ask,
+        &args.answer,
+        &args.detector,
+        cancel,
+    )
 }
 
 /// `impinge self`.
@@ -61,7 +68,10 @@ fn answer(
     let (pairs, times) = repeat(&mut detector, &mut scene, &query, n_frames, cancel, &watch)?;
     drop(watch);
 
-    let bodies: Vec<(BodyId, &str)> = ids.into_iter().zip(names.iter().map(String::as_str)).collect();
+    let bodies: Vec<(BodyId, &str)> = ids
+        .into_iter()
+        .zip(names.iter().map(String::as_str))
+        .collect();
     // Files come first: where one can't be written, no answer is printed that looks like success.
     if let Some(file) = &answer.pairs {
         rows::write(file, pairs)?;

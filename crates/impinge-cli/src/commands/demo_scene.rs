@@ -6,7 +6,7 @@
 
 use std::f32::consts::TAU;
 
-use impinge::{BodyId, Elements, Error, Scene};
+use impinge::{BodyId, Error, Scene};
 use impinge_scenes::Model;
 use impinge_scenes::deform::{Deform, Drift, Twist, Wave};
 use impinge_scenes::surfaces::{ball, bumpy_ball, stand_in};
@@ -19,7 +19,18 @@ struct Actor {
     id: BodyId,
     name: &'static str,
     rest: Vec<[f32; 3]>,
-    motion: Box<dyn Fn(&[[f32; 3]], f32, &mut [[f32; 3]])>,
+    motion: Box<dyn Motion>,
+}
+
+/// A [`Deform`] behind a pointer, called once a frame and not once a vertex.
+trait Motion {
+    fn pose(&self, rest: &[[f32; 3]], t: f32, now: &mut [[f32; 3]]);
+}
+
+impl<D: Deform> Motion for D {
+    fn pose(&self, rest: &[[f32; 3]], t: f32, now: &mut [[f32; 3]]) {
+        self.apply(rest, t, now);
+    }
 }
 
 /// The bodies and how they move.
@@ -43,10 +54,10 @@ impl DemoScene {
             ..Wave::default()
         };
         let sink = Drift {
-            velocity: [0.0, 0.0, -1.6],
+            velocity: [0.0, 0.0, -0.7],
         };
         let knot = stand_in(n).mapped(|p| p.map(|x| x * 1.1));
-        demo.add("knot", knot, ((ripple, Place([0.05, 0.75, 0.8])), sink))?;
+        demo.add("knot", knot, ((ripple, Place([0.05, 0.25, 0.7])), sink))?;
         let twist = Twist { axis: 0, rate: 6.0 };
         let approach = Drift {
             velocity: [-1.7, 0.0, 0.0],
@@ -67,15 +78,12 @@ impl DemoScene {
             elements,
         } = model;
         let rest = positions.clone();
-        let id = self.scene.add::<Elements, _>(elements, positions)?;
-        let motion = Box::new(move |rest: &[[f32; 3]], t: f32, now: &mut [[f32; 3]]| {
-            deform.apply(rest, t, now);
-        });
+        let id = self.scene.add(elements, positions)?;
         self.actors.push(Actor {
             id,
             name,
             rest,
-            motion,
+            motion: Box::new(deform),
         });
         Ok(())
     }
@@ -85,7 +93,7 @@ impl DemoScene {
         let t = frame as f32 / n_frames.saturating_sub(1).max(1) as f32;
         for actor in &self.actors {
             let now = self.scene.positions_mut::<f32>(actor.id)?;
-            (actor.motion)(&actor.rest, t, now);
+            actor.motion.pose(&actor.rest, t, now);
         }
         Ok(())
     }

@@ -39,7 +39,10 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         (false, false) => Query::all(),
     };
     let query = query(asked, &args.ask, &ids)?;
-    let bodies: Vec<(BodyId, &str)> = ids.into_iter().zip(names.iter().map(String::as_str)).collect();
+    let bodies: Vec<(BodyId, &str)> = ids
+        .into_iter()
+        .zip(names.iter().map(String::as_str))
+        .collect();
 
     let range = args
         .frames
@@ -104,12 +107,16 @@ impl Frames {
         let positions = self.sequence.frame(frame_ix)?;
         let positions = match &self.weld {
             None => positions,
-            Some(weld) => weld.positions(&positions).ok_or_else(|| impinge_io::Error::Mismatch {
-                file: self.name.clone(),
-                what: "positions a frame (the mesh, before welding, has as many vertices)".to_owned(),
-                expected: weld.map().len() as u64,
-                found: positions.len() as u64,
-            })?,
+            Some(weld) => {
+                weld.positions(&positions)
+                    .ok_or_else(|| impinge_io::Error::Mismatch {
+                        file: self.name.clone(),
+                        what: "positions a frame (the mesh, before welding, has as many vertices)"
+                            .to_owned(),
+                        expected: weld.map().len() as u64,
+                        found: positions.len() as u64,
+                    })?
+            }
         };
         Ok(to_positions(positions))
     }
@@ -141,8 +148,16 @@ impl Lines {
         Ok(to.flush()?)
     }
 
-    fn frame(&mut self, frame_ix: usize, bodies: &[(BodyId, &str)], pairs: &Pairs) -> Result<(), Error> {
-        let colliding: usize = bodies.iter().map(|&(id, _)| pairs.colliding(id).len()).sum();
+    fn frame(
+        &mut self,
+        frame_ix: usize,
+        bodies: &[(BodyId, &str)],
+        pairs: &Pairs,
+    ) -> Result<(), Error> {
+        let colliding: usize = bodies
+            .iter()
+            .map(|&(id, _)| pairs.colliding(id).len())
+            .sum();
         let mut to = out();
         writeln!(
             to,
