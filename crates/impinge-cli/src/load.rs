@@ -80,17 +80,17 @@ fn note(name: &str, summary: &Summary, n_welded: usize) {
     for (n, what) in [
         (
             summary.n_polygons_fanned,
-            "polygons fanned into triangles: primitives are numbered after that",
+            "polygons fanned (primitives are numbered after that)",
         ),
         (
             summary.n_triangles_skipped,
-            "triangles beside the tetrahedra left out",
+            "triangles beside tetrahedra left out",
         ),
         (n_welded as u64, "vertices welded to others"),
     ] {
         if n > 0 {
             // A note that nobody can read does no harm.
-            let _ = writeln!(stderr(), "note: {name}: {} {what}", grouped(n));
+            let _ = writeln!(stderr(), "note: {name}: {what}: {}", grouped(n));
         }
     }
 }

@@ -60,10 +60,10 @@ impl DemoScene {
         demo.add("knot", knot, ((ripple, Place([0.05, 0.25, 0.7])), sink))?;
         let twist = Twist { axis: 0, rate: 6.0 };
         let approach = Drift {
-            velocity: [-1.7, 0.0, 0.0],
+            velocity: [-2.1, 0.0, 0.0],
         };
         let bumpy = bumpy_ball(n, 0.3).scaled(0.7);
-        demo.add("ball", bumpy, ((twist, Place([1.8, 0.45, 0.1])), approach))?;
+        demo.add("ball", bumpy, ((twist, Place([2.2, 0.45, 0.1])), approach))?;
         Ok(demo)
     }
 

@@ -1,0 +1,269 @@
+//! `impinge pairs` and `impinge self`.
+
+use impinge::{Query, SharedVertex};
+use impinge_io::{ReadOptions, read};
+use impinge_scenes::solids::solid_ball;
+use impinge_scenes::soup::{lattice_triangles, lattice_web};
+use impinge_scenes::surfaces::{ball, cube};
+use serde_json::{Value, json};
+
+use crate::harness::{Folder, csv_rows, keys, npy_rows, oracle};
+
+#[test]
+fn json_has_the_shape_that_is_promised() {
+    let folder = Folder::new();
+    let (a, b) = (ball(320), ball(500).translated([0.7, 0.1, 0.0]));
+    folder.ply("a.ply", &a);
+    folder.ply("b.ply", &b);
+    let (rows, hash) = oracle(&[&a, &b], |ids| Query::between(ids[0], ids[1]));
+    assert!(!rows.is_empty());
+
+    let object = folder
+        .run(["pairs", "a.ply", "b.ply", "--json", "--backend", "cpu"])
+        .json();
+    assert_eq!(
+        keys(&object),
+        [
+            "pairs", "hash", "backend", "method", "bodies", "ms", "stats"
+        ]
+    );
+    assert_eq!(object["pairs"], json!(rows.len()));
+    assert_eq!(object["hash"], json!(hash));
+    assert_eq!(object["backend"], json!("cpu"));
+    assert_eq!(object["method"], json!("clusters"));
+    let colliding = |body: u32| {
+        let mut found: Vec<u32> = rows
+            .iter()
+            .flat_map(|&[body_a, a, body_b, b]| [(body_a, a), (body_b, b)])
+            .filter(|&(of, _)| of == body)
+            .map(|(_, primitive)| primitive)
+            .collect();
+        found.sort_unstable();
+        found.dedup();
+        found.len()
+    };
+    let described = |name: &str, primitives: usize, vertices: usize, colliding: usize| {
+        json!({
+            "name": name, "kind": "triangles", "primitives": primitives, "vertices": vertices, "colliding": colliding,
+        })
+    };
+    assert_eq!(
+        object["bodies"],
+        json!([
+            described("a.ply", 320, a.n_vertices(), colliding(0)),
+            described("b.ply", 500, b.n_vertices(), colliding(1)),
+        ])
+    );
+    assert_eq!(keys(&object["ms"]), ["total", "stages"]);
+    let total = object["ms"]["total"].as_f64().unwrap();
+    let stages: Vec<f64> = object["ms"]["stages"]
+        .as_object()
+        .unwrap()
+        .values()
+        .map(|ms| ms.as_f64().unwrap())
+        .collect();
+    assert!(total > 0.0 && !stages.is_empty() && stages.iter().all(|ms| *ms >= 0.0));
+    assert!(stages.iter().sum::<f64>() <= total * 1.01 + 0.01);
+    assert!(object["stats"]["n_candidates"].as_u64().unwrap() >= rows.len() as u64);
+    assert!(object["stats"]["n_threads"].as_u64().unwrap() >= 1);
+}
+
+#[test]
+fn written_rows_are_the_library_s() {
+    let folder = Folder::new();
+    let models = [
+        lattice_triangles(150, 6, 1),
+        lattice_triangles(100, 6, 2),
+        lattice_web(80, 6, 3),
+    ];
+    let models: Vec<_> = models.iter().collect();
+    let names = ["a.ply", "b.ply", "c.ply"];
+    for (name, model) in names.iter().zip(&models) {
+        folder.ply(name, model);
+    }
+    let resolve = SharedVertex::Resolve;
+    type Ask = fn(&[impinge::BodyId]) -> Query;
+    let cases: [(&[&str], Ask); 7] = [
+        (&["pairs"], |_| Query::all()),
+        (&["pairs", "--self"], |_| Query::everything()),
+        (&["pairs", "--ignore", "0,1"], |ids| {
+            Query::all().ignore(ids[0], ids[1])
+        }),
+        (&["pairs", "--ignore", "2,0", "--ignore", "1,2"], |ids| {
+            Query::all().ignore(ids[0], ids[2]).ignore(ids[1], ids[2])
+        }),
+        (&["pairs", "--self", "--ignore", "1,1"], |ids| {
+            Query::everything().ignore(ids[1], ids[1])
+        }),
+        (&["self"], |_| Query::all_within()),
+        (&["self", "--ignore", "0,0"], |ids| {
+            Query::all_within().ignore(ids[0], ids[0])
+        }),
+    ];
+    let mut seen = Vec::new();
+    for (args, ask) in cases {
+        for rule in ["skip", "resolve"] {
+            let (rows, hash) = oracle(&models, |ids| match rule {
+                "skip" => ask(ids),
+                _ => ask(ids).shared_vertex(resolve),
+            });
+            assert!(!rows.is_empty(), "{args:?}");
+            for file in ["rows.npy", "rows.csv"] {
+                let options = ["--shared-vertex", rule, "--pairs", file, "--json"];
+                let object = folder.run(args.iter().chain(&names).chain(&options)).json();
+                assert_eq!(object["hash"], json!(hash), "{args:?}");
+                assert_eq!(object["pairs"], json!(rows.len()), "{args:?}");
+            }
+            assert!(rows.is_sorted());
+            assert_eq!(npy_rows(&folder.path("rows.npy")), rows, "{args:?} {rule}");
+            assert_eq!(csv_rows(&folder.path("rows.csv")), rows, "{args:?} {rule}");
+            seen.push(rows);
+        }
+    }
+    // Each option changes something, or this test could not fail.
+    seen.sort();
+    let n_cases = seen.len();
+    seen.dedup();
+    assert!(seen.len() > n_cases / 2 + 1);
+}
+
+#[test]
+fn no_option_of_the_search_changes_the_answer() {
+    let folder = Folder::new();
+    let (a, b) = (ball(500), solid_ball(200).translated([0.4, 0.0, 0.1]));
+    folder.ply("a.ply", &a);
+    folder.medit("b.mesh", &b);
+    let (rows, hash) = oracle(&[&a, &b], |_| Query::everything());
+    for options in [
+        &["--method", "naive"][..],
+        &["--method", "clusters", "--threads", "1"],
+        &["--method", "clusters", "--threads", "2", "--repeat", "3"],
+        &["--method", "cells", "--lambda", "0.3"],
+        &[
+            "--method",
+            "cells",
+            "--lambda",
+            "7",
+            "--group-size",
+            "5",
+            "--threads",
+            "2",
+        ],
+        &[
+            "--backend",
+            "auto",
+            "--memory-budget",
+            "1G",
+            "--no-progress",
+        ],
+    ] {
+        let args = [
+            "pairs", "a.ply", "b.mesh", "--self", "--json", "--pairs", "rows.npy",
+        ];
+        let object = folder.run(args.iter().chain(options)).json();
+        assert_eq!(object["hash"], json!(hash), "{options:?}");
+        assert_eq!(npy_rows(&folder.path("rows.npy")), rows, "{options:?}");
+        assert_eq!(object["bodies"][1]["kind"], json!("tetrahedra"));
+        if options[0] == "--method" {
+            assert_eq!(object["method"], json!(options[1]));
+        }
+        if let Some(ix) = options.iter().position(|option| *option == "--threads")
+            && options[1] == "clusters"
+        {
+            assert_eq!(object["stats"]["n_threads"].to_string(), options[ix + 1]);
+        }
+    }
+}
+
+#[test]
+fn text_for_people_holds_the_numbers() {
+    let folder = Folder::new();
+    let (a, b) = (ball(1_280), ball(1_280).translated([0.8, 0.0, 0.0]));
+    folder.ply("a.ply", &a);
+    folder.ply("b.ply", &b);
+    let (rows, hash) = oracle(&[&a, &b], |_| Query::all());
+    let text = folder.run(["pairs", "a.ply", "b.ply"]).printed();
+    for word in [
+        "a.ply",
+        "b.ply",
+        "triangles",
+        "1,280",
+        "stage",
+        "total",
+        "clusters on cpu",
+    ] {
+        assert!(text.contains(word), "{word}: {text}");
+    }
+    assert!(
+        text.contains(&format!("{} pairs, hash {hash}", rows.len())),
+        "{text}"
+    );
+    let text = folder
+        .run(["pairs", "a.ply", "b.ply", "--repeat", "5"])
+        .printed();
+    assert!(text.contains("median of 5"), "{text}");
+}
+
+#[test]
+fn welding_is_asked_for_and_said() {
+    let folder = Folder::new();
+    // Two triangles over one edge whose vertices the file repeats.
+    folder.text(
+        "split.obj",
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 0 1 0\nv 1 1 0.5\nf 1 2 3\nf 4 6 5\n",
+    );
+    let apart = folder.run(["self", "split.obj", "--json"]).json();
+    assert_eq!(apart["pairs"], json!(1));
+    assert_eq!(apart["bodies"][0]["vertices"], json!(6));
+    let welded = folder.run(["self", "split.obj", "--weld", "--json"]).json();
+    assert_eq!(welded["pairs"], json!(0));
+    assert_eq!(welded["bodies"][0]["vertices"], json!(4));
+    let run = folder.run(["self", "split.obj", "--weld"]);
+    assert_eq!(
+        run.stderr,
+        "note: split.obj: vertices welded to others: 2\n"
+    );
+}
+
+#[test]
+fn coloured_meshes_hold_every_body() {
+    let folder = Folder::new();
+    let (a, b) = (cube([0.0; 3], 1.0), cube([0.9, 0.9, 0.9], 1.0));
+    folder.ply("a.ply", &a);
+    folder.ply("b.ply", &b);
+    for (out, is_red) in [("seen.ply", true), ("seen.glb", false), ("seen.vtu", false)] {
+        folder
+            .run(["pairs", "a.ply", "b.ply", "--out", out])
+            .printed();
+        let mesh = read(&folder.path(out), &ReadOptions::default()).unwrap();
+        assert_eq!(mesh.n_primitives(), 24, "{out}");
+        let bytes = std::fs::read(folder.path(out)).unwrap();
+        if is_red {
+            let has = |color: [u8; 3]| bytes.windows(3).any(|window| window == color);
+            assert!(has([214, 39, 40]) && has([31, 119, 180]) && has([200, 200, 200]));
+        }
+    }
+    let bytes = std::fs::read(folder.path("seen.vtu")).unwrap();
+    assert!(bytes.windows(9).any(|window| window == b"colliding"));
+    // Tetrahedra go where tetrahedra can.
+    folder.medit("t.mesh", &solid_ball(40));
+    folder
+        .run(["pairs", "a.ply", "t.mesh", "--out", "mixed.vtu"])
+        .printed();
+    assert!(folder.path("mixed.vtu").is_file());
+}
+
+#[test]
+fn polygons_are_fanned_with_a_note() {
+    let folder = Folder::new();
+    folder.text(
+        "quad.obj",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n",
+    );
+    let run = folder.run(["self", "quad.obj"]);
+    let expected = "note: quad.obj: polygons fanned (primitives are numbered after that): 1\n";
+    assert_eq!(run.stderr, expected);
+    let object = folder.run(["self", "quad.obj", "--json"]).json();
+    assert_eq!(object["bodies"][0]["primitives"], json!(2));
+    assert_eq!(object["stats"]["grid"], Value::Null);
+}

@@ -1,0 +1,67 @@
+//! `impinge demo`.
+
+use impinge_io::{ReadOptions, read};
+
+use crate::harness::Folder;
+
+#[test]
+fn a_small_demo_finds_checks_and_writes() {
+    let folder = Folder::new();
+    let text = folder
+        .run(["demo", "--triangles", "3000", "--frames", "12"])
+        .printed();
+    for word in [
+        "3 deforming bodies, 3,000 triangles, 12 frames",
+        "worm with itself",
+        "frames a second",
+        "checked: naive finds the same",
+        "wrote out/demo.glb",
+    ] {
+        assert!(text.contains(word), "{word}: {text}");
+    }
+    let mesh = read(&folder.path("out/demo.glb"), &ReadOptions::default()).unwrap();
+    assert_eq!(mesh.n_primitives(), 3_000);
+    // Everybody meets, and the worm itself: a demo of nothing would show nothing.
+    for what in [
+        "worm with itself",
+        "worm and knot",
+        "worm and ball",
+        "knot and ball",
+    ] {
+        let row = text.lines().find(|line| line.starts_with(what)).unwrap();
+        let numbers: Vec<u64> = row[what.len()..]
+            .split_whitespace()
+            .map(|number| number.replace(',', "").parse().unwrap())
+            .collect();
+        assert!(numbers.iter().all(|n| *n > 0), "{row}");
+    }
+}
+
+#[test]
+fn every_method_is_checked_by_another_one() {
+    let folder = Folder::new();
+    for (method, by) in [
+        ("clusters", "naive"),
+        ("cells", "naive"),
+        ("naive", "clusters"),
+    ] {
+        let text = folder
+            .run([
+                "demo",
+                "--triangles",
+                "1200",
+                "--frames",
+                "2",
+                "--out",
+                "seen.ply",
+                "--method",
+                method,
+            ])
+            .printed();
+        assert!(
+            text.contains(&format!("checked: {by} finds the same")),
+            "{text}"
+        );
+        assert!(folder.path("seen.ply").is_file());
+    }
+}

@@ -1,0 +1,9 @@
+//! The program from outside: the built binary, on files made for the test.
+
+mod answer;
+mod demo;
+mod harness;
+mod sequence;
+mod shared_data;
+mod signals;
+mod usage;

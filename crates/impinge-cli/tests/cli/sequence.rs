@@ -1,0 +1,192 @@
+//! `impinge sequence`.
+
+use impinge::Query;
+use impinge_io::Pc2Writer;
+use impinge_scenes::Model;
+use impinge_scenes::surfaces::{ball, torus};
+use serde_json::{Value, json};
+
+use crate::harness::{Folder, keys, oracle};
+
+/// A ball that falls through a ring, and folds in two on its way.
+fn falling(n_frames: usize) -> (Model, Vec<Model>) {
+    let rest = ball(300);
+    let frames = (0..n_frames)
+        .map(|frame| {
+            let t = frame as f32 / n_frames as f32;
+            rest.mapped(|[x, y, z]| [x.abs() * t + x * (1.0 - t), y, z + 1.0 - 2.0 * t])
+        })
+        .collect();
+    (rest, frames)
+}
+
+fn write(folder: &Folder, n_frames: usize) -> Vec<Model> {
+    let (rest, frames) = falling(n_frames);
+    folder.ply("ball.ply", &rest);
+    folder.ply("ring.ply", &ring());
+    let mut cache =
+        Pc2Writer::create(&folder.path("run.pc2"), rest.n_vertices(), 0.0, 1.0).unwrap();
+    for (frame_ix, frame) in frames.iter().enumerate() {
+        cache.append(&frame.positions).unwrap();
+        folder.ply(&format!("run_{frame_ix:03}.ply"), frame);
+    }
+    cache.finish().unwrap();
+    frames
+}
+
+fn ring() -> Model {
+    torus(24, 8, 0.45, 0.1)
+}
+
+fn lines(text: &str) -> Vec<Value> {
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+#[test]
+fn every_frame_is_the_oracle_s() {
+    let folder = Folder::new();
+    let frames = write(&folder, 8);
+    let ring = ring();
+    type Case<'a> = (&'a [&'a str], Query);
+    let cases: [Case; 4] = [
+        (&[], Query::all_within()),
+        (&["--self"], Query::all_within()),
+        (&["--other", "ring.ply"], Query::all()),
+        (&["--other", "ring.ply", "--self"], Query::everything()),
+    ];
+    for (options, query) in cases {
+        let expected: Vec<(Value, Value)> = frames
+            .iter()
+            .map(|frame| {
+                let models = if options.contains(&"--other") {
+                    vec![frame, &ring]
+                } else {
+                    vec![frame]
+                };
+                let (rows, hash) = oracle(&models, |_| query.clone());
+                (json!(rows.len()), json!(hash))
+            })
+            .collect();
+        assert!(
+            expected.iter().any(|(n, _)| n != &expected[0].0),
+            "{options:?}"
+        );
+        for sequence in ["run.pc2", "run_000.ply", "run_%03d.ply"] {
+            let args = ["sequence", "ball.ply", sequence, "--json"];
+            let text = folder.run(args.iter().chain(options)).printed();
+            let lines = lines(&text);
+            assert_eq!(lines.len(), frames.len());
+            for (frame_ix, (line, (n, hash))) in lines.iter().zip(&expected).enumerate() {
+                assert_eq!(
+                    keys(line),
+                    [
+                        "frame", "pairs", "hash", "backend", "method", "bodies", "ms", "stats"
+                    ]
+                );
+                assert_eq!(line["frame"], json!(frame_ix));
+                assert_eq!(
+                    (&line["pairs"], &line["hash"]),
+                    (n, hash),
+                    "{options:?} {sequence}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn ranges_of_frames() {
+    let folder = Folder::new();
+    write(&folder, 6);
+    let numbers = |range: &str| -> Vec<u64> {
+        let text = folder
+            .run([
+                "sequence", "ball.ply", "run.pc2", "--json", "--frames", range,
+            ])
+            .printed();
+        lines(&text)
+            .iter()
+            .map(|line| line["frame"].as_u64().unwrap())
+            .collect()
+    };
+    assert_eq!(numbers("2..4"), [2, 3]);
+    assert_eq!(numbers("4.."), [4, 5]);
+    assert_eq!(numbers("..1"), [0]);
+    for range in ["3..7", "7.."] {
+        let said = folder
+            .run([
+                "sequence", "ball.ply", "run.pc2", "--json", "--frames", range,
+            ])
+            .misuse();
+        assert!(said.contains("6 frames of run.pc2"), "{said}");
+    }
+}
+
+#[test]
+fn text_for_people() {
+    let folder = Folder::new();
+    write(&folder, 5);
+    let text = folder.run(["sequence", "ball.ply", "run.pc2"]).printed();
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines.len(), 7, "{text}");
+    assert!(lines[0].contains("frame") && lines[0].contains("hash"));
+    assert!(lines[6].starts_with("5 frames, 0 to "), "{text}");
+}
+
+#[test]
+fn frames_are_welded_as_the_mesh_is() {
+    let folder = Folder::new();
+    let (rest, frames) = falling(4);
+    // Every triangle with vertices of its own, as in a file that repeats them.
+    let soup = |model: &Model| -> Model {
+        let impinge::Elements::Triangles(faces) = &model.elements else {
+            unreachable!("a ball is made of triangles");
+        };
+        Model {
+            positions: faces
+                .as_flattened()
+                .iter()
+                .map(|&ix| model.positions[ix as usize])
+                .collect(),
+            elements: (0..faces.len() as u32)
+                .map(|face| [3 * face, 3 * face + 1, 3 * face + 2])
+                .collect::<Vec<_>>()
+                .into(),
+        }
+    };
+    folder.ply("soup.ply", &soup(&rest));
+    for (frame_ix, frame) in frames.iter().enumerate() {
+        folder.ply(&format!("soup_{frame_ix}.ply"), &soup(frame));
+    }
+    let text = folder
+        .run(["sequence", "soup.ply", "soup_0.ply", "--weld", "--json"])
+        .printed();
+    for (line, frame) in lines(&text).iter().zip(&frames) {
+        let (rows, hash) = oracle(&[frame], |_| Query::all_within());
+        assert_eq!(
+            (&line["pairs"], &line["hash"]),
+            (&json!(rows.len()), &json!(hash))
+        );
+        assert_eq!(line["bodies"][0]["vertices"], json!(rest.n_vertices()));
+    }
+}
+
+#[test]
+fn frames_that_do_not_fit_are_named() {
+    let folder = Folder::new();
+    write(&folder, 2);
+    folder.ply("other.ply", &ball(80));
+    let n = ball(300).n_vertices();
+    for weld in [&["--json"][..], &["--json", "--weld"]] {
+        let args = ["sequence", "other.ply", "run.pc2"];
+        let line = folder.run(args.iter().chain(weld)).error();
+        assert!(
+            line.contains("run.pc2") && line.contains(&n.to_string()),
+            "{line}"
+        );
+    }
+    let line = folder.run(["sequence", "ball.ply", "missing.pc2"]).error();
+    assert!(line.contains("missing.pc2"), "{line}");
+}

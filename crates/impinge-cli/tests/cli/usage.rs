@@ -1,0 +1,177 @@
+//! Help, exit codes and error lines.
+
+use crate::harness::{Folder, program};
+use impinge_scenes::surfaces::ball;
+
+#[test]
+fn help_shows_every_command_with_examples() {
+    let folder = Folder::new();
+    let help = folder.run(["--help"]).printed();
+    for word in [
+        "demo",
+        "pairs",
+        "self",
+        "sequence",
+        "Exit codes",
+        "Examples:",
+    ] {
+        assert!(help.contains(word), "{word}");
+    }
+    for (command, words) in [
+        (
+            "demo",
+            &["--frames", "--triangles", "--out", "impinge demo --"][..],
+        ),
+        (
+            "pairs",
+            &[
+                "--self",
+                "--method",
+                "--backend",
+                "--threads",
+                "--shared-vertex",
+                "--weld",
+                "--lambda",
+                "--repeat",
+                "--pairs",
+                "--out",
+                "--json",
+                "--ignore",
+                "--memory-budget",
+                "--group-size",
+                "impinge pairs a.obj b.obj",
+            ],
+        ),
+        (
+            "self",
+            &["--shared-vertex", "--weld", "impinge self cow.off --weld"],
+        ),
+        (
+            "sequence",
+            &[
+                "--self",
+                "--other",
+                "--frames",
+                "impinge sequence body.ply run.pc2",
+            ],
+        ),
+    ] {
+        let help = folder.run([command, "--help"]).printed();
+        for word in words.iter().chain(&["Examples:"]) {
+            assert!(help.contains(word), "{command}: {word}");
+        }
+    }
+    let version = folder.run(["--version"]).printed();
+    assert_eq!(version, format!("impinge {}\n", env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn bad_usage_is_code_2() {
+    let folder = Folder::new();
+    folder.ply("a.ply", &ball(20));
+    for args in [
+        &[][..],
+        &["frobnicate"],
+        &["pairs"],
+        &["pairs", "a.ply"],
+        &["self"],
+        &["sequence", "a.ply"],
+        &["pairs", "a.ply", "a.ply", "--method", "magic"],
+        &["pairs", "a.ply", "a.ply", "--threads", "0"],
+        &["pairs", "a.ply", "a.ply", "--threads", "100000"],
+        &["pairs", "a.ply", "a.ply", "--repeat", "0"],
+        &["pairs", "a.ply", "a.ply", "--lambda", "0"],
+        &["pairs", "a.ply", "a.ply", "--group-size", "65"],
+        &["pairs", "a.ply", "a.ply", "--memory-budget", "lots"],
+        &["pairs", "a.ply", "a.ply", "--pairs", "rows.txt"],
+        &["pairs", "a.ply", "a.ply", "--out", "seen.obj"],
+        &["pairs", "a.ply", "a.ply", "--ignore", "0"],
+        &["demo", "--frames", "0"],
+        &["demo", "--out", "demo"],
+    ] {
+        let said = folder.run(args).misuse();
+        assert!(!said.is_empty(), "{args:?}");
+    }
+    let said = folder
+        .run(["pairs", "a.ply", "a.ply", "--ignore", "0,2"])
+        .misuse();
+    assert_eq!(
+        said.trim_end(),
+        "impinge: --ignore names body 2, but 2 bodies are given, numbered from 0"
+    );
+}
+
+#[test]
+fn other_errors_are_code_1_and_one_line() {
+    let folder = Folder::new();
+    folder.ply("good.ply", &ball(20));
+    folder.text("broken.obj", "v 0 0 0\nv 1 0 0\nv 0 1 zero\nf 1 2 3\n");
+    folder.text("range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n");
+    folder.text("far.off", "OFF\n3 1 0\n0 0 0\n1e300 0 0\n0 1 0\n3 0 1 2\n");
+    folder.text("mesh.txt", "");
+    for (file, words) in [
+        ("missing.ply", &["missing.ply"][..]),
+        ("broken.obj", &["broken.obj:3", "zero"]),
+        ("range.obj", &["range.obj:4", "4", "3 vertices"]),
+        ("far.off", &["far.off", "vertex 1", "1e300"]),
+        ("mesh.txt", &["mesh.txt", "txt"]),
+    ] {
+        for args in [
+            ["pairs", "good.ply", file, "--json"],
+            ["self", "good.ply", file, "--no-progress"],
+        ] {
+            let line = folder.run(args).error();
+            for word in words {
+                assert!(line.contains(word), "{line}");
+            }
+        }
+    }
+}
+
+#[test]
+fn unwritable_files_are_named() {
+    let folder = Folder::new();
+    folder.ply("a.ply", &ball(20));
+    for (option, file) in [("--pairs", "no/rows.csv"), ("--out", "no/seen.ply")] {
+        let line = folder
+            .run(["pairs", "a.ply", "a.ply", option, file])
+            .error();
+        assert!(line.contains(file), "{line}");
+    }
+}
+
+#[test]
+fn a_budget_that_is_too_small_is_refused() {
+    let folder = Folder::new();
+    folder.ply("a.ply", &ball(2_000));
+    let line = folder
+        .run(["pairs", "a.ply", "a.ply", "--memory-budget", "1"])
+        .error();
+    assert!(line.contains("memory budget is 1 bytes"), "{line}");
+}
+
+#[test]
+fn closed_pipes_are_no_panic() {
+    let folder = Folder::new();
+    folder.ply("a.ply", &ball(200));
+    for args in [
+        &["pairs", "a.ply", "a.ply", "--json"][..],
+        &["self", "a.ply"],
+        &["--help"],
+    ] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let output = folder.command(args).stdout(writer).output().unwrap();
+        assert_eq!(String::from_utf8(output.stderr).unwrap(), "", "{args:?}");
+        assert_eq!(output.status.code(), Some(0), "{args:?}");
+    }
+    // Standard error may be closed as well: the code still tells.
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let status = program()
+        .args(["self", "missing.ply"])
+        .stderr(writer)
+        .status()
+        .unwrap();
+    assert_eq!(status.code(), Some(1));
+}
