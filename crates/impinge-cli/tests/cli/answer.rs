@@ -136,8 +136,17 @@ fn no_option_of_the_search_changes_the_answer() {
     let (rows, hash) = oracle(&[&a, &b], |_| Query::everything());
     for options in [
         &["--method", "naive"][..],
-        &["--method", "clusters", "--threads", "1"],
-        &["--method", "clusters", "--threads", "2", "--repeat", "3"],
+        &["--method", "clusters", "--threads", "1", "--backend", "cpu"],
+        &[
+            "--method",
+            "clusters",
+            "--threads",
+            "2",
+            "--repeat",
+            "3",
+            "--backend",
+            "cpu",
+        ],
         &["--method", "cells", "--lambda", "0.3"],
         &[
             "--method",
@@ -182,7 +191,9 @@ fn text_for_people_holds_the_numbers() {
     folder.ply("a.ply", &a);
     folder.ply("b.ply", &b);
     let (rows, hash) = oracle(&[&a, &b], |_| Query::all());
-    let text = folder.run(["pairs", "a.ply", "b.ply"]).printed();
+    let text = folder
+        .run(["pairs", "a.ply", "b.ply", "--backend", "cpu"])
+        .printed();
     for word in [
         "a.ply",
         "b.ply",
