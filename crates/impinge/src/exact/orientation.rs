@@ -163,6 +163,12 @@ impl Projection {
         [p[self.0[0]], p[self.0[1]]]
     }
 
+    /// The two coordinates that stay, of three points.
+    #[inline]
+    pub(super) fn apply_all(self, points: &[Point; 3]) -> [[f64; 2]; 3] {
+        points.each_ref().map(|point| self.apply(point))
+    }
+
     /// The turn of the projected points.
     #[inline]
     pub(super) fn turn(self, a: &Point, b: &Point, c: &Point) -> Sign {

@@ -223,6 +223,9 @@ fn beyond_vertex(v: &Point, a: Points, b: Points) -> bool {
             (_, true) => return false,
             _ => {}
         }
+        if let Some(answer) = beyond_vertex_in_plane(v, [a0, a1], [b0, b1]) {
+            return answer;
+        }
     }
     if parted_by_face(v, a.as_slice(), b.as_slice())
         || parted_by_face(v, b.as_slice(), a.as_slice())
@@ -237,6 +240,30 @@ fn beyond_vertex(v: &Point, a: Points, b: Points) -> bool {
     }
     hulls_meet(a.as_slice(), b.with(*v).as_slice())
         || hulls_meet(b.as_slice(), a.with(*v).as_slice())
+}
+
+/// [`beyond_vertex`] for two triangles of one plane: whether their angles at v share a direction.
+/// None when they are not in one plane, or one is degenerate.
+fn beyond_vertex_in_plane(v: &Point, a: [&Point; 2], b: [&Point; 2]) -> Option<bool> {
+    if b.iter()
+        .any(|point| !orient3d(v, a[0], a[1], point).is_zero())
+    {
+        return None;
+    }
+    let projection = Projection::injective(v, a[0], a[1])?;
+    let turn = |p: &Point, q: &Point| projection.turn(v, p, q);
+    let (turn_a, turn_b) = (turn(a[0], a[1]), turn(b[0], b[1]));
+    if turn_b.is_zero() {
+        return None;
+    }
+    let within = |angle: [&Point; 2], inside: Sign, point: &Point| {
+        !turn(angle[0], point).strictly_opposite(inside)
+            && !turn(point, angle[1]).strictly_opposite(inside)
+    };
+    Some(
+        b.iter().any(|point| within(a, turn_a, point))
+            || a.iter().any(|point| within(b, turn_b, point)),
+    )
 }
 
 /// Whether a face of the tetrahedron v, a that contains v has all of `b` strictly on its outer

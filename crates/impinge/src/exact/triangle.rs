@@ -42,7 +42,35 @@ pub(super) fn triangles_intersect_by_signs(a: &[Point; 3], b: &[Point; 3]) -> bo
     if strictly_on_one_side(&a_sides) {
         return false;
     }
+    if a_sides.iter().chain(&b_sides).all(|side| side.is_zero())
+        && let Some(answer) = intersect_in_plane(a, b)
+    {
+        return answer;
+    }
     any_edge_meets(a, a_sides, b) || any_edge_meets(b, b_sides, a)
+}
+
+/// Triangle against triangle in one plane; none when one is degenerate.
+///
+/// Two convex polygons of a plane share no point if and only if the line of an edge of one has the
+/// other strictly on its outer side: seen as the difference of the two, a convex polygon with
+/// edges parallel to theirs, the origin is then strictly beyond one of its edges.
+fn intersect_in_plane(a: &[Point; 3], b: &[Point; 3]) -> Option<bool> {
+    let projection = Projection::injective(&a[0], &a[1], &a[2])?;
+    let (a, b) = (projection.apply_all(a), projection.apply_all(b));
+    let a_turn = orient2d(a[0], a[1], a[2]);
+    let b_turn = orient2d(b[0], b[1], b[2]);
+    if b_turn.is_zero() {
+        return None;
+    }
+    let parts = |t: &[[f64; 2]; 3], turn: Sign, other: &[[f64; 2]; 3]| {
+        EDGES.iter().any(|&[i, j]| {
+            other
+                .iter()
+                .all(|&vertex| orient2d(t[i], t[j], vertex).strictly_opposite(turn))
+        })
+    };
+    Some(!parts(&a, a_turn, &b) && !parts(&b, b_turn, &a))
 }
 
 /// On which side of the plane of `triangle` each vertex of `other` lies. All zero when
@@ -99,7 +127,7 @@ fn segment_meets_triangle_in_plane(p: &Point, q: &Point, triangle: &[Point; 3]) 
             .iter()
             .any(|&[i, j]| segments_intersect(p, q, &triangle[i], &triangle[j]));
     };
-    let [a, b, c] = triangle.each_ref().map(|vertex| projection.apply(vertex));
+    let [a, b, c] = projection.apply_all(triangle);
     let (p, q) = (projection.apply(p), projection.apply(q));
     // Either the segment lies inside, and then so does p, or it meets an edge.
     on_one_side(&[orient2d(a, b, p), orient2d(b, c, p), orient2d(c, a, p)])

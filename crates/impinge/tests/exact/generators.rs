@@ -57,6 +57,8 @@ pub enum Kind {
     Lattice(u64),
     /// Lattice points under one linear map with 24-bit entries: degenerate in no axis.
     Skewed(u64),
+    /// Lattice points {0..n}^2 of one plane in no special position: all coplanar, often more.
+    Planar(u64),
     /// `f32` numbers of about one size.
     Plain,
     /// Any finite `f32`, from the smallest subnormal to the largest number.
@@ -72,10 +74,11 @@ pub enum Kind {
 }
 
 impl Kind {
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Lattice(2),
         Self::Lattice(3),
         Self::Skewed(2),
+        Self::Planar(4),
         Self::Plain,
         Self::AnyF32,
         Self::Palette,
@@ -88,13 +91,8 @@ impl Kind {
     pub fn points<const N: usize>(self, random: &mut Random) -> [[f64; 3]; N] {
         match self {
             Self::Lattice(n) => [(); N].map(|()| [(); 3].map(|()| random.below(n + 1) as f64)),
-            Self::Skewed(n) => {
-                let axes = [(); 3].map(|()| [(); 3].map(|()| (random.unit() * 8e6).round()));
-                [(); N].map(|()| {
-                    let at = [(); 3].map(|()| random.below(n + 1) as f64);
-                    std::array::from_fn(|k| (0..3).map(|axis| at[axis] * axes[axis][k]).sum())
-                })
-            }
+            Self::Skewed(n) => on_skewed_lattice(random, [n, n, n]),
+            Self::Planar(n) => on_skewed_lattice(random, [n, n, 0]),
             Self::Plain => [(); N].map(|()| [(); 3].map(|()| f64::from(random.unit() as f32))),
             Self::AnyF32 => [(); N].map(|()| [(); 3].map(|()| random.any_f32())),
             Self::Palette => {
@@ -138,6 +136,15 @@ impl Kind {
             }),
         }
     }
+}
+
+/// N points of {0..n}^3, with an n for each axis, under a random linear map with 24-bit entries.
+fn on_skewed_lattice<const N: usize>(random: &mut Random, n: [u64; 3]) -> [[f64; 3]; N] {
+    let axes = [(); 3].map(|()| [(); 3].map(|()| (random.unit() * 8e6).round()));
+    [(); N].map(|()| {
+        let at = n.map(|n| random.below(n + 1) as f64);
+        std::array::from_fn(|k| (0..3).map(|axis| at[axis] * axes[axis][k]).sum())
+    })
 }
 
 /// N points, each a blend with small integer weights of three of four common points.

@@ -88,83 +88,76 @@ pub(in super::super) fn tetrahedra_answer(a: &[Point; 4], b: &[Point; 4]) -> Opt
     }
 }
 
-/// The faces as vertex numbers, counterclockwise as seen from the vertex that each leaves out when
-/// (d1 x d2) . d3 > 0, with d the differences to vertex 0.
+/// The faces as vertex numbers; face k leaves out vertex k.
 const FACES: [[usize; 3]; 4] = [[1, 3, 2], [0, 2, 3], [0, 3, 1], [0, 1, 2]];
 
 /// The edges as vertex numbers.
 const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
 /// Where the four points of one tetrahedron lie by the faces of the other.
-struct Sides {
-    /// `[face][point]`, positive on the side where an upright tetrahedron is.
-    values: [[Determinant; 4]; 4],
-    upright: bool,
-    inverted: bool,
+struct Sides([FaceSides; 4]);
+
+/// Where four points lie by the plane of one face.
+#[derive(Clone, Copy)]
+struct FaceSides {
+    /// Whether a point is certainly on the side of the tetrahedron.
+    inner: [bool; 4],
+    /// Whether a point is certainly on the other side.
+    outer: [bool; 4],
+}
+
+impl FaceSides {
+    /// `points` by the face pqr of a tetrahedron with the fourth vertex `apex`.
+    #[inline(always)]
+    fn new([p, q, r]: [&Point; 3], apex: &Point, points: &[Point; 4]) -> Self {
+        let normal = Normal::new(&difference(q, p), &difference(r, p));
+        let apex = normal.dot(&difference(apex, p));
+        let [a, b, c, d] = points;
+        let sides = [a, b, c, d].map(|point| normal.dot(&difference(point, p)));
+        Self {
+            inner: sides.map(|side| side.is_same(apex)),
+            outer: sides.map(|side| side.is_opposite(apex)),
+        }
+    }
 }
 
 impl Sides {
     /// `points` by the faces of `k`.
     #[inline(always)]
-    fn new(k: &[Point; 4], points: &[Point; 4]) -> Self {
-        let normals = FACES
-            .map(|[p, q, r]| Normal::new(&difference(&k[q], &k[p]), &difference(&k[r], &k[p])));
-        let orientation = normals[3].dot(&difference(&k[3], &k[0]));
-        let values = std::array::from_fn(|face| {
-            points.map(|point| normals[face].dot(&difference(&point, &k[FACES[face][0]])))
-        });
-        Self {
-            values,
-            upright: orientation.is_positive(),
-            inverted: orientation.is_negative(),
-        }
-    }
-
-    /// Whether the point is certainly on the inner side of the face.
-    #[inline(always)]
-    fn inner(&self, face: usize, point: usize) -> bool {
-        let value = self.values[face][point];
-        (self.upright & value.is_positive()) | (self.inverted & value.is_negative())
-    }
-
-    /// Whether the point is certainly on the outer side of the face.
-    #[inline(always)]
-    fn outer(&self, face: usize, point: usize) -> bool {
-        let value = self.values[face][point];
-        (self.upright & value.is_negative()) | (self.inverted & value.is_positive())
+    fn new([k0, k1, k2, k3]: &[Point; 4], points: &[Point; 4]) -> Self {
+        Self([
+            FaceSides::new([k1, k3, k2], k0, points),
+            FaceSides::new([k0, k2, k3], k1, points),
+            FaceSides::new([k0, k3, k1], k2, points),
+            FaceSides::new([k0, k1, k2], k3, points),
+        ])
     }
 
     /// Whether some face certainly has all points on its outer side.
     #[inline(always)]
     fn parted_by_face(&self) -> bool {
-        let mut parted = false;
-        for face in 0..4 {
-            let mut all = true;
-            for point in 0..4 {
-                all &= self.outer(face, point);
-            }
-            parted |= all;
-        }
-        parted
+        let [a, b, c, d] = self.0.map(
+            |FaceSides {
+                 outer: [p, q, r, s],
+                 ..
+             }| p & q & r & s,
+        );
+        a | b | c | d
     }
 
     /// Whether some point is certainly inside.
     #[inline(always)]
     fn any_inside(&self) -> bool {
-        let mut any = false;
-        for point in 0..4 {
-            let mut all = true;
-            for face in 0..4 {
-                all &= self.inner(face, point);
-            }
-            any |= all;
-        }
-        any
+        let [a, b, c, d] = self.0.map(|face| face.inner);
+        (a[0] & b[0] & c[0] & d[0])
+            | (a[1] & b[1] & c[1] & d[1])
+            | (a[2] & b[2] & c[2] & d[2])
+            | (a[3] & b[3] & c[3] & d[3])
     }
 
     /// Whether the point is certainly outside.
     fn is_outside(&self, point: usize) -> bool {
-        (0..4).any(|face| self.outer(face, point))
+        self.0.iter().any(|face| face.outer[point])
     }
 }
 
@@ -185,13 +178,17 @@ fn edges_cross(points: &[Point; 4], sides: &Sides, k: &[Point; 4]) -> Crossing {
     for [from, to] in EDGES {
         let (p, q) = (&points[from], &points[to]);
         // Most edges are outside of one face with both ends and miss the whole tetrahedron.
-        if (0..4).any(|face| sides.outer(face, from) && sides.outer(face, to)) {
+        if sides
+            .0
+            .iter()
+            .any(|face| face.outer[from] && face.outer[to])
+        {
             continue;
         }
         let along = difference(q, p);
         let corners = k.map(|corner| difference(&corner, p));
-        for (face, face_sides) in FACES.iter().zip(&sides.values) {
-            if face_sides[from].is_same(face_sides[to]) {
+        for (face, FaceSides { inner, outer }) in FACES.iter().zip(&sides.0) {
+            if inner[from] && inner[to] {
                 continue;
             }
             // The line pq passes the three edges of the face on the same side, or misses it.
@@ -201,7 +198,8 @@ fn edges_cross(points: &[Point; 4], sides: &Sides, k: &[Point; 4]) -> Crossing {
             if x.is_opposite(y) || y.is_opposite(z) || z.is_opposite(x) {
                 continue;
             }
-            if face_sides[from].is_opposite(face_sides[to]) && x.is_same(y) && y.is_same(z) {
+            let apart = (inner[from] && outer[to]) || (outer[from] && inner[to]);
+            if apart && x.is_same(y) && y.is_same(z) {
                 return Crossing::Certain;
             }
             crossing = Crossing::Unsure;
