@@ -201,11 +201,13 @@ impl Detector {
         };
         match settings.method {
             Method::Naive => {
+                self.frame.check(scene)?;
                 stats.time("naive", |stats| {
                     naive::run(scene, &self.frame, control, keys, stats)
                 })?;
             }
             Method::Cells => {
+                self.frame.check(scene)?;
                 let options = cells::Options {
                     lambda: settings.lambda,
                     group_size: settings.group_size,

@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 
 use crate::error::Error;
 use crate::query::{Query, Scope, SharedVertex};
-use crate::scene::{Body, BodyId, Filter, Kind, Scene, check_positions};
+use crate::scene::{Body, BodyId, Filter, Kind, Positions, Scene, check_positions};
 
 /// One body that takes part in a frame.
 #[derive(Debug, Clone, Copy)]
@@ -41,7 +41,7 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    /// Resolves a query and checks positions that were written in place.
+    /// Resolves a query. Positions that were written in place are not checked yet.
     pub fn resolve(&mut self, scene: &Scene, query: &Query) -> Result<(), Error> {
         self.participants.clear();
         self.shared_vertex = query.shared_vertex;
@@ -74,6 +74,24 @@ impl Frame {
         Ok(())
     }
 
+    /// Refuses positions that were written in place and are not finite or out of range.
+    pub fn check(&self, scene: &Scene) -> Result<(), Error> {
+        (0..self.participants.len()).try_for_each(|ix| self.check_one(scene, ix))
+    }
+
+    /// As [`check`](Frame::check), for one participant.
+    pub fn check_one(&self, scene: &Scene, participant_ix: usize) -> Result<(), Error> {
+        let body = self.body(scene, participant_ix);
+        if body.is_checked() {
+            return Ok(());
+        }
+        let id = self.participants[participant_ix].id;
+        match body.positions() {
+            Positions::F32(positions) => check_positions(id, positions),
+            Positions::F64(positions) => check_positions(id, positions),
+        }
+    }
+
     fn push(
         &mut self,
         scene: &Scene,
@@ -82,12 +100,6 @@ impl Frame {
         filter: Option<Filter>,
     ) -> Result<(), Error> {
         let body = scene.body(id)?;
-        if !body.is_checked() {
-            match body.positions() {
-                crate::Positions::F32(positions) => check_positions(id, positions)?,
-                crate::Positions::F64(positions) => check_positions(id, positions)?,
-            }
-        }
         let first = self.n_primitives();
         let n = body.n_primitives() as u64;
         let limit = u64::from(u32::MAX);

@@ -137,7 +137,10 @@ impl Positions {
     #[inline]
     pub fn point(&self, vertex: usize) -> [f64; 3] {
         match self {
-            Positions::F32(positions) => positions[vertex].map(f64::from),
+            Positions::F32(positions) => {
+                let [x, y, z] = positions[vertex];
+                [f64::from(x), f64::from(y), f64::from(z)]
+            }
             Positions::F64(positions) => positions[vertex],
         }
     }

@@ -56,6 +56,12 @@ impl Vec4 {
     }
 
     #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        // SAFETY: SSE2.
+        Vec4(unsafe { std::arch::x86_64::_mm_add_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
     fn xyz(self) -> [f32; 3] {
         let mut out = [0.0f32; 4];
         // SAFETY: `out` holds 16 bytes.
@@ -110,6 +116,11 @@ impl Vec4 {
     }
 
     #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Vec4(std::array::from_fn(|k| self.0[k] + other.0[k]))
+    }
+
+    #[inline(always)]
     fn xyz(self) -> [f32; 3] {
         [self.0[0], self.0[1], self.0[2]]
     }
@@ -124,44 +135,16 @@ impl Vec4 {
 #[inline]
 pub(crate) fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
     match positions {
-        Positions::F32(positions) => {
-            let mut min = [Vec4::splat(f32::INFINITY); 2];
-            let mut max = [Vec4::splat(f32::NEG_INFINITY); 2];
-            let (twos, rest) = vertices.as_chunks::<2>();
-            // Two chains of minima hide the instruction's latency.
-            for two in twos {
-                for k in 0..2 {
-                    let vertex = Vec4::load(positions, two[k] as usize);
-                    min[k] = min[k].min(vertex);
-                    max[k] = max[k].max(vertex);
-                }
-            }
-            for &vertex in rest {
-                let vertex = Vec4::load(positions, vertex as usize);
-                min[0] = min[0].min(vertex);
-                max[0] = max[0].max(vertex);
-            }
-            Bounds {
-                min: min[0].min(min[1]).xyz(),
-                max: max[0].max(max[1]).xyz(),
-            }
-        }
+        Positions::F32(positions) => of_vertices_f32(positions, vertices).0,
         Positions::F64(positions) => {
             let mut min = [f64::INFINITY; 3];
             let mut max = [f64::NEG_INFINITY; 3];
             for &vertex in vertices {
                 let point = &positions[vertex as usize];
                 for axis in 0..3 {
-                    min[axis] = if point[axis] < min[axis] {
-                        point[axis]
-                    } else {
-                        min[axis]
-                    };
-                    max[axis] = if point[axis] > max[axis] {
-                        point[axis]
-                    } else {
-                        max[axis]
-                    };
+                    let x = point[axis];
+                    min[axis] = if x < min[axis] { x } else { min[axis] };
+                    max[axis] = if x > max[axis] { x } else { max[axis] };
                 }
             }
             Bounds {
@@ -170,6 +153,37 @@ pub(crate) fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
             }
         }
     }
+}
+
+/// The box of some vertices, and whether all are certainly finite. The latter costs one addition: a
+/// sum is finite only if all its terms are. (It may overflow on finite ones: then they are looked at.)
+#[inline]
+pub(crate) fn of_vertices_f32(positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
+    let mut min = [Vec4::splat(f32::INFINITY); 2];
+    let mut max = [Vec4::splat(f32::NEG_INFINITY); 2];
+    let mut sum = [Vec4::splat(0.0); 2];
+    let (twos, rest) = vertices.as_chunks::<2>();
+    // Two chains hide the latency of the instructions.
+    for two in twos {
+        for k in 0..2 {
+            let vertex = Vec4::load(positions, two[k] as usize);
+            min[k] = min[k].min(vertex);
+            max[k] = max[k].max(vertex);
+            sum[k] = sum[k].add(vertex);
+        }
+    }
+    for &vertex in rest {
+        let vertex = Vec4::load(positions, vertex as usize);
+        min[0] = min[0].min(vertex);
+        max[0] = max[0].max(vertex);
+        sum[0] = sum[0].add(vertex);
+    }
+    let bounds = Bounds {
+        min: min[0].min(min[1]).xyz(),
+        max: max[0].max(max[1]).xyz(),
+    };
+    let [x, y, z] = sum[0].add(sum[1]).xyz();
+    (bounds, (x + y + z).is_finite())
 }
 
 /// The box of all vertices of a body.
@@ -221,9 +235,13 @@ fn of_primitives<const N: usize>(
         Positions::F32(positions) => {
             let (fours, rest) = corners.as_chunks::<4>();
             for (four_ix, four) in fours.iter().enumerate() {
-                let extent = four.each_ref().map(|corners| extent(positions, corners));
-                let min = Vec4::transpose(extent.map(|(min, _)| min));
-                let max = Vec4::transpose(extent.map(|(_, max)| max));
+                let [a, b, c, d] = four;
+                let (min_a, max_a) = extent(positions, a);
+                let (min_b, max_b) = extent(positions, b);
+                let (min_c, max_c) = extent(positions, c);
+                let (min_d, max_d) = extent(positions, d);
+                let min = Vec4::transpose([min_a, min_b, min_c, min_d]);
+                let max = Vec4::transpose([max_a, max_b, max_c, max_d]);
                 let lane = 4 * four_ix;
                 for axis in 0..3 {
                     lanes.min[axis][lane..lane + 4].copy_from_slice(&min[axis]);
@@ -251,12 +269,13 @@ fn of_primitives<const N: usize>(
 #[inline(always)]
 fn extent<const N: usize>(positions: &[[f32; 3]], corners: &[u32; N]) -> (Vec4, Vec4) {
     let first = Vec4::load(positions, corners[0] as usize);
-    corners[1..]
-        .iter()
-        .fold((first, first), |(min, max), &corner| {
-            let vertex = Vec4::load(positions, corner as usize);
-            (min.min(vertex), max.max(vertex))
-        })
+    let (mut min, mut max) = (first, first);
+    for &corner in &corners[1..] {
+        let vertex = Vec4::load(positions, corner as usize);
+        min = min.min(vertex);
+        max = max.max(vertex);
+    }
+    (min, max)
 }
 
 /// The boxes of a tree, level by level, leaves first.

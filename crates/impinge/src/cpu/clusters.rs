@@ -10,6 +10,7 @@
 //! Memory: what is cached a body, a box array a cluster that takes part, and the work items. The latter
 //! two come in slabs: when one is full it is paired and settled, and dispatch goes on.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use crate::detector::{InstructionSet, Recluster};
@@ -19,7 +20,7 @@ use crate::grouping::GROUP;
 use crate::grouping::bounds::RawBoundsArray;
 use crate::grouping::clusters::Clustering;
 use crate::progress::Control;
-use crate::scene::Body;
+use crate::scene::{Body, Positions};
 use crate::stats::Statistics;
 
 use super::Job;
@@ -95,9 +96,7 @@ impl Clusters {
         self.scratches
             .resize_with(job.workers.n(), Settler::default);
         stats.time("clustering", |stats| self.cluster(job, stats))?;
-        stats.time("bounds", |stats| {
-            self.refit(job, options, stats);
-        });
+        stats.time("bounds", |stats| self.refit(job, options, stats))?;
         self.slab.limit(options, self.bytes(), job.frame)?;
         let isa = self.isa;
         dispatch!(isa, detect, (
@@ -165,7 +164,12 @@ impl Clusters {
     }
 
     /// Boxes of what has moved; clusters anew what has flowed away from its clusters.
-    fn refit(&mut self, job: Job<'_>, options: &Options, stats: &mut Statistics) {
+    fn refit(
+        &mut self,
+        job: Job<'_>,
+        options: &Options,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
         let Job {
             scene,
             frame,
@@ -174,12 +178,20 @@ impl Clusters {
         } = job;
         self.tasks.clear();
         for (ix, participant) in frame.participants.iter().enumerate() {
-            let stamp = frame.body(scene, ix).positions_stamp();
+            let body = frame.body(scene, ix);
+            let stamp = body.positions_stamp();
             let cache = self.caches[participant.id.index()]
                 .as_mut()
                 .expect("clustered");
             let n = cache.clustering.n_clusters() as u32;
-            if cache.positions_stamp != stamp && n > 0 {
+            let covered = cache.clustering.n_vertices_covered == Some(body.n_vertices());
+            if cache.positions_stamp == stamp {
+                continue;
+            }
+            if !(covered && matches!(body.positions(), Positions::F32(_))) {
+                frame.check_one(scene, ix)?;
+            }
+            if n > 0 {
                 let leaves = cache.bounds.levels[0].raw();
                 let tasks = (0..n).step_by(REFIT_TASK).map(|first| RefitTask {
                     participant: ix as u32,
@@ -190,7 +202,9 @@ impl Clusters {
                 self.tasks.extend(tasks);
             }
         }
-        self.refit_leaves(job);
+        if !self.refit_leaves(job) {
+            frame.check(scene)?;
+        }
         for (ix, participant) in frame.participants.iter().enumerate() {
             let body = frame.body(scene, ix);
             let cache = self.caches[participant.id.index()]
@@ -218,9 +232,11 @@ impl Clusters {
                 cache.best_spread = cache.best_spread.min(spread);
             }
         }
+        Ok(())
     }
 
-    fn refit_leaves(&mut self, job: Job<'_>) {
+    /// Boxes of clusters; whether all positions that were looked at are certainly finite.
+    fn refit_leaves(&mut self, job: Job<'_>) -> bool {
         let Job {
             scene,
             frame,
@@ -233,13 +249,20 @@ impl Clusters {
             frame,
             caches,
         };
+        let all_finite = AtomicBool::new(true);
         let refit = |_: &mut Settler, ix: usize| {
             let task = tasks[ix];
             let body = world.body(task.participant);
             let clustering = &world.cache(task.participant).clustering;
             for cluster in task.first..task.end {
                 let vertices = clustering.vertices(cluster as usize);
-                let bounds = bounds::of_vertices(body.positions, vertices);
+                let (bounds, finite) = match body.positions {
+                    Positions::F32(positions) => bounds::of_vertices_f32(positions, vertices),
+                    Positions::F64(_) => (bounds::of_vertices(body.positions, vertices), true),
+                };
+                if !finite {
+                    all_finite.store(false, Ordering::Relaxed);
+                }
                 // SAFETY: no two tasks name the same cluster of the same body, and nobody reads
                 // leaf boxes before all tasks are done.
                 unsafe { task.leaves.put(cluster as usize, &bounds) };
@@ -248,6 +271,7 @@ impl Clusters {
         let parallel = frame.n_primitives() >= PARALLEL_FROM;
         let n_workers = if parallel { workers.n() } else { 1 };
         workers.for_each(&mut self.scratches[..n_workers], tasks.len(), refit);
+        all_finite.into_inner()
     }
 }
 
@@ -462,10 +486,16 @@ fn detect<S: Simd>(
         } else {
             top.refit(frame.participants.len(), |ix| world.cache(ix).bounds.root());
             top.pairs(simd, body_stack, |a, b| {
-                if frame.meets(a as usize, b as usize) {
-                    clusters_between(simd, a, b, stack, &mut flusher)?;
+                if !frame.meets(a as usize, b as usize) {
+                    return Ok(());
                 }
-                Ok(())
+                // Compiled on its own: inside this closure the instruction set would be lost.
+                dispatch!(flusher.isa, clusters_between, (
+                    a: u32 = a,
+                    b: u32 = b,
+                    stack: &mut Vec<NodePair> = stack,
+                    flusher: &mut Flusher<'_, '_> = &mut flusher,
+                ) -> Result<(), Error>)
             })?;
         }
     }

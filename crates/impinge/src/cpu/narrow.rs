@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use crate::exact::filter::{self, LANES, TrianglePairs8};
 use crate::frame::pair_key;
 use crate::narrow::{intersect, intersect_shared};
-use crate::scene::Kind;
+use crate::scene::{Kind, Positions};
 
 use super::simd::Simd;
 use super::world::{BodyRef, World};
@@ -113,13 +113,16 @@ impl Settler {
             filled[n_filled] = candidate;
             n_filled += 1;
             if n_filled == LANES {
-                self.keep(&filled, !filter::reject_by_planes(&batch));
+                self.keep(&filled, !filter::reject_by_planes::<S::F64x8>(&batch));
                 n_filled = 0;
             }
         }
         if n_filled > 0 {
             let used = !(u8::MAX << n_filled);
-            self.keep(&filled, !filter::reject_by_planes(&batch) & used);
+            self.keep(
+                &filled,
+                !filter::reject_by_planes::<S::F64x8>(&batch) & used,
+            );
         }
         self.candidates = candidates;
     }
@@ -142,7 +145,7 @@ impl Settler {
                 lookup.go_to(candidate);
                 fill(&mut batch, lane, &lookup.a, &lookup.b, candidate);
             }
-            let verdict = filter::classify(&batch);
+            let verdict = filter::classify::<S::F64x8>(&batch);
             for (lane, &candidate) in chunk.iter().enumerate() {
                 if verdict.no >> lane & 1 == 1 {
                     continue;
@@ -236,11 +239,25 @@ fn fill_side(side: &mut [[[f64; LANES]; 3]; 3], lane: usize, body: &BodyRef<'_>,
     let crate::Elements::Triangles(faces) = body.elements else {
         unreachable!("only triangles are batched");
     };
-    let corners = &faces[place as usize];
-    for (k, &corner) in corners.iter().enumerate() {
-        let point = body.positions.point(corner as usize);
-        for axis in 0..3 {
-            side[k][axis][lane] = point[axis];
+    let [p, q, r] = faces[place as usize];
+    // The match is outside: one predictable branch a triangle, not one a vertex.
+    match body.positions {
+        Positions::F32(positions) => {
+            fill_vertex(&mut side[0], lane, &positions[p as usize]);
+            fill_vertex(&mut side[1], lane, &positions[q as usize]);
+            fill_vertex(&mut side[2], lane, &positions[r as usize]);
+        }
+        Positions::F64(positions) => {
+            fill_vertex(&mut side[0], lane, &positions[p as usize]);
+            fill_vertex(&mut side[1], lane, &positions[q as usize]);
+            fill_vertex(&mut side[2], lane, &positions[r as usize]);
         }
     }
+}
+
+#[inline(always)]
+fn fill_vertex<R: Copy + Into<f64>>(vertex: &mut [[f64; LANES]; 3], lane: usize, point: &[R; 3]) {
+    vertex[0][lane] = point[0].into();
+    vertex[1][lane] = point[1].into();
+    vertex[2][lane] = point[2].into();
 }

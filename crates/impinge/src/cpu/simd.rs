@@ -2,10 +2,12 @@
 //!
 //! A binary built for plain x86-64 finds out at run time what the processor has. Kernels are
 //! generic over [`Simd`] and wrapped once per instruction set by `dispatch!`; everything between wrapper
-//! and intrinsic is `inline(always)`, so a kernel is compiled whole for its set.
+//! and intrinsic is `inline(always)`, so a kernel is compiled whole for its set. Kernels pass no closures
+//! to library functions: those would be compiled on their own, without the set.
 //! The answers are bit masks of exact comparisons: no set can differ from another.
 
 use crate::detector::InstructionSet;
+use crate::exact::filter::number::{self, Vector};
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, BoundsArray};
 
@@ -26,8 +28,8 @@ impl LaneBounds {
     #[inline(always)]
     pub fn at(&self, lane: usize) -> Bounds {
         Bounds {
-            min: std::array::from_fn(|axis| self.min[axis][lane]),
-            max: std::array::from_fn(|axis| self.max[axis][lane]),
+            min: [self.min[0][lane], self.min[1][lane], self.min[2][lane]],
+            max: [self.max[0][lane], self.max[1][lane], self.max[2][lane]],
         }
     }
 
@@ -49,6 +51,9 @@ impl LaneBounds {
 
 /// An instruction set: the box tests that kernels are made of.
 pub(crate) trait Simd: Copy {
+    /// Eight f64 for the narrow stage's filters.
+    type F64x8: Vector;
+
     /// Bit `k`: box `first + k` overlaps `query`, for `k` below 8.
     fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32;
 
@@ -61,6 +66,8 @@ pub(crate) trait Simd: Copy {
 pub(crate) struct Portable;
 
 impl Simd for Portable {
+    type F64x8 = number::Portable8;
+
     #[inline(always)]
     fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
         let mut overlap = [1u8; 8];
@@ -105,7 +112,7 @@ pub(crate) use x86::{Avx2, Avx512};
 mod x86 {
     use std::arch::x86_64::*;
 
-    use super::{Bounds, BoundsArray, LaneBounds, Simd};
+    use super::{Bounds, BoundsArray, LaneBounds, Simd, number};
     use crate::grouping::bounds::READ_AHEAD;
 
     /// 256-bit registers. Only made where `avx2` was detected.
@@ -134,6 +141,8 @@ mod x86 {
     }
 
     impl Simd for Avx2 {
+        type F64x8 = number::Avx2;
+
         #[inline(always)]
         fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
             assert!(first + READ_AHEAD <= boxes.len() + READ_AHEAD);
@@ -157,8 +166,16 @@ mod x86 {
             // SAFETY: `Avx2` exists only where the processor has it; lanes 8 c .. 8 c + 8 of 64
             // lie within their array, which is aligned to 64 bytes.
             unsafe {
-                let query_min = query.min.map(|x| _mm256_set1_ps(x));
-                let query_max = query.max.map(|x| _mm256_set1_ps(x));
+                let query_min = [
+                    _mm256_set1_ps(query.min[0]),
+                    _mm256_set1_ps(query.min[1]),
+                    _mm256_set1_ps(query.min[2]),
+                ];
+                let query_max = [
+                    _mm256_set1_ps(query.max[0]),
+                    _mm256_set1_ps(query.max[1]),
+                    _mm256_set1_ps(query.max[2]),
+                ];
                 let mut mask = 0u64;
                 for chunk in 0..8 {
                     if (among >> (8 * chunk)) & 0xff == 0 {
@@ -180,6 +197,8 @@ mod x86 {
     }
 
     impl Simd for Avx512 {
+        type F64x8 = number::Avx512;
+
         #[inline(always)]
         fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
             assert!(first + READ_AHEAD <= boxes.len() + READ_AHEAD);
@@ -203,8 +222,16 @@ mod x86 {
             // SAFETY: `Avx512` exists only where the processor has it; lanes 16 c .. 16 c + 16 of
             // 64 lie within their array, which is aligned to 64 bytes.
             unsafe {
-                let query_min = query.min.map(|x| _mm512_set1_ps(x));
-                let query_max = query.max.map(|x| _mm512_set1_ps(x));
+                let query_min = [
+                    _mm512_set1_ps(query.min[0]),
+                    _mm512_set1_ps(query.min[1]),
+                    _mm512_set1_ps(query.min[2]),
+                ];
+                let query_max = [
+                    _mm512_set1_ps(query.max[0]),
+                    _mm512_set1_ps(query.max[1]),
+                    _mm512_set1_ps(query.max[2]),
+                ];
                 let mut mask = 0u64;
                 for chunk in 0..4 {
                     let mut all = (among >> (16 * chunk)) as __mmask16;

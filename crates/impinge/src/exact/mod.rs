@@ -16,7 +16,7 @@
 //!
 //! `docs/exactness.md` derives every bound and draws every case.
 
-pub mod filter;
+pub(crate) mod filter;
 mod orientation;
 mod segment;
 mod shared;

@@ -33,6 +33,9 @@ pub(crate) struct Clustering {
     pub vertices: Vec<u32>,
     /// Where each cluster's run starts, and one past the last.
     pub vertex_starts: Vec<u32>,
+    /// Whether every vertex below the body's highest index belongs to some primitive, and how many
+    /// vertices that is.
+    pub n_vertices_covered: Option<usize>,
     /// The tree over the clusters.
     pub shape: Shape,
     adjacency: OnceLock<Adjacency>,
@@ -63,6 +66,7 @@ impl Clustering {
             Elements::Tetrahedra(tets) => unique_vertices(tets),
         };
         Clustering {
+            n_vertices_covered: covered(&vertices),
             order,
             corners,
             vertices,
@@ -109,6 +113,16 @@ impl Clustering {
             + self.shape.bytes()
             + self.adjacency.get().map_or(0, Adjacency::bytes)
     }
+}
+
+/// `n` if vertices `0..n` all occur.
+fn covered(vertices: &[u32]) -> Option<usize> {
+    let n = vertices.iter().max().map_or(0, |&last| last as usize + 1);
+    let mut seen = vec![false; n];
+    for &vertex in vertices {
+        seen[vertex as usize] = true;
+    }
+    seen.iter().all(|&seen| seen).then_some(n)
 }
 
 fn gather<const N: usize>(elements: &[[u32; N]], order: &[u32]) -> Vec<[u32; N]> {

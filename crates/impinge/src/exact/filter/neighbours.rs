@@ -1,41 +1,7 @@
 //! Triangles of one body that share a vertex or an edge (`SharedVertex::Resolve`).
 
-use super::determinant::{Determinant, Normal, bit, difference};
-use super::{LANES, Point, TrianglePairs8, Verdict};
-
-/// Which lanes certainly intersect beyond the one vertex that they share, and which certainly do
-/// not. The shared vertex must be vertex 0 of both triangles, in every lane.
-///
-/// Unsure lanes go to
-/// [`triangles_intersect_beyond_shared`](crate::exact::triangles_intersect_beyond_shared).
-#[inline(always)]
-#[must_use]
-pub fn classify_shared_vertex(pairs: &TrianglePairs8) -> Verdict {
-    let (mut yes, mut no) = (0, 0);
-    for lane in 0..LANES {
-        let (a, b) = pairs.get(lane);
-        let (meet, miss) = shared_vertex(&a[0], [&a[1], &a[2]], [&b[1], &b[2]]);
-        yes |= bit(meet, lane);
-        no |= bit(miss, lane);
-    }
-    Verdict {
-        yes: yes as u8,
-        no: no as u8,
-    }
-}
-
-/// The lanes that certainly do not intersect beyond the edge that they share: those that are not
-/// coplanar. The edge must be vertices 0 and 1 of both triangles, in any order, in every lane.
-#[inline(always)]
-#[must_use]
-pub fn reject_shared_edge(pairs: &TrianglePairs8) -> u8 {
-    let mut no = 0;
-    for lane in 0..LANES {
-        let (a, b) = pairs.get(lane);
-        no |= bit(shared_edge(&a[0], &a[1], &a[2], &b[2]), lane);
-    }
-    no as u8
-}
+use super::Point;
+use super::determinant::{Determinant, Normal, difference};
 
 /// Whether the triangles v, a and v, b certainly meet, and certainly miss, beyond v.
 ///

@@ -1,67 +1,7 @@
 //! Tetrahedron against tetrahedron.
 
-use super::determinant::{Determinant, Normal, bit, difference};
-use super::{LANES, Point, Verdict};
-
-/// One tetrahedron a lane: `[vertex][axis][lane]`.
-pub type Tetrahedra8 = [[[f64; LANES]; 3]; 4];
-
-/// Eight pairs of tetrahedra, one a lane.
-///
-/// Lanes that are not set hold tetrahedra that are points, which are unsure: mask them out.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[repr(align(64))]
-pub struct TetrahedronPairs8 {
-    /// The first tetrahedron of each pair, `[vertex][axis][lane]`.
-    pub a: Tetrahedra8,
-    /// The second tetrahedron of each pair, `[vertex][axis][lane]`.
-    pub b: Tetrahedra8,
-}
-
-impl TetrahedronPairs8 {
-    /// Puts a pair into lane `lane`, which must be less than [`LANES`].
-    #[inline(always)]
-    pub fn set(&mut self, lane: usize, a: &[Point; 4], b: &[Point; 4]) {
-        for vertex in 0..4 {
-            for axis in 0..3 {
-                self.a[vertex][axis][lane] = a[vertex][axis];
-                self.b[vertex][axis][lane] = b[vertex][axis];
-            }
-        }
-    }
-
-    /// The pair of lane `lane`, which must be less than [`LANES`].
-    #[inline(always)]
-    #[must_use]
-    pub fn get(&self, lane: usize) -> ([Point; 4], [Point; 4]) {
-        let of = |k: &Tetrahedra8| -> [Point; 4] {
-            std::array::from_fn(|vertex| std::array::from_fn(|axis| k[vertex][axis][lane]))
-        };
-        (of(&self.a), of(&self.b))
-    }
-}
-
-/// Which lanes are certainly apart because a face of one parts them, and which certainly intersect
-/// because one has a vertex inside the other.
-///
-/// Unsure lanes, those that only cross at edges among them, go to
-/// [`tetrahedra_intersect`](crate::exact::tetrahedra_intersect), which tries its edges in `f64`
-/// first. About 900 operations for all eight lanes, without a branch.
-#[inline(always)]
-#[must_use]
-pub fn classify_by_faces(pairs: &TetrahedronPairs8) -> Verdict {
-    let (mut yes, mut no) = (0, 0);
-    for lane in 0..LANES {
-        let (a, b) = pairs.get(lane);
-        let (of_a, of_b) = (Sides::new(&b, &a), Sides::new(&a, &b));
-        yes |= bit(of_a.any_inside() | of_b.any_inside(), lane);
-        no |= bit(of_a.parted_by_face() | of_b.parted_by_face(), lane);
-    }
-    Verdict {
-        yes: yes as u8,
-        no: no as u8,
-    }
-}
+use super::Point;
+use super::determinant::{Determinant, Normal, difference};
 
 /// The answer for one pair, faces first, then edges; none when unsure.
 ///

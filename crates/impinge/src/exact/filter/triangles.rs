@@ -1,38 +1,43 @@
 //! Triangle against triangle.
 
-use super::determinant::{Determinant, Normal, bit, difference, select};
-use super::{LANES, Point, TrianglePairs8, Verdict};
+use super::determinant::{Determinant, Normal, difference};
+use super::number::{Number, Vector};
+use super::{LANES, Point, TrianglePairs8, Triangles8, Verdict};
 
 /// The lanes whose triangles are certainly apart because the plane of one has the other strictly
 /// on one side. The cheap first step; the rest is for [`classify`].
 #[inline(always)]
 #[must_use]
-pub fn reject_by_planes(pairs: &TrianglePairs8) -> u8 {
-    let mut no = 0;
-    for lane in 0..LANES {
-        let (a, b) = pairs.get(lane);
-        no |= bit(Sides::new(&a, &b).are_apart(), lane);
-    }
-    no as u8
+pub fn reject_by_planes<V: Vector>(pairs: &TrianglePairs8) -> u8 {
+    let (a, b) = (load::<V>(&pairs.a), load::<V>(&pairs.b));
+    V::bits(Sides::new(&a, &b).are_apart())
 }
 
 /// Which lanes certainly intersect and which certainly do not.
 #[inline(always)]
 #[must_use]
-pub fn classify(pairs: &TrianglePairs8) -> Verdict {
-    let (mut yes, mut no) = (0, 0);
-    for lane in 0..LANES {
-        let (a, b) = pairs.get(lane);
-        let sides = Sides::new(&a, &b);
-        let (apart, sure) = (sides.are_apart(), sides.are_sure());
-        let (meet, miss) = cross_on_line(&a, &b, &sides);
-        yes |= bit(sure & !apart & meet, lane);
-        no |= bit(apart | (sure & miss), lane);
-    }
+pub fn classify<V: Vector>(pairs: &TrianglePairs8) -> Verdict {
+    let (a, b) = (load::<V>(&pairs.a), load::<V>(&pairs.b));
+    let sides = Sides::new(&a, &b);
+    let (apart, sure) = (sides.are_apart(), sides.are_sure());
+    let (meet, miss) = cross_on_line(&a, &b, &sides);
     Verdict {
-        yes: yes as u8,
-        no: no as u8,
+        yes: V::bits(sure & !apart & meet),
+        no: V::bits(apart | (sure & miss)),
     }
+}
+
+// Here and below no closures are passed to library functions: those would be compiled on their
+// own, without the instruction set, and every operation would become a call.
+
+#[inline(always)]
+fn load<V: Vector>([p, q, r]: &Triangles8) -> [[V; 3]; 3] {
+    [load_vertex(p), load_vertex(q), load_vertex(r)]
+}
+
+#[inline(always)]
+fn load_vertex<V: Vector>([x, y, z]: &[[f64; LANES]; 3]) -> [V; 3] {
+    [V::load(x), V::load(y), V::load(z)]
 }
 
 /// [`classify`] for one pair, with an early end; none when unsure.
@@ -54,14 +59,14 @@ pub(in super::super) fn triangles_answer(a: &[Point; 3], b: &[Point; 3]) -> Opti
 
 /// How far (times a constant of the plane) each vertex of each triangle is above the plane of the
 /// other.
-struct Sides {
-    a: [Determinant; 3],
-    b: [Determinant; 3],
+struct Sides<T: Number> {
+    a: [Determinant<T>; 3],
+    b: [Determinant<T>; 3],
 }
 
-impl Sides {
+impl<T: Number> Sides<T> {
     #[inline(always)]
-    fn new(a: &[Point; 3], b: &[Point; 3]) -> Self {
+    fn new(a: &[[T; 3]; 3], b: &[[T; 3]; 3]) -> Self {
         Self {
             a: above(b, a),
             b: above(a, b),
@@ -70,36 +75,41 @@ impl Sides {
 
     /// Whether one triangle is certainly on one side of the other's plane.
     #[inline(always)]
-    fn are_apart(&self) -> bool {
+    fn are_apart(&self) -> T::Mask {
         all_on_one_side(&self.a) | all_on_one_side(&self.b)
     }
 
     /// Whether no vertex may be in the plane of the other triangle.
     #[inline(always)]
-    fn are_sure(&self) -> bool {
+    fn are_sure(&self) -> T::Mask {
         all_sure(&self.a) & all_sure(&self.b)
     }
 }
 
 /// How far each vertex of `other` is above the plane of `triangle`.
 #[inline(always)]
-fn above(triangle: &[Point; 3], other: &[Point; 3]) -> [Determinant; 3] {
+fn above<T: Number>(triangle: &[[T; 3]; 3], other: &[[T; 3]; 3]) -> [Determinant<T>; 3] {
     let origin = &triangle[0];
     let normal = Normal::new(
         &difference(&triangle[1], origin),
         &difference(&triangle[2], origin),
     );
-    other.map(|vertex| normal.dot(&difference(&vertex, origin)))
+    let [p, q, r] = other;
+    [
+        normal.dot(&difference(p, origin)),
+        normal.dot(&difference(q, origin)),
+        normal.dot(&difference(r, origin)),
+    ]
 }
 
 #[inline(always)]
-fn all_on_one_side(&[x, y, z]: &[Determinant; 3]) -> bool {
+fn all_on_one_side<T: Number>(&[x, y, z]: &[Determinant<T>; 3]) -> T::Mask {
     (x.is_positive() & y.is_positive() & z.is_positive())
         | (x.is_negative() & y.is_negative() & z.is_negative())
 }
 
 #[inline(always)]
-fn all_sure(&[x, y, z]: &[Determinant; 3]) -> bool {
+fn all_sure<T: Number>(&[x, y, z]: &[Determinant<T>; 3]) -> T::Mask {
     x.is_sure() & y.is_sure() & z.is_sure()
 }
 
@@ -121,7 +131,11 @@ fn all_sure(&[x, y, z]: &[Determinant; 3]) -> bool {
 ///
 /// Which of two crossings comes first is the sign of one determinant of the two edges.
 #[inline(always)]
-fn cross_on_line(a: &[Point; 3], b: &[Point; 3], sides: &Sides) -> (bool, bool) {
+fn cross_on_line<T: Number>(
+    a: &[[T; 3]; 3],
+    b: &[[T; 3]; 3],
+    sides: &Sides<T>,
+) -> (T::Mask, T::Mask) {
     let (a_alone, a_above) = alone(&sides.a);
     let (b_alone, b_above) = alone(&sides.b);
     let [a0, a1, a2] = turned(a, a_alone, !b_above);
@@ -138,29 +152,41 @@ fn cross_on_line(a: &[Point; 3], b: &[Point; 3], sides: &Sides) -> (bool, bool) 
 /// Which vertex is alone on its side (vertex 1, vertex 2; else vertex 0), and whether it is the
 /// upper side.
 #[inline(always)]
-fn alone(sides: &[Determinant; 3]) -> ([bool; 2], bool) {
-    let [x, y, z] = sides.map(Determinant::seems_positive);
-    let is_1 = (x == z) & (y != z);
-    let is_2 = (x == y) & (y != z);
+fn alone<T: Number>(sides: &[Determinant<T>; 3]) -> ([T::Mask; 2], T::Mask) {
+    let [x, y, z] = [
+        sides[0].seems_positive(),
+        sides[1].seems_positive(),
+        sides[2].seems_positive(),
+    ];
+    let is_1 = !(x ^ z) & (y ^ z);
+    let is_2 = !(x ^ y) & (y ^ z);
     ([is_1, is_2], (is_1 & y) | (is_2 & z) | (!is_1 & !is_2 & x))
 }
 
 /// The triangle with its vertices turned so that the lone one comes first, the other two
 /// exchanged if `exchange`.
 #[inline(always)]
-fn turned(triangle: &[Point; 3], [is_1, is_2]: [bool; 2], exchange: bool) -> [Point; 3] {
-    let turn = |at_0: usize, at_1: usize, at_2: usize| -> Point {
-        std::array::from_fn(|axis| {
-            select(
-                is_1,
-                triangle[at_1][axis],
-                select(is_2, triangle[at_2][axis], triangle[at_0][axis]),
-            )
-        })
-    };
-    let (next, last) = (turn(1, 2, 0), turn(2, 0, 1));
-    let pick = |yes: &Point, no: &Point| -> Point {
-        std::array::from_fn(|axis| select(exchange, yes[axis], no[axis]))
-    };
-    [turn(0, 1, 2), pick(&last, &next), pick(&next, &last)]
+fn turned<T: Number>(
+    triangle: &[[T; 3]; 3],
+    [is_1, is_2]: [T::Mask; 2],
+    exchange: T::Mask,
+) -> [[T; 3]; 3] {
+    let [p, q, r] = triangle;
+    let first = pick(is_1, q, &pick(is_2, r, p));
+    let next = pick(is_1, r, &pick(is_2, p, q));
+    let last = pick(is_1, p, &pick(is_2, q, r));
+    [
+        first,
+        pick(exchange, &last, &next),
+        pick(exchange, &next, &last),
+    ]
+}
+
+#[inline(always)]
+fn pick<T: Number>(mask: T::Mask, yes: &[T; 3], no: &[T; 3]) -> [T; 3] {
+    [
+        T::select(mask, yes[0], no[0]),
+        T::select(mask, yes[1], no[1]),
+        T::select(mask, yes[2], no[2]),
+    ]
 }

@@ -1,0 +1,356 @@
+//! What the filter computes with: one `f64`, or eight of them in vector registers.
+//!
+//! The filter is written once, generic over [`Number`]; comparisons give a mask and branches are
+//! selects. Additions, subtractions and multiplications are those of IEEE 754 in every
+//! implementation, one rounding each, so every instruction set gives the same masks.
+
+use std::ops::{Add, BitAnd, BitOr, BitXor, Mul, Not, Sub};
+
+use super::LANES;
+
+/// One `f64` or several, side by side.
+pub trait Number:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + sealed::Sealed
+{
+    /// A condition for each.
+    type Mask: Copy
+        + BitAnd<Output = Self::Mask>
+        + BitOr<Output = Self::Mask>
+        + BitXor<Output = Self::Mask>
+        + Not<Output = Self::Mask>;
+
+    /// The same number everywhere.
+    fn splat(x: f64) -> Self;
+    /// The magnitude.
+    fn abs(self) -> Self;
+    /// The larger one; either where one is NaN.
+    fn larger(self, other: Self) -> Self;
+    /// Whether `self > other`; false for NaN.
+    fn gt(self, other: Self) -> Self::Mask;
+    /// `yes` where the mask is set, else `no`.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+}
+
+/// Eight numbers, and masks as bits.
+pub trait Vector: Number {
+    /// From memory.
+    fn load(lanes: &[f64; LANES]) -> Self;
+    /// Bit k for lane k.
+    fn bits(mask: Self::Mask) -> u8;
+}
+
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for f64 {}
+    impl Sealed for super::Portable8 {}
+    #[cfg(target_arch = "x86_64")]
+    impl Sealed for super::Avx2 {}
+    #[cfg(target_arch = "x86_64")]
+    impl Sealed for super::Avx512 {}
+}
+
+impl Number for f64 {
+    type Mask = bool;
+
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        x
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.abs()
+    }
+    /// A comparison: `f64::max` costs three instructions to keep NaN out, and NaN is harmless here.
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+    #[inline(always)]
+    fn gt(self, other: Self) -> bool {
+        self > other
+    }
+    #[inline(always)]
+    fn select(mask: bool, yes: Self, no: Self) -> Self {
+        if mask { yes } else { no }
+    }
+}
+
+/// Eight numbers as an array: whatever the compiler makes of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Portable8([f64; LANES]);
+
+/// Eight conditions, all bits set or none.
+#[derive(Debug, Clone, Copy)]
+pub struct PortableMask([u64; LANES]);
+
+impl Portable8 {
+    #[inline(always)]
+    fn zip(self, other: Self, op: impl Fn(f64, f64) -> f64) -> Self {
+        Portable8(std::array::from_fn(|k| op(self.0[k], other.0[k])))
+    }
+}
+
+impl PortableMask {
+    #[inline(always)]
+    fn zip(self, other: Self, op: impl Fn(u64, u64) -> u64) -> Self {
+        PortableMask(std::array::from_fn(|k| op(self.0[k], other.0[k])))
+    }
+}
+
+macro_rules! operator {
+    ($type:ty, $trait:ident, $method:ident, |$a:ident, $b:ident| $body:expr) => {
+        impl $trait for $type {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                let ($a, $b) = (self, other);
+                $body
+            }
+        }
+    };
+}
+
+operator!(Portable8, Add, add, |a, b| a.zip(b, |x, y| x + y));
+operator!(Portable8, Sub, sub, |a, b| a.zip(b, |x, y| x - y));
+operator!(Portable8, Mul, mul, |a, b| a.zip(b, |x, y| x * y));
+operator!(PortableMask, BitAnd, bitand, |a, b| a.zip(b, |x, y| x & y));
+operator!(PortableMask, BitOr, bitor, |a, b| a.zip(b, |x, y| x | y));
+operator!(PortableMask, BitXor, bitxor, |a, b| a.zip(b, |x, y| x ^ y));
+
+impl Not for PortableMask {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        PortableMask(self.0.map(|x| !x))
+    }
+}
+
+impl Number for Portable8 {
+    type Mask = PortableMask;
+
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Portable8([x; LANES])
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Portable8(self.0.map(f64::abs))
+    }
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        self.zip(other, Number::larger)
+    }
+    #[inline(always)]
+    fn gt(self, other: Self) -> PortableMask {
+        PortableMask(std::array::from_fn(|k| {
+            if self.0[k] > other.0[k] { u64::MAX } else { 0 }
+        }))
+    }
+    #[inline(always)]
+    fn select(mask: PortableMask, yes: Self, no: Self) -> Self {
+        Portable8(std::array::from_fn(|k| {
+            f64::from_bits((yes.0[k].to_bits() & mask.0[k]) | (no.0[k].to_bits() & !mask.0[k]))
+        }))
+    }
+}
+
+impl Vector for Portable8 {
+    #[inline(always)]
+    fn load(lanes: &[f64; LANES]) -> Self {
+        Portable8(*lanes)
+    }
+    #[inline(always)]
+    fn bits(mask: PortableMask) -> u8 {
+        (0..LANES).fold(0, |bits, k| bits | ((mask.0[k] & 1) as u8) << k)
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+pub use x86::{Avx2, Avx512};
+
+/// Every method is sound only inside a function that enables the instruction set, which is why the
+/// types can be had by `load` and `splat` alone and those are called by such functions.
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use super::*;
+    use std::arch::x86_64::*;
+
+    /// Eight numbers in two 256-bit registers. To be used where `avx2` was detected.
+    #[derive(Debug, Clone, Copy)]
+    pub struct Avx2(__m256d, __m256d);
+
+    /// Eight conditions in two registers.
+    #[derive(Debug, Clone, Copy)]
+    pub struct Avx2Mask(__m256d, __m256d);
+
+    /// Eight numbers in a 512-bit register. To be used where `avx512f` and `avx512dq` were detected.
+    #[derive(Debug, Clone, Copy)]
+    pub struct Avx512(__m512d);
+
+    /// Eight conditions in a mask register.
+    #[derive(Debug, Clone, Copy)]
+    pub struct Avx512Mask(__mmask8);
+
+    // SAFETY (all below): these types are used inside functions compiled for, and called on
+    // processors with, their instruction set; the intrinsics touch no memory but that of `load`,
+    // whose array has eight numbers.
+    macro_rules! on_256 {
+        ($type:ident, $trait:ident, $method:ident, $intrinsic:ident) => {
+            operator!($type, $trait, $method, |a, b| {
+                // SAFETY: see above.
+                unsafe { $type($intrinsic(a.0, b.0), $intrinsic(a.1, b.1)) }
+            });
+        };
+    }
+    macro_rules! on_512 {
+        ($trait:ident, $method:ident, $intrinsic:ident) => {
+            operator!(Avx512, $trait, $method, |a, b| {
+                // SAFETY: see above.
+                unsafe { Avx512($intrinsic(a.0, b.0)) }
+            });
+        };
+    }
+
+    on_256!(Avx2, Add, add, _mm256_add_pd);
+    on_256!(Avx2, Sub, sub, _mm256_sub_pd);
+    on_256!(Avx2, Mul, mul, _mm256_mul_pd);
+    on_256!(Avx2Mask, BitAnd, bitand, _mm256_and_pd);
+    on_256!(Avx2Mask, BitOr, bitor, _mm256_or_pd);
+    on_256!(Avx2Mask, BitXor, bitxor, _mm256_xor_pd);
+    on_512!(Add, add, _mm512_add_pd);
+    on_512!(Sub, sub, _mm512_sub_pd);
+    on_512!(Mul, mul, _mm512_mul_pd);
+    operator!(Avx512Mask, BitAnd, bitand, |a, b| Avx512Mask(a.0 & b.0));
+    operator!(Avx512Mask, BitOr, bitor, |a, b| Avx512Mask(a.0 | b.0));
+    operator!(Avx512Mask, BitXor, bitxor, |a, b| Avx512Mask(a.0 ^ b.0));
+
+    impl Not for Avx2Mask {
+        type Output = Self;
+        #[inline(always)]
+        fn not(self) -> Self {
+            // SAFETY: see above.
+            let all = unsafe { _mm256_castsi256_pd(_mm256_set1_epi32(-1)) };
+            self ^ Avx2Mask(all, all)
+        }
+    }
+
+    impl Not for Avx512Mask {
+        type Output = Self;
+        #[inline(always)]
+        fn not(self) -> Self {
+            Avx512Mask(!self.0)
+        }
+    }
+
+    impl Number for Avx2 {
+        type Mask = Avx2Mask;
+
+        #[inline(always)]
+        fn splat(x: f64) -> Self {
+            // SAFETY: see above.
+            let x = unsafe { _mm256_set1_pd(x) };
+            Avx2(x, x)
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            // SAFETY: see above.
+            unsafe {
+                let sign = _mm256_set1_pd(-0.0);
+                Avx2(
+                    _mm256_andnot_pd(sign, self.0),
+                    _mm256_andnot_pd(sign, self.1),
+                )
+            }
+        }
+        #[inline(always)]
+        fn larger(self, other: Self) -> Self {
+            // SAFETY: see above.
+            unsafe {
+                Avx2(
+                    _mm256_max_pd(self.0, other.0),
+                    _mm256_max_pd(self.1, other.1),
+                )
+            }
+        }
+        #[inline(always)]
+        fn gt(self, other: Self) -> Avx2Mask {
+            // SAFETY: see above.
+            unsafe {
+                Avx2Mask(
+                    _mm256_cmp_pd::<_CMP_GT_OQ>(self.0, other.0),
+                    _mm256_cmp_pd::<_CMP_GT_OQ>(self.1, other.1),
+                )
+            }
+        }
+        #[inline(always)]
+        fn select(mask: Avx2Mask, yes: Self, no: Self) -> Self {
+            // SAFETY: see above.
+            unsafe {
+                Avx2(
+                    _mm256_blendv_pd(no.0, yes.0, mask.0),
+                    _mm256_blendv_pd(no.1, yes.1, mask.1),
+                )
+            }
+        }
+    }
+
+    impl Vector for Avx2 {
+        #[inline(always)]
+        fn load(lanes: &[f64; LANES]) -> Self {
+            // SAFETY: see above; two loads of four make the eight.
+            unsafe {
+                Avx2(
+                    _mm256_loadu_pd(lanes.as_ptr()),
+                    _mm256_loadu_pd(lanes.as_ptr().add(4)),
+                )
+            }
+        }
+        #[inline(always)]
+        fn bits(mask: Avx2Mask) -> u8 {
+            // SAFETY: see above.
+            unsafe { (_mm256_movemask_pd(mask.0) | _mm256_movemask_pd(mask.1) << 4) as u8 }
+        }
+    }
+
+    impl Number for Avx512 {
+        type Mask = Avx512Mask;
+
+        #[inline(always)]
+        fn splat(x: f64) -> Self {
+            // SAFETY: see above.
+            Avx512(unsafe { _mm512_set1_pd(x) })
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            // SAFETY: see above.
+            Avx512(unsafe { _mm512_abs_pd(self.0) })
+        }
+        #[inline(always)]
+        fn larger(self, other: Self) -> Self {
+            // SAFETY: see above.
+            Avx512(unsafe { _mm512_max_pd(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn gt(self, other: Self) -> Avx512Mask {
+            // SAFETY: see above.
+            Avx512Mask(unsafe { _mm512_cmp_pd_mask::<_CMP_GT_OQ>(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn select(mask: Avx512Mask, yes: Self, no: Self) -> Self {
+            // SAFETY: see above.
+            Avx512(unsafe { _mm512_mask_blend_pd(mask.0, no.0, yes.0) })
+        }
+    }
+
+    impl Vector for Avx512 {
+        #[inline(always)]
+        fn load(lanes: &[f64; LANES]) -> Self {
+            // SAFETY: see above; one load of eight.
+            Avx512(unsafe { _mm512_loadu_pd(lanes.as_ptr()) })
+        }
+        #[inline(always)]
+        fn bits(mask: Avx512Mask) -> u8 {
+            mask.0
+        }
+    }
+}
