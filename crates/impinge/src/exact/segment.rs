@@ -76,3 +76,31 @@ pub(super) fn segments_intersect(p: &Point, q: &Point, r: &Point, s: &Point) -> 
         None => overlap_on_line(p, q, r, s),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Segments of one line never decide a triangle's answer alone, so they are asked here.
+    #[test]
+    fn segments_of_one_line_overlap_or_not() {
+        let at = |t: f64| [t, 2.0 * t];
+        let cases = [
+            ([0.0, 1.0, 1.0, 2.0], true),
+            ([0.0, 1.0, 2.0, 3.0], false),
+            ([0.0, 3.0, 2.0, 1.0], true),
+            ([1.0, 1.0, 0.0, 2.0], true),
+            ([1.0, 1.0, 1.0, 1.0], true),
+            ([1.0, 1.0, 2.0, 2.0], false),
+        ];
+        for (ends, expected) in cases {
+            for [p, q, r, s] in [[0, 1, 2, 3], [1, 0, 2, 3], [2, 3, 0, 1], [3, 2, 1, 0]] {
+                let [p, q, r, s] = [p, q, r, s].map(|ix: usize| at(ends[ix]));
+                assert_eq!(segments_intersect_2d(p, q, r, s), expected, "{ends:?}");
+                let lift = |[x, y]: [f64; 2]| [x, y, -x];
+                let [p, q, r, s] = [p, q, r, s].map(lift);
+                assert_eq!(segments_intersect(&p, &q, &r, &s), expected, "{ends:?}");
+            }
+        }
+    }
+}

@@ -258,6 +258,43 @@ fn neighbouring_tetrahedra_agree_with_the_oracle() {
     }
 }
 
+/// Two flat tetrahedra in different planes, or one line, that share the edge where they meet: what
+/// counts then is how far each goes on along the line of the edge.
+#[test]
+fn flat_tetrahedra_that_share_an_edge_agree_with_the_oracle() {
+    let mut random = Random::new(11);
+    let mut seen = Seen::default();
+    for _ in 0..3000 {
+        let mut points = Kind::Lattice(4).points::<6>(&mut random);
+        let [u, v, p, q, r, s] = &mut points;
+        for point in [&mut *u, v] {
+            (point[1], point[2]) = (2.0, 2.0);
+        }
+        for point in [p, q] {
+            point[2] = 2.0;
+        }
+        for point in [r, s] {
+            point[1] = 2.0;
+        }
+        let at = |ids: [u32; 4]| ids.map(|id| points[id as usize]);
+        let (ids_a, ids_b) = ([0, 1, 2, 3], [1, 4, 0, 5]);
+        let (a, b) = (at(ids_a), at(ids_b));
+        let expected = oracle::intersect_beyond_shared(&a, &ids_a, &b, &ids_b);
+        seen.count(expected);
+        assert_eq!(
+            tetrahedra_intersect_beyond_shared(&a, ids_a, &b, ids_b),
+            expected,
+            "{points:?}"
+        );
+        assert_eq!(
+            tetrahedra_intersect_beyond_shared(&b, ids_b, &a, ids_a),
+            expected,
+            "{points:?}"
+        );
+    }
+    seen.assert_both(Kind::Lattice(4));
+}
+
 #[test]
 fn neighbours_of_two_kinds_agree_with_the_oracle() {
     let mut random = Random::new(7);
@@ -352,7 +389,7 @@ fn neighbouring_triangles_follow_the_usual_rules() {
 #[test]
 fn scaling_to_the_ends_of_the_range_changes_nothing() {
     let mut random = Random::new(9);
-    for kind in [Kind::Lattice(2), Kind::Skewed(2), Kind::NearlyTouching] {
+    for kind in [Kind::Lattice(2), Kind::Skewed(2), Kind::NearlyTouching64] {
         for _ in 0..500 {
             let points = kind.points::<8>(&mut random);
             let magnitudes = || {
