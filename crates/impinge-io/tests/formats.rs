@@ -814,7 +814,7 @@ fn vtu_pieces_and_errors() {
     }
     assert!(
         message(Format::Vtu, "<VTKFile>\n<a></b>")
-            .starts_with("file:2: expected well-formed XML, found ")
+            .starts_with("file: byte 13: expected well-formed XML, found ")
     );
 }
 
@@ -946,4 +946,28 @@ fn tetgen_files_find_each_other() {
         .unwrap_err();
         assert_eq!(error.to_string(), expected);
     }
+}
+
+#[test]
+fn vtu_of_any_shape_takes_linear_time() {
+    // A parser that checks each attribute or namespace against all others takes minutes for these.
+    let n = 200_000;
+    let attributes: String = (0..n).map(|ix| format!(" a{ix}=''")).collect();
+    let namespaces: String = (0..n)
+        .map(|ix| format!("<a xmlns:n{ix}='u{ix}'>"))
+        .collect();
+    let start = std::time::Instant::now();
+    for xml in [
+        format!("<VTKFile type='UnstructuredGrid'><a{attributes}/></VTKFile>"),
+        format!(
+            "<VTKFile type='UnstructuredGrid'>{namespaces}{}</VTKFile>",
+            "</a>".repeat(n)
+        ),
+    ] {
+        assert_eq!(
+            message(Format::Vtu, &xml),
+            "file: byte 0: expected an element 'UnstructuredGrid', found none"
+        );
+    }
+    assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
 }
