@@ -201,6 +201,14 @@ fn obj_errors_name_the_line_and_both_numbers() {
 }
 
 #[test]
+fn byte_order_marks_hide_no_vertex() {
+    let mesh = load(Format::Obj, "\u{feff}v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").or_show();
+    assert_eq!(mesh.n_vertices(), 3);
+    let mesh = load(Format::Off, "\u{feff}OFF 1 1 0\n0 0 0\n3 0 0 0\n").or_show();
+    assert_eq!(mesh.n_vertices(), 1);
+}
+
+#[test]
 fn off_variants() {
     for off in [
         "OFF # comment\n# more\n3 1\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",

@@ -33,17 +33,20 @@ pub(super) struct Node<'d> {
 impl<'x> Document<'x> {
     /// Parses `xml`. Behind the start tag of an element `last`, if there is one, nothing is looked at.
     pub(super) fn parse(xml: &'x str, last: &str, name: Name) -> Result<Self, Error> {
-        let mut reader = Reader::from_str(xml);
+        // The reader would skip one byte order mark itself, and not count its bytes.
+        let bare = xml.trim_start_matches('\u{feff}');
+        let base = xml.len() - bare.len();
+        let mut reader = Reader::from_str(bare);
         let mut elements: Vec<Element> = Vec::new();
         let mut open: Vec<usize> = Vec::new();
         // Offsets in a text in memory fit in usize.
-        let at = |reader: &Reader<&[u8]>| reader.buffer_position() as usize;
+        let at = |reader: &Reader<&[u8]>| base + reader.buffer_position() as usize;
         loop {
             let offset = at(&reader);
             let event = reader.read_event().map_err(|error| {
                 let message = error.to_string().replace(['\n', '\r'], " ");
                 name.syntax(
-                    Place::Byte(reader.error_position()),
+                    Place::Byte(base as u64 + reader.error_position()),
                     "well-formed XML",
                     message,
                 )
