@@ -73,11 +73,17 @@ pub(crate) struct Text<'a> {
 }
 
 impl<'a> Text<'a> {
+    /// A cursor at the start of `bytes`, behind the byte order mark that some editors put before UTF-8.
     pub(crate) fn new(name: Name<'a>, bytes: &'a [u8]) -> Self {
+        let offset = if bytes.starts_with(b"\xef\xbb\xbf") {
+            3
+        } else {
+            0
+        };
         Text {
             name,
             bytes,
-            offset: 0,
+            offset,
             line: 1,
             comment: None,
             base: None,

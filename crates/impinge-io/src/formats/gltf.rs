@@ -160,7 +160,7 @@ impl<'a> Scene<'a, '_> {
             None if root.scene.is_some() => {
                 return Err(index_error(
                     name,
-                    "scene",
+                    "scenes",
                     root.scene.unwrap_or(0),
                     root.scenes.len(),
                 ));
@@ -185,7 +185,7 @@ impl<'a> Scene<'a, '_> {
             let node = root
                 .nodes
                 .get(node_ix)
-                .ok_or_else(|| index_error(name, "node", node_ix, root.nodes.len()))?;
+                .ok_or_else(|| index_error(name, "nodes", node_ix, root.nodes.len()))?;
             if std::mem::replace(&mut is_visited[node_ix], true) {
                 return Err(name.syntax(
                     Place::File,
@@ -203,7 +203,7 @@ impl<'a> Scene<'a, '_> {
                 let mesh = root
                     .meshes
                     .get(mesh_ix)
-                    .ok_or_else(|| index_error(name, "mesh", mesh_ix, root.meshes.len()))?;
+                    .ok_or_else(|| index_error(name, "meshes", mesh_ix, root.meshes.len()))?;
                 let mut bases = HashMap::new();
                 for primitive in &mesh.primitives {
                     self.add(primitive, transform, &mut bases)?;
@@ -342,7 +342,7 @@ impl<'a> Scene<'a, '_> {
 fn index_error(name: Name, what: &str, index: usize, n: usize) -> Error {
     name.syntax(
         Place::File,
-        format!("the index of a {what} below {n}"),
+        format!("an index of {what} below {n}"),
         index.to_string(),
     )
 }

@@ -18,7 +18,9 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
         return Err(name.syntax(text.place(), "'MeshVersionFormatted'", shown(first)));
     }
     text.number::<u32>("a version")?;
-    while let Some(keyword) = text.word() {
+    loop {
+        // Without the end mark, a file that was cut off between two sections would pass for a whole one.
+        let keyword = text.need_word("a keyword, at last 'End'")?;
         let place = text.place();
         match keyword {
             b"End" => break,

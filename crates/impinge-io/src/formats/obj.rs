@@ -19,11 +19,11 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
     while let Some(line) = text.line() {
         let place = line.place();
         let joined = joined(line, &mut text);
-        let mut words = Line {
+        let statement = Line {
             bytes: &joined,
             number: line.number,
-        }
-        .words();
+        };
+        let mut words = statement.before(b'#').words();
         match words.next() {
             Some(b"v") => {
                 let mut position = [0.0; 3];

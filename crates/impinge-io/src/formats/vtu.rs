@@ -4,10 +4,10 @@
 //! Source: VTK File Formats (Kitware), "XML file formats"; vtkXMLDataReader.cxx for the block header of compressed data.
 
 mod array;
-
-use roxmltree::{Document, Node};
+mod xml;
 
 use self::array::Arrays;
+use self::xml::{Document, Node};
 use super::cells;
 use crate::budget::Budget;
 use crate::collect::{Collector, check_n_vertices};
@@ -21,26 +21,21 @@ pub(crate) fn read<'a>(
     options: &ReadOptions,
 ) -> Result<Collector<'a>, Error> {
     let file = File::split(bytes, name)?;
-    let document = Document::parse(&file.xml).map_err(|error| {
-        let message = error.to_string().replace(['\n', '\r'], " ");
-        name.syntax(
-            Place::Line(u64::from(error.pos().row)),
-            "well-formed XML",
-            message,
-        )
-    })?;
-    let root = document.root_element();
-    if root.tag_name().name() != "VTKFile" {
+    let document = Document::parse(file.xml, APPENDED, name)?;
+    let root = document
+        .root()
+        .ok_or_else(|| name.syntax(Place::File, "the element 'VTKFile'", "none"))?;
+    if root.tag() != "VTKFile" {
         return Err(name.syntax(
-            place(root),
+            root.place(),
             "the element 'VTKFile'",
-            shown(root.tag_name().name().as_bytes()),
+            shown(root.tag().as_bytes()),
         ));
     }
     let kind = root.attribute("type").unwrap_or_default();
     if kind != "UnstructuredGrid" {
         return Err(name.unsupported(
-            place(root),
+            root.place(),
             format!(
                 "the VTK file type {} (UnstructuredGrid is)",
                 shown(kind.as_bytes())
@@ -49,14 +44,14 @@ pub(crate) fn read<'a>(
     }
     let mut arrays = Arrays {
         name,
-        xml: &file.xml,
-        appended: file.appended(&document)?,
+        xml: file.xml,
+        appended: file.appended(root)?,
         endian: match root.attribute("byte_order") {
             None | Some("LittleEndian") => Endian::Little,
             Some("BigEndian") => Endian::Big,
             Some(other) => {
                 return Err(name.syntax(
-                    place(root),
+                    root.place(),
                     "'LittleEndian' or 'BigEndian'",
                     shown(other.as_bytes()),
                 ));
@@ -67,7 +62,7 @@ pub(crate) fn read<'a>(
             Some("UInt64") => Scalar::U64,
             Some(other) => {
                 return Err(name.syntax(
-                    place(root),
+                    root.place(),
                     "'UInt32' or 'UInt64'",
                     shown(other.as_bytes()),
                 ));
@@ -79,7 +74,7 @@ pub(crate) fn read<'a>(
             Some("vtkLZ4DataCompressor") => Some(array::Compressor::Lz4),
             Some(other) => {
                 return Err(name.unsupported(
-                    place(root),
+                    root.place(),
                     format!(
                         "the compressor {} (zlib and LZ4 are)",
                         shown(other.as_bytes())
@@ -90,35 +85,23 @@ pub(crate) fn read<'a>(
         budget: Budget::new(options.max_expanded_bytes.max(4 * bytes.len() as u64)),
     };
     let mut parts = Collector::new(name);
-    let grid = child(root, "UnstructuredGrid")
-        .ok_or_else(|| name.syntax(place(root), "an element 'UnstructuredGrid'", "none"))?;
-    for piece in children(grid, "Piece") {
+    let grid = root
+        .child("UnstructuredGrid")
+        .ok_or_else(|| name.syntax(root.place(), "an element 'UnstructuredGrid'", "none"))?;
+    for piece in grid.children("Piece") {
         read_piece(&mut arrays, piece, &mut parts)?;
     }
     Ok(parts)
 }
 
-/// The place of an element.
-fn place(node: Node) -> Place {
-    Place::Byte(node.range().start as u64)
-}
+/// The tag of the element that holds appended data.
+const APPENDED: &str = "AppendedData";
 
-fn children<'a, 'x: 'a>(
-    node: Node<'a, 'x>,
-    tag: &'static str,
-) -> impl Iterator<Item = Node<'a, 'x>> {
-    node.children().filter(move |child| child.has_tag_name(tag))
-}
-
-fn child<'a, 'x: 'a>(node: Node<'a, 'x>, tag: &'static str) -> Option<Node<'a, 'x>> {
-    children(node, tag).next()
-}
-
-/// The two parts of a file: XML that a parser can read, and what is appended, which may be any bytes.
+/// The two parts of a file: XML, and what is appended, which may be any bytes.
 struct File<'b> {
     name: Name<'b>,
-    /// The file up to the appended data; offsets are those of the file. The end tags that were behind it are put back.
-    xml: String,
+    /// The file, or its beginning up to the start tag of the appended data.
+    xml: &'b str,
     /// The bytes behind the `_` that starts the appended data, and the offset of the first.
     behind: Option<(&'b [u8], usize)>,
 }
@@ -134,52 +117,47 @@ struct Appended<'b> {
 
 impl<'b> File<'b> {
     fn split(bytes: &'b [u8], name: Name<'b>) -> Result<Self, Error> {
-        const TAG: &[u8] = b"<AppendedData";
-        let text = |bytes: &[u8]| {
-            std::str::from_utf8(bytes)
-                .map(str::to_owned)
-                .map_err(|error| {
-                    name.syntax(
-                        Place::Byte(error.valid_up_to() as u64),
-                        "XML in UTF-8",
-                        "other bytes",
-                    )
-                })
+        let text = |bytes| {
+            std::str::from_utf8(bytes).map_err(|error| {
+                name.syntax(
+                    Place::Byte(error.valid_up_to() as u64),
+                    "XML in UTF-8",
+                    "other bytes",
+                )
+            })
         };
-        let Some(tag) = find(bytes, TAG) else {
+        let Some(tag) = find(bytes, format!("<{APPENDED}").as_bytes()) else {
             return Ok(File {
                 name,
                 xml: text(bytes)?,
                 behind: None,
             });
         };
-        let missing =
-            |what: &str| name.syntax(Place::Byte(tag as u64), what, "the end of the file");
-        let open = tag
-            + bytes[tag..]
+        let missing = |what| name.syntax(Place::Byte(tag as u64), what, "the end of the file");
+        let find_from = |from: usize, wanted| {
+            bytes[from..]
                 .iter()
-                .position(|&b| b == b'>')
-                .ok_or_else(|| missing("'>'"))?;
-        let mut xml = text(&bytes[..=open])?;
-        let mut behind = None;
-        if xml.ends_with("/>") {
-            xml.push_str("</VTKFile>");
-        } else {
-            let mark = open
-                + bytes[open..]
-                    .iter()
-                    .position(|&b| b == b'_')
-                    .ok_or_else(|| missing("'_' and the appended data"))?;
-            behind = Some((&bytes[mark + 1..], mark + 1));
-            xml.push_str("</AppendedData></VTKFile>");
+                .position(|&b| b == wanted)
+                .map(|ix| from + ix)
+        };
+        let open = find_from(tag, b'>').ok_or_else(|| missing("'>'"))?;
+        if bytes[open - 1] == b'/' {
+            return Ok(File {
+                name,
+                xml: text(bytes)?,
+                behind: None,
+            });
         }
-        Ok(File { name, xml, behind })
+        let mark = find_from(open, b'_').ok_or_else(|| missing("'_' and the appended data"))?;
+        Ok(File {
+            name,
+            xml: text(&bytes[..=open])?,
+            behind: Some((&bytes[mark + 1..], mark + 1)),
+        })
     }
 
-    fn appended(&self, document: &Document) -> Result<Option<Appended<'b>>, Error> {
-        let (Some((bytes, start)), Some(node)) =
-            (self.behind, child(document.root_element(), "AppendedData"))
-        else {
+    fn appended(&self, root: Node) -> Result<Option<Appended<'b>>, Error> {
+        let (Some((bytes, start)), Some(node)) = (self.behind, root.child(APPENDED)) else {
             return Ok(None);
         };
         let is_base64 = match node.attribute("encoding") {
@@ -187,7 +165,7 @@ impl<'b> File<'b> {
             None | Some("base64") => true,
             Some(other) => {
                 return Err(self.name.syntax(
-                    place(node),
+                    node.place(),
                     "'raw' or 'base64'",
                     shown(other.as_bytes()),
                 ));
@@ -226,7 +204,7 @@ fn read_piece(arrays: &mut Arrays, piece: Node, parts: &mut Collector) -> Result
         let value = piece.attribute(attribute).unwrap_or_default();
         value.trim().parse::<u64>().map_err(|_| {
             name.syntax(
-                place(piece),
+                piece.place(),
                 format!("a number in '{attribute}'"),
                 shown(value.as_bytes()),
             )
@@ -234,12 +212,14 @@ fn read_piece(arrays: &mut Arrays, piece: Node, parts: &mut Collector) -> Result
     };
     let (n_points, n_cells) = (number("NumberOfPoints")?, number("NumberOfCells")?);
     let first = parts.n_vertices();
-    check_n_vertices(name, place(piece), first.saturating_add(n_points))?;
+    check_n_vertices(name, piece.place(), first.saturating_add(n_points))?;
     if n_points > 0 {
-        let points = child(piece, "Points").and_then(|points| child(points, "DataArray"));
+        let points = piece
+            .child("Points")
+            .and_then(|points| points.child("DataArray"));
         let points = points.ok_or_else(|| {
             name.syntax(
-                place(piece),
+                piece.place(),
                 "an element 'Points' with a 'DataArray'",
                 "none",
             )
@@ -247,7 +227,7 @@ fn read_piece(arrays: &mut Arrays, piece: Node, parts: &mut Collector) -> Result
         let values = arrays.read(points)?;
         if values.len() as u64 != 3 * n_points {
             return Err(name.count(
-                place(points),
+                points.place(),
                 "coordinates",
                 3 * n_points,
                 values.len() as u64,
@@ -255,25 +235,27 @@ fn read_piece(arrays: &mut Arrays, piece: Node, parts: &mut Collector) -> Result
         }
         append(
             &mut parts.positions,
-            values.positions(name, place(points), first)?,
+            values.positions(name, points.place(), first)?,
         );
     }
     if n_cells == 0 {
         return Ok(());
     }
-    let cells = child(piece, "Cells")
-        .ok_or_else(|| name.syntax(place(piece), "an element 'Cells'", "none"))?;
+    let cells = piece
+        .child("Cells")
+        .ok_or_else(|| name.syntax(piece.place(), "an element 'Cells'", "none"))?;
     let mut array = |title: &str| {
-        let node =
-            children(cells, "DataArray").find(|array| array.attribute("Name") == Some(title));
+        let node = cells
+            .children("DataArray")
+            .find(|array| array.attribute("Name") == Some(title));
         let node = node.ok_or_else(|| {
             name.syntax(
-                place(cells),
+                cells.place(),
                 format!("a 'DataArray' named '{title}'"),
                 "none",
             )
         })?;
-        Ok::<_, Error>((arrays.read(node)?, place(node)))
+        Ok::<_, Error>((arrays.read(node)?, node.place()))
     };
     let ((connectivity, connectivity_at), (offsets, offsets_at), (types, types_at)) =
         (array("connectivity")?, array("offsets")?, array("types")?);

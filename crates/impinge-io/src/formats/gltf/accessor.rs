@@ -99,7 +99,7 @@ impl<'a, 'r> Data<'a, 'r> {
         let accessors = &self.root.accessors;
         let accessor = accessors
             .get(accessor_ix)
-            .ok_or_else(|| index_error(self.name, "accessor", accessor_ix, accessors.len()))?;
+            .ok_or_else(|| index_error(self.name, "accessors", accessor_ix, accessors.len()))?;
         if accessor.kind != kind {
             return Err(self.name.syntax(
                 Place::File,
@@ -181,7 +181,7 @@ impl<'a, 'r> Data<'a, 'r> {
         let view = root
             .buffer_views
             .get(view_ix)
-            .ok_or_else(|| index_error(name, "buffer view", view_ix, root.buffer_views.len()))?;
+            .ok_or_else(|| index_error(name, "buffer views", view_ix, root.buffer_views.len()))?;
         let stride = view.byte_stride.unwrap_or(size);
         if stride < size {
             return Err(name.syntax(
@@ -227,7 +227,7 @@ impl<'a, 'r> Data<'a, 'r> {
         let buffer = root
             .buffers
             .get(buffer_ix)
-            .ok_or_else(|| index_error(name, "buffer", buffer_ix, root.buffers.len()))?;
+            .ok_or_else(|| index_error(name, "buffers", buffer_ix, root.buffers.len()))?;
         let bytes = match &buffer.uri {
             None => Cow::Borrowed(self.binary.ok_or_else(|| {
                 name.syntax(

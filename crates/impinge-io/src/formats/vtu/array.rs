@@ -2,9 +2,8 @@
 
 use std::borrow::Cow;
 
-use roxmltree::Node;
-
-use super::{Appended, place};
+use super::Appended;
+use super::xml::Node;
 use crate::base64;
 use crate::binary::{Endian, Scalar};
 use crate::budget::Budget;
@@ -106,7 +105,7 @@ struct Encoded<'b> {
 impl<'b> Arrays<'b> {
     /// Reads the `DataArray` at `node`.
     pub(super) fn read(&mut self, node: Node) -> Result<Values<'b>, Error> {
-        let (name, at) = (self.name, place(node));
+        let (name, at) = (self.name, node.place());
         let kind = node.attribute("type").unwrap_or_default();
         let scalar = match kind {
             "Int8" => Scalar::I8,
@@ -121,11 +120,7 @@ impl<'b> Arrays<'b> {
             "Float64" => Scalar::F64,
             other => return Err(name.syntax(at, "a type of numbers", shown(other.as_bytes()))),
         };
-        // Numbers hold no entities, so the text can be taken from the file itself, where offsets are known.
-        let text = node
-            .children()
-            .find(Node::is_text)
-            .map_or(0..0, |text| text.range());
+        let text = node.text();
         let encoded = match node.attribute("format") {
             None | Some("ascii") => return self.read_ascii(scalar, text),
             Some("binary") => Encoded {

@@ -1,0 +1,202 @@
+//! Sequences from point caches and numbered files.
+
+mod common;
+
+use std::path::Path;
+
+use common::Order;
+use impinge_io::{Error, Positions, Sequence, SequenceFormat};
+
+fn pc2(n_points: i32, n_frames: i32, values: &[f32]) -> Vec<u8> {
+    let order = Order::Little;
+    [
+        b"POINTCACHE2\0".to_vec(),
+        order.i32s([1, n_points]),
+        order.f32s([0.0, 1.0]),
+        order.i32s([n_frames]),
+        order.f32s(values.iter().copied()),
+    ]
+    .concat()
+}
+
+fn mdd(n_points: i32, n_frames: i32, values: &[f32]) -> Vec<u8> {
+    let order = Order::Big;
+    let times = (0..n_frames.clamp(0, 99)).map(|frame| frame as f32 / 24.0);
+    [
+        order.i32s([n_frames, n_points]),
+        order.f32s(times),
+        order.f32s(values.iter().copied()),
+    ]
+    .concat()
+}
+
+const VALUES: [f32; 12] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 0.1];
+
+#[test]
+fn caches() {
+    for (format, bytes) in [
+        (SequenceFormat::Pc2, pc2(2, 2, &VALUES)),
+        (SequenceFormat::Mdd, mdd(2, 2, &VALUES)),
+    ] {
+        let sequence = Sequence::from_bytes(bytes, format, "cache").unwrap();
+        assert_eq!((sequence.n_frames(), sequence.n_points()), (2, 2));
+        assert_eq!(
+            sequence.frame(1).unwrap(),
+            Positions::F32(vec![[6.0, 7.0, 8.0], [9.0, 10.0, 0.1]])
+        );
+        assert_eq!(
+            sequence.frame(0).unwrap(),
+            Positions::F32(vec![[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]])
+        );
+        assert_eq!(
+            sequence.frame(2).unwrap_err().to_string(),
+            "cache: frame index beyond the frames: expected 2, found 2"
+        );
+    }
+}
+
+#[test]
+fn mdd_file_is_read_frame_by_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.MDD");
+    std::fs::write(&path, mdd(1, 4, &VALUES)).unwrap();
+    let sequence = Sequence::open(&path).unwrap();
+    assert_eq!((sequence.n_frames(), sequence.n_points()), (4, 1));
+    assert_eq!(
+        sequence.frame(3).unwrap(),
+        Positions::F32(vec![[9.0, 10.0, 0.1]])
+    );
+    // A file that shrinks after it was opened is an error, not an old frame.
+    std::fs::write(&path, mdd(1, 4, &VALUES[..6])).unwrap();
+    assert!(matches!(
+        sequence.frame(3),
+        Err(Error::Io { action: "read", .. })
+    ));
+}
+
+#[test]
+fn cache_errors() {
+    use SequenceFormat::{Mdd, Pc2};
+    let truncated = |mut bytes: Vec<u8>| {
+        bytes.pop();
+        bytes
+    };
+    for (format, bytes, expected) in [
+        (
+            Pc2,
+            b"POINTCACHE1\0".to_vec(),
+            "c: byte 0: expected 'POINTCACHE2', found 'POINTCACHE1?'",
+        ),
+        (
+            Pc2,
+            truncated(pc2(2, 2, &VALUES)),
+            "c: a sequence of 2 frames of 2 points needs 80 bytes, but 79 are left",
+        ),
+        (
+            Mdd,
+            truncated(mdd(2, 2, &VALUES)),
+            "c: a sequence of 2 frames of 2 points needs 64 bytes, but 63 are left",
+        ),
+        (
+            Pc2,
+            pc2(-1, 2, &VALUES),
+            "c: byte 16: expected the number of points, at least 0, found -1",
+        ),
+        (
+            Mdd,
+            mdd(2, -7, &VALUES),
+            "c: byte 0: expected the number of frames, at least 0, found -7",
+        ),
+        (
+            Pc2,
+            pc2(i32::MAX, i32::MAX, &VALUES),
+            "c: a sequence of 2147483647 frames of 2147483647 points needs 18446744073709551615 bytes, but 80 are left",
+        ),
+    ] {
+        assert_eq!(
+            Sequence::from_bytes(bytes, format, "c")
+                .unwrap_err()
+                .to_string(),
+            expected
+        );
+    }
+    let nan =
+        Sequence::from_bytes(pc2(2, 1, &[0.0, 0.0, 0.0, 0.0, f32::NAN, 0.0]), Pc2, "c").unwrap();
+    assert_eq!(
+        nan.frame(0).unwrap_err().to_string(),
+        "c: byte 44: vertex 1 has the coordinate NaN, which is not a finite number"
+    );
+    for (format, bytes) in [(Pc2, pc2(2, 2, &VALUES)), (Mdd, mdd(2, 2, &VALUES))] {
+        for length in 0..bytes.len() {
+            assert!(
+                Sequence::from_bytes(bytes[..length].to_vec(), format, "c").is_err(),
+                "{length}"
+            );
+        }
+    }
+}
+
+fn write_frames(folder: &Path) {
+    for (name, x) in [
+        ("run_08.obj", 8.0),
+        ("run_09.obj", 9.0),
+        ("run_10.obj", 10.0),
+        ("run_100.obj", 100.0),
+        ("other_11.obj", 0.0),
+        ("run_011.obj", 0.0),
+    ] {
+        std::fs::write(folder.join(name), format!("v {x} 0 0\nv 1 0 0\n")).unwrap();
+    }
+}
+
+fn first_coordinates(sequence: &Sequence) -> Vec<f64> {
+    (0..sequence.n_frames())
+        .map(|frame_ix| sequence.frame(frame_ix).unwrap().get(0).unwrap()[0])
+        .collect()
+}
+
+#[test]
+fn numbered_files_from_the_first_one_on() {
+    let folder = tempfile::tempdir().unwrap();
+    write_frames(folder.path());
+    let open = |name: &str| Sequence::open(&folder.path().join(name));
+    assert_eq!(
+        first_coordinates(&open("run_08.obj").unwrap()),
+        [8.0, 9.0, 10.0, 100.0]
+    );
+    assert_eq!(
+        first_coordinates(&open("run_10.obj").unwrap()),
+        [10.0, 100.0]
+    );
+    assert_eq!(
+        first_coordinates(&open("run_%02d.obj").unwrap()),
+        [8.0, 9.0, 10.0, 100.0]
+    );
+    assert_eq!(
+        first_coordinates(&open("run_%d.obj").unwrap()),
+        [10.0, 100.0]
+    );
+    assert_eq!(
+        first_coordinates(&open("r?n_*0.obj").unwrap()),
+        [10.0, 100.0]
+    );
+    assert_eq!(open("run_08.obj").unwrap().n_points(), 2);
+    for name in ["walk_%d.obj", "walk_*.obj", "walk_1.obj", "walk.obj"] {
+        let message = open(name).unwrap_err().to_string();
+        assert!(message.contains(name), "{message}");
+    }
+}
+
+#[test]
+fn frames_of_another_size_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    write_frames(folder.path());
+    std::fs::write(folder.path().join("run_09.obj"), "v 0 0 0\n").unwrap();
+    let sequence = Sequence::open(&folder.path().join("run_08.obj")).unwrap();
+    assert!(sequence.frame(0).is_ok());
+    let message = sequence.frame(1).unwrap_err().to_string();
+    assert!(
+        message.ends_with("run_09.obj: vertices of a frame: expected 2, found 1"),
+        "{message}"
+    );
+}

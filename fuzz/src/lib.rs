@@ -1,0 +1,106 @@
+//! What every fuzz target of a file format asserts: no panic, no endless loop, little memory (libFuzzer sees to these), and
+//! of what is returned that it is valid.
+
+use impinge_io::{
+    Error, Format, Mesh, Positions, Prefer, ReadOptions, Sequence, SequenceFormat, read_bytes,
+    read_tetgen_bytes,
+};
+
+/// Little room for what may grow beyond its file, so that the fuzzer need not hold gigabytes.
+fn options(prefer: Prefer) -> ReadOptions {
+    ReadOptions {
+        weld: true,
+        prefer,
+        max_expanded_bytes: 1 << 24,
+    }
+}
+
+fn check_positions(positions: &Positions) {
+    assert!((0..positions.len()).all(|ix| {
+        positions
+            .get(ix)
+            .is_some_and(|p| p.iter().all(|c| c.is_finite()))
+    }));
+}
+
+fn check(result: Result<Mesh, Error>) {
+    match result {
+        Ok(mut mesh) => {
+            let n_vertices = mesh.n_vertices();
+            assert!(!mesh.elements.is_empty());
+            assert!(
+                mesh.elements
+                    .indices()
+                    .iter()
+                    .all(|&ix| (ix as usize) < n_vertices)
+            );
+            check_positions(&mesh.positions);
+            let exact = mesh.positions.to_f64();
+            mesh.positions.narrow_if_exact();
+            assert!(exact == mesh.positions.to_f64());
+        }
+        Err(error) => assert!(!error.to_string().contains('\n'), "{error}"),
+    }
+}
+
+/// Reads a mesh, for either kind of primitive.
+pub fn mesh(bytes: &[u8], format: Format) {
+    check(read_bytes(bytes, format, "file", &options(Prefer::Volume)));
+    check(read_bytes(
+        bytes,
+        format,
+        "file",
+        &options(Prefer::Triangles),
+    ));
+}
+
+/// Reads a TetGen mesh: its two files are parted by a zero; the first byte tells which kind of cells the second has.
+pub fn tetgen(bytes: &[u8]) {
+    let Some((kind, bytes)) = bytes.split_first() else {
+        return;
+    };
+    let mut files = bytes.splitn(2, |&byte| byte == 0);
+    let (nodes, cells) = (
+        files.next().unwrap_or_default(),
+        files.next().unwrap_or_default(),
+    );
+    let cells_name = if kind % 2 == 0 {
+        "file.ele"
+    } else {
+        "file.face"
+    };
+    check(read_tetgen_bytes(
+        nodes,
+        "file.node",
+        cells,
+        cells_name,
+        &options(Prefer::Volume),
+    ));
+}
+
+/// Reads some frames of a sequence.
+pub fn sequence(bytes: &[u8], format: SequenceFormat) {
+    match Sequence::from_bytes(bytes.to_vec(), format, "file") {
+        Ok(sequence) => {
+            for frame_ix in [
+                0,
+                1,
+                sequence.n_frames() / 2,
+                sequence.n_frames().wrapping_sub(1),
+                sequence.n_frames(),
+            ] {
+                match sequence.frame(frame_ix) {
+                    Ok(positions) => {
+                        assert!(
+                            frame_ix < sequence.n_frames()
+                                && positions.len() == sequence.n_points()
+                        );
+                        check_positions(&positions);
+                    }
+                    Err(error) => assert!(!error.to_string().contains('\n'), "{error}"),
+                }
+            }
+        }
+        Err(error) => assert!(!error.to_string().contains('\n'), "{error}"),
+    }
+}
