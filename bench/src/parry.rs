@@ -6,7 +6,7 @@ use std::fmt;
 use std::time::Instant;
 
 use impinge::Elements;
-use parry3d::bounding_volume::Aabb;
+use parry3d::bounding_volume::{Aabb, BoundingVolume};
 use parry3d::math::Vector;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhLeafUpdateStatus, BvhNode, BvhWorkspace};
 use rayon::prelude::*;
@@ -93,6 +93,10 @@ struct Side {
     owners: Vec<u32>,
     /// Where the primitives of each body start, and one past the last.
     starts: Vec<usize>,
+    /// The same for vertices.
+    vertex_starts: Vec<usize>,
+    /// The boxes of the leaves in this frame, where leaves are bodies.
+    body_boxes: Vec<Aabb>,
     bvh: Bvh,
     workspace: BvhWorkspace,
     updates: Vec<(Aabb, u32, f32)>,
@@ -115,6 +119,8 @@ impl Side {
             corners: Vec::new(),
             owners: Vec::new(),
             starts: vec![0],
+            vertex_starts: vec![0],
+            body_boxes: Vec::new(),
             bvh: Bvh::new(),
             workspace: BvhWorkspace::default(),
             updates: Vec::new(),
@@ -133,6 +139,7 @@ impl Side {
                 side.owners.push(u32::try_from(body_ix)?);
             }
             side.starts.push(side.owners.len());
+            side.vertex_starts.push(side.positions.len());
         }
         let n_leaves = side.n_leaves(setting.over_bodies);
         let leaves: Vec<Aabb> = (0..n_leaves)
@@ -159,8 +166,8 @@ impl Side {
     #[inline]
     fn leaf_box<P: Corners>(&self, leaf: usize, over_bodies: bool) -> Aabb {
         if over_bodies {
-            let corners = &self.corners[self.starts[leaf] * P::N..self.starts[leaf + 1] * P::N];
-            aabb(corners.iter().map(|&index| self.positions[index as usize]))
+            let vertices = self.vertex_starts[leaf]..self.vertex_starts[leaf + 1];
+            aabb(self.positions[vertices].iter().copied())
         } else {
             self.primitive_box::<P>(leaf)
         }
@@ -190,11 +197,19 @@ impl Side {
             self.bvh
                 .insert_or_update_batch_partially_parallel(&updates, &mut self.statuses);
             self.bvh.refit_parallel(&mut self.workspace);
+            if setting.over_bodies {
+                self.body_boxes.clear();
+                self.body_boxes.extend(updates.iter().map(|(aabb, _, _)| *aabb));
+            }
             self.updates = updates;
             return;
         }
+        self.body_boxes.clear();
         for leaf in 0..n_leaves {
             let aabb = self.leaf_box::<P>(leaf, setting.over_bodies);
+            if setting.over_bodies {
+                self.body_boxes.push(aabb);
+            }
             self.bvh.insert_or_update_partially(aabb, leaf as u32, 0.0);
         }
         match setting.refit {
@@ -328,8 +343,10 @@ fn test<P: Corners>(
         let primitives = |side: &Side, body: u32| side.starts[body as usize]..side.starts[body as usize + 1];
         for p in primitives(a, i) {
             let of_p = a.primitive_box::<P>(p);
+            if !of_p.intersects(&b.body_boxes[j as usize]) {
+                continue;
+            }
             for q in primitives(b, j) {
-                use parry3d::bounding_volume::BoundingVolume;
                 if of_p.intersects(&b.primitive_box::<P>(q))
                     && a.corners::<P>(p).meet(&b.corners::<P>(q))
                 {

@@ -24,10 +24,10 @@ pub const SCENE_ROBUST: c_int = 4;
 /// `struct RTCBounds`
 #[repr(C, align(16))]
 pub struct Bounds {
-    pub lower: [f32; 3],
-    pub align0: f32,
-    pub upper: [f32; 3],
-    pub align1: f32,
+    /// Lower x, y, z, and a lane of padding.
+    pub min: [f32; 4],
+    /// Upper x, y, z, and a lane of padding.
+    pub max: [f32; 4],
 }
 
 /// `struct RTCBoundsFunctionArguments`

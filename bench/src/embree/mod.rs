@@ -10,8 +10,7 @@ mod ffi;
 
 use std::ffi::{CString, c_int, c_void};
 use std::fmt;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, AtomicU64, AtomicUsize, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
 use std::time::Instant;
 
 use impinge::Elements;
@@ -112,14 +111,15 @@ pub fn tuned(problem: &Problem, setting: Option<Setting>) -> Result<(Box<dyn Run
 
 /// The primitives behind one Embree scene.
 struct Side {
-    positions: Vec<[f32; 3]>,
+    /// Padded to 16 bytes, so that a position is one load.
+    positions: Vec<[f32; 4]>,
     /// Corner indices, `K` a primitive.
     corners: Vec<u32>,
     /// The body of each primitive, where it matters.
     owners: Vec<u32>,
-    /// Boxes as Embree was told them, bit patterns of min and max: written by the bounds callback
-    /// from several threads, possibly twice, hence atomics. Relaxed ones cost nothing here.
-    boxes: Vec<[AtomicU32; 6]>,
+    /// Boxes as Embree was told them, min and max, two coordinates a word: written by the bounds
+    /// callback from several threads, possibly twice, hence atomics. Relaxed ones cost nothing here.
+    boxes: Vec<[AtomicU64; 4]>,
 }
 
 impl Side {
@@ -133,7 +133,8 @@ impl Side {
         for &body_ix in bodies {
             let body = &problem.bodies[body_ix];
             let first = u32::try_from(side.positions.len())?;
-            side.positions.extend(&body.poses[0]);
+            side.positions
+                .extend(body.poses[0].iter().map(|&[x, y, z]| [x, y, z, 0.0]));
             for primitive in 0..body.elements.len() {
                 let corners = body.elements.corners(primitive);
                 if corners.len() != P::N {
@@ -155,17 +156,24 @@ impl Side {
     #[inline(always)]
     fn corners<P: Corners>(&self, primitive: usize) -> P {
         let indices = self.indices::<P>(primitive);
-        P::from_fn(|k| self.positions[indices[k] as usize].map(f64::from))
+        P::from_fn(|k| {
+            let [x, y, z, _] = self.positions[indices[k] as usize];
+            [x, y, z].map(f64::from)
+        })
     }
 
     #[inline(always)]
     fn boxes_overlap(&self, i: usize, other: &Side, j: usize) -> bool {
-        let (a, b) = (&self.boxes[i], &other.boxes[j]);
-        let coordinate = |bits: &AtomicU32| f32::from_bits(bits.load(Relaxed));
-        (0..3).all(|axis| {
-            coordinate(&a[axis]) <= coordinate(&b[axis + 3])
-                && coordinate(&b[axis]) <= coordinate(&a[axis + 3])
-        })
+        let words = |of: &[AtomicU64; 4]| of.each_ref().map(|word| word.load(Relaxed));
+        let (a, b) = (words(&self.boxes[i]), words(&other.boxes[j]));
+        let low = |word: u64| f32::from_bits(word as u32);
+        let high = |word: u64| f32::from_bits((word >> 32) as u32);
+        (low(a[0]) <= low(b[2]))
+            & (low(b[0]) <= low(a[2]))
+            & (high(a[0]) <= high(b[2]))
+            & (high(b[0]) <= high(a[2]))
+            & (low(a[1]) <= low(b[3]))
+            & (low(b[1]) <= low(a[3]))
     }
 }
 
@@ -181,7 +189,7 @@ const BETWEEN: u8 = 0;
 const WITHIN: u8 = 1;
 const ALL: u8 = 2;
 
-unsafe extern "C" fn bounds<P: Corners>(arguments: *const ffi::BoundsArguments) {
+unsafe extern "C" fn bounds<P: Corners, const BOXES: bool>(arguments: *const ffi::BoundsArguments) {
     // SAFETY: Embree passes a valid pointer whose `user` is the `Side` that `frame` set, alive
     // and not mutated while a commit runs, and whose `bounds` is ours to write.
     let (side, primitive, bounds) = unsafe {
@@ -197,17 +205,23 @@ unsafe extern "C" fn bounds<P: Corners>(arguments: *const ffi::BoundsArguments) 
     let (mut min, mut max) = (first, first);
     for &index in &indices[1..] {
         let p = side.positions[index as usize];
-        for axis in 0..3 {
-            min[axis] = min[axis].min(p[axis]);
-            max[axis] = max[axis].max(p[axis]);
-        }
+        // Written so that each line is one vector instruction: no NaN gets this far.
+        min = std::array::from_fn(|k| if p[k] < min[k] { p[k] } else { min[k] });
+        max = std::array::from_fn(|k| if p[k] > max[k] { p[k] } else { max[k] });
     }
-    bounds.lower = min;
-    bounds.upper = max;
-    let stored = &side.boxes[primitive];
-    for axis in 0..3 {
-        stored[axis].store(min[axis].to_bits(), Relaxed);
-        stored[axis + 3].store(max[axis].to_bits(), Relaxed);
+    bounds.min = min;
+    bounds.max = max;
+    if BOXES {
+        let word = |low: f32, high: f32| u64::from(low.to_bits()) | u64::from(high.to_bits()) << 32;
+        let words = [
+            word(min[0], min[1]),
+            word(min[2], 0.0),
+            word(max[0], max[1]),
+            word(max[2], 0.0),
+        ];
+        for (stored, word) in side.boxes[primitive].iter().zip(words) {
+            stored.store(word, Relaxed);
+        }
     }
 }
 
@@ -387,6 +401,11 @@ impl<P: Corners> Embree<P> {
     fn run(&self) -> usize {
         self.shared.n_hits.store(0, Relaxed);
         let handles = &self.handles;
+        let bounds_function = if self.setting.boxes {
+            bounds::<P, true>
+        } else {
+            bounds::<P, false> as ffi::BoundsFunction
+        };
         for ((&scene, &geometry), side) in handles
             .scenes
             .iter()
@@ -398,11 +417,12 @@ impl<P: Corners> Embree<P> {
             // which Embree calls back with it, and the callback only reads it.
             unsafe {
                 ffi::rtcSetGeometryUserData(geometry, user);
-                ffi::rtcSetGeometryBoundsFunction(geometry, bounds::<P>, user);
+                ffi::rtcSetGeometryBoundsFunction(geometry, bounds_function, user);
                 ffi::rtcCommitGeometry(geometry);
                 ffi::rtcCommitScene(scene);
             }
         }
+
         let (first, last) = (handles.scenes[0], handles.scenes[handles.scenes.len() - 1]);
         let user = std::ptr::from_ref(&*self.shared).cast_mut().cast();
         // SAFETY: both scenes are committed; the callback reads `shared` and writes its atomics only.
@@ -424,7 +444,9 @@ impl<P: Corners> Runner for Embree<P> {
         for (side, layout) in self.shared.sides.iter_mut().zip(&self.layout) {
             for &(body_ix, first) in layout {
                 let pose = &problem.bodies[body_ix].poses[pose];
-                side.positions[first..first + pose.len()].copy_from_slice(pose);
+                for (position, &[x, y, z]) in side.positions[first..].iter_mut().zip(pose) {
+                    *position = [x, y, z, 0.0];
+                }
             }
         }
         Ok(())
