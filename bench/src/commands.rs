@@ -183,7 +183,9 @@ fn bodies(options: &Options, report: &mut Report) -> Result<(), Failure> {
 fn sizes(options: &Options, report: &mut Report) -> Result<(), Failure> {
     let mut peers = Peers::default();
     let mut tables = Vec::new();
-    for n in [10_000, 30_000, 100_000, 300_000, 1_000_000, 3_000_000, 10_000_000] {
+    for n in [
+        10_000, 30_000, 100_000, 300_000, 1_000_000, 3_000_000, 10_000_000,
+    ] {
         if options.size.is_some_and(|largest| n > largest) {
             continue;
         }
@@ -219,10 +221,18 @@ fn sizes(options: &Options, report: &mut Report) -> Result<(), Failure> {
             grouped(table.rows[0].n_pairs)
         );
         for row in &table.rows {
-            text += &format!(" {} | {:.1} |", figures(row.median_ms), row.median_ms * 1e6 / n);
+            text += &format!(
+                " {} | {:.1} |",
+                figures(row.median_ms),
+                row.median_ms * 1e6 / n
+            );
         }
         let bytes = |key: &str| table.rows[0].details[key].as_f64().unwrap_or(0.0) / n;
-        text += &format!(" {:.1} | {:.1} |\n", bytes("bytes_scene"), bytes("bytes_held"));
+        text += &format!(
+            " {:.1} | {:.1} |\n",
+            bytes("bytes_scene"),
+            bytes("bytes_held")
+        );
     }
     report.say(&text);
     Ok(())
@@ -241,12 +251,19 @@ fn adversarial_scenes(options: &Options, report: &mut Report) -> Result<(), Fail
                     |---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n"
         .to_owned();
     for entry in adversarial::SCENES {
-        if options.scene.as_ref().is_some_and(|scene| scene != entry.name) {
+        if options
+            .scene
+            .as_ref()
+            .is_some_and(|scene| scene != entry.name)
+        {
             continue;
         }
         let n = size.min(entry.max_n);
         let problem = posed((entry.build)(n)?, entry.probes)?;
-        let plain = posed(adversarial::plain(problem.n_primitives())?, "two bodies that meet")?;
+        let plain = posed(
+            adversarial::plain(problem.n_primitives())?,
+            "two bodies that meet",
+        )?;
         for &method in &methods {
             let measured = |problem: &Problem| -> Result<Table, Failure> {
                 let runner = Ours::new(problem, settings(options, method), Feed::InPlace)?;
@@ -285,6 +302,10 @@ fn adversarial_scenes(options: &Options, report: &mut Report) -> Result<(), Fail
 fn posed(built: BuiltScene, about: &str) -> Result<Problem, Failure> {
     let name = built.name.clone();
     let models = models(built)?;
-    let ask = if models.len() == 2 { Ask::Between } else { Ask::All };
+    let ask = if models.len() == 2 {
+        Ask::Between
+    } else {
+        Ask::All
+    };
     Ok(Problem::mirrored(&name, models, ask).about(about))
 }

@@ -39,21 +39,33 @@ fn mesh(file: &str, stand_in: impl FnOnce() -> Model) -> Result<(Model, String),
     }
 }
 
-const MIRRORED: &str =
-    "frames alternate with the mirror image, whose pairs are the same because changing signs is exact";
+const MIRRORED: &str = "frames alternate with the mirror image, whose pairs are the same because changing signs is exact";
 
 /// Two copies of a body: `ball15k`, `ball` (30,000), `bunny`, `buddha`, `dragon`.
 pub fn two_body(scene: &str) -> Result<Problem, Failure> {
     let (model, offset, expected, about) = match scene {
-        "ball15k" => (surfaces::ball(15_000), BALL_OFFSET, None, "generated".to_owned()),
-        "ball" => (surfaces::ball(30_000), BALL_OFFSET, None, "generated".to_owned()),
+        "ball15k" => (
+            surfaces::ball(15_000),
+            BALL_OFFSET,
+            None,
+            "generated".to_owned(),
+        ),
+        "ball" => (
+            surfaces::ball(30_000),
+            BALL_OFFSET,
+            None,
+            "generated".to_owned(),
+        ),
         "bunny" | "buddha" | "dragon" => {
             let n_stand_in = match scene {
                 "bunny" => 69_450,
                 "buddha" => 100_000,
                 _ => 400_000,
             };
-            match (data::data_file(&format!("meshes/{scene}.ply")), published(scene)?) {
+            match (
+                data::data_file(&format!("meshes/{scene}.ply")),
+                published(scene)?,
+            ) {
                 (Some(path), Some((offset, n_pairs))) => (
                     load(&path)?,
                     offset,
@@ -68,7 +80,11 @@ pub fn two_body(scene: &str) -> Result<Problem, Failure> {
                 ),
             }
         }
-        _ => return Err(format!("no scene `{scene}`: ball15k, ball, bunny, buddha or dragon").into()),
+        _ => {
+            return Err(
+                format!("no scene `{scene}`: ball15k, ball, bunny, buddha or dragon").into(),
+            );
+        }
     };
     let moved = model.translated(offset);
     Ok(Problem::mirrored(scene, vec![model, moved], Ask::Between)
@@ -83,9 +99,12 @@ fn published(scene: &str) -> Result<Option<([f32; 3], u64)>, Failure> {
     };
     let answers: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(path)?)?;
     let answer = &answers[scene];
-    let offset: Option<Vec<f64>> = answer["offset_f32"]
-        .as_array()
-        .map(|offset| offset.iter().filter_map(serde_json::Value::as_f64).collect());
+    let offset: Option<Vec<f64>> = answer["offset_f32"].as_array().map(|offset| {
+        offset
+            .iter()
+            .filter_map(serde_json::Value::as_f64)
+            .collect()
+    });
     match (offset.as_deref(), answer["pairs"].as_u64()) {
         // The file holds f32 numbers written out in full: narrowing gives them back.
         (Some(&[x, y, z]), Some(n_pairs)) => Ok(Some(([x as f32, y as f32, z as f32], n_pairs))),
@@ -111,6 +130,9 @@ pub fn tets() -> Result<Problem, Failure> {
     let (model, about) = mesh("tets/bunny_19k.msh", || solids::solid_ball(19_379))?;
     let width = model.bounds().map_or(0.0, |(min, max)| max[0] - min[0]);
     let moved = model.translated([0.33 * width, 0.011 * width, 0.007 * width]);
-    Ok(Problem::mirrored("tets", vec![model, moved], Ask::Between)
-        .about(format!("{about} twice, a third of its width apart; {MIRRORED}")))
+    Ok(
+        Problem::mirrored("tets", vec![model, moved], Ask::Between).about(format!(
+            "{about} twice, a third of its width apart; {MIRRORED}"
+        )),
+    )
 }

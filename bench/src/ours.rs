@@ -76,7 +76,10 @@ impl Runner for Ours {
     fn setting(&self) -> String {
         let settings = self.detector.settings();
         match settings.method {
-            Method::Cells => format!("lambda {}, groups of {}", settings.lambda, settings.group_size),
+            Method::Cells => format!(
+                "lambda {}, groups of {}",
+                settings.lambda, settings.group_size
+            ),
             _ => "default".to_owned(),
         }
     }

@@ -45,14 +45,25 @@ impl fmt::Display for Setting {
             Refit::Reordered => "refit reordered",
             Refit::Parallel => "refit in parallel",
         };
-        let test = if self.parallel_test { "parallel" } else { "serial" };
-        let over = if self.over_bodies { ", tree over bodies" } else { "" };
+        let test = if self.parallel_test {
+            "parallel"
+        } else {
+            "serial"
+        };
+        let over = if self.over_bodies {
+            ", tree over bodies"
+        } else {
+            ""
+        };
         write!(f, "{:?} build, {refit}, {test} tests{over}", self.strategy)
     }
 }
 
 /// parry with a setting, or with the one that is fastest on this problem.
-pub fn tuned(problem: &Problem, setting: Option<Setting>) -> Result<(Box<dyn Runner>, Setting), Failure> {
+pub fn tuned(
+    problem: &Problem,
+    setting: Option<Setting>,
+) -> Result<(Box<dyn Runner>, Setting), Failure> {
     let build = |setting: &Setting| -> Result<Box<dyn Runner>, Failure> {
         match problem.bodies.first().map(|body| &*body.elements) {
             Some(Elements::Tetrahedra(_)) => {
@@ -104,7 +115,10 @@ struct Side {
 }
 
 fn aabb(points: impl Iterator<Item = [f32; 3]>) -> Aabb {
-    let (mut min, mut max) = (Vector::splat(f32::INFINITY), Vector::splat(f32::NEG_INFINITY));
+    let (mut min, mut max) = (
+        Vector::splat(f32::INFINITY),
+        Vector::splat(f32::NEG_INFINITY),
+    );
     for p in points {
         min = min.min(Vector::from(p));
         max = max.max(Vector::from(p));
@@ -113,7 +127,11 @@ fn aabb(points: impl Iterator<Item = [f32; 3]>) -> Aabb {
 }
 
 impl Side {
-    fn new<P: Corners>(problem: &Problem, bodies: &[usize], setting: Setting) -> Result<Self, Failure> {
+    fn new<P: Corners>(
+        problem: &Problem,
+        bodies: &[usize],
+        setting: Setting,
+    ) -> Result<Self, Failure> {
         let mut side = Side {
             positions: Vec::new(),
             corners: Vec::new(),
@@ -135,7 +153,8 @@ impl Side {
                 if corners.len() != P::N {
                     return Err("bodies of different kinds in one problem".into());
                 }
-                side.corners.extend(corners.iter().map(|corner| corner + first));
+                side.corners
+                    .extend(corners.iter().map(|corner| corner + first));
                 side.owners.push(u32::try_from(body_ix)?);
             }
             side.starts.push(side.owners.len());
@@ -192,14 +211,21 @@ impl Side {
             (0..n_leaves)
                 .into_par_iter()
                 .with_min_len(1024)
-                .map(|leaf| (side.leaf_box::<P>(leaf, setting.over_bodies), leaf as u32, 0.0))
+                .map(|leaf| {
+                    (
+                        side.leaf_box::<P>(leaf, setting.over_bodies),
+                        leaf as u32,
+                        0.0,
+                    )
+                })
                 .collect_into_vec(&mut updates);
             self.bvh
                 .insert_or_update_batch_partially_parallel(&updates, &mut self.statuses);
             self.bvh.refit_parallel(&mut self.workspace);
             if setting.over_bodies {
                 self.body_boxes.clear();
-                self.body_boxes.extend(updates.iter().map(|(aabb, _, _)| *aabb));
+                self.body_boxes
+                    .extend(updates.iter().map(|(aabb, _, _)| *aabb));
             }
             self.updates = updates;
             return;
@@ -340,7 +366,8 @@ fn test<P: Corners>(
     hits: &mut Vec<(u32, u32)>,
 ) {
     if over_bodies {
-        let primitives = |side: &Side, body: u32| side.starts[body as usize]..side.starts[body as usize + 1];
+        let primitives =
+            |side: &Side, body: u32| side.starts[body as usize]..side.starts[body as usize + 1];
         for p in primitives(a, i) {
             let of_p = a.primitive_box::<P>(p);
             if !of_p.intersects(&b.body_boxes[j as usize]) {

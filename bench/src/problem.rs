@@ -54,7 +54,13 @@ impl Problem {
     }
 
     /// A problem whose second pose is another moment of a motion; the first is as given.
-    pub fn moving(name: &str, models: Vec<Model>, ask: Ask, motion: &impl Deform, t: f32) -> Problem {
+    pub fn moving(
+        name: &str,
+        models: Vec<Model>,
+        ask: Ask,
+        motion: &impl Deform,
+        t: f32,
+    ) -> Problem {
         Problem::new(name, models, ask, |rest| {
             let mut now = rest.to_vec();
             motion.apply(rest, t, &mut now);

@@ -94,7 +94,9 @@ impl Report {
             std::fs::write(path, &text).map_err(|error| format!("{}: {error}", path.display()))?;
         }
         if let Some(name) = record {
-            let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("record").join(name);
+            let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+                .join("record")
+                .join(name);
             std::fs::create_dir_all(&folder)?;
             std::fs::write(folder.join(format!("{}.json", self.command)), &text)?;
             std::fs::write(folder.join(format!("{}.md", self.command)), &self.markdown)?;

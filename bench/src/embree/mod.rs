@@ -29,8 +29,8 @@ pub struct Setting {
     flags: c_int,
     /// 0 for all.
     threads: usize,
-    /// Whether boxes of candidates are compared before corners are fetched: a leaf may hold
-    /// several primitives, and Embree does not compare their boxes.
+    /// Whether boxes of candidates are compared before the pair test: a leaf may hold several
+    /// primitives, and Embree does not compare their boxes.
     boxes: bool,
 }
 
@@ -96,7 +96,10 @@ fn settings() -> Vec<Setting> {
 }
 
 /// Embree with a setting, or with the one that is fastest on this problem.
-pub fn tuned(problem: &Problem, setting: Option<Setting>) -> Result<(Box<dyn Runner>, Setting), Failure> {
+pub fn tuned(
+    problem: &Problem,
+    setting: Option<Setting>,
+) -> Result<(Box<dyn Runner>, Setting), Failure> {
     let build = |setting: &Setting| -> Result<Box<dyn Runner>, Failure> {
         match problem.bodies.first().map(|body| &*body.elements) {
             Some(Elements::Tetrahedra(_)) => {
@@ -117,9 +120,6 @@ struct Side {
     corners: Vec<u32>,
     /// The body of each primitive, where it matters.
     owners: Vec<u32>,
-    /// Boxes as Embree was told them, min and max, two coordinates a word: written by the bounds
-    /// callback from several threads, possibly twice, hence atomics. Relaxed ones cost nothing here.
-    boxes: Vec<[AtomicU64; 4]>,
 }
 
 impl Side {
@@ -128,7 +128,6 @@ impl Side {
             positions: Vec::new(),
             corners: Vec::new(),
             owners: Vec::new(),
-            boxes: Vec::new(),
         };
         for &body_ix in bodies {
             let body = &problem.bodies[body_ix];
@@ -140,11 +139,11 @@ impl Side {
                 if corners.len() != P::N {
                     return Err("bodies of different kinds in one problem".into());
                 }
-                side.corners.extend(corners.iter().map(|corner| corner + first));
+                side.corners
+                    .extend(corners.iter().map(|corner| corner + first));
                 side.owners.push(u32::try_from(body_ix)?);
             }
         }
-        side.boxes.resize_with(side.owners.len(), Default::default);
         Ok(side)
     }
 
@@ -162,18 +161,27 @@ impl Side {
         })
     }
 
+    /// The box of a primitive, in the first three lanes.
     #[inline(always)]
-    fn boxes_overlap(&self, i: usize, other: &Side, j: usize) -> bool {
-        let words = |of: &[AtomicU64; 4]| of.each_ref().map(|word| word.load(Relaxed));
-        let (a, b) = (words(&self.boxes[i]), words(&other.boxes[j]));
-        let low = |word: u64| f32::from_bits(word as u32);
-        let high = |word: u64| f32::from_bits((word >> 32) as u32);
-        (low(a[0]) <= low(b[2]))
-            & (low(b[0]) <= low(a[2]))
-            & (high(a[0]) <= high(b[2]))
-            & (high(b[0]) <= high(a[2]))
-            & (low(a[1]) <= low(b[3]))
-            & (low(b[1]) <= low(a[3]))
+    fn bounds<P: Corners>(&self, primitive: usize) -> ([f32; 4], [f32; 4]) {
+        let indices = self.indices::<P>(primitive);
+        let first = self.positions[indices[0] as usize];
+        let (mut min, mut max) = (first, first);
+        for &index in &indices[1..] {
+            let p = self.positions[index as usize];
+            // Written so that each line is one vector instruction: no NaN gets this far.
+            min = std::array::from_fn(|k| if p[k] < min[k] { p[k] } else { min[k] });
+            max = std::array::from_fn(|k| if p[k] > max[k] { p[k] } else { max[k] });
+        }
+        (min, max)
+    }
+
+    #[inline(always)]
+    fn boxes_overlap<P: Corners>(&self, i: usize, other: &Side, j: usize) -> bool {
+        let ((min_a, max_a), (min_b, max_b)) = (self.bounds::<P>(i), other.bounds::<P>(j));
+        (0..4).fold(true, |overlap, k| {
+            overlap & (min_a[k] <= max_b[k]) & (min_b[k] <= max_a[k])
+        })
     }
 }
 
@@ -189,7 +197,7 @@ const BETWEEN: u8 = 0;
 const WITHIN: u8 = 1;
 const ALL: u8 = 2;
 
-unsafe extern "C" fn bounds<P: Corners, const BOXES: bool>(arguments: *const ffi::BoundsArguments) {
+unsafe extern "C" fn bounds<P: Corners>(arguments: *const ffi::BoundsArguments) {
     // SAFETY: Embree passes a valid pointer whose `user` is the `Side` that `frame` set, alive
     // and not mutated while a commit runs, and whose `bounds` is ours to write.
     let (side, primitive, bounds) = unsafe {
@@ -200,29 +208,7 @@ unsafe extern "C" fn bounds<P: Corners, const BOXES: bool>(arguments: *const ffi
             &mut *arguments.bounds,
         )
     };
-    let indices = side.indices::<P>(primitive);
-    let first = side.positions[indices[0] as usize];
-    let (mut min, mut max) = (first, first);
-    for &index in &indices[1..] {
-        let p = side.positions[index as usize];
-        // Written so that each line is one vector instruction: no NaN gets this far.
-        min = std::array::from_fn(|k| if p[k] < min[k] { p[k] } else { min[k] });
-        max = std::array::from_fn(|k| if p[k] > max[k] { p[k] } else { max[k] });
-    }
-    bounds.min = min;
-    bounds.max = max;
-    if BOXES {
-        let word = |low: f32, high: f32| u64::from(low.to_bits()) | u64::from(high.to_bits()) << 32;
-        let words = [
-            word(min[0], min[1]),
-            word(min[2], 0.0),
-            word(max[0], max[1]),
-            word(max[2], 0.0),
-        ];
-        for (stored, word) in side.boxes[primitive].iter().zip(words) {
-            stored.store(word, Relaxed);
-        }
-    }
+    (bounds.min, bounds.max) = side.bounds::<P>(primitive);
 }
 
 unsafe extern "C" fn collide<P: Corners, const RULE: u8, const BOXES: bool>(
@@ -253,7 +239,7 @@ unsafe extern "C" fn collide<P: Corners, const RULE: u8, const BOXES: bool>(
             if RULE == ALL && a.owners[i] == b.owners[j] {
                 continue;
             }
-            if BOXES && !a.boxes_overlap(i, b, j) {
+            if BOXES && !a.boxes_overlap::<P>(i, b, j) {
                 continue;
             }
             if RULE == WITHIN {
@@ -401,11 +387,6 @@ impl<P: Corners> Embree<P> {
     fn run(&self) -> usize {
         self.shared.n_hits.store(0, Relaxed);
         let handles = &self.handles;
-        let bounds_function = if self.setting.boxes {
-            bounds::<P, true>
-        } else {
-            bounds::<P, false> as ffi::BoundsFunction
-        };
         for ((&scene, &geometry), side) in handles
             .scenes
             .iter()
@@ -417,7 +398,7 @@ impl<P: Corners> Embree<P> {
             // which Embree calls back with it, and the callback only reads it.
             unsafe {
                 ffi::rtcSetGeometryUserData(geometry, user);
-                ffi::rtcSetGeometryBoundsFunction(geometry, bounds_function, user);
+                ffi::rtcSetGeometryBoundsFunction(geometry, bounds::<P>, user);
                 ffi::rtcCommitGeometry(geometry);
                 ffi::rtcCommitScene(scene);
             }
