@@ -1,0 +1,311 @@
+//! The commands: which problems, which contestants, which tables.
+
+use impinge::{Backend, Detector, Method, Settings};
+use impinge_scenes::deform::Wave;
+use impinge_scenes::{BuiltScene, Model, adversarial, surfaces};
+
+use crate::measure::{self, Table};
+use crate::ours::{Feed, Ours};
+use crate::problem::{Ask, Problem};
+use crate::report::{Report, figures, grouped};
+use crate::runner::Runner;
+use crate::{Failure, Options, files};
+
+/// Runs a command by its name.
+pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
+    let mut report = match command {
+        "two-body" | "self" | "tets" | "bodies" | "sizes" | "adversarial" => Report::new(command),
+        _ => return Err(format!("no command `{command}`; --help lists what there is").into()),
+    };
+    match command {
+        "two-body" => two_body(options, &mut report)?,
+        "self" => within(options, &mut report)?,
+        "tets" => tets(options, &mut report)?,
+        "bodies" => bodies(options, &mut report)?,
+        "sizes" => sizes(options, &mut report)?,
+        _ => adversarial_scenes(options, &mut report)?,
+    }
+    report.write(options.json.as_deref(), options.record.as_deref())
+}
+
+/// The peers' settings once found, to be used again on the same kind of problem.
+#[derive(Default)]
+struct Peers {
+    #[cfg(feature = "embree")]
+    embree: Option<crate::embree::Setting>,
+    #[cfg(feature = "parry")]
+    parry: Option<crate::parry::Setting>,
+}
+
+impl Peers {
+    /// All peers there are, at their best, or as they were at their best last time.
+    #[cfg_attr(not(any(feature = "embree", feature = "parry")), allow(unused))]
+    fn runners(&mut self, problem: &Problem) -> Result<Vec<Box<dyn Runner>>, Failure> {
+        let mut runners = Vec::new();
+        #[cfg(feature = "embree")]
+        {
+            let (runner, setting) = crate::embree::tuned(problem, self.embree)?;
+            self.embree = Some(setting);
+            runners.push(runner);
+        }
+        #[cfg(feature = "parry")]
+        {
+            let (runner, setting) = crate::parry::tuned(problem, self.parry)?;
+            self.parry = Some(setting);
+            runners.push(runner);
+        }
+        Ok(runners)
+    }
+}
+
+fn settings(options: &Options, method: Method) -> Settings {
+    Settings {
+        method,
+        backend: options.backend,
+        threads: options.threads,
+        ..Settings::default()
+    }
+}
+
+/// The library's contestants; the first is what others are compared with.
+fn ours(problem: &Problem, options: &Options) -> Result<Vec<Box<dyn Runner>>, Failure> {
+    let clusters = settings(options, Method::Clusters);
+    let mut runners: Vec<Box<dyn Runner>> = vec![
+        Box::new(Ours::new(problem, clusters.clone(), Feed::InPlace)?),
+        Box::new(Ours::new(problem, clusters.clone(), Feed::Copied)?),
+    ];
+    if options.threads == 0 && options.backend == Backend::Cpu {
+        let single = Settings {
+            threads: 1,
+            ..clusters
+        };
+        runners.push(Box::new(Ours::new(problem, single, Feed::InPlace)?));
+    }
+    if options.cells {
+        let cells = settings(options, Method::Cells);
+        runners.push(Box::new(Ours::new(problem, cells, Feed::InPlace)?));
+    }
+    Ok(runners)
+}
+
+fn contest(
+    problem: &Problem,
+    options: &Options,
+    peers: &mut Peers,
+    default_frames: usize,
+) -> Result<Table, Failure> {
+    let mut runners = ours(problem, options)?;
+    if options.peers {
+        runners.extend(peers.runners(problem)?);
+    }
+    measure::run(problem, runners, options.frames.unwrap_or(default_frames))
+}
+
+/// The number of pairs by the oracle, for problems small enough for it.
+fn by_oracle(problem: Problem) -> Result<Problem, Failure> {
+    const MAX_PRIMITIVES: usize = 60_000;
+    if problem.expected.is_some() || problem.n_primitives() > MAX_PRIMITIVES {
+        return Ok(problem);
+    }
+    let (scene, _, query) = problem.scene()?;
+    let mut oracle = Detector::with_settings(settings_of_oracle())?;
+    let n_pairs = oracle.detect(&scene, &query)?.len() as u64;
+    let about = format!("{}; pairs counted by the oracle in this run", problem.about);
+    Ok(problem.about(about).expecting(Some(n_pairs)))
+}
+
+fn settings_of_oracle() -> Settings {
+    Settings {
+        method: Method::Naive,
+        backend: Backend::Cpu,
+        ..Settings::default()
+    }
+}
+
+fn two_body(options: &Options, report: &mut Report) -> Result<(), Failure> {
+    let scenes = match &options.scene {
+        Some(scene) => vec![scene.as_str()],
+        None => vec!["ball", "bunny", "buddha", "dragon"],
+    };
+    for scene in scenes {
+        let problem = by_oracle(files::two_body(scene)?)?;
+        report.contest(&contest(&problem, options, &mut Peers::default(), 40)?);
+    }
+    Ok(())
+}
+
+fn within(options: &Options, report: &mut Report) -> Result<(), Failure> {
+    let problem = by_oracle(files::within(options.scene.as_deref().unwrap_or("dragon"))?)?;
+    report.contest(&contest(&problem, options, &mut Peers::default(), 20)?);
+    Ok(())
+}
+
+fn tets(options: &Options, report: &mut Report) -> Result<(), Failure> {
+    let problem = by_oracle(files::tets()?)?;
+    report.contest(&contest(&problem, options, &mut Peers::default(), 40)?);
+    Ok(())
+}
+
+/// The models of a built scene, to be posed anew.
+fn models(built: BuiltScene) -> Result<Vec<Model>, Failure> {
+    built
+        .bodies
+        .iter()
+        .map(|&id| {
+            let body = built.scene.body(id)?;
+            match body.positions() {
+                impinge::Positions::F32(positions) => Ok(Model {
+                    positions: positions.clone(),
+                    elements: body.elements().clone(),
+                }),
+                impinge::Positions::F64(_) => Err("scenes are built in single precision".into()),
+            }
+        })
+        .collect()
+}
+
+fn bodies(options: &Options, report: &mut Report) -> Result<(), Failure> {
+    for n_bodies in [1_000, 10_000, 100_000] {
+        if options.size.is_some_and(|largest| n_bodies > largest) {
+            continue;
+        }
+        let models = models(adversarial::boxes(n_bodies, 1)?)?;
+        let name = format!("{} bodies", grouped(n_bodies as u64));
+        let problem = by_oracle(Problem::mirrored(&name, models, Ask::All).about(
+            "cubes of 12 triangles placed and turned at random; frames alternate with the mirror image",
+        ))?;
+        let frames = if n_bodies > 10_000 { 10 } else { 40 };
+        report.contest(&contest(&problem, options, &mut Peers::default(), frames)?);
+    }
+    Ok(())
+}
+
+fn sizes(options: &Options, report: &mut Report) -> Result<(), Failure> {
+    let mut peers = Peers::default();
+    let mut tables = Vec::new();
+    for n in [
+        10_000, 30_000, 100_000, 300_000, 1_000_000, 3_000_000, 10_000_000,
+    ] {
+        if options.size.is_some_and(|largest| n > largest) {
+            continue;
+        }
+        let body = surfaces::stand_in(n / 2);
+        let other = body.translated([0.4, 0.01, 0.01]);
+        // Waves get shorter with the triangles, so that the meeting of the two bodies looks alike
+        // at every size.
+        let wave = Wave::default();
+        let name = format!("{} triangles", grouped(n as u64));
+        let problem = Problem::moving(&name, vec![body, other], Ask::Between, &wave, 1.0)
+            .about("generated tubes along a knot; frames alternate between rest and a wave");
+        let frames = if n > 1_000_000 { 6 } else { 20 };
+        let table = contest(&problem, options, &mut peers, frames)?;
+        report.contest(&table);
+        tables.push(table);
+    }
+    let mut text = "### Cost against size\n\n".to_owned();
+    let Some(first) = tables.first() else {
+        return Ok(());
+    };
+    text += "| triangles | pairs |";
+    for row in &first.rows {
+        text += &format!(" {} ms | ns a triangle |", row.name);
+    }
+    text += " bytes a triangle, positions and topology | bytes a triangle, detector |\n|---:|---:|";
+    text += &"---:|---:|".repeat(first.rows.len() + 1);
+    text.push('\n');
+    for table in &tables {
+        let n = table.n_primitives as f64;
+        text += &format!(
+            "| {} | {} |",
+            grouped(table.n_primitives as u64),
+            grouped(table.rows[0].n_pairs)
+        );
+        for row in &table.rows {
+            text += &format!(
+                " {} | {:.1} |",
+                figures(row.median_ms),
+                row.median_ms * 1e6 / n
+            );
+        }
+        let bytes = |key: &str| table.rows[0].details[key].as_f64().unwrap_or(0.0) / n;
+        text += &format!(
+            " {:.1} | {:.1} |\n",
+            bytes("bytes_scene"),
+            bytes("bytes_held")
+        );
+    }
+    report.say(&text);
+    Ok(())
+}
+
+fn adversarial_scenes(options: &Options, report: &mut Report) -> Result<(), Failure> {
+    let size = options.size.unwrap_or(1_000_000);
+    let methods = if options.cells {
+        vec![Method::Clusters, Method::Cells]
+    } else {
+        vec![Method::Clusters]
+    };
+    let mut text = "Each scene beside a plain one (two bodies that meet) of as many primitives. `per item` is time over \
+                    primitives plus pairs.\n\n\
+                    | scene | method | primitives | pairs | candidates | ms | plain ms | ratio | ns per item | plain | bytes a primitive |\n\
+                    |---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n"
+        .to_owned();
+    for entry in adversarial::SCENES {
+        if options
+            .scene
+            .as_ref()
+            .is_some_and(|scene| scene != entry.name)
+        {
+            continue;
+        }
+        let n = size.min(entry.max_n);
+        let problem = posed((entry.build)(n)?, entry.probes)?;
+        let plain = posed(
+            adversarial::plain(problem.n_primitives())?,
+            "two bodies that meet",
+        )?;
+        for &method in &methods {
+            let measured = |problem: &Problem| -> Result<Table, Failure> {
+                let runner = Ours::new(problem, settings(options, method), Feed::InPlace)?;
+                measure::run(problem, vec![Box::new(runner)], options.frames.unwrap_or(5))
+            };
+            let (table, base) = (measured(&problem)?, measured(&plain)?);
+            let (row, base_row) = (&table.rows[0], &base.rows[0]);
+            let per_item = |table: &Table| {
+                let row = &table.rows[0];
+                row.median_ms * 1e6 / (table.n_primitives as f64 + row.n_pairs as f64)
+            };
+            let count = |key: &str| row.details[key].as_u64().unwrap_or(0);
+            text += &format!(
+                "| {} | {} | {} | {} | {} | {} | {} | {:.1} | {:.1} | {:.1} | {:.0} |\n",
+                entry.name,
+                method.name(),
+                grouped(table.n_primitives as u64),
+                grouped(row.n_pairs),
+                grouped(count("candidates")),
+                figures(row.median_ms),
+                figures(base_row.median_ms),
+                row.median_ms / base_row.median_ms,
+                per_item(&table),
+                per_item(&base),
+                count("bytes_held") as f64 / table.n_primitives as f64,
+            );
+            report.keep(&table);
+            report.keep(&base);
+        }
+    }
+    report.say(&text);
+    Ok(())
+}
+
+/// A built scene as a problem: between for two bodies, all for more.
+fn posed(built: BuiltScene, about: &str) -> Result<Problem, Failure> {
+    let name = built.name.clone();
+    let models = models(built)?;
+    let ask = if models.len() == 2 {
+        Ask::Between
+    } else {
+        Ask::All
+    };
+    Ok(Problem::mirrored(&name, models, ask).about(about))
+}

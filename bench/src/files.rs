@@ -1,0 +1,138 @@
+//! The benchmark meshes: files where they are, labelled stand-ins where they are not.
+
+use std::path::Path;
+
+use impinge::Elements;
+use impinge_io::ReadOptions;
+use impinge_scenes::{Model, data, solids, surfaces};
+
+use crate::Failure;
+use crate::problem::{Ask, Problem};
+
+/// A ball of 30,000 triangles twice, moved by this: 1,080 pairs, counted by the oracle.
+const BALL_OFFSET: [f32; 3] = [0.9, 0.01, 0.02];
+
+/// A mesh file in single precision. Coordinates that need more are rounded: a bench is about time.
+pub fn load(path: &Path) -> Result<Model, Failure> {
+    let mesh = impinge_io::read(path, &ReadOptions::default())?;
+    Ok(Model {
+        positions: mesh.positions.to_f32_rounded(),
+        elements: match mesh.elements {
+            impinge_io::Elements::Triangles(faces) => Elements::Triangles(faces),
+            impinge_io::Elements::Tetrahedra(tets) => Elements::Tetrahedra(tets),
+        },
+    })
+}
+
+/// A mesh from the shared data, or a stand-in, and what it is.
+fn mesh(file: &str, stand_in: impl FnOnce() -> Model) -> Result<(Model, String), Failure> {
+    match data::data_file(file) {
+        Some(path) => Ok((load(&path)?, format!("`{file}`"))),
+        None => {
+            let model = stand_in();
+            let about = format!(
+                "a generated stand-in of {} primitives, because `{file}` is not here",
+                model.n_primitives()
+            );
+            Ok((model, about))
+        }
+    }
+}
+
+const MIRRORED: &str = "frames alternate with the mirror image, whose pairs are the same because changing signs is exact";
+
+/// Two copies of a body: `ball15k`, `ball` (30,000), `bunny`, `buddha`, `dragon`.
+pub fn two_body(scene: &str) -> Result<Problem, Failure> {
+    let (model, offset, expected, about) = match scene {
+        "ball15k" => (
+            surfaces::ball(15_000),
+            BALL_OFFSET,
+            None,
+            "generated".to_owned(),
+        ),
+        "ball" => (
+            surfaces::ball(30_000),
+            BALL_OFFSET,
+            None,
+            "generated".to_owned(),
+        ),
+        "bunny" | "buddha" | "dragon" => {
+            let n_stand_in = match scene {
+                "bunny" => 69_450,
+                "buddha" => 100_000,
+                _ => 400_000,
+            };
+            match (
+                data::data_file(&format!("meshes/{scene}.ply")),
+                published(scene)?,
+            ) {
+                (Some(path), Some((offset, n_pairs))) => (
+                    load(&path)?,
+                    offset,
+                    Some(n_pairs),
+                    format!("`meshes/{scene}.ply`; pairs as published with the data"),
+                ),
+                _ => (
+                    surfaces::stand_in(n_stand_in),
+                    [0.4, 0.01, 0.01],
+                    None,
+                    format!("a generated stand-in, because `meshes/{scene}.ply` is not here"),
+                ),
+            }
+        }
+        _ => {
+            return Err(
+                format!("no scene `{scene}`: ball15k, ball, bunny, buddha or dragon").into(),
+            );
+        }
+    };
+    let moved = model.translated(offset);
+    Ok(Problem::mirrored(scene, vec![model, moved], Ask::Between)
+        .about(format!("{about}; {MIRRORED}"))
+        .expecting(expected))
+}
+
+/// Offset and number of pairs of a two-body scene from `expected/two_body.json`.
+fn published(scene: &str) -> Result<Option<([f32; 3], u64)>, Failure> {
+    let Some(path) = data::data_file("expected/two_body.json") else {
+        return Ok(None);
+    };
+    let answers: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(path)?)?;
+    let answer = &answers[scene];
+    let offset: Option<Vec<f64>> = answer["offset_f32"].as_array().map(|offset| {
+        offset
+            .iter()
+            .filter_map(serde_json::Value::as_f64)
+            .collect()
+    });
+    match (offset.as_deref(), answer["pairs"].as_u64()) {
+        // The file holds f32 numbers written out in full: narrowing gives them back.
+        (Some(&[x, y, z]), Some(n_pairs)) => Ok(Some(([x as f32, y as f32, z as f32], n_pairs))),
+        _ => Err(format!("two_body.json: no offset and pairs for `{scene}`").into()),
+    }
+}
+
+/// Self-collision of one body.
+pub fn within(scene: &str) -> Result<Problem, Failure> {
+    let (model, about) = match scene {
+        "ball" => (surfaces::ball(30_000), "generated".to_owned()),
+        "bunny" => mesh("meshes/bunny.ply", || surfaces::stand_in(69_450))?,
+        "buddha" => mesh("meshes/buddha.ply", || surfaces::stand_in(100_000))?,
+        "dragon" => mesh("meshes/dragon.ply", || surfaces::stand_in(400_000))?,
+        "cow" => mesh("meshes/cow.off", || surfaces::stand_in(5_804))?,
+        _ => return Err(format!("no scene `{scene}`: ball, bunny, buddha, dragon or cow").into()),
+    };
+    Ok(Problem::mirrored(scene, vec![model], Ask::Within).about(format!("{about}; {MIRRORED}")))
+}
+
+/// A solid twice, overlapping: moved by a third of its box along x and a little aside.
+pub fn tets() -> Result<Problem, Failure> {
+    let (model, about) = mesh("tets/bunny_19k.msh", || solids::solid_ball(19_379))?;
+    let width = model.bounds().map_or(0.0, |(min, max)| max[0] - min[0]);
+    let moved = model.translated([0.33 * width, 0.011 * width, 0.007 * width]);
+    Ok(
+        Problem::mirrored("tets", vec![model, moved], Ask::Between).about(format!(
+            "{about} twice, a third of its width apart; {MIRRORED}"
+        )),
+    )
+}

@@ -1,0 +1,137 @@
+//! Benchmarks of impinge. Peers run in the same process, on the same frames, turn by turn.
+//!
+//! ```text
+//! cargo run --release -p impinge-bench --features embree,parry -- two-body --scene dragon
+//! ```
+//!
+//! Before each frame all positions are rewritten, into the memory that each contestant reads, while no
+//! clock runs. A frame is timed from there to pairs in memory. Exact contestants must find the
+//! expected number of pairs and, among themselves, the same pairs; peers' counts are printed with their
+//! difference. Peers run with the setting that is fastest on the problem at hand, found before the
+//! contest, and need not sort their answer.
+
+mod commands;
+#[cfg(feature = "embree")]
+mod embree;
+mod files;
+mod measure;
+mod ours;
+#[cfg(feature = "parry")]
+mod parry;
+#[cfg_attr(not(any(feature = "embree", feature = "parry")), allow(dead_code))]
+mod plain;
+mod problem;
+mod report;
+mod runner;
+#[cfg_attr(not(any(feature = "embree", feature = "parry")), allow(dead_code))]
+mod tune;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use impinge::Backend;
+
+/// Anything that ends a run.
+pub type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+const HELP: &str = "\
+Benchmarks of impinge, peers measured in the same run.
+
+usage: impinge-bench COMMAND [options]
+
+commands:
+  two-body      two copies of a mesh: --scene ball15k|ball|bunny|buddha|dragon, or all but ball15k
+  self          self-collision of one mesh: --scene ball|bunny|buddha|dragon|cow, or the dragon
+  tets          two solids of tetrahedra
+  bodies        1,000, 10,000 and 100,000 bodies of 12 triangles
+  sizes         10^4 to 10^7 triangles in two waving bodies
+  adversarial   scenes that break methods which are only fast on average, as ratios to a plain one
+
+options:
+  --scene NAME       one scene only (two-body, self, adversarial)
+  --frames N         timed frames of each contestant (default 40; fewer for large scenes)
+  --size N           adversarial: primitives (default 1,000,000); sizes, bodies: the largest size
+  --threads N        threads of impinge (default: all)
+  --backend NAME     cpu (default), gpu or auto
+  --no-cells         leaves out impinge's other method, Cells
+  --no-peers         leaves out Embree and parry
+  --json FILE        figures for machines
+  --record NAME      also writes bench/record/NAME/COMMAND.md and .json; NAME is <machine>-<date>
+  --help             this text
+
+Embree needs --features embree, parry needs --features parry.";
+
+/// What the command line asks for.
+#[derive(Debug, Clone)]
+pub struct Options {
+    scene: Option<String>,
+    frames: Option<usize>,
+    size: Option<usize>,
+    threads: usize,
+    backend: Backend,
+    cells: bool,
+    peers: bool,
+    json: Option<PathBuf>,
+    record: Option<String>,
+}
+
+fn parse() -> Result<Option<(String, Options)>, lexopt::Error> {
+    use lexopt::prelude::*;
+    let mut options = Options {
+        scene: None,
+        frames: None,
+        size: None,
+        threads: 0,
+        backend: Backend::Cpu,
+        cells: true,
+        peers: true,
+        json: None,
+        record: None,
+    };
+    let mut command = None;
+    let mut parser = lexopt::Parser::from_env();
+    while let Some(argument) = parser.next()? {
+        match argument {
+            Long("help") | Short('h') => return Ok(None),
+            Long("scene") => options.scene = Some(parser.value()?.string()?),
+            Long("frames") => options.frames = Some(parser.value()?.parse()?),
+            Long("size") => options.size = Some(parser.value()?.parse()?),
+            Long("threads") => options.threads = parser.value()?.parse()?,
+            Long("backend") => {
+                options.backend = parser.value()?.parse_with(|name| match name {
+                    "cpu" => Ok(Backend::Cpu),
+                    "gpu" => Ok(Backend::Gpu),
+                    "auto" => Ok(Backend::Auto),
+                    _ => Err("cpu, gpu or auto"),
+                })?;
+            }
+            Long("no-cells") => options.cells = false,
+            Long("no-peers") => options.peers = false,
+            Long("json") => options.json = Some(parser.value()?.into()),
+            Long("record") => options.record = Some(parser.value()?.string()?),
+            Value(name) if command.is_none() => command = Some(name.string()?),
+            other => return Err(other.unexpected()),
+        }
+    }
+    Ok(command.map(|command| (command, options)))
+}
+
+fn main() -> ExitCode {
+    match parse() {
+        Ok(None) => {
+            println!("{HELP}");
+            ExitCode::SUCCESS
+        }
+        Ok(Some((command, options))) => match commands::run(&command, &options) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => {
+                eprintln!("impinge-bench: {error}");
+                ExitCode::FAILURE
+            }
+        },
+        Err(error) => {
+            eprintln!("impinge-bench: {error}; --help lists what there is");
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,0 +1,280 @@
+//! The pair tests that peers run: plain double precision, without error bounds, written to be
+//! fast. They may err where primitives touch or nearly do, which shows as a difference in counts.
+
+/// A point in double precision.
+pub type Point = [f64; 3];
+
+/// The corners of a primitive: three or four points.
+pub trait Corners: Copy + Send + Sync + 'static {
+    /// How many.
+    const N: usize;
+    /// The corners given one by one.
+    fn from_fn(corner: impl FnMut(usize) -> Point) -> Self;
+    /// Whether two primitives meet, by the plain test.
+    fn meet(&self, other: &Self) -> bool;
+}
+
+impl Corners for [Point; 3] {
+    const N: usize = 3;
+    #[inline(always)]
+    fn from_fn(corner: impl FnMut(usize) -> Point) -> Self {
+        std::array::from_fn(corner)
+    }
+    #[inline(always)]
+    fn meet(&self, other: &Self) -> bool {
+        triangles(self, other)
+    }
+}
+
+impl Corners for [Point; 4] {
+    const N: usize = 4;
+    #[inline(always)]
+    fn from_fn(corner: impl FnMut(usize) -> Point) -> Self {
+        std::array::from_fn(corner)
+    }
+    #[inline(always)]
+    fn meet(&self, other: &Self) -> bool {
+        tetrahedra(self, other)
+    }
+}
+
+#[inline(always)]
+fn sub(a: Point, b: Point) -> Point {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn cross(a: Point, b: Point) -> Point {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+#[inline(always)]
+fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Positive when `d` lies on the side of the plane `abc` from which `abc` turns counterclockwise.
+#[inline(always)]
+fn orient(a: Point, b: Point, c: Point, d: Point) -> f64 {
+    dot(sub(d, a), cross(sub(b, a), sub(c, a)))
+}
+
+/// Signed distances, scaled, of the corners of `t` from the plane of `plane`.
+#[inline(always)]
+fn sides(plane: &[Point; 3], t: &[Point; 3]) -> [f64; 3] {
+    let normal = cross(sub(plane[1], plane[0]), sub(plane[2], plane[0]));
+    t.map(|p| dot(sub(p, plane[0]), normal))
+}
+
+#[inline(always)]
+fn one_sided(d: [f64; 3]) -> bool {
+    (d[0] > 0.0 && d[1] > 0.0 && d[2] > 0.0) || (d[0] < 0.0 && d[1] < 0.0 && d[2] < 0.0)
+}
+
+/// The corner that has a side of the other triangle's plane for itself, and whether that is the
+/// upper side. A corner in the plane counts for the side on which it leaves one corner alone.
+/// `None` when all three lie in the plane.
+#[inline(always)]
+fn apex(d: [f64; 3]) -> Option<(usize, bool)> {
+    let bits = |keep: fn(f64) -> bool| {
+        usize::from(keep(d[0])) | usize::from(keep(d[1])) << 1 | usize::from(keep(d[2])) << 2
+    };
+    let above = bits(|x| x > 0.0);
+    let below = bits(|x| x < 0.0);
+    let in_plane = 7 & !(above | below);
+    let single = |mask: usize| mask.count_ones() == 1;
+    let corner = |mask: usize| mask.trailing_zeros() as usize;
+    if single(above) {
+        Some((corner(above), true))
+    } else if single(below) {
+        Some((corner(below), false))
+    } else if in_plane == 7 {
+        None
+    } else {
+        // One corner in the plane, the others together on one side: it stands for the other side.
+        Some((corner(in_plane), below != 0))
+    }
+}
+
+/// Whether two triangles meet: Guigue and Devillers 2003, "Fast and robust triangle-triangle
+/// overlap test using orientation predicates".
+#[inline]
+pub fn triangles(a: &[Point; 3], b: &[Point; 3]) -> bool {
+    let from_b = sides(b, a);
+    if one_sided(from_b) {
+        return false;
+    }
+    let from_a = sides(a, b);
+    if one_sided(from_a) {
+        return false;
+    }
+    let (Some((i, a_above)), Some((j, b_above))) = (apex(from_b), apex(from_a)) else {
+        return coplanar(a, b);
+    };
+    // Each apex first, and each triangle turned so that the other's apex lies above it.
+    let [p1, mut q1, mut r1] = [a[i], a[(i + 1) % 3], a[(i + 2) % 3]];
+    let [p2, mut q2, mut r2] = [b[j], b[(j + 1) % 3], b[(j + 2) % 3]];
+    if !a_above {
+        std::mem::swap(&mut q2, &mut r2);
+    }
+    if !b_above {
+        std::mem::swap(&mut q1, &mut r1);
+    }
+    // The two segments in which the planes' common line meets the triangles overlap.
+    orient(p1, q1, p2, q2) <= 0.0 && orient(p1, r1, r2, p2) <= 0.0
+}
+
+/// Coplanar triangles: no edge of either has the other on its far side, seen along the axis in
+/// which the plane is steepest.
+#[cold]
+fn coplanar(a: &[Point; 3], b: &[Point; 3]) -> bool {
+    let normal = cross(sub(a[1], a[0]), sub(a[2], a[0])).map(f64::abs);
+    let (u, v) = if normal[0] >= normal[1] && normal[0] >= normal[2] {
+        (1, 2)
+    } else if normal[1] >= normal[2] {
+        (2, 0)
+    } else {
+        (0, 1)
+    };
+    let turn = |p: Point, q: Point, r: Point| {
+        (q[u] - p[u]) * (r[v] - p[v]) - (q[v] - p[v]) * (r[u] - p[u])
+    };
+    let separates = |s: &[Point; 3], t: &[Point; 3]| {
+        let inside = turn(s[0], s[1], s[2]).signum();
+        (0..3).any(|k| {
+            t.iter()
+                .all(|&p| turn(s[k], s[(k + 1) % 3], p) * inside < 0.0)
+        })
+    };
+    !separates(a, b) && !separates(b, a)
+}
+
+/// Whether two tetrahedra meet: separating axes, the faces of both first, then the cross
+/// products of edges; a corner of one inside the other is seen on the way and ends the test.
+#[inline]
+pub fn tetrahedra(a: &[Point; 4], b: &[Point; 4]) -> bool {
+    match (faces(a, b), faces(b, a)) {
+        (Faces::Separate, _) | (_, Faces::Separate) => return false,
+        (Faces::Inside, _) | (_, Faces::Inside) => return true,
+        _ => {}
+    }
+    const EDGES: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+    let edges = |t: &[Point; 4]| EDGES.map(|(i, j)| sub(t[j], t[i]));
+    let (edges_a, edges_b) = (edges(a), edges(b));
+    for &e in &edges_a {
+        for &f in &edges_b {
+            let axis = cross(e, f);
+            let range = |t: &[Point; 4]| {
+                let d = t.map(|p| dot(axis, sub(p, a[0])));
+                (
+                    d[0].min(d[1]).min(d[2].min(d[3])),
+                    d[0].max(d[1]).max(d[2].max(d[3])),
+                )
+            };
+            let ((min_a, max_a), (min_b, max_b)) = (range(a), range(b));
+            if max_a < min_b || max_b < min_a {
+                return false;
+            }
+        }
+    }
+    true
+}
+
+enum Faces {
+    /// A face has all of the other tetrahedron beyond it.
+    Separate,
+    /// A corner of the other tetrahedron is inside.
+    Inside,
+    Unknown,
+}
+
+#[inline(always)]
+fn faces(a: &[Point; 4], b: &[Point; 4]) -> Faces {
+    const FACES: [[usize; 4]; 4] = [[0, 1, 2, 3], [0, 1, 3, 2], [0, 2, 3, 1], [1, 2, 3, 0]];
+    let mut outside_any = 0u32;
+    for [i, j, k, opposite] in FACES {
+        let normal = cross(sub(a[j], a[i]), sub(a[k], a[i]));
+        let inward = dot(sub(a[opposite], a[i]), normal);
+        let mut outside = 0u32;
+        for (corner, &p) in b.iter().enumerate() {
+            let beyond = dot(sub(p, a[i]), normal) * inward < 0.0;
+            outside |= u32::from(beyond) << corner;
+        }
+        if outside == 0b1111 {
+            return Faces::Separate;
+        }
+        outside_any |= outside;
+    }
+    if outside_any != 0b1111 {
+        return Faces::Inside;
+    }
+    Faces::Unknown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use impinge::exact;
+    use impinge_scenes::soup;
+
+    fn corners<const K: usize>(model: &impinge_scenes::Model) -> Vec<[Point; K]> {
+        (0..model.n_primitives())
+            .map(|primitive| {
+                let corners = model.elements.corners(primitive);
+                std::array::from_fn(|k| model.positions[corners[k] as usize].map(f64::from))
+            })
+            .collect()
+    }
+
+    /// Random primitives nearly never touch without crossing: the plain tests agree with the
+    /// exact ones on all of them.
+    #[test]
+    fn plain_tests_agree_with_exact_ones_in_general_position() {
+        let soup_a = corners::<3>(&soup::triangles(400, 0.9, 1));
+        let soup_b = corners::<3>(&soup::triangles(400, 0.9, 2));
+        let mut n_meet = 0;
+        for a in &soup_a {
+            for b in &soup_b {
+                let meet = exact::triangles_intersect(a, b);
+                n_meet += usize::from(meet);
+                assert_eq!(triangles(a, b), meet, "{a:?} {b:?}");
+            }
+        }
+        assert!(n_meet > 1_000, "{n_meet}");
+        let solid_a = corners::<4>(&soup::tetrahedra(200, 0.9, 3));
+        let solid_b = corners::<4>(&soup::tetrahedra(200, 0.9, 4));
+        let mut n_meet = 0;
+        for a in &solid_a {
+            for b in &solid_b {
+                let meet = exact::tetrahedra_intersect(a, b);
+                n_meet += usize::from(meet);
+                assert_eq!(tetrahedra(a, b), meet, "{a:?} {b:?}");
+            }
+        }
+        assert!(n_meet > 1_000, "{n_meet}");
+    }
+
+    /// On a small lattice nothing rounds, so for triangles that are not degenerate the plain test
+    /// is exact even where they touch.
+    #[test]
+    fn plain_triangle_test_is_right_on_a_lattice() {
+        let soup_a = corners::<3>(&soup::lattice_triangles(600, 3, 1));
+        let proper = |t: &&[Point; 3]| {
+            let normal = cross(sub(t[1], t[0]), sub(t[2], t[0]));
+            dot(normal, normal) > 0.0
+        };
+        let mut n_meet = 0;
+        for a in soup_a.iter().filter(proper) {
+            for b in soup_a.iter().filter(proper) {
+                let meet = exact::triangles_intersect(a, b);
+                n_meet += usize::from(meet);
+                assert_eq!(triangles(a, b), meet, "{a:?} {b:?}");
+            }
+        }
+        assert!(n_meet > 10_000, "{n_meet}");
+    }
+}

@@ -1,0 +1,130 @@
+//! What is measured: bodies, the question, and two poses between which frames alternate.
+
+use std::sync::Arc;
+
+use impinge::{Elements, Query, Scene};
+use impinge_scenes::Model;
+use impinge_scenes::deform::Deform;
+
+use crate::Failure;
+
+/// What is asked of the bodies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ask {
+    /// Pairs between the first and the second body.
+    Between,
+    /// Self-collision of the only body; pairs that share a vertex are left out.
+    Within,
+    /// Pairs of different bodies.
+    All,
+}
+
+/// One body.
+#[derive(Debug, Clone)]
+pub struct Body {
+    /// Its primitives.
+    pub elements: Arc<Elements>,
+    /// Its positions in either pose.
+    pub poses: [Vec<[f32; 3]>; 2],
+}
+
+/// A scene to be measured.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// Its name in tables.
+    pub name: String,
+    /// Where the meshes came from, and what the poses are.
+    pub about: String,
+    /// The bodies.
+    pub bodies: Vec<Body>,
+    /// The question.
+    pub ask: Ask,
+    /// The number of pairs in either pose, where it is known from elsewhere.
+    pub expected: Option<u64>,
+}
+
+impl Problem {
+    /// A problem whose second pose is the mirror image of the first, x to -x. Changing a sign is
+    /// exact, so both poses have the same pairs, and yet every coordinate that matters is new in
+    /// every frame: nothing static can be exploited.
+    pub fn mirrored(name: &str, models: Vec<Model>, ask: Ask) -> Problem {
+        Problem::new(name, models, ask, |p| {
+            p.iter().map(|&[x, y, z]| [-x, y, z]).collect()
+        })
+    }
+
+    /// A problem whose second pose is another moment of a motion; the first is as given.
+    pub fn moving(
+        name: &str,
+        models: Vec<Model>,
+        ask: Ask,
+        motion: &impl Deform,
+        t: f32,
+    ) -> Problem {
+        Problem::new(name, models, ask, |rest| {
+            let mut now = rest.to_vec();
+            motion.apply(rest, t, &mut now);
+            now
+        })
+    }
+
+    fn new(
+        name: &str,
+        models: Vec<Model>,
+        ask: Ask,
+        second: impl Fn(&[[f32; 3]]) -> Vec<[f32; 3]>,
+    ) -> Problem {
+        let bodies = models
+            .into_iter()
+            .map(|model| Body {
+                poses: [second(&model.positions), model.positions],
+                elements: Arc::new(model.elements),
+            })
+            .map(|mut body| {
+                body.poses.swap(0, 1);
+                body
+            })
+            .collect();
+        Problem {
+            name: name.to_owned(),
+            about: String::new(),
+            bodies,
+            ask,
+            expected: None,
+        }
+    }
+
+    /// Says where it comes from.
+    pub fn about(mut self, about: impl Into<String>) -> Problem {
+        self.about = about.into();
+        self
+    }
+
+    /// Says how many pairs there must be.
+    pub fn expecting(mut self, n_pairs: Option<u64>) -> Problem {
+        self.expected = n_pairs;
+        self
+    }
+
+    /// Primitives of all bodies.
+    pub fn n_primitives(&self) -> usize {
+        self.bodies.iter().map(|body| body.elements.len()).sum()
+    }
+
+    /// The library's scene and query for it.
+    pub fn scene(&self) -> Result<(Scene, Vec<impinge::BodyId>, Query), Failure> {
+        let mut scene = Scene::new();
+        let ids = self
+            .bodies
+            .iter()
+            .map(|body| scene.add(Elements::clone(&body.elements), body.poses[0].clone()))
+            .collect::<Result<Vec<_>, _>>()?;
+        let query = match (self.ask, &ids[..]) {
+            (Ask::Between, [a, b]) => Query::between(*a, *b),
+            (Ask::Within, [a]) => Query::within(*a),
+            (Ask::All, _) => Query::all(),
+            (ask, _) => return Err(format!("{ask:?} does not fit {} bodies", ids.len()).into()),
+        };
+        Ok((scene, ids, query))
+    }
+}
