@@ -294,7 +294,11 @@ impl Cells {
         let mut most_cells = u64::MAX;
         if let Some(budget) = options.memory_budget {
             // Boxes twice over (parts and kept), one entry each, one cell, one slab of items.
-            let fixed = 2 * n * size_of::<Kept>() as u64 + slab_bytes(options) + 4096;
+            let scratches: usize = self.scratches.iter().map(Settler::bytes).sum();
+            let fixed = 2 * n * size_of::<Kept>() as u64
+                + slab_bytes(options)
+                + (scratches + self.top.bytes()) as u64
+                + 4096;
             let needed = fixed + 4 * n + 8;
             if needed > budget {
                 return Err(Error::MemoryBudget {

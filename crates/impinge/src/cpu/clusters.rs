@@ -95,6 +95,9 @@ impl Clusters {
     ) -> Result<(), Error> {
         self.scratches
             .resize_with(job.workers.n(), Settler::default);
+        for scratch in &mut self.scratches {
+            scratch.clear();
+        }
         stats.time("clustering", |stats| self.cluster(job, stats))?;
         stats.time("bounds", |stats| self.refit(job, options, stats))?;
         self.slab.limit(options, self.bytes(), job.frame)?;
@@ -465,9 +468,6 @@ fn detect<S: Simd>(
     };
     let start = Instant::now();
     slab.begin(world);
-    for scratch in scratches.iter_mut() {
-        scratch.clear();
-    }
     let mut flusher = Flusher {
         isa: *isa,
         world,

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use crate::exact::filter::{self, LANES, TrianglePairs8};
 use crate::frame::pair_key;
+use crate::grouping::GROUP;
 use crate::narrow::{intersect, intersect_shared};
 use crate::scene::{Kind, Positions};
 
@@ -26,6 +27,8 @@ pub(crate) struct Candidate {
 
 /// Candidates are settled once this many have gathered.
 const FULL: usize = 1024;
+/// The last work item before that may add this many.
+const MOST: usize = FULL + GROUP * GROUP;
 
 /// One worker's candidates, pairs and counts.
 #[derive(Debug, Default)]
@@ -40,17 +43,20 @@ pub(crate) struct Settler {
 }
 
 impl Settler {
+    /// Makes ready for a frame. Candidates get all the room that they may ever need.
     pub fn clear(&mut self) {
         self.keys.clear();
         self.candidates.clear();
+        self.candidates.reserve_exact(MOST);
+        self.survivors.reserve_exact(MOST);
         self.n_candidates = 0;
         self.n_unsure = 0;
         self.busy = Duration::ZERO;
     }
 
+    /// Bytes held, the keys not counted: they are the answer.
     pub fn bytes(&self) -> usize {
-        size_of::<u64>() * self.keys.capacity()
-            + size_of::<Candidate>() * (self.candidates.capacity() + self.survivors.capacity())
+        size_of::<Candidate>() * (self.candidates.capacity() + self.survivors.capacity())
     }
 
     #[inline(always)]

@@ -49,22 +49,21 @@ impl Grid {
         });
         let wanted = (lambda * n_primitives as f64).clamp(1.0, MOST_CELLS as f64);
         let mut resolution = [1u32; 3];
-        let mut along: Vec<usize> = (0..3).filter(|&axis| extent[axis] > 0.0).collect();
-        while !along.is_empty() {
+        let mut wide = extent.map(|extent| extent > 0.0);
+        loop {
             // Extents are at most 2^129 and at least 2^-149: their products are normal f64.
-            let volume: f64 = along.iter().map(|&axis| extent[axis]).product();
-            let density = match along.len() {
+            let axes = || (0..3).filter(|&axis| wide[axis]);
+            let volume: f64 = axes().map(|axis| extent[axis]).product();
+            let density = match axes().count() {
                 3 => (wanted / volume).cbrt(),
                 2 => (wanted / volume).sqrt(),
                 _ => wanted / volume,
             };
             let cells = |axis: usize| extent[axis] * density;
-            match along.iter().position(|&axis| cells(axis) < 1.0) {
-                Some(thin) => {
-                    along.remove(thin);
-                }
+            match axes().find(|&axis| cells(axis) < 1.0) {
+                Some(thin) => wide[thin] = false,
                 None => {
-                    for &axis in &along {
+                    for axis in axes() {
                         resolution[axis] = (cells(axis) as u32).clamp(1, MOST_ALONG);
                     }
                     break;
