@@ -33,8 +33,8 @@
 //! file holds, not by what its header says.
 //!
 //! # Why the parsers are our own
-//! At the time of writing the published crates read text coordinates as f32 (or round them to it), merge or reorder primitives, cover one version
-//! of a format, or give no line with an error. XML, JSON, base64, zlib and LZ4 are left to crates.
+//! Crates exist for most of these formats, but they cover one version of a format, read coordinates as f32, merge vertices,
+//! or give no line with an error. XML, JSON, zlib and LZ4 are left to crates.
 
 mod base64;
 mod binary;

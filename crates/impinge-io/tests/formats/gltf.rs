@@ -1,0 +1,209 @@
+//! glTF and GLB.
+
+use crate::*;
+
+#[test]
+fn gltf_transforms_multiply_down_the_tree() {
+    let turned = r#","rotation":[0,0,0.7071067811865476,0.7071067811865476],"scale":[2,2,2],"translation":[10,0,0]"#;
+    let mesh = read_bytes(
+        &glb_of(&gltf_json("", turned), &gltf_buffer()),
+        Format::Gltf,
+        "g",
+        &ReadOptions::default(),
+    )
+    .or_show();
+    let Positions::F64(positions) = &mesh.positions else {
+        panic!("moved positions are f64")
+    };
+    for ([x, y, z], moved) in VERTICES.into_iter().zip(positions) {
+        for (expected, found) in [10.0 - 2.0 * y, 2.0 * x, 2.0 * z].into_iter().zip(moved) {
+            assert!((expected - found).abs() < 1e-12, "{moved:?}");
+        }
+    }
+
+    // A parent that moves, children that use the mesh twice, once as a matrix.
+    let json = gltf_json("", "").replace(
+        r#"[{"mesh":0}]"#,
+        r#"[{"children":[1,2],"translation":[1,0,0]},{"mesh":0},{"mesh":0,"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,5,1]}]"#,
+    );
+    let mesh = read_bytes(
+        &glb_of(&json, &gltf_buffer()),
+        Format::Gltf,
+        "g",
+        &ReadOptions::default(),
+    )
+    .or_show();
+    assert_eq!((mesh.n_vertices(), mesh.n_primitives()), (10, 6));
+    assert_eq!(mesh.positions.get(1), Some([2.0, 0.0, 0.0]));
+    assert_eq!(mesh.positions.get(6), Some([2.0, 0.0, 5.0]));
+    assert_eq!(triangles(&mesh)[3], TRIANGLES[0].map(|ix| ix + 5));
+}
+
+#[test]
+fn gltf_modes_shared_positions_and_external_buffers() {
+    // Two primitives of one mesh share their positions: a strip, and a fan without indices.
+    let json = gltf_json(r#","uri":"my%20data.bin""#, "")
+        .replace(r#""indices":1}"#, r#""indices":1,"mode":5},{"attributes":{"POSITION":0},"mode":6},{"attributes":{"POSITION":0},"mode":1}"#);
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("my data.bin"), gltf_buffer()).unwrap();
+    let path = folder.path().join("a.gltf");
+    std::fs::write(&path, &json).unwrap();
+    let (mesh, summary) = read_with_summary(&path, &ReadOptions::default()).or_show();
+    assert_eq!(mesh.n_vertices(), 5);
+    let [a, b, c] = TRIANGLES;
+    assert_eq!(
+        triangles(&mesh),
+        [
+            a,
+            [a[2], a[1], b[0]],
+            [a[2], b[0], b[1]],
+            [b[1], b[0], b[2]],
+            [b[1], b[2], c[0]],
+            [c[0], b[2], c[1]],
+            [c[0], c[1], c[2]],
+            [0, 1, 2],
+            [0, 2, 3],
+            [0, 3, 4]
+        ]
+    );
+    assert_eq!(summary.n_lines_skipped, 1);
+    let message = load(Format::Gltf, &json).unwrap_err().to_string();
+    assert_eq!(
+        message,
+        "file: buffer 0 at 'my%20data.bin' (files beside a mesh in memory are not read) is not supported"
+    );
+    for outside in ["/etc/passwd", "file:///etc/passwd", "http://a/b"] {
+        std::fs::write(&path, json.replace("my%20data.bin", outside)).unwrap();
+        let error = read(&path, &ReadOptions::default()).unwrap_err();
+        assert!(matches!(error, Error::Unsupported { .. }), "{error}");
+    }
+}
+
+#[test]
+fn gltf_sparse_and_quantized() {
+    let sparse = gltf_json("", "").replace(
+        r#""componentType":5126,"count":5,"type":"VEC3""#,
+        r#""componentType":5126,"count":5,"type":"VEC3","sparse":{"count":1,"indices":{"bufferView":1,"byteOffset":2,"componentType":5123},"values":{"bufferView":0,"byteOffset":12}}"#,
+    );
+    let mesh = read_bytes(
+        &glb_of(&sparse, &gltf_buffer()),
+        Format::Gltf,
+        "g",
+        &ReadOptions::default(),
+    )
+    .or_show();
+    // The second index is 2, and the second position (1, 0, 0).
+    assert_eq!(mesh.positions.get(2), Some([1.0, 0.0, 0.0]));
+
+    let quantized = gltf_json("", "")
+        .replace(
+            r#""componentType":5126"#,
+            r#""componentType":5122,"normalized":true"#,
+        )
+        .replace(r#""byteLength":60}"#, r#""byteLength":60,"byteStride":8}"#);
+    let mut buffer = gltf_buffer();
+    buffer[8..14].copy_from_slice(&[0xff, 0x7f, 0x01, 0x80, 0x00, 0x80]);
+    let mesh = read_bytes(
+        &glb_of(&quantized, &buffer),
+        Format::Gltf,
+        "g",
+        &ReadOptions::default(),
+    )
+    .or_show();
+    assert_eq!(mesh.positions.get(1), Some([1.0, -1.0, -1.0]));
+}
+
+#[test]
+fn gltf_errors() {
+    let json = gltf_json("", "");
+    for (from, to, expected) in [
+        (
+            r#""count":9"#,
+            r#""count":10"#,
+            "file: 10 values in buffer view 1 needs 20 bytes, but 18 are left",
+        ),
+        (
+            r#""count":9"#,
+            r#""count":8"#,
+            "file: expected 9 indices of triangles, found 8",
+        ),
+        (
+            r#""count":5"#,
+            r#""count":4"#,
+            "file: vertex index 4 is out of range: 4 vertices, numbered from 0",
+        ),
+        (
+            r#""indices":1"#,
+            r#""indices":7"#,
+            "file: expected an index of accessors below 2, found 7",
+        ),
+        (
+            r#""nodes":[0]"#,
+            r#""nodes":[0,0]"#,
+            "file: expected nodes that form a tree, found node 0 twice",
+        ),
+        (
+            r#"{"mesh":0}"#,
+            r#"{"mesh":0,"children":[0]}"#,
+            "file: expected nodes that form a tree, found node 0 twice",
+        ),
+        (
+            r#""asset""#,
+            r#""extensionsRequired":["KHR_draco_mesh_compression"],"asset""#,
+            "file: the extension 'KHR_draco_mesh_compressi…' is not supported",
+        ),
+        (
+            r#""byteLength":18"#,
+            r#""byteLength":9000"#,
+            "file: buffer view 1 needs 9060 bytes, but 80 are left",
+        ),
+        (
+            r#""byteLength":80"#,
+            r#""byteLength":81"#,
+            "file: buffer 0 needs 81 bytes, but 80 are left",
+        ),
+        (
+            r#""2.0""#,
+            r#""1.0""#,
+            "file: glTF version '1.0' (2.x is) is not supported",
+        ),
+    ] {
+        let broken = json.replace(from, to);
+        assert_ne!(broken, json);
+        let error = read_bytes(
+            &glb_of(&broken, &gltf_buffer()),
+            Format::Gltf,
+            "file",
+            &ReadOptions::default(),
+        )
+        .unwrap_err();
+        assert_eq!(error.to_string(), expected);
+    }
+    assert!(
+        message(Format::Gltf, "{\"asset\": {\n\"version\" 2}}")
+            .starts_with("file:2: expected glTF in JSON, found expected `:`")
+    );
+}
+
+#[test]
+fn gltf_instances_are_held_to_the_budget() {
+    let nodes = vec![r#"{"mesh":0}"#; 1000].join(",");
+    let all: Vec<String> = (0..1000).map(|ix| ix.to_string()).collect();
+    let json = gltf_json("", "")
+        .replace(r#"{"mesh":0}"#, &nodes)
+        .replace(r#""nodes":[0]"#, &format!(r#""nodes":[{}]"#, all.join(",")));
+    let glb = glb_of(&json, &gltf_buffer());
+    let options = ReadOptions::default();
+    assert_eq!(
+        read_bytes(&glb, Format::Gltf, "g", &options)
+            .or_show()
+            .n_primitives(),
+        3000
+    );
+    let options = ReadOptions {
+        max_expanded_bytes: 1000,
+        ..options
+    };
+    let error = read_bytes(&glb, Format::Gltf, "g", &options).unwrap_err();
+    assert!(matches!(error, Error::TooLarge { .. }), "{error}");
+}

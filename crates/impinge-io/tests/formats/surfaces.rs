@@ -1,0 +1,289 @@
+//! OBJ, OFF, PLY and STL.
+
+use crate::*;
+
+#[test]
+fn text_is_read_as_f64_without_rounding() {
+    // Neighbours of 0.1 in f64 that are one number in f32.
+    let (one, other) = (0.1f64, f64::from_bits(0.1f64.to_bits() + 1));
+    let obj = format!("v {one} 0 0\nv {other:e} 1 0\nv +1.5E0 -0.0 .5\nf 1 2 3\n");
+    let mesh = load(Format::Obj, &obj).unwrap();
+    assert_eq!(
+        mesh.positions,
+        Positions::F64(vec![[one, 0.0, 0.0], [other, 1.0, 0.0], [1.5, -0.0, 0.5]])
+    );
+}
+
+#[test]
+fn obj_polygons_negative_indices_and_continued_lines() {
+    let obj = "v 0 0 0 1.0\nv 1 0 0\nv 1 1 0 0.5 0.5 0.5\nvt 0 0\nf 1/1/1 2//3 3/1 4/2 # five is behind\nv 0 1 0\ng other\nf -4 -3\\\n -1\nl 1 2\np 1\nusemtl x\n";
+    let (mesh, summary) =
+        read_bytes_with_summary(obj.as_bytes(), Format::Obj, "o", &ReadOptions::default())
+            .or_show();
+    assert_eq!(triangles(&mesh), [[0, 1, 2], [0, 2, 3], [0, 1, 3]]);
+    assert_eq!(
+        (
+            summary.n_polygons_fanned,
+            summary.n_lines_skipped,
+            summary.n_points_skipped
+        ),
+        (1, 1, 1)
+    );
+}
+
+#[test]
+fn obj_errors_name_the_line_and_both_numbers() {
+    for (obj, expected) in [
+        (
+            "v 0 0 0\nf 1 2 3\n",
+            "file:2: vertex index 3 is out of range: 1 vertices, numbered from 1",
+        ),
+        (
+            "v 0 0 0\nv 0 0 0\nf 1 2 -3\n",
+            "file:3: vertex index -3 is out of range: 2 vertices, numbered from -2",
+        ),
+        (
+            "v 0 0 0\nf 1 0 1\n",
+            "file:2: vertex index 0 is out of range: 1 vertices, numbered from 1",
+        ),
+        (
+            "v 0 0 0\nf 1 1 99999999999\n",
+            "file:2: vertex index 99999999999 is out of range: 1 vertices, numbered from 1",
+        ),
+        ("v 0 0\n", "file:1: expected z, found the end of the line"),
+        ("v 0 0 o\n", "file:1: expected z, found 'o'"),
+        (
+            "v 0 0 1e999\n",
+            "file:1: vertex 0 has the coordinate inf, which is not a finite number",
+        ),
+        (
+            "v 0 nan 1\n",
+            "file:1: vertex 0 has the coordinate NaN, which is not a finite number",
+        ),
+        (
+            "v 0 0 0\nf 1 1\n",
+            "file:2: expected 3 corners of a polygon, or more, found 2",
+        ),
+        (
+            "v 0 0 0\nf 1 x 1\n",
+            "file:2: expected a vertex index, found 'x'",
+        ),
+        (
+            "surf 0 1 0 1\n",
+            "file:1: free-form geometry ('surf'; only polygons are read) is not supported",
+        ),
+        (
+            "v 0 0 0\nl 1 1\n",
+            "file: no triangles or tetrahedra in this file (1 vertices, 0 triangles, 0 tetrahedra, 1 lines, 0 points)",
+        ),
+    ] {
+        assert_eq!(message(Format::Obj, obj), expected);
+    }
+}
+
+#[test]
+fn byte_order_marks_hide_no_vertex() {
+    let mesh = load(Format::Obj, "\u{feff}v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").or_show();
+    assert_eq!(mesh.n_vertices(), 3);
+    let mesh = load(Format::Off, "\u{feff}OFF 1 1 0\n0 0 0\n3 0 0 0\n").or_show();
+    assert_eq!(mesh.n_vertices(), 1);
+}
+
+#[test]
+fn off_variants() {
+    for off in [
+        "OFF # comment\n# more\n3 1\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+        "COFF 3 1 0\n0 0 0 255 0 0 255\n1 0 0 1 1 1 1\n0 1 0 1 1 1 1\n\n3 0 1 2 0.5 0.5 0.5\n",
+        "NOFF\n3 1 0\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1\n3 0 1 2\n",
+        "3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2",
+        "OFF\n3 3 0\n0 0 0\n1 0 0\n0 1 0\n1 0\n2 0 1\n3 0 1 2\n",
+    ] {
+        let mesh = load(Format::Off, off).or_show();
+        assert_eq!(
+            mesh.positions,
+            Positions::F64(vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+            "{off}"
+        );
+        assert_eq!(triangles(&mesh), [[0, 1, 2]], "{off}");
+    }
+    for (off, expected) in [
+        (
+            "4OFF\n1 0 0\n",
+            "file:1: the keyword '4OFF' (vertices have three coordinates here) is not supported",
+        ),
+        (
+            "OFF BINARY\n",
+            "file:1: binary OFF (text is) is not supported",
+        ),
+        (
+            "OFF\n3 1 0\n0 0 0\n1 0 0\n",
+            "file:5: expected 3 vertices, found 2",
+        ),
+        (
+            "OFF\n1 2 0\n0 0 0\n3 0 0 0\n",
+            "file:5: expected 2 faces, found 1",
+        ),
+        (
+            "OFF\n1 1 0\n0 0 0\n3 0 0 1\n",
+            "file:4: vertex index 1 is out of range: 1 vertices, numbered from 0",
+        ),
+        (
+            "OFF\n1 1 0\n0 0 0\n3 0 0\n",
+            "file:4: expected 3 corners, found 2",
+        ),
+        (
+            "OFF\n1 1 0\n0 0 0\n0\n",
+            "file:4: expected 3 corners of a polygon, or more, found 0",
+        ),
+        (
+            "OFF\n-1 1 0\n",
+            "file:2: expected the numbers of vertices and faces, found '-1'",
+        ),
+        (
+            "OFF\n5000000000 1 0\n",
+            "file:2: number of vertices: 5000000000 is more than the limit of 4294967295",
+        ),
+    ] {
+        assert_eq!(message(Format::Off, off), expected);
+    }
+}
+
+#[test]
+fn ply_strips_tetrahedra_and_other_elements() {
+    let head = "ply\nformat ascii 1.0\nobj_info x\nelement other 1\nproperty int a\nproperty list uchar float b\nelement vertex 5\nproperty list uchar int tags\nproperty double z\nproperty double x\nproperty double y\n";
+    let body = "1 2 0.5 0.25\n0 0 0 0\n1 9 0 1 0\n0 0 0 1\n0 1 0 0\n0 1 1 1\n";
+    let strips = format!(
+        "{head}element tristrips 1\nproperty list int int vertex_indices\nelement edge 1\nproperty int a\nend_header\n{body}8 0 1 2 3 -1 4 3 2\n5\n"
+    );
+    let (mesh, summary) =
+        read_bytes_with_summary(strips.as_bytes(), Format::Ply, "p", &ReadOptions::default())
+            .or_show();
+    assert_eq!(triangles(&mesh), [[0, 1, 2], [2, 1, 3], [4, 3, 2]]);
+    assert_eq!(mesh.positions.get(1), Some([1.0, 0.0, 0.0]));
+    assert_eq!(mesh.positions.get(3), Some([0.0, 0.0, 1.0]));
+    assert_eq!(summary.n_lines_skipped, 1);
+
+    let tets = format!(
+        "{head}element face 1\nproperty uchar c\nproperty list uchar int vertex_index\nelement tetra 2\nproperty list uchar int vertex_indices\nend_header\n{body}7 4 0 1 2 3\n4 0 1 2 3\n4 4 3 2 1\n"
+    );
+    let (mesh, summary) =
+        read_bytes_with_summary(tets.as_bytes(), Format::Ply, "p", &ReadOptions::default())
+            .or_show();
+    assert_eq!(
+        mesh.elements,
+        Elements::Tetrahedra(vec![[0, 1, 2, 3], [4, 3, 2, 1]])
+    );
+    assert_eq!(
+        (summary.n_triangles_skipped, summary.n_polygons_fanned),
+        (2, 1)
+    );
+    let options = ReadOptions {
+        prefer: Prefer::Triangles,
+        ..ReadOptions::default()
+    };
+    let (mesh, summary) =
+        read_bytes_with_summary(tets.as_bytes(), Format::Ply, "p", &options).or_show();
+    assert_eq!(triangles(&mesh), [[0, 1, 2], [0, 2, 3]]);
+    assert_eq!(summary.n_tetrahedra_skipped, 2);
+    let options = ReadOptions {
+        prefer: Prefer::Tetrahedra,
+        ..ReadOptions::default()
+    };
+    let error = read_bytes(strips.as_bytes(), Format::Ply, "p", &options).unwrap_err();
+    assert!(
+        matches!(
+            error,
+            Error::NoPrimitives {
+                wanted: "tetrahedra",
+                n_triangles: 3,
+                ..
+            }
+        ),
+        "{error}"
+    );
+}
+
+#[test]
+fn ply_binary_with_properties_of_all_kinds_around() {
+    // A list before the vertices, integer coordinates, and a property on either side of a face's vertices.
+    let mut ply = b"ply\nformat binary_big_endian 1.0\nelement list 2\nproperty list ushort short v\nelement face 2\nproperty uchar a\n\
+        property list uint8 uint16 vertex_index\nproperty list uchar uchar b\nelement vertex 4\nproperty int16 x\nproperty uint8 y\nproperty int8 z\nend_header\n"
+        .to_vec();
+    ply.extend([0, 1, 9, 9, 0, 0]);
+    ply.extend([7, 4, 0, 0, 0, 1, 0, 2, 0, 3, 1, 5]);
+    ply.extend([7, 3, 0, 3, 0, 1, 0, 2, 0]);
+    ply.extend([0xff, 0xfe, 200, 0xff, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 1]);
+    let mesh = read_bytes(&ply, Format::Ply, "p", &ReadOptions::default()).or_show();
+    assert_eq!(
+        mesh.positions,
+        Positions::F32(vec![
+            [-2.0, 200.0, -1.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [256.0, 0.0, 1.0]
+        ])
+    );
+    assert_eq!(triangles(&mesh), [[0, 1, 2], [0, 2, 3], [3, 1, 2]]);
+}
+
+#[test]
+fn ply_errors() {
+    let vertices = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n";
+    let faces = format!(
+        "{vertices}element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n"
+    );
+    for (ply, expected) in [
+        ("plY\n".to_owned(), "file:1: expected 'ply', found 'plY'"),
+        ("ply\nformat ascii 1.0\nend_header\n".into(), "file:4: expected an element 'vertex' in the header, found none"),
+        ("ply\nformat text 1.0\n".into(), "file:2: expected 'ascii', 'binary_little_endian' or 'binary_big_endian', found 'text'"),
+        ("ply\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n".into(), "file:6: expected a line 'format' in the header, found none"),
+        ("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n".into(), "file:3: expected a property 'z' of the element 'vertex', found none"),
+        (format!("{vertices}element face 1\nproperty list uchar float vertex_indices\nend_header\n0 0 0\n"), "file:7: expected an integer type for vertex indices, found a floating one"),
+        (format!("{vertices}element face 1\nproperty int a\nend_header\n0 0 0\n1\n"), "file:7: expected a list 'vertex_indices' of the element 'face', found none"),
+        (format!("{faces}3 0 0 1\n"), "file:11: vertex index 1 is out of range: 1 vertices, numbered from 0"),
+        (format!("{faces}3 0 0 -1\n"), "file:11: vertex index -1 is out of range: 1 vertices, numbered from 0"),
+        (format!("{faces}3 0 0\n"), "file:11: expected an item of a list, found the end of the line"),
+        (format!("{faces}3 0 0 0 0\n"), "file:11: expected the end of the line, found '0'"),
+        (format!("{faces}2 0 0\n"), "file:11: expected 3 corners of a polygon, or more, found 2"),
+        (faces.clone(), "file:11: expected 1 records of the element 'face', found 0"),
+    ] {
+        assert_eq!(message(Format::Ply, &ply), expected);
+    }
+}
+
+#[test]
+fn stl_of_several_solids() {
+    let facet =
+        "FACET NORMAL 0 0 1 OUTER LOOP VERTEX 0 0 0 VERTEX 1 0 0 VERTEX 0 1 0 ENDLOOP ENDFACET";
+    let mesh = load(
+        Format::Stl,
+        &format!("solid\n{facet}\nendsolid\nsolid facet\n{facet}\nendsolid facet\n"),
+    )
+    .or_show();
+    assert_eq!(triangles(&mesh), [[0, 1, 2], [3, 4, 5]]);
+    let options = ReadOptions {
+        weld: true,
+        ..ReadOptions::default()
+    };
+    let (mesh, summary) = read_bytes_with_summary(
+        format!("solid a\n{facet}\n{facet}\nendsolid").as_bytes(),
+        Format::Stl,
+        "s",
+        &options,
+    )
+    .or_show();
+    assert_eq!(triangles(&mesh), [[0, 1, 2], [0, 1, 2]]);
+    assert_eq!((mesh.n_vertices(), summary.n_welded), (3, 3));
+    assert_eq!(
+        message(Format::Stl, "solid\nfacet normal 0 0 1\nouter\nvertex"),
+        "file:4: expected 'loop', found 'vertex'"
+    );
+    assert_eq!(
+        message(Format::Stl, &format!("solid\n{facet}\n")),
+        "file:3: expected 'endsolid', found the end of the file"
+    );
+    assert_eq!(
+        message(Format::Stl, "garbage"),
+        "file: byte 0: the title needs 80 bytes, but 7 are left"
+    );
+}
