@@ -67,19 +67,26 @@ fn settings(options: &Options, method: Method) -> Settings {
     }
 }
 
-/// The library's contestants; the first is what others are compared with.
-fn ours(problem: &Problem, options: &Options) -> Result<Vec<Box<dyn Runner>>, Failure> {
+/// The library's contestants; the first is what others are compared with. `variants` are positions
+/// copied while the clock runs, and a single thread.
+fn ours(
+    problem: &Problem,
+    options: &Options,
+    variants: bool,
+) -> Result<Vec<Box<dyn Runner>>, Failure> {
     let clusters = settings(options, Method::Clusters);
-    let mut runners: Vec<Box<dyn Runner>> = vec![
-        Box::new(Ours::new(problem, clusters.clone(), Feed::InPlace)?),
-        Box::new(Ours::new(problem, clusters.clone(), Feed::Copied)?),
-    ];
-    if options.threads == 0 && options.backend == Backend::Cpu {
-        let single = Settings {
-            threads: 1,
-            ..clusters
-        };
-        runners.push(Box::new(Ours::new(problem, single, Feed::InPlace)?));
+    let in_place = Ours::new(problem, clusters.clone(), Feed::InPlace)?;
+    let mut runners: Vec<Box<dyn Runner>> = vec![Box::new(in_place)];
+    if variants {
+        let copied = Ours::new(problem, clusters.clone(), Feed::Copied)?;
+        runners.push(Box::new(copied));
+        if options.threads == 0 && options.backend == Backend::Cpu {
+            let single = Settings {
+                threads: 1,
+                ..clusters
+            };
+            runners.push(Box::new(Ours::new(problem, single, Feed::InPlace)?));
+        }
     }
     if options.cells {
         let cells = settings(options, Method::Cells);
@@ -93,8 +100,14 @@ fn contest(
     options: &Options,
     peers: &mut Peers,
     default_frames: usize,
+    variants: bool,
 ) -> Result<Table, Failure> {
-    let mut runners = ours(problem, options)?;
+    eprintln!(
+        "{}: {} primitives …",
+        problem.name,
+        grouped(problem.n_primitives() as u64)
+    );
+    let mut runners = ours(problem, options, variants)?;
     if options.peers {
         runners.extend(peers.runners(problem)?);
     }
@@ -129,20 +142,38 @@ fn two_body(options: &Options, report: &mut Report) -> Result<(), Failure> {
     };
     for scene in scenes {
         let problem = by_oracle(files::two_body(scene)?)?;
-        report.contest(&contest(&problem, options, &mut Peers::default(), 40)?);
+        report.contest(&contest(
+            &problem,
+            options,
+            &mut Peers::default(),
+            40,
+            true,
+        )?);
     }
     Ok(())
 }
 
 fn within(options: &Options, report: &mut Report) -> Result<(), Failure> {
     let problem = by_oracle(files::within(options.scene.as_deref().unwrap_or("dragon"))?)?;
-    report.contest(&contest(&problem, options, &mut Peers::default(), 20)?);
+    report.contest(&contest(
+        &problem,
+        options,
+        &mut Peers::default(),
+        20,
+        true,
+    )?);
     Ok(())
 }
 
 fn tets(options: &Options, report: &mut Report) -> Result<(), Failure> {
     let problem = by_oracle(files::tets()?)?;
-    report.contest(&contest(&problem, options, &mut Peers::default(), 40)?);
+    report.contest(&contest(
+        &problem,
+        options,
+        &mut Peers::default(),
+        40,
+        true,
+    )?);
     Ok(())
 }
 
@@ -175,7 +206,13 @@ fn bodies(options: &Options, report: &mut Report) -> Result<(), Failure> {
             "cubes of 12 triangles placed and turned at random; frames alternate with the mirror image",
         ))?;
         let frames = if n_bodies > 10_000 { 10 } else { 40 };
-        report.contest(&contest(&problem, options, &mut Peers::default(), frames)?);
+        report.contest(&contest(
+            &problem,
+            options,
+            &mut Peers::default(),
+            frames,
+            true,
+        )?);
     }
     Ok(())
 }
@@ -191,14 +228,12 @@ fn sizes(options: &Options, report: &mut Report) -> Result<(), Failure> {
         }
         let body = surfaces::stand_in(n / 2);
         let other = body.translated([0.4, 0.01, 0.01]);
-        // Waves get shorter with the triangles, so that the meeting of the two bodies looks alike
-        // at every size.
-        let wave = Wave::default();
         let name = format!("{} triangles", grouped(n as u64));
-        let problem = Problem::moving(&name, vec![body, other], Ask::Between, &wave, 1.0)
-            .about("generated tubes along a knot; frames alternate between rest and a wave");
+        let models = vec![body, other];
+        let problem = Problem::moving(&name, models, Ask::Between, &Wave::default(), [1.0, 2.0])
+            .about("generated tubes along a knot; frames alternate between two moments of a wave");
         let frames = if n > 1_000_000 { 6 } else { 20 };
-        let table = contest(&problem, options, &mut peers, frames)?;
+        let table = contest(&problem, options, &mut peers, frames, false)?;
         report.contest(&table);
         tables.push(table);
     }

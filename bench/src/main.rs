@@ -41,7 +41,8 @@ usage: impinge-bench COMMAND [options]
 
 commands:
   two-body      two copies of a mesh: --scene ball15k|ball|bunny|buddha|dragon, or all but ball15k
-  self          self-collision of one mesh: --scene ball|bunny|buddha|dragon|cow, or the dragon
+  self          self-collision of one mesh: --scene ball|bunny|buddha|dragon|cow|camelhead;
+                the dragon if not said
   tets          two solids of tetrahedra
   bodies        1,000, 10,000 and 100,000 bodies of 12 triangles
   sizes         10^4 to 10^7 triangles in two waving bodies

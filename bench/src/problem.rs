@@ -39,32 +39,35 @@ pub struct Problem {
     pub bodies: Vec<Body>,
     /// The question.
     pub ask: Ask,
-    /// The number of pairs in either pose, where it is known from elsewhere.
+    /// The number of pairs in either pose, where it is the same and known from elsewhere.
     pub expected: Option<u64>,
 }
 
 impl Problem {
     /// A problem whose second pose is the mirror image of the first, x to -x. Changing a sign is
-    /// exact, so both poses have the same pairs, and yet every coordinate that matters is new in
-    /// every frame: nothing static can be exploited.
+    /// exact, so both poses have the same pairs, and yet every vertex moves in every frame: nothing
+    /// static can be exploited.
     pub fn mirrored(name: &str, models: Vec<Model>, ask: Ask) -> Problem {
-        Problem::new(name, models, ask, |p| {
-            p.iter().map(|&[x, y, z]| [-x, y, z]).collect()
+        Problem::new(name, models, ask, |positions| {
+            let mirror = positions.iter().map(|&[x, y, z]| [-x, y, z]).collect();
+            [positions, mirror]
         })
     }
 
-    /// A problem whose second pose is another moment of a motion; the first is as given.
+    /// A problem whose poses are two moments of a motion. Their pairs differ.
     pub fn moving(
         name: &str,
         models: Vec<Model>,
         ask: Ask,
         motion: &impl Deform,
-        t: f32,
+        times: [f32; 2],
     ) -> Problem {
         Problem::new(name, models, ask, |rest| {
-            let mut now = rest.to_vec();
-            motion.apply(rest, t, &mut now);
-            now
+            times.map(|t| {
+                let mut now = rest.clone();
+                motion.apply(&rest, t, &mut now);
+                now
+            })
         })
     }
 
@@ -72,17 +75,13 @@ impl Problem {
         name: &str,
         models: Vec<Model>,
         ask: Ask,
-        second: impl Fn(&[[f32; 3]]) -> Vec<[f32; 3]>,
+        poses: impl Fn(Vec<[f32; 3]>) -> [Vec<[f32; 3]>; 2],
     ) -> Problem {
         let bodies = models
             .into_iter()
             .map(|model| Body {
-                poses: [second(&model.positions), model.positions],
+                poses: poses(model.positions),
                 elements: Arc::new(model.elements),
-            })
-            .map(|mut body| {
-                body.poses.swap(0, 1);
-                body
             })
             .collect();
         Problem {

@@ -12,7 +12,6 @@ pub const GEOMETRY_USER: c_int = 120;
 /// `enum RTCBuildQuality`
 pub const QUALITY_LOW: c_int = 0;
 pub const QUALITY_MEDIUM: c_int = 1;
-pub const QUALITY_HIGH: c_int = 2;
 pub const QUALITY_REFIT: c_int = 3;
 
 /// `enum RTCSceneFlags`
