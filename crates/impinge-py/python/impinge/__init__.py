@@ -4,7 +4,7 @@ Two meshes, one line:
 
 >>> import numpy as np, impinge
 >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
->>> impinge.pairs(corners, [[0, 1, 2]], corners[:, [2, 0, 1]] - 0.25, [[0, 1, 2]])
+>>> impinge.pairs(corners, [[0, 1, 2]], corners[:, [0, 2, 1]] + [0, 0.25, -0.25], [[0, 1, 2]])
 array([[0, 0]], dtype=uint32)
 
 A pair is reported if and only if the two primitives share a point when the given coordinates are

@@ -5,6 +5,20 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import TypeAlias, Unpack
 
+__all__ = [
+    "Body",
+    "CancelToken",
+    "Cancelled",
+    "Detector",
+    "Result",
+    "Scene",
+    "Statistics",
+    "__version__",
+    "hash_rows",
+    "pairs",
+    "self_pairs",
+]
+
 __version__: str
 
 _Array: TypeAlias = Any  # An array-like, or anything that speaks DLPack or the buffer protocol.
