@@ -1,0 +1,44 @@
+"""Exact, real-time collision detection for deforming meshes.
+
+Two meshes, one line:
+
+>>> import numpy as np, impinge
+>>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+>>> impinge.pairs(corners, [[0, 1, 2]], corners[:, [0, 2, 1]] + [0, 0.25, -0.25], [[0, 1, 2]])
+array([[0, 0]], dtype=uint32)
+
+A pair is reported if and only if the two primitives share a point when the given coordinates are
+read as real numbers: touching counts, and there is no tolerance anywhere. The answer is sorted
+and depends on the input alone, not on method, backend, threads or memory.
+
+For deforming meshes keep a `Scene` and a `Detector`, move the vertices with
+`Scene.set_positions`, and ask again with `Detector.detect`.
+"""
+
+from ._impinge import (
+    Body,
+    Cancelled,
+    CancelToken,
+    Detector,
+    Result,
+    Scene,
+    Statistics,
+    __version__,
+    hash_rows,
+    pairs,
+    self_pairs,
+)
+
+__all__ = [
+    "Body",
+    "CancelToken",
+    "Cancelled",
+    "Detector",
+    "Result",
+    "Scene",
+    "Statistics",
+    "__version__",
+    "hash_rows",
+    "pairs",
+    "self_pairs",
+]

@@ -1,0 +1,334 @@
+//! What comes in as an argument becomes rows of numbers: read where they lie when the layout
+//! allows it, converted when nothing is lost, refused by name otherwise.
+//!
+//! An argument is taken, in this order, as a NumPy array, through DLPack, or through
+//! `numpy.asarray` (buffer protocol, `__array__`, nested sequences).
+
+use impinge::{Elements, Kind};
+use numpy::{
+    Element, PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray2, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+
+use crate::errors::number;
+
+/// Positions in the precision in which they are answered, in C order.
+pub enum PositionArray<'py> {
+    F32(PyReadonlyArray2<'py, f32>),
+    F64(PyReadonlyArray2<'py, f64>),
+}
+
+impl<'py> PositionArray<'py> {
+    /// Takes the argument `name` as `(n, 3)` positions.
+    pub fn new(argument: &Bound<'py, PyAny>, name: &str) -> PyResult<Self> {
+        let array = as_array(argument, name)?;
+        let kind = NumberKind::of(&array, name)?;
+        check_columns(&array, name, &[3])?;
+        match kind {
+            NumberKind::Float(4) => Ok(PositionArray::F32(in_c_order(&array, "=f4")?)),
+            NumberKind::Float(8) => Ok(PositionArray::F64(in_c_order(&array, "=f8")?)),
+            // Half precision widens to single without loss.
+            NumberKind::Float(2) => Ok(PositionArray::F32(in_c_order(&array, "=f4")?)),
+            NumberKind::Float(_) => extended_to_double(&array, name).map(PositionArray::F64),
+            NumberKind::Signed(8) => {
+                let native = in_c_order::<i64>(&array, "=i8")?;
+                check_exact(&native, name, |&x: &i64| fits_double(x.unsigned_abs()))?;
+                Ok(PositionArray::F64(in_c_order(&array, "=f8")?))
+            }
+            NumberKind::Unsigned(8) => {
+                let native = in_c_order::<u64>(&array, "=u8")?;
+                check_exact(&native, name, |&x: &u64| fits_double(x))?;
+                Ok(PositionArray::F64(in_c_order(&array, "=f8")?))
+            }
+            // Integers of at most 32 bits are doubles.
+            NumberKind::Signed(_) | NumberKind::Unsigned(_) => {
+                Ok(PositionArray::F64(in_c_order(&array, "=f8")?))
+            }
+        }
+    }
+
+    /// How many positions there are.
+    pub fn len(&self) -> usize {
+        match self {
+            PositionArray::F32(array) => array.shape()[0],
+            PositionArray::F64(array) => array.shape()[0],
+        }
+    }
+
+    /// The axis along which a vertex has a coordinate; 0 where none has it.
+    pub fn axis_of(&self, vertex: usize, value: f64) -> usize {
+        (0..3)
+            .find(|&axis| {
+                let at = [vertex, axis];
+                value
+                    == match self {
+                        PositionArray::F32(array) => array.get(at).map_or(f64::NAN, |&x| x.into()),
+                        PositionArray::F64(array) => array.get(at).map_or(f64::NAN, |&x| x),
+                    }
+            })
+            .unwrap_or(0)
+    }
+}
+
+/// Vertex indices, three or four a row.
+pub fn elements(
+    argument: &Bound<'_, PyAny>,
+    name: &str,
+    kind: Option<Kind>,
+    n_vertices: usize,
+) -> PyResult<Elements> {
+    let array = as_array(argument, name)?;
+    let numbers = NumberKind::of(&array, name)?;
+    let allowed: &[usize] = match kind {
+        None => &[3, 4],
+        Some(Kind::Triangles) => &[3],
+        Some(Kind::Tetrahedra) => &[4],
+    };
+    check_columns(&array, name, allowed)?;
+    let indices = indices(&array, numbers, name)?;
+    let n_columns = array.shape()[1];
+    if let Some(at) = indices.iter().position(|&ix| ix as usize >= n_vertices) {
+        let place = format!("{name}[{}, {}]", at / n_columns, at % n_columns);
+        return Err(PyValueError::new_err(format!(
+            "{place} = {}: there are {n_vertices} vertices",
+            indices[at]
+        )));
+    }
+    Ok(match n_columns {
+        3 => Elements::Triangles(indices.as_chunks().0.to_vec()),
+        _ => Elements::Tetrahedra(indices.as_chunks().0.to_vec()),
+    })
+}
+
+/// The kind of primitive that a user names.
+pub fn kind(name: Option<&str>) -> PyResult<Option<Kind>> {
+    match name {
+        None => Ok(None),
+        Some("triangles") => Ok(Some(Kind::Triangles)),
+        Some("tetrahedra") => Ok(Some(Kind::Tetrahedra)),
+        Some(other) => Err(PyValueError::new_err(format!(
+            "kind: {other:?} given, \"triangles\", \"tetrahedra\" or None allowed"
+        ))),
+    }
+}
+
+/// Rows `(n, n_columns)` of unsigned 32-bit numbers, row after row.
+pub fn rows(argument: &Bound<'_, PyAny>, name: &str, n_columns: usize) -> PyResult<Vec<u32>> {
+    let array = as_array(argument, name)?;
+    let numbers = NumberKind::of(&array, name)?;
+    check_columns(&array, name, &[n_columns])?;
+    indices(&array, numbers, name)
+}
+
+/// The contiguous rows of an array that [`in_c_order`] has made.
+pub fn slice_rows<'a, T: Element, const N: usize>(
+    array: &'a PyReadonlyArray2<'_, T>,
+) -> PyResult<&'a [[T; N]]> {
+    Ok(array.as_slice()?.as_chunks().0)
+}
+
+/// The numbers that an array may hold, and their size in bytes.
+#[derive(Clone, Copy)]
+enum NumberKind {
+    Float(usize),
+    Signed(usize),
+    Unsigned(usize),
+}
+
+impl NumberKind {
+    fn of(array: &Bound<'_, PyUntypedArray>, name: &str) -> PyResult<Self> {
+        let dtype = array.dtype();
+        let size = dtype.itemsize();
+        match dtype.kind() {
+            b'f' => Ok(NumberKind::Float(size)),
+            b'i' => Ok(NumberKind::Signed(size)),
+            b'u' => Ok(NumberKind::Unsigned(size)),
+            _ => Err(PyTypeError::new_err(format!(
+                "{name}: an array of real numbers expected, dtype {} given",
+                dtype.str()?
+            ))),
+        }
+    }
+}
+
+fn as_array<'py>(argument: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let numpy = argument.py().import("numpy")?;
+    if let Ok(array) = argument.cast::<PyUntypedArray>() {
+        let masked = numpy.getattr("ma")?;
+        if array.is_instance(&masked.getattr("MaskedArray")?)?
+            && masked.call_method1("is_masked", (array,))?.is_truthy()?
+        {
+            return Err(PyValueError::new_err(format!(
+                "{name}: a masked array with masked entries; fill or drop them first"
+            )));
+        }
+        return Ok(array.clone());
+    }
+    // A producer that DLPack cannot serve (a gradient to keep, a read-only buffer) may still
+    // offer `__array__`, whose refusal explains more.
+    if argument.hasattr("__dlpack__")?
+        && let Ok(array) = numpy.call_method1("from_dlpack", (argument,))
+    {
+        return Ok(array.cast_into::<PyUntypedArray>()?);
+    }
+    let array = numpy
+        .call_method1("asarray", (argument,))
+        .map_err(|cause| {
+            let py = argument.py();
+            let message = format!("{name}: not usable as an array: {}", cause.value(py));
+            let error = if cause.is_instance_of::<PyValueError>(py) {
+                PyValueError::new_err(message)
+            } else {
+                PyTypeError::new_err(message)
+            };
+            error.set_cause(py, Some(cause));
+            error
+        })?;
+    Ok(array.cast_into::<PyUntypedArray>()?)
+}
+
+fn check_columns(array: &Bound<'_, PyUntypedArray>, name: &str, allowed: &[usize]) -> PyResult<()> {
+    let shape = array.shape();
+    if shape.len() == 2 && allowed.contains(&shape[1]) {
+        return Ok(());
+    }
+    let expected: Vec<String> = allowed.iter().map(|n| format!("(n, {n})")).collect();
+    Err(PyValueError::new_err(format!(
+        "{name}: shape {} expected, {} given",
+        expected.join(" or "),
+        array.getattr("shape")?.str()?
+    )))
+}
+
+/// The array itself when it is in C order, aligned and of this type, else a converted copy.
+fn in_c_order<'py, T: Element>(
+    array: &Bound<'py, PyUntypedArray>,
+    dtype: &str,
+) -> PyResult<PyReadonlyArray2<'py, T>> {
+    if array.is_c_contiguous()
+        && array.is_aligned()
+        && let Ok(same) = array.cast::<PyArray2<T>>()
+    {
+        return Ok(same.try_readonly()?);
+    }
+    let numpy = array.py().import("numpy")?;
+    let converted = numpy.call_method1("require", (array, dtype, ["C", "A"]))?;
+    Ok(converted.cast_into::<PyArray2<T>>()?.try_readonly()?)
+}
+
+/// Whether a magnitude survives the way to double precision: at most 53 bits from its highest to
+/// its lowest set bit.
+fn fits_double(magnitude: u64) -> bool {
+    magnitude == 0 || magnitude.ilog2() - magnitude.trailing_zeros() < 53
+}
+
+fn check_exact<T: Element + std::fmt::Display>(
+    array: &PyReadonlyArray2<'_, T>,
+    name: &str,
+    exact: impl Fn(&T) -> bool,
+) -> PyResult<()> {
+    match array.as_array().indexed_iter().find(|(_, x)| !exact(x)) {
+        None => Ok(()),
+        Some(((row, column), x)) => Err(PyValueError::new_err(format!(
+            "{name}[{row}, {column}] = {x}: not representable in float64 without loss"
+        ))),
+    }
+}
+
+/// `numpy.longdouble` to double precision, where every number survives it.
+fn extended_to_double<'py>(
+    array: &Bound<'py, PyUntypedArray>,
+    name: &str,
+) -> PyResult<PyReadonlyArray2<'py, f64>> {
+    let numpy = array.py().import("numpy")?;
+    let double = numpy.call_method1("require", (array, "=f8", ["C", "A"]))?;
+    let differs = array.rich_compare(&double, pyo3::basic::CompareOp::Ne)?;
+    // What was not finite before is refused later, by that name.
+    let finite = numpy.call_method1("isfinite", (array,))?;
+    let lossy = numpy.call_method1("logical_and", (differs, finite))?;
+    let places = numpy.call_method1("argwhere", (lossy,))?;
+    if places.len()? == 0 {
+        return Ok(double.cast_into::<PyArray2<f64>>()?.try_readonly()?);
+    }
+    let place = places.get_item(0)?;
+    let (row, column): (usize, usize) =
+        (place.get_item(0)?.extract()?, place.get_item(1)?.extract()?);
+    Err(PyValueError::new_err(format!(
+        "{name}[{row}, {column}] = {}: not representable in float64 without loss",
+        array.get_item((row, column))?.str()?
+    )))
+}
+
+fn indices(
+    array: &Bound<'_, PyUntypedArray>,
+    numbers: NumberKind,
+    name: &str,
+) -> PyResult<Vec<u32>> {
+    match numbers {
+        NumberKind::Unsigned(4) => Ok(in_c_order::<u32>(array, "=u4")?.as_slice()?.to_vec()),
+        NumberKind::Unsigned(_) => whole(&in_c_order::<u64>(array, "=u8")?, name),
+        NumberKind::Signed(4) => whole(&in_c_order::<i32>(array, "=i4")?, name),
+        NumberKind::Signed(_) => whole(&in_c_order::<i64>(array, "=i8")?, name),
+        NumberKind::Float(size) => {
+            let doubles = if size > 8 {
+                extended_to_double(array, name)?
+            } else {
+                in_c_order::<f64>(array, "=f8")?
+            };
+            let convert = |&x: &f64| {
+                // The range is checked first, so the cast is exact.
+                (x.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&x)).then_some(x as u32)
+            };
+            collect(&doubles, name, convert, |&x| {
+                let why = if x.fract() == 0.0 {
+                    OUTSIDE
+                } else {
+                    "not a whole number"
+                };
+                format!("{}: {why}", number(x))
+            })
+        }
+    }
+}
+
+const OUTSIDE: &str = "an index lies between 0 and 4294967295";
+
+fn whole<T: Element + Copy + TryInto<u32> + std::fmt::Display>(
+    array: &PyReadonlyArray2<'_, T>,
+    name: &str,
+) -> PyResult<Vec<u32>> {
+    collect(
+        array,
+        name,
+        |&x| x.try_into().ok(),
+        |x| format!("{x}: {OUTSIDE}"),
+    )
+}
+
+/// Converts every entry, or names the first that has no place among the indices.
+fn collect<T: Element>(
+    array: &PyReadonlyArray2<'_, T>,
+    name: &str,
+    convert: impl Fn(&T) -> Option<u32>,
+    complaint: impl Fn(&T) -> String,
+) -> PyResult<Vec<u32>> {
+    let entries = array.as_slice()?;
+    let mut indices = Vec::with_capacity(entries.len());
+    for (at, entry) in entries.iter().enumerate() {
+        match convert(entry) {
+            Some(ix) => indices.push(ix),
+            None => {
+                let n_columns = array.shape()[1];
+                return Err(PyValueError::new_err(format!(
+                    "{name}[{}, {}] = {}",
+                    at / n_columns,
+                    at % n_columns,
+                    complaint(entry)
+                )));
+            }
+        }
+    }
+    Ok(indices)
+}

@@ -1,0 +1,136 @@
+//! The everyday case in one line.
+
+use numpy::PyArray2;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays;
+use crate::detector::Detector;
+use crate::errors::Names;
+use crate::result::Answer;
+use crate::scene::Scene;
+
+/// Which primitives of two meshes intersect.
+///
+/// Parameters
+/// ----------
+/// vertices_a, vertices_b : array_like, shape (v, 3)
+///     Positions, float32 or float64.
+/// faces_a, faces_b : array_like of int, shape (n, 3) or (n, 4)
+///     Triangles or tetrahedra as vertex indices.
+/// **settings
+///     As for `Detector`.
+///
+/// Returns
+/// -------
+/// numpy.ndarray of uint32, shape (n, 2)
+///     Every pair (row of `faces_a`, row of `faces_b`) that shares a point, touching included;
+///     sorted.
+///
+/// Raises
+/// ------
+/// ValueError, TypeError
+///     As `Scene.add` and `Detector`.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np, impinge
+/// >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+/// >>> impinge.pairs(corners, [[0, 1, 2]], corners + [0, 0, 1], [[0, 1, 2]])
+/// array([], shape=(0, 2), dtype=uint32)
+#[pyfunction]
+#[pyo3(signature = (vertices_a, faces_a, vertices_b, faces_b, **settings))]
+pub fn pairs<'py>(
+    py: Python<'py>,
+    vertices_a: &Bound<'py, PyAny>,
+    faces_a: &Bound<'py, PyAny>,
+    vertices_b: &Bound<'py, PyAny>,
+    faces_b: &Bound<'py, PyAny>,
+    settings: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyArray2<u32>>> {
+    let mut scene = Scene::empty();
+    let a = Names {
+        vertices: "vertices_a",
+        elements: "faces_a",
+    };
+    let b = Names {
+        vertices: "vertices_b",
+        elements: "faces_b",
+    };
+    scene.add_named(vertices_a, faces_a, None, a)?;
+    scene.add_named(vertices_b, faces_b, None, b)?;
+    let question = PyDict::new(py);
+    question.set_item("between", (0, 1))?;
+    ask(py, scene, &question, settings)
+}
+
+/// Which primitives of one mesh intersect each other.
+///
+/// Parameters
+/// ----------
+/// vertices : array_like, shape (v, 3)
+///     Positions, float32 or float64.
+/// faces : array_like of int, shape (n, 3) or (n, 4)
+///     Triangles or tetrahedra as vertex indices.
+/// shared_vertex : {"skip", "resolve"}
+///     Primitives that share a vertex index are not reported, or reported when they meet in more
+///     than what they share.
+/// **settings
+///     As for `Detector`.
+///
+/// Returns
+/// -------
+/// numpy.ndarray of uint32, shape (n, 2)
+///     Pairs of rows of `faces`, the lower one first; sorted.
+///
+/// Raises
+/// ------
+/// ValueError, TypeError
+///     As `Scene.add` and `Detector`.
+#[pyfunction]
+#[pyo3(signature = (vertices, faces, shared_vertex="skip", **settings))]
+pub fn self_pairs<'py>(
+    py: Python<'py>,
+    vertices: &Bound<'py, PyAny>,
+    faces: &Bound<'py, PyAny>,
+    shared_vertex: &str,
+    settings: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyArray2<u32>>> {
+    let mut scene = Scene::empty();
+    let names = Names {
+        vertices: "vertices",
+        elements: "faces",
+    };
+    scene.add_named(vertices, faces, None, names)?;
+    let question = PyDict::new(py);
+    question.set_item("within", 0)?;
+    question.set_item("shared_vertex", shared_vertex)?;
+    ask(py, scene, &question, settings)
+}
+
+fn ask<'py>(
+    py: Python<'py>,
+    scene: Scene,
+    question: &Bound<'py, PyDict>,
+    settings: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyArray2<u32>>> {
+    let detector = py.get_type::<Detector>().call((), settings)?;
+    let result = detector.call_method("detect", (Bound::new(py, scene)?,), Some(question))?;
+    result.cast::<Answer>()?.get().pairs(py)
+}
+
+/// `Result.hash` of rows that come from elsewhere.
+///
+/// Parameters
+/// ----------
+/// rows : array_like of int, shape (n, 4)
+///     As `Result.rows`; their order does not matter.
+///
+/// Returns
+/// -------
+/// int
+#[pyfunction]
+pub fn hash_rows(rows: &Bound<'_, PyAny>) -> PyResult<u64> {
+    let rows = arrays::rows(rows, "rows", 4)?;
+    Ok(impinge::hash_rows(rows.as_chunks().0.iter().copied()))
+}

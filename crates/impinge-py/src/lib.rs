@@ -1,0 +1,42 @@
+//! The Python module `impinge`: the library's scenes, detectors and answers on NumPy arrays.
+//!
+//! What Python users read stands in the docstrings of the classes and in `docs/python.md`. This
+//! crate converts arguments, names what it refuses, and lets go of the interpreter while it works.
+
+mod arrays;
+mod bodies;
+mod detector;
+mod errors;
+mod functions;
+mod result;
+mod scene;
+mod settings;
+mod statistics;
+mod watch;
+
+use pyo3::prelude::*;
+
+/// Exact, real-time collision detection for deforming meshes (compiled part).
+#[pymodule]
+mod _impinge {
+    #[pymodule_export]
+    use super::bodies::Body;
+    #[pymodule_export]
+    use super::detector::Detector;
+    #[pymodule_export]
+    use super::errors::Cancelled;
+    #[pymodule_export]
+    use super::functions::{hash_rows, pairs, self_pairs};
+    #[pymodule_export]
+    use super::result::Answer;
+    #[pymodule_export]
+    use super::scene::Scene;
+    #[pymodule_export]
+    use super::statistics::Statistics;
+    #[pymodule_export]
+    use super::watch::CancelToken;
+
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "the name that Python expects")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}

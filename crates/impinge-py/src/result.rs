@@ -1,0 +1,219 @@
+//! `impinge.Result`: the pairs as arrays.
+
+use std::sync::OnceLock;
+
+use impinge::{BodyId, Pairs};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::bodies::{Body, body_id};
+use crate::statistics::Statistics;
+
+/// Which columns `pairs()` has.
+#[derive(Clone, Copy)]
+pub enum Asked {
+    Between(BodyId, BodyId),
+    Within(BodyId),
+    Many,
+}
+
+/// The pairs that a detection found: sorted, the same bytes on every method, backend and thread
+/// count.
+///
+/// ``len(result)`` is the number of pairs; a result without pairs is false.
+#[pyclass(module = "impinge", name = "Result", frozen)]
+pub struct Answer {
+    pairs: Pairs,
+    scene: u64,
+    asked: Asked,
+    hash: OnceLock<u64>,
+}
+
+impl Answer {
+    pub fn new(pairs: Pairs, scene: u64, asked: Asked) -> Self {
+        Answer {
+            pairs,
+            scene,
+            asked,
+            hash: OnceLock::new(),
+        }
+    }
+
+    fn id(&self, argument: &Bound<'_, PyAny>, name: &str) -> PyResult<BodyId> {
+        let known = || self.pairs.bodies().map(|(id, _)| id);
+        let id = body_id(argument, name, self.scene, known())?;
+        if known().any(|held| held == id) {
+            Ok(id)
+        } else {
+            Err(PyValueError::new_err(format!(
+                "{name}: body {id} took no part in this detection"
+            )))
+        }
+    }
+
+    fn pairs_between(&self, a: BodyId, b: BodyId) -> Vec<[u32; 2]> {
+        let mut pairs: Vec<[u32; 2]> = self.pairs.between(a, b).map(Into::into).collect();
+        // They are held in the order of the body with the lower number.
+        if b < a {
+            pairs.sort_unstable();
+        }
+        pairs
+    }
+
+    fn pairs_within(&self, body: BodyId) -> Vec<[u32; 2]> {
+        self.pairs.within(body).map(Into::into).collect()
+    }
+}
+
+/// An `(n, N)` array that owns its rows.
+pub fn to_array<const N: usize>(
+    py: Python<'_>,
+    rows: Vec<[u32; N]>,
+) -> PyResult<Bound<'_, PyArray2<u32>>> {
+    let shape = [rows.len(), N];
+    PyArray1::from_vec(py, rows.into_flattened()).reshape(shape)
+}
+
+#[pymethods]
+impl Answer {
+    /// The pairs of a question about two bodies or about one.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray of uint32, shape (n, 2)
+    ///     Sorted. ``between=(a, b)``: primitives of `a` and of `b`. ``within=a``: both of `a`,
+    ///     the lower one first.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     The question was about all bodies: see `rows`, `between` and `within`.
+    pub fn pairs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let pairs = match self.asked {
+            Asked::Between(a, b) => py.detach(|| self.pairs_between(a, b)),
+            Asked::Within(body) => py.detach(|| self.pairs_within(body)),
+            Asked::Many => {
+                return Err(PyValueError::new_err(
+                    "the question was about all bodies: take rows, between(a, b) or within(a)",
+                ));
+            }
+        };
+        to_array(py, pairs)
+    }
+
+    /// The pairs of two bodies.
+    ///
+    /// Parameters
+    /// ----------
+    /// a, b : Body or int
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray of uint32, shape (n, 2)
+    ///     Primitive of `a`, primitive of `b`; sorted.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A body that took no part, or one named twice.
+    fn between<'py>(
+        &self,
+        py: Python<'py>,
+        a: &Bound<'py, PyAny>,
+        b: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let (a, b) = (self.id(a, "a")?, self.id(b, "b")?);
+        if a == b {
+            return Err(PyValueError::new_err(format!(
+                "a and b are both body {a}: take within({a})"
+            )));
+        }
+        to_array(py, py.detach(|| self.pairs_between(a, b)))
+    }
+
+    /// The pairs of primitives of one body.
+    ///
+    /// Parameters
+    /// ----------
+    /// body : Body or int
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray of uint32, shape (n, 2)
+    ///     The lower primitive first; sorted.
+    fn within<'py>(
+        &self,
+        py: Python<'py>,
+        body: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let body = self.id(body, "body")?;
+        to_array(py, py.detach(|| self.pairs_within(body)))
+    }
+
+    /// numpy.ndarray of uint32, shape (n, 4) : all pairs, sorted, one a row: number of a body,
+    /// its primitive, number of the other body, its primitive. A new array at each access.
+    #[getter]
+    fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        to_array(py, py.detach(|| self.pairs.rows().collect()))
+    }
+
+    /// The primitives of a body that take part in any pair, for colouring.
+    ///
+    /// Parameters
+    /// ----------
+    /// body : Body or int
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray of uint32, shape (n,)
+    ///     Sorted, each once.
+    fn colliding<'py>(
+        &self,
+        py: Python<'py>,
+        body: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        let body = self.id(body, "body")?;
+        Ok(PyArray1::from_vec(
+            py,
+            py.detach(|| self.pairs.colliding(body)),
+        ))
+    }
+
+    /// list of Body : the bodies that took part, in order.
+    #[getter]
+    fn bodies(&self) -> Vec<Body> {
+        let scene = self.scene;
+        self.pairs
+            .bodies()
+            .map(|(id, _)| Body { id, scene })
+            .collect()
+    }
+
+    /// int : a 64-bit hash of the set of pairs; equal sets have equal hashes everywhere.
+    #[getter]
+    fn hash(&self, py: Python<'_>) -> u64 {
+        *self.hash.get_or_init(|| py.detach(|| self.pairs.hash()))
+    }
+
+    /// Statistics : what the detection cost.
+    #[getter]
+    fn stats(&self) -> Statistics {
+        Statistics {
+            inner: self.pairs.stats().clone(),
+        }
+    }
+
+    fn __len__(&self) -> usize {
+        self.pairs.len()
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        format!(
+            "Result({} pairs of {} bodies, hash {:#018x})",
+            self.pairs.len(),
+            self.pairs.bodies().len(),
+            self.hash(py)
+        )
+    }
+}

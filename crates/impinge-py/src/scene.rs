@@ -1,0 +1,326 @@
+//! `impinge.Scene`: bodies, their topology and positions.
+
+use impinge::{BodyId, Elements, Filter, Positions};
+use numpy::{PyArray1, PyArrayMethods};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+
+use crate::arrays::{self, PositionArray, slice_rows};
+use crate::bodies::{Body, body_id, new_scene_number};
+use crate::errors::{Names, raise, refuse};
+use crate::settings::unsigned;
+
+const ARGUMENTS: Names<'static> = Names {
+    vertices: "vertices",
+    elements: "faces",
+};
+
+/// Bodies with fixed topology, and where their vertices are now.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np, impinge
+/// >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+/// >>> scene = impinge.Scene()
+/// >>> a = scene.add(corners, [[0, 1, 2]])
+/// >>> b = scene.add(corners[:, [0, 2, 1]] + [0, 0.25, -0.25], [[0, 1, 2]])
+/// >>> impinge.Detector().detect(scene, between=(a, b)).pairs()
+/// array([[0, 0]], dtype=uint32)
+#[pyclass(module = "impinge")]
+pub struct Scene {
+    pub inner: impinge::Scene,
+    pub number: u64,
+}
+
+impl Scene {
+    /// A scene without bodies.
+    pub fn empty() -> Self {
+        Scene {
+            inner: impinge::Scene::new(),
+            number: new_scene_number(),
+        }
+    }
+
+    /// The body that an argument names.
+    pub fn id(&self, argument: &Bound<'_, PyAny>, name: &str) -> PyResult<BodyId> {
+        let id = body_id(
+            argument,
+            name,
+            self.number,
+            self.inner.bodies().map(|(id, _)| id),
+        )?;
+        self.inner.body(id).map_err(raise)?;
+        Ok(id)
+    }
+
+    fn body(&self, argument: &Bound<'_, PyAny>) -> PyResult<&impinge::Body> {
+        self.inner.body(self.id(argument, "body")?).map_err(raise)
+    }
+
+    fn handle(&self, id: BodyId) -> Body {
+        Body {
+            id,
+            scene: self.number,
+        }
+    }
+
+    /// Adds a body whose arguments go by other names in the caller's signature.
+    pub fn add_named(
+        &mut self,
+        vertices: &Bound<'_, PyAny>,
+        faces: &Bound<'_, PyAny>,
+        kind: Option<&str>,
+        names: Names<'_>,
+    ) -> PyResult<BodyId> {
+        let positions = PositionArray::new(vertices, names.vertices)?;
+        let kind = arrays::kind(kind)?;
+        let elements = arrays::elements(faces, names.elements, kind, positions.len())?;
+        self.inner
+            .add(elements, stored(&positions)?)
+            .map_err(|error| refuse(error, names, &positions))
+    }
+}
+
+fn stored(positions: &PositionArray<'_>) -> PyResult<Positions> {
+    Ok(match positions {
+        PositionArray::F32(array) => Positions::F32(slice_rows(array)?.to_vec()),
+        PositionArray::F64(array) => Positions::F64(slice_rows(array)?.to_vec()),
+    })
+}
+
+/// Borrows a scene to change it; a detection in another thread may be reading it.
+fn change<'py>(scene: &Bound<'py, Scene>) -> PyResult<PyRefMut<'py, Scene>> {
+    scene.try_borrow_mut().map_err(|_| {
+        PyRuntimeError::new_err("the scene is being read by a detection: wait for it to end")
+    })
+}
+
+#[pymethods]
+impl Scene {
+    #[new]
+    fn new() -> Self {
+        Scene::empty()
+    }
+
+    /// Adds a body of triangles or tetrahedra. The arrays are copied.
+    ///
+    /// Parameters
+    /// ----------
+    /// vertices : array_like, shape (v, 3)
+    ///     Positions. float32 and float64 are taken as they are and answered exactly; other
+    ///     dtypes are converted where that loses nothing.
+    /// faces : array_like of int, shape (n, 3) or (n, 4)
+    ///     Vertex indices: three a triangle, four a tetrahedron. Orientation does not matter.
+    /// kind : {"triangles", "tetrahedra"}, optional
+    ///     What the rows of `faces` are; by default their length tells.
+    ///
+    /// Returns
+    /// -------
+    /// Body
+    ///     The handle by which the body is named from now on.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A wrong shape, an index out of range, a position that is not finite or outside the
+    ///     range in which answers are exact, a number that a conversion would change.
+    /// TypeError
+    ///     An array that holds no real numbers.
+    #[pyo3(signature = (vertices, faces, kind=None))]
+    fn add(
+        slf: &Bound<'_, Self>,
+        vertices: &Bound<'_, PyAny>,
+        faces: &Bound<'_, PyAny>,
+        kind: Option<&str>,
+    ) -> PyResult<Body> {
+        let mut scene = change(slf)?;
+        let id = scene.add_named(vertices, faces, kind, ARGUMENTS)?;
+        Ok(scene.handle(id))
+    }
+
+    /// Moves the vertices of a body. The array is copied; the precision may change.
+    ///
+    /// Parameters
+    /// ----------
+    /// body : Body or int
+    /// vertices : array_like, shape (v, 3)
+    ///     As many positions as the body has vertices.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     As `add`; the body keeps its old positions then.
+    fn set_positions(
+        slf: &Bound<'_, Self>,
+        body: &Bound<'_, PyAny>,
+        vertices: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let mut scene = change(slf)?;
+        let id = scene.id(body, "body")?;
+        let positions = PositionArray::new(vertices, "vertices")?;
+        match &positions {
+            PositionArray::F32(array) => scene.inner.set_positions::<f32>(id, slice_rows(array)?),
+            PositionArray::F64(array) => scene.inner.set_positions::<f64>(id, slice_rows(array)?),
+        }
+        .map_err(|error| refuse(error, ARGUMENTS, &positions))
+    }
+
+    /// Gives a body new topology and positions under its old handle.
+    ///
+    /// Parameters
+    /// ----------
+    /// body : Body or int
+    /// vertices, faces, kind
+    ///     As in `add`.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     As `add`; the body is unchanged then.
+    #[pyo3(signature = (body, vertices, faces, kind=None))]
+    fn remesh(
+        slf: &Bound<'_, Self>,
+        body: &Bound<'_, PyAny>,
+        vertices: &Bound<'_, PyAny>,
+        faces: &Bound<'_, PyAny>,
+        kind: Option<&str>,
+    ) -> PyResult<()> {
+        let mut scene = change(slf)?;
+        let id = scene.id(body, "body")?;
+        let positions = PositionArray::new(vertices, ARGUMENTS.vertices)?;
+        let kind = arrays::kind(kind)?;
+        let elements = arrays::elements(faces, ARGUMENTS.elements, kind, positions.len())?;
+        scene
+            .inner
+            .remesh(id, elements, stored(&positions)?)
+            .map_err(|error| refuse(error, ARGUMENTS, &positions))
+    }
+
+    /// Removes a body. Its handle is refused from now on; its number may be used again.
+    ///
+    /// Parameters
+    /// ----------
+    /// body : Body or int
+    fn remove(slf: &Bound<'_, Self>, body: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut scene = change(slf)?;
+        let id = scene.id(body, "body")?;
+        scene.inner.remove(id).map_err(raise)
+    }
+
+    /// Sets who a body meets when a question is about all bodies.
+    ///
+    /// Two bodies meet when each one's `category` shares a bit with the other one's `mask`.
+    ///
+    /// Parameters
+    /// ----------
+    /// body : Body or int
+    /// category : int, 64 bits
+    ///     The groups to which the body belongs.
+    /// mask : int, 64 bits
+    ///     The groups that it meets; all of them by default.
+    #[pyo3(signature = (body, category=None, mask=None))]
+    fn set_filter(
+        slf: &Bound<'_, Self>,
+        body: &Bound<'_, PyAny>,
+        category: Option<&Bound<'_, PyAny>>,
+        mask: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let mut scene = change(slf)?;
+        let id = scene.id(body, "body")?;
+        let mut filter = Filter::default();
+        if let Some(category) = category {
+            filter.category = unsigned(category, "category", u64::MAX)?;
+        }
+        if let Some(mask) = mask {
+            filter.mask = unsigned(mask, "mask", u64::MAX)?;
+        }
+        scene.inner.set_filter(id, filter).map_err(raise)
+    }
+
+    /// The current positions of a body.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray, shape (v, 3), float32 or float64
+    ///     A copy, in the precision in which they were given.
+    fn positions<'py>(
+        &self,
+        py: Python<'py>,
+        body: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let body = self.body(body)?;
+        let shape = [body.n_vertices(), 3];
+        Ok(match body.positions() {
+            Positions::F32(positions) => PyArray1::from_slice(py, positions.as_flattened())
+                .reshape(shape)?
+                .into_any(),
+            Positions::F64(positions) => PyArray1::from_slice(py, positions.as_flattened())
+                .reshape(shape)?
+                .into_any(),
+        })
+    }
+
+    /// The vertex indices of a body.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray of uint32, shape (n, 3) or (n, 4)
+    ///     A copy.
+    fn elements<'py>(
+        &self,
+        py: Python<'py>,
+        body: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let body = self.body(body)?;
+        let (flat, n_columns) = match body.elements() {
+            Elements::Triangles(faces) => (faces.as_flattened(), 3),
+            Elements::Tetrahedra(tets) => (tets.as_flattened(), 4),
+        };
+        let shape = [body.n_primitives(), n_columns];
+        Ok(PyArray1::from_slice(py, flat).reshape(shape)?.into_any())
+    }
+
+    /// ``"triangles"`` or ``"tetrahedra"``: what a body is made of.
+    fn kind(&self, body: &Bound<'_, PyAny>) -> PyResult<&'static str> {
+        Ok(self.body(body)?.kind().name())
+    }
+
+    /// How many primitives a body has.
+    fn n_primitives(&self, body: &Bound<'_, PyAny>) -> PyResult<usize> {
+        Ok(self.body(body)?.n_primitives())
+    }
+
+    /// How many vertices a body has.
+    fn n_vertices(&self, body: &Bound<'_, PyAny>) -> PyResult<usize> {
+        Ok(self.body(body)?.n_vertices())
+    }
+
+    /// list of Body : the bodies in the order of their numbers.
+    #[getter]
+    fn bodies(&self) -> Vec<Body> {
+        self.inner.bodies().map(|(id, _)| self.handle(id)).collect()
+    }
+
+    /// int : bytes held for topology and positions.
+    #[getter]
+    fn nbytes(&self) -> usize {
+        self.inner.bytes()
+    }
+
+    fn __len__(&self) -> usize {
+        self.inner.n_bodies()
+    }
+
+    fn __contains__(&self, body: &Bound<'_, PyAny>) -> bool {
+        self.id(body, "body").is_ok()
+    }
+
+    fn __repr__(&self) -> String {
+        let bodies: Vec<String> = self
+            .inner
+            .bodies()
+            .map(|(id, body)| format!("{id}: {} {}", body.n_primitives(), body.kind().name()))
+            .collect();
+        format!("Scene({})", bodies.join(", "))
+    }
+}

@@ -1,0 +1,316 @@
+"""Questions, answers, settings, threads."""
+
+import json
+import threading
+import time
+
+import numpy as np
+import pytest
+from shapes import ACROSS, FACE, TRIANGLE, ball, lattice_triangles, soup
+
+import impinge
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """Three balls in a row, each overlapping the next, the last one in double precision."""
+    scene = impinge.Scene()
+    vertices, faces = ball()
+    for shift in [0, 1, 2]:
+        moved = vertices + np.float32([shift, 0.25, 0.125 * shift])
+        scene.add(moved.astype(np.float64) if shift == 2 else moved, faces)
+    web = lattice_triangles(60, 3, 1, shared=True)
+    scene.add(web[0] + np.float32(20), web[1])
+    return scene
+
+
+def truth(scene, **question):
+    return impinge.Detector("naive").detect(scene, **question)
+
+
+@pytest.mark.parametrize(
+    "question",
+    [
+        {},
+        {"between": True},
+        {"between": (0, 1)},
+        {"between": (2, 1)},
+        {"within": 3},
+        {"within": True},
+        {"within": 3, "shared_vertex": "resolve"},
+        {"between": True, "within": True},
+        {"between": True, "within": True, "ignore": [(1, 0), (3, 3)]},
+        {"between": None, "within": False, "ignore": iter([(2, 1)])},
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("method", ["clusters", "cells"])
+def test_questions(scene, question, method):
+    question = dict(question)
+    if "ignore" in question:
+        question["ignore"] = list(question["ignore"]) or [(2, 1)]
+    expected = truth(scene, **question)
+    result = impinge.Detector(method).detect(scene, **question)
+    assert len(result) > 0 and bool(result)
+    assert np.array_equal(result.rows, expected.rows)
+    assert result.hash == expected.hash == impinge.hash_rows(result.rows)
+
+
+def test_results(scene):
+    a, b, c, web = scene.bodies
+    result = impinge.Detector().detect(scene, between=True, within=True)
+    rows = result.rows
+    assert rows.shape == (len(result), 4) and rows.dtype == np.uint32
+    assert np.array_equal(rows, rows[np.lexsort((rows[:, 3], rows[:, 2], rows[:, 1], rows[:, 0]))])
+
+    def between(x, y):
+        return rows[(rows[:, 0] == x.index) & (rows[:, 2] == y.index)][:, [1, 3]]
+
+    assert len(between(a, b)) > 10 and len(between(web, web)) > 10
+    assert np.array_equal(result.between(a, b), between(a, b))
+    swapped = between(a, b)[:, ::-1]
+    swapped = swapped[np.lexsort((swapped[:, 1], swapped[:, 0]))]
+    assert np.array_equal(result.between(b, a), swapped)
+    assert np.array_equal(result.within(web), between(web, web))
+    assert result.between(a, web).shape == (0, 2)
+    colliding = np.union1d(rows[rows[:, 0] == 1][:, 1], rows[rows[:, 2] == 1][:, 3])
+    assert np.array_equal(result.colliding(b), colliding) and result.colliding(1).dtype == np.uint32
+    assert result.bodies == scene.bodies
+    with pytest.raises(ValueError, match="^the question was about all bodies"):
+        result.pairs()
+    with pytest.raises(ValueError, match=r"^a and b are both body 1: take within\(1\)"):
+        result.between(b, b)
+    narrow = impinge.Detector().detect(scene, between=(b, a))
+    assert np.array_equal(narrow.pairs(), result.between(b, a))
+    with pytest.raises(ValueError, match="^body: "):
+        narrow.colliding(c)
+
+
+def test_results_outlive_the_next_frame():
+    scene = impinge.Scene()
+    a, b = scene.add(TRIANGLE, FACE), scene.add(ACROSS, FACE)
+    detector = impinge.Detector()
+    first = detector.detect(scene, between=(a, b))
+    scene.set_positions(a, TRIANGLE + np.float32(7))
+    second = detector.detect(scene, between=(a, b))
+    scene.remove(a)
+    assert first.pairs().tolist() == [[0, 0]] and second.pairs().tolist() == []
+    assert first.colliding(a).tolist() == [0] and not second
+    assert first.hash != second.hash == 0
+
+
+def test_frames_follow_the_positions():
+    """A deforming body against the oracle, frame after frame in one detector."""
+    vertices, faces = ball(dtype=np.float64)
+    scene = impinge.Scene()
+    a = scene.add(vertices, faces)
+    b = scene.add(vertices + [0.5, 0.25, 0.125], faces)
+    detectors = [impinge.Detector(), impinge.Detector("cells"), impinge.Detector("naive")]
+    counts = set()
+    for frame in range(6):
+        angle = 0.5 * frame * vertices[:, 2]
+        x, y, z = vertices.T
+        twisted = np.stack(
+            [np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y, 0.7 * z], 1
+        )
+        scene.set_positions(a, twisted if frame % 2 else twisted.astype(np.float32))
+        results = [d.detect(scene, between=True, within=True) for d in detectors]
+        assert len({result.hash for result in results}) == 1
+        assert all(np.array_equal(result.rows, results[0].rows) for result in results)
+        counts.add(len(results[0].between(b, a)))
+    assert len(counts) > 2
+
+
+@pytest.mark.parametrize(
+    "question, error, message",
+    [
+        ({"between": (0, 0)}, ValueError, "between body 0 and itself"),
+        ({"between": (0, 9)}, ValueError, "^between: there is no body 9"),
+        ({"between": (0, 1, 2)}, ValueError, "^between: two bodies expected, 3 given"),
+        ({"between": 0}, TypeError, "^between: a pair of bodies expected"),
+        ({"between": "ab"}, TypeError, "^between: a Body or its number expected, str given"),
+        ({"within": (0, 1)}, TypeError, "^within: a Body or its number expected, tuple given"),
+        ({"within": 9}, ValueError, "^within: there is no body 9"),
+        ({"between": (0, 1), "within": 0}, ValueError, "^between and within: two questions"),
+        ({"between": True, "within": 0}, ValueError, "^between and within: two questions"),
+        ({"ignore": [(0, 1), (0, 9)]}, ValueError, r"^ignore\[1\]: there is no body 9"),
+        ({"ignore": [0]}, TypeError, r"^ignore\[0\]: a pair of bodies expected"),
+        ({"shared_vertex": "all"}, ValueError, '^shared_vertex: "all" given, "skip", "resolve"'),
+        ({"progress": 1}, TypeError, "^progress: a callable expected"),
+    ],
+)
+def test_questions_refused(scene, question, error, message):
+    with pytest.raises(error, match=message):
+        impinge.Detector().detect(scene, **question)
+
+
+@pytest.mark.parametrize(
+    "settings, error, message",
+    [
+        ({"method": "magic"}, ValueError, '^method: "magic" given, "clusters", "cells", "naive"'),
+        ({"backend": "tpu"}, ValueError, '^backend: "tpu" given, "auto", "cpu", "gpu" allowed'),
+        ({"recluster": "yes"}, ValueError, "^recluster: "),
+        ({"instruction_set": "mmx"}, ValueError, "^instruction_set: "),
+        ({"threads": -1}, ValueError, "^threads: -1 given, 0 to 1024 allowed"),
+        ({"threads": 1025}, ValueError, "^threads: 1025 given"),
+        ({"threads": 2.5}, TypeError, "^threads: a whole number expected, float given"),
+        ({"threads": True}, TypeError, "^threads: a whole number expected, bool given"),
+        ({"memory_budget": -5}, ValueError, "^memory_budget: -5 given"),
+        ({"memory_budget": 2**64}, ValueError, "^memory_budget: 18446744073709551616 given"),
+        ({"lambda_": 0}, ValueError, "^lambda: 0 given, a number above 0 allowed"),
+        ({"lambda_": float("nan")}, ValueError, "^lambda: NaN given"),
+        ({"lambda_": "1"}, TypeError, "^lambda_: a number expected, '1' given"),
+        ({"group_size": 0}, ValueError, "^group size: 0 given, 1 to 64 allowed"),
+        ({"group_size": 65}, ValueError, "^group_size: 65 given"),
+        ({"device": 3}, TypeError, "device"),
+        ({"colour": "red"}, TypeError, "colour"),
+    ],
+)
+def test_settings_refused(settings, error, message):
+    with pytest.raises(error, match=message):
+        impinge.Detector(**settings)
+
+
+def test_numpy_scalars_are_numbers():
+    detector = impinge.Detector(
+        threads=np.int64(2), memory_budget=np.uint64(1 << 30), lambda_=np.float32(2), group_size=np.uint8(9)
+    )
+    assert repr(detector) == (
+        'Detector(method="clusters", backend="auto", threads=2, memory_budget=1073741824)'
+    )
+
+
+def test_too_small_a_budget_says_what_is_needed(scene):
+    with pytest.raises(MemoryError, match="memory budget is 10 bytes, but [0-9]+ bytes are needed"):
+        impinge.Detector(memory_budget=10).detect(scene)
+
+
+def test_statistics(scene):
+    stats = impinge.Detector(threads=1).detect(scene).stats
+    assert stats.backend and stats.method == "clusters" and stats.n_threads == 1
+    assert stats.n_candidates > 0 and stats.n_clusters > 0 and stats.n_clustered == 4
+    assert 0 <= stats.unsure_share <= 1 and stats.bytes_held > 0
+    assert 0 < sum(stats.stages.values()) <= 1.1 * stats.total_ms
+    as_dict = stats.as_dict()
+    assert json.loads(json.dumps(as_dict))["stages"] == stats.stages
+    names = {name for name in dir(impinge.Statistics) if name[0] != "_"} - {"as_dict"}
+    assert set(as_dict) == names
+    assert all(as_dict[name] == getattr(stats, name) for name in names)
+    assert repr(stats).startswith("Statistics(")
+    stats = impinge.Detector("cells").detect(scene).stats
+    assert len(stats.grid) == 3 and stats.n_entries > 0
+
+
+@pytest.fixture(scope="module")
+def long():
+    """A scene on which the oracle works for a while."""
+    scene = impinge.Scene()
+    scene.add(*soup(15_000, 0.001, 3))
+    return scene
+
+
+def test_the_interpreter_is_released(long):
+    """While a thread detects, this one keeps running Python."""
+    took = []
+
+    def work():
+        start = time.perf_counter()
+        impinge.Detector("naive", threads=1).detect(long, within=0)
+        took.append(time.perf_counter() - start)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    turns, last, gap = 0, time.perf_counter(), 0.0
+    while thread.is_alive():
+        time.sleep(0.001)
+        now = time.perf_counter()
+        turns, gap, last = turns + 1, max(gap, now - last), now
+    thread.join()
+    assert took[0] > 0.05, "too short a run to tell"
+    assert turns > 10 and gap < 0.7 * took[0]
+
+
+def test_threads_share_a_scene(scene):
+    expected = truth(scene).hash
+    hashes = []
+
+    def work():
+        detector = impinge.Detector(threads=2)
+        hashes.extend(detector.detect(scene).hash for _ in range(20))
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert hashes == [expected] * 80
+
+
+def test_what_is_in_use_is_not_changed(long):
+    """From within a running detection neither its scene nor itself can be touched."""
+    detector = impinge.Detector("naive")
+    seen = []
+
+    def progress(done, total):
+        for change in [
+            lambda: long.set_positions(0, long.positions(0)),
+            lambda: long.remove(0),
+            lambda: detector.detect(long, within=0),
+        ]:
+            with pytest.raises(RuntimeError, match="being read by a detection|detector is busy") as raised:
+                change()
+            seen.append(str(raised.value)[:12])
+
+    detector.detect(long, within=0, progress=progress)
+    assert set(seen) == {"the scene is", "the detector"}
+
+
+@pytest.mark.parametrize("method", ["clusters", "cells", "naive"])
+def test_progress(scene, method):
+    seen = []
+    thread = threading.get_ident()
+
+    def progress(done, total):
+        assert threading.get_ident() == thread
+        seen.append((done, total))
+
+    result = impinge.Detector(method).detect(scene, progress=progress)
+    assert result.hash == truth(scene).hash
+    assert all(isinstance(done, int) and 0 <= done <= total for done, total in seen)
+    if method != "naive":
+        assert seen[-1][0] == seen[-1][1]
+
+
+def test_an_exception_of_progress_stops_the_run(long):
+    detector = impinge.Detector("naive")
+
+    def progress(done, total):
+        raise LookupError(f"{done} of {total}")
+
+    with pytest.raises(LookupError, match="of 15000"):
+        detector.detect(long, within=0, progress=progress)
+    small = impinge.Scene()
+    small.add(TRIANGLE, FACE), small.add(ACROSS, FACE)
+    assert len(detector.detect(small)) == 1
+
+
+@pytest.mark.parametrize("method", ["clusters", "cells", "naive"])
+def test_cancel(scene, method):
+    token = impinge.CancelToken()
+    detector = impinge.Detector(method)
+    assert len(detector.detect(scene, cancel=token)) > 0
+    token.cancel()
+    assert token.cancelled
+    with pytest.raises(impinge.Cancelled, match="cancelled"):
+        detector.detect(scene, cancel=token)
+    assert detector.detect(scene).hash == truth(scene).hash
+
+
+def test_cancel_from_another_thread(long):
+    token = impinge.CancelToken()
+    timer = threading.Timer(0.02, token.cancel)
+    timer.start()
+    with pytest.raises(impinge.Cancelled):
+        while True:
+            impinge.Detector("naive").detect(long, within=0, cancel=token)
+    timer.join()

@@ -1,0 +1,67 @@
+"""Every example runs as its user would run it."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from shapes import ball
+
+trimesh = pytest.importorskip("trimesh")
+
+
+@pytest.fixture
+def run(root, tmp_path):
+    def run(name, *arguments):
+        script = root / "examples" / "python" / name
+        return subprocess.run(
+            [sys.executable, str(script), *map(str, arguments)],
+            capture_output=True,
+            text=True,
+            cwd=tmp_path,
+            timeout=120,
+        )
+
+    return run
+
+
+def test_every_example_is_run_here(root):
+    names = {path.name for path in (root / "examples" / "python").glob("*.py")}
+    assert names == {"check_mesh.py", "sequence.py", "color_trimesh.py"}
+
+
+def test_check_mesh(run, tmp_path):
+    out = run("check_mesh.py", "--report", "pairs.csv")
+    assert out.returncode == 1 and "pairs of faces intersect" in out.stdout, out.stderr
+    pairs = np.loadtxt(tmp_path / "pairs.csv", delimiter=",", skiprows=1, dtype=int)
+    assert f"{len(pairs)} pairs" in out.stdout and len(pairs) > 100
+    trimesh.Trimesh(*ball(), process=False).export(tmp_path / "ball.stl")
+    out = run("check_mesh.py", "ball.stl")
+    assert out.returncode == 0, out.stdout + out.stderr
+    assert ": 0 pairs of faces intersect" in out.stdout
+
+
+def test_sequence(run, tmp_path):
+    pytest.importorskip("tqdm")
+    pytest.importorskip("matplotlib")
+    out = run("sequence.py", "--frames", 12, "--faces", 2000, "--plot", "plot.png")
+    assert out.returncode == 0, out.stderr
+    words = out.stdout.split()
+    assert int(words[2]) > 50 and int(words[6]) > 50, out.stdout
+    assert "12/12" in out.stderr
+    assert (tmp_path / "plot.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_color_trimesh(run, tmp_path):
+    vertices, faces = ball()
+    for name, shift in [("a.ply", 0), ("b.ply", 1)]:
+        trimesh.Trimesh(vertices + [shift, 0.25, 0], faces, process=False).export(tmp_path / name)
+    for arguments in [[], ["a.ply", "b.ply"]]:
+        out = run("color_trimesh.py", *arguments)
+        assert out.returncode == 0, out.stderr
+        n_red = sum(int(line.split()[0]) for line in out.stdout.splitlines()[:2])
+        coloured = trimesh.load(tmp_path / "coloured.ply", process=False)
+        red = (coloured.visual.face_colors == [214, 39, 40, 255]).all(axis=1).sum()
+        assert red == n_red > 20
+    out = run("color_trimesh.py", "a.ply")
+    assert out.returncode == 2 and "two meshes expected, 1 given" in out.stderr

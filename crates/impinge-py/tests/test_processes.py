@@ -1,0 +1,130 @@
+"""What happens across processes: Ctrl-C, forks, spawned workers."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from shapes import ball
+
+import impinge
+
+# Large triangles that all overlap: minutes of work for every method.
+LONG_RUN = """
+import numpy as np, impinge, sys
+random = np.random.default_rng(1)
+n = 200_000
+vertices = random.random((3 * n, 3))
+faces = np.arange(3 * n).reshape(n, 3)
+scene = impinge.Scene()
+body = scene.add(vertices, faces)
+detector = impinge.Detector(sys.argv[1], threads=int(sys.argv[2]))
+print("ready", flush=True)
+try:
+    detector.detect(scene, within=body)
+except KeyboardInterrupt:
+    scene.remesh(body, vertices[:300], faces[:100])
+    again = detector.detect(scene, within=body)
+    oracle = impinge.self_pairs(vertices[:300], faces[:100], method="naive")
+    assert len(oracle) and np.array_equal(again.pairs(), oracle)
+    print("interrupted and usable", flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of this kind are POSIX")
+@pytest.mark.parametrize("threads", ["1", "2"])
+@pytest.mark.parametrize("method", ["clusters", "cells", "naive"])
+def test_ctrl_c(method, threads):
+    child = subprocess.Popen(
+        [sys.executable, "-c", LONG_RUN, method, threads],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert child.stdout.readline() == "ready\n"
+        time.sleep(0.7)
+        assert child.poll() is None, "the run was over before it could be interrupted"
+        start = time.monotonic()
+        child.send_signal(signal.SIGINT)
+        out, err = child.communicate(timeout=60)
+        took = time.monotonic() - start
+    finally:
+        child.kill()
+        child.communicate()
+    assert (child.returncode, out, err) == (0, "interrupted and usable\n", "")
+    assert took < 20
+
+
+HANDLER = """
+import signal, numpy as np, impinge
+class Enough(Exception): pass
+def handler(*_): raise Enough
+signal.signal(signal.SIGALRM, handler)
+random = np.random.default_rng(1)
+scene = impinge.Scene()
+scene.add(random.random((90_000, 3)), np.arange(90_000).reshape(-1, 3))
+signal.setitimer(signal.ITIMER_REAL, 0.2)
+try:
+    impinge.Detector("naive").detect(scene, within=0)
+    print("ran to the end")
+except Enough:
+    print("enough")
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="no SIGALRM here")
+def test_handlers_of_the_user_run():
+    out = subprocess.run(
+        [sys.executable, "-c", HANDLER], capture_output=True, text=True, timeout=120
+    )
+    assert (out.stdout, out.stderr) == ("enough\n", "")
+
+
+FORK = """
+import os, sys, impinge
+corners, face = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]
+if sys.argv[1] == "late":
+    impinge.pairs(corners, face, corners, face)
+child = os.fork()
+if child == 0:
+    try:
+        print(len(impinge.pairs(corners, face, corners, face)), flush=True)
+    except RuntimeError as error:
+        print(error, flush=True)
+    os._exit(0)
+os.waitpid(child, 0)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.parametrize(
+    "when, answer", [("early", "1\n"), ("late", "this process was forked from one that had")]
+)
+def test_forks(when, answer):
+    out = subprocess.run(
+        [sys.executable, "-c", FORK, when], capture_output=True, text=True, timeout=60
+    )
+    assert out.stdout.startswith(answer), out
+
+
+def count(shift):
+    vertices, faces = ball()
+    return len(impinge.pairs(vertices, faces, vertices + vertices.dtype.type(shift), faces))
+
+
+def test_spawned_workers():
+    code = (
+        "import sys, multiprocessing; sys.path.insert(0, sys.argv[1])\n"
+        "from test_processes import count\n"
+        "if __name__ == '__main__':\n"
+        "    with multiprocessing.get_context('spawn').Pool(2) as pool:\n"
+        "        print(pool.map(count, [0.25, 0.5, 9]))\n"
+    )
+    here = os.path.dirname(__file__)
+    out = subprocess.run(
+        [sys.executable, "-c", code, here], capture_output=True, text=True, timeout=120
+    )
+    assert out.stdout == f"{[count(0.25), count(0.5), 0]}\n", out
