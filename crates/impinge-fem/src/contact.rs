@@ -1,0 +1,323 @@
+//! Contact: a penalty on the volume that two tetrahedra have in common.
+//!
+//! For each pair that the detector finds, the common polyhedron is cut out exactly (but for
+//! rounding). With volume V, centroid c and a unit direction n, tetrahedron a is pushed by `k V n`
+//! at c and tetrahedron b by the opposite, spread to corners by the barycentric coordinates of c.
+//! Both forces act at one point, so linear and angular momentum are kept. Summed over a layer of
+//! pairs, where bodies overlap by a depth d over an area A, the force is `k A d`: a pressure `k d`,
+//! whatever the meshes.
+//!
+//! **Direction.** Each vertex has a direction that leads outwards: on the surface the normal of its
+//! faces, weighted by area; inside, the way in which the depth at rest falls, interpolated in the deformed
+//! mesh (Hirota et al. 2001, Fisher & Lin 2001). n is b's direction at c less a's, which is smooth in c,
+//! defined also between edges, and the same whichever body comes first. Where both cancel, a is pushed
+//! away from the centroid of b.
+//!
+//! **Stiffness.** V grows by the cross-section as the bodies approach. The cross-section is V over
+//! the larger of the polyhedron's extent along n and the depth d that the two interpolated depths sum
+//! up to at c: for a stack of pairs through the overlap they share one cross-section that way.
+//! It enters the implicit step, so that stiff contacts stay stable.
+//!
+//! **Friction** is Coulomb's, with the normal force of the step's beginning and a linear rise at
+//! very small speeds, also implicit.
+
+use impinge::Pairs;
+use rayon::prelude::*;
+
+use crate::elasticity::GRAIN;
+use crate::error::Error;
+use crate::lists::Lists;
+use crate::mesh::{Mat3, Mesh, Vec3};
+use crate::overlap::Clipper;
+use crate::rotation::cofactors;
+use crate::settings::Settings;
+
+/// Slip of this share of an edge a step is where friction reaches its full strength.
+const FULL_FRICTION: f64 = 1e-2;
+
+/// Directions shorter than this share of a unit vector say nothing.
+const CANCELLED: f64 = 1e-6;
+
+/// Two tetrahedra that push each other.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Contact {
+    /// Corners of a, then of b.
+    pub vertices: [u32; 8],
+    /// Barycentric coordinates of the point of contact: positive for a, negative for b.
+    pub weights: [f64; 8],
+    /// The force on a at the start of the step.
+    pub force: Vec3,
+    /// What couples the velocities in the implicit step: h² stiffness + h friction.
+    pub block: Mat3,
+}
+
+/// A penalty along a direction with friction across, as the implicit step takes it:
+/// `h² k n nᵀ + h c (1 − n nᵀ)`.
+fn implicit(normal: &Vec3, stiffness: f64, drag: f64, dt: f64) -> Mat3 {
+    normal * (normal * (dt * dt * stiffness - dt * drag)).transpose()
+        + Mat3::from_diagonal_element(dt * drag)
+}
+
+/// Coulomb's friction as a drag: force over slip speed.
+fn drag(settings: &Settings, normal_force: f64, normal: &Vec3, velocity: &Vec3, edge: f64) -> f64 {
+    let slip = (velocity - normal * normal.dot(velocity)).norm();
+    settings.friction * normal_force / slip.max(FULL_FRICTION * edge / settings.dt)
+}
+
+/// Fills `outward` with the outward direction of each vertex, of length 1, or 0 where there is none.
+pub(crate) fn outward_directions(mesh: &Mesh, positions: &[Vec3], outward: &mut Vec<Vec3>) {
+    let face_normal = |&face: &u32| {
+        let [a, b, c] = mesh.surface[face as usize].map(|corner| positions[corner as usize]);
+        (b - a).cross(&(c - a))
+    };
+    let rise = |&entry: &u32| {
+        let element = &mesh.elements[entry as usize / 4];
+        let [a, b, c, d] = element.corners.map(|corner| mesh.depths[corner as usize]);
+        let [p, q, r] = &element.gradients;
+        let at_rest = p * (b - a) + q * (c - a) + r * (d - a);
+        // The gradient where the element is now, times its volume: finite even when it is flat.
+        let f = element.deformation(positions);
+        let cofactors = cofactors(&f);
+        let det = f.column(0).dot(&cofactors.column(0));
+        cofactors * at_rest * (element.volume * det.signum())
+    };
+    (0..mesh.n_vertices())
+        .into_par_iter()
+        .with_min_len(GRAIN)
+        .map(|vertex| {
+            let faces = mesh.faces_at.get(vertex);
+            let direction: Vec3 = if faces.is_empty() {
+                -mesh.tets_at.get(vertex).iter().map(rise).sum::<Vec3>()
+            } else {
+                faces.iter().map(face_normal).sum()
+            };
+            direction.try_normalize(0.0).unwrap_or_else(Vec3::zeros)
+        })
+        .collect_into_vec(outward);
+}
+
+/// The state at the start of a step, as contact sees it.
+pub(crate) struct Now<'a> {
+    pub mesh: &'a Mesh,
+    pub settings: &'a Settings,
+    pub positions: &'a [Vec3],
+    pub velocities: &'a [Vec3],
+    pub outward: &'a [Vec3],
+}
+
+impl Now<'_> {
+    /// The contacts of pairs of tetrahedra, numbered over all solids, in their order.
+    pub fn contacts(&self, pairs: &[[u32; 2]], contacts: &mut Vec<Contact>) {
+        contacts.clear();
+        contacts.par_extend(
+            pairs
+                .par_iter()
+                .with_min_len(64)
+                .map_init(Clipper::default, |clipper, &pair| {
+                    self.contact(clipper, pair)
+                })
+                .flatten_iter(),
+        );
+    }
+
+    fn contact(&self, clipper: &mut Clipper, pair: [u32; 2]) -> Option<Contact> {
+        let elements = pair.map(|tet| &self.mesh.elements[tet as usize]);
+        let corners = elements.map(|e| e.corners.map(|corner| self.positions[corner as usize]));
+        clipper.clip(&corners[0], &corners[1]);
+        let (volume, at) = clipper.volume()?;
+        let weights = [
+            barycentric(&corners[0], &at)?,
+            barycentric(&corners[1], &at)?,
+        ];
+        let mean = |body: usize, of: &dyn Fn(usize) -> Vec3| -> Vec3 {
+            elements[body]
+                .corners
+                .iter()
+                .zip(weights[body])
+                .map(|(&corner, weight)| of(corner as usize) * weight)
+                .sum()
+        };
+        let outward = |vertex: usize| self.outward[vertex];
+        let centre = |body: usize| corners[body].iter().sum::<Vec3>() / 4.0;
+        let normal = (mean(1, &outward) - mean(0, &outward))
+            .try_normalize(CANCELLED)
+            .or_else(|| (centre(0) - centre(1)).try_normalize(0.0))?;
+        let depth: f64 = elements
+            .iter()
+            .zip(weights)
+            .flat_map(|(element, weights)| element.corners.into_iter().zip(weights))
+            .map(|(corner, weight)| self.mesh.depths[corner as usize] * weight)
+            .sum();
+        let (hardness, edge) = self.hardness(pair);
+        let force = hardness * volume;
+        let stiffness = force / clipper.extent(&normal).max(depth);
+        if !(force.is_finite() && stiffness.is_finite()) {
+            return None;
+        }
+        let velocity = |vertex: usize| self.velocities[vertex];
+        let slip = mean(0, &velocity) - mean(1, &velocity);
+        let drag = drag(self.settings, force, &normal, &slip, edge);
+        let both = |a: [f64; 4], b: [f64; 4]| {
+            std::array::from_fn(|k| if k < 4 { a[k] } else { -b[k - 4] })
+        };
+        Some(Contact {
+            vertices: std::array::from_fn(|k| elements[k / 4].corners[k % 4]),
+            weights: both(weights[0], weights[1]),
+            force: normal * force,
+            block: implicit(&normal, stiffness, drag, self.settings.dt),
+        })
+    }
+
+    /// Pressure over depth between two elements in Pa/m, and the length of their edges: the harmonic
+    /// mean of the materials' moduli over the mean edge.
+    fn hardness(&self, pair: [u32; 2]) -> (f64, f64) {
+        let [a, b] = pair.map(|tet| {
+            let parts = &self.mesh.parts;
+            &parts[parts.partition_point(|part| part.tets.end <= tet as usize)]
+        });
+        let edge = 0.5 * (a.edge + b.edge);
+        let young = 2.0 * a.young * b.young / (a.young + b.young);
+        (self.settings.contact_stiffness * young / edge, edge)
+    }
+
+    /// The ground's force on each vertex of the surface below it, and what it adds to the implicit
+    /// step, through `add`.
+    pub fn ground(&self, mut add: impl FnMut(usize, Vec3, Mat3)) {
+        let Some(ground) = self.settings.ground else {
+            return;
+        };
+        let normal = Vec3::from(ground.normal).normalize();
+        for part in &self.mesh.parts {
+            let hardness = self.settings.contact_stiffness * part.young / part.edge;
+            for vertex in part.vertices.clone() {
+                let depth = ground.height - normal.dot(&self.positions[vertex]);
+                let stiffness = hardness * self.mesh.areas[vertex];
+                if depth <= 0.0 || stiffness == 0.0 {
+                    continue;
+                }
+                let force = stiffness * depth;
+                let velocity = &self.velocities[vertex];
+                let drag = drag(self.settings, force, &normal, velocity, part.edge);
+                let block = implicit(&normal, stiffness, drag, self.settings.dt);
+                add(vertex, normal * force, block);
+            }
+        }
+    }
+}
+
+/// Barycentric coordinates of a point inside a tetrahedron of any orientation: 0 or more, sum 1.
+/// `None` where it is too flat to have any.
+fn barycentric(tet: &[Vec3; 4], at: &Vec3) -> Option<[f64; 4]> {
+    let [a, b, c, d] = tet.map(|corner| corner - at);
+    let volume = |p: &Vec3, q: &Vec3, r: &Vec3| p.cross(q).dot(r);
+    // Each corner weighs as much as the tetrahedron in which the point takes its place.
+    let weights = [
+        volume(&b, &c, &d),
+        -volume(&a, &c, &d),
+        volume(&a, &b, &d),
+        -volume(&a, &b, &c),
+    ];
+    let sign = weights.iter().sum::<f64>().signum();
+    // Rounding may put a point on a face a little outside.
+    let weights = weights.map(|weight| (weight * sign).max(0.0));
+    let sum: f64 = weights.iter().sum();
+    (sum > 0.0).then(|| weights.map(|weight| weight / sum))
+}
+
+/// The pairs of an answer with tetrahedra numbered over all solids.
+pub(crate) fn numbered(mesh: &Mesh, pairs: &Pairs, out: &mut Vec<[u32; 2]>) -> Result<(), Error> {
+    out.clear();
+    for [body_a, a, body_b, b] in pairs.rows() {
+        let number = |body: u32, tet: u32| {
+            let tets = &mesh.parts.get(body as usize)?.tets;
+            let global = tets.start + tet as usize;
+            // Element numbers fit: the mesh was checked to have fewer than 2^28.
+            tets.contains(&global).then_some(global as u32)
+        };
+        match (number(body_a, a), number(body_b, b)) {
+            (Some(a), Some(b)) => out.push([a, b]),
+            _ => {
+                return Err(Error::ForeignPair {
+                    row: [body_a, a, body_b, b],
+                });
+            }
+        }
+    }
+    // Eight corners of each contact are numbered in 32 bits.
+    let limit = u32::MAX as usize / 8;
+    if out.len() > limit {
+        return Err(Error::TooMany {
+            what: "colliding pairs",
+            given: out.len(),
+            limit,
+        });
+    }
+    Ok(())
+}
+
+/// The contacts as part of the system matrix: blocks between any two of a contact's eight vertices,
+/// applied without being written out.
+#[derive(Debug, Default)]
+pub(crate) struct Couplings {
+    pub contacts: Vec<Contact>,
+    /// Each vertex' contacts, as 8 · contact + corner.
+    at: Lists,
+}
+
+impl Couplings {
+    /// Finds each vertex' contacts.
+    pub fn index(&mut self, n_vertices: usize) {
+        let corners = self.contacts.iter().map(|contact| contact.vertices);
+        self.at.rebuild(n_vertices, corners);
+    }
+
+    /// What each contact answers to velocities `x`.
+    pub fn react(&self, x: &[Vec3], out: &mut Vec<Vec3>) {
+        self.contacts
+            .par_iter()
+            .with_min_len(GRAIN)
+            .map(|contact| {
+                let relative: Vec3 = contact
+                    .vertices
+                    .iter()
+                    .zip(contact.weights)
+                    .map(|(&vertex, weight)| x[vertex as usize] * weight)
+                    .sum();
+                contact.block * relative
+            })
+            .collect_into_vec(out);
+    }
+
+    /// Adds a row of the product, from what the contacts answered.
+    #[inline]
+    pub fn add_row(&self, row: usize, reactions: &[Vec3], sum: Vec3) -> Vec3 {
+        self.at.get(row).iter().fold(sum, |sum, &entry| {
+            let (contact, corner) = (entry as usize / 8, entry as usize % 8);
+            sum + reactions[contact] * self.contacts[contact].weights[corner]
+        })
+    }
+
+    /// The force on a vertex at the start of the step.
+    pub fn force(&self, vertex: usize) -> Vec3 {
+        self.at
+            .get(vertex)
+            .iter()
+            .map(|&entry| {
+                let contact = &self.contacts[entry as usize / 8];
+                contact.force * contact.weights[entry as usize % 8]
+            })
+            .sum()
+    }
+
+    /// The block on the diagonal of a row.
+    pub fn diagonal(&self, row: usize) -> Mat3 {
+        self.at
+            .get(row)
+            .iter()
+            .map(|&entry| {
+                let contact = &self.contacts[entry as usize / 8];
+                contact.block * contact.weights[entry as usize % 8].powi(2)
+            })
+            .sum()
+    }
+}

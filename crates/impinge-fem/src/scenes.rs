@@ -1,0 +1,193 @@
+//! Scenes with large deformation: one body dropped on another one like it.
+//!
+//! The bodies are those of the paper's table 2 as far as their meshes are at hand. They come from files that are
+//! not part of the repository (`tets/*.msh` in the folder of shared data, see [`impinge_scenes::data`]);
+//! where they are absent, balls of about the same number of tetrahedra stand in, and say so.
+
+use std::path::Path;
+
+use impinge::Elements;
+use impinge_io::{ReadOptions, read};
+use impinge_scenes::{data, solids};
+
+use crate::error::Error;
+use crate::settings::{Ground, Settings};
+use crate::solid::{Material, Solid};
+
+/// A scene by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum SceneName {
+    /// Two bunnies of 7,356 tetrahedra each.
+    Bunny7k,
+    /// Two bunnies of 19,379 tetrahedra each.
+    Bunny19k,
+    /// Two dragons of 8,408 tetrahedra each.
+    Dragon8k,
+    /// Two dragons of 15,047 tetrahedra each.
+    Dragon15k,
+    /// Two blocks of 1,296 tetrahedra each: generated, small and quick.
+    Blocks,
+}
+
+impl SceneName {
+    /// All of them.
+    pub const ALL: [SceneName; 5] = [
+        SceneName::Bunny7k,
+        SceneName::Bunny19k,
+        SceneName::Dragon8k,
+        SceneName::Dragon15k,
+        SceneName::Blocks,
+    ];
+
+    /// As on the command line: `"bunny-7k"` and so on.
+    pub fn name(self) -> &'static str {
+        match self {
+            SceneName::Bunny7k => "bunny-7k",
+            SceneName::Bunny19k => "bunny-19k",
+            SceneName::Dragon8k => "dragon-8k",
+            SceneName::Dragon15k => "dragon-15k",
+            SceneName::Blocks => "blocks",
+        }
+    }
+
+    /// The file in the folder of shared data and its number of tetrahedra.
+    fn file(self) -> Option<(&'static str, usize)> {
+        match self {
+            SceneName::Bunny7k => Some(("tets/bunny_7k.msh", 7_356)),
+            SceneName::Bunny19k => Some(("tets/bunny_19k.msh", 19_379)),
+            SceneName::Dragon8k => Some(("tets/dragon_8k.msh", 8_408)),
+            SceneName::Dragon15k => Some(("tets/dragon_15k.msh", 15_047)),
+            SceneName::Blocks => None,
+        }
+    }
+}
+
+/// A scene ready to be simulated.
+#[derive(Debug, Clone)]
+pub struct DropScene {
+    /// What it is, with the number of tetrahedra; a stand-in says that it is one.
+    pub label: String,
+    /// Whether a generated body stands in for a mesh that is absent.
+    pub is_stand_in: bool,
+    /// The lower body, and the one that is dropped on it.
+    pub solids: Vec<Solid>,
+    /// How to simulate it.
+    pub settings: Settings,
+    /// Enough steps to fall, to be crushed and to come to rest again.
+    pub n_steps: u64,
+}
+
+/// What the bodies are made of: soft enough to be crushed to a fraction of their height.
+pub const SOFT: Material = Material {
+    young: 3e4,
+    poisson: 0.4,
+    density: 1e3,
+};
+
+/// Builds a scene: two bodies with the longest side of their box 1 m, the upper one turned a little and thrown down
+/// on the lower one.
+///
+/// # Errors
+/// A mesh file that is there but can't be read, or holds no tetrahedra.
+pub fn drop_scene(name: SceneName) -> Result<DropScene, Error> {
+    let (solid, label, is_stand_in) = match name.file() {
+        None => {
+            let solid = block(6, 6, 6, 1.0 / 6.0, SOFT);
+            (solid, "block".to_owned(), false)
+        }
+        Some((path, n_tets)) => match data::data_file(path) {
+            Some(path) => (load(&path, SOFT)?, name.name().to_owned(), false),
+            None => {
+                let label = format!("ball, standing in for {}", name.name());
+                (ball(n_tets, SOFT), label, true)
+            }
+        },
+    };
+    let solid = normalised(solid);
+    let label = format!("{label}, {} tetrahedra, twice", solid.tets.len());
+    let top = solid.rest.iter().fold(0.0, |top: f64, p| top.max(p[1]));
+    // A turn about the vertical axis: no two faces of the copies are parallel.
+    let (sin, cos) = 0.5f64.sin_cos();
+    let upper = solid
+        .clone()
+        .posed(|[x, y, z]| {
+            [
+                cos * x + sin * z + 0.1,
+                y + top + 0.05,
+                cos * z - sin * x + 0.05,
+            ]
+        })
+        .moving([0.0, -3.0, 0.0]);
+    Ok(DropScene {
+        label,
+        is_stand_in,
+        solids: vec![solid, upper],
+        settings: Settings {
+            ground: Some(Ground {
+                normal: [0.0, 1.0, 0.0],
+                height: 0.0,
+            }),
+            ..Settings::default()
+        },
+        n_steps: 240,
+    })
+}
+
+/// Reads a solid from a file of tetrahedra; vertices that no tetrahedron names are dropped.
+///
+/// # Errors
+/// A file that can't be read, or holds triangles.
+pub fn load(path: &Path, material: Material) -> Result<Solid, Error> {
+    let mesh = read(path, &ReadOptions::default())?;
+    match mesh.elements {
+        impinge_io::Elements::Tetrahedra(tets) => {
+            Ok(Solid::new(tets, mesh.positions.to_f64(), material).without_unused_vertices())
+        }
+        impinge_io::Elements::Triangles(_) => Err(Error::NoTetrahedra(path.display().to_string())),
+    }
+}
+
+/// A block of `n_x` by `n_y` by `n_z` cubes with edge `spacing` in metres, from the origin on, six
+/// tetrahedra each.
+pub fn block(n_x: usize, n_y: usize, n_z: usize, spacing: f64, material: Material) -> Solid {
+    let model = solids::block(n_x, n_y, n_z, 1.0);
+    let rest = model.positions_f64();
+    let rest = rest.iter().map(|p| p.map(|x| x * spacing)).collect();
+    Solid::new(tetrahedra(model.elements), rest, material)
+}
+
+/// A ball of radius 0.5 m about the origin with about `n_tets` tetrahedra.
+pub fn ball(n_tets: usize, material: Material) -> Solid {
+    let model = solids::solid_ball(n_tets);
+    let rest = model.positions_f64();
+    Solid::new(tetrahedra(model.elements), rest, material)
+}
+
+fn tetrahedra(elements: Elements) -> Vec<[u32; 4]> {
+    match elements {
+        Elements::Tetrahedra(tets) => tets,
+        Elements::Triangles(_) => Vec::new(),
+    }
+}
+
+/// The solid with the longest side of its box 1 m, standing on y = 0 above the origin.
+fn normalised(solid: Solid) -> Solid {
+    let (low, high) = solid.rest.iter().fold(
+        ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]),
+        |(low, high), p| {
+            (
+                std::array::from_fn(|k| low[k].min(p[k])),
+                std::array::from_fn(|k| high[k].max(p[k])),
+            )
+        },
+    );
+    let longest = (0..3).fold(0.0, |longest: f64, k| longest.max(high[k] - low[k]));
+    let foot = [0.5 * (low[0] + high[0]), low[1], 0.5 * (low[2] + high[2])];
+    let scale = if longest > 0.0 { 1.0 / longest } else { 1.0 };
+    let rest = solid
+        .rest
+        .iter()
+        .map(|p| std::array::from_fn(|k| (p[k] - foot[k]) * scale))
+        .collect();
+    Solid::new(solid.tets, rest, solid.material)
+}

@@ -1,0 +1,317 @@
+//! Contact: forces that balance, bodies that do not pass, the ground, and the same bits every time.
+
+mod common;
+
+use common::{cpu, cross, distance, no_gravity, still, sum};
+use impinge::{Control, Detector, Method};
+use impinge_fem::scenes::{SceneName, block, drop_scene};
+use impinge_fem::{Error, Ground, Material, Settings, Simulation, Solid, State};
+
+const MATERIAL: Material = Material {
+    young: 1e5,
+    poisson: 0.3,
+    density: 1e3,
+};
+
+const FLOOR: Ground = Ground {
+    normal: [0.0, 2.0, 0.0],
+    height: 0.0,
+};
+
+/// A block of 1 m, turned about the vertical axis and moved.
+fn turned_block(angle: f64, offset: [f64; 3]) -> Solid {
+    let (s, c) = angle.sin_cos();
+    block(3, 3, 3, 1.0 / 3.0, MATERIAL).posed(|[x, y, z]| {
+        let (x, z) = (x - 0.5, z - 0.5);
+        [
+            c * x + s * z + offset[0],
+            y + offset[1],
+            c * z - s * x + offset[2],
+        ]
+    })
+}
+
+#[test]
+fn contact_forces_are_opposite_and_twist_nothing() {
+    let lower = turned_block(0.0, [0.0; 3]);
+    let upper = turned_block(0.4, [0.1, 0.93, -0.05]);
+    let settings = no_gravity();
+    let simulation = Simulation::new(&[lower, upper], settings.clone()).unwrap();
+    let mut detector = cpu();
+    let pairs = simulation.detect(&mut detector, &Control::new()).unwrap();
+    let forces = simulation.contact_forces(pairs).unwrap();
+    let positions = simulation.positions();
+    let n = forces.len() / 2;
+    let (below, above) = (sum(forces[..n].to_vec()), sum(forces[n..].to_vec()));
+    // The overlap is 0.07 m deep over the common area of two squares turned and moved; it pushes straight up but
+    // for the rim, where normals lean outwards.
+    let pressure = settings.contact_stiffness * 1e5 * 0.07 / mean_edge();
+    let area = above[1] / pressure;
+    assert!((0.7..0.95).contains(&area), "{area}");
+    assert!(above[0].hypot(above[2]) < 0.1 * above[1], "{above:?}");
+    assert!(distance(below, above.map(|x| -x)) < 1e-9 * above[1]);
+    let torque = sum(positions.iter().zip(&forces).map(|(x, f)| cross(*x, *f)));
+    assert!(distance(torque, [0.0; 3]) < 1e-9 * above[1], "{torque:?}");
+    // Whoever comes first, the forces are the same.
+    let swapped = Simulation::new(
+        &[
+            turned_block(0.4, [0.1, 0.93, -0.05]),
+            turned_block(0.0, [0.0; 3]),
+        ],
+        settings,
+    )
+    .unwrap();
+    let pairs = swapped.detect(&mut detector, &Control::new()).unwrap();
+    let again = swapped.contact_forces(pairs).unwrap();
+    for (a, b) in forces.iter().zip(again[n..].iter().chain(&again[..n])) {
+        assert!(distance(*a, *b) < 1e-9 * above[1]);
+    }
+}
+
+/// Mean edge of a block's surface: two sides of a square to one diagonal, shared by two triangles.
+fn mean_edge() -> f64 {
+    (2.0 + 2f64.sqrt()) / 9.0
+}
+
+#[test]
+fn a_collision_keeps_momentum_and_gains_no_energy() {
+    let left = turned_block(0.2, [0.0; 3]).moving([2.0, 0.1, 0.0]);
+    let right = turned_block(0.0, [1.3, 0.2, 0.1]).moving([-1.0, 0.0, 0.3]);
+    let settings = Settings {
+        dt: 2e-3,
+        tolerance: 1e-12,
+        friction: 0.2,
+        ..no_gravity()
+    };
+    let n_left = left.rest.len();
+    let mut simulation = Simulation::new(&[left, right], settings).unwrap();
+    let momentum = simulation.momentum();
+    let start = simulation.energy().total();
+    let mut detector = cpu();
+    let (mut n_contacts, mut most) = (0, 0.0f64);
+    for _ in 0..500 {
+        let report = simulation.step(&mut detector).unwrap();
+        assert!(distance(simulation.momentum(), momentum) < 1e-6);
+        n_contacts += report.n_contacts;
+        most = most.max(simulation.energy().total());
+    }
+    assert!(n_contacts > 100);
+    assert!(most <= start * (1.0 + 1e-9), "{start} {most}");
+    // They met and parted: the left one is slower than the right one now.
+    let (masses, velocities) = (simulation.masses(), simulation.velocities());
+    let mean = |range: std::ops::Range<usize>| {
+        let mass: f64 = masses[range.clone()].iter().sum();
+        range.map(|v| masses[v] * velocities[v][0]).sum::<f64>() / mass
+    };
+    let (left, right) = (mean(0..n_left), mean(n_left..masses.len()));
+    assert!(left < right + 1e-3, "{left} {right}");
+}
+
+fn two_blocks(settings: Settings) -> Simulation {
+    let lower = turned_block(0.0, [0.0; 3]);
+    let upper = turned_block(0.5, [0.2, 1.2, 0.1]).moving([0.0, -3.0, 0.0]);
+    let settings = Settings {
+        ground: Some(FLOOR),
+        ..settings
+    };
+    Simulation::new(&[lower, upper], settings).unwrap()
+}
+
+/// Heights of the centroids of two solids of equal size.
+fn heights(simulation: &Simulation) -> [f64; 2] {
+    let positions = simulation.positions();
+    let n = positions.len() / 2;
+    [&positions[..n], &positions[n..]].map(|p| p.iter().map(|p| p[1]).sum::<f64>() / n as f64)
+}
+
+#[test]
+fn blocks_that_are_dropped_do_not_pass_through_each_other() {
+    let mut simulation = two_blocks(still());
+    let mut detector = cpu();
+    let mut deepest = f64::INFINITY;
+    let mut last = None;
+    for _ in 0..400 {
+        let report = simulation.step(&mut detector).unwrap();
+        assert!(report.residual <= simulation.settings().tolerance);
+        let [lower, upper] = heights(&simulation);
+        assert!(lower > 0.3, "{lower}");
+        deepest = deepest.min(upper - lower);
+        last = Some(report);
+    }
+    // One at rest on the other: about a metre apart, in contact, nothing through the floor.
+    assert!(deepest > 0.6, "{deepest}");
+    let [lower, upper] = heights(&simulation);
+    assert!(
+        (0.3..0.55).contains(&lower) && (0.8..1.05).contains(&(upper - lower)),
+        "{lower} {upper}"
+    );
+    let report = last.unwrap();
+    assert!(report.n_contacts > 20 && report.n_contacts <= report.n_pairs);
+    assert_eq!(report.n_colliding.len(), 2);
+    assert!(report.n_colliding.iter().all(|n| *n > 5));
+    let lowest = simulation
+        .positions()
+        .iter()
+        .fold(f64::INFINITY, |m, p| m.min(p[1]));
+    assert!((-0.05..0.0).contains(&lowest), "{lowest}");
+    let speed = simulation.energy().kinetic;
+    assert!(speed < 5.0, "at rest: {speed} J");
+}
+
+#[test]
+fn without_contact_they_would_pass() {
+    // The same fall with pairs that say nothing: shows that the test above can fail.
+    let mut simulation = two_blocks(still());
+    let mut detector = cpu();
+    let mut apart = Simulation::new(
+        &[
+            turned_block(0.0, [0.0; 3]),
+            turned_block(0.0, [9.0, 9.0, 9.0]),
+        ],
+        still(),
+    )
+    .unwrap();
+    apart.step(&mut detector).unwrap();
+    let nothing = apart.detect(&mut detector, &Control::new()).unwrap();
+    assert!(nothing.is_empty());
+    for _ in 0..150 {
+        simulation.advance(nothing).unwrap();
+    }
+    let [lower, upper] = heights(&simulation);
+    assert!((upper - lower).abs() < 0.2, "{lower} {upper}");
+}
+
+#[test]
+fn friction_holds_on_a_slope_and_without_it_slides() {
+    let slide = |friction: f64| {
+        // Gravity leans by 0.2 rad: a slope of tan 0.2 = 0.2027.
+        let settings = Settings {
+            gravity: [9.81 * 0.2f64.sin(), -9.81 * 0.2f64.cos(), 0.0],
+            ground: Some(FLOOR),
+            friction,
+            ..still()
+        };
+        let mut simulation = Simulation::new(&[turned_block(0.0, [0.0; 3])], settings).unwrap();
+        for _ in 0..200 {
+            simulation.step(&mut cpu()).unwrap();
+        }
+        let n = simulation.masses().len() as f64;
+        simulation.positions().iter().map(|p| p[0]).sum::<f64>() / n
+    };
+    // A second of free sliding: g sin 0.2 / 2; with friction of 0.1, g (sin 0.2 - 0.1 cos 0.2) / 2.
+    assert!((slide(0.0) - 0.974).abs() < 0.08, "{}", slide(0.0));
+    assert!((slide(0.1) - 0.494).abs() < 0.08, "{}", slide(0.1));
+    assert!(slide(0.5) < 0.1, "{}", slide(0.5));
+}
+
+#[test]
+fn a_body_pushes_itself_where_asked_to() {
+    // A strip bent into a ring whose ends run into each other.
+    let ring = |self_contact| {
+        let strip = block(24, 2, 2, 0.1, MATERIAL).posed(|[x, y, z]| {
+            let angle = x / 2.4 * 2.05 * std::f64::consts::PI;
+            let radius = 0.45 - (y - 0.1);
+            [radius * angle.sin(), -radius * angle.cos(), z]
+        });
+        let settings = Settings {
+            self_contact,
+            ..no_gravity()
+        };
+        let mut simulation = Simulation::new(&[strip], settings).unwrap();
+        simulation.step(&mut cpu()).unwrap()
+    };
+    let report = ring(true);
+    assert!(report.n_pairs > 10 && report.n_contacts > 0, "{report:?}");
+    assert_eq!(ring(false).n_pairs, 0);
+}
+
+/// State after 60 steps of the falling blocks.
+fn blocks_state(threads: usize, method: Method) -> State {
+    let scene = drop_scene(SceneName::Blocks).unwrap();
+    let settings = Settings {
+        threads,
+        ..scene.settings
+    };
+    let mut simulation = Simulation::new(&scene.solids, settings).unwrap();
+    let mut detector = Detector::with_settings(impinge::Settings {
+        method,
+        threads,
+        ..impinge::Settings::default()
+    })
+    .unwrap();
+    let mut n_contacts = 0;
+    for _ in 0..60 {
+        n_contacts += simulation.step(&mut detector).unwrap().n_contacts;
+    }
+    assert!(n_contacts > 1_000, "{n_contacts}");
+    simulation.state()
+}
+
+#[test]
+fn threads_and_methods_do_not_change_a_bit() {
+    let expected = blocks_state(1, Method::Clusters).to_bytes();
+    for (threads, method) in [
+        (2, Method::Cells),
+        (3, Method::Clusters),
+        (8, Method::Clusters),
+    ] {
+        assert!(
+            blocks_state(threads, method).to_bytes() == expected,
+            "{threads} threads, {method:?}"
+        );
+    }
+}
+
+#[test]
+fn going_on_from_a_saved_state_is_going_on() {
+    let scene = drop_scene(SceneName::Blocks).unwrap();
+    let settings = Settings {
+        threads: 1,
+        ..scene.settings.clone()
+    };
+    let mut whole = Simulation::new(&scene.solids, settings.clone()).unwrap();
+    let mut detector = cpu();
+    let mut saved = None;
+    for step in 0..60 {
+        if step == 35 {
+            saved = Some(whole.state().to_bytes());
+        }
+        whole.step(&mut detector).unwrap();
+    }
+    let saved = State::from_bytes(&saved.unwrap()).unwrap();
+    assert_eq!(saved.step(), 35);
+    let mut resumed = Simulation::new(&scene.solids, settings.clone()).unwrap();
+    resumed.restore(&saved).unwrap();
+    let mut detector = cpu();
+    while resumed.n_steps() < 60 {
+        resumed.step(&mut detector).unwrap();
+    }
+    assert!(resumed.state() == whole.state());
+    // Another scene's state is refused, and so is one of other settings.
+    let other = Settings {
+        friction: 0.31,
+        ..settings
+    };
+    let mut other = Simulation::new(&scene.solids, other).unwrap();
+    let before = other.state();
+    assert!(matches!(other.restore(&saved), Err(Error::State(_))));
+    assert!(other.state() == before);
+}
+
+#[test]
+fn pairs_of_another_scene_are_refused() {
+    let mut simulation = Simulation::new(&[turned_block(0.0, [0.0; 3])], still()).unwrap();
+    let other = Simulation::new(
+        &[turned_block(0.0, [0.0; 3]), turned_block(0.5, [0.0; 3])],
+        still(),
+    )
+    .unwrap();
+    let mut detector = cpu();
+    let pairs = other.detect(&mut detector, &Control::new()).unwrap();
+    let before = simulation.state();
+    assert!(matches!(
+        simulation.advance(pairs),
+        Err(Error::ForeignPair { .. })
+    ));
+    assert!(simulation.state() == before);
+}
