@@ -1,0 +1,198 @@
+//! Real meshes against answers that were not made by this project: pair lists of CGAL's exact kernel,
+//! published self-intersections, the oracle on frames of a sequence. Skipped, and said so, where the
+//! data folder (`../shared/data` or `$IMPINGE_DATA`) is absent.
+
+mod common;
+
+use std::path::PathBuf;
+
+use common::{Case, agree, naive, rows};
+use impinge::{Backend, BodyId, Detector, Method, Query, Scene, Settings, SharedVertex, hash_rows};
+use impinge_io::{Mesh, ReadOptions, Sequence};
+
+fn file(path: &str) -> Option<PathBuf> {
+    let found = impinge_scenes::data::data_file(path);
+    if found.is_none() {
+        eprintln!("skipped: {path} is not there (set IMPINGE_DATA)");
+    }
+    found
+}
+
+fn detector(method: Method) -> Detector {
+    Detector::with_settings(Settings {
+        method,
+        backend: Backend::Cpu,
+        threads: 2,
+        ..Settings::default()
+    })
+    .unwrap()
+}
+
+fn read(path: &str, weld: bool) -> Option<Mesh> {
+    let options = ReadOptions {
+        weld,
+        ..ReadOptions::default()
+    };
+    file(path).map(|path| impinge_io::read(&path, &options).unwrap())
+}
+
+fn positions_f32(positions: &impinge_io::Positions) -> Vec<[f32; 3]> {
+    match positions {
+        impinge_io::Positions::F32(positions) => positions.clone(),
+        impinge_io::Positions::F64(_) => panic!("single precision expected"),
+    }
+}
+
+fn add(scene: &mut Scene, mesh: &Mesh) -> BodyId {
+    let elements: impinge::Elements = match &mesh.elements {
+        impinge_io::Elements::Triangles(faces) => faces.clone().into(),
+        impinge_io::Elements::Tetrahedra(tets) => tets.clone().into(),
+    };
+    match &mesh.positions {
+        impinge_io::Positions::F32(positions) => scene.add(elements, positions.clone()),
+        impinge_io::Positions::F64(positions) => scene.add(elements, positions.clone()),
+    }
+    .unwrap()
+}
+
+/// The 32-bit or 64-bit integers of an `(n, 2)` array in NumPy's format.
+fn read_npy_pairs(path: &PathBuf) -> Vec<[u32; 4]> {
+    let bytes = std::fs::read(path).unwrap();
+    let header_len = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let header = std::str::from_utf8(&bytes[10..10 + header_len]).unwrap();
+    let data = &bytes[10 + header_len..];
+    let numbers: Vec<u32> = if header.contains("i8") || header.contains("u8") {
+        data.chunks_exact(8)
+            .map(|word| u64::from_le_bytes(word.try_into().unwrap()) as u32)
+            .collect()
+    } else {
+        assert!(header.contains("i4") || header.contains("u4"), "{header}");
+        data.chunks_exact(4)
+            .map(|word| u32::from_le_bytes(word.try_into().unwrap()))
+            .collect()
+    };
+    numbers
+        .chunks_exact(2)
+        .map(|pair| [0, pair[0], 1, pair[1]])
+        .collect()
+}
+
+#[test]
+fn two_bodies_meet_as_the_exact_kernel_says() {
+    let Some(answers) = file("expected/two_body.json") else {
+        return;
+    };
+    let answers: serde_json::Value =
+        serde_json::from_reader(std::fs::File::open(answers).unwrap()).unwrap();
+    for (name, answer) in answers.as_object().unwrap() {
+        let offset: Vec<f32> = answer["offset_f32"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|x| x.as_f64().unwrap() as f32)
+            .collect();
+        let Some(mesh) = read(answer["mesh"].as_str().unwrap(), false) else {
+            return;
+        };
+        let Some(list) = file(answer["file"].as_str().unwrap()) else {
+            return;
+        };
+        let expected = read_npy_pairs(&list);
+        assert_eq!(expected.len() as u64, answer["pairs"].as_u64().unwrap());
+        let moved: Vec<[f32; 3]> = positions_f32(&mesh.positions)
+            .iter()
+            .map(|p| std::array::from_fn(|axis| p[axis] + offset[axis]))
+            .collect();
+        let mut scene = Scene::new();
+        let a = add(&mut scene, &mesh);
+        let elements = scene.body(a).unwrap().elements().clone();
+        let b = scene.add(elements, moved).unwrap();
+        for method in [Method::Clusters, Method::Cells] {
+            let mut detector = detector(method);
+            let pairs = detector.detect(&scene, &Query::between(a, b)).unwrap();
+            assert_eq!(pairs.hash(), hash_rows(expected.iter().copied()), "{name}");
+            agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+            for (body, count) in [(a, "colliding_triangles_a"), (b, "colliding_triangles_b")] {
+                assert_eq!(
+                    pairs.colliding(body).len() as u64,
+                    answer[count].as_u64().unwrap()
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn welded_meshes_intersect_themselves_as_published() {
+    for (path, skip, resolve) in [("meshes/cow.off", 73, 83), ("meshes/camelhead.off", 3, 5)] {
+        let Some(mesh) = read(path, true) else { return };
+        let mut scene = Scene::new();
+        let body = add(&mut scene, &mesh);
+        for (rule, expected) in [(SharedVertex::Skip, skip), (SharedVertex::Resolve, resolve)] {
+            for method in [Method::Clusters, Method::Cells] {
+                let mut detector = detector(method);
+                let query = Query::within(body).shared_vertex(rule);
+                let pairs = detector.detect(&scene, &query).unwrap();
+                assert_eq!(pairs.len(), expected, "{path} {method:?} {rule:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_dancer_is_answered_as_the_oracle_says() {
+    let (Some(mesh), Some(frames)) = (
+        read("sequences/rumba.ply", false),
+        file("sequences/rumba.pc2"),
+    ) else {
+        return;
+    };
+    let sequence = Sequence::open(&frames).unwrap();
+    let mut scene = Scene::new();
+    let body = add(&mut scene, &mesh);
+    let (mut clusters, mut cells) = (detector(Method::Clusters), detector(Method::Cells));
+    for frame in [0, 60, 120] {
+        let positions = positions_f32(&sequence.frame(frame).unwrap());
+        scene.set_positions(body, &positions).unwrap();
+        let case = Case {
+            name: format!("rumba {frame}"),
+            scene: scene.clone(),
+            query: Query::within(body),
+        };
+        let expected = naive(&case);
+        for detector in [&mut clusters, &mut cells] {
+            let pairs = detector.detect(&scene, &case.query).unwrap();
+            agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+        }
+    }
+}
+
+#[test]
+fn tetrahedra_of_real_solids_are_answered_as_the_oracle_says() {
+    let Some(mesh) = read("tets/bunny_7k.msh", false) else {
+        return;
+    };
+    let mut scene = Scene::new();
+    let a = add(&mut scene, &mesh);
+    let b = add(&mut scene, &mesh);
+    let shift = |x: f64| x + 0.0625;
+    match scene.body(b).unwrap().positions().clone() {
+        impinge::Positions::F64(positions) => {
+            let moved: Vec<_> = positions.iter().map(|p| p.map(shift)).collect();
+            scene.set_positions(b, &moved).unwrap();
+        }
+        impinge::Positions::F32(_) => panic!("text is read in double precision"),
+    }
+    let case = Case {
+        name: "bunny 7k".into(),
+        scene,
+        query: Query::between(a, b),
+    };
+    let expected = naive(&case);
+    assert!(expected.len() > 1000);
+    for method in [Method::Clusters, Method::Cells] {
+        let mut detector = detector(method);
+        let pairs = detector.detect(&case.scene, &case.query).unwrap();
+        agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+    }
+}
