@@ -178,7 +178,7 @@ fn tets(options: &Options, report: &mut Report) -> Result<(), Failure> {
 }
 
 /// The models of a built scene, to be posed anew.
-fn models(built: BuiltScene) -> Result<Vec<Model>, Failure> {
+pub fn models(built: BuiltScene) -> Result<Vec<Model>, Failure> {
     built
         .bodies
         .iter()

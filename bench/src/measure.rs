@@ -1,5 +1,7 @@
 //! Frames of all contestants, interleaved, so that each meets the same weather.
 
+use std::time::Duration;
+
 use serde_json::json;
 
 use crate::Failure;
@@ -8,6 +10,9 @@ use crate::runner::Runner;
 
 /// Frames that are run before the clock counts, of either pose half of them.
 const N_WARM: usize = 4;
+
+/// Between one contestant's frame and the next one's.
+const PAUSE: Duration = Duration::from_millis(1);
 
 /// One contestant's figures on one problem.
 #[derive(Debug, Clone)]
@@ -92,6 +97,8 @@ pub fn run(
     for frame in 0..N_WARM + n_frames.max(1) {
         let pose = frame % 2;
         for (ix, runner) in runners.iter_mut().enumerate() {
+            // Idle workers of the contestant before spin for a while: let them fall asleep.
+            std::thread::sleep(PAUSE);
             runner.load(problem, pose)?;
             let answer = runner.frame(frame < N_WARM)?;
             if frame == 0 {
@@ -110,6 +117,7 @@ pub fn run(
                 .into());
             }
             let Some(hash) = answer.hash else { continue };
+            // Later frames are held against these by their number.
             if let Some(expected) = problem.expected.filter(|&n| n != answer.n_pairs) {
                 return Err(format!(
                     "{}: {name} found {} pairs, {expected} are right",
@@ -155,4 +163,134 @@ pub fn run(
         n_frames: n_frames.max(1),
         rows,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ours::{Feed, Ours};
+    use crate::problem::Ask;
+    use crate::runner::Answer;
+    use impinge::{Backend, Method, Settings};
+    use impinge_scenes::{Model, adversarial, solids, surfaces};
+
+    fn ours(problem: &Problem, method: Method, feed: Feed) -> Box<dyn Runner> {
+        let settings = Settings {
+            method,
+            backend: Backend::Cpu,
+            ..Settings::default()
+        };
+        Box::new(Ours::new(problem, settings, feed).expect("a valid problem"))
+    }
+
+    /// Problems of all kinds, small enough for the oracle, in general position.
+    fn problems() -> Vec<Problem> {
+        let pair = |model: Model, offset| {
+            let moved = model.translated(offset);
+            vec![model, moved]
+        };
+        let balls = pair(surfaces::ball(2_000), [0.7, 0.01, 0.02]);
+        let solids = pair(solids::solid_ball(1_000), [0.6, 0.011, 0.017]);
+        let cubes = crate::commands::models(adversarial::boxes(100, 1).expect("valid"));
+        // A wave that moves vertices along its own travel folds the knot into itself.
+        let fold = impinge_scenes::deform::Wave {
+            amplitude: 0.1,
+            displacement: [0.8, 0.6, 0.0],
+            ..Default::default()
+        };
+        let knot = vec![surfaces::stand_in(2_000)];
+        vec![
+            Problem::mirrored("balls", balls, Ask::Between),
+            Problem::mirrored("solids", solids, Ask::Between),
+            Problem::mirrored("cubes", cubes.expect("valid"), Ask::All),
+            Problem::moving("knot", knot, Ask::Within, &fold, [1.0, 1.1]),
+        ]
+    }
+
+    #[test]
+    fn all_contestants_find_the_pairs_of_the_oracle() {
+        for problem in problems() {
+            let mut runners = vec![
+                ours(&problem, Method::Naive, Feed::InPlace),
+                ours(&problem, Method::Clusters, Feed::InPlace),
+                ours(&problem, Method::Clusters, Feed::Copied),
+                ours(&problem, Method::Cells, Feed::InPlace),
+            ];
+            #[cfg(feature = "embree")]
+            runners.push(crate::embree::tuned(&problem, None).expect("Embree runs").0);
+            #[cfg(feature = "parry")]
+            runners.push(crate::parry::tuned(&problem, None).expect("parry runs").0);
+            // The library holds its own methods against each other; peers are compared here.
+            let table = run(&problem, std::mem::take(&mut runners), 2).expect("they agree");
+            let oracle = &table.rows[0];
+            assert!(oracle.n_pairs > 50, "{}: {}", problem.name, oracle.n_pairs);
+            for row in &table.rows {
+                assert_eq!(
+                    row.n_pairs, oracle.n_pairs,
+                    "{}: {}",
+                    problem.name, row.name
+                );
+            }
+        }
+    }
+
+    /// A contestant that answers well and then changes its answer.
+    struct Liar {
+        honest: Box<dyn Runner>,
+        change: fn(&mut Answer),
+    }
+
+    impl Runner for Liar {
+        fn name(&self) -> String {
+            "liar".to_owned()
+        }
+        fn setting(&self) -> String {
+            String::new()
+        }
+        fn load(&mut self, problem: &Problem, pose: usize) -> Result<(), Failure> {
+            self.honest.load(problem, pose)
+        }
+        fn frame(&mut self, verify: bool) -> Result<Answer, Failure> {
+            let mut answer = self.honest.frame(verify)?;
+            (self.change)(&mut answer);
+            Ok(answer)
+        }
+    }
+
+    #[test]
+    fn lies_are_caught() {
+        let problem = problems().swap_remove(0);
+        let table = run(
+            &problem,
+            vec![ours(&problem, Method::Naive, Feed::InPlace)],
+            1,
+        );
+        let n_pairs = table.expect("the oracle answers").rows[0].n_pairs;
+        let problem = problem.expecting(Some(n_pairs));
+        let contest = |change: fn(&mut Answer)| {
+            let liar = Liar {
+                honest: ours(&problem, Method::Clusters, Feed::InPlace),
+                change,
+            };
+            let honest = ours(&problem, Method::Clusters, Feed::InPlace);
+            run(&problem, vec![honest, Box::new(liar)], 2).map(|_| ())
+        };
+        assert!(contest(|_| {}).is_ok());
+        let drops = contest(|answer| answer.n_pairs -= 1).map_err(|error| error.to_string());
+        assert!(drops.is_err_and(|error| error.contains("are right")));
+        let swaps = contest(|answer| answer.hash = answer.hash.map(|hash| hash ^ 1));
+        assert!(swaps.is_err_and(|error| error.to_string().contains("differ in their pairs")));
+    }
+
+    #[test]
+    fn a_wrong_number_is_caught_in_timed_frames_too() {
+        let problem = problems().swap_remove(0);
+        // In warm frames the hash is there and the lie is held back.
+        let liar = Liar {
+            honest: ours(&problem, Method::Clusters, Feed::InPlace),
+            change: |answer| answer.n_pairs += u64::from(answer.hash.is_none()),
+        };
+        let outcome = run(&problem, vec![Box::new(liar)], 2).map(|_| ());
+        assert!(outcome.is_err_and(|error| error.to_string().contains("in the same pose before")));
+    }
 }
