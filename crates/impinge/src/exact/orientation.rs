@@ -86,6 +86,9 @@ pub(super) fn strictly_on_one_side(signs: &[Sign]) -> bool {
 #[inline]
 #[must_use]
 pub fn orient2d(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Sign {
+    if a == b || b == c || c == a {
+        return Sign::Zero;
+    }
     let coord = |p: [f64; 2]| Coord { x: p[0], y: p[1] };
     Sign::of(robust::orient2d(coord(a), coord(b), coord(c)))
 }
@@ -138,9 +141,15 @@ pub fn orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
 }
 
 /// The stages of growing precision behind [`orient3d`], out of line because they are rare.
+///
+/// Two points that coincide are the usual reason to come here (meshes whose vertices are not
+/// welded), and would need the last stage.
 #[cold]
 #[inline(never)]
 fn orient3d_adaptive(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
+    if a == b || a == c || a == d || b == c || b == d || c == d {
+        return Sign::Zero;
+    }
     let coord = |p: &Point| Coord3D {
         x: p[0],
         y: p[1],

@@ -43,7 +43,45 @@ pub fn triangles_intersect_beyond_shared(
     b: &[Point; 3],
     ids_b: [u32; 3],
 ) -> bool {
-    Parts::new(a, ids_a, b, ids_b).meet_beyond_shared()
+    neighbours_answer(a, ids_a, b, ids_b)
+        .unwrap_or_else(|| Parts::new(a, ids_a, b, ids_b).meet_beyond_shared())
+}
+
+/// The filter's answer for triangles with three different ids each; none when unsure.
+#[inline]
+fn neighbours_answer(
+    a: &[Point; 3],
+    ids_a: [u32; 3],
+    b: &[Point; 3],
+    ids_b: [u32; 3],
+) -> Option<bool> {
+    let differ = |[p, q, r]: [u32; 3]| p != q && q != r && r != p;
+    if !differ(ids_a) || !differ(ids_b) {
+        return None;
+    }
+    let is_shared_a = ids_a.map(|id| ids_b.contains(&id));
+    let is_shared_b = ids_b.map(|id| ids_a.contains(&id));
+    let first = |flags: [bool; 3], sought: bool| flags.iter().position(|&flag| flag == sought);
+    // The vertices after a given one, in the triangle's turn.
+    let next = |vertex: usize| [(vertex + 1) % 3, (vertex + 2) % 3];
+    match is_shared_a.iter().filter(|&&shared| shared).count() {
+        1 => {
+            let (i, j) = (first(is_shared_a, true)?, first(is_shared_b, true)?);
+            let others_a = next(i).map(|vertex| &a[vertex]);
+            let others_b = next(j).map(|vertex| &b[vertex]);
+            match shared_vertex(&a[i], others_a, others_b) {
+                (true, _) => Some(true),
+                (_, true) => Some(false),
+                _ => None,
+            }
+        }
+        2 => {
+            let (i, j) = (first(is_shared_a, false)?, first(is_shared_b, false)?);
+            let [u, v] = next(i).map(|vertex| &a[vertex]);
+            shared_edge(u, v, &a[i], &b[j]).then_some(false)
+        }
+        _ => None,
+    }
 }
 
 /// Whether two tetrahedra of one body meet beyond the vertices that they share.
@@ -217,15 +255,10 @@ fn padded<const N: usize>(points: &[Point]) -> [Point; N] {
 /// is not in conv(a) and not in conv(b), each ends in its face opposite v: so it must be that
 /// one of these two faces meets the other primitive, and, as v is in neither, that is enough.
 fn beyond_vertex(v: &Point, a: Points, b: Points) -> bool {
-    if let ([a0, a1], [b0, b1]) = (a.as_slice(), b.as_slice()) {
-        match shared_vertex(v, [a0, a1], [b0, b1]) {
-            (true, _) => return true,
-            (_, true) => return false,
-            _ => {}
-        }
-        if let Some(answer) = beyond_vertex_in_plane(v, [a0, a1], [b0, b1]) {
-            return answer;
-        }
+    if let ([a0, a1], [b0, b1]) = (a.as_slice(), b.as_slice())
+        && let Some(answer) = beyond_vertex_in_plane(v, [a0, a1], [b0, b1])
+    {
+        return answer;
     }
     if parted_by_face(v, a.as_slice(), b.as_slice())
         || parted_by_face(v, b.as_slice(), a.as_slice())
@@ -288,11 +321,6 @@ fn parts_around(a: Points) -> impl Iterator<Item = Points> {
 /// Whether conv(u, v, a) and conv(u, v, b) are more than the segment uv in common, with one or
 /// two points in each of `a` and `b`.
 fn beyond_edge(u: &Point, v: &Point, a: &[Point], b: &[Point]) -> bool {
-    if let ([p], [q]) = (a, b)
-        && shared_edge(u, v, p, q)
-    {
-        return false;
-    }
     if same(u, v) {
         return beyond_vertex(u, Points::from_slice(a), Points::from_slice(b));
     }

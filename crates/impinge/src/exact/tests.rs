@@ -119,16 +119,23 @@ impl Random {
 
     /// Points of which many determinants are zero, or nearly so.
     fn troublesome<const N: usize>(&mut self) -> [Point; N] {
-        let kind = self.bits() % 4;
+        let kind = self.bits() % 6;
         let far = [0.0, 1e6, 1e30][(self.bits() % 3) as usize];
+        // A lattice of one plane in no special position; in `f32` nearly so.
+        let n_bits = [20, 50][(self.bits() % 2) as usize];
+        let axes = [(); 2].map(|()| [(); 3].map(|()| (self.bits() >> (64 - n_bits)) as f64));
         [(); N].map(|()| {
-            [(); 3].map(|()| {
+            let steps = [(); 2].map(|()| (self.bits() % 4) as f64);
+            std::array::from_fn(|axis| {
                 let bits = self.bits();
                 let x = (bits % 3) as f64;
+                let ulps = ((bits >> 32) % 3) as f64;
                 match kind {
                     0 => x,
-                    1 => x * 0.1 + f64::EPSILON * ((bits >> 32) % 3) as f64,
-                    2 => x + far * ((bits >> 16) % 2) as f64,
+                    1 => x * 0.1 + f64::EPSILON * ulps,
+                    2 => x * 0.1 + f64::from(f32::EPSILON) / 16.0 * ulps,
+                    3 => x + far * ((bits >> 16) % 2) as f64,
+                    4 => steps[0] * axes[0][axis] + steps[1] * axes[1][axis],
                     _ => loop {
                         let any = f32::from_bits(self.bits() as u32);
                         if any.is_finite() {

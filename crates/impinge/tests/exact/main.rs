@@ -17,7 +17,7 @@ use impinge::exact::{
 /// How many cases of each kind a test takes; big integers make the wide kinds slower.
 fn n_cases(kind: Kind, n: usize) -> usize {
     match kind {
-        Kind::Lattice(_) => 4 * n,
+        Kind::Lattice(_) => 6 * n,
         _ => n,
     }
 }
@@ -65,7 +65,7 @@ fn triangle_pairs_agree_with_the_oracle() {
     let mut random = Random::new(1);
     for kind in Kind::ALL {
         let mut seen = Seen::default();
-        for _ in 0..n_cases(kind, 1000) {
+        for _ in 0..n_cases(kind, 600) {
             let (a, b) = cut::<3, 3>(&kind.points::<6>(&mut random));
             let expected = oracle::intersect(&a, &b);
             seen.count(expected);
@@ -97,7 +97,7 @@ fn tetrahedron_pairs_agree_with_the_oracle() {
     let mut random = Random::new(2);
     for kind in Kind::ALL {
         let mut seen = Seen::default();
-        for _ in 0..n_cases(kind, 150) {
+        for _ in 0..n_cases(kind, 100) {
             let (a, b) = cut::<4, 4>(&kind.points::<8>(&mut random));
             let expected = oracle::intersect(&a, &b);
             seen.count(expected);
@@ -127,7 +127,7 @@ fn mixed_pairs_agree_with_the_oracle() {
     let mut random = Random::new(3);
     for kind in Kind::ALL {
         let mut seen = Seen::default();
-        for _ in 0..n_cases(kind, 250) {
+        for _ in 0..n_cases(kind, 150) {
             let (t, k) = cut::<3, 4>(&kind.points::<7>(&mut random));
             let expected = oracle::intersect(&t, &k);
             seen.count(expected);
@@ -209,7 +209,7 @@ fn neighbouring_triangles_agree_with_the_oracle() {
     let mut random = Random::new(5);
     for kind in Kind::ALL {
         let mut seen = Seen::default();
-        for _ in 0..n_cases(kind, 800) {
+        for _ in 0..n_cases(kind, 500) {
             let (a, ids_a, b, ids_b) = shared_case::<3, 3>(&mut random, kind);
             let expected = oracle::intersect_beyond_shared(&a, &ids_a, &b, &ids_b);
             seen.count(expected);
@@ -236,7 +236,7 @@ fn neighbouring_tetrahedra_agree_with_the_oracle() {
     let mut random = Random::new(6);
     for kind in Kind::ALL {
         let mut seen = Seen::default();
-        for _ in 0..n_cases(kind, 250) {
+        for _ in 0..n_cases(kind, 150) {
             let (a, ids_a, b, ids_b) = shared_case::<4, 4>(&mut random, kind);
             let expected = oracle::intersect_beyond_shared(&a, &ids_a, &b, &ids_b);
             seen.count(expected);

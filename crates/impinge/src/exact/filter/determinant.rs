@@ -2,7 +2,7 @@
 
 use super::number::Number;
 
-/// 64 unit roundoffs, 2^-47. The derivation needs a little more than 48.
+/// 64 unit roundoffs, 2^-47. The derivation needs a little more than 60.
 pub(super) const DETERMINANT_BOUND: f64 = f64::from_bits((1023 - 47) << 52);
 
 /// The computed value of a determinant (d x e) . f of three differences of input points, with
