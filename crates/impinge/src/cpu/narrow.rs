@@ -2,16 +2,17 @@
 //!
 //! In: candidates. Out: keys of pairs that intersect. Triangle pairs go through two floating-point
 //! filters, eight pairs at a time (`exact::filter`, bounds derived in `docs/exactness.md`): most are
-//! thrown out because one triangle lies on one side of the other's plane; the rest is classified; what
-//! the filters leave open goes to exact arithmetic. Other kinds go there at once; that code filters too.
+//! thrown out because one triangle lies on one side of the other's plane; the rest is classified.
+//! Tetrahedron pairs are classified by their faces. What the filters leave open goes to exact arithmetic,
+//! and so do pairs of a triangle and a tetrahedron; that code filters too.
 
 use std::time::{Duration, Instant};
 
-use crate::exact::filter::{self, LANES, TrianglePairs8};
+use crate::exact::filter::{self, LANES, TetrahedronPairs8, TrianglePairs8, Verdict};
 use crate::frame::pair_key;
 use crate::grouping::GROUP;
 use crate::narrow::{intersect, intersect_shared};
-use crate::scene::{Kind, Positions};
+use crate::scene::{Elements, Positions};
 
 use super::simd::Simd;
 use super::world::{BodyRef, World};
@@ -98,36 +99,81 @@ impl Settler {
         self.busy += start.elapsed();
     }
 
-    /// Moves what the planes do not separate to the survivors; kinds other than triangles are
-    /// settled on the way.
+    /// Triangle pairs that the planes do not separate go on to the survivors; tetrahedron pairs are
+    /// classified, and other kinds settled, on the way.
     #[inline(always)]
     fn reject<S: Simd>(&mut self, _: S, world: World<'_>) {
         let mut lookup = Lookup::new(world);
-        let mut batch = TrianglePairs8::default();
+        let mut triangles = TrianglePairs8::default();
+        let mut tetrahedra = TetrahedronPairs8::default();
         let mut filled = [Candidate::NONE; LANES];
-        let mut n_filled = 0;
+        let mut filled_tetrahedra = [Candidate::NONE; LANES];
+        let (mut n_filled, mut n_filled_tetrahedra) = (0, 0);
         let candidates = std::mem::take(&mut self.candidates);
         for &candidate in &candidates {
             lookup.go_to(candidate);
             let (a, b) = (&lookup.a, &lookup.b);
-            let kinds = (a.participant.kind, b.participant.kind);
-            if kinds != (Kind::Triangles, Kind::Triangles) {
-                self.settle_exactly(a, b, candidate);
-                continue;
-            }
-            fill(&mut batch, n_filled, a, b, candidate);
-            filled[n_filled] = candidate;
-            n_filled += 1;
-            if n_filled == LANES {
-                self.keep(&filled, !filter::reject_by_planes::<S::F64x8>(&batch));
-                n_filled = 0;
+            let (place_a, place_b) = (candidate.place_a, candidate.place_b);
+            match (a.elements, b.elements) {
+                (Elements::Triangles(faces_a), Elements::Triangles(faces_b)) => {
+                    let lane = n_filled;
+                    fill(
+                        &mut triangles.a,
+                        lane,
+                        a.positions,
+                        &faces_a[place_a as usize],
+                    );
+                    fill(
+                        &mut triangles.b,
+                        lane,
+                        b.positions,
+                        &faces_b[place_b as usize],
+                    );
+                    filled[lane] = candidate;
+                    n_filled += 1;
+                    if n_filled == LANES {
+                        self.keep(&filled, !filter::reject_by_planes::<S::F64x8>(&triangles));
+                        n_filled = 0;
+                    }
+                }
+                (Elements::Tetrahedra(tets_a), Elements::Tetrahedra(tets_b)) => {
+                    let lane = n_filled_tetrahedra;
+                    fill(
+                        &mut tetrahedra.a,
+                        lane,
+                        a.positions,
+                        &tets_a[place_a as usize],
+                    );
+                    fill(
+                        &mut tetrahedra.b,
+                        lane,
+                        b.positions,
+                        &tets_b[place_b as usize],
+                    );
+                    filled_tetrahedra[lane] = candidate;
+                    n_filled_tetrahedra += 1;
+                    if n_filled_tetrahedra == LANES {
+                        let verdict = filter::classify_by_faces::<S::F64x8>(&tetrahedra);
+                        self.take(&mut lookup, &filled_tetrahedra, verdict);
+                        n_filled_tetrahedra = 0;
+                    }
+                }
+                _ => self.settle_exactly(a, b, candidate),
             }
         }
         if n_filled > 0 {
             let used = !(u8::MAX << n_filled);
             self.keep(
                 &filled,
-                !filter::reject_by_planes::<S::F64x8>(&batch) & used,
+                !filter::reject_by_planes::<S::F64x8>(&triangles) & used,
+            );
+        }
+        if n_filled_tetrahedra > 0 {
+            let verdict = filter::classify_by_faces::<S::F64x8>(&tetrahedra);
+            self.take(
+                &mut lookup,
+                &filled_tetrahedra[..n_filled_tetrahedra],
+                verdict,
             );
         }
         self.candidates = candidates;
@@ -149,27 +195,41 @@ impl Settler {
         for chunk in survivors.chunks(LANES) {
             for (lane, &candidate) in chunk.iter().enumerate() {
                 lookup.go_to(candidate);
-                fill(&mut batch, lane, &lookup.a, &lookup.b, candidate);
+                let (a, b) = (&lookup.a, &lookup.b);
+                let (Elements::Triangles(faces_a), Elements::Triangles(faces_b)) =
+                    (a.elements, b.elements)
+                else {
+                    unreachable!("survivors are triangles");
+                };
+                let (place_a, place_b) = (candidate.place_a, candidate.place_b);
+                fill(&mut batch.a, lane, a.positions, &faces_a[place_a as usize]);
+                fill(&mut batch.b, lane, b.positions, &faces_b[place_b as usize]);
             }
             let verdict = filter::classify::<S::F64x8>(&batch);
-            for (lane, &candidate) in chunk.iter().enumerate() {
-                if verdict.no >> lane & 1 == 1 {
-                    continue;
-                }
-                lookup.go_to(candidate);
-                let (a, b) = (&lookup.a, &lookup.b);
-                if verdict.yes >> lane & 1 == 1 {
-                    self.keys.push(pair_key(
-                        a.global(candidate.place_a),
-                        b.global(candidate.place_b),
-                    ));
-                } else {
-                    self.n_unsure += 1;
-                    self.settle_exactly(a, b, candidate);
-                }
-            }
+            self.take(&mut lookup, chunk, verdict);
         }
         self.survivors = survivors;
+    }
+
+    /// Books the verdict over a batch; settles what it leaves open.
+    #[inline(always)]
+    fn take(&mut self, lookup: &mut Lookup<'_>, candidates: &[Candidate], verdict: Verdict) {
+        for (lane, &candidate) in candidates.iter().enumerate() {
+            if verdict.no >> lane & 1 == 1 {
+                continue;
+            }
+            lookup.go_to(candidate);
+            let (a, b) = (&lookup.a, &lookup.b);
+            if verdict.yes >> lane & 1 == 1 {
+                self.keys.push(pair_key(
+                    a.global(candidate.place_a),
+                    b.global(candidate.place_b),
+                ));
+            } else {
+                self.n_unsure += 1;
+                self.settle_exactly(a, b, candidate);
+            }
+        }
     }
 
     #[inline(never)]
@@ -228,35 +288,25 @@ impl<'a> Lookup<'a> {
     }
 }
 
+/// Puts a primitive into a lane of a batch.
 #[inline(always)]
-fn fill(
-    batch: &mut TrianglePairs8,
+fn fill<const N: usize>(
+    side: &mut [[[f64; LANES]; 3]; N],
     lane: usize,
-    a: &BodyRef<'_>,
-    b: &BodyRef<'_>,
-    candidate: Candidate,
+    positions: &Positions,
+    corners: &[u32; N],
 ) {
-    fill_side(&mut batch.a, lane, a, candidate.place_a);
-    fill_side(&mut batch.b, lane, b, candidate.place_b);
-}
-
-#[inline(always)]
-fn fill_side(side: &mut [[[f64; LANES]; 3]; 3], lane: usize, body: &BodyRef<'_>, place: u32) {
-    let crate::Elements::Triangles(faces) = body.elements else {
-        unreachable!("only triangles are batched");
-    };
-    let [p, q, r] = faces[place as usize];
-    // The match is outside: one predictable branch a triangle, not one a vertex.
-    match body.positions {
+    // The match is outside: one predictable branch a primitive, not one a vertex.
+    match positions {
         Positions::F32(positions) => {
-            fill_vertex(&mut side[0], lane, &positions[p as usize]);
-            fill_vertex(&mut side[1], lane, &positions[q as usize]);
-            fill_vertex(&mut side[2], lane, &positions[r as usize]);
+            for k in 0..N {
+                fill_vertex(&mut side[k], lane, &positions[corners[k] as usize]);
+            }
         }
         Positions::F64(positions) => {
-            fill_vertex(&mut side[0], lane, &positions[p as usize]);
-            fill_vertex(&mut side[1], lane, &positions[q as usize]);
-            fill_vertex(&mut side[2], lane, &positions[r as usize]);
+            for k in 0..N {
+                fill_vertex(&mut side[k], lane, &positions[corners[k] as usize]);
+            }
         }
     }
 }

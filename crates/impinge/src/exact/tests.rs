@@ -3,8 +3,8 @@
 
 use super::Point;
 use super::filter::{
-    self, LANES, TrianglePairs8, Triangles8, Verdict, number, shared_edge, shared_vertex,
-    tetrahedra_answer, triangles_answer,
+    self, LANES, TetrahedronPairs8, TrianglePairs8, Triangles8, Verdict, number, shared_edge,
+    shared_vertex, tetrahedra_answer, triangles_answer,
 };
 use super::tetrahedron::tetrahedra_intersect_by_signs;
 use super::triangle::triangles_intersect_by_signs;
@@ -32,11 +32,11 @@ fn lane_of(triangles: &Triangles8, lane: usize) -> [Point; 3] {
 }
 
 /// What every instruction set of this processor says, after it was found to be the same.
-fn on_all<T: PartialEq + std::fmt::Debug>(
-    pairs: &TrianglePairs8,
-    portable: impl Fn(&TrianglePairs8) -> T,
-    #[cfg(target_arch = "x86_64")] avx2: unsafe fn(&TrianglePairs8) -> T,
-    #[cfg(target_arch = "x86_64")] avx512: unsafe fn(&TrianglePairs8) -> T,
+fn on_all<P, T: PartialEq + std::fmt::Debug>(
+    pairs: &P,
+    portable: impl Fn(&P) -> T,
+    #[cfg(target_arch = "x86_64")] avx2: unsafe fn(&P) -> T,
+    #[cfg(target_arch = "x86_64")] avx512: unsafe fn(&P) -> T,
 ) -> T {
     let answer = portable(pairs);
     #[cfg(target_arch = "x86_64")]
@@ -93,6 +93,46 @@ fn reject_by_planes(pairs: &TrianglePairs8) -> u8 {
         #[cfg(target_arch = "x86_64")]
         avx512,
     )
+}
+
+fn classify_by_faces(pairs: &TetrahedronPairs8) -> Verdict {
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn avx2(pairs: &TetrahedronPairs8) -> Verdict {
+        filter::classify_by_faces::<number::Avx2>(pairs)
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    fn avx512(pairs: &TetrahedronPairs8) -> Verdict {
+        filter::classify_by_faces::<number::Avx512>(pairs)
+    }
+    on_all(
+        pairs,
+        filter::classify_by_faces::<number::Portable8>,
+        #[cfg(target_arch = "x86_64")]
+        avx2,
+        #[cfg(target_arch = "x86_64")]
+        avx512,
+    )
+}
+
+/// One pair in every lane of a batch, by faces: the answer of all lanes, none when unsure.
+fn tetrahedra_by_faces(a: &[Point; 4], b: &[Point; 4]) -> Option<bool> {
+    let mut pairs = TetrahedronPairs8::default();
+    for lane in 0..LANES {
+        for vertex in 0..4 {
+            for axis in 0..3 {
+                pairs.a[vertex][axis][lane] = a[vertex][axis];
+                pairs.b[vertex][axis][lane] = b[vertex][axis];
+            }
+        }
+    }
+    match classify_by_faces(&pairs) {
+        Verdict { yes: 0xff, no: 0 } => Some(true),
+        Verdict { yes: 0, no: 0xff } => Some(false),
+        Verdict { yes: 0, no: 0 } => None,
+        verdict => panic!("lanes differ: {verdict:?}"),
+    }
 }
 
 /// Pseudo-random bits: splitmix64.
@@ -304,7 +344,7 @@ fn beyond_vertex_by_signs(a: &[Point; 3], b: &[Point; 3]) -> bool {
 #[test]
 fn filter_settles_random_tetrahedra_and_is_right() {
     let mut random = Random(4);
-    let (mut n_settled, mut n_yes) = (0, 0);
+    let (mut n_settled, mut n_by_faces, mut n_yes) = (0, 0, 0);
     let n = 4000;
     for _ in 0..n {
         let (a, mut b) = (random.plain(), random.plain());
@@ -312,12 +352,19 @@ fn filter_settles_random_tetrahedra_and_is_right() {
         let truth = tetrahedra_intersect_by_signs(&a, &b);
         let answer = tetrahedra_answer(&a, &b);
         n_settled += u32::from(answer.is_some());
+        let by_faces = tetrahedra_by_faces(&a, &b);
+        n_by_faces += u32::from(by_faces.is_some());
+        assert!(by_faces.is_none_or(|answer| answer == truth), "{a:?} {b:?}");
         n_yes += u32::from(truth);
         assert!(answer.is_none_or(|answer| answer == truth), "{a:?} {b:?}");
     }
     assert!(
         n_settled * 1000 > n * 999,
         "only {n_settled} of {n} settled"
+    );
+    assert!(
+        n_by_faces > n / 3,
+        "only {n_by_faces} of {n} settled by faces"
     );
     assert!(n_yes > n / 10 && n_yes < n * 9 / 10, "{n_yes} of {n} meet");
 }
@@ -329,6 +376,9 @@ fn filter_is_never_wrong_on_troublesome_tetrahedra() {
     for _ in 0..20_000 {
         let [a, b, c, d, e, f, g, h] = random.troublesome();
         let (a, b) = ([a, b, c, d], [e, f, g, h]);
+        if let Some(answer) = tetrahedra_by_faces(&a, &b) {
+            assert_eq!(answer, tetrahedra_intersect_by_signs(&a, &b), "{a:?} {b:?}");
+        }
         if let Some(answer) = tetrahedra_answer(&a, &b) {
             assert_eq!(answer, tetrahedra_intersect_by_signs(&a, &b), "{a:?} {b:?}");
             n_settled += 1;

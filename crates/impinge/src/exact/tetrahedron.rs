@@ -3,7 +3,7 @@
 use super::Point;
 use super::filter::tetrahedra_answer;
 use super::orientation::{Sign, orient3d};
-use super::triangle::triangles_intersect;
+use super::triangle::{have_common_point, triangles_intersect};
 
 /// The faces of a tetrahedron as vertex numbers; face k leaves out vertex k, and
 /// `orient3d(face k, vertex k)` has the sign of the tetrahedron for every k.
@@ -38,7 +38,8 @@ fn orientation(k: &[Point; 4]) -> Sign {
 /// ```
 #[must_use]
 pub fn tetrahedra_intersect(a: &[Point; 4], b: &[Point; 4]) -> bool {
-    tetrahedra_answer(a, b).unwrap_or_else(|| tetrahedra_intersect_by_signs(a, b))
+    tetrahedra_answer(a, b)
+        .unwrap_or_else(|| have_common_point(a, b) || tetrahedra_intersect_by_signs(a, b))
 }
 
 /// [`tetrahedra_intersect`] by exact signs alone.
@@ -70,6 +71,9 @@ pub(super) fn tetrahedra_intersect_by_signs(a: &[Point; 4], b: &[Point; 4]) -> b
 /// ```
 #[must_use]
 pub fn triangle_tetrahedron_intersect(t: &[Point; 3], k: &[Point; 4]) -> bool {
+    if have_common_point(t, k) {
+        return true;
+    }
     let k_sign = orientation(k);
     if separated_by_face(k, k_sign, t) {
         return false;

@@ -25,7 +25,14 @@ const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 /// ```
 #[must_use]
 pub fn triangles_intersect(a: &[Point; 3], b: &[Point; 3]) -> bool {
-    triangles_answer(a, b).unwrap_or_else(|| triangles_intersect_by_signs(a, b))
+    triangles_answer(a, b)
+        .unwrap_or_else(|| have_common_point(a, b) || triangles_intersect_by_signs(a, b))
+}
+
+/// Whether some vertex of one primitive is also a vertex of the other, number for number: then they
+/// touch. Most pairs that no filter can settle are such neighbours in a mesh that repeats its vertices.
+pub(super) fn have_common_point(a: &[Point], b: &[Point]) -> bool {
+    a.iter().any(|point| b.contains(point))
 }
 
 /// [`triangles_intersect`] by exact signs alone.

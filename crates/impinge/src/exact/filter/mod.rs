@@ -30,6 +30,7 @@ mod triangles;
 use super::Point;
 
 pub(super) use neighbours::{shared_edge, shared_vertex};
+pub use tetrahedra::classify_by_faces;
 pub(super) use tetrahedra::tetrahedra_answer;
 pub(super) use triangles::triangles_answer;
 pub use triangles::{classify, reject_by_planes};
@@ -50,6 +51,19 @@ pub struct TrianglePairs8 {
     pub a: Triangles8,
     /// The second triangle of each pair, `[vertex][axis][lane]`.
     pub b: Triangles8,
+}
+
+/// One tetrahedron a lane: `[vertex][axis][lane]`.
+pub type Tetrahedra8 = [[[f64; LANES]; 3]; 4];
+
+/// Eight pairs of tetrahedra, one a lane.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[repr(align(64))]
+pub struct TetrahedronPairs8 {
+    /// The first tetrahedron of each pair, `[vertex][axis][lane]`.
+    pub a: Tetrahedra8,
+    /// The second tetrahedron of each pair, `[vertex][axis][lane]`.
+    pub b: Tetrahedra8,
 }
 
 /// What a filter found out: bit k stands for lane k. A lane with neither bit is unsure; no lane

@@ -39,6 +39,12 @@ pub trait Vector: Number {
     fn bits(mask: Self::Mask) -> u8;
 }
 
+/// Eight points from memory.
+#[inline(always)]
+pub(super) fn load_vertex<V: Vector>([x, y, z]: &[[f64; LANES]; 3]) -> [V; 3] {
+    [V::load(x), V::load(y), V::load(z)]
+}
+
 mod sealed {
     pub trait Sealed {}
     impl Sealed for f64 {}

@@ -1,8 +1,8 @@
 //! Triangle against triangle.
 
 use super::determinant::{Determinant, Normal, difference};
-use super::number::{Number, Vector};
-use super::{LANES, Point, TrianglePairs8, Triangles8, Verdict};
+use super::number::{Number, Vector, load_vertex};
+use super::{Point, TrianglePairs8, Triangles8, Verdict};
 
 /// The lanes whose triangles are certainly apart because the plane of one has the other strictly
 /// on one side. The cheap first step; the rest is for [`classify`].
@@ -33,11 +33,6 @@ pub fn classify<V: Vector>(pairs: &TrianglePairs8) -> Verdict {
 #[inline(always)]
 fn load<V: Vector>([p, q, r]: &Triangles8) -> [[V; 3]; 3] {
     [load_vertex(p), load_vertex(q), load_vertex(r)]
-}
-
-#[inline(always)]
-fn load_vertex<V: Vector>([x, y, z]: &[[f64; LANES]; 3]) -> [V; 3] {
-    [V::load(x), V::load(y), V::load(z)]
 }
 
 /// [`classify`] for one pair, with an early end; none when unsure.
