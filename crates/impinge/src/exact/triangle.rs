@@ -13,7 +13,7 @@ const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 /// Touching and coplanar overlap count; a degenerate triangle is the segment or the point that
 /// it is. Exact for coordinates [`in_range`](super::in_range); never panics.
 ///
-/// Most pairs are settled by the [`filter`](super::filter) in plain `f64`, the rest by signs.
+/// Most pairs are settled by a filter in plain `f64`, the rest by exact signs.
 ///
 /// ```
 /// use impinge::exact::triangles_intersect;
