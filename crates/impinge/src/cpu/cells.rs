@@ -218,6 +218,11 @@ impl Cells {
             }
         });
         self.kept.clear();
+        let n_kept = self.parts[..self.tasks.len()]
+            .iter_mut()
+            .map(|part| part.get_mut().expect("no task panics").len())
+            .sum();
+        self.kept.reserve_exact(n_kept);
         for part in &mut self.parts[..self.tasks.len()] {
             self.kept
                 .extend_from_slice(part.get_mut().expect("no task panics"));
@@ -293,12 +298,10 @@ impl Cells {
         let mut most_entries = n.saturating_mul(MOST_ENTRIES_EACH).min(u64::from(u32::MAX));
         let mut most_cells = u64::MAX;
         if let Some(budget) = options.memory_budget {
-            // Boxes twice over (parts and kept), one entry each, one cell, one slab of items.
-            let scratches: usize = self.scratches.iter().map(Settler::bytes).sum();
-            let fixed = 2 * n * size_of::<Kept>() as u64
-                + slab_bytes(options)
-                + (scratches + self.top.bytes()) as u64
-                + 4096;
+            // What is held by now, primitives' boxes above all, but for what is still to be sized.
+            let sized_later = size_of::<u32>() * (self.starts.capacity() + self.entries.capacity())
+                + size_of::<WorkItem>() * self.items.capacity();
+            let fixed = self.bytes() - sized_later as u64 + slab_bytes(options) + 4;
             let needed = fixed + 4 * n + 8;
             if needed > budget {
                 return Err(Error::MemoryBudget {
@@ -327,6 +330,7 @@ impl Cells {
         }
         let n_cells = grid.n_cells() as usize;
         self.starts.clear();
+        self.starts.reserve_exact(n_cells + 1);
         self.starts.resize(n_cells + 1, 0);
         for kept in &self.kept {
             for_cells(&kept.range, |cell| self.starts[grid.index(cell) + 1] += 1);
@@ -336,6 +340,7 @@ impl Cells {
         }
         let n_entries = self.starts[n_cells] as usize;
         self.entries.clear();
+        self.entries.reserve_exact(n_entries);
         self.entries.resize(n_entries, 0);
         for (place, kept) in (0u32..).zip(&self.kept) {
             // Each start moves to its list's end, which is the next list's start.
@@ -363,6 +368,9 @@ impl Cells {
         let start = Instant::now();
         let mut paired_ms = 0.0;
         let most_items = slab_items(options);
+        if options.memory_budget.is_some() {
+            self.items.reserve_exact(most_items);
+        }
         let Cells {
             isa,
             kept,
@@ -544,23 +552,18 @@ fn pair(
         }
         let first = task * PAIRING_TASK;
         let items = &items[first..items.len().min(first + PAIRING_TASK)];
-        dispatch!(isa, pair_items, (
-            lists: Lists<'_> = lists,
-            items: &[WorkItem] = items,
-            settler: &mut Settler = settler,
-        ));
+        pair_items(isa, lists, items, settler);
     });
     control.step(done, total)?;
     Ok(start.elapsed().as_secs_f64() * 1e3)
 }
 
-#[inline(always)]
-fn pair_items<S: Simd>(simd: S, lists: Lists<'_>, items: &[WorkItem], settler: &mut Settler) {
+fn pair_items(isa: Isa, lists: Lists<'_>, items: &[WorkItem], settler: &mut Settler) {
     for item in items {
         pair_item(lists, item, settler);
-        settler.settle_when_full(simd, lists.world);
+        settler.settle_when_full(isa, lists.world);
     }
-    settler.settle(simd, lists.world);
+    settler.settle(isa, lists.world);
 }
 
 /// The second level of one work item.

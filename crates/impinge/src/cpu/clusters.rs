@@ -7,44 +7,32 @@
 //! narrow      filters, then exact arithmetic
 //! ```
 //!
-//! Memory: what is cached a body, a box array a cluster that takes part, and the work items. The latter
-//! two come in slabs: when one is full it is paired and settled, and dispatch goes on.
+//! This file keeps the caches; `slabs` runs the stages from `dispatch` on.
+//!
+//! Memory: what is cached a body, and a slab of work items. When that is full it is paired and settled,
+//! and dispatch goes on.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use crate::detector::{InstructionSet, Recluster};
 use crate::error::Error;
-use crate::frame::Frame;
-use crate::grouping::GROUP;
 use crate::grouping::bounds::RawBoundsArray;
 use crate::grouping::clusters::Clustering;
-use crate::progress::Control;
 use crate::scene::{Body, Positions};
 use crate::stats::Statistics;
 
 use super::Job;
 use super::bounds::{self, TreeBounds};
-use super::dispatch::{self, NodePair};
-use super::narrow::Settler;
-use super::pairing::{self, WorkItem};
-use super::simd::{Isa, LaneBounds, Simd, dispatch};
+use super::dispatch::NodePair;
+use super::pairing::{WorkItem, Worker};
+use super::simd::Isa;
+use super::slabs::{self, Slabs};
 use super::top_level::TopLevel;
-use super::workers::Workers;
 use super::world::{BodyCache, Caches, World};
 
-/// Clusters that take part in one slab, at most, unless the budget says less.
-const SLAB_CLUSTERS: usize = 1 << 16;
-/// Work items of one slab.
-const SLAB_ITEMS: usize = 1 << 20;
-/// The least of both with which a slab makes sense.
-const SMALLEST_SLAB: usize = 64;
 /// Clusters a task refits.
 const REFIT_TASK: usize = 256;
-/// Clusters whose primitives' boxes a task finds.
-const BOXES_TASK: usize = 32;
-/// Work items a task pairs.
-const PAIRING_TASK: usize = 32;
 /// Primitives of all bodies together below which waking threads costs more than it saves.
 const PARALLEL_FROM: u64 = 60_000;
 /// How much the clusters' surface may grow against the body's before it is clustered again.
@@ -56,8 +44,8 @@ pub(crate) struct Clusters {
     caches: Caches,
     top: TopLevel,
     tasks: Vec<RefitTask>,
-    slab: Slab,
-    scratches: Vec<Settler>,
+    items: Vec<WorkItem>,
+    scratches: Vec<Worker>,
     stack: Vec<NodePair>,
     body_stack: Vec<NodePair>,
 }
@@ -78,7 +66,7 @@ impl Clusters {
             caches: Vec::new(),
             top: TopLevel::default(),
             tasks: Vec::new(),
-            slab: Slab::default(),
+            items: Vec::new(),
             scratches: Vec::new(),
             stack: Vec::new(),
             body_stack: Vec::new(),
@@ -93,22 +81,44 @@ impl Clusters {
         keys: &mut Vec<u64>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        self.scratches
-            .resize_with(job.workers.n(), Settler::default);
-        for scratch in &mut self.scratches {
-            scratch.clear();
-        }
+        self.scratches.resize_with(job.workers.n(), Worker::default);
         stats.time("clustering", |stats| self.cluster(job, stats))?;
         stats.time("bounds", |stats| self.refit(job, options, stats))?;
-        self.slab.limit(options, self.bytes(), job.frame)?;
-        let isa = self.isa;
-        dispatch!(isa, detect, (
-            engine: &mut Clusters = self,
-            job: Job<'_> = job,
-            keys: &mut Vec<u64> = keys,
-            stats: &mut Statistics = stats,
-        ) -> Result<(), Error>)?;
-        stats.bytes_held = (self.bytes() + self.slab.bytes()) as u64;
+        for worker in &mut self.scratches {
+            worker.begin(stats.n_clusters);
+        }
+        let most_items = slabs::most_items(options.memory_budget, self.bytes() as u64)?;
+        self.items.clear();
+        self.items.shrink_to(most_items);
+        let Clusters {
+            isa,
+            caches,
+            top,
+            items,
+            scratches,
+            stack,
+            body_stack,
+            ..
+        } = self;
+        let mut slabs = Slabs {
+            isa: *isa,
+            job,
+            world: World {
+                scene: job.scene,
+                frame: job.frame,
+                caches: Some(caches),
+            },
+            items,
+            most_items,
+            scratches,
+            stats,
+            ms: 0.0,
+        };
+        slabs.run(top, stack, body_stack)?;
+        for worker in scratches.iter() {
+            keys.extend_from_slice(&worker.settler.keys);
+        }
+        stats.bytes_held = (self.bytes() + size_of::<WorkItem>() * self.items.capacity()) as u64;
         Ok(())
     }
 
@@ -119,7 +129,7 @@ impl Clusters {
             .flatten()
             .map(|cache| size_of::<BodyCache>() + cache.clustering.bytes() + cache.bounds.bytes())
             .sum();
-        let scratches: usize = self.scratches.iter().map(Settler::bytes).sum();
+        let scratches: usize = self.scratches.iter().map(Worker::bytes).sum();
         caches + scratches + self.top.bytes()
     }
 
@@ -253,7 +263,7 @@ impl Clusters {
             caches,
         };
         let all_finite = AtomicBool::new(true);
-        let refit = |_: &mut Settler, ix: usize| {
+        let refit = |_: &mut Worker, ix: usize| {
             let task = tasks[ix];
             let body = world.body(task.participant);
             let clustering = &world.cache(task.participant).clustering;
@@ -324,310 +334,5 @@ impl BodyCache {
         } else {
             1.0
         }
-    }
-}
-
-/// Clusters that take part and the pairs of them, up to a limit.
-#[derive(Default)]
-struct Slab {
-    items: Vec<WorkItem>,
-    /// The box arrays of clusters that take part, and which they are.
-    boxes: Vec<LaneBounds>,
-    active: Vec<(u32, u32)>,
-    /// For each cluster of all participants, its place in `active` plus one.
-    slots: Vec<u32>,
-    /// Where each participant's clusters start in `slots`.
-    firsts: Vec<u32>,
-    most_items: usize,
-    most_active: usize,
-}
-
-impl Slab {
-    fn bytes(&self) -> usize {
-        size_of::<WorkItem>() * self.items.capacity()
-            + size_of::<LaneBounds>() * self.boxes.capacity()
-            + size_of::<(u32, u32)>() * self.active.capacity()
-            + size_of::<u32>() * (self.slots.capacity() + self.firsts.capacity())
-    }
-
-    /// Sets how much a slab may hold so that all stays within the budget.
-    fn limit(&mut self, options: &Options, bytes: usize, frame: &Frame) -> Result<(), Error> {
-        (self.most_items, self.most_active) = (SLAB_ITEMS, SLAB_CLUSTERS);
-        let Some(budget) = options.memory_budget else {
-            return Ok(());
-        };
-        let n_clusters =
-            frame.n_primitives().div_ceil(GROUP as u64) + frame.participants.len() as u64;
-        let fixed = bytes as u64 + 8 * n_clusters + 4 * frame.participants.len() as u64;
-        // What one cluster in a slab costs: its boxes, its place, and eight work items.
-        let each = (size_of::<LaneBounds>() + 8 + 8 * size_of::<WorkItem>()) as u64;
-        let needed = fixed + each * SMALLEST_SLAB as u64;
-        if needed > budget {
-            return Err(Error::MemoryBudget {
-                what: "clusters, their boxes and the smallest slab",
-                needed,
-                budget,
-            });
-        }
-        let n = ((budget - fixed) / each).min(SLAB_CLUSTERS as u64) as usize;
-        (self.most_items, self.most_active) = (8 * n, n);
-        // Larger slabs of earlier frames must not stay.
-        if self.bytes() as u64 + bytes as u64 > budget {
-            *self = Slab {
-                most_items: self.most_items,
-                most_active: self.most_active,
-                ..Slab::default()
-            };
-        }
-        self.items
-            .reserve_exact(self.most_items.saturating_sub(self.items.len()));
-        self.active
-            .reserve_exact(self.most_active.saturating_sub(self.active.len()));
-        Ok(())
-    }
-
-    fn begin(&mut self, world: World<'_>) {
-        self.firsts.clear();
-        let mut next = 0;
-        for ix in 0..world.frame.participants.len() {
-            self.firsts.push(next);
-            next += world.cache(ix as u32).clustering.n_clusters() as u32;
-        }
-        self.slots.clear();
-        self.slots.resize(next as usize, 0);
-        self.items.clear();
-        self.active.clear();
-    }
-
-    fn has_room(&self) -> bool {
-        self.items.len() < self.most_items && self.active.len() + 2 <= self.most_active
-    }
-
-    #[inline(always)]
-    fn slot(&mut self, participant: u32, cluster: u32) -> u32 {
-        let ix = (self.firsts[participant as usize] + cluster) as usize;
-        if self.slots[ix] == 0 {
-            self.active.push((participant, cluster));
-            self.slots[ix] = self.active.len() as u32;
-        }
-        self.slots[ix] - 1
-    }
-
-    #[inline(always)]
-    fn push(&mut self, a: u32, b: u32, cluster_a: u32, cluster_b: u32) {
-        let slot_a = self.slot(a, cluster_a);
-        let slot_b = self.slot(b, cluster_b);
-        self.items.push(WorkItem {
-            a,
-            b,
-            cluster_a,
-            cluster_b,
-            slot_a,
-            slot_b,
-        });
-    }
-
-    fn clear(&mut self) {
-        for &(participant, cluster) in &self.active {
-            self.slots[(self.firsts[participant as usize] + cluster) as usize] = 0;
-        }
-        self.items.clear();
-        self.active.clear();
-    }
-}
-
-/// Dispatch, pairing and narrow, slab by slab.
-#[inline(always)]
-fn detect<S: Simd>(
-    simd: S,
-    engine: &mut Clusters,
-    job: Job<'_>,
-    keys: &mut Vec<u64>,
-    stats: &mut Statistics,
-) -> Result<(), Error> {
-    let Job {
-        scene,
-        frame,
-        workers,
-        control,
-    } = job;
-    let Clusters {
-        isa,
-        caches,
-        top,
-        slab,
-        scratches,
-        stack,
-        body_stack,
-        ..
-    } = engine;
-    let world = World {
-        scene,
-        frame,
-        caches: Some(caches),
-    };
-    let start = Instant::now();
-    slab.begin(world);
-    let mut flusher = Flusher {
-        isa: *isa,
-        world,
-        workers,
-        control,
-        stats,
-        slab,
-        scratches,
-        ms: 0.0,
-    };
-    if frame.between() {
-        if frame.participants.len() == 2 {
-            if frame.meets(0, 1) {
-                clusters_between(simd, 0, 1, stack, &mut flusher)?;
-            }
-        } else {
-            top.refit(frame.participants.len(), |ix| world.cache(ix).bounds.root());
-            top.pairs(simd, body_stack, |a, b| {
-                if !frame.meets(a as usize, b as usize) {
-                    return Ok(());
-                }
-                // Compiled on its own: inside this closure the instruction set would be lost.
-                dispatch!(flusher.isa, clusters_between, (
-                    a: u32 = a,
-                    b: u32 = b,
-                    stack: &mut Vec<NodePair> = stack,
-                    flusher: &mut Flusher<'_, '_> = &mut flusher,
-                ) -> Result<(), Error>)
-            })?;
-        }
-    }
-    for (ix, participant) in frame.participants.iter().enumerate() {
-        if participant.within {
-            let ix = ix as u32;
-            let tree = world.cache(ix).tree();
-            dispatch::within(simd, tree, stack, |cluster_a, cluster_b| {
-                // Adjacency masks are kept with the lower cluster.
-                flusher.put(ix, ix, cluster_a.min(cluster_b), cluster_a.max(cluster_b))
-            })?;
-        }
-    }
-    flusher.flush()?;
-    let flushed_ms = flusher.ms;
-    let total_ms = start.elapsed().as_secs_f64() * 1e3;
-    stats.add_ms("dispatch", total_ms - flushed_ms);
-    let busy: f64 = scratches.iter().map(|s| s.busy.as_secs_f64() * 1e3).sum();
-    let narrow_ms = (busy / workers.n() as f64).min(flushed_ms);
-    stats.add_ms("pairing", flushed_ms - narrow_ms);
-    stats.add_ms("narrow", narrow_ms);
-    for scratch in scratches.iter() {
-        keys.extend_from_slice(&scratch.keys);
-        stats.n_candidates += scratch.n_candidates;
-        stats.n_unsure += scratch.n_unsure;
-    }
-    Ok(())
-}
-
-#[inline(always)]
-fn clusters_between<S: Simd>(
-    simd: S,
-    a: u32,
-    b: u32,
-    stack: &mut Vec<NodePair>,
-    flusher: &mut Flusher<'_, '_>,
-) -> Result<(), Error> {
-    let (tree_a, tree_b) = (flusher.world.cache(a).tree(), flusher.world.cache(b).tree());
-    dispatch::between(simd, tree_a, tree_b, stack, |cluster_a, cluster_b| {
-        flusher.put(a, b, cluster_a, cluster_b)
-    })
-}
-
-/// Takes work items; pairs and settles them whenever a slab is full.
-struct Flusher<'a, 'b> {
-    isa: Isa,
-    world: World<'a>,
-    workers: &'a Workers,
-    control: &'a Control<'b>,
-    stats: &'a mut Statistics,
-    slab: &'a mut Slab,
-    scratches: &'a mut [Settler],
-    ms: f64,
-}
-
-impl Flusher<'_, '_> {
-    #[inline(always)]
-    fn put(&mut self, a: u32, b: u32, cluster_a: u32, cluster_b: u32) -> Result<(), Error> {
-        if !self.slab.has_room() {
-            self.flush()?;
-        }
-        self.slab.push(a, b, cluster_a, cluster_b);
-        Ok(())
-    }
-
-    #[inline(never)]
-    fn flush(&mut self) -> Result<(), Error> {
-        let start = Instant::now();
-        let (isa, world) = (self.isa, self.world);
-        let Slab {
-            items,
-            boxes,
-            active,
-            ..
-        } = &mut *self.slab;
-        if boxes.len() < active.len() {
-            boxes.reserve_exact(active.len() - boxes.len());
-            boxes.resize(active.len(), LaneBounds::EMPTY);
-        }
-        let enough = items.len() >= 4 * PAIRING_TASK;
-        let n_workers = if enough { self.workers.n() } else { 1 };
-        let scratches = &mut self.scratches[..n_workers];
-        let shared = SharedBoxes(boxes.as_mut_ptr());
-        let n_tasks = active.len().div_ceil(BOXES_TASK);
-        self.workers.for_each(scratches, n_tasks, |_, task| {
-            let end = active.len().min((task + 1) * BOXES_TASK);
-            let slots = task * BOXES_TASK..end;
-            for (slot, &(participant, cluster)) in slots.clone().zip(&active[slots]) {
-                let body = world.body(participant);
-                // SAFETY: each slot below `active.len()` is written by one task.
-                let lanes = unsafe { shared.at(slot) };
-                let clustering = &world.cache(participant).clustering;
-                bounds::of_cluster_primitives(body.positions, clustering, cluster as usize, lanes);
-            }
-        });
-        let control = self.control;
-        let (boxes, items) = (&boxes[..], &items[..]);
-        let n_tasks = items.len().div_ceil(PAIRING_TASK);
-        self.workers.for_each(scratches, n_tasks, |settler, task| {
-            if control.step(task as u64, n_tasks as u64).is_err() {
-                return;
-            }
-            let first = task * PAIRING_TASK;
-            let items = &items[first..items.len().min(first + PAIRING_TASK)];
-            dispatch!(isa, pairing::run, (
-                world: World<'_> = world,
-                items: &[WorkItem] = items,
-                boxes: &[LaneBounds] = boxes,
-                settler: &mut Settler = settler,
-            ));
-        });
-        control.step(n_tasks as u64, n_tasks as u64)?;
-        self.stats.n_work_items += items.len() as u64;
-        self.stats.n_slabs += 1;
-        self.slab.clear();
-        self.ms += start.elapsed().as_secs_f64() * 1e3;
-        Ok(())
-    }
-}
-
-/// Box arrays that several workers write, each its own slots.
-struct SharedBoxes(*mut LaneBounds);
-
-// SAFETY: `at` is the only access, and its contract keeps writes apart.
-unsafe impl Sync for SharedBoxes {}
-
-impl SharedBoxes {
-    /// # Safety
-    /// The slot must lie within the array, and nobody else may use it meanwhile.
-    #[allow(clippy::mut_from_ref)]
-    unsafe fn at(&self, slot: usize) -> &mut LaneBounds {
-        // SAFETY: said above.
-        unsafe { &mut *self.0.add(slot) }
     }
 }

@@ -7,6 +7,7 @@ pub(crate) mod dispatch;
 pub(crate) mod narrow;
 pub(crate) mod pairing;
 pub(crate) mod simd;
+pub(crate) mod slabs;
 pub(crate) mod top_level;
 pub(crate) mod workers;
 pub(crate) mod world;

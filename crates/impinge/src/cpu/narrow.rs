@@ -14,7 +14,7 @@ use crate::grouping::GROUP;
 use crate::narrow::{intersect, intersect_shared};
 use crate::scene::{Elements, Positions};
 
-use super::simd::Simd;
+use super::simd::{Isa, Simd, dispatch};
 use super::world::{BodyRef, World};
 
 /// Two primitives whose boxes overlap: participants, and places in their clusters' orders.
@@ -66,9 +66,9 @@ impl Settler {
     }
 
     #[inline(always)]
-    pub fn settle_when_full<S: Simd>(&mut self, simd: S, world: World<'_>) {
+    pub fn settle_when_full(&mut self, isa: Isa, world: World<'_>) {
         if self.candidates.len() >= FULL {
-            self.settle(simd, world);
+            self.settle(isa, world);
         }
     }
 
@@ -84,105 +84,88 @@ impl Settler {
         }
     }
 
-    /// Settles what has gathered.
-    #[inline(always)]
-    pub fn settle<S: Simd>(&mut self, simd: S, world: World<'_>) {
+    /// Settles what has gathered. Compiled once an instruction set, not once a caller.
+    pub fn settle(&mut self, isa: Isa, world: World<'_>) {
         if self.candidates.is_empty() {
             return;
         }
         let start = Instant::now();
         self.n_candidates += self.candidates.len() as u64;
-        self.reject(simd, world);
-        self.classify(simd, world);
+        dispatch!(isa, settle, (settler: &mut Settler = self, world: World<'_> = world));
         self.candidates.clear();
         self.survivors.clear();
         self.busy += start.elapsed();
     }
 
     /// Triangle pairs that the planes do not separate go on to the survivors; tetrahedron pairs are
-    /// classified, and other kinds settled, on the way.
+    /// classified, and batches of several kinds settled, on the way.
     #[inline(always)]
     fn reject<S: Simd>(&mut self, _: S, world: World<'_>) {
         let mut lookup = Lookup::new(world);
         let mut triangles = TrianglePairs8::default();
         let mut tetrahedra = TetrahedronPairs8::default();
-        let mut filled = [Candidate::NONE; LANES];
-        let mut filled_tetrahedra = [Candidate::NONE; LANES];
-        let (mut n_filled, mut n_filled_tetrahedra) = (0, 0);
         let candidates = std::mem::take(&mut self.candidates);
-        for &candidate in &candidates {
-            lookup.go_to(candidate);
-            let (a, b) = (&lookup.a, &lookup.b);
-            let (place_a, place_b) = (candidate.place_a, candidate.place_b);
-            match (a.elements, b.elements) {
-                (Elements::Triangles(faces_a), Elements::Triangles(faces_b)) => {
-                    let lane = n_filled;
-                    fill(
-                        &mut triangles.a,
-                        lane,
-                        a.positions,
-                        &faces_a[place_a as usize],
-                    );
-                    fill(
-                        &mut triangles.b,
-                        lane,
-                        b.positions,
-                        &faces_b[place_b as usize],
-                    );
-                    filled[lane] = candidate;
-                    n_filled += 1;
-                    if n_filled == LANES {
-                        self.keep(&filled, !filter::reject_by_planes::<S::F64x8>(&triangles));
-                        n_filled = 0;
+        for chunk in candidates.chunks(LANES) {
+            let (mut n_triangles, mut n_tetrahedra) = (0, 0);
+            for (lane, &candidate) in chunk.iter().enumerate() {
+                lookup.go_to(candidate);
+                let (a, b) = (&lookup.a, &lookup.b);
+                let (place_a, place_b) = (candidate.place_a, candidate.place_b);
+                match (a.elements, b.elements) {
+                    (Elements::Triangles(faces_a), Elements::Triangles(faces_b)) => {
+                        fill(
+                            &mut triangles.a,
+                            lane,
+                            a.positions,
+                            &faces_a[place_a as usize],
+                        );
+                        fill(
+                            &mut triangles.b,
+                            lane,
+                            b.positions,
+                            &faces_b[place_b as usize],
+                        );
+                        n_triangles += 1;
                     }
-                }
-                (Elements::Tetrahedra(tets_a), Elements::Tetrahedra(tets_b)) => {
-                    let lane = n_filled_tetrahedra;
-                    fill(
-                        &mut tetrahedra.a,
-                        lane,
-                        a.positions,
-                        &tets_a[place_a as usize],
-                    );
-                    fill(
-                        &mut tetrahedra.b,
-                        lane,
-                        b.positions,
-                        &tets_b[place_b as usize],
-                    );
-                    filled_tetrahedra[lane] = candidate;
-                    n_filled_tetrahedra += 1;
-                    if n_filled_tetrahedra == LANES {
-                        let verdict = filter::classify_by_faces::<S::F64x8>(&tetrahedra);
-                        self.take(&mut lookup, &filled_tetrahedra, verdict);
-                        n_filled_tetrahedra = 0;
+                    (Elements::Tetrahedra(tets_a), Elements::Tetrahedra(tets_b)) => {
+                        fill(
+                            &mut tetrahedra.a,
+                            lane,
+                            a.positions,
+                            &tets_a[place_a as usize],
+                        );
+                        fill(
+                            &mut tetrahedra.b,
+                            lane,
+                            b.positions,
+                            &tets_b[place_b as usize],
+                        );
+                        n_tetrahedra += 1;
                     }
+                    _ => {}
                 }
-                _ => self.settle_exactly(a, b, candidate),
             }
-        }
-        if n_filled > 0 {
-            let used = !(u8::MAX << n_filled);
-            self.keep(
-                &filled,
-                !filter::reject_by_planes::<S::F64x8>(&triangles) & used,
-            );
-        }
-        if n_filled_tetrahedra > 0 {
-            let verdict = filter::classify_by_faces::<S::F64x8>(&tetrahedra);
-            self.take(
-                &mut lookup,
-                &filled_tetrahedra[..n_filled_tetrahedra],
-                verdict,
-            );
+            if n_triangles == chunk.len() {
+                let kept = !filter::reject_by_planes::<S::F64>(&triangles);
+                self.keep(chunk, kept);
+            } else if n_tetrahedra == chunk.len() {
+                let verdict = filter::classify_by_faces::<S::F64>(&tetrahedra);
+                self.take(&mut lookup, chunk, verdict);
+            } else {
+                for &candidate in chunk {
+                    lookup.go_to(candidate);
+                    self.settle_exactly(&lookup.a, &lookup.b, candidate);
+                }
+            }
         }
         self.candidates = candidates;
     }
 
     #[inline(always)]
-    fn keep(&mut self, filled: &[Candidate; LANES], mut kept: u8) {
+    fn keep(&mut self, chunk: &[Candidate], mut kept: u8) {
+        kept &= u8::MAX >> (LANES - chunk.len());
         while kept != 0 {
-            self.survivors.push(filled[kept.trailing_zeros() as usize]);
+            self.survivors.push(chunk[kept.trailing_zeros() as usize]);
             kept &= kept - 1;
         }
     }
@@ -205,7 +188,7 @@ impl Settler {
                 fill(&mut batch.a, lane, a.positions, &faces_a[place_a as usize]);
                 fill(&mut batch.b, lane, b.positions, &faces_b[place_b as usize]);
             }
-            let verdict = filter::classify::<S::F64x8>(&batch);
+            let verdict = filter::classify::<S::F64>(&batch);
             self.take(&mut lookup, chunk, verdict);
         }
         self.survivors = survivors;
@@ -245,13 +228,10 @@ impl Settler {
     }
 }
 
-impl Candidate {
-    const NONE: Candidate = Candidate {
-        a: 0,
-        b: 0,
-        place_a: 0,
-        place_b: 0,
-    };
+#[inline(always)]
+fn settle<S: Simd>(simd: S, settler: &mut Settler, world: World<'_>) {
+    settler.reject(simd, world);
+    settler.classify(simd, world);
 }
 
 /// The two bodies of the candidate at hand; candidates of the same bodies come in runs.

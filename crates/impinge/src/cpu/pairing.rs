@@ -1,8 +1,10 @@
 //! Stage `pairing`: which primitives of two clusters have boxes that meet.
 //!
-//! In: work items (two clusters) and a box a primitive for each cluster that takes part. Out:
-//! candidates, which `narrow` settles in runs of about a thousand, while they are in the cache.
+//! In: work items (two clusters). Out: candidates, which `narrow` settles in runs of about a thousand,
+//! while they are in the cache.
 //!
+//! 0. The boxes of a cluster's primitives are found when it is first needed; a worker keeps those of the
+//!    clusters it saw last. Work items come in the order of the tree, so most are found again.
 //! 1. The two clusters' boxes intersect in a box; primitives of either side that do not meet it
 //!    drop out, for a partner's box lies in its cluster's box.
 //! 2. Each survivor of the smaller side is tested against the survivors of the other, 16 (or 8)
@@ -16,19 +18,91 @@ use crate::grouping::GROUP;
 use crate::narrow::share_vertex;
 use crate::query::SharedVertex;
 
+use super::bounds::of_cluster_primitives;
 use super::narrow::{Candidate, Settler};
-use super::simd::{LaneBounds, Simd};
+use super::simd::{Isa, LaneBounds, Simd};
 use super::world::{BodyRef, World};
 
-/// Two clusters that may meet: participants, clusters, and where their primitives' boxes are.
+/// Two clusters that may meet: participants and their clusters.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct WorkItem {
     pub a: u32,
     pub b: u32,
     pub cluster_a: u32,
     pub cluster_b: u32,
-    pub slot_a: u32,
-    pub slot_b: u32,
+}
+
+/// What one worker has of its own.
+#[derive(Debug, Default)]
+pub(crate) struct Worker {
+    pub settler: Settler,
+    boxes: BoxCache,
+}
+
+impl Worker {
+    /// Makes ready for a frame of so many clusters.
+    pub fn begin(&mut self, n_clusters: u64) {
+        self.settler.clear();
+        self.boxes.begin(n_clusters);
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.settler.bytes() + self.boxes.bytes()
+    }
+}
+
+/// The boxes of the primitives of the clusters seen last: 400 KB, which a second-level cache holds.
+///
+/// A cluster has two places, `h` and `h ^ 1`; the one that is not in use makes room.
+#[derive(Debug, Default)]
+struct BoxCache {
+    /// Participant and cluster of each place.
+    keys: Vec<u64>,
+    boxes: Vec<LaneBounds>,
+}
+
+/// No participant has this number: there are fewer than 2^32 of them.
+const NOBODY: u64 = u64::MAX;
+const MOST_CACHED: u64 = 256;
+
+impl BoxCache {
+    fn begin(&mut self, n_clusters: u64) {
+        let n = n_clusters.clamp(4, MOST_CACHED).next_power_of_two() as usize;
+        if self.boxes.len() < n {
+            self.boxes.resize(n, LaneBounds::EMPTY);
+        }
+        self.keys.clear();
+        self.keys.resize(self.boxes.len(), NOBODY);
+    }
+
+    fn bytes(&self) -> usize {
+        size_of::<u64>() * self.keys.capacity() + size_of::<LaneBounds>() * self.boxes.capacity()
+    }
+
+    /// The place of a cluster's boxes, found now if they are not there; `pinned` stays as it is.
+    #[inline(always)]
+    fn place(&mut self, world: World<'_>, participant: u32, cluster: u32, pinned: usize) -> usize {
+        let key = u64::from(participant) << 32 | u64::from(cluster);
+        let first =
+            (participant.wrapping_mul(67).wrapping_add(cluster) as usize) & (self.keys.len() - 1);
+        for place in [first, first ^ 1] {
+            if self.keys[place] == key {
+                return place;
+            }
+        }
+        let place = if first == pinned { first ^ 1 } else { first };
+        self.keys[place] = key;
+        self.find(world, participant, cluster, place);
+        place
+    }
+
+    #[inline(never)]
+    fn find(&mut self, world: World<'_>, participant: u32, cluster: u32, place: usize) {
+        let body = world.body(participant);
+        let clustering = &world.cache(participant).clustering;
+        let lanes = &mut self.boxes[place];
+        of_cluster_primitives(body.positions, clustering, cluster as usize, lanes);
+    }
 }
 
 /// Lanes of a mask, lowest first.
@@ -57,21 +131,24 @@ pub(crate) fn full(size: usize) -> u64 {
 #[inline(always)]
 pub(crate) fn run<S: Simd>(
     simd: S,
+    isa: Isa,
     world: World<'_>,
     items: &[WorkItem],
-    boxes: &[LaneBounds],
-    settler: &mut Settler,
+    worker: &mut Worker,
 ) {
+    let Worker { settler, boxes } = worker;
     for item in items {
-        let (boxes_a, boxes_b) = (&boxes[item.slot_a as usize], &boxes[item.slot_b as usize]);
+        let place_a = boxes.place(world, item.a, item.cluster_a, usize::MAX);
+        let place_b = boxes.place(world, item.b, item.cluster_b, place_a);
+        let (boxes_a, boxes_b) = (&boxes.boxes[place_a], &boxes.boxes[place_b]);
         if item.a == item.b {
             within_body(simd, world, item, boxes_a, boxes_b, settler);
         } else {
             between_bodies(simd, world, item, boxes_a, boxes_b, settler);
         }
-        settler.settle_when_full(simd, world);
+        settler.settle_when_full(isa, world);
     }
-    settler.settle(simd, world);
+    settler.settle(isa, world);
 }
 
 #[inline(always)]
@@ -160,12 +237,25 @@ fn within_body<S: Simd>(
         return;
     }
     let mut shared = [0u64; GROUP];
-    for (lane, mask) in adjacency.between(cluster_a, cluster_b) {
-        shared[lane] = mask;
-    }
-    for lane in Lanes(lanes_a) {
-        let met = simd.overlaps_64(boxes_b, &boxes_a.at(lane), lanes_b);
-        row.put(lane, met, shared[lane], settler);
+    if lanes_a.count_ones() <= lanes_b.count_ones() {
+        for (lane, mask) in adjacency.between(cluster_a, cluster_b) {
+            shared[lane] = mask;
+        }
+        for lane in Lanes(lanes_a) {
+            let met = simd.overlaps_64(boxes_b, &boxes_a.at(lane), lanes_b);
+            row.put(lane, met, shared[lane], settler);
+        }
+    } else {
+        for (lane, mask) in adjacency.between(cluster_a, cluster_b) {
+            for lane_b in Lanes(mask & lanes_b) {
+                shared[lane_b] |= 1 << lane;
+            }
+        }
+        let row = row.swapped();
+        for lane in Lanes(lanes_b) {
+            let met = simd.overlaps_64(boxes_a, &boxes_b.at(lane), lanes_a);
+            row.put(lane, met, shared[lane], settler);
+        }
     }
 }
 
@@ -180,6 +270,16 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
+    /// The same with the two clusters exchanged.
+    #[inline(always)]
+    fn swapped(self) -> Self {
+        Row {
+            first_a: self.first_b,
+            first_b: self.first_a,
+            ..self
+        }
+    }
+
     /// Lanes `met` by `lane` become candidates; those of `shared` only as the rule says.
     #[inline(always)]
     fn put(&self, lane: usize, met: u64, shared: u64, settler: &mut Settler) {

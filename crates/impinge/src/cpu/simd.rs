@@ -51,8 +51,8 @@ impl LaneBounds {
 
 /// An instruction set: the box tests that kernels are made of.
 pub(crate) trait Simd: Copy {
-    /// Eight f64 for the narrow stage's filters.
-    type F64x8: Vector;
+    /// The f64 of the narrow stage's filters.
+    type F64: Vector;
 
     /// Bit `k`: box `first + k` overlaps `query`, for `k` below 8.
     fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32;
@@ -66,7 +66,7 @@ pub(crate) trait Simd: Copy {
 pub(crate) struct Portable;
 
 impl Simd for Portable {
-    type F64x8 = number::Portable8;
+    type F64 = number::Portable;
 
     #[inline(always)]
     fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
@@ -141,7 +141,7 @@ mod x86 {
     }
 
     impl Simd for Avx2 {
-        type F64x8 = number::Avx2;
+        type F64 = number::Avx2;
 
         #[inline(always)]
         fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
@@ -197,7 +197,7 @@ mod x86 {
     }
 
     impl Simd for Avx512 {
-        type F64x8 = number::Avx512;
+        type F64 = number::Avx512;
 
         #[inline(always)]
         fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {

@@ -66,7 +66,7 @@ fn classify(pairs: &TrianglePairs8) -> Verdict {
     }
     on_all(
         pairs,
-        filter::classify::<number::Portable8>,
+        filter::classify::<number::Portable>,
         #[cfg(target_arch = "x86_64")]
         avx2,
         #[cfg(target_arch = "x86_64")]
@@ -87,7 +87,7 @@ fn reject_by_planes(pairs: &TrianglePairs8) -> u8 {
     }
     on_all(
         pairs,
-        filter::reject_by_planes::<number::Portable8>,
+        filter::reject_by_planes::<number::Portable>,
         #[cfg(target_arch = "x86_64")]
         avx2,
         #[cfg(target_arch = "x86_64")]
@@ -108,7 +108,7 @@ fn classify_by_faces(pairs: &TetrahedronPairs8) -> Verdict {
     }
     on_all(
         pairs,
-        filter::classify_by_faces::<number::Portable8>,
+        filter::classify_by_faces::<number::Portable>,
         #[cfg(target_arch = "x86_64")]
         avx2,
         #[cfg(target_arch = "x86_64")]

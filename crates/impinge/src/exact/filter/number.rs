@@ -1,4 +1,4 @@
-//! What the filter computes with: one `f64`, or eight of them in vector registers.
+//! What the filter computes with: one `f64`, or a vector register of them.
 //!
 //! The filter is written once, generic over [`Number`]; comparisons give a mask and branches are
 //! selects. Additions, subtractions and multiplications are those of IEEE 754 in every
@@ -31,24 +31,26 @@ pub trait Number:
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
 }
 
-/// Eight numbers, and masks as bits.
+/// A register of numbers, and masks as bits.
 pub trait Vector: Number {
-    /// From memory.
-    fn load(lanes: &[f64; LANES]) -> Self;
-    /// Bit k for lane k.
+    /// Numbers in a register: a divisor of [`LANES`].
+    const N: usize;
+    /// `N` numbers from memory, from lane `first` on.
+    fn load(lanes: &[f64; LANES], first: usize) -> Self;
+    /// Bit k for number k.
     fn bits(mask: Self::Mask) -> u8;
 }
 
-/// Eight points from memory.
+/// Points from memory, from lane `first` on.
 #[inline(always)]
-pub(super) fn load_vertex<V: Vector>([x, y, z]: &[[f64; LANES]; 3]) -> [V; 3] {
-    [V::load(x), V::load(y), V::load(z)]
+pub(super) fn load_vertex<V: Vector>([x, y, z]: &[[f64; LANES]; 3], first: usize) -> [V; 3] {
+    [V::load(x, first), V::load(y, first), V::load(z, first)]
 }
 
 mod sealed {
     pub trait Sealed {}
     impl Sealed for f64 {}
-    impl Sealed for super::Portable8 {}
+    impl Sealed for super::Portable {}
     #[cfg(target_arch = "x86_64")]
     impl Sealed for super::Avx2 {}
     #[cfg(target_arch = "x86_64")]
@@ -81,18 +83,21 @@ impl Number for f64 {
     }
 }
 
-/// Eight numbers as an array: whatever the compiler makes of it.
-#[derive(Debug, Clone, Copy)]
-pub struct Portable8([f64; LANES]);
+/// Numbers side by side where no wider set is known: 128 bits, which SSE2 and NEON have.
+const PORTABLE: usize = 2;
 
-/// Eight conditions, all bits set or none.
+/// Two numbers as an array: whatever the compiler makes of it.
 #[derive(Debug, Clone, Copy)]
-pub struct PortableMask([u64; LANES]);
+pub struct Portable([f64; PORTABLE]);
 
-impl Portable8 {
+/// Two conditions, all bits set or none.
+#[derive(Debug, Clone, Copy)]
+pub struct PortableMask([u64; PORTABLE]);
+
+impl Portable {
     #[inline(always)]
     fn zip(self, other: Self, op: impl Fn(f64, f64) -> f64) -> Self {
-        Portable8(std::array::from_fn(|k| op(self.0[k], other.0[k])))
+        Portable(std::array::from_fn(|k| op(self.0[k], other.0[k])))
     }
 }
 
@@ -116,9 +121,9 @@ macro_rules! operator {
     };
 }
 
-operator!(Portable8, Add, add, |a, b| a.zip(b, |x, y| x + y));
-operator!(Portable8, Sub, sub, |a, b| a.zip(b, |x, y| x - y));
-operator!(Portable8, Mul, mul, |a, b| a.zip(b, |x, y| x * y));
+operator!(Portable, Add, add, |a, b| a.zip(b, |x, y| x + y));
+operator!(Portable, Sub, sub, |a, b| a.zip(b, |x, y| x - y));
+operator!(Portable, Mul, mul, |a, b| a.zip(b, |x, y| x * y));
 operator!(PortableMask, BitAnd, bitand, |a, b| a.zip(b, |x, y| x & y));
 operator!(PortableMask, BitOr, bitor, |a, b| a.zip(b, |x, y| x | y));
 operator!(PortableMask, BitXor, bitxor, |a, b| a.zip(b, |x, y| x ^ y));
@@ -131,16 +136,16 @@ impl Not for PortableMask {
     }
 }
 
-impl Number for Portable8 {
+impl Number for Portable {
     type Mask = PortableMask;
 
     #[inline(always)]
     fn splat(x: f64) -> Self {
-        Portable8([x; LANES])
+        Portable([x; PORTABLE])
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        Portable8(self.0.map(f64::abs))
+        Portable(self.0.map(f64::abs))
     }
     #[inline(always)]
     fn larger(self, other: Self) -> Self {
@@ -154,20 +159,22 @@ impl Number for Portable8 {
     }
     #[inline(always)]
     fn select(mask: PortableMask, yes: Self, no: Self) -> Self {
-        Portable8(std::array::from_fn(|k| {
+        Portable(std::array::from_fn(|k| {
             f64::from_bits((yes.0[k].to_bits() & mask.0[k]) | (no.0[k].to_bits() & !mask.0[k]))
         }))
     }
 }
 
-impl Vector for Portable8 {
+impl Vector for Portable {
+    const N: usize = PORTABLE;
+
     #[inline(always)]
-    fn load(lanes: &[f64; LANES]) -> Self {
-        Portable8(*lanes)
+    fn load(lanes: &[f64; LANES], first: usize) -> Self {
+        Portable([lanes[first], lanes[first + 1]])
     }
     #[inline(always)]
     fn bits(mask: PortableMask) -> u8 {
-        (0..LANES).fold(0, |bits, k| bits | ((mask.0[k] & 1) as u8) << k)
+        (mask.0[0] & 1) as u8 | ((mask.0[1] & 1) as u8) << 1
     }
 }
 
@@ -181,13 +188,13 @@ mod x86 {
     use super::*;
     use std::arch::x86_64::*;
 
-    /// Eight numbers in two 256-bit registers. To be used where `avx2` was detected.
+    /// Four numbers in a 256-bit register. To be used where `avx2` was detected.
     #[derive(Debug, Clone, Copy)]
-    pub struct Avx2(__m256d, __m256d);
+    pub struct Avx2(__m256d);
 
-    /// Eight conditions in two registers.
+    /// Four conditions in a register.
     #[derive(Debug, Clone, Copy)]
-    pub struct Avx2Mask(__m256d, __m256d);
+    pub struct Avx2Mask(__m256d);
 
     /// Eight numbers in a 512-bit register. To be used where `avx512f` and `avx512dq` were detected.
     #[derive(Debug, Clone, Copy)]
@@ -204,7 +211,7 @@ mod x86 {
         ($type:ident, $trait:ident, $method:ident, $intrinsic:ident) => {
             operator!($type, $trait, $method, |a, b| {
                 // SAFETY: see above.
-                unsafe { $type($intrinsic(a.0, b.0), $intrinsic(a.1, b.1)) }
+                unsafe { $type($intrinsic(a.0, b.0)) }
             });
         };
     }
@@ -236,7 +243,7 @@ mod x86 {
         fn not(self) -> Self {
             // SAFETY: see above.
             let all = unsafe { _mm256_castsi256_pd(_mm256_set1_epi32(-1)) };
-            self ^ Avx2Mask(all, all)
+            self ^ Avx2Mask(all)
         }
     }
 
@@ -254,67 +261,43 @@ mod x86 {
         #[inline(always)]
         fn splat(x: f64) -> Self {
             // SAFETY: see above.
-            let x = unsafe { _mm256_set1_pd(x) };
-            Avx2(x, x)
+            Avx2(unsafe { _mm256_set1_pd(x) })
         }
         #[inline(always)]
         fn abs(self) -> Self {
             // SAFETY: see above.
-            unsafe {
-                let sign = _mm256_set1_pd(-0.0);
-                Avx2(
-                    _mm256_andnot_pd(sign, self.0),
-                    _mm256_andnot_pd(sign, self.1),
-                )
-            }
+            Avx2(unsafe { _mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0) })
         }
         #[inline(always)]
         fn larger(self, other: Self) -> Self {
             // SAFETY: see above.
-            unsafe {
-                Avx2(
-                    _mm256_max_pd(self.0, other.0),
-                    _mm256_max_pd(self.1, other.1),
-                )
-            }
+            Avx2(unsafe { _mm256_max_pd(self.0, other.0) })
         }
         #[inline(always)]
         fn gt(self, other: Self) -> Avx2Mask {
             // SAFETY: see above.
-            unsafe {
-                Avx2Mask(
-                    _mm256_cmp_pd::<_CMP_GT_OQ>(self.0, other.0),
-                    _mm256_cmp_pd::<_CMP_GT_OQ>(self.1, other.1),
-                )
-            }
+            Avx2Mask(unsafe { _mm256_cmp_pd::<_CMP_GT_OQ>(self.0, other.0) })
         }
         #[inline(always)]
         fn select(mask: Avx2Mask, yes: Self, no: Self) -> Self {
             // SAFETY: see above.
-            unsafe {
-                Avx2(
-                    _mm256_blendv_pd(no.0, yes.0, mask.0),
-                    _mm256_blendv_pd(no.1, yes.1, mask.1),
-                )
-            }
+            Avx2(unsafe { _mm256_blendv_pd(no.0, yes.0, mask.0) })
         }
     }
 
     impl Vector for Avx2 {
+        const N: usize = 4;
+
         #[inline(always)]
-        fn load(lanes: &[f64; LANES]) -> Self {
-            // SAFETY: see above; two loads of four make the eight.
-            unsafe {
-                Avx2(
-                    _mm256_loadu_pd(lanes.as_ptr()),
-                    _mm256_loadu_pd(lanes.as_ptr().add(4)),
-                )
-            }
+        fn load(lanes: &[f64; LANES], first: usize) -> Self {
+            let four: &[f64; 4] = lanes[first..].first_chunk().expect("four lanes");
+            // SAFETY: see above; one load of four.
+            Avx2(unsafe { _mm256_loadu_pd(four.as_ptr()) })
         }
         #[inline(always)]
         fn bits(mask: Avx2Mask) -> u8 {
             // SAFETY: see above.
-            unsafe { (_mm256_movemask_pd(mask.0) | _mm256_movemask_pd(mask.1) << 4) as u8 }
+            unsafe { _mm256_movemask_pd(mask.0) as u8 }
         }
     }
 
@@ -349,8 +332,10 @@ mod x86 {
     }
 
     impl Vector for Avx512 {
+        const N: usize = LANES;
+
         #[inline(always)]
-        fn load(lanes: &[f64; LANES]) -> Self {
+        fn load(lanes: &[f64; LANES], _: usize) -> Self {
             // SAFETY: see above; one load of eight.
             Avx512(unsafe { _mm512_loadu_pd(lanes.as_ptr()) })
         }

@@ -2,7 +2,7 @@
 
 use super::determinant::{Determinant, Normal, difference};
 use super::number::{Number, Vector, load_vertex};
-use super::{Point, Tetrahedra8, TetrahedronPairs8, Verdict};
+use super::{LANES, Point, Tetrahedra8, TetrahedronPairs8, Verdict};
 
 /// Which lanes are certainly apart because a face of one parts them, and which certainly intersect
 /// because one has a vertex inside the other.
@@ -13,21 +13,23 @@ use super::{Point, Tetrahedra8, TetrahedronPairs8, Verdict};
 #[inline(always)]
 #[must_use]
 pub fn classify_by_faces<V: Vector>(pairs: &TetrahedronPairs8) -> Verdict {
-    let (a, b) = (load::<V>(&pairs.a), load::<V>(&pairs.b));
-    let (of_a, of_b) = (Sides::new(&b, &a), Sides::new(&a, &b));
-    Verdict {
-        yes: V::bits(of_a.any_inside() | of_b.any_inside()),
-        no: V::bits(of_a.parted_by_face() | of_b.parted_by_face()),
+    let mut verdict = Verdict::default();
+    for first in (0..LANES).step_by(V::N) {
+        let (a, b) = (load::<V>(&pairs.a, first), load::<V>(&pairs.b, first));
+        let (of_a, of_b) = (Sides::new(&b, &a), Sides::new(&a, &b));
+        verdict.yes |= V::bits(of_a.any_inside() | of_b.any_inside()) << first;
+        verdict.no |= V::bits(of_a.parted_by_face() | of_b.parted_by_face()) << first;
     }
+    verdict
 }
 
 #[inline(always)]
-fn load<V: Vector>([p, q, r, s]: &Tetrahedra8) -> [[V; 3]; 4] {
+fn load<V: Vector>([p, q, r, s]: &Tetrahedra8, first: usize) -> [[V; 3]; 4] {
     [
-        load_vertex(p),
-        load_vertex(q),
-        load_vertex(r),
-        load_vertex(s),
+        load_vertex(p, first),
+        load_vertex(q, first),
+        load_vertex(r, first),
+        load_vertex(s, first),
     ]
 }
 

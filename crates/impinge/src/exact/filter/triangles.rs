@@ -2,37 +2,47 @@
 
 use super::determinant::{Determinant, Normal, difference};
 use super::number::{Number, Vector, load_vertex};
-use super::{Point, TrianglePairs8, Triangles8, Verdict};
+use super::{LANES, Point, TrianglePairs8, Triangles8, Verdict};
 
 /// The lanes whose triangles are certainly apart because the plane of one has the other strictly
 /// on one side. The cheap first step; the rest is for [`classify`].
 #[inline(always)]
 #[must_use]
 pub fn reject_by_planes<V: Vector>(pairs: &TrianglePairs8) -> u8 {
-    let (a, b) = (load::<V>(&pairs.a), load::<V>(&pairs.b));
-    V::bits(Sides::new(&a, &b).are_apart())
+    let mut no = 0;
+    for first in (0..LANES).step_by(V::N) {
+        let (a, b) = (load::<V>(&pairs.a, first), load::<V>(&pairs.b, first));
+        no |= V::bits(Sides::new(&a, &b).are_apart()) << first;
+    }
+    no
 }
 
 /// Which lanes certainly intersect and which certainly do not.
 #[inline(always)]
 #[must_use]
 pub fn classify<V: Vector>(pairs: &TrianglePairs8) -> Verdict {
-    let (a, b) = (load::<V>(&pairs.a), load::<V>(&pairs.b));
-    let sides = Sides::new(&a, &b);
-    let (apart, sure) = (sides.are_apart(), sides.are_sure());
-    let (meet, miss) = cross_on_line(&a, &b, &sides);
-    Verdict {
-        yes: V::bits(sure & !apart & meet),
-        no: V::bits(apart | (sure & miss)),
+    let mut verdict = Verdict::default();
+    for first in (0..LANES).step_by(V::N) {
+        let (a, b) = (load::<V>(&pairs.a, first), load::<V>(&pairs.b, first));
+        let sides = Sides::new(&a, &b);
+        let (apart, sure) = (sides.are_apart(), sides.are_sure());
+        let (meet, miss) = cross_on_line(&a, &b, &sides);
+        verdict.yes |= V::bits(sure & !apart & meet) << first;
+        verdict.no |= V::bits(apart | (sure & miss)) << first;
     }
+    verdict
 }
 
 // Here and below no closures are passed to library functions: those would be compiled on their
 // own, without the instruction set, and every operation would become a call.
 
 #[inline(always)]
-fn load<V: Vector>([p, q, r]: &Triangles8) -> [[V; 3]; 3] {
-    [load_vertex(p), load_vertex(q), load_vertex(r)]
+fn load<V: Vector>([p, q, r]: &Triangles8, first: usize) -> [[V; 3]; 3] {
+    [
+        load_vertex(p, first),
+        load_vertex(q, first),
+        load_vertex(r, first),
+    ]
 }
 
 /// [`classify`] for one pair, with an early end; none when unsure.

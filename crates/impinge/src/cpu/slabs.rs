@@ -1,0 +1,201 @@
+//! The stages of `Clusters` from `dispatch` on: work items come in slabs, and a full slab is paired and
+//! settled before dispatch goes on.
+
+use std::time::Instant;
+
+use crate::error::Error;
+
+use super::Job;
+use super::dispatch::{self, NodePair};
+use super::pairing::{self, WorkItem, Worker};
+use super::simd::{Isa, Simd, dispatch};
+use super::top_level::TopLevel;
+use super::world::World;
+
+/// Work items of one slab, unless the budget says less.
+const MOST_ITEMS: usize = 1 << 20;
+/// The least with which a slab makes sense.
+const FEWEST_ITEMS: usize = 256;
+/// Work items a task pairs, at most and at least. Neighbours in the slab are neighbours in space, and a
+/// worker keeps the boxes of the clusters it has just seen: long tasks find more of them.
+const TASK: std::ops::RangeInclusive<usize> = 32..=512;
+/// Tasks a worker should get, so that none waits long for the last one.
+const TASKS_EACH: usize = 6;
+/// Work items below which waking a thread costs more than it saves.
+const PARALLEL_FROM: usize = 256;
+
+/// How many work items a slab may hold within the budget, when `held` bytes are held besides.
+pub(crate) fn most_items(budget: Option<u64>, held: u64) -> Result<usize, Error> {
+    let Some(budget) = budget else {
+        return Ok(MOST_ITEMS);
+    };
+    let each = size_of::<WorkItem>() as u64;
+    let needed = held + each * FEWEST_ITEMS as u64;
+    if needed > budget {
+        return Err(Error::MemoryBudget {
+            what: "clusters, their boxes and the smallest slab",
+            needed,
+            budget,
+        });
+    }
+    Ok(((budget - held) / each).min(MOST_ITEMS as u64) as usize)
+}
+
+/// A frame from `dispatch` on.
+pub(crate) struct Slabs<'a> {
+    pub isa: Isa,
+    pub job: Job<'a>,
+    pub world: World<'a>,
+    pub items: &'a mut Vec<WorkItem>,
+    pub most_items: usize,
+    pub scratches: &'a mut [Worker],
+    pub stats: &'a mut crate::stats::Statistics,
+    /// Time spent on full slabs.
+    pub ms: f64,
+}
+
+impl Slabs<'_> {
+    /// All that the frame asks for; pairs stay with the workers.
+    pub fn run(
+        &mut self,
+        top: &mut TopLevel,
+        stack: &mut Vec<NodePair>,
+        body_stack: &mut Vec<NodePair>,
+    ) -> Result<(), Error> {
+        let start = Instant::now();
+        dispatch!(self.isa, all, (
+            slabs: &mut Slabs<'_> = self,
+            top: &mut TopLevel = top,
+            stack: &mut Vec<NodePair> = stack,
+            body_stack: &mut Vec<NodePair> = body_stack,
+        ) -> Result<(), Error>)?;
+        self.flush()?;
+        let stats = &mut *self.stats;
+        let total_ms = start.elapsed().as_secs_f64() * 1e3;
+        stats.add_ms("dispatch", total_ms - self.ms);
+        let mut busy_ms = 0.0;
+        for worker in &*self.scratches {
+            busy_ms += worker.settler.busy.as_secs_f64() * 1e3;
+            stats.n_candidates += worker.settler.n_candidates;
+            stats.n_unsure += worker.settler.n_unsure;
+        }
+        let narrow_ms = (busy_ms / self.scratches.len() as f64).min(self.ms);
+        stats.add_ms("pairing", self.ms - narrow_ms);
+        stats.add_ms("narrow", narrow_ms);
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn put(&mut self, item: WorkItem) -> Result<(), Error> {
+        if self.items.len() == self.most_items {
+            self.flush()?;
+        }
+        if self.items.len() == self.items.capacity() {
+            // Doubling must not pass the limit.
+            let (held, left) = (self.items.len(), self.most_items - self.items.len());
+            let more = held.max(FEWEST_ITEMS).min(left);
+            self.items.reserve_exact(more);
+        }
+        self.items.push(item);
+        Ok(())
+    }
+
+    #[inline(never)]
+    fn flush(&mut self) -> Result<(), Error> {
+        let start = Instant::now();
+        let (isa, world, control) = (self.isa, self.world, self.job.control);
+        let workers = self.job.workers;
+        let items = &self.items[..];
+        let n_workers = if items.len() < PARALLEL_FROM {
+            1
+        } else {
+            workers.n()
+        };
+        let task = (items.len() / (TASKS_EACH * n_workers)).clamp(*TASK.start(), *TASK.end());
+        let n_tasks = items.len().div_ceil(task);
+        let scratches = &mut self.scratches[..n_workers];
+        workers.for_each(scratches, n_tasks, |worker, ix| {
+            if control.step(ix as u64, n_tasks as u64).is_err() {
+                return;
+            }
+            let items = &items[ix * task..items.len().min((ix + 1) * task)];
+            dispatch!(isa, pairing::run, (
+                isa: Isa = isa,
+                world: World<'_> = world,
+                items: &[WorkItem] = items,
+                worker: &mut Worker = worker,
+            ));
+        });
+        control.step(n_tasks as u64, n_tasks as u64)?;
+        self.stats.n_work_items += items.len() as u64;
+        self.stats.n_slabs += 1;
+        self.items.clear();
+        self.ms += start.elapsed().as_secs_f64() * 1e3;
+        Ok(())
+    }
+}
+
+/// Dispatch for every pair of bodies and every body that the frame asks for.
+#[inline(always)]
+fn all<S: Simd>(
+    simd: S,
+    slabs: &mut Slabs<'_>,
+    top: &mut TopLevel,
+    stack: &mut Vec<NodePair>,
+    body_stack: &mut Vec<NodePair>,
+) -> Result<(), Error> {
+    let (world, frame) = (slabs.world, slabs.job.frame);
+    if frame.between() && frame.participants.len() == 2 {
+        if frame.meets(0, 1) {
+            between(simd, 0, 1, stack, slabs)?;
+        }
+    } else if frame.between() {
+        top.refit(frame.participants.len(), |ix| world.cache(ix).bounds.root());
+        top.pairs(simd, body_stack, |a, b| {
+            if !frame.meets(a as usize, b as usize) {
+                return Ok(());
+            }
+            // Compiled on its own: inside this closure the instruction set would be lost.
+            dispatch!(slabs.isa, between, (
+                a: u32 = a,
+                b: u32 = b,
+                stack: &mut Vec<NodePair> = stack,
+                slabs: &mut Slabs<'_> = slabs,
+            ) -> Result<(), Error>)
+        })?;
+    }
+    for (ix, participant) in (0u32..).zip(&frame.participants) {
+        if participant.within {
+            let tree = world.cache(ix).tree();
+            dispatch::within(simd, tree, stack, |cluster_a, cluster_b| {
+                // Adjacency masks are kept with the lower cluster.
+                slabs.put(WorkItem {
+                    a: ix,
+                    b: ix,
+                    cluster_a: cluster_a.min(cluster_b),
+                    cluster_b: cluster_a.max(cluster_b),
+                })
+            })?;
+        }
+    }
+    Ok(())
+}
+
+#[inline(always)]
+fn between<S: Simd>(
+    simd: S,
+    a: u32,
+    b: u32,
+    stack: &mut Vec<NodePair>,
+    slabs: &mut Slabs<'_>,
+) -> Result<(), Error> {
+    let (tree_a, tree_b) = (slabs.world.cache(a).tree(), slabs.world.cache(b).tree());
+    dispatch::between(simd, tree_a, tree_b, stack, |cluster_a, cluster_b| {
+        slabs.put(WorkItem {
+            a,
+            b,
+            cluster_a,
+            cluster_b,
+        })
+    })
+}
