@@ -11,7 +11,7 @@ use impinge_io::{ReadOptions, read};
 use impinge_scenes::{data, solids};
 
 use crate::error::Error;
-use crate::settings::{Ground, Settings};
+use crate::settings::{Damping, Ground, Settings};
 use crate::solid::{Material, Solid};
 
 /// A scene by its name.
@@ -92,7 +92,9 @@ pub const SOFT: Material = Material {
 pub fn drop_scene(name: SceneName) -> Result<DropScene, Error> {
     let (solid, label, is_stand_in) = match name.file() {
         None => {
-            let solid = block(6, 6, 6, 1.0 / 6.0, SOFT);
+            // A block weighs far more than a bunny in the same box.
+            let material = Material { young: 1e5, ..SOFT };
+            let solid = block(6, 6, 6, 1.0 / 6.0, material);
             (solid, "block".to_owned(), false)
         }
         Some((path, n_tets)) => match data::data_file(path) {
@@ -110,14 +112,8 @@ pub fn drop_scene(name: SceneName) -> Result<DropScene, Error> {
     let (sin, cos) = 0.5f64.sin_cos();
     let upper = solid
         .clone()
-        .posed(|[x, y, z]| {
-            [
-                cos * x + sin * z + 0.1,
-                y + top + 0.05,
-                cos * z - sin * x + 0.05,
-            ]
-        })
-        .moving([0.0, -3.0, 0.0]);
+        .posed(|[x, y, z]| [cos * x + sin * z, y + top + 0.05, cos * z - sin * x])
+        .moving([0.0, -2.0, 0.0]);
     Ok(DropScene {
         label,
         is_stand_in,
@@ -127,6 +123,11 @@ pub fn drop_scene(name: SceneName) -> Result<DropScene, Error> {
                 normal: [0.0, 1.0, 0.0],
                 height: 0.0,
             }),
+            // Enough for the bodies to stay together after the first impact.
+            damping: Damping {
+                mass: 0.5,
+                stiffness: 4e-3,
+            },
             ..Settings::default()
         },
         n_steps: 240,
