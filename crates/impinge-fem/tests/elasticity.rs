@@ -205,7 +205,7 @@ fn cantilever(n_across: usize) -> f64 {
         max_iterations: 10_000,
         ..still()
     };
-    let mut simulation = Simulation::new(&[solid.clone()], settings).unwrap();
+    let mut simulation = Simulation::new(std::slice::from_ref(&solid), settings).unwrap();
     for _ in 0..4 {
         simulation.step(&mut cpu()).unwrap();
     }
@@ -262,7 +262,7 @@ fn inverted_elements_recover() {
             },
             ..no_gravity()
         };
-        let mut simulation = Simulation::new(&[solid.clone()], settings).unwrap();
+        let mut simulation = Simulation::new(std::slice::from_ref(&solid), settings).unwrap();
         let start = simulation.energy().elastic;
         assert!(start > 100.0, "{what}: {start}");
         for _ in 0..600 {
