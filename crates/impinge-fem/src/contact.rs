@@ -271,13 +271,12 @@ impl Couplings {
     pub fn index(&mut self, n_vertices: usize) {
         let corners = self.contacts.iter().map(|contact| contact.vertices);
         self.at.rebuild(n_vertices, corners);
-        self.weights.clear();
-        self.weights.extend(
-            self.at
-                .entries()
-                .iter()
-                .map(|&entry| self.contacts[entry as usize / 8].weights[entry as usize % 8]),
-        );
+        self.at
+            .entries()
+            .par_iter()
+            .with_min_len(GRAIN)
+            .map(|&entry| self.contacts[entry as usize / 8].weights[entry as usize % 8])
+            .collect_into_vec(&mut self.weights);
     }
 
     /// What each contact answers to velocities `x`.

@@ -129,6 +129,8 @@ fn build(name: SceneName, mesh: Option<&Path>) -> Result<DropScene, Error> {
                 normal: [0.0, 1.0, 0.0],
                 height: 0.0,
             }),
+            // An error in the velocities far below what gravity adds in a step.
+            tolerance: 1e-4,
             // Enough for the bodies to stay together after the first impact.
             damping: Damping {
                 mass: 0.5,
