@@ -4,6 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use impinge_fem::scenes::SceneName;
 
 use crate::values::{FrameRange, MeshFile, RowsFile, body_numbers, bytes, lambda};
 
@@ -21,6 +22,7 @@ Examples:
   impinge pairs a.obj b.obj                     which primitives of two meshes meet
   impinge self cloth.ply --weld                 where a mesh runs into itself
   impinge sequence body.ply run.pc2 --self      the same, frame after frame
+  impinge simulate blocks --out out/blocks      bodies that fall, deform and collide
 
 Exit codes: 0 done, 2 bad usage, 1 any other error (one line on stderr).
 `impinge help COMMAND` explains a command.";
@@ -39,6 +41,9 @@ pub enum Command {
     /// Follow a deforming mesh through the frames of a sequence
     #[command(after_help = SEQUENCE_EXAMPLES)]
     Sequence(SequenceArgs),
+    /// Drop an elastic body on another one and write what happens, step by step
+    #[command(after_help = SIMULATE_EXAMPLES)]
+    Simulate(SimulateArgs),
 }
 
 const DEMO_EXAMPLES: &str = "\
@@ -78,6 +83,16 @@ Examples:
 
 FRAMES is a .pc2 or .mdd file, the first of numbered mesh files, or a pattern of their names.
 Without --other, self-collision is what is asked for.";
+
+const SIMULATE_EXAMPLES: &str = "\
+Examples:
+  impinge simulate blocks --out out/blocks
+  impinge simulate bunny-7k --out out/bunny --format vtu
+  impinge simulate bunny-7k --out out/bunny --format vtu --resume
+
+Corotated finite elements on tetrahedra; contact forces come from the pairs found. Ctrl-C saves
+the state and stops; --resume goes on to the very bits of a run that was never stopped.
+Where the mesh of a scene is not at hand, a generated ball stands in, and the first line says so.";
 
 /// Who works, and how.
 #[derive(Debug, Clone, Args)]
@@ -187,6 +202,69 @@ pub struct SequenceArgs {
     pub ask: AskArgs,
     #[command(flatten)]
     pub detector: DetectorArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct SimulateArgs {
+    /// What to simulate: two bodies, one dropped on the other
+    #[arg(value_enum, value_name = "SCENE")]
+    pub scene: SceneArg,
+    /// The folder for all files
+    #[arg(long, value_name = "FOLDER")]
+    pub out: PathBuf,
+    /// Time steps [default: 240]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub steps: Option<u32>,
+    /// How the sequence is written
+    #[arg(long, value_enum, default_value_t = SequenceFormatArg::Pc2)]
+    pub format: SequenceFormatArg,
+    /// Go on from the state saved in the folder; start where there is none
+    #[arg(long)]
+    pub resume: bool,
+    #[command(flatten)]
+    pub detector: DetectorArgs,
+}
+
+/// [`SceneName`] as an argument.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SceneArg {
+    /// Two bunnies of 7,356 tetrahedra
+    #[value(name = "bunny-7k")]
+    Bunny7k,
+    /// Two bunnies of 19,379 tetrahedra
+    #[value(name = "bunny-19k")]
+    Bunny19k,
+    /// Two dragons of 8,408 tetrahedra
+    #[value(name = "dragon-8k")]
+    Dragon8k,
+    /// Two dragons of 15,047 tetrahedra
+    #[value(name = "dragon-15k")]
+    Dragon15k,
+    /// Two blocks of 1,296 tetrahedra
+    Blocks,
+}
+
+impl From<SceneArg> for SceneName {
+    fn from(scene: SceneArg) -> Self {
+        match scene {
+            SceneArg::Bunny7k => SceneName::Bunny7k,
+            SceneArg::Bunny19k => SceneName::Bunny19k,
+            SceneArg::Dragon8k => SceneName::Dragon8k,
+            SceneArg::Dragon15k => SceneName::Dragon15k,
+            SceneArg::Blocks => SceneName::Blocks,
+        }
+    }
+}
+
+/// How a simulated sequence is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SequenceFormatArg {
+    /// One mesh (.ply), its positions (.pc2), and a table of what collides
+    Pc2,
+    /// A VTU file a step, with a field `colliding`
+    Vtu,
+    /// A PLY file a step, colliding tetrahedra coloured
+    Ply,
 }
 
 #[derive(Debug, Args)]

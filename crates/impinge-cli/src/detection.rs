@@ -139,7 +139,7 @@ impl Times {
 }
 
 /// The percentile with linear interpolation between the two nearest ranks; 0 of no values.
-fn percentile(values: &[f64], percent: u32) -> f64 {
+pub fn percentile(values: &[f64], percent: u32) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     let Some(last) = sorted.len().checked_sub(1) else {

@@ -21,6 +21,25 @@ pub enum Error {
     /// The detection failed, or was cancelled.
     #[error(transparent)]
     Detection(#[from] impinge::Error),
+    /// The simulation could not be set up or go on, or was cancelled.
+    #[error(transparent)]
+    Simulation(#[from] impinge_fem::Error),
+    /// A saved state that is damaged or of another simulation.
+    #[error("{}: {source}", .path.display())]
+    SavedState {
+        path: PathBuf,
+        source: impinge_fem::Error,
+    },
+    /// A simulation was asked to stop, and has saved its state.
+    #[error("stopped after step {step} of {n_steps}; --resume goes on in {}", .folder.display())]
+    Stopped {
+        step: u64,
+        n_steps: u64,
+        folder: PathBuf,
+    },
+    /// A file of an earlier run could not be read.
+    #[error("{}: cannot read: {source}", .path.display())]
+    Read { path: PathBuf, source: io::Error },
     /// Rows of pairs, or the folder of an output file, could not be written.
     #[error("{}: cannot write: {source}", .path.display())]
     Write { path: PathBuf, source: io::Error },

@@ -26,6 +26,7 @@ fn main() -> ExitCode {
         Command::Pairs(args) => commands::pairs(&args, &cancel),
         Command::Within(args) => commands::within(&args, &cancel),
         Command::Sequence(args) => commands::sequence(&args, &cancel),
+        Command::Simulate(args) => commands::simulate(&args, &cancel),
     });
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -49,6 +49,17 @@ pub enum MeshFormat {
     Vtu,
 }
 
+impl MeshFormat {
+    /// The extension of its files.
+    pub fn extension(self) -> &'static str {
+        match self {
+            MeshFormat::Ply => "ply",
+            MeshFormat::Glb => "glb",
+            MeshFormat::Vtu => "vtu",
+        }
+    }
+}
+
 impl FromStr for MeshFile {
     type Err = String;
 

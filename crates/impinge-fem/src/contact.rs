@@ -33,7 +33,7 @@ use crate::rotation::cofactors;
 use crate::settings::Settings;
 
 /// Slip of this share of an edge a step is where friction reaches its full strength.
-const FULL_FRICTION: f64 = 1e-2;
+const FULL_FRICTION: f64 = 1e-3;
 
 /// Directions shorter than this share of a unit vector say nothing.
 const CANCELLED: f64 = 1e-6;
@@ -262,6 +262,8 @@ pub(crate) struct Couplings {
     pub contacts: Vec<Contact>,
     /// Each vertex' contacts, as 8 · contact + corner.
     at: Lists,
+    /// The weight of each entry of `at`: read once an iteration of the solver, in order.
+    weights: Vec<f64>,
 }
 
 impl Couplings {
@@ -269,6 +271,12 @@ impl Couplings {
     pub fn index(&mut self, n_vertices: usize) {
         let corners = self.contacts.iter().map(|contact| contact.vertices);
         self.at.rebuild(n_vertices, corners);
+        self.at
+            .entries()
+            .par_iter()
+            .with_min_len(GRAIN)
+            .map(|&entry| self.contacts[entry as usize / 8].weights[entry as usize % 8])
+            .collect_into_vec(&mut self.weights);
     }
 
     /// What each contact answers to velocities `x`.
@@ -291,10 +299,14 @@ impl Couplings {
     /// Adds a row of the product, from what the contacts answered.
     #[inline]
     pub fn add_row(&self, row: usize, reactions: &[Vec3], sum: Vec3) -> Vec3 {
-        self.at.get(row).iter().fold(sum, |sum, &entry| {
-            let (contact, corner) = (entry as usize / 8, entry as usize % 8);
-            sum + reactions[contact] * self.contacts[contact].weights[corner]
-        })
+        let weights = &self.weights[self.at.range(row)];
+        self.at
+            .get(row)
+            .iter()
+            .zip(weights)
+            .fold(sum, |sum, (&entry, &weight)| {
+                sum + reactions[entry as usize / 8] * weight
+            })
     }
 
     /// The force on a vertex at the start of the step.

@@ -189,7 +189,8 @@ fn element(corners: [u32; 4], rest: &[Vec3], lame: (f64, f64)) -> Result<Element
     let edges = [b - a, c - a, d - a];
     let det = edges[0].cross(&edges[1]).dot(&edges[2]);
     let longest = edges.iter().map(Vec3::norm_squared).fold(0.0, f64::max);
-    if !(det.abs() > FLAT * longest * longest.sqrt()) || !det.is_normal() {
+    let is_thick = det.abs() > FLAT * longest * longest.sqrt();
+    if !(is_thick && det.is_normal()) {
         return Err(det.abs() / 6.0);
     }
     // The gradients are the rows of the inverse of the matrix of edges, whatever its orientation.

@@ -71,8 +71,8 @@ fn cut(piece: &[Vec3; 4], heights: [f64; 4], out: &mut Vec<[Vec3; 4]>) {
     // Corners above first.
     let mut order = [0, 1, 2, 3];
     let mut n_above = 0;
-    for k in 0..4 {
-        if heights[k] >= 0.0 {
+    for (k, height) in heights.iter().enumerate() {
+        if *height >= 0.0 {
             order.swap(n_above, k);
             n_above += 1;
         }

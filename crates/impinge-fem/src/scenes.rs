@@ -11,7 +11,7 @@ use impinge_io::{ReadOptions, read};
 use impinge_scenes::{data, solids};
 
 use crate::error::Error;
-use crate::settings::{Ground, Settings};
+use crate::settings::{Damping, Ground, Settings};
 use crate::solid::{Material, Solid};
 
 /// A scene by its name.
@@ -90,13 +90,21 @@ pub const SOFT: Material = Material {
 /// # Errors
 /// A mesh file that is there but can't be read, or holds no tetrahedra.
 pub fn drop_scene(name: SceneName) -> Result<DropScene, Error> {
+    let mesh = name.file().and_then(|(path, _)| data::data_file(path));
+    build(name, mesh.as_deref())
+}
+
+/// The scene with a mesh from a file, or without one.
+fn build(name: SceneName, mesh: Option<&Path>) -> Result<DropScene, Error> {
     let (solid, label, is_stand_in) = match name.file() {
         None => {
-            let solid = block(6, 6, 6, 1.0 / 6.0, SOFT);
+            // A block weighs far more than a bunny in the same box.
+            let material = Material { young: 1e5, ..SOFT };
+            let solid = block(6, 6, 6, 1.0 / 6.0, material);
             (solid, "block".to_owned(), false)
         }
-        Some((path, n_tets)) => match data::data_file(path) {
-            Some(path) => (load(&path, SOFT)?, name.name().to_owned(), false),
+        Some((_, n_tets)) => match mesh {
+            Some(path) => (load(path, SOFT)?, name.name().to_owned(), false),
             None => {
                 let label = format!("ball, standing in for {}", name.name());
                 (ball(n_tets, SOFT), label, true)
@@ -110,14 +118,8 @@ pub fn drop_scene(name: SceneName) -> Result<DropScene, Error> {
     let (sin, cos) = 0.5f64.sin_cos();
     let upper = solid
         .clone()
-        .posed(|[x, y, z]| {
-            [
-                cos * x + sin * z + 0.1,
-                y + top + 0.05,
-                cos * z - sin * x + 0.05,
-            ]
-        })
-        .moving([0.0, -3.0, 0.0]);
+        .posed(|[x, y, z]| [cos * x + sin * z, y + top + 0.05, cos * z - sin * x])
+        .moving([0.0, -2.0, 0.0]);
     Ok(DropScene {
         label,
         is_stand_in,
@@ -127,6 +129,13 @@ pub fn drop_scene(name: SceneName) -> Result<DropScene, Error> {
                 normal: [0.0, 1.0, 0.0],
                 height: 0.0,
             }),
+            // An error in the velocities far below what gravity adds in a step.
+            tolerance: 1e-4,
+            // Enough for the bodies to stay together after the first impact.
+            damping: Damping {
+                mass: 0.5,
+                stiffness: 4e-3,
+            },
             ..Settings::default()
         },
         n_steps: 240,
@@ -190,4 +199,37 @@ fn normalised(solid: Solid) -> Solid {
         .map(|p| std::array::from_fn(|k| (p[k] - foot[k]) * scale))
         .collect();
     Solid::new(solid.tets, rest, solid.material)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stand_ins_say_so_and_have_about_the_size() {
+        for name in SceneName::ALL {
+            let scene = build(name, None).unwrap();
+            let n_tets = scene.solids[0].tets.len();
+            assert_eq!(scene.solids[1].tets.len(), n_tets);
+            match name.file() {
+                None => assert!(!scene.is_stand_in && !scene.label.contains("standing in")),
+                Some((_, wanted)) => {
+                    assert!(scene.is_stand_in);
+                    let words = format!("standing in for {}, {n_tets} tetrahedra", name.name());
+                    assert!(scene.label.contains(&words), "{}", scene.label);
+                    assert!(n_tets.abs_diff(wanted) * 10 < wanted, "{n_tets} {wanted}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_of_triangles_is_refused() {
+        let Some(path) = data::data_file("meshes/cow.off") else {
+            println!("skipped: the folder of shared data is absent");
+            return;
+        };
+        let error = build(SceneName::Bunny7k, Some(&path)).unwrap_err();
+        assert!(error.to_string().contains("it holds triangles"), "{error}");
+    }
 }

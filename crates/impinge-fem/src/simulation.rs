@@ -453,8 +453,13 @@ fn integrate(
     forces(mesh, turned, force);
     matrix.assemble(turned, dt * (dt + settings.damping.stiffness));
     let gravity = Vec3::from(settings.gravity);
-    for (vertex, (force, mass)) in force.iter_mut().zip(&mesh.masses).enumerate() {
-        *force += gravity * *mass + couplings.force(vertex);
+    force
+        .par_iter_mut()
+        .zip(&mesh.masses)
+        .enumerate()
+        .with_min_len(GRAIN)
+        .for_each(|(vertex, (force, mass))| *force += gravity * *mass + couplings.force(vertex));
+    for (vertex, mass) in mesh.masses.iter().enumerate() {
         let damped = mass * (1.0 + dt * settings.damping.mass);
         let block = matrix.diagonal_mut(vertex);
         (0..3).for_each(|k| block[(k, k)] += damped);

@@ -39,21 +39,32 @@ pub(crate) struct Scratch {
 }
 
 impl System<'_> {
-    /// `out = A x`, 0 at fixed vertices.
-    fn multiply(&self, x: &[Vec3], coupled: &mut Vec<Vec3>, out: &mut [Vec3]) {
+    /// `out = A x`, 0 at fixed vertices; gives `x · out`.
+    fn multiply(
+        &self,
+        x: &[Vec3],
+        coupled: &mut Vec<Vec3>,
+        out: &mut [Vec3],
+        sums: &mut Vec<f64>,
+    ) -> f64 {
         self.couplings.react(x, coupled);
         out.par_chunks_mut(GRAIN)
             .enumerate()
-            .for_each(|(piece, out)| {
+            .map(|(piece, out)| {
+                let mut sum = 0.0;
                 for (row, out) in (piece * GRAIN..).zip(out) {
-                    *out = if self.fixed[row] {
-                        Vec3::zeros()
-                    } else {
-                        self.couplings
-                            .add_row(row, coupled, self.matrix.row_times(row, x))
-                    };
+                    if self.fixed[row] {
+                        *out = Vec3::zeros();
+                        continue;
+                    }
+                    let product = self.matrix.row_times(row, x);
+                    *out = self.couplings.add_row(row, coupled, product);
+                    sum += x[row].dot(out);
                 }
-            });
+                sum
+            })
+            .collect_into_vec(sums);
+        sums.iter().sum()
     }
 
     /// The inverse of each block on the diagonal; 0 at fixed vertices.
@@ -96,37 +107,50 @@ impl System<'_> {
             vector.resize(n, Vec3::zeros());
         }
         self.precondition(inverse);
-        self.multiply(x, coupled, product);
         let scale = pieces(sums, n, |k| b[k].dot(&(inverse[k] * b[k])));
+        self.multiply(x, coupled, product, sums);
         let fixed = self.fixed;
         residual
             .iter_mut()
             .enumerate()
             .filter(|&(k, _)| !fixed[k])
             .for_each(|(k, r)| *r = b[k] - product[k]);
-        let mut norm = apply(residual, inverse, preconditioned, sums);
+        preconditioned
+            .iter_mut()
+            .zip(&*inverse)
+            .zip(&*residual)
+            .for_each(|((z, inverse), r)| *z = inverse * r);
         direction.copy_from_slice(preconditioned);
+        let mut norm = pieces(sums, n, |k| residual[k].dot(&preconditioned[k]));
         let goal = tolerance * tolerance * scale;
         let mut n_iterations = 0;
         while norm > goal && n_iterations < max_iterations {
             n_iterations += 1;
-            self.multiply(direction, coupled, product);
-            let curvature = pieces(sums, n, |k| direction[k].dot(&product[k]));
+            let curvature = self.multiply(direction, coupled, product, sums);
             // A matrix that rounding makes indefinite, or a vector that is not finite, ends the search.
             if curvature.is_nan() || curvature <= 0.0 {
                 break;
             }
             let step = norm / curvature;
+            // One pass over all vectors: the solution moves, the residual follows, and so do its
+            // preconditioned self and their product.
             x.par_chunks_mut(GRAIN)
                 .zip(residual.par_chunks_mut(GRAIN))
+                .zip(preconditioned.par_chunks_mut(GRAIN))
                 .zip(direction.par_chunks(GRAIN).zip(product.par_chunks(GRAIN)))
-                .for_each(|((x, residual), (direction, product))| {
-                    for (((x, r), d), p) in x.iter_mut().zip(residual).zip(direction).zip(product) {
-                        *x += d * step;
-                        *r -= p * step;
+                .zip(inverse.par_chunks(GRAIN))
+                .map(|((((x, r), z), (d, p)), inverse)| {
+                    let mut sum = 0.0;
+                    for k in 0..x.len() {
+                        x[k] += d[k] * step;
+                        r[k] -= p[k] * step;
+                        z[k] = inverse[k] * r[k];
+                        sum += r[k].dot(&z[k]);
                     }
-                });
-            let next = apply(residual, inverse, preconditioned, sums);
+                    sum
+                })
+                .collect_into_vec(sums);
+            let next: f64 = sums.iter().sum();
             let keep = next / norm;
             norm = next;
             direction
@@ -156,25 +180,6 @@ fn pieces(sums: &mut Vec<f64>, n: usize, of: impl Fn(usize) -> f64 + Sync) -> f6
         .map(|piece| {
             (piece * GRAIN..n.min((piece + 1) * GRAIN))
                 .map(&of)
-                .sum::<f64>()
-        })
-        .collect_into_vec(sums);
-    sums.iter().sum()
-}
-
-/// Applies the preconditioner, and gives the residual's norm in it, squared.
-fn apply(residual: &[Vec3], inverse: &[Mat3], out: &mut [Vec3], sums: &mut Vec<f64>) -> f64 {
-    out.par_chunks_mut(GRAIN)
-        .enumerate()
-        .map(|(piece, out)| {
-            let range = piece * GRAIN..piece * GRAIN + out.len();
-            let values = residual[range.clone()].iter().zip(&inverse[range]);
-            out.iter_mut()
-                .zip(values)
-                .map(|(z, (r, inverse))| {
-                    *z = inverse * r;
-                    r.dot(z)
-                })
                 .sum::<f64>()
         })
         .collect_into_vec(sums);

@@ -205,7 +205,7 @@ fn cantilever(n_across: usize) -> f64 {
         max_iterations: 10_000,
         ..still()
     };
-    let mut simulation = Simulation::new(&[solid.clone()], settings).unwrap();
+    let mut simulation = Simulation::new(std::slice::from_ref(&solid), settings).unwrap();
     for _ in 0..4 {
         simulation.step(&mut cpu()).unwrap();
     }
@@ -262,7 +262,7 @@ fn inverted_elements_recover() {
             },
             ..no_gravity()
         };
-        let mut simulation = Simulation::new(&[solid.clone()], settings).unwrap();
+        let mut simulation = Simulation::new(std::slice::from_ref(&solid), settings).unwrap();
         let start = simulation.energy().elastic;
         assert!(start > 100.0, "{what}: {start}");
         for _ in 0..600 {
@@ -316,7 +316,7 @@ fn bad_input_is_refused_by_name() {
     ];
     for (said, words) in said.iter().zip([
         "solid 1: tetrahedron 3 names vertex 8, but there are 8 vertices",
-        "solid 1: tetrahedron 0 is flat at rest",
+        "solid 1: tetrahedron 1 is flat at rest (volume 0e0)",
         "solid 1: vertex 5: position (1, NaN, 1) is not finite",
         "body 1: vertex 5 has a non-finite position",
         "solid 1: vertex 8 is to be fixed, but there are 8 vertices",

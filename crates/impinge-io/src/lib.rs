@@ -57,4 +57,4 @@ pub use read::{
     read_with_summary,
 };
 pub use sequence::{Sequence, SequenceFormat};
-pub use write::{ColoredMesh, Pc2Writer, write_glb, write_ply, write_vtu};
+pub use write::{ColoredMesh, GrowingPc2, Pc2Writer, write_glb, write_ply, write_vtu};

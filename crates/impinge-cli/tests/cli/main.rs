@@ -6,4 +6,5 @@ mod harness;
 mod sequence;
 mod shared_data;
 mod signals;
+mod simulate;
 mod usage;

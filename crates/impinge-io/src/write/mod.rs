@@ -1,13 +1,16 @@
-//! Writing coloured meshes and point caches. A file appears under its name when it is complete, and not before.
+//! Writing coloured meshes and point caches. A file appears under its name when it is complete, and not before,
+//! but for [`GrowingPc2`].
 
 mod atomic;
 mod glb;
+mod growing;
 mod pc2;
 mod ply;
 mod surface;
 mod vtu;
 
 pub use glb::write_glb;
+pub use growing::GrowingPc2;
 pub use pc2::Pc2Writer;
 pub use ply::write_ply;
 pub use vtu::write_vtu;

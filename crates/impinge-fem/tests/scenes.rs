@@ -1,0 +1,68 @@
+//! The scenes with the meshes of the shared data, where it is at hand.
+
+mod common;
+
+use common::cpu;
+use impinge::{Control, Detector, Method, Settings};
+use impinge_fem::Simulation;
+use impinge_fem::scenes::{SceneName, drop_scene};
+
+#[test]
+fn the_meshes_are_those_of_the_tables() {
+    for (name, n_tets) in [
+        (SceneName::Bunny7k, 7_356),
+        (SceneName::Bunny19k, 19_379),
+        (SceneName::Dragon8k, 8_408),
+        (SceneName::Dragon15k, 15_047),
+    ] {
+        let scene = drop_scene(name).unwrap();
+        if scene.is_stand_in {
+            println!("skipped: the mesh of {} is absent", name.name());
+            continue;
+        }
+        assert!(scene.solids.iter().all(|solid| solid.tets.len() == n_tets));
+        assert!(scene.n_steps >= 200);
+        // Every mesh is fit to be simulated, and the bodies start apart.
+        let mut simulation = Simulation::new(&scene.solids, scene.settings).unwrap();
+        assert_eq!(simulation.step(&mut cpu()).unwrap().n_pairs, 0);
+    }
+}
+
+#[test]
+fn a_body_dropped_on_another_crushes_it_and_every_method_sees_the_same() {
+    let scene = drop_scene(SceneName::Bunny7k).unwrap();
+    if scene.is_stand_in {
+        println!(
+            "no mesh of {} here: a ball stands in",
+            SceneName::Bunny7k.name()
+        );
+    }
+    let height = |simulation: &Simulation| {
+        let n = simulation.masses().len() / 2;
+        let lower = &simulation.positions()[..n];
+        lower.iter().fold(0.0, |top: f64, p| top.max(p[1]))
+    };
+    let mut simulation = Simulation::new(&scene.solids, scene.settings).unwrap();
+    let start = height(&simulation);
+    let mut detector = cpu();
+    let mut most = 0;
+    for _ in 0..60 {
+        let report = simulation.step(&mut detector).unwrap();
+        assert!(report.residual <= simulation.settings().tolerance);
+        most = most.max(report.n_colliding.iter().sum());
+    }
+    assert!(most > 500, "{most}");
+    assert!(
+        height(&simulation) < 0.8 * start,
+        "{start} {}",
+        height(&simulation)
+    );
+    let expected = simulation.detect(&mut detector, &Control::new()).unwrap();
+    let mut cells = Detector::with_settings(Settings {
+        method: Method::Cells,
+        ..Settings::default()
+    })
+    .unwrap();
+    let pairs = simulation.detect(&mut cells, &Control::new()).unwrap();
+    assert!(expected.len() > 500 && pairs.same_as(expected));
+}
