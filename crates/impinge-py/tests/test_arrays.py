@@ -5,9 +5,9 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from shapes import ACROSS, FACE, TRIANGLE, ball, soup
 
 import impinge
+from shapes import ACROSS, FACE, TRIANGLE, ball, soup
 
 # Whole-numbered corners, so that every dtype can hold them.
 CORNERS = np.array([[0, 0, 0], [8, 0, 0], [0, 8, 0], [2, 2, 4]])

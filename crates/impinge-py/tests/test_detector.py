@@ -6,9 +6,9 @@ import time
 
 import numpy as np
 import pytest
-from shapes import ACROSS, FACE, TRIANGLE, ball, lattice_triangles, soup
 
 import impinge
+from shapes import ACROSS, FACE, TRIANGLE, ball, lattice_triangles, soup
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +111,8 @@ def test_frames_follow_the_positions():
         angle = 0.5 * frame * vertices[:, 2]
         x, y, z = vertices.T
         twisted = np.stack(
-            [np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y, 0.7 * z], 1
+            [np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y, 0.7 * z],
+            1,
         )
         scene.set_positions(a, twisted if frame % 2 else twisted.astype(np.float32))
         results = [d.detect(scene, between=True, within=True) for d in detectors]
@@ -173,7 +174,10 @@ def test_settings_refused(settings, error, message):
 
 def test_numpy_scalars_are_numbers():
     detector = impinge.Detector(
-        threads=np.int64(2), memory_budget=np.uint64(1 << 30), lambda_=np.float32(2), group_size=np.uint8(9)
+        threads=np.int64(2),
+        memory_budget=np.uint64(1 << 30),
+        lambda_=np.float32(2),
+        group_size=np.uint8(9),
     )
     assert repr(detector) == (
         'Detector(method="clusters", backend="auto", threads=2, memory_budget=1073741824)'
@@ -257,7 +261,9 @@ def test_what_is_in_use_is_not_changed(long):
             lambda: long.remove(0),
             lambda: detector.detect(long, within=0),
         ]:
-            with pytest.raises(RuntimeError, match="being read by a detection|detector is busy") as raised:
+            with pytest.raises(
+                RuntimeError, match="being read by a detection|detector is busy"
+            ) as raised:
                 change()
             seen.append(str(raised.value)[:12])
 

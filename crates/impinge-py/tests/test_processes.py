@@ -7,9 +7,9 @@ import sys
 import time
 
 import pytest
-from shapes import ball
 
 import impinge
+from shapes import ball
 
 # Large triangles that all overlap: minutes of work for every method.
 LONG_RUN = """

@@ -1,5 +1,5 @@
 from collections.abc import Callable, Iterable
-from typing import Any, Literal, SupportsFloat, SupportsIndex, TypedDict, Union, final
+from typing import Any, Literal, SupportsFloat, SupportsIndex, TypedDict, final
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +22,7 @@ __all__ = [
 __version__: str
 
 _Array: TypeAlias = Any  # An array-like, or anything that speaks DLPack or the buffer protocol.
-_Body: TypeAlias = Union[Body, SupportsIndex]
+_Body: TypeAlias = Body | SupportsIndex
 _Pair: TypeAlias = tuple[_Body, _Body]
 _Method: TypeAlias = Literal["clusters", "cells", "naive"]
 _Backend: TypeAlias = Literal["auto", "cpu", "gpu"]
