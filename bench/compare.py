@@ -14,8 +14,8 @@ vertices have moved; "query" is the question. Each contender runs all frames on 
 rounds, so that its caches are its own; the table shows medians over frames and rounds.
 
 What is checked. Every contender's pairs in every frame, as a set, against the exact ones: those of
-CGAL's exact kernel (through libigl), and for the first frame also the published ones where there are
-some. Without libigl they come from impinge's other method, and the table says so.
+CGAL's exact kernel (through libigl), and for the first frame also the published ones where some
+are. Without libigl they come from impinge's other method, and the table says so.
 """
 
 import argparse
