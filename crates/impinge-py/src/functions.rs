@@ -9,6 +9,7 @@ use crate::detector::Detector;
 use crate::errors::Names;
 use crate::result::Answer;
 use crate::scene::Scene;
+use crate::settings::Argument;
 
 /// Which primitives of two meshes intersect.
 ///
@@ -88,12 +89,15 @@ pub fn pairs<'py>(
 /// ValueError, TypeError
 ///     As `Scene.add` and `Detector`.
 #[pyfunction]
-#[pyo3(signature = (vertices, faces, shared_vertex="skip", **settings))]
+#[pyo3(
+    signature = (vertices, faces, shared_vertex=None, **settings),
+    text_signature = "(vertices, faces, shared_vertex=\"skip\", **settings)"
+)]
 pub fn self_pairs<'py>(
     py: Python<'py>,
     vertices: &Bound<'py, PyAny>,
     faces: &Bound<'py, PyAny>,
-    shared_vertex: &str,
+    shared_vertex: Argument<'py, 'py>,
     settings: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<u32>>> {
     let mut scene = Scene::empty();

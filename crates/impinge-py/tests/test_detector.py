@@ -137,7 +137,10 @@ def test_frames_follow_the_positions():
         ({"ignore": [(0, 1), (0, 9)]}, ValueError, r"^ignore\[1\]: there is no body 9"),
         ({"ignore": [0]}, TypeError, r"^ignore\[0\]: a pair of bodies expected"),
         ({"shared_vertex": "all"}, ValueError, '^shared_vertex: "all" given, "skip", "resolve"'),
-        ({"progress": 1}, TypeError, "^progress: a callable expected"),
+        ({"shared_vertex": 0}, TypeError, "^shared_vertex: a string expected, int given"),
+        ({"ignore": 0}, TypeError, "^ignore: a sequence of pairs of bodies expected, int given"),
+        ({"progress": 1}, TypeError, "^progress: a callable expected, int given"),
+        ({"cancel": 1}, TypeError, "^cancel: a CancelToken expected, int given"),
     ],
 )
 def test_questions_refused(scene, question, error, message):
@@ -160,16 +163,23 @@ def test_questions_refused(scene, question, error, message):
         ({"memory_budget": 2**64}, ValueError, "^memory_budget: 18446744073709551616 given"),
         ({"lambda_": 0}, ValueError, "^lambda: 0 given, a number above 0 allowed"),
         ({"lambda_": float("nan")}, ValueError, "^lambda: NaN given"),
-        ({"lambda_": "1"}, TypeError, "^lambda_: a number expected, '1' given"),
+        ({"lambda_": "1"}, TypeError, "^lambda_: a number expected, str given"),
         ({"group_size": 0}, ValueError, "^group size: 0 given, 1 to 64 allowed"),
         ({"group_size": 65}, ValueError, "^group_size: 65 given"),
-        ({"device": 3}, TypeError, "device"),
+        ({"device": 3}, TypeError, "^device: a string expected, int given"),
+        ({"method": b"cells"}, TypeError, "^method: a string expected, bytes given"),
         ({"colour": "red"}, TypeError, "colour"),
     ],
 )
 def test_settings_refused(settings, error, message):
     with pytest.raises(error, match=message):
         impinge.Detector(**settings)
+
+
+@pytest.mark.parametrize("bad", [None, 3, "scene"])
+def test_not_a_scene(bad):
+    with pytest.raises(TypeError, match="^scene: a Scene expected, "):
+        impinge.Detector().detect(bad)
 
 
 def test_numpy_scalars_are_numbers():

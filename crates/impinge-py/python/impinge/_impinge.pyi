@@ -37,8 +37,8 @@ class _Settings(TypedDict, total=False):
     device: str | None
     threads: SupportsIndex | None
     memory_budget: SupportsIndex | None
-    lambda_: SupportsFloat | None
-    group_size: SupportsIndex | None
+    lambda_: SupportsFloat
+    group_size: SupportsIndex
     recluster: _Recluster
     instruction_set: _InstructionSet
 
@@ -102,8 +102,8 @@ class Detector:
         threads: SupportsIndex | None = None,
         memory_budget: SupportsIndex | None = None,
         *,
-        lambda_: SupportsFloat | None = None,
-        group_size: SupportsIndex | None = None,
+        lambda_: SupportsFloat = 1.0,
+        group_size: SupportsIndex = 64,
         recluster: _Recluster = "auto",
         instruction_set: _InstructionSet = "avx512",
     ) -> Detector: ...
