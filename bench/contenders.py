@@ -298,15 +298,14 @@ class IpcToolkit(Contender):
 
 def available():
     """The contenders that can be run here, impinge first, and the peers that are missing."""
-    present, missing = [Impinge(""), Impinge(", one thread", threads=1)], []
-    try:
-        gpu = Impinge(", GPU", backend="gpu")
-        gpu.start(*[np.array([[0, 1, 2]])] * 2, *[np.eye(3, dtype=np.float32)] * 2)
-        if gpu.result.stats.backend != "cpu":
-            present.append(gpu)
-    except RuntimeError:
-        # There is no GPU here, or this wheel was built without it.
-        pass
+    present = [Impinge("", backend="cpu"), Impinge(", one thread", backend="cpu", threads=1)]
+    missing = []
+    # By itself a detector takes a GPU only where there is a real one.
+    gpu = Impinge("", backend="auto")
+    gpu.start(*[np.array([[0, 1, 2]])] * 2, *[np.eye(3, dtype=np.float32)] * 2)
+    if gpu.result.stats.backend != "cpu":
+        gpu.words = f", {gpu.result.stats.backend}"
+        present.append(gpu)
     for peer in [Libigl, Coal, CoalRefit, Fcl, IpcToolkit]:
         try:
             present.append(peer())

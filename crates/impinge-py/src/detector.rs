@@ -72,6 +72,7 @@ impl Detector {
                           recluster=\"auto\", instruction_set=\"avx512\")"
     )]
     fn new(
+        py: Python<'_>,
         method: Argument<'_, '_>,
         backend: Argument<'_, '_>,
         device: Argument<'_, '_>,
@@ -83,7 +84,7 @@ impl Detector {
         instruction_set: Argument<'_, '_>,
     ) -> PyResult<Self> {
         check_process()?;
-        let settings = Told {
+        let told = Told {
             method,
             backend,
             device,
@@ -93,10 +94,12 @@ impl Detector {
             group_size,
             recluster,
             instruction_set,
-        }
-        .settings()?;
+        };
+        let settings = told.settings()?;
+        // Looking for a GPU and starting threads takes a while.
+        let inner = py.detach(|| impinge::Detector::with_settings(settings));
         Ok(Detector {
-            inner: impinge::Detector::with_settings(settings).map_err(raise)?,
+            inner: inner.map_err(raise)?,
         })
     }
 

@@ -20,7 +20,8 @@ use crate::settings::Argument;
 /// faces_a, faces_b : array_like of int, shape (n, 3) or (n, 4)
 ///     Triangles or tetrahedra as vertex indices.
 /// **settings
-///     As for `Detector`.
+///     As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given: waking a GPU
+///     does not pay for one question.
 ///
 /// Returns
 /// -------
@@ -77,7 +78,8 @@ pub fn pairs<'py>(
 ///     Primitives that share a vertex index are not reported, or reported when they meet in more
 ///     than what they share.
 /// **settings
-///     As for `Detector`.
+///     As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given: waking a GPU
+///     does not pay for one question.
 ///
 /// Returns
 /// -------
@@ -118,7 +120,15 @@ fn ask<'py>(
     question: &Bound<'py, PyDict>,
     settings: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<u32>>> {
-    let detector = py.get_type::<Detector>().call((), settings)?;
+    let settings = match settings {
+        Some(settings) => settings.copy()?,
+        None => PyDict::new(py),
+    };
+    // Waking a GPU costs more than any single question.
+    if !settings.contains("backend")? {
+        settings.set_item("backend", "cpu")?;
+    }
+    let detector = py.get_type::<Detector>().call((), Some(&settings))?;
     let result = detector.call_method("detect", (Bound::new(py, scene)?,), Some(question))?;
     result.cast::<Answer>()?.get().pairs(py)
 }

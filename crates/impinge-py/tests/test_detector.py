@@ -200,8 +200,8 @@ def test_too_small_a_budget_says_what_is_needed(scene):
 
 
 def test_statistics(scene):
-    stats = impinge.Detector(threads=1).detect(scene).stats
-    assert stats.backend and stats.method == "clusters" and stats.n_threads == 1
+    stats = impinge.Detector(threads=1, backend="cpu").detect(scene).stats
+    assert stats.backend == "cpu" and stats.method == "clusters" and stats.n_threads == 1
     assert stats.n_candidates > 0 and stats.n_clusters > 0 and stats.n_clustered == 4
     assert 0 <= stats.unsure_share <= 1 and stats.bytes_held > 0
     assert 0 < sum(stats.stages.values()) <= 1.1 * stats.total_ms
@@ -211,7 +211,7 @@ def test_statistics(scene):
     assert set(as_dict) == names
     assert all(as_dict[name] == getattr(stats, name) for name in names)
     assert repr(stats).startswith("Statistics(")
-    stats = impinge.Detector("cells").detect(scene).stats
+    stats = impinge.Detector("cells", "cpu").detect(scene).stats
     assert len(stats.grid) == 3 and stats.n_entries > 0
 
 
