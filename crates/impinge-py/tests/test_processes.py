@@ -54,7 +54,8 @@ def test_ctrl_c(method, threads):
     finally:
         child.kill()
         child.communicate()
-    assert (child.returncode, out, err) == (0, "interrupted and usable\n", "")
+    # What a graphics driver may have to say on stderr is its own affair.
+    assert (child.returncode, out) == (0, "interrupted and usable\n"), err
     assert took < 20
 
 
