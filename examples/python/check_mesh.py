@@ -60,7 +60,9 @@ def main():
     if len(pairs) > 5:
         print(f"  and {len(pairs) - 5} more")
     if arguments.report:
-        np.savetxt(arguments.report, pairs, fmt="%d", delimiter=",", header="face,face", comments="")
+        np.savetxt(
+            arguments.report, pairs, fmt="%d", delimiter=",", header="face,face", comments=""
+        )
     return 1 if len(pairs) else 0
 
 

@@ -102,18 +102,6 @@ pub fn elements(
     })
 }
 
-/// The kind of primitive that a user names.
-pub fn kind(name: Option<&str>) -> PyResult<Option<Kind>> {
-    match name {
-        None => Ok(None),
-        Some("triangles") => Ok(Some(Kind::Triangles)),
-        Some("tetrahedra") => Ok(Some(Kind::Tetrahedra)),
-        Some(other) => Err(PyValueError::new_err(format!(
-            "kind: {other:?} given, \"triangles\", \"tetrahedra\" or None allowed"
-        ))),
-    }
-}
-
 /// Rows `(n, n_columns)` of unsigned 32-bit numbers, row after row.
 pub fn rows(argument: &Bound<'_, PyAny>, name: &str, n_columns: usize) -> PyResult<Vec<u32>> {
     let array = as_array(argument, name)?;

@@ -4,9 +4,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use impinge::BodyId;
 use pyo3::basic::CompareOp;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
+
+use crate::settings::unexpected;
 
 /// A handle of a body in a scene; what `Scene.add` returns.
 ///
@@ -95,11 +97,5 @@ pub fn body_id(
 }
 
 fn not_a_body(argument: &Bound<'_, PyAny>, name: &str) -> PyErr {
-    let given = argument
-        .get_type()
-        .name()
-        .map_or_else(|_| "something else".into(), |name| name.to_string());
-    PyTypeError::new_err(format!(
-        "{name}: a Body or its number expected, {given} given"
-    ))
+    unexpected(argument, name, "a Body or its number")
 }

@@ -10,7 +10,7 @@ use pyo3::types::PyBool;
 use crate::errors::raise;
 use crate::result::{Answer, Asked};
 use crate::scene::Scene;
-use crate::settings::{Told, shared_vertex};
+use crate::settings::{Argument, Told, shared_vertex, unexpected};
 use crate::watch::{CancelToken, Watch};
 
 /// Finds intersecting pairs, frame after frame. Scratch memory lives here and is used again.
@@ -32,10 +32,10 @@ use crate::watch::{CancelToken, Watch};
 ///     CPU threads; by default one a core.
 /// memory_budget : int, optional
 ///     Bytes that the detector may hold besides the answer; by default as many as it takes.
-/// lambda_ : float, optional
-///     ``"cells"``: the density coefficient of the paper's equation (1), above 0; 1 by default.
-/// group_size : int, optional
-///     ``"cells"``: the most primitives a group may hold, 1 to 64; 64 by default.
+/// lambda_ : float
+///     ``"cells"``: the density coefficient of the paper's equation (1), above 0.
+/// group_size : int
+///     ``"cells"``: the most primitives a group may hold, 1 to 64.
 /// recluster : {"auto", "never"}
 ///     ``"clusters"``: whether a body that has flowed far from its rest pose is clustered anew.
 /// instruction_set : {"avx512", "avx2", "portable"}
@@ -62,23 +62,29 @@ pub struct Detector {
 impl Detector {
     #[new]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
-    #[pyo3(signature = (
-        method="clusters", backend="auto", device=None, threads=None, memory_budget=None, *,
-        lambda_=None, group_size=None, recluster="auto", instruction_set="avx512",
-    ))]
+    #[pyo3(
+        signature = (
+            method=None, backend=None, device=None, threads=None, memory_budget=None, *,
+            lambda_=None, group_size=None, recluster=None, instruction_set=None,
+        ),
+        text_signature = "(method=\"clusters\", backend=\"auto\", device=None, threads=None, \
+                          memory_budget=None, *, lambda_=1.0, group_size=64, \
+                          recluster=\"auto\", instruction_set=\"avx512\")"
+    )]
     fn new(
-        method: &str,
-        backend: &str,
-        device: Option<String>,
-        threads: Option<&Bound<'_, PyAny>>,
-        memory_budget: Option<&Bound<'_, PyAny>>,
-        lambda_: Option<&Bound<'_, PyAny>>,
-        group_size: Option<&Bound<'_, PyAny>>,
-        recluster: &str,
-        instruction_set: &str,
+        py: Python<'_>,
+        method: Argument<'_, '_>,
+        backend: Argument<'_, '_>,
+        device: Argument<'_, '_>,
+        threads: Argument<'_, '_>,
+        memory_budget: Argument<'_, '_>,
+        lambda_: Argument<'_, '_>,
+        group_size: Argument<'_, '_>,
+        recluster: Argument<'_, '_>,
+        instruction_set: Argument<'_, '_>,
     ) -> PyResult<Self> {
         check_process()?;
-        let settings = Told {
+        let told = Told {
             method,
             backend,
             device,
@@ -88,10 +94,12 @@ impl Detector {
             group_size,
             recluster,
             instruction_set,
-        }
-        .settings()?;
+        };
+        let settings = told.settings()?;
+        // Looking for a GPU and starting threads takes a while.
+        let inner = py.detach(|| impinge::Detector::with_settings(settings));
         Ok(Detector {
-            inner: impinge::Detector::with_settings(settings).map_err(raise)?,
+            inner: inner.map_err(raise)?,
         })
     }
 
@@ -134,37 +142,46 @@ impl Detector {
     /// RuntimeError
     ///     A detector that is busy in another thread, a GPU failure.
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
-    #[pyo3(signature = (
-        scene, *, between=None, within=None, ignore=None, shared_vertex="skip", progress=None,
-        cancel=None,
-    ))]
+    #[pyo3(
+        signature = (
+            scene, *, between=None, within=None, ignore=None, shared_vertex=None, progress=None,
+            cancel=None,
+        ),
+        text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
+                          shared_vertex=\"skip\", progress=None, cancel=None)"
+    )]
     fn detect(
         slf: &Bound<'_, Self>,
-        scene: &Bound<'_, Scene>,
-        between: Option<&Bound<'_, PyAny>>,
-        within: Option<&Bound<'_, PyAny>>,
-        ignore: Option<&Bound<'_, PyAny>>,
-        shared_vertex: &str,
-        progress: Option<&Bound<'_, PyAny>>,
-        cancel: Option<&Bound<'_, CancelToken>>,
+        scene: &Bound<'_, PyAny>,
+        between: Argument<'_, '_>,
+        within: Argument<'_, '_>,
+        ignore: Argument<'_, '_>,
+        shared_vertex: Argument<'_, '_>,
+        progress: Argument<'_, '_>,
+        cancel: Argument<'_, '_>,
     ) -> PyResult<Answer> {
         let py = slf.py();
+        let scene = scene
+            .cast::<Scene>()
+            .map_err(|_| unexpected(scene, "scene", "a Scene"))?;
+        if let Some(progress) = progress
+            && !progress.is_callable()
+        {
+            return Err(unexpected(progress, "progress", "a callable"));
+        }
+        let cancel = match cancel.map(|token| (token, token.cast::<CancelToken>())) {
+            None => None,
+            Some((_, Ok(token))) => Some(token.get().inner.clone()),
+            Some((token, Err(_))) => return Err(unexpected(token, "cancel", "a CancelToken")),
+        };
         let mut detector = slf.try_borrow_mut().map_err(|_| {
             PyRuntimeError::new_err("the detector is busy: give each thread one of its own")
         })?;
         let scene = scene
             .try_borrow()
             .map_err(|_| PyRuntimeError::new_err("the scene is being changed by another thread"))?;
-        if let Some(progress) = progress
-            && !progress.is_callable()
-        {
-            return Err(PyTypeError::new_err("progress: a callable expected"));
-        }
         let (query, asked) = question(&scene, between, within, ignore, shared_vertex)?;
-        let watch = Watch::new(
-            progress.map(|progress| progress.clone().unbind()),
-            cancel.map(|token| token.get().inner.clone()),
-        );
+        let watch = Watch::new(progress.map(|progress| progress.clone().unbind()), cancel);
         let pairs = detector.run(py, &scene, &query, &watch);
         match (watch.raised(), pairs) {
             (Some(error), _) => Err(error),
@@ -230,10 +247,10 @@ fn check_process() -> PyResult<()> {
 /// What the keywords ask.
 fn question(
     scene: &Scene,
-    between: Option<&Bound<'_, PyAny>>,
-    within: Option<&Bound<'_, PyAny>>,
-    ignore: Option<&Bound<'_, PyAny>>,
-    rule: &str,
+    between: Argument<'_, '_>,
+    within: Argument<'_, '_>,
+    ignore: Argument<'_, '_>,
+    rule: Argument<'_, '_>,
 ) -> PyResult<(Query, Asked)> {
     let (query, asked) = match (Scope::new(between), Scope::new(within)) {
         (Scope::Nothing | Scope::All, Scope::Nothing) => (Query::all(), Asked::Many),
@@ -256,7 +273,10 @@ fn question(
     };
     let mut query = query.shared_vertex(shared_vertex(rule)?);
     if let Some(ignore) = ignore {
-        for (ix, pair) in ignore.try_iter()?.enumerate() {
+        let pairs = ignore
+            .try_iter()
+            .map_err(|_| unexpected(ignore, "ignore", "a sequence of pairs of bodies"))?;
+        for (ix, pair) in pairs.enumerate() {
             let (a, b) = two_bodies(scene, &pair?, &format!("ignore[{ix}]"))?;
             query = query.ignore(a, b);
         }
@@ -272,7 +292,7 @@ enum Scope<'a, 'py> {
 }
 
 impl<'a, 'py> Scope<'a, 'py> {
-    fn new(argument: Option<&'a Bound<'py, PyAny>>) -> Self {
+    fn new(argument: Argument<'a, 'py>) -> Self {
         match argument.map(|argument| (argument, argument.cast::<PyBool>())) {
             None => Scope::Nothing,
             Some((_, Ok(all))) if all.is_true() => Scope::All,

@@ -9,6 +9,7 @@ use crate::detector::Detector;
 use crate::errors::Names;
 use crate::result::Answer;
 use crate::scene::Scene;
+use crate::settings::Argument;
 
 /// Which primitives of two meshes intersect.
 ///
@@ -19,7 +20,8 @@ use crate::scene::Scene;
 /// faces_a, faces_b : array_like of int, shape (n, 3) or (n, 4)
 ///     Triangles or tetrahedra as vertex indices.
 /// **settings
-///     As for `Detector`.
+///     As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given: waking a GPU
+///     does not pay for one question.
 ///
 /// Returns
 /// -------
@@ -76,7 +78,8 @@ pub fn pairs<'py>(
 ///     Primitives that share a vertex index are not reported, or reported when they meet in more
 ///     than what they share.
 /// **settings
-///     As for `Detector`.
+///     As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given: waking a GPU
+///     does not pay for one question.
 ///
 /// Returns
 /// -------
@@ -88,12 +91,15 @@ pub fn pairs<'py>(
 /// ValueError, TypeError
 ///     As `Scene.add` and `Detector`.
 #[pyfunction]
-#[pyo3(signature = (vertices, faces, shared_vertex="skip", **settings))]
+#[pyo3(
+    signature = (vertices, faces, shared_vertex=None, **settings),
+    text_signature = "(vertices, faces, shared_vertex=\"skip\", **settings)"
+)]
 pub fn self_pairs<'py>(
     py: Python<'py>,
     vertices: &Bound<'py, PyAny>,
     faces: &Bound<'py, PyAny>,
-    shared_vertex: &str,
+    shared_vertex: Argument<'py, 'py>,
     settings: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<u32>>> {
     let mut scene = Scene::empty();
@@ -114,7 +120,15 @@ fn ask<'py>(
     question: &Bound<'py, PyDict>,
     settings: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<u32>>> {
-    let detector = py.get_type::<Detector>().call((), settings)?;
+    let settings = match settings {
+        Some(settings) => settings.copy()?,
+        None => PyDict::new(py),
+    };
+    // Waking a GPU costs more than any single question.
+    if !settings.contains("backend")? {
+        settings.set_item("backend", "cpu")?;
+    }
+    let detector = py.get_type::<Detector>().call((), Some(&settings))?;
     let result = detector.call_method("detect", (Bound::new(py, scene)?,), Some(question))?;
     result.cast::<Answer>()?.get().pairs(py)
 }

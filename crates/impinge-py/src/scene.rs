@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use crate::arrays::{self, PositionArray, slice_rows};
 use crate::bodies::{Body, body_id, new_scene_number};
 use crate::errors::{Names, raise, refuse};
-use crate::settings::unsigned;
+use crate::settings::{self, Argument, unsigned};
 
 const ARGUMENTS: Names<'static> = Names {
     vertices: "vertices",
@@ -69,11 +69,11 @@ impl Scene {
         &mut self,
         vertices: &Bound<'_, PyAny>,
         faces: &Bound<'_, PyAny>,
-        kind: Option<&str>,
+        kind: Argument<'_, '_>,
         names: Names<'_>,
     ) -> PyResult<BodyId> {
         let positions = PositionArray::new(vertices, names.vertices)?;
-        let kind = arrays::kind(kind)?;
+        let kind = settings::kind(kind)?;
         let elements = arrays::elements(faces, names.elements, kind, positions.len())?;
         self.inner
             .add(elements, stored(&positions)?)
@@ -131,7 +131,7 @@ impl Scene {
         slf: &Bound<'_, Self>,
         vertices: &Bound<'_, PyAny>,
         faces: &Bound<'_, PyAny>,
-        kind: Option<&str>,
+        kind: Argument<'_, '_>,
     ) -> PyResult<Body> {
         let mut scene = change(slf)?;
         let id = scene.add_named(vertices, faces, kind, ARGUMENTS)?;
@@ -183,12 +183,12 @@ impl Scene {
         body: &Bound<'_, PyAny>,
         vertices: &Bound<'_, PyAny>,
         faces: &Bound<'_, PyAny>,
-        kind: Option<&str>,
+        kind: Argument<'_, '_>,
     ) -> PyResult<()> {
         let mut scene = change(slf)?;
         let id = scene.id(body, "body")?;
         let positions = PositionArray::new(vertices, ARGUMENTS.vertices)?;
-        let kind = arrays::kind(kind)?;
+        let kind = settings::kind(kind)?;
         let elements = arrays::elements(faces, ARGUMENTS.elements, kind, positions.len())?;
         scene
             .inner
@@ -222,8 +222,8 @@ impl Scene {
     fn set_filter(
         slf: &Bound<'_, Self>,
         body: &Bound<'_, PyAny>,
-        category: Option<&Bound<'_, PyAny>>,
-        mask: Option<&Bound<'_, PyAny>>,
+        category: Argument<'_, '_>,
+        mask: Argument<'_, '_>,
     ) -> PyResult<()> {
         let mut scene = change(slf)?;
         let id = scene.id(body, "body")?;

@@ -1,77 +1,63 @@
 //! Keyword arguments as the library's settings.
 
-use impinge::{Backend, InstructionSet, Method, Recluster, Settings, SharedVertex};
+use impinge::{Backend, InstructionSet, Kind, Method, Recluster, Settings, SharedVertex};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
 
-/// Picks the value that goes with a name, or lists the names.
-pub fn choose<T: Copy>(setting: &str, given: &str, choices: &[(&str, T)]) -> PyResult<T> {
-    choices
+/// An argument of Python's side that may be left out.
+pub type Argument<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
+
+/// Picks the value that goes with a name, or lists the names. Without an argument, the default.
+fn choose<T: Copy + Default>(
+    argument: Argument<'_, '_>,
+    name: &str,
+    choices: &[(&str, T)],
+) -> PyResult<T> {
+    let Some(argument) = argument else {
+        return Ok(T::default());
+    };
+    let given = text(argument, name)?;
+    if let Some(&(_, value)) = choices.iter().find(|(choice, _)| *choice == given) {
+        return Ok(value);
+    }
+    let choices: Vec<String> = choices
         .iter()
-        .find(|(name, _)| *name == given)
-        .map(|&(_, value)| value)
-        .ok_or_else(|| {
-            let names: Vec<String> = choices
-                .iter()
-                .map(|(name, _)| format!("{name:?}"))
-                .collect();
-            PyValueError::new_err(format!(
-                "{setting}: {given:?} given, {} allowed",
-                names.join(", ")
-            ))
-        })
+        .map(|(choice, _)| format!("{choice:?}"))
+        .collect();
+    Err(PyValueError::new_err(format!(
+        "{name}: {given:?} given, {} allowed",
+        choices.join(", ")
+    )))
 }
 
-/// `"clusters"`, `"cells"` or `"naive"`.
-pub fn method(name: &str) -> PyResult<Method> {
-    choose(
-        "method",
-        name,
-        &[Method::Clusters, Method::Cells, Method::Naive].map(|method| (method.name(), method)),
-    )
+/// A string argument.
+fn text(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<String> {
+    argument
+        .extract()
+        .map_err(|_| unexpected(argument, name, "a string"))
 }
 
-/// `"auto"`, `"cpu"` or `"gpu"`.
-pub fn backend(name: &str) -> PyResult<Backend> {
-    choose(
-        "backend",
-        name,
-        &[
-            ("auto", Backend::Auto),
-            ("cpu", Backend::Cpu),
-            ("gpu", Backend::Gpu),
-        ],
-    )
+/// The exception for an argument of the wrong type. PyO3 names the argument in a note, which
+/// Python before 3.11 does not have; this message names it everywhere.
+pub fn unexpected(argument: &Bound<'_, PyAny>, name: &str, expected: &str) -> PyErr {
+    match argument.get_type().name() {
+        Ok(given) => PyTypeError::new_err(format!("{name}: {expected} expected, {given} given")),
+        Err(error) => error,
+    }
 }
 
-/// `"auto"` or `"never"`.
-pub fn recluster(name: &str) -> PyResult<Recluster> {
-    choose(
-        "recluster",
-        name,
-        &[("auto", Recluster::Auto), ("never", Recluster::Never)],
-    )
+/// What the rows of an index array are; `None` leaves it to their length.
+pub fn kind(argument: Argument<'_, '_>) -> PyResult<Option<Kind>> {
+    let kinds = [Kind::Triangles, Kind::Tetrahedra].map(|kind| (kind.name(), Some(kind)));
+    choose(argument, "kind", &kinds)
 }
 
-/// `"portable"`, `"avx2"` or `"avx512"`.
-pub fn instruction_set(name: &str) -> PyResult<InstructionSet> {
+/// What becomes of primitives that share a vertex.
+pub fn shared_vertex(argument: Argument<'_, '_>) -> PyResult<SharedVertex> {
     choose(
-        "instruction_set",
-        name,
-        &[
-            ("portable", InstructionSet::Portable),
-            ("avx2", InstructionSet::Avx2),
-            ("avx512", InstructionSet::Avx512),
-        ],
-    )
-}
-
-/// `"skip"` or `"resolve"`.
-pub fn shared_vertex(name: &str) -> PyResult<SharedVertex> {
-    choose(
+        argument,
         "shared_vertex",
-        name,
         &[
             ("skip", SharedVertex::Skip),
             ("resolve", SharedVertex::Resolve),
@@ -87,10 +73,7 @@ pub fn unsigned(argument: &Bound<'_, PyAny>, name: &str, most: u64) -> PyResult<
         argument.call_method0("__index__").ok()
     };
     let Some(integer) = integer else {
-        return Err(PyTypeError::new_err(format!(
-            "{name}: a whole number expected, {} given",
-            argument.get_type().name()?
-        )));
+        return Err(unexpected(argument, name, "a whole number"));
     };
     match integer.extract::<u64>() {
         Ok(number) if number <= most => Ok(number),
@@ -103,48 +86,69 @@ pub fn unsigned(argument: &Bound<'_, PyAny>, name: &str, most: u64) -> PyResult<
 
 /// What the detector's constructor was told, in its order.
 pub struct Told<'a, 'py> {
-    pub method: &'a str,
-    pub backend: &'a str,
-    pub device: Option<String>,
-    pub threads: Option<&'a Bound<'py, PyAny>>,
-    pub memory_budget: Option<&'a Bound<'py, PyAny>>,
-    pub lambda: Option<&'a Bound<'py, PyAny>>,
-    pub group_size: Option<&'a Bound<'py, PyAny>>,
-    pub recluster: &'a str,
-    pub instruction_set: &'a str,
+    pub method: Argument<'a, 'py>,
+    pub backend: Argument<'a, 'py>,
+    pub device: Argument<'a, 'py>,
+    pub threads: Argument<'a, 'py>,
+    pub memory_budget: Argument<'a, 'py>,
+    pub lambda: Argument<'a, 'py>,
+    pub group_size: Argument<'a, 'py>,
+    pub recluster: Argument<'a, 'py>,
+    pub instruction_set: Argument<'a, 'py>,
 }
 
 impl Told<'_, '_> {
     /// The library's settings.
     pub fn settings(self) -> PyResult<Settings> {
-        let threads = match self.threads {
-            Some(threads) => unsigned(threads, "threads", 1024)?,
-            None => 0,
+        let mut settings = Settings {
+            method: choose(
+                self.method,
+                "method",
+                &[Method::Clusters, Method::Cells, Method::Naive]
+                    .map(|method| (method.name(), method)),
+            )?,
+            backend: choose(
+                self.backend,
+                "backend",
+                &[
+                    ("auto", Backend::Auto),
+                    ("cpu", Backend::Cpu),
+                    ("gpu", Backend::Gpu),
+                ],
+            )?,
+            recluster: choose(
+                self.recluster,
+                "recluster",
+                &[("auto", Recluster::Auto), ("never", Recluster::Never)],
+            )?,
+            instruction_set: choose(
+                self.instruction_set,
+                "instruction_set",
+                &[
+                    ("portable", InstructionSet::Portable),
+                    ("avx2", InstructionSet::Avx2),
+                    ("avx512", InstructionSet::Avx512),
+                ],
+            )?,
+            ..Settings::default()
         };
-        let memory_budget = match self.memory_budget {
-            Some(budget) => Some(unsigned(budget, "memory_budget", u64::MAX)?),
-            None => None,
-        };
-        let lambda = match self.lambda {
-            Some(lambda) => lambda.extract().map_err(|_| {
-                PyTypeError::new_err(format!("lambda_: a number expected, {lambda:?} given"))
-            })?,
-            None => Settings::default().lambda,
-        };
-        let group_size = match self.group_size {
-            Some(group_size) => unsigned(group_size, "group_size", 64)? as u32,
-            None => Settings::default().group_size,
-        };
-        Ok(Settings {
-            method: method(self.method)?,
-            backend: backend(self.backend)?,
-            threads: threads as usize,
-            instruction_set: instruction_set(self.instruction_set)?,
-            lambda,
-            group_size,
-            memory_budget,
-            recluster: recluster(self.recluster)?,
-            device: self.device,
-        })
+        if let Some(device) = self.device {
+            settings.device = Some(text(device, "device")?);
+        }
+        if let Some(threads) = self.threads {
+            settings.threads = unsigned(threads, "threads", 1024)? as usize;
+        }
+        if let Some(budget) = self.memory_budget {
+            settings.memory_budget = Some(unsigned(budget, "memory_budget", u64::MAX)?);
+        }
+        if let Some(lambda) = self.lambda {
+            settings.lambda = lambda
+                .extract()
+                .map_err(|_| unexpected(lambda, "lambda_", "a number"))?;
+        }
+        if let Some(group_size) = self.group_size {
+            settings.group_size = unsigned(group_size, "group_size", 64)? as u32;
+        }
+        Ok(settings)
     }
 }

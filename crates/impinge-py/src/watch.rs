@@ -95,9 +95,14 @@ impl Watch {
         if state.raised.is_some() || (!ended && state.looked.elapsed() < INTERVAL) {
             return;
         }
-        if let Err(error) = Python::attach(|py| self.look(py, at)) {
-            state.raised = Some(error);
-            self.stop.cancel();
+        // An interpreter that is shutting down cannot be had any more: nobody waits for the answer.
+        match Python::try_attach(|py| self.look(py, at)) {
+            Some(Ok(())) => {}
+            Some(Err(error)) => {
+                state.raised = Some(error);
+                self.stop.cancel();
+            }
+            None => self.stop.cancel(),
         }
         state.looked = Instant::now();
     }

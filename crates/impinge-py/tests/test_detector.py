@@ -6,9 +6,9 @@ import time
 
 import numpy as np
 import pytest
-from shapes import ACROSS, FACE, TRIANGLE, ball, lattice_triangles, soup
 
 import impinge
+from shapes import ACROSS, FACE, TRIANGLE, ball, lattice_triangles, soup
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +111,8 @@ def test_frames_follow_the_positions():
         angle = 0.5 * frame * vertices[:, 2]
         x, y, z = vertices.T
         twisted = np.stack(
-            [np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y, 0.7 * z], 1
+            [np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y, 0.7 * z],
+            1,
         )
         scene.set_positions(a, twisted if frame % 2 else twisted.astype(np.float32))
         results = [d.detect(scene, between=True, within=True) for d in detectors]
@@ -136,7 +137,10 @@ def test_frames_follow_the_positions():
         ({"ignore": [(0, 1), (0, 9)]}, ValueError, r"^ignore\[1\]: there is no body 9"),
         ({"ignore": [0]}, TypeError, r"^ignore\[0\]: a pair of bodies expected"),
         ({"shared_vertex": "all"}, ValueError, '^shared_vertex: "all" given, "skip", "resolve"'),
-        ({"progress": 1}, TypeError, "^progress: a callable expected"),
+        ({"shared_vertex": 0}, TypeError, "^shared_vertex: a string expected, int given"),
+        ({"ignore": 0}, TypeError, "^ignore: a sequence of pairs of bodies expected, int given"),
+        ({"progress": 1}, TypeError, "^progress: a callable expected, int given"),
+        ({"cancel": 1}, TypeError, "^cancel: a CancelToken expected, int given"),
     ],
 )
 def test_questions_refused(scene, question, error, message):
@@ -159,10 +163,11 @@ def test_questions_refused(scene, question, error, message):
         ({"memory_budget": 2**64}, ValueError, "^memory_budget: 18446744073709551616 given"),
         ({"lambda_": 0}, ValueError, "^lambda: 0 given, a number above 0 allowed"),
         ({"lambda_": float("nan")}, ValueError, "^lambda: NaN given"),
-        ({"lambda_": "1"}, TypeError, "^lambda_: a number expected, '1' given"),
+        ({"lambda_": "1"}, TypeError, "^lambda_: a number expected, str given"),
         ({"group_size": 0}, ValueError, "^group size: 0 given, 1 to 64 allowed"),
         ({"group_size": 65}, ValueError, "^group_size: 65 given"),
-        ({"device": 3}, TypeError, "device"),
+        ({"device": 3}, TypeError, "^device: a string expected, int given"),
+        ({"method": b"cells"}, TypeError, "^method: a string expected, bytes given"),
         ({"colour": "red"}, TypeError, "colour"),
     ],
 )
@@ -171,9 +176,18 @@ def test_settings_refused(settings, error, message):
         impinge.Detector(**settings)
 
 
+@pytest.mark.parametrize("bad", [None, 3, "scene"])
+def test_not_a_scene(bad):
+    with pytest.raises(TypeError, match="^scene: a Scene expected, "):
+        impinge.Detector().detect(bad)
+
+
 def test_numpy_scalars_are_numbers():
     detector = impinge.Detector(
-        threads=np.int64(2), memory_budget=np.uint64(1 << 30), lambda_=np.float32(2), group_size=np.uint8(9)
+        threads=np.int64(2),
+        memory_budget=np.uint64(1 << 30),
+        lambda_=np.float32(2),
+        group_size=np.uint8(9),
     )
     assert repr(detector) == (
         'Detector(method="clusters", backend="auto", threads=2, memory_budget=1073741824)'
@@ -186,8 +200,8 @@ def test_too_small_a_budget_says_what_is_needed(scene):
 
 
 def test_statistics(scene):
-    stats = impinge.Detector(threads=1).detect(scene).stats
-    assert stats.backend and stats.method == "clusters" and stats.n_threads == 1
+    stats = impinge.Detector(threads=1, backend="cpu").detect(scene).stats
+    assert stats.backend == "cpu" and stats.method == "clusters" and stats.n_threads == 1
     assert stats.n_candidates > 0 and stats.n_clusters > 0 and stats.n_clustered == 4
     assert 0 <= stats.unsure_share <= 1 and stats.bytes_held > 0
     assert 0 < sum(stats.stages.values()) <= 1.1 * stats.total_ms
@@ -197,7 +211,7 @@ def test_statistics(scene):
     assert set(as_dict) == names
     assert all(as_dict[name] == getattr(stats, name) for name in names)
     assert repr(stats).startswith("Statistics(")
-    stats = impinge.Detector("cells").detect(scene).stats
+    stats = impinge.Detector("cells", "cpu").detect(scene).stats
     assert len(stats.grid) == 3 and stats.n_entries > 0
 
 
@@ -257,7 +271,9 @@ def test_what_is_in_use_is_not_changed(long):
             lambda: long.remove(0),
             lambda: detector.detect(long, within=0),
         ]:
-            with pytest.raises(RuntimeError, match="being read by a detection|detector is busy") as raised:
+            with pytest.raises(
+                RuntimeError, match="being read by a detection|detector is busy"
+            ) as raised:
                 change()
             seen.append(str(raised.value)[:12])
 

@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+
 from shapes import ball
 
 trimesh = pytest.importorskip("trimesh")

@@ -4,9 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from shapes import ball, lattice_tetrahedra, lattice_triangles, soup
 
 import impinge
+from shapes import ball, lattice_tetrahedra, lattice_triangles, soup
 
 SETTINGS = [
     {"method": "clusters", "threads": 1},

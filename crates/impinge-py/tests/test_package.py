@@ -5,9 +5,9 @@ import inspect
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
-import shutil
 
 import pytest
 

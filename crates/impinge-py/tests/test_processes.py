@@ -7,9 +7,9 @@ import sys
 import time
 
 import pytest
-from shapes import ball
 
 import impinge
+from shapes import ball
 
 # Large triangles that all overlap: minutes of work for every method.
 LONG_RUN = """
@@ -54,7 +54,8 @@ def test_ctrl_c(method, threads):
     finally:
         child.kill()
         child.communicate()
-    assert (child.returncode, out, err) == (0, "interrupted and usable\n", "")
+    # What a graphics driver may have to say on stderr is its own affair.
+    assert (child.returncode, out) == (0, "interrupted and usable\n"), err
     assert took < 20
 
 

@@ -1,5 +1,5 @@
 from collections.abc import Callable, Iterable
-from typing import Any, Literal, SupportsFloat, SupportsIndex, TypedDict, Union, final
+from typing import Any, Literal, SupportsFloat, SupportsIndex, TypedDict, final
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +22,7 @@ __all__ = [
 __version__: str
 
 _Array: TypeAlias = Any  # An array-like, or anything that speaks DLPack or the buffer protocol.
-_Body: TypeAlias = Union[Body, SupportsIndex]
+_Body: TypeAlias = Body | SupportsIndex
 _Pair: TypeAlias = tuple[_Body, _Body]
 _Method: TypeAlias = Literal["clusters", "cells", "naive"]
 _Backend: TypeAlias = Literal["auto", "cpu", "gpu"]
@@ -37,8 +37,8 @@ class _Settings(TypedDict, total=False):
     device: str | None
     threads: SupportsIndex | None
     memory_budget: SupportsIndex | None
-    lambda_: SupportsFloat | None
-    group_size: SupportsIndex | None
+    lambda_: SupportsFloat
+    group_size: SupportsIndex
     recluster: _Recluster
     instruction_set: _InstructionSet
 
@@ -102,8 +102,8 @@ class Detector:
         threads: SupportsIndex | None = None,
         memory_budget: SupportsIndex | None = None,
         *,
-        lambda_: SupportsFloat | None = None,
-        group_size: SupportsIndex | None = None,
+        lambda_: SupportsFloat = 1.0,
+        group_size: SupportsIndex = 64,
         recluster: _Recluster = "auto",
         instruction_set: _InstructionSet = "avx512",
     ) -> Detector: ...

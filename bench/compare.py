@@ -1,0 +1,282 @@
+"""The same deforming frames through impinge and its peers, in one run, with the answers checked.
+
+    python bench/compare.py                         # every scene whose mesh is there
+    python bench/compare.py bunny --frames 3
+    python bench/compare.py --record --machine my-machine
+
+It installs nothing: peers that are missing are named, with what to install. Meshes are looked for
+in $IMPINGE_DATA or ../shared/data; the scene "ball" is generated and always there.
+
+What is timed. Two overlapping copies of a mesh are twisted a little further in each frame. A
+contender gets the positions of both as the arrays that it takes without a conversion, and must
+answer which triangles of one meet which of the other. "Build" is whatever it has to do because the
+vertices have moved; "query" is the question. Each contender runs all frames on its own, several
+rounds, so that its caches are its own; the table shows medians over frames and rounds.
+
+What is checked. Every contender's pairs in every frame, as a set, against the exact ones: those of
+CGAL's exact kernel (through libigl), and for the first frame also the published ones where some
+are. Without libigl they come from impinge's other method, and the table says so.
+"""
+
+import argparse
+import datetime
+import json
+import os
+import pathlib
+import platform
+import re
+import statistics
+import sys
+import time
+
+import numpy as np
+
+try:
+    import contenders
+except ModuleNotFoundError as missing:
+    sys.exit(f"{missing}: pip install . (in the root of the checkout) installs impinge and NumPy")
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+#: Radians a unit length by which the last frame is twisted.
+TWIST = 1.5
+
+
+def read_ply(path):
+    """Vertices (v, 3) float32 and faces (n, 3) of a binary PLY that holds just these."""
+    data = path.read_bytes()
+    header, _, body = data.partition(b"end_header\n")
+    counts = {name: int(n) for name, n in re.findall(r"element (\w+) (\d+)", header.decode())}
+    lines = [line for line in header.decode().splitlines() if line.startswith(("prop", "form"))]
+    expected = ["format binary_little_endian 1.0", *(f"property float {axis}" for axis in "xyz")]
+    if lines[:4] != expected or not lines[4].startswith("property list uchar int") or lines[5:]:
+        raise ValueError(f"{path}: not a binary PLY of float vertices and int triangles alone")
+    n_vertices, n_faces = counts["vertex"], counts["face"]
+    vertices = np.frombuffer(body, "<f4", 3 * n_vertices).reshape(-1, 3)
+    rows = np.frombuffer(body, [("n", "u1"), ("face", "<i4", 3)], n_faces, 12 * n_vertices)
+    if (rows["n"] != 3).any():
+        raise ValueError(f"{path}: a face that is not a triangle")
+    return vertices.copy(), rows["face"].astype(np.int64)
+
+
+def ball(n_rings=124, n_segments=124):
+    """A dented ball of some 30,000 triangles."""
+    ring = np.pi * (np.arange(n_rings) + 0.5) / n_rings
+    segment = 2 * np.pi * np.arange(n_segments) / n_segments
+    ring, segment = np.meshgrid(ring, segment, indexing="ij")
+    radius = 0.5 + 0.05 * np.sin(7 * ring) * np.cos(5 * segment)
+    vertices = radius[..., None] * np.stack(
+        [np.sin(ring) * np.cos(segment), np.sin(ring) * np.sin(segment), np.cos(ring)], axis=-1
+    )
+    u, v = np.meshgrid(np.arange(n_rings - 1), np.arange(n_segments), indexing="ij")
+    here, right = u * n_segments + v, u * n_segments + (v + 1) % n_segments
+    below, across = here + n_segments, right + n_segments
+    faces = np.stack([here, below, across, here, across, right], axis=-1)
+    return vertices.reshape(-1, 3).astype(np.float32), faces.reshape(-1, 3).astype(np.int64)
+
+
+class Scene:
+    """Two copies of a mesh, their frames, and the exact pairs where they are known."""
+
+    def __init__(self, name, data, n_frames):
+        self.name = name
+        self.published = None
+        if name == "ball":
+            self.vertices, self.faces = ball()
+            offset = np.float32([0.7, 0.05, 0.02])
+        else:
+            entry = json.loads((data / "expected" / "two_body.json").read_text())[name]
+            self.vertices, self.faces = read_ply(data / entry["mesh"])
+            offset = np.array(entry["offset_f32"], np.float32)
+            self.published = contenders.as_keys(np.load(data / entry["file"]))
+        twists = np.linspace(0, TWIST, n_frames)
+        self.frames = [(self.twisted(twist, 0), self.twisted(-twist, offset)) for twist in twists]
+
+    def twisted(self, twist, offset):
+        """The mesh turned about the x axis, the more the further along it; float32."""
+        vertices = self.vertices + np.float32(offset)
+        x, y, z = vertices.T.astype(np.float64)
+        angle = twist * (x - x.mean())
+        cos, sin = np.cos(angle), np.sin(angle)
+        return np.stack([x, cos * y - sin * z, sin * y + cos * z], axis=1).astype(np.float32)
+
+    def truth(self, reference):
+        """The exact pairs of every frame, as sorted keys."""
+        reference.start(self.faces, self.faces, *self.frames[0])
+        truth = []
+        for frame in self.frames:
+            arrays = reference.arrays(*frame)
+            reference.build(arrays)
+            reference.query()
+            truth.append(contenders.as_keys(reference.pairs()))
+        if self.published is not None and not np.array_equal(self.published, truth[0]):
+            raise AssertionError(
+                f"{self.name}: {reference.name} disagrees with the published pairs"
+            )
+        return truth
+
+
+def run(contender, scene, truth, seconds):
+    """Medians in milliseconds and what was wrong, over all frames and rounds.
+
+    Every frame is run at least once, then further rounds until these seconds are up.
+    """
+    contender.start(scene.faces, scene.faces, *scene.frames[0])
+    frames = [contender.arrays(*frame) for frame in scene.frames]
+    builds, queries, n_pairs, n_extra, n_missing = [], [], 0, 0, 0
+    rounds, began = 0, time.perf_counter()
+    while rounds == 0 or time.perf_counter() - began < seconds:
+        for frame, exact in zip(frames, truth):
+            t0 = time.perf_counter()
+            contender.build(frame)
+            t1 = time.perf_counter()
+            contender.query()
+            t2 = time.perf_counter()
+            moved = contender.build_within_query_ms()
+            builds.append(1e3 * (t1 - t0) + moved)
+            queries.append(1e3 * (t2 - t1) - moved)
+            if rounds == 0:
+                keys = contenders.as_keys(contender.pairs())
+                n_pairs += len(keys)
+                n_extra += len(np.setdiff1d(keys, exact, assume_unique=True))
+                n_missing += len(np.setdiff1d(exact, keys, assume_unique=True))
+        rounds += 1
+    return {
+        "contender": contender.name,
+        "version": contender.version,
+        "settings": contender.settings,
+        "exact": contender.exact,
+        "once_ms": contender.once_ms(),
+        "build_ms": statistics.median(builds),
+        "query_ms": statistics.median(queries),
+        "frame_ms": statistics.median(map(sum, zip(builds, queries))),
+        "fastest_frame_ms": min(map(sum, zip(builds, queries))),
+        "rounds": rounds,
+        "pairs": n_pairs,
+        "extra": n_extra,
+        "missing": n_missing,
+    }
+
+
+def milliseconds(time):
+    """Three digits that mean something; empty for what does not apply."""
+    if time is None:
+        return ""
+    return f"{time:,.0f}" if time >= 100 else f"{time:.{1 if time >= 10 else 3}f}"
+
+
+def table(scene, reference, truth, rows):
+    """The results of one scene as Markdown."""
+    n = len(scene.faces)
+    lines = [
+        f"### {scene.name}: {n:,} triangles against {n:,}, {len(truth)} frames",
+        "",
+        f"{sum(map(len, truth)):,} true pairs in all frames (by {reference}); times in "
+        "milliseconds a frame.",
+        "",
+        "| | once | build | query | frame | pairs | wrong | times impinge |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    ours = rows[0]["frame_ms"]
+    for row in rows:
+        times = [row["once_ms"], row["build_ms"], row["query_ms"], row["frame_ms"]]
+        wrong = f"+{row['extra']:,} −{row['missing']:,}" if row["extra"] + row["missing"] else "0"
+        cells = [row["contender"], *map(milliseconds, times), f"{row['pairs']:,}", wrong]
+        lines.append(f"| {' | '.join(cells)} | {row['frame_ms'] / ours:,.1f} |")
+    return "\n".join(lines)
+
+
+def abilities(classes):
+    """What each contender does and does not do, as Markdown."""
+    lines = [
+        "### What each one answers",
+        "",
+        "| | two meshes | one mesh with itself | tetrahedra | answers | when vertices move |",
+        "|---|---|---|---|---|---|",
+    ]
+    for contender in classes:
+        words = [contender.label, *contender.abilities]
+        lines.append("| " + " | ".join(words) + " |")
+    return "\n".join(lines)
+
+
+def machine():
+    """The processor in words, and how many of it."""
+    model = platform.processor() or platform.machine()
+    try:
+        cpuinfo = pathlib.Path("/proc/cpuinfo").read_text()
+        model = re.search(r"model name\s*: (.*)", cpuinfo)[1]
+    except (OSError, TypeError):
+        pass
+    return f"{model}, {os.cpu_count()} threads, {platform.system()}"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("scenes", nargs="*", help="ball, bunny, buddha, dragon; all by default")
+    parser.add_argument("--frames", type=int, default=5)
+    parser.add_argument("--seconds", type=float, default=2.0, help="for each contender, at least")
+    parser.add_argument("--record", action="store_true", help="write to bench/record as well")
+    parser.add_argument("--machine", default=machine(), help="the machine's name in the record")
+    arguments = parser.parse_args()
+    if arguments.frames < 1:
+        parser.error(f"--frames: at least 1, {arguments.frames} given")
+
+    data = pathlib.Path(os.environ.get("IMPINGE_DATA", ROOT.parent / "shared" / "data"))
+    known = ["ball"]
+    if (data / "expected" / "two_body.json").is_file():
+        known += ["bunny", "buddha", "dragon"]
+    else:
+        print("no meshes: set IMPINGE_DATA; only the generated ball is run", file=sys.stderr)
+    unknown = set(arguments.scenes) - set(known)
+    if unknown:
+        parser.error(f"no scene {', '.join(sorted(unknown))}; there is {', '.join(known)}")
+
+    present, missing = contenders.available()
+    for contender in missing:
+        print(f"{contender.label} is missing: pip install {contender.package}", file=sys.stderr)
+    reference = contenders.reference(present)
+
+    parts, record, failed = [], {}, False
+    for name in arguments.scenes or known:
+        scene = Scene(name, data, arguments.frames)
+        truth = scene.truth(reference)
+        rows = []
+        for contender in present:
+            row = run(contender, scene, truth, arguments.seconds)
+            print(f"{name}: {row['contender']} {row['frame_ms']:.3g} ms a frame", file=sys.stderr)
+            rows.append(row)
+            if contender.exact and row["extra"] + row["missing"]:
+                print(f"{name}: {row['contender']} claims to be exact and is not", file=sys.stderr)
+                failed = True
+        parts.append(table(scene, reference.name, truth, rows))
+        record[name] = {"n_triangles": len(scene.faces), "frames": len(truth), "rows": rows}
+
+    today = datetime.date.today().isoformat()
+    classes = list({contender.label: type(contender) for contender in present}.values())
+    versions = dict.fromkeys(f"{type(c).label} {c.version} ({c.settings})" for c in present)
+    text = "\n\n".join(
+        [
+            f"# impinge and its peers, {today}",
+            f"{arguments.machine}. Python {platform.python_version()}, NumPy {np.__version__}. "
+            "Made by `bench/compare.py`, which says what is timed and checked.",
+            *parts,
+            abilities(classes),
+            "Versions and settings: " + "; ".join(versions) + ".",
+        ]
+    )
+    print(text)
+    if arguments.record:
+        slug = re.sub(r"[^a-z0-9]+", "-", arguments.machine.lower()).strip("-")
+        folder = ROOT / "bench" / "record" / f"{slug}-{today}"
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "compare.md").write_text(text + "\n", encoding="utf-8")
+        head = {"machine": arguments.machine, "date": today, "python": platform.python_version()}
+        (folder / "compare.json").write_text(
+            json.dumps({**head, "scenes": record}, indent=1) + "\n"
+        )
+        print(f"recorded in {folder.relative_to(ROOT)}", file=sys.stderr)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
