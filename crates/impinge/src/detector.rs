@@ -1,5 +1,7 @@
 //! The frame loop: resolves a query, picks method and backend, sorts the answer.
 
+#[cfg(feature = "gpu")]
+use std::sync::Arc;
 use std::time::Instant;
 
 use crate::cpu::Job;
@@ -132,6 +134,8 @@ pub struct Detector {
     workers: Workers,
     clusters: Clusters,
     cells: Cells,
+    #[cfg(feature = "gpu")]
+    gpu: Option<crate::gpu::Engine>,
 }
 
 impl Detector {
@@ -153,6 +157,8 @@ impl Detector {
     pub fn with_settings(settings: Settings) -> Result<Self, Error> {
         check(&settings)?;
         Ok(Detector {
+            #[cfg(feature = "gpu")]
+            gpu: open_gpu(&settings)?,
             workers: Workers::new(settings.threads)?,
             frame: Frame::default(),
             pairs: Pairs::default(),
@@ -191,8 +197,18 @@ impl Detector {
         let (keys, stats) = self.pairs.parts_mut();
         let settings = &self.settings;
         stats.method = settings.method.name();
-        stats.backend.push_str("cpu");
         stats.n_threads = self.workers.n();
+        #[cfg(feature = "gpu")]
+        if let Some(engine) = &mut self.gpu {
+            stats.backend.push_str(engine.gpu().name());
+            let gpu = Arc::clone(engine.gpu());
+            let (frame, budget) = (&self.frame, settings.memory_budget);
+            gpu.block_on(engine.run(scene, frame, budget, control, keys, stats))?;
+            stats.time("collect", |_| keys.sort_unstable());
+            stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
+            return Ok(&self.pairs);
+        }
+        stats.backend.push_str("cpu");
         let job = Job {
             scene,
             frame: &self.frame,
@@ -230,6 +246,24 @@ impl Detector {
     }
 }
 
+/// The GPU that the settings ask for, if they ask for one.
+#[cfg(feature = "gpu")]
+fn open_gpu(settings: &Settings) -> Result<Option<crate::gpu::Engine>, Error> {
+    use crate::gpu::{Capacities, Engine, Gpu, Wanted};
+    let named = settings.device.as_deref().map(Wanted::Named);
+    let gpu = match settings.backend {
+        Backend::Cpu => return Ok(None),
+        Backend::Auto if settings.method != Method::Clusters => return Ok(None),
+        // A driver that runs on the CPU is slower than the CPU backend.
+        Backend::Auto => match Gpu::open(named.unwrap_or(Wanted::Hardware)) {
+            Ok(gpu) => gpu,
+            Err(_) => return Ok(None),
+        },
+        Backend::Gpu => Gpu::open(named.unwrap_or(Wanted::Any))?,
+    };
+    Ok(Some(Engine::new(gpu, Capacities::default())))
+}
+
 fn check(settings: &Settings) -> Result<(), Error> {
     let refuse = |setting, given: String, allowed| {
         Err(Error::Setting {
@@ -243,6 +277,17 @@ fn check(settings: &Settings) -> Result<(), Error> {
     }
     if !(1..=64).contains(&settings.group_size) {
         return refuse("group size", settings.group_size.to_string(), "1 to 64");
+    }
+    if settings.backend == Backend::Gpu {
+        if !cfg!(feature = "gpu") {
+            return Err(Error::NoAdapter {
+                found: "impinge was built without its feature `gpu`".to_owned(),
+            });
+        }
+        if settings.method != Method::Clusters {
+            let given = settings.method.name().to_owned();
+            return refuse("method on a GPU", given, "clusters");
+        }
     }
     if settings.threads > 1024 {
         return refuse("threads", settings.threads.to_string(), "0 to 1024");

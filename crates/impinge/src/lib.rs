@@ -15,6 +15,8 @@ mod detector;
 mod error;
 pub mod exact;
 mod frame;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod grouping;
 mod naive;
 mod narrow;
@@ -26,6 +28,8 @@ mod stats;
 
 pub use detector::{Backend, Detector, InstructionSet, Method, Recluster, Settings};
 pub use error::Error;
+#[cfg(feature = "gpu")]
+pub use gpu::{Capacities, DeviceInfo, devices};
 pub use pairs::{Pairs, Primitive, hash_rows};
 pub use progress::{CancelToken, Control, Progress};
 pub use query::{Query, SharedVertex};

@@ -1,0 +1,19 @@
+// Between stages: turns a counter into the arguments of the next, indirect, dispatch.
+//
+// In: one counter. Out: workgroups in x and y, neither above 32,768, for the elements that fitted.
+// Cost: one thread.
+
+@group(0) @binding(0) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(1) var<storage, read_write> arguments: array<Arguments>;
+@group(0) @binding(2) var<uniform> params: Params;
+
+const WIDEST: u32 = 32768u;
+
+@compute @workgroup_size(1)
+fn main() {
+    let n = min(atomicLoad(&counters[params.counter]), params.capacity);
+    let groups = n / params.per_group + select(0u, 1u, n % params.per_group != 0u);
+    let x = min(groups, WIDEST);
+    let y = select(0u, groups / WIDEST + select(0u, 1u, groups % WIDEST != 0u), groups > 0u);
+    arguments[params.slot] = Arguments(x, y, 1u);
+}
