@@ -168,6 +168,25 @@ impl Detector {
         })
     }
 
+    /// [`with_settings`](Detector::with_settings), and how much room GPU buffers begin with. For
+    /// tests: buffers grow by themselves.
+    ///
+    /// # Errors
+    /// As `with_settings`.
+    #[cfg(feature = "gpu")]
+    #[doc(hidden)]
+    pub fn with_capacities(
+        settings: Settings,
+        capacities: crate::Capacities,
+    ) -> Result<Self, Error> {
+        let mut detector = Detector::with_settings(settings)?;
+        if let Some(engine) = &mut detector.gpu {
+            let gpu = Arc::clone(engine.gpu());
+            *engine = crate::gpu::Engine::new(gpu, capacities);
+        }
+        Ok(detector)
+    }
+
     /// What it was told.
     pub fn settings(&self) -> &Settings {
         &self.settings

@@ -29,7 +29,10 @@ mod stats;
 pub use detector::{Backend, Detector, InstructionSet, Method, Recluster, Settings};
 pub use error::Error;
 #[cfg(feature = "gpu")]
-pub use gpu::{Capacities, DeviceInfo, devices};
+#[doc(hidden)]
+pub use gpu::Capacities;
+#[cfg(feature = "gpu")]
+pub use gpu::{DeviceInfo, devices};
 pub use pairs::{Pairs, Primitive, hash_rows};
 pub use progress::{CancelToken, Control, Progress};
 pub use query::{Query, SharedVertex};

@@ -55,7 +55,7 @@ impl<T: Pod> Storage<T> {
     }
 
     /// A buffer that kernels read or write.
-    pub fn storage(label: &'static str) -> Self {
+    pub fn plain(label: &'static str) -> Self {
         Storage::new(label, wgpu::BufferUsages::STORAGE)
     }
 

@@ -108,9 +108,9 @@ impl Room {
         let copied = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         let indirect = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
         Room {
-            queues: ["queue a", "queue b"].map(Storage::storage),
-            items: Storage::storage("work items"),
-            candidates: Storage::storage("candidates"),
+            queues: ["queue a", "queue b"].map(Storage::plain),
+            items: Storage::plain("work items"),
+            candidates: Storage::plain("candidates"),
             pairs: Storage::new("pairs", copied),
             unsure: Storage::new("unsure", copied),
             counters: Storage::new("counters", copied),

@@ -2,7 +2,7 @@
 //
 // In: candidates. Out: keys of pairs that certainly intersect, keys of pairs that are left to exact
 // arithmetic. One thread a candidate. Cost: 32 bytes of corners and 72 (96) of positions read.
-// Invariant: yes and no are proofs, whatever the device's rounding (`docs/gpu.md`).
+// Invariant: yes and no are proofs, whatever the device's rounding (`docs/exactness.md`).
 //
 // A triangle's fourth corner repeats its third. `WITH_SOLIDS` is false when no body has
 // tetrahedra, which keeps that code, and the registers it wants, out of the pipeline.
@@ -53,7 +53,7 @@ fn settle(candidate: Candidate) -> i32 {
     if largest > LARGEST_BITS {
         return UNSURE;
     }
-    let slack = select(0.0, ROUNDING * bitcast<f32>(largest), (candidate.a & FLAG) != 0u);
+    let slack = select(0.0, NARROWING * bitcast<f32>(largest), (candidate.a & FLAG) != 0u);
     if WITH_SOLIDS {
         if a.z != a.w || b.z != b.w {
             var solid_a = Solid(array<vec3<f32>, 4>(bitcast<vec3<f32>>(a0), bitcast<vec3<f32>>(a1),

@@ -1,26 +1,21 @@
 // The floating-point filter: signs of determinants that are certain, or no sign at all.
 //
-// Bounds are derived in `docs/gpu.md`. They hold under any rounding mode, contraction and
-// reassociation, with subnormals flushed or kept. The one determinant is (d x e) . f, where d, e, f
-// are differences of input points; its computed value is wrong by less than
-//
-//     2^-17 |d| |e| |f|                                  |.| the largest coordinate
-//
-// as long as the input is below 2^30 and |d|, |e|, |f| are at least 2^-30; else there is no sign.
-// Positions that the host has rounded from f64 add `slack` = 2^-22 times the largest coordinate to
-// each difference: |d| becomes |d| + slack, and 8 slack (|d||e| + |e||f| + |f||d|) is added.
+// Constants, bounds and their proof: `docs/exactness.md`, "The GPU filter". They hold under any
+// rounding direction, contraction and reassociation, with subnormals flushed or kept. The one
+// determinant is (d x e) . f, where d, e, f are differences of input points, never of differences.
+// Positions that the host has rounded from f64 widen each size by `slack`.
 
-const DETERMINANT_BOUND: f32 = 0x1p-17f;
-const LEAST_SIZE: f32 = 0x1p-30f;
-const LARGEST_BITS: u32 = 0x4e800000u; // 2^30
-const ROUNDING: f32 = 0x1p-22f;
+const BOUND: f32 = 0x1p-16f;
+const SMALLEST: f32 = 0x1p-32f;
+const LARGEST_BITS: u32 = 0x53800000u; // 2^40
+const NARROWING: f32 = 0x1p-22f;
 
 fn size(d: vec3<f32>) -> f32 {
     let m = abs(d);
     return max(max(m.x, m.y), m.z);
 }
 
-// A vector d x e with the sizes of both; none when `size` is 0.
+// A vector d x e and the sizes of both.
 struct Normal {
     vector: vec3<f32>,
     // |d| and |e|, slack included; both 0 when one is too small.
@@ -36,7 +31,7 @@ fn normal(d: vec3<f32>, e: vec3<f32>, slack: f32) -> Normal {
     );
     let size_d = size(d);
     let size_e = size(e);
-    if size_d < LEAST_SIZE || size_e < LEAST_SIZE {
+    if size_d < SMALLEST || size_e < SMALLEST {
         return Normal(vector, 0.0, 0.0);
     }
     return Normal(vector, size_d + slack, size_e + slack);
@@ -45,13 +40,13 @@ fn normal(d: vec3<f32>, e: vec3<f32>, slack: f32) -> Normal {
 // The sign of (d x e) . f: 1 or -1 when certain, 0 when not.
 fn side(n: Normal, f: vec3<f32>, slack: f32) -> i32 {
     let size_f = size(f);
-    if n.d == 0.0 || size_f < LEAST_SIZE {
+    if n.d == 0.0 || size_f < SMALLEST {
         return 0;
     }
     let value = n.vector.x * f.x + n.vector.y * f.y + n.vector.z * f.z;
     let wide = size_f + slack;
-    let bound = DETERMINANT_BOUND * (n.d * n.e * wide)
-        + 8.0 * slack * (n.d * n.e + n.e * wide + wide * n.d);
+    let bound = BOUND * (n.d * n.e * wide)
+        + 4.0 * slack * (n.d * n.e + n.e * wide + wide * n.d);
     return select(0, 1, value > bound) - select(0, 1, value < -bound);
 }
 
