@@ -182,7 +182,7 @@ impl Detector {
         let mut detector = Detector::with_settings(settings)?;
         if let Some(engine) = &mut detector.gpu {
             let gpu = Arc::clone(engine.gpu());
-            *engine = crate::gpu::Engine::new(gpu, capacities);
+            *engine = crate::gpu::Engine::new(gpu, gpu_options(&detector.settings), capacities);
         }
         Ok(detector)
     }
@@ -221,8 +221,7 @@ impl Detector {
         if let Some(engine) = &mut self.gpu {
             stats.backend.push_str(engine.gpu().name());
             let gpu = Arc::clone(engine.gpu());
-            let (frame, budget) = (&self.frame, settings.memory_budget);
-            gpu.block_on(engine.run(scene, frame, budget, control, keys, stats))?;
+            gpu.block_on(engine.run(scene, &self.frame, control, keys, stats))?;
             stats.time("collect", |_| keys.sort_unstable());
             stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
             return Ok(&self.pairs);
@@ -272,7 +271,7 @@ fn open_gpu(settings: &Settings) -> Result<Option<crate::gpu::Engine>, Error> {
     let named = settings.device.as_deref().map(Wanted::Named);
     let gpu = match settings.backend {
         Backend::Cpu => return Ok(None),
-        Backend::Auto if settings.method != Method::Clusters => return Ok(None),
+        Backend::Auto if settings.method == Method::Naive => return Ok(None),
         // A driver that runs on the CPU is slower than the CPU backend.
         Backend::Auto => match Gpu::open(named.unwrap_or(Wanted::Hardware)) {
             Ok(gpu) => gpu,
@@ -280,7 +279,18 @@ fn open_gpu(settings: &Settings) -> Result<Option<crate::gpu::Engine>, Error> {
         },
         Backend::Gpu => Gpu::open(named.unwrap_or(Wanted::Any))?,
     };
-    Ok(Some(Engine::new(gpu, Capacities::default())))
+    let options = gpu_options(settings);
+    Ok(Some(Engine::new(gpu, options, Capacities::default())))
+}
+
+#[cfg(feature = "gpu")]
+fn gpu_options(settings: &Settings) -> crate::gpu::Options {
+    crate::gpu::Options {
+        method: settings.method,
+        lambda: settings.lambda,
+        group_size: settings.group_size,
+        memory_budget: settings.memory_budget,
+    }
 }
 
 fn check(settings: &Settings) -> Result<(), Error> {
@@ -303,9 +313,9 @@ fn check(settings: &Settings) -> Result<(), Error> {
                 found: "impinge was built without its feature `gpu`".to_owned(),
             });
         }
-        if settings.method != Method::Clusters {
+        if settings.method == Method::Naive {
             let given = settings.method.name().to_owned();
-            return refuse("method on a GPU", given, "clusters");
+            return refuse("method on a GPU", given, "clusters or cells");
         }
     }
     if settings.threads > 1024 {

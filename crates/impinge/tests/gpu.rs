@@ -50,6 +50,45 @@ fn clusters_agree_with_the_oracle() {
     }
 }
 
+#[test]
+fn cells_agree_with_the_oracle() {
+    for (ix, case) in cases().into_iter().enumerate() {
+        let expected = naive(&case);
+        check(&case, &expected, gpu(Method::Cells));
+        let (lambda, group_size) = [(0.01, 20), (20.0, 64), (1e6, 7)][ix % 3];
+        let settings = Settings {
+            lambda,
+            group_size,
+            ..gpu(Method::Cells)
+        };
+        check(&case, &expected, settings);
+    }
+}
+
+#[test]
+fn a_crowded_cell_is_worked_in_parts() {
+    // One cell and groups of one primitive: more work items than one invocation may write.
+    let soup = soup::triangles(300, 0.4, 11);
+    let mut scene = Scene::new();
+    let id = soup.add_to(&mut scene).unwrap();
+    let case = Case {
+        name: "one cell".into(),
+        scene,
+        query: Query::within(id),
+    };
+    let mut detector = Detector::with_settings(Settings {
+        lambda: 1e-9,
+        group_size: 1,
+        ..gpu(Method::Cells)
+    })
+    .unwrap();
+    assert_agree("parts", &naive(&case), &mut detector, &case);
+    let pairs = detector.detect(&case.scene, &case.query).unwrap();
+    assert_eq!(pairs.stats().grid, Some([1, 1, 1]));
+    assert!(pairs.stats().n_slabs > 1, "{:?}", pairs.stats());
+    assert_eq!(pairs.stats().n_work_items, 300 * 301 / 2);
+}
+
 /// 2,000 primitives a body, enough for several rounds and thousands of pairs.
 fn large() -> Case {
     let mut scene = Scene::new();
@@ -69,47 +108,61 @@ fn large() -> Case {
 #[test]
 fn buffers_that_overflow_grow_and_nothing_is_lost() {
     let case = large();
-    let settings = gpu(Method::Clusters);
     let mut cpu = Detector::with_settings(cpu(Method::Clusters)).unwrap();
     let expected = rows(cpu.detect(&case.scene, &case.query).unwrap());
     assert!(expected.len() > 1000);
-    let small = |stage: &str| {
+    let ample = || {
         let mut capacities = Capacities::default();
-        capacities.unsure = 1 << 17;
-        match stage {
-            "queue" => capacities.queue = 3,
-            "items" => capacities.items = 2,
-            "candidates" => capacities.candidates = 5,
-            "pairs" => capacities.pairs = 1,
-            "unsure" => capacities.unsure = 1,
-            _ => (),
-        }
+        (capacities.candidates, capacities.unsure) = (1 << 19, 1 << 17);
         capacities
     };
-    for stage in ["queue", "items", "candidates", "pairs", "unsure", "none"] {
-        let mut detector = Detector::with_capacities(settings.clone(), small(stage)).unwrap();
-        assert_agree(stage, &expected, &mut detector, &case);
-        let reruns = |detector: &mut Detector| {
-            let pairs = detector.detect(&case.scene, &case.query).unwrap();
-            pairs.stats().n_reruns
-        };
-        // Once grown it stays so, and the first frame had to.
-        assert_eq!(reruns(&mut detector), 0, "{stage}");
-        let mut again = Detector::with_capacities(settings.clone(), small(stage)).unwrap();
-        assert_eq!(reruns(&mut again) > 0, stage != "none", "{stage}");
+    for method in [Method::Clusters, Method::Cells] {
+        let settings = gpu(method);
+        let stages: [(&str, fn(&mut Capacities)); 8] = [
+            ("none", |_| ()),
+            ("queue", |room| room.queue = 3),
+            ("items", |room| room.items = 2),
+            ("kept", |room| room.kept = 9),
+            ("entries", |room| room.entries = 7),
+            ("candidates", |room| room.candidates = 5),
+            ("pairs", |room| room.pairs = 1),
+            ("unsure", |room| room.unsure = 1),
+        ];
+        for (stage, shrink) in stages {
+            let mut capacities = ample();
+            shrink(&mut capacities);
+            let mut detector = Detector::with_capacities(settings.clone(), capacities).unwrap();
+            assert_agree(stage, &expected, &mut detector, &case);
+            let reruns = |detector: &mut Detector| {
+                let pairs = detector.detect(&case.scene, &case.query).unwrap();
+                pairs.stats().n_reruns
+            };
+            // Once grown it stays so, and the first frame had to, if the method has this stage.
+            assert_eq!(reruns(&mut detector), 0, "{method:?} {stage}");
+            let mut again = Detector::with_capacities(settings.clone(), capacities).unwrap();
+            let is_there = match stage {
+                "none" => false,
+                "queue" => method == Method::Clusters,
+                "kept" | "entries" => method == Method::Cells,
+                _ => true,
+            };
+            assert_eq!(reruns(&mut again) > 0, is_there, "{method:?} {stage}");
+        }
+        let mut tiny = Capacities::default();
+        for field in [
+            &mut tiny.queue,
+            &mut tiny.items,
+            &mut tiny.kept,
+            &mut tiny.entries,
+            &mut tiny.candidates,
+            &mut tiny.pairs,
+            &mut tiny.unsure,
+        ] {
+            *field = 1;
+        }
+        let mut detector = Detector::with_capacities(settings, tiny).unwrap();
+        assert_agree("all at once", &expected, &mut detector, &case);
     }
-    let mut tiny = Capacities::default();
-    for field in [
-        &mut tiny.queue,
-        &mut tiny.items,
-        &mut tiny.candidates,
-        &mut tiny.pairs,
-        &mut tiny.unsure,
-    ] {
-        *field = 1;
-    }
-    let mut detector = Detector::with_capacities(settings, tiny).unwrap();
-    assert_agree("all at once", &expected, &mut detector, &case);
 }
 
 #[test]
@@ -119,28 +172,30 @@ fn a_memory_budget_is_kept_by_working_in_slabs() {
     let expected = rows(cpu.detect(&case.scene, &case.query).unwrap());
     let mut free = Detector::with_settings(gpu(Method::Clusters)).unwrap();
     assert_agree("free", &expected, &mut free, &case);
-    let mut seen_slabs = false;
-    for budget in [1_500_000, 900_000, 700_000] {
+    for method in [Method::Clusters, Method::Cells] {
+        let mut seen_slabs = false;
+        for budget in [2_500_000, 1_500_000, 1_000_000] {
+            let mut detector = Detector::with_settings(Settings {
+                memory_budget: Some(budget),
+                ..gpu(method)
+            })
+            .unwrap();
+            assert_agree("budget", &expected, &mut detector, &case);
+            let pairs = detector.detect(&case.scene, &case.query).unwrap();
+            assert!(pairs.stats().bytes_held <= budget, "{:?}", pairs.stats());
+            seen_slabs |= pairs.stats().n_slabs > 1;
+        }
+        assert!(seen_slabs, "{method:?}");
         let mut detector = Detector::with_settings(Settings {
-            memory_budget: Some(budget),
-            ..gpu(Method::Clusters)
+            memory_budget: Some(100_000),
+            ..gpu(method)
         })
         .unwrap();
-        assert_agree("budget", &expected, &mut detector, &case);
-        let pairs = detector.detect(&case.scene, &case.query).unwrap();
-        assert!(pairs.stats().bytes_held <= budget, "{:?}", pairs.stats());
-        seen_slabs |= pairs.stats().n_slabs > 1;
+        assert!(matches!(
+            detector.detect(&case.scene, &case.query),
+            Err(Error::MemoryBudget { .. })
+        ));
     }
-    assert!(seen_slabs);
-    let mut detector = Detector::with_settings(Settings {
-        memory_budget: Some(100_000),
-        ..gpu(Method::Clusters)
-    })
-    .unwrap();
-    assert!(matches!(
-        detector.detect(&case.scene, &case.query),
-        Err(Error::MemoryBudget { .. })
-    ));
 }
 
 #[test]
@@ -148,7 +203,8 @@ fn twenty_runs_give_the_same_bytes() {
     let case = large();
     let mut first = None;
     for run in 0..20 {
-        let mut detector = Detector::with_settings(gpu(Method::Clusters)).unwrap();
+        let method = [Method::Clusters, Method::Cells][run % 2];
+        let mut detector = Detector::with_settings(gpu(method)).unwrap();
         let pairs = detector.detect(&case.scene, &case.query).unwrap();
         let answer = rows(pairs);
         let first = first.get_or_insert_with(|| answer.clone());
@@ -209,7 +265,8 @@ fn frames_follow_positions_bodies_and_precision() {
     let ball = surfaces::ball(600);
     let a = ball.add_to(&mut scene).unwrap();
     let b = ball.translated([0.4, 0.0, 0.0]).add_to(&mut scene).unwrap();
-    let mut detector = Detector::with_settings(gpu(Method::Clusters)).unwrap();
+    let mut detectors = [Method::Clusters, Method::Cells]
+        .map(|method| Detector::with_settings(gpu(method)).unwrap());
     let mut compare = |scene: &Scene, query: Query| {
         let case = Case {
             name: "changes".into(),
@@ -217,7 +274,9 @@ fn frames_follow_positions_bodies_and_precision() {
             query,
         };
         let expected = naive(&case);
-        assert_agree("frames", &expected, &mut detector, &case);
+        for detector in &mut detectors {
+            assert_agree("frames", &expected, detector, &case);
+        }
         expected.len()
     };
     let first = compare(&scene, Query::all());
@@ -261,4 +320,5 @@ fn many_small_bodies_meet_through_the_tree_over_bodies() {
     let expected = naive(&case);
     assert!(expected.len() > 5000);
     check(&case, &expected, gpu(Method::Clusters));
+    check(&case, &expected, gpu(Method::Cells));
 }

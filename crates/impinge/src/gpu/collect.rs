@@ -1,7 +1,7 @@
 //! Stage `collect`: counters and results come back in one copy.
 //!
 //! ```text
-//! counters | times of the stages | pairs, as many as last time and some | unsure pairs, likewise
+//! counters | grid | times of the stages | pairs, as many as last time and some | unsure pairs, likewise
 //! ```
 //!
 //! When there are more than were copied, the rest follows in a second copy; no kernel runs again.
@@ -12,13 +12,16 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll, Waker};
 
 use super::device::Gpu;
-use super::layout::{Counter, N_COUNTERS, PairKey, UnsureKey};
-use super::plan::STAGES;
+use super::layout::{Counter, Grid, N_COUNTERS, PairKey, UnsureKey};
 use super::room::{Counts, Room};
 use crate::error::Error;
 
 const COUNTERS: u64 = N_COUNTERS as u64 * size_of::<Counter>() as u64;
-const TIMES: u64 = 2 * STAGES.len() as u64 * size_of::<u64>() as u64;
+const GRID: u64 = size_of::<Grid>() as u64;
+/// Stages that a method has at most.
+const MOST_STAGES: usize = 5;
+const TIMES: u64 = 2 * MOST_STAGES as u64 * size_of::<u64>() as u64;
+const HEADER: u64 = COUNTERS + GRID + TIMES;
 const KEY: u64 = size_of::<PairKey>() as u64;
 /// Keys copied at least.
 const LEAST: u64 = 1024;
@@ -50,8 +53,10 @@ pub(crate) struct Guess {
 #[derive(Debug)]
 pub(crate) struct Collected {
     pub counts: Counts,
+    /// The grid of `Cells`.
+    pub grid: Grid,
     /// Milliseconds a stage, where the device has a clock.
-    pub stage_ms: Option<[f64; STAGES.len()]>,
+    pub stage_ms: Option<Vec<f64>>,
     pub pairs: Vec<PairKey>,
     pub unsure: Vec<UnsureKey>,
 }
@@ -64,7 +69,7 @@ impl Collector {
                 queries: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
                     label: Some("times"),
                     ty: wgpu::QueryType::Timestamp,
-                    count: 2 * STAGES.len() as u32,
+                    count: 2 * MOST_STAGES as u32,
                 }),
                 resolved: gpu.device.create_buffer(&wgpu::BufferDescriptor {
                     label: Some("times"),
@@ -94,27 +99,34 @@ impl Collector {
     }
 
     /// Encodes the copy of everything that is wanted.
-    pub fn encode(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, room: &Room) -> Guess {
+    pub fn encode(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        room: &Room,
+        n_stages: u32,
+    ) -> Guess {
         let capacities = room.capacities();
         let guess = |last: u64, capacity: u64| (last + last / 4).max(LEAST).min(capacity);
         let guess = Guess {
             pairs: guess(self.n_pairs, capacities.pairs),
             unsure: guess(self.n_unsure, capacities.unsure),
         };
-        let bytes = COUNTERS + TIMES + KEY * (guess.pairs + guess.unsure);
+        let bytes = HEADER + KEY * (guess.pairs + guess.unsure);
         let staging = self.reserve(gpu, bytes);
         let mut copy = |from: &wgpu::Buffer, to: u64, size: u64| {
             encoder.copy_buffer_to_buffer(from, 0, &staging, to, size);
         };
         copy(room.counters.buffer(), 0, COUNTERS);
-        let pairs = COUNTERS + TIMES;
+        copy(room.grid.buffer(), COUNTERS, GRID);
+        let pairs = HEADER;
         copy(room.pairs.buffer(), pairs, KEY * guess.pairs);
         let unsure = pairs + KEY * guess.pairs;
         copy(room.unsure.buffer(), unsure, KEY * guess.unsure);
         if let Some(times) = &self.times {
-            let n = 2 * STAGES.len() as u32;
-            encoder.resolve_query_set(&times.queries, 0..n, &times.resolved, 0);
-            encoder.copy_buffer_to_buffer(&times.resolved, 0, &staging, COUNTERS, TIMES);
+            encoder.resolve_query_set(&times.queries, 0..2 * n_stages, &times.resolved, 0);
+            let to = COUNTERS + GRID;
+            encoder.copy_buffer_to_buffer(&times.resolved, 0, &staging, to, TIMES);
         }
         guess
     }
@@ -123,25 +135,32 @@ impl Collector {
     ///
     /// # Errors
     /// The device's own.
-    pub async fn take(&mut self, gpu: &Gpu, room: &Room, guess: Guess) -> Result<Collected, Error> {
+    pub async fn take(
+        &mut self,
+        gpu: &Gpu,
+        room: &Room,
+        n_stages: usize,
+        guess: Guess,
+    ) -> Result<Collected, Error> {
         let staging = self.staging.clone().expect("encoded before");
-        let bytes = COUNTERS + TIMES + KEY * (guess.pairs + guess.unsure);
-        let (counts, ticks, n_pairs, n_unsure, mut pairs, mut unsure) = {
+        let bytes = HEADER + KEY * (guess.pairs + guess.unsure);
+        let (counts, grid, ticks, n_pairs, n_unsure, mut pairs, mut unsure) = {
             let view = map(&staging, bytes).await?;
             let at = |from: u64, size: u64| &view[from as usize..(from + size) as usize];
             let counters: Vec<Counter> = bytemuck::pod_collect_to_vec(at(0, COUNTERS));
-            let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(at(COUNTERS, TIMES));
+            let grid: Grid = bytemuck::pod_read_unaligned(at(COUNTERS, GRID));
+            let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(at(COUNTERS + GRID, TIMES));
             let counts = Counts::new(&counters);
             let capacities = room.capacities();
             let n_pairs = counts.needed.pairs.min(capacities.pairs);
             let n_unsure = counts.needed.unsure.min(capacities.unsure);
-            let first = COUNTERS + TIMES;
+            let first = HEADER;
             let pairs: Vec<PairKey> =
                 bytemuck::pod_collect_to_vec(at(first, KEY * n_pairs.min(guess.pairs)));
             let first = first + KEY * guess.pairs;
             let unsure: Vec<UnsureKey> =
                 bytemuck::pod_collect_to_vec(at(first, KEY * n_unsure.min(guess.unsure)));
-            (counts, ticks, n_pairs, n_unsure, pairs, unsure)
+            (counts, grid, ticks, n_pairs, n_unsure, pairs, unsure)
         };
         staging.unmap();
         (self.n_pairs, self.n_unsure) = (n_pairs, n_unsure);
@@ -171,13 +190,12 @@ impl Collector {
         }
         let stage_ms = self.times.is_some().then(|| {
             let ms = f64::from(gpu.queue.get_timestamp_period()) * 1e-6;
-            std::array::from_fn(|stage| {
-                let span = ticks[2 * stage + 1].saturating_sub(ticks[2 * stage]);
-                span as f64 * ms
-            })
+            let span = |stage: usize| ticks[2 * stage + 1].saturating_sub(ticks[2 * stage]);
+            (0..n_stages).map(|stage| span(stage) as f64 * ms).collect()
         });
         Ok(Collected {
             counts,
+            grid,
             stage_ms,
             pairs,
             unsure,

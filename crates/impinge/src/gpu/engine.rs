@@ -1,21 +1,29 @@
 //! The frame on the device: passes, growing, splitting.
 //!
-//! A pass takes pairs of tree nodes, its seeds, through all stages in one submission. If a buffer was
-//! too small, the counters say how large it must be: it grows and the pass runs again. If it may not
-//! grow, by the device's limit or the memory budget, the seeds are split and each half is a pass: in
-//! the end a seed is one pair of clusters, for which [`Capacities::LEAST`] is always enough.
+//! A pass takes its share of the work through all stages in one submission. If a buffer was too small,
+//! the counters say how large it must be: it grows and the pass runs again. If it may not grow, by the
+//! device's limit or the memory budget, the work is split and each half is a pass. What is split:
+//!
+//! * `Clusters`: pairs of tree nodes, the seeds of the traversal, down to one pair of clusters;
+//! * `Cells`: cells, then of one cell the rows and columns of the product of its groups.
+//!
+//! In the end a pass has one work item, for which [`Capacities::LEAST`] is enough.
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::collect::{Collected, Collector};
+use super::buffers::{Storage, count};
+use super::cells::{self, Part, Told};
+use super::clusters;
+use super::collect::{Collected, Collector, Guess};
 use super::device::{Gpu, Scopes};
-use super::layout::{Counter, N_COUNTERS, NodePair};
-use super::plan::{Launches, Plan, STAGES};
-use super::room::{Capacities, Room, Verdict};
+use super::layout::{Cell, Counter, N_COUNTERS, NodePair};
+use super::room::{Capacities, CellsWanted, Room, Verdict};
+use super::steps::Stages;
 use super::world::World;
+use crate::detector::Method;
 use crate::error::Error;
 use crate::frame::{Frame, pair_key};
 use crate::narrow::settle;
@@ -28,29 +36,58 @@ use crate::stats::Statistics;
 const SEEDS: usize = 512;
 /// Unsure pairs from which on threads share them.
 const PARALLEL_FROM: usize = 512;
+/// Cells at most, whatever lambda says.
+const MOST_CELLS: u64 = 1 << 25;
+/// The share of a memory budget that cells may have.
+const SHARE_OF_CELLS: u64 = 8;
+
+/// What the backend is told.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Options {
+    pub method: Method,
+    pub lambda: f64,
+    pub group_size: u32,
+    pub memory_budget: Option<u64>,
+}
 
 /// The GPU backend of one detector.
 #[derive(Debug)]
 pub(crate) struct Engine {
     gpu: Arc<Gpu>,
+    options: Options,
+    first: Capacities,
     world: World,
     room: Room,
     plan: Plan,
     collector: Collector,
-    launches: Option<Launches>,
-    first: Capacities,
+}
+
+#[derive(Debug)]
+enum Plan {
+    Clusters(clusters::Plan),
+    Cells(cells::Plan),
+}
+
+/// What a pass does.
+#[derive(Debug, Clone)]
+enum Work {
+    Seeds(Vec<NodePair>),
+    Part(Part),
 }
 
 impl Engine {
-    pub fn new(gpu: Arc<Gpu>, first: Capacities) -> Self {
+    pub fn new(gpu: Arc<Gpu>, options: Options, first: Capacities) -> Self {
         Engine {
             gpu,
+            options,
+            first: first.of(options.method),
             world: World::new(),
             room: Room::new(),
-            plan: Plan::new(),
+            plan: match options.method {
+                Method::Cells => Plan::Cells(cells::Plan::new()),
+                _ => Plan::Clusters(clusters::Plan::new()),
+            },
             collector: Collector::default(),
-            launches: None,
-            first,
         }
     }
 
@@ -66,17 +103,14 @@ impl Engine {
         &mut self,
         scene: &Scene,
         frame: &Frame,
-        memory_budget: Option<u64>,
         control: &Control<'_>,
         keys: &mut Vec<u64>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let result = self
-            .passes(scene, frame, memory_budget, control, keys, stats)
-            .await;
+        let result = self.passes(scene, frame, control, keys, stats).await;
         if let Err(Error::Gpu { .. }) = result {
             // Whatever state the buffers are in, the next frame must not build on it.
-            *self = Engine::new(Arc::clone(&self.gpu), self.first);
+            *self = Engine::new(Arc::clone(&self.gpu), self.options, self.first);
         }
         result
     }
@@ -85,7 +119,6 @@ impl Engine {
         &mut self,
         scene: &Scene,
         frame: &Frame,
-        memory_budget: Option<u64>,
         control: &Control<'_>,
         keys: &mut Vec<u64>,
         stats: &mut Statistics,
@@ -96,57 +129,85 @@ impl Engine {
         let updated = self.world.update(&self.gpu, scene, frame, stats);
         let closed = scopes.close();
         if updated? {
-            self.launches = None;
+            self.unbind();
         }
         closed.await?;
         stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
-        let mut capacities = self.first_room(memory_budget)?;
-        let mut waiting = vec![self.descend(frame)];
-        while let Some(seeds) = waiting.pop() {
-            if seeds.is_empty() {
-                continue;
-            }
-            control.step(stats.n_slabs, stats.n_slabs + waiting.len() as u64 + 1)?;
-            let collected = self.pass(frame, &seeds, capacities, stats).await?;
-            let bytes = memory_budget.map(|budget| budget.saturating_sub(self.world.bytes()));
-            match collected.counts.judge(&self.gpu, capacities, bytes) {
+        let cells = self.cells_wanted(frame);
+        let mut capacities = self.first_room(cells)?;
+        let mut waiting = Vec::from_iter(self.whole(frame));
+        while let Some(work) = waiting.pop() {
+            let done = stats.n_slabs;
+            control.step(done, done + count(waiting.len()) + 1)?;
+            let collected = self.pass(frame, &work, capacities, cells, stats).await?;
+            let fixed = self.world.bytes() + cells.map_or(0, |cells| cells.bytes());
+            let room = self.options.memory_budget;
+            let room = room.map(|budget| budget.saturating_sub(fixed));
+            match collected.counts.judge(&self.gpu, capacities, room) {
                 Verdict::Complete => {
-                    stats.n_slabs += 1;
-                    stats.n_work_items += collected.counts.needed.items;
-                    stats.n_candidates += collected.counts.needed.candidates;
-                    stats.n_unsure += collected.counts.needed.unsure;
+                    book(&collected, self.options.method, stats);
                     stats.time("settle", |_| settle_all(scene, frame, &collected, keys));
                 }
                 Verdict::Grow(larger) => {
                     stats.n_reruns += 1;
                     capacities = larger;
-                    waiting.push(seeds);
+                    waiting.push(work);
                 }
                 Verdict::Split => {
                     stats.n_reruns += 1;
-                    waiting.extend(self.split(frame, &seeds)?);
+                    match self.split(frame, &work, &collected)? {
+                        Some(parts) => waiting.extend(parts),
+                        None => {
+                            capacities = self.lean(&collected, capacities, room)?;
+                            waiting.push(work);
+                        }
+                    }
                 }
             }
         }
-        stats.bytes_held = self.world.bytes() + self.room.capacities().bytes();
+        stats.bytes_held = self.world.bytes() + self.room.bytes();
         Ok(())
     }
 
-    /// Room for the first pass: what there is, unless the budget says less.
-    fn first_room(&self, memory_budget: Option<u64>) -> Result<Capacities, Error> {
-        let wanted = match &self.launches {
-            Some(_) => self.room.capacities(),
-            None => self.first.max(self.room.capacities()),
-        };
-        let Some(budget) = memory_budget else {
-            return Ok(wanted);
-        };
-        let world = self.world.bytes();
-        if world + wanted.bytes() <= budget {
-            return Ok(wanted);
+    fn unbind(&mut self) {
+        match &mut self.plan {
+            Plan::Clusters(plan) => plan.unbind(),
+            Plan::Cells(plan) => plan.unbind(),
         }
-        let least = Capacities::LEAST;
-        let needed = world + least.bytes();
+    }
+
+    /// Room for the grid: as many cells as equation (1) can ask for.
+    fn cells_wanted(&self, frame: &Frame) -> Option<CellsWanted> {
+        if self.options.method != Method::Cells {
+            return None;
+        }
+        let most = MOST_CELLS.min(Storage::<Cell>::limit(&self.gpu));
+        let most = self.options.memory_budget.map_or(most, |budget| {
+            most.min(budget / SHARE_OF_CELLS / CellsWanted::CELL)
+        });
+        // Below 2^25, so the cast back is exact enough.
+        let asked = (frame.n_primitives() as f64 * self.options.lambda).min(MOST_CELLS as f64);
+        Some(CellsWanted {
+            n_cells: (asked.ceil() as u64).min(most).max(1),
+            n_bodies: count(frame.participants.len()),
+        })
+    }
+
+    /// Room for the first pass: what there is, unless the budget says less.
+    fn first_room(&self, cells: Option<CellsWanted>) -> Result<Capacities, Error> {
+        let wanted = self.first.max(self.room.capacities());
+        let Some(budget) = self.options.memory_budget else {
+            return Ok(wanted);
+        };
+        let fixed = self.world.bytes() + cells.map_or(0, |cells| cells.bytes());
+        let held = self.room.capacities();
+        for wanted in [wanted, held.max(Capacities::LEAST)] {
+            if fixed + wanted.bytes() <= budget {
+                return Ok(wanted);
+            }
+        }
+        let least = Capacities::LEAST.of(self.options.method);
+        let needed = fixed + least.bytes();
         if needed > budget {
             return Err(Error::MemoryBudget {
                 what: "positions, clusters and the smallest pass on the GPU",
@@ -157,9 +218,20 @@ impl Engine {
         Ok(least)
     }
 
+    /// All of the work, if there is any.
+    fn whole(&self, frame: &Frame) -> Option<Work> {
+        let seeds = self.world.seeds(frame);
+        if seeds.is_empty() {
+            return None;
+        }
+        Some(match self.plan {
+            Plan::Clusters(_) => Work::Seeds(self.descend(frame, seeds)),
+            Plan::Cells(_) => Work::Part(Part::ALL),
+        })
+    }
+
     /// Seeds, as far down as the host goes.
-    fn descend(&self, frame: &Frame) -> Vec<NodePair> {
-        let mut seeds = self.world.seeds(frame);
+    fn descend(&self, frame: &Frame, mut seeds: Vec<NodePair>) -> Vec<NodePair> {
         let mut below = Vec::new();
         loop {
             below.clear();
@@ -175,91 +247,190 @@ impl Engine {
         }
     }
 
-    /// Half of the seeds each, or the children of a single one.
-    fn split(&self, frame: &Frame, seeds: &[NodePair]) -> Result<Vec<Vec<NodePair>>, Error> {
+    /// Two halves, or the children of a single pair of nodes; none when that is no help.
+    fn split(
+        &self,
+        frame: &Frame,
+        work: &Work,
+        collected: &Collected,
+    ) -> Result<Option<Vec<Work>>, Error> {
+        let seeds = match work {
+            Work::Seeds(seeds) => seeds,
+            Work::Part(part) => return Ok(self.split_part(*part, collected)),
+        };
         if seeds.len() > 1 {
             let (low, high) = seeds.split_at(seeds.len() / 2);
-            return Ok(vec![low.to_vec(), high.to_vec()]);
+            return Ok(Some(
+                [low, high].map(|half| Work::Seeds(half.to_vec())).into(),
+            ));
         }
         let mut below = Vec::new();
         for &seed in seeds {
             if !self.world.expand(frame, seed, &mut below) {
-                return Err(Error::Gpu {
-                    what: "two clusters do not fit the smallest pass".to_owned(),
-                });
+                return Err(self.too_small("two clusters", Capacities::LEAST));
             }
         }
-        Ok(vec![below])
+        Ok(Some(match below.is_empty() {
+            true => Vec::new(),
+            false => vec![Work::Seeds(below)],
+        }))
+    }
+
+    fn split_part(&self, part: Part, collected: &Collected) -> Option<Vec<Work>> {
+        // What is kept does not depend on the part.
+        let needed = &collected.counts.needed;
+        if needed.kept > self.room.capacities().kept {
+            return None;
+        }
+        // At most 2^31 primitives are kept.
+        let n_groups = needed.kept.div_ceil(u64::from(self.options.group_size)) as u32;
+        let halves = part.split(collected.grid.n_cells, n_groups)?;
+        Some(halves.map(Work::Part).into())
+    }
+
+    /// Room for what cannot be split, at the cost of all that can.
+    fn lean(
+        &self,
+        collected: &Collected,
+        now: Capacities,
+        room: Option<u64>,
+    ) -> Result<Capacities, Error> {
+        let needed = &collected.counts.needed;
+        let least = Capacities::LEAST.of(self.options.method);
+        let lean = Capacities {
+            kept: needed.kept.max(least.kept),
+            entries: match needed.kept > now.kept {
+                true => least.entries,
+                false => needed.entries.max(least.entries),
+            },
+            ..least
+        };
+        let is_allowed = room.is_none_or(|room| lean.bytes() <= room);
+        if lean == now || !is_allowed || !lean.fit(&self.gpu) {
+            return Err(self.too_small("the primitives of one cell", lean));
+        }
+        Ok(lean)
+    }
+
+    fn too_small(&self, what: &'static str, needed: Capacities) -> Error {
+        match self.options.memory_budget {
+            Some(budget) => Error::MemoryBudget {
+                what,
+                needed: self.world.bytes() + needed.bytes(),
+                budget,
+            },
+            None => Error::Gpu {
+                what: format!("{} cannot hold {what}", self.gpu.name()),
+            },
+        }
     }
 
     /// One submission and its results.
     async fn pass(
         &mut self,
         frame: &Frame,
-        seeds: &[NodePair],
+        work: &Work,
         capacities: Capacities,
+        cells: Option<CellsWanted>,
         stats: &mut Statistics,
     ) -> Result<Collected, Error> {
         let scopes = Scopes::open(&self.gpu.device);
-        let submitted = self.submit(frame, seeds, capacities);
+        let submitted = self.submit(frame, work, capacities, cells);
         let closed = scopes.close();
         let guess = submitted?;
         closed.await?;
-        let collected = self.collector.take(&self.gpu, &self.room, guess).await?;
-        if let Some(stage_ms) = collected.stage_ms {
-            for (name, ms) in STAGES.into_iter().zip(stage_ms) {
-                stats.add_ms(name, ms);
-            }
+        let names = self.stages();
+        let collected = self
+            .collector
+            .take(&self.gpu, &self.room, names.len(), guess)
+            .await?;
+        for (&name, &ms) in names.iter().zip(collected.stage_ms.iter().flatten()) {
+            stats.add_ms(name, ms);
         }
         self.world.is_moved = false;
         Ok(collected)
     }
 
+    fn stages(&self) -> &'static [&'static str] {
+        match self.plan {
+            Plan::Clusters(_) => clusters::STAGES,
+            Plan::Cells(_) => cells::STAGES,
+        }
+    }
+
     fn submit(
         &mut self,
         frame: &Frame,
-        seeds: &[NodePair],
-        capacities: Capacities,
-    ) -> Result<super::collect::Guess, Error> {
-        let (gpu, world) = (&*self.gpu, &self.world);
-        let n_seeds = super::buffers::count(seeds.len());
-        let mut capacities = capacities;
-        capacities.queue = capacities.queue.max(n_seeds);
-        let mut grew = self.room.resize(gpu, &capacities);
-        let resolve = frame.shared_vertex == SharedVertex::Resolve;
-        let n_rounds = world.forest().rounds(seeds);
-        grew |= self.plan.make(gpu, world, &self.room, n_rounds, resolve)?;
-        let fits = self.launches.as_ref().is_some_and(|made| made.fit(world));
-        if grew || !fits {
-            self.launches = Some(Launches::new(gpu, world, &self.room, &self.plan));
+        work: &Work,
+        mut capacities: Capacities,
+        cells: Option<CellsWanted>,
+    ) -> Result<Guess, Error> {
+        let names = self.stages();
+        if let Work::Seeds(seeds) = work {
+            capacities.queue = capacities.queue.max(count(seeds.len()));
         }
-        let launches = self.launches.as_ref().expect("just made");
-        let mut counters = [Counter::default(); N_COUNTERS as usize];
-        counters[0].n = n_seeds as u32;
-        self.room.counters.write(gpu, 0, &counters);
-        self.room.queues[0].write(gpu, 0, seeds);
+        if self.room.resize(&self.gpu, &capacities, cells) {
+            self.unbind();
+        }
+        let (gpu, world, room) = (&*self.gpu, &self.world, &self.room);
+        let resolve = frame.shared_vertex == SharedVertex::Resolve;
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor {
                 label: Some("impinge"),
             });
-        let times = self.collector.times(gpu);
-        self.plan
-            .encode(&mut encoder, launches, world, &self.room, n_seeds, times);
-        let guess = self.collector.encode(gpu, &mut encoder, &self.room);
+        let mut stages = Stages {
+            names,
+            encoder: &mut encoder,
+            times: self.collector.times(gpu),
+            next: 0,
+        };
+        let mut counters = [Counter::default(); N_COUNTERS as usize];
+        match (&mut self.plan, work) {
+            (Plan::Clusters(plan), Work::Seeds(seeds)) => {
+                plan.make(gpu, world, room, world.forest().rounds(seeds), resolve)?;
+                // Seeds fit a queue, which 32 bits can number.
+                counters[0].n = seeds.len() as u32;
+                room.queues[0].write(gpu, 0, seeds);
+                plan.encode(&mut stages, world, room, count(seeds.len()));
+            }
+            (Plan::Cells(plan), Work::Part(part)) => {
+                let told = Told {
+                    lambda: self.options.lambda,
+                    group_size: self.options.group_size,
+                    resolve,
+                };
+                plan.make(gpu, world, room, told, *part)?;
+                plan.encode(&mut stages, world, room);
+            }
+            _ => unreachable!("work is made for the plan"),
+        }
+        room.counters.write(gpu, 0, &counters);
+        let n_stages = names.len() as u32;
+        let guess = self.collector.encode(gpu, &mut encoder, room, n_stages);
         gpu.queue.submit([encoder.finish()]);
         Ok(guess)
     }
 }
 
+/// Counts of a pass that is complete.
+fn book(collected: &Collected, method: Method, stats: &mut Statistics) {
+    let needed = &collected.counts.needed;
+    stats.n_slabs += 1;
+    stats.n_work_items += needed.items;
+    stats.n_candidates += needed.candidates;
+    stats.n_unsure += needed.unsure;
+    if method == Method::Cells {
+        stats.n_entries += needed.entries;
+        stats.n_subdivided += collected.counts.n_subdivided;
+        stats.grid = Some(collected.grid.resolution);
+    }
+}
+
 /// Takes the certain pairs and settles the others exactly.
 fn settle_all(scene: &Scene, frame: &Frame, collected: &Collected, keys: &mut Vec<u64>) {
-    keys.extend(
-        collected
-            .pairs
-            .iter()
-            .map(|pair| pair_key(pair.low, pair.high)),
-    );
+    let certain = collected.pairs.iter();
+    keys.extend(certain.map(|pair| pair_key(pair.low, pair.high)));
     let settled = |pair: &super::layout::UnsureKey| {
         settle(scene, frame, pair.low, pair.high).then(|| pair_key(pair.low, pair.high))
     };

@@ -1,8 +1,9 @@
 //! All kernels: their sources, their bindings, and the compiled set.
 
 use super::layout::{
-    Arguments, Body, Candidate, Cluster, ClusterVertex, Coordinate, Corners, Counter, Level, Node,
-    NodePair, Order, PairKey, Params, UnsureKey, WorkItem,
+    Arguments, Body, Candidate, Cell, CellItem, Cluster, ClusterVertex, Coordinate, Corners,
+    Counter, Grid, Kept, Level, ListEntry, Node, NodePair, Order, PairKey, Params, Reach, Start,
+    Tally, UnsureKey, WorkItem,
 };
 use super::pipeline::{Kernel, Source, bindings, source};
 
@@ -87,48 +88,166 @@ bindings! {
     }
 }
 
-pub(crate) const BOUNDS_CLUSTERS: Source =
-    source!("bounds_clusters", "boxes", "vertices", "groups");
-pub(crate) const BOUNDS_LEVEL: Source = source!("bounds_level", "refit", "groups");
-pub(crate) const BOUNDS_TOP: Source = source!("bounds_top", "refit");
-pub(crate) const PREPARE: Source = source!("prepare");
-pub(crate) const DISPATCH: Source = source!("dispatch", "boxes", "reserve", "groups");
-pub(crate) const PAIRING: Source = source!("pairing", "boxes", "vertices", "reserve", "groups");
-pub(crate) const NARROW: Source = source!(
-    "narrow",
-    "filter",
-    "triangles",
-    "solids",
-    "reserve",
-    "groups"
-);
-
-/// Every kernel, compiled.
-pub(crate) struct Kernels {
-    pub bounds_clusters: Kernel<BoundsClusters>,
-    pub bounds_level: Kernel<BoundsLevel>,
-    pub bounds_top: Kernel<BoundsTop>,
-    pub prepare: Kernel<Prepare>,
-    pub dispatch: Kernel<Dispatch>,
-    pub pairing: Kernel<Pairing>,
-    /// For scenes of triangles alone.
-    pub narrow: Kernel<Narrow>,
-    /// For scenes with tetrahedra.
-    pub narrow_solids: Kernel<Narrow>,
+bindings! {
+    /// `bounds_reach.wgsl`
+    BoundsReach {
+        nodes: Read<Node>,
+        bodies: Read<Body>,
+        ignored: Read<NodePair>,
+        reaches: Write<Reach>,
+        tallies: Write<Tally>,
+        params: Uniform<Params>,
+    }
 }
 
-impl Kernels {
-    /// Compiles all of them; errors go to the error scopes that are open.
-    pub fn new(device: &wgpu::Device) -> Self {
-        Kernels {
-            bounds_clusters: Kernel::new(device, &BOUNDS_CLUSTERS, &[]),
-            bounds_level: Kernel::new(device, &BOUNDS_LEVEL, &[]),
-            bounds_top: Kernel::new(device, &BOUNDS_TOP, &[]),
-            prepare: Kernel::new(device, &PREPARE, &[]),
-            dispatch: Kernel::new(device, &DISPATCH, &[]),
-            pairing: Kernel::new(device, &PAIRING, &[]),
-            narrow: Kernel::new(device, &NARROW, &[("WITH_SOLIDS", 0.0)]),
-            narrow_solids: Kernel::new(device, &NARROW, &[("WITH_SOLIDS", 1.0)]),
-        }
+bindings! {
+    /// `bounds_keep.wgsl`
+    BoundsKeep {
+        nodes: Read<Node>,
+        clusters: Read<Cluster>,
+        bodies: Read<Body>,
+        corners: Read<Corners>,
+        positions: Read<Coordinate>,
+        reaches: Read<Reach>,
+        kept: Write<Kept>,
+        counters: Write<Counter>,
     }
+}
+
+bindings! {
+    /// `grid_resolution.wgsl`
+    GridResolution {
+        counters: Write<Counter>,
+        tallies: Write<Tally>,
+        grid: Write<Grid>,
+        arguments: Write<Arguments>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
+    /// `grid_ranges.wgsl`
+    GridRanges {
+        grid: Read<Grid>,
+        kept: Write<Kept>,
+        counters: Write<Counter>,
+        tallies: Write<Tally>,
+    }
+}
+
+bindings! {
+    /// `grid_shift.wgsl`
+    GridShift {
+        counters: Write<Counter>,
+        tallies: Write<Tally>,
+        grid: Write<Grid>,
+        arguments: Write<Arguments>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
+    /// `grid_count.wgsl`
+    GridCount {
+        grid: Read<Grid>,
+        kept: Write<Kept>,
+        counters: Write<Counter>,
+        cells: Write<Cell>,
+    }
+}
+
+bindings! {
+    /// `dispatch_cells.wgsl`
+    DispatchCells {
+        grid: Read<Grid>,
+        bodies: Read<Body>,
+        cells: Write<Cell>,
+        starts: Write<Start>,
+        items: Write<CellItem>,
+        counters: Write<Counter>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
+    /// `dispatch_scatter.wgsl`
+    DispatchScatter {
+        grid: Read<Grid>,
+        kept: Read<Kept>,
+        starts: Read<Start>,
+        cells: Write<Cell>,
+        entries: Write<ListEntry>,
+        counters: Write<Counter>,
+    }
+}
+
+bindings! {
+    /// `pairing_cells.wgsl`
+    PairingCells {
+        bodies: Read<Body>,
+        ignored: Read<NodePair>,
+        corners: Read<Corners>,
+        kept: Read<Kept>,
+        entries: Read<ListEntry>,
+        items: Read<CellItem>,
+        candidates: Write<Candidate>,
+        counters: Write<Counter>,
+        params: Uniform<Params>,
+    }
+}
+
+/// Declares the compiled set: for each kernel its source, constants and bindings.
+macro_rules! kernels {
+    ($($name:ident: $bindings:ident = $source:ident [$($constant:expr),*]
+        from $file:literal ($($shared:literal),*);)*) => {
+        /// Every kernel, compiled.
+        pub(crate) struct Kernels {
+            $(pub $name: Kernel<$bindings>,)*
+        }
+
+        $(pub(crate) const $source: Source = source!($file, [$($shared),*]);)*
+
+        impl Kernels {
+            /// Compiles all of them; errors go to the error scopes that are open.
+            pub fn new(device: &wgpu::Device) -> Self {
+                Kernels {
+                    $($name: Kernel::new(device, &$source, &[$($constant),*]),)*
+                }
+            }
+        }
+
+        /// Every kernel's source and what it binds.
+        #[cfg(test)]
+        pub(crate) const ALL: &[(Source, &[super::pipeline::Entry])] = &[
+            $(($source, <$bindings as super::pipeline::Bindings>::ENTRIES),)*
+        ];
+    };
+}
+
+kernels! {
+    bounds_clusters: BoundsClusters = BOUNDS_CLUSTERS []
+        from "bounds_clusters" ("boxes", "vertices", "groups");
+    bounds_level: BoundsLevel = BOUNDS_LEVEL [] from "bounds_level" ("refit", "groups");
+    bounds_top: BoundsTop = BOUNDS_TOP [] from "bounds_top" ("refit");
+    prepare: Prepare = PREPARE [] from "prepare" ("arguments");
+    dispatch: Dispatch = DISPATCH [] from "dispatch" ("boxes", "meets", "reserve", "groups");
+    pairing: Pairing = PAIRING []
+        from "pairing" ("boxes", "vertices", "ids", "reserve", "groups");
+    narrow: Narrow = NARROW [("WITH_SOLIDS", 0.0)]
+        from "narrow" ("filter", "triangles", "solids", "reserve", "groups");
+    narrow_solids: Narrow = NARROW_SOLIDS [("WITH_SOLIDS", 1.0)]
+        from "narrow" ("filter", "triangles", "solids", "reserve", "groups");
+    bounds_reach: BoundsReach = BOUNDS_REACH [] from "bounds_reach" ("boxes", "meets", "groups");
+    bounds_keep: BoundsKeep = BOUNDS_KEEP []
+        from "bounds_keep" ("boxes", "vertices", "reserve", "groups");
+    grid_resolution: GridResolution = GRID_RESOLUTION []
+        from "grid_resolution" ("region", "arguments");
+    grid_ranges: GridRanges = GRID_RANGES [] from "grid_ranges" ("region", "groups");
+    grid_shift: GridShift = GRID_SHIFT [] from "grid_shift" ("arguments");
+    grid_count: GridCount = GRID_COUNT [] from "grid_count" ("coarse", "groups");
+    dispatch_cells: DispatchCells = DISPATCH_CELLS [] from "dispatch_cells" ("reserve", "groups");
+    dispatch_scatter: DispatchScatter = DISPATCH_SCATTER []
+        from "dispatch_scatter" ("coarse", "groups");
+    pairing_cells: PairingCells = PAIRING_CELLS []
+        from "pairing_cells" ("boxes", "meets", "ids", "reserve", "groups");
 }

@@ -44,7 +44,28 @@ words! {
         first: u32, count: u32,
         counter: u32, per_group: u32, capacity: u32, slot: u32,
         n_ignored: u32, resolve: u32,
+        group_size: u32, lambda: u32, most_cells: u32, unused: u32,
+        first_row: u32, n_rows: u32, first_column: u32, n_columns: u32,
     }
+    /// A primitive that reaches another body.
+    Kept { low: [u32; 3], place: u32, high: [u32; 3], body: u32, range: [u32; 3], unused: u32 }
+    /// Where others may meet a body.
+    Reach { low: [u32; 3], gap: u32, high: [u32; 3], gap_too: u32 }
+    /// The grid; the floats are never looked at here.
+    Grid {
+        origin: [u32; 3], shift: u32, scale: [u32; 3], n_cells: u32,
+        finest: [u32; 3], unused: u32, resolution: [u32; 3], unused_too: u32,
+    }
+    /// A coarse cell.
+    Cell { n_entries: u32, highest: u32, lowest: u32 }
+    /// Two groups of one cell.
+    CellItem { cell: u32, sizes: u32, first_a: u32, first_b: u32 }
+    /// Where the list of a cell starts.
+    Start { entry: u32 }
+    /// One entry of a cell's list.
+    ListEntry { kept: u32 }
+    /// A word of the region, or of the entries a shift.
+    Tally { word: u32 }
     /// Workgroups of an indirect dispatch.
     Arguments { x: u32, y: u32, z: u32 }
     /// One word of a position: the bits of a coordinate.
@@ -75,8 +96,18 @@ pub(crate) const N_CANDIDATES: u32 = 33;
 pub(crate) const N_PAIRS: u32 = 34;
 /// Counter of unsure pairs.
 pub(crate) const N_UNSURE: u32 = 35;
-/// Not 0 when a counter has passed 2^32.
-pub(crate) const WRAPPED: u32 = 36;
+/// Not 0 when a counter has passed 2^32, or one invocation had too much to do.
+pub(crate) const TOO_MUCH: u32 = 36;
+/// Counter of kept primitives.
+pub(crate) const N_KEPT: u32 = 37;
+/// Counter of entries of the cell lists.
+pub(crate) const N_ENTRIES: u32 = 38;
+/// Counter of cells that went through the second level.
+pub(crate) const N_SUBDIVIDED: u32 = 39;
+/// Words of the region and of the entries a shift.
+pub(crate) const N_TALLIES: u32 = 37;
+/// The root of a body without primitives, and the top where there is no tree over bodies.
+pub(crate) const NO_ROOT: u32 = u32::MAX;
 /// Counters in all.
 pub(crate) const N_COUNTERS: u32 = 40;
 /// Flags of candidates.
@@ -112,14 +143,14 @@ impl Node {
 #[repr(C)]
 pub(crate) struct Step {
     pub params: Params,
-    padding: [u32; 56],
+    padding: [u32; 48],
 }
 
 impl From<Params> for Step {
     fn from(params: Params) -> Self {
         Step {
             params,
-            padding: [0; 56],
+            padding: [0; 48],
         }
     }
 }

@@ -65,7 +65,7 @@ impl Source {
 
 /// The text of a kernel file and of the shared files that it needs.
 macro_rules! source {
-    ($name:literal $(, $shared:literal)*) => {
+    ($name:literal, [$($shared:literal),*]) => {
         $crate::gpu::pipeline::Source {
             name: $name,
             parts: &[

@@ -7,9 +7,11 @@
 use super::buffers::Storage;
 use super::device::Gpu;
 use super::layout::{
-    Arguments, Candidate, Counter, N_CANDIDATES, N_COUNTERS, N_ITEMS, N_PAIRS, N_UNSURE, NodePair,
-    PairKey, ROUNDS, UnsureKey, WRAPPED, WorkItem,
+    Arguments, Candidate, Cell, CellItem, Counter, Grid, Kept, ListEntry, N_CANDIDATES, N_COUNTERS,
+    N_ENTRIES, N_ITEMS, N_KEPT, N_PAIRS, N_SUBDIVIDED, N_TALLIES, N_UNSURE, NodePair, PairKey,
+    ROUNDS, Reach, Start, TOO_MUCH, Tally, UnsureKey, WorkItem,
 };
+use crate::detector::Method;
 
 /// Elements that each buffer has room for. The answer never depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,6 +21,10 @@ pub struct Capacities {
     pub queue: u64,
     /// Work items.
     pub items: u64,
+    /// `Cells`: primitives within reach of another body.
+    pub kept: u64,
+    /// `Cells`: entries of the cell lists.
+    pub entries: u64,
     /// Candidates.
     pub candidates: u64,
     /// Pairs that certainly intersect.
@@ -32,6 +38,8 @@ impl Default for Capacities {
         Capacities {
             queue: 1 << 15,
             items: 1 << 15,
+            kept: 1 << 15,
+            entries: 1 << 16,
             candidates: 1 << 18,
             pairs: 1 << 16,
             unsure: 1 << 14,
@@ -47,15 +55,42 @@ impl Capacities {
     pub(crate) const LEAST: Capacities = Capacities {
         queue: 64,
         items: 64,
+        kept: 64,
+        entries: 64,
         candidates: ONE_ITEM,
         pairs: ONE_ITEM,
         unsure: ONE_ITEM,
     };
 
+    const NONE: Capacities = Capacities {
+        queue: 0,
+        items: 0,
+        kept: 0,
+        entries: 0,
+        candidates: 0,
+        pairs: 0,
+        unsure: 0,
+    };
+
+    /// Without the room that only the other method needs.
+    pub(crate) fn of(self, method: Method) -> Self {
+        match method {
+            Method::Cells => Capacities { queue: 1, ..self },
+            _ => Capacities {
+                kept: 1,
+                entries: 1,
+                ..self
+            },
+        }
+    }
+
     /// Bytes on the device, read-back included.
     pub(crate) fn bytes(&self) -> u64 {
+        let item = size_of::<WorkItem>().max(size_of::<CellItem>());
         2 * self.queue * size_of::<NodePair>() as u64
-            + self.items * size_of::<WorkItem>() as u64
+            + self.items * item as u64
+            + self.kept * size_of::<Kept>() as u64
+            + self.entries * size_of::<ListEntry>() as u64
             + self.candidates * size_of::<Candidate>() as u64
             + 2 * self.pairs * size_of::<PairKey>() as u64
             + 2 * self.unsure * size_of::<UnsureKey>() as u64
@@ -65,6 +100,8 @@ impl Capacities {
         Capacities {
             queue: pick(self.queue, other.queue),
             items: pick(self.items, other.items),
+            kept: pick(self.kept, other.kept),
+            entries: pick(self.entries, other.entries),
             candidates: pick(self.candidates, other.candidates),
             pairs: pick(self.pairs, other.pairs),
             unsure: pick(self.unsure, other.unsure),
@@ -79,11 +116,18 @@ impl Capacities {
         self.max(room) == room
     }
 
+    /// Whether the device can bind this much.
+    pub(crate) fn fit(self, gpu: &Gpu) -> bool {
+        self.fits(Capacities::limit(gpu))
+    }
+
     /// What one binding of the device may hold.
     fn limit(gpu: &Gpu) -> Self {
         Capacities {
             queue: Storage::<NodePair>::limit(gpu),
-            items: Storage::<WorkItem>::limit(gpu),
+            items: Storage::<CellItem>::limit(gpu),
+            kept: Storage::<Kept>::limit(gpu),
+            entries: Storage::<ListEntry>::limit(gpu),
             candidates: Storage::<Candidate>::limit(gpu),
             pairs: Storage::<PairKey>::limit(gpu),
             unsure: Storage::<UnsureKey>::limit(gpu),
@@ -91,7 +135,7 @@ impl Capacities {
     }
 }
 
-/// The buffers.
+/// The buffers. A method leaves those of the other at one element each.
 #[derive(Debug)]
 pub(crate) struct Room {
     pub queues: [Storage<NodePair>; 2],
@@ -101,6 +145,31 @@ pub(crate) struct Room {
     pub unsure: Storage<UnsureKey>,
     pub counters: Storage<Counter>,
     pub arguments: Storage<Arguments>,
+    pub cell_items: Storage<CellItem>,
+    pub kept: Storage<Kept>,
+    pub entries: Storage<ListEntry>,
+    pub cells: Storage<Cell>,
+    pub starts: Storage<Start>,
+    pub reaches: Storage<Reach>,
+    pub tallies: Storage<Tally>,
+    pub grid: Storage<Grid>,
+    sizes: Option<(Capacities, CellsWanted)>,
+}
+
+/// Room that `Cells` wants besides what grows by itself; none for `Clusters`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct CellsWanted {
+    pub n_cells: u64,
+    pub n_bodies: u64,
+}
+
+impl CellsWanted {
+    /// Bytes of a cell and of its list's start.
+    pub const CELL: u64 = (size_of::<Cell>() + size_of::<Start>()) as u64;
+
+    pub fn bytes(&self) -> u64 {
+        self.n_cells * Self::CELL + self.n_bodies * size_of::<Reach>() as u64
+    }
 }
 
 impl Room {
@@ -115,32 +184,59 @@ impl Room {
             unsure: Storage::new("unsure", copied),
             counters: Storage::new("counters", copied),
             arguments: Storage::new("arguments", indirect),
+            cell_items: Storage::plain("work items of cells"),
+            kept: Storage::plain("kept"),
+            entries: Storage::plain("entries"),
+            cells: Storage::plain("cells"),
+            starts: Storage::plain("starts"),
+            reaches: Storage::plain("reaches"),
+            tallies: Storage::plain("tallies"),
+            grid: Storage::new("grid", copied),
+            sizes: None,
         }
     }
 
     /// Makes exactly this much room. Returns whether any buffer is a new one.
-    pub fn resize(&mut self, gpu: &Gpu, capacities: &Capacities) -> bool {
-        let before = self.capacities();
+    pub fn resize(&mut self, gpu: &Gpu, wanted: &Capacities, cells: Option<CellsWanted>) -> bool {
+        let is_cells = cells.is_some();
+        let cells = cells.unwrap_or_default();
+        let sizes = Some((*wanted, cells));
+        if self.sizes == sizes {
+            return false;
+        }
+        self.sizes = sizes;
+        let (of_clusters, of_cells) = match is_cells {
+            true => (1, wanted.items),
+            false => (wanted.items, 1),
+        };
         let [a, b] = &mut self.queues;
-        a.resize_exactly(gpu, capacities.queue);
-        b.resize_exactly(gpu, capacities.queue);
-        self.items.resize_exactly(gpu, capacities.items);
-        self.candidates.resize_exactly(gpu, capacities.candidates);
-        self.pairs.resize_exactly(gpu, capacities.pairs);
-        self.unsure.resize_exactly(gpu, capacities.unsure);
+        a.resize_exactly(gpu, wanted.queue);
+        b.resize_exactly(gpu, wanted.queue);
+        self.items.resize_exactly(gpu, of_clusters);
+        self.candidates.resize_exactly(gpu, wanted.candidates);
+        self.pairs.resize_exactly(gpu, wanted.pairs);
+        self.unsure.resize_exactly(gpu, wanted.unsure);
         self.counters.resize_exactly(gpu, u64::from(N_COUNTERS));
         self.arguments.resize_exactly(gpu, u64::from(ROUNDS) + 2);
-        before != self.capacities()
+        self.cell_items.resize_exactly(gpu, of_cells);
+        self.kept.resize_exactly(gpu, wanted.kept);
+        self.entries.resize_exactly(gpu, wanted.entries);
+        self.cells.resize_exactly(gpu, cells.n_cells);
+        self.starts.resize_exactly(gpu, cells.n_cells);
+        self.reaches.resize_exactly(gpu, cells.n_bodies);
+        self.tallies.resize_exactly(gpu, u64::from(N_TALLIES));
+        self.grid.resize_exactly(gpu, 1);
+        true
     }
 
     pub fn capacities(&self) -> Capacities {
-        Capacities {
-            queue: self.queues[0].len(),
-            items: self.items.len(),
-            candidates: self.candidates.len(),
-            pairs: self.pairs.len(),
-            unsure: self.unsure.len(),
-        }
+        self.sizes.map_or(Capacities::NONE, |(wanted, _)| wanted)
+    }
+
+    /// Bytes on the device.
+    pub fn bytes(&self) -> u64 {
+        self.sizes
+            .map_or(0, |(wanted, cells)| wanted.bytes() + cells.bytes())
     }
 }
 
@@ -149,7 +245,9 @@ impl Room {
 pub(crate) struct Counts {
     /// What would have held everything; of later stages a lower bound when an earlier one overflowed.
     pub needed: Capacities,
-    wrapped: bool,
+    /// Cells that went through the second level.
+    pub n_subdivided: u64,
+    too_much: bool,
 }
 
 /// What is to be done about the counts of a pass.
@@ -170,17 +268,20 @@ impl Counts {
             needed: Capacities {
                 queue: (0..ROUNDS).map(at).max().unwrap_or(0),
                 items: at(N_ITEMS),
+                kept: at(N_KEPT),
+                entries: at(N_ENTRIES),
                 candidates: at(N_CANDIDATES),
                 pairs: at(N_PAIRS),
                 unsure: at(N_UNSURE),
             },
-            wrapped: at(WRAPPED) != 0,
+            n_subdivided: at(N_SUBDIVIDED),
+            too_much: at(TOO_MUCH) != 0,
         }
     }
 
     /// Compares with the room there was. `bytes` may be held in all by these buffers.
     pub fn judge(&self, gpu: &Gpu, room: Capacities, bytes: Option<u64>) -> Verdict {
-        if self.wrapped {
+        if self.too_much {
             return Verdict::Split;
         }
         if self.needed.fits(room) {

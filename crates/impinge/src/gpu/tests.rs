@@ -6,19 +6,7 @@ use naga::{AddressSpace, Module, StorageAccess, TypeInner};
 use super::buffers::Access;
 use super::kernels::*;
 use super::layout::*;
-use super::pipeline::{Bindings, Entry, Source};
-
-fn all_kernels() -> [(Source, &'static [Entry]); 7] {
-    [
-        (BOUNDS_CLUSTERS, BoundsClusters::ENTRIES),
-        (BOUNDS_LEVEL, BoundsLevel::ENTRIES),
-        (BOUNDS_TOP, BoundsTop::ENTRIES),
-        (PREPARE, Prepare::ENTRIES),
-        (DISPATCH, Dispatch::ENTRIES),
-        (PAIRING, Pairing::ENTRIES),
-        (NARROW, Narrow::ENTRIES),
-    ]
-}
+use super::pipeline::Source;
 
 fn parse(source: &Source) -> Module {
     let text = source.text();
@@ -32,8 +20,8 @@ fn parse(source: &Source) -> Module {
 
 #[test]
 fn kernels_are_valid_and_bind_what_the_host_binds() {
-    for (source, entries) in all_kernels() {
-        let module = parse(&source);
+    for (source, entries) in ALL {
+        let module = parse(source);
         let bound: Vec<_> = module
             .global_variables
             .iter()
@@ -70,8 +58,8 @@ fn kernels_are_valid_and_bind_what_the_host_binds() {
 
 #[test]
 fn workgroups_keep_to_what_every_device_has() {
-    for (source, _) in all_kernels() {
-        let module = parse(&source);
+    for (source, _) in ALL {
+        let module = parse(source);
         let [entry] = &module.entry_points[..] else {
             panic!("{} has one entry point", source.name);
         };
@@ -138,10 +126,22 @@ fn structs_are_laid_out_as_on_the_host() {
         Candidate { a, b }
         PairKey { low, high }
         UnsureKey { low, high }
-        Params { first, count, counter, per_group, capacity, slot, n_ignored, resolve }
+        Params {
+            first, count, counter, per_group, capacity, slot, n_ignored, resolve, group_size,
+            lambda, most_cells, unused, first_row, n_rows, first_column, n_columns
+        }
+        Kept { low, place, high, body, range, unused }
+        Grid { origin, shift, scale, n_cells, finest, unused, resolution, unused_too }
+        Cell { n_entries, highest, lowest }
+        CellItem { cell, sizes, first_a, first_b }
         Arguments { x, y, z }
     );
     assert_eq!(size_of::<Step>(), 256);
+    // The shader leaves a gap after each corner, which has a name on the host alone.
+    let (reach, span) = members(&module, "Reach");
+    assert_eq!(reach, [("low".to_owned(), 0), ("high".to_owned(), 16)]);
+    assert_eq!(span as usize, size_of::<Reach>());
+    assert_eq!(std::mem::offset_of!(Reach, high), 16);
 }
 
 #[test]
@@ -164,8 +164,13 @@ fn constants_are_those_of_the_host() {
         ("N_CANDIDATES", N_CANDIDATES),
         ("N_PAIRS", N_PAIRS),
         ("N_UNSURE", N_UNSURE),
-        ("WRAPPED", WRAPPED),
+        ("TOO_MUCH", TOO_MUCH),
+        ("N_KEPT", N_KEPT),
+        ("N_ENTRIES", N_ENTRIES),
+        ("N_SUBDIVIDED", N_SUBDIVIDED),
         ("N_COUNTERS", N_COUNTERS),
+        ("N_TALLIES", N_TALLIES),
+        ("NO_ROOT", NO_ROOT),
         ("CHILDREN", CHILDREN),
         ("GATE", GATE),
         ("FLAG", FLAG),

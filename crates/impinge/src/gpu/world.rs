@@ -23,19 +23,21 @@ use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, round_down, round_up};
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::{Entry, Shape, order};
-use crate::scene::{BodyId, Elements, Positions, Scene};
+use crate::scene::{BodyId, Elements, Filter, Positions, Scene};
 use crate::stats::Statistics;
 
 use super::buffers::{Storage, count};
 use super::device::Gpu;
 use super::layout::{
-    Body, Cluster, ClusterVertex, Coordinate, Corners, Level, Node, NodePair, Order,
+    Body, Cluster, ClusterVertex, Coordinate, Corners, Level, NO_ROOT, Node, NodePair, Order,
 };
 
 /// Places carry a flag in bit 31.
 const MOST_PRIMITIVES: u64 = 1 << 31;
 /// How many keys the boxes of rounded positions are widened: see `boxes.wgsl`.
 const SLACK: u32 = 2;
+/// Bodies, empty ones included, that need no tree over bodies if at most two are filled.
+const FEW_BODIES: usize = 1024;
 /// How far bodies may part from their neighbours in the tree over bodies before it is made anew.
 const STALE: f64 = 1.5;
 
@@ -340,7 +342,14 @@ impl World {
         let words = |bits: u64| [bits as u32, (bits >> 32) as u32];
         let mut bodies = Vec::with_capacity(frame.participants.len());
         for (ix, participant) in frame.participants.iter().enumerate() {
-            let filter = frame.filter(ix);
+            // Bodies without a category meet nobody.
+            let filter = match frame.between() {
+                true => frame.filter(ix),
+                false => Filter {
+                    category: 0,
+                    mask: 0,
+                },
+            };
             let rounded = match frame.body(scene, ix).positions() {
                 Positions::F32(_) => false,
                 Positions::F64(_) => true,
@@ -383,8 +392,9 @@ impl World {
         let forest = &self.forest;
         let root = |ix: usize| forest.roots[ix];
         let mut seeds = Vec::new();
-        if frame.between() && forest.has_top {
-            let top = forest.top();
+        if let Some(top) = forest.top()
+            && frame.between()
+        {
             return vec![NodePair { a: top, b: top }];
         }
         if frame.between() {
@@ -487,9 +497,6 @@ pub(crate) struct Forest {
     entries: Vec<Entry>,
 }
 
-/// The root of a body without primitives.
-const NO_ROOT: u32 = u32::MAX;
-
 impl Forest {
     fn new(shapes: &[&Shape], sample: impl Fn(usize) -> [f32; 3]) -> Self {
         let mut forest = Forest {
@@ -532,7 +539,8 @@ impl Forest {
         let filled: Vec<u32> = (0..shapes.len() as u32)
             .filter(|&ix| forest.is_filled(ix as usize))
             .collect();
-        if filled.len() > 2 {
+        // Without a tree kernels walk over all bodies, empty ones too.
+        if filled.len() > 2 || (shapes.len() > FEW_BODIES && !filled.is_empty()) {
             forest.has_top = true;
             forest.push_top(&filled);
             forest.reorder(sample);
@@ -575,8 +583,9 @@ impl Forest {
         }
     }
 
-    fn top(&self) -> u32 {
-        self.nodes.len() as u32 - 1
+    /// The root of the tree over bodies.
+    pub fn top(&self) -> Option<u32> {
+        self.has_top.then(|| self.nodes.len() as u32 - 1)
     }
 
     fn is_filled(&self, participant_ix: usize) -> bool {

@@ -42,27 +42,11 @@ fn load(cluster: Cluster, lane: u32, entry: u32, both: Box) -> bool {
         return false;
     }
     let corner = corners[cluster.first_place + lane];
-    let p = vertex_key(corner.x);
-    let q = vertex_key(corner.y);
-    let r = vertex_key(corner.z);
-    var low = min(min(p, q), r);
-    var high = max(max(p, q), r);
-    if corner.w != corner.z {
-        let s = vertex_key(corner.w);
-        low = min(low, s);
-        high = max(high, s);
-    }
-    let slack = bodies[cluster.body].slack;
-    low -= slack;
-    high += slack;
-    lows[entry] = low;
-    highs[entry] = high;
+    let own = primitive_box(corner, bodies[cluster.body].slack);
+    lows[entry] = own.low;
+    highs[entry] = own.high;
     ids[entry] = corner;
-    return overlap(Box(low, high), both);
-}
-
-fn shares_vertex(a: vec4<u32>, b: vec4<u32>) -> bool {
-    return any(a == b) || any(a == b.yzwx) || any(a == b.zwxy) || any(a == b.wxyz);
+    return overlap(own, both);
 }
 
 // Puts candidates of the lane's primitive and the partners in one word of its mask.

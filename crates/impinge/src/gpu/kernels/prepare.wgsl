@@ -7,13 +7,8 @@
 @group(0) @binding(1) var<storage, read_write> arguments: array<Arguments>;
 @group(0) @binding(2) var<uniform> params: Params;
 
-const WIDEST: u32 = 32768u;
-
 @compute @workgroup_size(1)
 fn main() {
     let n = min(atomicLoad(&counters[params.counter]), params.capacity);
-    let groups = n / params.per_group + select(0u, 1u, n % params.per_group != 0u);
-    let x = min(groups, WIDEST);
-    let y = select(0u, groups / WIDEST + select(0u, 1u, groups % WIDEST != 0u), groups > 0u);
-    arguments[params.slot] = Arguments(x, y, 1u);
+    arguments[params.slot] = arguments_for(n, params.per_group);
 }

@@ -5,7 +5,7 @@ fn reserve(counter: u32, n: u32) -> u32 {
     }
     let first = atomicAdd(&counters[counter], n);
     if first + n < first {
-        atomicStore(&counters[WRAPPED], 1u);
+        atomicStore(&counters[TOO_MUCH], 1u);
     }
     return first;
 }
