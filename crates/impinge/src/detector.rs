@@ -1,7 +1,8 @@
 //! The frame loop: resolves a query, picks method and backend, sorts the answer.
 
 #[cfg(feature = "gpu")]
-use std::sync::Arc;
+mod gpu;
+
 use std::time::Instant;
 
 use crate::cpu::Job;
@@ -158,7 +159,7 @@ impl Detector {
         check(&settings)?;
         Ok(Detector {
             #[cfg(feature = "gpu")]
-            gpu: open_gpu(&settings)?,
+            gpu: gpu::open(&settings)?,
             workers: Workers::new(settings.threads)?,
             frame: Frame::default(),
             pairs: Pairs::default(),
@@ -166,25 +167,6 @@ impl Detector {
             cells: Cells::new(settings.instruction_set),
             settings,
         })
-    }
-
-    /// [`with_settings`](Detector::with_settings), and how much room GPU buffers begin with. For
-    /// tests: buffers grow by themselves.
-    ///
-    /// # Errors
-    /// As `with_settings`.
-    #[cfg(feature = "gpu")]
-    #[doc(hidden)]
-    pub fn with_capacities(
-        settings: Settings,
-        capacities: crate::Capacities,
-    ) -> Result<Self, Error> {
-        let mut detector = Detector::with_settings(settings)?;
-        if let Some(engine) = &mut detector.gpu {
-            let gpu = Arc::clone(engine.gpu());
-            *engine = crate::gpu::Engine::new(gpu, gpu_options(&detector.settings), capacities);
-        }
-        Ok(detector)
     }
 
     /// What it was told.
@@ -210,6 +192,11 @@ impl Detector {
         query: &Query,
         control: &Control<'_>,
     ) -> Result<&Pairs, Error> {
+        #[cfg(feature = "gpu")]
+        if let Some(gpu) = self.gpu_in_use() {
+            gpu.block_on(self.detect_on_gpu(scene, query, control))?;
+            return Ok(&self.pairs);
+        }
         let start = Instant::now();
         self.frame.resolve(scene, query)?;
         self.pairs.begin(&self.frame);
@@ -217,15 +204,6 @@ impl Detector {
         let settings = &self.settings;
         stats.method = settings.method.name();
         stats.n_threads = self.workers.n();
-        #[cfg(feature = "gpu")]
-        if let Some(engine) = &mut self.gpu {
-            stats.backend.push_str(engine.gpu().name());
-            let gpu = Arc::clone(engine.gpu());
-            gpu.block_on(engine.run(scene, &self.frame, control, keys, stats))?;
-            stats.time("collect", |_| keys.sort_unstable());
-            stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
-            return Ok(&self.pairs);
-        }
         stats.backend.push_str("cpu");
         let job = Job {
             scene,
@@ -261,35 +239,6 @@ impl Detector {
         }
         stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(&self.pairs)
-    }
-}
-
-/// The GPU that the settings ask for, if they ask for one.
-#[cfg(feature = "gpu")]
-fn open_gpu(settings: &Settings) -> Result<Option<crate::gpu::Engine>, Error> {
-    use crate::gpu::{Capacities, Engine, Gpu, Wanted};
-    let named = settings.device.as_deref().map(Wanted::Named);
-    let gpu = match settings.backend {
-        Backend::Cpu => return Ok(None),
-        Backend::Auto if settings.method == Method::Naive => return Ok(None),
-        // A driver that runs on the CPU is slower than the CPU backend.
-        Backend::Auto => match Gpu::open(named.unwrap_or(Wanted::Hardware)) {
-            Ok(gpu) => gpu,
-            Err(_) => return Ok(None),
-        },
-        Backend::Gpu => Gpu::open(named.unwrap_or(Wanted::Any))?,
-    };
-    let options = gpu_options(settings);
-    Ok(Some(Engine::new(gpu, options, Capacities::default())))
-}
-
-#[cfg(feature = "gpu")]
-fn gpu_options(settings: &Settings) -> crate::gpu::Options {
-    crate::gpu::Options {
-        method: settings.method,
-        lambda: settings.lambda,
-        group_size: settings.group_size,
-        memory_budget: settings.memory_budget,
     }
 }
 

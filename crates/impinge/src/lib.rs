@@ -32,9 +32,12 @@ pub use error::Error;
 #[doc(hidden)]
 pub use gpu::Capacities;
 #[cfg(feature = "gpu")]
-pub use gpu::{DeviceInfo, devices};
+pub use gpu::{DeviceInfo, ResidentPairs, devices};
 pub use pairs::{Pairs, Primitive, hash_rows};
 pub use progress::{CancelToken, Control, Progress};
 pub use query::{Query, SharedVertex};
 pub use scene::{Body, BodyId, Elements, Filter, Kind, Positions, Real, Scene};
 pub use stats::{Stage, Statistics};
+/// The GPU interface that [`Detector::with_device`] and [`Detector::encode`] speak.
+#[cfg(feature = "gpu")]
+pub use wgpu;

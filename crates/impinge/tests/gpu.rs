@@ -5,11 +5,13 @@
 
 mod common;
 
+use std::future::Future;
 use std::sync::{Mutex, OnceLock};
 
 use common::{Case, agree, cases, check, naive, rows};
 use impinge::{
     Backend, Capacities, Detector, Error, Method, Query, Scene, Settings, SharedVertex, devices,
+    wgpu,
 };
 use impinge_scenes::{soup, surfaces};
 
@@ -118,7 +120,8 @@ fn buffers_that_overflow_grow_and_nothing_is_lost() {
     };
     for method in [Method::Clusters, Method::Cells] {
         let settings = gpu(method);
-        let stages: [(&str, fn(&mut Capacities)); 8] = [
+        type Shrink = fn(&mut Capacities);
+        let stages: [(&str, Shrink); 8] = [
             ("none", |_| ()),
             ("queue", |room| room.queue = 3),
             ("items", |room| room.items = 2),
@@ -321,4 +324,146 @@ fn many_small_bodies_meet_through_the_tree_over_bodies() {
     assert!(expected.len() > 5000);
     check(&case, &expected, gpu(Method::Clusters));
     check(&case, &expected, gpu(Method::Cells));
+}
+
+/// Words of a buffer on the device.
+fn read(device: &wgpu::Device, queue: &wgpu::Queue, buffer: &wgpu::Buffer) -> Vec<u32> {
+    let staging = device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: buffer.size(),
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&Default::default());
+    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
+    queue.submit([encoder.finish()]);
+    staging.map_async(wgpu::MapMode::Read, .., |_| ());
+    device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+    let view = staging.get_mapped_range(..).unwrap();
+    let words = view.chunks_exact(4);
+    words
+        .map(|word| u32::from_le_bytes(word.try_into().unwrap()))
+        .collect()
+}
+
+#[test]
+fn resident_frames_take_positions_and_leave_pairs_on_the_device() {
+    let instance = wgpu::Instance::default();
+    let adapter = pollster::block_on(instance.request_adapter(&Default::default()));
+    let adapter = adapter.expect("these tests need an adapter");
+    let device = pollster::block_on(adapter.request_device(&Default::default()));
+    let (device, queue) = device.unwrap();
+    let ball = surfaces::bumpy_ball(1500, 0.2);
+    let moved = ball.translated([0.3, 0.1, 0.0]);
+    // The scene has the rest pose; where the second ball really is, the device alone knows.
+    let mut scene = Scene::new();
+    let a = ball.add_to(&mut scene).unwrap();
+    let b = ball.add_to(&mut scene).unwrap();
+    let query = Query::between(a, b);
+    let mut truth = scene.clone();
+    truth.set_positions(b, &moved.positions).unwrap();
+    let mut oracle = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+    let expected: Vec<[u32; 2]> = oracle
+        .detect(&truth, &query)
+        .unwrap()
+        .between(a, b)
+        .map(|(i, j)| [i, j + 1500])
+        .collect();
+    assert!(expected.len() > 100);
+    let bytes: Vec<u8> = moved
+        .positions
+        .iter()
+        .flatten()
+        .flat_map(|x| x.to_le_bytes())
+        .collect();
+    let positions = device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: bytes.len() as u64,
+        usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    queue.write_buffer(&positions, 0, &bytes);
+    for method in [Method::Clusters, Method::Cells] {
+        let settings = gpu(method);
+        let mut detector = Detector::with_device(device.clone(), queue.clone(), settings).unwrap();
+        let mut n_tries = 0;
+        let found = loop {
+            let mut encoder = device.create_command_encoder(&Default::default());
+            let resident = [(b, &positions)];
+            let found = detector.encode(&scene, &query, &resident, &mut encoder);
+            queue.submit([encoder.finish()]);
+            n_tries += 1;
+            if detector.make_room().unwrap() {
+                break found.unwrap();
+            }
+            assert!(n_tries < 9);
+        };
+        let counts = read(&device, &queue, &found.counts);
+        let keys = |buffer: &wgpu::Buffer, offset: u64| -> Vec<[u32; 2]> {
+            let n = counts[offset as usize / 4] as usize;
+            let words = read(&device, &queue, buffer);
+            words.as_chunks::<2>().0[..n].to_vec()
+        };
+        let mut pairs = keys(&found.pairs, found.n_pairs_offset);
+        let unsure = keys(&found.unsure, found.n_unsure_offset);
+        assert!(unsure.len() * 20 < pairs.len());
+        // What is left open belongs to the truth or does not; the rest must be right.
+        pairs.extend(unsure.iter().filter(|&pair| expected.contains(pair)));
+        pairs.sort_unstable();
+        assert!(pairs == expected, "{method:?}");
+        // Asked in the other way, the same detector answers from the scene's own positions.
+        let pairs = detector.detect(&truth, &query).unwrap();
+        assert_eq!(pairs.len(), expected.len());
+        let small = device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: 12,
+            usage: wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let refused = detector.encode(&scene, &query, &[(b, &small)], &mut encoder);
+        assert!(matches!(refused, Err(Error::Gpu { .. })));
+    }
+}
+
+#[test]
+fn a_lost_device_is_an_error_and_a_new_detector_works() {
+    let instance = wgpu::Instance::default();
+    let adapter = pollster::block_on(instance.request_adapter(&Default::default()));
+    let adapter = adapter.expect("these tests need an adapter");
+    let device = pollster::block_on(adapter.request_device(&Default::default()));
+    let (device, queue) = device.unwrap();
+    let case = cases().swap_remove(0);
+    let settings = gpu(Method::Clusters);
+    let mut detector = Detector::with_device(device.clone(), queue, settings.clone()).unwrap();
+    assert!(detector.detect(&case.scene, &case.query).is_ok());
+    device.destroy();
+    for _ in 0..2 {
+        let lost = detector.detect(&case.scene, &case.query);
+        assert!(matches!(lost, Err(Error::Gpu { .. })), "{lost:?}");
+    }
+    check(&case, &naive(&case), settings);
+}
+
+#[test]
+fn frames_can_be_awaited() {
+    let case = cases().swap_remove(0);
+    let mut detector = Detector::with_settings(gpu(Method::Clusters)).unwrap();
+    let expected = naive(&case);
+    let mut context = std::task::Context::from_waker(std::task::Waker::noop());
+    let mut n_pending = 0;
+    let answer = {
+        let mut frame = std::pin::pin!(detector.detect_async(&case.scene, &case.query));
+        loop {
+            match frame.as_mut().poll(&mut context) {
+                std::task::Poll::Ready(pairs) => break rows(pairs.unwrap()),
+                std::task::Poll::Pending => n_pending += 1,
+            }
+            // Other detectors of this process poll the device they share with this one.
+            let mut other = Detector::with_settings(gpu(Method::Clusters)).unwrap();
+            other.detect(&case.scene, &case.query).unwrap();
+        }
+    };
+    assert!(answer == expected);
+    assert!(n_pending > 0, "the device was waited for");
 }

@@ -204,7 +204,7 @@ impl Collector {
 }
 
 /// Maps the front of a buffer for reading.
-async fn map(buffer: &wgpu::Buffer, bytes: u64) -> Result<wgpu::BufferView, Error> {
+pub(crate) async fn map(buffer: &wgpu::Buffer, bytes: u64) -> Result<wgpu::BufferView, Error> {
     let mapping = Mapping::default();
     let shared = Arc::clone(&mapping.0);
     buffer.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {

@@ -56,12 +56,7 @@ fn adapters() -> Vec<(wgpu::Adapter, DeviceInfo)> {
     let found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
     let mut adapters: Vec<_> = found
         .into_iter()
-        .filter(|adapter| {
-            let limits = adapter.limits();
-            limits.max_storage_buffers_per_shader_stage >= STORAGE_BUFFERS
-                && limits.max_compute_invocations_per_workgroup >= 256
-                && limits.max_compute_workgroups_per_dimension >= 32_768
-        })
+        .filter(|adapter| suffices(&adapter.limits()))
         .map(|adapter| {
             let info = describe(&adapter.get_info(), &adapter.limits());
             (adapter, info)
@@ -69,6 +64,12 @@ fn adapters() -> Vec<(wgpu::Adapter, DeviceInfo)> {
         .collect();
     adapters.sort_by_key(|(_, info)| info.is_software);
     adapters
+}
+
+fn suffices(limits: &wgpu::Limits) -> bool {
+    limits.max_storage_buffers_per_shader_stage >= STORAGE_BUFFERS
+        && limits.max_compute_invocations_per_workgroup >= 256
+        && limits.max_compute_workgroups_per_dimension >= 32_768
 }
 
 fn describe(info: &wgpu::AdapterInfo, limits: &wgpu::Limits) -> DeviceInfo {
@@ -176,14 +177,37 @@ impl Gpu {
         let (device, queue) = request.await.map_err(|error| Error::Gpu {
             what: format!("{info}: {error}"),
         })?;
-        Gpu::with_device(device, queue, info).await
+        let gpu = Gpu::with_kernels(device, queue, info).await?;
+        let told = Arc::clone(&gpu.lost);
+        gpu.device.set_device_lost_callback(move |reason, message| {
+            let mut told = told.lock().unwrap_or_else(PoisonError::into_inner);
+            *told = Some(format!("device lost ({reason:?}): {message}"));
+        });
+        Ok(gpu)
     }
 
-    /// A device that is already open.
+    /// A device that is the caller's. Its callbacks are left alone.
     ///
     /// # Errors
-    /// A kernel does not compile.
-    pub async fn with_device(
+    /// It allows too little; a kernel does not compile.
+    pub fn of_caller(device: wgpu::Device, queue: wgpu::Queue) -> Result<Gpu, Error> {
+        let limits = device.limits();
+        if !suffices(&limits) {
+            return Err(Error::Gpu {
+                what: format!(
+                    "the device allows {} storage buffers a stage, {} invocations a workgroup \
+                     and {} workgroups along an axis; {STORAGE_BUFFERS}, 256 and 32768 are needed",
+                    limits.max_storage_buffers_per_shader_stage,
+                    limits.max_compute_invocations_per_workgroup,
+                    limits.max_compute_workgroups_per_dimension,
+                ),
+            });
+        }
+        let info = describe(&device.adapter_info(), &limits);
+        pollster::block_on(Gpu::with_kernels(device, queue, info))
+    }
+
+    async fn with_kernels(
         device: wgpu::Device,
         queue: wgpu::Queue,
         info: DeviceInfo,
@@ -191,19 +215,13 @@ impl Gpu {
         let scopes = Scopes::open(&device);
         let kernels = Kernels::new(&device);
         scopes.close().await?;
-        let lost = Arc::new(Mutex::new(None));
-        let told = Arc::clone(&lost);
-        device.set_device_lost_callback(move |reason, message| {
-            let mut told = told.lock().unwrap_or_else(PoisonError::into_inner);
-            *told = Some(format!("device lost ({reason:?}): {message}"));
-        });
         Ok(Gpu {
             has_timestamps: device.features().contains(wgpu::Features::TIMESTAMP_QUERY),
             device,
             queue,
             kernels,
             info,
-            lost,
+            lost: Arc::default(),
         })
     }
 

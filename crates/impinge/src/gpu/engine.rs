@@ -19,7 +19,7 @@ use super::cells::{self, Part, Told};
 use super::clusters;
 use super::collect::{Collected, Collector, Guess};
 use super::device::{Gpu, Scopes};
-use super::layout::{Cell, Counter, N_COUNTERS, NodePair};
+use super::layout::{Cell, NodePair};
 use super::room::{Capacities, CellsWanted, Room, Verdict};
 use super::steps::Stages;
 use super::world::World;
@@ -29,7 +29,7 @@ use crate::frame::{Frame, pair_key};
 use crate::narrow::settle;
 use crate::progress::Control;
 use crate::query::SharedVertex;
-use crate::scene::Scene;
+use crate::scene::{BodyId, Scene};
 use crate::stats::Statistics;
 
 /// Seeds up to which the host descends before the first launch: each step down saves two launches.
@@ -56,8 +56,8 @@ pub(crate) struct Engine {
     gpu: Arc<Gpu>,
     options: Options,
     first: Capacities,
-    world: World,
-    room: Room,
+    pub(super) world: World,
+    pub(super) room: Room,
     plan: Plan,
     collector: Collector,
 }
@@ -70,7 +70,7 @@ enum Plan {
 
 /// What a pass does.
 #[derive(Debug, Clone)]
-enum Work {
+pub(super) enum Work {
     Seeds(Vec<NodePair>),
     Part(Part),
 }
@@ -126,11 +126,9 @@ impl Engine {
         self.gpu.check_lost()?;
         let start = Instant::now();
         let scopes = Scopes::open(&self.gpu.device);
-        let updated = self.world.update(&self.gpu, scene, frame, stats);
+        let updated = self.update(scene, frame, &[], stats);
         let closed = scopes.close();
-        if updated? {
-            self.unbind();
-        }
+        updated?;
         closed.await?;
         stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
         let cells = self.cells_wanted(frame);
@@ -140,9 +138,7 @@ impl Engine {
             let done = stats.n_slabs;
             control.step(done, done + count(waiting.len()) + 1)?;
             let collected = self.pass(frame, &work, capacities, cells, stats).await?;
-            let fixed = self.world.bytes() + cells.map_or(0, |cells| cells.bytes());
-            let room = self.options.memory_budget;
-            let room = room.map(|budget| budget.saturating_sub(fixed));
+            let room = self.budget_for_room();
             match collected.counts.judge(&self.gpu, capacities, room) {
                 Verdict::Complete => {
                     book(&collected, self.options.method, stats);
@@ -169,6 +165,35 @@ impl Engine {
         Ok(())
     }
 
+    /// Brings the device up to the frame, but for positions that are on the device already.
+    pub(super) fn update(
+        &mut self,
+        scene: &Scene,
+        frame: &Frame,
+        resident: &[BodyId],
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        if self
+            .world
+            .update(&self.gpu, scene, frame, resident, stats)?
+        {
+            self.unbind();
+        }
+        Ok(())
+    }
+
+    /// What the budget leaves for buffers that grow by themselves.
+    pub(super) fn budget_for_room(&self) -> Option<u64> {
+        let fixed = self.world.bytes() + self.room.bytes_of_cells();
+        let budget = self.options.memory_budget;
+        budget.map(|budget| budget.saturating_sub(fixed))
+    }
+
+    /// Room from the next frame on.
+    pub(super) fn grow_to(&mut self, capacities: Capacities) {
+        self.first = capacities;
+    }
+
     fn unbind(&mut self) {
         match &mut self.plan {
             Plan::Clusters(plan) => plan.unbind(),
@@ -177,7 +202,7 @@ impl Engine {
     }
 
     /// Room for the grid: as many cells as equation (1) can ask for.
-    fn cells_wanted(&self, frame: &Frame) -> Option<CellsWanted> {
+    pub(super) fn cells_wanted(&self, frame: &Frame) -> Option<CellsWanted> {
         if self.options.method != Method::Cells {
             return None;
         }
@@ -194,7 +219,7 @@ impl Engine {
     }
 
     /// Room for the first pass: what there is, unless the budget says less.
-    fn first_room(&self, cells: Option<CellsWanted>) -> Result<Capacities, Error> {
+    pub(super) fn first_room(&self, cells: Option<CellsWanted>) -> Result<Capacities, Error> {
         let wanted = self.first.max(self.room.capacities());
         let Some(budget) = self.options.memory_budget else {
             return Ok(wanted);
@@ -219,7 +244,7 @@ impl Engine {
     }
 
     /// All of the work, if there is any.
-    fn whole(&self, frame: &Frame) -> Option<Work> {
+    pub(super) fn whole(&self, frame: &Frame) -> Option<Work> {
         let seeds = self.world.seeds(frame);
         if seeds.is_empty() {
             return None;
@@ -312,7 +337,7 @@ impl Engine {
         Ok(lean)
     }
 
-    fn too_small(&self, what: &'static str, needed: Capacities) -> Error {
+    pub(super) fn too_small(&self, what: &'static str, needed: Capacities) -> Error {
         match self.options.memory_budget {
             Some(budget) => Error::MemoryBudget {
                 what,
@@ -362,39 +387,61 @@ impl Engine {
         &mut self,
         frame: &Frame,
         work: &Work,
-        mut capacities: Capacities,
+        capacities: Capacities,
         cells: Option<CellsWanted>,
     ) -> Result<Guess, Error> {
-        let names = self.stages();
-        if let Work::Seeds(seeds) = work {
-            capacities.queue = capacities.queue.max(count(seeds.len()));
-        }
-        if self.room.resize(&self.gpu, &capacities, cells) {
-            self.unbind();
-        }
-        let (gpu, world, room) = (&*self.gpu, &self.world, &self.room);
-        let resolve = frame.shared_vertex == SharedVertex::Resolve;
-        let mut encoder = gpu
+        let mut encoder = self
+            .gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor {
                 label: Some("impinge"),
             });
+        let times = self.collector.times(&self.gpu).cloned();
+        let times = times.as_ref();
+        self.encode_pass(frame, Some(work), capacities, cells, times, &mut encoder)?;
+        let (gpu, n_stages) = (&*self.gpu, self.stages().len() as u32);
+        let guess = self
+            .collector
+            .encode(gpu, &mut encoder, &self.room, n_stages);
+        gpu.queue.submit([encoder.finish()]);
+        Ok(guess)
+    }
+
+    /// Encodes all stages; without work, counters that say so.
+    pub(super) fn encode_pass(
+        &mut self,
+        frame: &Frame,
+        work: Option<&Work>,
+        mut capacities: Capacities,
+        cells: Option<CellsWanted>,
+        times: Option<&wgpu::QuerySet>,
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<(), Error> {
+        let seeds: &[NodePair] = match work {
+            Some(Work::Seeds(seeds)) => seeds,
+            _ => &[],
+        };
+        capacities.queue = capacities.queue.max(count(seeds.len()));
+        if self.room.resize(&self.gpu, &capacities, cells) {
+            self.unbind();
+        }
+        let names = self.stages();
+        let gpu = &*self.gpu;
+        self.room.encode_start(gpu, seeds, encoder)?;
+        let (world, room) = (&self.world, &self.room);
+        let resolve = frame.shared_vertex == SharedVertex::Resolve;
         let mut stages = Stages {
             names,
-            encoder: &mut encoder,
-            times: self.collector.times(gpu),
+            encoder,
+            times,
             next: 0,
         };
-        let mut counters = [Counter::default(); N_COUNTERS as usize];
         match (&mut self.plan, work) {
-            (Plan::Clusters(plan), Work::Seeds(seeds)) => {
+            (Plan::Clusters(plan), Some(Work::Seeds(seeds))) => {
                 plan.make(gpu, world, room, world.forest().rounds(seeds), resolve)?;
-                // Seeds fit a queue, which 32 bits can number.
-                counters[0].n = seeds.len() as u32;
-                room.queues[0].write(gpu, 0, seeds);
                 plan.encode(&mut stages, world, room, count(seeds.len()));
             }
-            (Plan::Cells(plan), Work::Part(part)) => {
+            (Plan::Cells(plan), Some(Work::Part(part))) => {
                 let told = Told {
                     lambda: self.options.lambda,
                     group_size: self.options.group_size,
@@ -403,13 +450,10 @@ impl Engine {
                 plan.make(gpu, world, room, told, *part)?;
                 plan.encode(&mut stages, world, room);
             }
+            (_, None) => (),
             _ => unreachable!("work is made for the plan"),
         }
-        room.counters.write(gpu, 0, &counters);
-        let n_stages = names.len() as u32;
-        let guess = self.collector.encode(gpu, &mut encoder, room, n_stages);
-        gpu.queue.submit([encoder.finish()]);
-        Ok(guess)
+        Ok(())
     }
 }
 

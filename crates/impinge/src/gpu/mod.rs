@@ -16,11 +16,13 @@ mod kernels;
 mod layout;
 mod narrow;
 mod pipeline;
+mod resident;
 mod room;
 mod steps;
 mod world;
 
 pub use device::{DeviceInfo, devices};
+pub use resident::ResidentPairs;
 pub use room::Capacities;
 
 pub(crate) use device::{Gpu, Wanted};

@@ -12,6 +12,7 @@ use super::layout::{
     ROUNDS, Reach, Start, TOO_MUCH, Tally, UnsureKey, WorkItem,
 };
 use crate::detector::Method;
+use crate::error::Error;
 
 /// Elements that each buffer has room for. The answer never depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,7 +63,7 @@ impl Capacities {
         unsure: ONE_ITEM,
     };
 
-    const NONE: Capacities = Capacities {
+    pub(crate) const NONE: Capacities = Capacities {
         queue: 0,
         items: 0,
         kept: 0,
@@ -153,6 +154,10 @@ pub(crate) struct Room {
     pub reaches: Storage<Reach>,
     pub tallies: Storage<Tally>,
     pub grid: Storage<Grid>,
+    /// What a pass starts from, copied by its encoder: counters and the first queue.
+    start_counters: Storage<Counter>,
+    start_queue: Storage<NodePair>,
+    started: Option<Vec<NodePair>>,
     sizes: Option<(Capacities, CellsWanted)>,
 }
 
@@ -192,6 +197,9 @@ impl Room {
             reaches: Storage::plain("reaches"),
             tallies: Storage::plain("tallies"),
             grid: Storage::new("grid", copied),
+            start_counters: Storage::new("first counters", wgpu::BufferUsages::COPY_SRC),
+            start_queue: Storage::new("first queue", wgpu::BufferUsages::COPY_SRC),
+            started: None,
             sizes: None,
         }
     }
@@ -227,6 +235,41 @@ impl Room {
         self.tallies.resize_exactly(gpu, u64::from(N_TALLIES));
         self.grid.resize_exactly(gpu, 1);
         true
+    }
+
+    /// Encodes what a pass starts from: counters at zero but for the seeds, which fit the queue.
+    ///
+    /// # Errors
+    /// As [`Storage::resize`].
+    pub fn encode_start(
+        &mut self,
+        gpu: &Gpu,
+        seeds: &[NodePair],
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<(), Error> {
+        if self.started.as_deref() != Some(seeds) {
+            let mut counters = [Counter::default(); N_COUNTERS as usize];
+            // Seeds fit a queue, which 32 bits can number.
+            counters[0].n = seeds.len() as u32;
+            self.start_counters.upload(gpu, &counters)?;
+            self.start_queue.upload(gpu, seeds)?;
+            self.started = Some(seeds.to_vec());
+        }
+        let mut copy = |from: &wgpu::Buffer, to: &wgpu::Buffer, bytes: u64| {
+            if bytes > 0 {
+                encoder.copy_buffer_to_buffer(from, 0, to, 0, bytes);
+            }
+        };
+        let bytes = u64::from(N_COUNTERS) * size_of::<Counter>() as u64;
+        copy(self.start_counters.buffer(), self.counters.buffer(), bytes);
+        let bytes = size_of_val(seeds) as u64;
+        copy(self.start_queue.buffer(), self.queues[0].buffer(), bytes);
+        Ok(())
+    }
+
+    /// Bytes of the room that does not grow by itself.
+    pub fn bytes_of_cells(&self) -> u64 {
+        self.sizes.map_or(0, |(_, cells)| cells.bytes())
     }
 
     pub fn capacities(&self) -> Capacities {

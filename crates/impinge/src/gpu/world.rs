@@ -123,7 +123,7 @@ impl World {
         &self.forest
     }
 
-    /// Brings the device up to the frame. Returns whether any buffer is a new one.
+    /// Brings the device up to the frame; positions of `resident` bodies are there already. Returns whether any buffer is a new one.
     ///
     /// # Errors
     /// More primitives than the device can bind at once.
@@ -132,6 +132,7 @@ impl World {
         gpu: &Gpu,
         scene: &Scene,
         frame: &Frame,
+        resident: &[BodyId],
         stats: &mut Statistics,
     ) -> Result<bool, Error> {
         if frame.n_primitives() > MOST_PRIMITIVES {
@@ -148,8 +149,8 @@ impl World {
             self.residents.clear();
             grew |= self.send_topology(gpu, scene, frame)?;
         }
-        self.send_positions(gpu, scene, frame);
-        grew |= self.send_bodies(gpu, scene, frame)?;
+        self.send_positions(gpu, scene, frame, resident);
+        grew |= self.send_bodies(gpu, scene, frame, resident)?;
         stats.n_clusters = self.forest.n_clusters();
         Ok(grew)
     }
@@ -284,14 +285,16 @@ impl World {
     }
 
     /// Sends the positions of bodies that have moved, neighbours in one piece.
-    fn send_positions(&mut self, gpu: &Gpu, scene: &Scene, frame: &Frame) {
+    fn send_positions(&mut self, gpu: &Gpu, scene: &Scene, frame: &Frame, resident: &[BodyId]) {
         let mut ix = 0;
         while ix < self.residents.len() {
             let from = ix;
             let start = self.residents[from].first_vertex;
             while ix < self.residents.len() {
                 let stamp = frame.body(scene, ix).positions_stamp();
-                if self.residents[ix].positions_stamp == stamp {
+                let is_there = self.residents[ix].positions_stamp == stamp
+                    || resident.contains(&self.residents[ix].id);
+                if is_there {
                     break;
                 }
                 self.residents[ix].positions_stamp = stamp;
@@ -333,7 +336,13 @@ impl World {
     }
 
     /// Sends what is said of each body in this frame, if it differs from what the device has.
-    fn send_bodies(&mut self, gpu: &Gpu, scene: &Scene, frame: &Frame) -> Result<bool, Error> {
+    fn send_bodies(
+        &mut self,
+        gpu: &Gpu,
+        scene: &Scene,
+        frame: &Frame,
+        resident: &[BodyId],
+    ) -> Result<bool, Error> {
         if self.forest.reorder(|ix| sample(scene, frame, ix)) {
             self.nodes
                 .write(gpu, u64::from(self.forest.first_gate), self.forest.gates());
@@ -352,7 +361,7 @@ impl World {
             };
             let rounded = match frame.body(scene, ix).positions() {
                 Positions::F32(_) => false,
-                Positions::F64(_) => true,
+                Positions::F64(_) => !resident.contains(&participant.id),
             };
             bodies.push(Body {
                 root: self.forest.roots[ix],
@@ -380,6 +389,25 @@ impl World {
             self.ignored_sent = ignored;
         }
         Ok(grew)
+    }
+
+    /// Encodes the copy of a body's positions from a buffer on the device, if it takes part.
+    pub fn copy_positions(
+        &mut self,
+        body: BodyId,
+        buffer: &wgpu::Buffer,
+        encoder: &mut wgpu::CommandEncoder,
+    ) {
+        let held = self.residents.iter_mut().find(|held| held.id == body);
+        let Some(held) = held.filter(|held| held.n_vertices > 0) else {
+            return;
+        };
+        // The scene's positions are no longer what the device has.
+        held.positions_stamp = 0;
+        self.is_moved = true;
+        let vertex = 3 * size_of::<Coordinate>() as u64;
+        let (to, size) = (held.first_vertex * vertex, held.n_vertices * vertex);
+        encoder.copy_buffer_to_buffer(buffer, 0, self.positions.buffer(), to, size);
     }
 
     /// Entries of the list of ignored pairs.
