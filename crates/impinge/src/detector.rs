@@ -43,7 +43,8 @@ impl Method {
 /// Where the work is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Backend {
-    /// A GPU where there is one, else the CPU.
+    /// A GPU where there is one in hardware, else the CPU; also when the GPU fails or the scene is
+    /// more than it can hold.
     #[default]
     Auto,
     /// All cores, or as many threads as told.
@@ -194,8 +195,10 @@ impl Detector {
     ) -> Result<&Pairs, Error> {
         #[cfg(feature = "gpu")]
         if let Some(gpu) = self.gpu_in_use() {
-            gpu.block_on(self.detect_on_gpu(scene, query, control))?;
-            return Ok(&self.pairs);
+            let result = gpu.block_on(self.detect_on_gpu(scene, query, control));
+            if self.is_answered(result)? {
+                return Ok(&self.pairs);
+            }
         }
         let start = Instant::now();
         self.frame.resolve(scene, query)?;

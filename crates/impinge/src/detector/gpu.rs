@@ -91,6 +91,19 @@ impl Detector {
         self.gpu.as_ref().map(|engine| Arc::clone(engine.gpu()))
     }
 
+    /// Whether the GPU has answered. With `Backend::Auto` a GPU that fails, or cannot hold the scene, is
+    /// given up for the CPU.
+    pub(super) fn is_answered(&mut self, result: Result<(), Error>) -> Result<bool, Error> {
+        match result {
+            Ok(()) => Ok(true),
+            Err(Error::Gpu { .. }) if self.settings.backend == Backend::Auto => {
+                self.gpu = None;
+                Ok(false)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
     /// One frame on the GPU. Awaits the device and blocks nowhere.
     pub(super) async fn detect_on_gpu(
         &mut self,
@@ -121,11 +134,12 @@ impl Detector {
     /// As `detect`.
     pub async fn detect_async(&mut self, scene: &Scene, query: &Query) -> Result<&Pairs, Error> {
         if self.gpu.is_some() {
-            self.detect_on_gpu(scene, query, &Control::new()).await?;
-            Ok(&self.pairs)
-        } else {
-            self.detect(scene, query)
+            let result = self.detect_on_gpu(scene, query, &Control::new()).await;
+            if self.is_answered(result)? {
+                return Ok(&self.pairs);
+            }
         }
+        self.detect(scene, query)
     }
 
     /// Encodes a whole frame into the caller's encoder: positions come from buffers on the device and
