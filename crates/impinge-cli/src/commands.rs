@@ -3,8 +3,12 @@
 mod answer;
 mod demo;
 mod demo_scene;
+#[cfg(feature = "gpu")]
+mod devices;
 mod sequence;
 
 pub use answer::{pairs, within};
 pub use demo::demo;
+#[cfg(feature = "gpu")]
+pub use devices::devices;
 pub use sequence::sequence;
