@@ -44,6 +44,18 @@ pub enum Command {
     /// Drop an elastic body on another one and write what happens, step by step
     #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(SimulateArgs),
+    /// List the GPUs, and drivers that imitate one, for --device
+    #[cfg(feature = "gpu")]
+    Devices(DevicesArgs),
+}
+
+/// What is said of GPUs.
+#[cfg(feature = "gpu")]
+#[derive(Debug, Clone, Args)]
+pub struct DevicesArgs {
+    /// Print JSON and nothing else
+    #[arg(long)]
+    pub json: bool,
 }
 
 const DEMO_EXAMPLES: &str = "\
@@ -104,6 +116,9 @@ pub struct DetectorArgs {
     /// Where the work is done
     #[arg(long, value_enum, default_value_t = BackendArg::Auto)]
     pub backend: BackendArg,
+    /// A part of the GPU's name, to choose among several (`impinge devices` lists them)
+    #[arg(long, value_name = "NAME")]
+    pub device: Option<String>,
     /// CPU threads [default: one a core]
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
@@ -306,10 +321,12 @@ impl From<MethodArg> for impinge::Method {
 /// [`impinge::Backend`] as an option.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum BackendArg {
-    /// The fastest that is there
+    /// A GPU if there is one, else the CPU
     Auto,
     /// The CPU
     Cpu,
+    /// A GPU, or an error where there is none
+    Gpu,
 }
 
 impl From<BackendArg> for impinge::Backend {
@@ -317,6 +334,7 @@ impl From<BackendArg> for impinge::Backend {
         match backend {
             BackendArg::Auto => impinge::Backend::Auto,
             BackendArg::Cpu => impinge::Backend::Cpu,
+            BackendArg::Gpu => impinge::Backend::Gpu,
         }
     }
 }

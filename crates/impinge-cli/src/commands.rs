@@ -3,11 +3,15 @@
 mod answer;
 mod demo;
 mod demo_scene;
+#[cfg(feature = "gpu")]
+mod devices;
 mod record;
 mod sequence;
 mod simulate;
 
 pub use answer::{pairs, within};
 pub use demo::demo;
+#[cfg(feature = "gpu")]
+pub use devices::devices;
 pub use sequence::sequence;
 pub use simulate::simulate;

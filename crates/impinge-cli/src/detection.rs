@@ -20,6 +20,7 @@ pub fn settings(args: &DetectorArgs) -> Settings {
         lambda: args.lambda,
         group_size: args.group_size,
         memory_budget: args.memory_budget,
+        device: args.device.clone(),
         ..Settings::default()
     }
 }

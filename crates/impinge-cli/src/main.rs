@@ -20,6 +20,8 @@ use clap::Parser;
 use crate::args::{Cli, Command};
 
 fn main() -> ExitCode {
+    #[cfg(all(feature = "gpu", target_os = "linux"))]
+    keep_mesa_quiet();
     let cli = Cli::parse();
     let result = watch::cancel_on_signal().and_then(|cancel| match cli.command {
         Command::Demo(args) => commands::demo(&args, &cancel),
@@ -27,6 +29,8 @@ fn main() -> ExitCode {
         Command::Within(args) => commands::within(&args, &cancel),
         Command::Sequence(args) => commands::sequence(&args, &cancel),
         Command::Simulate(args) => commands::simulate(&args, &cancel),
+        #[cfg(feature = "gpu")]
+        Command::Devices(args) => commands::devices(&args),
     });
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -38,5 +42,15 @@ fn main() -> ExitCode {
             }
             ExitCode::from(code)
         }
+    }
+}
+
+/// Where there is no session, a Vulkan layer of Mesa's says on standard error that it finds no display
+/// to choose a GPU by. We choose ourselves.
+#[cfg(all(feature = "gpu", target_os = "linux"))]
+fn keep_mesa_quiet() {
+    if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+        // SAFETY: the program has just begun, no other thread runs that could read the environment.
+        unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
     }
 }

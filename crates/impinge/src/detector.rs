@@ -1,5 +1,8 @@
 //! The frame loop: resolves a query, picks method and backend, sorts the answer.
 
+#[cfg(feature = "gpu")]
+mod gpu;
+
 use std::time::Instant;
 
 use crate::cpu::Job;
@@ -40,7 +43,8 @@ impl Method {
 /// Where the work is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Backend {
-    /// A GPU where there is one, else the CPU.
+    /// A GPU where there is one in hardware, else the CPU; also when the GPU fails or the scene is
+    /// more than it can hold.
     #[default]
     Auto,
     /// All cores, or as many threads as told.
@@ -132,6 +136,8 @@ pub struct Detector {
     workers: Workers,
     clusters: Clusters,
     cells: Cells,
+    #[cfg(feature = "gpu")]
+    gpu: Option<crate::gpu::Engine>,
 }
 
 impl Detector {
@@ -153,6 +159,8 @@ impl Detector {
     pub fn with_settings(settings: Settings) -> Result<Self, Error> {
         check(&settings)?;
         Ok(Detector {
+            #[cfg(feature = "gpu")]
+            gpu: gpu::open(&settings)?,
             workers: Workers::new(settings.threads)?,
             frame: Frame::default(),
             pairs: Pairs::default(),
@@ -185,14 +193,21 @@ impl Detector {
         query: &Query,
         control: &Control<'_>,
     ) -> Result<&Pairs, Error> {
+        #[cfg(feature = "gpu")]
+        if let Some(gpu) = self.gpu_in_use() {
+            let result = gpu.block_on(self.detect_on_gpu(scene, query, control));
+            if self.is_answered(result)? {
+                return Ok(&self.pairs);
+            }
+        }
         let start = Instant::now();
         self.frame.resolve(scene, query)?;
         self.pairs.begin(&self.frame);
         let (keys, stats) = self.pairs.parts_mut();
         let settings = &self.settings;
         stats.method = settings.method.name();
-        stats.backend.push_str("cpu");
         stats.n_threads = self.workers.n();
+        stats.backend.push_str("cpu");
         let job = Job {
             scene,
             frame: &self.frame,
@@ -243,6 +258,17 @@ fn check(settings: &Settings) -> Result<(), Error> {
     }
     if !(1..=64).contains(&settings.group_size) {
         return refuse("group size", settings.group_size.to_string(), "1 to 64");
+    }
+    if settings.backend == Backend::Gpu {
+        if !cfg!(feature = "gpu") {
+            return Err(Error::NoAdapter {
+                found: "impinge was built without its feature `gpu`".to_owned(),
+            });
+        }
+        if settings.method == Method::Naive {
+            let given = settings.method.name().to_owned();
+            return refuse("method on a GPU", given, "clusters or cells");
+        }
     }
     if settings.threads > 1024 {
         return refuse("threads", settings.threads.to_string(), "0 to 1024");

@@ -143,6 +143,26 @@ impl Frame {
                 || !self.ignored.contains(&(a.id.min(b.id), a.id.max(b.id))))
     }
 
+    /// Who a participant meets.
+    #[cfg(feature = "gpu")]
+    pub fn filter(&self, participant_ix: usize) -> Filter {
+        self.participants[participant_ix].filter
+    }
+
+    /// Pairs of participants, lower first and sorted, that do not meet whatever their filters say.
+    #[cfg(feature = "gpu")]
+    pub fn ignored_pairs(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let find = |id: BodyId| {
+            self.participants
+                .binary_search_by_key(&id, |participant| participant.id)
+                .ok()
+        };
+        self.ignored
+            .iter()
+            .filter(|(a, b)| a != b)
+            .filter_map(move |&(a, b)| Some((find(a)?, find(b)?)))
+    }
+
     /// The body behind a participant.
     #[inline]
     pub fn body<'a>(&self, scene: &'a Scene, participant_ix: usize) -> &'a Body {

@@ -15,6 +15,8 @@ mod detector;
 mod error;
 pub mod exact;
 mod frame;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod grouping;
 mod naive;
 mod narrow;
@@ -26,8 +28,16 @@ mod stats;
 
 pub use detector::{Backend, Detector, InstructionSet, Method, Recluster, Settings};
 pub use error::Error;
+#[cfg(feature = "gpu")]
+#[doc(hidden)]
+pub use gpu::Capacities;
+#[cfg(feature = "gpu")]
+pub use gpu::{DeviceInfo, ResidentPairs, devices};
 pub use pairs::{Pairs, Primitive, hash_rows};
 pub use progress::{CancelToken, Control, Progress};
 pub use query::{Query, SharedVertex};
 pub use scene::{Body, BodyId, Elements, Filter, Kind, Positions, Real, Scene};
 pub use stats::{Stage, Statistics};
+/// The GPU interface that [`Detector::with_device`] and [`Detector::encode`] speak.
+#[cfg(feature = "gpu")]
+pub use wgpu;

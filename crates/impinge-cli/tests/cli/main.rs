@@ -2,6 +2,8 @@
 
 mod answer;
 mod demo;
+#[cfg(feature = "gpu")]
+mod devices;
 mod harness;
 mod sequence;
 mod shared_data;

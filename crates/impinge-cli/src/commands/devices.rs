@@ -1,0 +1,51 @@
+//! `impinge devices`: the GPUs that there are.
+
+use std::io::Write;
+
+use serde_json::json;
+
+use crate::args::DevicesArgs;
+use crate::error::Error;
+use crate::output::{out, shown_bytes, table};
+
+/// Lists adapters, hardware first.
+pub fn devices(args: &DevicesArgs) -> Result<(), Error> {
+    let devices = impinge::devices();
+    if args.json {
+        let list: Vec<_> = devices
+            .iter()
+            .map(|device| {
+                json!({
+                    "name": device.name,
+                    "interface": device.interface,
+                    "driver": device.driver,
+                    "is_software": device.is_software,
+                    "max_binding": device.max_binding,
+                })
+            })
+            .collect();
+        writeln!(out(), "{}", serde_json::Value::from(list)).map_err(Error::Output)?;
+        return Ok(());
+    }
+    if devices.is_empty() {
+        writeln!(out(), "no GPU, and no driver that imitates one").map_err(Error::Output)?;
+        return Ok(());
+    }
+    let rows = devices.iter().map(|device| {
+        vec![
+            device.name.clone(),
+            device.interface.clone(),
+            device.driver.clone(),
+            if device.is_software {
+                "software"
+            } else {
+                "hardware"
+            }
+            .to_owned(),
+            shown_bytes(device.max_binding),
+        ]
+    });
+    let header = ["name", "interface", "driver", "made of", "largest binding"];
+    let text = table(&header, &[0, 1, 2, 3], rows);
+    writeln!(out(), "{text}").map_err(Error::Output)
+}

@@ -1,0 +1,26 @@
+//! GPUs: listed, chosen, and refused by name.
+
+use crate::harness::Folder;
+use impinge_scenes::surfaces::ball;
+
+#[test]
+fn devices_are_listed_and_one_answers_like_the_cpu() {
+    let folder = Folder::new();
+    let list = folder.run(["devices", "--json"]).printed();
+    let list: serde_json::Value = serde_json::from_str(&list).unwrap();
+    let list = list.as_array().unwrap();
+    assert!(!list.is_empty(), "a GPU or a software driver is needed");
+    let name = list[0]["name"].as_str().unwrap();
+    assert!(folder.run(["devices"]).printed().contains(name));
+    folder.ply("a.ply", &ball(400));
+    folder.ply("b.ply", &ball(400).translated([0.3, 0.1, 0.0]));
+    let hash = |backend: &str| {
+        let run = folder.run(["pairs", "a.ply", "b.ply", "--backend", backend, "--json"]);
+        let answer: serde_json::Value = serde_json::from_str(&run.printed()).unwrap();
+        (answer["hash"].clone(), answer["backend"].clone())
+    };
+    let (on_cpu, on_gpu) = (hash("cpu"), hash("gpu"));
+    assert_eq!(on_cpu.0, on_gpu.0);
+    assert_eq!(on_cpu.1, "cpu");
+    assert_eq!(on_gpu.1, name);
+}

@@ -1,0 +1,200 @@
+//! A simulation that never leaves the GPU: a compute shader deforms a mesh, the detector finds what
+//! collides, another shader uses the pairs. The host only submits; it looks once, after the last frame.
+//!
+//! `cargo run --release --example gpu_resident --features gpu`
+
+use impinge::wgpu::{self, util::DeviceExt};
+use impinge::{Detector, Query, Scene, Settings};
+use impinge_scenes::surfaces;
+
+const FRAMES: u32 = 60;
+
+/// Moves every vertex of the rest pose by a travelling wave.
+const DEFORM: &str = "
+@group(0) @binding(0) var<storage, read> rest: array<f32>;
+@group(0) @binding(1) var<storage, read_write> positions: array<f32>;
+@group(0) @binding(2) var<uniform> time: vec4<f32>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let word = 3u * id.x;
+    if word >= arrayLength(&rest) {
+        return;
+    }
+    let x = rest[word];
+    positions[word] = x;
+    positions[word + 1u] = rest[word + 1u] + 0.1 * sin(8.0 * x + time.x);
+    positions[word + 2u] = rest[word + 2u] + 0.5 - 0.01 * time.x;
+}
+";
+
+/// Marks the primitives that take part in a pair, unsure ones too: that is safe.
+const MARK: &str = "
+struct Pair { low: u32, high: u32 }
+@group(0) @binding(0) var<storage, read> pairs: array<Pair>;
+@group(0) @binding(1) var<storage, read> unsure: array<Pair>;
+@group(0) @binding(2) var<storage, read> counts: array<u32>;
+@group(0) @binding(3) var<storage, read_write> is_hit: array<u32>;
+@group(0) @binding(4) var<uniform> offsets: vec4<u32>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(global_invocation_id) id: vec3<u32>,
+    @builtin(num_workgroups) n_groups: vec3<u32>,
+) {
+    let n_pairs = min(counts[offsets.x], arrayLength(&pairs));
+    let n_unsure = min(counts[offsets.y], arrayLength(&unsure));
+    for (var ix = id.x; ix < n_pairs + n_unsure; ix += 64u * n_groups.x) {
+        var pair: Pair;
+        if ix < n_pairs {
+            pair = pairs[ix];
+        } else {
+            pair = unsure[ix - n_pairs];
+        }
+        is_hit[pair.low] = 1u;
+        is_hit[pair.high] = 1u;
+    }
+}
+";
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let instance = wgpu::Instance::default();
+    let adapter = pollster::block_on(instance.request_adapter(&Default::default()))?;
+    let (device, queue) = pollster::block_on(adapter.request_device(&Default::default()))?;
+    println!("on {}", adapter.get_info().name);
+
+    // Two balls: one deforms on the device and sinks into the other, which rests.
+    let ball = surfaces::ball(20_000);
+    let mut scene = Scene::new();
+    let moving = ball.add_to(&mut scene)?;
+    let resting = ball.add_to(&mut scene)?;
+    let query = Query::between(moving, resting);
+    let mut detector = Detector::with_device(device.clone(), queue.clone(), Settings::default())?;
+
+    let words: Vec<u8> = ball
+        .positions
+        .iter()
+        .flatten()
+        .flat_map(|x| x.to_le_bytes())
+        .collect();
+    let buffer = |label, contents: &[u8], usage| {
+        device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some(label),
+            contents,
+            usage,
+        })
+    };
+    use wgpu::BufferUsages as Usage;
+    let rest = buffer("rest", &words, Usage::STORAGE);
+    let positions = buffer("positions", &words, Usage::STORAGE | Usage::COPY_SRC);
+    let time = buffer("time", &[0; 16], Usage::UNIFORM | Usage::COPY_DST);
+    let n_primitives = 2 * ball.n_primitives();
+    let is_hit = buffer(
+        "is hit",
+        &vec![0; 4 * n_primitives],
+        Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST,
+    );
+    let deform = pipeline(&device, DEFORM);
+    let mark = pipeline(&device, MARK);
+    let deform_group = group(&device, &deform, &[&rest, &positions, &time]);
+
+    let start = std::time::Instant::now();
+    for frame in 0..FRAMES {
+        let now = frame as f32 * 0.5;
+        queue.write_buffer(&time, 0, &now.to_le_bytes());
+        let mut encoder = device.create_command_encoder(&Default::default());
+        run(
+            &mut encoder,
+            &deform,
+            &deform_group,
+            ball.n_vertices().div_ceil(64),
+        );
+        let found = detector.encode(&scene, &query, &[(moving, &positions)], &mut encoder)?;
+        let words = [found.n_pairs_offset / 4, found.n_unsure_offset / 4, 0, 0];
+        let words: Vec<u8> = words
+            .iter()
+            .flat_map(|&word| (word as u32).to_le_bytes())
+            .collect();
+        let offsets = buffer("offsets", &words, Usage::UNIFORM);
+        let buffers = [
+            &found.pairs,
+            &found.unsure,
+            &found.counts,
+            &is_hit,
+            &offsets,
+        ];
+        encoder.clear_buffer(&is_hit, 0, None);
+        run(&mut encoder, &mark, &group(&device, &mark, &buffers), 64);
+        queue.submit([encoder.finish()]);
+    }
+
+    // The one look: did everything fit, and how many primitives were hit in the last frame?
+    let is_complete = detector.make_room()?;
+    let staging = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("staging"),
+        size: is_hit.size(),
+        usage: Usage::MAP_READ | Usage::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&Default::default());
+    encoder.copy_buffer_to_buffer(&is_hit, 0, &staging, 0, is_hit.size());
+    queue.submit([encoder.finish()]);
+    staging.map_async(wgpu::MapMode::Read, .., |_| ());
+    device.poll(wgpu::PollType::wait_indefinitely())?;
+    let n_hit = staging
+        .get_mapped_range(..)?
+        .chunks_exact(4)
+        .filter(|word| word[0] == 1)
+        .count();
+    let ms = start.elapsed().as_secs_f64() * 1e3 / f64::from(FRAMES);
+    println!(
+        "{n_hit} of {n_primitives} triangles hit, complete: {is_complete}, {ms:.2} ms a frame"
+    );
+    Ok(())
+}
+
+fn pipeline(device: &wgpu::Device, shader: &str) -> wgpu::ComputePipeline {
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: None,
+        source: wgpu::ShaderSource::Wgsl(shader.into()),
+    });
+    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: None,
+        layout: None,
+        module: &module,
+        entry_point: Some("main"),
+        compilation_options: Default::default(),
+        cache: None,
+    })
+}
+
+fn group(
+    device: &wgpu::Device,
+    pipeline: &wgpu::ComputePipeline,
+    buffers: &[&wgpu::Buffer],
+) -> wgpu::BindGroup {
+    let entries: Vec<wgpu::BindGroupEntry<'_>> = (0..)
+        .zip(buffers)
+        .map(|(binding, buffer)| wgpu::BindGroupEntry {
+            binding,
+            resource: buffer.as_entire_binding(),
+        })
+        .collect();
+    device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: &entries,
+    })
+}
+
+fn run(
+    encoder: &mut wgpu::CommandEncoder,
+    pipeline: &wgpu::ComputePipeline,
+    group: &wgpu::BindGroup,
+    n_groups: usize,
+) {
+    let mut pass = encoder.begin_compute_pass(&Default::default());
+    pass.set_pipeline(pipeline);
+    pass.set_bind_group(0, group, &[]);
+    pass.dispatch_workgroups(n_groups as u32, 1, 1);
+}

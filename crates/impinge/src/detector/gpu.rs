@@ -1,0 +1,200 @@
+//! What a detector does on a GPU: its own device, or the caller's.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::{Backend, Detector, Method, Settings, check};
+use crate::cpu::cells::Cells;
+use crate::cpu::clusters::Clusters;
+use crate::cpu::workers::Workers;
+use crate::error::Error;
+use crate::frame::Frame;
+use crate::gpu::{Capacities, Engine, Gpu, Options, ResidentPairs, Wanted};
+use crate::pairs::Pairs;
+use crate::progress::Control;
+use crate::query::Query;
+use crate::scene::{BodyId, Scene};
+
+/// The GPU that the settings ask for, if they ask for one.
+pub(super) fn open(settings: &Settings) -> Result<Option<Engine>, Error> {
+    let named = settings.device.as_deref().map(Wanted::Named);
+    let gpu = match settings.backend {
+        Backend::Cpu => return Ok(None),
+        Backend::Auto if settings.method == Method::Naive => return Ok(None),
+        // A driver that runs on the CPU is slower than the CPU backend.
+        Backend::Auto => match Gpu::open(named.unwrap_or(Wanted::Hardware)) {
+            Ok(gpu) => gpu,
+            Err(_) => return Ok(None),
+        },
+        Backend::Gpu => Gpu::open(named.unwrap_or(Wanted::Any))?,
+    };
+    Ok(Some(engine(gpu, settings, Capacities::default())))
+}
+
+fn engine(gpu: Arc<Gpu>, settings: &Settings, first: Capacities) -> Engine {
+    let options = Options {
+        method: settings.method,
+        lambda: settings.lambda,
+        group_size: settings.group_size,
+        memory_budget: settings.memory_budget,
+    };
+    Engine::new(gpu, options, first)
+}
+
+impl Detector {
+    /// [`with_settings`](Detector::with_settings), and how much room GPU buffers begin with. For
+    /// tests: buffers grow by themselves.
+    ///
+    /// # Errors
+    /// As `with_settings`.
+    #[doc(hidden)]
+    pub fn with_capacities(settings: Settings, capacities: Capacities) -> Result<Self, Error> {
+        let mut detector = Detector::with_settings(settings)?;
+        if let Some(gpu) = detector.gpu_in_use() {
+            detector.gpu = Some(engine(gpu, &detector.settings, capacities));
+        }
+        Ok(detector)
+    }
+
+    /// A detector on a device of the caller's, which must allow 8 storage buffers a stage and
+    /// workgroups of 256 (WebGPU's defaults do). `settings.backend` and `settings.device` are passed over.
+    ///
+    /// Such a detector answers [`detect`](Detector::detect) as any other, and besides
+    /// [`encode`](Detector::encode), where positions and pairs stay on the device.
+    ///
+    /// # Errors
+    /// A setting out of its range; a device that allows too little; a kernel that does not compile.
+    pub fn with_device(
+        device: wgpu::Device,
+        queue: wgpu::Queue,
+        settings: Settings,
+    ) -> Result<Self, Error> {
+        let settings = Settings {
+            backend: Backend::Gpu,
+            device: None,
+            ..settings
+        };
+        check(&settings)?;
+        let gpu = Arc::new(Gpu::of_caller(device, queue)?);
+        Ok(Detector {
+            gpu: Some(engine(gpu, &settings, Capacities::default())),
+            workers: Workers::new(settings.threads)?,
+            frame: Frame::default(),
+            pairs: Pairs::default(),
+            clusters: Clusters::new(settings.instruction_set),
+            cells: Cells::new(settings.instruction_set),
+            settings,
+        })
+    }
+
+    pub(super) fn gpu_in_use(&self) -> Option<Arc<Gpu>> {
+        self.gpu.as_ref().map(|engine| Arc::clone(engine.gpu()))
+    }
+
+    /// Whether the GPU has answered. With `Backend::Auto` a GPU that fails, or cannot hold the scene, is
+    /// given up for the CPU.
+    pub(super) fn is_answered(&mut self, result: Result<(), Error>) -> Result<bool, Error> {
+        match result {
+            Ok(()) => Ok(true),
+            Err(Error::Gpu { .. }) if self.settings.backend == Backend::Auto => {
+                self.gpu = None;
+                Ok(false)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// One frame on the GPU. Awaits the device and blocks nowhere.
+    pub(super) async fn detect_on_gpu(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        control: &Control<'_>,
+    ) -> Result<(), Error> {
+        let start = Instant::now();
+        self.frame.resolve(scene, query)?;
+        self.frame.check(scene)?;
+        self.pairs.begin(&self.frame);
+        let (keys, stats) = self.pairs.parts_mut();
+        stats.method = self.settings.method.name();
+        stats.n_threads = self.workers.n();
+        if let Some(engine) = &mut self.gpu {
+            stats.backend.push_str(engine.gpu().name());
+            engine.run(scene, &self.frame, control, keys, stats).await?;
+        }
+        stats.time("collect", |_| keys.sort_unstable());
+        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
+        Ok(())
+    }
+
+    /// [`detect`](Detector::detect) without blocking: on a GPU the future waits for the device, which
+    /// somebody must poll (a browser does; natively `wgpu::Device::poll`). On the CPU it is ready at once.
+    ///
+    /// # Errors
+    /// As `detect`.
+    pub async fn detect_async(&mut self, scene: &Scene, query: &Query) -> Result<&Pairs, Error> {
+        if self.gpu.is_some() {
+            let result = self.detect_on_gpu(scene, query, &Control::new()).await;
+            if self.is_answered(result)? {
+                return Ok(&self.pairs);
+            }
+        }
+        self.detect(scene, query)
+    }
+
+    /// Encodes a whole frame into the caller's encoder: positions come from buffers on the device and
+    /// pairs stay there. Nothing is read back.
+    ///
+    /// `positions` names bodies whose positions are taken from a buffer: `(v, 3)` f32 tightly packed,
+    /// with the usage `COPY_SRC`, copied when the encoder's commands run; other bodies' positions
+    /// come from the scene. The scene's own positions of named bodies are a pose that clusters are
+    /// found in, once. Positions on the device are not checked: with one that is not finite the pairs of
+    /// its primitives are unspecified.
+    ///
+    /// At most one frame of a detector may be encoded a submission. What the filter on the device
+    /// leaves open comes in a list of its own. If there is not enough room the lists are incomplete and
+    /// their counts say so, see [`ResidentPairs`]; [`make_room`](Detector::make_room) then grows them.
+    ///
+    /// # Errors
+    /// A stale id, a buffer too small or without its usage, a detector without a GPU. The device's own
+    /// errors go where its owner sends them.
+    pub fn encode(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        positions: &[(BodyId, &wgpu::Buffer)],
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<ResidentPairs, Error> {
+        self.frame.resolve(scene, query)?;
+        self.frame.check(scene)?;
+        let Some(engine) = &mut self.gpu else {
+            return Err(Error::NoAdapter {
+                found: "this detector works on the CPU".to_owned(),
+            });
+        };
+        engine.encode(scene, &self.frame, positions, encoder)
+    }
+
+    /// Reads the counts of the frame that was last encoded, and whose commands have been submitted, and
+    /// grows what was too small. Returns whether that frame was complete; if not, encode it again.
+    ///
+    /// # Errors
+    /// A lost device; lists larger than it can bind; a memory budget that does not allow them.
+    pub fn make_room(&mut self) -> Result<bool, Error> {
+        match self.gpu_in_use() {
+            Some(gpu) => gpu.block_on(self.make_room_async()),
+            None => Ok(true),
+        }
+    }
+
+    /// [`make_room`](Detector::make_room) without blocking.
+    ///
+    /// # Errors
+    /// As `make_room`.
+    pub async fn make_room_async(&mut self) -> Result<bool, Error> {
+        match &mut self.gpu {
+            Some(engine) => engine.make_room().await,
+            None => Ok(true),
+        }
+    }
+}

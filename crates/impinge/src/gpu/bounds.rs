@@ -1,0 +1,106 @@
+//! Stage `bounds`: the boxes of clusters and of the forest above them, for both methods.
+
+use super::device::Gpu;
+use super::kernels::{BoundsClusters, BoundsLevel, BoundsTop};
+use super::layout::Params;
+use super::pipeline::{Bound, Groups};
+use super::steps::Steps;
+use super::world::World;
+
+/// Levels up to this wide are refitted by one workgroup, in one launch with those above them.
+const NARROW_LEVEL: u32 = 2048;
+
+/// The kernels with their buffers.
+#[derive(Debug)]
+pub(crate) struct Bounds {
+    clusters: Bound,
+    level: Bound,
+    top: Bound,
+}
+
+/// Which launches are needed.
+#[derive(Debug, Default)]
+pub(crate) struct BoundsSteps {
+    /// Step and width of each wide level.
+    wide: Vec<(u32, u32)>,
+    top: Option<u32>,
+}
+
+impl BoundsSteps {
+    pub fn plan(&mut self, world: &World, steps: &mut Steps) {
+        self.wide.clear();
+        let levels = &world.forest().levels;
+        let narrow_from = levels
+            .iter()
+            .rposition(|level| level.count > NARROW_LEVEL)
+            .map_or(1, |last| last + 1)
+            .max(1);
+        for level in levels.iter().take(narrow_from).skip(1) {
+            let step = steps.push(Params {
+                first: level.first,
+                count: level.count,
+                ..Params::default()
+            });
+            self.wide.push((step, level.count));
+        }
+        self.top = (narrow_from < levels.len()).then(|| {
+            steps.push(Params {
+                first: narrow_from as u32,
+                count: (levels.len() - narrow_from) as u32,
+                ..Params::default()
+            })
+        });
+    }
+}
+
+impl Bounds {
+    pub fn new(gpu: &Gpu, world: &World, steps: &Steps) -> Self {
+        let kernels = &gpu.kernels;
+        let (bodies, nodes) = (|| world.bodies.read(), || world.nodes.write_to());
+        Bounds {
+            clusters: kernels.bounds_clusters.bind(
+                gpu,
+                &BoundsClusters {
+                    clusters: world.clusters.read(),
+                    cluster_vertices: world.cluster_vertices.read(),
+                    positions: world.positions.read(),
+                    bodies: bodies(),
+                    nodes: nodes(),
+                },
+            ),
+            level: kernels.bounds_level.bind(
+                gpu,
+                &BoundsLevel {
+                    bodies: bodies(),
+                    nodes: nodes(),
+                    params: steps.params(),
+                },
+            ),
+            top: kernels.bounds_top.bind(
+                gpu,
+                &BoundsTop {
+                    bodies: bodies(),
+                    levels: world.levels.read(),
+                    nodes: nodes(),
+                    params: steps.params(),
+                },
+            ),
+        }
+    }
+
+    /// Refits everything, if anything has moved.
+    pub fn run(&self, pass: &mut wgpu::ComputePass<'_>, world: &World, steps: &BoundsSteps) {
+        if !world.is_moved {
+            return;
+        }
+        let n_clusters = Groups::Known(world.forest().n_clusters());
+        self.clusters.run(pass, 0, n_clusters);
+        for &(step, count) in &steps.wide {
+            let groups = Groups::Known(u64::from(count).div_ceil(64));
+            self.level.run(pass, step, groups);
+        }
+        if let Some(step) = steps.top {
+            self.top.run(pass, step, Groups::Known(1));
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! Stage `collect`: counters and results come back in one copy.
+//!
+//! ```text
+//! counters | grid | times of the stages | pairs, as many as last time and some | unsure pairs, likewise
+//! ```
+//!
+//! When there are more than were copied, the rest follows in a second copy; no kernel runs again.
+
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::task::{Context, Poll, Waker};
+
+use super::device::Gpu;
+use super::layout::{Counter, Grid, N_COUNTERS, PairKey, UnsureKey};
+use super::room::{Counts, Room};
+use crate::error::Error;
+
+const COUNTERS: u64 = N_COUNTERS as u64 * size_of::<Counter>() as u64;
+const GRID: u64 = size_of::<Grid>() as u64;
+/// Stages that a method has at most.
+const MOST_STAGES: usize = 5;
+const TIMES: u64 = 2 * MOST_STAGES as u64 * size_of::<u64>() as u64;
+const HEADER: u64 = COUNTERS + GRID + TIMES;
+const KEY: u64 = size_of::<PairKey>() as u64;
+/// Keys copied at least.
+const LEAST: u64 = 1024;
+
+/// The memory that results are read from.
+#[derive(Debug, Default)]
+pub(crate) struct Collector {
+    staging: Option<wgpu::Buffer>,
+    times: Option<Times>,
+    /// What the last pass had.
+    n_pairs: u64,
+    n_unsure: u64,
+}
+
+#[derive(Debug)]
+struct Times {
+    queries: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+}
+
+/// How many keys are copied along.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Guess {
+    pairs: u64,
+    unsure: u64,
+}
+
+/// What came back.
+#[derive(Debug)]
+pub(crate) struct Collected {
+    pub counts: Counts,
+    /// The grid of `Cells`.
+    pub grid: Grid,
+    /// Milliseconds a stage, where the device has a clock.
+    pub stage_ms: Option<Vec<f64>>,
+    pub pairs: Vec<PairKey>,
+    pub unsure: Vec<UnsureKey>,
+}
+
+impl Collector {
+    /// Where the stages' times are written, if the device has a clock.
+    pub fn times(&mut self, gpu: &Gpu) -> Option<&wgpu::QuerySet> {
+        if gpu.has_timestamps && self.times.is_none() {
+            self.times = Some(Times {
+                queries: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+                    label: Some("times"),
+                    ty: wgpu::QueryType::Timestamp,
+                    count: 2 * MOST_STAGES as u32,
+                }),
+                resolved: gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                    label: Some("times"),
+                    size: TIMES,
+                    usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+                    mapped_at_creation: false,
+                }),
+            });
+        }
+        self.times.as_ref().map(|times| &times.queries)
+    }
+
+    fn reserve(&mut self, gpu: &Gpu, bytes: u64) -> wgpu::Buffer {
+        match &self.staging {
+            Some(staging) if staging.size() >= bytes => staging.clone(),
+            _ => {
+                self.staging = None;
+                let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                    label: Some("read-back"),
+                    size: bytes,
+                    usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                    mapped_at_creation: false,
+                });
+                self.staging.insert(staging).clone()
+            }
+        }
+    }
+
+    /// Encodes the copy of everything that is wanted.
+    pub fn encode(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        room: &Room,
+        n_stages: u32,
+    ) -> Guess {
+        let capacities = room.capacities();
+        let guess = |last: u64, capacity: u64| (last + last / 4).max(LEAST).min(capacity);
+        let guess = Guess {
+            pairs: guess(self.n_pairs, capacities.pairs),
+            unsure: guess(self.n_unsure, capacities.unsure),
+        };
+        let bytes = HEADER + KEY * (guess.pairs + guess.unsure);
+        let staging = self.reserve(gpu, bytes);
+        let mut copy = |from: &wgpu::Buffer, to: u64, size: u64| {
+            encoder.copy_buffer_to_buffer(from, 0, &staging, to, size);
+        };
+        copy(room.counters.buffer(), 0, COUNTERS);
+        copy(room.grid.buffer(), COUNTERS, GRID);
+        let pairs = HEADER;
+        copy(room.pairs.buffer(), pairs, KEY * guess.pairs);
+        let unsure = pairs + KEY * guess.pairs;
+        copy(room.unsure.buffer(), unsure, KEY * guess.unsure);
+        if let Some(times) = &self.times {
+            encoder.resolve_query_set(&times.queries, 0..2 * n_stages, &times.resolved, 0);
+            let to = COUNTERS + GRID;
+            encoder.copy_buffer_to_buffer(&times.resolved, 0, &staging, to, TIMES);
+        }
+        guess
+    }
+
+    /// Waits for the copy and takes what it brought.
+    ///
+    /// # Errors
+    /// The device's own.
+    pub async fn take(
+        &mut self,
+        gpu: &Gpu,
+        room: &Room,
+        n_stages: usize,
+        guess: Guess,
+    ) -> Result<Collected, Error> {
+        let staging = self.staging.clone().expect("encoded before");
+        let bytes = HEADER + KEY * (guess.pairs + guess.unsure);
+        let (counts, grid, ticks, n_pairs, n_unsure, mut pairs, mut unsure) = {
+            let view = map(&staging, bytes).await?;
+            let at = |from: u64, size: u64| &view[from as usize..(from + size) as usize];
+            let counters: Vec<Counter> = bytemuck::pod_collect_to_vec(at(0, COUNTERS));
+            let grid: Grid = bytemuck::pod_read_unaligned(at(COUNTERS, GRID));
+            let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(at(COUNTERS + GRID, TIMES));
+            let counts = Counts::new(&counters);
+            let capacities = room.capacities();
+            let n_pairs = counts.needed.pairs.min(capacities.pairs);
+            let n_unsure = counts.needed.unsure.min(capacities.unsure);
+            let first = HEADER;
+            let pairs: Vec<PairKey> =
+                bytemuck::pod_collect_to_vec(at(first, KEY * n_pairs.min(guess.pairs)));
+            let first = first + KEY * guess.pairs;
+            let unsure: Vec<UnsureKey> =
+                bytemuck::pod_collect_to_vec(at(first, KEY * n_unsure.min(guess.unsure)));
+            (counts, grid, ticks, n_pairs, n_unsure, pairs, unsure)
+        };
+        staging.unmap();
+        (self.n_pairs, self.n_unsure) = (n_pairs, n_unsure);
+        let more_pairs = n_pairs.saturating_sub(guess.pairs);
+        let more_unsure = n_unsure.saturating_sub(guess.unsure);
+        if more_pairs + more_unsure > 0 {
+            let bytes = KEY * (more_pairs + more_unsure);
+            let staging = self.reserve(gpu, bytes);
+            let mut encoder = gpu
+                .device
+                .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let mut copy = |from: &wgpu::Buffer, first: u64, to: u64, n: u64| {
+                let (first, to, size) = (KEY * first, KEY * to, KEY * n);
+                encoder.copy_buffer_to_buffer(from, first, &staging, to, size);
+            };
+            copy(room.pairs.buffer(), guess.pairs, 0, more_pairs);
+            copy(room.unsure.buffer(), guess.unsure, more_pairs, more_unsure);
+            gpu.queue.submit([encoder.finish()]);
+            {
+                let view = map(&staging, bytes).await?;
+                let (of_pairs, of_unsure) =
+                    view[..bytes as usize].split_at((KEY * more_pairs) as usize);
+                pairs.extend(bytemuck::pod_collect_to_vec::<u8, PairKey>(of_pairs));
+                unsure.extend(bytemuck::pod_collect_to_vec::<u8, UnsureKey>(of_unsure));
+            }
+            staging.unmap();
+        }
+        let stage_ms = self.times.is_some().then(|| {
+            let ms = f64::from(gpu.queue.get_timestamp_period()) * 1e-6;
+            let span = |stage: usize| ticks[2 * stage + 1].saturating_sub(ticks[2 * stage]);
+            (0..n_stages).map(|stage| span(stage) as f64 * ms).collect()
+        });
+        Ok(Collected {
+            counts,
+            grid,
+            stage_ms,
+            pairs,
+            unsure,
+        })
+    }
+}
+
+/// Maps the front of a buffer for reading.
+pub(crate) async fn map(buffer: &wgpu::Buffer, bytes: u64) -> Result<wgpu::BufferView, Error> {
+    let mapping = Mapping::default();
+    let shared = Arc::clone(&mapping.0);
+    buffer.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
+        let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
+        shared.result = Some(result);
+        if let Some(waker) = shared.waker.take() {
+            waker.wake();
+        }
+    });
+    let failed = |what: String| Error::Gpu { what };
+    mapping.await.map_err(|error| failed(error.to_string()))?;
+    buffer
+        .get_mapped_range(0..bytes)
+        .map_err(|error| failed(error.to_string()))
+}
+
+#[derive(Debug, Default)]
+struct MappingState {
+    result: Option<Result<(), wgpu::BufferAsyncError>>,
+    waker: Option<Waker>,
+}
+
+/// Ready when the device has called back.
+#[derive(Debug, Default)]
+struct Mapping(Arc<Mutex<MappingState>>);
+
+impl Future for Mapping {
+    type Output = Result<(), wgpu::BufferAsyncError>;
+
+    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
+        let mut state = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match state.result.take() {
+            Some(result) => Poll::Ready(result),
+            None => {
+                state.waker = Some(context.waker().clone());
+                Poll::Pending
+            }
+        }
+    }
+}

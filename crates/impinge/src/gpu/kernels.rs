@@ -1,0 +1,253 @@
+//! All kernels: their sources, their bindings, and the compiled set.
+
+use super::layout::{
+    Arguments, Body, Candidate, Cell, CellItem, Cluster, ClusterVertex, Coordinate, Corners,
+    Counter, Grid, Kept, Level, ListEntry, Node, NodePair, Order, PairKey, Params, Reach, Start,
+    Tally, UnsureKey, WorkItem,
+};
+use super::pipeline::{Kernel, Source, bindings, source};
+
+bindings! {
+    /// `bounds_clusters.wgsl`
+    BoundsClusters {
+        clusters: Read<Cluster>,
+        cluster_vertices: Read<ClusterVertex>,
+        positions: Read<Coordinate>,
+        bodies: Read<Body>,
+        nodes: Write<Node>,
+    }
+}
+
+bindings! {
+    /// `bounds_level.wgsl`
+    BoundsLevel {
+        bodies: Read<Body>,
+        nodes: Write<Node>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
+    /// `bounds_top.wgsl`
+    BoundsTop {
+        bodies: Read<Body>,
+        levels: Read<Level>,
+        nodes: Write<Node>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
+    /// `prepare.wgsl`
+    Prepare {
+        counters: Write<Counter>,
+        arguments: Write<Arguments>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
+    /// `dispatch.wgsl`
+    Dispatch {
+        nodes: Read<Node>,
+        bodies: Read<Body>,
+        ignored: Read<NodePair>,
+        queue: Read<NodePair>,
+        next_queue: Write<NodePair>,
+        items: Write<WorkItem>,
+        counters: Write<Counter>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
+    /// `pairing.wgsl`
+    Pairing {
+        nodes: Read<Node>,
+        clusters: Read<Cluster>,
+        bodies: Read<Body>,
+        corners: Read<Corners>,
+        positions: Read<Coordinate>,
+        items: Read<WorkItem>,
+        candidates: Write<Candidate>,
+        counters: Write<Counter>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
+    /// `narrow.wgsl`
+    Narrow {
+        candidates: Read<Candidate>,
+        corners: Read<Corners>,
+        positions: Read<Coordinate>,
+        order: Read<Order>,
+        pairs: Write<PairKey>,
+        unsure: Write<UnsureKey>,
+        counters: Write<Counter>,
+    }
+}
+
+bindings! {
+    /// `bounds_reach.wgsl`
+    BoundsReach {
+        nodes: Read<Node>,
+        bodies: Read<Body>,
+        ignored: Read<NodePair>,
+        reaches: Write<Reach>,
+        tallies: Write<Tally>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
+    /// `bounds_keep.wgsl`
+    BoundsKeep {
+        nodes: Read<Node>,
+        clusters: Read<Cluster>,
+        bodies: Read<Body>,
+        corners: Read<Corners>,
+        positions: Read<Coordinate>,
+        reaches: Read<Reach>,
+        kept: Write<Kept>,
+        counters: Write<Counter>,
+    }
+}
+
+bindings! {
+    /// `grid_resolution.wgsl`
+    GridResolution {
+        counters: Write<Counter>,
+        tallies: Write<Tally>,
+        grid: Write<Grid>,
+        arguments: Write<Arguments>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
+    /// `grid_ranges.wgsl`
+    GridRanges {
+        grid: Read<Grid>,
+        kept: Write<Kept>,
+        counters: Write<Counter>,
+        tallies: Write<Tally>,
+    }
+}
+
+bindings! {
+    /// `grid_shift.wgsl`
+    GridShift {
+        counters: Write<Counter>,
+        tallies: Write<Tally>,
+        grid: Write<Grid>,
+        arguments: Write<Arguments>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
+    /// `grid_count.wgsl`
+    GridCount {
+        grid: Read<Grid>,
+        kept: Write<Kept>,
+        counters: Write<Counter>,
+        cells: Write<Cell>,
+    }
+}
+
+bindings! {
+    /// `dispatch_cells.wgsl`
+    DispatchCells {
+        grid: Read<Grid>,
+        bodies: Read<Body>,
+        cells: Write<Cell>,
+        starts: Write<Start>,
+        items: Write<CellItem>,
+        counters: Write<Counter>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
+    /// `dispatch_scatter.wgsl`
+    DispatchScatter {
+        grid: Read<Grid>,
+        kept: Read<Kept>,
+        starts: Read<Start>,
+        cells: Write<Cell>,
+        entries: Write<ListEntry>,
+        counters: Write<Counter>,
+    }
+}
+
+bindings! {
+    /// `pairing_cells.wgsl`
+    PairingCells {
+        bodies: Read<Body>,
+        ignored: Read<NodePair>,
+        corners: Read<Corners>,
+        kept: Read<Kept>,
+        entries: Read<ListEntry>,
+        items: Read<CellItem>,
+        candidates: Write<Candidate>,
+        counters: Write<Counter>,
+        params: Uniform<Params>,
+    }
+}
+
+/// Declares the compiled set: for each kernel its source, constants and bindings.
+macro_rules! kernels {
+    ($($name:ident: $bindings:ident = $source:ident [$($constant:expr),*]
+        from $file:literal ($($shared:literal),*);)*) => {
+        /// Every kernel, compiled.
+        pub(crate) struct Kernels {
+            $(pub $name: Kernel<$bindings>,)*
+        }
+
+        $(pub(crate) const $source: Source = source!($file, [$($shared),*]);)*
+
+        impl Kernels {
+            /// Compiles all of them; errors go to the error scopes that are open.
+            pub fn new(device: &wgpu::Device) -> Self {
+                Kernels {
+                    $($name: Kernel::new(device, &$source, &[$($constant),*]),)*
+                }
+            }
+        }
+
+        /// Every kernel's source and what it binds.
+        #[cfg(test)]
+        pub(crate) const ALL: &[(Source, &[super::pipeline::Entry])] = &[
+            $(($source, <$bindings as super::pipeline::Bindings>::ENTRIES),)*
+        ];
+    };
+}
+
+kernels! {
+    bounds_clusters: BoundsClusters = BOUNDS_CLUSTERS []
+        from "bounds_clusters" ("boxes", "vertices", "groups");
+    bounds_level: BoundsLevel = BOUNDS_LEVEL [] from "bounds_level" ("refit", "groups");
+    bounds_top: BoundsTop = BOUNDS_TOP [] from "bounds_top" ("refit");
+    prepare: Prepare = PREPARE [] from "prepare" ("arguments");
+    dispatch: Dispatch = DISPATCH [] from "dispatch" ("boxes", "meets", "reserve", "groups");
+    pairing: Pairing = PAIRING []
+        from "pairing" ("boxes", "vertices", "ids", "reserve", "groups");
+    narrow: Narrow = NARROW [("WITH_SOLIDS", 0.0)]
+        from "narrow" ("filter", "triangles", "solids", "reserve", "groups");
+    narrow_solids: Narrow = NARROW_SOLIDS [("WITH_SOLIDS", 1.0)]
+        from "narrow" ("filter", "triangles", "solids", "reserve", "groups");
+    bounds_reach: BoundsReach = BOUNDS_REACH [] from "bounds_reach" ("boxes", "meets", "groups");
+    bounds_keep: BoundsKeep = BOUNDS_KEEP []
+        from "bounds_keep" ("boxes", "vertices", "reserve", "groups");
+    grid_resolution: GridResolution = GRID_RESOLUTION []
+        from "grid_resolution" ("region", "arguments");
+    grid_ranges: GridRanges = GRID_RANGES [] from "grid_ranges" ("region", "groups");
+    grid_shift: GridShift = GRID_SHIFT [] from "grid_shift" ("arguments");
+    grid_count: GridCount = GRID_COUNT [] from "grid_count" ("coarse", "groups");
+    dispatch_cells: DispatchCells = DISPATCH_CELLS [] from "dispatch_cells" ("reserve", "groups");
+    dispatch_scatter: DispatchScatter = DISPATCH_SCATTER []
+        from "dispatch_scatter" ("coarse", "groups");
+    pairing_cells: PairingCells = PAIRING_CELLS []
+        from "pairing_cells" ("boxes", "meets", "ids", "reserve", "groups");
+}

@@ -1,0 +1,58 @@
+// Stage `bounds` of `Cells`: the primitives that reach another body, with their boxes.
+//
+// In: clusters, corners, positions, reaches. Out: kept primitives, in any order; what does not fit is
+// counted. One workgroup a cluster, a lane a primitive. Cost: every primitive once, unless its cluster
+// is out of reach.
+
+@group(0) @binding(0) var<storage, read> nodes: array<Node>;
+@group(0) @binding(1) var<storage, read> clusters: array<Cluster>;
+@group(0) @binding(2) var<storage, read> bodies: array<Body>;
+@group(0) @binding(3) var<storage, read> corners: array<vec4<u32>>;
+@group(0) @binding(4) var<storage, read> positions: array<u32>;
+@group(0) @binding(5) var<storage, read> reaches: array<Reach>;
+@group(0) @binding(6) var<storage, read_write> kept: array<Kept>;
+@group(0) @binding(7) var<storage, read_write> counters: array<atomic<u32>>;
+
+var<workgroup> n_found: atomic<u32>;
+var<workgroup> first_found: u32;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) n_groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let cluster_ix = group_number(group, n_groups);
+    if cluster_ix >= arrayLength(&clusters) {
+        return;
+    }
+    let cluster = clusters[cluster_ix];
+    let reach = Box(reaches[cluster.body].low, reaches[cluster.body].high);
+    if lane == 0u {
+        atomicStore(&n_found, 0u);
+    }
+    workgroupBarrier();
+    let is_near = overlap(box_of(nodes[cluster_ix]), reach);
+    var own = empty_box();
+    var place = 0u;
+    var is_kept = false;
+    let slack = bodies[cluster.body].slack;
+    if is_near && lane < (cluster.sizes & 0xffffu) {
+        own = primitive_box(corners[cluster.first_place + lane], slack);
+        is_kept = overlap(own, reach);
+        if is_kept {
+            place = atomicAdd(&n_found, 1u);
+        }
+    }
+    workgroupBarrier();
+    if lane == 0u {
+        first_found = reserve(N_KEPT, atomicLoad(&n_found));
+    }
+    workgroupBarrier();
+    place += first_found;
+    if is_kept && place < arrayLength(&kept) {
+        let rounded = select(0u, FLAG, slack != 0u);
+        kept[place] = Kept(own.low, (cluster.first_place + lane) | rounded, own.high, cluster.body,
+            vec3<u32>(0u), 0u);
+    }
+}

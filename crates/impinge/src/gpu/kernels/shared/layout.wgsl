@@ -1,0 +1,165 @@
+// What crosses the line between host and device. The Rust twins are in `gpu/layout.rs`; a test
+// parses this file and compares sizes, offsets and constants.
+
+// A node of the forest: a box in ordered keys (see boxes.wgsl) and where its children are.
+//
+//   shape  31           13   12   11       4 3        0
+//         +---------------+------+----------+----------+
+//         |       0       | gate |  height  | children |
+//         +---------------+------+----------+----------+
+//
+// Height 0: a cluster, `first_child` is its number. Gate: the door to a body, `first_child` is the
+// body's number and the only child is the body's root. Else: children are neighbours.
+struct Node {
+    low: vec3<u32>,
+    first_child: u32,
+    high: vec3<u32>,
+    shape: u32,
+}
+
+const CHILDREN: u32 = 15u;
+const GATE: u32 = 0x1000u;
+
+// The nodes of one height.
+struct Level { first: u32, count: u32 }
+
+// One participant. `slack`: how many keys its boxes are widened, for rounded positions.
+struct Body {
+    root: u32,
+    slack: u32,
+    within: u32,
+    unused: u32,
+    category: vec2<u32>,
+    mask: vec2<u32>,
+}
+
+// A run of at most 64 primitives and the run of its unique vertices.
+//
+//   sizes  31         16 15          0
+//         +-------------+-------------+
+//         |  vertices   | primitives  |
+//         +-------------+-------------+
+struct Cluster {
+    first_place: u32,
+    first_vertex: u32,
+    sizes: u32,
+    body: u32,
+}
+
+struct NodePair { a: u32, b: u32 }
+struct WorkItem { a: u32, b: u32 }
+
+// Two places. Bit 31 of `a`: positions were rounded. Bit 31 of `b`: the two share a vertex.
+struct Candidate { a: u32, b: u32 }
+
+// Two global primitive numbers, the lower one first.
+struct PairKey { low: u32, high: u32 }
+struct UnsureKey { low: u32, high: u32 }
+
+// What one dispatch is told.
+struct Params {
+    // bounds: the nodes or levels to refit. dispatch: the round.
+    first: u32,
+    count: u32,
+    // prepare: the counter to read, elements a workgroup, the most there are, where arguments go.
+    counter: u32,
+    per_group: u32,
+    capacity: u32,
+    slot: u32,
+    // Pairs of bodies that do not meet whatever their filters say.
+    n_ignored: u32,
+    // 1 when pairs that share a vertex are resolved, 0 when they are left out.
+    resolve: u32,
+    // Cells: primitives a group, cells a primitive (bits of an f32), most cells there is room for.
+    group_size: u32,
+    lambda: u32,
+    most_cells: u32,
+    unused: u32,
+    // Cells: the part of the work that this pass does: cells, and of a single one rows and columns of
+    // the product of its groups.
+    first_row: u32,
+    n_rows: u32,
+    first_column: u32,
+    n_columns: u32,
+}
+
+// A primitive that reaches another body: its box, its place (bit 31: rounded), its body, and the
+// fine cells that it touches:
+//
+//   range.x  31       16 15        0
+//           +-----------+-----------+
+//           |  last x   |  first x  |      and so on for y and z
+//           +-----------+-----------+
+struct Kept {
+    low: vec3<u32>,
+    place: u32,
+    high: vec3<u32>,
+    body: u32,
+    range: vec3<u32>,
+    unused: u32,
+}
+
+// Where others may meet a body.
+struct Reach {
+    low: vec3<u32>,
+    high: vec3<u32>,
+}
+
+// The grid. Fine cells are four a coarse cell and axis; `shift` halvings make all of them coarser.
+struct Grid {
+    origin: vec3<f32>,
+    shift: u32,
+    scale: vec3<f32>,
+    n_cells: u32,
+    // Coarse cells along each axis before and after the shift.
+    finest: vec3<u32>,
+    unused: u32,
+    resolution: vec3<u32>,
+    unused_too: u32,
+}
+
+// A coarse cell: entries, the highest body with one, and the highest complement (of the lowest).
+struct Cell {
+    n_entries: atomic<u32>,
+    highest: atomic<u32>,
+    lowest: atomic<u32>,
+}
+
+// Two groups of one cell, as runs of the entries.
+//
+//   cell   31     28 27      14 13       0        sizes  31   28 27      14 13       7 6        0
+//         +---------+----------+----------+             +-------+----------+----------+----------+
+//         |    0    |    y     |    x     |             |   0   |    z     |  n_b - 1 |  n_a - 1 |
+//         +---------+----------+----------+             +-------+----------+----------+----------+
+struct CellItem {
+    cell: u32,
+    sizes: u32,
+    first_a: u32,
+    first_b: u32,
+}
+
+// Workgroups of an indirect dispatch.
+struct Arguments { x: u32, y: u32, z: u32 }
+
+// Counters: how much was needed, whether it fitted or not.
+const ROUNDS: u32 = 32u;
+const N_ITEMS: u32 = 32u;
+const N_CANDIDATES: u32 = 33u;
+const N_PAIRS: u32 = 34u;
+const N_UNSURE: u32 = 35u;
+const TOO_MUCH: u32 = 36u;
+const N_KEPT: u32 = 37u;
+const N_ENTRIES: u32 = 38u;
+const N_SUBDIVIDED: u32 = 39u;
+const N_COUNTERS: u32 = 40u;
+
+// Tallies: the region (three complements of its low end, three of its high end), then entries of the cell
+// lists for every shift, two words each, and a bit for each shift that is too fine.
+const ENTRIES_BY_SHIFT: u32 = 6u;
+const SHIFTS_TOO_FINE: u32 = 36u;
+const SHIFTS: u32 = 15u;
+const N_TALLIES: u32 = 37u;
+
+const NO_ROOT: u32 = 0xffffffffu;
+
+const FLAG: u32 = 0x80000000u;

@@ -1,0 +1,156 @@
+//! What crosses the line between host and device, once: each struct here has its twin in
+//! `kernels/shared/layout.wgsl`, where the bits are drawn. Tests parse the shaders and compare.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Declares plain structs of 32-bit words.
+macro_rules! words {
+    ($($(#[$doc:meta])* $name:ident { $($field:ident: $type:ty),* $(,)? })*) => {
+        $(
+            $(#[$doc])*
+            #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+            #[repr(C)]
+            pub(crate) struct $name {
+                $(pub $field: $type,)*
+            }
+        )*
+    };
+}
+
+words! {
+    /// A node of the forest.
+    Node { low: [u32; 3], first_child: u32, high: [u32; 3], shape: u32 }
+    /// One participant.
+    Body {
+        root: u32, slack: u32, within: u32, unused: u32,
+        category: [u32; 2], mask: [u32; 2],
+    }
+    /// A run of primitives and its unique vertices.
+    Cluster { first_place: u32, first_vertex: u32, sizes: u32, body: u32 }
+    /// The nodes of one height.
+    Level { first: u32, count: u32 }
+    /// Two nodes whose boxes may overlap; in the list of ignored pairs, two participants.
+    NodePair { a: u32, b: u32 }
+    /// Two clusters.
+    WorkItem { a: u32, b: u32 }
+    /// Two places, with flags.
+    Candidate { a: u32, b: u32 }
+    /// Two global primitive numbers that certainly intersect.
+    PairKey { low: u32, high: u32 }
+    /// Two global primitive numbers left to exact arithmetic.
+    UnsureKey { low: u32, high: u32 }
+    /// What one dispatch is told.
+    Params {
+        first: u32, count: u32,
+        counter: u32, per_group: u32, capacity: u32, slot: u32,
+        n_ignored: u32, resolve: u32,
+        group_size: u32, lambda: u32, most_cells: u32, unused: u32,
+        first_row: u32, n_rows: u32, first_column: u32, n_columns: u32,
+    }
+    /// A primitive that reaches another body.
+    Kept { low: [u32; 3], place: u32, high: [u32; 3], body: u32, range: [u32; 3], unused: u32 }
+    /// Where others may meet a body.
+    Reach { low: [u32; 3], gap: u32, high: [u32; 3], gap_too: u32 }
+    /// The grid; the floats are never looked at here.
+    Grid {
+        origin: [u32; 3], shift: u32, scale: [u32; 3], n_cells: u32,
+        finest: [u32; 3], unused: u32, resolution: [u32; 3], unused_too: u32,
+    }
+    /// A coarse cell.
+    Cell { n_entries: u32, highest: u32, lowest: u32 }
+    /// Two groups of one cell.
+    CellItem { cell: u32, sizes: u32, first_a: u32, first_b: u32 }
+    /// Where the list of a cell starts.
+    Start { entry: u32 }
+    /// One entry of a cell's list.
+    ListEntry { kept: u32 }
+    /// A word of the region, or of the entries a shift.
+    Tally { word: u32 }
+    /// Workgroups of an indirect dispatch.
+    Arguments { x: u32, y: u32, z: u32 }
+    /// One word of a position: the bits of a coordinate.
+    Coordinate { bits: u32 }
+    /// The corners of a primitive; a triangle repeats its last one.
+    Corners { vertices: [u32; 4] }
+    /// A vertex of a cluster.
+    ClusterVertex { vertex: u32 }
+    /// The global number of the primitive at a place.
+    Order { number: u32 }
+    /// How much of something was needed.
+    Counter { n: u32 }
+}
+
+/// Children of a node, in `Node::shape`.
+pub(crate) const CHILDREN: u32 = 15;
+/// The door to a body, in `Node::shape`.
+pub(crate) const GATE: u32 = 0x1000;
+/// Where the height of a node is, in `Node::shape`.
+pub(crate) const HEIGHT_SHIFT: u32 = 4;
+/// The most rounds that a traversal takes; counters 0 .. 32 are the queues'.
+pub(crate) const ROUNDS: u32 = 32;
+/// Counter of work items.
+pub(crate) const N_ITEMS: u32 = 32;
+/// Counter of candidates.
+pub(crate) const N_CANDIDATES: u32 = 33;
+/// Counter of certain pairs.
+pub(crate) const N_PAIRS: u32 = 34;
+/// Counter of unsure pairs.
+pub(crate) const N_UNSURE: u32 = 35;
+/// Not 0 when a counter has passed 2^32, or one invocation had too much to do.
+pub(crate) const TOO_MUCH: u32 = 36;
+/// Counter of kept primitives.
+pub(crate) const N_KEPT: u32 = 37;
+/// Counter of entries of the cell lists.
+pub(crate) const N_ENTRIES: u32 = 38;
+/// Counter of cells that went through the second level.
+pub(crate) const N_SUBDIVIDED: u32 = 39;
+/// Words of the region and of the entries a shift.
+pub(crate) const N_TALLIES: u32 = 37;
+/// The root of a body without primitives, and the top where there is no tree over bodies.
+pub(crate) const NO_ROOT: u32 = u32::MAX;
+/// Counters in all.
+pub(crate) const N_COUNTERS: u32 = 40;
+/// Flags of candidates.
+#[cfg(test)]
+pub(crate) const FLAG: u32 = 0x8000_0000;
+
+impl Node {
+    /// A node whose box is not known yet.
+    pub fn new(first_child: u32, n_children: u32, height: u32, gate: bool) -> Self {
+        Node {
+            low: [u32::MAX; 3],
+            high: [0; 3],
+            first_child,
+            shape: n_children | height << HEIGHT_SHIFT | if gate { GATE } else { 0 },
+        }
+    }
+
+    pub fn n_children(&self) -> u32 {
+        self.shape & CHILDREN
+    }
+
+    pub fn height(&self) -> u32 {
+        self.shape >> HEIGHT_SHIFT & 0xff
+    }
+
+    pub fn is_gate(&self) -> bool {
+        self.shape & GATE != 0
+    }
+}
+
+/// The parameters of one dispatch, as far apart as devices want uniform offsets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Step {
+    pub params: Params,
+    padding: [u32; 48],
+}
+
+impl From<Params> for Step {
+    fn from(params: Params) -> Self {
+        Step {
+            params,
+            padding: [0; 48],
+        }
+    }
+}

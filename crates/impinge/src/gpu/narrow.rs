@@ -1,0 +1,76 @@
+//! Stage `narrow`: the filter over all candidates, for both methods.
+
+use super::device::Gpu;
+use super::kernels::{Narrow, Prepare};
+use super::layout::{N_CANDIDATES, Params, ROUNDS};
+use super::pipeline::{Bound, Groups};
+use super::room::Room;
+use super::steps::Steps;
+use super::world::World;
+
+/// Candidates a workgroup settles.
+const GROUP: u32 = 64;
+/// Where the arguments of this stage are.
+const SLOT: u32 = ROUNDS + 1;
+
+/// The kernels with their buffers.
+#[derive(Debug)]
+pub(crate) struct Settling {
+    prepare: Bound,
+    narrow: Bound,
+}
+
+/// `prepare`, for any stage.
+pub(crate) fn prepare(gpu: &Gpu, room: &Room, steps: &Steps) -> Bound {
+    gpu.kernels.prepare.bind(
+        gpu,
+        &Prepare {
+            counters: room.counters.write_to(),
+            arguments: room.arguments.write_to(),
+            params: steps.params(),
+        },
+    )
+}
+
+impl Settling {
+    pub fn new(gpu: &Gpu, world: &World, room: &Room, steps: &Steps) -> Self {
+        // Scenes of triangles alone do without the code for solids, and the registers it wants.
+        let narrow = match world.has_solids {
+            true => &gpu.kernels.narrow_solids,
+            false => &gpu.kernels.narrow,
+        };
+        Settling {
+            prepare: prepare(gpu, room, steps),
+            narrow: narrow.bind(
+                gpu,
+                &Narrow {
+                    candidates: room.candidates.read(),
+                    corners: world.corners.read(),
+                    positions: world.positions.read(),
+                    order: world.order.read(),
+                    pairs: room.pairs.write_to(),
+                    unsure: room.unsure.write_to(),
+                    counters: room.counters.write_to(),
+                },
+            ),
+        }
+    }
+
+    /// Plans the stage and returns its step.
+    pub fn plan(steps: &mut Steps, room: &Room) -> u32 {
+        steps.push(Params {
+            counter: N_CANDIDATES,
+            per_group: GROUP,
+            // Capacities are at most what 32 bits can number.
+            capacity: room.capacities().candidates as u32,
+            slot: SLOT,
+            ..Params::default()
+        })
+    }
+
+    pub fn run(&self, pass: &mut wgpu::ComputePass<'_>, room: &Room, step: u32) {
+        self.prepare.run(pass, step, Groups::Known(1));
+        let groups = Groups::Indirect(room.arguments.buffer(), SLOT);
+        self.narrow.run(pass, step, groups);
+    }
+}

@@ -1,0 +1,128 @@
+//! Frames that stay on the device: positions from the caller's buffers, pairs in ours.
+
+use super::buffers::count;
+use super::collect::map;
+use super::engine::Engine;
+use super::layout::{Counter, N_COUNTERS, N_PAIRS, N_UNSURE};
+use super::room::{Capacities, Counts, Verdict};
+use crate::error::Error;
+use crate::frame::Frame;
+use crate::scene::{BodyId, Scene};
+use crate::stats::Statistics;
+
+/// Where the pairs of an encoded frame are once its commands have run.
+///
+/// Both lists hold two `u32` a pair, the numbers of its primitives, the lower one first. Primitives are
+/// numbered through, body after body in the order of their ids: primitive `i` of a body has the number
+/// `first + i`, where `first` is the number of primitives of the bodies before it that take part. The order of
+/// pairs is not specified.
+///
+/// A count may be larger than its list: then the list holds as many pairs as fit, and
+/// [`Detector::make_room`](crate::Detector::make_room) makes it larger.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct ResidentPairs {
+    /// Pairs that certainly intersect.
+    pub pairs: wgpu::Buffer,
+    /// Pairs within the rounding error of intersecting or not. Taken as pairs they are safe.
+    pub unsure: wgpu::Buffer,
+    /// Holds the two counts as `u32`.
+    pub counts: wgpu::Buffer,
+    /// Byte offset of the number of pairs in `counts`.
+    pub n_pairs_offset: u64,
+    /// Byte offset of the number of unsure pairs in `counts`.
+    pub n_unsure_offset: u64,
+    /// Pairs that the list has room for.
+    pub pairs_capacity: u64,
+    /// Unsure pairs that the list has room for.
+    pub unsure_capacity: u64,
+}
+
+const COUNTER: u64 = size_of::<Counter>() as u64;
+
+impl Engine {
+    /// Encodes all work of a frame as one pass.
+    ///
+    /// # Errors
+    /// Those of [`Detector::encode`](crate::Detector::encode).
+    pub fn encode(
+        &mut self,
+        scene: &Scene,
+        frame: &Frame,
+        positions: &[(BodyId, &wgpu::Buffer)],
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<ResidentPairs, Error> {
+        for &(body, buffer) in positions {
+            let needed = 12 * count(scene.body(body)?.n_vertices());
+            if buffer.size() < needed {
+                return Err(Error::Gpu {
+                    what: format!(
+                        "body {body}: its positions take {needed} bytes, the buffer has {}",
+                        buffer.size()
+                    ),
+                });
+            }
+            if !buffer.usage().contains(wgpu::BufferUsages::COPY_SRC) {
+                return Err(Error::Gpu {
+                    what: format!("body {body}: its buffer lacks the usage COPY_SRC"),
+                });
+            }
+        }
+        let ids: Vec<BodyId> = positions.iter().map(|&(body, _)| body).collect();
+        self.update(scene, frame, &ids, &mut Statistics::default())?;
+        for &(body, buffer) in positions {
+            self.world.copy_positions(body, buffer, encoder);
+        }
+        let cells = self.cells_wanted(frame);
+        let capacities = self.first_room(cells)?;
+        let work = self.whole(frame);
+        self.encode_pass(frame, work.as_ref(), capacities, cells, None, encoder)?;
+        let capacities = self.room.capacities();
+        Ok(ResidentPairs {
+            pairs: self.room.pairs.buffer().clone(),
+            unsure: self.room.unsure.buffer().clone(),
+            counts: self.room.counters.buffer().clone(),
+            n_pairs_offset: u64::from(N_PAIRS) * COUNTER,
+            n_unsure_offset: u64::from(N_UNSURE) * COUNTER,
+            pairs_capacity: capacities.pairs,
+            unsure_capacity: capacities.unsure,
+        })
+    }
+
+    /// Reads the counters and grows what was too small. Returns whether nothing was.
+    ///
+    /// # Errors
+    /// Those of [`Detector::make_room`](crate::Detector::make_room).
+    pub async fn make_room(&mut self) -> Result<bool, Error> {
+        self.gpu().check_lost()?;
+        let capacities = self.room.capacities();
+        if capacities == Capacities::NONE {
+            return Ok(true);
+        }
+        let counts = {
+            let bytes = u64::from(N_COUNTERS) * COUNTER;
+            let device = &self.gpu().device;
+            let staging = device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("counters"),
+                size: bytes,
+                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            });
+            let mut encoder =
+                device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let counters = self.room.counters.buffer();
+            encoder.copy_buffer_to_buffer(counters, 0, &staging, 0, bytes);
+            self.gpu().queue.submit([encoder.finish()]);
+            let view = map(&staging, bytes).await?;
+            Counts::new(&bytemuck::pod_collect_to_vec::<u8, Counter>(&view))
+        };
+        match counts.judge(self.gpu(), capacities, self.budget_for_room()) {
+            Verdict::Complete => Ok(true),
+            Verdict::Grow(larger) => {
+                self.grow_to(larger);
+                Ok(false)
+            }
+            Verdict::Split => Err(self.too_small("the frame at once", counts.needed)),
+        }
+    }
+}

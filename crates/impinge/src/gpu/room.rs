@@ -1,0 +1,350 @@
+//! Room for what a pass finds: queues, work items, candidates, pairs, unsure pairs.
+//!
+//! How much a frame finds is not known before. Kernels count what they need, whether it fits or not; what
+//! did not fit makes its buffer grow and the pass run again. Where the device or the memory budget
+//! allows no more, the engine splits the pass instead.
+
+use super::buffers::Storage;
+use super::device::Gpu;
+use super::layout::{
+    Arguments, Candidate, Cell, CellItem, Counter, Grid, Kept, ListEntry, N_CANDIDATES, N_COUNTERS,
+    N_ENTRIES, N_ITEMS, N_KEPT, N_PAIRS, N_SUBDIVIDED, N_TALLIES, N_UNSURE, NodePair, PairKey,
+    ROUNDS, Reach, Start, TOO_MUCH, Tally, UnsureKey, WorkItem,
+};
+use crate::detector::Method;
+use crate::error::Error;
+
+/// Elements that each buffer has room for. The answer never depends on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Capacities {
+    /// Pairs of tree nodes waiting in one round.
+    pub queue: u64,
+    /// Work items.
+    pub items: u64,
+    /// `Cells`: primitives within reach of another body.
+    pub kept: u64,
+    /// `Cells`: entries of the cell lists.
+    pub entries: u64,
+    /// Candidates.
+    pub candidates: u64,
+    /// Pairs that certainly intersect.
+    pub pairs: u64,
+    /// Pairs left to exact arithmetic.
+    pub unsure: u64,
+}
+
+impl Default for Capacities {
+    fn default() -> Self {
+        Capacities {
+            queue: 1 << 15,
+            items: 1 << 15,
+            kept: 1 << 15,
+            entries: 1 << 16,
+            candidates: 1 << 18,
+            pairs: 1 << 16,
+            unsure: 1 << 14,
+        }
+    }
+}
+
+/// Candidates of two full clusters: the least that a pass must be able to hold.
+const ONE_ITEM: u64 = 64 * 64;
+
+impl Capacities {
+    /// With these a pass of one pair of clusters always fits.
+    pub(crate) const LEAST: Capacities = Capacities {
+        queue: 64,
+        items: 64,
+        kept: 64,
+        entries: 64,
+        candidates: ONE_ITEM,
+        pairs: ONE_ITEM,
+        unsure: ONE_ITEM,
+    };
+
+    pub(crate) const NONE: Capacities = Capacities {
+        queue: 0,
+        items: 0,
+        kept: 0,
+        entries: 0,
+        candidates: 0,
+        pairs: 0,
+        unsure: 0,
+    };
+
+    /// Without the room that only the other method needs.
+    pub(crate) fn of(self, method: Method) -> Self {
+        match method {
+            Method::Cells => Capacities { queue: 1, ..self },
+            _ => Capacities {
+                kept: 1,
+                entries: 1,
+                ..self
+            },
+        }
+    }
+
+    /// Bytes on the device, read-back included.
+    pub(crate) fn bytes(&self) -> u64 {
+        let item = size_of::<WorkItem>().max(size_of::<CellItem>());
+        2 * self.queue * size_of::<NodePair>() as u64
+            + self.items * item as u64
+            + self.kept * size_of::<Kept>() as u64
+            + self.entries * size_of::<ListEntry>() as u64
+            + self.candidates * size_of::<Candidate>() as u64
+            + 2 * self.pairs * size_of::<PairKey>() as u64
+            + 2 * self.unsure * size_of::<UnsureKey>() as u64
+    }
+
+    fn zip(self, other: Self, pick: impl Fn(u64, u64) -> u64) -> Self {
+        Capacities {
+            queue: pick(self.queue, other.queue),
+            items: pick(self.items, other.items),
+            kept: pick(self.kept, other.kept),
+            entries: pick(self.entries, other.entries),
+            candidates: pick(self.candidates, other.candidates),
+            pairs: pick(self.pairs, other.pairs),
+            unsure: pick(self.unsure, other.unsure),
+        }
+    }
+
+    pub(crate) fn max(self, other: Self) -> Self {
+        self.zip(other, u64::max)
+    }
+
+    fn fits(self, room: Self) -> bool {
+        self.max(room) == room
+    }
+
+    /// Whether the device can bind this much.
+    pub(crate) fn fit(self, gpu: &Gpu) -> bool {
+        self.fits(Capacities::limit(gpu))
+    }
+
+    /// What one binding of the device may hold.
+    fn limit(gpu: &Gpu) -> Self {
+        Capacities {
+            queue: Storage::<NodePair>::limit(gpu),
+            items: Storage::<CellItem>::limit(gpu),
+            kept: Storage::<Kept>::limit(gpu),
+            entries: Storage::<ListEntry>::limit(gpu),
+            candidates: Storage::<Candidate>::limit(gpu),
+            pairs: Storage::<PairKey>::limit(gpu),
+            unsure: Storage::<UnsureKey>::limit(gpu),
+        }
+    }
+}
+
+/// The buffers. A method leaves those of the other at one element each.
+#[derive(Debug)]
+pub(crate) struct Room {
+    pub queues: [Storage<NodePair>; 2],
+    pub items: Storage<WorkItem>,
+    pub candidates: Storage<Candidate>,
+    pub pairs: Storage<PairKey>,
+    pub unsure: Storage<UnsureKey>,
+    pub counters: Storage<Counter>,
+    pub arguments: Storage<Arguments>,
+    pub cell_items: Storage<CellItem>,
+    pub kept: Storage<Kept>,
+    pub entries: Storage<ListEntry>,
+    pub cells: Storage<Cell>,
+    pub starts: Storage<Start>,
+    pub reaches: Storage<Reach>,
+    pub tallies: Storage<Tally>,
+    pub grid: Storage<Grid>,
+    /// What a pass starts from, copied by its encoder: counters and the first queue.
+    start_counters: Storage<Counter>,
+    start_queue: Storage<NodePair>,
+    started: Option<Vec<NodePair>>,
+    sizes: Option<(Capacities, CellsWanted)>,
+}
+
+/// Room that `Cells` wants besides what grows by itself; none for `Clusters`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct CellsWanted {
+    pub n_cells: u64,
+    pub n_bodies: u64,
+}
+
+impl CellsWanted {
+    /// Bytes of a cell and of its list's start.
+    pub const CELL: u64 = (size_of::<Cell>() + size_of::<Start>()) as u64;
+
+    pub fn bytes(&self) -> u64 {
+        self.n_cells * Self::CELL + self.n_bodies * size_of::<Reach>() as u64
+    }
+}
+
+impl Room {
+    pub fn new() -> Self {
+        let copied = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        let indirect = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
+        Room {
+            queues: ["queue a", "queue b"].map(Storage::plain),
+            items: Storage::plain("work items"),
+            candidates: Storage::plain("candidates"),
+            pairs: Storage::new("pairs", copied),
+            unsure: Storage::new("unsure", copied),
+            counters: Storage::new("counters", copied),
+            arguments: Storage::new("arguments", indirect),
+            cell_items: Storage::plain("work items of cells"),
+            kept: Storage::plain("kept"),
+            entries: Storage::plain("entries"),
+            cells: Storage::plain("cells"),
+            starts: Storage::plain("starts"),
+            reaches: Storage::plain("reaches"),
+            tallies: Storage::plain("tallies"),
+            grid: Storage::new("grid", copied),
+            start_counters: Storage::new("first counters", wgpu::BufferUsages::COPY_SRC),
+            start_queue: Storage::new("first queue", wgpu::BufferUsages::COPY_SRC),
+            started: None,
+            sizes: None,
+        }
+    }
+
+    /// Makes exactly this much room. Returns whether any buffer is a new one.
+    pub fn resize(&mut self, gpu: &Gpu, wanted: &Capacities, cells: Option<CellsWanted>) -> bool {
+        let is_cells = cells.is_some();
+        let cells = cells.unwrap_or_default();
+        let sizes = Some((*wanted, cells));
+        if self.sizes == sizes {
+            return false;
+        }
+        self.sizes = sizes;
+        let (of_clusters, of_cells) = match is_cells {
+            true => (1, wanted.items),
+            false => (wanted.items, 1),
+        };
+        let [a, b] = &mut self.queues;
+        a.resize_exactly(gpu, wanted.queue);
+        b.resize_exactly(gpu, wanted.queue);
+        self.items.resize_exactly(gpu, of_clusters);
+        self.candidates.resize_exactly(gpu, wanted.candidates);
+        self.pairs.resize_exactly(gpu, wanted.pairs);
+        self.unsure.resize_exactly(gpu, wanted.unsure);
+        self.counters.resize_exactly(gpu, u64::from(N_COUNTERS));
+        self.arguments.resize_exactly(gpu, u64::from(ROUNDS) + 2);
+        self.cell_items.resize_exactly(gpu, of_cells);
+        self.kept.resize_exactly(gpu, wanted.kept);
+        self.entries.resize_exactly(gpu, wanted.entries);
+        self.cells.resize_exactly(gpu, cells.n_cells);
+        self.starts.resize_exactly(gpu, cells.n_cells);
+        self.reaches.resize_exactly(gpu, cells.n_bodies);
+        self.tallies.resize_exactly(gpu, u64::from(N_TALLIES));
+        self.grid.resize_exactly(gpu, 1);
+        true
+    }
+
+    /// Encodes what a pass starts from: counters at zero but for the seeds, which fit the queue.
+    ///
+    /// # Errors
+    /// As [`Storage::resize`].
+    pub fn encode_start(
+        &mut self,
+        gpu: &Gpu,
+        seeds: &[NodePair],
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<(), Error> {
+        if self.started.as_deref() != Some(seeds) {
+            let mut counters = [Counter::default(); N_COUNTERS as usize];
+            // Seeds fit a queue, which 32 bits can number.
+            counters[0].n = seeds.len() as u32;
+            self.start_counters.upload(gpu, &counters)?;
+            self.start_queue.upload(gpu, seeds)?;
+            self.started = Some(seeds.to_vec());
+        }
+        let mut copy = |from: &wgpu::Buffer, to: &wgpu::Buffer, bytes: u64| {
+            if bytes > 0 {
+                encoder.copy_buffer_to_buffer(from, 0, to, 0, bytes);
+            }
+        };
+        let bytes = u64::from(N_COUNTERS) * size_of::<Counter>() as u64;
+        copy(self.start_counters.buffer(), self.counters.buffer(), bytes);
+        let bytes = size_of_val(seeds) as u64;
+        copy(self.start_queue.buffer(), self.queues[0].buffer(), bytes);
+        Ok(())
+    }
+
+    /// Bytes of the room that does not grow by itself.
+    pub fn bytes_of_cells(&self) -> u64 {
+        self.sizes.map_or(0, |(_, cells)| cells.bytes())
+    }
+
+    pub fn capacities(&self) -> Capacities {
+        self.sizes.map_or(Capacities::NONE, |(wanted, _)| wanted)
+    }
+
+    /// Bytes on the device.
+    pub fn bytes(&self) -> u64 {
+        self.sizes
+            .map_or(0, |(wanted, cells)| wanted.bytes() + cells.bytes())
+    }
+}
+
+/// What a pass counted.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Counts {
+    /// What would have held everything; of later stages a lower bound when an earlier one overflowed.
+    pub needed: Capacities,
+    /// Cells that went through the second level.
+    pub n_subdivided: u64,
+    too_much: bool,
+}
+
+/// What is to be done about the counts of a pass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    /// All of it fitted.
+    Complete,
+    /// Run again with this much room.
+    Grow(Capacities),
+    /// There is no more room to be had.
+    Split,
+}
+
+impl Counts {
+    pub fn new(counters: &[Counter]) -> Self {
+        let at = |ix: u32| u64::from(counters[ix as usize].n);
+        Counts {
+            needed: Capacities {
+                queue: (0..ROUNDS).map(at).max().unwrap_or(0),
+                items: at(N_ITEMS),
+                kept: at(N_KEPT),
+                entries: at(N_ENTRIES),
+                candidates: at(N_CANDIDATES),
+                pairs: at(N_PAIRS),
+                unsure: at(N_UNSURE),
+            },
+            n_subdivided: at(N_SUBDIVIDED),
+            too_much: at(TOO_MUCH) != 0,
+        }
+    }
+
+    /// Compares with the room there was. `bytes` may be held in all by these buffers.
+    pub fn judge(&self, gpu: &Gpu, room: Capacities, bytes: Option<u64>) -> Verdict {
+        if self.too_much {
+            return Verdict::Split;
+        }
+        if self.needed.fits(room) {
+            return Verdict::Complete;
+        }
+        let limit = Capacities::limit(gpu);
+        // A quarter more than needed, where it is needed; the next frame needs a little more.
+        let larger = self.needed.zip(room, |needed, room| {
+            if needed > room {
+                needed + needed / 4
+            } else {
+                room
+            }
+        });
+        let larger = larger.zip(limit, u64::min);
+        let is_allowed = bytes.is_none_or(|bytes| larger.bytes() <= bytes);
+        if self.needed.fits(larger) && is_allowed {
+            Verdict::Grow(larger)
+        } else {
+            Verdict::Split
+        }
+    }
+}

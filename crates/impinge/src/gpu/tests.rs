@@ -1,0 +1,189 @@
+//! Kernels without a GPU: every one parses, validates, and agrees with the host on what it binds.
+
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use naga::{AddressSpace, Module, StorageAccess, TypeInner};
+
+use super::buffers::Access;
+use super::kernels::*;
+use super::layout::*;
+use super::pipeline::Source;
+
+fn parse(source: &Source) -> Module {
+    let text = source.text();
+    let module = naga::front::wgsl::parse_str(&text)
+        .unwrap_or_else(|error| panic!("{}: {}", source.name, error.emit_to_string(&text)));
+    Validator::new(ValidationFlags::all(), Capabilities::empty())
+        .validate(&module)
+        .unwrap_or_else(|error| panic!("{}: {}", source.name, error.emit_to_string(&text)));
+    module
+}
+
+#[test]
+fn kernels_are_valid_and_bind_what_the_host_binds() {
+    for (source, entries) in ALL {
+        let module = parse(source);
+        let bound: Vec<_> = module
+            .global_variables
+            .iter()
+            .filter_map(|(_, variable)| Some((variable.binding?, variable)))
+            .collect();
+        assert_eq!(bound.len(), entries.len(), "{}", source.name);
+        let n_storage = bound
+            .iter()
+            .filter(|(_, variable)| matches!(variable.space, AddressSpace::Storage { .. }))
+            .count();
+        assert!(n_storage <= 8, "{} binds {n_storage} buffers", source.name);
+        for (binding, variable) in bound {
+            let entry = &entries[binding.binding as usize];
+            let name = variable.name.as_deref().unwrap_or_default();
+            assert_eq!((binding.group, name), (0, entry.name), "{}", source.name);
+            let access = match variable.space {
+                AddressSpace::Uniform => Access::Uniform,
+                AddressSpace::Storage { access } if access.contains(StorageAccess::STORE) => {
+                    Access::Write
+                }
+                AddressSpace::Storage { .. } => Access::Read,
+                space => panic!("{}: {name} is in {space:?}", source.name),
+            };
+            assert_eq!(access, entry.access, "{}: {name}", source.name);
+            let stride = match module.types[variable.ty].inner {
+                TypeInner::Array { stride, .. } => stride,
+                TypeInner::Struct { span, .. } => span,
+                ref other => panic!("{}: {name} is {other:?}", source.name),
+            };
+            assert_eq!(u64::from(stride), entry.stride, "{}: {name}", source.name);
+        }
+    }
+}
+
+#[test]
+fn workgroups_keep_to_what_every_device_has() {
+    for (source, _) in ALL {
+        let module = parse(source);
+        let [entry] = &module.entry_points[..] else {
+            panic!("{} has one entry point", source.name);
+        };
+        let [x, y, z] = entry.workgroup_size;
+        assert!(x * y * z <= 256, "{}", source.name);
+        let shared: u32 = module
+            .global_variables
+            .iter()
+            .filter(|(_, variable)| variable.space == AddressSpace::WorkGroup)
+            .map(|(_, variable)| match module.types[variable.ty].inner {
+                TypeInner::Array { size, stride, .. } => match size {
+                    naga::ArraySize::Constant(n) => n.get() * stride,
+                    ref other => panic!("{}: {other:?}", source.name),
+                },
+                _ => 4,
+            })
+            .sum();
+        assert!(shared <= 16 * 1024, "{}: {shared} bytes", source.name);
+    }
+}
+
+/// Offsets of the members of a struct of `layout.wgsl`, and its size.
+fn members(module: &Module, name: &str) -> (Vec<(String, u32)>, u32) {
+    let found = module
+        .types
+        .iter()
+        .find(|(_, held)| held.name.as_deref() == Some(name));
+    let (_, held) = found.unwrap_or_else(|| panic!("no struct {name}"));
+    let TypeInner::Struct { members, span } = &held.inner else {
+        panic!("{name} is no struct");
+    };
+    let offsets = members
+        .iter()
+        .map(|member| (member.name.clone().unwrap_or_default(), member.offset))
+        .collect();
+    (offsets, *span)
+}
+
+/// Asserts that a struct has the same members at the same offsets on both sides.
+macro_rules! assert_twins {
+    ($module:expr, $($name:ident { $($field:ident),* })*) => {
+        $(
+            let (shader, span) = members($module, stringify!($name));
+            let host = vec![
+                $((stringify!($field).to_owned(), std::mem::offset_of!($name, $field) as u32),)*
+            ];
+            assert_eq!(shader, host, stringify!($name));
+            assert_eq!(span as usize, size_of::<$name>(), stringify!($name));
+        )*
+    };
+}
+
+#[test]
+fn structs_are_laid_out_as_on_the_host() {
+    // Any kernel has all of the layout in front of it.
+    let module = parse(&DISPATCH);
+    assert_twins!(&module,
+        Node { low, first_child, high, shape }
+        Body { root, slack, within, unused, category, mask }
+        Cluster { first_place, first_vertex, sizes, body }
+        Level { first, count }
+        NodePair { a, b }
+        WorkItem { a, b }
+        Candidate { a, b }
+        PairKey { low, high }
+        UnsureKey { low, high }
+        Params {
+            first, count, counter, per_group, capacity, slot, n_ignored, resolve, group_size,
+            lambda, most_cells, unused, first_row, n_rows, first_column, n_columns
+        }
+        Kept { low, place, high, body, range, unused }
+        Grid { origin, shift, scale, n_cells, finest, unused, resolution, unused_too }
+        Cell { n_entries, highest, lowest }
+        CellItem { cell, sizes, first_a, first_b }
+        Arguments { x, y, z }
+    );
+    assert_eq!(size_of::<Step>(), 256);
+    // The shader leaves a gap after each corner, which has a name on the host alone.
+    let (reach, span) = members(&module, "Reach");
+    assert_eq!(reach, [("low".to_owned(), 0), ("high".to_owned(), 16)]);
+    assert_eq!(span as usize, size_of::<Reach>());
+    assert_eq!(std::mem::offset_of!(Reach, high), 16);
+}
+
+#[test]
+fn constants_are_those_of_the_host() {
+    let module = parse(&NARROW);
+    let value = |name: &str| {
+        let (_, constant) = module
+            .constants
+            .iter()
+            .find(|(_, constant)| constant.name.as_deref() == Some(name))
+            .unwrap_or_else(|| panic!("no constant {name}"));
+        match module.global_expressions[constant.init] {
+            naga::Expression::Literal(naga::Literal::U32(value)) => value,
+            ref other => panic!("{name} is {other:?}"),
+        }
+    };
+    for (name, host) in [
+        ("ROUNDS", ROUNDS),
+        ("N_ITEMS", N_ITEMS),
+        ("N_CANDIDATES", N_CANDIDATES),
+        ("N_PAIRS", N_PAIRS),
+        ("N_UNSURE", N_UNSURE),
+        ("TOO_MUCH", TOO_MUCH),
+        ("N_KEPT", N_KEPT),
+        ("N_ENTRIES", N_ENTRIES),
+        ("N_SUBDIVIDED", N_SUBDIVIDED),
+        ("N_COUNTERS", N_COUNTERS),
+        ("N_TALLIES", N_TALLIES),
+        ("NO_ROOT", NO_ROOT),
+        ("CHILDREN", CHILDREN),
+        ("GATE", GATE),
+        ("FLAG", FLAG),
+    ] {
+        assert_eq!(value(name), host, "{name}");
+    }
+}
+
+#[test]
+fn a_broken_kernel_is_noticed() {
+    let broken = Source {
+        name: "broken",
+        parts: &["fn f() -> u32 { return 1.5; }"],
+    };
+    assert!(std::panic::catch_unwind(|| parse(&broken)).is_err());
+}
