@@ -68,27 +68,30 @@ fn cells_agree_with_the_oracle() {
 }
 
 #[test]
-fn a_crowded_cell_is_worked_in_parts() {
+fn a_cell_too_crowded_for_one_pass_is_refused_by_name() {
     // One cell and groups of one primitive: more work items than one invocation may write.
     let soup = soup::triangles(300, 0.4, 11);
     let mut scene = Scene::new();
     let id = soup.add_to(&mut scene).unwrap();
-    let case = Case {
-        name: "one cell".into(),
-        scene,
-        query: Query::within(id),
-    };
     let mut detector = Detector::with_settings(Settings {
         lambda: 1e-9,
         group_size: 1,
         ..gpu(Method::Cells)
     })
     .unwrap();
-    assert_agree("parts", &naive(&case), &mut detector, &case);
-    let pairs = detector.detect(&case.scene, &case.query).unwrap();
-    assert_eq!(pairs.stats().grid, Some([1, 1, 1]));
-    assert!(pairs.stats().n_slabs > 1, "{:?}", pairs.stats());
-    assert_eq!(pairs.stats().n_work_items, 300 * 301 / 2);
+    let error = detector.detect(&scene, &Query::within(id)).unwrap_err();
+    assert!(
+        error.to_string().contains("the primitives of one cell"),
+        "{error}"
+    );
+    // The detector goes on with a question that it can answer.
+    let case = Case {
+        name: "clusters of the same".into(),
+        scene,
+        query: Query::within(id),
+    };
+    let mut detector = Detector::with_settings(gpu(Method::Clusters)).unwrap();
+    assert_agree("crowded", &naive(&case), &mut detector, &case);
 }
 
 /// 2,000 primitives a body, enough for several rounds and thousands of pairs.

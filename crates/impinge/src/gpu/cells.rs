@@ -37,16 +37,13 @@ pub(crate) struct Told {
     pub resolve: bool,
 }
 
-/// The part of the work that a pass does: some cells, and of a single one some rows and columns of the
-/// product of its groups.
+/// The part of the work that a pass does: some cells. A single cell is not split further: each pass fills
+/// the lists anew, in whatever order threads come, so rows of the product of its groups would not
+/// be the same primitives from pass to pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Part {
     first: u32,
     count: u32,
-    first_row: u32,
-    n_rows: u32,
-    first_column: u32,
-    n_columns: u32,
 }
 
 impl Part {
@@ -54,39 +51,20 @@ impl Part {
     pub const ALL: Part = Part {
         first: 0,
         count: u32::MAX,
-        first_row: 0,
-        n_rows: u32::MAX,
-        first_column: 0,
-        n_columns: u32::MAX,
     };
 
-    /// Two halves: of the cells, or else of the rows, or else of the columns; none when there is but one
-    /// work item. `n_cells` and `n_groups` are at least what there is.
-    pub fn split(self, n_cells: u32, n_groups: u32) -> Option<[Part; 2]> {
-        let halve = |first: u32, count: u32, end: u32| {
-            let count = count.min(end.saturating_sub(first));
-            (count > 1).then_some((count / 2, count - count / 2))
+    /// Two halves of the cells; none when there is but one. `n_cells` is at least what there is.
+    pub fn split(self, n_cells: u32) -> Option<[Part; 2]> {
+        let count = self.count.min(n_cells.saturating_sub(self.first));
+        let low = Part {
+            count: count / 2,
+            ..self
         };
-        if let Some((low, high)) = halve(self.first, self.count, n_cells) {
-            let (mut a, mut b) = (self, self);
-            a.count = low;
-            b.first += low;
-            b.count = high;
-            Some([a, b])
-        } else if let Some((low, high)) = halve(self.first_row, self.n_rows, n_groups) {
-            let (mut a, mut b) = (self, self);
-            a.n_rows = low;
-            b.first_row += low;
-            b.n_rows = high;
-            Some([a, b])
-        } else {
-            let (low, high) = halve(self.first_column, self.n_columns, n_groups)?;
-            let (mut a, mut b) = (self, self);
-            a.n_columns = low;
-            b.first_column += low;
-            b.n_columns = high;
-            Some([a, b])
-        }
+        let high = Part {
+            first: self.first + low.count,
+            count: count - low.count,
+        };
+        (count > 1).then_some([low, high])
     }
 }
 
@@ -187,10 +165,10 @@ impl Plan {
             n_ignored: world.n_ignored(),
             resolve: u32::from(told.resolve),
             group_size: told.group_size,
-            first_row: part.first_row,
-            n_rows: part.n_rows,
-            first_column: part.first_column,
-            n_columns: part.n_columns,
+            first_row: 0,
+            n_rows: u32::MAX,
+            first_column: 0,
+            n_columns: u32::MAX,
             ..Params::default()
         });
         self.prepare_pairing = steps.push(Params {
@@ -361,19 +339,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_split_down_to_single_work_items() {
-        let (n_cells, n_groups) = (5, 3);
+    fn parts_split_down_to_single_cells() {
+        let n_cells = 5;
         let mut waiting = vec![Part::ALL];
         let mut seen = std::collections::BTreeSet::new();
         while let Some(part) = waiting.pop() {
-            match part.split(n_cells, n_groups) {
+            match part.split(n_cells) {
                 Some(halves) => waiting.extend(halves),
-                None => {
-                    let item = (part.first, part.first_row, part.first_column);
-                    assert!(seen.insert(item), "{item:?} twice");
-                }
+                None => assert!(seen.insert(part.first), "cell {} twice", part.first),
             }
         }
-        assert_eq!(seen.len(), 5 * 3 * 3);
+        assert_eq!(seen.len(), 5);
     }
 }

@@ -307,9 +307,7 @@ impl Engine {
         if needed.kept > self.room.capacities().kept {
             return None;
         }
-        // At most 2^31 primitives are kept.
-        let n_groups = needed.kept.div_ceil(u64::from(self.options.group_size)) as u32;
-        let halves = part.split(collected.grid.n_cells, n_groups)?;
+        let halves = part.split(collected.grid.n_cells)?;
         Some(halves.map(Work::Part).into())
     }
 
