@@ -34,7 +34,7 @@ use super::world::{BodyCache, Caches, World};
 /// Clusters a task refits.
 const REFIT_TASK: usize = 256;
 /// Primitives of all bodies together below which waking threads costs more than it saves.
-const PARALLEL_FROM: u64 = 100_000;
+const PARALLEL_FROM: u64 = 300_000;
 /// How much the clusters' surface may grow against the body's before it is clustered again.
 pub(super) const STALE: f64 = 1.5;
 
