@@ -5,7 +5,7 @@
 //! device's limit or the memory budget, the work is split and each half is a pass. What is split:
 //!
 //! * `Clusters`: pairs of tree nodes, the seeds of the traversal, down to one pair of clusters;
-//! * `Cells`: cells, then of one cell the rows and columns of the product of its groups.
+//! * `Cells`: cells.
 //!
 //! In the end a pass has one work item, for which [`Capacities::LEAST`] is enough.
 
