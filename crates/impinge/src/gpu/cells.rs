@@ -165,10 +165,6 @@ impl Plan {
             n_ignored: world.n_ignored(),
             resolve: u32::from(told.resolve),
             group_size: told.group_size,
-            first_row: 0,
-            n_rows: u32::MAX,
-            first_column: 0,
-            n_columns: u32::MAX,
             ..Params::default()
         });
         self.prepare_pairing = steps.push(Params {

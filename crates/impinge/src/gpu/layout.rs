@@ -45,7 +45,6 @@ words! {
         counter: u32, per_group: u32, capacity: u32, slot: u32,
         n_ignored: u32, resolve: u32,
         group_size: u32, lambda: u32, most_cells: u32, unused: u32,
-        first_row: u32, n_rows: u32, first_column: u32, n_columns: u32,
     }
     /// A primitive that reaches another body.
     Kept { low: [u32; 3], place: u32, high: [u32; 3], body: u32, range: [u32; 3], unused: u32 }
@@ -143,14 +142,14 @@ impl Node {
 #[repr(C)]
 pub(crate) struct Step {
     pub params: Params,
-    padding: [u32; 48],
+    padding: [u32; 52],
 }
 
 impl From<Params> for Step {
     fn from(params: Params) -> Self {
         Step {
             params,
-            padding: [0; 48],
+            padding: [0; 52],
         }
     }
 }

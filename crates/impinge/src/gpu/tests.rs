@@ -128,7 +128,7 @@ fn structs_are_laid_out_as_on_the_host() {
         UnsureKey { low, high }
         Params {
             first, count, counter, per_group, capacity, slot, n_ignored, resolve, group_size,
-            lambda, most_cells, unused, first_row, n_rows, first_column, n_columns
+            lambda, most_cells, unused
         }
         Kept { low, place, high, body, range, unused }
         Grid { origin, shift, scale, n_cells, finest, unused, resolution, unused_too }

@@ -11,7 +11,7 @@
 //
 //   groups   0   1   2          items: the upper triangle, diagonal included
 //      0     x   x   x
-//      1         x   x          of a single cell a pass may do some rows and columns only
+//      1         x   x
 //      2             x
 
 @group(0) @binding(0) var<storage, read> grid: array<Grid>;
@@ -23,7 +23,7 @@
 @group(0) @binding(6) var<uniform> params: Params;
 
 const NOWHERE: u32 = 0xffffffffu;
-// Work items that one invocation writes at most; a pass that has more in a cell is split.
+// Work items that one invocation writes at most; a cell with more is refused.
 const MOST_ITEMS: u32 = 32768u;
 
 var<workgroup> n_wanted: atomic<u32>;
@@ -32,23 +32,12 @@ var<workgroup> n_cells: atomic<u32>;
 var<workgroup> first_wanted: u32;
 var<workgroup> first_item: u32;
 
-// Entries of the upper triangle within the rows and columns of this pass; more than MOST_ITEMS are
-// not counted exactly.
-fn count_items(last_row: u32, last_column: u32) -> u32 {
-    let n_rows = last_row - params.first_row;
-    let n_columns = last_column - params.first_column;
-    if min(n_rows, n_columns) == 0u {
-        return 0u;
-    }
-    if max(n_rows, n_columns) > MOST_ITEMS {
+// Entries of the upper triangle; more than MOST_ITEMS are not counted exactly.
+fn count_items(groups: u32) -> u32 {
+    if groups > MOST_ITEMS {
         return MOST_ITEMS + 1u;
     }
-    // Rows above the square part have all columns, those below one less each.
-    let whole = min(last_row, max(params.first_column, params.first_row)) - params.first_row;
-    let first = params.first_row + whole;
-    let n_short = min(last_row, max(last_column, first)) - first;
-    return whole * n_columns + n_short * (last_column - min(first, last_column))
-        - n_short * (n_short - min(n_short, 1u)) / 2u;
+    return groups * (groups + 1u) / 2u;
 }
 
 @compute @workgroup_size(64)
@@ -76,11 +65,7 @@ fn main(
     }
     let size = params.group_size;
     let groups = n / size + select(0u, 1u, n % size != 0u);
-    let row_end = groups - min(groups, params.first_row);
-    let last_row = params.first_row + min(row_end, params.n_rows);
-    let column_end = groups - min(groups, params.first_column);
-    let last_column = params.first_column + min(column_end, params.n_columns);
-    let mine = select(0u, count_items(last_row, last_column), n > 0u);
+    let mine = count_items(groups);
     if mine > MOST_ITEMS {
         atomicStore(&counters[TOO_MUCH], 1u);
         n = 0u;
@@ -112,8 +97,8 @@ fn main(
     let y = ix / grid[0].resolution.x % grid[0].resolution.y;
     let z = ix / grid[0].resolution.x / grid[0].resolution.y;
     // One loop through rows and columns: see `next_cell` in coarse.wgsl.
-    var row = params.first_row;
-    var column = max(row, params.first_column);
+    var row = 0u;
+    var column = 0u;
     let first = first_item + item_at;
     for (var at = first; at < min(first + mine, arrayLength(&items)); at++) {
         let n_a = min(size, n - row * size);
@@ -121,9 +106,9 @@ fn main(
         let sizes = (n_a - 1u) | (n_b - 1u) << 7u | z << 14u;
         items[at] = CellItem(x | y << 14u, sizes, start + row * size, start + column * size);
         column++;
-        if column >= last_column {
+        if column >= groups {
             row++;
-            column = max(row, params.first_column);
+            column = row;
         }
     }
 }

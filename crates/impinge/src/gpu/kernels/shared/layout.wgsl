@@ -75,12 +75,6 @@ struct Params {
     lambda: u32,
     most_cells: u32,
     unused: u32,
-    // Cells: the part of the work that this pass does: cells, and of a single one rows and columns of
-    // the product of its groups.
-    first_row: u32,
-    n_rows: u32,
-    first_column: u32,
-    n_columns: u32,
 }
 
 // A primitive that reaches another body: its box, its place (bit 31: rounded), its body, and the
