@@ -9,6 +9,10 @@ pub enum Error {
     /// Options that do not fit together, or not what they are applied to.
     #[error("{0}")]
     Usage(String),
+    /// A picture could not be drawn or written.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Picture(#[from] impinge_render::Error),
     /// A mesh file that can't be read or written.
     #[error(transparent)]
     File(#[from] impinge_io::Error),
@@ -67,6 +71,10 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Usage(_) | Error::Detection(impinge::Error::Setting { .. }) => 2,
+            #[cfg(feature = "gpu")]
+            Error::Picture(
+                impinge_render::Error::Setting { .. } | impinge_render::Error::Size { .. },
+            ) => 2,
             Error::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
             _ => 1,
         }

@@ -116,6 +116,28 @@ impl FromStr for FrameRange {
     }
 }
 
+/// A file for a picture.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PngFile(pub PathBuf);
+
+impl FromStr for PngFile {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match extension(text).as_str() {
+            "png" => Ok(PngFile(text.into())),
+            _ => Err("pictures are written as .png".to_owned()),
+        }
+    }
+}
+
+/// Width and height in pixels with an `x` between them.
+pub fn size(text: &str) -> Result<[u32; 2], String> {
+    text.split_once('x')
+        .and_then(|(width, height)| Some([width.parse().ok()?, height.parse().ok()?]))
+        .ok_or_else(|| "expected width and height, such as 1280x960".to_owned())
+}
+
 /// A number above 0.
 pub fn lambda(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -250,6 +272,16 @@ mod tests {
             MeshFormat::Vtu
         );
         assert!("ply".parse::<MeshFile>().is_err());
+    }
+
+    #[test]
+    fn pictures() {
+        assert_eq!(size("1280x960"), Ok([1280, 960]));
+        for text in ["", "1280", "1280x", "1280x-1", "1x2x3", "1.5x2"] {
+            assert!(size(text).is_err(), "{text}");
+        }
+        assert_eq!("a.PNG".parse(), Ok(PngFile("a.PNG".into())));
+        assert!("a.jpg".parse::<PngFile>().is_err());
     }
 
     #[test]
