@@ -8,7 +8,7 @@ use impinge_fem::scenes::SceneName;
 
 use crate::values::{FrameRange, MeshFile, RowsFile, body_numbers, bytes, lambda};
 #[cfg(feature = "gpu")]
-use crate::values::{PngFile, size};
+use crate::values::{PngFile, azimuth, elevation, part, size};
 
 /// Exact collision detection for deforming meshes of triangles and tetrahedra.
 #[derive(Debug, Parser)]
@@ -203,7 +203,8 @@ pub struct PictureArgs {
     #[arg(
         long,
         value_name = "D",
-        default_value = "25",
+        value_parser = azimuth,
+        default_value = "-25",
         allow_negative_numbers = true,
         requires = "png"
     )]
@@ -212,6 +213,7 @@ pub struct PictureArgs {
     #[arg(
         long,
         value_name = "D",
+        value_parser = elevation,
         default_value = "20",
         allow_negative_numbers = true,
         requires = "png"
@@ -221,7 +223,7 @@ pub struct PictureArgs {
     #[arg(long, value_enum, value_name = "AXIS", default_value_t = UpArg::Y, requires = "png")]
     pub up: UpArg,
     /// How strongly hidden colliding primitives are seen, 0 (not at all) to 1 (as if nothing hid them)
-    #[arg(long, value_name = "X", default_value = "0.3", requires = "png")]
+    #[arg(long, value_name = "X", value_parser = part, default_value = "0.5", requires = "png")]
     pub see_through: f32,
     /// Without perspective
     #[arg(long, requires = "png")]

@@ -71,10 +71,6 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Usage(_) | Error::Detection(impinge::Error::Setting { .. }) => 2,
-            #[cfg(feature = "gpu")]
-            Error::Picture(
-                impinge_render::Error::Setting { .. } | impinge_render::Error::Size { .. },
-            ) => 2,
             Error::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
             _ => 1,
         }

@@ -42,7 +42,7 @@ pub struct Camera {
 impl Default for Camera {
     fn default() -> Self {
         Camera {
-            azimuth: 25.0,
+            azimuth: -25.0,
             elevation: 20.0,
             up: UpAxis::default(),
             projection: Projection::Perspective { degrees: 28.0 },
