@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     let ring = torus(180, 22, 0.27, 0.042).mapped(|[x, y, z]| {
         let turn = y.atan2(x);
-        [x, y, z + 0.12 + 0.035 * (5.0 * turn).sin()]
+        [x, y, z + 0.09 + 0.05 * (5.0 * turn).sin()]
     });
 
     let mut scene = Scene::new();
@@ -27,8 +27,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let mut picture = Picture {
         camera: Camera {
-            azimuth: 10.0,
-            elevation: 48.0,
+            azimuth: 50.0,
+            elevation: 55.0,
             up: UpAxis::Z,
             ..Camera::default()
         },
