@@ -267,6 +267,10 @@ fn colliding(models: [Model; 2]) -> Picture {
     Picture {
         surfaces,
         size: [320, 240],
+        camera: Camera {
+            azimuth: 25.0,
+            ..Camera::default()
+        },
         ..Picture::default()
     }
 }
@@ -447,6 +451,39 @@ fn bad_input_is_refused_by_name() {
     let error = Surface::of_body(scene.body(id).unwrap(), &[20], colors).unwrap_err();
     let text = "primitive 20 collides, but the body has 20 primitives";
     assert_eq!(error.to_string(), text);
+}
+
+#[test]
+fn a_device_of_the_caller_draws_as_large_as_its_textures() {
+    use impinge_render::wgpu;
+    let descriptor = wgpu::InstanceDescriptor {
+        flags: wgpu::InstanceFlags::empty(),
+        ..wgpu::InstanceDescriptor::new_without_display_handle()
+    };
+    let instance = wgpu::Instance::new(descriptor);
+    let adapter = pollster::block_on(instance.request_adapter(&Default::default()))
+        .expect("a GPU or a software driver is needed");
+    let required_limits = wgpu::Limits::downlevel_defaults();
+    assert_eq!(required_limits.max_texture_dimension_2d, 2048);
+    let request = adapter.request_device(&wgpu::DeviceDescriptor {
+        required_limits,
+        ..Default::default()
+    });
+    let (device, queue) = pollster::block_on(request).unwrap();
+    let mut renderer = Renderer::with_device(device, queue).unwrap();
+    // Several tiles with their margins.
+    let surface = triangle([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], RED);
+    let mut picture = plain(vec![surface], [2048, 2048]);
+    let image = renderer.render(&picture).unwrap();
+    assert_near(at(&image, 500, 1500), RED);
+    assert_near(at(&image, 1600, 1900), RED);
+    assert_eq!(at(&image, 1600, 100), [0; 3]);
+    picture.size = [2049, 10];
+    let text = renderer.render(&picture).unwrap_err().to_string();
+    assert_eq!(
+        text,
+        "a picture of 2049 x 10 pixels was asked for, 1 x 1 to 2048 x 2048 is possible"
+    );
 }
 
 #[test]
