@@ -95,9 +95,9 @@ impl Pipelines {
         Pipelines {
             surface: faces(wgpu::DepthBiasState::default()),
             raised: faces(wgpu::DepthBiasState {
-                constant: -2,
-                slope_scale: -0.5,
-                clamp: 0.0,
+                constant: -8,
+                // By slope, sides of tetrahedra that stand on end would rise out of the body.
+                ..Default::default()
             }),
             occlusion: pipeline(device, &occlusion, &occlusion_layout, OCCLUSION, None),
             composite: pipeline(device, &composite, &composite_layout, PIXELS, None),

@@ -118,6 +118,32 @@ fn the_nearer_face_hides_the_other_whatever_their_order() {
 }
 
 #[test]
+fn a_face_that_shows_through_wins_against_one_in_the_same_place() {
+    // The same plane by other corners: depths are rounded otherwise.
+    let grey = triangle(
+        [[-1.0, -1.5, 0.1], [5.0, -1.0, 3.7], [-1.2, 6.0, 1.5]],
+        GREY,
+    );
+    let mut red = triangle([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], RED);
+    let [a, b, c] = [0, 1, 2].map(|k| grey.positions[k]);
+    let inside =
+        |u: f64, v: f64| std::array::from_fn(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]));
+    red.positions = vec![inside(0.1, 0.1), inside(0.7, 0.15), inside(0.2, 0.6)];
+    red.faces[0].shows_through = true;
+    let mut over = red.clone();
+    over.positions.iter_mut().for_each(|point| point[2] += 0.01);
+    let n_red = |surfaces: [&Surface; 2]| {
+        let picture = plain(surfaces.map(Surface::clone).to_vec(), [200, 200]);
+        count(&renderer().render(&picture).unwrap(), is_red)
+    };
+    let expected = n_red([&grey, &over]);
+    assert!(expected > 1_000);
+    for surfaces in [[&grey, &red], [&red, &grey]] {
+        assert!(n_red(surfaces).abs_diff(expected) < expected / 50);
+    }
+}
+
+#[test]
 fn a_hidden_face_that_shows_through_is_seen_as_far_as_asked() {
     let near = triangle([[0.0, 0.0, 1.0], [4.0, 0.0, 1.0], [0.0, 4.0, 1.0]], GREY);
     let mut far = triangle([[0.5, 0.5, 0.0], [1.5, 0.5, 0.0], [0.5, 1.5, 0.0]], RED);
