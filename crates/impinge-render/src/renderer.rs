@@ -7,8 +7,9 @@ use crate::corners::{FACE_BYTES, chunks};
 use crate::device::Gpu;
 use crate::error::Error;
 use crate::image::Image;
-use crate::passes::{Chunks, FrameUniform, Pipelines, Targets};
 use crate::picture::Picture;
+use crate::pipelines::{FrameUniform, Pipelines};
+use crate::targets::{Chunks, Targets};
 
 /// Draws pictures on one device. Textures are kept from picture to picture.
 #[derive(Debug)]
