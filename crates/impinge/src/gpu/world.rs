@@ -84,7 +84,7 @@ pub struct World {
 }
 
 impl World {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         World {
             caches: Vec::new(),
             residents: Vec::new(),
