@@ -7,6 +7,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use impinge_fem::scenes::SceneName;
 
 use crate::values::{FrameRange, MeshFile, RowsFile, body_numbers, bytes, lambda};
+#[cfg(feature = "gpu")]
+use crate::values::{PngFile, azimuth, elevation, part, size};
 
 /// Exact collision detection for deforming meshes of triangles and tetrahedra.
 #[derive(Debug, Parser)]
@@ -44,6 +46,10 @@ pub enum Command {
     /// Drop an elastic body on another one and write what happens, step by step
     #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(SimulateArgs),
+    /// Draw meshes, the primitives that meet in red and blue
+    #[cfg(feature = "gpu")]
+    #[command(after_help = RENDER_EXAMPLES)]
+    Render(RenderArgs),
     /// List the GPUs, and drivers that imitate one, for --device
     #[cfg(feature = "gpu")]
     Devices(DevicesArgs),
@@ -57,6 +63,17 @@ pub struct DevicesArgs {
     #[arg(long)]
     pub json: bool,
 }
+
+#[cfg(feature = "gpu")]
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  impinge render a.obj b.obj --png out.png
+  impinge render a.ply b.msh --png out.png --size 1920x1080 --azimuth -60 --up z
+  impinge render cow.off --self --weld --png cow.png --see-through 1
+  impinge pairs a.ply b.ply --png out.png           the answer, and its picture
+
+A software driver suffices where there is no GPU. The colliding primitives of body 0 are red, of body 1
+blue, then green, orange, …; where they are hidden, they are seen faintly.";
 
 const DEMO_EXAMPLES: &str = "\
 Examples:
@@ -165,6 +182,91 @@ pub struct AnswerArgs {
     /// Write the meshes, colliding primitives coloured (.ply, .glb or .vtu)
     #[arg(long, value_name = "FILE")]
     pub out: Option<MeshFile>,
+    /// Draw the meshes, colliding primitives coloured (.png)
+    #[cfg(feature = "gpu")]
+    #[arg(long, value_name = "FILE")]
+    pub png: Option<PngFile>,
+    #[cfg(feature = "gpu")]
+    #[command(flatten)]
+    pub picture: PictureArgs,
+}
+
+/// How a picture looks.
+#[cfg(feature = "gpu")]
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "How it is drawn")]
+pub struct PictureArgs {
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x960", requires = "png")]
+    pub size: [u32; 2],
+    /// Degrees around the up axis, counter-clockwise seen from above
+    #[arg(
+        long,
+        value_name = "D",
+        value_parser = azimuth,
+        default_value = "-25",
+        allow_negative_numbers = true,
+        requires = "png"
+    )]
+    pub azimuth: f64,
+    /// Degrees above the ground, -90 to 90
+    #[arg(
+        long,
+        value_name = "D",
+        value_parser = elevation,
+        default_value = "20",
+        allow_negative_numbers = true,
+        requires = "png"
+    )]
+    pub elevation: f64,
+    /// The axis that points up; at azimuth 0 the viewer is on the side of +z or of -y
+    #[arg(long, value_enum, value_name = "AXIS", default_value_t = UpArg::Y, requires = "png")]
+    pub up: UpArg,
+    /// How strongly hidden colliding primitives are seen, 0 (not at all) to 1 (as if nothing hid them)
+    #[arg(long, value_name = "X", value_parser = part, default_value = "0.5", requires = "png")]
+    pub see_through: f32,
+    /// Without perspective
+    #[arg(long, requires = "png")]
+    pub orthographic: bool,
+}
+
+/// [`impinge_render::UpAxis`] as an option.
+#[cfg(feature = "gpu")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum UpArg {
+    Y,
+    Z,
+}
+
+#[cfg(feature = "gpu")]
+impl From<UpArg> for impinge_render::UpAxis {
+    fn from(up: UpArg) -> Self {
+        match up {
+            UpArg::Y => impinge_render::UpAxis::Y,
+            UpArg::Z => impinge_render::UpAxis::Z,
+        }
+    }
+}
+
+/// What is drawn.
+#[cfg(feature = "gpu")]
+#[derive(Debug, Args)]
+pub struct RenderArgs {
+    /// Mesh files, a body each
+    #[arg(value_name = "MESH", required = true)]
+    pub meshes: Vec<PathBuf>,
+    /// The picture (.png)
+    #[arg(long, value_name = "FILE", required = true)]
+    pub png: PngFile,
+    /// Find the pairs within each body as well
+    #[arg(long = "self")]
+    pub within: bool,
+    #[command(flatten)]
+    pub ask: AskArgs,
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    #[command(flatten)]
+    pub detector: DetectorArgs,
 }
 
 #[derive(Debug, Args)]

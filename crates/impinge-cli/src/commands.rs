@@ -6,6 +6,8 @@ mod demo_scene;
 #[cfg(feature = "gpu")]
 mod devices;
 mod record;
+#[cfg(feature = "gpu")]
+mod render;
 mod sequence;
 mod simulate;
 
@@ -13,5 +15,7 @@ pub use answer::{pairs, within};
 pub use demo::demo;
 #[cfg(feature = "gpu")]
 pub use devices::devices;
+#[cfg(feature = "gpu")]
+pub use render::render;
 pub use sequence::sequence;
 pub use simulate::simulate;

@@ -8,6 +8,9 @@ mod json;
 mod load;
 mod meshes;
 mod output;
+mod palette;
+#[cfg(feature = "gpu")]
+mod picture;
 mod rows;
 mod values;
 mod watch;
@@ -29,6 +32,8 @@ fn main() -> ExitCode {
         Command::Within(args) => commands::within(&args, &cancel),
         Command::Sequence(args) => commands::sequence(&args, &cancel),
         Command::Simulate(args) => commands::simulate(&args, &cancel),
+        #[cfg(feature = "gpu")]
+        Command::Render(args) => commands::render(&args, &cancel),
         #[cfg(feature = "gpu")]
         Command::Devices(args) => commands::devices(&args),
     });
