@@ -6,9 +6,7 @@
 //! Invariant: a box holds all its vertices; f64 positions are rounded outward.
 
 use crate::grouping::GROUP;
-use crate::grouping::bounds::{Bounds, BoundsArray, round_down, round_up};
-#[cfg(not(target_arch = "x86_64"))]
-use crate::grouping::bounds::{greater, lesser};
+use crate::grouping::bounds::{Bounds, BoundsArray, greater, lesser, round_down, round_up};
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
 use crate::scene::{Elements, Positions};
@@ -186,30 +184,42 @@ pub(crate) fn of_vertices_f32(positions: &[[f32; 3]], vertices: &[u32]) -> (Boun
     (bounds, (x + y + z).is_finite())
 }
 
-/// The box of all vertices of a body.
-pub(crate) fn of_all(positions: &Positions) -> Bounds {
+/// Coordinates looked at together in [`of_run`]: several registers of them hide the latency.
+const TOGETHER: usize = 24;
+
+/// The box of a run of a body's vertices.
+pub(crate) fn of_run(positions: &Positions, run: std::ops::Range<usize>) -> Bounds {
+    let mut bounds = Bounds::EMPTY;
     match positions {
         Positions::F32(positions) => {
-            let mut bounds = Bounds::EMPTY;
-            for &point in positions {
-                bounds.join(&Bounds {
-                    min: point,
-                    max: point,
-                });
+            let mut min = [f32::INFINITY; TOGETHER];
+            let mut max = [f32::NEG_INFINITY; TOGETHER];
+            let (chunks, rest) = positions[run].as_flattened().as_chunks::<TOGETHER>();
+            for chunk in chunks {
+                for k in 0..TOGETHER {
+                    min[k] = lesser(min[k], chunk[k]);
+                    max[k] = greater(max[k], chunk[k]);
+                }
             }
-            bounds
+            for (k, &x) in rest.iter().enumerate() {
+                min[k] = lesser(min[k], x);
+                max[k] = greater(max[k], x);
+            }
+            for k in 0..TOGETHER {
+                bounds.min[k % 3] = lesser(bounds.min[k % 3], min[k]);
+                bounds.max[k % 3] = greater(bounds.max[k % 3], max[k]);
+            }
         }
         Positions::F64(positions) => {
-            let mut bounds = Bounds::EMPTY;
-            for point in positions {
+            for point in &positions[run] {
                 bounds.join(&Bounds {
                     min: point.map(round_down),
                     max: point.map(round_up),
                 });
             }
-            bounds
         }
     }
+    bounds
 }
 
 /// The boxes of a cluster's primitives, a lane each; lanes past its size are emptied.

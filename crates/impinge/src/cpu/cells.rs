@@ -136,13 +136,15 @@ impl Cells {
             scratches,
             ..
         } = self;
-        stats.time("bounds", |_| reaching.find(world, workers, scratches));
+        let n_near = stats.time("bounds", |_| {
+            reaching.find_sharing(world, workers, scratches)
+        });
         let Some(region) = self.reaching.region() else {
             stats.n_slabs = 1;
             return Ok(());
         };
         let grid = stats.time("grid", |stats| {
-            self.scatter(&region, options, control, stats)
+            self.scatter(&region, n_near as u64, options, control, stats)
         })?;
         stats.grid = Some(grid.resolution);
         let task = Task {
@@ -174,12 +176,13 @@ impl Cells {
     fn scatter(
         &mut self,
         region: &Bounds,
+        n_near: u64,
         options: &Options,
         control: &Control<'_>,
         stats: &mut Statistics,
     ) -> Result<Grid, Error> {
         let n = self.reaching.kept.len() as u64;
-        let mut grid = Grid::new(region, n, options.lambda);
+        let mut grid = Grid::new(region, n_near, options.lambda);
         let mut most_entries = n.saturating_mul(MOST_ENTRIES_EACH).min(u64::from(u32::MAX));
         let mut most_cells = u64::MAX;
         if let Some(budget) = options.memory_budget {

@@ -5,20 +5,26 @@
 //! primitive's corners once. Invariant: no pair that intersects has a primitive that is not kept.
 
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::FineRange;
 
 use super::bounds;
+use super::cull::Cull;
 use super::dispatch::NodePair;
 use super::simd::{Isa, Simd, dispatch};
 use super::top_level::TopLevel;
 use super::workers::Workers;
-use super::world::World;
+use super::world::{BodyRef, World};
 
 /// Primitives whose boxes a task finds.
-const BOUNDS_TASK: usize = 4096;
+const PRIMITIVES: u32 = 4096;
+/// Vertices that a task looks at.
+const VERTICES: u32 = 1 << 15;
+/// Primitives below which waking a thread costs more than it saves.
+const PARALLEL_FROM: u64 = 50_000;
 
 /// A primitive that reaches the region.
 #[derive(Debug, Clone, Copy)]
@@ -33,12 +39,54 @@ pub struct Kept {
     pub primitive: u32,
 }
 
-/// A task of the bounds stage: a run of one participant's primitives.
+impl Kept {
+    /// A primitive, if its box meets `reach`.
+    #[inline(always)]
+    fn reaching(
+        body: &BodyRef<'_>,
+        participant: u32,
+        primitive: u32,
+        reach: &Bounds,
+    ) -> Option<Kept> {
+        let bounds = bounds::of_vertices(body.positions, body.corners(primitive));
+        bounds.overlaps(reach).then_some(Kept {
+            bounds,
+            range: FineRange {
+                lo: [0; 3],
+                hi: [0; 3],
+            },
+            participant,
+            primitive,
+        })
+    }
+}
+
+/// As many of the workers as are worth waking.
+fn few<'a, S>(world: World<'_>, scratches: &'a mut [S]) -> &'a mut [S] {
+    let n = match world.frame.n_primitives() < PARALLEL_FROM {
+        true => 1,
+        false => scratches.len(),
+    };
+    &mut scratches[..n]
+}
+
+/// A task of the bounds stage: a run of one participant's primitives, or of its vertices.
 #[derive(Debug, Clone, Copy)]
-struct BoundsTask {
-    participant: u32,
-    first: u32,
-    end: u32,
+pub(crate) struct Run {
+    pub participant: u32,
+    pub first: u32,
+    pub end: u32,
+}
+
+impl Run {
+    /// Runs of `n` things of a participant.
+    fn cut(participant: usize, n: u32, length: u32) -> impl Iterator<Item = Run> {
+        (0..n).step_by(length as usize).map(move |first| Run {
+            participant: participant as u32,
+            first,
+            end: n.min(first.saturating_add(length)),
+        })
+    }
 }
 
 /// The kept primitives of a frame, and the memory for them.
@@ -49,8 +97,13 @@ pub struct KeptList {
     reach: Vec<Bounds>,
     top: TopLevel,
     stack: Vec<NodePair>,
-    tasks: Vec<BoundsTask>,
+    /// Runs of primitives.
+    runs: Vec<Run>,
+    /// What each of them adds.
     parts: Vec<Mutex<Vec<Kept>>>,
+    /// Runs of vertices, with their boxes.
+    vertices: Vec<(Run, Mutex<Bounds>)>,
+    cull: Cull,
     /// The primitives.
     pub kept: Vec<Kept>,
 }
@@ -64,8 +117,10 @@ impl KeptList {
             reach: Vec::new(),
             top: TopLevel::default(),
             stack: Vec::new(),
-            tasks: Vec::new(),
+            runs: Vec::new(),
             parts: Vec::new(),
+            vertices: Vec::new(),
+            cull: Cull::default(),
             kept: Vec::new(),
         }
     }
@@ -80,68 +135,125 @@ impl KeptList {
         size_of::<Kept>() * (self.kept.capacity() + parts)
             + size_of::<Bounds>() * (self.bodies.capacity() + self.reach.capacity())
             + self.top.bytes()
+            + size_of::<(Run, Mutex<Bounds>)>() * self.vertices.capacity()
+            + self.cull.bytes()
     }
 
     /// Boxes of bodies, where they reach each other, and the primitives that do. `scratches` are one
     /// a worker and only counted.
     pub fn find<S: Send>(&mut self, world: World<'_>, workers: &Workers, scratches: &mut [S]) {
-        let frame = world.frame;
-        self.tasks.clear();
-        for (ix, participant) in frame.participants.iter().enumerate() {
-            let n = participant.n_primitives;
-            self.tasks
-                .extend((0..n).step_by(BOUNDS_TASK).map(|first| BoundsTask {
-                    participant: ix as u32,
-                    first,
-                    end: n.min(first.saturating_add(BOUNDS_TASK as u32)),
-                }));
-        }
-        self.parts
-            .resize_with(self.tasks.len().max(self.parts.len()), Mutex::default);
-        self.find_bodies(world);
-        self.find_reach(world);
-        let (tasks, parts, reach) = (&self.tasks, &self.parts, &self.reach);
-        workers.for_each(scratches, tasks.len(), |_, task_ix| {
-            let task = tasks[task_ix];
-            let reach = &reach[task.participant as usize];
-            let body = world.body(task.participant);
-            let mut part = parts[task_ix].lock().expect("no task panics");
+        let scratches = few(world, scratches);
+        self.begin(world, workers, scratches);
+        let (runs, parts, reach) = (&self.runs, &self.parts, &self.reach);
+        workers.for_each(scratches, runs.len(), |_, ix| {
+            let run = runs[ix];
+            let body = world.body(run.participant);
+            let reach = &reach[run.participant as usize];
+            let mut part = parts[ix].lock().expect("no task panics");
             part.clear();
-            for primitive in task.first..task.end {
-                let bounds = bounds::of_vertices(body.positions, body.corners(primitive));
-                if bounds.overlaps(reach) {
-                    part.push(Kept {
-                        bounds,
-                        range: FineRange {
-                            lo: [0; 3],
-                            hi: [0; 3],
-                        },
-                        participant: task.participant,
-                        primitive,
-                    });
-                }
+            for primitive in run.first..run.end {
+                part.extend(Kept::reaching(&body, run.participant, primitive, reach));
             }
         });
+        self.gather();
+    }
+
+    /// As [`find`](KeptList::find), but for primitives that no other body comes near: they are left
+    /// out. Returns how many were near where bodies meet.
+    pub(crate) fn find_sharing<S: Send>(
+        &mut self,
+        world: World<'_>,
+        workers: &Workers,
+        scratches: &mut [S],
+    ) -> usize {
+        let scratches = few(world, scratches);
+        if !world.frame.between() {
+            self.find(world, workers, scratches);
+            return self.kept.len();
+        }
+        self.begin(world, workers, scratches);
         self.kept.clear();
-        let n_kept = self.parts[..self.tasks.len()]
+        let Some(region) = self.joined_reach() else {
+            return 0;
+        };
+        self.cull.begin(world, &region, self.runs.len());
+        let isa = self.isa;
+        let codes = self.cull.codes();
+        let (cull, vertices) = (&self.cull, &self.vertices);
+        workers.for_each(scratches, vertices.len(), |_, ix| {
+            let run = vertices[ix].0;
+            let range = run.first as usize..run.end as usize;
+            let positions = world.body(run.participant).positions;
+            // SAFETY: runs do not overlap, and codes are read only when all are written.
+            unsafe { codes.put(isa, positions, range, cull.first_code(run.participant)) };
+        });
+        let (runs, parts, reach) = (&self.runs, &self.parts, &self.reach);
+        workers.for_each(scratches, runs.len(), |_, ix| {
+            let run = runs[ix];
+            cull.mark(world, run, ix, &reach[run.participant as usize]);
+        });
+        let n_near = AtomicUsize::new(0);
+        workers.for_each(scratches, runs.len(), |_, ix| {
+            let run = runs[ix];
+            let body = world.body(run.participant);
+            let reach = &reach[run.participant as usize];
+            let mut part = parts[ix].lock().expect("no task panics");
+            part.clear();
+            let n = cull.for_live(ix, |primitive| {
+                part.extend(Kept::reaching(&body, run.participant, primitive, reach));
+            });
+            n_near.fetch_add(n, Ordering::Relaxed);
+        });
+        self.gather();
+        n_near.into_inner()
+    }
+
+    /// Tasks, the boxes of bodies and where they reach each other.
+    fn begin<S: Send>(&mut self, world: World<'_>, workers: &Workers, scratches: &mut [S]) {
+        self.runs.clear();
+        self.vertices.clear();
+        for (ix, participant) in world.frame.participants.iter().enumerate() {
+            let n_vertices = match participant.n_primitives {
+                0 => 0,
+                _ => world.body(ix as u32).positions.len() as u32,
+            };
+            self.runs
+                .extend(Run::cut(ix, participant.n_primitives, PRIMITIVES));
+            self.vertices.extend(
+                Run::cut(ix, n_vertices, VERTICES).map(|run| (run, Mutex::new(Bounds::EMPTY))),
+            );
+        }
+        self.parts
+            .resize_with(self.runs.len().max(self.parts.len()), Mutex::default);
+        let vertices = &self.vertices;
+        workers.for_each(scratches, vertices.len(), |_, ix| {
+            let (run, bounds) = &vertices[ix];
+            let positions = world.body(run.participant).positions;
+            let range = run.first as usize..run.end as usize;
+            *bounds.lock().expect("no task panics") = bounds::of_run(positions, range);
+        });
+        self.bodies.clear();
+        self.bodies
+            .resize(world.frame.participants.len(), Bounds::EMPTY);
+        for (run, bounds) in &mut self.vertices {
+            let bounds = bounds.get_mut().expect("no task panics");
+            self.bodies[run.participant as usize].join(bounds);
+        }
+        self.find_reach(world);
+    }
+
+    /// Puts the parts behind each other.
+    fn gather(&mut self) {
+        let parts = &mut self.parts[..self.runs.len()];
+        self.kept.clear();
+        let n_kept = parts
             .iter_mut()
             .map(|part| part.get_mut().expect("no task panics").len())
             .sum();
         self.kept.reserve_exact(n_kept);
-        for part in &mut self.parts[..self.tasks.len()] {
+        for part in parts {
             self.kept
                 .extend_from_slice(part.get_mut().expect("no task panics"));
-        }
-    }
-
-    fn find_bodies(&mut self, world: World<'_>) {
-        self.bodies.clear();
-        for ix in 0..world.frame.participants.len() {
-            let body = world.body(ix as u32);
-            self.bodies.push(match body.participant.n_primitives {
-                0 => Bounds::EMPTY,
-                _ => bounds::of_all(body.positions),
-            });
         }
     }
 
@@ -183,11 +295,15 @@ impl KeptList {
 
     /// The box of all reaches; none when nothing reaches anything.
     pub fn region(&self) -> Option<Bounds> {
+        self.joined_reach().filter(|_| !self.kept.is_empty())
+    }
+
+    fn joined_reach(&self) -> Option<Bounds> {
         let mut region = Bounds::EMPTY;
         for reach in &self.reach {
             region.join(reach);
         }
-        (!self.kept.is_empty()).then_some(region)
+        (region != Bounds::EMPTY).then_some(region)
     }
 }
 

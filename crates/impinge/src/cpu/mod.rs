@@ -3,6 +3,7 @@
 pub(crate) mod bounds;
 pub(crate) mod cells;
 pub(crate) mod clusters;
+pub(crate) mod cull;
 pub(crate) mod dispatch;
 pub(crate) mod kept;
 pub(crate) mod narrow;
