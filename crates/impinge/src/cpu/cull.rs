@@ -2,16 +2,18 @@
 //!
 //! ```text
 //! quantise   each vertex once: the cell of the map that it lies in, a byte an axis
-//! mark       each primitive: the range of its vertices' cells; its body's bit in all of them
-//! look up    each primitive again: whether some cell of its range has the bits of two bodies
+//! mark       each primitive: the range of its vertices' cells, in the map of its body; a row of
+//!            cells along x is a number of 64 bits
+//! compare    cells that two bodies mark
+//! look up    each primitive again: whether its range has such a cell
 //! ```
 //!
-//! In: positions and where each body may be met. Out: whether a primitive may have a partner. Cost: three
-//! bytes a vertex, twelve a primitive near other bodies. Invariant: the map from coordinates to
+//! In: positions and where each body may be met. Out: whether a primitive may have a partner. Cost: four
+//! bytes a vertex, twelve a primitive near other bodies. Invariant: the function from coordinates to
 //! cells is monotone under any rounding, so that a point of two primitives lies in a cell that both mark.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 use crate::grouping::bounds::{Bounds, greater, lesser};
 use crate::grouping::grid::Grid;
@@ -21,14 +23,17 @@ use super::kept::Run;
 use super::simd::{Isa, Simd, dispatch};
 use super::world::World;
 
-/// Cells along an axis at most: two more hold what lies outside, and a byte numbers them all.
-const MOST_ALONG: u32 = 253;
+/// Cells along each axis at most: two more hold what lies outside. A row along x has 64, and a byte
+/// numbers the others.
+const MOST_ALONG: [u32; 3] = [62, 253, 253];
 /// Primitives of all bodies a cell of the map.
 const PRIMITIVES_A_CELL: u64 = 4;
-/// Cells of the map that one primitive marks at most; a larger one counts as being everywhere.
-const MOST_MARKED: u32 = 512;
-/// The bit of all participants from the eighth on. Two of them are not told apart: it stands for several.
-const SEVERAL: u8 = 1 << 7;
+/// Rows of the map that one primitive marks at most; a larger one counts as being everywhere.
+const MOST_MARKED: u32 = 256;
+/// Maps at most. All participants from the eighth on share the last one, where they are not told apart.
+const MOST_MAPS: usize = 8;
+/// Primitives looked at before those among them that are near are marked.
+const TOGETHER: usize = 512;
 
 /// A primitive near where its body is met, and the cells of its vertices along x, y, z, a byte each.
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +41,16 @@ struct Near {
     primitive: u32,
     low: u32,
     high: u32,
+}
+
+impl Near {
+    /// How many rows of the map it touches.
+    #[inline(always)]
+    fn n_rows(&self) -> u32 {
+        let ([_, y, z, _], [_, y_end, z_end, _]) =
+            (self.low.to_le_bytes(), self.high.to_le_bytes());
+        (u32::from(y_end - y) + 1) * (u32::from(z_end - z) + 1)
+    }
 }
 
 /// The map and the memory for it.
@@ -46,16 +61,18 @@ pub(crate) struct Cull {
     scale: [f32; 3],
     /// Cells along each axis, those outside included.
     along: [u32; 3],
-    /// Three bytes a vertex, body after body.
-    codes: Vec<u8>,
+    /// The cell of each vertex, a byte an axis, body after body.
+    codes: Vec<u32>,
     /// Where each participant's codes start.
     firsts: Vec<usize>,
-    /// For each cell the bits of the bodies that are there.
-    marks: Vec<AtomicU8>,
-    /// Bits of bodies with primitives too large to be marked.
-    everywhere: AtomicU8,
-    /// Bits that pair with themselves.
-    alone: u8,
+    /// Each body's map, one after the other: its rows along x, bit k for the cell k.
+    maps: Vec<AtomicU64>,
+    /// Cells where primitives of different bodies, or of one that is asked for itself, are.
+    live: Vec<u64>,
+    /// Maps of bodies with primitives too large to be marked.
+    everywhere: AtomicU32,
+    /// Maps whose bodies pair with themselves.
+    alone: u32,
     near: Vec<Mutex<Vec<Near>>>,
 }
 
@@ -65,7 +82,7 @@ impl Cull {
         let frame = world.frame;
         let wanted = frame.n_primitives() / PRIMITIVES_A_CELL;
         let along = Grid::new(region, wanted, 1.0).resolution;
-        let along = along.map(|along| along.min(MOST_ALONG));
+        let along: [u32; 3] = std::array::from_fn(|axis| along[axis].min(MOST_ALONG[axis]));
         for axis in 0..3 {
             // A little less than all cells, so that the region's end is still within the last one.
             let scale = (along[axis] as f32 - 0.01) / (region.max[axis] - region.min[axis]);
@@ -75,27 +92,31 @@ impl Cull {
         self.origin = region.min;
         self.along = along.map(|along| along + 2);
         self.firsts.clear();
-        self.alone = SEVERAL;
+        self.alone = 1 << (MOST_MAPS - 1);
         let mut n_codes = 0;
         for (ix, participant) in frame.participants.iter().enumerate() {
             self.firsts.push(n_codes);
-            n_codes += 3 * world.body(ix as u32).positions.len();
-            self.alone |= if participant.within { bit(ix) } else { 0 };
+            n_codes += world.body(ix as u32).positions.len();
+            self.alone |= u32::from(participant.within) << map_of(ix);
         }
-        // Codes are read four bytes at a time.
-        self.codes.resize(n_codes + 1, 0);
-        self.everywhere = AtomicU8::new(0);
-        self.marks.clear();
-        let n_cells = self.along.iter().map(|&along| along as usize).product();
-        self.marks.resize_with(n_cells, || AtomicU8::new(0));
+        self.codes.resize(n_codes, 0);
+        *self.everywhere.get_mut() = 0;
+        self.maps.clear();
+        let n_maps = frame.participants.len().min(MOST_MAPS);
+        self.maps
+            .resize_with(n_maps * self.n_rows(), AtomicU64::default);
         self.near
             .resize_with(n_runs.max(self.near.len()), Mutex::default);
     }
 
+    fn n_rows(&self) -> usize {
+        self.along[1] as usize * self.along[2] as usize
+    }
+
     pub fn bytes(&self) -> usize {
         let near = |part: &Mutex<Vec<Near>>| part.lock().map_or(0, |part| part.capacity());
-        self.codes.capacity()
-            + self.marks.capacity()
+        size_of::<u32>() * self.codes.capacity()
+            + size_of::<u64>() * (self.maps.capacity() + self.live.capacity())
             + size_of::<usize>() * self.firsts.capacity()
             + size_of::<Near>() * self.near.iter().map(near).sum::<usize>()
     }
@@ -104,6 +125,12 @@ impl Cull {
     pub fn codes(&mut self) -> Codes {
         Codes {
             first: self.codes.as_mut_ptr(),
+            function: self.function(),
+        }
+    }
+
+    fn function(&self) -> Function {
+        Function {
             origin: self.origin,
             scale: self.scale,
             limit: self.along.map(|along| (along - 1) as f32),
@@ -121,115 +148,130 @@ impl Cull {
         near.clear();
         let body = world.body(run.participant);
         let codes = &self.codes[self.first_code(run.participant)..];
-        let reach = (self.code(&reach.min), self.code(&reach.max));
-        let own = bit(run.participant as usize);
+        let function = self.function();
+        let reach = (function.code(&reach.min), function.code(&reach.max));
         match body.elements {
             crate::Elements::Triangles(faces) => {
-                self.mark_all(codes, faces, run, reach, own, &mut near);
+                self.mark_all(codes, faces, run, reach, &mut near);
             }
             crate::Elements::Tetrahedra(tets) => {
-                self.mark_all(codes, tets, run, reach, own, &mut near);
+                self.mark_all(codes, tets, run, reach, &mut near);
             }
         }
     }
 
     fn mark_all<const N: usize>(
         &self,
-        codes: &[u8],
+        codes: &[u32],
         corners: &[[u32; N]],
         run: Run,
         reach: (u32, u32),
-        own: u8,
         near: &mut Vec<Near>,
     ) {
+        let map_ix = map_of(run.participant as usize);
+        let n_rows = self.n_rows();
+        let map = &self.maps[map_ix * n_rows..][..n_rows];
+        let mut together = [Near {
+            primitive: 0,
+            low: 0,
+            high: 0,
+        }; TOGETHER];
         let corners = &corners[run.first as usize..run.end as usize];
-        for (primitive, corners) in (run.first..).zip(corners) {
-            let first = code(codes, corners[0]);
-            let (mut low, mut high) = (first, first);
-            for &corner in &corners[1..] {
-                let vertex = code(codes, corner);
-                low = lesser_bytes(low, vertex);
-                high = greater_bytes(high, vertex);
-            }
-            // Partners are met within reach only.
-            low = greater_bytes(low, reach.0);
-            high = lesser_bytes(high, reach.1);
-            if greater_bytes(low, high) & 0xff_ffff != high & 0xff_ffff {
-                continue;
-            }
-            near.push(Near {
-                primitive,
-                low,
-                high,
-            });
-            if n_cells(low, high) > MOST_MARKED {
-                self.everywhere.fetch_or(own, Ordering::Relaxed);
-                continue;
-            }
-            self.for_cells(low, high, |cell| {
-                if cell.load(Ordering::Relaxed) & own == 0 {
-                    cell.fetch_or(own, Ordering::Relaxed);
+        for (first, corners) in (run.first..)
+            .step_by(TOGETHER)
+            .zip(corners.chunks(TOGETHER))
+        {
+            // No branch: whether a primitive is near cannot be foreseen.
+            let mut n = 0;
+            for (primitive, corners) in (first..).zip(corners) {
+                let vertex = codes[corners[0] as usize];
+                let (mut low, mut high) = (vertex, vertex);
+                for &corner in &corners[1..] {
+                    let vertex = codes[corner as usize];
+                    low = lesser_bytes(low, vertex);
+                    high = greater_bytes(high, vertex);
                 }
-                true
-            });
+                // Partners are met within reach only.
+                low = greater_bytes(low, reach.0);
+                high = lesser_bytes(high, reach.1);
+                together[n] = Near {
+                    primitive,
+                    low,
+                    high,
+                };
+                n += usize::from(greater_bytes(low, high) == high);
+            }
+            near.extend_from_slice(&together[..n]);
+            for near in &together[..n] {
+                if near.n_rows() > MOST_MARKED {
+                    self.everywhere.fetch_or(1 << map_ix, Ordering::Relaxed);
+                    continue;
+                }
+                self.for_rows(near, |row, cells| {
+                    let row = &map[row];
+                    if row.load(Ordering::Relaxed) & cells != cells {
+                        row.fetch_or(cells, Ordering::Relaxed);
+                    }
+                });
+            }
+        }
+    }
+
+    /// Finds the cells in which primitives may have partners, when all are marked.
+    pub fn compare(&mut self) {
+        let n_rows = self.n_rows();
+        self.live.clear();
+        self.live.resize(n_rows, 0);
+        let n_maps = self.maps.len() / n_rows;
+        for row in 0..n_rows {
+            let (mut once, mut live) = (0u64, 0u64);
+            for map in 0..n_maps {
+                let everywhere = *self.everywhere.get_mut() >> map & 1 == 1;
+                let marks = match everywhere {
+                    true => u64::MAX,
+                    false => *self.maps[map * n_rows + row].get_mut(),
+                };
+                let alone = self.alone >> map & 1 == 1;
+                live |= if alone { marks } else { once & marks };
+                once |= marks;
+            }
+            self.live[row] = live;
         }
     }
 
     /// Calls back for the primitives of a run that may have partners, in their order; how many were near.
     pub fn for_live(&self, run_ix: usize, mut call: impl FnMut(u32)) -> usize {
         let near = self.near[run_ix].lock().expect("no task panics");
-        let everywhere = self.everywhere.load(Ordering::Relaxed);
         for near in &*near {
-            let mut live = n_cells(near.low, near.high) > MOST_MARKED;
-            if !live {
-                self.for_cells(near.low, near.high, |cell| {
-                    let bits = cell.load(Ordering::Relaxed) | everywhere;
-                    live |= bits & self.alone != 0 || bits & (bits - 1) != 0;
-                    !live
-                });
+            let mut live = u64::from(near.n_rows() > MOST_MARKED);
+            if live == 0 {
+                self.for_rows(near, |row, cells| live |= self.live[row] & cells);
             }
-            if live {
+            if live != 0 {
                 call(near.primitive);
             }
         }
         near.len()
     }
 
-    /// Calls back for the cells of a range until told to stop.
+    /// Calls back for the rows of a primitive's range, each with its cells of that row.
     #[inline(always)]
-    fn for_cells(&self, low: u32, high: u32, mut call: impl FnMut(&AtomicU8) -> bool) {
-        let ([x, y, z, _], [x_end, y_end, z_end, _]) = (low.to_le_bytes(), high.to_le_bytes());
-        let [n_x, n_y, _] = self.along.map(|along| along as usize);
+    fn for_rows(&self, near: &Near, mut call: impl FnMut(usize, u64)) {
+        let ([x, y, z, _], [x_end, y_end, z_end, _]) =
+            (near.low.to_le_bytes(), near.high.to_le_bytes());
+        let cells = (u64::MAX << x) & (u64::MAX >> (63 - x_end));
         for z in usize::from(z)..=usize::from(z_end) {
-            for y in usize::from(y)..=usize::from(y_end) {
-                let row = (z * n_y + y) * n_x;
-                for cell in &self.marks[row + usize::from(x)..=row + usize::from(x_end)] {
-                    if !call(cell) {
-                        return;
-                    }
-                }
+            let first = z * self.along[1] as usize;
+            for row in first + usize::from(y)..=first + usize::from(y_end) {
+                call(row, cells);
             }
         }
     }
-
-    fn code(&self, point: &[f32; 3]) -> u32 {
-        let mut bytes = [0u8; 4];
-        for axis in 0..3 {
-            let limit = (self.along[axis] - 1) as f32;
-            bytes[axis] = quantised(point[axis], self.origin[axis], self.scale[axis], limit);
-        }
-        u32::from_le_bytes(bytes)
-    }
 }
 
-fn bit(participant: usize) -> u8 {
-    1 << participant.min(7)
-}
-
-fn n_cells(low: u32, high: u32) -> u32 {
-    let ([x, y, z, _], [x_end, y_end, z_end, _]) = (low.to_le_bytes(), high.to_le_bytes());
-    let along = |low: u8, high: u8| u32::from(high - low) + 1;
-    along(x, x_end) * along(y, y_end) * along(z, z_end)
+/// The map of a participant.
+fn map_of(participant: usize) -> usize {
+    participant.min(MOST_MAPS - 1)
 }
 
 /// The cell along one axis: 0 before the region, `limit` past it.
@@ -240,12 +282,6 @@ fn quantised(x: f32, origin: f32, scale: f32, limit: f32) -> u8 {
     let cell = greater(lesser((x - origin) * scale + 1.0, limit), 0.0);
     // SAFETY: between 0 and `limit`, which is at most 254; NaN would have become `limit`.
     (unsafe { cell.to_int_unchecked::<i32>() }) as u8
-}
-
-#[inline(always)]
-fn code(codes: &[u8], vertex: u32) -> u32 {
-    let at = 3 * vertex as usize;
-    u32::from_le_bytes(*codes[at..].first_chunk().expect("padded"))
 }
 
 /// The lesser of each byte of two numbers.
@@ -282,13 +318,31 @@ fn greater_bytes(a: u32, b: u32) -> u32 {
     }
 }
 
-/// A pointer to the cells of the vertices, and the map from coordinates.
+/// From coordinates to cells of the map.
 #[derive(Clone, Copy)]
-pub(crate) struct Codes {
-    first: *mut u8,
+struct Function {
     origin: [f32; 3],
     scale: [f32; 3],
     limit: [f32; 3],
+}
+
+impl Function {
+    #[inline(always)]
+    fn code(&self, point: &[f32; 3]) -> u32 {
+        let mut bytes = [0u8; 4];
+        for axis in 0..3 {
+            let (origin, scale) = (self.origin[axis], self.scale[axis]);
+            bytes[axis] = quantised(point[axis], origin, scale, self.limit[axis]);
+        }
+        u32::from_le_bytes(bytes)
+    }
+}
+
+/// A pointer to the cells of the vertices, and the function that gives them.
+#[derive(Clone, Copy)]
+pub(crate) struct Codes {
+    first: *mut u32,
+    function: Function,
 }
 
 // SAFETY: a pointer does nothing by itself; `put` says what its callers owe.
@@ -313,24 +367,20 @@ impl Codes {
     ) {
         // SAFETY: said above.
         let into = unsafe {
-            std::slice::from_raw_parts_mut(self.first.add(first + 3 * range.start), 3 * range.len())
+            std::slice::from_raw_parts_mut(self.first.add(first + range.start), range.len())
         };
         match positions {
             Positions::F32(positions) => {
                 dispatch!(isa, quantise, (
                     positions: &[[f32; 3]] = &positions[range],
-                    map: Codes = self,
-                    into: &mut [u8] = into,
+                    function: Function = self.function,
+                    into: &mut [u32] = into,
                 ));
             }
             Positions::F64(positions) => {
-                for (point, code) in positions[range].iter().zip(into.as_chunks_mut::<3>().0) {
-                    for axis in 0..3 {
-                        // Rounding is monotone as well.
-                        let (origin, scale) = (self.origin[axis], self.scale[axis]);
-                        let x = point[axis] as f32;
-                        code[axis] = quantised(x, origin, scale, self.limit[axis]);
-                    }
+                for (point, code) in positions[range].iter().zip(into) {
+                    // Rounding is monotone as well.
+                    *code = self.function.code(&point.map(|x| x as f32));
                 }
             }
         }
@@ -338,21 +388,26 @@ impl Codes {
 }
 
 #[inline(always)]
-fn quantise<S: Simd>(_: S, positions: &[[f32; 3]], map: Codes, into: &mut [u8]) {
+fn quantise<S: Simd>(_: S, positions: &[[f32; 3]], function: Function, into: &mut [u32]) {
     let mut row = [[0.0f32; 3 * CHUNK]; 3];
     for k in 0..3 * CHUNK {
-        row[0][k] = map.origin[k % 3];
-        row[1][k] = map.scale[k % 3];
-        row[2][k] = map.limit[k % 3];
+        row[0][k] = function.origin[k % 3];
+        row[1][k] = function.scale[k % 3];
+        row[2][k] = function.limit[k % 3];
     }
-    let (chunks, rest) = positions.as_flattened().as_chunks::<{ 3 * CHUNK }>();
-    let (into_chunks, into_rest) = into.as_chunks_mut::<{ 3 * CHUNK }>();
+    let (chunks, rest) = positions.as_chunks::<CHUNK>();
+    let (into_chunks, into_rest) = into.as_chunks_mut::<CHUNK>();
     for (chunk, codes) in chunks.iter().zip(into_chunks) {
+        let chunk: &[f32; 3 * CHUNK] = chunk.as_flattened().first_chunk().expect("48 of 48");
+        let mut bytes = [0u8; 3 * CHUNK];
         for k in 0..3 * CHUNK {
-            codes[k] = quantised(chunk[k], row[0][k], row[1][k], row[2][k]);
+            bytes[k] = quantised(chunk[k], row[0][k], row[1][k], row[2][k]);
+        }
+        for k in 0..CHUNK {
+            codes[k] = u32::from_le_bytes([bytes[3 * k], bytes[3 * k + 1], bytes[3 * k + 2], 0]);
         }
     }
-    for (k, (&x, code)) in rest.iter().zip(into_rest).enumerate() {
-        *code = quantised(x, row[0][k], row[1][k], row[2][k]);
+    for (point, code) in rest.iter().zip(into_rest) {
+        *code = function.code(point);
     }
 }

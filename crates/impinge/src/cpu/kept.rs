@@ -192,6 +192,8 @@ impl KeptList {
             let run = runs[ix];
             cull.mark(world, run, ix, &reach[run.participant as usize]);
         });
+        self.cull.compare();
+        let cull = &self.cull;
         let n_near = AtomicUsize::new(0);
         workers.for_each(scratches, runs.len(), |_, ix| {
             let run = runs[ix];
