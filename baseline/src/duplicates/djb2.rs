@@ -7,7 +7,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use impinge::guest::{Candidate, Isa, Job, Kept, Rule, Settler, World};
+use impinge::guest::{Asked, Candidate, Isa, Job, Kept, Rule, Settler, World};
 use impinge::{Error, Statistics};
 
 use super::Possible;
@@ -103,15 +103,17 @@ pub(super) struct Insert<'a> {
 }
 
 impl Rule for Insert<'_> {
+    fn asked(&self) -> Asked {
+        self.possible.asked()
+    }
+
     #[inline(always)]
-    fn admits(&self, _: [u32; 3], a: &Kept, b: &Kept, _: &mut Vec<u64>) -> bool {
-        if self.possible.admits(a, b) {
-            let pair = u64::from(a.primitive) << 32 | u64::from(b.primitive);
-            let slot = &self.slots[djb2(a.primitive, b.primitive) as usize % self.slots.len()];
-            // Repetitions are many: most find what they would write.
-            if slot.load(Ordering::Relaxed) > pair {
-                slot.fetch_min(pair, Ordering::Relaxed);
-            }
+    fn admits(&self, a: &Kept, b: &Kept, _: &mut Vec<u64>) -> bool {
+        let pair = u64::from(a.primitive) << 32 | u64::from(b.primitive);
+        let slot = &self.slots[djb2(a.primitive, b.primitive) as usize % self.slots.len()];
+        // Repetitions are many: most find what they would write.
+        if slot.load(Ordering::Relaxed) > pair {
+            slot.fetch_min(pair, Ordering::Relaxed);
         }
         false
     }

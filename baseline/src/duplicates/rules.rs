@@ -1,14 +1,16 @@
 //! What becomes of a pair found in a cell, where impinge asks who owns it.
 
-use impinge::guest::{Frame, Kept, Rule, pair_key};
+use impinge::guest::{Asked, Frame, Kept, Rule, pair_key};
 
 use super::Possible;
 
 impl Possible {
-    /// Whether a pair that touches a common sub-cell goes on.
-    #[inline(always)]
-    pub(super) fn admits(self, a: &Kept, b: &Kept) -> bool {
-        self == Possible::Masks || a.bounds.overlaps(&b.bounds)
+    /// Which pairs that touch a common sub-cell go on, whichever cell they are found in.
+    pub(super) fn asked(self) -> Asked {
+        Asked {
+            boxes: self != Possible::Masks,
+            owned: false,
+        }
     }
 }
 
@@ -16,9 +18,13 @@ impl Possible {
 pub(super) struct Every(pub Possible);
 
 impl Rule for Every {
+    fn asked(&self) -> Asked {
+        self.0.asked()
+    }
+
     #[inline(always)]
-    fn admits(&self, _: [u32; 3], a: &Kept, b: &Kept, _: &mut Vec<u64>) -> bool {
-        self.0.admits(a, b)
+    fn admits(&self, _: &Kept, _: &Kept, _: &mut Vec<u64>) -> bool {
+        true
     }
 }
 
@@ -29,14 +35,15 @@ pub(super) struct Recorded<'a> {
 }
 
 impl Rule for Recorded<'_> {
+    fn asked(&self) -> Asked {
+        self.possible.asked()
+    }
+
     #[inline(always)]
-    fn admits(&self, _: [u32; 3], a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool {
-        if self.possible.admits(a, b) {
-            let global = |kept: &Kept| {
-                self.frame.participants[kept.participant as usize].first + kept.primitive
-            };
-            keys.push(pair_key(global(a), global(b)));
-        }
+    fn admits(&self, a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool {
+        let global =
+            |kept: &Kept| self.frame.participants[kept.participant as usize].first + kept.primitive;
+        keys.push(pair_key(global(a), global(b)));
         false
     }
 }

@@ -13,6 +13,7 @@ pub use crate::cpu::cells::{Cells, MOST_ENTRIES_EACH, Options, Owner, Rule, for_
 pub use crate::cpu::kept::{Kept, KeptList};
 pub use crate::cpu::narrow::{Candidate, Settler};
 pub use crate::cpu::simd::{Isa, LaneBounds, masks};
+pub use crate::cpu::subcells::Asked;
 pub use crate::cpu::workers::Workers;
 pub use crate::cpu::world::World;
 pub use crate::error::Error;

@@ -5,7 +5,7 @@
 //! grid        eq. (1) resolution, eq. (3) ranges; count, prefix sum, scatter into cell lists
 //! dispatch    cells with primitives of bodies that meet; lists cut into groups of at most 64;
 //!             Cartesian product of groups, eq. (4): work items
-//! pairing     4x4x4 masks, transposed to membership; partners by OR; owner rule; boxes
+//! pairing     4x4x4 sub-cells, axis by axis; owner rule; boxes
 //! narrow      filters, then exact arithmetic
 //! ```
 //!
@@ -19,9 +19,8 @@ use std::time::Instant;
 
 use crate::detector::InstructionSet;
 use crate::error::Error;
-use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
-use crate::grouping::grid::{FineRange, Grid, owns};
+use crate::grouping::grid::{FineRange, Grid};
 use crate::narrow::share_vertex;
 use crate::progress::Control;
 use crate::query::SharedVertex;
@@ -30,8 +29,9 @@ use crate::stats::Statistics;
 use super::Job;
 use super::kept::{Kept, KeptList};
 use super::narrow::{Candidate, Settler};
-use super::pairing::{Lanes, full};
+use super::pairing::Lanes;
 use super::simd::Isa;
+use super::subcells::{Asked, Groups, Lanes64};
 use super::workers::Workers;
 use super::world::World;
 
@@ -57,8 +57,11 @@ pub struct Options {
 /// The method is compiled once for each rule; [`Owner`] is that of every detector. Others are for studies
 /// of what it replaces.
 pub trait Rule: Sync {
-    /// Whether the pair is a candidate here. What the rule appends to `keys` ends up in the answer's.
-    fn admits(&self, cell: [u32; 3], a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool;
+    /// Which pairs the rule is asked about.
+    fn asked(&self) -> Asked;
+
+    /// Whether such a pair is a candidate here. What the rule appends to `keys` ends up in the answer's.
+    fn admits(&self, a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool;
 }
 
 /// Boxes overlap, and the cell owns the pair: each candidate comes once.
@@ -67,8 +70,16 @@ pub struct Owner;
 
 impl Rule for Owner {
     #[inline(always)]
-    fn admits(&self, cell: [u32; 3], a: &Kept, b: &Kept, _: &mut Vec<u64>) -> bool {
-        a.bounds.overlaps(&b.bounds) && owns(cell, &a.range, &b.range)
+    fn asked(&self) -> Asked {
+        Asked {
+            boxes: true,
+            owned: true,
+        }
+    }
+
+    #[inline(always)]
+    fn admits(&self, _: &Kept, _: &Kept, _: &mut Vec<u64>) -> bool {
+        true
     }
 }
 
@@ -189,8 +200,8 @@ impl Cells {
             // What is held by now, primitives' boxes above all, but for what is still to be sized.
             let sized_later = size_of::<u32>() * (self.starts.capacity() + self.entries.capacity())
                 + size_of::<WorkItem>() * self.items.capacity();
-            let fixed = self.bytes() - sized_later as u64 + slab_bytes(options) + 4;
-            let needed = fixed + 4 * n + 8;
+            let fixed = self.bytes() - sized_later as u64 + slab_bytes(options) + 8;
+            let needed = fixed + 4 * n + 12;
             if needed > budget {
                 return Err(Error::MemoryBudget {
                     what: "primitives' boxes, cell lists and a slab of work items",
@@ -217,29 +228,28 @@ impl Cells {
             stats.n_reruns += 1;
         }
         let n_cells = grid.n_cells() as usize;
+        // Two places further on than the cell's own: the sum moves them by one, and so does the scatter.
         self.starts.clear();
-        self.starts.reserve_exact(n_cells + 1);
-        self.starts.resize(n_cells + 1, 0);
+        self.starts.reserve_exact(n_cells + 2);
+        self.starts.resize(n_cells + 2, 0);
         for kept in &self.reaching.kept {
-            for_cells(&kept.range, |cell| self.starts[grid.index(cell) + 1] += 1);
+            for_cells(&kept.range, |cell| self.starts[grid.index(cell) + 2] += 1);
         }
-        for ix in 0..n_cells {
-            self.starts[ix + 1] += self.starts[ix];
+        let mut n_entries = 0;
+        for start in &mut self.starts {
+            n_entries += *start;
+            *start = n_entries;
         }
-        let n_entries = self.starts[n_cells] as usize;
         self.entries.clear();
-        self.entries.reserve_exact(n_entries);
-        self.entries.resize(n_entries, 0);
+        self.entries.reserve_exact(n_entries as usize);
+        self.entries.resize(n_entries as usize, 0);
         for (place, kept) in (0u32..).zip(&self.reaching.kept) {
-            // Each start moves to its list's end, which is the next list's start.
             for_cells(&kept.range, |cell| {
-                let next = &mut self.starts[grid.index(cell)];
+                let next = &mut self.starts[grid.index(cell) + 1];
                 self.entries[*next as usize] = place;
                 *next += 1;
             });
         }
-        self.starts.copy_within(0..n_cells, 1);
-        self.starts[0] = 0;
         Ok(grid)
     }
 
@@ -272,9 +282,13 @@ impl Cells {
             entries,
         };
         let n_cells = grid.n_cells() as usize;
-        let mut cell = [0u32; 3];
-        for ix in 0..n_cells {
-            let list = starts[ix] as usize..starts[ix + 1] as usize;
+        for (ix, ends) in starts.windows(2).take(n_cells).enumerate() {
+            // Most cells are empty.
+            if ends[1] < ends[0] + 2 {
+                continue;
+            }
+            let cell = grid.cell(ix);
+            let list = ends[0] as usize..ends[1] as usize;
             let before = stats.n_work_items + items.len() as u64;
             lists.product(list, options.group_size as usize, |a, b| {
                 if items.len() == most_items {
@@ -294,7 +308,6 @@ impl Cells {
                 Ok(())
             })?;
             stats.n_subdivided += u64::from(stats.n_work_items + items.len() as u64 > before);
-            cell = grid.next(cell);
         }
         let at = (n_cells as u64, n_cells as u64);
         paired_ms += pair(*isa, lists, items, scratches, task, at)?;
@@ -451,104 +464,58 @@ fn pair_items<R: Rule>(
     rule: &R,
     settler: &mut Settler,
 ) {
+    let mut lanes = Lanes64::default();
     for item in items {
-        pair_item(lists, item, rule, settler);
+        pair_item(isa, lists, item, rule, &mut lanes, settler);
         settler.settle_when_full(isa, lists.world);
     }
     settler.settle(isa, lists.world);
 }
 
 /// The second level of one work item.
-///
-/// ```text
-/// masks of B          bit s of row j: box j touches sub-cell s        (64 rows, a primitive each)
-/// membership of B     bit j of row s: the same, transposed            (64 rows, a sub-cell each)
-/// partners of i       OR of membership[s] over the sub-cells s of mask i
-/// ```
 #[inline(always)]
-fn pair_item<R: Rule>(lists: Lists<'_>, item: &WorkItem, rule: &R, settler: &mut Settler) {
+fn pair_item<R: Rule>(
+    isa: Isa,
+    lists: Lists<'_>,
+    item: &WorkItem,
+    rule: &R,
+    lanes: &mut Lanes64,
+    settler: &mut Settler,
+) {
     let (first_a, first_b) = (item.first_a as usize, item.first_b as usize);
-    let group_a = &lists.entries[first_a..first_a + usize::from(item.n_a)];
-    let group_b = &lists.entries[first_b..first_b + usize::from(item.n_b)];
-    let same_group = first_a == first_b;
+    let groups = Groups {
+        kept: lists.kept,
+        a: &lists.entries[first_a..first_a + usize::from(item.n_a)],
+        b: &lists.entries[first_b..first_b + usize::from(item.n_b)],
+        cell: item.cell,
+        same: first_a == first_b,
+    };
+    lanes.find(isa, groups, rule.asked());
     let kept = |entry: u32| &lists.kept[entry as usize];
-    let mut membership = [0u64; GROUP];
-    for (row, &entry) in membership.iter_mut().zip(group_b) {
-        *row = kept(entry).range.occupancy(item.cell);
-    }
-    transpose(&mut membership);
-    // Sub-cells that hold nothing of B are culled: they add no partner.
-    let occupied = (0..GROUP).fold(0u64, |all, s| all | u64::from(membership[s] != 0) << s);
-    for (i, &entry_a) in group_a.iter().enumerate() {
+    // A group's primitives are of one body.
+    let (a, b) = (kept(groups.a[0]).participant, kept(groups.b[0]).participant);
+    let shared = (a == b).then(|| lists.world.body(a));
+    for (&entry_a, &partners) in groups.a.iter().zip(&lanes.partners) {
         let a = kept(entry_a);
-        let mask = a.range.occupancy(item.cell) & occupied;
-        let mut partners = Lanes(mask).fold(0u64, |partners, s| partners | membership[s]);
-        if same_group {
-            partners &= full(group_a.len()) & (u64::MAX << i << 1);
-        }
         for j in Lanes(partners) {
-            let b = kept(group_b[j]);
-            if rule.admits(item.cell, a, b, &mut settler.keys) {
-                put(lists.world, a, b, settler);
+            let b = kept(groups.b[j]);
+            if !rule.admits(a, b, &mut settler.keys) {
+                continue;
             }
-        }
-    }
-}
-
-#[inline(always)]
-fn put(world: World<'_>, a: &Kept, b: &Kept, settler: &mut Settler) {
-    if a.participant == b.participant {
-        let body = world.body(a.participant);
-        if share_vertex(body.corners(a.primitive), body.corners(b.primitive)) {
-            if world.frame.shared_vertex == SharedVertex::Resolve {
-                settler.settle_shared(&body, a.primitive, b.primitive);
+            if let Some(body) = &shared
+                && share_vertex(body.corners(a.primitive), body.corners(b.primitive))
+            {
+                if lists.world.frame.shared_vertex == SharedVertex::Resolve {
+                    settler.settle_shared(body, a.primitive, b.primitive);
+                }
+                continue;
             }
-            return;
-        }
-    }
-    settler.push(Candidate {
-        a: a.participant,
-        b: b.participant,
-        place_a: a.primitive,
-        place_b: b.primitive,
-    });
-}
-
-/// Transposes a 64 x 64 bit matrix in place: six rounds that swap off-diagonal blocks of 32, 16, … 1
-/// (after Warren, Hacker's Delight, section 7-3).
-fn transpose(rows: &mut [u64; GROUP]) {
-    let mut width = 32;
-    let mut mask = 0x0000_0000_ffff_ffffu64;
-    while width > 0 {
-        let mut row = 0;
-        while row < GROUP {
-            let swapped = ((rows[row] >> width) ^ rows[row + width]) & mask;
-            rows[row] ^= swapped << width;
-            rows[row + width] ^= swapped;
-            row = (row + width + 1) & !width;
-        }
-        width /= 2;
-        mask ^= mask << width;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn transposing_moves_every_bit() {
-        let mut state = 1u64;
-        let rows: [u64; GROUP] = std::array::from_fn(|_| {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(99);
-            state
-        });
-        let mut transposed = rows;
-        transpose(&mut transposed);
-        for (i, row) in rows.iter().enumerate() {
-            for (j, column) in transposed.iter().enumerate() {
-                assert_eq!(row >> j & 1, column >> i & 1);
-            }
+            settler.push(Candidate {
+                a: a.participant,
+                b: b.participant,
+                place_a: a.primitive,
+                place_b: b.primitive,
+            });
         }
     }
 }

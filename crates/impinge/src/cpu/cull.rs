@@ -27,7 +27,7 @@ use super::world::World;
 /// numbers the others.
 const MOST_ALONG: [u32; 3] = [62, 253, 253];
 /// Primitives of all bodies a cell of the map.
-const PRIMITIVES_A_CELL: u64 = 4;
+const PRIMITIVES_A_CELL: u64 = 8;
 /// Rows of the map that one primitive marks at most; a larger one counts as being everywhere.
 const MOST_MARKED: u32 = 256;
 /// Maps at most. All participants from the eighth on share the last one, where they are not told apart.

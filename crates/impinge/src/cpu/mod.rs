@@ -10,6 +10,7 @@ pub(crate) mod narrow;
 pub(crate) mod pairing;
 pub(crate) mod simd;
 pub(crate) mod slabs;
+pub(crate) mod subcells;
 pub(crate) mod top_level;
 pub(crate) mod workers;
 pub(crate) mod world;

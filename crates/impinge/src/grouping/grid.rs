@@ -119,8 +119,9 @@ impl Grid {
     #[inline(always)]
     fn fine(&self, point: &[f32; 3]) -> [u16; 3] {
         std::array::from_fn(|axis| {
-            let fine = ((point[axis] - self.origin[axis]) * self.scale[axis]).floor();
-            // A cast from float saturates, and sends NaN (only where the scale is 0) to 0.
+            let fine = (point[axis] - self.origin[axis]) * self.scale[axis];
+            // A cast from float rounds towards 0, which is down; below 0 it saturates, and it sends
+            // NaN (only where the scale is 0) to 0.
             (fine as u32).min(4 * self.resolution[axis] - 1) as u16
         })
     }
@@ -132,18 +133,13 @@ impl Grid {
         ((cell[2] as usize * n_y as usize) + cell[1] as usize) * n_x as usize + cell[0] as usize
     }
 
-    /// The cell that follows in the order of [`index`](Grid::index).
+    /// The cell at a place of the linear array.
     #[inline(always)]
-    pub fn next(&self, cell: [u32; 3]) -> [u32; 3] {
+    pub fn cell(&self, index: usize) -> [u32; 3] {
         let [n_x, n_y, _] = self.resolution;
-        let [x, y, z] = cell;
-        if x + 1 < n_x {
-            [x + 1, y, z]
-        } else if y + 1 < n_y {
-            [0, y + 1, z]
-        } else {
-            [0, 0, z + 1]
-        }
+        // There are far fewer than 2^32 cells.
+        let index = index as u32;
+        [index % n_x, index / n_x % n_y, index / n_x / n_y]
     }
 }
 

@@ -1,0 +1,205 @@
+//! The second level: which primitives of two groups of one cell touch a common sub-cell.
+//!
+//! A box touches a product of ranges of the 4 x 4 x 4 sub-cells. Two products share a sub-cell exactly
+//! if their ranges overlap along x, along y and along z, so that the 64 x 64 occupancy bits of the
+//! paper, with their transposition, come down to 8 masks of lanes an axis:
+//!
+//! ```text
+//! begins[s]    lanes j whose range begins at sub-cell s or before      s = 0 … 3
+//! ends[s]      lanes j whose range ends at sub-cell s or after
+//! partners     of i: for all axes, begins[last of i] and ends[first of i]
+//! ```
+//!
+//! The owner rule is a mask as well: of all cells that two boxes share, the pair belongs to the one where
+//! along each axis one of the two begins.
+
+use crate::grouping::GROUP;
+
+use super::kept::Kept;
+use super::pairing::full;
+use super::simd::{Isa, LaneBounds, Simd, dispatch};
+
+/// Which pairs of primitives that share a sub-cell are asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Asked {
+    /// Only those whose boxes overlap.
+    pub boxes: bool,
+    /// Only those that the cell owns.
+    pub owned: bool,
+}
+
+/// Two groups of one cell: places in `kept`.
+#[derive(Clone, Copy)]
+pub(crate) struct Groups<'a> {
+    pub kept: &'a [Kept],
+    pub a: &'a [u32],
+    pub b: &'a [u32],
+    pub cell: [u32; 3],
+    /// Whether they are one and the same: each pair is then found once.
+    pub same: bool,
+}
+
+/// One group, and the partners found in it.
+pub(crate) struct Lanes64 {
+    boxes: LaneBounds,
+    /// For each primitive of the other group the lanes that it meets.
+    pub partners: [u64; GROUP],
+}
+
+impl Default for Lanes64 {
+    fn default() -> Self {
+        Lanes64 {
+            boxes: LaneBounds::EMPTY,
+            partners: [0; GROUP],
+        }
+    }
+}
+
+impl Lanes64 {
+    /// Finds the partners in b of each primitive of a.
+    pub fn find(&mut self, isa: Isa, groups: Groups<'_>, asked: Asked) {
+        dispatch!(isa, find, (
+            lanes: &mut Lanes64 = self,
+            groups: Groups<'_> = groups,
+            asked: Asked = asked,
+        ));
+    }
+}
+
+/// The first and the last sub-cell along an axis: 1 to 4, and the first is 0 for a range that begins in
+/// a cell before.
+#[inline(always)]
+fn along(kept: &Kept, cell: [u32; 3], axis: usize) -> (usize, usize) {
+    let before = 4 * cell[axis];
+    let first = (u32::from(kept.range.lo[axis]) + 1).saturating_sub(before);
+    let last = (u32::from(kept.range.hi[axis]) + 1 - before).min(4);
+    (first.min(4) as usize, last as usize & 7)
+}
+
+#[inline(always)]
+fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: Groups<'_>, asked: Asked) {
+    let Groups {
+        kept,
+        a,
+        b,
+        cell,
+        same,
+    } = groups;
+    let mut begins = [[0u64; 8]; 3];
+    let mut ends = [[0u64; 8]; 3];
+    for (lane, &entry) in b.iter().enumerate() {
+        let kept = &kept[entry as usize];
+        lanes.boxes.put(lane, &kept.bounds);
+        for axis in 0..3 {
+            let (first, last) = along(kept, cell, axis);
+            begins[axis][first] |= 1 << lane;
+            ends[axis][last] |= 1 << lane;
+        }
+    }
+    let all = full(b.len());
+    let mut owned = [0u64; 3];
+    for axis in 0..3 {
+        owned[axis] = all & !begins[axis][0];
+        for s in 1..5 {
+            begins[axis][s] |= begins[axis][s - 1];
+            ends[axis][4 - s] |= ends[axis][5 - s];
+        }
+    }
+    for (lane, &entry) in a.iter().enumerate() {
+        let kept = &kept[entry as usize];
+        let mut partners = if same {
+            all & (u64::MAX << lane << 1)
+        } else {
+            all
+        };
+        for axis in 0..3 {
+            let (first, last) = along(kept, cell, axis);
+            partners &= begins[axis][last] & ends[axis][first];
+            if asked.owned && first == 0 {
+                partners &= owned[axis];
+            }
+        }
+        if asked.boxes && partners != 0 {
+            partners = simd.overlaps_64(&lanes.boxes, &kept.bounds, partners);
+        }
+        lanes.partners[lane] = partners;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detector::InstructionSet;
+    use crate::grouping::bounds::Bounds;
+    use crate::grouping::grid::{Grid, owns};
+
+    #[test]
+    fn partners_are_those_of_the_occupancy_bits() {
+        let region = Bounds {
+            min: [0.0; 3],
+            max: [3.0; 3],
+        };
+        let grid = Grid::new(&region, 27, 1.0);
+        assert_eq!(grid.resolution, [3; 3]);
+        let mut state = 5u64;
+        let mut random = |n: u64| {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(99);
+            (state >> 33) % n
+        };
+        let kept: Vec<Kept> = (0..100)
+            .map(|primitive| {
+                let min: [f32; 3] = std::array::from_fn(|_| random(30) as f32 / 10.0);
+                let bounds = Bounds {
+                    min,
+                    max: min.map(|x| x + random(14) as f32 / 10.0),
+                };
+                Kept {
+                    bounds,
+                    range: grid.range(&bounds),
+                    participant: 0,
+                    primitive,
+                }
+            })
+            .collect();
+        let cell = [1, 1, 1];
+        let here: Vec<u32> = (0..100)
+            .filter(|&ix| kept[ix as usize].range.occupancy(cell) != 0)
+            .filter(|&ix| {
+                let (lo, hi) = kept[ix as usize].range.coarse();
+                (0..3).all(|axis| lo[axis] <= 1 && 1 <= hi[axis])
+            })
+            .collect();
+        assert!(here.len() > 30);
+        let mut seen = 0;
+        for (a, b, same) in [
+            (&here[..15], &here[15..], false),
+            (&here[..30], &here[..30], true),
+        ] {
+            let groups = Groups {
+                kept: &kept,
+                a,
+                b,
+                cell,
+                same,
+            };
+            for (boxes, owned) in [(false, false), (true, false), (false, true), (true, true)] {
+                for isa in [Isa::Portable, Isa::detect(InstructionSet::Avx512)] {
+                    let mut lanes = Lanes64::default();
+                    lanes.find(isa, groups, Asked { boxes, owned });
+                    for (i, &entry_a) in a.iter().enumerate() {
+                        for (j, &entry_b) in b.iter().enumerate() {
+                            let (a, b) = (&kept[entry_a as usize], &kept[entry_b as usize]);
+                            let expected = a.range.occupancy(cell) & b.range.occupancy(cell) != 0
+                                && (!boxes || a.bounds.overlaps(&b.bounds))
+                                && (!owned || owns(cell, &a.range, &b.range))
+                                && (!same || j > i);
+                            assert_eq!(lanes.partners[i] >> j & 1 == 1, expected);
+                            seen += u32::from(expected);
+                        }
+                    }
+                }
+            }
+        }
+        assert!(seen > 100);
+    }
+}
