@@ -10,6 +10,7 @@ impl Possible {
         Asked {
             boxes: self != Possible::Masks,
             owned: false,
+            adjacent: true,
         }
     }
 }

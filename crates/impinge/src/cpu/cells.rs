@@ -21,7 +21,6 @@ use crate::detector::InstructionSet;
 use crate::error::Error;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::{FineRange, Grid};
-use crate::narrow::share_vertex;
 use crate::progress::Control;
 use crate::query::SharedVertex;
 use crate::stats::Statistics;
@@ -74,6 +73,7 @@ impl Rule for Owner {
         Asked {
             boxes: true,
             owned: true,
+            adjacent: false,
         }
     }
 
@@ -227,13 +227,13 @@ impl Cells {
             grid = coarser;
             stats.n_reruns += 1;
         }
-        let n_cells = grid.n_cells() as usize;
         // Two places further on than the cell's own: the sum moves them by one, and so does the scatter.
+        let n_starts = grid.n_cells() as usize + 2;
         self.starts.clear();
-        self.starts.reserve_exact(n_cells + 2);
-        self.starts.resize(n_cells + 2, 0);
+        self.starts.reserve_exact(n_starts);
+        self.starts.resize(n_starts, 0);
         for kept in &self.reaching.kept {
-            for_cells(&kept.range, |cell| self.starts[grid.index(cell) + 2] += 1);
+            for_places(&grid, &kept.range, |cell| self.starts[cell + 2] += 1);
         }
         let mut n_entries = 0;
         for start in &mut self.starts {
@@ -244,8 +244,8 @@ impl Cells {
         self.entries.reserve_exact(n_entries as usize);
         self.entries.resize(n_entries as usize, 0);
         for (place, kept) in (0u32..).zip(&self.reaching.kept) {
-            for_cells(&kept.range, |cell| {
-                let next = &mut self.starts[grid.index(cell) + 1];
+            for_places(&grid, &kept.range, |cell| {
+                let next = &mut self.starts[cell + 1];
                 self.entries[*next as usize] = place;
                 *next += 1;
             });
@@ -366,6 +366,20 @@ pub fn for_cells(range: &FineRange, mut call: impl FnMut([u32; 3])) {
     }
 }
 
+/// As [`for_cells`], with the cells' places in the linear array.
+#[inline(always)]
+fn for_places(grid: &Grid, range: &FineRange, mut call: impl FnMut(usize)) {
+    let (lo, hi) = range.coarse();
+    for z in lo[2]..=hi[2] {
+        for y in lo[1]..=hi[1] {
+            let first = grid.index([lo[0], y, z]);
+            for cell in first..first + (hi[0] - lo[0]) as usize + 1 {
+                call(cell);
+            }
+        }
+    }
+}
+
 /// The cell lists and what they name.
 #[derive(Clone, Copy)]
 struct Lists<'a> {
@@ -414,6 +428,9 @@ impl Lists<'_> {
     fn run(&self, start: usize, end: usize) -> (usize, std::ops::Range<usize>) {
         let owner = |entry: u32| self.kept[entry as usize].participant;
         let participant = owner(self.entries[start]);
+        if owner(self.entries[end - 1]) == participant {
+            return (participant as usize, start..end);
+        }
         let len = self.entries[start..end].partition_point(|&entry| owner(entry) == participant);
         (participant as usize, start..start + len)
     }
@@ -483,39 +500,44 @@ fn pair_item<R: Rule>(
     settler: &mut Settler,
 ) {
     let (first_a, first_b) = (item.first_a as usize, item.first_b as usize);
+    let kept = |entry: u32| &lists.kept[entry as usize];
+    let group_a = &lists.entries[first_a..first_a + usize::from(item.n_a)];
+    let group_b = &lists.entries[first_b..first_b + usize::from(item.n_b)];
+    // A group's primitives are of one body.
+    let owner = kept(group_a[0]).participant;
+    let one_body = owner == kept(group_b[0]).participant;
     let groups = Groups {
         kept: lists.kept,
-        a: &lists.entries[first_a..first_a + usize::from(item.n_a)],
-        b: &lists.entries[first_b..first_b + usize::from(item.n_b)],
+        a: group_a,
+        b: group_b,
         cell: item.cell,
         same: first_a == first_b,
+        body: one_body.then(|| lists.world.body(owner)),
     };
-    lanes.find(isa, groups, rule.asked());
-    let kept = |entry: u32| &lists.kept[entry as usize];
-    // A group's primitives are of one body.
-    let (a, b) = (kept(groups.a[0]).participant, kept(groups.b[0]).participant);
-    let shared = (a == b).then(|| lists.world.body(a));
-    for (&entry_a, &partners) in groups.a.iter().zip(&lanes.partners) {
+    let asked = rule.asked();
+    lanes.find(isa, groups, asked);
+    let resolve = lists.world.frame.shared_vertex == SharedVertex::Resolve;
+    for (i, &entry_a) in group_a.iter().enumerate() {
         let a = kept(entry_a);
-        for j in Lanes(partners) {
-            let b = kept(groups.b[j]);
-            if !rule.admits(a, b, &mut settler.keys) {
-                continue;
+        for j in Lanes(lanes.partners[i] & !lanes.adjacent[i]) {
+            let b = kept(group_b[j]);
+            if rule.admits(a, b, &mut settler.keys) {
+                settler.push(Candidate {
+                    a: a.participant,
+                    b: b.participant,
+                    place_a: a.primitive,
+                    place_b: b.primitive,
+                });
             }
-            if let Some(body) = &shared
-                && share_vertex(body.corners(a.primitive), body.corners(b.primitive))
-            {
-                if lists.world.frame.shared_vertex == SharedVertex::Resolve {
-                    settler.settle_shared(body, a.primitive, b.primitive);
-                }
-                continue;
+        }
+        let Some(body) = groups.body.filter(|_| resolve || asked.adjacent) else {
+            continue;
+        };
+        for j in Lanes(lanes.adjacent[i]) {
+            let b = kept(group_b[j]);
+            if rule.admits(a, b, &mut settler.keys) && resolve {
+                settler.settle_shared(&body, a.primitive, b.primitive);
             }
-            settler.push(Candidate {
-                a: a.participant,
-                b: b.participant,
-                place_a: a.primitive,
-                place_b: b.primitive,
-            });
         }
     }
 }

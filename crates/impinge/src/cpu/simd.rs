@@ -56,6 +56,11 @@ impl LaneBounds {
     }
 }
 
+/// A number for each primitive of a group.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub(crate) struct Lanes32(pub [u32; GROUP]);
+
 /// An instruction set: the box tests that kernels are made of.
 pub(crate) trait Simd: Copy {
     /// The f64 of the narrow stage's filters.
@@ -66,6 +71,9 @@ pub(crate) trait Simd: Copy {
 
     /// Bit `k`: lane `k` overlaps `query`; only lanes of `among` are looked at.
     fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64;
+
+    /// Bit `k`: lane `k` equals `query`; only lanes of `among` are looked at.
+    fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64;
 
     /// Eight vertices as rows of x, y and z in double precision.
     ///
@@ -134,6 +142,17 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
+    fn equals_64(self, lanes: &Lanes32, query: u32, mut among: u64) -> u64 {
+        let mut mask = 0;
+        while among != 0 {
+            let lane = among.trailing_zeros() as usize;
+            mask |= u64::from(lanes.0[lane] == query) << lane;
+            among &= among - 1;
+        }
+        mask
+    }
+
+    #[inline(always)]
     fn put_vertices(
         self,
         positions: &[[f32; 3]],
@@ -151,7 +170,7 @@ pub(crate) use x86::{Avx2, Avx512};
 mod x86 {
     use std::arch::x86_64::*;
 
-    use super::{Bounds, BoundsArray, LANES, LaneBounds, Simd, number, put_vertices};
+    use super::{Bounds, BoundsArray, LANES, LaneBounds, Lanes32, Simd, number, put_vertices};
     use crate::grouping::bounds::READ_AHEAD;
 
     /// 256-bit registers. Only made where `avx2` was detected.
@@ -279,6 +298,24 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64 {
+            // SAFETY: as above, lane for lane.
+            unsafe {
+                let query = _mm256_set1_epi32(query as i32);
+                let mut mask = 0u64;
+                for chunk in 0..8 {
+                    if (among >> (8 * chunk)) & 0xff == 0 {
+                        continue;
+                    }
+                    let lanes = _mm256_load_si256(lanes.0.as_ptr().add(8 * chunk).cast());
+                    let equal = _mm256_castsi256_ps(_mm256_cmpeq_epi32(lanes, query));
+                    mask |= u64::from(_mm256_movemask_ps(equal) as u32) << (8 * chunk);
+                }
+                mask & among
+            }
+        }
+
+        #[inline(always)]
         fn put_vertices(
             self,
             positions: &[[f32; 3]],
@@ -349,6 +386,25 @@ mod x86 {
                         all = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(all, query_min[axis], max);
                     }
                     mask |= u64::from(all) << (16 * chunk);
+                }
+                mask
+            }
+        }
+
+        #[inline(always)]
+        fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64 {
+            // SAFETY: as above, lane for lane.
+            unsafe {
+                let query = _mm512_set1_epi32(query as i32);
+                let mut mask = 0u64;
+                for chunk in 0..4 {
+                    let among = (among >> (16 * chunk)) as __mmask16;
+                    if among == 0 {
+                        continue;
+                    }
+                    let lanes = _mm512_load_si512(lanes.0.as_ptr().add(16 * chunk).cast());
+                    let equal = _mm512_mask_cmpeq_epi32_mask(among, lanes, query);
+                    mask |= u64::from(equal) << (16 * chunk);
                 }
                 mask
             }

@@ -17,7 +17,8 @@ use crate::grouping::GROUP;
 
 use super::kept::Kept;
 use super::pairing::full;
-use super::simd::{Isa, LaneBounds, Simd, dispatch};
+use super::simd::{Isa, LaneBounds, Lanes32, Simd, dispatch};
+use super::world::BodyRef;
 
 /// Which pairs of primitives that share a sub-cell are asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +27,8 @@ pub struct Asked {
     pub boxes: bool,
     /// Only those that the cell owns.
     pub owned: bool,
+    /// Also those of one body that share a vertex.
+    pub adjacent: bool,
 }
 
 /// Two groups of one cell: places in `kept`.
@@ -37,20 +40,27 @@ pub(crate) struct Groups<'a> {
     pub cell: [u32; 3],
     /// Whether they are one and the same: each pair is then found once.
     pub same: bool,
+    /// The body, where both groups are of one.
+    pub body: Option<BodyRef<'a>>,
 }
 
 /// One group, and the partners found in it.
 pub(crate) struct Lanes64 {
     boxes: LaneBounds,
+    corners: [Lanes32; 4],
     /// For each primitive of the other group the lanes that it meets.
     pub partners: [u64; GROUP],
+    /// Those among them that share a vertex with it.
+    pub adjacent: [u64; GROUP],
 }
 
 impl Default for Lanes64 {
     fn default() -> Self {
         Lanes64 {
             boxes: LaneBounds::EMPTY,
+            corners: [const { Lanes32([0; GROUP]) }; 4],
             partners: [0; GROUP],
+            adjacent: [0; GROUP],
         }
     }
 }
@@ -84,6 +94,7 @@ fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: Groups<'_>, asked: Asked)
         b,
         cell,
         same,
+        body,
     } = groups;
     let mut begins = [[0u64; 8]; 3];
     let mut ends = [[0u64; 8]; 3];
@@ -94,6 +105,14 @@ fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: Groups<'_>, asked: Asked)
             let (first, last) = along(kept, cell, axis);
             begins[axis][first] |= 1 << lane;
             ends[axis][last] |= 1 << lane;
+        }
+    }
+    if let Some(body) = &body {
+        for (lane, &entry) in b.iter().enumerate() {
+            let corners = body.corners(kept[entry as usize].primitive);
+            for (row, &corner) in lanes.corners.iter_mut().zip(corners) {
+                row.0[lane] = corner;
+            }
         }
     }
     let all = full(b.len());
@@ -123,6 +142,18 @@ fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: Groups<'_>, asked: Asked)
             partners = simd.overlaps_64(&lanes.boxes, &kept.bounds, partners);
         }
         lanes.partners[lane] = partners;
+        let mut adjacent = 0;
+        if let Some(body) = &body
+            && partners != 0
+        {
+            let corners = body.corners(kept.primitive);
+            for row in &lanes.corners[..corners.len()] {
+                for &corner in corners {
+                    adjacent |= simd.equals_64(row, corner, partners);
+                }
+            }
+        }
+        lanes.adjacent[lane] = adjacent;
     }
 }
 
@@ -163,7 +194,6 @@ mod tests {
             .collect();
         let cell = [1, 1, 1];
         let here: Vec<u32> = (0..100)
-            .filter(|&ix| kept[ix as usize].range.occupancy(cell) != 0)
             .filter(|&ix| {
                 let (lo, hi) = kept[ix as usize].range.coarse();
                 (0..3).all(|axis| lo[axis] <= 1 && 1 <= hi[axis])
@@ -181,11 +211,17 @@ mod tests {
                 b,
                 cell,
                 same,
+                body: None,
             };
             for (boxes, owned) in [(false, false), (true, false), (false, true), (true, true)] {
+                let asked = Asked {
+                    boxes,
+                    owned,
+                    adjacent: false,
+                };
                 for isa in [Isa::Portable, Isa::detect(InstructionSet::Avx512)] {
                     let mut lanes = Lanes64::default();
-                    lanes.find(isa, groups, Asked { boxes, owned });
+                    lanes.find(isa, groups, asked);
                     for (i, &entry_a) in a.iter().enumerate() {
                         for (j, &entry_b) in b.iter().enumerate() {
                             let (a, b) = (&kept[entry_a as usize], &kept[entry_b as usize]);
