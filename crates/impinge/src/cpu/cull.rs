@@ -12,16 +12,17 @@
 //! bytes a vertex, twelve a primitive near other bodies. Invariant: the function from coordinates to
 //! cells is monotone under any rounding, so that a point of two primitives lies in a cell that both mark.
 
+mod codes;
+
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-use crate::grouping::bounds::{Bounds, greater, lesser};
+use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::Grid;
-use crate::scene::Positions;
 
 use super::kept::Run;
-use super::simd::{Isa, Simd, dispatch};
 use super::world::World;
+use codes::{Codes, Function, greater_bytes, lesser_bytes};
 
 /// Cells along each axis at most: two more hold what lies outside. A row along x has 64, and a byte
 /// numbers the others.
@@ -56,9 +57,8 @@ impl Near {
 /// The map and the memory for it.
 #[derive(Default)]
 pub(crate) struct Cull {
-    origin: [f32; 3],
-    /// Cells a unit of length, above zero.
-    scale: [f32; 3],
+    /// From coordinates to cells.
+    function: Function,
     /// Cells along each axis, those outside included.
     along: [u32; 3],
     /// The cell of each vertex, a byte an axis, body after body.
@@ -83,14 +83,21 @@ impl Cull {
         let wanted = frame.n_primitives() / PRIMITIVES_A_CELL;
         let along = Grid::new(region, wanted, 1.0).resolution;
         let along: [u32; 3] = std::array::from_fn(|axis| along[axis].min(MOST_ALONG[axis]));
-        for axis in 0..3 {
-            // A little less than all cells, so that the region's end is still within the last one.
-            let scale = (along[axis] as f32 - 0.01) / (region.max[axis] - region.min[axis]);
-            let usable = scale.is_finite() && scale > 0.0;
-            self.scale[axis] = if usable { scale } else { 1.0 };
-        }
-        self.origin = region.min;
         self.along = along.map(|along| along + 2);
+        self.function = Function {
+            origin: region.min,
+            scale: std::array::from_fn(|axis| {
+                // A little less than all cells, so that the region's end is still within the last one.
+                let extent = region.max[axis] - region.min[axis];
+                let scale = (along[axis] as f32 - 0.01) / extent;
+                if scale.is_finite() && scale > 0.0 {
+                    scale
+                } else {
+                    1.0
+                }
+            }),
+            limit: along.map(|along| (along + 1) as f32),
+        };
         self.firsts.clear();
         self.alone = 1 << (MOST_MAPS - 1);
         let mut n_codes = 0;
@@ -125,15 +132,7 @@ impl Cull {
     pub fn codes(&mut self) -> Codes {
         Codes {
             first: self.codes.as_mut_ptr(),
-            function: self.function(),
-        }
-    }
-
-    fn function(&self) -> Function {
-        Function {
-            origin: self.origin,
-            scale: self.scale,
-            limit: self.along.map(|along| (along - 1) as f32),
+            function: self.function,
         }
     }
 
@@ -148,8 +147,10 @@ impl Cull {
         near.clear();
         let body = world.body(run.participant);
         let codes = &self.codes[self.first_code(run.participant)..];
-        let function = self.function();
-        let reach = (function.code(&reach.min), function.code(&reach.max));
+        let reach = (
+            self.function.code(&reach.min),
+            self.function.code(&reach.max),
+        );
         match body.elements {
             crate::Elements::Triangles(faces) => {
                 self.mark_all(codes, faces, run, reach, &mut near);
@@ -272,142 +273,4 @@ impl Cull {
 /// The map of a participant.
 fn map_of(participant: usize) -> usize {
     participant.min(MOST_MAPS - 1)
-}
-
-/// The cell along one axis: 0 before the region, `limit` past it.
-///
-/// Each operation is monotone, for `scale` is above 0 and nothing is NaN.
-#[inline(always)]
-fn quantised(x: f32, origin: f32, scale: f32, limit: f32) -> u8 {
-    let cell = greater(lesser((x - origin) * scale + 1.0, limit), 0.0);
-    // SAFETY: between 0 and `limit`, which is at most 254; NaN would have become `limit`.
-    (unsafe { cell.to_int_unchecked::<i32>() }) as u8
-}
-
-/// The lesser of each byte of two numbers.
-#[inline(always)]
-fn lesser_bytes(a: u32, b: u32) -> u32 {
-    #[cfg(target_arch = "x86_64")]
-    // SAFETY: SSE2 belongs to every x86-64 processor.
-    unsafe {
-        use std::arch::x86_64::*;
-        let both = _mm_min_epu8(_mm_cvtsi32_si128(a as i32), _mm_cvtsi32_si128(b as i32));
-        _mm_cvtsi128_si32(both) as u32
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    {
-        let (a, b) = (a.to_le_bytes(), b.to_le_bytes());
-        u32::from_le_bytes([0, 1, 2, 3].map(|k| a[k].min(b[k])))
-    }
-}
-
-/// The greater of each byte of two numbers.
-#[inline(always)]
-fn greater_bytes(a: u32, b: u32) -> u32 {
-    #[cfg(target_arch = "x86_64")]
-    // SAFETY: SSE2 belongs to every x86-64 processor.
-    unsafe {
-        use std::arch::x86_64::*;
-        let both = _mm_max_epu8(_mm_cvtsi32_si128(a as i32), _mm_cvtsi32_si128(b as i32));
-        _mm_cvtsi128_si32(both) as u32
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    {
-        let (a, b) = (a.to_le_bytes(), b.to_le_bytes());
-        u32::from_le_bytes([0, 1, 2, 3].map(|k| a[k].max(b[k])))
-    }
-}
-
-/// From coordinates to cells of the map.
-#[derive(Clone, Copy)]
-struct Function {
-    origin: [f32; 3],
-    scale: [f32; 3],
-    limit: [f32; 3],
-}
-
-impl Function {
-    #[inline(always)]
-    fn code(&self, point: &[f32; 3]) -> u32 {
-        let mut bytes = [0u8; 4];
-        for axis in 0..3 {
-            let (origin, scale) = (self.origin[axis], self.scale[axis]);
-            bytes[axis] = quantised(point[axis], origin, scale, self.limit[axis]);
-        }
-        u32::from_le_bytes(bytes)
-    }
-}
-
-/// A pointer to the cells of the vertices, and the function that gives them.
-#[derive(Clone, Copy)]
-pub(crate) struct Codes {
-    first: *mut u32,
-    function: Function,
-}
-
-// SAFETY: a pointer does nothing by itself; `put` says what its callers owe.
-unsafe impl Send for Codes {}
-// SAFETY: as above.
-unsafe impl Sync for Codes {}
-
-/// Vertices whose coordinates are taken at once, as one row of floats.
-const CHUNK: usize = 16;
-
-impl Codes {
-    /// Writes the cells of vertices `range` of a body whose codes start at `first`.
-    ///
-    /// # Safety
-    /// The codes must still live and hold the body's; nobody else may use those of `range` meanwhile.
-    pub unsafe fn put(
-        self,
-        isa: Isa,
-        positions: &Positions,
-        range: std::ops::Range<usize>,
-        first: usize,
-    ) {
-        // SAFETY: said above.
-        let into = unsafe {
-            std::slice::from_raw_parts_mut(self.first.add(first + range.start), range.len())
-        };
-        match positions {
-            Positions::F32(positions) => {
-                dispatch!(isa, quantise, (
-                    positions: &[[f32; 3]] = &positions[range],
-                    function: Function = self.function,
-                    into: &mut [u32] = into,
-                ));
-            }
-            Positions::F64(positions) => {
-                for (point, code) in positions[range].iter().zip(into) {
-                    // Rounding is monotone as well.
-                    *code = self.function.code(&point.map(|x| x as f32));
-                }
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn quantise<S: Simd>(_: S, positions: &[[f32; 3]], function: Function, into: &mut [u32]) {
-    let mut row = [[0.0f32; 3 * CHUNK]; 3];
-    for k in 0..3 * CHUNK {
-        row[0][k] = function.origin[k % 3];
-        row[1][k] = function.scale[k % 3];
-        row[2][k] = function.limit[k % 3];
-    }
-    let (chunks, rest) = positions.as_chunks::<CHUNK>();
-    let (into_chunks, into_rest) = into.as_chunks_mut::<CHUNK>();
-    for (chunk, codes) in chunks.iter().zip(into_chunks) {
-        let chunk: &[f32; 3 * CHUNK] = chunk.as_flattened().first_chunk().expect("48 of 48");
-        let mut bytes = [0u8; 3 * CHUNK];
-        for k in 0..3 * CHUNK {
-            bytes[k] = quantised(chunk[k], row[0][k], row[1][k], row[2][k]);
-        }
-        for k in 0..CHUNK {
-            codes[k] = u32::from_le_bytes([bytes[3 * k], bytes[3 * k + 1], bytes[3 * k + 2], 0]);
-        }
-    }
-    for (point, code) in rest.iter().zip(into_rest) {
-        *code = function.code(point);
-    }
 }

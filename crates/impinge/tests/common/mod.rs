@@ -86,6 +86,37 @@ fn two(name: &str, a: &Model, b: &Model, double: bool) -> Case {
     }
 }
 
+/// More bodies than bits in a byte, of every kind and precision, some with huge primitives.
+fn many(scale: f32) -> Case {
+    let mut scene = Scene::new();
+    for k in 0..12u64 {
+        let at = [0.35 * (k % 4) as f32, 0.3 * (k / 4) as f32, 0.1 * k as f32];
+        let mut model = match k % 3 {
+            0 => soup::tetrahedra(60, 0.15, k),
+            1 => soup::triangles(120, 0.1, k),
+            _ => surfaces::ball(300),
+        }
+        .translated(at);
+        if k % 5 == 4 {
+            model.positions[0] = [9.0, 8.0, 7.0];
+        }
+        for position in &mut model.positions {
+            *position = position.map(|x| x * scale);
+        }
+        let added = if k % 4 == 1 {
+            scene.add(model.elements.clone(), model.positions_f64())
+        } else {
+            scene.add(model.elements, model.positions)
+        };
+        added.unwrap();
+    }
+    Case {
+        name: format!("many bodies, scale {scale:e}"),
+        scene,
+        query: Query::all(),
+    }
+}
+
 fn one(name: &str, model: &Model, rule: SharedVertex) -> Case {
     let mut scene = Scene::new();
     let id = scene
@@ -150,6 +181,9 @@ pub fn cases() -> Vec<Case> {
             cases.push(two(&format!("soup {n}"), &a, &b, double));
         }
     }
+    cases.push(many(1.0));
+    cases.push(many(1e-30));
+    cases.push(many(1e25));
     for rule in rules {
         cases.push(one("soup", &soup::triangles(900, 0.15, 7), rule));
         cases.push(one("tetrahedra", &soup::tetrahedra(300, 0.2, 8), rule));
