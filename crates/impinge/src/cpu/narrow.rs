@@ -235,40 +235,11 @@ impl<'a> Lookup<'a> {
         chunk: &[Candidate],
         batch: &mut TrianglePairs8,
     ) -> bool {
-        if let Some((places_a, places_b)) = places_in_common(chunk) {
-            self.go_to(chunk[0]);
-            let (a, b) = (&self.a, &self.b);
-            let (Elements::Triangles(faces_a), Elements::Triangles(faces_b)) =
-                (a.elements, b.elements)
-            else {
-                return false;
-            };
-            put_all(simd, &mut batch.a, a.positions, faces_a, places_a);
-            put_all(simd, &mut batch.b, b.positions, faces_b, places_b);
-            return true;
-        }
-        for (lane, &candidate) in chunk.iter().enumerate() {
-            self.go_to(candidate);
-            let (a, b) = (&self.a, &self.b);
-            let (Elements::Triangles(faces_a), Elements::Triangles(faces_b)) =
-                (a.elements, b.elements)
-            else {
-                return false;
-            };
-            put(
-                &mut batch.a,
-                lane,
-                a.positions,
-                &faces_a[candidate.place_a as usize],
-            );
-            put(
-                &mut batch.b,
-                lane,
-                b.positions,
-                &faces_b[candidate.place_b as usize],
-            );
-        }
-        true
+        let TrianglePairs8 { a, b } = batch;
+        self.fill(simd, chunk, [a, b], |elements| match elements {
+            Elements::Triangles(faces) => Some(faces),
+            Elements::Tetrahedra(_) => None,
+        })
     }
 
     /// Gathers a batch of tetrahedron pairs; whether all of them are.
@@ -279,38 +250,39 @@ impl<'a> Lookup<'a> {
         chunk: &[Candidate],
         batch: &mut TetrahedronPairs8,
     ) -> bool {
-        if let Some((places_a, places_b)) = places_in_common(chunk) {
-            self.go_to(chunk[0]);
-            let (a, b) = (&self.a, &self.b);
-            let (Elements::Tetrahedra(tets_a), Elements::Tetrahedra(tets_b)) =
-                (a.elements, b.elements)
-            else {
-                return false;
-            };
-            put_all(simd, &mut batch.a, a.positions, tets_a, places_a);
-            put_all(simd, &mut batch.b, b.positions, tets_b, places_b);
-            return true;
-        }
+        let TetrahedronPairs8 { a, b } = batch;
+        self.fill(simd, chunk, [a, b], |elements| match elements {
+            Elements::Tetrahedra(tets) => Some(tets),
+            Elements::Triangles(_) => None,
+        })
+    }
+
+    /// Gathers a batch; whether all primitives have the corners that are asked for.
+    #[inline(always)]
+    fn fill<S: Simd, const N: usize>(
+        &mut self,
+        simd: S,
+        chunk: &[Candidate],
+        [side_a, side_b]: [&mut [[[f64; LANES]; 3]; N]; 2],
+        corners_of: impl Fn(&'a Elements) -> Option<&'a [[u32; N]]>,
+    ) -> bool {
+        let common = places_in_common(chunk);
         for (lane, &candidate) in chunk.iter().enumerate() {
             self.go_to(candidate);
             let (a, b) = (&self.a, &self.b);
-            let (Elements::Tetrahedra(tets_a), Elements::Tetrahedra(tets_b)) =
-                (a.elements, b.elements)
+            let (Some(corners_a), Some(corners_b)) =
+                (corners_of(a.elements), corners_of(b.elements))
             else {
                 return false;
             };
-            put(
-                &mut batch.a,
-                lane,
-                a.positions,
-                &tets_a[candidate.place_a as usize],
-            );
-            put(
-                &mut batch.b,
-                lane,
-                b.positions,
-                &tets_b[candidate.place_b as usize],
-            );
+            if let Some((places_a, places_b)) = common {
+                put_all(simd, side_a, a.positions, corners_a, places_a);
+                put_all(simd, side_b, b.positions, corners_b, places_b);
+                return true;
+            }
+            let (place_a, place_b) = (candidate.place_a as usize, candidate.place_b as usize);
+            put(side_a, lane, a.positions, &corners_a[place_a]);
+            put(side_b, lane, b.positions, &corners_b[place_b]);
         }
         true
     }
