@@ -1,0 +1,87 @@
+//! One benchmark, whatever moves its bodies: λ, contestants, oracle, picture.
+
+use impinge::{Backend, Detector, Method, Settings};
+
+use crate::contest::Contest;
+use crate::control::Control;
+use crate::course::Course;
+use crate::error::Error;
+use crate::finders::Place;
+use crate::options::Options;
+use crate::pictures::Painter;
+use crate::report::{Moment, Scene};
+use crate::samples::Samples;
+use crate::sweep::{contestants, sweep};
+
+/// The oracle is asked where its quadratic cost is a second or so.
+const MOST_FOR_ORACLE: usize = 40_000;
+
+/// Runs all frames of a course by everybody.
+pub(crate) fn run(
+    course: &mut dyn Course,
+    options: &Options,
+    places: &[Place],
+    painter: &mut Painter,
+    control: &Control<'_>,
+) -> Result<Scene, Error> {
+    let (name, n_frames) = (course.name().name(), course.n_frames());
+    let sweep = sweep(course, places, options.is_quick, control.cancel)?;
+    let setups = contestants(places, &sweep, options.lambda);
+    let mut contest = Contest::new(setups, n_frames)?;
+    let query = course.query();
+    let mut fullest = (0, 0, Vec::new());
+    for frame in 0..n_frames {
+        course.pose(frame)?;
+        let rows = contest.frame(course.scene(), &query, control)?;
+        if fullest.2.is_empty() || rows.len() > fullest.0 {
+            fullest = (rows.len(), frame, rows.to_vec());
+        }
+        control.report(name, frame + 1, n_frames);
+    }
+    let (_, frame, rows) = fullest;
+    course.pose(frame)?;
+    let picture = painter.paint(course, &rows)?;
+    let n_primitives = course.n_primitives();
+    let is_small = n_primitives.iter().sum::<usize>() <= MOST_FOR_ORACLE;
+    let mut runs = contest.runs();
+    if is_small && n_frames > 0 && oracle(course, control)? != rows {
+        // The first contestant is wrong, and all that agree with it.
+        runs.iter_mut().for_each(|run| run.n_frames_differing += 1);
+    }
+    let moments = contest.course();
+    let counts = |count: fn(&Moment) -> usize| {
+        Samples::of_counts(moments.iter().map(|moment| count(moment) as u64))
+    };
+    Ok(Scene {
+        name: name.to_owned(),
+        mesh: course.mesh().to_owned(),
+        is_stand_in: course.is_stand_in(),
+        kind: match course.name().is_volume() {
+            true => "tetrahedron".to_owned(),
+            false => "triangle".to_owned(),
+        },
+        n_primitives,
+        n_frames,
+        n_pairs: counts(|moment| moment.n_pairs),
+        n_colliding: counts(|moment| moment.n_colliding),
+        hash: runs.first().map_or_else(String::new, |run| run.hash.clone()),
+        n_frames_of_oracle: usize::from(is_small),
+        runs,
+        sweep,
+        picture,
+        simulation_ms: None,
+        course: moments.to_vec(),
+    })
+}
+
+/// What the oracle finds as things are now.
+fn oracle(course: &dyn Course, control: &Control<'_>) -> Result<Vec<[u32; 4]>, Error> {
+    let mut detector = Detector::with_settings(Settings {
+        method: Method::Naive,
+        backend: Backend::Cpu,
+        ..Settings::default()
+    })?;
+    let watched = impinge::Control::new().cancel(control.cancel);
+    let pairs = detector.detect_with(course.scene(), &course.query(), &watched)?;
+    Ok(pairs.rows().collect())
+}

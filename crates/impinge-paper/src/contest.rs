@@ -1,0 +1,181 @@
+//! Frames of all contestants, turn by turn, so that each meets the same weather; and their pairs compared.
+
+use std::time::Duration;
+
+use impinge::{Query, Scene, hash_rows};
+
+use crate::control::Control;
+use crate::error::Error;
+use crate::finders::{Finder, Found, Setup};
+use crate::published;
+use crate::report::{Method, Moment, Run, StageTimes};
+use crate::samples::Samples;
+
+/// Between one contestant's frame and the next one's: idle workers of the one before fall asleep.
+const PAUSE: Duration = Duration::from_millis(1);
+
+/// Frames of a contestant on a driver that imitates a GPU, at most: such times say little.
+const FRAMES_IN_SOFTWARE: usize = 10;
+
+struct Contestant {
+    setup: Setup,
+    is_chosen_lambda: bool,
+    finder: Box<dyn Finder>,
+    /// It takes every so many frames.
+    every: usize,
+    found: Vec<Found>,
+    hash: u64,
+    n_frames_differing: usize,
+}
+
+/// All contestants on one scene. The first one is that which others are compared with.
+pub(crate) struct Contest {
+    contestants: Vec<Contestant>,
+    rows: Vec<[u32; 4]>,
+    expected: Vec<[u32; 4]>,
+    is_warm: bool,
+    course: Vec<Moment>,
+}
+
+impl Contest {
+    /// A contest of `n_frames` frames. With each setup: whether its λ measured best, or was asked for.
+    pub fn new(setups: Vec<(Setup, bool)>, n_frames: usize) -> Result<Self, Error> {
+        let contestants = setups.into_iter().map(|(setup, is_chosen_lambda)| {
+            Ok(Contestant {
+                finder: setup.build()?,
+                every: match setup.place.is_software() {
+                    true => n_frames.div_ceil(FRAMES_IN_SOFTWARE),
+                    false => 1,
+                },
+                setup,
+                is_chosen_lambda,
+                found: Vec::with_capacity(n_frames),
+                hash: 0,
+                n_frames_differing: 0,
+            })
+        });
+        Ok(Contest {
+            contestants: contestants.collect::<Result<_, Error>>()?,
+            rows: Vec::new(),
+            expected: Vec::new(),
+            is_warm: false,
+            course: Vec::with_capacity(n_frames),
+        })
+    }
+
+    /// One frame of everybody. Returns the pairs of the first contestant.
+    pub fn frame(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        control: &Control<'_>,
+    ) -> Result<&[[u32; 4]], Error> {
+        let frame = self.course.len();
+        if !self.is_warm {
+            for contestant in &mut self.contestants {
+                let finder = &mut contestant.finder;
+                finder.find(scene, query, control.cancel, &mut self.rows)?;
+            }
+            self.is_warm = true;
+        }
+        for (ix, contestant) in self.contestants.iter_mut().enumerate() {
+            // Every so many frames, in the middle of so many.
+            if frame % contestant.every != contestant.every / 2 {
+                continue;
+            }
+            control.go_on()?;
+            std::thread::sleep(PAUSE);
+            let rows = match ix {
+                0 => &mut self.expected,
+                _ => &mut self.rows,
+            };
+            let found = contestant
+                .finder
+                .find(scene, query, control.cancel, rows)?;
+            contestant.found.push(found);
+            contestant.hash = contestant.hash.wrapping_add(hash_rows(rows.iter().copied()));
+            if ix > 0 && self.rows != self.expected {
+                contestant.n_frames_differing += 1;
+            }
+        }
+        self.course.push(Moment {
+            n_pairs: self.expected.len(),
+            n_colliding: n_colliding(&self.expected),
+        });
+        Ok(&self.expected)
+    }
+
+    /// What the first contestant found, frame by frame.
+    pub fn course(&self) -> &[Moment] {
+        &self.course
+    }
+
+    /// Everybody's figures.
+    pub fn runs(&self) -> Vec<Run> {
+        self.contestants.iter().map(Contestant::run).collect()
+    }
+}
+
+impl Contestant {
+    fn run(&self) -> Run {
+        let Setup {
+            method,
+            place,
+            lambda,
+        } = &self.setup;
+        let counts = |count: fn(&Found) -> u64| Samples::of_counts(self.found.iter().map(count));
+        let mut names: Vec<&str> = Vec::new();
+        for (name, _) in self.found.iter().flat_map(|found| &found.stages) {
+            if !names.contains(name) {
+                names.push(name);
+            }
+        }
+        // A stage that a frame did not run took no time there.
+        let stage = |name: &str| {
+            let of = |found: &Found| {
+                let stages = found.stages.iter().filter(|(stage, _)| *stage == name);
+                stages.map(|(_, ms)| ms).sum::<f64>()
+            };
+            StageTimes {
+                name: name.to_owned(),
+                ms: Samples::of(self.found.iter().map(of)),
+            }
+        };
+        Run {
+            method: *method,
+            backend: place.name().to_owned(),
+            is_gpu: place.is_gpu(),
+            is_software: place.is_software(),
+            lambda: self.setup.has_lambda().then_some(*lambda),
+            is_papers_lambda: papers_lambda(*method) == Some(*lambda),
+            is_chosen_lambda: self.is_chosen_lambda,
+            ms: Samples::of(self.found.iter().map(|found| found.ms)),
+            stages: names.into_iter().map(stage).collect(),
+            n_cells: counts(|found| found.n_cells),
+            n_subdivided: counts(|found| found.n_subdivided),
+            n_candidates: counts(|found| found.n_candidates),
+            n_unsure: counts(|found| found.n_unsure),
+            bytes_held: self.found.iter().map(|found| found.bytes_held).max().unwrap_or(0),
+            hash: format!("{:016x}", self.hash),
+            n_frames_differing: self.n_frames_differing,
+        }
+    }
+}
+
+/// λ of the paper for a method that has one.
+pub(crate) fn papers_lambda(method: Method) -> Option<f64> {
+    match method {
+        Method::Cells => Some(published::LAMBDA),
+        Method::Fwzs11 => Some(published::LAMBDA_FWZS11),
+        Method::Clusters => None,
+    }
+}
+
+/// Primitives that take part in a pair, those of all bodies together.
+pub(crate) fn n_colliding(rows: &[[u32; 4]]) -> usize {
+    let ends = rows.iter().flat_map(|&[body_a, a, body_b, b]| [(body_a, a), (body_b, b)]);
+    let mut primitives: Vec<(u32, u32)> = ends.collect();
+    primitives.sort_unstable();
+    primitives.dedup();
+    primitives.len()
+}
