@@ -1,0 +1,133 @@
+//! Bodies of a scene as surfaces.
+
+use impinge::{Body, Elements};
+
+use crate::error::Error;
+use crate::picture::{Face, Normals, Surface};
+
+/// The two colours of a body, sRGB.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Colors {
+    /// Of primitives that collide.
+    pub colliding: [u8; 3],
+    /// Of all the others.
+    pub other: [u8; 3],
+}
+
+impl Surface {
+    /// A body where it is now, its `colliding` primitives coloured and showing through.
+    ///
+    /// Triangles are drawn as they are, smooth. Tetrahedra are drawn flat: the faces that belong to one
+    /// tetrahedron only, and all faces of those that collide.
+    ///
+    /// # Errors
+    /// A colliding primitive that the body does not have.
+    pub fn of_body(body: &Body, colliding: &[u32], colors: Colors) -> Result<Self, Error> {
+        let n_primitives = body.n_primitives();
+        let mut collides = vec![false; n_primitives];
+        for &primitive in colliding {
+            match collides.get_mut(primitive as usize) {
+                Some(collides) => *collides = true,
+                None => {
+                    return Err(Error::PrimitiveOutOfRange {
+                        primitive,
+                        n_primitives,
+                    });
+                }
+            }
+        }
+        let face = |corners, collides| Face {
+            corners,
+            color: if collides {
+                colors.colliding
+            } else {
+                colors.other
+            },
+            shows_through: collides,
+        };
+        let positions = body.positions();
+        Ok(Surface {
+            positions: (0..body.n_vertices())
+                .map(|ix| positions.point(ix))
+                .collect(),
+            faces: match body.elements() {
+                Elements::Triangles(faces) => faces
+                    .iter()
+                    .zip(&collides)
+                    .map(|(&corners, &collides)| face(corners, collides))
+                    .collect(),
+                Elements::Tetrahedra(tets) => shown_sides(tets, &collides)
+                    .map(|side| face(side.corners, side.collides))
+                    .collect(),
+            },
+            normals: match body.elements() {
+                Elements::Triangles(_) => Normals::Smooth,
+                Elements::Tetrahedra(_) => Normals::Flat,
+            },
+        })
+    }
+}
+
+/// A face of a tetrahedron.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Side {
+    /// The corners in ascending order: the same for both tetrahedra that share the face.
+    key: [u32; 3],
+    corners: [u32; 3],
+    collides: bool,
+}
+
+/// The faces that belong to one tetrahedron only, and those of which one collides, each once.
+fn shown_sides(tets: &[[u32; 4]], collides: &[bool]) -> impl Iterator<Item = Side> {
+    let mut sides: Vec<Side> = tets
+        .iter()
+        .zip(collides)
+        .flat_map(|(&[a, b, c, d], &collides)| {
+            [[a, c, b], [a, b, d], [b, c, d], [c, a, d]].map(|corners| {
+                let mut key = corners;
+                key.sort_unstable();
+                Side {
+                    key,
+                    corners,
+                    collides,
+                }
+            })
+        })
+        .collect();
+    // Stable: of two tetrahedra, the first one's side is drawn.
+    sides.sort_by_key(|side| side.key);
+    let shown: Vec<Side> = sides
+        .chunk_by(|a, b| a.key == b.key)
+        .filter_map(|same| {
+            let collides = same.iter().any(|side| side.collides);
+            (same.len() == 1 || collides).then_some(Side {
+                collides,
+                ..same[0]
+            })
+        })
+        .collect();
+    shown.into_iter()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_tetrahedra_have_six_sides_and_seven_where_they_collide() {
+        let tets = [[0, 1, 2, 3], [1, 2, 3, 4]];
+        let corners = |collides: [bool; 2]| {
+            let shown: Vec<Side> = shown_sides(&tets, &collides).collect();
+            let n_colliding = shown.iter().filter(|side| side.collides).count();
+            (shown.len(), n_colliding)
+        };
+        assert_eq!(corners([false, false]), (6, 0));
+        assert_eq!(corners([true, false]), (7, 4));
+        assert_eq!(corners([false, true]), (7, 4));
+        assert_eq!(corners([true, true]), (7, 7));
+        let keys: Vec<_> = shown_sides(&tets, &[false, false])
+            .map(|side| side.key)
+            .collect();
+        assert!(!keys.contains(&[1, 2, 3]), "{keys:?}");
+    }
+}

@@ -1,0 +1,124 @@
+//! Faces as what the GPU draws: three corners each, with normals.
+
+use bytemuck::{Pod, Zeroable};
+
+use impinge::wgpu;
+
+use crate::camera::Frame;
+use crate::picture::{Face, Normals, Picture, Surface};
+
+/// A corner of a face as the vertex shader takes it.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Corner {
+    /// In the coordinates of a [`Frame`].
+    position: [f32; 3],
+    /// In 32767ths; the last one is not used.
+    normal: [i16; 4],
+    /// sRGB; the last one is not used.
+    color: [u8; 4],
+}
+
+/// The layout of [`Corner`].
+pub(crate) const CORNER: [wgpu::VertexAttribute; 3] =
+    wgpu::vertex_attr_array![0 => Float32x3, 1 => Snorm16x4, 2 => Unorm8x4];
+
+/// Bytes of a face.
+pub(crate) const FACE_BYTES: u64 = 3 * size_of::<Corner>() as u64;
+
+/// Cosine of the sharpest edge that still looks smooth: 50 degrees.
+const SMOOTHEST: f64 = 0.642_787_609_686_539_3;
+
+/// Hands over the corners of all faces for which `wanted` holds, at most `n_faces` faces at a time.
+pub(crate) fn chunks(
+    picture: &Picture,
+    frame: &Frame,
+    n_faces: usize,
+    wanted: impl Fn(&Face) -> bool,
+    mut take: impl FnMut(&[Corner]),
+) {
+    let mut chunk = Vec::new();
+    for surface in &picture.surfaces {
+        if !surface.faces.iter().any(&wanted) {
+            continue;
+        }
+        let at_vertices = match surface.normals {
+            Normals::Flat => Vec::new(),
+            Normals::Smooth => vertex_normals(surface, frame),
+        };
+        for face in surface.faces.iter().filter(|face| wanted(face)) {
+            let points = surface.points(face).map(|point| frame.place(point));
+            let flat = normal(points);
+            for (ix, point) in face.corners.into_iter().zip(points) {
+                let smooth = at_vertices.get(ix as usize).copied();
+                let normal = smooth
+                    .filter(|&smooth| dot(smooth, flat) >= SMOOTHEST)
+                    .unwrap_or(flat);
+                let [r, g, b] = face.color;
+                chunk.push(Corner {
+                    position: point.map(|x| x as f32),
+                    normal: [snorm(normal[0]), snorm(normal[1]), snorm(normal[2]), 0],
+                    color: [r, g, b, 255],
+                });
+            }
+            if chunk.len() >= 3 * n_faces {
+                take(&chunk);
+                chunk.clear();
+            }
+        }
+    }
+    if !chunk.is_empty() {
+        take(&chunk);
+    }
+}
+
+/// Unit normals: those of the faces around a vertex, weighted by their angles there.
+fn vertex_normals(surface: &Surface, frame: &Frame) -> Vec<[f64; 3]> {
+    let mut sums = vec![[0.0; 3]; surface.positions.len()];
+    for face in &surface.faces {
+        let points = surface.points(face).map(|point| frame.place(point));
+        let flat = normal(points);
+        for k in 0..3 {
+            let a = unit(sub(points[(k + 1) % 3], points[k]));
+            let b = unit(sub(points[(k + 2) % 3], points[k]));
+            let angle = dot(a, b).clamp(-1.0, 1.0).acos();
+            let sum = &mut sums[face.corners[k] as usize];
+            for (sum, x) in sum.iter_mut().zip(flat) {
+                *sum += angle * x;
+            }
+        }
+    }
+    sums.into_iter().map(unit).collect()
+}
+
+/// The unit normal, or 0 of a face without area.
+fn normal([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
+    let (u, v) = (sub(b, a), sub(c, a));
+    unit([
+        u[1] * v[2] - u[2] * v[1],
+        u[2] * v[0] - u[0] * v[2],
+        u[0] * v[1] - u[1] * v[0],
+    ])
+}
+
+fn unit(v: [f64; 3]) -> [f64; 3] {
+    let length = dot(v, v).sqrt();
+    if length > 0.0 {
+        v.map(|x| x / length)
+    } else {
+        [0.0; 3]
+    }
+}
+
+fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|k| a[k] - b[k])
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// A number of -1 to 1 in 32767ths.
+fn snorm(x: f64) -> i16 {
+    (x * f64::from(i16::MAX)).round() as i16
+}

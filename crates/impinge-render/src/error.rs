@@ -1,0 +1,78 @@
+use std::io;
+use std::path::PathBuf;
+
+/// Everything that can go wrong, by name: which surface, which index, and both numbers.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A position holds NaN or an infinity.
+    #[error("surface {surface}: vertex {vertex} has a non-finite position ({}, {}, {})", value[0], value[1], value[2])]
+    NonFinitePosition {
+        /// Index of the surface within the picture.
+        surface: usize,
+        /// Index of the vertex within the surface.
+        vertex: usize,
+        /// The position as given.
+        value: [f64; 3],
+    },
+    /// A face names a vertex that does not exist.
+    #[error(
+        "surface {surface}: face {face} names vertex {index}, but there are {n_vertices} vertices"
+    )]
+    VertexIndexOutOfRange {
+        /// Index of the surface within the picture.
+        surface: usize,
+        /// Index of the face within the surface.
+        face: usize,
+        /// The vertex index it names.
+        index: u32,
+        /// How many vertices the surface has.
+        n_vertices: usize,
+    },
+    /// A primitive is said to collide that the body does not have: the pairs are of another body.
+    #[error("primitive {primitive} collides, but the body has {n_primitives} primitives")]
+    PrimitiveOutOfRange {
+        /// The primitive as given.
+        primitive: u32,
+        /// How many primitives the body has.
+        n_primitives: usize,
+    },
+    /// A picture of no pixels, or larger than the device draws.
+    #[error("a picture of {} x {} pixels was asked for, {allowed} is possible", given[0], given[1])]
+    Size {
+        /// Width and height as asked for.
+        given: [u32; 2],
+        /// What is possible.
+        allowed: String,
+    },
+    /// A setting lies outside its range.
+    #[error("{setting}: {given} given, {allowed} allowed")]
+    Setting {
+        /// The setting's name.
+        setting: &'static str,
+        /// The value as given.
+        given: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// No adapter fits what was asked for; the text lists those found.
+    #[error("no GPU adapter to draw with: {found}")]
+    NoAdapter {
+        /// What was looked for and what is there.
+        found: String,
+    },
+    /// The GPU refused: out of memory, a lost device, a shader that does not compile.
+    #[error("GPU: {what}")]
+    Gpu {
+        /// The driver's own words.
+        what: String,
+    },
+    /// An image file could not be written.
+    #[error("{}: cannot write: {source}", .path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}

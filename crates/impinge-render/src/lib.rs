@@ -1,0 +1,56 @@
+//! Pictures of meshes and of what collides in them, drawn off screen with `wgpu`: on any GPU, and on a
+//! software driver where there is none.
+//!
+//! A [`Picture`] is plain data: [`Surface`]s with a colour a face, a [`Camera`] and a size. A
+//! [`Renderer`] turns it into an [`Image`]. The camera fits itself to what there is to see.
+//!
+//! ```no_run
+//! use impinge::{Backend, Detector, Query, Scene};
+//! use impinge_render::{Colors, Picture, Renderer, Surface};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let (faces, positions) = ([[0u32, 1, 2]], [[0.0f32; 3]; 3]);
+//! let mut scene = Scene::new();
+//! let a = scene.add_triangles(&faces, &positions)?;
+//! let b = scene.add_triangles(&faces, &positions)?;
+//! let mut detector = Detector::new(Backend::Auto)?;
+//! let pairs = detector.detect(&scene, &Query::between(a, b))?;
+//!
+//! let mut picture = Picture::default();
+//! for (body, red_or_blue) in [(a, [215, 38, 61]), (b, [27, 95, 217])] {
+//!     let colors = Colors { colliding: red_or_blue, other: [200; 3] };
+//!     let colliding = pairs.colliding(body);
+//!     picture.surfaces.push(Surface::of_body(scene.body(body)?, &colliding, colors)?);
+//! }
+//! Renderer::new()?.render(&picture)?.write_png("collision.png")?;
+//! # Ok(()) }
+//! ```
+//!
+//! # What is drawn
+//! Both sides of every face, with soft light and darkened hollows, four samples a pixel. Faces that
+//! [show through](Face::shows_through) are seen faintly where other faces hide them, so that a band of
+//! contact can be followed around a body. Of tetrahedra the boundary is drawn, and all faces of those that
+//! collide.
+//!
+//! # What it costs
+//! A picture is drawn in tiles and faces in chunks, so device memory beyond the faces themselves (72 bytes
+//! each) is bounded whatever the size. The same picture on the same device gives the same bytes; devices
+//! differ in the last bits.
+
+mod body;
+mod camera;
+mod corners;
+mod device;
+mod error;
+mod image;
+mod passes;
+mod picture;
+mod renderer;
+
+pub use body::Colors;
+pub use camera::{Camera, Projection, UpAxis};
+pub use error::Error;
+pub use image::Image;
+/// The GPU interface that [`Renderer::with_device`] speaks.
+pub use impinge::wgpu;
+pub use picture::{Face, Normals, Picture, Surface};
+pub use renderer::Renderer;

@@ -1,0 +1,451 @@
+//! Pictures on whatever adapter there is. They fail where there is none: a software driver suffices.
+
+use impinge::{Backend, Detector, Query, Scene};
+use impinge_render::{
+    Camera, Colors, Error, Face, Image, Normals, Picture, Projection, Renderer, Surface, UpAxis,
+};
+use impinge_scenes::{Model, solids::solid_ball, surfaces};
+
+const RED: [u8; 3] = [215, 38, 61];
+const BLUE: [u8; 3] = [27, 95, 217];
+const GREY: [u8; 3] = [200, 200, 200];
+
+fn renderer() -> Renderer {
+    Renderer::new().expect("a GPU or a software driver is needed")
+}
+
+/// Looks along -z at a triangle or more; y is up.
+fn front() -> Camera {
+    Camera {
+        azimuth: 0.0,
+        elevation: 0.0,
+        up: UpAxis::Y,
+        projection: Projection::Orthographic,
+    }
+}
+
+/// On a black ground, without anything but faces and light.
+fn plain(surfaces: Vec<Surface>, size: [u32; 2]) -> Picture {
+    Picture {
+        surfaces,
+        camera: front(),
+        size,
+        see_through: 0.0,
+        occlusion: 0.0,
+        background: [[0; 3]; 2],
+    }
+}
+
+fn triangle(points: [[f64; 3]; 3], color: [u8; 3]) -> Surface {
+    Surface {
+        positions: points.to_vec(),
+        faces: vec![Face {
+            corners: [0, 1, 2],
+            color,
+            shows_through: false,
+        }],
+        normals: Normals::Flat,
+    }
+}
+
+fn at(image: &Image, x: u32, y: u32) -> [u8; 3] {
+    let [r, g, b, a] = image.pixels()[(y * image.width() + x) as usize];
+    assert_eq!(a, 255);
+    [r, g, b]
+}
+
+#[track_caller]
+fn assert_near(found: [u8; 3], expected: [u8; 3]) {
+    let is_near = found.iter().zip(expected).all(|(a, b)| a.abs_diff(b) <= 20);
+    assert!(is_near, "{found:?}, expected about {expected:?}");
+}
+
+fn is_red([r, g, b, _]: [u8; 4]) -> bool {
+    r > 120 && u32::from(r) > 2 * u32::from(g.max(b))
+}
+
+fn is_blue([r, g, b, _]: [u8; 4]) -> bool {
+    b > 120 && u32::from(b) > 3 * u32::from(r) && b > g
+}
+
+fn count(image: &Image, wanted: impl Fn([u8; 4]) -> bool) -> usize {
+    image
+        .pixels()
+        .iter()
+        .filter(|pixel| wanted(**pixel))
+        .count()
+}
+
+#[test]
+fn a_triangle_covers_its_pixels_and_no_others() {
+    // Half a square: the camera fits 93 % of the height, pixels 3.5 to 96.5 of 100.
+    let surface = triangle([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]], RED);
+    for flipped in [false, true] {
+        let mut surface = surface.clone();
+        if flipped {
+            // Both sides are seen alike.
+            surface.faces[0].corners = [0, 2, 1];
+        }
+        let image = renderer()
+            .render(&plain(vec![surface], [100, 100]))
+            .unwrap();
+        assert_eq!((image.width(), image.height()), (100, 100));
+        for y in 0..100 {
+            for x in 0..100 {
+                let (right, up) = (f64::from(x) + 0.5 - 3.5, 99.5 - f64::from(y) - 3.5);
+                let inside = right.min(up).min(93.0 - right - up);
+                if inside > 1.0 {
+                    assert_near(at(&image, x, y), RED);
+                } else if inside < -1.0 {
+                    assert_eq!(at(&image, x, y), [0; 3], "{x} {y}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_nearer_face_hides_the_other_whatever_their_order() {
+    let corners = [[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]];
+    let at_depth = |z: f64, color| triangle(corners.map(|[x, y]| [x, y, z]), color);
+    for (red_z, blue_z, expected) in [(0.1, 0.0, RED), (0.0, 0.1, BLUE)] {
+        let (red, blue) = (at_depth(red_z, RED), at_depth(blue_z, BLUE));
+        for surfaces in [vec![red.clone(), blue.clone()], vec![blue, red]] {
+            let image = renderer().render(&plain(surfaces, [64, 64])).unwrap();
+            assert_near(at(&image, 20, 44), expected);
+        }
+    }
+}
+
+#[test]
+fn a_hidden_face_that_shows_through_is_seen_as_far_as_asked() {
+    let near = triangle([[0.0, 0.0, 1.0], [4.0, 0.0, 1.0], [0.0, 4.0, 1.0]], GREY);
+    let mut far = triangle([[0.5, 0.5, 0.0], [1.5, 0.5, 0.0], [0.5, 1.5, 0.0]], RED);
+    far.faces[0].shows_through = true;
+    let mut redness = Vec::new();
+    for see_through in [0.0, 0.3, 1.0] {
+        let picture = Picture {
+            see_through,
+            ..plain(vec![near.clone(), far.clone()], [64, 64])
+        };
+        let image = renderer().render(&picture).unwrap();
+        let [r, g, _] = at(&image, 16, 47);
+        redness.push(i32::from(r) - i32::from(g));
+        // The rest stays as it is.
+        assert_near(at(&image, 32, 58), GREY);
+    }
+    assert!(redness[0].abs() < 5, "{redness:?}");
+    assert!((20..120).contains(&redness[1]), "{redness:?}");
+    assert!(redness[2] > 150, "{redness:?}");
+}
+
+#[test]
+fn the_viewer_stands_where_the_angles_say() {
+    // A small square at the end of each axis; the one that faces the viewer is in the middle of the picture.
+    let axes: [([f64; 3], [u8; 3]); 3] = [
+        ([1.0, 0.0, 0.0], RED),
+        ([0.0, 1.0, 0.0], [40, 160, 40]),
+        ([0.0, 0.0, 1.0], BLUE),
+    ];
+    let surfaces: Vec<Surface> = axes
+        .iter()
+        .flat_map(|&(axis, color)| {
+            // In front, and dark behind the origin.
+            [(1.0, color), (-1.0, [20, 20, 20])].map(|(sign, color)| {
+                let middle = axis.map(|x| sign * x);
+                let [x, y, z] = axis;
+                let (u, v) = ([y, z, x], [z, x, y]);
+                let corner = |a: f64, b: f64| {
+                    std::array::from_fn(|k| middle[k] + 0.3 * (a * u[k] + b * v[k]))
+                };
+                triangle(
+                    [corner(-2.0, -1.0), corner(2.0, -1.0), corner(0.0, 2.0)],
+                    color,
+                )
+            })
+        })
+        .collect();
+    for (up, azimuth, elevation, expected) in [
+        (UpAxis::Y, 0.0, 0.0, BLUE),
+        (UpAxis::Y, 90.0, 0.0, RED),
+        (UpAxis::Y, 0.0, 90.0, [40, 160, 40]),
+        (UpAxis::Z, 90.0, 0.0, RED),
+        (UpAxis::Z, 180.0, 0.0, [40, 160, 40]),
+        (UpAxis::Z, 0.0, 90.0, BLUE),
+    ] {
+        for projection in [
+            Projection::Orthographic,
+            Projection::Perspective { degrees: 30.0 },
+        ] {
+            let mut picture = plain(surfaces.clone(), [60, 60]);
+            picture.camera = Camera {
+                azimuth,
+                elevation,
+                up,
+                projection,
+            };
+            let image = renderer().render(&picture).unwrap();
+            assert_near(at(&image, 30, 30), expected);
+        }
+    }
+}
+
+#[test]
+fn everything_is_in_the_picture_and_fills_it() {
+    let ball = |offset: [f64; 3]| {
+        let model = surfaces::ball(500);
+        let mut scene = Scene::new();
+        let id = model.add_to(&mut scene).unwrap();
+        let colors = Colors {
+            colliding: RED,
+            other: RED,
+        };
+        let mut surface = Surface::of_body(scene.body(id).unwrap(), &[], colors).unwrap();
+        for point in &mut surface.positions {
+            *point = std::array::from_fn(|k| 1e6 * (point[k] + offset[k]) + 1e9);
+        }
+        surface
+    };
+    for projection in [
+        Projection::Orthographic,
+        Projection::Perspective { degrees: 20.0 },
+        Projection::Perspective { degrees: 100.0 },
+    ] {
+        for size in [[200, 100], [100, 200]] {
+            let mut picture = plain(vec![ball([0.0; 3]), ball([3.0, 1.0, 5.0])], size);
+            picture.camera = Camera {
+                azimuth: 30.0,
+                elevation: 40.0,
+                up: UpAxis::Z,
+                projection,
+            };
+            let image = renderer().render(&picture).unwrap();
+            let [width, height] = size;
+            let covered = |x: u32, y: u32| at(&image, x, y) != [0; 3];
+            let (mut first, mut last) = ([u32::MAX; 2], [0; 2]);
+            for y in 0..height {
+                for x in 0..width {
+                    if covered(x, y) {
+                        first = [first[0].min(x), first[1].min(y)];
+                        last = [last[0].max(x), last[1].max(y)];
+                    }
+                }
+            }
+            let margins = [0, 1].map(|k| (first[k], size[k] - 1 - last[k]));
+            assert!(margins.iter().all(|&(a, b)| a.min(b) >= 2), "{margins:?}");
+            // One pair of edges is reached, within 5 % of the size.
+            assert!(
+                (0..2).any(|k| {
+                    let (a, b) = margins[k];
+                    a.max(b) <= size[k] / 20
+                }),
+                "{projection:?} {size:?} {margins:?}"
+            );
+        }
+    }
+}
+
+fn colliding(models: [Model; 2]) -> Picture {
+    let mut scene = Scene::new();
+    let ids = models.map(|model| model.add_to(&mut scene).unwrap());
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let pairs = detector
+        .detect(&scene, &Query::between(ids[0], ids[1]))
+        .unwrap();
+    assert!(!pairs.is_empty());
+    let surfaces = ids
+        .iter()
+        .zip([RED, BLUE])
+        .map(|(&id, color)| {
+            let colors = Colors {
+                colliding: color,
+                other: GREY,
+            };
+            Surface::of_body(scene.body(id).unwrap(), &pairs.colliding(id), colors).unwrap()
+        })
+        .collect();
+    Picture {
+        surfaces,
+        size: [320, 240],
+        ..Picture::default()
+    }
+}
+
+#[test]
+fn what_collides_is_red_and_blue() {
+    let apart = [0.9, 0.3, 0.2];
+    for models in [
+        [
+            surfaces::ball(2_000),
+            surfaces::ball(2_000).translated(apart),
+        ],
+        [solid_ball(3_000), solid_ball(3_000).translated(apart)],
+    ] {
+        let mut picture = colliding(models);
+        let image = renderer().render(&picture).unwrap();
+        assert!(count(&image, is_red) > 100, "{}", count(&image, is_red));
+        assert!(count(&image, is_blue) > 100, "{}", count(&image, is_blue));
+        for face in picture
+            .surfaces
+            .iter_mut()
+            .flat_map(|surface| &mut surface.faces)
+        {
+            face.color = GREY;
+        }
+        let grey = renderer().render(&picture).unwrap();
+        assert_eq!((count(&grey, is_red), count(&grey, is_blue)), (0, 0));
+    }
+}
+
+#[test]
+fn runs_tiles_and_chunks_change_no_byte() {
+    let mut picture = colliding([
+        surfaces::ball(2_000),
+        surfaces::bumpy_ball(3_000, 0.2).translated([0.9, 0.3, 0.2]),
+    ]);
+    let mut one = renderer();
+    let image = one.render(&picture).unwrap();
+    assert_eq!(image, one.render(&picture).unwrap());
+    assert_eq!(image, renderer().render(&picture).unwrap());
+    for (tile, n_faces) in [(1536, 100), (1536, 1), (100, 100_000), (37, 700)] {
+        let image_of_parts = renderer()
+            .with_room(tile, n_faces)
+            .render(&picture)
+            .unwrap();
+        assert!(image == image_of_parts, "{tile} {n_faces}");
+    }
+    // Where it could fail: another picture has other bytes.
+    picture.camera.azimuth += 1.0;
+    assert_ne!(image, one.render(&picture).unwrap());
+}
+
+#[test]
+fn hollows_are_darker() {
+    let floor = |x: f64| [x, 0.0, -1.0];
+    let wall = |x: f64, y: f64| [x, y, -1.0];
+    let quad = |corners: [[f64; 3]; 4]| Surface {
+        positions: corners.to_vec(),
+        faces: [[0, 1, 2], [0, 2, 3]]
+            .map(|corners| Face {
+                corners,
+                color: GREY,
+                shows_through: false,
+            })
+            .to_vec(),
+        normals: Normals::Flat,
+    };
+    let surfaces = vec![
+        quad([floor(-1.0), floor(1.0), [1.0, 0.0, 1.0], [-1.0, 0.0, 1.0]]),
+        quad([floor(-1.0), floor(1.0), wall(1.0, 1.0), wall(-1.0, 1.0)]),
+    ];
+    let mut picture = plain(surfaces, [200, 200]);
+    picture.camera.elevation = 45.0;
+    let flat = renderer().render(&picture).unwrap();
+    picture.occlusion = 1.0;
+    let shaded = renderer().render(&picture).unwrap();
+    // The edge between floor and wall lies in the middle of the picture's height.
+    let edge = (50..150).max_by_key(|&y| at(&flat, 100, y)[0].abs_diff(at(&shaded, 100, y)[0]));
+    let edge = edge.unwrap();
+    assert!(at(&shaded, 100, edge)[0] + 20 < at(&flat, 100, edge)[0]);
+    assert_eq!(at(&shaded, 100, 180), at(&flat, 100, 180));
+}
+
+#[test]
+fn an_empty_picture_is_its_background() {
+    let picture = Picture {
+        background: [[10, 20, 30]; 2],
+        size: [7, 5],
+        ..Picture::default()
+    };
+    let image = renderer().render(&picture).unwrap();
+    assert_eq!(image.pixels(), [[10, 20, 30, 255]; 35]);
+    // A point and a needle are seen by nobody, and harm nobody.
+    let point = triangle([[1.0; 3]; 3], RED);
+    let needle = triangle([[0.0; 3], [1e-300, 0.0, 0.0], [1e300, 0.0, 0.0]], RED);
+    for surface in [point, needle] {
+        for projection in [
+            Projection::Orthographic,
+            Projection::Perspective { degrees: 30.0 },
+        ] {
+            let mut picture = plain(vec![surface.clone()], [8, 8]);
+            picture.camera.projection = projection;
+            let image = renderer().render(&picture).unwrap();
+            assert!(image.pixels().iter().all(|p| *p == [0, 0, 0, 255]));
+        }
+    }
+}
+
+#[test]
+fn bad_input_is_refused_by_name() {
+    let mut renderer = renderer();
+    let good = triangle([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], RED);
+    let mut refused = |change: &dyn Fn(&mut Picture)| {
+        let mut picture = plain(vec![good.clone(), good.clone()], [16, 16]);
+        change(&mut picture);
+        renderer.render(&picture).unwrap_err().to_string()
+    };
+    assert_eq!(
+        refused(&|picture| picture.surfaces[1].positions[2][0] = f64::NAN),
+        "surface 1: vertex 2 has a non-finite position (NaN, 1, 0)"
+    );
+    assert_eq!(
+        refused(&|picture| picture.surfaces[1].faces[0].corners[1] = 3),
+        "surface 1: face 0 names vertex 3, but there are 3 vertices"
+    );
+    for size in [[0, 16], [16, 0], [u32::MAX, 16], [16, u32::MAX]] {
+        let text = refused(&|picture| picture.size = size);
+        let begin = format!(
+            "a picture of {} x {} pixels was asked for",
+            size[0], size[1]
+        );
+        assert!(text.starts_with(&begin), "{text}");
+    }
+    let text = refused(&|picture| picture.camera.elevation = 91.0);
+    assert_eq!(text, "elevation: 91 given, -90 to 90 allowed");
+    let text = refused(&|picture| picture.camera.azimuth = f64::INFINITY);
+    assert_eq!(text, "azimuth: inf given, any finite angle allowed");
+    let text = refused(&|picture| picture.see_through = -0.5);
+    assert_eq!(text, "see_through: -0.5 given, 0 to 1 allowed");
+    let text = refused(&|picture| {
+        picture.camera.projection = Projection::Perspective { degrees: 0.0 };
+    });
+    assert_eq!(text, "angle of view: 0 given, above 0 to 120 allowed");
+    // And it draws on.
+    renderer.render(&plain(vec![good], [16, 16])).unwrap();
+
+    let error = Renderer::on_device_named("no such device").unwrap_err();
+    assert!(matches!(error, Error::NoAdapter { .. }), "{error}");
+    assert!(error.to_string().contains("no such device"), "{error}");
+
+    let mut scene = Scene::new();
+    let id = surfaces::ball(20).add_to(&mut scene).unwrap();
+    let colors = Colors {
+        colliding: RED,
+        other: GREY,
+    };
+    let error = Surface::of_body(scene.body(id).unwrap(), &[20], colors).unwrap_err();
+    let text = "primitive 20 collides, but the body has 20 primitives";
+    assert_eq!(error.to_string(), text);
+}
+
+#[test]
+fn files_hold_the_pixels() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.png");
+    let surface = triangle([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], RED);
+    let image = renderer().render(&plain(vec![surface], [50, 20])).unwrap();
+    image.write_png(&path).unwrap();
+    let file = std::io::BufReader::new(std::fs::File::open(&path).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    assert_eq!(reader.info().size(), (50, 20));
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut bytes).unwrap();
+    let expected: Vec<u8> = image
+        .pixels()
+        .iter()
+        .flat_map(|p| [p[0], p[1], p[2]])
+        .collect();
+    assert_eq!(bytes, expected);
+    let error = image.write_png(folder.path().join("no/a.png")).unwrap_err();
+    assert!(error.to_string().contains("cannot write"), "{error}");
+}
