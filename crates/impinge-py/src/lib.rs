@@ -6,6 +6,7 @@
 mod arrays;
 mod bodies;
 mod detector;
+mod devices;
 mod errors;
 mod functions;
 mod result;
@@ -23,6 +24,8 @@ mod _impinge {
     use super::bodies::Body;
     #[pymodule_export]
     use super::detector::Detector;
+    #[pymodule_export]
+    use super::devices::{Device, devices};
     #[pymodule_export]
     use super::errors::Cancelled;
     #[pymodule_export]

@@ -10,10 +10,12 @@ __all__ = [
     "CancelToken",
     "Cancelled",
     "Detector",
+    "Device",
     "Result",
     "Scene",
     "Statistics",
     "__version__",
+    "devices",
     "hash_rows",
     "pairs",
     "self_pairs",
@@ -64,6 +66,23 @@ class Body:
     def __le__(self, other: Body | int, /) -> bool: ...
     def __gt__(self, other: Body | int, /) -> bool: ...
     def __ge__(self, other: Body | int, /) -> bool: ...
+
+@final
+class Device:
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def interface(self) -> str: ...
+    @property
+    def driver(self) -> str: ...
+    @property
+    def is_software(self) -> bool: ...
+    @property
+    def max_binding(self) -> int: ...
+
+def devices() -> list[Device]: ...
 
 @final
 class Scene:
