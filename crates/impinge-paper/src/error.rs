@@ -30,6 +30,10 @@ pub enum Error {
     /// A simulation failed, or was cancelled.
     #[error(transparent)]
     Simulation(#[from] impinge_fem::Error),
+    /// A picture could not be drawn.
+    #[cfg(feature = "gpu")]
+    #[error("picture: {0}")]
+    Picture(#[from] impinge_render::Error),
     /// A plot could not be drawn.
     #[error("plot: {0}")]
     Plot(String),
