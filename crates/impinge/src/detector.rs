@@ -228,7 +228,7 @@ impl Detector {
                     group_size: settings.group_size,
                     memory_budget: settings.memory_budget,
                 };
-                self.cells.run(job, &options, keys, stats)?;
+                self.cells.run(job, &options, &cells::Owner, keys, stats)?;
                 stats.time("collect", |_| keys.sort_unstable());
             }
             Method::Clusters => {

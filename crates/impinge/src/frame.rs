@@ -20,11 +20,14 @@ use crate::scene::{Body, BodyId, Filter, Kind, Positions, Scene, check_positions
 
 /// One body that takes part in a frame.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Participant {
+pub struct Participant {
+    /// The body.
     pub id: BodyId,
     /// Global number of its first primitive.
     pub first: u32,
+    /// How many primitives it has.
     pub n_primitives: u32,
+    /// What they are.
     pub kind: Kind,
     /// Whether its self-collision is asked for.
     pub within: bool,
@@ -33,8 +36,10 @@ pub(crate) struct Participant {
 
 /// Participants and rules; the memory is kept from frame to frame.
 #[derive(Debug, Default)]
-pub(crate) struct Frame {
+pub struct Frame {
+    /// In slot order.
     pub participants: Vec<Participant>,
+    /// The adjacency rule of self-collision.
     pub shared_vertex: SharedVertex,
     between: bool,
     ignored: BTreeSet<(BodyId, BodyId)>,
@@ -185,7 +190,7 @@ pub(crate) fn owner_by_first<T>(entries: &[T], global: u32, first: impl Fn(&T) -
 
 /// The key of a pair of global primitive numbers, lower number first.
 #[inline(always)]
-pub(crate) fn pair_key(a: u32, b: u32) -> u64 {
+pub fn pair_key(a: u32, b: u32) -> u64 {
     let (low, high) = if a < b { (a, b) } else { (b, a) };
     u64::from(low) << 32 | u64::from(high)
 }

@@ -18,6 +18,8 @@ mod frame;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod grouping;
+#[doc(hidden)]
+pub mod guest;
 mod naive;
 mod narrow;
 mod pairs;

@@ -61,7 +61,11 @@ impl<'a> Control<'a> {
     }
 
     /// Called by the stages between pieces of work.
-    pub(crate) fn step(&self, done: u64, total: u64) -> Result<(), Error> {
+    ///
+    /// # Errors
+    /// Cancellation.
+    #[doc(hidden)]
+    pub fn step(&self, done: u64, total: u64) -> Result<(), Error> {
         if self.cancel.is_some_and(CancelToken::is_cancelled) {
             return Err(Error::Cancelled);
         }

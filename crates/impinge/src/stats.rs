@@ -66,7 +66,8 @@ impl Statistics {
     }
 
     /// Adds time to a stage, which is appended at its first mention.
-    pub(crate) fn add_ms(&mut self, name: &'static str, ms: f64) {
+    #[doc(hidden)]
+    pub fn add_ms(&mut self, name: &'static str, ms: f64) {
         match self.stages.iter_mut().find(|stage| stage.name == name) {
             Some(stage) => stage.ms += ms,
             None => self.stages.push(Stage { name, ms }),
@@ -74,7 +75,8 @@ impl Statistics {
     }
 
     /// Runs one stage and books its wall time.
-    pub(crate) fn time<T>(&mut self, name: &'static str, stage: impl FnOnce(&mut Self) -> T) -> T {
+    #[doc(hidden)]
+    pub fn time<T>(&mut self, name: &'static str, stage: impl FnOnce(&mut Self) -> T) -> T {
         let start = Instant::now();
         let result = stage(self);
         self.add_ms(name, start.elapsed().as_secs_f64() * 1e3);

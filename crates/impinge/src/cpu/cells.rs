@@ -15,12 +15,10 @@
 //! coarser until the lists hold at most [`MOST_ENTRIES_EACH`] entries a primitive. That keeps memory
 //! bounded; the price is more pairs a cell, and `n_reruns` and `grid` in the statistics tell it.
 
-use std::sync::Mutex;
 use std::time::Instant;
 
 use crate::detector::InstructionSet;
 use crate::error::Error;
-use crate::frame::Frame;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::{FineRange, Grid, owns};
@@ -30,38 +28,48 @@ use crate::query::SharedVertex;
 use crate::stats::Statistics;
 
 use super::Job;
-use super::bounds;
-use super::dispatch::NodePair;
+use super::kept::{Kept, KeptList};
 use super::narrow::{Candidate, Settler};
 use super::pairing::{Lanes, full};
-use super::simd::{Isa, Simd, dispatch};
-use super::top_level::TopLevel;
+use super::simd::Isa;
 use super::workers::Workers;
 use super::world::World;
 
 /// Entries of the cell lists a primitive, at most, on average.
-const MOST_ENTRIES_EACH: u64 = 16;
-/// Primitives whose boxes a task finds.
-const BOUNDS_TASK: usize = 4096;
+pub const MOST_ENTRIES_EACH: u64 = 16;
 /// Work items of one slab, and of one task.
 const SLAB_ITEMS: usize = 1 << 18;
 const PAIRING_TASK: usize = 32;
 
 /// What the method is told.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Options {
+pub struct Options {
+    /// Cells a primitive, the paper's λ.
     pub lambda: f64,
+    /// Primitives a group, at most.
     pub group_size: u32,
+    /// Bytes that may be held.
     pub memory_budget: Option<u64>,
 }
 
-/// A primitive that reaches the region.
+/// What becomes of two primitives of one cell that touch a common sub-cell.
+///
+/// The method is compiled once for each rule; [`Owner`] is that of every detector. Others are for studies
+/// of what it replaces.
+pub trait Rule: Sync {
+    /// Whether the pair is a candidate here. What the rule appends to `keys` ends up in the answer's.
+    fn admits(&self, cell: [u32; 3], a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool;
+}
+
+/// Boxes overlap, and the cell owns the pair: each candidate comes once.
 #[derive(Debug, Clone, Copy)]
-struct Kept {
-    bounds: Bounds,
-    range: FineRange,
-    participant: u32,
-    primitive: u32,
+pub struct Owner;
+
+impl Rule for Owner {
+    #[inline(always)]
+    fn admits(&self, cell: [u32; 3], a: &Kept, b: &Kept, _: &mut Vec<u64>) -> bool {
+        a.bounds.overlaps(&b.bounds) && owns(cell, &a.range, &b.range)
+    }
 }
 
 /// Two groups of one cell: runs of the cell lists.
@@ -74,25 +82,10 @@ struct WorkItem {
     n_b: u8,
 }
 
-/// A task of the bounds stage: a run of one participant's primitives.
-#[derive(Debug, Clone, Copy)]
-struct BoundsTask {
-    participant: u32,
-    first: u32,
-    end: u32,
-}
-
 /// Scratch of the method; kept from frame to frame.
-pub(crate) struct Cells {
+pub struct Cells {
     isa: Isa,
-    bodies: Vec<Bounds>,
-    /// For each participant, the box in which others may meet it.
-    reach: Vec<Bounds>,
-    top: TopLevel,
-    stack: Vec<NodePair>,
-    tasks: Vec<BoundsTask>,
-    parts: Vec<Mutex<Vec<Kept>>>,
-    kept: Vec<Kept>,
+    reaching: KeptList,
     /// Where each cell's list starts, and one past the last.
     starts: Vec<u32>,
     /// The cell lists: places in `kept`, rising within a cell, so that a body's are together.
@@ -102,16 +95,11 @@ pub(crate) struct Cells {
 }
 
 impl Cells {
+    /// With the best instructions that are allowed and there.
     pub fn new(allowed: InstructionSet) -> Self {
         Cells {
             isa: Isa::detect(allowed),
-            bodies: Vec::new(),
-            reach: Vec::new(),
-            top: TopLevel::default(),
-            stack: Vec::new(),
-            tasks: Vec::new(),
-            parts: Vec::new(),
-            kept: Vec::new(),
+            reaching: KeptList::new(Isa::detect(allowed)),
             starts: Vec::new(),
             entries: Vec::new(),
             items: Vec::new(),
@@ -119,11 +107,15 @@ impl Cells {
         }
     }
 
-    /// Appends the keys of all pairs that the frame asks for, unsorted.
-    pub fn run(
+    /// Appends the keys of all pairs that the frame asks for, unsorted, as the rule has it.
+    ///
+    /// # Errors
+    /// A memory budget too small for a slab; cancellation.
+    pub fn run<R: Rule>(
         &mut self,
         job: Job<'_>,
         options: &Options,
+        rule: &R,
         keys: &mut Vec<u64>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
@@ -138,13 +130,14 @@ impl Cells {
             scratch.clear();
         }
         self.items.clear();
-        let world = World {
-            scene,
-            frame,
-            caches: None,
-        };
-        stats.time("bounds", |_| self.bounds(world, workers));
-        let Some(region) = self.region() else {
+        let world = World::new(scene, frame);
+        let Cells {
+            reaching,
+            scratches,
+            ..
+        } = self;
+        stats.time("bounds", |_| reaching.find(world, workers, scratches));
+        let Some(region) = self.reaching.region() else {
             stats.n_slabs = 1;
             return Ok(());
         };
@@ -152,7 +145,13 @@ impl Cells {
             self.scatter(&region, options, control, stats)
         })?;
         stats.grid = Some(grid.resolution);
-        self.dispatch_items(world, grid, options, workers, control, stats)?;
+        let task = Task {
+            world,
+            workers,
+            control,
+            rule,
+        };
+        self.dispatch_items(task, grid, options, stats)?;
         for scratch in &self.scratches {
             keys.extend_from_slice(&scratch.keys);
             stats.n_candidates += scratch.n_candidates;
@@ -164,125 +163,11 @@ impl Cells {
     }
 
     fn bytes(&self) -> u64 {
-        let parts: usize = self
-            .parts
-            .iter()
-            .map(|part| part.lock().map_or(0, |part| part.capacity()))
-            .sum();
-        let bytes = size_of::<Kept>() * (self.kept.capacity() + parts)
+        let bytes = self.reaching.bytes()
             + size_of::<u32>() * (self.starts.capacity() + self.entries.capacity())
             + size_of::<WorkItem>() * self.items.capacity()
-            + size_of::<Bounds>() * (self.bodies.capacity() + self.reach.capacity())
-            + self.top.bytes()
             + self.scratches.iter().map(Settler::bytes).sum::<usize>();
         bytes as u64
-    }
-
-    /// Boxes of bodies, where they reach each other, and the primitives that do.
-    fn bounds(&mut self, world: World<'_>, workers: &Workers) {
-        let frame = world.frame;
-        self.tasks.clear();
-        for (ix, participant) in frame.participants.iter().enumerate() {
-            let n = participant.n_primitives;
-            self.tasks
-                .extend((0..n).step_by(BOUNDS_TASK).map(|first| BoundsTask {
-                    participant: ix as u32,
-                    first,
-                    end: n.min(first.saturating_add(BOUNDS_TASK as u32)),
-                }));
-        }
-        self.parts
-            .resize_with(self.tasks.len().max(self.parts.len()), Mutex::default);
-        self.find_bodies(world);
-        self.find_reach(world);
-        let (tasks, parts, reach) = (&self.tasks, &self.parts, &self.reach);
-        workers.for_each(&mut self.scratches, tasks.len(), |_, task_ix| {
-            let task = tasks[task_ix];
-            let reach = &reach[task.participant as usize];
-            let body = world.body(task.participant);
-            let mut part = parts[task_ix].lock().expect("no task panics");
-            part.clear();
-            for primitive in task.first..task.end {
-                let bounds = bounds::of_vertices(body.positions, body.corners(primitive));
-                if bounds.overlaps(reach) {
-                    part.push(Kept {
-                        bounds,
-                        range: FineRange {
-                            lo: [0; 3],
-                            hi: [0; 3],
-                        },
-                        participant: task.participant,
-                        primitive,
-                    });
-                }
-            }
-        });
-        self.kept.clear();
-        let n_kept = self.parts[..self.tasks.len()]
-            .iter_mut()
-            .map(|part| part.get_mut().expect("no task panics").len())
-            .sum();
-        self.kept.reserve_exact(n_kept);
-        for part in &mut self.parts[..self.tasks.len()] {
-            self.kept
-                .extend_from_slice(part.get_mut().expect("no task panics"));
-        }
-    }
-
-    fn find_bodies(&mut self, world: World<'_>) {
-        self.bodies.clear();
-        for ix in 0..world.frame.participants.len() {
-            let body = world.body(ix as u32);
-            self.bodies.push(match body.participant.n_primitives {
-                0 => Bounds::EMPTY,
-                _ => bounds::of_all(body.positions),
-            });
-        }
-    }
-
-    /// Reason for the discard that follows: a pair's boxes share a point, which lies in both bodies'
-    /// boxes, so each primitive meets the intersection of the two.
-    fn find_reach(&mut self, world: World<'_>) {
-        let frame = world.frame;
-        let Cells {
-            isa,
-            bodies,
-            reach,
-            top,
-            stack,
-            ..
-        } = self;
-        reach.clear();
-        reach.extend(
-            frame
-                .participants
-                .iter()
-                .zip(&*bodies)
-                .map(|(participant, bounds)| match participant.within {
-                    true => *bounds,
-                    false => Bounds::EMPTY,
-                }),
-        );
-        if frame.between() {
-            top.refit(bodies.len(), |ix| bodies[ix as usize]);
-            let bodies = &bodies[..];
-            dispatch!(*isa, reach_pairs, (
-                top: &TopLevel = top,
-                stack: &mut Vec<NodePair> = stack,
-                frame: &Frame = frame,
-                bodies: &[Bounds] = bodies,
-                reach: &mut [Bounds] = reach,
-            ));
-        }
-    }
-
-    /// The box of all reaches; none when nothing reaches anything.
-    fn region(&self) -> Option<Bounds> {
-        let mut region = Bounds::EMPTY;
-        for reach in &self.reach {
-            region.join(reach);
-        }
-        (!self.kept.is_empty()).then_some(region)
     }
 
     /// Finds the grid, counts, and scatters primitives into cell lists.
@@ -293,7 +178,7 @@ impl Cells {
         control: &Control<'_>,
         stats: &mut Statistics,
     ) -> Result<Grid, Error> {
-        let n = self.kept.len() as u64;
+        let n = self.reaching.kept.len() as u64;
         let mut grid = Grid::new(region, n, options.lambda);
         let mut most_entries = n.saturating_mul(MOST_ENTRIES_EACH).min(u64::from(u32::MAX));
         let mut most_cells = u64::MAX;
@@ -317,7 +202,7 @@ impl Cells {
         loop {
             control.step(0, 1)?;
             let mut n_entries = 0;
-            for kept in &mut self.kept {
+            for kept in &mut self.reaching.kept {
                 kept.range = grid.range(&kept.bounds);
                 n_entries += kept.range.n_coarse();
             }
@@ -332,7 +217,7 @@ impl Cells {
         self.starts.clear();
         self.starts.reserve_exact(n_cells + 1);
         self.starts.resize(n_cells + 1, 0);
-        for kept in &self.kept {
+        for kept in &self.reaching.kept {
             for_cells(&kept.range, |cell| self.starts[grid.index(cell) + 1] += 1);
         }
         for ix in 0..n_cells {
@@ -342,7 +227,7 @@ impl Cells {
         self.entries.clear();
         self.entries.reserve_exact(n_entries);
         self.entries.resize(n_entries, 0);
-        for (place, kept) in (0u32..).zip(&self.kept) {
+        for (place, kept) in (0u32..).zip(&self.reaching.kept) {
             // Each start moves to its list's end, which is the next list's start.
             for_cells(&kept.range, |cell| {
                 let next = &mut self.starts[grid.index(cell)];
@@ -356,13 +241,11 @@ impl Cells {
     }
 
     /// Work items of all cells, a slab at a time.
-    fn dispatch_items(
+    fn dispatch_items<R: Rule>(
         &mut self,
-        world: World<'_>,
+        task: Task<'_, R>,
         grid: Grid,
         options: &Options,
-        workers: &Workers,
-        control: &Control<'_>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         let start = Instant::now();
@@ -373,7 +256,7 @@ impl Cells {
         }
         let Cells {
             isa,
-            kept,
+            reaching,
             starts,
             entries,
             items,
@@ -381,8 +264,8 @@ impl Cells {
             ..
         } = self;
         let lists = Lists {
-            world,
-            kept,
+            world: task.world,
+            kept: &reaching.kept,
             entries,
         };
         let n_cells = grid.n_cells() as usize;
@@ -393,7 +276,7 @@ impl Cells {
             lists.product(list, options.group_size as usize, |a, b| {
                 if items.len() == most_items {
                     let at = (ix as u64, n_cells as u64);
-                    paired_ms += pair(*isa, lists, items, scratches, workers, control, at)?;
+                    paired_ms += pair(*isa, lists, items, scratches, task, at)?;
                     stats.n_work_items += items.len() as u64;
                     stats.n_slabs += 1;
                     items.clear();
@@ -411,12 +294,12 @@ impl Cells {
             cell = grid.next(cell);
         }
         let at = (n_cells as u64, n_cells as u64);
-        paired_ms += pair(*isa, lists, items, scratches, workers, control, at)?;
+        paired_ms += pair(*isa, lists, items, scratches, task, at)?;
         stats.n_work_items += items.len() as u64;
         stats.n_slabs += 1;
         items.clear();
         let busy: f64 = scratches.iter().map(|s| s.busy.as_secs_f64() * 1e3).sum();
-        let narrow_ms = (busy / workers.n() as f64).min(paired_ms);
+        let narrow_ms = (busy / task.workers.n() as f64).min(paired_ms);
         stats.add_ms("dispatch", start.elapsed().as_secs_f64() * 1e3 - paired_ms);
         stats.add_ms("pairing", paired_ms - narrow_ms);
         stats.add_ms("narrow", narrow_ms);
@@ -438,30 +321,25 @@ fn slab_bytes(options: &Options) -> u64 {
     (slab_items(options) * size_of::<WorkItem>()) as u64
 }
 
-#[inline(always)]
-fn reach_pairs<S: Simd>(
-    simd: S,
-    top: &TopLevel,
-    stack: &mut Vec<NodePair>,
-    frame: &Frame,
-    bodies: &[Bounds],
-    reach: &mut [Bounds],
-) {
-    let met = top.pairs(simd, stack, |a, b| {
-        let (a, b) = (a as usize, b as usize);
-        if frame.meets(a, b) {
-            let both = bodies[a].intersection(&bodies[b]);
-            reach[a].join(&both);
-            reach[b].join(&both);
-        }
-        Ok::<(), std::convert::Infallible>(())
-    });
-    let Ok(()) = met;
+/// A frame, with what the rule says of its pairs.
+struct Task<'a, R> {
+    world: World<'a>,
+    workers: &'a Workers,
+    control: &'a Control<'a>,
+    rule: &'a R,
 }
+
+impl<R> Clone for Task<'_, R> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<R> Copy for Task<'_, R> {}
 
 /// Calls back for each coarse cell of a range.
 #[inline(always)]
-fn for_cells(range: &FineRange, mut call: impl FnMut([u32; 3])) {
+pub fn for_cells(range: &FineRange, mut call: impl FnMut([u32; 3])) {
     let (lo, hi) = range.coarse();
     for z in lo[2]..=hi[2] {
         for y in lo[1]..=hi[1] {
@@ -535,32 +413,43 @@ fn groups(
 }
 
 /// Pairs and settles a slab of work items; returns the milliseconds it took.
-fn pair(
+fn pair<R: Rule>(
     isa: Isa,
     lists: Lists<'_>,
     items: &[WorkItem],
     scratches: &mut [Settler],
-    workers: &Workers,
-    control: &Control<'_>,
+    task: Task<'_, R>,
     (done, total): (u64, u64),
 ) -> Result<f64, Error> {
     let start = Instant::now();
     let n_tasks = items.len().div_ceil(PAIRING_TASK);
-    workers.for_each(scratches, n_tasks, |settler, task| {
+    let Task {
+        workers,
+        control,
+        rule,
+        ..
+    } = task;
+    workers.for_each(scratches, n_tasks, |settler, ix| {
         if control.step(done, total).is_err() {
             return;
         }
-        let first = task * PAIRING_TASK;
+        let first = ix * PAIRING_TASK;
         let items = &items[first..items.len().min(first + PAIRING_TASK)];
-        pair_items(isa, lists, items, settler);
+        pair_items(isa, lists, items, rule, settler);
     });
     control.step(done, total)?;
     Ok(start.elapsed().as_secs_f64() * 1e3)
 }
 
-fn pair_items(isa: Isa, lists: Lists<'_>, items: &[WorkItem], settler: &mut Settler) {
+fn pair_items<R: Rule>(
+    isa: Isa,
+    lists: Lists<'_>,
+    items: &[WorkItem],
+    rule: &R,
+    settler: &mut Settler,
+) {
     for item in items {
-        pair_item(lists, item, settler);
+        pair_item(lists, item, rule, settler);
         settler.settle_when_full(isa, lists.world);
     }
     settler.settle(isa, lists.world);
@@ -574,7 +463,7 @@ fn pair_items(isa: Isa, lists: Lists<'_>, items: &[WorkItem], settler: &mut Sett
 /// partners of i       OR of membership[s] over the sub-cells s of mask i
 /// ```
 #[inline(always)]
-fn pair_item(lists: Lists<'_>, item: &WorkItem, settler: &mut Settler) {
+fn pair_item<R: Rule>(lists: Lists<'_>, item: &WorkItem, rule: &R, settler: &mut Settler) {
     let (first_a, first_b) = (item.first_a as usize, item.first_b as usize);
     let group_a = &lists.entries[first_a..first_a + usize::from(item.n_a)];
     let group_b = &lists.entries[first_b..first_b + usize::from(item.n_b)];
@@ -596,7 +485,7 @@ fn pair_item(lists: Lists<'_>, item: &WorkItem, settler: &mut Settler) {
         }
         for j in Lanes(partners) {
             let b = kept(group_b[j]);
-            if a.bounds.overlaps(&b.bounds) && owns(item.cell, &a.range, &b.range) {
+            if rule.admits(item.cell, a, b, &mut settler.keys) {
                 put(lists.world, a, b, settler);
             }
         }

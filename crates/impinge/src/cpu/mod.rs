@@ -4,6 +4,7 @@ pub(crate) mod bounds;
 pub(crate) mod cells;
 pub(crate) mod clusters;
 pub(crate) mod dispatch;
+pub(crate) mod kept;
 pub(crate) mod narrow;
 pub(crate) mod pairing;
 pub(crate) mod simd;
@@ -20,9 +21,13 @@ use workers::Workers;
 
 /// What a method is asked to do, and with whom.
 #[derive(Clone, Copy)]
-pub(crate) struct Job<'a> {
+pub struct Job<'a> {
+    /// The bodies.
     pub scene: &'a Scene,
+    /// Who takes part.
     pub frame: &'a Frame,
+    /// The threads.
     pub workers: &'a Workers,
+    /// Stops and watches it.
     pub control: &'a Control<'a>,
 }

@@ -19,10 +19,14 @@ use super::world::{BodyRef, World};
 
 /// Two primitives whose boxes overlap: participants, and places in their clusters' orders.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Candidate {
+pub struct Candidate {
+    /// Participant.
     pub a: u32,
+    /// The other participant.
     pub b: u32,
+    /// Place of the primitive of `a`.
     pub place_a: u32,
+    /// Place of the primitive of `b`.
     pub place_b: u32,
 }
 
@@ -33,9 +37,12 @@ const MOST: usize = FULL + GROUP * GROUP;
 
 /// One worker's candidates, pairs and counts.
 #[derive(Debug, Default)]
-pub(crate) struct Settler {
+pub struct Settler {
+    /// Keys of the pairs that intersect.
     pub keys: Vec<u64>,
+    /// Candidates that were settled.
     pub n_candidates: u64,
+    /// Those left to exact arithmetic.
     pub n_unsure: u64,
     /// Time spent here, for the statistics.
     pub busy: Duration,
@@ -60,11 +67,13 @@ impl Settler {
         size_of::<Candidate>() * (self.candidates.capacity() + self.survivors.capacity())
     }
 
+    /// Adds a candidate.
     #[inline(always)]
     pub fn push(&mut self, candidate: Candidate) {
         self.candidates.push(candidate);
     }
 
+    /// Settles what has gathered once it is worth it.
     #[inline(always)]
     pub fn settle_when_full(&mut self, isa: Isa, world: World<'_>) {
         if self.candidates.len() >= FULL {

@@ -14,17 +14,21 @@ use crate::grouping::bounds::{Bounds, BoundsArray};
 /// The boxes of one group, a lane each; lanes past the group's size hold empty boxes.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
-pub(crate) struct LaneBounds {
+pub struct LaneBounds {
+    /// Low ends, an axis a row.
     pub min: [[f32; GROUP]; 3],
+    /// High ends.
     pub max: [[f32; GROUP]; 3],
 }
 
 impl LaneBounds {
+    /// Nothing in any lane.
     pub const EMPTY: LaneBounds = LaneBounds {
         min: [[f32::INFINITY; GROUP]; 3],
         max: [[f32::NEG_INFINITY; GROUP]; 3],
     };
 
+    /// The box of a lane.
     #[inline(always)]
     pub fn at(&self, lane: usize) -> Bounds {
         Bounds {
@@ -33,6 +37,7 @@ impl LaneBounds {
         }
     }
 
+    /// Sets the box of a lane.
     #[inline(always)]
     pub fn put(&mut self, lane: usize, bounds: &Bounds) {
         for axis in 0..3 {
@@ -41,6 +46,7 @@ impl LaneBounds {
         }
     }
 
+    /// Empties the lanes from this one on.
     pub fn clear_from(&mut self, lane: usize) {
         for axis in 0..3 {
             self.min[axis][lane..].fill(f32::INFINITY);
@@ -254,10 +260,13 @@ mod x86 {
 
 /// The instruction sets that kernels are compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Isa {
+pub enum Isa {
+    /// Plain loops.
     Portable,
+    /// 256 bits.
     #[cfg(target_arch = "x86_64")]
     Avx2,
+    /// 512 bits.
     #[cfg(target_arch = "x86_64")]
     Avx512,
 }
@@ -323,3 +332,27 @@ macro_rules! dispatch {
     }};
 }
 pub(crate) use dispatch;
+
+/// For each query, which of the lanes of `among` it overlaps: `overlaps_64` for callers that are not
+/// themselves compiled once an instruction set. As many queries are answered as there are masks.
+pub fn masks(isa: Isa, boxes: &LaneBounds, among: u64, queries: &[Bounds], masks: &mut [u64]) {
+    dispatch!(isa, all_masks, (
+        boxes: &LaneBounds = boxes,
+        among: u64 = among,
+        queries: &[Bounds] = queries,
+        masks: &mut [u64] = masks,
+    ));
+}
+
+#[inline(always)]
+fn all_masks<S: Simd>(
+    simd: S,
+    boxes: &LaneBounds,
+    among: u64,
+    queries: &[Bounds],
+    masks: &mut [u64],
+) {
+    for (mask, query) in masks.iter_mut().zip(queries) {
+        *mask = simd.overlaps_64(boxes, query, among);
+    }
+}

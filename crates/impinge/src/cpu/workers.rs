@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use crate::error::Error;
 
 /// How many workers there are and where they come from.
-pub(crate) struct Workers {
+pub struct Workers {
     /// `None` for the global pool.
     pool: Option<rayon::ThreadPool>,
     n: usize,
@@ -29,6 +29,7 @@ impl Workers {
         Ok(Workers { pool, n })
     }
 
+    /// How many there are.
     pub fn n(&self) -> usize {
         self.n
     }

@@ -26,18 +26,22 @@ pub(crate) type Caches = Vec<Option<Box<BodyCache>>>;
 
 /// What the narrow stage reads, whatever the method.
 #[derive(Clone, Copy)]
-pub(crate) struct World<'a> {
+pub struct World<'a> {
+    /// The bodies.
     pub scene: &'a Scene,
+    /// Who takes part.
     pub frame: &'a Frame,
     /// `Clusters` only: places of primitives are those of the clusters' orders.
-    pub caches: Option<&'a Caches>,
+    pub(crate) caches: Option<&'a Caches>,
 }
 
 /// One participant, looked up. A *place* names a primitive: in the order of the clusters where there
 /// are any, else as the body numbers it.
 #[derive(Clone, Copy)]
-pub(crate) struct BodyRef<'a> {
+pub struct BodyRef<'a> {
+    /// Who it is.
     pub participant: &'a Participant,
+    /// Where its vertices are.
     pub positions: &'a Positions,
     /// The corners at each place.
     pub elements: &'a Elements,
@@ -45,6 +49,16 @@ pub(crate) struct BodyRef<'a> {
 }
 
 impl<'a> World<'a> {
+    /// Places of primitives as the bodies number them.
+    pub fn new(scene: &'a Scene, frame: &'a Frame) -> Self {
+        World {
+            scene,
+            frame,
+            caches: None,
+        }
+    }
+
+    /// A participant, looked up.
     #[inline(always)]
     pub fn body(&self, participant_ix: u32) -> BodyRef<'a> {
         let participant = &self.frame.participants[participant_ix as usize];
@@ -60,7 +74,7 @@ impl<'a> World<'a> {
 
     /// `Clusters` only: what is kept of a participant.
     #[inline(always)]
-    pub fn cache(&self, participant_ix: u32) -> &'a BodyCache {
+    pub(crate) fn cache(&self, participant_ix: u32) -> &'a BodyCache {
         let slot = self.frame.participants[participant_ix as usize].id.index();
         self.caches
             .and_then(|caches| caches[slot].as_deref())

@@ -5,17 +5,21 @@
 
 /// A closed box. The empty one has `min > max` and overlaps nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Bounds {
+pub struct Bounds {
+    /// Low ends.
     pub min: [f32; 3],
+    /// High ends.
     pub max: [f32; 3],
 }
 
 impl Bounds {
+    /// Holds nothing.
     pub const EMPTY: Bounds = Bounds {
         min: [f32::INFINITY; 3],
         max: [f32::NEG_INFINITY; 3],
     };
 
+    /// Whether the two share a point.
     #[inline(always)]
     pub fn overlaps(&self, other: &Bounds) -> bool {
         let mut overlap = true;
@@ -25,6 +29,7 @@ impl Bounds {
         overlap
     }
 
+    /// Grows to hold another box.
     #[inline(always)]
     pub fn join(&mut self, other: &Bounds) {
         for axis in 0..3 {
@@ -33,6 +38,7 @@ impl Bounds {
         }
     }
 
+    /// What lies in both; empty when they do not overlap.
     #[inline(always)]
     pub fn intersection(&self, other: &Bounds) -> Bounds {
         let mut both = *self;

@@ -21,7 +21,7 @@ const MOST_CELLS: u64 = 1 << 25;
 
 /// A uniform grid over a region.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Grid {
+pub struct Grid {
     origin: [f32; 3],
     /// Fine cells a unit of length.
     scale: [f32; 3],
@@ -32,8 +32,10 @@ pub(crate) struct Grid {
 
 /// Fine cells that a box touches, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct FineRange {
+pub struct FineRange {
+    /// The first along each axis.
     pub lo: [u16; 3],
+    /// The last along each axis.
     pub hi: [u16; 3],
 }
 
@@ -97,6 +99,7 @@ impl Grid {
             .then(|| Grid::with_resolution(&region, self.resolution.map(|along| along.div_ceil(2))))
     }
 
+    /// Coarse cells in all.
     pub fn n_cells(&self) -> u64 {
         self.resolution
             .iter()
@@ -195,7 +198,7 @@ fn spread(bits: u64, stride: u32) -> u64 {
 /// corner of their common range, `max(lo_a, lo_b)`. Exact, without memory; it stands where the paper
 /// has a table hashed by DJB2, which lost 2.7 to 4.3 % of the collisions (table 3).
 #[inline(always)]
-pub(crate) fn owns(cell: [u32; 3], a: &FineRange, b: &FineRange) -> bool {
+pub fn owns(cell: [u32; 3], a: &FineRange, b: &FineRange) -> bool {
     (0..3).all(|axis| u32::from(a.lo[axis].max(b.lo[axis]) >> 2) == cell[axis])
 }
 

@@ -8,4 +8,4 @@ pub(crate) mod grid;
 pub(crate) mod hierarchy;
 
 /// The most primitives a group holds: one bit each in a 64-bit mask.
-pub(crate) const GROUP: usize = 64;
+pub const GROUP: usize = 64;
