@@ -28,11 +28,10 @@ pub(crate) fn run(
     let sweep = sweep(course, places, options.is_quick, control.cancel)?;
     let setups = contestants(places, &sweep, options.lambda);
     let mut contest = Contest::new(setups, n_frames)?;
-    let query = course.query();
     let mut fullest = (0, 0, Vec::new());
     for frame in 0..n_frames {
         course.pose(frame)?;
-        let rows = contest.frame(course.scene(), &query, control)?;
+        let rows = contest.frame(course.scene(), course.bodies(), control)?;
         if fullest.2.is_empty() || rows.len() > fullest.0 {
             fullest = (rows.len(), frame, rows.to_vec());
         }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use impinge::{Query, Scene, hash_rows};
+use impinge::{BodyId, Scene, hash_rows};
 
 use crate::control::Control;
 use crate::error::Error;
@@ -67,14 +67,14 @@ impl Contest {
     pub fn frame(
         &mut self,
         scene: &Scene,
-        query: &Query,
+        bodies: [BodyId; 2],
         control: &Control<'_>,
     ) -> Result<&[[u32; 4]], Error> {
         let frame = self.course.len();
         if !self.is_warm {
             for contestant in &mut self.contestants {
                 let finder = &mut contestant.finder;
-                finder.find(scene, query, control.cancel, &mut self.rows)?;
+                finder.find(scene, bodies, control.cancel, &mut self.rows)?;
             }
             self.is_warm = true;
         }
@@ -91,7 +91,7 @@ impl Contest {
             };
             let found = contestant
                 .finder
-                .find(scene, query, control.cancel, rows)?;
+                .find(scene, bodies, control.cancel, rows)?;
             contestant.found.push(found);
             contestant.hash = contestant.hash.wrapping_add(hash_rows(rows.iter().copied()));
             if ix > 0 && self.rows != self.expected {
@@ -153,6 +153,7 @@ impl Contestant {
             stages: names.into_iter().map(stage).collect(),
             n_cells: counts(|found| found.n_cells),
             n_subdivided: counts(|found| found.n_subdivided),
+            n_entries: counts(|found| found.n_entries),
             n_candidates: counts(|found| found.n_candidates),
             n_unsure: counts(|found| found.n_unsure),
             bytes_held: self.found.iter().map(|found| found.bytes_held).max().unwrap_or(0),

@@ -2,7 +2,8 @@
 
 use std::time::Instant;
 
-use impinge::{Backend, CancelToken, Control, Detector, Query, Scene, Settings};
+use impinge::{Backend, BodyId, CancelToken, Control, Detector, Pairs, Query, Scene, Settings};
+use impinge_baseline::UniformGrid;
 
 use crate::error::Error;
 use crate::machine::Adapter;
@@ -55,6 +56,7 @@ pub(crate) struct Found {
     pub stages: Vec<(&'static str, f64)>,
     pub n_cells: u64,
     pub n_subdivided: u64,
+    pub n_entries: u64,
     pub n_candidates: u64,
     pub n_unsure: u64,
     pub bytes_held: u64,
@@ -62,12 +64,12 @@ pub(crate) struct Found {
 
 /// Finds all pairs of a frame.
 pub(crate) trait Finder {
-    /// Finds pairs as things are in the scene now; `rows` takes their place, sorted, after the clock has
+    /// Finds the pairs between two bodies as things are in the scene now; `rows` takes their place, sorted, after the clock has
     /// stopped.
     fn find(
         &mut self,
         scene: &Scene,
-        query: &Query,
+        bodies: [BodyId; 2],
         cancel: &CancelToken,
         rows: &mut Vec<[u32; 4]>,
     ) -> Result<Found, Error>;
@@ -87,13 +89,13 @@ impl Setup {
         let method = match self.method {
             Method::Cells => impinge::Method::Cells,
             Method::Clusters => impinge::Method::Clusters,
-            Method::Fwzs11 => impinge::Method::Cells,
+            Method::Fwzs11 => return self.place.uniform_grid(self.lambda),
         };
-        Ok(Box::new(Ours(Detector::with_settings(Settings {
+        Ok(Box::new(Detector::with_settings(Settings {
             method,
             lambda: self.lambda,
             ..self.place.settings()
-        })?)))
+        })?))
     }
 
     /// Whether the method has a λ.
@@ -102,38 +104,72 @@ impl Setup {
     }
 }
 
-/// The library.
-struct Ours(Detector);
+impl Place {
+    /// The method of [FWZS11] here.
+    fn uniform_grid(&self, lambda: f64) -> Result<Box<dyn Finder>, Error> {
+        let settings = impinge_baseline::Settings {
+            lambda,
+            ..impinge_baseline::Settings::default()
+        };
+        match self {
+            Place::Cpu { n_threads } => Ok(Box::new(UniformGrid::new(impinge_baseline::Settings {
+                threads: *n_threads,
+                ..settings
+            })?)),
+            Place::Gpu(_) => todo!(),
+        }
+    }
+}
 
-impl Finder for Ours {
+impl Finder for Detector {
     fn find(
         &mut self,
         scene: &Scene,
-        query: &Query,
+        [a, b]: [BodyId; 2],
         cancel: &CancelToken,
         rows: &mut Vec<[u32; 4]>,
     ) -> Result<Found, Error> {
+        let query = Query::between(a, b);
         let control = Control::new().cancel(cancel);
         let start = Instant::now();
-        let pairs = self.0.detect_with(scene, query, &control)?;
+        let pairs = self.detect_with(scene, &query, &control)?;
+        Ok(Found::of(start, pairs, rows))
+    }
+}
+
+impl Finder for UniformGrid {
+    fn find(
+        &mut self,
+        scene: &Scene,
+        [a, b]: [BodyId; 2],
+        _: &CancelToken,
+        rows: &mut Vec<[u32; 4]>,
+    ) -> Result<Found, Error> {
+        let start = Instant::now();
+        let outcome = self.detect(scene, a, b)?;
+        Ok(Found::of(start, outcome.pairs, rows))
+    }
+}
+
+impl Found {
+    /// What the statistics of an answer say that was asked for at `start`. Stops the clock first.
+    fn of(start: Instant, pairs: &Pairs, rows: &mut Vec<[u32; 4]>) -> Self {
         let ms = start.elapsed().as_secs_f64() * 1e3;
         rows.clear();
         rows.extend(pairs.rows());
         let stats = pairs.stats();
-        Ok(Found {
+        let stages = stats.stages.iter();
+        Found {
             ms,
-            stages: stats
-                .stages
-                .iter()
-                .map(|stage| (stage.name, stage.ms))
-                .collect(),
+            stages: stages.map(|stage| (stage.name, stage.ms)).collect(),
             n_cells: stats
                 .grid
                 .map_or(0, |grid| grid.into_iter().map(u64::from).product()),
             n_subdivided: stats.n_subdivided,
+            n_entries: stats.n_entries,
             n_candidates: stats.n_candidates,
             n_unsure: stats.n_unsure,
             bytes_held: stats.bytes_held,
-        })
+        }
     }
 }

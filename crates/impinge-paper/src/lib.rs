@@ -8,6 +8,7 @@ mod benchmark;
 mod contest;
 mod control;
 mod course;
+mod duplicates;
 mod error;
 mod finders;
 mod machine;

@@ -27,7 +27,7 @@ pub struct Report {
     pub surfaces: Vec<Scene>,
     /// Table 2, figure 6: a scene each.
     pub volumes: Vec<Scene>,
-    /// Table 3: a row a scene.
+    /// Table 3: two rows a scene, for two ways to read the paper.
     pub duplicates: Vec<Duplicates>,
     /// Figure 7: missing rates of one scene.
     pub table_sizes: Option<TableSizes>,
@@ -114,7 +114,9 @@ pub struct Run {
     pub n_cells: Samples,
     /// Cells that went through the second level.
     pub n_subdivided: Samples,
-    /// Pairs whose boxes overlap.
+    /// Entries of the cell lists, a primitive counted once a cell.
+    pub n_entries: Samples,
+    /// Pairs of primitives that are tested exactly, repetitions counted.
     pub n_candidates: Samples,
     /// Candidates that the floating-point filter left to exact arithmetic.
     pub n_unsure: Samples,
@@ -151,11 +153,14 @@ pub struct Sweep {
 pub struct Duplicates {
     /// The scene.
     pub scene: String,
+    /// Which pairs of a cell are tested: of those that touch a common sub-cell all, as the paper has it, or
+    /// the ones whose boxes overlap.
+    pub has_box_test: bool,
     /// Frames looked at.
     pub n_frames: usize,
-    /// Entries of the hash table.
+    /// Slots of the hash table.
     pub table_size: u64,
-    /// Different candidates a frame: pairs that some sub-cell would test.
+    /// Pairs that are tested at all, a frame.
     pub n_candidates: f64,
     /// Of those, the share tested more than once without a hash table.
     pub share_repeated: f64,
@@ -199,12 +204,14 @@ pub struct TableSizes {
 /// One size of the hash table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TableSize {
-    /// Entries.
+    /// Slots.
     pub table_size: u64,
     /// Share of the colliding primitives that is lost.
     pub missing_rate: f64,
     /// Share of the pairs that is lost.
     pub missing_rate_of_pairs: f64,
+    /// Share of the colliding primitives that is lost where boxes are tested before the table.
+    pub missing_rate_with_box_test: f64,
 }
 
 impl Report {

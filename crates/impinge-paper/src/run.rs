@@ -2,6 +2,7 @@
 
 use crate::benchmark;
 use crate::control::Control;
+use crate::duplicates;
 use crate::error::Error;
 use crate::finders::Place;
 use crate::machine::{Adapter, Machine};
@@ -52,6 +53,13 @@ pub fn run(options: &Options, control: &Control<'_>) -> Result<Outcome, Error> {
                 let scene =
                     benchmark::run(&mut course, options, &places, &mut painter, control)?;
                 report.surfaces.push(scene);
+                report
+                    .duplicates
+                    .extend(duplicates::table(&mut course, options, control)?);
+                if name == SceneName::Bunny {
+                    let sizes = duplicates::table_sizes(&mut course, options, control)?;
+                    report.table_sizes = Some(sizes);
+                }
             }
             Some(mut course) => {
                 let scene =

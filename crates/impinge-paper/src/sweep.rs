@@ -46,11 +46,11 @@ pub(crate) fn sweep(
                 let mut times = Vec::new();
                 for &frame in &frames {
                     course.pose(frame)?;
-                    let (scene, query) = (course.scene(), course.query());
-                    finder.find(scene, &query, cancel, &mut rows)?;
+                    let (scene, bodies) = (course.scene(), course.bodies());
+                    finder.find(scene, bodies, cancel, &mut rows)?;
                     for _ in 0..n_repeats {
                         std::thread::sleep(Duration::from_millis(1));
-                        times.push(finder.find(scene, &query, cancel, &mut rows)?.ms);
+                        times.push(finder.find(scene, bodies, cancel, &mut rows)?.ms);
                     }
                 }
                 points.push((lambda, Samples::of(times).mean));
