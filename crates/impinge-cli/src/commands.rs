@@ -5,6 +5,7 @@ mod demo;
 mod demo_scene;
 #[cfg(feature = "gpu")]
 mod devices;
+mod paper;
 mod record;
 mod sequence;
 mod simulate;
@@ -13,5 +14,6 @@ pub use answer::{pairs, within};
 pub use demo::demo;
 #[cfg(feature = "gpu")]
 pub use devices::devices;
+pub use paper::paper;
 pub use sequence::sequence;
 pub use simulate::simulate;

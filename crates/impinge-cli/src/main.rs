@@ -17,7 +17,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use crate::args::{Cli, Command};
+use crate::args::{BenchCommand, Cli, Command};
 
 fn main() -> ExitCode {
     #[cfg(all(feature = "gpu", target_os = "linux"))]
@@ -29,6 +29,9 @@ fn main() -> ExitCode {
         Command::Within(args) => commands::within(&args, &cancel),
         Command::Sequence(args) => commands::sequence(&args, &cancel),
         Command::Simulate(args) => commands::simulate(&args, &cancel),
+        Command::Bench(args) => match args.command {
+            BenchCommand::Paper(args) => commands::paper(&args, &cancel),
+        },
         #[cfg(feature = "gpu")]
         Command::Devices(args) => commands::devices(&args),
     });

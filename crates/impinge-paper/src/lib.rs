@@ -5,13 +5,17 @@
 //! writes both as Markdown, HTML and JSON.
 
 mod benchmark;
+mod chapters;
 mod contest;
 mod control;
 mod course;
+mod document;
 mod duplicates;
 mod error;
 mod finders;
+mod html;
 mod machine;
+mod markdown;
 mod options;
 mod pictures;
 mod plots;
@@ -22,6 +26,7 @@ mod samples;
 mod scenes;
 mod sweep;
 mod volumes;
+mod write;
 
 pub use control::{Control, Progress};
 pub use error::Error;

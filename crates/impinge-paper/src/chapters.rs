@@ -1,0 +1,2 @@
+use crate::document::Block; use crate::report::Report;
+pub(crate) fn all(_: &Report) -> Vec<Block> { Vec::new() }
