@@ -367,13 +367,12 @@ pub enum PaperBackendArg {
     Both,
 }
 
-impl From<Option<PaperBackendArg>> for Backends {
-    fn from(backend: Option<PaperBackendArg>) -> Self {
+impl From<PaperBackendArg> for Backends {
+    fn from(backend: PaperBackendArg) -> Self {
         match backend {
-            None => Backends::Found,
-            Some(PaperBackendArg::Cpu) => Backends::Cpu,
-            Some(PaperBackendArg::Gpu) => Backends::Gpu,
-            Some(PaperBackendArg::Both) => Backends::Both,
+            PaperBackendArg::Cpu => Backends::Cpu,
+            PaperBackendArg::Gpu => Backends::Gpu,
+            PaperBackendArg::Both => Backends::Both,
         }
     }
 }

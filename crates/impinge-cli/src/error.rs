@@ -29,10 +29,7 @@ pub enum Error {
     Paper(#[from] impinge_paper::Error),
     /// Contestants of a benchmark gave different answers: a defect.
     #[error("{n} answers in {} differ from those beside them: please report this", .report.display())]
-    Disagreements {
-        n: usize,
-        report: PathBuf,
-    },
+    Disagreements { n: usize, report: PathBuf },
     /// A saved state that is damaged or of another simulation.
     #[error("{}: {source}", .path.display())]
     SavedState {

@@ -54,6 +54,7 @@ pub(crate) fn run(
     Ok(Scene {
         name: name.to_owned(),
         mesh: course.mesh().to_owned(),
+        motion: course.motion(),
         is_stand_in: course.is_stand_in(),
         kind: match course.name().is_volume() {
             true => "tetrahedron".to_owned(),
@@ -63,7 +64,9 @@ pub(crate) fn run(
         n_frames,
         n_pairs: counts(|moment| moment.n_pairs),
         n_colliding: counts(|moment| moment.n_colliding),
-        hash: runs.first().map_or_else(String::new, |run| run.hash.clone()),
+        hash: runs
+            .first()
+            .map_or_else(String::new, |run| run.hash.clone()),
         n_frames_of_oracle: usize::from(is_small),
         runs,
         sweep,

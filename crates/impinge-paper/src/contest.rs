@@ -93,7 +93,9 @@ impl Contest {
                 .finder
                 .find(scene, bodies, control.cancel, rows)?;
             contestant.found.push(found);
-            contestant.hash = contestant.hash.wrapping_add(hash_rows(rows.iter().copied()));
+            contestant.hash = contestant
+                .hash
+                .wrapping_add(hash_rows(rows.iter().copied()));
             if ix > 0 && self.rows != self.expected {
                 contestant.n_frames_differing += 1;
             }
@@ -156,7 +158,12 @@ impl Contestant {
             n_entries: counts(|found| found.n_entries),
             n_candidates: counts(|found| found.n_candidates),
             n_unsure: counts(|found| found.n_unsure),
-            bytes_held: self.found.iter().map(|found| found.bytes_held).max().unwrap_or(0),
+            bytes_held: self
+                .found
+                .iter()
+                .map(|found| found.bytes_held)
+                .max()
+                .unwrap_or(0),
             hash: format!("{:016x}", self.hash),
             n_frames_differing: self.n_frames_differing,
         }
@@ -174,7 +181,9 @@ pub(crate) fn papers_lambda(method: Method) -> Option<f64> {
 
 /// Primitives that take part in a pair, those of all bodies together.
 pub(crate) fn n_colliding(rows: &[[u32; 4]]) -> usize {
-    let ends = rows.iter().flat_map(|&[body_a, a, body_b, b]| [(body_a, a), (body_b, b)]);
+    let ends = rows
+        .iter()
+        .flat_map(|&[body_a, a, body_b, b]| [(body_a, a), (body_b, b)]);
     let mut primitives: Vec<(u32, u32)> = ends.collect();
     primitives.sort_unstable();
     primitives.dedup();

@@ -11,6 +11,8 @@ pub(crate) trait Course {
     fn name(&self) -> SceneName;
     /// What the bodies are made of, for the report.
     fn mesh(&self) -> &str;
+    /// How they move, for the report.
+    fn motion(&self) -> String;
     /// Whether generated bodies stand in for scans.
     fn is_stand_in(&self) -> bool;
     /// The bodies as they are now.

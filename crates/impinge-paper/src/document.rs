@@ -142,12 +142,18 @@ pub(crate) fn ratio(ratio: f64) -> String {
 pub(crate) fn range(values: &[f64]) -> String {
     let (low, high) = values
         .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| {
+            (low.min(x), high.max(x))
+        });
     if low > high {
         return NONE.to_owned();
     }
     let [low, high] = [low, high].map(|x| format!("{x:.1}"));
-    if low == high { low } else { format!("{low} to {high}") }
+    if low == high {
+        low
+    } else {
+        format!("{low} to {high}")
+    }
 }
 
 /// A primitive count as "15,000 x2".
@@ -155,7 +161,11 @@ pub(crate) fn twice(n_primitives: &[usize]) -> String {
     match n_primitives {
         // Meshes have far fewer than 2^53 primitives.
         [a, b] if a == b => format!("{} x2", count(*a as f64)),
-        all => all.iter().map(|n| count(*n as f64)).collect::<Vec<_>>().join(" + "),
+        all => all
+            .iter()
+            .map(|n| count(*n as f64))
+            .collect::<Vec<_>>()
+            .join(" + "),
     }
 }
 
@@ -166,8 +176,14 @@ mod tests {
     #[test]
     fn numbers_are_readable() {
         assert_eq!([0.0, 999.4, 1e6].map(count), ["0", "999", "1,000,000"]);
-        assert_eq!([0.0451, 1.004, 12.34, 123.4].map(ms), ["0.045", "1.00", "12.3", "123"]);
-        assert_eq!([0.0, 1e-6, 0.0037, 0.62].map(percent), ["0", "< 0.01 %", "0.37 %", "62.0 %"]);
+        assert_eq!(
+            [0.0451, 1.004, 12.34, 123.4].map(ms),
+            ["0.045", "1.00", "12.3", "123"]
+        );
+        assert_eq!(
+            [0.0, 1e-6, 0.0037, 0.62].map(percent),
+            ["0", "< 0.01 %", "0.37 %", "62.0 %"]
+        );
         assert_eq!(range(&[2.04, 1.0, 3.0]), "1.0 to 3.0");
         assert_eq!(range(&[2.0]), "2.0");
         assert_eq!(range(&[]), NONE);

@@ -126,10 +126,7 @@ pub(crate) fn table_sizes(
         .collect();
     let mut missing = vec![[Missing::default(); 2]; sizes.len()];
     let mut owner = owner(options)?;
-    let mut two_levels = [
-        two_levels(options, WAYS[0])?,
-        two_levels(options, WAYS[1])?,
-    ];
+    let mut two_levels = [two_levels(options, WAYS[0])?, two_levels(options, WAYS[1])?];
     for (ix, &frame) in frames.iter().enumerate() {
         course.pose(frame)?;
         let exact = owner.detect(course.scene(), &course.query())?;

@@ -112,10 +112,12 @@ impl Place {
             ..impinge_baseline::Settings::default()
         };
         match self {
-            Place::Cpu { n_threads } => Ok(Box::new(UniformGrid::new(impinge_baseline::Settings {
-                threads: *n_threads,
-                ..settings
-            })?)),
+            Place::Cpu { n_threads } => {
+                Ok(Box::new(UniformGrid::new(impinge_baseline::Settings {
+                    threads: *n_threads,
+                    ..settings
+                })?))
+            }
             Place::Gpu(_) => todo!(),
         }
     }

@@ -56,7 +56,11 @@ pub(crate) fn write(blocks: &[Block]) -> String {
 fn table(table: &Table) -> String {
     let cells = |tag: &str, cells: &[String]| -> String {
         let cell = |(ix, cell): (usize, &String)| {
-            let class = if ix < table.n_text { " class=\"text\"" } else { "" };
+            let class = if ix < table.n_text {
+                " class=\"text\""
+            } else {
+                ""
+            };
             format!("<{tag}{class}>{}</{tag}>", marked(cell))
         };
         cells.iter().enumerate().map(cell).collect()
@@ -65,7 +69,11 @@ fn table(table: &Table) -> String {
         .rows
         .iter()
         .map(|row| {
-            let class = if row.is_papers { " class=\"paper\"" } else { "" };
+            let class = if row.is_papers {
+                " class=\"paper\""
+            } else {
+                ""
+            };
             format!("<tr{class}>{}</tr>", cells("td", &row.cells))
         })
         .collect();
@@ -78,7 +86,11 @@ fn table(table: &Table) -> String {
 }
 
 fn figure(figure: &Figure) -> String {
-    let class = if figure.images.len() > 1 { "many" } else { "one" };
+    let class = if figure.images.len() > 1 {
+        "many"
+    } else {
+        "one"
+    };
     let mut text = format!("<figure class=\"{class}\">\n");
     for image in &figure.images {
         let ending = if image.has_svg { "svg" } else { "png" };
@@ -130,7 +142,10 @@ mod tests {
 
     #[test]
     fn marks_become_tags_and_nothing_else_does() {
-        assert_eq!(marked("a `b` **c** <d> &"), "a <code>b</code> <strong>c</strong> &lt;d&gt; &amp;");
+        assert_eq!(
+            marked("a `b` **c** <d> &"),
+            "a <code>b</code> <strong>c</strong> &lt;d&gt; &amp;"
+        );
         assert_eq!(marked("2 ** 3 `x"), "2 ** 3 `x");
     }
 

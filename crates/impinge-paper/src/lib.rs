@@ -12,6 +12,7 @@ mod course;
 mod document;
 mod duplicates;
 mod error;
+mod figures;
 mod finders;
 mod html;
 mod machine;

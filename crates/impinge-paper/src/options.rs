@@ -151,12 +151,13 @@ impl Options {
 
     /// Frames of a benchmark.
     pub(crate) fn n_frames(&self, scene: SceneName) -> usize {
-        self.n_frames.unwrap_or(match (self.is_quick, scene.is_volume()) {
-            (false, false) => 100,
-            (false, true) => 240,
-            (true, false) => 5,
-            (true, true) => 20,
-        })
+        self.n_frames
+            .unwrap_or(match (self.is_quick, scene.is_volume()) {
+                (false, false) => 100,
+                (false, true) => 240,
+                (true, false) => 5,
+                (true, true) => 20,
+            })
     }
 
     pub(crate) fn check(&self) -> Result<(), Error> {

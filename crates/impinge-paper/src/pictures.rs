@@ -76,8 +76,8 @@ impl Painter {
         let mut picture = Picture {
             // Bodies lie beside each other along x, or one on the other.
             size: match course.name().is_volume() {
-                true => [480, 560],
-                false => [720, 480],
+                true => [420, 490],
+                false => [600, 400],
             },
             camera: Camera {
                 azimuth: 20.0,
@@ -85,6 +85,7 @@ impl Painter {
                 ..Camera::default()
             },
             background: [[255; 3]; 2],
+            see_through: 0.55,
             ..Picture::default()
         };
         for (ix, (body, colors)) in course.bodies().into_iter().zip(COLORS).enumerate() {
@@ -93,7 +94,9 @@ impl Painter {
             colliding.sort_unstable();
             colliding.dedup();
             let body = course.scene().body(body)?;
-            picture.surfaces.push(Surface::of_body(body, &colliding, colors)?);
+            picture
+                .surfaces
+                .push(Surface::of_body(body, &colliding, colors)?);
         }
         let bytes = renderer
             .render(&picture)?

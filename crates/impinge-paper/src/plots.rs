@@ -64,7 +64,10 @@ pub(crate) fn files(name: &str, plot: &impl Plot) -> Result<[File; 2], Error> {
         }
     });
     let mut svg = String::new();
-    plot.draw(&SVGBackend::with_string(&mut svg, SIZE).into_drawing_area(), 1)?;
+    plot.draw(
+        &SVGBackend::with_string(&mut svg, SIZE).into_drawing_area(),
+        1,
+    )?;
     let (width, height) = (SIZE.0 * SCALE, SIZE.1 * SCALE);
     let mut pixels = vec![255; 3 * width as usize * height as usize];
     plot.draw(
@@ -100,14 +103,4 @@ pub(crate) fn png(pixels: &[u8], width: u32, height: u32) -> Result<Vec<u8>, Err
 /// An error of the plotting crate.
 fn failed(error: impl std::fmt::Display) -> Error {
     Error::Plot(error.to_string())
-}
-
-/// A time in milliseconds with three significant figures.
-pub(crate) fn short_ms(ms: f64) -> String {
-    match ms {
-        ms if ms >= 99.95 => format!("{ms:.0}"),
-        ms if ms >= 9.995 => format!("{ms:.1}"),
-        ms if ms >= 0.9995 => format!("{ms:.2}"),
-        ms => format!("{ms:.3}"),
-    }
 }

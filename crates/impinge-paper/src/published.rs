@@ -137,7 +137,8 @@ mod tests {
             assert_eq!(table_1.ms, table_3.ms_without);
             assert_eq!(table_1.n_colliding, table_3.n_colliding_without);
             // The missing rate is that of the two counts, but for its rounding.
-            let missing = 1.0 - table_3.n_colliding_with as f64 / table_3.n_colliding_without as f64;
+            let missing =
+                1.0 - table_3.n_colliding_with as f64 / table_3.n_colliding_without as f64;
             assert!((missing - table_3.missing_rate).abs() < 0.0015, "{scene}");
         }
         assert!(surface("blocks").is_none() && volume("bunny").is_none());

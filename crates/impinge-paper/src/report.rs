@@ -42,6 +42,8 @@ pub struct Scene {
     pub mesh: String,
     /// Whether a generated mesh stands in for a scan.
     pub is_stand_in: bool,
+    /// How the bodies move.
+    pub motion: String,
     /// `"triangle"` or `"tetrahedron"`.
     pub kind: String,
     /// Primitives of each body.
@@ -217,9 +219,8 @@ pub struct TableSize {
 impl Report {
     /// Frames in which a contestant gave other pairs than the first one, and subsets that are none.
     pub fn n_disagreements(&self) -> usize {
-        let differing = |scene: &Scene| -> usize {
-            scene.runs.iter().map(|run| run.n_frames_differing).sum()
-        };
+        let differing =
+            |scene: &Scene| -> usize { scene.runs.iter().map(|run| run.n_frames_differing).sum() };
         let scenes = self.surfaces.iter().chain(&self.volumes);
         let rows = self.duplicates.iter();
         scenes.map(differing).sum::<usize>()

@@ -4,6 +4,7 @@ use crate::benchmark;
 use crate::control::Control;
 use crate::duplicates;
 use crate::error::Error;
+use crate::figures;
 use crate::finders::Place;
 use crate::machine::{Adapter, Machine};
 use crate::options::{Backends, Options, SceneName};
@@ -45,13 +46,15 @@ pub fn run(options: &Options, control: &Control<'_>) -> Result<Outcome, Error> {
         duplicates: Vec::new(),
         table_sizes: None,
     };
-    for name in SceneName::ALL.into_iter().filter(|name| options.wants(*name)) {
+    for name in SceneName::ALL
+        .into_iter()
+        .filter(|name| options.wants(*name))
+    {
         control.go_on()?;
         match Recorded::new(name, options, control)? {
             None => {
                 let mut course = Moving::new(name, options)?;
-                let scene =
-                    benchmark::run(&mut course, options, &places, &mut painter, control)?;
+                let scene = benchmark::run(&mut course, options, &places, &mut painter, control)?;
                 report.surfaces.push(scene);
                 report
                     .duplicates
@@ -62,8 +65,7 @@ pub fn run(options: &Options, control: &Control<'_>) -> Result<Outcome, Error> {
                 }
             }
             Some(mut course) => {
-                let scene =
-                    benchmark::run(&mut course, options, &places, &mut painter, control)?;
+                let scene = benchmark::run(&mut course, options, &places, &mut painter, control)?;
                 report.volumes.push(crate::report::Scene {
                     simulation_ms: Some(course.simulation_ms),
                     ..scene
@@ -71,10 +73,9 @@ pub fn run(options: &Options, control: &Control<'_>) -> Result<Outcome, Error> {
             }
         }
     }
-    Ok(Outcome {
-        figures: painter.files,
-        report,
-    })
+    let mut figures = painter.files;
+    figures.extend(figures::plots(&report)?);
+    Ok(Outcome { report, figures })
 }
 
 /// Where contestants run, the GPU among them, and what there is to say about that.

@@ -56,6 +56,7 @@ pub(crate) struct Moving {
     rest: Vec<[f32; 3]>,
     now: Vec<[f32; 3]>,
     waves: [Wave; 2],
+    approach: Approach,
     from: [f32; 3],
     drift: Drift,
 }
@@ -107,6 +108,7 @@ impl Moving {
             now: model.positions.clone(),
             rest: model.positions,
             waves: waves(&options.waving, diagonal),
+            approach,
             from: at(approach.from),
             drift: Drift {
                 velocity: [(approach.to - approach.from) * width, 0.0, 0.0],
@@ -122,6 +124,11 @@ impl Course for Moving {
 
     fn mesh(&self) -> &str {
         &self.mesh
+    }
+
+    fn motion(&self) -> String {
+        let Approach { from, to } = self.approach;
+        format!("the second body drifts from {from} to {to} widths beside the first one")
     }
 
     fn is_stand_in(&self) -> bool {

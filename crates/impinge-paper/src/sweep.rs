@@ -120,8 +120,12 @@ mod tests {
         }];
         let lambdas = |asked| -> Vec<(f64, bool)> {
             let all = contestants(&places, &sweeps, asked);
-            let cells = all.iter().filter(|(setup, _)| setup.method == Method::Cells);
-            cells.map(|(setup, chosen)| (setup.lambda, *chosen)).collect()
+            let cells = all
+                .iter()
+                .filter(|(setup, _)| setup.method == Method::Cells);
+            cells
+                .map(|(setup, chosen)| (setup.lambda, *chosen))
+                .collect()
         };
         assert_eq!(lambdas(None), [(1.0, false), (0.25, true)]);
         assert_eq!(lambdas(Some(8.0)), [(1.0, false), (8.0, true)]);

@@ -69,7 +69,9 @@ impl Recorded {
             name,
             mesh: match given {
                 Some(path) => format!("`{}`", path.display()),
-                None if dropped.is_stand_in => format!("**a generated stand-in**: {}", dropped.label),
+                None if dropped.is_stand_in => {
+                    format!("**a generated stand-in**: {}", dropped.label)
+                }
                 None => dropped.label,
             },
             is_stand_in: dropped.is_stand_in,
@@ -101,6 +103,10 @@ impl Course for Recorded {
 
     fn mesh(&self) -> &str {
         &self.mesh
+    }
+
+    fn motion(&self) -> String {
+        "one dropped on the other".to_owned()
     }
 
     fn is_stand_in(&self) -> bool {

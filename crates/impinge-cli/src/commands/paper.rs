@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use impinge::CancelToken;
-use impinge_paper::{Control, Options, Waving};
+use impinge_paper::{Backends, Control, Options, Waving};
 
 use crate::args::PaperArgs;
 use crate::error::Error;
@@ -54,7 +54,7 @@ fn options(args: &PaperArgs) -> Result<Options, Error> {
         n_frames: args.frames.map(|n| n as usize),
         lambda: args.lambda,
         n_threads: args.threads.map_or(0, Into::into),
-        backends: args.backend.into(),
+        backends: args.backend.map_or(Backends::Found, Into::into),
         device: args.device.clone(),
         waving: Waving {
             amplitude: args.amplitude,

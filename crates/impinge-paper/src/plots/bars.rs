@@ -70,13 +70,21 @@ impl Plot for Bars {
                     .map_err(failed)?;
                 let top = chart.backend_coord(&(left + 0.5 * width, *height));
                 let style = text(11).pos(middle);
-                area.draw(&Text::new(label.clone(), (top.0, top.1 - px(3) as i32), style))
-                    .map_err(failed)?;
+                area.draw(&Text::new(
+                    label.clone(),
+                    (top.0, top.1 - px(3) as i32),
+                    style,
+                ))
+                .map_err(failed)?;
             }
             let foot = chart.backend_coord(&(group as f64 + 0.5, 0.0));
             let style = text(13).pos(Pos::new(HPos::Center, VPos::Top));
-            area.draw(&Text::new(name.clone(), (foot.0, foot.1 + px(7) as i32), style))
-                .map_err(failed)?;
+            area.draw(&Text::new(
+                name.clone(),
+                (foot.0, foot.1 + px(7) as i32),
+                style,
+            ))
+            .map_err(failed)?;
         }
         if let Some((height, label)) = &self.mark {
             let line = ShapeStyle::from(&AXIS).stroke_width(scale);
@@ -89,7 +97,8 @@ impl Plot for Bars {
             }
             let style = text(11).pos(Pos::new(HPos::Right, VPos::Bottom));
             let at = (to.0, to.1 - px(2) as i32);
-            area.draw(&Text::new(label.clone(), at, style)).map_err(failed)?;
+            area.draw(&Text::new(label.clone(), at, style))
+                .map_err(failed)?;
         }
         legend(area, &self.kinds, scale)
     }
@@ -107,7 +116,10 @@ where
     let px = |size: u32| (size * scale) as i32;
     let style = TextStyle::from((FONT, 12 * scale).into_font()).color(&AXIS);
     let style = style.pos(Pos::new(HPos::Left, VPos::Center));
-    let width = |name: &str| area.estimate_text_size(name, &style).map(|(width, _)| width as i32);
+    let width = |name: &str| {
+        area.estimate_text_size(name, &style)
+            .map(|(width, _)| width as i32)
+    };
     let mut widths = Vec::with_capacity(kinds.len());
     for (name, _) in kinds {
         widths.push(px(16) + width(name).map_err(failed)?);
@@ -119,7 +131,8 @@ where
     let y = height as i32 - px(20);
     for ((name, color), width) in kinds.iter().zip(widths) {
         let corners = [(x, y - px(5)), (x + px(10), y + px(5))];
-        area.draw(&Rectangle::new(corners, color.filled())).map_err(failed)?;
+        area.draw(&Rectangle::new(corners, color.filled()))
+            .map_err(failed)?;
         area.draw(&Text::new(name.clone(), (x + px(16), y), style.clone()))
             .map_err(failed)?;
         x += width + gap;

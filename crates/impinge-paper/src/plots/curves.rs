@@ -51,7 +51,10 @@ impl Axis {
         let most = if most > 0.0 { most } else { 1.0 };
         let power = 10f64.powf((most / 6.0).log10().floor());
         let steps = [1.0, 2.0, 5.0, 10.0].map(|step| step * power);
-        let step = steps.into_iter().find(|step| most / step <= 6.0).unwrap_or(steps[3]);
+        let step = steps
+            .into_iter()
+            .find(|step| most / step <= 6.0)
+            .unwrap_or(steps[3]);
         let n_decimals = (-step.log10().floor()).max(0.0) as usize;
         let n_steps = (most / step - 1e-9).ceil() as usize;
         let ticks = (0..=n_steps.max(1)).map(|k| {
@@ -73,7 +76,11 @@ impl Axis {
             .fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), value| {
                 (low.min(value), high.max(value))
             });
-        let (low, high) = if low <= high { (low, high) } else { (1.0, 10.0) };
+        let (low, high) = if low <= high {
+            (low, high)
+        } else {
+            (1.0, 10.0)
+        };
         let first = low.log10().floor() as i32;
         let all = (first..first + 30).flat_map(|power| {
             let unit = 10f64.powi(power);
@@ -150,35 +157,52 @@ impl Plot for Curves {
                 .map_err(failed)?;
         }
         let frame = [(low.0, high.1), (low.0, low.1), (high.0, low.1)];
-        area.draw(&PathElement::new(frame, line(&AXIS, 1))).map_err(failed)?;
+        area.draw(&PathElement::new(frame, line(&AXIS, 1)))
+            .map_err(failed)?;
         let style = text(13).pos(Pos::new(HPos::Center, VPos::Top));
         let below = ((low.0 + high.0) / 2, low.1 + px(24) as i32);
-        area.draw(&Text::new(self.x.name.clone(), below, style)).map_err(failed)?;
-        let turned = (FONT, px(13)).into_font().transform(plotters::style::FontTransform::Rotate270);
-        let style = TextStyle::from(turned).color(&AXIS).pos(Pos::new(HPos::Center, VPos::Top));
+        area.draw(&Text::new(self.x.name.clone(), below, style))
+            .map_err(failed)?;
+        let turned = (FONT, px(13))
+            .into_font()
+            .transform(plotters::style::FontTransform::Rotate270);
+        let style = TextStyle::from(turned)
+            .color(&AXIS)
+            .pos(Pos::new(HPos::Center, VPos::Top));
         let beside = (px(8) as i32, (low.1 + high.1) / 2);
-        area.draw(&Text::new(self.y.name.clone(), beside, style)).map_err(failed)?;
+        area.draw(&Text::new(self.y.name.clone(), beside, style))
+            .map_err(failed)?;
         let marks: Vec<((i32, i32), &str)> = self
             .marks
             .iter()
             .map(|mark| (pixel(mark.at), mark.name.as_str()))
             .collect();
         for curve in &self.curves {
-            let points = curve.points.iter().map(|&(x, y)| (self.x.place(x), self.y.place(y)));
+            let points = curve
+                .points
+                .iter()
+                .map(|&(x, y)| (self.x.place(x), self.y.place(y)));
             let points: Vec<(f64, f64)> = points.collect();
             chart
-                .draw_series(LineSeries::new(points.iter().copied(), line(&curve.color, 2)))
+                .draw_series(LineSeries::new(
+                    points.iter().copied(),
+                    line(&curve.color, 2),
+                ))
                 .map_err(failed)?;
             if curve.has_dots {
-                let dots = points.iter().map(|&at| Circle::new(at, px(3), curve.color.filled()));
+                let dots = points
+                    .iter()
+                    .map(|&at| Circle::new(at, px(3), curve.color.filled()));
                 chart.draw_series(dots).map_err(failed)?;
             }
         }
         for (at, name) in marks {
-            area.draw(&Circle::new(at, px(5), line(&AXIS, 2))).map_err(failed)?;
+            area.draw(&Circle::new(at, px(5), line(&AXIS, 2)))
+                .map_err(failed)?;
             let style = text(12).pos(Pos::new(HPos::Left, VPos::Bottom));
             let beside = (at.0 + px(8) as i32, at.1 - px(4) as i32);
-            area.draw(&Text::new(name.to_owned(), beside, style)).map_err(failed)?;
+            area.draw(&Text::new(name.to_owned(), beside, style))
+                .map_err(failed)?;
         }
         let kinds: Vec<(String, RGBColor)> = self
             .curves
@@ -199,10 +223,22 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_hold_all_values() {
-        assert_eq!(labels(&Axis::linear("", 0.11)), ["0.00", "0.02", "0.04", "0.06", "0.08", "0.10", "0.12"]);
-        assert_eq!(labels(&Axis::linear("", 3000.0)), ["0", "500", "1000", "1500", "2000", "2500", "3000"]);
-        assert_eq!(labels(&Axis::linear("", 0.0)), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
-        assert_eq!(labels(&Axis::log("", [0.3, 7.0])), ["0.2", "0.5", "1", "2", "5", "10"]);
+        assert_eq!(
+            labels(&Axis::linear("", 0.11)),
+            ["0.00", "0.02", "0.04", "0.06", "0.08", "0.10", "0.12"]
+        );
+        assert_eq!(
+            labels(&Axis::linear("", 3000.0)),
+            ["0", "500", "1000", "1500", "2000", "2500", "3000"]
+        );
+        assert_eq!(
+            labels(&Axis::linear("", 0.0)),
+            ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
+        );
+        assert_eq!(
+            labels(&Axis::log("", [0.3, 7.0])),
+            ["0.2", "0.5", "1", "2", "5", "10"]
+        );
         assert_eq!(labels(&Axis::log("", [2.0])), ["2", "5"]);
         assert_eq!(labels(&Axis::log("", [])), ["1", "2", "5", "10"]);
     }
