@@ -10,7 +10,7 @@ use impinge::guest::{
     Bounds, Candidate, GROUP, Grid, Isa, Kept, LaneBounds, Settler, World, masks,
 };
 
-/// Box tests up to which two loops are faster than laying out lanes (measured on the bunny, λ = 5).
+/// Box tests up to which laying out lanes is not worth it.
 const FEW: usize = 24;
 
 /// The entries of one cell that has primitives of both bodies, or as many of `a` as make a group.

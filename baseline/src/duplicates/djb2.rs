@@ -92,7 +92,7 @@ impl Table {
             stats.n_candidates += settler.n_candidates;
             stats.n_unsure += settler.n_unsure;
         }
-        stats.bytes_held += (size_of::<AtomicU64>() * slots.len()) as u64;
+        stats.bytes_held += size_of_val(slots) as u64;
     }
 }
 

@@ -3,6 +3,9 @@
 //!
 //! Not part of the stable interface.
 
+#[cfg(feature = "gpu")]
+pub mod gpu;
+
 use std::time::Instant;
 
 pub use crate::cpu::Job;

@@ -3,11 +3,15 @@
 //! data folder (`../shared/data` or `$IMPINGE_DATA`) is absent.
 
 mod common;
+#[path = "common/published.rs"]
+mod published;
 
 use std::path::PathBuf;
 
 use common::{Case, agree, naive, rows};
-use impinge::{Backend, BodyId, Detector, Method, Query, Scene, Settings, SharedVertex, hash_rows};
+use impinge::{
+    Backend, BodyId, Detector, Filter, Method, Query, Scene, Settings, SharedVertex, hash_rows,
+};
 use impinge_io::{Mesh, ReadOptions, Sequence};
 
 fn file(path: &str) -> Option<PathBuf> {
@@ -18,14 +22,24 @@ fn file(path: &str) -> Option<PathBuf> {
     found
 }
 
-fn detector(method: Method) -> Detector {
-    Detector::with_settings(Settings {
-        method,
-        backend: Backend::Cpu,
-        threads: 2,
-        ..Settings::default()
-    })
-    .unwrap()
+/// A detector of each method and backend. Without an adapter that of the GPU fails.
+fn detectors() -> Vec<Detector> {
+    let mut detectors = Vec::new();
+    for backend in [Backend::Cpu, Backend::Gpu] {
+        if backend == Backend::Gpu && !cfg!(feature = "gpu") {
+            continue;
+        }
+        for method in [Method::Clusters, Method::Cells] {
+            let settings = Settings {
+                method,
+                backend,
+                threads: 2,
+                ..Settings::default()
+            };
+            detectors.push(Detector::with_settings(settings).expect("these tests need an adapter"));
+        }
+    }
+    detectors
 }
 
 fn read(path: &str, weld: bool) -> Option<Mesh> {
@@ -107,8 +121,7 @@ fn two_bodies_meet_as_the_exact_kernel_says() {
         let a = add(&mut scene, &mesh);
         let elements = scene.body(a).unwrap().elements().clone();
         let b = scene.add(elements, moved).unwrap();
-        for method in [Method::Clusters, Method::Cells] {
-            let mut detector = detector(method);
+        for mut detector in detectors() {
             let pairs = detector.detect(&scene, &Query::between(a, b)).unwrap();
             assert_eq!(pairs.hash(), hash_rows(expected.iter().copied()), "{name}");
             agree(&expected, &rows(pairs), pairs.hash()).unwrap();
@@ -118,6 +131,11 @@ fn two_bodies_meet_as_the_exact_kernel_says() {
                     answer[count].as_u64().unwrap()
                 );
             }
+            let stats = pairs.stats();
+            assert!(
+                100 * stats.n_unsure < stats.n_candidates,
+                "{name} {stats:?}"
+            );
         }
     }
 }
@@ -129,11 +147,11 @@ fn welded_meshes_intersect_themselves_as_published() {
         let mut scene = Scene::new();
         let body = add(&mut scene, &mesh);
         for (rule, expected) in [(SharedVertex::Skip, skip), (SharedVertex::Resolve, resolve)] {
-            for method in [Method::Clusters, Method::Cells] {
-                let mut detector = detector(method);
+            for mut detector in detectors() {
                 let query = Query::within(body).shared_vertex(rule);
                 let pairs = detector.detect(&scene, &query).unwrap();
-                assert_eq!(pairs.len(), expected, "{path} {method:?} {rule:?}");
+                let stats = pairs.stats();
+                assert_eq!(pairs.len(), expected, "{path} {rule:?} {stats:?}");
             }
         }
     }
@@ -150,7 +168,7 @@ fn a_dancer_is_answered_as_the_oracle_says() {
     let sequence = Sequence::open(&frames).unwrap();
     let mut scene = Scene::new();
     let body = add(&mut scene, &mesh);
-    let (mut clusters, mut cells) = (detector(Method::Clusters), detector(Method::Cells));
+    let mut detectors = detectors();
     for frame in [0, 60, 120] {
         let positions = positions_f32(&sequence.frame(frame).unwrap());
         scene.set_positions(body, &positions).unwrap();
@@ -160,7 +178,7 @@ fn a_dancer_is_answered_as_the_oracle_says() {
             query: Query::within(body),
         };
         let expected = naive(&case);
-        for detector in [&mut clusters, &mut cells] {
+        for detector in &mut detectors {
             let pairs = detector.detect(&scene, &case.query).unwrap();
             agree(&expected, &rows(pairs), pairs.hash()).unwrap();
         }
@@ -190,8 +208,45 @@ fn tetrahedra_of_real_solids_are_answered_as_the_oracle_says() {
     };
     let expected = naive(&case);
     assert!(expected.len() > 1000);
-    for method in [Method::Clusters, Method::Cells] {
-        let mut detector = detector(method);
+    for mut detector in detectors() {
+        let pairs = detector.detect(&case.scene, &case.query).unwrap();
+        agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+    }
+}
+
+#[test]
+fn published_triangle_pairs_are_answered_as_bodies() {
+    let (Some(mut cases), Some(special)) = (published::random_pairs(), published::special_pairs())
+    else {
+        return;
+    };
+    cases.extend(special);
+    // A body a triangle; each pair meets one in 64 of the others as well.
+    let mut scene = Scene::new();
+    for (ix, case) in cases.iter().enumerate() {
+        for triangle in case.triangles {
+            let body = scene.add(vec![[0, 1, 2]], triangle.to_vec()).unwrap();
+            let class = 1 << (ix % 64);
+            let filter = Filter {
+                category: class,
+                mask: class,
+            };
+            scene.set_filter(body, filter).unwrap();
+        }
+    }
+    let case = Case {
+        name: "published".into(),
+        scene,
+        query: Query::all(),
+    };
+    let expected = naive(&case);
+    let found: std::collections::HashSet<[u32; 2]> =
+        expected.iter().map(|row| [row[0], row[2]]).collect();
+    for (ix, published) in (0..).zip(&cases) {
+        let is_found = found.contains(&[2 * ix, 2 * ix + 1]);
+        assert_eq!(is_found, published.intersect, "{}", published.name);
+    }
+    for mut detector in detectors() {
         let pairs = detector.detect(&case.scene, &case.query).unwrap();
         agree(&expected, &rows(pairs), pairs.hash()).unwrap();
     }

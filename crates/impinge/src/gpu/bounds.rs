@@ -12,7 +12,7 @@ const NARROW_LEVEL: u32 = 2048;
 
 /// The kernels with their buffers.
 #[derive(Debug)]
-pub(crate) struct Bounds {
+pub struct Bounds {
     clusters: Bound,
     level: Bound,
     top: Bound,
@@ -20,7 +20,7 @@ pub(crate) struct Bounds {
 
 /// Which launches are needed.
 #[derive(Debug, Default)]
-pub(crate) struct BoundsSteps {
+pub struct BoundsSteps {
     /// Step and width of each wide level.
     wide: Vec<(u32, u32)>,
     top: Option<u32>,

@@ -14,7 +14,7 @@ use crate::error::Error;
 
 /// A device buffer of `T`, at least one element long.
 #[derive(Debug)]
-pub(crate) struct Storage<T> {
+pub struct Storage<T> {
     label: &'static str,
     usage: wgpu::BufferUsages,
     buffer: Option<wgpu::Buffer>,
@@ -27,18 +27,18 @@ pub(crate) struct Storage<T> {
 
 /// A binding that kernels only read.
 #[derive(Debug, Clone)]
-pub(crate) struct Read<T>(wgpu::Buffer, u64, PhantomData<T>);
+pub struct Read<T>(wgpu::Buffer, u64, PhantomData<T>);
 
 /// A binding that kernels write.
 #[derive(Debug, Clone)]
-pub(crate) struct Write<T>(wgpu::Buffer, u64, PhantomData<T>);
+pub struct Write<T>(wgpu::Buffer, u64, PhantomData<T>);
 
 /// A binding of one `T` that stays the same through a dispatch, at an offset given with it.
 #[derive(Debug, Clone)]
-pub(crate) struct Uniform<T>(wgpu::Buffer, PhantomData<T>);
+pub struct Uniform<T>(wgpu::Buffer, PhantomData<T>);
 
 /// Elements are numbered with 32 bits.
-pub(crate) fn count(n: usize) -> u64 {
+pub fn count(n: usize) -> u64 {
     n as u64
 }
 
@@ -171,7 +171,7 @@ fn resource(buffer: &wgpu::Buffer, size: u64) -> wgpu::BindingResource<'_> {
 
 /// What a kernel does with a binding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Access {
+pub enum Access {
     /// `var<storage, read>`
     Read,
     /// `var<storage, read_write>`
@@ -181,7 +181,7 @@ pub(crate) enum Access {
 }
 
 /// One of the three kinds of bindings.
-pub(crate) trait Binding {
+pub trait Binding {
     /// What the kernel does with it.
     const ACCESS: Access;
     /// Bytes of one element.

@@ -8,42 +8,67 @@
 //! narrow     prepare · narrow
 //! ```
 
-use super::bounds::{Bounds, BoundsSteps};
+use std::fmt;
+
 use super::device::Gpu;
-use super::kernels::{
-    BoundsKeep, BoundsReach, DispatchCells, DispatchScatter, GridCount, GridRanges, GridResolution,
-    GridShift, PairingCells,
-};
-use super::layout::{N_ITEMS, NO_ROOT, Params, ROUNDS};
+use super::kernels::{DispatchCells, DispatchScatter, GridCount, PairingCells};
+use super::layout::{N_ITEMS, Params, ROUNDS};
 use super::narrow::{Settling, prepare};
 use super::pipeline::{Bound, Groups};
+use super::reaching::{CELLS, KEPT, Reaching, ReachingSteps};
 use super::room::Room;
 use super::steps::{Stages, Steps};
 use super::world::World;
 use crate::error::Error;
 
 /// The stages on the device, in order: the names of their times.
-pub(crate) const STAGES: &[&str] = &["bounds", "grid", "dispatch", "pairing", "narrow"];
-
-/// Slots of indirect arguments; those of pairing and narrow are as in `Clusters`.
-const KEPT: u32 = 0;
-const CELLS: u32 = 1;
+const STAGES: &[&str] = &["bounds", "grid", "dispatch", "pairing", "narrow"];
 
 /// What the method is told.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Told {
+pub struct Told {
     pub lambda: f64,
     pub group_size: u32,
     pub resolve: bool,
+}
+
+/// A plan of passes that work in cells: this method's, or one from outside.
+pub trait InCells: fmt::Debug + Send {
+    /// The stages on the device, in order: the names of their times.
+    fn stages(&self) -> &'static [&'static str];
+
+    /// Another one, that has seen no buffers.
+    fn anew(&self) -> Box<dyn InCells>;
+
+    /// Forgets which buffers it was made for.
+    fn unbind(&mut self);
+
+    /// Plans a pass.
+    ///
+    /// # Errors
+    /// As [`Steps::send`]; buffers of its own that cannot be had.
+    fn make(
+        &mut self,
+        gpu: &Gpu,
+        world: &World,
+        room: &Room,
+        told: Told,
+        part: Part,
+    ) -> Result<(), Error>;
+
+    /// Encodes all stages.
+    fn encode(&self, stages: &mut Stages<'_>, world: &World, room: &Room);
 }
 
 /// The part of the work that a pass does: some cells. A single cell is not split further: each pass fills
 /// the lists anew, in whatever order threads come, so rows of the product of its groups would not
 /// be the same primitives from pass to pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Part {
-    first: u32,
-    count: u32,
+pub struct Part {
+    /// The first cell.
+    pub first: u32,
+    /// How many.
+    pub count: u32,
 }
 
 impl Part {
@@ -71,12 +96,7 @@ impl Part {
 /// Kernels with their buffers; made anew when a buffer is.
 #[derive(Debug)]
 struct Launches {
-    bounds: Bounds,
-    reach: Bound,
-    keep: Bound,
-    resolution: Bound,
-    ranges: Bound,
-    shift: Bound,
+    reaching: Reaching,
     count: Bound,
     dispatch: Bound,
     scatter: Bound,
@@ -87,13 +107,10 @@ struct Launches {
 
 /// Everything that is launched in a pass.
 #[derive(Debug)]
-pub(crate) struct Plan {
+pub struct Plan {
     steps: Steps,
     launches: Option<Launches>,
-    bounds: BoundsSteps,
-    reach: u32,
-    resolution: u32,
-    shift: u32,
+    reaching: ReachingSteps,
     /// Dispatch and pairing.
     work: u32,
     prepare_pairing: u32,
@@ -105,26 +122,28 @@ impl Plan {
         Plan {
             steps: Steps::new(),
             launches: None,
-            bounds: BoundsSteps::default(),
-            reach: 0,
-            resolution: 0,
-            shift: 0,
+            reaching: ReachingSteps::default(),
             work: 0,
             prepare_pairing: 0,
             narrow: 0,
         }
     }
+}
 
-    /// Forgets which buffers it was made for.
-    pub fn unbind(&mut self) {
+impl InCells for Plan {
+    fn stages(&self) -> &'static [&'static str] {
+        STAGES
+    }
+
+    fn anew(&self) -> Box<dyn InCells> {
+        Box::new(Plan::new())
+    }
+
+    fn unbind(&mut self) {
         self.launches = None;
     }
 
-    /// Plans a pass.
-    ///
-    /// # Errors
-    /// As [`Steps::send`].
-    pub fn make(
+    fn make(
         &mut self,
         gpu: &Gpu,
         world: &World,
@@ -134,31 +153,7 @@ impl Plan {
     ) -> Result<(), Error> {
         let steps = &mut self.steps;
         steps.clear();
-        self.bounds.plan(world, steps);
-        // Capacities and counts are at most what 32 bits can number.
-        let capacities = room.capacities();
-        self.reach = steps.push(Params {
-            first: world.forest().top().unwrap_or(NO_ROOT),
-            count: world.bodies.len() as u32,
-            n_ignored: world.n_ignored(),
-            ..Params::default()
-        });
-        let over_kept = Params {
-            capacity: capacities.kept as u32,
-            lambda: (told.lambda as f32)
-                .clamp(f32::MIN_POSITIVE, f32::MAX)
-                .to_bits(),
-            most_cells: room.cells.len() as u32,
-            ..Params::default()
-        };
-        self.resolution = steps.push(Params {
-            slot: KEPT,
-            ..over_kept
-        });
-        self.shift = steps.push(Params {
-            slot: CELLS,
-            ..over_kept
-        });
+        self.reaching.plan(world, room, told, steps);
         self.work = steps.push(Params {
             first: part.first,
             count: part.count,
@@ -170,7 +165,8 @@ impl Plan {
         self.prepare_pairing = steps.push(Params {
             counter: N_ITEMS,
             per_group: 1,
-            capacity: capacities.items as u32,
+            // Capacities are at most what 32 bits can number.
+            capacity: room.capacities().items as u32,
             slot: ROUNDS,
             ..Params::default()
         });
@@ -181,32 +177,21 @@ impl Plan {
         Ok(())
     }
 
-    /// Encodes all stages.
-    pub fn encode(&self, stages: &mut Stages<'_>, world: &World, room: &Room) {
+    fn encode(&self, stages: &mut Stages<'_>, world: &World, room: &Room) {
         let launches = self.launches.as_ref().expect("made before it is encoded");
         let arguments = room.arguments.buffer();
         stages.encoder.clear_buffer(room.cells.buffer(), 0, None);
-        stages.encoder.clear_buffer(room.tallies.buffer(), 0, None);
+        Reaching::clear(stages.encoder, room);
+        let kept = || Groups::Indirect(arguments, KEPT);
+        stages.stage(|pass| launches.reaching.run_bounds(pass, world, &self.reaching));
         stages.stage(|pass| {
-            launches.bounds.run(pass, world, &self.bounds);
-            let groups = Groups::Known(world.bodies.len().div_ceil(64));
-            launches.reach.run(pass, self.reach, groups);
-            let groups = Groups::Known(world.forest().n_clusters());
-            launches.keep.run(pass, 0, groups);
-        });
-        stages.stage(|pass| {
-            let one = || Groups::Known(1);
-            let kept = || Groups::Indirect(arguments, KEPT);
-            launches.resolution.run(pass, self.resolution, one());
-            launches.ranges.run(pass, 0, kept());
-            launches.shift.run(pass, self.shift, one());
+            launches.reaching.run_grid(pass, room, &self.reaching);
             launches.count.run(pass, 0, kept());
         });
         stages.stage(|pass| {
             let groups = Groups::Indirect(arguments, CELLS);
             launches.dispatch.run(pass, self.work, groups);
-            let groups = Groups::Indirect(arguments, KEPT);
-            launches.scatter.run(pass, 0, groups);
+            launches.scatter.run(pass, 0, kept());
         });
         stages.stage(|pass| {
             let step = self.prepare_pairing;
@@ -224,60 +209,7 @@ impl Launches {
         let params = || steps.params();
         let counters = || room.counters.write_to();
         Launches {
-            bounds: Bounds::new(gpu, world, steps),
-            reach: kernels.bounds_reach.bind(
-                gpu,
-                &BoundsReach {
-                    nodes: world.nodes.read(),
-                    bodies: world.bodies.read(),
-                    ignored: world.ignored.read(),
-                    reaches: room.reaches.write_to(),
-                    tallies: room.tallies.write_to(),
-                    params: params(),
-                },
-            ),
-            keep: kernels.bounds_keep.bind(
-                gpu,
-                &BoundsKeep {
-                    nodes: world.nodes.read(),
-                    clusters: world.clusters.read(),
-                    bodies: world.bodies.read(),
-                    corners: world.corners.read(),
-                    positions: world.positions.read(),
-                    reaches: room.reaches.read(),
-                    kept: room.kept.write_to(),
-                    counters: counters(),
-                },
-            ),
-            resolution: kernels.grid_resolution.bind(
-                gpu,
-                &GridResolution {
-                    counters: counters(),
-                    tallies: room.tallies.write_to(),
-                    grid: room.grid.write_to(),
-                    arguments: room.arguments.write_to(),
-                    params: params(),
-                },
-            ),
-            ranges: kernels.grid_ranges.bind(
-                gpu,
-                &GridRanges {
-                    grid: room.grid.read(),
-                    kept: room.kept.write_to(),
-                    counters: counters(),
-                    tallies: room.tallies.write_to(),
-                },
-            ),
-            shift: kernels.grid_shift.bind(
-                gpu,
-                &GridShift {
-                    counters: counters(),
-                    tallies: room.tallies.write_to(),
-                    grid: room.grid.write_to(),
-                    arguments: room.arguments.write_to(),
-                    params: params(),
-                },
-            ),
+            reaching: Reaching::new(gpu, world, room, steps),
             count: kernels.grid_count.bind(
                 gpu,
                 &GridCount {

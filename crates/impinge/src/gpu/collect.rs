@@ -19,7 +19,7 @@ use crate::error::Error;
 const COUNTERS: u64 = N_COUNTERS as u64 * size_of::<Counter>() as u64;
 const GRID: u64 = size_of::<Grid>() as u64;
 /// Stages that a method has at most.
-const MOST_STAGES: usize = 5;
+const MOST_STAGES: usize = 8;
 const TIMES: u64 = 2 * MOST_STAGES as u64 * size_of::<u64>() as u64;
 const HEADER: u64 = COUNTERS + GRID + TIMES;
 const KEY: u64 = size_of::<PairKey>() as u64;
@@ -28,7 +28,7 @@ const LEAST: u64 = 1024;
 
 /// The memory that results are read from.
 #[derive(Debug, Default)]
-pub(crate) struct Collector {
+pub struct Collector {
     staging: Option<wgpu::Buffer>,
     times: Option<Times>,
     /// What the last pass had.
@@ -44,14 +44,14 @@ struct Times {
 
 /// How many keys are copied along.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Guess {
+pub struct Guess {
     pairs: u64,
     unsure: u64,
 }
 
 /// What came back.
 #[derive(Debug)]
-pub(crate) struct Collected {
+pub struct Collected {
     pub counts: Counts,
     /// The grid of `Cells`.
     pub grid: Grid,
@@ -204,7 +204,7 @@ impl Collector {
 }
 
 /// Maps the front of a buffer for reading.
-pub(crate) async fn map(buffer: &wgpu::Buffer, bytes: u64) -> Result<wgpu::BufferView, Error> {
+pub async fn map(buffer: &wgpu::Buffer, bytes: u64) -> Result<wgpu::BufferView, Error> {
     let mapping = Mapping::default();
     let shared = Arc::clone(&mapping.0);
     buffer.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {

@@ -91,10 +91,13 @@ fn max_binding(limits: &wgpu::Limits) -> u64 {
 }
 
 /// A device with its kernels compiled. Detectors on the same adapter share one.
-pub(crate) struct Gpu {
+pub struct Gpu {
+    /// The device.
     pub device: wgpu::Device,
+    /// Its queue.
     pub queue: wgpu::Queue,
-    pub kernels: Kernels,
+    pub(crate) kernels: Kernels,
+    /// Whether stages can be timed.
     pub has_timestamps: bool,
     info: DeviceInfo,
     lost: Arc<Mutex<Option<String>>>,
@@ -108,7 +111,7 @@ impl fmt::Debug for Gpu {
 
 /// Which adapters come into question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Wanted<'a> {
+pub enum Wanted<'a> {
     /// Any, hardware before software.
     Any,
     /// Hardware only.
@@ -225,6 +228,7 @@ impl Gpu {
         })
     }
 
+    /// The adapter's name.
     pub fn name(&self) -> &str {
         &self.info.name
     }
@@ -232,6 +236,17 @@ impl Gpu {
     /// Bytes that one binding may have.
     pub fn max_binding(&self) -> u64 {
         self.info.max_binding
+    }
+
+    /// Runs what makes things on the device, kernels above all.
+    ///
+    /// # Errors
+    /// The first of the device's own.
+    pub fn make<T>(&self, make: impl FnOnce(&wgpu::Device) -> T) -> Result<T, Error> {
+        let scopes = Scopes::open(&self.device);
+        let made = make(&self.device);
+        self.block_on(scopes.close())?;
+        Ok(made)
     }
 
     /// An error once the device is lost.
@@ -266,7 +281,7 @@ impl Gpu {
 }
 
 /// Catches the device's errors of this thread until it is closed.
-pub(crate) struct Scopes([wgpu::ErrorScopeGuard; 3]);
+pub struct Scopes([wgpu::ErrorScopeGuard; 3]);
 
 impl Scopes {
     pub fn open(device: &wgpu::Device) -> Self {

@@ -15,12 +15,12 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::buffers::{Storage, count};
-use super::cells::{self, Part, Told};
+use super::cells::{self, InCells, Part, Told};
 use super::clusters;
 use super::collect::{Collected, Collector, Guess};
 use super::device::{Gpu, Scopes};
 use super::layout::{Cell, NodePair};
-use super::room::{Capacities, CellsWanted, Room, Verdict};
+use super::room::{Capacities, CellsWanted, Counts, Room, Verdict};
 use super::steps::Stages;
 use super::world::World;
 use crate::detector::Method;
@@ -43,29 +43,35 @@ const SHARE_OF_CELLS: u64 = 8;
 
 /// What the backend is told.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Options {
+pub struct Options {
+    /// The method; for one from outside, the one whose room it works in.
     pub method: Method,
+    /// Cells a primitive, the paper's λ.
     pub lambda: f64,
+    /// Primitives a group, at most.
     pub group_size: u32,
+    /// Bytes on the device, at most.
     pub memory_budget: Option<u64>,
 }
 
 /// The GPU backend of one detector.
 #[derive(Debug)]
-pub(crate) struct Engine {
+pub struct Engine {
     gpu: Arc<Gpu>,
     options: Options,
     first: Capacities,
     pub(super) world: World,
     pub(super) room: Room,
     plan: Plan,
+    /// What each complete pass of the last frame counted.
+    pub complete: Vec<Counts>,
     collector: Collector,
 }
 
 #[derive(Debug)]
 enum Plan {
     Clusters(clusters::Plan),
-    Cells(cells::Plan),
+    Cells(Box<dyn InCells>),
 }
 
 /// What a pass does.
@@ -77,16 +83,32 @@ pub(super) enum Work {
 
 impl Engine {
     pub fn new(gpu: Arc<Gpu>, options: Options, first: Capacities) -> Self {
+        let plan = match options.method {
+            Method::Cells => Plan::Cells(Box::new(cells::Plan::new())),
+            _ => Plan::Clusters(clusters::Plan::new()),
+        };
+        Engine::with_plan(gpu, options, first, plan)
+    }
+
+    /// With a plan from outside.
+    pub fn of_guest(
+        gpu: Arc<Gpu>,
+        options: Options,
+        first: Capacities,
+        plan: Box<dyn InCells>,
+    ) -> Self {
+        Engine::with_plan(gpu, options, first.of(options.method), Plan::Cells(plan))
+    }
+
+    fn with_plan(gpu: Arc<Gpu>, options: Options, first: Capacities, plan: Plan) -> Self {
         Engine {
             gpu,
             options,
             first: first.of(options.method),
             world: World::new(),
             room: Room::new(),
-            plan: match options.method {
-                Method::Cells => Plan::Cells(cells::Plan::new()),
-                _ => Plan::Clusters(clusters::Plan::new()),
-            },
+            plan,
+            complete: Vec::new(),
             collector: Collector::default(),
         }
     }
@@ -110,7 +132,11 @@ impl Engine {
         let result = self.passes(scene, frame, control, keys, stats).await;
         if let Err(Error::Gpu { .. }) = result {
             // Whatever state the buffers are in, the next frame must not build on it.
-            *self = Engine::new(Arc::clone(&self.gpu), self.options, self.first);
+            let plan = match &self.plan {
+                Plan::Clusters(_) => Plan::Clusters(clusters::Plan::new()),
+                Plan::Cells(plan) => Plan::Cells(plan.anew()),
+            };
+            *self = Engine::with_plan(Arc::clone(&self.gpu), self.options, self.first, plan);
         }
         result
     }
@@ -124,6 +150,7 @@ impl Engine {
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         self.gpu.check_lost()?;
+        self.complete.clear();
         let start = Instant::now();
         let scopes = Scopes::open(&self.gpu.device);
         let updated = self.update(scene, frame, &[], stats);
@@ -142,6 +169,7 @@ impl Engine {
             match collected.counts.judge(&self.gpu, capacities, room) {
                 Verdict::Complete => {
                     book(&collected, self.options.method, stats);
+                    self.complete.push(collected.counts);
                     stats.time("settle", |_| settle_all(scene, frame, &collected, keys));
                 }
                 Verdict::Grow(larger) => {
@@ -375,9 +403,9 @@ impl Engine {
     }
 
     fn stages(&self) -> &'static [&'static str] {
-        match self.plan {
+        match &self.plan {
             Plan::Clusters(_) => clusters::STAGES,
-            Plan::Cells(_) => cells::STAGES,
+            Plan::Cells(plan) => plan.stages(),
         }
     }
 

@@ -10,7 +10,7 @@ macro_rules! words {
             $(#[$doc])*
             #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
             #[repr(C)]
-            pub(crate) struct $name {
+            pub struct $name {
                 $(pub $field: $type,)*
             }
         )*
@@ -44,7 +44,7 @@ words! {
         first: u32, count: u32,
         counter: u32, per_group: u32, capacity: u32, slot: u32,
         n_ignored: u32, resolve: u32,
-        group_size: u32, lambda: u32, most_cells: u32, unused: u32,
+        group_size: u32, lambda: u32, most_cells: u32, owner_rule: u32,
     }
     /// A primitive that reaches another body.
     Kept { low: [u32; 3], place: u32, high: [u32; 3], body: u32, range: [u32; 3], unused: u32 }
@@ -80,38 +80,42 @@ words! {
 }
 
 /// Children of a node, in `Node::shape`.
-pub(crate) const CHILDREN: u32 = 15;
+pub const CHILDREN: u32 = 15;
 /// The door to a body, in `Node::shape`.
-pub(crate) const GATE: u32 = 0x1000;
+pub const GATE: u32 = 0x1000;
 /// Where the height of a node is, in `Node::shape`.
-pub(crate) const HEIGHT_SHIFT: u32 = 4;
+pub const HEIGHT_SHIFT: u32 = 4;
 /// The most rounds that a traversal takes; counters 0 .. 32 are the queues'.
-pub(crate) const ROUNDS: u32 = 32;
+pub const ROUNDS: u32 = 32;
 /// Counter of work items.
-pub(crate) const N_ITEMS: u32 = 32;
+pub const N_ITEMS: u32 = 32;
 /// Counter of candidates.
-pub(crate) const N_CANDIDATES: u32 = 33;
+pub const N_CANDIDATES: u32 = 33;
 /// Counter of certain pairs.
-pub(crate) const N_PAIRS: u32 = 34;
+pub const N_PAIRS: u32 = 34;
 /// Counter of unsure pairs.
-pub(crate) const N_UNSURE: u32 = 35;
+pub const N_UNSURE: u32 = 35;
 /// Not 0 when a counter has passed 2^32, or one invocation had too much to do.
-pub(crate) const TOO_MUCH: u32 = 36;
+pub const TOO_MUCH: u32 = 36;
 /// Counter of kept primitives.
-pub(crate) const N_KEPT: u32 = 37;
+pub const N_KEPT: u32 = 37;
 /// Counter of entries of the cell lists.
-pub(crate) const N_ENTRIES: u32 = 38;
+pub const N_ENTRIES: u32 = 38;
 /// Counter of cells that went through the second level.
-pub(crate) const N_SUBDIVIDED: u32 = 39;
+pub const N_SUBDIVIDED: u32 = 39;
+/// Counter of box tests, of methods that count them: low word.
+pub const N_BOX_TESTS: u32 = 40;
+/// High word.
+pub const N_BOX_TESTS_HIGH: u32 = 41;
 /// Words of the region and of the entries a shift.
-pub(crate) const N_TALLIES: u32 = 37;
+pub const N_TALLIES: u32 = 37;
 /// The root of a body without primitives, and the top where there is no tree over bodies.
-pub(crate) const NO_ROOT: u32 = u32::MAX;
+pub const NO_ROOT: u32 = u32::MAX;
 /// Counters in all.
-pub(crate) const N_COUNTERS: u32 = 40;
+pub const N_COUNTERS: u32 = 42;
 /// Flags of candidates.
 #[cfg(test)]
-pub(crate) const FLAG: u32 = 0x8000_0000;
+pub const FLAG: u32 = 0x8000_0000;
 
 impl Node {
     /// A node whose box is not known yet.
@@ -140,7 +144,7 @@ impl Node {
 /// The parameters of one dispatch, as far apart as devices want uniform offsets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct Step {
+pub struct Step {
     pub params: Params,
     padding: [u32; 52],
 }

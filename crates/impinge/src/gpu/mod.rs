@@ -6,26 +6,39 @@
 //! blocks but [`device::Gpu::block_on`].
 
 mod bounds;
-mod buffers;
-mod cells;
 mod clusters;
 mod collect;
 mod device;
-mod engine;
-mod kernels;
-mod layout;
-mod narrow;
-mod pipeline;
 mod resident;
-mod room;
-mod steps;
-mod world;
+
+// What `guest` hands on of these is no part of the stable interface: its types are documented, their
+// fields and small methods speak for themselves.
+#[allow(missing_docs)]
+pub(crate) mod buffers;
+#[allow(missing_docs)]
+pub(crate) mod cells;
+#[allow(missing_docs)]
+pub(crate) mod engine;
+mod kernels;
+#[allow(missing_docs)]
+pub(crate) mod layout;
+#[allow(missing_docs)]
+pub(crate) mod narrow;
+#[allow(missing_docs)]
+pub(crate) mod pipeline;
+pub(crate) mod reaching;
+#[allow(missing_docs)]
+pub(crate) mod room;
+#[allow(missing_docs)]
+pub(crate) mod steps;
+#[allow(missing_docs)]
+pub(crate) mod world;
 
 pub use device::{DeviceInfo, devices};
 pub use resident::ResidentPairs;
 pub use room::Capacities;
 
-pub(crate) use device::{Gpu, Wanted};
+pub use device::{Gpu, Wanted};
 pub(crate) use engine::{Engine, Options};
 
 #[cfg(test)]

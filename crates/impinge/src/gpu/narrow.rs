@@ -15,13 +15,13 @@ const SLOT: u32 = ROUNDS + 1;
 
 /// The kernels with their buffers.
 #[derive(Debug)]
-pub(crate) struct Settling {
+pub struct Settling {
     prepare: Bound,
     narrow: Bound,
 }
 
 /// `prepare`, for any stage.
-pub(crate) fn prepare(gpu: &Gpu, room: &Room, steps: &Steps) -> Bound {
+pub fn prepare(gpu: &Gpu, room: &Room, steps: &Steps) -> Bound {
     gpu.kernels.prepare.bind(
         gpu,
         &Prepare {

@@ -7,9 +7,8 @@ use super::device::Gpu;
 
 /// One binding as a kernel declares it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Entry {
+pub struct Entry {
     /// What the kernel calls it; tests compare.
-    #[cfg(test)]
     pub name: &'static str,
     pub access: Access,
     /// Bytes of one element.
@@ -17,42 +16,43 @@ pub(crate) struct Entry {
 }
 
 /// Everything that a kernel binds, in the order of its binding numbers.
-pub(crate) trait Bindings {
+pub trait Bindings {
     const ENTRIES: &'static [Entry];
     fn resources(&self) -> Vec<wgpu::BindingResource<'_>>;
 }
 
 /// Declares the bindings of a kernel: `name: Read<T>`, `Write<T>` or `Uniform<T>`, in order.
-macro_rules! bindings {
+#[macro_export]
+#[doc(hidden)]
+macro_rules! guest_bindings {
     ($(#[$doc:meta])* $name:ident { $($field:ident: $access:ident<$type:ty>),* $(,)? }) => {
         $(#[$doc])*
         pub(crate) struct $name {
-            $(pub $field: $crate::gpu::buffers::$access<$type>,)*
+            $(pub $field: $crate::guest::gpu::$access<$type>,)*
         }
 
-        impl $crate::gpu::pipeline::Bindings for $name {
-            const ENTRIES: &'static [$crate::gpu::pipeline::Entry] = &[
-                $($crate::gpu::pipeline::Entry {
-                    #[cfg(test)]
+        impl $crate::guest::gpu::Bindings for $name {
+            const ENTRIES: &'static [$crate::guest::gpu::Entry] = &[
+                $($crate::guest::gpu::Entry {
                     name: stringify!($field),
-                    access: <$crate::gpu::buffers::$access<$type>
-                        as $crate::gpu::buffers::Binding>::ACCESS,
-                    stride: <$crate::gpu::buffers::$access<$type>
-                        as $crate::gpu::buffers::Binding>::STRIDE,
+                    access: <$crate::guest::gpu::$access<$type>
+                        as $crate::guest::gpu::Binding>::ACCESS,
+                    stride: <$crate::guest::gpu::$access<$type>
+                        as $crate::guest::gpu::Binding>::STRIDE,
                 },)*
             ];
 
             fn resources(&self) -> Vec<wgpu::BindingResource<'_>> {
-                use $crate::gpu::buffers::Binding;
+                use $crate::guest::gpu::Binding;
                 vec![$(self.$field.resource(),)*]
             }
         }
     };
 }
-pub(crate) use bindings;
+pub(crate) use guest_bindings as bindings;
 
 /// A kernel's text: its own file behind the shared ones that it builds on.
-pub(crate) struct Source {
+pub struct Source {
     pub name: &'static str,
     pub parts: &'static [&'static str],
 }
@@ -79,7 +79,7 @@ macro_rules! source {
 pub(crate) use source;
 
 /// A compiled kernel that takes the bindings `B`.
-pub(crate) struct Kernel<B> {
+pub struct Kernel<B> {
     name: &'static str,
     layout: wgpu::BindGroupLayout,
     pipeline: wgpu::ComputePipeline,
@@ -165,14 +165,14 @@ const STEP: u32 = size_of::<super::layout::Step>() as u32;
 
 /// A kernel with its buffers, ready to be dispatched.
 #[derive(Debug)]
-pub(crate) struct Bound {
+pub struct Bound {
     pipeline: wgpu::ComputePipeline,
     group: wgpu::BindGroup,
     has_params: bool,
 }
 
 /// How many workgroups.
-pub(crate) enum Groups<'a> {
+pub enum Groups<'a> {
     /// As many as this, in rows if need be.
     Known(u64),
     /// As the arguments in this slot say.

@@ -7,9 +7,10 @@
 use super::buffers::Storage;
 use super::device::Gpu;
 use super::layout::{
-    Arguments, Candidate, Cell, CellItem, Counter, Grid, Kept, ListEntry, N_CANDIDATES, N_COUNTERS,
-    N_ENTRIES, N_ITEMS, N_KEPT, N_PAIRS, N_SUBDIVIDED, N_TALLIES, N_UNSURE, NodePair, PairKey,
-    ROUNDS, Reach, Start, TOO_MUCH, Tally, UnsureKey, WorkItem,
+    Arguments, Candidate, Cell, CellItem, Counter, Grid, Kept, ListEntry, N_BOX_TESTS,
+    N_BOX_TESTS_HIGH, N_CANDIDATES, N_COUNTERS, N_ENTRIES, N_ITEMS, N_KEPT, N_PAIRS, N_SUBDIVIDED,
+    N_TALLIES, N_UNSURE, NodePair, PairKey, ROUNDS, Reach, Start, TOO_MUCH, Tally, UnsureKey,
+    WorkItem,
 };
 use crate::detector::Method;
 use crate::error::Error;
@@ -53,7 +54,7 @@ const ONE_ITEM: u64 = 64 * 64;
 
 impl Capacities {
     /// With these a pass of one pair of clusters always fits.
-    pub(crate) const LEAST: Capacities = Capacities {
+    pub const LEAST: Capacities = Capacities {
         queue: 64,
         items: 64,
         kept: 64,
@@ -63,7 +64,7 @@ impl Capacities {
         unsure: ONE_ITEM,
     };
 
-    pub(crate) const NONE: Capacities = Capacities {
+    pub const NONE: Capacities = Capacities {
         queue: 0,
         items: 0,
         kept: 0,
@@ -74,7 +75,7 @@ impl Capacities {
     };
 
     /// Without the room that only the other method needs.
-    pub(crate) fn of(self, method: Method) -> Self {
+    pub fn of(self, method: Method) -> Self {
         match method {
             Method::Cells => Capacities { queue: 1, ..self },
             _ => Capacities {
@@ -86,7 +87,7 @@ impl Capacities {
     }
 
     /// Bytes on the device, read-back included.
-    pub(crate) fn bytes(&self) -> u64 {
+    pub fn bytes(&self) -> u64 {
         let item = size_of::<WorkItem>().max(size_of::<CellItem>());
         2 * self.queue * size_of::<NodePair>() as u64
             + self.items * item as u64
@@ -109,7 +110,7 @@ impl Capacities {
         }
     }
 
-    pub(crate) fn max(self, other: Self) -> Self {
+    pub fn max(self, other: Self) -> Self {
         self.zip(other, u64::max)
     }
 
@@ -118,7 +119,7 @@ impl Capacities {
     }
 
     /// Whether the device can bind this much.
-    pub(crate) fn fit(self, gpu: &Gpu) -> bool {
+    pub fn fit(self, gpu: &Gpu) -> bool {
         self.fits(Capacities::limit(gpu))
     }
 
@@ -138,7 +139,7 @@ impl Capacities {
 
 /// The buffers. A method leaves those of the other at one element each.
 #[derive(Debug)]
-pub(crate) struct Room {
+pub struct Room {
     pub queues: [Storage<NodePair>; 2],
     pub items: Storage<WorkItem>,
     pub candidates: Storage<Candidate>,
@@ -163,7 +164,7 @@ pub(crate) struct Room {
 
 /// Room that `Cells` wants besides what grows by itself; none for `Clusters`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct CellsWanted {
+pub struct CellsWanted {
     pub n_cells: u64,
     pub n_bodies: u64,
 }
@@ -285,17 +286,19 @@ impl Room {
 
 /// What a pass counted.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Counts {
+pub struct Counts {
     /// What would have held everything; of later stages a lower bound when an earlier one overflowed.
     pub needed: Capacities,
     /// Cells that went through the second level.
     pub n_subdivided: u64,
+    /// Box tests, of methods that count them.
+    pub n_box_tests: u64,
     too_much: bool,
 }
 
 /// What is to be done about the counts of a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Verdict {
+pub enum Verdict {
     /// All of it fitted.
     Complete,
     /// Run again with this much room.
@@ -318,6 +321,7 @@ impl Counts {
                 unsure: at(N_UNSURE),
             },
             n_subdivided: at(N_SUBDIVIDED),
+            n_box_tests: at(N_BOX_TESTS_HIGH) << 32 | at(N_BOX_TESTS),
             too_much: at(TOO_MUCH) != 0,
         }
     }

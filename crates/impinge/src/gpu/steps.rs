@@ -7,7 +7,7 @@ use crate::error::Error;
 
 /// The parameters of all steps of a plan, sent when they change.
 #[derive(Debug)]
-pub(crate) struct Steps {
+pub struct Steps {
     planned: Vec<Step>,
     sent: Vec<Step>,
     buffer: Storage<Step>,
@@ -52,7 +52,7 @@ impl Steps {
 }
 
 /// Encodes stages, each in a pass of its own so that it can be timed.
-pub(crate) struct Stages<'a> {
+pub struct Stages<'a> {
     pub names: &'static [&'static str],
     pub encoder: &'a mut wgpu::CommandEncoder,
     pub times: Option<&'a wgpu::QuerySet>,

@@ -128,7 +128,7 @@ fn structs_are_laid_out_as_on_the_host() {
         UnsureKey { low, high }
         Params {
             first, count, counter, per_group, capacity, slot, n_ignored, resolve, group_size,
-            lambda, most_cells, unused
+            lambda, most_cells, owner_rule
         }
         Kept { low, place, high, body, range, unused }
         Grid { origin, shift, scale, n_cells, finest, unused, resolution, unused_too }
@@ -168,6 +168,8 @@ fn constants_are_those_of_the_host() {
         ("N_KEPT", N_KEPT),
         ("N_ENTRIES", N_ENTRIES),
         ("N_SUBDIVIDED", N_SUBDIVIDED),
+        ("N_BOX_TESTS", N_BOX_TESTS),
+        ("N_BOX_TESTS_HIGH", N_BOX_TESTS_HIGH),
         ("N_COUNTERS", N_COUNTERS),
         ("N_TALLIES", N_TALLIES),
         ("NO_ROOT", NO_ROOT),

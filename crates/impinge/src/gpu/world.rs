@@ -61,7 +61,7 @@ struct Resident {
 
 /// Everything about the participants that the kernels read.
 #[derive(Debug)]
-pub(crate) struct World {
+pub struct World {
     caches: Vec<Option<Arc<Cached>>>,
     residents: Vec<Resident>,
     /// What the device has of the nodes, without the boxes.
@@ -511,7 +511,7 @@ fn bounds_of(positions: &Positions, corners: &[u32]) -> Bounds {
 
 /// All trees in one array.
 #[derive(Debug, Default)]
-pub(crate) struct Forest {
+pub struct Forest {
     pub nodes: Vec<Node>,
     pub levels: Vec<Level>,
     /// Root of each participant; meaningless for an empty one.

@@ -74,7 +74,8 @@ struct Params {
     group_size: u32,
     lambda: u32,
     most_cells: u32,
-    unused: u32,
+    // Methods from outside: 1 when a pair is tested by one of its cells alone.
+    owner_rule: u32,
 }
 
 // A primitive that reaches another body: its box, its place (bit 31: rounded), its body, and the
@@ -145,7 +146,10 @@ const TOO_MUCH: u32 = 36u;
 const N_KEPT: u32 = 37u;
 const N_ENTRIES: u32 = 38u;
 const N_SUBDIVIDED: u32 = 39u;
-const N_COUNTERS: u32 = 40u;
+// Low and high word, of methods that count them.
+const N_BOX_TESTS: u32 = 40u;
+const N_BOX_TESTS_HIGH: u32 = 41u;
+const N_COUNTERS: u32 = 42u;
 
 // Tallies: the region (three complements of its low end, three of its high end), then entries of the cell
 // lists for every shift, two words each, and a bit for each shift that is too fine.

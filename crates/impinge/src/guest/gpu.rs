@@ -1,0 +1,114 @@
+//! The same for the GPU: a method from outside is a plan of passes that work in cells.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use crate::detector::Method;
+use crate::error::Error;
+use crate::frame::Frame;
+pub use crate::gpu::buffers::{Access, Binding, Read, Storage, Uniform, Write};
+pub use crate::gpu::cells::{InCells, Part, Told};
+use crate::gpu::engine::{Engine, Options};
+pub use crate::gpu::layout::{
+    Arguments, Candidate, CellItem, Counter, Grid, Kept, N_ENTRIES, N_ITEMS, Params, ROUNDS,
+};
+pub use crate::gpu::narrow::{Settling, prepare};
+pub use crate::gpu::pipeline::{Bindings, Bound, Entry, Groups, Kernel, Source};
+pub use crate::gpu::reaching::{KEPT, Reaching, ReachingSteps};
+pub use crate::gpu::room::{Capacities, Counts, Room};
+pub use crate::gpu::steps::{Stages, Steps};
+pub use crate::gpu::world::World;
+pub use crate::gpu::{Gpu, Wanted};
+pub use crate::guest_bindings as bindings;
+use crate::pairs::Pairs;
+use crate::progress::Control;
+use crate::query::Query;
+use crate::scene::Scene;
+
+/// Text that kernels are put together from: `LAYOUT` first, it has the structs of all.
+pub mod shared {
+    macro_rules! shared {
+        ($($name:ident = $file:literal;)*) => {
+            $(
+                #[doc = concat!("`", $file, ".wgsl`")]
+                pub const $name: &str =
+                    include_str!(concat!("../gpu/kernels/shared/", $file, ".wgsl"));
+            )*
+        };
+    }
+
+    shared! {
+        LAYOUT = "layout";
+        ARGUMENTS = "arguments";
+        BOXES = "boxes";
+        COARSE = "coarse";
+        GROUPS = "groups";
+        RESERVE = "reserve";
+    }
+}
+
+/// The frame loop around a plan from outside.
+pub struct Host {
+    frame: Frame,
+    pairs: Pairs,
+    engine: Engine,
+}
+
+impl Host {
+    /// On the adapter whose name contains `device`, or the best there is, with cells as dense as `lambda`.
+    ///
+    /// # Errors
+    /// No adapter fits; the driver refuses; those of `plan`, which compiles its kernels.
+    pub fn new(
+        device: Option<&str>,
+        lambda: f64,
+        first: Option<Capacities>,
+        plan: impl FnOnce(&Gpu) -> Result<Box<dyn InCells>, Error>,
+    ) -> Result<Self, Error> {
+        let gpu = Gpu::open(device.map_or(Wanted::Any, Wanted::Named))?;
+        let plan = plan(&gpu)?;
+        let options = Options {
+            method: Method::Cells,
+            lambda,
+            group_size: 64,
+            memory_budget: None,
+        };
+        let first = first.unwrap_or_default();
+        Ok(Host {
+            frame: Frame::default(),
+            pairs: Pairs::default(),
+            engine: Engine::of_guest(Arc::clone(&gpu), options, first, plan),
+        })
+    }
+
+    /// One frame, repetitions dropped; and what each pass counted.
+    ///
+    /// # Errors
+    /// A stale id, refused positions, the device's own.
+    pub fn detect(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        name: &'static str,
+    ) -> Result<(&Pairs, &[Counts]), Error> {
+        let start = Instant::now();
+        self.frame.resolve(scene, query)?;
+        self.frame.check(scene)?;
+        self.pairs.begin(&self.frame);
+        let (keys, stats) = self.pairs.parts_mut();
+        stats.method = name;
+        stats.n_threads = 1;
+        let gpu = Arc::clone(self.engine.gpu());
+        stats.backend.push_str(gpu.name());
+        gpu.block_on(
+            self.engine
+                .run(scene, &self.frame, &Control::new(), keys, stats),
+        )?;
+        stats.time("collect", |_| {
+            keys.sort_unstable();
+            keys.dedup();
+        });
+        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
+        Ok((&self.pairs, &self.engine.complete))
+    }
+}
