@@ -1,15 +1,18 @@
 //! The command line: what may be said, and its help.
 
+mod paper;
+
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use impinge_fem::scenes::SceneName as DropName;
-use impinge_paper::{Backends, SceneName, Waving};
+use impinge_fem::scenes::SceneName;
 
-use crate::values::{
-    BenchmarkMesh, FrameRange, MeshFile, RowsFile, benchmark, body_numbers, bytes, lambda,
-};
+pub use paper::{BenchArgs, BenchCommand, PaperArgs};
+
+use crate::values::{FrameRange, MeshFile, RowsFile, body_numbers, bytes, lambda};
+#[cfg(feature = "gpu")]
+use crate::values::{PngFile, azimuth, elevation, part, size};
 
 /// Exact collision detection for deforming meshes of triangles and tetrahedra.
 #[derive(Debug, Parser)]
@@ -49,6 +52,10 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// Measure benchmarks that have been published, and write a report
     Bench(BenchArgs),
+    /// Draw meshes, the primitives that meet in red and blue
+    #[cfg(feature = "gpu")]
+    #[command(after_help = RENDER_EXAMPLES)]
+    Render(RenderArgs),
     /// List the GPUs, and drivers that imitate one, for --device
     #[cfg(feature = "gpu")]
     Devices(DevicesArgs),
@@ -62,6 +69,17 @@ pub struct DevicesArgs {
     #[arg(long)]
     pub json: bool,
 }
+
+#[cfg(feature = "gpu")]
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  impinge render a.obj b.obj --png out.png
+  impinge render a.ply b.msh --png out.png --size 1920x1080 --azimuth -60 --up z
+  impinge render cow.off --self --weld --png cow.png --see-through 1
+  impinge pairs a.ply b.ply --png out.png           the answer, and its picture
+
+A software driver suffices where there is no GPU. The colliding primitives of body 0 are red, of body 1
+blue, then green, orange, …; where they are hidden, they are seen faintly.";
 
 const DEMO_EXAMPLES: &str = "\
 Examples:
@@ -110,18 +128,6 @@ Examples:
 Corotated finite elements on tetrahedra; contact forces come from the pairs found. Ctrl-C saves
 the state and stops; --resume goes on to the very bits of a run that was never stopped.
 Where the mesh of a scene is not at hand, a generated ball stands in, and the first line says so.";
-
-const PAPER_EXAMPLES: &str = "\
-Examples:
-  impinge bench paper --out out/paper
-  impinge bench paper --quick
-  impinge bench paper --scene bunny --backend cpu
-  impinge bench paper --scene dragon --mesh my_dragon.ply
-  impinge bench paper --mesh bunny=my_bunny.ply --mesh bunny-7k=my_bunny.msh
-
-Scans are looked for in ../shared/data beside the repository, or $IMPINGE_DATA. Where there is neither
-a scan nor --mesh, generated meshes of the same size stand in, and the report says so.
-The full run takes about a quarter of an hour on two cores.";
 
 /// Who works, and how.
 #[derive(Debug, Clone, Args)]
@@ -182,6 +188,91 @@ pub struct AnswerArgs {
     /// Write the meshes, colliding primitives coloured (.ply, .glb or .vtu)
     #[arg(long, value_name = "FILE")]
     pub out: Option<MeshFile>,
+    /// Draw the meshes, colliding primitives coloured (.png)
+    #[cfg(feature = "gpu")]
+    #[arg(long, value_name = "FILE")]
+    pub png: Option<PngFile>,
+    #[cfg(feature = "gpu")]
+    #[command(flatten)]
+    pub picture: PictureArgs,
+}
+
+/// How a picture looks.
+#[cfg(feature = "gpu")]
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "How it is drawn")]
+pub struct PictureArgs {
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x960", requires = "png")]
+    pub size: [u32; 2],
+    /// Degrees around the up axis, counter-clockwise seen from above
+    #[arg(
+        long,
+        value_name = "D",
+        value_parser = azimuth,
+        default_value = "-25",
+        allow_negative_numbers = true,
+        requires = "png"
+    )]
+    pub azimuth: f64,
+    /// Degrees above the ground, -90 to 90
+    #[arg(
+        long,
+        value_name = "D",
+        value_parser = elevation,
+        default_value = "20",
+        allow_negative_numbers = true,
+        requires = "png"
+    )]
+    pub elevation: f64,
+    /// The axis that points up; at azimuth 0 the viewer is on the side of +z or of -y
+    #[arg(long, value_enum, value_name = "AXIS", default_value_t = UpArg::Y, requires = "png")]
+    pub up: UpArg,
+    /// How strongly hidden colliding primitives are seen, 0 (not at all) to 1 (as if nothing hid them)
+    #[arg(long, value_name = "X", value_parser = part, default_value = "0.5", requires = "png")]
+    pub see_through: f32,
+    /// Without perspective
+    #[arg(long, requires = "png")]
+    pub orthographic: bool,
+}
+
+/// [`impinge_render::UpAxis`] as an option.
+#[cfg(feature = "gpu")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum UpArg {
+    Y,
+    Z,
+}
+
+#[cfg(feature = "gpu")]
+impl From<UpArg> for impinge_render::UpAxis {
+    fn from(up: UpArg) -> Self {
+        match up {
+            UpArg::Y => impinge_render::UpAxis::Y,
+            UpArg::Z => impinge_render::UpAxis::Z,
+        }
+    }
+}
+
+/// What is drawn.
+#[cfg(feature = "gpu")]
+#[derive(Debug, Args)]
+pub struct RenderArgs {
+    /// Mesh files, a body each
+    #[arg(value_name = "MESH", required = true)]
+    pub meshes: Vec<PathBuf>,
+    /// The picture (.png)
+    #[arg(long, value_name = "FILE", required = true)]
+    pub png: PngFile,
+    /// Find the pairs within each body as well
+    #[arg(long = "self")]
+    pub within: bool,
+    #[command(flatten)]
+    pub ask: AskArgs,
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    #[command(flatten)]
+    pub detector: DetectorArgs,
 }
 
 #[derive(Debug, Args)]
@@ -257,7 +348,7 @@ pub struct SimulateArgs {
     pub detector: DetectorArgs,
 }
 
-/// [`DropName`] as an argument.
+/// [`SceneName`] as an argument.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SceneArg {
     /// Two bunnies of 7,356 tetrahedra
@@ -276,14 +367,14 @@ pub enum SceneArg {
     Blocks,
 }
 
-impl From<SceneArg> for DropName {
+impl From<SceneArg> for SceneName {
     fn from(scene: SceneArg) -> Self {
         match scene {
-            SceneArg::Bunny7k => DropName::Bunny7k,
-            SceneArg::Bunny19k => DropName::Bunny19k,
-            SceneArg::Dragon8k => DropName::Dragon8k,
-            SceneArg::Dragon15k => DropName::Dragon15k,
-            SceneArg::Blocks => DropName::Blocks,
+            SceneArg::Bunny7k => SceneName::Bunny7k,
+            SceneArg::Bunny19k => SceneName::Bunny19k,
+            SceneArg::Dragon8k => SceneName::Dragon8k,
+            SceneArg::Dragon15k => SceneName::Dragon15k,
+            SceneArg::Blocks => SceneName::Blocks,
         }
     }
 }
@@ -297,84 +388,6 @@ pub enum SequenceFormatArg {
     Vtu,
     /// A PLY file a step, colliding tetrahedra coloured
     Ply,
-}
-
-#[derive(Debug, Args)]
-pub struct BenchArgs {
-    #[command(subcommand)]
-    pub command: BenchCommand,
-}
-
-/// What may be measured.
-#[derive(Debug, Subcommand)]
-pub enum BenchCommand {
-    /// Everything that the paper on two-level spatial hashing shows, its numbers beside ours
-    #[command(after_help = PAPER_EXAMPLES)]
-    Paper(PaperArgs),
-}
-
-#[derive(Debug, Args)]
-pub struct PaperArgs {
-    /// The folder for the report: report.md, report.html, report.json and figures
-    #[arg(long, value_name = "FOLDER", default_value = "out/paper")]
-    pub out: PathBuf,
-    /// A benchmark to run: ball, bunny, buddha, dragon (surfaces), bunny-7k, bunny-19k, dragon-8k, dragon-15k (solids) [default: all]
-    #[arg(long = "scene", value_name = "NAME", value_parser = benchmark)]
-    pub scenes: Vec<SceneName>,
-    /// A mesh for a benchmark, in place of what is at hand; with one --scene its name may be left out
-    #[arg(long = "mesh", value_name = "[NAME=]FILE")]
-    pub meshes: Vec<BenchmarkMesh>,
-    /// A few frames of everything in less than two minutes: to see that all agree, not how fast
-    #[arg(long)]
-    pub quick: bool,
-    /// Frames of each surface benchmark and steps of each solid one [default: 100 and 240]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    pub frames: Option<u32>,
-    /// λ of the grid to report beside the paper's 1 [default: what measures best]
-    #[arg(long, value_name = "X", value_parser = lambda)]
-    pub lambda: Option<f64>,
-    /// CPU threads [default: one a core]
-    #[arg(long, value_name = "N")]
-    pub threads: Option<NonZeroUsize>,
-    /// Where to measure [default: cpu, and gpu where an adapter is found]
-    #[arg(long, value_enum)]
-    pub backend: Option<PaperBackendArg>,
-    /// A part of the GPU's name, to choose among several (`impinge devices` lists them)
-    #[arg(long, value_name = "NAME")]
-    pub device: Option<String>,
-    /// How far waves move a vertex to either side, in box diagonals of a body
-    #[arg(long, value_name = "X", default_value_t = Waving::default().amplitude)]
-    pub amplitude: f32,
-    /// From crest to crest, in box diagonals
-    #[arg(long, value_name = "X", default_value_t = Waving::default().wave_length)]
-    pub wave_length: f32,
-    /// How far crests travel in the whole run, in box diagonals
-    #[arg(long, value_name = "X", default_value_t = Waving::default().speed)]
-    pub wave_speed: f32,
-    /// Show no progress bar
-    #[arg(long)]
-    pub no_progress: bool,
-}
-
-/// Where `bench paper` measures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum PaperBackendArg {
-    /// The CPU
-    Cpu,
-    /// A GPU, or an error where there is none
-    Gpu,
-    /// Both
-    Both,
-}
-
-impl From<PaperBackendArg> for Backends {
-    fn from(backend: PaperBackendArg) -> Self {
-        match backend {
-            PaperBackendArg::Cpu => Backends::Cpu,
-            PaperBackendArg::Gpu => Backends::Gpu,
-            PaperBackendArg::Both => Backends::Both,
-        }
-    }
 }
 
 #[derive(Debug, Args)]

@@ -7,6 +7,8 @@ mod demo_scene;
 mod devices;
 mod paper;
 mod record;
+#[cfg(feature = "gpu")]
+mod render;
 mod sequence;
 mod simulate;
 
@@ -15,5 +17,7 @@ pub use demo::demo;
 #[cfg(feature = "gpu")]
 pub use devices::devices;
 pub use paper::paper;
+#[cfg(feature = "gpu")]
+pub use render::render;
 pub use sequence::sequence;
 pub use simulate::simulate;

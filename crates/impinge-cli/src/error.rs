@@ -9,6 +9,10 @@ pub enum Error {
     /// Options that do not fit together, or not what they are applied to.
     #[error("{0}")]
     Usage(String),
+    /// A picture could not be drawn or written.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Picture(#[from] impinge_render::Error),
     /// A mesh file that can't be read or written.
     #[error(transparent)]
     File(#[from] impinge_io::Error),

@@ -8,6 +8,9 @@ mod json;
 mod load;
 mod meshes;
 mod output;
+mod palette;
+#[cfg(feature = "gpu")]
+mod picture;
 mod rows;
 mod values;
 mod watch;
@@ -32,6 +35,8 @@ fn main() -> ExitCode {
         Command::Bench(args) => match args.command {
             BenchCommand::Paper(args) => commands::paper(&args, &cancel),
         },
+        #[cfg(feature = "gpu")]
+        Command::Render(args) => commands::render(&args, &cancel),
         #[cfg(feature = "gpu")]
         Command::Devices(args) => commands::devices(&args),
     });

@@ -4,22 +4,8 @@ use impinge::{BodyId, Elements, Pairs, Positions, Scene};
 use impinge_io::{ColoredMesh, write_glb, write_ply, write_vtu};
 
 use crate::error::Error;
+use crate::palette::{self, BodyColors};
 use crate::values::{MeshFile, MeshFormat};
-
-/// Colliding primitives, a colour a body, over again after the last one.
-const COLLIDING: [[u8; 3]; 8] = [
-    [214, 39, 40],
-    [31, 119, 180],
-    [44, 160, 44],
-    [255, 127, 14],
-    [148, 103, 189],
-    [23, 190, 207],
-    [227, 119, 194],
-    [188, 189, 34],
-];
-
-/// All the others.
-const GREY: [u8; 3] = [200, 200, 200];
 
 /// Writes bodies as they are in the scene now; primitives that take part in a pair are coloured.
 pub fn write(
@@ -30,8 +16,8 @@ pub fn write(
 ) -> Result<(), Error> {
     let parts: Vec<Part> = bodies
         .iter()
-        .zip(COLLIDING.iter().cycle())
-        .map(|(&(id, name), &color)| Part::new(scene, id, name, color, pairs))
+        .enumerate()
+        .map(|(ix, &(id, name))| Part::new(scene, id, name, palette::body(ix), pairs))
         .collect::<Result<_, _>>()?;
     let meshes: Vec<ColoredMesh> = parts.iter().map(Part::mesh).collect();
     match file.format {
@@ -55,14 +41,14 @@ impl<'a> Part<'a> {
         scene: &Scene,
         id: BodyId,
         name: &'a str,
-        color: [u8; 3],
+        colors: BodyColors,
         pairs: &Pairs,
     ) -> Result<Self, Error> {
         let body = scene.body(id)?;
-        let mut colors = vec![GREY; body.n_primitives()];
+        let mut primitive_colors = vec![colors.other; body.n_primitives()];
         let mut colliding = vec![false; body.n_primitives()];
         for primitive in pairs.colliding(id) {
-            colors[primitive as usize] = color;
+            primitive_colors[primitive as usize] = colors.colliding;
             colliding[primitive as usize] = true;
         }
         Ok(Part {
@@ -74,7 +60,7 @@ impl<'a> Part<'a> {
                 Elements::Triangles(faces) => impinge_io::Elements::Triangles(faces.clone()),
                 Elements::Tetrahedra(tets) => impinge_io::Elements::Tetrahedra(tets.clone()),
             },
-            colors,
+            colors: primitive_colors,
             colliding,
             name,
         })

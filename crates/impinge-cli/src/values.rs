@@ -118,6 +118,55 @@ impl FromStr for FrameRange {
     }
 }
 
+/// A file for a picture.
+#[cfg(feature = "gpu")]
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PngFile(pub PathBuf);
+
+#[cfg(feature = "gpu")]
+impl FromStr for PngFile {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match extension(text).as_str() {
+            "png" => Ok(PngFile(text.into())),
+            _ => Err("pictures are written as .png".to_owned()),
+        }
+    }
+}
+
+/// Width and height in pixels with an `x` between them.
+#[cfg(feature = "gpu")]
+pub fn size(text: &str) -> Result<[u32; 2], String> {
+    text.split_once('x')
+        .and_then(|(width, height)| Some([width.parse().ok()?, height.parse().ok()?]))
+        .filter(|size| !size.contains(&0))
+        .ok_or_else(|| "expected width and height, such as 1280x960".to_owned())
+}
+
+/// An angle in degrees.
+#[cfg(feature = "gpu")]
+pub fn azimuth(text: &str) -> Result<f64, String> {
+    let angle = text.parse::<f64>().ok().filter(|angle| angle.is_finite());
+    angle.ok_or_else(|| "expected an angle in degrees".to_owned())
+}
+
+/// An angle above the ground in degrees.
+#[cfg(feature = "gpu")]
+pub fn elevation(text: &str) -> Result<f64, String> {
+    let angle = text.parse::<f64>().ok();
+    let angle = angle.filter(|angle| (-90.0..=90.0).contains(angle));
+    angle.ok_or_else(|| "expected an angle from -90 to 90 degrees".to_owned())
+}
+
+/// A part of the whole.
+#[cfg(feature = "gpu")]
+pub fn part(text: &str) -> Result<f32, String> {
+    let part = text.parse::<f32>().ok();
+    let part = part.filter(|part| (0.0..=1.0).contains(part));
+    part.ok_or_else(|| "expected a number from 0 to 1".to_owned())
+}
+
 /// A number above 0.
 pub fn lambda(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -288,6 +337,24 @@ mod tests {
             MeshFormat::Vtu
         );
         assert!("ply".parse::<MeshFile>().is_err());
+    }
+
+    #[cfg(feature = "gpu")]
+    #[test]
+    fn pictures() {
+        assert_eq!(size("1280x960"), Ok([1280, 960]));
+        for text in [
+            "", "1280", "1280x", "1280x-1", "1x2x3", "1.5x2", "0x9", "9x0",
+        ] {
+            assert!(size(text).is_err(), "{text}");
+        }
+        assert_eq!((azimuth("-400"), elevation("-90")), (Ok(-400.0), Ok(-90.0)));
+        assert!(azimuth("inf").is_err() && azimuth("x").is_err());
+        assert!(elevation("90.5").is_err() && elevation("nan").is_err());
+        assert_eq!((part("0"), part("1")), (Ok(0.0), Ok(1.0)));
+        assert!(part("-0.1").is_err() && part("1.1").is_err());
+        assert_eq!("a.PNG".parse(), Ok(PngFile("a.PNG".into())));
+        assert!("a.jpg".parse::<PngFile>().is_err());
     }
 
     #[test]

@@ -42,7 +42,7 @@ pub struct Camera {
 impl Default for Camera {
     fn default() -> Self {
         Camera {
-            azimuth: 25.0,
+            azimuth: -25.0,
             elevation: 20.0,
             up: UpAxis::default(),
             projection: Projection::Perspective { degrees: 28.0 },
@@ -219,7 +219,7 @@ impl View {
         let room = 1e-3 + 0.01 * (near - far);
         match camera.projection {
             Projection::Perspective { .. } => {
-                let distance = half[0].max(half[1]).max(near + 10.0 * room);
+                let distance = half[0].max(half[1]).max(near + 2.0 * room);
                 let eye = [offset[0] * slope[0], offset[1] * slope[1], distance];
                 let (near, far) = (distance - near - room, distance - far + room);
                 View::new(

@@ -374,7 +374,7 @@ impl Targets {
             }),
             ..Default::default()
         });
-        // The whole picture, of which the tile is a part: so tiles fit together to the last bit.
+        // The whole picture, of which the tile is a part: so tiles fit together.
         let [width, height, x, y] = frame.picture;
         pass.set_viewport(-x, -y, width, height, 0.0, 1.0);
         pass.set_bind_group(0, &self.frame_group, &[]);

@@ -59,7 +59,7 @@ impl Default for Picture {
             surfaces: Vec::new(),
             camera: Camera::default(),
             size: [1280, 960],
-            see_through: 0.3,
+            see_through: 0.5,
             occlusion: 0.7,
             background: [[255, 255, 255], [236, 239, 243]],
         }

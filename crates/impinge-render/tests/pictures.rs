@@ -209,7 +209,7 @@ fn everything_is_in_the_picture_and_fills_it() {
     for projection in [
         Projection::Orthographic,
         Projection::Perspective { degrees: 20.0 },
-        Projection::Perspective { degrees: 100.0 },
+        Projection::Perspective { degrees: 80.0 },
     ] {
         for size in [[200, 100], [100, 200]] {
             let mut picture = plain(vec![ball([0.0; 3]), ball([3.0, 1.0, 5.0])], size);
@@ -273,7 +273,7 @@ fn colliding(models: [Model; 2]) -> Picture {
 
 #[test]
 fn what_collides_is_red_and_blue() {
-    let apart = [0.9, 0.3, 0.2];
+    let apart = [0.7, 0.25, -0.3];
     for models in [
         [
             surfaces::ball(2_000),
@@ -297,8 +297,18 @@ fn what_collides_is_red_and_blue() {
     }
 }
 
+/// Pixels of which a channel differs by more than `allowed`.
+fn n_differing(a: &Image, b: &Image, allowed: u8) -> usize {
+    let differ = |(a, b): (&[u8; 4], &[u8; 4])| (0..4).any(|k| a[k].abs_diff(b[k]) > allowed);
+    a.pixels()
+        .iter()
+        .zip(b.pixels())
+        .filter(|&pair| differ(pair))
+        .count()
+}
+
 #[test]
-fn runs_tiles_and_chunks_change_no_byte() {
+fn runs_and_chunks_change_no_byte_and_tiles_no_picture() {
     let mut picture = colliding([
         surfaces::ball(2_000),
         surfaces::bumpy_ball(3_000, 0.2).translated([0.9, 0.3, 0.2]),
@@ -312,11 +322,22 @@ fn runs_tiles_and_chunks_change_no_byte() {
             .with_room(tile, n_faces)
             .render(&picture)
             .unwrap();
-        assert!(image == image_of_parts, "{tile} {n_faces}");
+        // Pixels beside a seam may be rounded otherwise: drivers place faces relative to the tile.
+        let is_one_tile = tile >= picture.size[0];
+        let allowed = if is_one_tile { 0 } else { 1 };
+        assert!(
+            n_differing(&image, &image_of_parts, allowed) == 0,
+            "{tile} {n_faces}"
+        );
+        assert!(
+            n_differing(&image, &image_of_parts, 0) < 50,
+            "{tile} {n_faces}"
+        );
     }
     // Where it could fail: another picture has other bytes.
     picture.camera.azimuth += 1.0;
-    assert_ne!(image, one.render(&picture).unwrap());
+    let other = one.render(&picture).unwrap();
+    assert!(n_differing(&image, &other, 1) > 500);
 }
 
 #[test]

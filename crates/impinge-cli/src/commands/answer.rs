@@ -10,6 +10,8 @@ use crate::args::{AnswerArgs, AskArgs, DetectorArgs, PairsArgs, WithinArgs};
 use crate::detection::{detector, query, repeat};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
+#[cfg(feature = "gpu")]
+use crate::picture;
 use crate::watch::Watch;
 use crate::{json, meshes, output, rows};
 
@@ -84,6 +86,12 @@ fn answer(
         writeln!(output::out(), "{object}")?;
     } else {
         output::print_answer(&scene, &bodies, pairs, &times)?;
+    }
+    // Last: whoever has no adapter has the answer.
+    #[cfg(feature = "gpu")]
+    if let Some(png) = &answer.png {
+        let device = how.device.as_deref();
+        picture::write(&png.0, &answer.picture, device, &scene, &bodies, pairs)?;
     }
     Ok(())
 }

@@ -251,7 +251,7 @@ fn coloured_meshes_hold_every_body() {
         let bytes = std::fs::read(folder.path(out)).unwrap();
         if is_red {
             let has = |color: [u8; 3]| bytes.windows(3).any(|window| window == color);
-            assert!(has([214, 39, 40]) && has([31, 119, 180]) && has([200, 200, 200]));
+            assert!(has([214, 39, 40]) && has([27, 95, 217]) && has([200, 200, 200]));
         }
     }
     let bytes = std::fs::read(folder.path("seen.vtu")).unwrap();

@@ -5,6 +5,8 @@ mod demo;
 #[cfg(feature = "gpu")]
 mod devices;
 mod harness;
+#[cfg(feature = "gpu")]
+mod render;
 mod sequence;
 mod shared_data;
 mod signals;

@@ -61,6 +61,28 @@ fn help_shows_every_command_with_examples() {
             assert!(help.contains(word), "{command}: {word}");
         }
     }
+    #[cfg(feature = "gpu")]
+    for (command, words) in [
+        (
+            "render",
+            &[
+                "--png",
+                "--size",
+                "--azimuth",
+                "--elevation",
+                "--up",
+                "--self",
+                "--device",
+            ][..],
+        ),
+        ("pairs", &["--png", "--size"]),
+        ("self", &["--png", "--size"]),
+    ] {
+        let help = folder.run([command, "--help"]).printed();
+        for word in words {
+            assert!(help.contains(word), "{command}: {word}");
+        }
+    }
     let version = folder.run(["--version"]).printed();
     assert_eq!(version, format!("impinge {}\n", env!("CARGO_PKG_VERSION")));
 }

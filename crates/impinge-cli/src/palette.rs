@@ -1,0 +1,33 @@
+//! The colours of bodies, in meshes and in pictures.
+
+/// sRGB.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BodyColors {
+    /// Of primitives that take part in a pair.
+    pub colliding: [u8; 3],
+    /// Of all the others.
+    pub other: [u8; 3],
+}
+
+/// Red, blue, green, orange, …
+const COLLIDING: [[u8; 3]; 8] = [
+    [214, 39, 40],
+    [27, 95, 217],
+    [44, 160, 44],
+    [255, 127, 14],
+    [148, 103, 189],
+    [23, 190, 207],
+    [227, 119, 194],
+    [188, 189, 34],
+];
+
+/// Greys that can just be told apart.
+const OTHER: [[u8; 3]; 2] = [[200, 200, 200], [172, 178, 188]];
+
+/// The colours of a body by its number; after the last ones, they begin again.
+pub fn body(ix: usize) -> BodyColors {
+    BodyColors {
+        colliding: COLLIDING[ix % COLLIDING.len()],
+        other: OTHER[ix % OTHER.len()],
+    }
+}
