@@ -27,23 +27,24 @@ pub(crate) fn run(
     let (name, n_frames) = (course.name().name(), course.n_frames());
     let sweep = sweep(course, places, options.is_quick, control.cancel)?;
     let setups = contestants(places, &sweep, options.lambda);
-    let mut contest = Contest::new(setups, n_frames)?;
-    let mut fullest = (0, 0, Vec::new());
+    let mut contest = Contest::new(setups, n_frames, options.is_quick)?;
+    // The frame with the most pairs, and its pairs.
+    let mut fullest: (usize, Vec<[u32; 4]>) = (0, Vec::new());
     for frame in 0..n_frames {
         course.pose(frame)?;
-        let rows = contest.frame(course.scene(), course.bodies(), control)?;
-        if fullest.2.is_empty() || rows.len() > fullest.0 {
-            fullest = (rows.len(), frame, rows.to_vec());
+        let rows = contest.frame(frame, course.scene(), course.bodies(), control)?;
+        if let Some(rows) = rows.filter(|rows| rows.len() >= fullest.1.len()) {
+            fullest = (frame, rows.to_vec());
         }
         control.report(name, frame + 1, n_frames);
     }
-    let (_, frame, rows) = fullest;
+    let (frame, rows) = fullest;
     course.pose(frame)?;
     let picture = painter.paint(course, &rows)?;
     let n_primitives = course.n_primitives();
     let is_small = n_primitives.iter().sum::<usize>() <= MOST_FOR_ORACLE;
     let mut runs = contest.runs();
-    if is_small && n_frames > 0 && oracle(course, control)? != rows {
+    if is_small && oracle(course, control)? != rows {
         // The first contestant is wrong, and all that agree with it.
         runs.iter_mut().for_each(|run| run.n_frames_differing += 1);
     }
@@ -61,7 +62,7 @@ pub(crate) fn run(
             false => "triangle".to_owned(),
         },
         n_primitives,
-        n_frames,
+        n_frames: moments.len(),
         n_pairs: counts(|moment| moment.n_pairs),
         n_colliding: counts(|moment| moment.n_colliding),
         hash: runs

@@ -108,7 +108,7 @@ fn contestants(caption: &str, scenes: &[Scene]) -> Table {
             let stages: Vec<String> = run
                 .stages
                 .iter()
-                .filter(|stage| stage.ms.median >= 0.0005)
+                .filter(|stage| stage.ms.median >= 0.005)
                 .map(|stage| format!("{} {}", stage.name, ms(stage.ms.median)))
                 .collect();
             table.ours(vec![

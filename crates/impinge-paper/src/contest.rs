@@ -16,6 +16,7 @@ const PAUSE: Duration = Duration::from_millis(1);
 
 /// Frames of a contestant on a driver that imitates a GPU, at most: such times say little.
 const FRAMES_IN_SOFTWARE: usize = 10;
+const FRAMES_IN_SOFTWARE_QUICK: usize = 2;
 
 struct Contestant {
     setup: Setup,
@@ -24,6 +25,8 @@ struct Contestant {
     /// It takes every so many frames.
     every: usize,
     found: Vec<Found>,
+    /// Its pairs of the last frame that it took.
+    rows: Vec<[u32; 4]>,
     hash: u64,
     n_frames_differing: usize,
 }
@@ -31,80 +34,78 @@ struct Contestant {
 /// All contestants on one scene. The first one is that which others are compared with.
 pub(crate) struct Contest {
     contestants: Vec<Contestant>,
-    rows: Vec<[u32; 4]>,
-    expected: Vec<[u32; 4]>,
-    is_warm: bool,
     course: Vec<Moment>,
 }
 
 impl Contest {
     /// A contest of `n_frames` frames. With each setup: whether its λ measured best, or was asked for.
-    pub fn new(setups: Vec<(Setup, bool)>, n_frames: usize) -> Result<Self, Error> {
+    pub fn new(setups: Vec<(Setup, bool)>, n_frames: usize, is_quick: bool) -> Result<Self, Error> {
+        let n_in_software = match is_quick {
+            true => FRAMES_IN_SOFTWARE_QUICK,
+            false => FRAMES_IN_SOFTWARE,
+        };
         let contestants = setups.into_iter().map(|(setup, is_chosen_lambda)| {
             Ok(Contestant {
                 finder: setup.build()?,
                 every: match setup.place.is_software() {
-                    true => n_frames.div_ceil(FRAMES_IN_SOFTWARE),
+                    true => n_frames.div_ceil(n_in_software).max(1),
                     false => 1,
                 },
                 setup,
                 is_chosen_lambda,
                 found: Vec::with_capacity(n_frames),
+                rows: Vec::new(),
                 hash: 0,
                 n_frames_differing: 0,
             })
         });
         Ok(Contest {
             contestants: contestants.collect::<Result<_, Error>>()?,
-            rows: Vec::new(),
-            expected: Vec::new(),
-            is_warm: false,
             course: Vec::with_capacity(n_frames),
         })
     }
 
-    /// One frame of everybody. Returns the pairs of the first contestant.
+    /// One frame of everybody who takes it, starting with another one each time. Returns the pairs of the
+    /// first contestant, if that one takes it.
     pub fn frame(
         &mut self,
+        frame: usize,
         scene: &Scene,
         bodies: [BodyId; 2],
         control: &Control<'_>,
-    ) -> Result<&[[u32; 4]], Error> {
-        let frame = self.course.len();
-        if !self.is_warm {
-            for contestant in &mut self.contestants {
-                let finder = &mut contestant.finder;
-                finder.find(scene, bodies, control.cancel, &mut self.rows)?;
-            }
-            self.is_warm = true;
-        }
-        for (ix, contestant) in self.contestants.iter_mut().enumerate() {
-            // Every so many frames, in the middle of so many.
-            if frame % contestant.every != contestant.every / 2 {
+    ) -> Result<Option<&[[u32; 4]]>, Error> {
+        let n = self.contestants.len();
+        for turn in 0..n {
+            let contestant = &mut self.contestants[(frame + turn) % n];
+            if !contestant.takes(frame) {
                 continue;
             }
             control.go_on()?;
-            std::thread::sleep(PAUSE);
-            let rows = match ix {
-                0 => &mut self.expected,
-                _ => &mut self.rows,
-            };
-            let found = contestant
-                .finder
-                .find(scene, bodies, control.cancel, rows)?;
-            contestant.found.push(found);
-            contestant.hash = contestant
-                .hash
-                .wrapping_add(hash_rows(rows.iter().copied()));
-            if ix > 0 && self.rows != self.expected {
-                contestant.n_frames_differing += 1;
+            let Contestant { finder, rows, .. } = contestant;
+            if contestant.found.is_empty() {
+                // Nobody's memory is grown, and nothing is clustered, while the clock runs.
+                finder.find(scene, bodies, control.cancel, rows)?;
             }
+            std::thread::sleep(PAUSE);
+            let found = finder.find(scene, bodies, control.cancel, rows)?;
+            contestant.found.push(found);
+        }
+        let Some((first, others)) = self.contestants.split_first_mut() else {
+            return Ok(None);
+        };
+        if !first.takes(frame) {
+            return Ok(None);
+        }
+        first.book();
+        for contestant in others.iter_mut().filter(|c| c.takes(frame)) {
+            contestant.book();
+            contestant.n_frames_differing += usize::from(contestant.rows != first.rows);
         }
         self.course.push(Moment {
-            n_pairs: self.expected.len(),
-            n_colliding: n_colliding(&self.expected),
+            n_pairs: first.rows.len(),
+            n_colliding: n_colliding(&first.rows),
         });
-        Ok(&self.expected)
+        Ok(Some(&first.rows))
     }
 
     /// What the first contestant found, frame by frame.
@@ -119,6 +120,16 @@ impl Contest {
 }
 
 impl Contestant {
+    /// Every so many frames, in the middle of so many.
+    fn takes(&self, frame: usize) -> bool {
+        frame % self.every == self.every / 2
+    }
+
+    fn book(&mut self) {
+        let of_frame = hash_rows(self.rows.iter().copied());
+        self.hash = self.hash.wrapping_add(of_frame);
+    }
+
     fn run(&self) -> Run {
         let Setup {
             method,
@@ -126,8 +137,11 @@ impl Contestant {
             lambda,
         } = &self.setup;
         let counts = |count: fn(&Found) -> u64| Samples::of_counts(self.found.iter().map(count));
+        // In the order of the frame with the most stages: one without contact leaves some out.
+        let mut by_length: Vec<&Found> = self.found.iter().collect();
+        by_length.sort_by_key(|found| std::cmp::Reverse(found.stages.len()));
         let mut names: Vec<&str> = Vec::new();
-        for (name, _) in self.found.iter().flat_map(|found| &found.stages) {
+        for (name, _) in by_length.iter().flat_map(|found| &found.stages) {
             if !names.contains(name) {
                 names.push(name);
             }

@@ -98,7 +98,7 @@ fn comparison(report: &Report, is_gpu: bool) -> Option<Bars> {
         groups,
         mark: Some((
             1.0 / published::CLAIMED_SPEED_UP,
-            "the paper's claim: below this".to_owned(),
+            "the paper's claim".to_owned(),
         )),
     })
 }
@@ -171,7 +171,7 @@ fn table_sizes(report: &Report) -> Option<Curves> {
         x: Axis {
             name: "slots of the table / primitives of both bodies".to_owned(),
             is_log: true,
-            ticks: (-5..=5).map(tick).collect(),
+            ticks: (-3..=5).map(tick).collect(),
         },
         y: Axis::linear(
             "missing rate of colliding triangles",

@@ -146,7 +146,7 @@ pub struct Sweep {
     pub method: Method,
     /// `"cpu"` or the adapter's name.
     pub backend: String,
-    /// λ and the median milliseconds with it.
+    /// λ and the milliseconds with it.
     pub points: Vec<(f64, f64)>,
 }
 

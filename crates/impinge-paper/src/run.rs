@@ -79,7 +79,10 @@ pub fn run(options: &Options, control: &Control<'_>) -> Result<Outcome, Error> {
 }
 
 /// Where contestants run, the GPU among them, and what there is to say about that.
-fn places(options: &Options) -> Result<(Vec<Place>, Option<Adapter>, Vec<String>), Error> {
+type Places = (Vec<Place>, Option<Adapter>, Vec<String>);
+
+/// The places that are asked for and are there.
+fn places(options: &Options) -> Result<Places, Error> {
     let mut places = Vec::new();
     let mut remarks = Vec::new();
     if options.backends != Backends::Gpu {

@@ -91,16 +91,20 @@ fn verdict(scenes: &[Scene], is_gpu: bool) -> String {
     let at_papers = ratios(scenes, run(Method::Fwzs11), run(Method::Cells));
     let at_best = ratios(scenes, best(Method::Fwzs11), best(Method::Cells));
     let n_held = |ratios: &[f64]| ratios.iter().filter(|x| **x > CLAIMED_SPEED_UP).count();
+    let held = |ratios: &[f64]| match (n_held(ratios), ratios.len()) {
+        (0, _) => "on none of the scenes".to_owned(),
+        (held, all) if held == all => "on all scenes".to_owned(),
+        (held, all) => format!("on {held} of {all} scenes"),
+    };
     let mut words = format!(
         "The paper's claim is that two levels are \"more than twice as fast\" on average. On the {} here they are {} \
-         times as fast with the paper's λ: more than twice on {} of {} scenes. With each method at its own best \
-         λ they are {} times as fast: more than twice on {}.",
+         times as fast with the paper's λ: more than twice {}. With each method at its own best \
+         λ they are {} times as fast: more than twice {}.",
         short_place(is_gpu),
         range(&at_papers),
-        n_held(&at_papers),
-        at_papers.len(),
+        held(&at_papers),
         range(&at_best),
-        n_held(&at_best),
+        held(&at_best),
     );
     if is_gpu
         && scenes
@@ -130,7 +134,7 @@ fn verdict(scenes: &[Scene], is_gpu: bool) -> String {
 fn where_time_goes(scenes: &[Scene], is_gpu: bool) -> Table {
     let mut table = Table::new(
         format!(
-            "Where the time goes on the {}, milliseconds (median), with the paper's λ.",
+            "Where the time goes on the {}, average milliseconds, with the paper's λ.",
             short_place(is_gpu)
         ),
         2,
@@ -156,7 +160,7 @@ fn where_time_goes(scenes: &[Scene], is_gpu: bool) -> Table {
                     .stages
                     .iter()
                     .filter(|stage| names.contains(&stage.name.as_str()));
-                stages.map(|stage| stage.ms.median).sum()
+                stages.map(|stage| stage.ms.mean).sum()
             };
             let known = [
                 stage(&["bounds"]),
@@ -164,7 +168,7 @@ fn where_time_goes(scenes: &[Scene], is_gpu: bool) -> Table {
                 stage(&["pairing"]),
                 stage(&["narrow"]),
             ];
-            let others = (run.ms.median - known.iter().sum::<f64>()).max(0.0);
+            let others = (run.ms.mean - known.iter().sum::<f64>()).max(0.0);
             let mut cells = vec![
                 scene.name.clone(),
                 super::method(method).to_owned(),

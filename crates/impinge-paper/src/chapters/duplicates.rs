@@ -29,7 +29,8 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
             "#CT: colliding triangles of both bodies, average of frames. #Missing rate: the share of them that the table loses; lost \
              pairs are more, because a triangle is missing only when all its pairs are."
                 .to_owned(),
-            "#MCT: share of the tested pairs that are tested more than once. #Checking times: tests a tested pair, on average."
+            "#MCT: share of the tested pairs that are tested more than once. #Checking times: tests a tested pair, on average. A pair \
+             that shares several sub-cells of one cell counts once here; the paper does not say whether it does there."
                 .to_owned(),
             "All pairs that come through the table are pairs of the exact answer, and testing everything gives the exact answer: held \
              against the owner rule in every frame."

@@ -10,6 +10,12 @@ use plotters::style::{Color, IntoFont, RGBColor, ShapeStyle, TextStyle, WHITE};
 use super::{AXIS, FONT, GRID, Plot, failed};
 use crate::error::Error;
 
+/// The height of a bar and what is written on top of it; `None` where it was not run.
+pub(crate) type Height = Option<(f64, String)>;
+
+/// A group's name, and the height of each kind of bar.
+pub(crate) type Group = (String, Vec<Height>);
+
 /// Groups of bars beside each other.
 pub(crate) struct Bars {
     pub title: String,
@@ -17,8 +23,8 @@ pub(crate) struct Bars {
     pub y: String,
     /// Names of the bars of a group, and their colours.
     pub kinds: Vec<(String, RGBColor)>,
-    /// Each group's name, and of each kind the height and what is written on top; `None` where it was not run.
-    pub groups: Vec<(String, Vec<Option<(f64, String)>>)>,
+    /// The groups.
+    pub groups: Vec<Group>,
     /// A height to mark, and what it is.
     pub mark: Option<(f64, String)>,
 }
@@ -86,7 +92,7 @@ impl Plot for Bars {
             ))
             .map_err(failed)?;
         }
-        if let Some((height, label)) = &self.mark {
+        if let Some((height, _)) = &self.mark {
             let line = ShapeStyle::from(&AXIS).stroke_width(scale);
             let [from, to] = [0.0, end].map(|x| chart.backend_coord(&(x, *height)));
             let dash = px(6) as i32;
@@ -95,19 +101,21 @@ impl Plot for Bars {
                 area.draw(&PathElement::new([(start, from.1), (stop, to.1)], line))
                     .map_err(failed)?;
             }
-            let style = text(11).pos(Pos::new(HPos::Right, VPos::Bottom));
-            let at = (to.0, to.1 - px(2) as i32);
-            area.draw(&Text::new(label.clone(), at, style))
-                .map_err(failed)?;
         }
-        legend(area, &self.kinds, scale)
+        let mut kinds: Vec<_> = self
+            .kinds
+            .iter()
+            .map(|(name, color)| (name.as_str(), Some(*color)))
+            .collect();
+        kinds.extend(self.mark.iter().map(|(_, name)| (name.as_str(), None)));
+        legend(area, &kinds, scale)
     }
 }
 
-/// Names and colours in a row below the plot.
+/// Names and colours in a row below the plot; without a colour, a dashed line.
 pub(super) fn legend<B: DrawingBackend>(
     area: &DrawingArea<B, Shift>,
-    kinds: &[(String, RGBColor)],
+    kinds: &[(&str, Option<RGBColor>)],
     scale: u32,
 ) -> Result<(), Error>
 where
@@ -131,10 +139,24 @@ where
     let y = height as i32 - px(20);
     for ((name, color), width) in kinds.iter().zip(widths) {
         let corners = [(x, y - px(5)), (x + px(10), y + px(5))];
-        area.draw(&Rectangle::new(corners, color.filled()))
-            .map_err(failed)?;
-        area.draw(&Text::new(name.clone(), (x + px(16), y), style.clone()))
-            .map_err(failed)?;
+        match color {
+            Some(color) => area
+                .draw(&Rectangle::new(corners, color.filled()))
+                .map_err(failed)?,
+            None => {
+                let line = ShapeStyle::from(&AXIS).stroke_width(scale);
+                for start in [x - px(5), x + px(3)] {
+                    let dash = [(start, y), (start + px(5), y)];
+                    area.draw(&PathElement::new(dash, line)).map_err(failed)?;
+                }
+            }
+        }
+        area.draw(&Text::new(
+            (*name).to_owned(),
+            (x + px(16), y),
+            style.clone(),
+        ))
+        .map_err(failed)?;
         x += width + gap;
     }
     Ok(())

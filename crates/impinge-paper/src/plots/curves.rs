@@ -204,10 +204,10 @@ impl Plot for Curves {
             area.draw(&Text::new(name.to_owned(), beside, style))
                 .map_err(failed)?;
         }
-        let kinds: Vec<(String, RGBColor)> = self
+        let kinds: Vec<_> = self
             .curves
             .iter()
-            .map(|curve| (curve.name.clone(), curve.color))
+            .map(|curve| (curve.name.as_str(), Some(curve.color)))
             .collect();
         legend(area, &kinds, scale)
     }
