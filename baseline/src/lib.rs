@@ -27,6 +27,8 @@
 //! ```
 
 pub mod duplicates;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 mod pairing;
 mod radix;
 mod uniform_grid;

@@ -1,0 +1,22 @@
+// What the kernels of the uniform grid share. The Rust twin of `Entry` is in `gpu/kernels.rs`.
+
+// A cell-primitive pair: which cell, and which kept primitive. Sorted by key, the primitives of a cell are
+// together, those of the first body before those of the second:
+//
+//   key   31                    1   0
+//        +-----------------------+------+
+//        |         cell          | body |
+//        +-----------------------+------+
+struct Entry {
+    key: u32,
+    kept: u32,
+}
+
+// Entries that one workgroup of a sort counts and scatters.
+const BLOCK: u32 = 4096u;
+// Values of a digit.
+const DIGITS: u32 = 256u;
+
+fn n_blocks_of(n: u32) -> u32 {
+    return n / BLOCK + select(0u, 1u, n % BLOCK != 0u);
+}

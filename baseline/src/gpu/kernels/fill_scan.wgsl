@@ -1,0 +1,45 @@
+// Stage `fill`, second kernel: exclusive sum over the workgroups of the first.
+//
+// In: entries of each workgroup. Out: entries of those before it; in the counters, entries in all. One
+// workgroup, a lane a run of sums. Cost: the sums, one for 64 primitives, read twice and written once.
+
+@group(0) @binding(0) var<storage, read_write> sums: array<u32>;
+@group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(2) var<uniform> params: Params;
+
+var<workgroup> running: array<u32, 256>;
+
+@compute @workgroup_size(256)
+fn main(@builtin(local_invocation_index) lane: u32) {
+    let n_kept = min(atomicLoad(&counters[N_KEPT]), params.capacity);
+    let n_sums = n_kept / 64u + select(0u, 1u, n_kept % 64u != 0u);
+    let each = n_sums / 256u + select(0u, 1u, n_sums % 256u != 0u);
+    let first = min(lane * each, n_sums);
+    let end = min(first + each, n_sums);
+    var sum = 0u;
+    for (var ix = first; ix < end; ix++) {
+        sum += sums[ix];
+    }
+    let own = sum;
+    running[lane] = sum;
+    workgroupBarrier();
+    for (var back = 1u; back < 256u; back *= 2u) {
+        var before = 0u;
+        if lane >= back {
+            before = running[lane - back];
+        }
+        workgroupBarrier();
+        sum += before;
+        running[lane] = sum;
+        workgroupBarrier();
+    }
+    var place = sum - own;
+    for (var ix = first; ix < end; ix++) {
+        let n = sums[ix];
+        sums[ix] = place;
+        place += n;
+    }
+    if lane == 255u {
+        atomicStore(&counters[N_ENTRIES], sum);
+    }
+}

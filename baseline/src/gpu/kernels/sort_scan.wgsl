@@ -1,0 +1,50 @@
+// Stage `sort`, second kernel of a round: exclusive sums of each digit's counts over the blocks.
+//
+// In: counts. Out: sums in their place, and the whole of each digit. One workgroup a digit, a lane a run of
+// blocks.
+
+@group(0) @binding(0) var<storage, read_write> counts: array<u32>;
+@group(0) @binding(1) var<storage, read_write> totals: array<u32>;
+@group(0) @binding(2) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(3) var<uniform> params: Params;
+
+var<workgroup> running: array<u32, 256>;
+
+// `params.capacity`: entries that there is room for.
+@compute @workgroup_size(256)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let n_blocks = n_blocks_of(min(atomicLoad(&counters[N_ENTRIES]), params.capacity));
+    let each = n_blocks / 256u + select(0u, 1u, n_blocks % 256u != 0u);
+    let first = min(lane * each, n_blocks);
+    let end = min(first + each, n_blocks);
+    let row = group.x * n_blocks;
+    var sum = 0u;
+    for (var block = first; block < end; block++) {
+        sum += counts[row + block];
+    }
+    let own = sum;
+    running[lane] = sum;
+    workgroupBarrier();
+    for (var back = 1u; back < 256u; back *= 2u) {
+        var before = 0u;
+        if lane >= back {
+            before = running[lane - back];
+        }
+        workgroupBarrier();
+        sum += before;
+        running[lane] = sum;
+        workgroupBarrier();
+    }
+    var place = sum - own;
+    for (var block = first; block < end; block++) {
+        let n = counts[row + block];
+        counts[row + block] = place;
+        place += n;
+    }
+    if lane == 255u {
+        totals[group.x] = sum;
+    }
+}
