@@ -203,3 +203,78 @@ pub(crate) fn n_colliding(rows: &[[u32; 4]]) -> usize {
     primitives.dedup();
     primitives.len()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use impinge::{Backend, CancelToken, Detector};
+    use impinge_scenes::{BuiltScene, surfaces};
+
+    use crate::finders::Place;
+
+    /// A finder that lies: it changes the rows of an honest one.
+    struct Liar(Detector, fn(&mut Vec<[u32; 4]>));
+
+    impl Finder for Liar {
+        fn find(
+            &mut self,
+            scene: &Scene,
+            bodies: [BodyId; 2],
+            cancel: &CancelToken,
+            rows: &mut Vec<[u32; 4]>,
+        ) -> Result<Found, Error> {
+            let found = self.0.find(scene, bodies, cancel, rows)?;
+            (self.1)(rows);
+            Ok(found)
+        }
+    }
+
+    /// Frames that differ, and hashes, of an honest contestant and one with changed rows.
+    fn against(lie: fn(&mut Vec<[u32; 4]>)) -> (usize, bool) {
+        let balls = BuiltScene::two_body("balls", &surfaces::ball(500), [0.9, 0.0, 0.0]).unwrap();
+        let setup = Setup {
+            method: Method::Clusters,
+            place: Place::Cpu { n_threads: 1 },
+            lambda: 1.0,
+        };
+        let setups = vec![(setup.clone(), false), (setup, false)];
+        let mut contest = Contest::new(setups, 3, false).unwrap();
+        contest.contestants[1].finder = Box::new(Liar(Detector::new(Backend::Cpu).unwrap(), lie));
+        let cancel = CancelToken::new();
+        let control = Control {
+            cancel: &cancel,
+            progress: &|_| {},
+        };
+        let bodies = [balls.bodies[0], balls.bodies[1]];
+        for frame in 0..3 {
+            let rows = contest
+                .frame(frame, &balls.scene, bodies, &control)
+                .unwrap();
+            assert!(rows.unwrap().len() > 2);
+        }
+        let runs = contest.runs();
+        assert_eq!(runs[0].n_frames_differing, 0);
+        assert_eq!(runs[1].ms.n, 3);
+        (runs[1].n_frames_differing, runs[0].hash == runs[1].hash)
+    }
+
+    #[test]
+    fn liars_are_caught() {
+        assert_eq!(against(|_| {}), (0, true));
+        let lies: [fn(&mut Vec<[u32; 4]>); 3] = [
+            |rows| _ = rows.pop(),
+            |rows| rows.push([0, 7, 1, 7]),
+            |rows| rows[0][1] += 1,
+        ];
+        for lie in lies {
+            assert_eq!(against(lie), (3, false));
+        }
+        // In another order the hash is the same, but the answer is not: it has to be sorted.
+        assert_eq!(against(|rows| rows.swap(0, 1)), (3, true));
+    }
+
+    #[test]
+    fn colliding_primitives_are_counted_once() {
+        assert_eq!(n_colliding(&[[0, 1, 1, 1], [0, 1, 1, 2], [0, 3, 1, 2]]), 4);
+    }
+}

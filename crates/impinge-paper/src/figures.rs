@@ -12,7 +12,12 @@ use crate::report::{Method, Report, Run, Scene};
 /// Names of the plots' files.
 pub(crate) const COMPARISON: [&str; 2] = ["figure-5-cpu", "figure-5-gpu"];
 pub(crate) const TABLE_SIZES: &str = "figure-7";
-pub(crate) const LAMBDA: [&str; 2] = ["lambda-cells", "lambda-fwzs11"];
+pub(crate) const LAMBDA: [(&str, Method, bool); 4] = [
+    ("lambda-cells-cpu", Method::Cells, false),
+    ("lambda-fwzs11-cpu", Method::Fwzs11, false),
+    ("lambda-cells-gpu", Method::Cells, true),
+    ("lambda-fwzs11-gpu", Method::Fwzs11, true),
+];
 pub(crate) const STEPS: &str = "steps";
 
 /// All plots that there is data for.
@@ -103,13 +108,13 @@ fn comparison(report: &Report, is_gpu: bool) -> Option<Bars> {
     })
 }
 
-/// Time against λ on the CPU, or on the GPU where only that was asked for.
-fn lambda(report: &Report, method: Method) -> Option<Curves> {
+/// Time against λ.
+fn lambda(report: &Report, method: Method, is_gpu: bool) -> Option<Curves> {
     let sweeps: Vec<_> = report
         .surfaces
         .iter()
         .filter_map(|scene| {
-            let sweep = scene.sweep.iter().find(|sweep| sweep.method == method)?;
+            let sweep = scene.sweep(method, is_gpu)?;
             Some((scene.name.clone(), sweep.points.clone()))
         })
         .collect();
@@ -122,7 +127,10 @@ fn lambda(report: &Report, method: Method) -> Option<Curves> {
         _ => "Two levels (Cells)",
     };
     (lambdas.len() > 1).then(|| Curves {
-        title: format!("{title}: time a frame against λ"),
+        title: format!(
+            "{title} on the {}: time a frame against λ",
+            if is_gpu { "GPU" } else { "CPU" }
+        ),
         x: Axis {
             name: "λ".to_owned(),
             is_log: true,
@@ -167,7 +175,7 @@ fn table_sizes(report: &Report) -> Option<Curves> {
         (2f64.powi(power), label)
     };
     Some(Curves {
-        title: format!("DJB2 table, {}: what is lost against its size", sizes.scene),
+        title: format!("Hash table, {}: what is lost against its size", sizes.scene),
         x: Axis {
             name: "slots of the table / primitives of both bodies".to_owned(),
             is_log: true,
@@ -178,10 +186,10 @@ fn table_sizes(report: &Report) -> Option<Curves> {
             most.fold(0.0, f64::max),
         ),
         curves: vec![
-            curve("DJB2 table, as the paper has it", COLORS[3], &|p| {
+            curve("hash table, as the paper has it", COLORS[3], &|p| {
                 p.missing_rate
             }),
-            curve("DJB2 table after a test of boxes", COLORS[1], &|p| {
+            curve("hash table after a test of boxes", COLORS[1], &|p| {
                 p.missing_rate_with_box_test
             }),
             curve("owner rule, no table", COLORS[4], &|_| 0.0),

@@ -107,19 +107,44 @@ impl Setup {
 impl Place {
     /// The method of [FWZS11] here.
     fn uniform_grid(&self, lambda: f64) -> Result<Box<dyn Finder>, Error> {
-        let settings = impinge_baseline::Settings {
-            lambda,
-            ..impinge_baseline::Settings::default()
-        };
         match self {
             Place::Cpu { n_threads } => {
                 Ok(Box::new(UniformGrid::new(impinge_baseline::Settings {
+                    lambda,
                     threads: *n_threads,
-                    ..settings
+                    ..impinge_baseline::Settings::default()
                 })?))
             }
-            Place::Gpu(_) => todo!(),
+            #[cfg(feature = "gpu")]
+            Place::Gpu(adapter) => {
+                use impinge_baseline::gpu;
+                Ok(Box::new(gpu::UniformGrid::new(gpu::Settings {
+                    lambda,
+                    device: Some(adapter.name.clone()),
+                    ..gpu::Settings::default()
+                })?))
+            }
+            #[cfg(not(feature = "gpu"))]
+            Place::Gpu(adapter) => Err(impinge::Error::NoAdapter {
+                found: adapter.name.clone(),
+            }
+            .into()),
         }
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl Finder for impinge_baseline::gpu::UniformGrid {
+    fn find(
+        &mut self,
+        scene: &Scene,
+        [a, b]: [BodyId; 2],
+        _: &CancelToken,
+        rows: &mut Vec<[u32; 4]>,
+    ) -> Result<Found, Error> {
+        let start = Instant::now();
+        let outcome = self.detect(scene, a, b)?;
+        Ok(Found::of(start, outcome.pairs, rows))
     }
 }
 

@@ -241,10 +241,25 @@ impl Scene {
         })
     }
 
-    /// The faster one where a method ran with several λ.
+    /// The fastest run of a method whose λ was looked for; `None` where only the paper's was run.
     pub fn best(&self, method: Method, is_gpu: bool) -> Option<&Run> {
         self.runs_of(method, is_gpu)
+            .find(|run| run.is_chosen_lambda)?;
+        self.runs_of(method, is_gpu)
             .min_by(|a, b| a.ms.median.total_cmp(&b.ms.median))
+    }
+
+    /// λ was looked for or not: the fastest run of a method.
+    pub fn fastest(&self, method: Method, is_gpu: bool) -> Option<&Run> {
+        self.runs_of(method, is_gpu)
+            .min_by(|a, b| a.ms.median.total_cmp(&b.ms.median))
+    }
+
+    /// Time against λ of a method on the CPU or a GPU.
+    pub fn sweep(&self, method: Method, is_gpu: bool) -> Option<&Sweep> {
+        self.sweep
+            .iter()
+            .find(|sweep| sweep.method == method && (sweep.backend != "cpu") == is_gpu)
     }
 
     fn runs_of(&self, method: Method, is_gpu: bool) -> impl Iterator<Item = &Run> {
