@@ -28,8 +28,8 @@ pub(crate) fn plots(report: &Report) -> Result<Vec<File>, Error> {
             all.extend(files(name, &bars)?);
         }
     }
-    for (name, method) in LAMBDA.into_iter().zip([Method::Cells, Method::Fwzs11]) {
-        if let Some(curves) = lambda(report, method) {
+    for (name, method, is_gpu) in LAMBDA {
+        if let Some(curves) = lambda(report, method, is_gpu) {
             all.extend(files(name, &curves)?);
         }
     }
