@@ -67,6 +67,26 @@ fn cells_agree_with_the_oracle() {
     }
 }
 
+/// Buffers of one scene are used again for the next, which may need more or less of them, and other
+/// kernels.
+#[test]
+fn one_detector_answers_scene_after_scene() {
+    let cases = cases();
+    let expected: Vec<_> = cases.iter().map(naive).collect();
+    for method in [Method::Clusters, Method::Cells] {
+        let mut detector = Detector::with_settings(gpu(method)).unwrap();
+        let order = (0..cases.len()).chain((0..cases.len()).rev());
+        for ix in order {
+            assert_agree(
+                "scene after scene",
+                &expected[ix],
+                &mut detector,
+                &cases[ix],
+            );
+        }
+    }
+}
+
 #[test]
 fn a_cell_too_crowded_for_one_pass_is_refused_by_name() {
     // One cell and groups of one primitive: more work items than one invocation may write.

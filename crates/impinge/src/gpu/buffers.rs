@@ -67,7 +67,7 @@ impl<T: Pod> Storage<T> {
     }
 
     /// Binds exactly `len` elements, growing by a quarter more than needed. Contents are lost when
-    /// it grows. Returns whether it grew.
+    /// it grows. Returns whether it has to be bound anew: a binding knows its buffer and its length.
     ///
     /// # Errors
     /// More than one binding may hold.
@@ -84,13 +84,15 @@ impl<T: Pod> Storage<T> {
                 ),
             });
         }
-        self.len = len.max(1);
+        let len = len.max(1);
+        let differs = len != self.len;
+        self.len = len;
         let grows = self.buffer.is_none() || self.len > self.capacity;
         if grows {
             let spare = if self.capacity == 0 { 0 } else { self.len / 4 };
             self.allocate(gpu, (self.len + spare).min(limit));
         }
-        Ok(grows)
+        Ok(grows || differs)
     }
 
     /// Binds exactly `len` elements with no room to spare, whatever was there.
@@ -113,14 +115,14 @@ impl<T: Pod> Storage<T> {
         }));
     }
 
-    /// Holds exactly `data`. Returns whether it grew.
+    /// Holds exactly `data`. Returns whether it has to be bound anew.
     ///
     /// # Errors
     /// As [`resize`](Storage::resize).
     pub fn upload(&mut self, gpu: &Gpu, data: &[T]) -> Result<bool, Error> {
-        let grew = self.resize(gpu, count(data.len()))?;
+        let is_new = self.resize(gpu, count(data.len()))?;
         self.write(gpu, 0, data);
-        Ok(grew)
+        Ok(is_new)
     }
 
     /// Writes elements from `first` on, which must fit.
@@ -137,6 +139,7 @@ impl<T: Pod> Storage<T> {
         self.buffer.as_ref().expect("resized before it is used")
     }
 
+    #[expect(clippy::len_without_is_empty, reason = "there is always one element")]
     pub fn len(&self) -> u64 {
         self.len
     }

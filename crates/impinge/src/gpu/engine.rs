@@ -70,7 +70,7 @@ pub struct Engine {
 
 #[derive(Debug)]
 enum Plan {
-    Clusters(clusters::Plan),
+    Clusters(Box<clusters::Plan>),
     Cells(Box<dyn InCells>),
 }
 
@@ -85,7 +85,7 @@ impl Engine {
     pub fn new(gpu: Arc<Gpu>, options: Options, first: Capacities) -> Self {
         let plan = match options.method {
             Method::Cells => Plan::Cells(Box::new(cells::Plan::new())),
-            _ => Plan::Clusters(clusters::Plan::new()),
+            _ => Plan::Clusters(Box::new(clusters::Plan::new())),
         };
         Engine::with_plan(gpu, options, first, plan)
     }
@@ -133,7 +133,7 @@ impl Engine {
         if let Err(Error::Gpu { .. }) = result {
             // Whatever state the buffers are in, the next frame must not build on it.
             let plan = match &self.plan {
-                Plan::Clusters(_) => Plan::Clusters(clusters::Plan::new()),
+                Plan::Clusters(_) => Plan::Clusters(Box::new(clusters::Plan::new())),
                 Plan::Cells(plan) => Plan::Cells(plan.anew()),
             };
             *self = Engine::with_plan(Arc::clone(&self.gpu), self.options, self.first, plan);

@@ -179,7 +179,7 @@ impl CellsWanted {
 }
 
 impl Room {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let copied = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         let indirect = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
         Room {

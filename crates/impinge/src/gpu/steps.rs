@@ -13,6 +13,12 @@ pub struct Steps {
     buffer: Storage<Step>,
 }
 
+impl Default for Steps {
+    fn default() -> Self {
+        Steps::new()
+    }
+}
+
 impl Steps {
     pub fn new() -> Self {
         Steps {
@@ -41,9 +47,11 @@ impl Steps {
         if self.planned == self.sent && self.buffer.bytes() > 0 {
             return Ok(false);
         }
-        let grew = self.buffer.upload(gpu, &self.planned)?;
+        // Steps are bound one at a time: their number does not matter, only the buffer.
+        let bytes = self.buffer.bytes();
+        self.buffer.upload(gpu, &self.planned)?;
         self.sent.clone_from(&self.planned);
-        Ok(grew)
+        Ok(self.buffer.bytes() != bytes)
     }
 
     pub fn params(&self) -> Uniform<Params> {

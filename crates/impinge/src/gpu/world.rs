@@ -84,7 +84,7 @@ pub struct World {
 }
 
 impl World {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         World {
             caches: Vec::new(),
             residents: Vec::new(),
@@ -123,7 +123,8 @@ impl World {
         &self.forest
     }
 
-    /// Brings the device up to the frame; positions of `resident` bodies are there already. Returns whether any buffer is a new one.
+    /// Brings the device up to the frame; positions of `resident` bodies are there already.
+    /// Returns whether anything has to be bound anew.
     ///
     /// # Errors
     /// More primitives than the device can bind at once.
@@ -143,16 +144,18 @@ impl World {
             });
         }
         self.cluster(scene, frame, stats);
-        let mut grew = false;
+        let mut is_new = false;
         if !self.is_resident(scene, frame) {
             // Half a topology must not pass for a whole one if an upload fails.
             self.residents.clear();
-            grew |= self.send_topology(gpu, scene, frame)?;
+            self.send_topology(gpu, scene, frame)?;
+            // Buffers may be the same ones, but kernels are chosen by what bodies are made of.
+            is_new = true;
         }
         self.send_positions(gpu, scene, frame, resident);
-        grew |= self.send_bodies(gpu, scene, frame, resident)?;
+        is_new |= self.send_bodies(gpu, scene, frame, resident)?;
         stats.n_clusters = self.forest.n_clusters();
-        Ok(grew)
+        Ok(is_new)
     }
 
     fn cluster(&mut self, scene: &Scene, frame: &Frame, stats: &mut Statistics) {
@@ -199,7 +202,7 @@ impl World {
             })
     }
 
-    fn send_topology(&mut self, gpu: &Gpu, scene: &Scene, frame: &Frame) -> Result<bool, Error> {
+    fn send_topology(&mut self, gpu: &Gpu, scene: &Scene, frame: &Frame) -> Result<(), Error> {
         let caches: Vec<Arc<Cached>> = frame
             .participants
             .iter()
@@ -272,16 +275,16 @@ impl World {
             .map(|cached| &cached.clustering.shape)
             .collect();
         self.forest = Forest::new(&shapes, |ix| sample(scene, frame, ix));
-        let grew = self.clusters.upload(gpu, &clusters)?
-            | self.cluster_vertices.upload(gpu, &cluster_vertices)?
-            | self.corners.upload(gpu, &corners)?
-            | self.order.upload(gpu, &numbers)?
-            | self.nodes.upload(gpu, &self.forest.nodes)?
-            | self.levels.upload(gpu, &self.forest.levels)?
-            | self.positions.resize(gpu, 3 * first_vertex)?;
+        self.clusters.upload(gpu, &clusters)?;
+        self.cluster_vertices.upload(gpu, &cluster_vertices)?;
+        self.corners.upload(gpu, &corners)?;
+        self.order.upload(gpu, &numbers)?;
+        self.nodes.upload(gpu, &self.forest.nodes)?;
+        self.levels.upload(gpu, &self.forest.levels)?;
+        self.positions.resize(gpu, 3 * first_vertex)?;
         self.bodies_sent.clear();
         self.residents = residents;
-        Ok(grew)
+        Ok(())
     }
 
     /// Sends the positions of bodies that have moved, neighbours in one piece.
@@ -372,9 +375,9 @@ impl World {
                 mask: words(filter.mask),
             });
         }
-        let mut grew = false;
+        let mut is_new = false;
         if bodies != self.bodies_sent {
-            grew |= self.bodies.upload(gpu, &bodies)?;
+            is_new |= self.bodies.upload(gpu, &bodies)?;
             self.bodies_sent = bodies;
         }
         let ignored: Vec<NodePair> = frame
@@ -385,10 +388,10 @@ impl World {
             })
             .collect();
         if ignored != self.ignored_sent || self.ignored.bytes() == 0 {
-            grew |= self.ignored.upload(gpu, &ignored)?;
+            is_new |= self.ignored.upload(gpu, &ignored)?;
             self.ignored_sent = ignored;
         }
-        Ok(grew)
+        Ok(is_new)
     }
 
     /// Encodes the copy of a body's positions from a buffer on the device, if it takes part.

@@ -56,6 +56,8 @@ pub struct Host {
 
 impl Host {
     /// On the adapter whose name contains `device`, or the best there is, with cells as dense as `lambda`.
+    /// `first` is the room to begin with, and `memory_budget` bytes are what the engine's own buffers may
+    /// have: beyond it, the work is done in parts.
     ///
     /// # Errors
     /// No adapter fits; the driver refuses; those of `plan`, which compiles its kernels.
@@ -63,6 +65,7 @@ impl Host {
         device: Option<&str>,
         lambda: f64,
         first: Option<Capacities>,
+        memory_budget: Option<u64>,
         plan: impl FnOnce(&Gpu) -> Result<Box<dyn InCells>, Error>,
     ) -> Result<Self, Error> {
         let gpu = Gpu::open(device.map_or(Wanted::Any, Wanted::Named))?;
@@ -71,7 +74,7 @@ impl Host {
             method: Method::Cells,
             lambda,
             group_size: 64,
-            memory_budget: None,
+            memory_budget,
         };
         let first = first.unwrap_or_default();
         Ok(Host {
