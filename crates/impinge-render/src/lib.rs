@@ -42,9 +42,10 @@ mod corners;
 mod device;
 mod error;
 mod image;
-mod passes;
 mod picture;
+mod pipelines;
 mod renderer;
+mod targets;
 
 pub use body::Colors;
 pub use camera::{Camera, Projection, UpAxis};

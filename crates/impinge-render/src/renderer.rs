@@ -7,8 +7,9 @@ use crate::corners::{FACE_BYTES, chunks};
 use crate::device::Gpu;
 use crate::error::Error;
 use crate::image::Image;
-use crate::passes::{Chunks, FrameUniform, Pipelines, Targets};
 use crate::picture::Picture;
+use crate::pipelines::{FrameUniform, Pipelines};
+use crate::targets::{Chunks, Targets};
 
 /// Draws pictures on one device. Textures are kept from picture to picture.
 #[derive(Debug)]
@@ -28,7 +29,7 @@ const CHUNK: u64 = 64 << 20;
 const TILE: u32 = 1536;
 /// How far from a hollow what darkens it may lie, in the scene's longest half extent and in pixels.
 const REACH: f32 = 0.16;
-const REACH_PIXELS: u32 = 256;
+const REACH_PIXELS: u32 = 254;
 /// How far occlusion is blurred, in pixels.
 const BLUR: u32 = 2;
 
@@ -49,7 +50,7 @@ impl Renderer {
         Renderer::on(Gpu::open(Some(name))?)
     }
 
-    /// A renderer on a device of the caller's. WebGPU's default limits suffice.
+    /// A renderer on a device of the caller's. The least limits of WebGPU suffice.
     ///
     /// # Errors
     /// A shader that does not compile there.
@@ -63,9 +64,12 @@ impl Renderer {
         Ok(Renderer {
             pipelines,
             targets: None,
-            // A tile with its margins fits any texture of 2,048 and more, which WebGPU promises.
-            tile: TILE,
-            n_faces: (limits.max_buffer_size.min(CHUNK) / FACE_BYTES) as usize,
+            // Both are far from 0 wherever WebGPU's least limits are kept: textures of 2,048.
+            tile: limits
+                .max_texture_dimension_2d
+                .saturating_sub(2 * (REACH_PIXELS + BLUR))
+                .clamp(1, TILE),
+            n_faces: (limits.max_buffer_size.min(CHUNK) / FACE_BYTES).max(1) as usize,
             gpu,
         })
     }
@@ -123,6 +127,8 @@ impl Renderer {
                     mapped_at_creation: false,
                 });
                 queue.write_buffer(&buffer, 0, bytes);
+                // Now, or all chunks would be held twice until the first tile is drawn.
+                queue.submit([]);
                 buffers.push(buffer);
             });
             buffers

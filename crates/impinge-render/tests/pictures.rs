@@ -118,6 +118,32 @@ fn the_nearer_face_hides_the_other_whatever_their_order() {
 }
 
 #[test]
+fn a_face_that_shows_through_wins_against_one_in_the_same_place() {
+    // The same plane by other corners: depths are rounded otherwise.
+    let grey = triangle(
+        [[-1.0, -1.5, 0.1], [5.0, -1.0, 3.7], [-1.2, 6.0, 1.5]],
+        GREY,
+    );
+    let mut red = triangle([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], RED);
+    let [a, b, c] = [0, 1, 2].map(|k| grey.positions[k]);
+    let inside =
+        |u: f64, v: f64| std::array::from_fn(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]));
+    red.positions = vec![inside(0.1, 0.1), inside(0.7, 0.15), inside(0.2, 0.6)];
+    red.faces[0].shows_through = true;
+    let mut over = red.clone();
+    over.positions.iter_mut().for_each(|point| point[2] += 0.01);
+    let n_red = |surfaces: [&Surface; 2]| {
+        let picture = plain(surfaces.map(Surface::clone).to_vec(), [200, 200]);
+        count(&renderer().render(&picture).unwrap(), is_red)
+    };
+    let expected = n_red([&grey, &over]);
+    assert!(expected > 1_000);
+    for surfaces in [[&grey, &red], [&red, &grey]] {
+        assert!(n_red(surfaces).abs_diff(expected) < expected / 50);
+    }
+}
+
+#[test]
 fn a_hidden_face_that_shows_through_is_seen_as_far_as_asked() {
     let near = triangle([[0.0, 0.0, 1.0], [4.0, 0.0, 1.0], [0.0, 4.0, 1.0]], GREY);
     let mut far = triangle([[0.5, 0.5, 0.0], [1.5, 0.5, 0.0], [0.5, 1.5, 0.0]], RED);
@@ -267,6 +293,10 @@ fn colliding(models: [Model; 2]) -> Picture {
     Picture {
         surfaces,
         size: [320, 240],
+        camera: Camera {
+            azimuth: 25.0,
+            ..Camera::default()
+        },
         ..Picture::default()
     }
 }
@@ -447,6 +477,39 @@ fn bad_input_is_refused_by_name() {
     let error = Surface::of_body(scene.body(id).unwrap(), &[20], colors).unwrap_err();
     let text = "primitive 20 collides, but the body has 20 primitives";
     assert_eq!(error.to_string(), text);
+}
+
+#[test]
+fn a_device_of_the_caller_draws_as_large_as_its_textures() {
+    use impinge_render::wgpu;
+    let descriptor = wgpu::InstanceDescriptor {
+        flags: wgpu::InstanceFlags::empty(),
+        ..wgpu::InstanceDescriptor::new_without_display_handle()
+    };
+    let instance = wgpu::Instance::new(descriptor);
+    let adapter = pollster::block_on(instance.request_adapter(&Default::default()))
+        .expect("a GPU or a software driver is needed");
+    let required_limits = wgpu::Limits::downlevel_defaults();
+    assert_eq!(required_limits.max_texture_dimension_2d, 2048);
+    let request = adapter.request_device(&wgpu::DeviceDescriptor {
+        required_limits,
+        ..Default::default()
+    });
+    let (device, queue) = pollster::block_on(request).unwrap();
+    let mut renderer = Renderer::with_device(device, queue).unwrap();
+    // Several tiles with their margins.
+    let surface = triangle([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], RED);
+    let mut picture = plain(vec![surface], [2048, 2048]);
+    let image = renderer.render(&picture).unwrap();
+    assert_near(at(&image, 500, 1500), RED);
+    assert_near(at(&image, 1600, 1900), RED);
+    assert_eq!(at(&image, 1600, 100), [0; 3]);
+    picture.size = [2049, 10];
+    let text = renderer.render(&picture).unwrap_err().to_string();
+    assert_eq!(
+        text,
+        "a picture of 2049 x 10 pixels was asked for, 1 x 1 to 2048 x 2048 is possible"
+    );
 }
 
 #[test]

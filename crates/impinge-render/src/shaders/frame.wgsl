@@ -1,4 +1,4 @@
-// What all shaders know: `FrameUniform` of passes.rs.
+// What all shaders know: `FrameUniform` of pipelines.rs.
 struct Frame {
     // Axes of the viewer; `w` moves the eye to 0.
     right: vec4<f32>,
