@@ -9,12 +9,18 @@ use crate::ours::{Feed, Ours};
 use crate::problem::{Ask, Problem};
 use crate::report::{Report, figures, grouped};
 use crate::runner::Runner;
-use crate::{Failure, Options, files};
+use crate::{Failure, Options, files, gpu};
 
 /// Runs a command by its name.
 pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
     let mut report = match command {
-        "two-body" | "self" | "tets" | "bodies" | "sizes" | "adversarial" => Report::new(command),
+        "two-body" | "self" | "tets" | "bodies" | "sizes" | "adversarial" | "gpu" => {
+            Report::new(command)
+        }
+        "device" => {
+            println!("{}", gpu::slug(&gpu::device(options)?));
+            return Ok(());
+        }
         _ => return Err(format!("no command `{command}`; --help lists what there is").into()),
     };
     match command {
@@ -23,6 +29,7 @@ pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
         "tets" => tets(options, &mut report)?,
         "bodies" => bodies(options, &mut report)?,
         "sizes" => sizes(options, &mut report)?,
+        "gpu" => gpu::scenes(options, &mut report)?,
         _ => adversarial_scenes(options, &mut report)?,
     }
     report.write(options.json.as_deref(), options.record.as_deref())
@@ -62,6 +69,7 @@ fn settings(options: &Options, method: Method) -> Settings {
     Settings {
         method,
         backend: options.backend,
+        device: options.device.clone(),
         threads: options.threads,
         ..Settings::default()
     }
@@ -115,7 +123,7 @@ fn contest(
 }
 
 /// The number of pairs by the oracle, for problems small enough for it.
-fn by_oracle(problem: Problem) -> Result<Problem, Failure> {
+pub fn by_oracle(problem: Problem) -> Result<Problem, Failure> {
     const MAX_PRIMITIVES: usize = 60_000;
     if problem.expected.is_some() || problem.n_primitives() > MAX_PRIMITIVES {
         return Ok(problem);

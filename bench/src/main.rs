@@ -14,6 +14,7 @@ mod commands;
 #[cfg(feature = "embree")]
 mod embree;
 mod files;
+mod gpu;
 mod measure;
 mod ours;
 #[cfg(feature = "parry")]
@@ -47,6 +48,8 @@ commands:
   bodies        1,000, 10,000 and 100,000 bodies of 12 triangles
   sizes         10^4 to 10^7 triangles in two waving bodies
   adversarial   scenes that break methods which are only fast on average, as ratios to a plain one
+  gpu           the scenes of two-body and self on a GPU: stages on the device beside their floor
+  device        prints the name of the GPU in a form that fits --record
 
 options:
   --scene NAME       one scene only (two-body, self, adversarial)
@@ -54,6 +57,7 @@ options:
   --size N           adversarial: primitives (default 1,000,000); sizes, bodies: the largest size
   --threads N        threads of impinge (default: all)
   --backend NAME     cpu (default), gpu or auto
+  --device NAME      part of a GPU's name, to choose among several
   --no-cells         leaves out impinge's other method, Cells
   --no-peers         leaves out Embree and parry
   --json FILE        figures for machines
@@ -70,6 +74,7 @@ pub struct Options {
     size: Option<usize>,
     threads: usize,
     backend: Backend,
+    device: Option<String>,
     cells: bool,
     peers: bool,
     json: Option<PathBuf>,
@@ -84,6 +89,7 @@ fn parse() -> Result<Option<(String, Options)>, lexopt::Error> {
         size: None,
         threads: 0,
         backend: Backend::Cpu,
+        device: None,
         cells: true,
         peers: true,
         json: None,
@@ -106,6 +112,7 @@ fn parse() -> Result<Option<(String, Options)>, lexopt::Error> {
                     _ => Err("cpu, gpu or auto"),
                 })?;
             }
+            Long("device") => options.device = Some(parser.value()?.string()?),
             Long("no-cells") => options.cells = false,
             Long("no-peers") => options.peers = false,
             Long("json") => options.json = Some(parser.value()?.into()),

@@ -78,6 +78,11 @@ impl Report {
         self.tables.push(table.json());
     }
 
+    /// Keeps figures for the record.
+    pub fn keep_json(&mut self, figures: serde_json::Value) {
+        self.tables.push(figures);
+    }
+
     fn json(&self) -> serde_json::Value {
         json!({
             "command": self.command,

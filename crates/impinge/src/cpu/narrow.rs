@@ -109,55 +109,16 @@ impl Settler {
     /// Triangle pairs that the planes do not separate go on to the survivors; tetrahedron pairs are
     /// classified, and batches of several kinds settled, on the way.
     #[inline(always)]
-    fn reject<S: Simd>(&mut self, _: S, world: World<'_>) {
+    fn reject<S: Simd>(&mut self, simd: S, world: World<'_>) {
         let mut lookup = Lookup::new(world);
         let mut triangles = TrianglePairs8::default();
         let mut tetrahedra = TetrahedronPairs8::default();
         let candidates = std::mem::take(&mut self.candidates);
         for chunk in candidates.chunks(LANES) {
-            let (mut n_triangles, mut n_tetrahedra) = (0, 0);
-            for (lane, &candidate) in chunk.iter().enumerate() {
-                lookup.go_to(candidate);
-                let (a, b) = (&lookup.a, &lookup.b);
-                let (place_a, place_b) = (candidate.place_a, candidate.place_b);
-                match (a.elements, b.elements) {
-                    (Elements::Triangles(faces_a), Elements::Triangles(faces_b)) => {
-                        fill(
-                            &mut triangles.a,
-                            lane,
-                            a.positions,
-                            &faces_a[place_a as usize],
-                        );
-                        fill(
-                            &mut triangles.b,
-                            lane,
-                            b.positions,
-                            &faces_b[place_b as usize],
-                        );
-                        n_triangles += 1;
-                    }
-                    (Elements::Tetrahedra(tets_a), Elements::Tetrahedra(tets_b)) => {
-                        fill(
-                            &mut tetrahedra.a,
-                            lane,
-                            a.positions,
-                            &tets_a[place_a as usize],
-                        );
-                        fill(
-                            &mut tetrahedra.b,
-                            lane,
-                            b.positions,
-                            &tets_b[place_b as usize],
-                        );
-                        n_tetrahedra += 1;
-                    }
-                    _ => {}
-                }
-            }
-            if n_triangles == chunk.len() {
+            if lookup.fill_triangles(simd, chunk, &mut triangles) {
                 let kept = !filter::reject_by_planes::<S::F64>(&triangles);
                 self.keep(chunk, kept);
-            } else if n_tetrahedra == chunk.len() {
+            } else if lookup.fill_tetrahedra(simd, chunk, &mut tetrahedra) {
                 let verdict = filter::classify_by_faces::<S::F64>(&tetrahedra);
                 self.take(&mut lookup, chunk, verdict);
             } else {
@@ -180,23 +141,13 @@ impl Settler {
     }
 
     #[inline(always)]
-    fn classify<S: Simd>(&mut self, _: S, world: World<'_>) {
+    fn classify<S: Simd>(&mut self, simd: S, world: World<'_>) {
         let mut lookup = Lookup::new(world);
         let mut batch = TrianglePairs8::default();
         let survivors = std::mem::take(&mut self.survivors);
         for chunk in survivors.chunks(LANES) {
-            for (lane, &candidate) in chunk.iter().enumerate() {
-                lookup.go_to(candidate);
-                let (a, b) = (&lookup.a, &lookup.b);
-                let (Elements::Triangles(faces_a), Elements::Triangles(faces_b)) =
-                    (a.elements, b.elements)
-                else {
-                    unreachable!("survivors are triangles");
-                };
-                let (place_a, place_b) = (candidate.place_a, candidate.place_b);
-                fill(&mut batch.a, lane, a.positions, &faces_a[place_a as usize]);
-                fill(&mut batch.b, lane, b.positions, &faces_b[place_b as usize]);
-            }
+            let filled = lookup.fill_triangles(simd, chunk, &mut batch);
+            debug_assert!(filled, "survivors are triangles");
             let verdict = filter::classify::<S::F64>(&batch);
             self.take(&mut lookup, chunk, verdict);
         }
@@ -275,11 +226,146 @@ impl<'a> Lookup<'a> {
             self.b = self.world.body(candidate.b);
         }
     }
+
+    /// Gathers a batch of triangle pairs; whether all of them are.
+    #[inline(always)]
+    fn fill_triangles<S: Simd>(
+        &mut self,
+        simd: S,
+        chunk: &[Candidate],
+        batch: &mut TrianglePairs8,
+    ) -> bool {
+        if let Some((places_a, places_b)) = places_in_common(chunk) {
+            self.go_to(chunk[0]);
+            let (a, b) = (&self.a, &self.b);
+            let (Elements::Triangles(faces_a), Elements::Triangles(faces_b)) =
+                (a.elements, b.elements)
+            else {
+                return false;
+            };
+            put_all(simd, &mut batch.a, a.positions, faces_a, places_a);
+            put_all(simd, &mut batch.b, b.positions, faces_b, places_b);
+            return true;
+        }
+        for (lane, &candidate) in chunk.iter().enumerate() {
+            self.go_to(candidate);
+            let (a, b) = (&self.a, &self.b);
+            let (Elements::Triangles(faces_a), Elements::Triangles(faces_b)) =
+                (a.elements, b.elements)
+            else {
+                return false;
+            };
+            put(
+                &mut batch.a,
+                lane,
+                a.positions,
+                &faces_a[candidate.place_a as usize],
+            );
+            put(
+                &mut batch.b,
+                lane,
+                b.positions,
+                &faces_b[candidate.place_b as usize],
+            );
+        }
+        true
+    }
+
+    /// Gathers a batch of tetrahedron pairs; whether all of them are.
+    #[inline(always)]
+    fn fill_tetrahedra<S: Simd>(
+        &mut self,
+        simd: S,
+        chunk: &[Candidate],
+        batch: &mut TetrahedronPairs8,
+    ) -> bool {
+        if let Some((places_a, places_b)) = places_in_common(chunk) {
+            self.go_to(chunk[0]);
+            let (a, b) = (&self.a, &self.b);
+            let (Elements::Tetrahedra(tets_a), Elements::Tetrahedra(tets_b)) =
+                (a.elements, b.elements)
+            else {
+                return false;
+            };
+            put_all(simd, &mut batch.a, a.positions, tets_a, places_a);
+            put_all(simd, &mut batch.b, b.positions, tets_b, places_b);
+            return true;
+        }
+        for (lane, &candidate) in chunk.iter().enumerate() {
+            self.go_to(candidate);
+            let (a, b) = (&self.a, &self.b);
+            let (Elements::Tetrahedra(tets_a), Elements::Tetrahedra(tets_b)) =
+                (a.elements, b.elements)
+            else {
+                return false;
+            };
+            put(
+                &mut batch.a,
+                lane,
+                a.positions,
+                &tets_a[candidate.place_a as usize],
+            );
+            put(
+                &mut batch.b,
+                lane,
+                b.positions,
+                &tets_b[candidate.place_b as usize],
+            );
+        }
+        true
+    }
 }
 
-/// Puts a primitive into a lane of a batch.
+/// The places of candidates of the same two bodies; lanes left over repeat the first.
 #[inline(always)]
-fn fill<const N: usize>(
+fn places_in_common(chunk: &[Candidate]) -> Option<([u32; LANES], [u32; LANES])> {
+    let first = chunk[0];
+    let mut places = ([first.place_a; LANES], [first.place_b; LANES]);
+    let mut same = true;
+    for (lane, candidate) in chunk.iter().enumerate() {
+        same &= (candidate.a == first.a) & (candidate.b == first.b);
+        places.0[lane] = candidate.place_a;
+        places.1[lane] = candidate.place_b;
+    }
+    same.then_some(places)
+}
+
+/// Puts primitives of one body into all lanes.
+#[inline(always)]
+fn put_all<S: Simd, const N: usize>(
+    simd: S,
+    side: &mut [[[f64; LANES]; 3]; N],
+    positions: &Positions,
+    corners: &[[u32; N]],
+    places: [u32; LANES],
+) {
+    match positions {
+        Positions::F32(positions) => {
+            let mut ids = [[0; LANES]; N];
+            for (lane, &place) in places.iter().enumerate() {
+                let corners = &corners[place as usize];
+                for k in 0..N {
+                    ids[k][lane] = corners[k];
+                }
+            }
+            for k in 0..N {
+                simd.put_vertices(positions, ids[k], &mut side[k]);
+            }
+        }
+        Positions::F64(positions) => {
+            for (lane, &place) in places.iter().enumerate() {
+                let corners = &corners[place as usize];
+                for k in 0..N {
+                    put_vertex(&mut side[k], lane, &positions[corners[k] as usize]);
+                }
+            }
+        }
+    }
+}
+
+/// Puts a primitive into a lane.
+#[inline(always)]
+fn put<const N: usize>(
     side: &mut [[[f64; LANES]; 3]; N],
     lane: usize,
     positions: &Positions,
@@ -289,19 +375,19 @@ fn fill<const N: usize>(
     match positions {
         Positions::F32(positions) => {
             for k in 0..N {
-                fill_vertex(&mut side[k], lane, &positions[corners[k] as usize]);
+                put_vertex(&mut side[k], lane, &positions[corners[k] as usize]);
             }
         }
         Positions::F64(positions) => {
             for k in 0..N {
-                fill_vertex(&mut side[k], lane, &positions[corners[k] as usize]);
+                put_vertex(&mut side[k], lane, &positions[corners[k] as usize]);
             }
         }
     }
 }
 
 #[inline(always)]
-fn fill_vertex<R: Copy + Into<f64>>(vertex: &mut [[f64; LANES]; 3], lane: usize, point: &[R; 3]) {
+fn put_vertex<R: Copy + Into<f64>>(vertex: &mut [[f64; LANES]; 3], lane: usize, point: &[R; 3]) {
     vertex[0][lane] = point[0].into();
     vertex[1][lane] = point[1].into();
     vertex[2][lane] = point[2].into();
