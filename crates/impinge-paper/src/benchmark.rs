@@ -38,17 +38,24 @@ pub(crate) fn run(
         }
         control.report(name, frame + 1, n_frames);
     }
+    let moments = contest.course().to_vec();
+    let picture = match painter.is_there() {
+        true => {
+            course.pose(course.picture_frame(&moments))?;
+            let rows = find(course, Method::Clusters, control)?;
+            painter.paint(course, &rows)?
+        }
+        false => None,
+    };
     let (frame, rows) = fullest;
     course.pose(frame)?;
-    let picture = painter.paint(course, &rows)?;
     let n_primitives = course.n_primitives();
     let is_small = n_primitives.iter().sum::<usize>() <= MOST_FOR_ORACLE;
     let mut runs = contest.runs();
-    if is_small && oracle(course, control)? != rows {
+    if is_small && find(course, Method::Naive, control)? != rows {
         // The first contestant is wrong, and all that agree with it.
         runs.iter_mut().for_each(|run| run.n_frames_differing += 1);
     }
-    let moments = contest.course();
     let counts = |count: fn(&Moment) -> usize| {
         Samples::of_counts(moments.iter().map(|moment| count(moment) as u64))
     };
@@ -73,14 +80,18 @@ pub(crate) fn run(
         sweep,
         picture,
         simulation_ms: None,
-        course: moments.to_vec(),
+        course: moments,
     })
 }
 
-/// What the oracle finds as things are now.
-fn oracle(course: &dyn Course, control: &Control<'_>) -> Result<Vec<[u32; 4]>, Error> {
+/// The pairs as things are now.
+fn find(
+    course: &dyn Course,
+    method: Method,
+    control: &Control<'_>,
+) -> Result<Vec<[u32; 4]>, Error> {
     let mut detector = Detector::with_settings(Settings {
-        method: Method::Naive,
+        method,
         backend: Backend::Cpu,
         ..Settings::default()
     })?;

@@ -102,6 +102,7 @@ impl Contest {
             contestant.n_frames_differing += usize::from(contestant.rows != first.rows);
         }
         self.course.push(Moment {
+            frame,
             n_pairs: first.rows.len(),
             n_colliding: n_colliding(&first.rows),
         });

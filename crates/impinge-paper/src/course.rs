@@ -4,6 +4,7 @@ use impinge::{BodyId, Query, Scene};
 
 use crate::error::Error;
 use crate::options::SceneName;
+use crate::report::Moment;
 
 /// Two bodies and where they are in each frame.
 pub(crate) trait Course {
@@ -23,6 +24,13 @@ pub(crate) trait Course {
     fn n_frames(&self) -> usize;
     /// Moves the bodies to where they are in a frame. Any frame may be asked for at any time.
     fn pose(&mut self, frame: usize) -> Result<(), Error>;
+
+    /// The frame to be shown, given what each frame found: that with the most pairs, unless a course
+    /// knows better.
+    fn picture_frame(&self, moments: &[Moment]) -> usize {
+        let fullest = moments.iter().max_by_key(|moment| moment.n_pairs);
+        fullest.map_or(0, |moment| moment.frame)
+    }
 
     /// Pairs between the two bodies.
     fn query(&self) -> Query {

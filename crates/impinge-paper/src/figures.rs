@@ -207,7 +207,8 @@ fn table_sizes(report: &Report) -> Option<Curves> {
 /// Colliding tetrahedra step by step.
 fn steps(report: &Report) -> Option<Curves> {
     let scenes = &report.volumes;
-    let n_steps = scenes.iter().map(|scene| scene.course.len()).max()?;
+    let last = scenes.iter().filter_map(|scene| scene.course.last());
+    let n_steps = last.map(|moment| moment.frame + 1).max()?;
     let most = scenes.iter().map(|scene| scene.n_colliding.max);
     Some(Curves {
         title: "Solids dropped on each other: colliding tetrahedra".to_owned(),
@@ -219,9 +220,10 @@ fn steps(report: &Report) -> Option<Curves> {
             .map(|(scene, color)| Curve {
                 name: scene.name.clone(),
                 color: *color,
-                points: (0..)
-                    .zip(&scene.course)
-                    .map(|(step, moment)| (f64::from(step), moment.n_colliding as f64))
+                points: scene
+                    .course
+                    .iter()
+                    .map(|moment| (moment.frame as f64, moment.n_colliding as f64))
                     .collect(),
                 has_dots: false,
             })

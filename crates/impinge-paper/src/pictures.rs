@@ -45,6 +45,14 @@ impl Painter {
         (Painter::default(), Some(reason.to_owned()))
     }
 
+    /// Whether anything will be drawn.
+    pub fn is_there(&self) -> bool {
+        #[cfg(feature = "gpu")]
+        return self.renderer.is_some();
+        #[cfg(not(feature = "gpu"))]
+        false
+    }
+
     /// Draws the bodies as they are now, with the primitives of these pairs coloured. Returns the file's name.
     #[cfg(not(feature = "gpu"))]
     pub fn paint(&mut self, _: &dyn Course, _: &[[u32; 4]]) -> Result<Option<String>, Error> {

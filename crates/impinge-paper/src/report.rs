@@ -73,6 +73,8 @@ pub struct Scene {
 /// What a frame found.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Moment {
+    /// Its number, from 0. A driver that imitates a GPU takes only some frames.
+    pub frame: usize,
     /// Pairs.
     pub n_pairs: usize,
     /// Colliding primitives of both bodies.

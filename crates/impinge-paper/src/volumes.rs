@@ -12,6 +12,7 @@ use crate::course::Course;
 use crate::error::Error;
 use crate::finders::Place;
 use crate::options::{Options, SceneName};
+use crate::report::Moment;
 use crate::samples::Samples;
 
 /// A simulation that has been run.
@@ -123,6 +124,14 @@ impl Course for Recorded {
 
     fn n_frames(&self) -> usize {
         self.frames.len()
+    }
+
+    /// The first step with a third of the most pairs: at the most, bodies are crushed beyond recognition.
+    fn picture_frame(&self, moments: &[Moment]) -> usize {
+        let most = moments.iter().map(|moment| moment.n_pairs).max();
+        let enough = |moment: &Moment| 3 * moment.n_pairs >= most.unwrap_or(0);
+        let first = moments.iter().find(|moment| enough(moment));
+        first.map_or(0, |moment| moment.frame)
     }
 
     fn pose(&mut self, frame: usize) -> Result<(), Error> {

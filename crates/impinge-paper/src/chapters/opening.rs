@@ -68,7 +68,7 @@ fn how() -> Vec<String> {
          that nobody finds its data in the caches or its threads awake. All positions are rewritten before each frame.",
         "The clock runs from positions in memory to sorted pairs in memory. On a GPU that includes sending \
          positions, reading pairs back and settling what the device left unsure.",
-        "The paper prints averages: so do tables here, with medians beside them. Ratios are of medians.",
+        "The paper prints averages: so do tables here, with medians beside them. Ratios are of medians for surfaces and of averages for solids.",
         "λ is 1 for `Cells` and 5 for [FWZS11] as in the paper, and beside that what measured best on a few frames \
          of the scene, for each method and machine.",
         "A driver that imitates a GPU runs on the CPU: it takes at most ten frames of each scene, with the paper's λ, and \
