@@ -10,7 +10,7 @@ mod opening;
 mod surfaces;
 mod volumes;
 
-use crate::document::{Block, NONE, Table, count, ms, percent, ratio};
+use crate::document::{Block, NONE, Table, count, density, ms, percent, ratio};
 use crate::report::{Method, Report, Run, Scene};
 
 /// The whole report.
@@ -68,7 +68,7 @@ fn lambda(run: &Run) -> String {
                 (true, false) => " (paper)",
                 (false, _) => " (best)",
             };
-            format!("{lambda}{whose}")
+            density(lambda) + whose
         }
     }
 }

@@ -129,6 +129,15 @@ pub(crate) fn percent(share: f64) -> String {
     }
 }
 
+/// λ: powers of two below 1 as fractions.
+pub(crate) fn density(lambda: f64) -> String {
+    let inverse = 1.0 / lambda;
+    match inverse > 1.0 && inverse.fract() == 0.0 {
+        true => format!("1/{inverse}"),
+        false => lambda.to_string(),
+    }
+}
+
 /// How many times as much.
 pub(crate) fn ratio(ratio: f64) -> String {
     match ratio {
@@ -183,6 +192,10 @@ mod tests {
         assert_eq!(
             [0.0, 1e-6, 0.0037, 0.62].map(percent),
             ["0", "< 0.01 %", "0.37 %", "62.0 %"]
+        );
+        assert_eq!(
+            [0.015625, 0.3, 1.0, 5.0].map(density),
+            ["1/64", "0.3", "1", "5"]
         );
         assert_eq!(range(&[2.04, 1.0, 3.0]), "1.0 to 3.0");
         assert_eq!(range(&[2.0]), "2.0");

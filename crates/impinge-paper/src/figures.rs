@@ -2,10 +2,10 @@
 
 use plotters::style::RGBColor;
 
-use crate::document::ms;
+use crate::document::{density, ms};
 use crate::error::Error;
 use crate::pictures::File;
-use crate::plots::{Axis, Bars, COLORS, Curve, Curves, Mark, files};
+use crate::plots::{Axis, Bars, COLORS, Curve, Curves, Group, Height, Mark, files};
 use crate::published;
 use crate::report::{Method, Report, Run, Scene};
 
@@ -79,7 +79,7 @@ const BARS: [Bar; 5] = [
 
 fn comparison(report: &Report, is_gpu: bool) -> Option<Bars> {
     let scenes = report.surfaces.iter();
-    let groups: Vec<_> = scenes
+    let groups: Vec<Group> = scenes
         .filter_map(|scene| {
             let whole = scene.run(Method::Fwzs11, is_gpu)?.ms.median;
             let bar = |bar: &Bar| {
@@ -93,14 +93,21 @@ fn comparison(report: &Report, is_gpu: bool) -> Option<Bars> {
         (true, Some(adapter)) => &adapter.name,
         _ => &report.machine.cpu,
     };
+    // A kind that no scene has, such as the best λ where only the paper's was run, gets no room.
+    let is_there = |kind: &usize| groups.iter().any(|(_, bars)| bars[*kind].is_some());
+    let kinds: Vec<usize> = (0..BARS.len()).filter(is_there).collect();
+    let chosen = |mut bars: Vec<Height>| kinds.iter().map(|&kind| bars[kind].take()).collect();
     (!groups.is_empty()).then(|| Bars {
         title: format!("Time a frame on {place}"),
         y: "[FWZS11] with λ = 5 is 1; numbers: ms".to_owned(),
-        kinds: BARS
+        kinds: kinds
             .iter()
-            .map(|bar| (bar.name.to_owned(), bar.color))
+            .map(|&kind| (BARS[kind].name.to_owned(), BARS[kind].color))
             .collect(),
-        groups,
+        groups: groups
+            .into_iter()
+            .map(|(name, bars)| (name, chosen(bars)))
+            .collect(),
         mark: Some((
             1.0 / published::CLAIMED_SPEED_UP,
             "the paper's claim".to_owned(),
@@ -134,7 +141,7 @@ fn lambda(report: &Report, method: Method, is_gpu: bool) -> Option<Curves> {
         x: Axis {
             name: "λ".to_owned(),
             is_log: true,
-            ticks: lambdas.iter().map(|x| (*x, x.to_string())).collect(),
+            ticks: lambdas.iter().map(|x| (*x, density(*x))).collect(),
         },
         y: Axis::log("ms", all().map(|(_, ms)| ms)),
         curves: sweeps

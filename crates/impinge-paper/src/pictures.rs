@@ -85,7 +85,7 @@ impl Painter {
             // Bodies lie beside each other along x, or one on the other.
             size: match course.name().is_volume() {
                 true => [420, 490],
-                false => [600, 400],
+                false => [570, 380],
             },
             camera: Camera {
                 azimuth: 20.0,

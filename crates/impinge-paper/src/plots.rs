@@ -10,7 +10,7 @@ use plotters::coord::Shift;
 use plotters::prelude::{DrawingArea, DrawingBackend, IntoDrawingArea, RGBColor, SVGBackend};
 use plotters::style::{FontStyle, register_font};
 
-pub(crate) use bars::Bars;
+pub(crate) use bars::{Bars, Group, Height};
 pub(crate) use curves::{Axis, Curve, Curves, Mark};
 
 use crate::error::Error;

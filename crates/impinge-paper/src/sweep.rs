@@ -11,9 +11,11 @@ use crate::finders::{Place, Setup};
 use crate::report::{Method, Sweep};
 use crate::samples::Samples;
 
-/// λ that are tried: the paper's and powers of two around them.
-const CELLS: [f64; 8] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
-const FWZS11: [f64; 8] = [0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0];
+/// λ that are tried: powers of two around the paper's 1, and 5 with its like.
+const CELLS: [f64; 10] = [
+    0.015625, 0.03125, 0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0,
+];
+const FWZS11: [f64; 10] = [0.03125, 0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0];
 
 /// Frames of a course that are looked at, and how often each.
 const N_FRAMES: usize = 3;

@@ -123,11 +123,15 @@ fn in_short(report: &Report) -> Vec<String> {
     let least = losses.iter().copied().fold(f64::INFINITY, f64::min);
     let most = losses.iter().copied().fold(0.0, f64::max);
     if least <= most {
+        let [least, most] = [least, most].map(percent);
+        let loss = if least == most {
+            most
+        } else {
+            format!("{least} to {most}")
+        };
         points.push(format!(
-            "The table hashed by DJB2 loses {} to {} of the colliding triangles (the paper: 2.7 % to 4.3 %); \
-             the owner rule, which has taken its place, loses none.",
-            percent(least),
-            percent(most)
+            "The table hashed by DJB2 loses {loss} of the colliding triangles (the paper: 2.7 % to 4.3 %); the owner rule, \
+             which has taken its place, loses none."
         ));
     }
     points.push(match report.n_disagreements() {

@@ -63,7 +63,7 @@ impl Plot for Bars {
             .y_labels(6)
             .draw()
             .map_err(failed)?;
-        let middle = Pos::new(HPos::Center, VPos::Bottom);
+        let mut labels = Vec::new();
         let width = 0.84 / self.kinds.len().max(1) as f64;
         for (group, (name, bars)) in self.groups.iter().enumerate() {
             for (kind, bar) in bars.iter().enumerate() {
@@ -75,13 +75,7 @@ impl Plot for Bars {
                     .draw_series([Rectangle::new(corners, color.filled())])
                     .map_err(failed)?;
                 let top = chart.backend_coord(&(left + 0.5 * width, *height));
-                let style = text(11).pos(middle);
-                area.draw(&Text::new(
-                    label.clone(),
-                    (top.0, top.1 - px(3) as i32),
-                    style,
-                ))
-                .map_err(failed)?;
+                labels.push((label, (top.0, top.1 - px(3) as i32)));
             }
             let foot = chart.backend_coord(&(group as f64 + 0.5, 0.0));
             let style = text(13).pos(Pos::new(HPos::Center, VPos::Top));
@@ -101,6 +95,17 @@ impl Plot for Bars {
                 area.draw(&PathElement::new([(start, from.1), (stop, to.1)], line))
                     .map_err(failed)?;
             }
+        }
+        // Numbers come last, on white: a line may pass behind them.
+        let style = text(11).pos(Pos::new(HPos::Center, VPos::Bottom));
+        for (label, at) in labels {
+            let (wide, high) = area.estimate_text_size(label, &style).map_err(failed)?;
+            let (half, high) = (wide as i32 / 2, high as i32);
+            let corners = [(at.0 - half, at.1 - high), (at.0 + half, at.1 + 1)];
+            area.draw(&Rectangle::new(corners, WHITE.filled()))
+                .map_err(failed)?;
+            area.draw(&Text::new(label.clone(), at, style.clone()))
+                .map_err(failed)?;
         }
         let mut kinds: Vec<_> = self
             .kinds

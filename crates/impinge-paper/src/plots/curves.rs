@@ -239,7 +239,8 @@ mod tests {
             labels(&Axis::log("", [0.3, 7.0])),
             ["0.2", "0.5", "1", "2", "5", "10"]
         );
-        assert_eq!(labels(&Axis::log("", [2.0])), ["2", "5"]);
+        assert_eq!(labels(&Axis::log("", [2.0])), ["1", "2"]);
+        assert_eq!(labels(&Axis::log("", [0.03, 0.04])), ["0.02", "0.05"]);
         assert_eq!(labels(&Axis::log("", [])), ["1", "2", "5", "10"]);
     }
 }
