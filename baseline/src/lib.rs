@@ -29,6 +29,7 @@
 pub mod duplicates;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+mod method;
 mod pairing;
 mod radix;
 mod uniform_grid;

@@ -14,10 +14,10 @@ pub const GPU: &str = "GTX 680";
 /// λ of the two-level method (section 4.1).
 pub const LAMBDA: f64 = 1.0;
 
-/// λ of [FWZS11] "for their best performance" (section 4.1).
+/// λ of \[FWZS11\] "for their best performance" (section 4.1).
 pub const LAMBDA_FWZS11: f64 = 5.0;
 
-/// "The average time of our method … is more than twice as fast" as [FWZS11] (section 4.1).
+/// "The average time of our method … is more than twice as fast" as \[FWZS11\] (section 4.1).
 pub const CLAIMED_SPEED_UP: f64 = 2.0;
 
 /// A row of table 1: surfaces, two copies of each.
