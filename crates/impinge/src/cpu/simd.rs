@@ -6,11 +6,11 @@
 //! to library functions: those would be compiled on their own, without the set.
 //! The answers are bit masks of exact comparisons: no set can differ from another.
 
-use crate::detector::InstructionSet;
 use crate::exact::filter::LANES;
 use crate::exact::filter::number::{self, Vector};
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, BoundsArray};
+use crate::settings::InstructionSet;
 
 /// The boxes of one group, a lane each; lanes past the group's size hold empty boxes.
 #[derive(Debug, Clone)]

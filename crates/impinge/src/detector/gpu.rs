@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::{Backend, Detector, Method, Settings, check};
+use super::{Backend, Detector, Method, Settings};
 use crate::cpu::cells::Cells;
 use crate::cpu::clusters::Clusters;
 use crate::cpu::workers::Workers;
@@ -74,7 +74,7 @@ impl Detector {
             device: None,
             ..settings
         };
-        check(&settings)?;
+        settings.check()?;
         let gpu = Arc::new(Gpu::of_caller(device, queue)?);
         Ok(Detector {
             gpu: Some(engine(gpu, &settings, Capacities::default())),

@@ -23,13 +23,13 @@ use super::layout::{Cell, NodePair};
 use super::room::{Capacities, CellsWanted, Counts, Room, Verdict};
 use super::steps::Stages;
 use super::world::World;
-use crate::detector::Method;
 use crate::error::Error;
 use crate::frame::{Frame, pair_key};
 use crate::narrow::settle;
 use crate::progress::Control;
 use crate::query::SharedVertex;
 use crate::scene::{BodyId, Scene};
+use crate::settings::Method;
 use crate::stats::Statistics;
 
 /// Seeds up to which the host descends before the first launch: each step down saves two launches.

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::detector::Method;
 use crate::error::Error;
 use crate::frame::Frame;
 pub use crate::gpu::buffers::{Access, Binding, Read, Storage, Uniform, Write};
@@ -24,6 +23,7 @@ use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
 use crate::scene::Scene;
+use crate::settings::Method;
 
 /// Text that kernels are put together from: `LAYOUT` first, it has the structs of all.
 pub mod shared {
