@@ -1,6 +1,6 @@
 //! The commands: which problems, which contestants, which tables.
 
-use impinge::{Backend, Detector, Method, Settings};
+use impinge::{Backend, Method, Settings};
 use impinge_scenes::deform::Wave;
 use impinge_scenes::{BuiltScene, Model, adversarial, surfaces};
 
