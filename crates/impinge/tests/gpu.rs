@@ -10,9 +10,10 @@ use std::sync::{Mutex, OnceLock};
 
 use common::{Case, agree, cases, check, naive, rows};
 use impinge::{
-    Backend, Capacities, Detector, Error, Method, Query, Scene, Settings, SharedVertex, devices,
-    wgpu,
+    Backend, Capacities, Detector, Error, Method, Query, Recluster, Scene, Settings, SharedVertex,
+    devices, wgpu,
 };
+use impinge_scenes::deform::{self, Deform};
 use impinge_scenes::{soup, surfaces};
 
 /// Settings for the GPU. The first call opens a device and keeps it open, so that all tests share
@@ -309,6 +310,53 @@ fn frames_follow_positions_bodies_and_precision() {
     assert!(compare(&scene, Query::between(a, c)) > 0);
     scene.remove(a).unwrap();
     compare(&scene, Query::all());
+}
+
+#[test]
+fn bodies_that_flow_away_are_clustered_again() {
+    let rest = surfaces::ball(20_000);
+    let other = rest.translated([0.4, 0.0, 0.0]);
+    let mut scene = Scene::new();
+    let a = rest.add_to(&mut scene).unwrap();
+    // One body in each precision.
+    let b = scene.add(other.elements.clone(), other.positions_f64());
+    let query = Query::between(a, b.unwrap());
+    let mut auto = Detector::with_settings(gpu(Method::Clusters)).unwrap();
+    let mut never = Detector::with_settings(Settings {
+        recluster: Recluster::Never,
+        ..gpu(Method::Clusters)
+    })
+    .unwrap();
+    let mut oracle = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+    assert_eq!(auto.detect(&scene, &query).unwrap().stats().n_clustered, 2);
+    never.detect(&scene, &query).unwrap();
+    // A body that moves and bends a little keeps its clusters.
+    scene
+        .set_positions(
+            a,
+            &rest
+                .mapped(|[x, y, z]| [x + 0.1, y + 0.1 * x * x, z])
+                .positions,
+        )
+        .unwrap();
+    let slightly = auto.detect(&scene, &query).unwrap();
+    assert_eq!(slightly.stats().n_clustered, 0);
+    let mut flowed = rest.positions.clone();
+    deform::Flow::default().apply(&rest.positions, 40.0, &mut flowed);
+    scene.set_positions(a, &flowed).unwrap();
+    let by_auto = auto.detect(&scene, &query).unwrap();
+    let by_never = never.detect(&scene, &query).unwrap();
+    assert!(by_auto.same_as(oracle.detect(&scene, &query).unwrap()));
+    assert!(by_auto.same_as(by_never) && !by_auto.is_empty());
+    assert_eq!(by_auto.stats().n_clustered, 1);
+    assert_eq!(by_auto.stats().n_reclustered, 1);
+    assert_eq!(by_never.stats().n_reclustered, 0);
+    assert!(by_auto.stats().n_work_items < by_never.stats().n_work_items);
+    // The next frame has nothing to repair.
+    scene.set_positions(a, &flowed).unwrap();
+    let after = auto.detect(&scene, &query).unwrap();
+    assert_eq!(after.stats().n_reclustered, 0);
+    assert!(after.same_as(oracle.detect(&scene, &query).unwrap()));
 }
 
 #[test]

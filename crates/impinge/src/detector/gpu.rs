@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::{Backend, Detector, Method, Settings, check};
+use super::{Backend, Detector, Method, Recluster, Settings, check};
 use crate::cpu::cells::Cells;
 use crate::cpu::clusters::Clusters;
 use crate::cpu::workers::Workers;
@@ -36,6 +36,7 @@ fn engine(gpu: Arc<Gpu>, settings: &Settings, first: Capacities) -> Engine {
         method: settings.method,
         lambda: settings.lambda,
         group_size: settings.group_size,
+        recluster: settings.recluster == Recluster::Auto,
         memory_budget: settings.memory_budget,
     };
     Engine::new(gpu, options, first)

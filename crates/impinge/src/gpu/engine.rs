@@ -50,6 +50,8 @@ pub struct Options {
     pub lambda: f64,
     /// Primitives a group, at most.
     pub group_size: u32,
+    /// `Clusters`: whether bodies that have flowed away from their clusters are clustered again.
+    pub recluster: bool,
     /// Bytes on the device, at most.
     pub memory_budget: Option<u64>,
 }
@@ -201,9 +203,11 @@ impl Engine {
         resident: &[BodyId],
         stats: &mut Statistics,
     ) -> Result<(), Error> {
+        // In `Cells` clusters only tell what is out of reach.
+        let recluster = self.options.recluster && self.options.method == Method::Clusters;
         if self
             .world
-            .update(&self.gpu, scene, frame, resident, stats)?
+            .update(&self.gpu, scene, frame, resident, recluster, stats)?
         {
             self.unbind();
         }

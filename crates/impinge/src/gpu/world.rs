@@ -38,21 +38,31 @@ const MOST_PRIMITIVES: u64 = 1 << 31;
 const SLACK: u32 = 2;
 /// Bodies, empty ones included, that need no tree over bodies if at most two are filled.
 const FEW_BODIES: usize = 1024;
-/// How far bodies may part from their neighbours in the tree over bodies before it is made anew.
+/// How far bodies may part from their neighbours in the tree over bodies before it is made anew, and
+/// how much the clusters' surface may grow against the body's before it is clustered again.
 const STALE: f64 = 1.5;
+/// Clusters that are looked at to judge how well a body's clusters fit its pose.
+const SAMPLES: usize = 64;
 
-/// The clusters of a body, kept while its topology stays.
+/// The clusters of a body, kept while its topology stays and they fit its pose.
 #[derive(Debug)]
 struct Cached {
     topology_stamp: u64,
-    clustering: Clustering,
+    /// No two clusterings of a detector have the same.
+    number: u64,
+    /// The positions that were judged last.
+    judged_stamp: u64,
+    /// Surface of the sampled clusters over that of all of them together, at its best so far.
+    best_spread: f64,
+    clustering: Arc<Clustering>,
 }
 
 /// One participant on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Resident {
     id: BodyId,
-    topology_stamp: u64,
+    /// The clustering that was sent.
+    number: u64,
     positions_stamp: u64,
     /// Index of its first vertex in the positions.
     first_vertex: u64,
@@ -62,7 +72,8 @@ struct Resident {
 /// Everything about the participants that the kernels read.
 #[derive(Debug)]
 pub struct World {
-    caches: Vec<Option<Arc<Cached>>>,
+    caches: Vec<Option<Box<Cached>>>,
+    n_clusterings: u64,
     residents: Vec<Resident>,
     /// What the device has of the nodes, without the boxes.
     forest: Forest,
@@ -87,6 +98,7 @@ impl World {
     pub fn new() -> Self {
         World {
             caches: Vec::new(),
+            n_clusterings: 0,
             residents: Vec::new(),
             forest: Forest::default(),
             bodies_sent: Vec::new(),
@@ -133,6 +145,7 @@ impl World {
         scene: &Scene,
         frame: &Frame,
         resident: &[BodyId],
+        recluster: bool,
         stats: &mut Statistics,
     ) -> Result<bool, Error> {
         if frame.n_primitives() > MOST_PRIMITIVES {
@@ -142,9 +155,9 @@ impl World {
                 limit: MOST_PRIMITIVES,
             });
         }
-        self.cluster(scene, frame, stats);
+        self.cluster(scene, frame, resident, recluster, stats);
         let mut grew = false;
-        if !self.is_resident(scene, frame) {
+        if !self.is_resident(frame) {
             // Half a topology must not pass for a whole one if an upload fails.
             self.residents.clear();
             grew |= self.send_topology(gpu, scene, frame)?;
@@ -155,7 +168,16 @@ impl World {
         Ok(grew)
     }
 
-    fn cluster(&mut self, scene: &Scene, frame: &Frame, stats: &mut Statistics) {
+    /// Clusters bodies that are new or were re-meshed, and those that have flowed away from their clusters; forgets those that are
+    /// gone. Of `resident` bodies the host does not know the pose, so they are not judged.
+    fn cluster(
+        &mut self,
+        scene: &Scene,
+        frame: &Frame,
+        resident: &[BodyId],
+        recluster: bool,
+        stats: &mut Statistics,
+    ) {
         let n_slots = frame
             .participants
             .last()
@@ -173,39 +195,41 @@ impl World {
         for (ix, participant) in frame.participants.iter().enumerate() {
             let body = frame.body(scene, ix);
             let cache = &mut self.caches[participant.id.index()];
-            let topology_stamp = body.topology_stamp();
-            if cache
-                .as_ref()
-                .is_none_or(|cache| cache.topology_stamp != topology_stamp)
-            {
-                let (elements, positions) = (body.elements(), body.positions());
-                let clustering = Clustering::new(elements, |primitive| {
-                    bounds_of(positions, elements.corners(primitive))
-                });
-                *cache = Some(Arc::new(Cached {
-                    topology_stamp,
-                    clustering,
-                }));
-                stats.n_clustered += 1;
+            let known = cache
+                .as_mut()
+                .filter(|cache| cache.topology_stamp == body.topology_stamp());
+            if let Some(cache) = known {
+                let is_judged = !recluster
+                    || cache.judged_stamp == body.positions_stamp()
+                    || resident.contains(&participant.id);
+                if is_judged || !cache.is_stale(body) {
+                    continue;
+                }
+                stats.n_reclustered += 1;
             }
+            stats.n_clustered += 1;
+            self.n_clusterings += 1;
+            *cache = Some(Box::new(Cached::new(body, self.n_clusterings)));
         }
     }
 
-    fn is_resident(&self, scene: &Scene, frame: &Frame) -> bool {
+    fn is_resident(&self, frame: &Frame) -> bool {
         self.residents.len() == frame.participants.len()
             && self.residents.iter().enumerate().all(|(ix, resident)| {
+                let cache = self.caches[resident.id.index()].as_ref();
                 resident.id == frame.participants[ix].id
-                    && resident.topology_stamp == frame.body(scene, ix).topology_stamp()
+                    && cache.is_some_and(|cache| cache.number == resident.number)
             })
     }
 
     fn send_topology(&mut self, gpu: &Gpu, scene: &Scene, frame: &Frame) -> Result<bool, Error> {
-        let caches: Vec<Arc<Cached>> = frame
+        let caches: Vec<(u64, Arc<Clustering>)> = frame
             .participants
             .iter()
             .map(|participant| {
                 let cache = self.caches[participant.id.index()].as_ref();
-                Arc::clone(cache.expect("just clustered"))
+                let cache = cache.expect("just clustered");
+                (cache.number, Arc::clone(&cache.clustering))
             })
             .collect();
         let mut residents = Vec::with_capacity(caches.len());
@@ -215,10 +239,9 @@ impl World {
         let mut numbers = Vec::new();
         let mut first_vertex = 0u64;
         self.has_solids = false;
-        for (ix, cached) in caches.iter().enumerate() {
+        for (ix, (number, clustering)) in caches.iter().enumerate() {
             let body = frame.body(scene, ix);
             let participant = &frame.participants[ix];
-            let clustering = &cached.clustering;
             let n_vertices = count(body.n_vertices());
             let limit = u64::from(u32::MAX) / 3;
             if first_vertex + n_vertices > limit {
@@ -260,7 +283,7 @@ impl World {
             }));
             residents.push(Resident {
                 id: participant.id,
-                topology_stamp: body.topology_stamp(),
+                number: *number,
                 positions_stamp: 0,
                 first_vertex,
                 n_vertices,
@@ -269,7 +292,7 @@ impl World {
         }
         let shapes: Vec<&Shape> = caches
             .iter()
-            .map(|cached| &cached.clustering.shape)
+            .map(|(_, clustering)| &clustering.shape)
             .collect();
         self.forest = Forest::new(&shapes, |ix| sample(scene, frame, ix));
         let grew = self.clusters.upload(gpu, &clusters)?
@@ -495,6 +518,51 @@ fn sample(scene: &Scene, frame: &Frame, ix: usize) -> [f32; 3] {
     let body = frame.body(scene, ix);
     let vertex = body.elements().corners(0)[0];
     body.positions().point(vertex as usize).map(|x| x as f32)
+}
+
+impl Cached {
+    fn new(body: &crate::scene::Body, number: u64) -> Self {
+        let (elements, positions) = (body.elements(), body.positions());
+        let clustering = Clustering::new(elements, |primitive| {
+            bounds_of(positions, elements.corners(primitive))
+        });
+        Cached {
+            topology_stamp: body.topology_stamp(),
+            number,
+            judged_stamp: body.positions_stamp(),
+            best_spread: spread(&clustering, positions),
+            clustering: Arc::new(clustering),
+        }
+    }
+
+    /// Whether the body has flowed away from its clusters.
+    fn is_stale(&mut self, body: &crate::scene::Body) -> bool {
+        self.judged_stamp = body.positions_stamp();
+        let spread = spread(&self.clustering, body.positions());
+        let is_stale = spread > STALE * self.best_spread;
+        self.best_spread = self.best_spread.min(spread);
+        is_stale
+    }
+}
+
+/// The surface of evenly spaced clusters over that of the box that holds them: how well the clusters fit
+/// the pose at hand. Both ends of the ratio come from the same clusters, in every frame.
+fn spread(clustering: &Clustering, positions: &Positions) -> f64 {
+    let n = clustering.n_clusters();
+    let n_samples = n.min(SAMPLES);
+    let mut whole = Bounds::EMPTY;
+    let mut sum = 0.0;
+    for sample in 0..n_samples {
+        let bounds = bounds_of(positions, clustering.vertices(sample * n / n_samples));
+        sum += bounds.half_area();
+        whole.join(&bounds);
+    }
+    let whole = whole.half_area();
+    if whole > 0.0 && sum.is_finite() {
+        sum / whole
+    } else {
+        1.0
+    }
 }
 
 fn bounds_of(positions: &Positions, corners: &[u32]) -> Bounds {
