@@ -68,31 +68,89 @@ fn cells_agree_with_the_oracle() {
     }
 }
 
+/// Settings of `Cells` that put everything into one cell, in groups of a few.
+fn one_cell(group_size: u32) -> Settings {
+    Settings {
+        lambda: 1e-9,
+        group_size,
+        ..gpu(Method::Cells)
+    }
+}
+
 #[test]
-fn a_cell_too_crowded_for_one_pass_is_refused_by_name() {
-    // One cell and groups of one primitive: more work items than one invocation may write.
+fn a_crowded_cell_is_worked_in_tiles() {
+    // Groups of one primitive: more pairs of groups than a pass lists of one cell.
     let soup = soup::triangles(300, 0.4, 11);
+    let web = soup::lattice_web(290, 4, 9);
     let mut scene = Scene::new();
     let id = soup.add_to(&mut scene).unwrap();
-    let mut detector = Detector::with_settings(Settings {
-        lambda: 1e-9,
-        group_size: 1,
-        ..gpu(Method::Cells)
-    })
-    .unwrap();
-    let error = detector.detect(&scene, &Query::within(id)).unwrap_err();
-    assert!(
-        error.to_string().contains("the primitives of one cell"),
-        "{error}"
-    );
-    // The detector goes on with a question that it can answer.
+    let within = Query::within(id);
+    let mut both = scene.clone();
+    web.add_to(&mut both).unwrap();
+    let everything = Query::everything().shared_vertex(SharedVertex::Resolve);
+    for (scene, query) in [
+        (&scene, within),
+        (&both, everything.clone()),
+        (&both, Query::all()),
+    ] {
+        let case = Case {
+            name: format!("crowded {query:?}"),
+            scene: scene.clone(),
+            query,
+        };
+        let expected = naive(&case);
+        check(&case, &expected, one_cell(1));
+        let mut detector = Detector::with_settings(one_cell(1)).unwrap();
+        let pairs = detector.detect(&case.scene, &case.query).unwrap();
+        let (stats, n) = (pairs.stats(), pairs.stats().n_entries);
+        assert_eq!((stats.method, stats.grid), ("cells", Some([1; 3])));
+        assert!(n >= 300, "{stats:?}");
+        assert_eq!(stats.n_work_items, n * (n + 1) / 2);
+        assert!(stats.n_slabs > 1, "{stats:?}");
+    }
+    // Buffers that grow between tiles leave the list alone.
+    let mut tiny = Capacities::default();
+    (tiny.items, tiny.candidates, tiny.pairs, tiny.unsure) = (1, 1, 1, 1);
+    (tiny.kept, tiny.entries) = (1, 1);
     let case = Case {
-        name: "clusters of the same".into(),
-        scene,
-        query: Query::within(id),
+        name: "crowded".into(),
+        scene: both,
+        query: everything,
     };
-    let mut detector = Detector::with_settings(gpu(Method::Clusters)).unwrap();
-    assert_agree("crowded", &naive(&case), &mut detector, &case);
+    let expected = naive(&case);
+    let mut detector = Detector::with_capacities(one_cell(1), tiny).unwrap();
+    for _ in 0..2 {
+        assert_agree("tiny", &expected, &mut detector, &case);
+    }
+}
+
+#[test]
+fn a_crowded_cell_keeps_to_the_budget_or_is_left_to_clusters() {
+    let case = large();
+    let mut cpu = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+    let expected = rows(cpu.detect(&case.scene, &case.query).unwrap());
+    for (budget, method) in [
+        (None, "cells"),
+        (Some(1_000_000), "cells"),
+        (Some(700_000), "clusters"),
+    ] {
+        let settings = Settings {
+            memory_budget: budget,
+            ..one_cell(20)
+        };
+        let mut detector = Detector::with_settings(settings).unwrap();
+        let pairs = detector.detect(&case.scene, &case.query).unwrap();
+        agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+        let stats = pairs.stats();
+        assert_eq!(stats.method, method, "{budget:?} {stats:?}");
+        assert!(stats.bytes_held <= budget.unwrap_or(u64::MAX), "{stats:?}");
+        assert!(stats.n_slabs > 1, "{stats:?}");
+        // A frame with less in it goes back to the method that was asked for.
+        let mut small = Scene::new();
+        let id = soup::triangles(50, 0.4, 1).add_to(&mut small).unwrap();
+        let pairs = detector.detect(&small, &Query::within(id)).unwrap();
+        assert_eq!(pairs.stats().method, "cells");
+    }
 }
 
 /// 2,000 primitives a body, enough for several rounds and thousands of pairs.

@@ -170,6 +170,16 @@ bindings! {
 }
 
 bindings! {
+    /// `dispatch_tile.wgsl`
+    DispatchTile {
+        grid: Read<Grid>,
+        items: Write<CellItem>,
+        counters: Write<Counter>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
     /// `dispatch_scatter.wgsl`
     DispatchScatter {
         grid: Read<Grid>,
@@ -248,6 +258,7 @@ kernels! {
     dispatch_cells: DispatchCells = DISPATCH_CELLS [] from "dispatch_cells" ("reserve", "groups");
     dispatch_scatter: DispatchScatter = DISPATCH_SCATTER []
         from "dispatch_scatter" ("coarse", "groups");
+    dispatch_tile: DispatchTile = DISPATCH_TILE [] from "dispatch_tile" ("reserve", "groups");
     pairing_cells: PairingCells = PAIRING_CELLS []
         from "pairing_cells" ("boxes", "meets", "ids", "reserve", "groups");
 }

@@ -9,6 +9,7 @@ mod bounds;
 mod clusters;
 mod collect;
 mod device;
+mod passes;
 mod resident;
 
 // What `guest` hands on of these is no part of the stable interface: its types are documented, their
