@@ -371,6 +371,39 @@ fn frames_follow_positions_bodies_and_precision() {
 }
 
 #[test]
+fn topology_that_changes_within_its_room_is_bound_anew() {
+    for method in [Method::Clusters, Method::Cells] {
+        let mut detector = Detector::with_settings(gpu(method)).unwrap();
+        let mut scene = Scene::new();
+        let a = surfaces::ball(100).add_to(&mut scene).unwrap();
+        let b = surfaces::ball(100).add_to(&mut scene).unwrap();
+        // Larger, larger within the quarter to spare, smaller and solid.
+        let solids = soup::tetrahedra(500, 0.3, 1);
+        for model in [
+            surfaces::ball(1000),
+            surfaces::ball(2000),
+            surfaces::ball(2300),
+            solids,
+        ] {
+            let (elements, positions) = (&model.elements, &model.positions);
+            for id in [a, b] {
+                scene
+                    .remesh(id, elements.clone(), positions.clone())
+                    .unwrap();
+            }
+            let shifted = model.translated([0.1, 0.03, 0.2]);
+            scene.set_positions(b, &shifted.positions).unwrap();
+            let case = Case {
+                name: format!("{method:?} of {}", model.n_primitives()),
+                scene: scene.clone(),
+                query: Query::everything(),
+            };
+            assert_agree("remeshed", &naive(&case), &mut detector, &case);
+        }
+    }
+}
+
+#[test]
 fn bodies_that_flow_away_are_clustered_again() {
     let rest = surfaces::ball(20_000);
     let other = rest.translated([0.4, 0.0, 0.0]);

@@ -67,7 +67,7 @@ impl<T: Pod> Storage<T> {
     }
 
     /// Binds exactly `len` elements, growing by a quarter more than needed. Contents are lost when
-    /// it grows. Returns whether it grew.
+    /// it grows. Returns whether what is bound is another buffer now, or another length of it.
     ///
     /// # Errors
     /// More than one binding may hold.
@@ -84,13 +84,14 @@ impl<T: Pod> Storage<T> {
                 ),
             });
         }
-        self.len = len.max(1);
-        let grows = self.buffer.is_none() || self.len > self.capacity;
-        if grows {
-            let spare = if self.capacity == 0 { 0 } else { self.len / 4 };
-            self.allocate(gpu, (self.len + spare).min(limit));
+        let len = len.max(1);
+        let is_other = self.buffer.is_none() || len != self.len;
+        self.len = len;
+        if self.buffer.is_none() || len > self.capacity {
+            let spare = if self.capacity == 0 { 0 } else { len / 4 };
+            self.allocate(gpu, (len + spare).min(limit));
         }
-        Ok(grows)
+        Ok(is_other)
     }
 
     /// Binds exactly `len` elements with no room to spare, whatever was there.
@@ -113,7 +114,7 @@ impl<T: Pod> Storage<T> {
         }));
     }
 
-    /// Holds exactly `data`. Returns whether it grew.
+    /// Holds exactly `data`. Returns as [`resize`](Storage::resize).
     ///
     /// # Errors
     /// As [`resize`](Storage::resize).

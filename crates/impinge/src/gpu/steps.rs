@@ -41,9 +41,11 @@ impl Steps {
         if self.planned == self.sent && self.buffer.bytes() > 0 {
             return Ok(false);
         }
-        let grew = self.buffer.upload(gpu, &self.planned)?;
+        // One step is bound at a time, so only another buffer matters, not another length.
+        let bytes = self.buffer.bytes();
+        self.buffer.upload(gpu, &self.planned)?;
         self.sent.clone_from(&self.planned);
-        Ok(grew)
+        Ok(self.buffer.bytes() != bytes)
     }
 
     pub fn params(&self) -> Uniform<Params> {

@@ -135,7 +135,8 @@ impl World {
         &self.forest
     }
 
-    /// Brings the device up to the frame; positions of `resident` bodies are there already. Returns whether any buffer is a new one.
+    /// Brings the device up to the frame; positions of `resident` bodies are there already. Returns
+    /// whether kernels have to be bound anew.
     ///
     /// # Errors
     /// More primitives than the device can bind at once.
@@ -156,16 +157,17 @@ impl World {
             });
         }
         self.cluster(scene, frame, resident, recluster, stats);
-        let mut grew = false;
+        let mut is_other = false;
         if !self.is_resident(frame) {
             // Half a topology must not pass for a whole one if an upload fails.
             self.residents.clear();
-            grew |= self.send_topology(gpu, scene, frame)?;
+            self.send_topology(gpu, scene, frame)?;
+            is_other = true;
         }
         self.send_positions(gpu, scene, frame, resident);
-        grew |= self.send_bodies(gpu, scene, frame, resident)?;
+        is_other |= self.send_bodies(gpu, scene, frame, resident)?;
         stats.n_clusters = self.forest.n_clusters();
-        Ok(grew)
+        Ok(is_other)
     }
 
     /// Clusters bodies that are new or were re-meshed, and those that have flowed away from their clusters; forgets those that are
@@ -222,7 +224,7 @@ impl World {
             })
     }
 
-    fn send_topology(&mut self, gpu: &Gpu, scene: &Scene, frame: &Frame) -> Result<bool, Error> {
+    fn send_topology(&mut self, gpu: &Gpu, scene: &Scene, frame: &Frame) -> Result<(), Error> {
         let caches: Vec<(u64, Arc<Clustering>)> = frame
             .participants
             .iter()
@@ -295,16 +297,16 @@ impl World {
             .map(|(_, clustering)| &clustering.shape)
             .collect();
         self.forest = Forest::new(&shapes, |ix| sample(scene, frame, ix));
-        let grew = self.clusters.upload(gpu, &clusters)?
-            | self.cluster_vertices.upload(gpu, &cluster_vertices)?
-            | self.corners.upload(gpu, &corners)?
-            | self.order.upload(gpu, &numbers)?
-            | self.nodes.upload(gpu, &self.forest.nodes)?
-            | self.levels.upload(gpu, &self.forest.levels)?
-            | self.positions.resize(gpu, 3 * first_vertex)?;
+        self.clusters.upload(gpu, &clusters)?;
+        self.cluster_vertices.upload(gpu, &cluster_vertices)?;
+        self.corners.upload(gpu, &corners)?;
+        self.order.upload(gpu, &numbers)?;
+        self.nodes.upload(gpu, &self.forest.nodes)?;
+        self.levels.upload(gpu, &self.forest.levels)?;
+        self.positions.resize(gpu, 3 * first_vertex)?;
         self.bodies_sent.clear();
         self.residents = residents;
-        Ok(grew)
+        Ok(())
     }
 
     /// Sends the positions of bodies that have moved, neighbours in one piece.
@@ -395,9 +397,9 @@ impl World {
                 mask: words(filter.mask),
             });
         }
-        let mut grew = false;
+        let mut is_other = false;
         if bodies != self.bodies_sent {
-            grew |= self.bodies.upload(gpu, &bodies)?;
+            is_other |= self.bodies.upload(gpu, &bodies)?;
             self.bodies_sent = bodies;
         }
         let ignored: Vec<NodePair> = frame
@@ -408,10 +410,10 @@ impl World {
             })
             .collect();
         if ignored != self.ignored_sent || self.ignored.bytes() == 0 {
-            grew |= self.ignored.upload(gpu, &ignored)?;
+            is_other |= self.ignored.upload(gpu, &ignored)?;
             self.ignored_sent = ignored;
         }
-        Ok(grew)
+        Ok(is_other)
     }
 
     /// Encodes the copy of a body's positions from a buffer on the device, if it takes part.
