@@ -264,6 +264,96 @@ fn a_memory_budget_is_kept_by_working_in_slabs() {
 }
 
 #[test]
+fn what_is_more_than_the_device_binds_is_answered_in_pieces() {
+    let mut n_many = 0;
+    for (ix, case) in cases().into_iter().enumerate() {
+        let expected = naive(&case);
+        let method = [Method::Clusters, Method::Cells][ix % 2];
+        // A cluster takes up to 3 KiB of positions.
+        for most_bound in [1, 8 << 10, 20 << 10] {
+            let mut detector = Detector::with_most_bound(gpu(method), most_bound).unwrap();
+            assert_agree("in pieces", &expected, &mut detector, &case);
+            let pairs = detector.detect(&case.scene, &case.query).unwrap();
+            n_many += u64::from(pairs.stats().n_pieces > 3);
+        }
+    }
+    assert!(n_many > 50, "{n_many}");
+}
+
+#[test]
+fn pieces_keep_to_filters_ignored_pairs_and_frames() {
+    let mut scene = Scene::new();
+    let knot = surfaces::torus_knot(1500, Default::default());
+    let web = soup::lattice_web_tetrahedra(300, 4, 3);
+    let a = knot.add_to(&mut scene).unwrap();
+    let b = knot.translated([0.1, 0.2, 0.3]);
+    let b = scene
+        .add(b.elements.clone(), b.positions_f64())
+        .expect("valid");
+    let c = web.add_to(&mut scene).unwrap();
+    let d = soup::triangles(400, 0.4, 7).add_to(&mut scene).unwrap();
+    let filter = |category, mask| impinge::Filter { category, mask };
+    scene.set_filter(c, filter(2, 1)).unwrap();
+    scene.set_filter(d, filter(4, 5)).unwrap();
+    let queries = [
+        Query::all(),
+        Query::all().ignore(a, b),
+        Query::everything().shared_vertex(SharedVertex::Resolve),
+        Query::everything().ignore(c, c).ignore(b, a),
+        Query::between(c, d),
+        Query::within(c).shared_vertex(SharedVertex::Resolve),
+    ];
+    let budget = |memory_budget| Settings {
+        memory_budget,
+        ..gpu(Method::Clusters)
+    };
+    let mut detectors = [
+        Detector::with_most_bound(budget(None), 16 << 10).unwrap(),
+        Detector::with_most_bound(budget(Some(400_000)), 24 << 10).unwrap(),
+        Detector::with_settings(budget(Some(250_000))).unwrap(),
+    ];
+    let mut sizes = std::collections::BTreeSet::new();
+    for frame in 0..2 {
+        for query in &queries {
+            let case = Case {
+                name: format!("{query:?} in frame {frame}"),
+                scene: scene.clone(),
+                query: query.clone(),
+            };
+            let expected = naive(&case);
+            sizes.insert(expected.len());
+            for detector in &mut detectors {
+                let pairs = detector.detect(&case.scene, &case.query).unwrap();
+                if let Err(error) = agree(&expected, &rows(pairs), pairs.hash()) {
+                    panic!("{}: {error}", case.name);
+                }
+                let stats = pairs.stats().clone();
+                let budget = detector.settings().memory_budget;
+                assert!(stats.bytes_held <= budget.unwrap_or(u64::MAX), "{stats:?}");
+                if *query == queries[0] {
+                    assert!(stats.n_pieces > 3, "{stats:?}");
+                }
+            }
+        }
+        let moved = knot.translated([0.3, 0.0, 0.1]);
+        scene.set_positions(a, &moved.positions).unwrap();
+    }
+    assert!(sizes.len() > 6, "{sizes:?}");
+    // A scene that fits is answered at once again, and one that does not in pieces again.
+    let small = cases().swap_remove(4);
+    let expected = naive(&small);
+    for detector in &mut detectors {
+        for _ in 0..2 {
+            assert_agree("at once", &expected, detector, &small);
+            let pairs = detector.detect(&small.scene, &small.query).unwrap();
+            assert_eq!(pairs.stats().n_pieces, 0, "{:?}", pairs.stats());
+            let pairs = detector.detect(&scene, &queries[0]).unwrap();
+            assert!(pairs.stats().n_pieces > 3);
+        }
+    }
+}
+
+#[test]
 fn twenty_runs_give_the_same_bytes() {
     let case = large();
     let mut first = None;

@@ -12,7 +12,9 @@ use super::collect::Collector;
 use super::device::{Gpu, Scopes};
 use super::layout::Cell;
 use super::passes::Answer;
+use super::pieces;
 use super::room::{Capacities, CellsWanted, Counts, Room};
+use super::topology::Most;
 use super::world::World;
 use crate::detector::Method;
 use crate::error::Error;
@@ -25,6 +27,9 @@ use crate::stats::Statistics;
 const MOST_CELLS: u64 = 1 << 25;
 /// The share of a memory budget that cells may have.
 const SHARE_OF_CELLS: u64 = 8;
+
+/// The largest buffer that 32 bits can number: positions by words, places with a flag.
+const WIDEST: u64 = 1 << 34;
 
 /// What the backend is told.
 #[derive(Debug, Clone, Copy)]
@@ -51,6 +56,10 @@ pub struct Engine {
     pub(super) method: Method,
     /// Primitives of the frame that was too much for `Cells`.
     too_much: Option<u64>,
+    /// Bytes of one buffer of topology or positions, where that is less than the device allows.
+    pub most_bound: u64,
+    /// Whether the device has pieces of a frame.
+    has_pieces: bool,
     pub(super) world: World,
     pub(super) room: Room,
     pub(super) plan: Plan,
@@ -61,7 +70,7 @@ pub struct Engine {
 
 #[derive(Debug)]
 pub(super) enum Plan {
-    Clusters(clusters::Plan),
+    Clusters(Box<clusters::Plan>),
     Cells(Box<dyn InCells>),
 }
 
@@ -69,7 +78,7 @@ impl Plan {
     fn of(method: Method) -> Self {
         match method {
             Method::Cells => Plan::Cells(Box::new(cells::Plan::new())),
-            _ => Plan::Clusters(clusters::Plan::new()),
+            _ => Plan::Clusters(Box::new(clusters::Plan::new())),
         }
     }
 }
@@ -96,6 +105,8 @@ impl Engine {
             first,
             method: options.method,
             too_much: None,
+            most_bound: u64::MAX,
+            has_pieces: false,
             world: World::new(),
             room: Room::new(),
             plan,
@@ -127,7 +138,11 @@ impl Engine {
                 Plan::Cells(plan) => Plan::Cells(plan.anew()),
                 Plan::Clusters(_) => Plan::of(self.options.method),
             };
-            *self = Engine::with_plan(Arc::clone(&self.gpu), self.options, self.first, plan);
+            let gpu = Arc::clone(&self.gpu);
+            *self = Engine {
+                most_bound: self.most_bound,
+                ..Engine::with_plan(gpu, self.options, self.first, plan)
+            };
         }
         result
     }
@@ -147,11 +162,25 @@ impl Engine {
             self.take(self.options.method);
         }
         let start = Instant::now();
+        let recluster = self.reclusters();
+        self.world.cluster(scene, frame, &[], recluster, stats);
+        if !self.is_held(scene, frame) && self.falls_back() {
+            self.take_clusters(frame);
+        }
+        if !self.is_held(scene, frame) && !self.is_guest() {
+            stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
+            return self.in_pieces(scene, frame, control, keys, stats).await;
+        }
         let scopes = Scopes::open(&self.gpu.device);
         let updated = self.update(scene, frame, &[], stats);
         let closed = scopes.close();
         updated?;
         closed.await?;
+        if self.first_room(self.cells_wanted(frame)).is_err() {
+            // What buffers have to spare is too much for the budget.
+            self.world.forget_buffers();
+            self.update(scene, frame, &[], stats)?;
+        }
         stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
         let before = (keys.len(), self.falls_back().then(|| stats.clone()));
         let work = Vec::from_iter(self.whole(frame));
@@ -165,25 +194,122 @@ impl Engine {
             let n_reruns = stats.n_slabs + stats.n_reruns;
             *stats = before;
             stats.n_reruns = n_reruns;
-            self.too_much = Some(frame.n_primitives());
-            self.take(Method::Clusters);
+            self.take_clusters(frame);
+            if !self.is_held(scene, frame) {
+                return self.in_pieces(scene, frame, control, keys, stats).await;
+            }
             let work = Vec::from_iter(self.whole(frame));
             let answer = self.work_off(scene, frame, work, control, keys, stats);
             if let Answer::Crowded(error) = answer.await? {
                 return Err(error);
             }
         }
-        stats.method = match &self.plan {
-            Plan::Clusters(_) => Method::Clusters.name(),
-            Plan::Cells(_) => stats.method,
-        };
-        stats.bytes_held = self.world.bytes() + self.room.bytes();
+        self.finish(stats);
         Ok(())
+    }
+
+    /// The same piece by piece, see [`pieces`].
+    async fn in_pieces(
+        &mut self,
+        scene: &Scene,
+        frame: &Frame,
+        control: &Control<'_>,
+        keys: &mut Vec<u64>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        if !self.has_pieces {
+            // They are sized for all of a frame.
+            self.world.forget_buffers();
+            self.unbind();
+            self.has_pieces = true;
+        }
+        let most = self.most();
+        // Two chunks a piece, and a quarter to spare in each buffer.
+        let most = Most {
+            binding: most.binding / 2,
+            bytes: most.bytes / 4,
+        };
+        let world = &self.world;
+        stats.n_clusters = world.weigh(scene, frame).n_clusters;
+        let clustering = |participant_ix| world.clustering(frame, participant_ix);
+        let chunks = pieces::cut(scene, frame, most, clustering);
+        for (ix, a) in chunks.iter().enumerate() {
+            for b in &chunks[ix..] {
+                let both = [a, b];
+                let piece = if std::ptr::eq(a, b) {
+                    &both[..1]
+                } else {
+                    &both
+                };
+                let pairs = pieces::meeting(frame, piece);
+                if pairs.is_empty() {
+                    continue;
+                }
+                let start = Instant::now();
+                let scopes = Scopes::open(&self.gpu.device);
+                let sent = self.world.send_piece(&self.gpu, scene, frame, piece);
+                self.unbind();
+                let closed = scopes.close();
+                sent?;
+                closed.await?;
+                stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
+                stats.n_pieces += 1;
+                let work = self.seeds_in_batches(frame, &pairs);
+                let answer = self.work_off(scene, frame, work, control, keys, stats);
+                if let Answer::Crowded(error) = answer.await? {
+                    return Err(error);
+                }
+            }
+        }
+        self.finish(stats);
+        Ok(())
+    }
+
+    fn finish(&self, stats: &mut Statistics) {
+        if let Plan::Clusters(_) = &self.plan {
+            stats.method = Method::Clusters.name();
+        }
+        stats.bytes_held = self.world.bytes() + self.room.bytes();
+    }
+
+    /// In `Cells` clusters only tell what is out of reach, however well they fit.
+    fn reclusters(&self) -> bool {
+        self.options.recluster && self.method == Method::Clusters
+    }
+
+    /// The most that may be on the device of topology and positions.
+    fn most(&self) -> Most {
+        let least = Capacities::LEAST.of(self.method).bytes();
+        let budget = self.options.memory_budget;
+        Most {
+            binding: self.most_bound.min(self.gpu.max_binding()).min(WIDEST),
+            bytes: budget.map_or(u64::MAX, |budget| budget.saturating_sub(least)),
+        }
+    }
+
+    /// Whether topology and positions of all of a frame fit the device and the budget.
+    fn is_held(&self, scene: &Scene, frame: &Frame) -> bool {
+        let cells = self.cells_wanted(frame).map_or(0, |cells| cells.bytes());
+        let most = self.most();
+        self.world.weigh(scene, frame).fits(Most {
+            bytes: most.bytes.saturating_sub(cells),
+            ..most
+        })
+    }
+
+    fn is_guest(&self) -> bool {
+        matches!(&self.plan, Plan::Cells(plan) if !plan.splits_cells())
     }
 
     /// Whether a frame that is too much for the method may be answered by `Clusters`.
     fn falls_back(&self) -> bool {
         matches!(&self.plan, Plan::Cells(plan) if plan.splits_cells())
+    }
+
+    /// Answers this frame, and those with as many primitives, by `Clusters`.
+    fn take_clusters(&mut self, frame: &Frame) {
+        self.too_much = Some(frame.n_primitives());
+        self.take(Method::Clusters);
     }
 
     /// Goes over to a method of the library's own.
@@ -201,8 +327,8 @@ impl Engine {
         resident: &[BodyId],
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        // In `Cells` clusters only tell what is out of reach.
-        let recluster = self.options.recluster && self.method == Method::Clusters;
+        let recluster = self.reclusters();
+        self.has_pieces = false;
         if self
             .world
             .update(&self.gpu, scene, frame, resident, recluster, stats)?

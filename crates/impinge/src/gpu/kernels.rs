@@ -218,10 +218,14 @@ macro_rules! kernels {
         $(pub(crate) const $source: Source = source!($file, [$($shared),*]);)*
 
         impl Kernels {
-            /// Compiles all of them; errors go to the error scopes that are open.
-            pub fn new(device: &wgpu::Device) -> Self {
+            /// Compiles all of them, each from what `text` makes of its source; errors go to the error
+            /// scopes that are open.
+            pub fn new(device: &wgpu::Device, text: impl Fn(&Source) -> String) -> Self {
                 Kernels {
-                    $($name: Kernel::new(device, &$source, &[$($constant),*]),)*
+                    $($name: {
+                        let text = text(&$source);
+                        Kernel::of_text(device, &$source, text, &[$($constant),*])
+                    },)*
                 }
             }
         }

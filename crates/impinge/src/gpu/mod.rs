@@ -9,12 +9,14 @@ mod bounds;
 mod clusters;
 mod collect;
 mod device;
+mod forest;
 mod passes;
+mod pieces;
 mod resident;
 
 // What `guest` hands on of these is no part of the stable interface: its types are documented, their
-// fields and small methods speak for themselves.
-#[allow(missing_docs)]
+// fields and small methods speak for themselves. A `Storage` is never empty, and nothing is made by default.
+#[allow(missing_docs, clippy::len_without_is_empty)]
 pub(crate) mod buffers;
 #[allow(missing_docs)]
 pub(crate) mod cells;
@@ -28,11 +30,12 @@ pub(crate) mod narrow;
 #[allow(missing_docs)]
 pub(crate) mod pipeline;
 pub(crate) mod reaching;
-#[allow(missing_docs)]
+#[allow(missing_docs, clippy::new_without_default)]
 pub(crate) mod room;
-#[allow(missing_docs)]
+#[allow(missing_docs, clippy::new_without_default)]
 pub(crate) mod steps;
-#[allow(missing_docs)]
+mod topology;
+#[allow(missing_docs, clippy::new_without_default)]
 pub(crate) mod world;
 
 pub use device::{DeviceInfo, devices};

@@ -121,6 +121,15 @@ impl Engine {
         })
     }
 
+    /// The work of a piece: pairs of its runs, not more at a time than a queue holds.
+    pub(super) fn seeds_in_batches(&self, frame: &Frame, pairs: &[[u32; 2]]) -> Vec<Work> {
+        let most = (self.room.capacities().queue as usize).max(SEEDS);
+        let batches = pairs.chunks(most);
+        batches
+            .map(|batch| Work::Seeds(self.descend(frame, self.world.seeds_of_runs(batch))))
+            .collect()
+    }
+
     /// Seeds, as far down as the host goes.
     fn descend(&self, frame: &Frame, mut seeds: Vec<NodePair>) -> Vec<NodePair> {
         let mut below = Vec::new();

@@ -19,27 +19,26 @@ use std::sync::Arc;
 
 use crate::error::Error;
 use crate::frame::Frame;
-use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, round_down, round_up};
 use crate::grouping::clusters::Clustering;
-use crate::grouping::hierarchy::{Entry, Shape, order};
-use crate::scene::{BodyId, Elements, Filter, Positions, Scene};
+use crate::grouping::hierarchy::Shape;
+use crate::scene::{BodyId, Filter, Positions, Scene};
 use crate::stats::Statistics;
 
 use super::buffers::{Storage, count};
 use super::device::Gpu;
+use super::forest::Forest;
 use super::layout::{
     Body, Cluster, ClusterVertex, Coordinate, Corners, Level, NO_ROOT, Node, NodePair, Order,
 };
+use super::pieces::{Chunk, Loaded};
+use super::topology::{Topology, Weight};
 
 /// Places carry a flag in bit 31.
-const MOST_PRIMITIVES: u64 = 1 << 31;
+pub const MOST_PRIMITIVES: u64 = 1 << 31;
 /// How many keys the boxes of rounded positions are widened: see `boxes.wgsl`.
 const SLACK: u32 = 2;
-/// Bodies, empty ones included, that need no tree over bodies if at most two are filled.
-const FEW_BODIES: usize = 1024;
-/// How far bodies may part from their neighbours in the tree over bodies before it is made anew, and
-/// how much the clusters' surface may grow against the body's before it is clustered again.
+/// How much the clusters' surface may grow against the body's before it is clustered again.
 const STALE: f64 = 1.5;
 /// Clusters that are looked at to judge how well a body's clusters fit its pose.
 const SAMPLES: usize = 64;
@@ -170,9 +169,10 @@ impl World {
         Ok(is_other)
     }
 
-    /// Clusters bodies that are new or were re-meshed, and those that have flowed away from their clusters; forgets those that are
-    /// gone. Of `resident` bodies the host does not know the pose, so they are not judged.
-    fn cluster(
+    /// Clusters bodies that are new or were re-meshed, and those that have flowed away from their clusters;
+    /// forgets those that are gone. Of `resident` bodies the host does not know the pose, so they
+    /// are not judged.
+    pub fn cluster(
         &mut self,
         scene: &Scene,
         frame: &Frame,
@@ -235,16 +235,11 @@ impl World {
             })
             .collect();
         let mut residents = Vec::with_capacity(caches.len());
-        let mut clusters = Vec::new();
-        let mut cluster_vertices = Vec::new();
-        let mut corners = Vec::new();
-        let mut numbers = Vec::new();
+        let mut topology = Topology::default();
         let mut first_vertex = 0u64;
-        self.has_solids = false;
         for (ix, (number, clustering)) in caches.iter().enumerate() {
-            let body = frame.body(scene, ix);
+            let n_vertices = count(frame.body(scene, ix).n_vertices());
             let participant = &frame.participants[ix];
-            let n_vertices = count(body.n_vertices());
             let limit = u64::from(u32::MAX) / 3;
             if first_vertex + n_vertices > limit {
                 return Err(Error::TooMany {
@@ -255,34 +250,14 @@ impl World {
             }
             // Vertices fit 32 bits, as was just checked.
             let first = first_vertex as u32;
-            for cluster in 0..clustering.n_clusters() {
-                let vertices = clustering.vertices(cluster);
-                clusters.push(Cluster {
-                    first_place: participant.first + (cluster * GROUP) as u32,
-                    first_vertex: cluster_vertices.len() as u32,
-                    sizes: clustering.size(cluster) as u32 | (vertices.len() as u32) << 16,
-                    body: ix as u32,
-                });
-                cluster_vertices.extend(vertices.iter().map(|&vertex| ClusterVertex {
-                    vertex: first + vertex,
-                }));
-            }
-            match &clustering.corners {
-                Elements::Triangles(faces) => {
-                    corners.extend(faces.iter().map(|&[a, b, c]| Corners {
-                        vertices: [a, b, c, c].map(|corner| first + corner),
-                    }));
-                }
-                Elements::Tetrahedra(tets) => {
-                    self.has_solids |= !tets.is_empty();
-                    corners.extend(tets.iter().map(|tet| Corners {
-                        vertices: tet.map(|corner| first + corner),
-                    }));
-                }
-            }
-            numbers.extend(clustering.order.iter().map(|&primitive| Order {
-                number: participant.first + primitive,
-            }));
+            let clusters = 0..clustering.n_clusters();
+            topology.push(
+                clustering,
+                clusters,
+                participant.first,
+                ix as u32,
+                |vertex| first + vertex,
+            );
             residents.push(Resident {
                 id: participant.id,
                 number: *number,
@@ -297,16 +272,92 @@ impl World {
             .map(|(_, clustering)| &clustering.shape)
             .collect();
         self.forest = Forest::new(&shapes, |ix| sample(scene, frame, ix));
-        self.clusters.upload(gpu, &clusters)?;
-        self.cluster_vertices.upload(gpu, &cluster_vertices)?;
-        self.corners.upload(gpu, &corners)?;
-        self.order.upload(gpu, &numbers)?;
-        self.nodes.upload(gpu, &self.forest.nodes)?;
-        self.levels.upload(gpu, &self.forest.levels)?;
+        self.send_trees(gpu, &topology)?;
         self.positions.resize(gpu, 3 * first_vertex)?;
         self.bodies_sent.clear();
         self.residents = residents;
         Ok(())
+    }
+
+    fn send_trees(&mut self, gpu: &Gpu, topology: &Topology) -> Result<(), Error> {
+        self.has_solids = topology.has_solids;
+        self.clusters.upload(gpu, &topology.clusters)?;
+        self.cluster_vertices
+            .upload(gpu, &topology.cluster_vertices)?;
+        self.corners.upload(gpu, &topology.corners)?;
+        self.order.upload(gpu, &topology.numbers)?;
+        self.nodes.upload(gpu, &self.forest.nodes)?;
+        self.levels.upload(gpu, &self.forest.levels)?;
+        Ok(())
+    }
+
+    /// Sends a piece of the frame in place of all of it. Kernels have to be bound anew after it.
+    ///
+    /// # Errors
+    /// The piece is more than the device can bind at once.
+    pub fn send_piece(
+        &mut self,
+        gpu: &Gpu,
+        scene: &Scene,
+        frame: &Frame,
+        chunks: &[&Chunk],
+    ) -> Result<(), Error> {
+        self.residents.clear();
+        let loaded = Loaded::new(scene, frame, chunks, |participant_ix| {
+            self.clustering(frame, participant_ix)
+        });
+        self.forest = Forest::of_trees(&Vec::from_iter(&loaded.shapes));
+        self.send_trees(gpu, &loaded.topology)?;
+        let words: &[Coordinate] = bytemuck::cast_slice(&loaded.words);
+        self.positions.upload(gpu, words)?;
+        let slacks = loaded.is_rounded.iter().map(|&is_rounded| Body {
+            root: NO_ROOT,
+            slack: if is_rounded { SLACK } else { 0 },
+            ..Body::default()
+        });
+        self.bodies.upload(gpu, &Vec::from_iter(slacks))?;
+        self.bodies_sent.clear();
+        self.ignored.upload(gpu, &[])?;
+        self.ignored_sent.clear();
+        self.is_moved = true;
+        Ok(())
+    }
+
+    /// Gives all buffers back. What is known of clusters stays.
+    pub fn forget_buffers(&mut self) {
+        *self = World {
+            caches: std::mem::take(&mut self.caches),
+            n_clusterings: self.n_clusterings,
+            ..World::new()
+        };
+    }
+
+    /// The clusters of a participant, which are known.
+    pub(crate) fn clustering(&self, frame: &Frame, participant_ix: usize) -> &Clustering {
+        let slot = frame.participants[participant_ix].id.index();
+        let cache = self.caches[slot].as_ref();
+        &cache.expect("just clustered").clustering
+    }
+
+    /// What all of a frame would take on the device.
+    pub fn weigh(&self, scene: &Scene, frame: &Frame) -> Weight {
+        let mut weight = Weight::default();
+        for ix in 0..frame.participants.len() {
+            let clustering = self.clustering(frame, ix);
+            weight.n_primitives += count(clustering.order.len());
+            weight.n_vertices += count(frame.body(scene, ix).n_vertices());
+            weight.n_cluster_vertices += count(clustering.vertices.len());
+            weight.n_clusters += count(clustering.n_clusters());
+            let shape = &clustering.shape;
+            let nodes = (0..shape.n_levels()).map(|level| count(shape.n_nodes(level)));
+            weight.n_nodes += nodes.sum::<u64>();
+            weight.n_bodies += 1;
+        }
+        if weight.n_bodies > 2 {
+            // Gates and the tree over them.
+            weight.n_nodes += 2 * weight.n_bodies;
+        }
+        weight
     }
 
     /// Sends the positions of bodies that have moved, neighbours in one piece.
@@ -346,12 +397,8 @@ impl World {
                         self.words.extend_from_slice(words);
                     }
                     Positions::F64(positions) => {
-                        // Rounded to nearest; boxes and filter allow for it, see `Body::slack`.
-                        let words = positions
-                            .as_flattened()
-                            .iter()
-                            .map(|&x| (x as f32).to_bits());
-                        self.words.extend(words);
+                        self.words
+                            .extend(positions.as_flattened().iter().map(narrowed));
                     }
                 }
             }
@@ -474,6 +521,16 @@ impl World {
         seeds
     }
 
+    /// Seeds of a piece: the trees of its runs, by their numbers.
+    pub fn seeds_of_runs(&self, pairs: &[[u32; 2]]) -> Vec<NodePair> {
+        let root = |run: u32| self.forest.roots[run as usize];
+        let seed = |&[a, b]: &[u32; 2]| NodePair {
+            a: root(a),
+            b: root(b),
+        };
+        pairs.iter().map(seed).collect()
+    }
+
     /// The pairs of children of two nodes, whether their boxes overlap or not; `None` for two
     /// clusters. The same steps as `dispatch.wgsl`.
     pub fn expand(&self, frame: &Frame, pair: NodePair, into: &mut Vec<NodePair>) -> bool {
@@ -513,6 +570,11 @@ impl World {
         }
         true
     }
+}
+
+/// The bits of a coordinate rounded to nearest; boxes and filter allow for it, see `Body::slack`.
+pub fn narrowed(x: &f64) -> u32 {
+    (*x as f32).to_bits()
 }
 
 /// A point of a body: its first vertex that a primitive names. The tree over bodies is made of these.
@@ -567,7 +629,7 @@ fn spread(clustering: &Clustering, positions: &Positions) -> f64 {
     }
 }
 
-fn bounds_of(positions: &Positions, corners: &[u32]) -> Bounds {
+pub fn bounds_of(positions: &Positions, corners: &[u32]) -> Bounds {
     let mut bounds = Bounds::EMPTY;
     for &corner in corners {
         let point = positions.point(corner as usize);
@@ -577,182 +639,4 @@ fn bounds_of(positions: &Positions, corners: &[u32]) -> Bounds {
         });
     }
     bounds
-}
-
-/// All trees in one array.
-#[derive(Debug, Default)]
-pub struct Forest {
-    pub nodes: Vec<Node>,
-    pub levels: Vec<Level>,
-    /// Root of each participant; meaningless for an empty one.
-    roots: Vec<u32>,
-    n_clusters: u64,
-    first_gate: u32,
-    n_gates: u32,
-    has_top: bool,
-    top_shape: Shape,
-    best_spread: f64,
-    entries: Vec<Entry>,
-}
-
-impl Forest {
-    fn new(shapes: &[&Shape], sample: impl Fn(usize) -> [f32; 3]) -> Self {
-        let mut forest = Forest {
-            roots: vec![NO_ROOT; shapes.len()],
-            ..Forest::default()
-        };
-        let n_heights = shapes.iter().map(|shape| shape.n_levels()).max();
-        // First node of the body at the height below, and at this one.
-        let mut below = vec![0u32; shapes.len()];
-        for height in 0..n_heights.unwrap_or(0) {
-            let first = forest.nodes.len() as u32;
-            let mut next_cluster = 0u32;
-            for (ix, shape) in shapes.iter().enumerate() {
-                if height >= shape.n_levels() {
-                    continue;
-                }
-                let first_here = forest.nodes.len() as u32;
-                for node in 0..shape.n_nodes(height) {
-                    forest.nodes.push(if height == 0 {
-                        next_cluster += 1;
-                        Node::new(next_cluster - 1, 0, 0, false)
-                    } else {
-                        let children = shape.children(height, node);
-                        Node::new(
-                            below[ix] + children.start as u32,
-                            children.len() as u32,
-                            height as u32,
-                            false,
-                        )
-                    });
-                }
-                below[ix] = first_here;
-                if height + 1 == shape.n_levels() {
-                    forest.roots[ix] = first_here;
-                }
-            }
-            forest.push_level(first);
-        }
-        forest.n_clusters = forest.levels.first().map_or(0, |level| level.count.into());
-        let filled: Vec<u32> = (0..shapes.len() as u32)
-            .filter(|&ix| forest.is_filled(ix as usize))
-            .collect();
-        // Without a tree kernels walk over all bodies, empty ones too.
-        if filled.len() > 2 || (shapes.len() > FEW_BODIES && !filled.is_empty()) {
-            forest.has_top = true;
-            forest.push_top(&filled);
-            forest.reorder(sample);
-        }
-        forest
-    }
-
-    fn push_level(&mut self, first: u32) {
-        self.levels.push(Level {
-            first,
-            count: self.nodes.len() as u32 - first,
-        });
-    }
-
-    /// Gates and the tree over them.
-    fn push_top(&mut self, filled: &[u32]) {
-        self.first_gate = self.nodes.len() as u32;
-        self.n_gates = filled.len() as u32;
-        let gate_height = self.levels.len() as u32;
-        let gates = filled
-            .iter()
-            .map(|&body| Node::new(body, 1, gate_height, true));
-        self.nodes.extend(gates);
-        self.push_level(self.first_gate);
-        self.top_shape = Shape::new(filled.len());
-        let mut below = self.first_gate;
-        for level in 1..self.top_shape.n_levels() {
-            let first = self.nodes.len() as u32;
-            for node in 0..self.top_shape.n_nodes(level) {
-                let children = self.top_shape.children(level, node);
-                self.nodes.push(Node::new(
-                    below + children.start as u32,
-                    children.len() as u32,
-                    gate_height + level as u32,
-                    false,
-                ));
-            }
-            below = first;
-            self.push_level(first);
-        }
-    }
-
-    /// The root of the tree over bodies.
-    pub fn top(&self) -> Option<u32> {
-        self.has_top.then(|| self.nodes.len() as u32 - 1)
-    }
-
-    fn is_filled(&self, participant_ix: usize) -> bool {
-        self.roots[participant_ix] != NO_ROOT
-    }
-
-    pub fn n_clusters(&self) -> u64 {
-        self.n_clusters
-    }
-
-    fn gates(&self) -> &[Node] {
-        let first = self.first_gate as usize;
-        &self.nodes[first..first + self.n_gates as usize]
-    }
-
-    /// Puts the gates in a new order when bodies have parted from their neighbours. Returns whether.
-    fn reorder(&mut self, sample: impl Fn(usize) -> [f32; 3]) -> bool {
-        if !self.has_top {
-            return false;
-        }
-        self.entries.clear();
-        let first = self.first_gate as usize;
-        for gate in first..first + self.n_gates as usize {
-            let number = self.nodes[gate].first_child;
-            self.entries.push(Entry {
-                center: sample(number as usize),
-                number,
-            });
-        }
-        let spread = self.spread();
-        let is_new = self.best_spread == 0.0;
-        if !is_new && spread <= STALE * self.best_spread {
-            self.best_spread = self.best_spread.min(spread);
-            return false;
-        }
-        order(&self.top_shape, 1, 1, &mut self.entries);
-        for (gate, entry) in self.entries.iter().enumerate() {
-            self.nodes[first + gate].first_child = entry.number;
-        }
-        // Never 0, so that it is known to have been found.
-        self.best_spread = self.spread().max(f64::MIN_POSITIVE);
-        true
-    }
-
-    /// The summed surface of the boxes of neighbouring entries: how well the order fits.
-    fn spread(&self) -> f64 {
-        let boxes = self.entries.chunks(crate::grouping::hierarchy::FANOUT);
-        boxes
-            .map(|entries| {
-                let mut bounds = Bounds::EMPTY;
-                for entry in entries {
-                    bounds.join(&Bounds {
-                        min: entry.center,
-                        max: entry.center,
-                    });
-                }
-                bounds.half_area()
-            })
-            .filter(|area| area.is_finite())
-            .sum()
-    }
-
-    /// Rounds that a traversal from these pairs takes.
-    pub fn rounds(&self, seeds: &[NodePair]) -> u32 {
-        seeds
-            .iter()
-            .flat_map(|pair| [pair.a, pair.b])
-            .map(|node| self.nodes[node as usize].height())
-            .max()
-            .map_or(0, |height| height.max(1))
-    }
 }
