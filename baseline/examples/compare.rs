@@ -8,6 +8,8 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
+#[cfg(feature = "gpu")]
+use impinge::BodyId;
 use impinge::{Backend, Detector, Method, Pairs, Query, Scene};
 use impinge_baseline::duplicates::{self, Missing, Possible, TwoLevels};
 use impinge_baseline::{Settings, UniformGrid};
@@ -53,6 +55,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         show(name, || Ok(grid.detect(&scene, a, b)?.pairs.clone()))?;
         println!("    {:?}", grid.detect(&scene, a, b)?.counts);
     }
+    #[cfg(feature = "gpu")]
+    on_gpu(&scene, a, b)?;
     for possible in [Possible::Masks, Possible::Boxes] {
         let mut two_levels = TwoLevels::new(duplicates::Settings {
             possible,
@@ -78,6 +82,36 @@ fn main() -> Result<(), Box<dyn Error>> {
                 missing.pair_rate()
             );
         }
+    }
+    Ok(())
+}
+
+/// impinge and the baseline on a GPU, if there is one.
+#[cfg(feature = "gpu")]
+fn on_gpu(scene: &Scene, a: BodyId, b: BodyId) -> Result<(), Box<dyn Error>> {
+    use impinge_baseline::gpu;
+    let Some(device) = impinge::devices().into_iter().next() else {
+        return Ok(());
+    };
+    println!("on {device}");
+    for method in [Method::Clusters, Method::Cells] {
+        let mut detector = Detector::with_settings(impinge::Settings {
+            method,
+            backend: Backend::Gpu,
+            ..impinge::Settings::default()
+        })?;
+        let query = Query::between(a, b);
+        show(method.name(), || {
+            Ok(detector.detect(scene, &query)?.clone())
+        })?;
+    }
+    for (name, owner_rule) in [("uniform grid", false), ("uniform grid, owner rule", true)] {
+        let mut grid = gpu::UniformGrid::new(gpu::Settings {
+            owner_rule,
+            ..gpu::Settings::default()
+        })?;
+        show(name, || Ok(grid.detect(scene, a, b)?.pairs.clone()))?;
+        println!("    {:?}", grid.detect(scene, a, b)?.counts);
     }
     Ok(())
 }

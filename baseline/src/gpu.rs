@@ -58,22 +58,31 @@ impl UniformGrid {
     /// # Errors
     /// A setting out of its range; no adapter fits; the driver refuses.
     pub fn new(settings: Settings) -> Result<Self, Error> {
-        UniformGrid::with_room(settings, None)
+        UniformGrid::with_room(settings, None, None)
     }
 
-    /// [`new`](UniformGrid::new), and how much room buffers begin with. For tests: they grow by themselves.
+    /// [`new`](UniformGrid::new), and how much room impinge's buffers begin with and may have. For tests:
+    /// they grow by themselves, as far as the device goes.
     ///
     /// # Errors
     /// As `new`.
     #[doc(hidden)]
-    pub fn with_capacities(settings: Settings, first: Capacities) -> Result<Self, Error> {
-        UniformGrid::with_room(settings, Some(first))
+    pub fn with_capacities(
+        settings: Settings,
+        first: Capacities,
+        memory_budget: Option<u64>,
+    ) -> Result<Self, Error> {
+        UniformGrid::with_room(settings, Some(first), memory_budget)
     }
 
-    fn with_room(settings: Settings, first: Option<Capacities>) -> Result<Self, Error> {
+    fn with_room(
+        settings: Settings,
+        first: Option<Capacities>,
+        memory_budget: Option<u64>,
+    ) -> Result<Self, Error> {
         check_lambda(settings.lambda)?;
         let device = settings.device.as_deref();
-        let host = Host::new(device, settings.lambda, first, |gpu| {
+        let host = Host::new(device, settings.lambda, first, memory_budget, |gpu| {
             let kernels = Arc::new(gpu.make(Kernels::new)?);
             Ok(Box::new(Plan::new(kernels, settings.owner_rule)))
         })?;

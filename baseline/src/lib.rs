@@ -1,6 +1,6 @@
 //! What impinge is measured against, written to be as good as it can be.
 //!
-//! * [`UniformGrid`]: the parallel spatial hashing of [FWZS11], as section 2 and section 4.1 of the paper
+//! * [`UniformGrid`]: the parallel spatial hashing of `FWZS11`, as section 2 and section 4.1 of the paper
 //!   ("Real-time Collision Detection with Two-level Spatial Hashing on GPU") describe it: one uniform
 //!   grid with λ = 5, cell-primitive pairs sorted by a radix sort, compaction, all pairs of a cell tested.
 //! * [`duplicates`]: the paper's own two levels without the owner rule that impinge has in its place:
@@ -9,7 +9,7 @@
 //!
 //! Both stand on impinge's boxes, grid, threads and exact test, so that a comparison compares methods.
 //!
-//! [FWZS11] is cited by the paper; what is built here follows the paper's description of it, not the
+//! `FWZS11` is cited by the paper; what is built here follows the paper's description of it, not the
 //! original text.
 //!
 //! ```
@@ -29,6 +29,7 @@
 pub mod duplicates;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+mod method;
 mod pairing;
 mod radix;
 mod uniform_grid;

@@ -15,6 +15,7 @@ fn rows(grid: &mut UniformGrid, case: &Case) -> Vec<[u32; 4]> {
 #[test]
 fn finds_what_the_oracle_finds() {
     let cases = cases();
+    let expected: Vec<_> = cases.iter().map(oracle).collect();
     for (lambda, owner_rule) in [(5.0, false), (5.0, true), (0.3, true), (60.0, false)] {
         let settings = Settings {
             lambda,
@@ -22,24 +23,73 @@ fn finds_what_the_oracle_finds() {
             device: None,
         };
         let mut grid = UniformGrid::new(settings.clone()).unwrap();
-        for case in &cases {
+        for (case, expected) in cases.iter().zip(&expected) {
             // Twice: the second frame runs in the memory of the first.
             for _ in 0..2 {
                 let found = rows(&mut grid, case);
-                assert_eq!(found, oracle(case), "{} with {settings:?}", case.name);
+                assert_eq!(&found, expected, "{} with {settings:?}", case.name);
             }
         }
     }
+}
+
+/// Next to no room.
+fn least() -> Capacities {
+    let mut least = Capacities::default();
+    (least.items, least.kept, least.entries) = (1, 1, 1);
+    (least.candidates, least.pairs, least.unsure) = (1, 1, 1);
+    least
+}
+
+#[test]
+fn works_in_parts_where_room_is_short() {
+    let ball = surfaces::bumpy_ball(3_000, 0.2);
+    let case = Case::new("balls", &ball, &ball.translated([0.05, 0.02, 0.01]), false);
+    let expected = oracle(&case);
+    let mut most_parts = 0;
+    for budget in (1..14).map(|step| 150_000 * step) {
+        let settings = Settings::default();
+        let mut grid = UniformGrid::with_capacities(settings, least(), Some(budget)).unwrap();
+        match grid.detect(&case.scene, case.a, case.b) {
+            Ok(outcome) => {
+                assert!(
+                    outcome.pairs.rows().eq(expected.iter().copied()),
+                    "{budget}"
+                );
+                most_parts = most_parts.max(outcome.pairs.stats().n_slabs);
+            }
+            Err(error) => {
+                let is_short = matches!(error, impinge::Error::MemoryBudget { .. });
+                assert!(is_short, "{budget}: {error}");
+            }
+        }
+    }
+    assert!(most_parts > 3, "{most_parts} parts at most");
+}
+
+#[test]
+fn a_cell_too_crowded_is_refused() {
+    // More than 32,768 pairs of groups in one cell.
+    let soup = impinge_scenes::soup::triangles(12_000, 0.01, 3);
+    let case = Case::new("crowd", &soup, &soup, false);
+    let settings = Settings {
+        lambda: 1e-9,
+        ..Settings::default()
+    };
+    let mut grid = UniformGrid::new(settings).unwrap();
+    let refused = grid.detect(&case.scene, case.a, case.b).err();
+    assert!(matches!(refused, Some(impinge::Error::Gpu { .. })));
+    // It stays usable.
+    let ball = surfaces::ball(500);
+    let case = Case::new("balls", &ball, &ball, false);
+    assert_eq!(rows(&mut grid, &case), oracle(&case));
 }
 
 #[test]
 fn grows_from_next_to_nothing() {
     let ball = surfaces::bumpy_ball(3_000, 0.2);
     let case = Case::new("balls", &ball, &ball.translated([0.3, 0.2, 0.1]), false);
-    let mut least = Capacities::default();
-    (least.items, least.kept, least.entries) = (1, 1, 1);
-    (least.candidates, least.pairs, least.unsure) = (1, 1, 1);
-    let mut grid = UniformGrid::with_capacities(Settings::default(), least).unwrap();
+    let mut grid = UniformGrid::with_capacities(Settings::default(), least(), None).unwrap();
     let expected = oracle(&case);
     assert!(expected.len() > 100);
     assert_eq!(rows(&mut grid, &case), expected);

@@ -119,7 +119,12 @@ fn contest(
     if options.peers {
         runners.extend(peers.runners(problem)?);
     }
-    measure::run(problem, runners, options.frames.unwrap_or(default_frames))
+    measure::run(
+        problem,
+        runners,
+        options.frames.unwrap_or(default_frames),
+        options.turn,
+    )
 }
 
 /// The number of pairs by the oracle, for problems small enough for it.
@@ -310,7 +315,12 @@ fn adversarial_scenes(options: &Options, report: &mut Report) -> Result<(), Fail
         for &method in &methods {
             let measured = |problem: &Problem| -> Result<Table, Failure> {
                 let runner = Ours::new(problem, settings(options, method), Feed::InPlace)?;
-                measure::run(problem, vec![Box::new(runner)], options.frames.unwrap_or(5))
+                measure::run(
+                    problem,
+                    vec![Box::new(runner)],
+                    options.frames.unwrap_or(5),
+                    options.turn,
+                )
             };
             let (table, base) = (measured(&problem)?, measured(&plain)?);
             let (row, base_row) = (&table.rows[0], &base.rows[0]);

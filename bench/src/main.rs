@@ -54,6 +54,7 @@ commands:
 options:
   --scene NAME       one scene only (two-body, self, adversarial)
   --frames N         timed frames of each contestant (default 40; fewer for large scenes)
+  --turn N           frames of one contestant in a row (default 10); with 1 all caches are cold
   --size N           adversarial: primitives (default 1,000,000); sizes, bodies: the largest size
   --threads N        threads of impinge (default: all)
   --backend NAME     cpu (default), gpu or auto
@@ -71,6 +72,7 @@ Embree needs --features embree, parry needs --features parry.";
 pub struct Options {
     scene: Option<String>,
     frames: Option<usize>,
+    turn: usize,
     size: Option<usize>,
     threads: usize,
     backend: Backend,
@@ -86,6 +88,7 @@ fn parse() -> Result<Option<(String, Options)>, lexopt::Error> {
     let mut options = Options {
         scene: None,
         frames: None,
+        turn: 10,
         size: None,
         threads: 0,
         backend: Backend::Cpu,
@@ -102,6 +105,7 @@ fn parse() -> Result<Option<(String, Options)>, lexopt::Error> {
             Long("help") | Short('h') => return Ok(None),
             Long("scene") => options.scene = Some(parser.value()?.string()?),
             Long("frames") => options.frames = Some(parser.value()?.parse()?),
+            Long("turn") => options.turn = parser.value()?.parse()?,
             Long("size") => options.size = Some(parser.value()?.parse()?),
             Long("threads") => options.threads = parser.value()?.parse()?,
             Long("backend") => {

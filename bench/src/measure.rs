@@ -1,4 +1,7 @@
-//! Frames of all contestants, interleaved, so that each meets the same weather.
+//! Frames of all contestants, turn by turn, so that each meets the same weather.
+//!
+//! A turn is a few frames of one contestant. With one frame a turn, each finds its data gone from the
+//! caches and its threads asleep; with ten, nine find what a program that uses one of them would.
 
 use std::time::Duration;
 
@@ -6,13 +9,13 @@ use serde_json::json;
 
 use crate::Failure;
 use crate::problem::Problem;
-use crate::runner::Runner;
+use crate::runner::{Answer, Runner};
 
 /// Frames that are run before the clock counts, of either pose half of them.
 const N_WARM: usize = 4;
 
-/// Between one contestant's frame and the next one's.
-const PAUSE: Duration = Duration::from_millis(1);
+/// Between one contestant's turn and the next one's.
+const PAUSE: Duration = Duration::from_millis(2);
 
 /// One contestant's figures on one problem.
 #[derive(Debug, Clone)]
@@ -46,6 +49,8 @@ pub struct Table {
     pub n_bodies: usize,
     /// Timed frames.
     pub n_frames: usize,
+    /// How many of them in a row.
+    pub turn: usize,
     /// One row a contestant.
     pub rows: Vec<Row>,
 }
@@ -75,12 +80,13 @@ impl Table {
             "primitives": self.n_primitives,
             "bodies": self.n_bodies,
             "frames": self.n_frames,
+            "turn": self.turn,
             "rows": rows,
         })
     }
 }
 
-/// Runs `n_frames` timed frames of every contestant, turn by turn.
+/// Runs `n_frames` timed frames of every contestant, `turn` of them in a row.
 ///
 /// # Errors
 /// A contestant fails; an exact one does not find the expected number of pairs, another number in another
@@ -89,68 +95,40 @@ pub fn run(
     problem: &Problem,
     mut runners: Vec<Box<dyn Runner>>,
     n_frames: usize,
+    turn: usize,
 ) -> Result<Table, Failure> {
-    let mut times = vec![Vec::with_capacity(n_frames); runners.len()];
-    let mut first_ms = vec![0.0; runners.len()];
-    let mut n_pairs = vec![[None::<u64>; 2]; runners.len()];
-    let mut hashes: [Option<(u64, String)>; 2] = [None, None];
-    for frame in 0..N_WARM + n_frames.max(1) {
-        let pose = frame % 2;
-        for (ix, runner) in runners.iter_mut().enumerate() {
+    let (n_frames, turn) = (n_frames.max(1), turn.max(1));
+    let mut records: Vec<Record> = runners.iter().map(|_| Record::default()).collect();
+    let mut hashes = [None, None];
+    let timed = (0..n_frames).step_by(turn).map(|from| {
+        let to = (from + turn).min(n_frames);
+        N_WARM + from..N_WARM + to
+    });
+    for frames in std::iter::once(0..N_WARM).chain(timed) {
+        for (runner, record) in runners.iter_mut().zip(&mut records) {
             // Idle workers of the contestant before spin for a while: let them fall asleep.
             std::thread::sleep(PAUSE);
-            runner.load(problem, pose)?;
-            let answer = runner.frame(frame < N_WARM)?;
-            if frame == 0 {
-                first_ms[ix] = answer.ms;
-            }
-            if frame >= N_WARM {
-                times[ix].push(answer.ms);
-            }
-            let seen = n_pairs[ix][pose].get_or_insert(answer.n_pairs);
-            let name = runner.name();
-            if *seen != answer.n_pairs {
-                return Err(format!(
-                    "{}: {name} found {} pairs in frame {frame} and {seen} in the same pose before",
-                    problem.name, answer.n_pairs
-                )
-                .into());
-            }
-            let Some(hash) = answer.hash else { continue };
-            // Later frames are held against these by their number.
-            if let Some(expected) = problem.expected.filter(|&n| n != answer.n_pairs) {
-                return Err(format!(
-                    "{}: {name} found {} pairs, {expected} are right",
-                    problem.name, answer.n_pairs
-                )
-                .into());
-            }
-            match &hashes[pose] {
-                Some((other, whose)) if *other != hash => {
-                    return Err(format!(
-                        "{}: {name} and {whose} differ in their pairs",
-                        problem.name
-                    )
-                    .into());
-                }
-                Some(_) => {}
-                None => hashes[pose] = Some((hash, name)),
+            for frame in frames.clone() {
+                runner.load(problem, frame % 2)?;
+                let answer = runner.frame(frame < N_WARM)?;
+                record.add(frame, &answer);
+                let agreed = &mut hashes[frame % 2];
+                check(problem, &runner.name(), frame, &answer, record, agreed)?;
             }
         }
     }
     let rows = runners
         .iter()
-        .zip(times)
-        .enumerate()
-        .map(|(ix, (runner, mut times))| {
-            times.sort_by(f64::total_cmp);
+        .zip(records)
+        .map(|(runner, mut record)| {
+            record.times.sort_by(f64::total_cmp);
             Row {
                 name: runner.name(),
                 setting: runner.setting(),
-                median_ms: times[times.len() / 2],
-                min_ms: times[0],
-                first_ms: first_ms[ix],
-                n_pairs: n_pairs[ix][0].unwrap_or(0),
+                median_ms: record.times[record.times.len() / 2],
+                min_ms: record.times[0],
+                first_ms: record.first_ms,
+                n_pairs: record.n_pairs[0].unwrap_or(0),
                 details: runner.details(),
             }
         })
@@ -160,9 +138,70 @@ pub fn run(
         about: problem.about.clone(),
         n_primitives: problem.n_primitives(),
         n_bodies: problem.bodies.len(),
-        n_frames: n_frames.max(1),
+        n_frames,
+        turn,
         rows,
     })
+}
+
+/// What one contestant has done so far.
+#[derive(Debug, Default)]
+struct Record {
+    times: Vec<f64>,
+    first_ms: f64,
+    /// Pairs in either pose.
+    n_pairs: [Option<u64>; 2],
+}
+
+impl Record {
+    fn add(&mut self, frame: usize, answer: &Answer) {
+        if frame == 0 {
+            self.first_ms = answer.ms;
+        }
+        if frame >= N_WARM {
+            self.times.push(answer.ms);
+        }
+        self.n_pairs[frame % 2].get_or_insert(answer.n_pairs);
+    }
+}
+
+/// Holds an answer against what is known: `agreed` is the hash of this pose and who gave it first.
+fn check(
+    problem: &Problem,
+    name: &str,
+    frame: usize,
+    answer: &Answer,
+    record: &Record,
+    agreed: &mut Option<(u64, String)>,
+) -> Result<(), Failure> {
+    if let Some(seen) = record.n_pairs[frame % 2].filter(|&seen| seen != answer.n_pairs) {
+        return Err(format!(
+            "{}: {name} found {} pairs in frame {frame} and {seen} in the same pose before",
+            problem.name, answer.n_pairs
+        )
+        .into());
+    }
+    let Some(hash) = answer.hash else {
+        return Ok(());
+    };
+    // Later frames are held against these by their number.
+    if let Some(expected) = problem.expected.filter(|&n| n != answer.n_pairs) {
+        return Err(format!(
+            "{}: {name} found {} pairs, {expected} are right",
+            problem.name, answer.n_pairs
+        )
+        .into());
+    }
+    match agreed {
+        Some((other, whose)) if *other != hash => {
+            Err(format!("{}: {name} and {whose} differ in their pairs", problem.name).into())
+        }
+        Some(_) => Ok(()),
+        None => {
+            *agreed = Some((hash, name.to_owned()));
+            Ok(())
+        }
+    }
 }
 
 #[cfg(test)]
@@ -170,7 +209,6 @@ mod tests {
     use super::*;
     use crate::ours::{Feed, Ours};
     use crate::problem::Ask;
-    use crate::runner::Answer;
     use impinge::{Backend, Method, Settings};
     use impinge_scenes::{Model, adversarial, solids, surfaces};
 
@@ -221,7 +259,7 @@ mod tests {
             #[cfg(feature = "parry")]
             runners.push(crate::parry::tuned(&problem, None).expect("parry runs").0);
             // The library holds its own methods against each other; peers are compared here.
-            let table = run(&problem, std::mem::take(&mut runners), 2).expect("they agree");
+            let table = run(&problem, std::mem::take(&mut runners), 2, 1).expect("they agree");
             let oracle = &table.rows[0];
             assert!(oracle.n_pairs > 50, "{}: {}", problem.name, oracle.n_pairs);
             for row in &table.rows {
@@ -264,6 +302,7 @@ mod tests {
             &problem,
             vec![ours(&problem, Method::Naive, Feed::InPlace)],
             1,
+            1,
         );
         let n_pairs = table.expect("the oracle answers").rows[0].n_pairs;
         let problem = problem.expecting(Some(n_pairs));
@@ -273,7 +312,7 @@ mod tests {
                 change,
             };
             let honest = ours(&problem, Method::Clusters, Feed::InPlace);
-            run(&problem, vec![honest, Box::new(liar)], 2).map(|_| ())
+            run(&problem, vec![honest, Box::new(liar)], 2, 1).map(|_| ())
         };
         assert!(contest(|_| {}).is_ok());
         let drops = contest(|answer| answer.n_pairs -= 1).map_err(|error| error.to_string());
@@ -290,7 +329,7 @@ mod tests {
             honest: ours(&problem, Method::Clusters, Feed::InPlace),
             change: |answer| answer.n_pairs += u64::from(answer.hash.is_none()),
         };
-        let outcome = run(&problem, vec![Box::new(liar)], 2).map(|_| ());
+        let outcome = run(&problem, vec![Box::new(liar)], 2, 2).map(|_| ());
         assert!(outcome.is_err_and(|error| error.to_string().contains("in the same pose before")));
     }
 }

@@ -38,7 +38,7 @@ impl Report {
     /// One problem, all contestants.
     pub fn contest(&mut self, table: &Table) {
         let mut text = format!(
-            "### {}: {} primitives in {}, {} pairs\n\n{}. {} frames each, interleaved.\n\n",
+            "### {}: {} primitives in {}, {} pairs\n\n{}. {} frames each, {} in a row.\n\n",
             table.name,
             grouped(table.n_primitives as u64),
             match table.n_bodies {
@@ -48,6 +48,7 @@ impl Report {
             grouped(table.rows[0].n_pairs),
             table.about,
             table.n_frames,
+            table.turn,
         );
         text += "| | median ms | min ms | first frame ms | ratio | pairs | setting |\n";
         text += "|---|---:|---:|---:|---:|---:|---|\n";

@@ -26,9 +26,10 @@ mod pairs;
 mod progress;
 mod query;
 mod scene;
+mod settings;
 mod stats;
 
-pub use detector::{Backend, Detector, InstructionSet, Method, Recluster, Settings};
+pub use detector::Detector;
 pub use error::Error;
 #[cfg(feature = "gpu")]
 #[doc(hidden)]
@@ -39,6 +40,7 @@ pub use pairs::{Pairs, Primitive, hash_rows};
 pub use progress::{CancelToken, Control, Progress};
 pub use query::{Query, SharedVertex};
 pub use scene::{Body, BodyId, Elements, Filter, Kind, Positions, Real, Scene};
+pub use settings::{Backend, InstructionSet, Method, Recluster, Settings};
 pub use stats::{Stage, Statistics};
 /// The GPU interface that [`Detector::with_device`] and [`Detector::encode`] speak.
 #[cfg(feature = "gpu")]

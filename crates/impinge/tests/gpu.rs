@@ -68,6 +68,26 @@ fn cells_agree_with_the_oracle() {
     }
 }
 
+/// Buffers of one scene are used again for the next, which may need more or less of them, and other
+/// kernels.
+#[test]
+fn one_detector_answers_scene_after_scene() {
+    let cases = cases();
+    let expected: Vec<_> = cases.iter().map(naive).collect();
+    for method in [Method::Clusters, Method::Cells] {
+        let mut detector = Detector::with_settings(gpu(method)).unwrap();
+        let order = (0..cases.len()).chain((0..cases.len()).rev());
+        for ix in order {
+            assert_agree(
+                "scene after scene",
+                &expected[ix],
+                &mut detector,
+                &cases[ix],
+            );
+        }
+    }
+}
+
 /// Settings of `Cells` that put everything into one cell, in groups of a few.
 fn one_cell(group_size: u32) -> Settings {
     Settings {

@@ -17,7 +17,6 @@
 
 use std::time::Instant;
 
-use crate::detector::InstructionSet;
 use crate::error::Error;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
@@ -25,6 +24,7 @@ use crate::grouping::grid::{FineRange, Grid, owns};
 use crate::narrow::share_vertex;
 use crate::progress::Control;
 use crate::query::SharedVertex;
+use crate::settings::InstructionSet;
 use crate::stats::Statistics;
 
 use super::Job;

@@ -237,7 +237,8 @@ fn within_body<S: Simd>(
         return;
     }
     let mut shared = [0u64; GROUP];
-    if lanes_a.count_ones() <= lanes_b.count_ones() {
+    // Masks are kept by lanes of a: turning them round costs more than some rows.
+    if lanes_a.count_ones() <= 2 * lanes_b.count_ones() {
         for (lane, mask) in adjacency.between(cluster_a, cluster_b) {
             shared[lane] = mask;
         }

@@ -6,10 +6,11 @@
 //! to library functions: those would be compiled on their own, without the set.
 //! The answers are bit masks of exact comparisons: no set can differ from another.
 
-use crate::detector::InstructionSet;
+use crate::exact::filter::LANES;
 use crate::exact::filter::number::{self, Vector};
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, BoundsArray};
+use crate::settings::InstructionSet;
 
 /// The boxes of one group, a lane each; lanes past the group's size hold empty boxes.
 #[derive(Debug, Clone)]
@@ -65,6 +66,28 @@ pub(crate) trait Simd: Copy {
 
     /// Bit `k`: lane `k` overlaps `query`; only lanes of `among` are looked at.
     fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64;
+
+    /// Eight vertices as rows of x, y and z in double precision.
+    ///
+    /// # Panics
+    /// If there is no such vertex.
+    fn put_vertices(
+        self,
+        positions: &[[f32; 3]],
+        vertices: [u32; LANES],
+        rows: &mut [[f64; LANES]; 3],
+    );
+}
+
+/// One coordinate after the other.
+#[inline(always)]
+fn put_vertices(positions: &[[f32; 3]], vertices: [u32; LANES], rows: &mut [[f64; LANES]; 3]) {
+    for (lane, &vertex) in vertices.iter().enumerate() {
+        let [x, y, z] = positions[vertex as usize];
+        rows[0][lane] = x.into();
+        rows[1][lane] = y.into();
+        rows[2][lane] = z.into();
+    }
 }
 
 /// Plain loops.
@@ -109,6 +132,16 @@ impl Simd for Portable {
         }
         mask & among
     }
+
+    #[inline(always)]
+    fn put_vertices(
+        self,
+        positions: &[[f32; 3]],
+        vertices: [u32; LANES],
+        rows: &mut [[f64; LANES]; 3],
+    ) {
+        put_vertices(positions, vertices, rows);
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -118,7 +151,7 @@ pub(crate) use x86::{Avx2, Avx512};
 mod x86 {
     use std::arch::x86_64::*;
 
-    use super::{Bounds, BoundsArray, LaneBounds, Simd, number};
+    use super::{Bounds, BoundsArray, LANES, LaneBounds, Simd, number, put_vertices};
     use crate::grouping::bounds::READ_AHEAD;
 
     /// 256-bit registers. Only made where `avx2` was detected.
@@ -143,6 +176,50 @@ mod x86 {
         /// The processor must have AVX-512 F, VL and DQ.
         pub(crate) unsafe fn new() -> Self {
             Avx512(())
+        }
+    }
+
+    /// Eight vertices as rows of x, y and z: two columns of four, transposed side by side. None where one
+    /// of them is the last one or past it: a vertex is read as 16 bytes, of which its successor has four.
+    ///
+    /// # Safety
+    /// The caller must be compiled for AVX2.
+    #[inline(always)]
+    unsafe fn rows(positions: &[[f32; 3]], vertices: [u32; LANES]) -> Option<[__m256; 3]> {
+        let end = positions.len().saturating_sub(1);
+        let mut all_inside = true;
+        for vertex in vertices {
+            all_inside &= (vertex as usize) < end;
+        }
+        if !all_inside {
+            return None;
+        }
+        let first = positions.as_ptr();
+        // SAFETY: all vertices have a successor, as was just seen, so 16 bytes lie in the slice.
+        unsafe {
+            let load = [
+                _mm_loadu_ps(first.add(vertices[0] as usize).cast()),
+                _mm_loadu_ps(first.add(vertices[1] as usize).cast()),
+                _mm_loadu_ps(first.add(vertices[2] as usize).cast()),
+                _mm_loadu_ps(first.add(vertices[3] as usize).cast()),
+                _mm_loadu_ps(first.add(vertices[4] as usize).cast()),
+                _mm_loadu_ps(first.add(vertices[5] as usize).cast()),
+                _mm_loadu_ps(first.add(vertices[6] as usize).cast()),
+                _mm_loadu_ps(first.add(vertices[7] as usize).cast()),
+            ];
+            let a = _mm256_set_m128(load[4], load[0]);
+            let b = _mm256_set_m128(load[5], load[1]);
+            let c = _mm256_set_m128(load[6], load[2]);
+            let d = _mm256_set_m128(load[7], load[3]);
+            let xy_ab = _mm256_unpacklo_ps(a, b);
+            let xy_cd = _mm256_unpacklo_ps(c, d);
+            let z_ab = _mm256_unpackhi_ps(a, b);
+            let z_cd = _mm256_unpackhi_ps(c, d);
+            Some([
+                _mm256_shuffle_ps::<0b01_00_01_00>(xy_ab, xy_cd),
+                _mm256_shuffle_ps::<0b11_10_11_10>(xy_ab, xy_cd),
+                _mm256_shuffle_ps::<0b01_00_01_00>(z_ab, z_cd),
+            ])
         }
     }
 
@@ -200,6 +277,27 @@ mod x86 {
                 mask & among
             }
         }
+
+        #[inline(always)]
+        fn put_vertices(
+            self,
+            positions: &[[f32; 3]],
+            vertices: [u32; LANES],
+            into: &mut [[f64; LANES]; 3],
+        ) {
+            // SAFETY: `Avx2` exists only where the processor has it; a row holds two times four.
+            unsafe {
+                let Some(rows) = rows(positions, vertices) else {
+                    return put_vertices(positions, vertices, into);
+                };
+                for axis in 0..3 {
+                    let low = _mm256_cvtps_pd(_mm256_castps256_ps128(rows[axis]));
+                    let high = _mm256_cvtps_pd(_mm256_extractf128_ps::<1>(rows[axis]));
+                    _mm256_storeu_pd(into[axis].as_mut_ptr(), low);
+                    _mm256_storeu_pd(into[axis].as_mut_ptr().add(4), high);
+                }
+            }
+        }
     }
 
     impl Simd for Avx512 {
@@ -253,6 +351,24 @@ mod x86 {
                     mask |= u64::from(all) << (16 * chunk);
                 }
                 mask
+            }
+        }
+
+        #[inline(always)]
+        fn put_vertices(
+            self,
+            positions: &[[f32; 3]],
+            vertices: [u32; LANES],
+            into: &mut [[f64; LANES]; 3],
+        ) {
+            // SAFETY: `Avx512` exists only where the processor has it; a row holds eight.
+            unsafe {
+                let Some(rows) = rows(positions, vertices) else {
+                    return put_vertices(positions, vertices, into);
+                };
+                for axis in 0..3 {
+                    _mm512_storeu_pd(into[axis].as_mut_ptr(), _mm512_cvtps_pd(rows[axis]));
+                }
             }
         }
     }

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::{Backend, Detector, Method, Recluster, Settings, check};
+use super::{Backend, Detector, Method, Settings};
 use crate::cpu::cells::Cells;
 use crate::cpu::clusters::Clusters;
 use crate::cpu::workers::Workers;
@@ -15,6 +15,7 @@ use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
 use crate::scene::{BodyId, Scene};
+use crate::settings::Recluster;
 
 /// The GPU that the settings ask for, if they ask for one.
 pub(super) fn open(settings: &Settings) -> Result<Option<Engine>, Error> {
@@ -123,7 +124,7 @@ impl Detector {
             device: None,
             ..settings
         };
-        check(&settings)?;
+        settings.check()?;
         let gpu = Arc::new(gpu);
         Ok(Detector {
             gpu: Some(engine(gpu, &settings, Capacities::default())),

@@ -138,6 +138,7 @@ impl<T: Pod> Storage<T> {
         self.buffer.as_ref().expect("resized before it is used")
     }
 
+    #[expect(clippy::len_without_is_empty, reason = "there is always one element")]
     pub fn len(&self) -> u64 {
         self.len
     }

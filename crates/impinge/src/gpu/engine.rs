@@ -16,11 +16,11 @@ use super::pieces;
 use super::room::{Capacities, CellsWanted, Counts, Room};
 use super::topology::Most;
 use super::world::World;
-use crate::detector::Method;
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::progress::Control;
 use crate::scene::{BodyId, Scene};
+use crate::settings::Method;
 use crate::stats::Statistics;
 
 /// Cells at most, whatever lambda says.

@@ -15,8 +15,8 @@ mod pieces;
 mod resident;
 
 // What `guest` hands on of these is no part of the stable interface: its types are documented, their
-// fields and small methods speak for themselves. A `Storage` is never empty, and nothing is made by default.
-#[allow(missing_docs, clippy::len_without_is_empty)]
+// fields and small methods speak for themselves.
+#[allow(missing_docs)]
 pub(crate) mod buffers;
 #[allow(missing_docs)]
 pub(crate) mod cells;
@@ -30,12 +30,12 @@ pub(crate) mod narrow;
 #[allow(missing_docs)]
 pub(crate) mod pipeline;
 pub(crate) mod reaching;
-#[allow(missing_docs, clippy::new_without_default)]
+#[allow(missing_docs)]
 pub(crate) mod room;
-#[allow(missing_docs, clippy::new_without_default)]
+#[allow(missing_docs)]
 pub(crate) mod steps;
 mod topology;
-#[allow(missing_docs, clippy::new_without_default)]
+#[allow(missing_docs)]
 pub(crate) mod world;
 
 pub use device::{DeviceInfo, devices};

@@ -20,13 +20,13 @@ use super::engine::{Engine, Plan};
 use super::layout::NodePair;
 use super::room::{Capacities, CellsWanted, Verdict};
 use super::steps::Stages;
-use crate::detector::Method;
 use crate::error::Error;
 use crate::frame::{Frame, pair_key};
 use crate::narrow::settle;
 use crate::progress::Control;
 use crate::query::SharedVertex;
 use crate::scene::Scene;
+use crate::settings::Method;
 use crate::stats::Statistics;
 
 /// Seeds up to which the host descends before the first launch: each step down saves two launches.

@@ -13,6 +13,12 @@ pub struct Steps {
     buffer: Storage<Step>,
 }
 
+impl Default for Steps {
+    fn default() -> Self {
+        Steps::new()
+    }
+}
+
 impl Steps {
     pub fn new() -> Self {
         Steps {

@@ -94,7 +94,7 @@ pub struct World {
 }
 
 impl World {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         World {
             caches: Vec::new(),
             n_clusterings: 0,

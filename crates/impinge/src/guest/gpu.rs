@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::detector::Method;
 use crate::error::Error;
 use crate::frame::Frame;
 pub use crate::gpu::buffers::{Access, Binding, Read, Storage, Uniform, Write};
@@ -24,6 +23,7 @@ use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
 use crate::scene::Scene;
+use crate::settings::Method;
 
 /// Text that kernels are put together from: `LAYOUT` first, it has the structs of all.
 pub mod shared {
@@ -56,6 +56,8 @@ pub struct Host {
 
 impl Host {
     /// On the adapter whose name contains `device`, or the best there is, with cells as dense as `lambda`.
+    /// `first` is the room to begin with, and `memory_budget` bytes are what the engine's own buffers may
+    /// have: beyond it, the work is done in parts.
     ///
     /// # Errors
     /// No adapter fits; the driver refuses; those of `plan`, which compiles its kernels.
@@ -63,6 +65,7 @@ impl Host {
         device: Option<&str>,
         lambda: f64,
         first: Option<Capacities>,
+        memory_budget: Option<u64>,
         plan: impl FnOnce(&Gpu) -> Result<Box<dyn InCells>, Error>,
     ) -> Result<Self, Error> {
         let gpu = Gpu::open(device.map_or(Wanted::Any, Wanted::Named))?;
@@ -72,7 +75,7 @@ impl Host {
             lambda,
             group_size: 64,
             recluster: false,
-            memory_budget: None,
+            memory_budget,
         };
         let first = first.unwrap_or_default();
         Ok(Host {
