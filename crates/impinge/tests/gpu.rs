@@ -404,6 +404,67 @@ fn few_pairs_are_left_to_exact_arithmetic() {
     assert!(!stats.backend.is_empty() && stats.backend != "cpu");
 }
 
+/// Triangles over a few vertices: nearly all share one with many others, some two or three.
+fn web(n: u32, n_vertices: u32, seed: u64) -> impinge_scenes::Model {
+    let mut state = seed;
+    let mut next = |below: u32| {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1);
+        ((state >> 33) % u64::from(below)) as u32
+    };
+    let mut model = soup::triangles(n_vertices as usize / 3, 1.0, seed);
+    let faces: Vec<[u32; 3]> = (0..n)
+        .map(|_| {
+            let a = next(n_vertices);
+            let b = (a + 1 + next(n_vertices - 2)) % n_vertices;
+            let c = (0..).map(|_| next(n_vertices)).find(|&c| c != a && c != b);
+            [a, b, c.unwrap()]
+        })
+        .collect();
+    model.elements = faces.into();
+    model
+}
+
+#[test]
+fn neighbours_are_settled_on_the_device() {
+    let model = web(500, 60, 5);
+    let folded = soup::lattice_web(400, 3, 2);
+    // Nearly coplanar, nearly touching.
+    let nearly = web(400, 60, 6).mapped(|p| p.map(|x| (2.0 * x).round() + 1e-6 * x));
+    let closed = surfaces::bumpy_ball(3000, 0.3);
+    for (name, model, most_unsure) in [
+        ("web", &model, 0.02),
+        ("lattice", &folded, 1.0),
+        ("nearly degenerate", &nearly, 1.0),
+        ("closed surface", &closed, 0.01),
+    ] {
+        for double in [false, true] {
+            let mut scene = Scene::new();
+            let id = match double {
+                false => model.add_to(&mut scene),
+                true => {
+                    let positions = model.positions_f64().into_iter();
+                    let moved = positions.map(|p| p.map(|x| x * (1.0 + 1e-9)));
+                    scene.add(model.elements.clone(), moved.collect::<Vec<_>>())
+                }
+            };
+            let case = Case {
+                name: format!("{name}, f64: {double}"),
+                scene,
+                query: Query::within(id.unwrap()).shared_vertex(SharedVertex::Resolve),
+            };
+            let expected = naive(&case);
+            for method in [Method::Clusters, Method::Cells] {
+                let mut detector = Detector::with_settings(gpu(method)).unwrap();
+                assert_agree("neighbours", &expected, &mut detector, &case);
+                let pairs = detector.detect(&case.scene, &case.query).unwrap();
+                let stats = pairs.stats();
+                let share = stats.n_unsure as f64 / stats.n_candidates as f64;
+                assert!(share <= most_unsure, "{}: {stats:?}", case.name);
+            }
+        }
+    }
+}
+
 #[test]
 fn adapters_are_listed_and_chosen_by_name() {
     let settings = gpu(Method::Clusters);

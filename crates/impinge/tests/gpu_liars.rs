@@ -93,6 +93,21 @@ const OF_BOTH: &[Damage] = &[
 ];
 
 const OF_CLUSTERS: &[Damage] = &[
+    (
+        "narrow",
+        "return select(NO, YES, a_q != b_q);",
+        "return select(YES, NO, a_q != b_q);",
+    ),
+    (
+        "narrow",
+        "if b_q * b_r > 0 || a_q * a_r > 0 {",
+        "if b_q * b_r > 0 || a_q * a_r < 0 {",
+    ),
+    (
+        "narrow",
+        "return select(NO, UNSURE, sign == 0);",
+        "return YES;",
+    ),
     ("dispatch", "&& !is_ignored(min(a, b), max(a, b))", ""),
     (
         "dispatch",
