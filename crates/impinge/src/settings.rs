@@ -41,7 +41,8 @@ pub enum Backend {
 /// Whether a body that has flowed far from the pose in which it was clustered is clustered anew.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Recluster {
-    /// When the summed surface of its cluster boxes has grown enough for it to pay.
+    /// When the summed surface of its cluster boxes has grown enough for it to pay. A GPU judges by a sample of
+    /// them, and only bodies whose positions are in the scene, not in a buffer of the caller's.
     #[default]
     Auto,
     /// Never: no frame ever pays for it. Boxes may grow and frames get slower.

@@ -9,6 +9,9 @@ mod bounds;
 mod clusters;
 mod collect;
 mod device;
+mod forest;
+mod passes;
+mod pieces;
 mod resident;
 
 // What `guest` hands on of these is no part of the stable interface: its types are documented, their
@@ -31,6 +34,7 @@ pub(crate) mod reaching;
 pub(crate) mod room;
 #[allow(missing_docs)]
 pub(crate) mod steps;
+mod topology;
 #[allow(missing_docs)]
 pub(crate) mod world;
 

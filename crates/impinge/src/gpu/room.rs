@@ -55,7 +55,7 @@ const ONE_ITEM: u64 = 64 * 64;
 impl Capacities {
     /// With these a pass of one pair of clusters always fits.
     pub const LEAST: Capacities = Capacities {
-        queue: 64,
+        queue: 512,
         items: 64,
         kept: 64,
         entries: 64,

@@ -74,6 +74,7 @@ impl Host {
             method: Method::Cells,
             lambda,
             group_size: 64,
+            recluster: false,
             memory_budget,
         };
         let first = first.unwrap_or_default();
