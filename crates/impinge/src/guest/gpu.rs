@@ -6,7 +6,7 @@ use std::time::Instant;
 use crate::error::Error;
 use crate::frame::Frame;
 pub use crate::gpu::buffers::{Access, Binding, Read, Storage, Uniform, Write};
-pub use crate::gpu::cells::{InCells, Part, Told};
+pub use crate::gpu::cells::{InCells, Part, Share, Tile, Told};
 use crate::gpu::engine::{Engine, Options};
 pub use crate::gpu::layout::{
     Arguments, Candidate, CellItem, Counter, Grid, Kept, N_ENTRIES, N_ITEMS, Params, ROUNDS,
