@@ -259,7 +259,7 @@ fn a_memory_budget_is_kept_by_working_in_slabs() {
     assert_agree("free", &expected, &mut free, &case);
     for method in [Method::Clusters, Method::Cells] {
         let mut seen_slabs = false;
-        for budget in [2_500_000, 1_500_000, 1_000_000] {
+        for budget in [1_500_000, 1_000_000, 700_000, 300_000] {
             let mut detector = Detector::with_settings(Settings {
                 memory_budget: Some(budget),
                 ..gpu(method)
@@ -268,7 +268,9 @@ fn a_memory_budget_is_kept_by_working_in_slabs() {
             assert_agree("budget", &expected, &mut detector, &case);
             let pairs = detector.detect(&case.scene, &case.query).unwrap();
             assert!(pairs.stats().bytes_held <= budget, "{:?}", pairs.stats());
-            seen_slabs |= pairs.stats().n_slabs > 1;
+            let stats = pairs.stats();
+            seen_slabs |= stats.n_slabs > 1 && stats.n_pieces == 0;
+            assert_eq!(stats.n_pieces > 0, budget == 300_000, "{stats:?}");
         }
         assert!(seen_slabs, "{method:?}");
         let mut detector = Detector::with_settings(Settings {
