@@ -303,6 +303,24 @@ fn what_is_more_than_the_device_binds_is_answered_in_pieces() {
 }
 
 #[test]
+fn auto_takes_the_cpu_where_the_gpu_would_need_pieces() {
+    let case = cases().swap_remove(0);
+    let settings = Settings {
+        backend: Backend::Auto,
+        device: Some(devices()[0].name.clone()),
+        ..gpu(Method::Clusters)
+    };
+    let answer = |most_bound| {
+        let mut detector = Detector::with_most_bound(settings.clone(), most_bound).unwrap();
+        assert_agree("auto", &naive(&case), &mut detector, &case);
+        let pairs = detector.detect(&case.scene, &case.query).unwrap();
+        pairs.stats().backend.clone()
+    };
+    assert_eq!(answer(8 << 10), "cpu");
+    assert_ne!(answer(u64::MAX), "cpu");
+}
+
+#[test]
 fn pieces_keep_to_filters_ignored_pairs_and_frames() {
     let mut scene = Scene::new();
     let knot = surfaces::torus_knot(1500, Default::default());

@@ -40,6 +40,8 @@ fn engine(gpu: Arc<Gpu>, settings: &Settings, first: Capacities) -> Engine {
         group_size: settings.group_size,
         recluster: settings.recluster == Recluster::Auto,
         memory_budget: settings.memory_budget,
+        // The CPU has no need to send anything twice.
+        in_pieces: settings.backend == Backend::Gpu,
     };
     Engine::new(gpu, options, first)
 }

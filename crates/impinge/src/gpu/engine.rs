@@ -44,6 +44,8 @@ pub struct Options {
     pub recluster: bool,
     /// Bytes on the device, at most.
     pub memory_budget: Option<u64>,
+    /// Whether a frame that is more than the device binds is answered in pieces, and not by an error.
+    pub in_pieces: bool,
 }
 
 /// The GPU backend of one detector.
@@ -169,6 +171,7 @@ impl Engine {
         }
         if !self.is_held(scene, frame) && !self.is_guest() {
             stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
+            self.may_cut(scene, frame)?;
             return self.in_pieces(scene, frame, control, keys, stats).await;
         }
         let scopes = Scopes::open(&self.gpu.device);
@@ -294,6 +297,24 @@ impl Engine {
         self.world.weigh(scene, frame).fits(Most {
             bytes: most.bytes.saturating_sub(cells),
             ..most
+        })
+    }
+
+    /// Whether a frame that is not held may be answered in pieces.
+    ///
+    /// # Errors
+    /// The device binds less, and somebody else is to answer then.
+    fn may_cut(&self, scene: &Scene, frame: &Frame) -> Result<(), Error> {
+        let (needed, most) = (self.world.weigh(scene, frame).binding(), self.most());
+        if self.options.in_pieces || needed <= most.binding {
+            return Ok(());
+        }
+        Err(Error::Gpu {
+            what: format!(
+                "{} binds at most {} bytes at once, but {needed} bytes are needed",
+                self.gpu.name(),
+                most.binding
+            ),
         })
     }
 

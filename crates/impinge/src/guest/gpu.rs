@@ -76,6 +76,7 @@ impl Host {
             group_size: 64,
             recluster: false,
             memory_budget,
+            in_pieces: false,
         };
         let first = first.unwrap_or_default();
         Ok(Host {
