@@ -165,7 +165,8 @@ impl Engine {
         }
         let start = Instant::now();
         let recluster = self.reclusters();
-        self.world.cluster(scene, frame, &[], recluster, stats);
+        let clusterings = &mut self.world.clusterings;
+        clusterings.update(scene, frame, &[], recluster, stats);
         if !self.is_held(scene, frame) && self.falls_back() {
             self.take_clusters(frame);
         }

@@ -6,6 +6,7 @@
 //! blocks but [`device::Gpu::block_on`].
 
 mod bounds;
+mod clusterings;
 mod clusters;
 mod collect;
 mod device;

@@ -21,8 +21,9 @@
 use rayon::prelude::*;
 
 use super::buffers::count;
+use super::clusterings::bounds_of;
 use super::topology::{Most, Topology, Weight};
-use super::world::{bounds_of, narrowed};
+use super::world::narrowed;
 use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;

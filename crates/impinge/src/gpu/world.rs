@@ -19,13 +19,13 @@ use std::sync::Arc;
 
 use crate::error::Error;
 use crate::frame::Frame;
-use crate::grouping::bounds::{Bounds, round_down, round_up};
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
 use crate::scene::{BodyId, Filter, Positions, Scene};
 use crate::stats::Statistics;
 
 use super::buffers::{Storage, count};
+use super::clusterings::Clusterings;
 use super::device::Gpu;
 use super::forest::Forest;
 use super::layout::{
@@ -38,24 +38,6 @@ use super::topology::{Topology, Weight};
 pub const MOST_PRIMITIVES: u64 = 1 << 31;
 /// How many keys the boxes of rounded positions are widened: see `boxes.wgsl`.
 const SLACK: u32 = 2;
-/// How much the clusters' surface may grow against the body's before it is clustered again.
-const STALE: f64 = 1.5;
-/// Clusters that are looked at to judge how well a body's clusters fit its pose.
-const SAMPLES: usize = 64;
-
-/// The clusters of a body, kept while its topology stays and they fit its pose.
-#[derive(Debug)]
-struct Cached {
-    topology_stamp: u64,
-    /// No two clusterings of a detector have the same.
-    number: u64,
-    /// The positions that were judged last.
-    judged_stamp: u64,
-    /// Surface of the sampled clusters over that of all of them together, at its best so far.
-    best_spread: f64,
-    clustering: Arc<Clustering>,
-}
-
 /// One participant on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Resident {
@@ -71,8 +53,7 @@ struct Resident {
 /// Everything about the participants that the kernels read.
 #[derive(Debug)]
 pub struct World {
-    caches: Vec<Option<Box<Cached>>>,
-    n_clusterings: u64,
+    pub clusterings: Clusterings,
     residents: Vec<Resident>,
     /// What the device has of the nodes, without the boxes.
     forest: Forest,
@@ -96,8 +77,7 @@ pub struct World {
 impl World {
     pub(crate) fn new() -> Self {
         World {
-            caches: Vec::new(),
-            n_clusterings: 0,
+            clusterings: Clusterings::default(),
             residents: Vec::new(),
             forest: Forest::default(),
             bodies_sent: Vec::new(),
@@ -155,7 +135,8 @@ impl World {
                 limit: MOST_PRIMITIVES,
             });
         }
-        self.cluster(scene, frame, resident, recluster, stats);
+        self.clusterings
+            .update(scene, frame, resident, recluster, stats);
         let mut is_other = false;
         if !self.is_resident(frame) {
             // Half a topology must not pass for a whole one if an upload fails.
@@ -169,56 +150,10 @@ impl World {
         Ok(is_other)
     }
 
-    /// Clusters bodies that are new or were re-meshed, and those that have flowed away from their clusters;
-    /// forgets those that are gone. Of `resident` bodies the host does not know the pose, so they
-    /// are not judged.
-    pub fn cluster(
-        &mut self,
-        scene: &Scene,
-        frame: &Frame,
-        resident: &[BodyId],
-        recluster: bool,
-        stats: &mut Statistics,
-    ) {
-        let n_slots = frame
-            .participants
-            .last()
-            .map_or(0, |last| last.id.index() + 1);
-        if self.caches.len() < n_slots {
-            self.caches.resize_with(n_slots, || None);
-        }
-        if self.caches.len() > scene.n_bodies() {
-            for (slot, cache) in self.caches.iter_mut().enumerate() {
-                if !scene.holds(slot) {
-                    *cache = None;
-                }
-            }
-        }
-        for (ix, participant) in frame.participants.iter().enumerate() {
-            let body = frame.body(scene, ix);
-            let cache = &mut self.caches[participant.id.index()];
-            let known = cache
-                .as_mut()
-                .filter(|cache| cache.topology_stamp == body.topology_stamp());
-            if let Some(cache) = known {
-                let is_judged = !recluster
-                    || cache.judged_stamp == body.positions_stamp()
-                    || resident.contains(&participant.id);
-                if is_judged || !cache.is_stale(body) {
-                    continue;
-                }
-                stats.n_reclustered += 1;
-            }
-            stats.n_clustered += 1;
-            self.n_clusterings += 1;
-            *cache = Some(Box::new(Cached::new(body, self.n_clusterings)));
-        }
-    }
-
     fn is_resident(&self, frame: &Frame) -> bool {
         self.residents.len() == frame.participants.len()
             && self.residents.iter().enumerate().all(|(ix, resident)| {
-                let cache = self.caches[resident.id.index()].as_ref();
+                let cache = self.clusterings.of(resident.id);
                 resident.id == frame.participants[ix].id
                     && cache.is_some_and(|cache| cache.number == resident.number)
             })
@@ -229,7 +164,7 @@ impl World {
             .participants
             .iter()
             .map(|participant| {
-                let cache = self.caches[participant.id.index()].as_ref();
+                let cache = self.clusterings.of(participant.id);
                 let cache = cache.expect("just clustered");
                 (cache.number, Arc::clone(&cache.clustering))
             })
@@ -326,16 +261,15 @@ impl World {
     /// Gives all buffers back. What is known of clusters stays.
     pub fn forget_buffers(&mut self) {
         *self = World {
-            caches: std::mem::take(&mut self.caches),
-            n_clusterings: self.n_clusterings,
+            clusterings: std::mem::take(&mut self.clusterings),
             ..World::new()
         };
     }
 
     /// The clusters of a participant, which are known.
     pub(crate) fn clustering(&self, frame: &Frame, participant_ix: usize) -> &Clustering {
-        let slot = frame.participants[participant_ix].id.index();
-        let cache = self.caches[slot].as_ref();
+        let id = frame.participants[participant_ix].id;
+        let cache = self.clusterings.of(id);
         &cache.expect("just clustered").clustering
     }
 
@@ -582,61 +516,4 @@ fn sample(scene: &Scene, frame: &Frame, ix: usize) -> [f32; 3] {
     let body = frame.body(scene, ix);
     let vertex = body.elements().corners(0)[0];
     body.positions().point(vertex as usize).map(|x| x as f32)
-}
-
-impl Cached {
-    fn new(body: &crate::scene::Body, number: u64) -> Self {
-        let (elements, positions) = (body.elements(), body.positions());
-        let clustering = Clustering::new(elements, |primitive| {
-            bounds_of(positions, elements.corners(primitive))
-        });
-        Cached {
-            topology_stamp: body.topology_stamp(),
-            number,
-            judged_stamp: body.positions_stamp(),
-            best_spread: spread(&clustering, positions),
-            clustering: Arc::new(clustering),
-        }
-    }
-
-    /// Whether the body has flowed away from its clusters.
-    fn is_stale(&mut self, body: &crate::scene::Body) -> bool {
-        self.judged_stamp = body.positions_stamp();
-        let spread = spread(&self.clustering, body.positions());
-        let is_stale = spread > STALE * self.best_spread;
-        self.best_spread = self.best_spread.min(spread);
-        is_stale
-    }
-}
-
-/// The surface of evenly spaced clusters over that of the box that holds them: how well the clusters fit
-/// the pose at hand. Both ends of the ratio come from the same clusters, in every frame.
-fn spread(clustering: &Clustering, positions: &Positions) -> f64 {
-    let n = clustering.n_clusters();
-    let n_samples = n.min(SAMPLES);
-    let mut whole = Bounds::EMPTY;
-    let mut sum = 0.0;
-    for sample in 0..n_samples {
-        let bounds = bounds_of(positions, clustering.vertices(sample * n / n_samples));
-        sum += bounds.half_area();
-        whole.join(&bounds);
-    }
-    let whole = whole.half_area();
-    if whole > 0.0 && sum.is_finite() {
-        sum / whole
-    } else {
-        1.0
-    }
-}
-
-pub fn bounds_of(positions: &Positions, corners: &[u32]) -> Bounds {
-    let mut bounds = Bounds::EMPTY;
-    for &corner in corners {
-        let point = positions.point(corner as usize);
-        bounds.join(&Bounds {
-            min: point.map(round_down),
-            max: point.map(round_up),
-        });
-    }
-    bounds
 }
