@@ -45,3 +45,12 @@ pub use stats::{Stage, Statistics};
 /// The GPU interface that [`Detector::with_device`] and [`Detector::encode`] speak.
 #[cfg(feature = "gpu")]
 pub use wgpu;
+
+// What users hold may be moved to, and lent to, other threads.
+const _: () = {
+    const fn threads_may_share<T: Send + Sync>() {}
+    threads_may_share::<Detector>();
+    threads_may_share::<Scene>();
+    threads_may_share::<Pairs>();
+    threads_may_share::<Query>();
+};

@@ -103,7 +103,7 @@ impl Tile {
 }
 
 /// A plan of passes that work in cells: this method's, or one from outside.
-pub trait InCells: fmt::Debug + Send {
+pub trait InCells: fmt::Debug + Send + Sync {
     /// The stages on the device, in order: the names of their times.
     fn stages(&self) -> &'static [&'static str];
 
