@@ -1,6 +1,6 @@
 //! The commands: which problems, which contestants, which tables.
 
-use impinge::{Backend, Detector, Method, Settings};
+use impinge::{Backend, Method, Settings};
 use impinge_scenes::deform::Wave;
 use impinge_scenes::{BuiltScene, Model, adversarial, surfaces};
 
@@ -127,34 +127,13 @@ fn contest(
     )
 }
 
-/// The number of pairs by the oracle, for problems small enough for it.
-pub fn by_oracle(problem: Problem) -> Result<Problem, Failure> {
-    const MAX_PRIMITIVES: usize = 60_000;
-    if problem.expected.is_some() || problem.n_primitives() > MAX_PRIMITIVES {
-        return Ok(problem);
-    }
-    let (scene, _, query) = problem.scene()?;
-    let mut oracle = Detector::with_settings(settings_of_oracle())?;
-    let n_pairs = oracle.detect(&scene, &query)?.len() as u64;
-    let about = format!("{}; pairs counted by the oracle in this run", problem.about);
-    Ok(problem.about(about).expecting(Some(n_pairs)))
-}
-
-fn settings_of_oracle() -> Settings {
-    Settings {
-        method: Method::Naive,
-        backend: Backend::Cpu,
-        ..Settings::default()
-    }
-}
-
 fn two_body(options: &Options, report: &mut Report) -> Result<(), Failure> {
     let scenes = match &options.scene {
         Some(scene) => vec![scene.as_str()],
         None => vec!["ball", "bunny", "buddha", "dragon"],
     };
     for scene in scenes {
-        let problem = by_oracle(files::two_body(scene)?)?;
+        let problem = files::two_body(scene)?.by_oracle()?;
         report.contest(&contest(
             &problem,
             options,
@@ -167,7 +146,7 @@ fn two_body(options: &Options, report: &mut Report) -> Result<(), Failure> {
 }
 
 fn within(options: &Options, report: &mut Report) -> Result<(), Failure> {
-    let problem = by_oracle(files::within(options.scene.as_deref().unwrap_or("dragon"))?)?;
+    let problem = files::within(options.scene.as_deref().unwrap_or("dragon"))?.by_oracle()?;
     report.contest(&contest(
         &problem,
         options,
@@ -179,7 +158,7 @@ fn within(options: &Options, report: &mut Report) -> Result<(), Failure> {
 }
 
 fn tets(options: &Options, report: &mut Report) -> Result<(), Failure> {
-    let problem = by_oracle(files::tets()?)?;
+    let problem = files::tets()?.by_oracle()?;
     report.contest(&contest(
         &problem,
         options,
@@ -215,9 +194,9 @@ fn bodies(options: &Options, report: &mut Report) -> Result<(), Failure> {
         }
         let models = models(adversarial::boxes(n_bodies, 1)?)?;
         let name = format!("{} bodies", grouped(n_bodies as u64));
-        let problem = by_oracle(Problem::mirrored(&name, models, Ask::All).about(
+        let problem = Problem::mirrored(&name, models, Ask::All).about(
             "cubes of 12 triangles placed and turned at random; frames alternate with the mirror image",
-        ))?;
+        ).by_oracle()?;
         let frames = if n_bodies > 10_000 { 10 } else { 40 };
         report.contest(&contest(
             &problem,

@@ -9,7 +9,6 @@ use impinge::wgpu::{self, util::DeviceExt};
 use impinge::{Backend, Detector, DeviceInfo, Method, Settings, Statistics, devices};
 use serde_json::json;
 
-use crate::commands::by_oracle;
 use crate::problem::{Ask, Problem};
 use crate::report::{Report, figures, grouped};
 use crate::{Failure, Options, files};
@@ -65,7 +64,7 @@ pub fn scenes(options: &Options, report: &mut Report) -> Result<(), Failure> {
         problems.push(files::within("dragon")?);
     }
     for problem in problems {
-        let problem = by_oracle(problem)?;
+        let problem = problem.by_oracle()?;
         for method in [Method::Clusters, Method::Cells] {
             if method == Method::Clusters || options.cells {
                 row(&problem, method, options, &rates, report)?;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use impinge::{Elements, Query, Scene};
+use impinge::{Backend, Detector, Elements, Method, Query, Scene, Settings};
 use impinge_scenes::Model;
 use impinge_scenes::deform::Deform;
 
@@ -103,6 +103,23 @@ impl Problem {
     pub fn expecting(mut self, n_pairs: Option<u64>) -> Problem {
         self.expected = n_pairs;
         self
+    }
+
+    /// With the number of pairs by the oracle, where that is not known and the problem small enough for it.
+    pub fn by_oracle(self) -> Result<Problem, Failure> {
+        const MAX_PRIMITIVES: usize = 60_000;
+        if self.expected.is_some() || self.n_primitives() > MAX_PRIMITIVES {
+            return Ok(self);
+        }
+        let (scene, _, query) = self.scene()?;
+        let mut oracle = Detector::with_settings(Settings {
+            method: Method::Naive,
+            backend: Backend::Cpu,
+            ..Settings::default()
+        })?;
+        let n_pairs = oracle.detect(&scene, &query)?.len() as u64;
+        let about = format!("{}; pairs counted by the oracle in this run", self.about);
+        Ok(self.about(about).expecting(Some(n_pairs)))
     }
 
     /// Primitives of all bodies.

@@ -67,6 +67,7 @@ fn counters(stats: &Statistics) -> Value {
         "n_clustered": stats.n_clustered,
         "n_reclustered": stats.n_reclustered,
         "n_slabs": stats.n_slabs,
+        "n_pieces": stats.n_pieces,
         "n_reruns": stats.n_reruns,
         "bytes_held": stats.bytes_held,
     })

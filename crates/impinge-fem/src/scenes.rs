@@ -94,6 +94,15 @@ pub fn drop_scene(name: SceneName) -> Result<DropScene, Error> {
     build(name, mesh.as_deref())
 }
 
+/// The same scene with a mesh of the caller's: a file of tetrahedra.
+///
+/// # Errors
+/// A file that can't be read, or holds no tetrahedra.
+pub fn drop_scene_of(path: &Path) -> Result<DropScene, Error> {
+    let label = path.display().to_string();
+    Ok(dropped(load(path, SOFT)?, label, false))
+}
+
 /// The scene with a mesh from a file, or without one.
 fn build(name: SceneName, mesh: Option<&Path>) -> Result<DropScene, Error> {
     let (solid, label, is_stand_in) = match name.file() {
@@ -111,6 +120,11 @@ fn build(name: SceneName, mesh: Option<&Path>) -> Result<DropScene, Error> {
             }
         },
     };
+    Ok(dropped(solid, label, is_stand_in))
+}
+
+/// A solid, and its copy above it.
+fn dropped(solid: Solid, label: String, is_stand_in: bool) -> DropScene {
     let solid = normalised(solid);
     let label = format!("{label}, {} tetrahedra, twice", solid.tets.len());
     let top = solid.rest.iter().fold(0.0, |top: f64, p| top.max(p[1]));
@@ -120,7 +134,7 @@ fn build(name: SceneName, mesh: Option<&Path>) -> Result<DropScene, Error> {
         .clone()
         .posed(|[x, y, z]| [cos * x + sin * z, y + top + 0.05, cos * z - sin * x])
         .moving([0.0, -2.0, 0.0]);
-    Ok(DropScene {
+    DropScene {
         label,
         is_stand_in,
         solids: vec![solid, upper],
@@ -139,7 +153,7 @@ fn build(name: SceneName, mesh: Option<&Path>) -> Result<DropScene, Error> {
             ..Settings::default()
         },
         n_steps: 240,
-    })
+    }
 }
 
 /// Reads a solid from a file of tetrahedra; vertices that no tetrahedron names are dropped.

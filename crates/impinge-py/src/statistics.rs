@@ -116,6 +116,13 @@ impl Statistics {
         self.inner.n_slabs
     }
 
+    /// int : GPU: pieces that a scene was cut into because the device or the budget could not hold it
+    /// whole; 0 if it was not.
+    #[getter]
+    fn n_pieces(&self) -> u64 {
+        self.inner.n_pieces
+    }
+
     /// int : stages that were run again because a buffer had to grow.
     #[getter]
     fn n_reruns(&self) -> u64 {
@@ -151,6 +158,7 @@ impl Statistics {
         all.set_item("n_clustered", self.n_clustered())?;
         all.set_item("n_reclustered", self.n_reclustered())?;
         all.set_item("n_slabs", self.n_slabs())?;
+        all.set_item("n_pieces", self.n_pieces())?;
         all.set_item("n_reruns", self.n_reruns())?;
         all.set_item("bytes_held", self.bytes_held())?;
         Ok(all)

@@ -271,8 +271,8 @@ pub fn stand_in(n_triangles: usize) -> Model {
     torus_knot(n_triangles, Knot::default())
 }
 
-/// Moves the box's middle to the origin and scales its diagonal to 1.
-fn unit_diagonal(model: Model) -> Model {
+/// The mesh with its box's middle moved to the origin and the box's diagonal scaled to 1.
+pub fn unit_diagonal(model: Model) -> Model {
     let Some((min, max)) = model.bounds() else {
         return model;
     };

@@ -26,9 +26,10 @@ mod pairs;
 mod progress;
 mod query;
 mod scene;
+mod settings;
 mod stats;
 
-pub use detector::{Backend, Detector, InstructionSet, Method, Recluster, Settings};
+pub use detector::Detector;
 pub use error::Error;
 #[cfg(feature = "gpu")]
 #[doc(hidden)]
@@ -39,7 +40,17 @@ pub use pairs::{Pairs, Primitive, hash_rows};
 pub use progress::{CancelToken, Control, Progress};
 pub use query::{Query, SharedVertex};
 pub use scene::{Body, BodyId, Elements, Filter, Kind, Positions, Real, Scene};
+pub use settings::{Backend, InstructionSet, Method, Recluster, Settings};
 pub use stats::{Stage, Statistics};
 /// The GPU interface that [`Detector::with_device`] and [`Detector::encode`] speak.
 #[cfg(feature = "gpu")]
 pub use wgpu;
+
+// What users hold may be moved to, and lent to, other threads.
+const _: () = {
+    const fn threads_may_share<T: Send + Sync>() {}
+    threads_may_share::<Detector>();
+    threads_may_share::<Scene>();
+    threads_may_share::<Pairs>();
+    threads_may_share::<Query>();
+};

@@ -45,6 +45,9 @@ pub struct Statistics {
     pub n_reclustered: u64,
     /// Runs over parts of the work, 1 when the memory budget allowed for all at once.
     pub n_slabs: u64,
+    /// GPU: pieces that the scene was answered in because the device or the memory budget cannot hold all of
+    /// it; 0 when it can.
+    pub n_pieces: u64,
     /// Stages that were run again because a buffer had to grow.
     pub n_reruns: u64,
     /// Bytes that the detector holds, the answer not counted.

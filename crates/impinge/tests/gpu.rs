@@ -10,9 +10,10 @@ use std::sync::{Mutex, OnceLock};
 
 use common::{Case, agree, cases, check, naive, rows};
 use impinge::{
-    Backend, Capacities, Detector, Error, Method, Query, Scene, Settings, SharedVertex, devices,
-    wgpu,
+    Backend, Capacities, Detector, Error, Method, Query, Recluster, Scene, Settings, SharedVertex,
+    devices, wgpu,
 };
+use impinge_scenes::deform::{self, Deform};
 use impinge_scenes::{soup, surfaces};
 
 /// Settings for the GPU. The first call opens a device and keeps it open, so that all tests share
@@ -87,31 +88,89 @@ fn one_detector_answers_scene_after_scene() {
     }
 }
 
+/// Settings of `Cells` that put everything into one cell, in groups of a few.
+fn one_cell(group_size: u32) -> Settings {
+    Settings {
+        lambda: 1e-9,
+        group_size,
+        ..gpu(Method::Cells)
+    }
+}
+
 #[test]
-fn a_cell_too_crowded_for_one_pass_is_refused_by_name() {
-    // One cell and groups of one primitive: more work items than one invocation may write.
+fn a_crowded_cell_is_worked_in_tiles() {
+    // Groups of one primitive: more pairs of groups than a pass lists of one cell.
     let soup = soup::triangles(300, 0.4, 11);
+    let web = soup::lattice_web(290, 4, 9);
     let mut scene = Scene::new();
     let id = soup.add_to(&mut scene).unwrap();
-    let mut detector = Detector::with_settings(Settings {
-        lambda: 1e-9,
-        group_size: 1,
-        ..gpu(Method::Cells)
-    })
-    .unwrap();
-    let error = detector.detect(&scene, &Query::within(id)).unwrap_err();
-    assert!(
-        error.to_string().contains("the primitives of one cell"),
-        "{error}"
-    );
-    // The detector goes on with a question that it can answer.
+    let within = Query::within(id);
+    let mut both = scene.clone();
+    web.add_to(&mut both).unwrap();
+    let everything = Query::everything().shared_vertex(SharedVertex::Resolve);
+    for (scene, query) in [
+        (&scene, within),
+        (&both, everything.clone()),
+        (&both, Query::all()),
+    ] {
+        let case = Case {
+            name: format!("crowded {query:?}"),
+            scene: scene.clone(),
+            query,
+        };
+        let expected = naive(&case);
+        check(&case, &expected, one_cell(1));
+        let mut detector = Detector::with_settings(one_cell(1)).unwrap();
+        let pairs = detector.detect(&case.scene, &case.query).unwrap();
+        let (stats, n) = (pairs.stats(), pairs.stats().n_entries);
+        assert_eq!((stats.method, stats.grid), ("cells", Some([1; 3])));
+        assert!(n >= 300, "{stats:?}");
+        assert_eq!(stats.n_work_items, n * (n + 1) / 2);
+        assert!(stats.n_slabs > 1, "{stats:?}");
+    }
+    // Buffers that grow between tiles leave the list alone.
+    let mut tiny = Capacities::default();
+    (tiny.items, tiny.candidates, tiny.pairs, tiny.unsure) = (1, 1, 1, 1);
+    (tiny.kept, tiny.entries) = (1, 1);
     let case = Case {
-        name: "clusters of the same".into(),
-        scene,
-        query: Query::within(id),
+        name: "crowded".into(),
+        scene: both,
+        query: everything,
     };
-    let mut detector = Detector::with_settings(gpu(Method::Clusters)).unwrap();
-    assert_agree("crowded", &naive(&case), &mut detector, &case);
+    let expected = naive(&case);
+    let mut detector = Detector::with_capacities(one_cell(1), tiny).unwrap();
+    for _ in 0..2 {
+        assert_agree("tiny", &expected, &mut detector, &case);
+    }
+}
+
+#[test]
+fn a_crowded_cell_keeps_to_the_budget_or_is_left_to_clusters() {
+    let case = large();
+    let mut cpu = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+    let expected = rows(cpu.detect(&case.scene, &case.query).unwrap());
+    for (budget, method) in [
+        (None, "cells"),
+        (Some(1_000_000), "cells"),
+        (Some(700_000), "clusters"),
+    ] {
+        let settings = Settings {
+            memory_budget: budget,
+            ..one_cell(20)
+        };
+        let mut detector = Detector::with_settings(settings).unwrap();
+        let pairs = detector.detect(&case.scene, &case.query).unwrap();
+        agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+        let stats = pairs.stats();
+        assert_eq!(stats.method, method, "{budget:?} {stats:?}");
+        assert!(stats.bytes_held <= budget.unwrap_or(u64::MAX), "{stats:?}");
+        assert!(stats.n_slabs > 1, "{stats:?}");
+        // A frame with less in it goes back to the method that was asked for.
+        let mut small = Scene::new();
+        let id = soup::triangles(50, 0.4, 1).add_to(&mut small).unwrap();
+        let pairs = detector.detect(&small, &Query::within(id)).unwrap();
+        assert_eq!(pairs.stats().method, "cells");
+    }
 }
 
 /// 2,000 primitives a body, enough for several rounds and thousands of pairs.
@@ -200,7 +259,7 @@ fn a_memory_budget_is_kept_by_working_in_slabs() {
     assert_agree("free", &expected, &mut free, &case);
     for method in [Method::Clusters, Method::Cells] {
         let mut seen_slabs = false;
-        for budget in [2_500_000, 1_500_000, 1_000_000] {
+        for budget in [1_500_000, 1_000_000, 700_000, 300_000] {
             let mut detector = Detector::with_settings(Settings {
                 memory_budget: Some(budget),
                 ..gpu(method)
@@ -209,7 +268,9 @@ fn a_memory_budget_is_kept_by_working_in_slabs() {
             assert_agree("budget", &expected, &mut detector, &case);
             let pairs = detector.detect(&case.scene, &case.query).unwrap();
             assert!(pairs.stats().bytes_held <= budget, "{:?}", pairs.stats());
-            seen_slabs |= pairs.stats().n_slabs > 1;
+            let stats = pairs.stats();
+            seen_slabs |= stats.n_slabs > 1 && stats.n_pieces == 0;
+            assert_eq!(stats.n_pieces > 0, budget == 300_000, "{stats:?}");
         }
         assert!(seen_slabs, "{method:?}");
         let mut detector = Detector::with_settings(Settings {
@@ -221,6 +282,114 @@ fn a_memory_budget_is_kept_by_working_in_slabs() {
             detector.detect(&case.scene, &case.query),
             Err(Error::MemoryBudget { .. })
         ));
+    }
+}
+
+#[test]
+fn what_is_more_than_the_device_binds_is_answered_in_pieces() {
+    let mut n_many = 0;
+    for (ix, case) in cases().into_iter().enumerate() {
+        let expected = naive(&case);
+        let method = [Method::Clusters, Method::Cells][ix % 2];
+        // A cluster takes up to 3 KiB of positions.
+        for most_bound in [1, 8 << 10, 20 << 10] {
+            let mut detector = Detector::with_most_bound(gpu(method), most_bound).unwrap();
+            assert_agree("in pieces", &expected, &mut detector, &case);
+            let pairs = detector.detect(&case.scene, &case.query).unwrap();
+            n_many += u64::from(pairs.stats().n_pieces > 3);
+        }
+    }
+    assert!(n_many > 50, "{n_many}");
+}
+
+#[test]
+fn auto_takes_the_cpu_where_the_gpu_would_need_pieces() {
+    let case = cases().swap_remove(0);
+    let settings = Settings {
+        backend: Backend::Auto,
+        device: Some(devices()[0].name.clone()),
+        ..gpu(Method::Clusters)
+    };
+    let answer = |most_bound| {
+        let mut detector = Detector::with_most_bound(settings.clone(), most_bound).unwrap();
+        assert_agree("auto", &naive(&case), &mut detector, &case);
+        let pairs = detector.detect(&case.scene, &case.query).unwrap();
+        pairs.stats().backend.clone()
+    };
+    assert_eq!(answer(8 << 10), "cpu");
+    assert_ne!(answer(u64::MAX), "cpu");
+}
+
+#[test]
+fn pieces_keep_to_filters_ignored_pairs_and_frames() {
+    let mut scene = Scene::new();
+    let knot = surfaces::torus_knot(1500, Default::default());
+    let web = soup::lattice_web_tetrahedra(300, 4, 3);
+    let a = knot.add_to(&mut scene).unwrap();
+    let b = knot.translated([0.1, 0.2, 0.3]);
+    let b = scene
+        .add(b.elements.clone(), b.positions_f64())
+        .expect("valid");
+    let c = web.add_to(&mut scene).unwrap();
+    let d = soup::triangles(400, 0.4, 7).add_to(&mut scene).unwrap();
+    let filter = |category, mask| impinge::Filter { category, mask };
+    scene.set_filter(c, filter(2, 1)).unwrap();
+    scene.set_filter(d, filter(4, 5)).unwrap();
+    let queries = [
+        Query::all(),
+        Query::all().ignore(a, b),
+        Query::everything().shared_vertex(SharedVertex::Resolve),
+        Query::everything().ignore(c, c).ignore(b, a),
+        Query::between(c, d),
+        Query::within(c).shared_vertex(SharedVertex::Resolve),
+    ];
+    let budget = |memory_budget| Settings {
+        memory_budget,
+        ..gpu(Method::Clusters)
+    };
+    let mut detectors = [
+        Detector::with_most_bound(budget(None), 16 << 10).unwrap(),
+        Detector::with_most_bound(budget(Some(400_000)), 24 << 10).unwrap(),
+        Detector::with_settings(budget(Some(250_000))).unwrap(),
+    ];
+    let mut sizes = std::collections::BTreeSet::new();
+    for frame in 0..2 {
+        for query in &queries {
+            let case = Case {
+                name: format!("{query:?} in frame {frame}"),
+                scene: scene.clone(),
+                query: query.clone(),
+            };
+            let expected = naive(&case);
+            sizes.insert(expected.len());
+            for detector in &mut detectors {
+                let pairs = detector.detect(&case.scene, &case.query).unwrap();
+                if let Err(error) = agree(&expected, &rows(pairs), pairs.hash()) {
+                    panic!("{}: {error}", case.name);
+                }
+                let stats = pairs.stats().clone();
+                let budget = detector.settings().memory_budget;
+                assert!(stats.bytes_held <= budget.unwrap_or(u64::MAX), "{stats:?}");
+                if *query == queries[0] {
+                    assert!(stats.n_pieces > 3, "{stats:?}");
+                }
+            }
+        }
+        let moved = knot.translated([0.3, 0.0, 0.1]);
+        scene.set_positions(a, &moved.positions).unwrap();
+    }
+    assert!(sizes.len() > 6, "{sizes:?}");
+    // A scene that fits is answered at once again, and one that does not in pieces again.
+    let small = cases().swap_remove(4);
+    let expected = naive(&small);
+    for detector in &mut detectors {
+        for _ in 0..2 {
+            assert_agree("at once", &expected, detector, &small);
+            let pairs = detector.detect(&small.scene, &small.query).unwrap();
+            assert_eq!(pairs.stats().n_pieces, 0, "{:?}", pairs.stats());
+            let pairs = detector.detect(&scene, &queries[0]).unwrap();
+            assert!(pairs.stats().n_pieces > 3);
+        }
     }
 }
 
@@ -253,6 +422,67 @@ fn few_pairs_are_left_to_exact_arithmetic() {
     assert!(stats.n_candidates > 500, "{stats:?}");
     assert!(100 * stats.n_unsure < stats.n_candidates, "{stats:?}");
     assert!(!stats.backend.is_empty() && stats.backend != "cpu");
+}
+
+/// Triangles over a few vertices: nearly all share one with many others, some two or three.
+fn web(n: u32, n_vertices: u32, seed: u64) -> impinge_scenes::Model {
+    let mut state = seed;
+    let mut next = |below: u32| {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1);
+        ((state >> 33) % u64::from(below)) as u32
+    };
+    let mut model = soup::triangles(n_vertices as usize / 3, 1.0, seed);
+    let faces: Vec<[u32; 3]> = (0..n)
+        .map(|_| {
+            let a = next(n_vertices);
+            let b = (a + 1 + next(n_vertices - 2)) % n_vertices;
+            let c = (0..).map(|_| next(n_vertices)).find(|&c| c != a && c != b);
+            [a, b, c.unwrap()]
+        })
+        .collect();
+    model.elements = faces.into();
+    model
+}
+
+#[test]
+fn neighbours_are_settled_on_the_device() {
+    let model = web(500, 60, 5);
+    let folded = soup::lattice_web(400, 3, 2);
+    // Nearly coplanar, nearly touching.
+    let nearly = web(400, 60, 6).mapped(|p| p.map(|x| (2.0 * x).round() + 1e-6 * x));
+    let closed = surfaces::bumpy_ball(3000, 0.3);
+    for (name, model, most_unsure) in [
+        ("web", &model, 0.02),
+        ("lattice", &folded, 1.0),
+        ("nearly degenerate", &nearly, 1.0),
+        ("closed surface", &closed, 0.01),
+    ] {
+        for double in [false, true] {
+            let mut scene = Scene::new();
+            let id = match double {
+                false => model.add_to(&mut scene),
+                true => {
+                    let positions = model.positions_f64().into_iter();
+                    let moved = positions.map(|p| p.map(|x| x * (1.0 + 1e-9)));
+                    scene.add(model.elements.clone(), moved.collect::<Vec<_>>())
+                }
+            };
+            let case = Case {
+                name: format!("{name}, f64: {double}"),
+                scene,
+                query: Query::within(id.unwrap()).shared_vertex(SharedVertex::Resolve),
+            };
+            let expected = naive(&case);
+            for method in [Method::Clusters, Method::Cells] {
+                let mut detector = Detector::with_settings(gpu(method)).unwrap();
+                assert_agree("neighbours", &expected, &mut detector, &case);
+                let pairs = detector.detect(&case.scene, &case.query).unwrap();
+                let stats = pairs.stats();
+                let share = stats.n_unsure as f64 / stats.n_candidates as f64;
+                assert!(share <= most_unsure, "{}: {stats:?}", case.name);
+            }
+        }
+    }
 }
 
 #[test]
@@ -329,6 +559,86 @@ fn frames_follow_positions_bodies_and_precision() {
     assert!(compare(&scene, Query::between(a, c)) > 0);
     scene.remove(a).unwrap();
     compare(&scene, Query::all());
+}
+
+#[test]
+fn topology_that_changes_within_its_room_is_bound_anew() {
+    for method in [Method::Clusters, Method::Cells] {
+        let mut detector = Detector::with_settings(gpu(method)).unwrap();
+        let mut scene = Scene::new();
+        let a = surfaces::ball(100).add_to(&mut scene).unwrap();
+        let b = surfaces::ball(100).add_to(&mut scene).unwrap();
+        // Larger, larger within the quarter to spare, smaller and solid.
+        let solids = soup::tetrahedra(500, 0.3, 1);
+        for model in [
+            surfaces::ball(1000),
+            surfaces::ball(2000),
+            surfaces::ball(2300),
+            solids,
+        ] {
+            let (elements, positions) = (&model.elements, &model.positions);
+            for id in [a, b] {
+                scene
+                    .remesh(id, elements.clone(), positions.clone())
+                    .unwrap();
+            }
+            let shifted = model.translated([0.1, 0.03, 0.2]);
+            scene.set_positions(b, &shifted.positions).unwrap();
+            let case = Case {
+                name: format!("{method:?} of {}", model.n_primitives()),
+                scene: scene.clone(),
+                query: Query::everything(),
+            };
+            assert_agree("remeshed", &naive(&case), &mut detector, &case);
+        }
+    }
+}
+
+#[test]
+fn bodies_that_flow_away_are_clustered_again() {
+    let rest = surfaces::ball(20_000);
+    let other = rest.translated([0.4, 0.0, 0.0]);
+    let mut scene = Scene::new();
+    let a = rest.add_to(&mut scene).unwrap();
+    // One body in each precision.
+    let b = scene.add(other.elements.clone(), other.positions_f64());
+    let query = Query::between(a, b.unwrap());
+    let mut auto = Detector::with_settings(gpu(Method::Clusters)).unwrap();
+    let mut never = Detector::with_settings(Settings {
+        recluster: Recluster::Never,
+        ..gpu(Method::Clusters)
+    })
+    .unwrap();
+    let mut oracle = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+    assert_eq!(auto.detect(&scene, &query).unwrap().stats().n_clustered, 2);
+    never.detect(&scene, &query).unwrap();
+    // A body that moves and bends a little keeps its clusters.
+    scene
+        .set_positions(
+            a,
+            &rest
+                .mapped(|[x, y, z]| [x + 0.1, y + 0.1 * x * x, z])
+                .positions,
+        )
+        .unwrap();
+    let slightly = auto.detect(&scene, &query).unwrap();
+    assert_eq!(slightly.stats().n_clustered, 0);
+    let mut flowed = rest.positions.clone();
+    deform::Flow::default().apply(&rest.positions, 40.0, &mut flowed);
+    scene.set_positions(a, &flowed).unwrap();
+    let by_auto = auto.detect(&scene, &query).unwrap();
+    let by_never = never.detect(&scene, &query).unwrap();
+    assert!(by_auto.same_as(oracle.detect(&scene, &query).unwrap()));
+    assert!(by_auto.same_as(by_never) && !by_auto.is_empty());
+    assert_eq!(by_auto.stats().n_clustered, 1);
+    assert_eq!(by_auto.stats().n_reclustered, 1);
+    assert_eq!(by_never.stats().n_reclustered, 0);
+    assert!(by_auto.stats().n_work_items < by_never.stats().n_work_items);
+    // The next frame has nothing to repair.
+    scene.set_positions(a, &flowed).unwrap();
+    let after = auto.detect(&scene, &query).unwrap();
+    assert_eq!(after.stats().n_reclustered, 0);
+    assert!(after.same_as(oracle.detect(&scene, &query).unwrap()));
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod demo;
 #[cfg(feature = "gpu")]
 mod devices;
 mod harness;
+mod paper;
 #[cfg(feature = "gpu")]
 mod render;
 mod sequence;

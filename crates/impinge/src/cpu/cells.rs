@@ -17,12 +17,12 @@
 
 use std::time::Instant;
 
-use crate::detector::InstructionSet;
 use crate::error::Error;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::{FineRange, Grid};
 use crate::progress::Control;
 use crate::query::SharedVertex;
+use crate::settings::InstructionSet;
 use crate::stats::Statistics;
 
 use super::Job;

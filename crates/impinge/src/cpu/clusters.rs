@@ -15,11 +15,11 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use crate::detector::{InstructionSet, Recluster};
 use crate::error::Error;
 use crate::grouping::bounds::RawBoundsArray;
 use crate::grouping::clusters::Clustering;
 use crate::scene::{Body, Positions};
+use crate::settings::{InstructionSet, Recluster};
 use crate::stats::Statistics;
 
 use super::Job;

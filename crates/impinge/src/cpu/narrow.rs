@@ -3,8 +3,8 @@
 //! In: candidates. Out: keys of pairs that intersect. Triangle pairs go through two floating-point
 //! filters, eight pairs at a time (`exact::filter`, bounds derived in `docs/exactness.md`): most are
 //! thrown out because one triangle lies on one side of the other's plane; the rest is classified.
-//! Tetrahedron pairs are classified by their faces. What the filters leave open goes to exact arithmetic,
-//! and so do pairs of a triangle and a tetrahedron; that code filters too.
+//! Tetrahedron pairs are classified by their faces, what is left by faces and edges. What the filters leave
+//! open goes to exact arithmetic, and so do pairs of a triangle and a tetrahedron; that code filters too.
 
 use std::time::{Duration, Instant};
 
@@ -14,6 +14,7 @@ use crate::grouping::GROUP;
 use crate::narrow::{intersect, intersect_shared};
 use crate::scene::{Elements, Positions};
 
+use super::pairing::Lanes;
 use super::simd::{Isa, Simd, dispatch};
 use super::world::{BodyRef, World};
 
@@ -47,7 +48,10 @@ pub struct Settler {
     /// Time spent here, for the statistics.
     pub busy: Duration,
     candidates: Vec<Candidate>,
+    /// Triangle pairs that no plane parts.
     survivors: Vec<Candidate>,
+    /// Tetrahedron pairs that faces leave open.
+    open: Vec<Candidate>,
 }
 
 impl Settler {
@@ -57,6 +61,7 @@ impl Settler {
         self.candidates.clear();
         self.candidates.reserve_exact(MOST);
         self.survivors.reserve_exact(MOST);
+        self.open.reserve_exact(MOST);
         self.n_candidates = 0;
         self.n_unsure = 0;
         self.busy = Duration::ZERO;
@@ -64,7 +69,9 @@ impl Settler {
 
     /// Bytes held, the keys not counted: they are the answer.
     pub fn bytes(&self) -> usize {
-        size_of::<Candidate>() * (self.candidates.capacity() + self.survivors.capacity())
+        let lists = [&self.candidates, &self.survivors, &self.open];
+        let room: usize = lists.iter().map(|list| list.capacity()).sum();
+        size_of::<Candidate>() * room
     }
 
     /// Adds a candidate.
@@ -103,11 +110,12 @@ impl Settler {
         dispatch!(isa, settle, (settler: &mut Settler = self, world: World<'_> = world));
         self.candidates.clear();
         self.survivors.clear();
+        self.open.clear();
         self.busy += start.elapsed();
     }
 
-    /// Triangle pairs that the planes do not separate go on to the survivors; tetrahedron pairs are
-    /// classified, and batches of several kinds settled, on the way.
+    /// Triangle pairs that the planes do not part, and tetrahedron pairs that faces leave open, go on;
+    /// batches of several kinds are settled on the way.
     #[inline(always)]
     fn reject<S: Simd>(&mut self, simd: S, world: World<'_>) {
         let mut lookup = Lookup::new(world);
@@ -117,10 +125,11 @@ impl Settler {
         for chunk in candidates.chunks(LANES) {
             if lookup.fill_triangles(simd, chunk, &mut triangles) {
                 let kept = !filter::reject_by_planes::<S::F64>(&triangles);
-                self.keep(chunk, kept);
+                keep(&mut self.survivors, chunk, kept);
             } else if lookup.fill_tetrahedra(simd, chunk, &mut tetrahedra) {
                 let verdict = filter::classify_by_faces::<S::F64>(&tetrahedra);
-                self.take(&mut lookup, chunk, verdict);
+                self.take_pairs(&mut lookup, chunk, verdict.yes);
+                keep(&mut self.open, chunk, !(verdict.yes | verdict.no));
             } else {
                 for &candidate in chunk {
                     lookup.go_to(candidate);
@@ -129,15 +138,6 @@ impl Settler {
             }
         }
         self.candidates = candidates;
-    }
-
-    #[inline(always)]
-    fn keep(&mut self, chunk: &[Candidate], mut kept: u8) {
-        kept &= u8::MAX >> (LANES - chunk.len());
-        while kept != 0 {
-            self.survivors.push(chunk[kept.trailing_zeros() as usize]);
-            kept &= kept - 1;
-        }
     }
 
     #[inline(always)]
@@ -152,26 +152,37 @@ impl Settler {
             self.take(&mut lookup, chunk, verdict);
         }
         self.survivors = survivors;
+        let mut batch = TetrahedronPairs8::default();
+        let open = std::mem::take(&mut self.open);
+        for chunk in open.chunks(LANES) {
+            let filled = lookup.fill_tetrahedra(simd, chunk, &mut batch);
+            debug_assert!(filled, "they are tetrahedra");
+            let verdict = filter::classify_tetrahedra::<S::F64>(&batch);
+            self.take(&mut lookup, chunk, verdict);
+        }
+        self.open = open;
     }
 
     /// Books the verdict over a batch; settles what it leaves open.
     #[inline(always)]
-    fn take(&mut self, lookup: &mut Lookup<'_>, candidates: &[Candidate], verdict: Verdict) {
-        for (lane, &candidate) in candidates.iter().enumerate() {
-            if verdict.no >> lane & 1 == 1 {
-                continue;
-            }
+    fn take(&mut self, lookup: &mut Lookup<'_>, chunk: &[Candidate], verdict: Verdict) {
+        self.take_pairs(lookup, chunk, verdict.yes);
+        for lane in lanes(chunk, !(verdict.yes | verdict.no)) {
+            lookup.go_to(chunk[lane]);
+            self.n_unsure += 1;
+            self.settle_exactly(&lookup.a, &lookup.b, chunk[lane]);
+        }
+    }
+
+    /// Books pairs that certainly intersect.
+    #[inline(always)]
+    fn take_pairs(&mut self, lookup: &mut Lookup<'_>, chunk: &[Candidate], yes: u8) {
+        for lane in lanes(chunk, yes) {
+            let candidate = chunk[lane];
             lookup.go_to(candidate);
-            let (a, b) = (&lookup.a, &lookup.b);
-            if verdict.yes >> lane & 1 == 1 {
-                self.keys.push(pair_key(
-                    a.global(candidate.place_a),
-                    b.global(candidate.place_b),
-                ));
-            } else {
-                self.n_unsure += 1;
-                self.settle_exactly(a, b, candidate);
-            }
+            let key_a = lookup.a.global(candidate.place_a);
+            let key_b = lookup.b.global(candidate.place_b);
+            self.keys.push(pair_key(key_a, key_b));
         }
     }
 
@@ -185,6 +196,19 @@ impl Settler {
                 b.global(candidate.place_b),
             ));
         }
+    }
+}
+
+/// The lanes of a mask that a batch has.
+#[inline(always)]
+fn lanes(chunk: &[Candidate], mask: u8) -> Lanes {
+    Lanes(u64::from(mask & (u8::MAX >> (LANES - chunk.len()))))
+}
+
+#[inline(always)]
+fn keep(list: &mut Vec<Candidate>, chunk: &[Candidate], mask: u8) {
+    for lane in lanes(chunk, mask) {
+        list.push(chunk[lane]);
     }
 }
 
@@ -235,40 +259,11 @@ impl<'a> Lookup<'a> {
         chunk: &[Candidate],
         batch: &mut TrianglePairs8,
     ) -> bool {
-        if let Some((places_a, places_b)) = places_in_common(chunk) {
-            self.go_to(chunk[0]);
-            let (a, b) = (&self.a, &self.b);
-            let (Elements::Triangles(faces_a), Elements::Triangles(faces_b)) =
-                (a.elements, b.elements)
-            else {
-                return false;
-            };
-            put_all(simd, &mut batch.a, a.positions, faces_a, places_a);
-            put_all(simd, &mut batch.b, b.positions, faces_b, places_b);
-            return true;
-        }
-        for (lane, &candidate) in chunk.iter().enumerate() {
-            self.go_to(candidate);
-            let (a, b) = (&self.a, &self.b);
-            let (Elements::Triangles(faces_a), Elements::Triangles(faces_b)) =
-                (a.elements, b.elements)
-            else {
-                return false;
-            };
-            put(
-                &mut batch.a,
-                lane,
-                a.positions,
-                &faces_a[candidate.place_a as usize],
-            );
-            put(
-                &mut batch.b,
-                lane,
-                b.positions,
-                &faces_b[candidate.place_b as usize],
-            );
-        }
-        true
+        let TrianglePairs8 { a, b } = batch;
+        self.fill(simd, chunk, [a, b], |elements| match elements {
+            Elements::Triangles(faces) => Some(faces),
+            Elements::Tetrahedra(_) => None,
+        })
     }
 
     /// Gathers a batch of tetrahedron pairs; whether all of them are.
@@ -279,38 +274,39 @@ impl<'a> Lookup<'a> {
         chunk: &[Candidate],
         batch: &mut TetrahedronPairs8,
     ) -> bool {
-        if let Some((places_a, places_b)) = places_in_common(chunk) {
-            self.go_to(chunk[0]);
-            let (a, b) = (&self.a, &self.b);
-            let (Elements::Tetrahedra(tets_a), Elements::Tetrahedra(tets_b)) =
-                (a.elements, b.elements)
-            else {
-                return false;
-            };
-            put_all(simd, &mut batch.a, a.positions, tets_a, places_a);
-            put_all(simd, &mut batch.b, b.positions, tets_b, places_b);
-            return true;
-        }
+        let TetrahedronPairs8 { a, b } = batch;
+        self.fill(simd, chunk, [a, b], |elements| match elements {
+            Elements::Tetrahedra(tets) => Some(tets),
+            Elements::Triangles(_) => None,
+        })
+    }
+
+    /// Gathers a batch; whether all primitives have the corners that are asked for.
+    #[inline(always)]
+    fn fill<S: Simd, const N: usize>(
+        &mut self,
+        simd: S,
+        chunk: &[Candidate],
+        [side_a, side_b]: [&mut [[[f64; LANES]; 3]; N]; 2],
+        corners_of: impl Fn(&'a Elements) -> Option<&'a [[u32; N]]>,
+    ) -> bool {
+        let common = places_in_common(chunk);
         for (lane, &candidate) in chunk.iter().enumerate() {
             self.go_to(candidate);
             let (a, b) = (&self.a, &self.b);
-            let (Elements::Tetrahedra(tets_a), Elements::Tetrahedra(tets_b)) =
-                (a.elements, b.elements)
+            let (Some(corners_a), Some(corners_b)) =
+                (corners_of(a.elements), corners_of(b.elements))
             else {
                 return false;
             };
-            put(
-                &mut batch.a,
-                lane,
-                a.positions,
-                &tets_a[candidate.place_a as usize],
-            );
-            put(
-                &mut batch.b,
-                lane,
-                b.positions,
-                &tets_b[candidate.place_b as usize],
-            );
+            if let Some((places_a, places_b)) = common {
+                put_all(simd, side_a, a.positions, corners_a, places_a);
+                put_all(simd, side_b, b.positions, corners_b, places_b);
+                return true;
+            }
+            let (place_a, place_b) = (candidate.place_a as usize, candidate.place_b as usize);
+            put(side_a, lane, a.positions, &corners_a[place_a]);
+            put(side_b, lane, b.positions, &corners_b[place_b]);
         }
         true
     }

@@ -6,11 +6,11 @@
 //! to library functions: those would be compiled on their own, without the set.
 //! The answers are bit masks of exact comparisons: no set can differ from another.
 
-use crate::detector::InstructionSet;
 use crate::exact::filter::LANES;
 use crate::exact::filter::number::{self, Vector};
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, BoundsArray};
+use crate::settings::InstructionSet;
 
 /// The boxes of one group, a lane each; lanes past the group's size hold empty boxes.
 #[derive(Debug, Clone)]
@@ -478,6 +478,10 @@ impl Isa {
 /// Calls a kernel `fn kernel(simd: impl Simd, …)`, marked `inline(always)`, compiled for `$isa`.
 macro_rules! dispatch {
     ($isa:expr, $kernel:path, ($($name:ident: $type:ty = $value:expr),* $(,)?) $(-> $result:ty)?) => {{
+        // A function of its own, as the others are: not optimised, a kernel's frame is half a megabyte.
+        fn portable($($name: $type),*) $(-> $result)? {
+            $kernel($crate::cpu::simd::Portable, $($name),*)
+        }
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2,bmi1,bmi2,popcnt,lzcnt")]
         fn avx2($($name: $type),*) $(-> $result)? {
@@ -491,9 +495,7 @@ macro_rules! dispatch {
             $kernel(unsafe { $crate::cpu::simd::Avx512::new() }, $($name),*)
         }
         match $isa {
-            $crate::cpu::simd::Isa::Portable => {
-                $kernel($crate::cpu::simd::Portable, $($value),*)
-            }
+            $crate::cpu::simd::Isa::Portable => portable($($value),*),
             // SAFETY: an `Isa` is only ever one that `Isa::detect` found on this processor.
             #[cfg(target_arch = "x86_64")]
             $crate::cpu::simd::Isa::Avx2 => unsafe { avx2($($value),*) },

@@ -1,9 +1,10 @@
 //! What a detector does on a GPU: its own device, or the caller's.
 
+use std::cell::Cell;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::{Backend, Detector, Method, Settings, check};
+use super::{Backend, Detector, Method, Settings};
 use crate::cpu::cells::Cells;
 use crate::cpu::clusters::Clusters;
 use crate::cpu::workers::Workers;
@@ -14,6 +15,7 @@ use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
 use crate::scene::{BodyId, Scene};
+use crate::settings::Recluster;
 
 /// The GPU that the settings ask for, if they ask for one.
 pub(super) fn open(settings: &Settings) -> Result<Option<Engine>, Error> {
@@ -36,7 +38,10 @@ fn engine(gpu: Arc<Gpu>, settings: &Settings, first: Capacities) -> Engine {
         method: settings.method,
         lambda: settings.lambda,
         group_size: settings.group_size,
+        recluster: settings.recluster == Recluster::Auto,
         memory_budget: settings.memory_budget,
+        // The CPU has no need to send anything twice.
+        in_pieces: settings.backend == Backend::Gpu,
     };
     Engine::new(gpu, options, first)
 }
@@ -56,6 +61,20 @@ impl Detector {
         Ok(detector)
     }
 
+    /// [`with_settings`](Detector::with_settings), and the most bytes of topology or positions that a GPU may
+    /// bind at once. For tests: devices say so themselves.
+    ///
+    /// # Errors
+    /// As `with_settings`.
+    #[doc(hidden)]
+    pub fn with_most_bound(settings: Settings, bytes: u64) -> Result<Self, Error> {
+        let mut detector = Detector::with_settings(settings)?;
+        if let Some(engine) = &mut detector.gpu {
+            engine.most_bound = bytes;
+        }
+        Ok(detector)
+    }
+
     /// A detector on a device of the caller's, which must allow 8 storage buffers a stage and
     /// workgroups of 256 (WebGPU's defaults do). `settings.backend` and `settings.device` are passed over.
     ///
@@ -69,13 +88,46 @@ impl Detector {
         queue: wgpu::Queue,
         settings: Settings,
     ) -> Result<Self, Error> {
+        Detector::on(Gpu::of_caller(device, queue)?, settings)
+    }
+
+    /// [`with_device`](Detector::with_device), with one line of one kernel replaced by another. For tests: answers
+    /// may be wrong.
+    ///
+    /// # Errors
+    /// As `with_device`; a kernel without this line.
+    #[doc(hidden)]
+    pub fn with_damage(
+        device: wgpu::Device,
+        queue: wgpu::Queue,
+        settings: Settings,
+        (kernel, line, damaged): (&str, &str, &str),
+    ) -> Result<Self, Error> {
+        let is_damaged = Cell::new(false);
+        let gpu = Gpu::of_caller_with(device, queue, |source| {
+            let text = source.text();
+            let is_it = source.name == kernel && text.contains(line);
+            if !is_it {
+                return text;
+            }
+            is_damaged.set(true);
+            text.replace(line, damaged)
+        })?;
+        if !is_damaged.get() {
+            let what = format!("kernel {kernel} has no line \"{line}\"");
+            return Err(Error::Gpu { what });
+        }
+        Detector::on(gpu, settings)
+    }
+
+    fn on(gpu: Gpu, settings: Settings) -> Result<Self, Error> {
         let settings = Settings {
             backend: Backend::Gpu,
             device: None,
             ..settings
         };
-        check(&settings)?;
-        let gpu = Arc::new(Gpu::of_caller(device, queue)?);
+        settings.check()?;
+        let gpu = Arc::new(gpu);
         Ok(Detector {
             gpu: Some(engine(gpu, &settings, Capacities::default())),
             workers: Workers::new(settings.threads)?,

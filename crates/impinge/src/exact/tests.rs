@@ -116,8 +116,33 @@ fn classify_by_faces(pairs: &TetrahedronPairs8) -> Verdict {
     )
 }
 
-/// One pair in every lane of a batch, by faces: the answer of all lanes, none when unsure.
-fn tetrahedra_by_faces(a: &[Point; 4], b: &[Point; 4]) -> Option<bool> {
+fn classify_tetrahedra(pairs: &TetrahedronPairs8) -> Verdict {
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn avx2(pairs: &TetrahedronPairs8) -> Verdict {
+        filter::classify_tetrahedra::<number::Avx2>(pairs)
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    fn avx512(pairs: &TetrahedronPairs8) -> Verdict {
+        filter::classify_tetrahedra::<number::Avx512>(pairs)
+    }
+    on_all(
+        pairs,
+        filter::classify_tetrahedra::<number::Portable>,
+        #[cfg(target_arch = "x86_64")]
+        avx2,
+        #[cfg(target_arch = "x86_64")]
+        avx512,
+    )
+}
+
+/// One pair in every lane of a batch: the answer of all lanes, none when unsure.
+fn in_all_lanes(
+    classify: fn(&TetrahedronPairs8) -> Verdict,
+    a: &[Point; 4],
+    b: &[Point; 4],
+) -> Option<bool> {
     let mut pairs = TetrahedronPairs8::default();
     for lane in 0..LANES {
         for vertex in 0..4 {
@@ -127,7 +152,7 @@ fn tetrahedra_by_faces(a: &[Point; 4], b: &[Point; 4]) -> Option<bool> {
             }
         }
     }
-    match classify_by_faces(&pairs) {
+    match classify(&pairs) {
         Verdict { yes: 0xff, no: 0 } => Some(true),
         Verdict { yes: 0, no: 0xff } => Some(false),
         Verdict { yes: 0, no: 0 } => None,
@@ -344,7 +369,7 @@ fn beyond_vertex_by_signs(a: &[Point; 3], b: &[Point; 3]) -> bool {
 #[test]
 fn filter_settles_random_tetrahedra_and_is_right() {
     let mut random = Random(4);
-    let (mut n_settled, mut n_by_faces, mut n_yes) = (0, 0, 0);
+    let (mut n_settled, mut n_by_faces, mut n_by_edges, mut n_yes) = (0, 0, 0, 0);
     let n = 4000;
     for _ in 0..n {
         let (a, mut b) = (random.plain(), random.plain());
@@ -352,9 +377,12 @@ fn filter_settles_random_tetrahedra_and_is_right() {
         let truth = tetrahedra_intersect_by_signs(&a, &b);
         let answer = tetrahedra_answer(&a, &b);
         n_settled += u32::from(answer.is_some());
-        let by_faces = tetrahedra_by_faces(&a, &b);
+        let by_faces = in_all_lanes(classify_by_faces, &a, &b);
         n_by_faces += u32::from(by_faces.is_some());
         assert!(by_faces.is_none_or(|answer| answer == truth), "{a:?} {b:?}");
+        let by_edges = in_all_lanes(classify_tetrahedra, &a, &b);
+        n_by_edges += u32::from(by_edges.is_some());
+        assert!(by_edges.is_none_or(|answer| answer == truth), "{a:?} {b:?}");
         n_yes += u32::from(truth);
         assert!(answer.is_none_or(|answer| answer == truth), "{a:?} {b:?}");
     }
@@ -366,6 +394,10 @@ fn filter_settles_random_tetrahedra_and_is_right() {
         n_by_faces > n / 3,
         "only {n_by_faces} of {n} settled by faces"
     );
+    assert!(
+        n_by_edges * 1000 > n * 999,
+        "only {n_by_edges} of {n} settled by faces and edges"
+    );
     assert!(n_yes > n / 10 && n_yes < n * 9 / 10, "{n_yes} of {n} meet");
 }
 
@@ -376,8 +408,10 @@ fn filter_is_never_wrong_on_troublesome_tetrahedra() {
     for _ in 0..20_000 {
         let [a, b, c, d, e, f, g, h] = random.troublesome();
         let (a, b) = ([a, b, c, d], [e, f, g, h]);
-        if let Some(answer) = tetrahedra_by_faces(&a, &b) {
-            assert_eq!(answer, tetrahedra_intersect_by_signs(&a, &b), "{a:?} {b:?}");
+        for classify in [classify_by_faces, classify_tetrahedra] {
+            if let Some(answer) = in_all_lanes(classify, &a, &b) {
+                assert_eq!(answer, tetrahedra_intersect_by_signs(&a, &b), "{a:?} {b:?}");
+            }
         }
         if let Some(answer) = tetrahedra_answer(&a, &b) {
             assert_eq!(answer, tetrahedra_intersect_by_signs(&a, &b), "{a:?} {b:?}");

@@ -67,7 +67,7 @@ impl<T: Pod> Storage<T> {
     }
 
     /// Binds exactly `len` elements, growing by a quarter more than needed. Contents are lost when
-    /// it grows. Returns whether it has to be bound anew: a binding knows its buffer and its length.
+    /// it grows. Returns whether what is bound is another buffer now, or another length of it.
     ///
     /// # Errors
     /// More than one binding may hold.
@@ -85,14 +85,13 @@ impl<T: Pod> Storage<T> {
             });
         }
         let len = len.max(1);
-        let differs = len != self.len;
+        let is_other = self.buffer.is_none() || len != self.len;
         self.len = len;
-        let grows = self.buffer.is_none() || self.len > self.capacity;
-        if grows {
-            let spare = if self.capacity == 0 { 0 } else { self.len / 4 };
-            self.allocate(gpu, (self.len + spare).min(limit));
+        if self.buffer.is_none() || len > self.capacity {
+            let spare = if self.capacity == 0 { 0 } else { len / 4 };
+            self.allocate(gpu, (len + spare).min(limit));
         }
-        Ok(grows || differs)
+        Ok(is_other)
     }
 
     /// Binds exactly `len` elements with no room to spare, whatever was there.
@@ -115,14 +114,14 @@ impl<T: Pod> Storage<T> {
         }));
     }
 
-    /// Holds exactly `data`. Returns whether it has to be bound anew.
+    /// Holds exactly `data`. Returns as [`resize`](Storage::resize).
     ///
     /// # Errors
     /// As [`resize`](Storage::resize).
     pub fn upload(&mut self, gpu: &Gpu, data: &[T]) -> Result<bool, Error> {
-        let is_new = self.resize(gpu, count(data.len()))?;
+        let grew = self.resize(gpu, count(data.len()))?;
         self.write(gpu, 0, data);
-        Ok(is_new)
+        Ok(grew)
     }
 
     /// Writes elements from `first` on, which must fit.

@@ -7,11 +7,14 @@
 //! pairing    prepare · level 2
 //! narrow     prepare · narrow
 //! ```
+//!
+//! A cell too crowded for one pass is worked in several: one fills its list, then each of the others pairs
+//! one tile of the product of its groups, dispatch · pairing · narrow.
 
 use std::fmt;
 
 use super::device::Gpu;
-use super::kernels::{DispatchCells, DispatchScatter, GridCount, PairingCells};
+use super::kernels::{DispatchCells, DispatchScatter, DispatchTile, GridCount, PairingCells};
 use super::layout::{N_ITEMS, Params, ROUNDS};
 use super::narrow::{Settling, prepare};
 use super::pipeline::{Bound, Groups};
@@ -30,10 +33,77 @@ pub struct Told {
     pub lambda: f64,
     pub group_size: u32,
     pub resolve: bool,
+    pub share: Share,
+}
+
+/// What a pass does in its cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Share {
+    /// All there is to do.
+    All,
+    /// Fills the lists and leaves them to later passes.
+    Lists,
+    /// Pairs one tile of the product of the groups of a list that is there.
+    Tile(Tile),
+}
+
+/// A square of the product of the groups of one cell with themselves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tile {
+    /// Entries of the cell's list.
+    pub n_entries: u32,
+    /// Groups of the cell's list.
+    pub n_groups: u32,
+    /// The first group along either side.
+    pub row: u32,
+    /// See `row`.
+    pub column: u32,
+    /// Groups along a side, a power of two.
+    pub side: u32,
+}
+
+impl Tile {
+    /// Groups along a side that one pass does at most: a megabyte of work items.
+    pub const MOST: u32 = 256;
+
+    /// All of a list.
+    pub fn all(n_entries: u32, group_size: u32) -> Self {
+        let n_groups = n_entries.div_ceil(group_size);
+        Tile {
+            n_entries,
+            n_groups,
+            row: 0,
+            column: 0,
+            // Places are numbered with 31 bits, so there is such a power.
+            side: n_groups.next_power_of_two(),
+        }
+    }
+
+    /// Its quarters, but for those that have nothing on or above the diagonal; none of a single pair of groups.
+    pub fn split(self) -> Option<Vec<Tile>> {
+        if self.side < 2 {
+            return None;
+        }
+        let half = self.side / 2;
+        let mut quarters = Vec::with_capacity(4);
+        for (down, right) in [(0, 0), (0, half), (half, 0), (half, half)] {
+            let (row, column) = (self.row + down, self.column + right);
+            let is_inside = row.max(column) < self.n_groups;
+            if is_inside && column + (half - 1) >= row {
+                quarters.push(Tile {
+                    row,
+                    column,
+                    side: half,
+                    ..self
+                });
+            }
+        }
+        Some(quarters)
+    }
 }
 
 /// A plan of passes that work in cells: this method's, or one from outside.
-pub trait InCells: fmt::Debug + Send {
+pub trait InCells: fmt::Debug + Send + Sync {
     /// The stages on the device, in order: the names of their times.
     fn stages(&self) -> &'static [&'static str];
 
@@ -42,6 +112,11 @@ pub trait InCells: fmt::Debug + Send {
 
     /// Forgets which buffers it was made for.
     fn unbind(&mut self);
+
+    /// Whether a single cell can be worked in several passes: whether it heeds [`Told::share`].
+    fn splits_cells(&self) -> bool {
+        false
+    }
 
     /// Plans a pass.
     ///
@@ -60,9 +135,9 @@ pub trait InCells: fmt::Debug + Send {
     fn encode(&self, stages: &mut Stages<'_>, world: &World, room: &Room);
 }
 
-/// The part of the work that a pass does: some cells. A single cell is not split further: each pass fills
-/// the lists anew, in whatever order threads come, so rows of the product of its groups would not
-/// be the same primitives from pass to pass.
+/// The part of the work that a pass does: some cells. To do a single cell in several passes takes
+/// a [`Share`]: each pass that fills the lists does so in whatever order threads come, so tiles of the product of the
+/// groups would not be the same primitives from pass to pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Part {
     /// The first cell.
@@ -99,6 +174,7 @@ struct Launches {
     reaching: Reaching,
     count: Bound,
     dispatch: Bound,
+    tile: Bound,
     scatter: Bound,
     prepare: Bound,
     pairing: Bound,
@@ -111,6 +187,7 @@ pub struct Plan {
     steps: Steps,
     launches: Option<Launches>,
     reaching: ReachingSteps,
+    share: Share,
     /// Dispatch and pairing.
     work: u32,
     prepare_pairing: u32,
@@ -123,6 +200,7 @@ impl Plan {
             steps: Steps::new(),
             launches: None,
             reaching: ReachingSteps::default(),
+            share: Share::All,
             work: 0,
             prepare_pairing: 0,
             narrow: 0,
@@ -143,6 +221,10 @@ impl InCells for Plan {
         self.launches = None;
     }
 
+    fn splits_cells(&self) -> bool {
+        true
+    }
+
     fn make(
         &mut self,
         gpu: &Gpu,
@@ -154,13 +236,28 @@ impl InCells for Plan {
         let steps = &mut self.steps;
         steps.clear();
         self.reaching.plan(world, room, told, steps);
-        self.work = steps.push(Params {
+        self.share = told.share;
+        let work = Params {
             first: part.first,
             count: part.count,
             n_ignored: world.n_ignored(),
             resolve: u32::from(told.resolve),
             group_size: told.group_size,
             ..Params::default()
+        };
+        self.work = steps.push(match told.share {
+            Share::All => work,
+            Share::Lists => Params {
+                lists_only: 1,
+                ..work
+            },
+            Share::Tile(tile) => Params {
+                n_entries: tile.n_entries,
+                tile_row: tile.row,
+                tile_column: tile.column,
+                tile_side: tile.side,
+                ..work
+            },
         });
         self.prepare_pairing = steps.push(Params {
             counter: N_ITEMS,
@@ -180,19 +277,29 @@ impl InCells for Plan {
     fn encode(&self, stages: &mut Stages<'_>, world: &World, room: &Room) {
         let launches = self.launches.as_ref().expect("made before it is encoded");
         let arguments = room.arguments.buffer();
-        stages.encoder.clear_buffer(room.cells.buffer(), 0, None);
-        Reaching::clear(stages.encoder, room);
         let kept = || Groups::Indirect(arguments, KEPT);
-        stages.stage(|pass| launches.reaching.run_bounds(pass, world, &self.reaching));
-        stages.stage(|pass| {
-            launches.reaching.run_grid(pass, room, &self.reaching);
-            launches.count.run(pass, 0, kept());
-        });
-        stages.stage(|pass| {
-            let groups = Groups::Indirect(arguments, CELLS);
-            launches.dispatch.run(pass, self.work, groups);
-            launches.scatter.run(pass, 0, kept());
-        });
+        if let Share::Tile(tile) = self.share {
+            // Boxes, grid and the list are there.
+            stages.stage(|_| ());
+            stages.stage(|_| ());
+            stages.stage(|pass| {
+                let groups = (u64::from(tile.side) * u64::from(tile.side)).div_ceil(64);
+                launches.tile.run(pass, self.work, Groups::Known(groups));
+            });
+        } else {
+            stages.encoder.clear_buffer(room.cells.buffer(), 0, None);
+            Reaching::clear(stages.encoder, room);
+            stages.stage(|pass| launches.reaching.run_bounds(pass, world, &self.reaching));
+            stages.stage(|pass| {
+                launches.reaching.run_grid(pass, room, &self.reaching);
+                launches.count.run(pass, 0, kept());
+            });
+            stages.stage(|pass| {
+                let groups = Groups::Indirect(arguments, CELLS);
+                launches.dispatch.run(pass, self.work, groups);
+                launches.scatter.run(pass, 0, kept());
+            });
+        }
         stages.stage(|pass| {
             let step = self.prepare_pairing;
             launches.prepare.run(pass, step, Groups::Known(1));
@@ -226,6 +333,15 @@ impl Launches {
                     bodies: world.bodies.read(),
                     cells: room.cells.write_to(),
                     starts: room.starts.write_to(),
+                    items: room.cell_items.write_to(),
+                    counters: counters(),
+                    params: params(),
+                },
+            ),
+            tile: kernels.dispatch_tile.bind(
+                gpu,
+                &DispatchTile {
+                    grid: room.grid.read(),
                     items: room.cell_items.write_to(),
                     counters: counters(),
                     params: params(),
@@ -278,5 +394,23 @@ mod tests {
             }
         }
         assert_eq!(seen.len(), 5);
+    }
+    #[test]
+    fn tiles_cover_every_pair_of_groups_once() {
+        for (n_entries, group_size) in [(1u32, 64), (64, 64), (65, 64), (7, 1), (33, 1), (130, 7)] {
+            let n_groups = n_entries.div_ceil(group_size);
+            let mut waiting = vec![Tile::all(n_entries, group_size)];
+            let mut seen = std::collections::BTreeSet::new();
+            while let Some(tile) = waiting.pop() {
+                match tile.split() {
+                    Some(quarters) => waiting.extend(quarters),
+                    None => {
+                        assert!(tile.row <= tile.column && tile.column < n_groups);
+                        assert!(seen.insert((tile.row, tile.column)), "{tile:?} twice");
+                    }
+                }
+            }
+            assert_eq!(seen.len() as u32, n_groups * (n_groups + 1) / 2);
+        }
     }
 }

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 use std::task::{Context, Poll, Waker};
 
 use super::kernels::Kernels;
+use super::pipeline::Source;
 use crate::error::Error;
 
 /// A GPU, or a driver that imitates one, on this machine.
@@ -180,7 +181,7 @@ impl Gpu {
         let (device, queue) = request.await.map_err(|error| Error::Gpu {
             what: format!("{info}: {error}"),
         })?;
-        let gpu = Gpu::with_kernels(device, queue, info).await?;
+        let gpu = Gpu::with_kernels(device, queue, info, Source::text).await?;
         let told = Arc::clone(&gpu.lost);
         gpu.device.set_device_lost_callback(move |reason, message| {
             let mut told = told.lock().unwrap_or_else(PoisonError::into_inner);
@@ -194,6 +195,15 @@ impl Gpu {
     /// # Errors
     /// It allows too little; a kernel does not compile.
     pub fn of_caller(device: wgpu::Device, queue: wgpu::Queue) -> Result<Gpu, Error> {
+        Gpu::of_caller_with(device, queue, Source::text)
+    }
+
+    /// The same with other texts than the kernels' own.
+    pub(crate) fn of_caller_with(
+        device: wgpu::Device,
+        queue: wgpu::Queue,
+        text: impl Fn(&Source) -> String,
+    ) -> Result<Gpu, Error> {
         let limits = device.limits();
         if !suffices(&limits) {
             return Err(Error::Gpu {
@@ -207,16 +217,17 @@ impl Gpu {
             });
         }
         let info = describe(&device.adapter_info(), &limits);
-        pollster::block_on(Gpu::with_kernels(device, queue, info))
+        pollster::block_on(Gpu::with_kernels(device, queue, info, text))
     }
 
     async fn with_kernels(
         device: wgpu::Device,
         queue: wgpu::Queue,
         info: DeviceInfo,
+        text: impl Fn(&Source) -> String,
     ) -> Result<Gpu, Error> {
         let scopes = Scopes::open(&device);
-        let kernels = Kernels::new(&device);
+        let kernels = Kernels::new(&device, text);
         scopes.close().await?;
         Ok(Gpu {
             has_timestamps: device.features().contains(wgpu::Features::TIMESTAMP_QUERY),

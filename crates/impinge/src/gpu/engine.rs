@@ -1,45 +1,35 @@
-//! The frame on the device: passes, growing, splitting.
+//! The GPU backend of one detector: which method, which share of the memory, which buffers.
 //!
-//! A pass takes its share of the work through all stages in one submission. If a buffer was too small,
-//! the counters say how large it must be: it grows and the pass runs again. If it may not grow, by the
-//! device's limit or the memory budget, the work is split and each half is a pass. What is split:
-//!
-//! * `Clusters`: pairs of tree nodes, the seeds of the traversal, down to one pair of clusters;
-//! * `Cells`: cells.
-//!
-//! In the end a pass has one work item, for which [`Capacities::LEAST`] is enough.
+//! What is done with them, pass after pass, is in [`passes`](super::passes).
 
 use std::sync::Arc;
 use std::time::Instant;
 
-use rayon::prelude::*;
-
 use super::buffers::{Storage, count};
-use super::cells::{self, InCells, Part, Told};
+use super::cells::{self, InCells};
 use super::clusters;
-use super::collect::{Collected, Collector, Guess};
+use super::collect::Collector;
 use super::device::{Gpu, Scopes};
-use super::layout::{Cell, NodePair};
-use super::room::{Capacities, CellsWanted, Counts, Room, Verdict};
-use super::steps::Stages;
+use super::layout::Cell;
+use super::passes::Answer;
+use super::pieces;
+use super::room::{Capacities, CellsWanted, Counts, Room};
+use super::topology::Most;
 use super::world::World;
-use crate::detector::Method;
 use crate::error::Error;
-use crate::frame::{Frame, pair_key};
-use crate::narrow::settle;
+use crate::frame::Frame;
 use crate::progress::Control;
-use crate::query::SharedVertex;
 use crate::scene::{BodyId, Scene};
+use crate::settings::Method;
 use crate::stats::Statistics;
 
-/// Seeds up to which the host descends before the first launch: each step down saves two launches.
-const SEEDS: usize = 512;
-/// Unsure pairs from which on threads share them.
-const PARALLEL_FROM: usize = 512;
 /// Cells at most, whatever lambda says.
 const MOST_CELLS: u64 = 1 << 25;
 /// The share of a memory budget that cells may have.
 const SHARE_OF_CELLS: u64 = 8;
+
+/// The largest buffer that 32 bits can number: positions by words, places with a flag.
+const WIDEST: u64 = 1 << 34;
 
 /// What the backend is told.
 #[derive(Debug, Clone, Copy)]
@@ -50,44 +40,54 @@ pub struct Options {
     pub lambda: f64,
     /// Primitives a group, at most.
     pub group_size: u32,
+    /// `Clusters`: whether bodies that have flowed away from their clusters are clustered again.
+    pub recluster: bool,
     /// Bytes on the device, at most.
     pub memory_budget: Option<u64>,
+    /// Whether a frame that is more than the device binds is answered in pieces, and not by an error.
+    pub in_pieces: bool,
 }
 
 /// The GPU backend of one detector.
 #[derive(Debug)]
 pub struct Engine {
-    gpu: Arc<Gpu>,
-    options: Options,
+    pub(super) gpu: Arc<Gpu>,
+    pub(super) options: Options,
     first: Capacities,
+    /// The method at work: `Clusters` for frames that are too much for `Cells`.
+    pub(super) method: Method,
+    /// Primitives of the frame that was too much for `Cells`.
+    too_much: Option<u64>,
+    /// Bytes of one buffer of topology or positions, where that is less than the device allows.
+    pub most_bound: u64,
+    /// Whether the device has pieces of a frame.
+    has_pieces: bool,
     pub(super) world: World,
     pub(super) room: Room,
-    plan: Plan,
+    pub(super) plan: Plan,
     /// What each complete pass of the last frame counted.
     pub complete: Vec<Counts>,
-    collector: Collector,
+    pub(super) collector: Collector,
 }
 
 #[derive(Debug)]
-enum Plan {
+pub(super) enum Plan {
     Clusters(Box<clusters::Plan>),
     Cells(Box<dyn InCells>),
 }
 
-/// What a pass does.
-#[derive(Debug, Clone)]
-pub(super) enum Work {
-    Seeds(Vec<NodePair>),
-    Part(Part),
+impl Plan {
+    fn of(method: Method) -> Self {
+        match method {
+            Method::Cells => Plan::Cells(Box::new(cells::Plan::new())),
+            _ => Plan::Clusters(Box::new(clusters::Plan::new())),
+        }
+    }
 }
 
 impl Engine {
     pub fn new(gpu: Arc<Gpu>, options: Options, first: Capacities) -> Self {
-        let plan = match options.method {
-            Method::Cells => Plan::Cells(Box::new(cells::Plan::new())),
-            _ => Plan::Clusters(Box::new(clusters::Plan::new())),
-        };
-        Engine::with_plan(gpu, options, first, plan)
+        Engine::with_plan(gpu, options, first, Plan::of(options.method))
     }
 
     /// With a plan from outside.
@@ -97,14 +97,18 @@ impl Engine {
         first: Capacities,
         plan: Box<dyn InCells>,
     ) -> Self {
-        Engine::with_plan(gpu, options, first.of(options.method), Plan::Cells(plan))
+        Engine::with_plan(gpu, options, first, Plan::Cells(plan))
     }
 
     fn with_plan(gpu: Arc<Gpu>, options: Options, first: Capacities, plan: Plan) -> Self {
         Engine {
             gpu,
             options,
-            first: first.of(options.method),
+            first,
+            method: options.method,
+            too_much: None,
+            most_bound: u64::MAX,
+            has_pieces: false,
             world: World::new(),
             room: Room::new(),
             plan,
@@ -129,19 +133,23 @@ impl Engine {
         keys: &mut Vec<u64>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let result = self.passes(scene, frame, control, keys, stats).await;
+        let result = self.answer(scene, frame, control, keys, stats).await;
         if let Err(Error::Gpu { .. }) = result {
             // Whatever state the buffers are in, the next frame must not build on it.
             let plan = match &self.plan {
-                Plan::Clusters(_) => Plan::Clusters(Box::new(clusters::Plan::new())),
                 Plan::Cells(plan) => Plan::Cells(plan.anew()),
+                Plan::Clusters(_) => Plan::of(self.options.method),
             };
-            *self = Engine::with_plan(Arc::clone(&self.gpu), self.options, self.first, plan);
+            let gpu = Arc::clone(&self.gpu);
+            *self = Engine {
+                most_bound: self.most_bound,
+                ..Engine::with_plan(gpu, self.options, self.first, plan)
+            };
         }
         result
     }
 
-    async fn passes(
+    async fn answer(
         &mut self,
         scene: &Scene,
         frame: &Frame,
@@ -151,46 +159,186 @@ impl Engine {
     ) -> Result<(), Error> {
         self.gpu.check_lost()?;
         self.complete.clear();
+        if self.too_much.is_some_and(|n| frame.n_primitives() < n) {
+            self.too_much = None;
+            self.take(self.options.method);
+        }
         let start = Instant::now();
+        let recluster = self.reclusters();
+        let clusterings = &mut self.world.clusterings;
+        clusterings.update(scene, frame, &[], recluster, stats);
+        if !self.is_held(scene, frame) && self.falls_back() {
+            self.take_clusters(frame);
+        }
+        if !self.is_held(scene, frame) && !self.is_guest() {
+            stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
+            self.may_cut(scene, frame)?;
+            return self.in_pieces(scene, frame, control, keys, stats).await;
+        }
         let scopes = Scopes::open(&self.gpu.device);
         let updated = self.update(scene, frame, &[], stats);
         let closed = scopes.close();
         updated?;
         closed.await?;
+        if self.first_room(self.cells_wanted(frame)).is_err() {
+            // What buffers have to spare is too much for the budget.
+            self.world.forget_buffers();
+            self.update(scene, frame, &[], stats)?;
+        }
         stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
-        let cells = self.cells_wanted(frame);
-        let mut capacities = self.first_room(cells)?;
-        let mut waiting = Vec::from_iter(self.whole(frame));
-        while let Some(work) = waiting.pop() {
-            let done = stats.n_slabs;
-            control.step(done, done + count(waiting.len()) + 1)?;
-            let collected = self.pass(frame, &work, capacities, cells, stats).await?;
-            let room = self.budget_for_room();
-            match collected.counts.judge(&self.gpu, capacities, room) {
-                Verdict::Complete => {
-                    book(&collected, self.options.method, stats);
-                    self.complete.push(collected.counts);
-                    stats.time("settle", |_| settle_all(scene, frame, &collected, keys));
+        let before = (keys.len(), self.falls_back().then(|| stats.clone()));
+        let work = Vec::from_iter(self.whole(frame));
+        let answer = self.work_off(scene, frame, work, control, keys, stats);
+        if let (Answer::Crowded(error), (n_keys, before)) = (answer.await?, before) {
+            let Some(before) = before else {
+                return Err(error);
+            };
+            // What its passes have given so far is given again.
+            keys.truncate(n_keys);
+            let n_reruns = stats.n_slabs + stats.n_reruns;
+            *stats = before;
+            stats.n_reruns = n_reruns;
+            self.take_clusters(frame);
+            if !self.is_held(scene, frame) {
+                return self.in_pieces(scene, frame, control, keys, stats).await;
+            }
+            let work = Vec::from_iter(self.whole(frame));
+            let answer = self.work_off(scene, frame, work, control, keys, stats);
+            if let Answer::Crowded(error) = answer.await? {
+                return Err(error);
+            }
+        }
+        self.finish(stats);
+        Ok(())
+    }
+
+    /// The same piece by piece, see [`pieces`].
+    async fn in_pieces(
+        &mut self,
+        scene: &Scene,
+        frame: &Frame,
+        control: &Control<'_>,
+        keys: &mut Vec<u64>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        if !self.has_pieces {
+            // They are sized for all of a frame.
+            self.world.forget_buffers();
+            self.unbind();
+            self.has_pieces = true;
+        }
+        let most = self.most();
+        // Two chunks a piece, and a quarter to spare in each buffer.
+        let most = Most {
+            binding: most.binding / 2,
+            bytes: most.bytes / 4,
+        };
+        let world = &self.world;
+        stats.n_clusters = world.weigh(scene, frame).n_clusters;
+        let clustering = |participant_ix| world.clustering(frame, participant_ix);
+        let chunks = pieces::cut(scene, frame, most, clustering);
+        for (ix, a) in chunks.iter().enumerate() {
+            for b in &chunks[ix..] {
+                let both = [a, b];
+                let piece = if std::ptr::eq(a, b) {
+                    &both[..1]
+                } else {
+                    &both
+                };
+                let pairs = pieces::meeting(frame, piece);
+                if pairs.is_empty() {
+                    continue;
                 }
-                Verdict::Grow(larger) => {
-                    stats.n_reruns += 1;
-                    capacities = larger;
-                    waiting.push(work);
-                }
-                Verdict::Split => {
-                    stats.n_reruns += 1;
-                    match self.split(frame, &work, &collected)? {
-                        Some(parts) => waiting.extend(parts),
-                        None => {
-                            capacities = self.lean(&collected, capacities, room)?;
-                            waiting.push(work);
-                        }
-                    }
+                let start = Instant::now();
+                let scopes = Scopes::open(&self.gpu.device);
+                let sent = self.world.send_piece(&self.gpu, scene, frame, piece);
+                self.unbind();
+                let closed = scopes.close();
+                sent?;
+                closed.await?;
+                stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
+                stats.n_pieces += 1;
+                let work = self.seeds_in_batches(frame, &pairs);
+                let answer = self.work_off(scene, frame, work, control, keys, stats);
+                if let Answer::Crowded(error) = answer.await? {
+                    return Err(error);
                 }
             }
         }
-        stats.bytes_held = self.world.bytes() + self.room.bytes();
+        self.finish(stats);
         Ok(())
+    }
+
+    fn finish(&self, stats: &mut Statistics) {
+        if let Plan::Clusters(_) = &self.plan {
+            stats.method = Method::Clusters.name();
+        }
+        stats.bytes_held = self.world.bytes() + self.room.bytes();
+    }
+
+    /// In `Cells` clusters only tell what is out of reach, however well they fit.
+    fn reclusters(&self) -> bool {
+        self.options.recluster && self.method == Method::Clusters
+    }
+
+    /// The most that may be on the device of topology and positions.
+    fn most(&self) -> Most {
+        let least = Capacities::LEAST.of(self.method).bytes();
+        let budget = self.options.memory_budget;
+        Most {
+            binding: self.most_bound.min(self.gpu.max_binding()).min(WIDEST),
+            bytes: budget.map_or(u64::MAX, |budget| budget.saturating_sub(least)),
+        }
+    }
+
+    /// Whether topology and positions of all of a frame fit the device and the budget.
+    fn is_held(&self, scene: &Scene, frame: &Frame) -> bool {
+        let cells = self.cells_wanted(frame).map_or(0, |cells| cells.bytes());
+        let most = self.most();
+        self.world.weigh(scene, frame).fits(Most {
+            bytes: most.bytes.saturating_sub(cells),
+            ..most
+        })
+    }
+
+    /// Whether a frame that is not held may be answered in pieces.
+    ///
+    /// # Errors
+    /// The device binds less, and somebody else is to answer then.
+    fn may_cut(&self, scene: &Scene, frame: &Frame) -> Result<(), Error> {
+        let (needed, most) = (self.world.weigh(scene, frame).binding(), self.most());
+        if self.options.in_pieces || needed <= most.binding {
+            return Ok(());
+        }
+        Err(Error::Gpu {
+            what: format!(
+                "{} binds at most {} bytes at once, but {needed} bytes are needed",
+                self.gpu.name(),
+                most.binding
+            ),
+        })
+    }
+
+    fn is_guest(&self) -> bool {
+        matches!(&self.plan, Plan::Cells(plan) if !plan.splits_cells())
+    }
+
+    /// Whether a frame that is too much for the method may be answered by `Clusters`.
+    fn falls_back(&self) -> bool {
+        matches!(&self.plan, Plan::Cells(plan) if plan.splits_cells())
+    }
+
+    /// Answers this frame, and those with as many primitives, by `Clusters`.
+    fn take_clusters(&mut self, frame: &Frame) {
+        self.too_much = Some(frame.n_primitives());
+        self.take(Method::Clusters);
+    }
+
+    /// Goes over to a method of the library's own.
+    fn take(&mut self, method: Method) {
+        self.method = method;
+        self.plan = Plan::of(method);
+        self.room = Room::new();
     }
 
     /// Brings the device up to the frame, but for positions that are on the device already.
@@ -201,9 +349,11 @@ impl Engine {
         resident: &[BodyId],
         stats: &mut Statistics,
     ) -> Result<(), Error> {
+        let recluster = self.reclusters();
+        self.has_pieces = false;
         if self
             .world
-            .update(&self.gpu, scene, frame, resident, stats)?
+            .update(&self.gpu, scene, frame, resident, recluster, stats)?
         {
             self.unbind();
         }
@@ -222,7 +372,7 @@ impl Engine {
         self.first = capacities;
     }
 
-    fn unbind(&mut self) {
+    pub(super) fn unbind(&mut self) {
         match &mut self.plan {
             Plan::Clusters(plan) => plan.unbind(),
             Plan::Cells(plan) => plan.unbind(),
@@ -231,7 +381,7 @@ impl Engine {
 
     /// Room for the grid: as many cells as equation (1) can ask for.
     pub(super) fn cells_wanted(&self, frame: &Frame) -> Option<CellsWanted> {
-        if self.options.method != Method::Cells {
+        if self.method != Method::Cells {
             return None;
         }
         let most = MOST_CELLS.min(Storage::<Cell>::limit(&self.gpu));
@@ -248,7 +398,7 @@ impl Engine {
 
     /// Room for the first pass: what there is, unless the budget says less.
     pub(super) fn first_room(&self, cells: Option<CellsWanted>) -> Result<Capacities, Error> {
-        let wanted = self.first.max(self.room.capacities());
+        let wanted = self.first.of(self.method).max(self.room.capacities());
         let Some(budget) = self.options.memory_budget else {
             return Ok(wanted);
         };
@@ -259,7 +409,7 @@ impl Engine {
                 return Ok(wanted);
             }
         }
-        let least = Capacities::LEAST.of(self.options.method);
+        let least = Capacities::LEAST.of(self.method);
         let needed = fixed + least.bytes();
         if needed > budget {
             return Err(Error::MemoryBudget {
@@ -269,98 +419,6 @@ impl Engine {
             });
         }
         Ok(least)
-    }
-
-    /// All of the work, if there is any.
-    pub(super) fn whole(&self, frame: &Frame) -> Option<Work> {
-        let seeds = self.world.seeds(frame);
-        if seeds.is_empty() {
-            return None;
-        }
-        Some(match self.plan {
-            Plan::Clusters(_) => Work::Seeds(self.descend(frame, seeds)),
-            Plan::Cells(_) => Work::Part(Part::ALL),
-        })
-    }
-
-    /// Seeds, as far down as the host goes.
-    fn descend(&self, frame: &Frame, mut seeds: Vec<NodePair>) -> Vec<NodePair> {
-        let mut below = Vec::new();
-        loop {
-            below.clear();
-            for &seed in &seeds {
-                if !self.world.expand(frame, seed, &mut below) {
-                    below.push(seed);
-                }
-            }
-            if below.len() > SEEDS || below == seeds {
-                return seeds;
-            }
-            std::mem::swap(&mut seeds, &mut below);
-        }
-    }
-
-    /// Two halves, or the children of a single pair of nodes; none when that is no help.
-    fn split(
-        &self,
-        frame: &Frame,
-        work: &Work,
-        collected: &Collected,
-    ) -> Result<Option<Vec<Work>>, Error> {
-        let seeds = match work {
-            Work::Seeds(seeds) => seeds,
-            Work::Part(part) => return Ok(self.split_part(*part, collected)),
-        };
-        if seeds.len() > 1 {
-            let (low, high) = seeds.split_at(seeds.len() / 2);
-            return Ok(Some(
-                [low, high].map(|half| Work::Seeds(half.to_vec())).into(),
-            ));
-        }
-        let mut below = Vec::new();
-        for &seed in seeds {
-            if !self.world.expand(frame, seed, &mut below) {
-                return Err(self.too_small("two clusters", Capacities::LEAST));
-            }
-        }
-        Ok(Some(match below.is_empty() {
-            true => Vec::new(),
-            false => vec![Work::Seeds(below)],
-        }))
-    }
-
-    fn split_part(&self, part: Part, collected: &Collected) -> Option<Vec<Work>> {
-        // What is kept does not depend on the part.
-        let needed = &collected.counts.needed;
-        if needed.kept > self.room.capacities().kept {
-            return None;
-        }
-        let halves = part.split(collected.grid.n_cells)?;
-        Some(halves.map(Work::Part).into())
-    }
-
-    /// Room for what cannot be split, at the cost of all that can.
-    fn lean(
-        &self,
-        collected: &Collected,
-        now: Capacities,
-        room: Option<u64>,
-    ) -> Result<Capacities, Error> {
-        let needed = &collected.counts.needed;
-        let least = Capacities::LEAST.of(self.options.method);
-        let lean = Capacities {
-            kept: needed.kept.max(least.kept),
-            entries: match needed.kept > now.kept {
-                true => least.entries,
-                false => needed.entries.max(least.entries),
-            },
-            ..least
-        };
-        let is_allowed = room.is_none_or(|room| lean.bytes() <= room);
-        if lean == now || !is_allowed || !lean.fit(&self.gpu) {
-            return Err(self.too_small("the primitives of one cell", lean));
-        }
-        Ok(lean)
     }
 
     pub(super) fn too_small(&self, what: &'static str, needed: Capacities) -> Error {
@@ -374,139 +432,5 @@ impl Engine {
                 what: format!("{} cannot hold {what}", self.gpu.name()),
             },
         }
-    }
-
-    /// One submission and its results.
-    async fn pass(
-        &mut self,
-        frame: &Frame,
-        work: &Work,
-        capacities: Capacities,
-        cells: Option<CellsWanted>,
-        stats: &mut Statistics,
-    ) -> Result<Collected, Error> {
-        let scopes = Scopes::open(&self.gpu.device);
-        let submitted = self.submit(frame, work, capacities, cells);
-        let closed = scopes.close();
-        let guess = submitted?;
-        closed.await?;
-        let names = self.stages();
-        let collected = self
-            .collector
-            .take(&self.gpu, &self.room, names.len(), guess)
-            .await?;
-        for (&name, &ms) in names.iter().zip(collected.stage_ms.iter().flatten()) {
-            stats.add_ms(name, ms);
-        }
-        self.world.is_moved = false;
-        Ok(collected)
-    }
-
-    fn stages(&self) -> &'static [&'static str] {
-        match &self.plan {
-            Plan::Clusters(_) => clusters::STAGES,
-            Plan::Cells(plan) => plan.stages(),
-        }
-    }
-
-    fn submit(
-        &mut self,
-        frame: &Frame,
-        work: &Work,
-        capacities: Capacities,
-        cells: Option<CellsWanted>,
-    ) -> Result<Guess, Error> {
-        let mut encoder = self
-            .gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
-                label: Some("impinge"),
-            });
-        let times = self.collector.times(&self.gpu).cloned();
-        let times = times.as_ref();
-        self.encode_pass(frame, Some(work), capacities, cells, times, &mut encoder)?;
-        let (gpu, n_stages) = (&*self.gpu, self.stages().len() as u32);
-        let guess = self
-            .collector
-            .encode(gpu, &mut encoder, &self.room, n_stages);
-        gpu.queue.submit([encoder.finish()]);
-        Ok(guess)
-    }
-
-    /// Encodes all stages; without work, counters that say so.
-    pub(super) fn encode_pass(
-        &mut self,
-        frame: &Frame,
-        work: Option<&Work>,
-        mut capacities: Capacities,
-        cells: Option<CellsWanted>,
-        times: Option<&wgpu::QuerySet>,
-        encoder: &mut wgpu::CommandEncoder,
-    ) -> Result<(), Error> {
-        let seeds: &[NodePair] = match work {
-            Some(Work::Seeds(seeds)) => seeds,
-            _ => &[],
-        };
-        capacities.queue = capacities.queue.max(count(seeds.len()));
-        if self.room.resize(&self.gpu, &capacities, cells) {
-            self.unbind();
-        }
-        let names = self.stages();
-        let gpu = &*self.gpu;
-        self.room.encode_start(gpu, seeds, encoder)?;
-        let (world, room) = (&self.world, &self.room);
-        let resolve = frame.shared_vertex == SharedVertex::Resolve;
-        let mut stages = Stages {
-            names,
-            encoder,
-            times,
-            next: 0,
-        };
-        match (&mut self.plan, work) {
-            (Plan::Clusters(plan), Some(Work::Seeds(seeds))) => {
-                plan.make(gpu, world, room, world.forest().rounds(seeds), resolve)?;
-                plan.encode(&mut stages, world, room, count(seeds.len()));
-            }
-            (Plan::Cells(plan), Some(Work::Part(part))) => {
-                let told = Told {
-                    lambda: self.options.lambda,
-                    group_size: self.options.group_size,
-                    resolve,
-                };
-                plan.make(gpu, world, room, told, *part)?;
-                plan.encode(&mut stages, world, room);
-            }
-            (_, None) => (),
-            _ => unreachable!("work is made for the plan"),
-        }
-        Ok(())
-    }
-}
-
-/// Counts of a pass that is complete.
-fn book(collected: &Collected, method: Method, stats: &mut Statistics) {
-    let needed = &collected.counts.needed;
-    stats.n_slabs += 1;
-    stats.n_work_items += needed.items;
-    stats.n_candidates += needed.candidates;
-    stats.n_unsure += needed.unsure;
-    if method == Method::Cells {
-        stats.n_entries += needed.entries;
-        stats.n_subdivided += collected.counts.n_subdivided;
-        stats.grid = Some(collected.grid.resolution);
-    }
-}
-
-/// Takes the certain pairs and settles the others exactly.
-fn settle_all(scene: &Scene, frame: &Frame, collected: &Collected, keys: &mut Vec<u64>) {
-    let certain = collected.pairs.iter();
-    keys.extend(certain.map(|pair| pair_key(pair.low, pair.high)));
-    let settled = |pair: &super::layout::UnsureKey| {
-        settle(scene, frame, pair.low, pair.high).then(|| pair_key(pair.low, pair.high))
-    };
-    if collected.unsure.len() < PARALLEL_FROM {
-        keys.extend(collected.unsure.iter().filter_map(settled));
-    } else {
-        keys.par_extend(collected.unsure.par_iter().filter_map(settled));
     }
 }

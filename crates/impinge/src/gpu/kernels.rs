@@ -170,6 +170,16 @@ bindings! {
 }
 
 bindings! {
+    /// `dispatch_tile.wgsl`
+    DispatchTile {
+        grid: Read<Grid>,
+        items: Write<CellItem>,
+        counters: Write<Counter>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
     /// `dispatch_scatter.wgsl`
     DispatchScatter {
         grid: Read<Grid>,
@@ -208,10 +218,14 @@ macro_rules! kernels {
         $(pub(crate) const $source: Source = source!($file, [$($shared),*]);)*
 
         impl Kernels {
-            /// Compiles all of them; errors go to the error scopes that are open.
-            pub fn new(device: &wgpu::Device) -> Self {
+            /// Compiles all of them, each from what `text` makes of its source; errors go to the error
+            /// scopes that are open.
+            pub fn new(device: &wgpu::Device, text: impl Fn(&Source) -> String) -> Self {
                 Kernels {
-                    $($name: Kernel::new(device, &$source, &[$($constant),*]),)*
+                    $($name: {
+                        let text = text(&$source);
+                        Kernel::of_text(device, &$source, text, &[$($constant),*])
+                    },)*
                 }
             }
         }
@@ -234,9 +248,9 @@ kernels! {
     pairing: Pairing = PAIRING []
         from "pairing" ("boxes", "vertices", "ids", "reserve", "groups");
     narrow: Narrow = NARROW [("WITH_SOLIDS", 0.0)]
-        from "narrow" ("filter", "triangles", "solids", "reserve", "groups");
+        from "narrow" ("filter", "triangles", "neighbours", "solids", "reserve", "groups");
     narrow_solids: Narrow = NARROW_SOLIDS [("WITH_SOLIDS", 1.0)]
-        from "narrow" ("filter", "triangles", "solids", "reserve", "groups");
+        from "narrow" ("filter", "triangles", "neighbours", "solids", "reserve", "groups");
     bounds_reach: BoundsReach = BOUNDS_REACH [] from "bounds_reach" ("boxes", "meets", "groups");
     bounds_keep: BoundsKeep = BOUNDS_KEEP []
         from "bounds_keep" ("boxes", "vertices", "reserve", "groups");
@@ -248,6 +262,7 @@ kernels! {
     dispatch_cells: DispatchCells = DISPATCH_CELLS [] from "dispatch_cells" ("reserve", "groups");
     dispatch_scatter: DispatchScatter = DISPATCH_SCATTER []
         from "dispatch_scatter" ("coarse", "groups");
+    dispatch_tile: DispatchTile = DISPATCH_TILE [] from "dispatch_tile" ("reserve", "groups");
     pairing_cells: PairingCells = PAIRING_CELLS []
         from "pairing_cells" ("boxes", "meets", "ids", "reserve", "groups");
 }

@@ -45,6 +45,7 @@ words! {
         counter: u32, per_group: u32, capacity: u32, slot: u32,
         n_ignored: u32, resolve: u32,
         group_size: u32, lambda: u32, most_cells: u32, owner_rule: u32,
+        lists_only: u32, n_entries: u32, tile_row: u32, tile_column: u32, tile_side: u32,
     }
     /// A primitive that reaches another body.
     Kept { low: [u32; 3], place: u32, high: [u32; 3], body: u32, range: [u32; 3], unused: u32 }
@@ -146,14 +147,14 @@ impl Node {
 #[repr(C)]
 pub struct Step {
     pub params: Params,
-    padding: [u32; 52],
+    padding: [u32; 47],
 }
 
 impl From<Params> for Step {
     fn from(params: Params) -> Self {
         Step {
             params,
-            padding: [0; 52],
+            padding: [0; 47],
         }
     }
 }

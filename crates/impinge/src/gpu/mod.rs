@@ -6,9 +6,13 @@
 //! blocks but [`device::Gpu::block_on`].
 
 mod bounds;
+mod clusterings;
 mod clusters;
 mod collect;
 mod device;
+mod forest;
+mod passes;
+mod pieces;
 mod resident;
 
 // What `guest` hands on of these is no part of the stable interface: its types are documented, their
@@ -31,6 +35,7 @@ pub(crate) mod reaching;
 pub(crate) mod room;
 #[allow(missing_docs)]
 pub(crate) mod steps;
+mod topology;
 #[allow(missing_docs)]
 pub(crate) mod world;
 

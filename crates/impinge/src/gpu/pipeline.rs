@@ -89,6 +89,16 @@ pub struct Kernel<B> {
 impl<B: Bindings> Kernel<B> {
     /// Compiles; errors go to the error scopes that are open.
     pub fn new(device: &wgpu::Device, source: &Source, constants: &[(&str, f64)]) -> Self {
+        Kernel::of_text(device, source, source.text(), constants)
+    }
+
+    /// Compiles a text in place of the kernel's own.
+    pub(crate) fn of_text(
+        device: &wgpu::Device,
+        source: &Source,
+        text: String,
+        constants: &[(&str, f64)],
+    ) -> Self {
         let entries: Vec<wgpu::BindGroupLayoutEntry> = (0u32..)
             .zip(B::ENTRIES)
             .map(|(binding, entry)| wgpu::BindGroupLayoutEntry {
@@ -118,7 +128,7 @@ impl<B: Bindings> Kernel<B> {
         });
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label,
-            source: wgpu::ShaderSource::Wgsl(source.text().into()),
+            source: wgpu::ShaderSource::Wgsl(text.into()),
         });
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label,

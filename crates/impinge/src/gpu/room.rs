@@ -12,8 +12,8 @@ use super::layout::{
     N_TALLIES, N_UNSURE, NodePair, PairKey, ROUNDS, Reach, Start, TOO_MUCH, Tally, UnsureKey,
     WorkItem,
 };
-use crate::detector::Method;
 use crate::error::Error;
+use crate::settings::Method;
 
 /// Elements that each buffer has room for. The answer never depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,7 +55,7 @@ const ONE_ITEM: u64 = 64 * 64;
 impl Capacities {
     /// With these a pass of one pair of clusters always fits.
     pub const LEAST: Capacities = Capacities {
-        queue: 64,
+        queue: 512,
         items: 64,
         kept: 64,
         entries: 64,

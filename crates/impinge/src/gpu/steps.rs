@@ -47,7 +47,7 @@ impl Steps {
         if self.planned == self.sent && self.buffer.bytes() > 0 {
             return Ok(false);
         }
-        // Steps are bound one at a time: their number does not matter, only the buffer.
+        // One step is bound at a time, so only another buffer matters, not another length.
         let bytes = self.buffer.bytes();
         self.buffer.upload(gpu, &self.planned)?;
         self.sent.clone_from(&self.planned);

@@ -128,7 +128,7 @@ fn structs_are_laid_out_as_on_the_host() {
         UnsureKey { low, high }
         Params {
             first, count, counter, per_group, capacity, slot, n_ignored, resolve, group_size,
-            lambda, most_cells, owner_rule
+            lambda, most_cells, owner_rule, lists_only, n_entries, tile_row, tile_column, tile_side
         }
         Kept { low, place, high, body, range, unused }
         Grid { origin, shift, scale, n_cells, finest, unused, resolution, unused_too }

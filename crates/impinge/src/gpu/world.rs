@@ -19,40 +19,31 @@ use std::sync::Arc;
 
 use crate::error::Error;
 use crate::frame::Frame;
-use crate::grouping::GROUP;
-use crate::grouping::bounds::{Bounds, round_down, round_up};
 use crate::grouping::clusters::Clustering;
-use crate::grouping::hierarchy::{Entry, Shape, order};
-use crate::scene::{BodyId, Elements, Filter, Positions, Scene};
+use crate::grouping::hierarchy::Shape;
+use crate::scene::{BodyId, Filter, Positions, Scene};
 use crate::stats::Statistics;
 
 use super::buffers::{Storage, count};
+use super::clusterings::Clusterings;
 use super::device::Gpu;
+use super::forest::Forest;
 use super::layout::{
     Body, Cluster, ClusterVertex, Coordinate, Corners, Level, NO_ROOT, Node, NodePair, Order,
 };
+use super::pieces::{Chunk, Loaded};
+use super::topology::{Topology, Weight};
 
 /// Places carry a flag in bit 31.
-const MOST_PRIMITIVES: u64 = 1 << 31;
+pub const MOST_PRIMITIVES: u64 = 1 << 31;
 /// How many keys the boxes of rounded positions are widened: see `boxes.wgsl`.
 const SLACK: u32 = 2;
-/// Bodies, empty ones included, that need no tree over bodies if at most two are filled.
-const FEW_BODIES: usize = 1024;
-/// How far bodies may part from their neighbours in the tree over bodies before it is made anew.
-const STALE: f64 = 1.5;
-
-/// The clusters of a body, kept while its topology stays.
-#[derive(Debug)]
-struct Cached {
-    topology_stamp: u64,
-    clustering: Clustering,
-}
-
 /// One participant on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Resident {
     id: BodyId,
-    topology_stamp: u64,
+    /// The clustering that was sent.
+    number: u64,
     positions_stamp: u64,
     /// Index of its first vertex in the positions.
     first_vertex: u64,
@@ -62,7 +53,7 @@ struct Resident {
 /// Everything about the participants that the kernels read.
 #[derive(Debug)]
 pub struct World {
-    caches: Vec<Option<Arc<Cached>>>,
+    pub clusterings: Clusterings,
     residents: Vec<Resident>,
     /// What the device has of the nodes, without the boxes.
     forest: Forest,
@@ -86,7 +77,7 @@ pub struct World {
 impl World {
     pub(crate) fn new() -> Self {
         World {
-            caches: Vec::new(),
+            clusterings: Clusterings::default(),
             residents: Vec::new(),
             forest: Forest::default(),
             bodies_sent: Vec::new(),
@@ -123,8 +114,8 @@ impl World {
         &self.forest
     }
 
-    /// Brings the device up to the frame; positions of `resident` bodies are there already.
-    /// Returns whether anything has to be bound anew.
+    /// Brings the device up to the frame; positions of `resident` bodies are there already. Returns
+    /// whether kernels have to be bound anew.
     ///
     /// # Errors
     /// More primitives than the device can bind at once.
@@ -134,6 +125,7 @@ impl World {
         scene: &Scene,
         frame: &Frame,
         resident: &[BodyId],
+        recluster: bool,
         stats: &mut Statistics,
     ) -> Result<bool, Error> {
         if frame.n_primitives() > MOST_PRIMITIVES {
@@ -143,86 +135,46 @@ impl World {
                 limit: MOST_PRIMITIVES,
             });
         }
-        self.cluster(scene, frame, stats);
-        let mut is_new = false;
-        if !self.is_resident(scene, frame) {
+        self.clusterings
+            .update(scene, frame, resident, recluster, stats);
+        let mut is_other = false;
+        if !self.is_resident(frame) {
             // Half a topology must not pass for a whole one if an upload fails.
             self.residents.clear();
             self.send_topology(gpu, scene, frame)?;
-            // Buffers may be the same ones, but kernels are chosen by what bodies are made of.
-            is_new = true;
+            is_other = true;
         }
         self.send_positions(gpu, scene, frame, resident);
-        is_new |= self.send_bodies(gpu, scene, frame, resident)?;
+        is_other |= self.send_bodies(gpu, scene, frame, resident)?;
         stats.n_clusters = self.forest.n_clusters();
-        Ok(is_new)
+        Ok(is_other)
     }
 
-    fn cluster(&mut self, scene: &Scene, frame: &Frame, stats: &mut Statistics) {
-        let n_slots = frame
-            .participants
-            .last()
-            .map_or(0, |last| last.id.index() + 1);
-        if self.caches.len() < n_slots {
-            self.caches.resize_with(n_slots, || None);
-        }
-        if self.caches.len() > scene.n_bodies() {
-            for (slot, cache) in self.caches.iter_mut().enumerate() {
-                if !scene.holds(slot) {
-                    *cache = None;
-                }
-            }
-        }
-        for (ix, participant) in frame.participants.iter().enumerate() {
-            let body = frame.body(scene, ix);
-            let cache = &mut self.caches[participant.id.index()];
-            let topology_stamp = body.topology_stamp();
-            if cache
-                .as_ref()
-                .is_none_or(|cache| cache.topology_stamp != topology_stamp)
-            {
-                let (elements, positions) = (body.elements(), body.positions());
-                let clustering = Clustering::new(elements, |primitive| {
-                    bounds_of(positions, elements.corners(primitive))
-                });
-                *cache = Some(Arc::new(Cached {
-                    topology_stamp,
-                    clustering,
-                }));
-                stats.n_clustered += 1;
-            }
-        }
-    }
-
-    fn is_resident(&self, scene: &Scene, frame: &Frame) -> bool {
+    fn is_resident(&self, frame: &Frame) -> bool {
         self.residents.len() == frame.participants.len()
             && self.residents.iter().enumerate().all(|(ix, resident)| {
+                let cache = self.clusterings.of(resident.id);
                 resident.id == frame.participants[ix].id
-                    && resident.topology_stamp == frame.body(scene, ix).topology_stamp()
+                    && cache.is_some_and(|cache| cache.number == resident.number)
             })
     }
 
     fn send_topology(&mut self, gpu: &Gpu, scene: &Scene, frame: &Frame) -> Result<(), Error> {
-        let caches: Vec<Arc<Cached>> = frame
+        let caches: Vec<(u64, Arc<Clustering>)> = frame
             .participants
             .iter()
             .map(|participant| {
-                let cache = self.caches[participant.id.index()].as_ref();
-                Arc::clone(cache.expect("just clustered"))
+                let cache = self.clusterings.of(participant.id);
+                let cache = cache.expect("just clustered");
+                (cache.number, Arc::clone(&cache.clustering))
             })
             .collect();
         let mut residents = Vec::with_capacity(caches.len());
-        let mut clusters = Vec::new();
-        let mut cluster_vertices = Vec::new();
-        let mut corners = Vec::new();
-        let mut numbers = Vec::new();
+        let mut topology = Topology::default();
         let mut first_vertex = 0u64;
-        self.has_solids = false;
-        for (ix, cached) in caches.iter().enumerate() {
-            let body = frame.body(scene, ix);
+        for (ix, (number, clustering)) in caches.iter().enumerate() {
+            let n_vertices = count(frame.body(scene, ix).n_vertices());
             let participant = &frame.participants[ix];
-            let clustering = &cached.clustering;
-            let n_vertices = count(body.n_vertices());
             let limit = u64::from(u32::MAX) / 3;
             if first_vertex + n_vertices > limit {
                 return Err(Error::TooMany {
@@ -233,37 +185,17 @@ impl World {
             }
             // Vertices fit 32 bits, as was just checked.
             let first = first_vertex as u32;
-            for cluster in 0..clustering.n_clusters() {
-                let vertices = clustering.vertices(cluster);
-                clusters.push(Cluster {
-                    first_place: participant.first + (cluster * GROUP) as u32,
-                    first_vertex: cluster_vertices.len() as u32,
-                    sizes: clustering.size(cluster) as u32 | (vertices.len() as u32) << 16,
-                    body: ix as u32,
-                });
-                cluster_vertices.extend(vertices.iter().map(|&vertex| ClusterVertex {
-                    vertex: first + vertex,
-                }));
-            }
-            match &clustering.corners {
-                Elements::Triangles(faces) => {
-                    corners.extend(faces.iter().map(|&[a, b, c]| Corners {
-                        vertices: [a, b, c, c].map(|corner| first + corner),
-                    }));
-                }
-                Elements::Tetrahedra(tets) => {
-                    self.has_solids |= !tets.is_empty();
-                    corners.extend(tets.iter().map(|tet| Corners {
-                        vertices: tet.map(|corner| first + corner),
-                    }));
-                }
-            }
-            numbers.extend(clustering.order.iter().map(|&primitive| Order {
-                number: participant.first + primitive,
-            }));
+            let clusters = 0..clustering.n_clusters();
+            topology.push(
+                clustering,
+                clusters,
+                participant.first,
+                ix as u32,
+                |vertex| first + vertex,
+            );
             residents.push(Resident {
                 id: participant.id,
-                topology_stamp: body.topology_stamp(),
+                number: *number,
                 positions_stamp: 0,
                 first_vertex,
                 n_vertices,
@@ -272,19 +204,94 @@ impl World {
         }
         let shapes: Vec<&Shape> = caches
             .iter()
-            .map(|cached| &cached.clustering.shape)
+            .map(|(_, clustering)| &clustering.shape)
             .collect();
         self.forest = Forest::new(&shapes, |ix| sample(scene, frame, ix));
-        self.clusters.upload(gpu, &clusters)?;
-        self.cluster_vertices.upload(gpu, &cluster_vertices)?;
-        self.corners.upload(gpu, &corners)?;
-        self.order.upload(gpu, &numbers)?;
-        self.nodes.upload(gpu, &self.forest.nodes)?;
-        self.levels.upload(gpu, &self.forest.levels)?;
+        self.send_trees(gpu, &topology)?;
         self.positions.resize(gpu, 3 * first_vertex)?;
         self.bodies_sent.clear();
         self.residents = residents;
         Ok(())
+    }
+
+    fn send_trees(&mut self, gpu: &Gpu, topology: &Topology) -> Result<(), Error> {
+        self.has_solids = topology.has_solids;
+        self.clusters.upload(gpu, &topology.clusters)?;
+        self.cluster_vertices
+            .upload(gpu, &topology.cluster_vertices)?;
+        self.corners.upload(gpu, &topology.corners)?;
+        self.order.upload(gpu, &topology.numbers)?;
+        self.nodes.upload(gpu, &self.forest.nodes)?;
+        self.levels.upload(gpu, &self.forest.levels)?;
+        Ok(())
+    }
+
+    /// Sends a piece of the frame in place of all of it. Kernels have to be bound anew after it.
+    ///
+    /// # Errors
+    /// The piece is more than the device can bind at once.
+    pub fn send_piece(
+        &mut self,
+        gpu: &Gpu,
+        scene: &Scene,
+        frame: &Frame,
+        chunks: &[&Chunk],
+    ) -> Result<(), Error> {
+        self.residents.clear();
+        let loaded = Loaded::new(scene, frame, chunks, |participant_ix| {
+            self.clustering(frame, participant_ix)
+        });
+        self.forest = Forest::of_trees(&Vec::from_iter(&loaded.shapes));
+        self.send_trees(gpu, &loaded.topology)?;
+        let words: &[Coordinate] = bytemuck::cast_slice(&loaded.words);
+        self.positions.upload(gpu, words)?;
+        let slacks = loaded.is_rounded.iter().map(|&is_rounded| Body {
+            root: NO_ROOT,
+            slack: if is_rounded { SLACK } else { 0 },
+            ..Body::default()
+        });
+        self.bodies.upload(gpu, &Vec::from_iter(slacks))?;
+        self.bodies_sent.clear();
+        self.ignored.upload(gpu, &[])?;
+        self.ignored_sent.clear();
+        self.is_moved = true;
+        Ok(())
+    }
+
+    /// Gives all buffers back. What is known of clusters stays.
+    pub fn forget_buffers(&mut self) {
+        *self = World {
+            clusterings: std::mem::take(&mut self.clusterings),
+            ..World::new()
+        };
+    }
+
+    /// The clusters of a participant, which are known.
+    pub(crate) fn clustering(&self, frame: &Frame, participant_ix: usize) -> &Clustering {
+        let id = frame.participants[participant_ix].id;
+        let cache = self.clusterings.of(id);
+        &cache.expect("just clustered").clustering
+    }
+
+    /// What all of a frame would take on the device.
+    pub fn weigh(&self, scene: &Scene, frame: &Frame) -> Weight {
+        let mut weight = Weight::default();
+        for ix in 0..frame.participants.len() {
+            let clustering = self.clustering(frame, ix);
+            weight.n_primitives += count(clustering.order.len());
+            weight.n_vertices += count(frame.body(scene, ix).n_vertices());
+            weight.n_cluster_vertices += count(clustering.vertices.len());
+            weight.n_clusters += count(clustering.n_clusters());
+            let shape = &clustering.shape;
+            let nodes = (0..shape.n_levels()).map(|level| count(shape.n_nodes(level)));
+            weight.n_nodes += nodes.sum::<u64>();
+            weight.n_bodies += 1;
+        }
+        if weight.n_bodies > 2 {
+            // Gates and the tree over them.
+            weight.n_nodes += 2 * weight.n_bodies;
+        }
+        weight
     }
 
     /// Sends the positions of bodies that have moved, neighbours in one piece.
@@ -324,12 +331,8 @@ impl World {
                         self.words.extend_from_slice(words);
                     }
                     Positions::F64(positions) => {
-                        // Rounded to nearest; boxes and filter allow for it, see `Body::slack`.
-                        let words = positions
-                            .as_flattened()
-                            .iter()
-                            .map(|&x| (x as f32).to_bits());
-                        self.words.extend(words);
+                        self.words
+                            .extend(positions.as_flattened().iter().map(narrowed));
                     }
                 }
             }
@@ -375,9 +378,9 @@ impl World {
                 mask: words(filter.mask),
             });
         }
-        let mut is_new = false;
+        let mut is_other = false;
         if bodies != self.bodies_sent {
-            is_new |= self.bodies.upload(gpu, &bodies)?;
+            is_other |= self.bodies.upload(gpu, &bodies)?;
             self.bodies_sent = bodies;
         }
         let ignored: Vec<NodePair> = frame
@@ -388,10 +391,10 @@ impl World {
             })
             .collect();
         if ignored != self.ignored_sent || self.ignored.bytes() == 0 {
-            is_new |= self.ignored.upload(gpu, &ignored)?;
+            is_other |= self.ignored.upload(gpu, &ignored)?;
             self.ignored_sent = ignored;
         }
-        Ok(is_new)
+        Ok(is_other)
     }
 
     /// Encodes the copy of a body's positions from a buffer on the device, if it takes part.
@@ -452,6 +455,16 @@ impl World {
         seeds
     }
 
+    /// Seeds of a piece: the trees of its runs, by their numbers.
+    pub fn seeds_of_runs(&self, pairs: &[[u32; 2]]) -> Vec<NodePair> {
+        let root = |run: u32| self.forest.roots[run as usize];
+        let seed = |&[a, b]: &[u32; 2]| NodePair {
+            a: root(a),
+            b: root(b),
+        };
+        pairs.iter().map(seed).collect()
+    }
+
     /// The pairs of children of two nodes, whether their boxes overlap or not; `None` for two
     /// clusters. The same steps as `dispatch.wgsl`.
     pub fn expand(&self, frame: &Frame, pair: NodePair, into: &mut Vec<NodePair>) -> bool {
@@ -493,199 +506,14 @@ impl World {
     }
 }
 
+/// The bits of a coordinate rounded to nearest; boxes and filter allow for it, see `Body::slack`.
+pub fn narrowed(x: &f64) -> u32 {
+    (*x as f32).to_bits()
+}
+
 /// A point of a body: its first vertex that a primitive names. The tree over bodies is made of these.
 fn sample(scene: &Scene, frame: &Frame, ix: usize) -> [f32; 3] {
     let body = frame.body(scene, ix);
     let vertex = body.elements().corners(0)[0];
     body.positions().point(vertex as usize).map(|x| x as f32)
-}
-
-fn bounds_of(positions: &Positions, corners: &[u32]) -> Bounds {
-    let mut bounds = Bounds::EMPTY;
-    for &corner in corners {
-        let point = positions.point(corner as usize);
-        bounds.join(&Bounds {
-            min: point.map(round_down),
-            max: point.map(round_up),
-        });
-    }
-    bounds
-}
-
-/// All trees in one array.
-#[derive(Debug, Default)]
-pub struct Forest {
-    pub nodes: Vec<Node>,
-    pub levels: Vec<Level>,
-    /// Root of each participant; meaningless for an empty one.
-    roots: Vec<u32>,
-    n_clusters: u64,
-    first_gate: u32,
-    n_gates: u32,
-    has_top: bool,
-    top_shape: Shape,
-    best_spread: f64,
-    entries: Vec<Entry>,
-}
-
-impl Forest {
-    fn new(shapes: &[&Shape], sample: impl Fn(usize) -> [f32; 3]) -> Self {
-        let mut forest = Forest {
-            roots: vec![NO_ROOT; shapes.len()],
-            ..Forest::default()
-        };
-        let n_heights = shapes.iter().map(|shape| shape.n_levels()).max();
-        // First node of the body at the height below, and at this one.
-        let mut below = vec![0u32; shapes.len()];
-        for height in 0..n_heights.unwrap_or(0) {
-            let first = forest.nodes.len() as u32;
-            let mut next_cluster = 0u32;
-            for (ix, shape) in shapes.iter().enumerate() {
-                if height >= shape.n_levels() {
-                    continue;
-                }
-                let first_here = forest.nodes.len() as u32;
-                for node in 0..shape.n_nodes(height) {
-                    forest.nodes.push(if height == 0 {
-                        next_cluster += 1;
-                        Node::new(next_cluster - 1, 0, 0, false)
-                    } else {
-                        let children = shape.children(height, node);
-                        Node::new(
-                            below[ix] + children.start as u32,
-                            children.len() as u32,
-                            height as u32,
-                            false,
-                        )
-                    });
-                }
-                below[ix] = first_here;
-                if height + 1 == shape.n_levels() {
-                    forest.roots[ix] = first_here;
-                }
-            }
-            forest.push_level(first);
-        }
-        forest.n_clusters = forest.levels.first().map_or(0, |level| level.count.into());
-        let filled: Vec<u32> = (0..shapes.len() as u32)
-            .filter(|&ix| forest.is_filled(ix as usize))
-            .collect();
-        // Without a tree kernels walk over all bodies, empty ones too.
-        if filled.len() > 2 || (shapes.len() > FEW_BODIES && !filled.is_empty()) {
-            forest.has_top = true;
-            forest.push_top(&filled);
-            forest.reorder(sample);
-        }
-        forest
-    }
-
-    fn push_level(&mut self, first: u32) {
-        self.levels.push(Level {
-            first,
-            count: self.nodes.len() as u32 - first,
-        });
-    }
-
-    /// Gates and the tree over them.
-    fn push_top(&mut self, filled: &[u32]) {
-        self.first_gate = self.nodes.len() as u32;
-        self.n_gates = filled.len() as u32;
-        let gate_height = self.levels.len() as u32;
-        let gates = filled
-            .iter()
-            .map(|&body| Node::new(body, 1, gate_height, true));
-        self.nodes.extend(gates);
-        self.push_level(self.first_gate);
-        self.top_shape = Shape::new(filled.len());
-        let mut below = self.first_gate;
-        for level in 1..self.top_shape.n_levels() {
-            let first = self.nodes.len() as u32;
-            for node in 0..self.top_shape.n_nodes(level) {
-                let children = self.top_shape.children(level, node);
-                self.nodes.push(Node::new(
-                    below + children.start as u32,
-                    children.len() as u32,
-                    gate_height + level as u32,
-                    false,
-                ));
-            }
-            below = first;
-            self.push_level(first);
-        }
-    }
-
-    /// The root of the tree over bodies.
-    pub fn top(&self) -> Option<u32> {
-        self.has_top.then(|| self.nodes.len() as u32 - 1)
-    }
-
-    fn is_filled(&self, participant_ix: usize) -> bool {
-        self.roots[participant_ix] != NO_ROOT
-    }
-
-    pub fn n_clusters(&self) -> u64 {
-        self.n_clusters
-    }
-
-    fn gates(&self) -> &[Node] {
-        let first = self.first_gate as usize;
-        &self.nodes[first..first + self.n_gates as usize]
-    }
-
-    /// Puts the gates in a new order when bodies have parted from their neighbours. Returns whether.
-    fn reorder(&mut self, sample: impl Fn(usize) -> [f32; 3]) -> bool {
-        if !self.has_top {
-            return false;
-        }
-        self.entries.clear();
-        let first = self.first_gate as usize;
-        for gate in first..first + self.n_gates as usize {
-            let number = self.nodes[gate].first_child;
-            self.entries.push(Entry {
-                center: sample(number as usize),
-                number,
-            });
-        }
-        let spread = self.spread();
-        let is_new = self.best_spread == 0.0;
-        if !is_new && spread <= STALE * self.best_spread {
-            self.best_spread = self.best_spread.min(spread);
-            return false;
-        }
-        order(&self.top_shape, 1, 1, &mut self.entries);
-        for (gate, entry) in self.entries.iter().enumerate() {
-            self.nodes[first + gate].first_child = entry.number;
-        }
-        // Never 0, so that it is known to have been found.
-        self.best_spread = self.spread().max(f64::MIN_POSITIVE);
-        true
-    }
-
-    /// The summed surface of the boxes of neighbouring entries: how well the order fits.
-    fn spread(&self) -> f64 {
-        let boxes = self.entries.chunks(crate::grouping::hierarchy::FANOUT);
-        boxes
-            .map(|entries| {
-                let mut bounds = Bounds::EMPTY;
-                for entry in entries {
-                    bounds.join(&Bounds {
-                        min: entry.center,
-                        max: entry.center,
-                    });
-                }
-                bounds.half_area()
-            })
-            .filter(|area| area.is_finite())
-            .sum()
-    }
-
-    /// Rounds that a traversal from these pairs takes.
-    pub fn rounds(&self, seeds: &[NodePair]) -> u32 {
-        seeds
-            .iter()
-            .flat_map(|pair| [pair.a, pair.b])
-            .map(|node| self.nodes[node as usize].height())
-            .max()
-            .map_or(0, |height| height.max(1))
-    }
 }

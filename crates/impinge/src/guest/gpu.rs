@@ -3,11 +3,10 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::detector::Method;
 use crate::error::Error;
 use crate::frame::Frame;
 pub use crate::gpu::buffers::{Access, Binding, Read, Storage, Uniform, Write};
-pub use crate::gpu::cells::{InCells, Part, Told};
+pub use crate::gpu::cells::{InCells, Part, Share, Tile, Told};
 use crate::gpu::engine::{Engine, Options};
 pub use crate::gpu::layout::{
     Arguments, Candidate, CellItem, Counter, Grid, Kept, N_ENTRIES, N_ITEMS, Params, ROUNDS,
@@ -24,6 +23,7 @@ use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
 use crate::scene::Scene;
+use crate::settings::Method;
 
 /// Text that kernels are put together from: `LAYOUT` first, it has the structs of all.
 pub mod shared {
@@ -74,7 +74,9 @@ impl Host {
             method: Method::Cells,
             lambda,
             group_size: 64,
+            recluster: false,
             memory_budget,
+            in_pieces: false,
         };
         let first = first.unwrap_or_default();
         Ok(Host {

@@ -30,8 +30,8 @@ mod triangles;
 use super::Point;
 
 pub(super) use neighbours::{shared_edge, shared_vertex};
-pub use tetrahedra::classify_by_faces;
 pub(super) use tetrahedra::tetrahedra_answer;
+pub use tetrahedra::{classify_by_faces, classify_tetrahedra};
 pub(super) use triangles::triangles_answer;
 pub use triangles::{classify, reject_by_planes};
 

@@ -23,7 +23,7 @@
 @group(0) @binding(6) var<uniform> params: Params;
 
 const NOWHERE: u32 = 0xffffffffu;
-// Work items that one invocation writes at most; a cell with more is refused.
+// Work items that one invocation writes at most; a cell with more is worked in tiles.
 const MOST_ITEMS: u32 = 32768u;
 
 var<workgroup> n_wanted: atomic<u32>;
@@ -65,7 +65,7 @@ fn main(
     }
     let size = params.group_size;
     let groups = n / size + select(0u, 1u, n % size != 0u);
-    let mine = count_items(groups);
+    let mine = select(count_items(groups), 0u, params.lists_only != 0u);
     if mine > MOST_ITEMS {
         atomicStore(&counters[TOO_MUCH], 1u);
         n = 0u;

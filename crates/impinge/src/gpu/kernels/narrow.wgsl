@@ -32,11 +32,9 @@ fn magnitude(bits: vec3<u32>) -> vec3<u32> {
 }
 
 fn settle(candidate: Candidate) -> i32 {
-    if (candidate.b & FLAG) != 0u {
-        return UNSURE;
-    }
+    let are_neighbours = (candidate.b & FLAG) != 0u;
     let a = corners[candidate.a & ~FLAG];
-    let b = corners[candidate.b];
+    let b = corners[candidate.b & ~FLAG];
     let a0 = vertex_bits(a.x);
     let a1 = vertex_bits(a.y);
     let a2 = vertex_bits(a.z);
@@ -56,12 +54,21 @@ fn settle(candidate: Candidate) -> i32 {
     let slack = select(0.0, NARROWING * bitcast<f32>(largest), (candidate.a & FLAG) != 0u);
     if WITH_SOLIDS {
         if a.z != a.w || b.z != b.w {
+            if are_neighbours {
+                return UNSURE;
+            }
             var solid_a = Solid(array<vec3<f32>, 4>(bitcast<vec3<f32>>(a0), bitcast<vec3<f32>>(a1),
                 bitcast<vec3<f32>>(a2), bitcast<vec3<f32>>(a3)), a.z == a.w);
             var solid_b = Solid(array<vec3<f32>, 4>(bitcast<vec3<f32>>(b0), bitcast<vec3<f32>>(b1),
                 bitcast<vec3<f32>>(b2), bitcast<vec3<f32>>(b3)), b.z == b.w);
             return solids(&solid_a, &solid_b, slack);
         }
+    }
+    if are_neighbours {
+        return neighbours(a.xyz, b.xyz,
+            bitcast<vec3<f32>>(a0), bitcast<vec3<f32>>(a1), bitcast<vec3<f32>>(a2),
+            bitcast<vec3<f32>>(b0), bitcast<vec3<f32>>(b1), bitcast<vec3<f32>>(b2), slack,
+        );
     }
     return triangles(
         bitcast<vec3<f32>>(a0), bitcast<vec3<f32>>(a1), bitcast<vec3<f32>>(a2),

@@ -76,6 +76,13 @@ struct Params {
     most_cells: u32,
     // Methods from outside: 1 when a pair is tested by one of its cells alone.
     owner_rule: u32,
+    // Cells: 1 when lists are filled and nothing is listed as work. Of the one cell whose lists are there:
+    // its entries, and the tile of the product of its groups.
+    lists_only: u32,
+    n_entries: u32,
+    tile_row: u32,
+    tile_column: u32,
+    tile_side: u32,
 }
 
 // A primitive that reaches another body: its box, its place (bit 31: rounded), its body, and the

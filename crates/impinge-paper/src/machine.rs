@@ -1,0 +1,91 @@
+//! What the numbers were measured on.
+
+use serde::Serialize;
+
+/// The processor, as the system names it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Machine {
+    /// The CPU's model.
+    pub cpu: String,
+    /// Threads that the system offers.
+    pub n_threads_offered: usize,
+    /// Threads that worked.
+    pub n_threads: usize,
+    /// Vector instructions that the library uses here.
+    pub vectors: String,
+    /// The operating system.
+    pub os: String,
+}
+
+/// A GPU, or a driver that imitates one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Adapter {
+    /// As the driver names it.
+    pub name: String,
+    /// The driver and its version.
+    pub driver: String,
+    /// Whether it is a program on the CPU.
+    pub is_software: bool,
+}
+
+impl Machine {
+    /// This machine; `n_threads` workers were asked for, 0 for one a core.
+    pub fn of_this(n_threads: usize) -> Self {
+        let n_threads_offered = std::thread::available_parallelism().map_or(1, usize::from);
+        Machine {
+            cpu: cpu().unwrap_or_else(|| std::env::consts::ARCH.to_owned()),
+            n_threads_offered,
+            n_threads: if n_threads == 0 {
+                n_threads_offered
+            } else {
+                n_threads
+            },
+            vectors: vectors().to_owned(),
+            os: std::env::consts::OS.to_owned(),
+        }
+    }
+}
+
+/// The processor's name as Linux tells it.
+#[cfg(target_os = "linux")]
+fn cpu() -> Option<String> {
+    let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
+    let named = ["model name", "Model", "Hardware"];
+    let line = named
+        .iter()
+        .find_map(|name| text.lines().find(|line| line.starts_with(name)))?;
+    Some(line.split_once(':')?.1.trim().to_owned())
+}
+
+/// The processor's name as macOS tells it.
+#[cfg(target_os = "macos")]
+fn cpu() -> Option<String> {
+    let output = std::process::Command::new("sysctl")
+        .args(["-n", "machdep.cpu.brand_string"])
+        .output()
+        .ok()?;
+    let name = String::from_utf8(output.stdout).ok()?;
+    (!name.trim().is_empty()).then(|| name.trim().to_owned())
+}
+
+/// The processor's name as Windows, or anybody, has it in the environment.
+#[cfg(not(any(target_os = "linux", target_os = "macos")))]
+fn cpu() -> Option<String> {
+    std::env::var("PROCESSOR_IDENTIFIER").ok()
+}
+
+#[cfg(target_arch = "x86_64")]
+fn vectors() -> &'static str {
+    if std::arch::is_x86_feature_detected!("avx512f") {
+        "AVX-512"
+    } else if std::arch::is_x86_feature_detected!("avx2") {
+        "AVX2"
+    } else {
+        "SSE2"
+    }
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn vectors() -> &'static str {
+    "the target's baseline"
+}

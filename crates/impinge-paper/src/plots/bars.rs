@@ -1,0 +1,168 @@
+//! Groups of bars, each with its number on top.
+
+use plotters::chart::{ChartBuilder, LabelAreaPosition};
+use plotters::coord::Shift;
+use plotters::element::{PathElement, Rectangle, Text};
+use plotters::prelude::{DrawingArea, DrawingBackend};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{Color, IntoFont, RGBColor, ShapeStyle, TextStyle, WHITE};
+
+use super::{AXIS, FONT, GRID, Plot, failed};
+use crate::error::Error;
+
+/// The height of a bar and what is written on top of it; `None` where it was not run.
+pub(crate) type Height = Option<(f64, String)>;
+
+/// A group's name, and the height of each kind of bar.
+pub(crate) type Group = (String, Vec<Height>);
+
+/// Groups of bars beside each other.
+pub(crate) struct Bars {
+    pub title: String,
+    /// What the height means.
+    pub y: String,
+    /// Names of the bars of a group, and their colours.
+    pub kinds: Vec<(String, RGBColor)>,
+    /// The groups.
+    pub groups: Vec<Group>,
+    /// A height to mark, and what it is.
+    pub mark: Option<(f64, String)>,
+}
+
+impl Plot for Bars {
+    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>, scale: u32) -> Result<(), Error>
+    where
+        B::ErrorType: 'static,
+    {
+        let px = |size: u32| size * scale;
+        let text = |size: u32| TextStyle::from((FONT, px(size)).into_font()).color(&AXIS);
+        area.fill(&WHITE).map_err(failed)?;
+        let heights = self.groups.iter().flat_map(|(_, bars)| bars).flatten();
+        let most = heights.fold(0.0, |most: f64, (height, _)| most.max(*height));
+        let most = if most > 0.0 { 1.12 * most } else { 1.0 };
+        // A group is one unit wide; its bars fill the middle of it.
+        let end = self.groups.len().max(1) as f64;
+        let mut chart = ChartBuilder::on(area)
+            .caption(&self.title, text(17))
+            .margin(px(10))
+            .margin_bottom(px(34))
+            .set_label_area_size(LabelAreaPosition::Left, px(58))
+            .set_label_area_size(LabelAreaPosition::Bottom, px(26))
+            .build_cartesian_2d(0.0..end, 0.0..most)
+            .map_err(failed)?;
+        chart
+            .configure_mesh()
+            .disable_x_mesh()
+            .disable_x_axis()
+            .light_line_style(WHITE)
+            .bold_line_style(ShapeStyle::from(&GRID).stroke_width(scale))
+            .axis_style(ShapeStyle::from(&AXIS).stroke_width(scale))
+            .y_desc(&self.y)
+            .y_label_style(text(12))
+            .axis_desc_style(text(13))
+            .y_labels(6)
+            .draw()
+            .map_err(failed)?;
+        let mut labels = Vec::new();
+        let width = 0.84 / self.kinds.len().max(1) as f64;
+        for (group, (name, bars)) in self.groups.iter().enumerate() {
+            for (kind, bar) in bars.iter().enumerate() {
+                let Some((height, label)) = bar else { continue };
+                let left = group as f64 + 0.08 + kind as f64 * width;
+                let color = self.kinds.get(kind).map_or(AXIS, |(_, color)| *color);
+                let corners = [(left + 0.04 * width, 0.0), (left + 0.96 * width, *height)];
+                chart
+                    .draw_series([Rectangle::new(corners, color.filled())])
+                    .map_err(failed)?;
+                let top = chart.backend_coord(&(left + 0.5 * width, *height));
+                labels.push((label, (top.0, top.1 - px(3) as i32)));
+            }
+            let foot = chart.backend_coord(&(group as f64 + 0.5, 0.0));
+            let style = text(13).pos(Pos::new(HPos::Center, VPos::Top));
+            area.draw(&Text::new(
+                name.clone(),
+                (foot.0, foot.1 + px(7) as i32),
+                style,
+            ))
+            .map_err(failed)?;
+        }
+        if let Some((height, _)) = &self.mark {
+            let line = ShapeStyle::from(&AXIS).stroke_width(scale);
+            let [from, to] = [0.0, end].map(|x| chart.backend_coord(&(x, *height)));
+            let dash = px(6) as i32;
+            for start in (from.0..to.0).step_by(2 * dash as usize) {
+                let stop = (start + dash).min(to.0);
+                area.draw(&PathElement::new([(start, from.1), (stop, to.1)], line))
+                    .map_err(failed)?;
+            }
+        }
+        // Numbers come last, on white: a line may pass behind them.
+        let style = text(11).pos(Pos::new(HPos::Center, VPos::Bottom));
+        for (label, at) in labels {
+            let (wide, high) = area.estimate_text_size(label, &style).map_err(failed)?;
+            let (half, high) = (wide as i32 / 2, high as i32);
+            let corners = [(at.0 - half, at.1 - high), (at.0 + half, at.1 + 1)];
+            area.draw(&Rectangle::new(corners, WHITE.filled()))
+                .map_err(failed)?;
+            area.draw(&Text::new(label.clone(), at, style.clone()))
+                .map_err(failed)?;
+        }
+        let mut kinds: Vec<_> = self
+            .kinds
+            .iter()
+            .map(|(name, color)| (name.as_str(), Some(*color)))
+            .collect();
+        kinds.extend(self.mark.iter().map(|(_, name)| (name.as_str(), None)));
+        legend(area, &kinds, scale)
+    }
+}
+
+/// Names and colours in a row below the plot; without a colour, a dashed line.
+pub(super) fn legend<B: DrawingBackend>(
+    area: &DrawingArea<B, Shift>,
+    kinds: &[(&str, Option<RGBColor>)],
+    scale: u32,
+) -> Result<(), Error>
+where
+    B::ErrorType: 'static,
+{
+    let px = |size: u32| (size * scale) as i32;
+    let style = TextStyle::from((FONT, 12 * scale).into_font()).color(&AXIS);
+    let style = style.pos(Pos::new(HPos::Left, VPos::Center));
+    let width = |name: &str| {
+        area.estimate_text_size(name, &style)
+            .map(|(width, _)| width as i32)
+    };
+    let mut widths = Vec::with_capacity(kinds.len());
+    for (name, _) in kinds {
+        widths.push(px(16) + width(name).map_err(failed)?);
+    }
+    let gap = px(22);
+    let total: i32 = widths.iter().sum::<i32>() + gap * (kinds.len() as i32 - 1).max(0);
+    let (all, height) = area.dim_in_pixel();
+    let mut x = (all as i32 - total) / 2;
+    let y = height as i32 - px(20);
+    for ((name, color), width) in kinds.iter().zip(widths) {
+        let corners = [(x, y - px(5)), (x + px(10), y + px(5))];
+        match color {
+            Some(color) => area
+                .draw(&Rectangle::new(corners, color.filled()))
+                .map_err(failed)?,
+            None => {
+                let line = ShapeStyle::from(&AXIS).stroke_width(scale);
+                for start in [x - px(5), x + px(3)] {
+                    let dash = [(start, y), (start + px(5), y)];
+                    area.draw(&PathElement::new(dash, line)).map_err(failed)?;
+                }
+            }
+        }
+        area.draw(&Text::new(
+            (*name).to_owned(),
+            (x + px(16), y),
+            style.clone(),
+        ))
+        .map_err(failed)?;
+        x += width + gap;
+    }
+    Ok(())
+}

@@ -1,0 +1,36 @@
+//! The files of a report.
+
+use std::path::Path;
+
+use crate::error::Error;
+use crate::run::Outcome;
+use crate::{chapters, html, markdown};
+
+impl Outcome {
+    /// Writes `report.md`, `report.html`, `report.json` and all figures into a folder, which is made where
+    /// it is not there. Files of the same names are replaced.
+    ///
+    /// # Errors
+    /// The folder cannot be made, or a file not be written.
+    pub fn write(&self, folder: &Path) -> Result<(), Error> {
+        let failed = |path: &Path, source| Error::Write {
+            path: path.to_owned(),
+            source,
+        };
+        std::fs::create_dir_all(folder).map_err(|source| failed(folder, source))?;
+        let put = |name: &str, bytes: &[u8]| {
+            let path = folder.join(name);
+            std::fs::write(&path, bytes).map_err(|source| failed(&path, source))
+        };
+        for figure in &self.figures {
+            put(&figure.name, &figure.bytes)?;
+        }
+        let document = chapters::all(&self.report);
+        put("report.md", markdown::write(&document).as_bytes())?;
+        put("report.html", html::write(&document).as_bytes())?;
+        // Plain data: numbers, strings and lists.
+        let json = serde_json::to_string_pretty(&self.report)
+            .map_err(|error| failed(&folder.join("report.json"), error.into()))?;
+        put("report.json", (json + "\n").as_bytes())
+    }
+}

@@ -1,0 +1,373 @@
+//! The frame on the device: passes, growing, splitting.
+//!
+//! A pass takes its share of the work through all stages in one submission. If a buffer was too small,
+//! the counters say how large it must be: it grows and the pass runs again. If it may not grow, by the
+//! device's limit or the memory budget, the work is split and each part is a pass. What is split:
+//!
+//! * `Clusters`: pairs of tree nodes, the seeds of the traversal, down to one pair of clusters;
+//! * `Cells`: cells; of a single cell the product of its groups, in tiles, over a list that stays as it is.
+//!
+//! In the end a pass has one work item, for which [`Capacities::LEAST`] is enough.
+
+use rayon::prelude::*;
+
+use super::buffers::count;
+use super::cells::{Part, Share, Tile, Told};
+use super::clusters;
+use super::collect::{Collected, Guess};
+use super::device::Scopes;
+use super::engine::{Engine, Plan};
+use super::layout::NodePair;
+use super::room::{Capacities, CellsWanted, Verdict};
+use super::steps::Stages;
+use crate::error::Error;
+use crate::frame::{Frame, pair_key};
+use crate::narrow::settle;
+use crate::progress::Control;
+use crate::query::SharedVertex;
+use crate::scene::Scene;
+use crate::settings::Method;
+use crate::stats::Statistics;
+
+/// Seeds up to which the host descends before the first launch: each step down saves two launches.
+const SEEDS: usize = 512;
+/// Unsure pairs from which on threads share them.
+const PARALLEL_FROM: usize = 512;
+
+/// What a pass does.
+#[derive(Debug, Clone)]
+pub(super) enum Work {
+    Seeds(Vec<NodePair>),
+    Cells(Part, Share),
+}
+
+/// How a list of work ended.
+#[derive(Debug)]
+pub(super) enum Answer {
+    Complete,
+    /// There is not room enough for what cannot be split.
+    Crowded(Error),
+}
+
+impl Engine {
+    /// Does all of the work. When it is too much, some of the keys are there already.
+    pub(super) async fn work_off(
+        &mut self,
+        scene: &Scene,
+        frame: &Frame,
+        mut waiting: Vec<Work>,
+        control: &Control<'_>,
+        keys: &mut Vec<u64>,
+        stats: &mut Statistics,
+    ) -> Result<Answer, Error> {
+        let cells = self.cells_wanted(frame);
+        let mut capacities = self.first_room(cells)?;
+        while let Some(work) = waiting.pop() {
+            if let Work::Cells(part, Share::Tile(tile)) = work
+                && tile.side > Tile::MOST
+            {
+                waiting.extend(quarters(part, tile));
+                continue;
+            }
+            let done = stats.n_slabs;
+            control.step(done, done + count(waiting.len()) + 1)?;
+            let collected = self.pass(frame, &work, capacities, cells, stats).await?;
+            let room = self.budget_for_room();
+            match collected.counts.judge(&self.gpu, capacities, room) {
+                Verdict::Complete => {
+                    book(&collected, self.method, stats);
+                    self.complete.push(collected.counts);
+                    stats.time("settle", |_| settle_all(scene, frame, &collected, keys));
+                    if let Work::Cells(part, Share::Lists) = work {
+                        // Nothing touches the list before the last of its tiles is done.
+                        let n_entries = collected.counts.needed.entries as u32;
+                        let tile = Tile::all(n_entries, self.options.group_size);
+                        waiting.extend(
+                            (n_entries > 0).then_some(Work::Cells(part, Share::Tile(tile))),
+                        );
+                    }
+                }
+                Verdict::Grow(larger) => {
+                    stats.n_reruns += 1;
+                    capacities = larger;
+                    waiting.push(work);
+                }
+                Verdict::Split => {
+                    stats.n_reruns += 1;
+                    if let Some(parts) = self.split(frame, &work, &collected)? {
+                        waiting.extend(parts);
+                        continue;
+                    }
+                    match self.lean(&work, &collected, capacities, room) {
+                        Ok(lean) => capacities = lean,
+                        Err(error) => return Ok(Answer::Crowded(error)),
+                    }
+                    waiting.push(work);
+                }
+            }
+        }
+        Ok(Answer::Complete)
+    }
+
+    /// All of the work, if there is any.
+    pub(super) fn whole(&self, frame: &Frame) -> Option<Work> {
+        let seeds = self.world.seeds(frame);
+        if seeds.is_empty() {
+            return None;
+        }
+        Some(match self.plan {
+            Plan::Clusters(_) => Work::Seeds(self.descend(frame, seeds)),
+            Plan::Cells(_) => Work::Cells(Part::ALL, Share::All),
+        })
+    }
+
+    /// The work of a piece: pairs of its runs, not more at a time than a queue holds.
+    pub(super) fn seeds_in_batches(&self, frame: &Frame, pairs: &[[u32; 2]]) -> Vec<Work> {
+        let most = (self.room.capacities().queue as usize).max(SEEDS);
+        let batches = pairs.chunks(most);
+        batches
+            .map(|batch| Work::Seeds(self.descend(frame, self.world.seeds_of_runs(batch))))
+            .collect()
+    }
+
+    /// Seeds, as far down as the host goes.
+    fn descend(&self, frame: &Frame, mut seeds: Vec<NodePair>) -> Vec<NodePair> {
+        let mut below = Vec::new();
+        loop {
+            below.clear();
+            for &seed in &seeds {
+                if !self.world.expand(frame, seed, &mut below) {
+                    below.push(seed);
+                }
+            }
+            if below.len() > SEEDS || below == seeds {
+                return seeds;
+            }
+            std::mem::swap(&mut seeds, &mut below);
+        }
+    }
+
+    /// Smaller parts, or the children of a single pair of nodes; none when that is no help.
+    fn split(
+        &self,
+        frame: &Frame,
+        work: &Work,
+        collected: &Collected,
+    ) -> Result<Option<Vec<Work>>, Error> {
+        let seeds = match work {
+            Work::Seeds(seeds) => seeds,
+            &Work::Cells(part, share) => return Ok(self.split_cells(part, share, collected)),
+        };
+        if seeds.len() > 1 {
+            let (low, high) = seeds.split_at(seeds.len() / 2);
+            return Ok(Some(
+                [low, high].map(|half| Work::Seeds(half.to_vec())).into(),
+            ));
+        }
+        let mut below = Vec::new();
+        for &seed in seeds {
+            if !self.world.expand(frame, seed, &mut below) {
+                return Err(self.too_small("two clusters", Capacities::LEAST));
+            }
+        }
+        Ok(Some(match below.is_empty() {
+            true => Vec::new(),
+            false => vec![Work::Seeds(below)],
+        }))
+    }
+
+    fn split_cells(&self, part: Part, share: Share, collected: &Collected) -> Option<Vec<Work>> {
+        match share {
+            Share::All => {
+                // What is kept does not depend on the part.
+                let needed = &collected.counts.needed;
+                if needed.kept > self.room.capacities().kept {
+                    return None;
+                }
+                if let Some(halves) = part.split(collected.grid.n_cells) {
+                    return Some(halves.map(|half| Work::Cells(half, Share::All)).into());
+                }
+                let splits_cells = matches!(&self.plan, Plan::Cells(plan) if plan.splits_cells());
+                splits_cells.then(|| vec![Work::Cells(part, Share::Lists)])
+            }
+            Share::Lists => None,
+            Share::Tile(tile) => (tile.side > 1).then(|| quarters(part, tile)),
+        }
+    }
+
+    /// Room for what cannot be split, at the cost of all that can.
+    fn lean(
+        &self,
+        work: &Work,
+        collected: &Collected,
+        now: Capacities,
+        room: Option<u64>,
+    ) -> Result<Capacities, Error> {
+        let needed = &collected.counts.needed;
+        let least = Capacities::LEAST.of(self.method);
+        let lean = match work {
+            // The list that is there must stay.
+            Work::Cells(_, Share::Tile(_)) => Capacities {
+                kept: now.kept,
+                entries: now.entries,
+                ..least
+            },
+            _ => Capacities {
+                kept: needed.kept.max(least.kept),
+                entries: match needed.kept > now.kept {
+                    true => least.entries,
+                    false => needed.entries.max(least.entries),
+                },
+                ..least
+            },
+        };
+        let is_allowed = room.is_none_or(|room| lean.bytes() <= room);
+        if lean == now || !is_allowed || !lean.fit(&self.gpu) {
+            return Err(self.too_small("the primitives of one cell", lean));
+        }
+        Ok(lean)
+    }
+
+    /// One submission and its results.
+    async fn pass(
+        &mut self,
+        frame: &Frame,
+        work: &Work,
+        capacities: Capacities,
+        cells: Option<CellsWanted>,
+        stats: &mut Statistics,
+    ) -> Result<Collected, Error> {
+        let scopes = Scopes::open(&self.gpu.device);
+        let submitted = self.submit(frame, work, capacities, cells);
+        let closed = scopes.close();
+        let guess = submitted?;
+        closed.await?;
+        let names = self.stages();
+        let collected = self
+            .collector
+            .take(&self.gpu, &self.room, names.len(), guess)
+            .await?;
+        for (&name, &ms) in names.iter().zip(collected.stage_ms.iter().flatten()) {
+            stats.add_ms(name, ms);
+        }
+        self.world.is_moved = false;
+        Ok(collected)
+    }
+
+    fn stages(&self) -> &'static [&'static str] {
+        match &self.plan {
+            Plan::Clusters(_) => clusters::STAGES,
+            Plan::Cells(plan) => plan.stages(),
+        }
+    }
+
+    fn submit(
+        &mut self,
+        frame: &Frame,
+        work: &Work,
+        capacities: Capacities,
+        cells: Option<CellsWanted>,
+    ) -> Result<Guess, Error> {
+        let mut encoder = self
+            .gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
+                label: Some("impinge"),
+            });
+        let times = self.collector.times(&self.gpu).cloned();
+        let times = times.as_ref();
+        self.encode_pass(frame, Some(work), capacities, cells, times, &mut encoder)?;
+        let (gpu, n_stages) = (&*self.gpu, self.stages().len() as u32);
+        let guess = self
+            .collector
+            .encode(gpu, &mut encoder, &self.room, n_stages);
+        gpu.queue.submit([encoder.finish()]);
+        Ok(guess)
+    }
+
+    /// Encodes all stages; without work, counters that say so.
+    pub(super) fn encode_pass(
+        &mut self,
+        frame: &Frame,
+        work: Option<&Work>,
+        mut capacities: Capacities,
+        cells: Option<CellsWanted>,
+        times: Option<&wgpu::QuerySet>,
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<(), Error> {
+        let seeds: &[NodePair] = match work {
+            Some(Work::Seeds(seeds)) => seeds,
+            _ => &[],
+        };
+        capacities.queue = capacities.queue.max(count(seeds.len()));
+        if self.room.resize(&self.gpu, &capacities, cells) {
+            self.unbind();
+        }
+        let names = self.stages();
+        let gpu = &*self.gpu;
+        self.room.encode_start(gpu, seeds, encoder)?;
+        let (world, room) = (&self.world, &self.room);
+        let resolve = frame.shared_vertex == SharedVertex::Resolve;
+        let mut stages = Stages {
+            names,
+            encoder,
+            times,
+            next: 0,
+        };
+        match (&mut self.plan, work) {
+            (Plan::Clusters(plan), Some(Work::Seeds(seeds))) => {
+                plan.make(gpu, world, room, world.forest().rounds(seeds), resolve)?;
+                plan.encode(&mut stages, world, room, count(seeds.len()));
+            }
+            (Plan::Cells(plan), Some(Work::Cells(part, share))) => {
+                let told = Told {
+                    lambda: self.options.lambda,
+                    group_size: self.options.group_size,
+                    resolve,
+                    share: *share,
+                };
+                plan.make(gpu, world, room, told, *part)?;
+                plan.encode(&mut stages, world, room);
+            }
+            (_, None) => (),
+            _ => unreachable!("work is made for the plan"),
+        }
+        Ok(())
+    }
+}
+
+/// The quarters of a tile that have anything to do.
+fn quarters(part: Part, tile: Tile) -> Vec<Work> {
+    let quarters = tile.split().unwrap_or_default().into_iter();
+    quarters
+        .map(|quarter| Work::Cells(part, Share::Tile(quarter)))
+        .collect()
+}
+
+/// Counts of a pass that is complete.
+fn book(collected: &Collected, method: Method, stats: &mut Statistics) {
+    let needed = &collected.counts.needed;
+    stats.n_slabs += 1;
+    stats.n_work_items += needed.items;
+    stats.n_candidates += needed.candidates;
+    stats.n_unsure += needed.unsure;
+    if method == Method::Cells {
+        stats.n_entries += needed.entries;
+        stats.n_subdivided += collected.counts.n_subdivided;
+        stats.grid = Some(collected.grid.resolution);
+    }
+}
+
+/// Takes the certain pairs and settles the others exactly.
+fn settle_all(scene: &Scene, frame: &Frame, collected: &Collected, keys: &mut Vec<u64>) {
+    let certain = collected.pairs.iter();
+    keys.extend(certain.map(|pair| pair_key(pair.low, pair.high)));
+    let settled = |pair: &super::layout::UnsureKey| {
+        settle(scene, frame, pair.low, pair.high).then(|| pair_key(pair.low, pair.high))
+    };
+    if collected.unsure.len() < PARALLEL_FROM {
+        keys.extend(collected.unsure.iter().filter_map(settled));
+    } else {
+        keys.par_extend(collected.unsure.par_iter().filter_map(settled));
+    }
+}

@@ -1,0 +1,213 @@
+//! Frames that are more than the device can hold at once: answered piece by piece.
+//!
+//! The clusters of all participants, body after body, are cut into chunks of which two fit. Every chunk is
+//! asked for the pairs within it, and every two chunks whose boxes meet for the pairs between them, each as a
+//! query of its own whose topology and positions are sent for it alone.
+//!
+//! ```text
+//! clusters  | body 0 . . . . . | body 1 . | body 2 . . . . . . . . |      chunks    0  1  2
+//! runs      | 0:0 . . | 1:0 .  . 1:1 . | 1:2 . . | 2:0 . . . . .   |         0      x  x  x
+//! chunks    |    0    |         1      .         |        2        |         1         x  x
+//!                                                                            2            x
+//! ```
+//!
+//! Two runs of one body count as one body on the device, with one numbering of their vertices: there
+//! primitives share a vertex if and only if they do in the whole body. Who meets whom is decided here, by
+//! the runs, so the device has no tree over bodies.
+//!
+//! Cost: the cuts are quadratic in the number of chunks, but chunks are compact and most of their boxes do
+//! not meet. Invariant: every two clusters lie in one pair of runs of one piece.
+
+use rayon::prelude::*;
+
+use super::buffers::count;
+use super::clusterings::bounds_of;
+use super::topology::{Most, Topology, Weight};
+use super::world::narrowed;
+use crate::frame::Frame;
+use crate::grouping::bounds::Bounds;
+use crate::grouping::clusters::Clustering;
+use crate::grouping::hierarchy::Shape;
+use crate::scene::{Positions, Scene};
+
+/// Neighbouring clusters of one participant.
+#[derive(Debug)]
+pub struct Run {
+    participant: usize,
+    first: usize,
+    end: usize,
+    bounds: Bounds,
+}
+
+/// Neighbouring runs, at most one a participant.
+#[derive(Debug)]
+pub struct Chunk {
+    pub runs: Vec<Run>,
+    bounds: Bounds,
+}
+
+/// Cuts the clusters of a frame into chunks of at most `most`, though of at least one cluster.
+pub fn cut<'a>(
+    scene: &Scene,
+    frame: &Frame,
+    most: Most,
+    clustering: impl Fn(usize) -> &'a Clustering + Sync,
+) -> Vec<Chunk> {
+    let mut chunks: Vec<Chunk> = Vec::new();
+    let mut weight = Weight::default();
+    for participant in 0..frame.participants.len() {
+        let clustering = clustering(participant);
+        for cluster in 0..clustering.n_clusters() {
+            let (n, n_vertices) = (clustering.size(cluster), clustering.vertices(cluster).len());
+            weight.add_cluster(count(n), count(n_vertices));
+            if chunks.is_empty() || !weight.fits(most) {
+                weight = Weight::default();
+                weight.add_cluster(count(n), count(n_vertices));
+                chunks.push(Chunk {
+                    runs: Vec::new(),
+                    bounds: Bounds::EMPTY,
+                });
+            }
+            let runs = &mut chunks.last_mut().expect("just pushed").runs;
+            match runs.last_mut() {
+                Some(run) if run.participant == participant => run.end = cluster + 1,
+                _ => runs.push(Run {
+                    participant,
+                    first: cluster,
+                    end: cluster + 1,
+                    bounds: Bounds::EMPTY,
+                }),
+            }
+        }
+    }
+    chunks.par_iter_mut().for_each(|chunk| {
+        for run in &mut chunk.runs {
+            let clustering = clustering(run.participant);
+            let positions = frame.body(scene, run.participant).positions();
+            for cluster in run.first..run.end {
+                let bounds = bounds_of(positions, clustering.vertices(cluster));
+                run.bounds.join(&bounds);
+            }
+            chunk.bounds.join(&run.bounds);
+        }
+    });
+    chunks
+}
+
+/// The pairs of runs of a piece that may hold pairs of primitives, lower number first: runs of the first
+/// chunk come before those of the second. One chunk is asked within itself.
+///
+/// Two primitives can only meet where the boxes of their runs do. Cost: a sweep along x.
+pub fn meeting(frame: &Frame, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
+    let mut pairs = Vec::new();
+    if let [a, b] = chunks
+        && !a.bounds.overlaps(&b.bounds)
+    {
+        return pairs;
+    }
+    let numbered = |chunk_ix: usize| {
+        let before = chunks[..chunk_ix].iter().map(|chunk| chunk.runs.len());
+        let first = before.sum::<usize>();
+        let runs = chunks[chunk_ix].runs.iter().enumerate();
+        runs.map(move |(ix, run)| (chunk_ix, (first + ix) as u32, run))
+    };
+    let mut runs: Vec<(usize, u32, &Run)> = (0..chunks.len()).flat_map(numbered).collect();
+    runs.sort_by(|a, b| a.2.bounds.min[0].total_cmp(&b.2.bounds.min[0]));
+    for (ix, &(chunk_a, a, run_a)) in runs.iter().enumerate() {
+        if chunks.len() == 1 && frame.participants[run_a.participant].within {
+            pairs.push([a, a]);
+        }
+        for &(chunk_b, b, run_b) in &runs[ix + 1..] {
+            if run_b.bounds.min[0] > run_a.bounds.max[0] {
+                break;
+            }
+            let is_asked = chunks.len() == 1 || chunk_a != chunk_b;
+            if is_asked && run_a.bounds.overlaps(&run_b.bounds) && meets(frame, run_a, run_b) {
+                pairs.push([a.min(b), a.max(b)]);
+            }
+        }
+    }
+    pairs
+}
+
+fn meets(frame: &Frame, a: &Run, b: &Run) -> bool {
+    if a.participant == b.participant {
+        frame.participants[a.participant].within
+    } else {
+        frame.meets(a.participant, b.participant)
+    }
+}
+
+/// A piece as it is sent.
+#[derive(Debug, Default)]
+pub struct Loaded {
+    pub topology: Topology,
+    /// The trees of the runs.
+    pub shapes: Vec<Shape>,
+    /// Of each body on the device, whether its positions were rounded.
+    pub is_rounded: Vec<bool>,
+    /// The bits of the coordinates of all vertices that are named.
+    pub words: Vec<u32>,
+}
+
+impl Loaded {
+    /// Runs of one participant become one body, in the order of the chunks.
+    pub fn new<'a>(
+        scene: &Scene,
+        frame: &Frame,
+        chunks: &[&Chunk],
+        clustering: impl Fn(usize) -> &'a Clustering,
+    ) -> Self {
+        let mut loaded = Loaded::default();
+        let runs: Vec<&Run> = chunks.iter().flat_map(|chunk| &chunk.runs).collect();
+        for runs in runs.chunk_by(|a, b| a.participant == b.participant) {
+            let participant = runs[0].participant;
+            loaded.push(scene, frame, participant, runs, clustering(participant));
+        }
+        loaded
+    }
+
+    fn push(
+        &mut self,
+        scene: &Scene,
+        frame: &Frame,
+        participant: usize,
+        runs: &[&Run],
+        clustering: &Clustering,
+    ) {
+        let positions = frame.body(scene, participant).positions();
+        // Where each vertex of the body is on the device.
+        let mut places = vec![u32::MAX; positions.len()];
+        for run in runs {
+            for cluster in run.first..run.end {
+                for &vertex in clustering.vertices(cluster) {
+                    places[vertex as usize] = 0;
+                }
+            }
+        }
+        let mut next = (self.words.len() / 3) as u32;
+        for (vertex, place) in places.iter_mut().enumerate() {
+            if *place == u32::MAX {
+                continue;
+            }
+            *place = next;
+            next += 1;
+            match positions {
+                Positions::F32(positions) => self.words.extend(positions[vertex].map(f32::to_bits)),
+                Positions::F64(positions) => {
+                    self.words.extend(positions[vertex].iter().map(narrowed))
+                }
+            }
+        }
+        let body = self.is_rounded.len() as u32;
+        self.is_rounded.push(matches!(positions, Positions::F64(_)));
+        let first = frame.participants[participant].first;
+        for run in runs {
+            self.topology
+                .push(clustering, run.first..run.end, first, body, |vertex| {
+                    places[vertex as usize]
+                });
+            self.shapes.push(Shape::new(run.end - run.first));
+        }
+    }
+}

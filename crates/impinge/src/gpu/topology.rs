@@ -1,0 +1,133 @@
+//! What is sent of clusters: their primitives, corners and vertices, once a topology.
+
+use std::ops::Range;
+
+use super::layout::{Body, Cluster, ClusterVertex, Coordinate, Corners, Node, Order};
+use crate::grouping::GROUP;
+use crate::grouping::clusters::Clustering;
+use crate::scene::Elements;
+
+/// Clusters as kernels read them.
+#[derive(Debug, Default)]
+pub struct Topology {
+    pub clusters: Vec<Cluster>,
+    pub cluster_vertices: Vec<ClusterVertex>,
+    pub corners: Vec<Corners>,
+    /// The global number of each primitive.
+    pub numbers: Vec<Order>,
+    pub has_solids: bool,
+}
+
+impl Topology {
+    /// Appends a run of clusters of a body whose first primitive has the global number `first`. `body` is its
+    /// number on the device, `place` says where each of its vertices is there.
+    pub fn push(
+        &mut self,
+        clustering: &Clustering,
+        clusters: Range<usize>,
+        first: u32,
+        body: u32,
+        place: impl Fn(u32) -> u32,
+    ) {
+        let begin = (clusters.start * GROUP).min(clustering.order.len());
+        let primitives = begin..(clusters.end * GROUP).min(clustering.order.len());
+        for cluster in clusters {
+            let vertices = clustering.vertices(cluster);
+            let first_place = self.corners.len() + cluster * GROUP - begin;
+            self.clusters.push(Cluster {
+                // Places and vertices fit 32 bits: what is sent was weighed before.
+                first_place: first_place as u32,
+                first_vertex: self.cluster_vertices.len() as u32,
+                sizes: clustering.size(cluster) as u32 | (vertices.len() as u32) << 16,
+                body,
+            });
+            let vertices = vertices.iter().map(|&vertex| ClusterVertex {
+                vertex: place(vertex),
+            });
+            self.cluster_vertices.extend(vertices);
+        }
+        match &clustering.corners {
+            Elements::Triangles(faces) => {
+                let corners = faces[primitives.clone()].iter().map(|&[a, b, c]| Corners {
+                    vertices: [a, b, c, c].map(&place),
+                });
+                self.corners.extend(corners);
+            }
+            Elements::Tetrahedra(tets) => {
+                self.has_solids |= !primitives.is_empty();
+                let corners = tets[primitives.clone()].iter().map(|tet| Corners {
+                    vertices: tet.map(&place),
+                });
+                self.corners.extend(corners);
+            }
+        }
+        let order = clustering.order[primitives].iter();
+        self.numbers.extend(order.map(|&primitive| Order {
+            number: first + primitive,
+        }));
+    }
+}
+
+/// How much there is to send.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Weight {
+    pub n_primitives: u64,
+    pub n_vertices: u64,
+    pub n_cluster_vertices: u64,
+    pub n_clusters: u64,
+    pub n_nodes: u64,
+    pub n_bodies: u64,
+}
+
+const fn bytes<T>(n: u64) -> u64 {
+    n * size_of::<T>() as u64
+}
+
+impl Weight {
+    /// Adds a cluster of a piece, its nodes and body included as if no other cluster shared them.
+    pub fn add_cluster(&mut self, n_primitives: u64, n_vertices: u64) {
+        self.n_primitives += n_primitives;
+        self.n_vertices += n_vertices;
+        self.n_cluster_vertices += n_vertices;
+        self.n_clusters += 1;
+        self.n_nodes += 2;
+        self.n_bodies += 1;
+    }
+
+    /// Bytes of the largest buffer.
+    pub fn binding(&self) -> u64 {
+        let sizes = [
+            bytes::<Corners>(self.n_primitives),
+            bytes::<[Coordinate; 3]>(self.n_vertices),
+            bytes::<ClusterVertex>(self.n_cluster_vertices),
+            bytes::<Node>(self.n_nodes),
+            bytes::<Body>(self.n_bodies),
+        ];
+        sizes.into_iter().max().unwrap_or(0)
+    }
+
+    /// Bytes of all buffers.
+    pub fn bytes(&self) -> u64 {
+        bytes::<Corners>(self.n_primitives)
+            + bytes::<Order>(self.n_primitives)
+            + bytes::<[Coordinate; 3]>(self.n_vertices)
+            + bytes::<ClusterVertex>(self.n_cluster_vertices)
+            + bytes::<Cluster>(self.n_clusters)
+            + bytes::<Node>(self.n_nodes)
+            + bytes::<Body>(self.n_bodies)
+    }
+
+    /// Whether no buffer has more than `binding` bytes and all together not more than `total`.
+    pub fn fits(&self, most: Most) -> bool {
+        self.binding() <= most.binding && self.bytes() <= most.bytes
+    }
+}
+
+/// The most that may be on the device of a frame, or of a piece of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Most {
+    /// Bytes of one buffer.
+    pub binding: u64,
+    /// Bytes of all buffers that hold topology and positions.
+    pub bytes: u64,
+}
