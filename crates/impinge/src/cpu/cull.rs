@@ -31,8 +31,8 @@ const MOST_ALONG: [u32; 3] = [62, 253, 253];
 const PRIMITIVES_A_CELL: u64 = 8;
 /// Rows of the map that one primitive marks at most; a larger one counts as being everywhere.
 const MOST_MARKED: u32 = 256;
-/// Maps at most. All participants from the eighth on share the last one, where they are not told apart.
-const MOST_MAPS: usize = 8;
+/// Maps, and so participants, at most.
+pub(crate) const MOST_MAPS: usize = 8;
 /// Primitives looked at before those among them that are near are marked.
 const TOGETHER: usize = 512;
 
@@ -77,7 +77,8 @@ pub(crate) struct Cull {
 }
 
 impl Cull {
-    /// Makes ready for a frame: all bodies meet within the region, its primitives come in `n_runs`.
+    /// Makes ready for a frame of [`MOST_MAPS`] participants at most, which meet within the region; their
+    /// primitives come in `n_runs`.
     pub fn begin(&mut self, world: World<'_>, region: &Bounds, n_runs: usize) {
         let frame = world.frame;
         let wanted = frame.n_primitives() / PRIMITIVES_A_CELL;
@@ -99,17 +100,17 @@ impl Cull {
             limit: along.map(|along| (along + 1) as f32),
         };
         self.firsts.clear();
-        self.alone = 1 << (MOST_MAPS - 1);
+        self.alone = 0;
         let mut n_codes = 0;
         for (ix, participant) in frame.participants.iter().enumerate() {
             self.firsts.push(n_codes);
             n_codes += world.body(ix as u32).positions.len();
-            self.alone |= u32::from(participant.within) << map_of(ix);
+            self.alone |= u32::from(participant.within) << ix;
         }
         self.codes.resize(n_codes, 0);
         *self.everywhere.get_mut() = 0;
         self.maps.clear();
-        let n_maps = frame.participants.len().min(MOST_MAPS);
+        let n_maps = frame.participants.len();
         self.maps
             .resize_with(n_maps * self.n_rows(), AtomicU64::default);
         self.near
@@ -169,7 +170,7 @@ impl Cull {
         reach: (u32, u32),
         near: &mut Vec<Near>,
     ) {
-        let map_ix = map_of(run.participant as usize);
+        let map_ix = run.participant as usize;
         let n_rows = self.n_rows();
         let map = &self.maps[map_ix * n_rows..][..n_rows];
         let mut together = [Near {
@@ -268,9 +269,4 @@ impl Cull {
             }
         }
     }
-}
-
-/// The map of a participant.
-fn map_of(participant: usize) -> usize {
-    participant.min(MOST_MAPS - 1)
 }

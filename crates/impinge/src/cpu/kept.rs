@@ -12,7 +12,7 @@ use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::FineRange;
 
 use super::bounds;
-use super::cull::Cull;
+use super::cull::{Cull, MOST_MAPS};
 use super::dispatch::NodePair;
 use super::simd::{Isa, Simd, dispatch};
 use super::top_level::TopLevel;
@@ -24,7 +24,7 @@ const PRIMITIVES: u32 = 4096;
 /// Vertices that a task looks at.
 const VERTICES: u32 = 1 << 15;
 /// Primitives below which waking a thread costs more than it saves.
-const PARALLEL_FROM: u64 = 50_000;
+const PARALLEL_FROM: u64 = 100_000;
 
 /// A primitive that reaches the region.
 #[derive(Debug, Clone, Copy)]
@@ -167,7 +167,12 @@ impl KeptList {
         scratches: &mut [S],
     ) -> usize {
         let scratches = few(world, scratches);
-        if !world.frame.between() {
+        // One that is asked for itself keeps all it has, and among many hardly anything is alone.
+        let participants = &world.frame.participants;
+        if !world.frame.between()
+            || participants.len() > MOST_MAPS
+            || participants.iter().all(|participant| participant.within)
+        {
             self.find(world, workers, scratches);
             return self.kept.len();
         }

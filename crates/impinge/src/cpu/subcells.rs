@@ -160,7 +160,7 @@ fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: Groups<'_>, asked: Asked)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detector::InstructionSet;
+    use crate::settings::InstructionSet;
     use crate::grouping::bounds::Bounds;
     use crate::grouping::grid::{Grid, owns};
 
