@@ -29,7 +29,8 @@ pub struct Statistics {
     pub grid: Option<[u32; 3]>,
     /// `Cells`: cells that went through the second level.
     pub n_subdivided: u64,
-    /// `Cells`: entries of the cell lists, a primitive counted once a cell.
+    /// `Cells`: entries of the cell lists, a primitive counted once a cell. Primitives that no other body
+    /// comes near may have none.
     pub n_entries: u64,
     /// `Clusters`: clusters of all participants.
     pub n_clusters: u64,

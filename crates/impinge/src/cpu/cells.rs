@@ -1,7 +1,8 @@
 //! The method `Cells` on the CPU: the paper's two levels.
 //!
 //! ```text
-//! bounds      box of each body; where bodies overlap; primitives that reach there, and their boxes
+//! bounds      box of each body; where bodies overlap; primitives that reach there and have another body's
+//!             near them, and their boxes
 //! grid        eq. (1) resolution, eq. (3) ranges; count, prefix sum, scatter into cell lists
 //! dispatch    cells with primitives of bodies that meet; lists cut into groups of at most 64;
 //!             Cartesian product of groups, eq. (4): work items

@@ -160,9 +160,9 @@ fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: Groups<'_>, asked: Asked)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::InstructionSet;
     use crate::grouping::bounds::Bounds;
     use crate::grouping::grid::{Grid, owns};
+    use crate::settings::InstructionSet;
 
     #[test]
     fn partners_are_those_of_the_occupancy_bits() {
