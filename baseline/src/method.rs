@@ -86,11 +86,19 @@ impl Method {
             scratches,
             ..
         } = self;
-        stats.time("bounds", |_| reaching.find(world, job.workers, scratches));
+        let n_near = stats.time("bounds", |_| {
+            if settings.coarse_map {
+                return reaching.find_sharing(world, job.workers, scratches);
+            }
+            reaching.find(world, job.workers, scratches);
+            reaching.kept.len()
+        });
         let Some(region) = reaching.region() else {
             return Ok(());
         };
-        let grid = stats.time("grid", |stats| self.grid(job, &region, settings, stats))?;
+        let grid = stats.time("grid", |stats| {
+            self.grid(job, &region, n_near, settings, stats)
+        })?;
         stats.time("fill", |_| self.fill(job, &grid));
         let Method {
             radix,
@@ -115,6 +123,7 @@ impl Method {
         &mut self,
         job: Job<'_>,
         region: &Bounds,
+        n_near: usize,
         settings: &Settings,
         stats: &mut Statistics,
     ) -> Result<Grid, Error> {
@@ -126,7 +135,7 @@ impl Method {
         let most = (kept.len() as u64)
             .saturating_mul(MOST_ENTRIES_EACH)
             .min(u64::from(u32::MAX));
-        let mut grid = Grid::new(region, kept.len() as u64, settings.lambda);
+        let mut grid = Grid::new(region, n_near as u64, settings.lambda);
         loop {
             let parts: Vec<Mutex<&mut [Kept]>> =
                 kept.chunks_mut(PRIMITIVES).map(Mutex::new).collect();

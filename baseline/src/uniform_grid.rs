@@ -15,6 +15,9 @@ pub struct Settings {
     /// Whether a pair is tested in one of the cells that it shares only, as impinge does it. The method as
     /// described has no such rule: a pair is tested in every cell.
     pub owner_rule: bool,
+    /// Whether primitives that the other body comes nowhere near are left out by impinge's coarse map, before
+    /// the grid. The method as described has no such map.
+    pub coarse_map: bool,
     /// CPU threads; 0 means one a core.
     pub threads: usize,
     /// The widest vector instructions that may be used.
@@ -26,6 +29,7 @@ impl Default for Settings {
         Settings {
             lambda: 5.0,
             owner_rule: false,
+            coarse_map: false,
             threads: 0,
             instruction_set: InstructionSet::default(),
         }

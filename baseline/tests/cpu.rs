@@ -18,6 +18,7 @@ fn uniform_grid_finds_what_the_oracle_finds() {
                 let settings = Settings {
                     lambda,
                     owner_rule,
+                    coarse_map: (ix + usize::from(owner_rule)) % 2 == 1,
                     threads: 1 + (case_ix + ix) % 2,
                     instruction_set: sets[(case_ix + ix / 2) % 2],
                 };

@@ -7,6 +7,7 @@ use impinge_baseline::UniformGrid;
 
 use crate::error::Error;
 use crate::machine::Adapter;
+use crate::published::LAMBDA_FWZS11;
 use crate::report::Method;
 
 /// Where a contestant runs.
@@ -111,6 +112,8 @@ impl Place {
             Place::Cpu { n_threads } => {
                 Ok(Box::new(UniformGrid::new(impinge_baseline::Settings {
                     lambda,
+                    // As the paper has it; at its best, with all that helps `Cells`.
+                    coarse_map: lambda != LAMBDA_FWZS11,
                     threads: *n_threads,
                     ..impinge_baseline::Settings::default()
                 })?))

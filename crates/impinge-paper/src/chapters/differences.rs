@@ -38,7 +38,8 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
             .to_owned(),
         "**#CT** is taken to count the colliding primitives of both bodies; the paper does not say which."
             .to_owned(),
-        "**`Cells`** has the owner rule in place of the paper's hash table, compares boxes in floats after the masks, gives an axis on which the \
+        "**`Cells`** has the owner rule in place of the paper's hash table, on the CPU leaves out primitives that the other body comes nowhere \
+         near before it fills the grid, compares boxes in floats after the masks, gives an axis on which the \
          region is thinner than a cell one cell, and coarsens the grid where lists would grow beyond 16 entries a primitive. \
          Its pairs are exact; the paper does not say what test of triangles or tetrahedra it uses, nor how exact it is."
             .to_owned(),

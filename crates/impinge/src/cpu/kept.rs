@@ -160,7 +160,7 @@ impl KeptList {
 
     /// As [`find`](KeptList::find), but for primitives that no other body comes near: they are left
     /// out. Returns how many were near where bodies meet.
-    pub(crate) fn find_sharing<S: Send>(
+    pub fn find_sharing<S: Send>(
         &mut self,
         world: World<'_>,
         workers: &Workers,
