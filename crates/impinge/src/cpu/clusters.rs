@@ -215,6 +215,8 @@ impl Clusters {
                 self.tasks.extend(tasks);
             }
         }
+        // Positions are mostly written in order: the last ones are in the nearest cache.
+        self.tasks.reverse();
         if !self.refit_leaves(job) {
             frame.check(scene)?;
         }
