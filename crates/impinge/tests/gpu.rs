@@ -800,3 +800,31 @@ fn frames_can_be_awaited() {
     assert!(answer == expected);
     assert!(n_pending > 0, "the device was waited for");
 }
+
+#[test]
+fn sizes_to_a_hundred_thousand_and_a_thousand_bodies() {
+    let mut detectors = [Method::Clusters, Method::Cells]
+        .map(|method| Detector::with_settings(gpu(method)).unwrap());
+    let mut compare = |name: String, scene: Scene, query: Query| {
+        let mut cpu = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+        let expected = rows(cpu.detect(&scene, &query).unwrap());
+        let case = Case { name, scene, query };
+        for detector in &mut detectors {
+            assert_agree("sizes", &expected, detector, &case);
+        }
+        expected.len()
+    };
+    for n in [1, 10, 100, 1_000, 10_000, 100_000] {
+        let body = soup::triangles(n, 2.0 / (n as f32).cbrt(), 5);
+        let other = soup::triangles(n, 2.0 / (n as f32).cbrt(), 6);
+        let mut scene = Scene::new();
+        let a = body.add_to(&mut scene).unwrap();
+        let b = other.add_to(&mut scene).unwrap();
+        let found = compare(format!("{n} triangles"), scene, Query::between(a, b));
+        assert!(n < 100 || found > n / 20, "{n}: {found}");
+    }
+    for n in [2, 10, 100, 1_000] {
+        let built = impinge_scenes::adversarial::boxes(n, 3).unwrap();
+        compare(format!("{n} bodies"), built.scene, Query::everything());
+    }
+}
