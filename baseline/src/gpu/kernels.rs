@@ -1,8 +1,8 @@
 //! The kernels of the uniform grid: their sources, their bindings, and the compiled set.
 
 use bytemuck::{Pod, Zeroable};
+use impinge::guest::gpu::bindings;
 use impinge::guest::gpu::{Candidate, CellItem, Counter, Grid, Kept, Kernel, Params, Source};
-use impinge::guest::gpu::{bindings, shared};
 use impinge::wgpu;
 
 /// A cell-primitive pair; the bits are drawn in `kernels/entries.wgsl`.
@@ -125,6 +125,13 @@ bindings! {
     }
 }
 
+/// Text that kernels build on: the library's, and what those of the uniform grid share.
+mod shared {
+    pub use impinge::guest::gpu::shared::*;
+
+    pub const SUMS: &str = include_str!("kernels/sums.wgsl");
+}
+
 /// Declares the compiled set: for each kernel its bindings and the shared text that it builds on.
 macro_rules! kernels {
     ($($name:ident: $bindings:ident from $file:literal ($($shared:ident),*);)*) => {
@@ -171,12 +178,12 @@ macro_rules! kernels {
 }
 
 kernels! {
-    fill_count: FillCount from "fill_count" (COARSE, GROUPS);
-    fill_scan: FillScan from "fill_scan" ();
+    fill_count: FillCount from "fill_count" (COARSE, GROUPS, SUMS);
+    fill_scan: FillScan from "fill_scan" (SUMS);
     fill_entries: FillEntries from "fill_entries" (COARSE, GROUPS);
     sort_count: SortCount from "sort_count" (GROUPS);
-    sort_scan: SortScan from "sort_scan" ();
-    sort_scatter: SortScatter from "sort_scatter" (GROUPS);
+    sort_scan: SortScan from "sort_scan" (SUMS);
+    sort_scatter: SortScatter from "sort_scatter" (GROUPS, SUMS);
     compact: Compact from "compact" (GROUPS, RESERVE);
     pairing: Pairing from "pairing" (BOXES, COARSE, GROUPS, RESERVE);
 }

@@ -9,8 +9,6 @@
 @group(0) @binding(3) var<storage, read_write> sums: array<u32>;
 @group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
 
-var<workgroup> running: array<u32, 64>;
-
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -30,20 +28,7 @@ fn main(
         kept[ix].range = range;
         n = n_touched(coarse(range));
     }
-    // Each step adds the sum that ends twice as far back.
-    var sum = n;
-    running[lane] = sum;
-    workgroupBarrier();
-    for (var back = 1u; back < 64u; back *= 2u) {
-        var before = 0u;
-        if lane >= back {
-            before = running[lane - back];
-        }
-        workgroupBarrier();
-        sum += before;
-        running[lane] = sum;
-        workgroupBarrier();
-    }
+    let sum = sum_up_to(lane, n, 64u);
     if ix < n_kept {
         firsts[ix] = sum - n;
     }

@@ -7,8 +7,6 @@
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<uniform> params: Params;
 
-var<workgroup> running: array<u32, 256>;
-
 @compute @workgroup_size(256)
 fn main(@builtin(local_invocation_index) lane: u32) {
     let n_kept = min(atomicLoad(&counters[N_KEPT]), params.capacity);
@@ -16,23 +14,11 @@ fn main(@builtin(local_invocation_index) lane: u32) {
     let each = n_sums / 256u + select(0u, 1u, n_sums % 256u != 0u);
     let first = min(lane * each, n_sums);
     let end = min(first + each, n_sums);
-    var sum = 0u;
+    var own = 0u;
     for (var ix = first; ix < end; ix++) {
-        sum += sums[ix];
+        own += sums[ix];
     }
-    let own = sum;
-    running[lane] = sum;
-    workgroupBarrier();
-    for (var back = 1u; back < 256u; back *= 2u) {
-        var before = 0u;
-        if lane >= back {
-            before = running[lane - back];
-        }
-        workgroupBarrier();
-        sum += before;
-        running[lane] = sum;
-        workgroupBarrier();
-    }
+    let sum = sum_up_to(lane, own, 256u);
     var place = sum - own;
     for (var ix = first; ix < end; ix++) {
         let n = sums[ix];

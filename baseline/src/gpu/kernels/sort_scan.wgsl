@@ -8,8 +8,6 @@
 @group(0) @binding(2) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(3) var<uniform> params: Params;
 
-var<workgroup> running: array<u32, 256>;
-
 // `params.capacity`: entries that there is room for.
 @compute @workgroup_size(256)
 fn main(
@@ -21,23 +19,11 @@ fn main(
     let first = min(lane * each, n_blocks);
     let end = min(first + each, n_blocks);
     let row = group.x * n_blocks;
-    var sum = 0u;
+    var own = 0u;
     for (var block = first; block < end; block++) {
-        sum += counts[row + block];
+        own += counts[row + block];
     }
-    let own = sum;
-    running[lane] = sum;
-    workgroupBarrier();
-    for (var back = 1u; back < 256u; back *= 2u) {
-        var before = 0u;
-        if lane >= back {
-            before = running[lane - back];
-        }
-        workgroupBarrier();
-        sum += before;
-        running[lane] = sum;
-        workgroupBarrier();
-    }
+    let sum = sum_up_to(lane, own, 256u);
     var place = sum - own;
     for (var block = first; block < end; block++) {
         let n = counts[row + block];

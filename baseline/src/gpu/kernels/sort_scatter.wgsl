@@ -15,7 +15,7 @@
 @group(0) @binding(5) var<uniform> params: Params;
 
 var<workgroup> rows: array<atomic<u32>, 2048>;
-// Where the next entry of each digit goes; before that, running sums.
+// Where the next entry of each digit goes.
 var<workgroup> places: array<u32, 256>;
 
 // `params.first`: the lowest bit of the digit.
@@ -29,20 +29,7 @@ fn main(
     let n = min(atomicLoad(&counters[N_ENTRIES]), arrayLength(&entries));
     let n_blocks = n_blocks_of(n);
     let own = totals[lane];
-    var sum = own;
-    places[lane] = sum;
-    workgroupBarrier();
-    for (var back = 1u; back < 256u; back *= 2u) {
-        var before = 0u;
-        if lane >= back {
-            before = places[lane - back];
-        }
-        workgroupBarrier();
-        sum += before;
-        places[lane] = sum;
-        workgroupBarrier();
-    }
-    var first = sum - own;
+    var first = sum_up_to(lane, own, 256u) - own;
     if block < n_blocks {
         first += counts[lane * n_blocks + block];
     }
