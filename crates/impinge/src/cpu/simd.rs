@@ -171,7 +171,6 @@ mod x86 {
     use std::arch::x86_64::*;
 
     use super::{Bounds, BoundsArray, LANES, LaneBounds, Lanes32, Simd, number, put_vertices};
-    use crate::grouping::bounds::READ_AHEAD;
 
     /// 256-bit registers. Only made where `avx2` was detected.
     #[derive(Debug, Clone, Copy)]
@@ -247,7 +246,7 @@ mod x86 {
 
         #[inline(always)]
         fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
-            assert!(first + READ_AHEAD <= boxes.len() + READ_AHEAD);
+            assert!(first <= boxes.len());
             // SAFETY: `Avx2` exists only where the processor has it; arrays are padded by
             // `READ_AHEAD` past `len`, and `first <= len` was just asserted.
             unsafe {
@@ -342,7 +341,7 @@ mod x86 {
 
         #[inline(always)]
         fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
-            assert!(first + READ_AHEAD <= boxes.len() + READ_AHEAD);
+            assert!(first <= boxes.len());
             // SAFETY: as for `Avx2`, with the mask comparisons of AVX-512 VL.
             unsafe {
                 let mut all: __mmask8 = 0xff;
