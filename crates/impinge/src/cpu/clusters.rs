@@ -26,15 +26,16 @@ use super::Job;
 use super::bounds::{self, TreeBounds};
 use super::dispatch::NodePair;
 use super::pairing::{WorkItem, Worker};
-use super::simd::Isa;
+use super::simd::{Isa, Simd, dispatch};
 use super::slabs::{self, Slabs};
 use super::top_level::TopLevel;
+use super::workers::Workers;
 use super::world::{BodyCache, Caches, World};
 
 /// Clusters a task refits.
 const REFIT_TASK: usize = 256;
 /// Primitives of all bodies together below which waking threads costs more than it saves.
-const PARALLEL_FROM: u64 = 300_000;
+const PARALLEL_FROM: u64 = 30_000;
 /// How much the clusters' surface may grow against the body's before it is clustered again.
 pub(super) const STALE: f64 = 1.5;
 
@@ -81,6 +82,7 @@ impl Clusters {
         keys: &mut Vec<u64>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
+        let _shift = job.workers.shift();
         self.scratches.resize_with(job.workers.n(), Worker::default);
         stats.time("clustering", |stats| self.cluster(job, stats))?;
         stats.time("bounds", |stats| self.refit(job, options, stats))?;
@@ -170,7 +172,7 @@ impl Clusters {
             let cache = cache.as_ref().expect("just clustered");
             stats.n_clusters += cache.clustering.n_clusters() as u64;
             if participant.within {
-                workers.install(|| cache.clustering.adjacency());
+                cache.find_adjacency(workers);
             }
         }
         Ok(())
@@ -235,7 +237,7 @@ impl Clusters {
                 let start = Instant::now();
                 **cache = workers.install(|| BodyCache::new(body));
                 if participant.within {
-                    workers.install(|| cache.clustering.adjacency());
+                    cache.find_adjacency(workers);
                 }
                 cache.refit_all(body);
                 cache.positions_stamp = body.positions_stamp();
@@ -258,7 +260,7 @@ impl Clusters {
             workers,
             ..
         } = job;
-        let (tasks, caches) = (&self.tasks, Some(&self.caches));
+        let (isa, tasks, caches) = (self.isa, &self.tasks, Some(&self.caches));
         let world = World {
             scene,
             frame,
@@ -267,26 +269,36 @@ impl Clusters {
         let all_finite = AtomicBool::new(true);
         let refit = |_: &mut Worker, ix: usize| {
             let task = tasks[ix];
-            let body = world.body(task.participant);
-            let clustering = &world.cache(task.participant).clustering;
-            for cluster in task.first..task.end {
-                let vertices = clustering.vertices(cluster as usize);
-                let (bounds, finite) = match body.positions {
-                    Positions::F32(positions) => bounds::of_vertices_f32(positions, vertices),
-                    Positions::F64(_) => (bounds::of_vertices(body.positions, vertices), true),
-                };
-                if !finite {
-                    all_finite.store(false, Ordering::Relaxed);
-                }
-                // SAFETY: no two tasks name the same cluster of the same body, and nobody reads
-                // leaf boxes before all tasks are done.
-                unsafe { task.leaves.put(cluster as usize, &bounds) };
+            let finite = dispatch!(isa, leaves, (
+                world: World<'_> = world,
+                task: RefitTask = task,
+            ) -> bool);
+            if !finite {
+                all_finite.store(false, Ordering::Relaxed);
             }
         };
         let parallel = frame.n_primitives() >= PARALLEL_FROM;
         let n_workers = if parallel { workers.n() } else { 1 };
         workers.for_each(&mut self.scratches[..n_workers], tasks.len(), refit);
         all_finite.into_inner()
+    }
+}
+
+/// The boxes of one task's clusters; whether all positions that were looked at are certainly finite.
+#[inline(always)]
+fn leaves<S: Simd>(simd: S, world: World<'_>, task: RefitTask) -> bool {
+    let positions = world.body(task.participant).positions;
+    let clustering = &world.cache(task.participant).clustering;
+    // SAFETY: no two tasks name the same cluster of the same body, and nobody reads leaf boxes before
+    // all tasks are done.
+    unsafe {
+        bounds::of_clusters(
+            simd,
+            positions,
+            clustering,
+            task.first..task.end,
+            task.leaves,
+        )
     }
 }
 
@@ -312,6 +324,14 @@ impl BodyCache {
             clustering,
             bounds,
             best_spread: f64::INFINITY,
+        }
+    }
+
+    /// Who shares vertices with whom, found before workers ask for it. Going to the pool costs 0.1 ms, so not
+    /// when it is known.
+    fn find_adjacency(&self, workers: &Workers) {
+        if !self.clustering.knows_adjacency() {
+            workers.install(|| self.clustering.adjacency());
         }
     }
 

@@ -1,14 +1,43 @@
-//! Threads: the caller works too, the others come from a rayon pool.
+//! Threads: the caller works too, the others are helpers from a rayon pool.
+//!
+//! Waking a sleeping thread takes about as long as a small frame (45 µs on the machine of the records), so
+//! helpers are called once a frame and nobody waits for one that has not come yet. Between the regions of a
+//! frame they stay awake:
+//!
+//! ```text
+//! caller    | call | region 1 ......... | alone | region 2 .... | shift over
+//! helper    : (waking) ..........|      | spins | ............. | leaves
+//! ```
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::any::Any;
+use std::cell::UnsafeCell;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use crate::error::Error;
+
+/// How long a helper waits for the next region of a frame before it goes.
+const LINGER: Duration = Duration::from_micros(500);
+/// Looks at the gate between two at the clock, or between two yields.
+const LOOKS: u32 = 64;
 
 /// How many workers there are and where they come from.
 pub struct Workers {
     /// `None` for the global pool.
     pool: Option<rayon::ThreadPool>,
     n: usize,
+    crew: Arc<Crew>,
+}
+
+/// While it lives, helpers wait for more to do.
+pub struct Shift<'a>(&'a Crew);
+
+impl Drop for Shift<'_> {
+    fn drop(&mut self) {
+        self.0.over.store(true, Ordering::Relaxed);
+    }
 }
 
 impl Workers {
@@ -26,12 +55,19 @@ impl Workers {
                 (Some(pool), n)
             }
         };
-        Ok(Workers { pool, n })
+        let crew = Arc::new(Crew::new(n - 1));
+        Ok(Workers { pool, n, crew })
     }
 
     /// How many there are.
     pub fn n(&self) -> usize {
         self.n
+    }
+
+    /// Keeps helpers awake between regions until what it returns is dropped.
+    pub fn shift(&self) -> Shift<'_> {
+        self.crew.over.store(false, Ordering::Relaxed);
+        Shift(&self.crew)
     }
 
     /// Runs something that uses rayon on its own, within the limits of this pool.
@@ -62,7 +98,13 @@ impl Workers {
             return;
         }
         let next = AtomicUsize::new(0);
-        let work = |scratch: &mut S| {
+        let scratches = Scratches(scratches.as_mut_ptr());
+        let work = |worker: usize| {
+            if worker >= n_workers {
+                return;
+            }
+            // SAFETY: there are at least `n_workers`, and every worker has a number of its own.
+            let scratch = unsafe { &mut *scratches.at(worker) };
             loop {
                 let ix = next.fetch_add(1, Ordering::Relaxed);
                 if ix >= n_tasks {
@@ -71,28 +113,171 @@ impl Workers {
                 task(scratch, ix);
             }
         };
-        let (own, others) = scratches[..n_workers]
-            .split_first_mut()
-            .expect("at least two workers");
-        let work = &work;
+        for seat in 1..n_workers {
+            self.call(seat);
+        }
+        self.crew.region(&work);
+    }
+
+    /// Sends for a helper that is not here.
+    fn call(&self, seat: usize) {
+        if self.crew.seats[seat - 1].swap(true, Ordering::AcqRel) {
+            return;
+        }
+        let crew = Arc::clone(&self.crew);
+        let serve = move || crew.serve(seat);
         match &self.pool {
-            Some(pool) => pool.in_place_scope(|scope| region(scope, own, others, work)),
-            None => rayon::in_place_scope(|scope| region(scope, own, others, work)),
+            Some(pool) => pool.spawn(serve),
+            None => rayon::spawn(serve),
         }
     }
 }
 
-/// The others work beside the caller.
-fn region<'scope, S: Send>(
-    scope: &rayon::Scope<'scope>,
-    own: &mut S,
-    others: &'scope mut [S],
-    work: &'scope (impl Fn(&mut S) + Sync),
-) {
-    for scratch in others {
-        scope.spawn(move |_| work(scratch));
+/// The first of some scratches, one a worker.
+struct Scratches<S>(*mut S);
+
+// SAFETY: each worker takes another one, and `S` may be sent to it.
+unsafe impl<S: Send> Sync for Scratches<S> {}
+
+impl<S> Scratches<S> {
+    /// # Safety
+    /// There must be so many.
+    unsafe fn at(&self, worker: usize) -> *mut S {
+        // SAFETY: said above.
+        unsafe { self.0.add(worker) }
     }
-    work(own);
+}
+
+/// What all workers do in a region, each called with its number.
+type Work<'a> = dyn Fn(usize) + Sync + 'a;
+
+/// What caller and helpers share.
+///
+/// The gate holds whether a region is open (bit 0), how many helpers are in it (bits 1 to 31), and the region's
+/// number (above). A helper enters an open gate only; the caller closes it and waits until all are out,
+/// so the region's work outlives everyone in it.
+struct Crew {
+    gate: AtomicU64,
+    /// Valid while the gate is open or somebody is inside.
+    work: UnsafeCell<Option<*const Work<'static>>>,
+    /// Whether the caller is in a region.
+    busy: AtomicBool,
+    /// Whether helpers that have nothing to do should go.
+    over: AtomicBool,
+    /// Which helpers are here or on their way.
+    seats: Box<[AtomicBool]>,
+    panic: Mutex<Option<Box<dyn Any + Send>>>,
+}
+
+const OPEN: u64 = 1;
+const INSIDE: u64 = 2;
+const INSIDE_MASK: u64 = (1 << 32) - INSIDE;
+const REGION: u64 = 1 << 32;
+
+// SAFETY: `work` is written by the one caller whose `busy` it is, while the gate is closed and nobody is inside; it
+// is read by those who entered an open gate.
+unsafe impl Send for Crew {}
+// SAFETY: as above.
+unsafe impl Sync for Crew {}
+
+impl Crew {
+    fn new(n_helpers: usize) -> Self {
+        Crew {
+            gate: AtomicU64::new(0),
+            work: UnsafeCell::new(None),
+            busy: AtomicBool::new(false),
+            over: AtomicBool::new(true),
+            seats: (0..n_helpers).map(|_| AtomicBool::new(false)).collect(),
+            panic: Mutex::new(None),
+        }
+    }
+
+    /// Does some work as worker 0, with those helpers that come. Panics if one of them did.
+    fn region(&self, work: &Work<'_>) {
+        if self.busy.swap(true, Ordering::Acquire) {
+            // A region within a region, or of another thread: helpers are taken.
+            return work(0);
+        }
+        // SAFETY: only the lifetime changes; `Closing` sees to it that everybody is out before it ends.
+        let work_ptr =
+            unsafe { std::mem::transmute::<*const Work<'_>, *const Work<'static>>(work) };
+        // SAFETY: the gate is closed and nobody inside; `busy` keeps other callers off.
+        unsafe { *self.work.get() = Some(work_ptr) };
+        let number = self.gate.load(Ordering::Relaxed) & !(REGION - 1);
+        self.gate
+            .store(number.wrapping_add(REGION) | OPEN, Ordering::Release);
+        let closing = Closing(self);
+        work(0);
+        drop(closing);
+        let mut panic = self.panic.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(payload) = panic.take() {
+            drop(panic);
+            resume_unwind(payload);
+        }
+    }
+
+    /// A helper's time on a crew.
+    fn serve(&self, seat: usize) {
+        let mut last_region = 0;
+        let mut since = Instant::now();
+        let mut looks = 0u32;
+        loop {
+            let gate = self.gate.load(Ordering::Acquire);
+            let region = gate / REGION;
+            if gate & OPEN != 0 && region != last_region {
+                let entered = self.gate.compare_exchange_weak(
+                    gate,
+                    gate + INSIDE,
+                    Ordering::Acquire,
+                    Ordering::Relaxed,
+                );
+                if entered.is_ok() {
+                    last_region = region;
+                    self.help(seat);
+                    self.gate.fetch_sub(INSIDE, Ordering::Release);
+                    since = Instant::now();
+                }
+                continue;
+            }
+            looks += 1;
+            if self.over.load(Ordering::Relaxed)
+                || looks.is_multiple_of(LOOKS) && since.elapsed() > LINGER
+            {
+                self.seats[seat - 1].store(false, Ordering::Release);
+                return;
+            }
+            std::hint::spin_loop();
+        }
+    }
+
+    /// The work of the region that is open.
+    fn help(&self, seat: usize) {
+        // SAFETY: the helper is inside, so the caller waits for it, and the work lives.
+        let work = unsafe { (*self.work.get()).map(|work| &*work) };
+        let Some(work) = work else { return };
+        if let Err(payload) = catch_unwind(AssertUnwindSafe(|| work(seat))) {
+            *self.panic.lock().unwrap_or_else(PoisonError::into_inner) = Some(payload);
+        }
+    }
+}
+
+/// Closes the gate and waits until everybody is out, also when the caller's part of the work panics.
+struct Closing<'a>(&'a Crew);
+
+impl Drop for Closing<'_> {
+    fn drop(&mut self) {
+        let crew = self.0;
+        crew.gate.fetch_and(!OPEN, Ordering::AcqRel);
+        let mut looks = 0u32;
+        while crew.gate.load(Ordering::Acquire) & INSIDE_MASK != 0 {
+            looks = looks.wrapping_add(1);
+            if looks.is_multiple_of(LOOKS * LOOKS) {
+                std::thread::yield_now();
+            }
+            std::hint::spin_loop();
+        }
+        crew.busy.store(false, Ordering::Release);
+    }
 }
 
 /// One thread shared by every detector that was told to use one, so that what rayon would spread
@@ -101,4 +286,73 @@ fn single() -> Option<&'static rayon::ThreadPool> {
     static POOL: std::sync::OnceLock<Option<rayon::ThreadPool>> = std::sync::OnceLock::new();
     POOL.get_or_init(|| rayon::ThreadPoolBuilder::new().num_threads(1).build().ok())
         .as_ref()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_task_is_done_once_whoever_comes() {
+        for threads in [1, 2, 5] {
+            let workers = Workers::new(threads).expect("threads");
+            let _shift = workers.shift();
+            let mut sums = vec![0u64; threads];
+            for n_tasks in (0..200).chain([10_000]) {
+                sums.fill(0);
+                workers.for_each(&mut sums, n_tasks, |sum, ix| *sum += ix as u64 + 1);
+                let n = n_tasks as u64;
+                assert_eq!(sums.iter().sum::<u64>(), n * (n + 1) / 2, "{n_tasks} tasks");
+            }
+        }
+    }
+
+    #[test]
+    fn helpers_come_again_after_a_shift_is_over() {
+        let workers = Workers::new(2).expect("threads");
+        for _ in 0..3 {
+            let shift = workers.shift();
+            let deadline = Instant::now() + Duration::from_secs(60);
+            let mut helped = [false; 2];
+            while !helped[1] {
+                assert!(Instant::now() < deadline, "no helper came");
+                workers.for_each(&mut helped, 64, |helped, _| {
+                    *helped = true;
+                    std::thread::sleep(Duration::from_micros(20));
+                });
+            }
+            drop(shift);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    #[test]
+    fn a_panic_of_any_worker_reaches_the_caller() {
+        let workers = Workers::new(3).expect("threads");
+        for bad in [0, 63] {
+            let mut scratches = [(); 3];
+            let run = catch_unwind(AssertUnwindSafe(|| {
+                workers.for_each(&mut scratches, 64, |(), ix| {
+                    std::thread::sleep(Duration::from_micros(50));
+                    assert_ne!(ix, bad, "a task that fails");
+                });
+            }));
+            assert!(run.is_err());
+        }
+        let mut sums = [0usize; 3];
+        workers.for_each(&mut sums, 100, |sum, ix| *sum += ix);
+        assert_eq!(sums.iter().sum::<usize>(), 4950, "works on after a panic");
+    }
+
+    #[test]
+    fn regions_nest() {
+        let workers = Workers::new(2).expect("threads");
+        let mut sums = [0usize; 2];
+        workers.for_each(&mut sums, 10, |sum, _| {
+            let mut inner = [0usize; 2];
+            workers.for_each(&mut inner, 10, |sum, ix| *sum += ix);
+            *sum += inner.iter().sum::<usize>();
+        });
+        assert_eq!(sums.iter().sum::<usize>(), 450);
+    }
 }
