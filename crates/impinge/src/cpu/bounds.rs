@@ -5,13 +5,17 @@
 //! Cost: every vertex of a body once for each cluster that has it (about 1.35 times a closed mesh).
 //! Invariant: a box holds all its vertices; f64 positions are rounded outward.
 
+use std::ops::Range;
+
 use crate::grouping::GROUP;
-use crate::grouping::bounds::{Bounds, BoundsArray, greater, lesser, round_down, round_up};
+use crate::grouping::bounds::{
+    Bounds, BoundsArray, RawBoundsArray, greater, lesser, round_down, round_up,
+};
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
 use crate::scene::{Elements, Positions};
 
-use super::simd::LaneBounds;
+use super::simd::{LaneBounds, Simd};
 
 /// x, y, z and a fourth number that nobody looks at.
 #[cfg(target_arch = "x86_64")]
@@ -157,14 +161,15 @@ pub(crate) fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
 /// sum is finite only if all its terms are. (It may overflow on finite ones: then they are looked at.)
 #[inline]
 pub(crate) fn of_vertices_f32(positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
-    let mut min = [Vec4::splat(f32::INFINITY); 2];
-    let mut max = [Vec4::splat(f32::NEG_INFINITY); 2];
-    let mut sum = [Vec4::splat(0.0); 2];
-    let (twos, rest) = vertices.as_chunks::<2>();
-    // Two chains hide the latency of the instructions.
-    for two in twos {
-        for k in 0..2 {
-            let vertex = Vec4::load(positions, two[k] as usize);
+    const CHAINS: usize = 4;
+    let mut min = [Vec4::splat(f32::INFINITY); CHAINS];
+    let mut max = [Vec4::splat(f32::NEG_INFINITY); CHAINS];
+    let mut sum = [Vec4::splat(0.0); CHAINS];
+    let (chunks, rest) = vertices.as_chunks::<CHAINS>();
+    // Several chains hide the latency of the instructions.
+    for chunk in chunks {
+        for k in 0..CHAINS {
+            let vertex = Vec4::load(positions, chunk[k] as usize);
             min[k] = min[k].min(vertex);
             max[k] = max[k].max(vertex);
             sum[k] = sum[k].add(vertex);
@@ -177,10 +182,10 @@ pub(crate) fn of_vertices_f32(positions: &[[f32; 3]], vertices: &[u32]) -> (Boun
         sum[0] = sum[0].add(vertex);
     }
     let bounds = Bounds {
-        min: min[0].min(min[1]).xyz(),
-        max: max[0].max(max[1]).xyz(),
+        min: min[0].min(min[1]).min(min[2].min(min[3])).xyz(),
+        max: max[0].max(max[1]).max(max[2].max(max[3])).xyz(),
     };
-    let [x, y, z] = sum[0].add(sum[1]).xyz();
+    let [x, y, z] = sum[0].add(sum[1]).add(sum[2].add(sum[3])).xyz();
     (bounds, (x + y + z).is_finite())
 }
 
@@ -220,6 +225,35 @@ pub(crate) fn of_run(positions: &Positions, run: std::ops::Range<usize>) -> Boun
         }
     }
     bounds
+}
+
+/// The boxes of some clusters, and whether all positions that were looked at are certainly finite. (f64 ones
+/// are checked before.)
+///
+/// # Safety
+/// `into` must be as long as the clustering, and nobody else may look at these clusters' boxes meanwhile.
+#[inline(always)]
+pub(crate) unsafe fn of_clusters<S: Simd>(
+    simd: S,
+    positions: &Positions,
+    clustering: &Clustering,
+    clusters: Range<u32>,
+    into: RawBoundsArray,
+) -> bool {
+    let mut all_finite = true;
+    for cluster in clusters {
+        let cluster = cluster as usize;
+        let vertices = clustering.vertices(cluster);
+        let (bounds, finite) = match positions {
+            // SAFETY: a cluster's vertices ascend.
+            Positions::F32(positions) => unsafe { simd.of_ascending(positions, vertices) },
+            Positions::F64(_) => (of_vertices(positions, vertices), true),
+        };
+        all_finite &= finite;
+        // SAFETY: the caller's.
+        unsafe { into.put(cluster, &bounds) };
+    }
+    all_finite
 }
 
 /// The boxes of a cluster's primitives, a lane each; lanes past its size are emptied.

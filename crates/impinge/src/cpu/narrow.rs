@@ -8,14 +8,17 @@
 
 use std::time::{Duration, Instant};
 
-use crate::exact::filter::{self, LANES, TetrahedronPairs8, TrianglePairs8, Verdict};
+use crate::exact::filter::{
+    self, BATCH, LANES, TetrahedronPairs8, TrianglePairs8, Verdict, Verdict16,
+};
 use crate::frame::pair_key;
 use crate::grouping::GROUP;
 use crate::narrow::{intersect, intersect_shared};
 use crate::scene::{Elements, Positions};
 
-use super::pairing::Lanes;
-use super::simd::{Isa, Simd, dispatch};
+use super::group_cache::Group;
+use super::pairing::{Met, WorkItem};
+use super::simd::{Isa, Lanes, Simd, dispatch};
 use super::world::{BodyRef, World};
 
 /// Two primitives whose boxes overlap: participants, and places in their clusters' orders.
@@ -78,6 +81,51 @@ impl Settler {
     #[inline(always)]
     pub fn push(&mut self, candidate: Candidate) {
         self.candidates.push(candidate);
+    }
+
+    /// The candidates of a work item. Triangles in f32 are settled by the filter in f32, but for a few that
+    /// it leaves open; these and all others go the way of [`push`](Self::push).
+    #[inline(always)]
+    pub(super) fn settle_item<S: Simd>(
+        &mut self,
+        _: S,
+        world: World<'_>,
+        item: &WorkItem,
+        [group_a, group_b]: [&Group; 2],
+        met: &Met,
+    ) {
+        let (first_a, first_b) = (item.cluster_a * GROUP as u32, item.cluster_b * GROUP as u32);
+        let in_tables = group_a.in_tables && group_b.in_tables;
+        let (body_a, body_b) = (world.body(item.a), world.body(item.b));
+        for first in (0..met.len()).step_by(BATCH) {
+            let batch = met.batch(first);
+            let lanes = u64::MAX >> (64 - (met.len() - first).min(BATCH));
+            let verdict = if in_tables {
+                filter::classify_in_tables::<S::F32>(&group_a.corners, &group_b.corners, batch)
+            } else {
+                Verdict16::default()
+            };
+            let places = |lane: usize| {
+                let [lane_a, lane_b] = batch.map(|lanes| u32::from(lanes[lane]));
+                (first_a + lane_a, first_b + lane_b)
+            };
+            for lane in Lanes(u64::from(verdict.yes) & lanes) {
+                let (place_a, place_b) = places(lane);
+                self.keys
+                    .push(pair_key(body_a.global(place_a), body_b.global(place_b)));
+            }
+            let open = u64::from(!(verdict.yes | verdict.no)) & lanes;
+            self.n_candidates += u64::from((lanes & !open).count_ones());
+            for lane in Lanes(open) {
+                let (place_a, place_b) = places(lane);
+                self.push(Candidate {
+                    a: item.a,
+                    b: item.b,
+                    place_a,
+                    place_b,
+                });
+            }
+        }
     }
 
     /// Settles what has gathered once it is worth it.

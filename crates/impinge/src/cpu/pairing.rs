@@ -1,10 +1,10 @@
 //! Stage `pairing`: which primitives of two clusters have boxes that meet.
 //!
-//! In: work items (two clusters). Out: candidates, which `narrow` settles in runs of about a thousand,
-//! while they are in the cache.
+//! In: work items (two clusters). Out: candidates, which `narrow` settles item by item, while both groups are in
+//! the cache.
 //!
-//! 0. The boxes of a cluster's primitives are found when it is first needed; a worker keeps those of the
-//!    clusters it saw last. Work items come in the order of the tree, so most are found again.
+//! 0. The boxes of a cluster's primitives, and their corners, are found when it is first needed; a worker keeps
+//!    those of the clusters it saw last. Work items come in the order of the tree, so most are found again.
 //! 1. The two clusters' boxes intersect in a box; primitives of either side that do not meet it
 //!    drop out, for a partner's box lies in its cluster's box.
 //! 2. Each survivor of the smaller side is tested against the survivors of the other, 16 (or 8)
@@ -14,14 +14,20 @@
 //! Invariant: a pair of primitives lies in one work item only, so no candidate comes twice.
 //! On a CPU these box tests beat the 4x4x4 sub-cell masks of the paper, see `docs/performance.md`.
 
+use std::time::Instant;
+
+use crate::exact::filter::BATCH;
 use crate::grouping::GROUP;
 use crate::narrow::share_vertex;
 use crate::query::SharedVertex;
 
-use super::bounds::of_cluster_primitives;
-use super::narrow::{Candidate, Settler};
-use super::simd::{Isa, LaneBounds, Simd};
+use super::group_cache::{Group, GroupCache};
+use super::narrow::Settler;
+use super::simd::{Isa, LaneBounds, Lanes, Masks, Simd};
 use super::world::{BodyRef, World};
+
+/// One work item in so many has its narrow stage timed: looking at the clock takes longer than some take.
+const SAMPLED: usize = 16;
 
 /// Two clusters that may meet: participants and their clusters.
 #[derive(Debug, Clone, Copy)]
@@ -36,88 +42,78 @@ pub(crate) struct WorkItem {
 #[derive(Debug, Default)]
 pub(crate) struct Worker {
     pub settler: Settler,
-    boxes: BoxCache,
+    groups: GroupCache,
+    met: Met,
+    masks: Masks,
 }
 
 impl Worker {
     /// Makes ready for a frame of so many clusters.
     pub fn begin(&mut self, n_clusters: u64) {
         self.settler.clear();
-        self.boxes.begin(n_clusters);
+        self.groups.begin(n_clusters);
     }
 
     pub fn bytes(&self) -> usize {
-        self.settler.bytes() + self.boxes.bytes()
+        self.settler.bytes() + self.groups.bytes() + size_of::<MetLanes>()
     }
 }
 
-/// The boxes of the primitives of the clusters seen last: 400 KB, which a second-level cache holds.
-///
-/// A cluster has two places, `h` and `h ^ 1`; the one that is not in use makes room.
+/// The candidates of one work item: lanes of its two groups.
 #[derive(Debug, Default)]
-struct BoxCache {
-    /// Participant and cluster of each place.
-    keys: Vec<u64>,
-    boxes: Vec<LaneBounds>,
+pub(super) struct Met {
+    lanes: Box<MetLanes>,
+    n: usize,
 }
 
-/// No participant has this number: there are fewer than 2^32 of them.
-const NOBODY: u64 = u64::MAX;
-const MOST_CACHED: u64 = 256;
+#[derive(Debug)]
+struct MetLanes {
+    a: [u8; MOST_MET],
+    b: [u8; MOST_MET],
+}
 
-impl BoxCache {
-    fn begin(&mut self, n_clusters: u64) {
-        let n = n_clusters.clamp(4, MOST_CACHED).next_power_of_two() as usize;
-        if self.boxes.len() < n {
-            self.boxes.resize(n, LaneBounds::EMPTY);
+/// All of one group with all of the other, and what is written or read beyond the last of them.
+const MOST_MET: usize = GROUP * GROUP + GROUP;
+
+impl Default for MetLanes {
+    fn default() -> Self {
+        MetLanes {
+            a: [0; MOST_MET],
+            b: [0; MOST_MET],
         }
-        self.keys.clear();
-        self.keys.resize(self.boxes.len(), NOBODY);
-    }
-
-    fn bytes(&self) -> usize {
-        size_of::<u64>() * self.keys.capacity() + size_of::<LaneBounds>() * self.boxes.capacity()
-    }
-
-    /// The place of a cluster's boxes, found now if they are not there; `pinned` stays as it is.
-    #[inline(always)]
-    fn place(&mut self, world: World<'_>, participant: u32, cluster: u32, pinned: usize) -> usize {
-        let key = u64::from(participant) << 32 | u64::from(cluster);
-        let first =
-            (participant.wrapping_mul(67).wrapping_add(cluster) as usize) & (self.keys.len() - 1);
-        for place in [first, first ^ 1] {
-            if self.keys[place] == key {
-                return place;
-            }
-        }
-        let place = if first == pinned { first ^ 1 } else { first };
-        self.keys[place] = key;
-        self.find(world, participant, cluster, place);
-        place
-    }
-
-    #[inline(never)]
-    fn find(&mut self, world: World<'_>, participant: u32, cluster: u32, place: usize) {
-        let body = world.body(participant);
-        let clustering = &world.cache(participant).clustering;
-        let lanes = &mut self.boxes[place];
-        of_cluster_primitives(body.positions, clustering, cluster as usize, lanes);
     }
 }
 
-/// Lanes of a mask, lowest first.
-pub(crate) struct Lanes(pub u64);
+/// The group whose lanes are rows.
+#[derive(Debug, Clone, Copy)]
+enum Side {
+    A,
+    B,
+}
 
-impl Iterator for Lanes {
-    type Item = usize;
-
+impl Met {
+    /// A lane of one group with some of the other.
     #[inline(always)]
-    fn next(&mut self) -> Option<usize> {
-        (self.0 != 0).then(|| {
-            let lane = self.0.trailing_zeros() as usize;
-            self.0 &= self.0 - 1;
-            lane
-        })
+    fn push_row<S: Simd>(&mut self, simd: S, side: Side, row: usize, mask: u64) {
+        let MetLanes { a, b } = &mut *self.lanes;
+        let (own, other) = match side {
+            Side::A => (a, b),
+            Side::B => (b, a),
+        };
+        own[self.n..][..GROUP].fill(row as u8);
+        let list = other[self.n..].first_chunk_mut().expect("padded");
+        self.n += simd.list_lanes(mask, list);
+    }
+
+    pub fn len(&self) -> usize {
+        self.n
+    }
+
+    /// The lanes of candidates from `first` on; those past the last one are any lanes.
+    #[inline(always)]
+    pub fn batch(&self, first: usize) -> [&[u8; BATCH]; 2] {
+        let MetLanes { a, b } = &*self.lanes;
+        [a, b].map(|lanes| lanes[first..].first_chunk().expect("padded"))
     }
 }
 
@@ -136,19 +132,53 @@ pub(crate) fn run<S: Simd>(
     items: &[WorkItem],
     worker: &mut Worker,
 ) {
-    let Worker { settler, boxes } = worker;
-    for item in items {
-        let place_a = boxes.place(world, item.a, item.cluster_a, usize::MAX);
-        let place_b = boxes.place(world, item.b, item.cluster_b, place_a);
-        let (boxes_a, boxes_b) = (&boxes.boxes[place_a], &boxes.boxes[place_b]);
+    let Worker {
+        settler,
+        groups,
+        met,
+        masks,
+    } = worker;
+    for (ix, item) in items.iter().enumerate() {
+        let clusters = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
+        let groups = groups.both(simd, world, clusters);
+        met.n = 0;
         if item.a == item.b {
-            within_body(simd, world, item, boxes_a, boxes_b, settler);
+            within_body(simd, world, item, groups, masks, met, settler);
         } else {
-            between_bodies(simd, world, item, boxes_a, boxes_b, settler);
+            between_bodies(simd, world, item, groups, masks, met);
+        }
+        if met.n > 0 {
+            let is_sample = ix % SAMPLED == 0;
+            let start = is_sample.then(Instant::now);
+            settler.settle_item(simd, world, item, groups, met);
+            if let Some(start) = start {
+                settler.busy += start.elapsed() * SAMPLED as u32;
+            }
         }
         settler.settle_when_full(isa, world);
     }
     settler.settle(isa, world);
+}
+
+/// The boxes of the two groups and the lanes of each that meet the box in which their clusters meet; none if
+/// one side has no such lane.
+#[inline(always)]
+fn cull<S: Simd>(
+    simd: S,
+    world: World<'_>,
+    item: &WorkItem,
+    [boxes_a, boxes_b]: [&LaneBounds; 2],
+) -> Option<[u64; 2]> {
+    let (a, b) = (world.cache(item.a), world.cache(item.b));
+    let (cluster_a, cluster_b) = (item.cluster_a as usize, item.cluster_b as usize);
+    let (leaves_a, leaves_b) = (&a.bounds.levels[0], &b.bounds.levels[0]);
+    let both = leaves_a.at(cluster_a).intersection(&leaves_b.at(cluster_b));
+    let lanes_a = simd.overlaps_64(boxes_a, &both, full(a.clustering.size(cluster_a)));
+    if lanes_a == 0 {
+        return None;
+    }
+    let lanes_b = simd.overlaps_64(boxes_b, &both, full(b.clustering.size(cluster_b)));
+    (lanes_b != 0).then_some([lanes_a, lanes_b])
 }
 
 #[inline(always)]
@@ -156,43 +186,23 @@ fn between_bodies<S: Simd>(
     simd: S,
     world: World<'_>,
     item: &WorkItem,
-    boxes_a: &LaneBounds,
-    boxes_b: &LaneBounds,
-    settler: &mut Settler,
+    [group_a, group_b]: [&Group; 2],
+    masks: &mut Masks,
+    met: &mut Met,
 ) {
-    let (a, b) = (world.cache(item.a), world.cache(item.b));
-    let (cluster_a, cluster_b) = (item.cluster_a as usize, item.cluster_b as usize);
-    let both = a.bounds.levels[0]
-        .at(cluster_a)
-        .intersection(&b.bounds.levels[0].at(cluster_b));
-    let lanes_a = simd.overlaps_64(boxes_a, &both, full(a.clustering.size(cluster_a)));
-    if lanes_a == 0 {
+    let (boxes_a, boxes_b) = (&group_a.boxes, &group_b.boxes);
+    let Some([lanes_a, lanes_b]) = cull(simd, world, item, [boxes_a, boxes_b]) else {
         return;
-    }
-    let lanes_b = simd.overlaps_64(boxes_b, &both, full(b.clustering.size(cluster_b)));
-    let mut candidate = Candidate {
-        a: item.a,
-        b: item.b,
-        place_a: 0,
-        place_b: 0,
     };
-    let (first_a, first_b) = (item.cluster_a * GROUP as u32, item.cluster_b * GROUP as u32);
-    if lanes_a.count_ones() <= lanes_b.count_ones() {
-        for lane_a in Lanes(lanes_a) {
-            candidate.place_a = first_a + lane_a as u32;
-            for lane_b in Lanes(simd.overlaps_64(boxes_b, &boxes_a.at(lane_a), lanes_b)) {
-                candidate.place_b = first_b + lane_b as u32;
-                settler.push(candidate);
-            }
-        }
+    let (side, rows) = if lanes_a.count_ones() <= lanes_b.count_ones() {
+        simd.overlaps_rows(boxes_b, lanes_b, boxes_a, lanes_a, masks);
+        (Side::A, lanes_a)
     } else {
-        for lane_b in Lanes(lanes_b) {
-            candidate.place_b = first_b + lane_b as u32;
-            for lane_a in Lanes(simd.overlaps_64(boxes_a, &boxes_b.at(lane_b), lanes_a)) {
-                candidate.place_a = first_a + lane_a as u32;
-                settler.push(candidate);
-            }
-        }
+        simd.overlaps_rows(boxes_a, lanes_a, boxes_b, lanes_b, masks);
+        (Side::B, lanes_b)
+    };
+    for row in Lanes(rows) {
+        met.push_row(simd, side, row, masks.0[row]);
     }
 }
 
@@ -201,117 +211,102 @@ fn within_body<S: Simd>(
     simd: S,
     world: World<'_>,
     item: &WorkItem,
-    boxes_a: &LaneBounds,
-    boxes_b: &LaneBounds,
+    [group_a, group_b]: [&Group; 2],
+    masks: &mut Masks,
+    met: &mut Met,
     settler: &mut Settler,
 ) {
+    let (boxes_a, boxes_b) = (&group_a.boxes, &group_b.boxes);
     let cache = world.cache(item.a);
     let adjacency = cache.clustering.adjacency();
     let (cluster_a, cluster_b) = (item.cluster_a as usize, item.cluster_b as usize);
-    let row = Row {
+    let rule = Rule {
         body: world.body(item.a),
-        a: item.a,
         first_a: item.cluster_a * GROUP as u32,
         first_b: item.cluster_b * GROUP as u32,
         needs_ids: adjacency.needs_ids(cluster_a, cluster_b),
-        rule: world.frame.shared_vertex,
+        shared_vertex: world.frame.shared_vertex,
     };
-    let all_a = full(cache.clustering.size(cluster_a));
     if cluster_a == cluster_b {
-        let own = adjacency.own(cluster_a);
-        for (lane, &shared) in own.iter().enumerate() {
-            let after = all_a & (u64::MAX << lane << 1);
-            let met = simd.overlaps_64(boxes_a, &boxes_a.at(lane), after);
-            row.put(lane, met, shared, settler);
+        let all = full(cache.clustering.size(cluster_a));
+        simd.overlaps_within(boxes_a, all, masks);
+        for (lane, &shared) in adjacency.own(cluster_a).iter().enumerate() {
+            rule.put_row(simd, Side::A, lane, masks.0[lane], shared, met, settler);
         }
         return;
     }
-    let leaves = &cache.bounds.levels[0];
-    let both = leaves.at(cluster_a).intersection(&leaves.at(cluster_b));
-    let lanes_a = simd.overlaps_64(boxes_a, &both, all_a);
-    if lanes_a == 0 {
+    let Some([lanes_a, lanes_b]) = cull(simd, world, item, [boxes_a, boxes_b]) else {
         return;
-    }
-    let lanes_b = simd.overlaps_64(boxes_b, &both, full(cache.clustering.size(cluster_b)));
-    if lanes_b == 0 {
-        return;
-    }
+    };
     let mut shared = [0u64; GROUP];
-    // Masks are kept by lanes of a: turning them round costs more than some rows.
-    if lanes_a.count_ones() <= 2 * lanes_b.count_ones() {
+    // Adjacency is kept by lanes of a: turning it round costs more than some rows.
+    let (side, rows) = if lanes_a.count_ones() <= 2 * lanes_b.count_ones() {
         for (lane, mask) in adjacency.between(cluster_a, cluster_b) {
             shared[lane] = mask;
         }
-        for lane in Lanes(lanes_a) {
-            let met = simd.overlaps_64(boxes_b, &boxes_a.at(lane), lanes_b);
-            row.put(lane, met, shared[lane], settler);
-        }
+        simd.overlaps_rows(boxes_b, lanes_b, boxes_a, lanes_a, masks);
+        (Side::A, lanes_a)
     } else {
         for (lane, mask) in adjacency.between(cluster_a, cluster_b) {
             for lane_b in Lanes(mask & lanes_b) {
                 shared[lane_b] |= 1 << lane;
             }
         }
-        let row = row.swapped();
-        for lane in Lanes(lanes_b) {
-            let met = simd.overlaps_64(boxes_a, &boxes_b.at(lane), lanes_a);
-            row.put(lane, met, shared[lane], settler);
-        }
+        simd.overlaps_rows(boxes_a, lanes_a, boxes_b, lanes_b, masks);
+        (Side::B, lanes_b)
+    };
+    for row in Lanes(rows) {
+        rule.put_row(simd, side, row, masks.0[row], shared[row], met, settler);
     }
 }
 
-/// Where the partners of a primitive of the same body go.
-struct Row<'a> {
+/// What becomes of primitives of one body that share a vertex.
+struct Rule<'a> {
     body: BodyRef<'a>,
-    a: u32,
     first_a: u32,
     first_b: u32,
     needs_ids: bool,
-    rule: SharedVertex,
+    shared_vertex: SharedVertex,
 }
 
-impl Row<'_> {
-    /// The same with the two clusters exchanged.
+impl Rule<'_> {
+    /// The lanes that a row has met become candidates; those of `shared`, and others whose vertices must be
+    /// compared, as the rule says.
     #[inline(always)]
-    fn swapped(self) -> Self {
-        Row {
-            first_a: self.first_b,
-            first_b: self.first_a,
-            ..self
+    #[expect(clippy::too_many_arguments, reason = "one call for each way to meet")]
+    fn put_row<S: Simd>(
+        &self,
+        simd: S,
+        side: Side,
+        row: usize,
+        mask: u64,
+        shared: u64,
+        met: &mut Met,
+        settler: &mut Settler,
+    ) {
+        if !self.needs_ids {
+            met.push_row(simd, side, row, mask & !shared);
+            if self.shared_vertex == SharedVertex::Skip {
+                return;
+            }
+        }
+        let left = if self.needs_ids { mask } else { mask & shared };
+        for lane in Lanes(left) {
+            let (lane_a, lane_b) = match side {
+                Side::A => (row, lane),
+                Side::B => (lane, row),
+            };
+            let (place_a, place_b) = (self.first_a + lane_a as u32, self.first_b + lane_b as u32);
+            if shared >> lane & 1 == 0 && !self.share_vertex(place_a, place_b) {
+                met.push_row(simd, side, row, 1 << lane);
+            } else if self.shared_vertex == SharedVertex::Resolve {
+                settler.settle_shared(&self.body, place_a, place_b);
+            }
         }
     }
 
-    /// Lanes `met` by `lane` become candidates; those of `shared` only as the rule says.
-    #[inline(always)]
-    fn put(&self, lane: usize, met: u64, shared: u64, settler: &mut Settler) {
-        let place_a = self.first_a + lane as u32;
-        for lane_b in Lanes(met & !shared) {
-            let place_b = self.first_b + lane_b as u32;
-            if self.needs_ids && self.share_vertex(place_a, place_b) {
-                self.put_shared(place_a, place_b, settler);
-                continue;
-            }
-            settler.push(Candidate {
-                a: self.a,
-                b: self.a,
-                place_a,
-                place_b,
-            });
-        }
-        if self.rule == SharedVertex::Resolve {
-            for lane_b in Lanes(met & shared) {
-                self.put_shared(place_a, self.first_b + lane_b as u32, settler);
-            }
-        }
-    }
-
+    #[inline(never)]
     fn share_vertex(&self, place_a: u32, place_b: u32) -> bool {
         share_vertex(self.body.corners(place_a), self.body.corners(place_b))
-    }
-
-    fn put_shared(&self, place_a: u32, place_b: u32, settler: &mut Settler) {
-        if self.rule == SharedVertex::Resolve {
-            settler.settle_shared(&self.body, place_a, place_b);
-        }
     }
 }

@@ -6,11 +6,15 @@
 //! to library functions: those would be compiled on their own, without the set.
 //! The answers are bit masks of exact comparisons: no set can differ from another.
 
-use crate::exact::filter::LANES;
-use crate::exact::filter::number::{self, Vector};
+use crate::exact::filter::number::{self, Lookup, Vector};
+use crate::exact::filter::{LANES, Triangles64};
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, BoundsArray};
+#[cfg(target_arch = "x86_64")]
+use crate::grouping::clusters::CHUNK;
 use crate::settings::InstructionSet;
+
+use super::bounds::of_vertices_f32;
 
 /// The boxes of one group, a lane each; lanes past the group's size hold empty boxes.
 #[derive(Debug, Clone)]
@@ -56,6 +60,39 @@ impl LaneBounds {
     }
 }
 
+/// Lanes of a mask, lowest first.
+pub(crate) struct Lanes(pub u64);
+
+impl Iterator for Lanes {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        (self.0 != 0).then(|| {
+            let lane = self.0.trailing_zeros() as usize;
+            self.0 &= self.0 - 1;
+            lane
+        })
+    }
+}
+
+/// A mask for each primitive of a group.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub struct Masks(pub [u64; GROUP]);
+
+impl Default for Masks {
+    fn default() -> Self {
+        Masks([0; GROUP])
+    }
+}
+
+/// The lanes from the first to a lane.
+#[inline(always)]
+pub(crate) fn up_to(lane: usize) -> u64 {
+    u64::MAX >> (GROUP - 1 - lane)
+}
+
 /// A number for each primitive of a group.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
@@ -66,14 +103,50 @@ pub(crate) trait Simd: Copy {
     /// The f64 of the narrow stage's filters.
     type F64: Vector;
 
+    /// The f32 of the filter that settles most pairs of triangles.
+    type F32: Lookup;
+
     /// Bit `k`: box `first + k` overlaps `query`, for `k` below 8.
     fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32;
 
     /// Bit `k`: lane `k` overlaps `query`; only lanes of `among` are looked at.
     fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64;
 
+    /// For each lane of `rows`, the mask of the lanes of `boxes` that its box among `queries` overlaps; only
+    /// lanes of `among` are looked at. Masks of other rows are zero.
+    fn overlaps_rows(
+        self,
+        boxes: &LaneBounds,
+        among: u64,
+        queries: &LaneBounds,
+        rows: u64,
+        masks: &mut Masks,
+    );
+
+    /// For each lane of `among`, the mask of the lanes of `among` beyond it that it overlaps. Other masks are
+    /// zero.
+    fn overlaps_within(self, boxes: &LaneBounds, among: u64, masks: &mut Masks);
+
+    /// Writes the lanes of a mask, lowest first, and anything after them; returns how many there are.
+    fn list_lanes(self, mask: u64, list: &mut [u8; GROUP]) -> usize;
+
     /// Bit `k`: lane `k` equals `query`; only lanes of `among` are looked at.
     fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64;
+
+    /// The box of some vertices, and whether all are certainly finite, as [`of_vertices_f32`] finds them.
+    ///
+    /// # Panics
+    /// If there is no such vertex.
+    ///
+    /// # Safety
+    /// `vertices` must not descend.
+    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool);
+
+    /// The corners of a group's triangles as tables, of which as many places are filled as there are faces.
+    ///
+    /// # Panics
+    /// If there is no such vertex, or more than 64 faces.
+    fn put_corners(self, positions: &[[f32; 3]], faces: &[[u32; 3]], into: &mut Triangles64);
 
     /// Eight vertices as rows of x, y and z in double precision.
     ///
@@ -98,12 +171,37 @@ fn put_vertices(positions: &[[f32; 3]], vertices: [u32; LANES], rows: &mut [[f64
     }
 }
 
+/// Lane by lane.
+#[inline(always)]
+fn list_lanes(mask: u64, list: &mut [u8; GROUP]) -> usize {
+    let mut n = 0;
+    for lane in Lanes(mask) {
+        list[n] = lane as u8;
+        n += 1;
+    }
+    n
+}
+
+/// One coordinate after the other, from a place on.
+#[inline(always)]
+fn put_corners(positions: &[[f32; 3]], faces: &[[u32; 3]], first: usize, into: &mut Triangles64) {
+    for (place, face) in (first..).zip(faces) {
+        for (corner, &vertex) in face.iter().enumerate() {
+            let point = &positions[vertex as usize];
+            for axis in 0..3 {
+                into[corner][axis][place] = point[axis];
+            }
+        }
+    }
+}
+
 /// Plain loops.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Portable;
 
 impl Simd for Portable {
     type F64 = number::Portable;
+    type F32 = number::Portable32;
 
     #[inline(always)]
     fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
@@ -142,6 +240,34 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
+    fn overlaps_rows(
+        self,
+        boxes: &LaneBounds,
+        among: u64,
+        queries: &LaneBounds,
+        rows: u64,
+        masks: &mut Masks,
+    ) {
+        masks.0 = [0; GROUP];
+        for row in Lanes(rows) {
+            masks.0[row] = self.overlaps_64(boxes, &queries.at(row), among);
+        }
+    }
+
+    #[inline(always)]
+    fn overlaps_within(self, boxes: &LaneBounds, among: u64, masks: &mut Masks) {
+        masks.0 = [0; GROUP];
+        for row in Lanes(among) {
+            masks.0[row] = self.overlaps_64(boxes, &boxes.at(row), among & !up_to(row));
+        }
+    }
+
+    #[inline(always)]
+    fn list_lanes(self, mask: u64, list: &mut [u8; GROUP]) -> usize {
+        list_lanes(mask, list)
+    }
+
+    #[inline(always)]
     fn equals_64(self, lanes: &Lanes32, query: u32, mut among: u64) -> u64 {
         let mut mask = 0;
         while among != 0 {
@@ -150,6 +276,16 @@ impl Simd for Portable {
             among &= among - 1;
         }
         mask
+    }
+
+    #[inline(always)]
+    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
+        of_vertices_f32(positions, vertices)
+    }
+
+    #[inline(always)]
+    fn put_corners(self, positions: &[[f32; 3]], faces: &[[u32; 3]], into: &mut Triangles64) {
+        put_corners(positions, faces, 0, into);
     }
 
     #[inline(always)]
@@ -170,14 +306,19 @@ pub(crate) use x86::{Avx2, Avx512};
 mod x86 {
     use std::arch::x86_64::*;
 
-    use super::{Bounds, BoundsArray, LANES, LaneBounds, Lanes32, Simd, number, put_vertices};
+    use crate::exact::filter::TABLE;
+
+    use super::{
+        Bounds, BoundsArray, CHUNK, GROUP, LANES, LaneBounds, Lanes, Lanes32, Masks, Simd,
+        Triangles64, list_lanes, number, of_vertices_f32, put_corners, put_vertices, up_to,
+    };
 
     /// 256-bit registers. Only made where `avx2` was detected.
     #[derive(Debug, Clone, Copy)]
     pub(crate) struct Avx2(());
 
-    /// 512-bit registers and mask registers. Only made where `avx512f`, `avx512vl` and `avx512dq` were
-    /// detected.
+    /// 512-bit registers and mask registers. Only made where `avx512f` and its extensions `vl`, `dq`, `bw` and
+    /// `vbmi2` were detected.
     #[derive(Debug, Clone, Copy)]
     pub(crate) struct Avx512(());
 
@@ -191,7 +332,7 @@ mod x86 {
 
     impl Avx512 {
         /// # Safety
-        /// The processor must have AVX-512 F, VL and DQ.
+        /// The processor must have AVX-512 F, VL, DQ, BW and VBMI2.
         pub(crate) unsafe fn new() -> Self {
             Avx512(())
         }
@@ -241,8 +382,100 @@ mod x86 {
         }
     }
 
+    /// As `Simd::put_corners`.
+    ///
+    /// # Safety
+    /// The caller must be compiled for AVX2.
+    #[inline(always)]
+    unsafe fn put_corners_by_eights(
+        positions: &[[f32; 3]],
+        faces: &[[u32; 3]],
+        into: &mut Triangles64,
+    ) {
+        assert!(faces.len() <= TABLE);
+        let (eights, rest) = faces.as_chunks::<8>();
+        for (eight_ix, eight) in eights.iter().enumerate() {
+            let place = 8 * eight_ix;
+            for corner in 0..3 {
+                let vertices = [
+                    eight[0][corner],
+                    eight[1][corner],
+                    eight[2][corner],
+                    eight[3][corner],
+                    eight[4][corner],
+                    eight[5][corner],
+                    eight[6][corner],
+                    eight[7][corner],
+                ];
+                // SAFETY: the caller's.
+                let Some(rows) = (unsafe { rows(positions, vertices) }) else {
+                    put_corners(positions, eight, place, into);
+                    break;
+                };
+                for axis in 0..3 {
+                    let row = into[corner][axis][place..].first_chunk_mut::<8>();
+                    let row = row.expect("at most 64 faces");
+                    // SAFETY: a row of eight.
+                    unsafe { _mm256_storeu_ps(row.as_mut_ptr(), rows[axis]) };
+                }
+            }
+        }
+        put_corners(positions, rest, 8 * eights.len(), into);
+    }
+
+    /// As `Simd::of_ascending`: two vertices a register and four chains, which hide the latency of minimum
+    /// and maximum.
+    ///
+    /// # Safety
+    /// The caller must be compiled for AVX2, and `vertices` must not descend.
+    #[inline(always)]
+    unsafe fn of_ascending(positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
+        let (chunks, rest) = vertices.as_chunks::<CHUNK>();
+        let last = vertices.last().map_or(0, |&last| last as usize);
+        if !rest.is_empty() || last + 1 >= positions.len() {
+            return of_vertices_f32(positions, vertices);
+        }
+        let first = positions.as_ptr();
+        // SAFETY: no vertex is higher than the last one, which has a successor: the 16 bytes of which a vertex
+        // is the first 12 lie within the slice.
+        unsafe {
+            let mut min = [_mm256_set1_ps(f32::INFINITY); CHUNK / 2];
+            let mut max = [_mm256_set1_ps(f32::NEG_INFINITY); CHUNK / 2];
+            let mut sum = [_mm256_setzero_ps(); CHUNK / 2];
+            for chunk in chunks {
+                for k in 0..CHUNK / 2 {
+                    let low = _mm_loadu_ps(first.add(chunk[2 * k] as usize).cast());
+                    let high = _mm_loadu_ps(first.add(chunk[2 * k + 1] as usize).cast());
+                    let two = _mm256_set_m128(high, low);
+                    min[k] = _mm256_min_ps(min[k], two);
+                    max[k] = _mm256_max_ps(max[k], two);
+                    sum[k] = _mm256_add_ps(sum[k], two);
+                }
+            }
+            let min = _mm256_min_ps(_mm256_min_ps(min[0], min[1]), _mm256_min_ps(min[2], min[3]));
+            let max = _mm256_max_ps(_mm256_max_ps(max[0], max[1]), _mm256_max_ps(max[2], max[3]));
+            let sum = _mm256_add_ps(_mm256_add_ps(sum[0], sum[1]), _mm256_add_ps(sum[2], sum[3]));
+            let (low, high) = (_mm256_castps256_ps128(min), _mm256_extractf128_ps::<1>(min));
+            let min = xyz(_mm_min_ps(low, high));
+            let (low, high) = (_mm256_castps256_ps128(max), _mm256_extractf128_ps::<1>(max));
+            let max = xyz(_mm_max_ps(low, high));
+            let (low, high) = (_mm256_castps256_ps128(sum), _mm256_extractf128_ps::<1>(sum));
+            let [x, y, z] = xyz(_mm_add_ps(low, high));
+            (Bounds { min, max }, (x + y + z).is_finite())
+        }
+    }
+
+    #[inline(always)]
+    fn xyz(row: __m128) -> [f32; 3] {
+        let mut out = [0.0f32; 4];
+        // SAFETY: SSE belongs to every x86-64 processor, and `out` holds 16 bytes.
+        unsafe { _mm_storeu_ps(out.as_mut_ptr(), row) };
+        [out[0], out[1], out[2]]
+    }
+
     impl Simd for Avx2 {
         type F64 = number::Avx2;
+        type F32 = number::Avx2F32;
 
         #[inline(always)]
         fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
@@ -297,6 +530,34 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn overlaps_rows(
+            self,
+            boxes: &LaneBounds,
+            among: u64,
+            queries: &LaneBounds,
+            rows: u64,
+            masks: &mut Masks,
+        ) {
+            masks.0 = [0; GROUP];
+            for row in Lanes(rows) {
+                masks.0[row] = self.overlaps_64(boxes, &queries.at(row), among);
+            }
+        }
+
+        #[inline(always)]
+        fn overlaps_within(self, boxes: &LaneBounds, among: u64, masks: &mut Masks) {
+            masks.0 = [0; GROUP];
+            for row in Lanes(among) {
+                masks.0[row] = self.overlaps_64(boxes, &boxes.at(row), among & !up_to(row));
+            }
+        }
+
+        #[inline(always)]
+        fn list_lanes(self, mask: u64, list: &mut [u8; GROUP]) -> usize {
+            list_lanes(mask, list)
+        }
+
+        #[inline(always)]
         fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64 {
             // SAFETY: as above, lane for lane.
             unsafe {
@@ -312,6 +573,18 @@ mod x86 {
                 }
                 mask & among
             }
+        }
+
+        #[inline(always)]
+        unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
+            // SAFETY: `Avx2` exists only where the processor has AVX2; the caller keeps the order.
+            unsafe { of_ascending(positions, vertices) }
+        }
+
+        #[inline(always)]
+        fn put_corners(self, positions: &[[f32; 3]], faces: &[[u32; 3]], into: &mut Triangles64) {
+            // SAFETY: `Avx2` exists only where the processor has AVX2.
+            unsafe { put_corners_by_eights(positions, faces, into) };
         }
 
         #[inline(always)]
@@ -336,8 +609,58 @@ mod x86 {
         }
     }
 
+    /// What sixteen lanes add to the masks of some rows. The lanes' boxes stay in registers.
+    ///
+    /// # Safety
+    /// The caller must be compiled for AVX-512.
+    #[inline(always)]
+    unsafe fn chunk_overlaps(
+        boxes: &LaneBounds,
+        chunk: usize,
+        among: u64,
+        queries: &LaneBounds,
+        rows: u64,
+        masks: &mut Masks,
+    ) {
+        let among = (among >> (16 * chunk)) as __mmask16;
+        if among == 0 {
+            return;
+        }
+        // SAFETY: lanes 16 c .. 16 c + 16 of 64 lie within their array, which is aligned to 64 bytes.
+        unsafe {
+            let row = |axis: &[f32; GROUP]| _mm512_load_ps(axis.as_ptr().add(16 * chunk));
+            let min = [row(&boxes.min[0]), row(&boxes.min[1]), row(&boxes.min[2])];
+            let max = [row(&boxes.max[0]), row(&boxes.max[1]), row(&boxes.max[2])];
+            for row in Lanes(rows) {
+                let mut all = among;
+                for axis in 0..3 {
+                    let query_min = _mm512_set1_ps(queries.min[axis][row]);
+                    let query_max = _mm512_set1_ps(queries.max[axis][row]);
+                    all = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(all, min[axis], query_max);
+                    all = _mm512_mask_cmp_ps_mask::<_CMP_GE_OQ>(all, max[axis], query_min);
+                }
+                masks.0[row] |= u64::from(all) << (16 * chunk);
+            }
+        }
+    }
+
+    /// The number of each lane.
+    #[repr(C, align(64))]
+    struct Numbers([u8; GROUP]);
+
+    static LANE: Numbers = {
+        let mut lanes = [0; GROUP];
+        let mut lane = 0;
+        while lane < GROUP {
+            lanes[lane] = lane as u8;
+            lane += 1;
+        }
+        Numbers(lanes)
+    };
+
     impl Simd for Avx512 {
         type F64 = number::Avx512;
+        type F32 = number::Avx512F32;
 
         #[inline(always)]
         fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
@@ -391,6 +714,47 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn overlaps_rows(
+            self,
+            boxes: &LaneBounds,
+            among: u64,
+            queries: &LaneBounds,
+            rows: u64,
+            masks: &mut Masks,
+        ) {
+            masks.0 = [0; GROUP];
+            for chunk in 0..4 {
+                // SAFETY: `Avx512` exists only where the processor has it.
+                unsafe { chunk_overlaps(boxes, chunk, among, queries, rows, masks) };
+            }
+        }
+
+        #[inline(always)]
+        fn overlaps_within(self, boxes: &LaneBounds, among: u64, masks: &mut Masks) {
+            masks.0 = [0; GROUP];
+            for chunk in 0..4 {
+                // A lane of this chunk is beyond no row that is past the chunk.
+                let rows = among & up_to(16 * chunk + 15);
+                // SAFETY: `Avx512` exists only where the processor has it.
+                unsafe { chunk_overlaps(boxes, chunk, among, boxes, rows, masks) };
+            }
+            for (row, mask) in masks.0.iter_mut().enumerate() {
+                *mask &= !up_to(row);
+            }
+        }
+
+        #[inline(always)]
+        fn list_lanes(self, mask: u64, list: &mut [u8; GROUP]) -> usize {
+            // SAFETY: `Avx512` exists only where the processor has it; one store of 64 bytes.
+            unsafe {
+                let lanes =
+                    _mm512_maskz_compress_epi8(mask, _mm512_load_si512(LANE.0.as_ptr().cast()));
+                _mm512_storeu_si512(list.as_mut_ptr().cast(), lanes);
+            }
+            mask.count_ones() as usize
+        }
+
+        #[inline(always)]
         fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64 {
             // SAFETY: as above, lane for lane.
             unsafe {
@@ -407,6 +771,18 @@ mod x86 {
                 }
                 mask
             }
+        }
+
+        #[inline(always)]
+        unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
+            // SAFETY: `Avx512` exists only where the processor has AVX2 too; the caller keeps the order.
+            unsafe { of_ascending(positions, vertices) }
+        }
+
+        #[inline(always)]
+        fn put_corners(self, positions: &[[f32; 3]], faces: &[[u32; 3]], into: &mut Triangles64) {
+            // SAFETY: `Avx512` exists only where the processor has AVX2 too.
+            unsafe { put_corners_by_eights(positions, faces, into) };
         }
 
         #[inline(always)]
@@ -452,6 +828,7 @@ impl Isa {
                 && is_x86_feature_detected!("avx512vl")
                 && is_x86_feature_detected!("avx512dq")
                 && is_x86_feature_detected!("avx512bw")
+                && is_x86_feature_detected!("avx512vbmi2")
                 && is_x86_feature_detected!("bmi1")
                 && is_x86_feature_detected!("bmi2")
                 && is_x86_feature_detected!("popcnt")
@@ -488,9 +865,9 @@ macro_rules! dispatch {
             $kernel(unsafe { $crate::cpu::simd::Avx2::new() }, $($name),*)
         }
         #[cfg(target_arch = "x86_64")]
-        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,bmi1,bmi2,popcnt,lzcnt")]
+        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx512vbmi2,avx2,bmi1,bmi2,popcnt,lzcnt")]
         fn avx512($($name: $type),*) $(-> $result)? {
-            // SAFETY: the caller's features include AVX-512 F, VL and DQ.
+            // SAFETY: the caller's features include AVX-512 F, VL, DQ, BW and VBMI2.
             $kernel(unsafe { $crate::cpu::simd::Avx512::new() }, $($name),*)
         }
         match $isa {

@@ -22,7 +22,7 @@ const TASK: std::ops::RangeInclusive<usize> = 32..=512;
 /// Tasks a worker should get, so that none waits long for the last one.
 const TASKS_EACH: usize = 6;
 /// Work items below which waking a thread costs more than it saves.
-const PARALLEL_FROM: usize = 768;
+const PARALLEL_FROM: usize = 64;
 
 /// How many work items a slab may hold within the budget, when `held` bytes are held besides.
 pub(crate) fn most_items(budget: Option<u64>, held: u64) -> Result<usize, Error> {

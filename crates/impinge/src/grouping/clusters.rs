@@ -5,7 +5,7 @@
 //! that order, and each cluster's unique vertices: a frame finds a cluster's box from those, each
 //! read once (64 triangles of a closed mesh have about 45 of them, not 192).
 //!
-//! Cost: `O(n log n)` time once a topology; 8 to 11 bytes a primitive for order and vertices, and a
+//! Cost: `O(n log n)` time once a topology; 8 to 12 bytes a primitive for order and vertices, and a
 //! copy of the corners. Inside a cluster, runs of eight primitives lie close together, so that a
 //! vector of lanes tends to be needed whole or not at all.
 
@@ -21,6 +21,9 @@ use crate::scene::Elements;
 
 /// Runs this short are not split further inside a cluster.
 const FINEST_RUN: usize = 8;
+/// A cluster's vertices come in whole chunks of so many, so that a loop over them ends where the processor
+/// expects it and needs no remainder.
+pub(crate) const CHUNK: usize = 8;
 
 /// The clusters of one body.
 #[derive(Debug)]
@@ -29,7 +32,8 @@ pub(crate) struct Clustering {
     pub order: Vec<u32>,
     /// The corners at each place of the order.
     pub corners: Elements,
-    /// Unique vertices of all clusters, cluster after cluster, each run sorted.
+    /// Unique vertices of all clusters, cluster after cluster. Each run ascends and repeats its last one up
+    /// to a multiple of [`CHUNK`].
     pub vertices: Vec<u32>,
     /// Where each cluster's run starts, and one past the last.
     pub vertex_starts: Vec<u32>,
@@ -86,7 +90,7 @@ impl Clustering {
         (self.order.len() - cluster * GROUP).min(GROUP)
     }
 
-    /// The unique vertices of a cluster.
+    /// The unique vertices of a cluster, ascending, the last one repeated up to a multiple of [`CHUNK`].
     #[inline(always)]
     pub fn vertices(&self, cluster: usize) -> &[u32] {
         let starts = &self.vertex_starts;
@@ -99,6 +103,11 @@ impl Clustering {
             Elements::Triangles(faces) => Adjacency::new(faces),
             Elements::Tetrahedra(tets) => Adjacency::new(tets),
         })
+    }
+
+    /// Whether [`adjacency`](Self::adjacency) has been found.
+    pub fn knows_adjacency(&self) -> bool {
+        self.adjacency.get().is_some()
     }
 
     pub fn bytes(&self) -> usize {
@@ -141,6 +150,8 @@ fn unique_vertices<const N: usize>(corners: &[[u32; N]]) -> (Vec<u32>, Vec<u32>)
             let mut list = group.as_flattened().to_vec();
             list.sort_unstable();
             list.dedup();
+            let last = list[list.len() - 1];
+            list.resize(list.len().next_multiple_of(CHUNK), last);
             list
         })
         .collect();

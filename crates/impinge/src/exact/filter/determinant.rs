@@ -2,9 +2,6 @@
 
 use super::number::Number;
 
-/// 64 unit roundoffs, 2^-47. The derivation needs a little more than 60.
-pub(super) const DETERMINANT_BOUND: f64 = f64::from_bits((1023 - 47) << 52);
-
 /// The computed value of a determinant (d x e) . f of three differences of input points, with
 /// the bound of its error.
 #[derive(Clone, Copy)]
@@ -57,7 +54,7 @@ impl<T: Number> Determinant<T> {
     }
 }
 
-/// A vector d x e, with `DETERMINANT_BOUND` |d| |e|.
+/// A vector d x e, with [`BOUND`](Number::BOUND) |d| |e|.
 #[derive(Clone, Copy)]
 pub(super) struct Normal<T: Number = f64> {
     vector: [T; 3],
@@ -73,7 +70,7 @@ impl<T: Number> Normal<T> {
                 d[2] * e[0] - d[0] * e[2],
                 d[0] * e[1] - d[1] * e[0],
             ],
-            bound: T::splat(DETERMINANT_BOUND) * (size(d) * size(e)),
+            bound: T::splat(T::BOUND) * (size(d) * size(e)),
         }
     }
 
@@ -82,7 +79,7 @@ impl<T: Number> Normal<T> {
     pub(super) fn dot(&self, f: &[T; 3]) -> Determinant<T> {
         Determinant {
             value: self.vector[0] * f[0] + self.vector[1] * f[1] + self.vector[2] * f[2],
-            bound: self.bound * size(f),
+            bound: (self.bound * size(f)).with_underflow(),
         }
     }
 }

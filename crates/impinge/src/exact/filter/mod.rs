@@ -1,11 +1,12 @@
-//! The fast path: most pairs settled in plain `f64`, eight at a time, with a proven error bound.
+//! The fast path: most pairs settled in plain `f64` or `f32`, many at a time, with a proven error bound.
 //!
 //! What it does: answers *yes*, *no* or *unsure* for a pair of triangles. Yes and no are certain;
 //! unsure pairs go to [`triangles_intersect`](super::triangles_intersect). Pairs of random
 //! triangles are settled in more than 99 of 100 cases; pairs that touch, are coplanar or
 //! degenerate are always unsure.
 //!
-//! In: [`TrianglePairs8`], eight pairs with one array a coordinate ("structure of arrays").
+//! In: [`TrianglePairs8`], eight pairs with one array a coordinate ("structure of arrays"), in `f64`; or, in
+//! `f32`, the corners of two groups as tables ([`Triangles64`]) and the places of sixteen pairs in them.
 //! Out: bit masks, bit k for pair k. Cost: [`reject_by_planes`] about 120 and [`classify`] about
 //! 330 operations, without a branch, for all eight lanes at once. Both are generic over the vector
 //! registers that they use ([`number`]) and `#[inline(always)]`, so that a caller compiles them for an
@@ -17,7 +18,7 @@
 //!
 //! Invariant: every determinant here is a sum of the six products of three vectors d, e, f, each a
 //! difference of two input points. Its computed value is wrong by less than
-//! 2^-47 |d| |e| |f| with |.| the largest coordinate, whatever the order of
+//! 2^-47 |d| |e| |f| in `f64`, 2^-18 |d| |e| |f| + 2^-100 in `f32`, with |.| the largest coordinate, whatever the order of
 //! operations and whether or not products and sums are fused (`docs/exactness.md`, "The batch
 //! filter"). NaN and overflow make comparisons fail, and so end as unsure.
 
@@ -33,10 +34,22 @@ pub(super) use neighbours::{shared_edge, shared_vertex};
 pub(super) use tetrahedra::tetrahedra_answer;
 pub use tetrahedra::{classify_by_faces, classify_tetrahedra};
 pub(super) use triangles::triangles_answer;
-pub use triangles::{classify, reject_by_planes};
+pub use triangles::{classify, classify_in_tables, reject_by_planes};
 
 /// How many pairs a batch has.
 pub const LANES: usize = 8;
+
+/// How many pairs a batch in `f32` has.
+pub const BATCH: usize = 16;
+
+/// How many triangles a table holds.
+pub const TABLE: usize = 64;
+
+/// The largest magnitude of a coordinate with which the filter in `f32` may be asked: larger ones overflow.
+pub const LARGEST_F32: f32 = f32::from_bits((127 + 40) << 23);
+
+/// The triangles of a group: `[vertex][axis][place]`.
+pub type Triangles64 = [[[f32; TABLE]; 3]; 3];
 
 /// One triangle a lane: `[vertex][axis][lane]`.
 pub type Triangles8 = [[[f64; LANES]; 3]; 3];
@@ -74,4 +87,13 @@ pub struct Verdict {
     pub yes: u8,
     /// The pairs that certainly do not.
     pub no: u8,
+}
+
+/// A [`Verdict`] over [`BATCH`] pairs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Verdict16 {
+    /// The pairs that certainly intersect.
+    pub yes: u16,
+    /// The pairs that certainly do not.
+    pub no: u16,
 }

@@ -1,8 +1,10 @@
 //! Triangle against triangle.
 
 use super::determinant::{Determinant, Normal, difference};
-use super::number::{Number, Vector, load_vertex};
-use super::{LANES, Point, TrianglePairs8, Triangles8, Verdict};
+use super::number::{Lookup, Number, Vector, load_vertex};
+use super::{
+    BATCH, LANES, Point, TABLE, TrianglePairs8, Triangles8, Triangles64, Verdict, Verdict16,
+};
 
 /// The lanes whose triangles are certainly apart because the plane of one has the other strictly
 /// on one side. The cheap first step; the rest is for [`classify`].
@@ -33,6 +35,28 @@ pub fn classify<V: Vector>(pairs: &TrianglePairs8) -> Verdict {
     verdict
 }
 
+/// As [`classify`], in `f32`: for triangles of two groups, named by their places in each. Coordinates must not be
+/// larger than [`LARGEST_F32`](super::LARGEST_F32).
+#[inline(always)]
+#[must_use]
+pub fn classify_in_tables<V: Lookup>(
+    a: &Triangles64,
+    b: &Triangles64,
+    [places_a, places_b]: [&[u8; BATCH]; 2],
+) -> Verdict16 {
+    let mut verdict = Verdict16::default();
+    for first in (0..BATCH).step_by(V::N) {
+        let a = look_up::<V>(a, V::places(places_a, first));
+        let b = look_up::<V>(b, V::places(places_b, first));
+        let sides = Sides::new(&a, &b);
+        let (apart, sure) = (sides.are_apart(), sides.are_sure());
+        let (meet, miss) = cross_on_line(&a, &b, &sides);
+        verdict.yes |= V::bits(sure & !apart & meet) << first;
+        verdict.no |= V::bits(apart | (sure & miss)) << first;
+    }
+    verdict
+}
+
 // Here and below no closures are passed to library functions: those would be compiled on their
 // own, without the instruction set, and every operation would become a call.
 
@@ -42,6 +66,24 @@ fn load<V: Vector>([p, q, r]: &Triangles8, first: usize) -> [[V; 3]; 3] {
         load_vertex(p, first),
         load_vertex(q, first),
         load_vertex(r, first),
+    ]
+}
+
+#[inline(always)]
+fn look_up<V: Lookup>([p, q, r]: &Triangles64, places: V::Places) -> [[V; 3]; 3] {
+    [
+        look_up_vertex(p, places),
+        look_up_vertex(q, places),
+        look_up_vertex(r, places),
+    ]
+}
+
+#[inline(always)]
+fn look_up_vertex<V: Lookup>([x, y, z]: &[[f32; TABLE]; 3], places: V::Places) -> [V; 3] {
+    [
+        V::look_up(x, places),
+        V::look_up(y, places),
+        V::look_up(z, places),
     ]
 }
 

@@ -1,0 +1,124 @@
+//! What `pairing` and `narrow` look at of the clusters seen last: a worker's own copy, a primitive a lane.
+//!
+//! In: positions and corners of a cluster. Out: the boxes of its primitives and, for triangles in f32, their
+//! corners as tables, so that the filter takes them from the first-level cache and not from all over the
+//! body. Cost: each corner of a cluster once, when it is first needed; 3.8 KB a cluster.
+
+use crate::exact::filter::{LARGEST_F32, Triangles64};
+use crate::grouping::GROUP;
+use crate::grouping::bounds::{Bounds, greater, lesser};
+use crate::scene::{Elements, Positions};
+
+use super::bounds::of_cluster_primitives;
+use super::simd::{LaneBounds, Simd};
+use super::world::World;
+
+/// One cluster's primitives.
+#[derive(Debug, Clone)]
+pub(super) struct Group {
+    /// Their boxes.
+    pub boxes: LaneBounds,
+    /// Their corners, where they are `in_tables`.
+    pub corners: Triangles64,
+    /// Whether they are triangles in f32 that the filter in f32 may be asked about.
+    pub in_tables: bool,
+}
+
+impl Group {
+    const EMPTY: Group = Group {
+        boxes: LaneBounds::EMPTY,
+        corners: [[[0.0; GROUP]; 3]; 3],
+        in_tables: false,
+    };
+
+    #[inline(always)]
+    fn fill<S: Simd>(&mut self, simd: S, world: World<'_>, participant: u32, cluster: usize) {
+        let positions = world.body(participant).positions;
+        let cache = world.cache(participant);
+        let clustering = &cache.clustering;
+        let (Positions::F32(points), Elements::Triangles(faces)) = (positions, &clustering.corners)
+        else {
+            self.in_tables = false;
+            return of_cluster_primitives(positions, clustering, cluster, &mut self.boxes);
+        };
+        let size = clustering.size(cluster);
+        let faces = &faces[cluster * GROUP..cluster * GROUP + size];
+        simd.put_corners(points, faces, &mut self.corners);
+        let [p, q, r] = &self.corners;
+        for axis in 0..3 {
+            for lane in 0..GROUP {
+                let (x, y, z) = (p[axis][lane], q[axis][lane], r[axis][lane]);
+                self.boxes.min[axis][lane] = lesser(x, lesser(y, z));
+                self.boxes.max[axis][lane] = greater(x, greater(y, z));
+            }
+        }
+        if size < GROUP {
+            self.boxes.clear_from(size);
+        }
+        self.in_tables = is_small(&cache.bounds.levels[0].at(cluster));
+    }
+}
+
+/// Whether products of three differences of coordinates do not overflow.
+fn is_small(bounds: &Bounds) -> bool {
+    let largest = |ends: &[f32; 3]| ends.iter().all(|x| x.abs() <= LARGEST_F32);
+    largest(&bounds.min) && largest(&bounds.max)
+}
+
+/// The clusters that a worker has seen last.
+///
+/// A cluster has two places, `h` and `h ^ 1`; the one that is not in use makes room.
+#[derive(Debug, Default)]
+pub(super) struct GroupCache {
+    /// Participant and cluster of each place.
+    keys: Vec<u64>,
+    groups: Vec<Group>,
+}
+
+/// No participant has this number: there are fewer than 2^32 of them.
+const NOBODY: u64 = u64::MAX;
+/// Clusters kept: 500 KB, which a second-level cache holds.
+const MOST: u64 = 128;
+
+impl GroupCache {
+    /// Makes ready for a frame of so many clusters.
+    pub fn begin(&mut self, n_clusters: u64) {
+        let n = n_clusters.clamp(4, MOST).next_power_of_two() as usize;
+        if self.groups.len() < n {
+            self.groups.resize(n, Group::EMPTY);
+        }
+        self.keys.clear();
+        self.keys.resize(self.groups.len(), NOBODY);
+    }
+
+    pub fn bytes(&self) -> usize {
+        size_of::<u64>() * self.keys.capacity() + size_of::<Group>() * self.groups.capacity()
+    }
+
+    /// Two clusters, found now if they are not there.
+    #[inline(always)]
+    pub fn both<S: Simd>(
+        &mut self,
+        simd: S,
+        world: World<'_>,
+        clusters: [(u32, u32); 2],
+    ) -> [&Group; 2] {
+        let mut places = [usize::MAX; 2];
+        for (ix, (participant, cluster)) in clusters.into_iter().enumerate() {
+            let key = u64::from(participant) << 32 | u64::from(cluster);
+            let hash = participant.wrapping_mul(67).wrapping_add(cluster) as usize;
+            let first = hash & (self.keys.len() - 1);
+            places[ix] = if self.keys[first] == key {
+                first
+            } else if self.keys[first ^ 1] == key {
+                first ^ 1
+            } else {
+                let place = if first == places[0] { first ^ 1 } else { first };
+                self.keys[place] = key;
+                self.groups[place].fill(simd, world, participant, cluster as usize);
+                place
+            };
+        }
+        places.map(|place| &self.groups[place])
+    }
+}
