@@ -34,8 +34,11 @@ use super::world::{BodyCache, Caches, World};
 
 /// Clusters a task refits.
 const REFIT_TASK: usize = 256;
-/// Primitives of all bodies together below which waking threads costs more than it saves.
-const PARALLEL_FROM: u64 = 30_000;
+/// Primitives of all bodies together from which on helpers are woken at a frame's begin.
+const CALL_FROM: u64 = 30_000;
+/// Primitives of all bodies together below which one thread finds the boxes. Positions have just been written,
+/// mostly by one thread, and what fits in its cache another fetches from there more slowly than it reads it.
+const PARALLEL_FROM: u64 = 300_000;
 /// How much the clusters' surface may grow against the body's before it is clustered again.
 pub(super) const STALE: f64 = 1.5;
 
@@ -85,6 +88,9 @@ impl Clusters {
         let _shift = job.workers.shift();
         self.scratches.resize_with(job.workers.n(), Worker::default);
         stats.time("clustering", |stats| self.cluster(job, stats))?;
+        if job.frame.n_primitives() >= CALL_FROM {
+            job.workers.call_all();
+        }
         stats.time("bounds", |stats| self.refit(job, options, stats))?;
         for worker in &mut self.scratches {
             worker.begin(stats.n_clusters);
@@ -316,6 +322,7 @@ impl BodyCache {
         let clustering = Clustering::new(elements, |primitive| {
             bounds::of_vertices(positions, elements.corners(primitive))
         });
+        clustering.local_faces();
         let mut bounds = TreeBounds::default();
         bounds.resize(&clustering.shape);
         BodyCache {

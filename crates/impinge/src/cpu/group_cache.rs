@@ -10,11 +10,12 @@ use crate::grouping::bounds::{Bounds, greater, lesser};
 use crate::scene::{Elements, Positions};
 
 use super::bounds::of_cluster_primitives;
-use super::simd::{LaneBounds, Simd};
+use super::simd::{ClusterFaces, LaneBounds, Simd};
 use super::world::World;
 
 /// One cluster's primitives.
 #[derive(Debug, Clone)]
+#[repr(C, align(64))]
 pub(super) struct Group {
     /// Their boxes.
     pub boxes: LaneBounds,
@@ -42,8 +43,12 @@ impl Group {
             return of_cluster_primitives(positions, clustering, cluster, &mut self.boxes);
         };
         let size = clustering.size(cluster);
-        let faces = &faces[cluster * GROUP..cluster * GROUP + size];
-        simd.put_corners(points, faces, &mut self.corners);
+        let faces = ClusterFaces {
+            faces: &faces[cluster * GROUP..cluster * GROUP + size],
+            vertices: clustering.vertices(cluster),
+            local: &clustering.local_faces()[cluster],
+        };
+        simd.put_corners(points, &faces, &mut self.corners);
         let [p, q, r] = &self.corners;
         for axis in 0..3 {
             for lane in 0..GROUP {

@@ -12,6 +12,7 @@ use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, BoundsArray};
 #[cfg(target_arch = "x86_64")]
 use crate::grouping::clusters::CHUNK;
+use crate::grouping::clusters::LocalFaces;
 use crate::settings::InstructionSet;
 
 use super::bounds::of_vertices_f32;
@@ -74,6 +75,17 @@ impl Iterator for Lanes {
             lane
         })
     }
+}
+
+/// The triangles of a cluster, twice: for those who load each corner, and for those who load each vertex once.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ClusterFaces<'a> {
+    /// At most 64.
+    pub faces: &'a [[u32; 3]],
+    /// Unique vertices, in whole chunks of [`CHUNK`](crate::grouping::clusters::CHUNK).
+    pub vertices: &'a [u32],
+    /// The corners as numbers of `vertices`.
+    pub local: &'a LocalFaces,
 }
 
 /// A mask for each primitive of a group.
@@ -142,11 +154,16 @@ pub(crate) trait Simd: Copy {
     /// `vertices` must not descend.
     unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool);
 
-    /// The corners of a group's triangles as tables, of which as many places are filled as there are faces.
+    /// The corners of a cluster's triangles as tables; places past its size hold anything.
     ///
     /// # Panics
-    /// If there is no such vertex, or more than 64 faces.
-    fn put_corners(self, positions: &[[f32; 3]], faces: &[[u32; 3]], into: &mut Triangles64);
+    /// If there is no such vertex.
+    fn put_corners(
+        self,
+        positions: &[[f32; 3]],
+        cluster: &ClusterFaces<'_>,
+        into: &mut Triangles64,
+    );
 
     /// Eight vertices as rows of x, y and z in double precision.
     ///
@@ -284,8 +301,13 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    fn put_corners(self, positions: &[[f32; 3]], faces: &[[u32; 3]], into: &mut Triangles64) {
-        put_corners(positions, faces, 0, into);
+    fn put_corners(
+        self,
+        positions: &[[f32; 3]],
+        cluster: &ClusterFaces<'_>,
+        into: &mut Triangles64,
+    ) {
+        put_corners(positions, cluster.faces, 0, into);
     }
 
     #[inline(always)]
@@ -306,11 +328,12 @@ pub(crate) use x86::{Avx2, Avx512};
 mod x86 {
     use std::arch::x86_64::*;
 
-    use crate::exact::filter::TABLE;
+    use crate::exact::filter::number::Lookup;
+    use crate::exact::filter::{BATCH, TABLE};
 
     use super::{
-        Bounds, BoundsArray, CHUNK, GROUP, LANES, LaneBounds, Lanes, Lanes32, Masks, Simd,
-        Triangles64, list_lanes, number, of_vertices_f32, put_corners, put_vertices, up_to,
+        Bounds, BoundsArray, CHUNK, ClusterFaces, GROUP, LANES, LaneBounds, Lanes, Lanes32, Masks,
+        Simd, Triangles64, list_lanes, number, of_vertices_f32, put_corners, put_vertices, up_to,
     };
 
     /// 256-bit registers. Only made where `avx2` was detected.
@@ -422,6 +445,50 @@ mod x86 {
         }
         put_corners(positions, rest, 8 * eights.len(), into);
     }
+
+    /// As `Simd::put_corners`, for at most 64 vertices: each is loaded once, and corners are looked up.
+    ///
+    /// # Safety
+    /// The caller must be compiled for AVX-512.
+    #[inline(always)]
+    unsafe fn put_corners_by_vertices(
+        positions: &[[f32; 3]],
+        cluster: &ClusterFaces<'_>,
+        into: &mut Triangles64,
+    ) {
+        let mut points = Table([[0.0f32; TABLE]; 3]);
+        let (chunks, _) = cluster.vertices.as_chunks::<CHUNK>();
+        for (chunk_ix, &chunk) in chunks.iter().take(TABLE / CHUNK).enumerate() {
+            let first = CHUNK * chunk_ix;
+            // SAFETY: the caller's.
+            if let Some(rows) = unsafe { rows(positions, chunk) } {
+                for (table, row) in points.0.iter_mut().zip(rows) {
+                    let eight = table[first..].first_chunk_mut::<CHUNK>();
+                    let eight = eight.expect("at most 64 vertices");
+                    // SAFETY: a row of eight.
+                    unsafe { _mm256_storeu_ps(eight.as_mut_ptr(), row) };
+                }
+            } else {
+                for (place, vertex) in (first..).zip(chunk) {
+                    for (table, x) in points.0.iter_mut().zip(positions[vertex as usize]) {
+                        table[place] = x;
+                    }
+                }
+            }
+        }
+        for (local, corner) in cluster.local.iter().zip(into) {
+            let (batches, _) = local.as_chunks::<BATCH>();
+            for (batch_ix, batch) in batches.iter().enumerate() {
+                let places = number::Avx512F32::places(batch, 0);
+                for (table, row) in points.0.iter().zip(&mut *corner) {
+                    number::Avx512F32::look_up(table, places).store(row, BATCH * batch_ix);
+                }
+            }
+        }
+    }
+
+    #[repr(C, align(64))]
+    struct Table([[f32; TABLE]; 3]);
 
     /// As `Simd::of_ascending`: two vertices a register and four chains, which hide the latency of minimum
     /// and maximum.
@@ -582,9 +649,14 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn put_corners(self, positions: &[[f32; 3]], faces: &[[u32; 3]], into: &mut Triangles64) {
+        fn put_corners(
+            self,
+            positions: &[[f32; 3]],
+            cluster: &ClusterFaces<'_>,
+            into: &mut Triangles64,
+        ) {
             // SAFETY: `Avx2` exists only where the processor has AVX2.
-            unsafe { put_corners_by_eights(positions, faces, into) };
+            unsafe { put_corners_by_eights(positions, cluster.faces, into) };
         }
 
         #[inline(always)]
@@ -780,9 +852,20 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn put_corners(self, positions: &[[f32; 3]], faces: &[[u32; 3]], into: &mut Triangles64) {
-            // SAFETY: `Avx512` exists only where the processor has AVX2 too.
-            unsafe { put_corners_by_eights(positions, faces, into) };
+        fn put_corners(
+            self,
+            positions: &[[f32; 3]],
+            cluster: &ClusterFaces<'_>,
+            into: &mut Triangles64,
+        ) {
+            // SAFETY: `Avx512` exists only where the processor has it, and AVX2 too.
+            unsafe {
+                if cluster.vertices.len() > TABLE {
+                    put_corners_by_eights(positions, cluster.faces, into);
+                } else {
+                    put_corners_by_vertices(positions, cluster, into);
+                }
+            }
         }
 
         #[inline(always)]

@@ -21,7 +21,7 @@ const FEWEST_ITEMS: usize = 256;
 const TASK: std::ops::RangeInclusive<usize> = 32..=512;
 /// Tasks a worker should get, so that none waits long for the last one.
 const TASKS_EACH: usize = 6;
-/// Work items below which waking a thread costs more than it saves.
+/// Work items below which one worker takes them all.
 const PARALLEL_FROM: usize = 64;
 
 /// How many work items a slab may hold within the budget, when `held` bytes are held besides.

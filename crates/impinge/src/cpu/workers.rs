@@ -1,42 +1,66 @@
-//! Threads: the caller works too, the others are helpers from a rayon pool.
+//! Threads: the caller works too, the others are helpers of its own.
 //!
-//! Waking a sleeping thread takes about as long as a small frame (45 µs on the machine of the records), so
-//! helpers are called once a frame and nobody waits for one that has not come yet. Between the regions of a
-//! frame they stay awake:
+//! Waking a sleeping thread takes as long as a small frame (15 µs of the caller's time and 45 until it runs, on the
+//! machine of the records; through a rayon pool 35 of the caller's), so helpers are called once a frame,
+//! nobody waits for one that has not come yet, and none goes to sleep at once:
 //!
 //! ```text
-//! caller    | call | region 1 ......... | alone | region 2 .... | shift over
-//! helper    : (waking) ..........|      | spins | ............. | leaves
+//! caller    | call | region 1 ......... | alone | region 2 .... | end of the shift
+//! helper    : (waking) ..........|      | spins | ............. | lingers, as long as the shift took | sleeps
 //! ```
+//!
+//! A helper that lingers yields to every other thread. What rayon spreads (clustering) runs in its pool.
 
 use std::any::Any;
 use std::cell::UnsafeCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering, fence};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use crate::error::Error;
 
-/// How long a helper waits for the next region of a frame before it goes.
-const LINGER: Duration = Duration::from_micros(500);
-/// Looks at the gate between two at the clock, or between two yields.
+/// How long a helper spins for the next region before it yields between looks.
+const SPIN: Duration = Duration::from_micros(50);
+/// How long a helper lingers within a shift, and at most after one.
+const LINGER: Duration = Duration::from_millis(1);
+/// Looks at the gate between two at the clock.
 const LOOKS: u32 = 64;
 
 /// How many workers there are and where they come from.
 pub struct Workers {
-    /// `None` for the global pool.
-    pool: Option<rayon::ThreadPool>,
     n: usize,
     crew: Arc<Crew>,
+    /// Started when first needed.
+    helpers: OnceLock<Vec<JoinHandle<()>>>,
+    /// For what uses rayon; `None` for the global pool.
+    pool: Option<rayon::ThreadPool>,
 }
 
-/// While it lives, helpers wait for more to do.
-pub struct Shift<'a>(&'a Crew);
+/// While it lives, helpers expect more to do.
+pub struct Shift<'a> {
+    crew: &'a Crew,
+    start: Instant,
+}
 
 impl Drop for Shift<'_> {
     fn drop(&mut self) {
-        self.0.over.store(true, Ordering::Relaxed);
+        let linger = self.start.elapsed().min(LINGER);
+        self.crew
+            .linger_ns
+            .store(linger.as_nanos() as u64, Ordering::Relaxed);
+    }
+}
+
+impl Drop for Workers {
+    fn drop(&mut self) {
+        self.crew.quit.store(true, Ordering::Relaxed);
+        for helper in self.helpers.take().into_iter().flatten() {
+            helper.thread().unpark();
+            // It catches panics of the work; there is nothing else to report.
+            let _ = helper.join();
+        }
     }
 }
 
@@ -48,15 +72,19 @@ impl Workers {
             1 => (None, 1),
             n => {
                 let pool = rayon::ThreadPoolBuilder::new()
-                    .num_threads(n - 1)
-                    .thread_name(|ix| format!("impinge-{ix}"))
+                    .num_threads(n)
+                    .thread_name(|ix| format!("impinge-pool-{ix}"))
                     .build()
                     .map_err(|error| Error::Threads(error.to_string()))?;
                 (Some(pool), n)
             }
         };
-        let crew = Arc::new(Crew::new(n - 1));
-        Ok(Workers { pool, n, crew })
+        Ok(Workers {
+            n,
+            crew: Arc::new(Crew::new(n - 1)),
+            helpers: OnceLock::new(),
+            pool,
+        })
     }
 
     /// How many there are.
@@ -66,8 +94,12 @@ impl Workers {
 
     /// Keeps helpers awake between regions until what it returns is dropped.
     pub fn shift(&self) -> Shift<'_> {
-        self.crew.over.store(false, Ordering::Relaxed);
-        Shift(&self.crew)
+        let linger = LINGER.as_nanos() as u64;
+        self.crew.linger_ns.store(linger, Ordering::Relaxed);
+        Shift {
+            crew: &self.crew,
+            start: Instant::now(),
+        }
     }
 
     /// Runs something that uses rayon on its own, within the limits of this pool.
@@ -82,8 +114,9 @@ impl Workers {
         }
     }
 
-    /// Calls `task(scratch, ix)` once for each `ix` below `n_tasks`, in any order, each worker with a
-    /// scratch of its own. With a single task or worker nobody is woken.
+    /// Calls `task(scratch, ix)` once for each `ix` below `n_tasks`, each worker with a scratch of its own. The
+    /// caller takes tasks from the first on, helpers from the last: tasks next to each other tend to use the same
+    /// memory. With a single task or worker nobody is woken.
     pub fn for_each<S: Send>(
         &self,
         scratches: &mut [S],
@@ -97,7 +130,7 @@ impl Workers {
             }
             return;
         }
-        let next = AtomicUsize::new(0);
+        let claims = Claims::default();
         let scratches = Scratches(scratches.as_mut_ptr());
         let work = |worker: usize| {
             if worker >= n_workers {
@@ -105,31 +138,58 @@ impl Workers {
             }
             // SAFETY: there are at least `n_workers`, and every worker has a number of its own.
             let scratch = unsafe { &mut *scratches.at(worker) };
-            loop {
-                let ix = next.fetch_add(1, Ordering::Relaxed);
-                if ix >= n_tasks {
-                    break;
-                }
+            while let Some(ix) = claims.next(n_tasks, worker == 0) {
                 task(scratch, ix);
             }
         };
-        for seat in 1..n_workers {
-            self.call(seat);
-        }
+        self.call(n_workers - 1);
         self.crew.region(&work);
     }
 
-    /// Sends for a helper that is not here.
-    fn call(&self, seat: usize) {
-        if self.crew.seats[seat - 1].swap(true, Ordering::AcqRel) {
-            return;
+    /// Wakes all helpers, so that they are there when they are needed.
+    pub fn call_all(&self) {
+        self.call(self.n - 1);
+    }
+
+    /// Wakes so many helpers, those that sleep.
+    fn call(&self, n: usize) {
+        let helpers = self.helpers.get_or_init(|| {
+            let start = |seat| {
+                let crew = Arc::clone(&self.crew);
+                thread::Builder::new()
+                    .name(format!("impinge-{seat}"))
+                    .spawn(move || crew.serve(seat))
+            };
+            // Where a thread cannot be had, there is one helper less.
+            (1..self.n).map_while(|seat| start(seat).ok()).collect()
+        });
+        for (helper, asleep) in helpers.iter().zip(&self.crew.asleep).take(n) {
+            if asleep.load(Ordering::Relaxed) && asleep.swap(false, Ordering::AcqRel) {
+                helper.thread().unpark();
+            }
         }
-        let crew = Arc::clone(&self.crew);
-        let serve = move || crew.serve(seat);
-        match &self.pool {
-            Some(pool) => pool.spawn(serve),
-            None => rayon::spawn(serve),
+    }
+}
+
+/// How many tasks were taken from the front (low half) and from the back (high half).
+#[derive(Default)]
+struct Claims(AtomicU64);
+
+impl Claims {
+    /// The next task that nobody has taken.
+    fn next(&self, n_tasks: usize, from_front: bool) -> Option<usize> {
+        const BACK: u64 = 1 << 32;
+        let step = if from_front { 1 } else { BACK };
+        let taken = self.0.fetch_add(step, Ordering::Relaxed);
+        let (front, back) = ((taken % BACK) as usize, (taken / BACK) as usize);
+        if front + back >= n_tasks {
+            return None;
         }
+        Some(if from_front {
+            front
+        } else {
+            n_tasks - 1 - back
+        })
     }
 }
 
@@ -162,10 +222,12 @@ struct Crew {
     work: UnsafeCell<Option<*const Work<'static>>>,
     /// Whether the caller is in a region.
     busy: AtomicBool,
-    /// Whether helpers that have nothing to do should go.
-    over: AtomicBool,
-    /// Which helpers are here or on their way.
-    seats: Box<[AtomicBool]>,
+    /// How long helpers that have nothing to do stay awake.
+    linger_ns: AtomicU64,
+    /// Whether helpers should end.
+    quit: AtomicBool,
+    /// Which helpers sleep, or are about to.
+    asleep: Box<[AtomicBool]>,
     panic: Mutex<Option<Box<dyn Any + Send>>>,
 }
 
@@ -186,8 +248,9 @@ impl Crew {
             gate: AtomicU64::new(0),
             work: UnsafeCell::new(None),
             busy: AtomicBool::new(false),
-            over: AtomicBool::new(true),
-            seats: (0..n_helpers).map(|_| AtomicBool::new(false)).collect(),
+            linger_ns: AtomicU64::new(0),
+            quit: AtomicBool::new(false),
+            asleep: (0..n_helpers).map(|_| AtomicBool::new(false)).collect(),
             panic: Mutex::new(None),
         }
     }
@@ -216,12 +279,12 @@ impl Crew {
         }
     }
 
-    /// A helper's time on a crew.
+    /// A helper's life.
     fn serve(&self, seat: usize) {
         let mut last_region = 0;
         let mut since = Instant::now();
         let mut looks = 0u32;
-        loop {
+        while !self.quit.load(Ordering::Relaxed) {
             let gate = self.gate.load(Ordering::Acquire);
             let region = gate / REGION;
             if gate & OPEN != 0 && region != last_region {
@@ -239,15 +302,31 @@ impl Crew {
                 }
                 continue;
             }
-            looks += 1;
-            if self.over.load(Ordering::Relaxed)
-                || looks.is_multiple_of(LOOKS) && since.elapsed() > LINGER
-            {
-                self.seats[seat - 1].store(false, Ordering::Release);
-                return;
-            }
             std::hint::spin_loop();
+            looks += 1;
+            if looks < LOOKS {
+                continue;
+            }
+            looks = 0;
+            let idle = since.elapsed();
+            if idle > Duration::from_nanos(self.linger_ns.load(Ordering::Relaxed)) {
+                self.sleep(seat, gate);
+                since = Instant::now();
+            } else if idle > SPIN {
+                thread::yield_now();
+            }
         }
+    }
+
+    /// Sleeps until called, unless something has happened since the helper looked at the gate. A call that comes
+    /// too early for it to be seen is lost: the region goes on without this helper.
+    fn sleep(&self, seat: usize, seen: u64) {
+        self.asleep[seat - 1].store(true, Ordering::Relaxed);
+        fence(Ordering::SeqCst);
+        if self.gate.load(Ordering::Acquire) == seen && !self.quit.load(Ordering::Relaxed) {
+            thread::park();
+        }
+        self.asleep[seat - 1].store(false, Ordering::Relaxed);
     }
 
     /// The work of the region that is open.
@@ -272,7 +351,7 @@ impl Drop for Closing<'_> {
         while crew.gate.load(Ordering::Acquire) & INSIDE_MASK != 0 {
             looks = looks.wrapping_add(1);
             if looks.is_multiple_of(LOOKS * LOOKS) {
-                std::thread::yield_now();
+                thread::yield_now();
             }
             std::hint::spin_loop();
         }
@@ -308,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn helpers_come_again_after_a_shift_is_over() {
+    fn helpers_come_again_after_they_slept() {
         let workers = Workers::new(2).expect("threads");
         for _ in 0..3 {
             let shift = workers.shift();
@@ -318,11 +397,11 @@ mod tests {
                 assert!(Instant::now() < deadline, "no helper came");
                 workers.for_each(&mut helped, 64, |helped, _| {
                     *helped = true;
-                    std::thread::sleep(Duration::from_micros(20));
+                    thread::sleep(Duration::from_micros(20));
                 });
             }
             drop(shift);
-            std::thread::sleep(Duration::from_millis(1));
+            thread::sleep(2 * LINGER);
         }
     }
 
@@ -333,7 +412,7 @@ mod tests {
             let mut scratches = [(); 3];
             let run = catch_unwind(AssertUnwindSafe(|| {
                 workers.for_each(&mut scratches, 64, |(), ix| {
-                    std::thread::sleep(Duration::from_micros(50));
+                    thread::sleep(Duration::from_micros(50));
                     assert_ne!(ix, bad, "a task that fails");
                 });
             }));

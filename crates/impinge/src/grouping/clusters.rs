@@ -43,7 +43,14 @@ pub(crate) struct Clustering {
     /// The tree over the clusters.
     pub shape: Shape,
     adjacency: OnceLock<Adjacency>,
+    local_faces: OnceLock<Vec<LocalFaces>>,
 }
+
+/// The corners of a cluster's triangles as numbers of its vertices: `[corner][place]`. Places past its size hold 0.
+pub(crate) type LocalFaces = [[u8; GROUP]; 3];
+
+/// Three vertices a triangle have numbers that fit a byte.
+const _: () = assert!(3 * GROUP <= 256);
 
 impl Clustering {
     /// Clusters primitives whose boxes in the pose at hand are given by `bounds`.
@@ -77,6 +84,7 @@ impl Clustering {
             vertex_starts,
             shape,
             adjacency: OnceLock::new(),
+            local_faces: OnceLock::new(),
         }
     }
 
@@ -105,6 +113,22 @@ impl Clustering {
         })
     }
 
+    /// For each cluster of triangles, its corners as numbers of its own vertices; found at the first call. Empty for
+    /// tetrahedra.
+    pub fn local_faces(&self) -> &[LocalFaces] {
+        self.local_faces.get_or_init(|| match &self.corners {
+            Elements::Triangles(faces) => (0..self.n_clusters())
+                .into_par_iter()
+                .with_min_len(64)
+                .map(|cluster| {
+                    let places = cluster * GROUP..cluster * GROUP + self.size(cluster);
+                    local_faces(&faces[places], self.vertices(cluster))
+                })
+                .collect(),
+            Elements::Tetrahedra(_) => Vec::new(),
+        })
+    }
+
     /// Whether [`adjacency`](Self::adjacency) has been found.
     pub fn knows_adjacency(&self) -> bool {
         self.adjacency.get().is_some()
@@ -121,7 +145,23 @@ impl Clustering {
             + size_of_val(&self.vertex_starts[..])
             + self.shape.bytes()
             + self.adjacency.get().map_or(0, Adjacency::bytes)
+            + self
+                .local_faces
+                .get()
+                .map_or(0, |faces| size_of_val(&faces[..]))
     }
+}
+
+fn local_faces(faces: &[[u32; 3]], vertices: &[u32]) -> LocalFaces {
+    let mut local = [[0; GROUP]; 3];
+    for (place, face) in faces.iter().enumerate() {
+        for corner in 0..3 {
+            // The first of those that the last one repeats.
+            let number = vertices.partition_point(|&vertex| vertex < face[corner]);
+            local[corner][place] = number as u8;
+        }
+    }
+    local
 }
 
 /// `n` if vertices `0..n` all occur.

@@ -653,6 +653,16 @@ mod x86 {
         }
     }
 
+    impl Avx512F32 {
+        /// Writes the numbers into a table from `first` on.
+        #[inline(always)]
+        pub fn store(self, table: &mut [f32; TABLE], first: usize) {
+            let sixteen: &mut [f32; 16] = table[first..].first_chunk_mut().expect("sixteen places");
+            // SAFETY: see above; one store of sixteen.
+            unsafe { _mm512_storeu_ps(sixteen.as_mut_ptr(), self.0) };
+        }
+    }
+
     impl Lookup for Avx512F32 {
         const N: usize = BATCH;
         type Places = __m512i;
