@@ -32,8 +32,8 @@ use super::top_level::TopLevel;
 use super::workers::Workers;
 use super::world::{BodyCache, Caches, World};
 
-/// Clusters a task refits.
-const REFIT_TASK: usize = 256;
+/// Nodes a task refits, of up to eight clusters each.
+const REFIT_TASK: usize = 32;
 /// Primitives of all bodies together from which on helpers are woken at a frame's begin.
 const CALL_FROM: u64 = 30_000;
 /// Primitives of all bodies together below which one thread finds the boxes. Positions have just been written,
@@ -57,10 +57,12 @@ pub(crate) struct Clusters {
 #[derive(Debug, Clone, Copy)]
 struct RefitTask {
     participant: u32,
+    /// Nodes of level 1 with their clusters; clusters where there is one only.
     first: u32,
     end: u32,
-    /// Where the body's cluster boxes go; valid within the frame that made the task.
+    /// Where the body's boxes go; valid within the frame that made the task.
     leaves: RawBoundsArray,
+    parents: Option<RawBoundsArray>,
 }
 
 impl Clusters {
@@ -204,7 +206,6 @@ impl Clusters {
             let cache = self.caches[participant.id.index()]
                 .as_mut()
                 .expect("clustered");
-            let n = cache.clustering.n_clusters() as u32;
             let covered = cache.clustering.n_vertices_covered == Some(body.n_vertices());
             if cache.positions_stamp == stamp {
                 continue;
@@ -212,16 +213,19 @@ impl Clusters {
             if !(covered && matches!(body.positions(), Positions::F32(_))) {
                 frame.check_one(scene, ix)?;
             }
-            if n > 0 {
-                let leaves = cache.bounds.levels[0].raw();
-                let tasks = (0..n).step_by(REFIT_TASK).map(|first| RefitTask {
-                    participant: ix as u32,
-                    first,
-                    end: n.min(first + REFIT_TASK as u32),
-                    leaves,
-                });
-                self.tasks.extend(tasks);
-            }
+            let (n, leaves, parents) = match &mut cache.bounds.levels[..] {
+                [] => continue,
+                [leaves] => (1, leaves.raw(), None),
+                [leaves, parents, ..] => (parents.len() as u32, leaves.raw(), Some(parents.raw())),
+            };
+            let tasks = (0..n).step_by(REFIT_TASK).map(|first| RefitTask {
+                participant: ix as u32,
+                first,
+                end: n.min(first + REFIT_TASK as u32),
+                leaves,
+                parents,
+            });
+            self.tasks.extend(tasks);
         }
         // Positions are mostly written in order: the last ones are in the nearest cache.
         self.tasks.reverse();
@@ -237,8 +241,8 @@ impl Clusters {
                 continue;
             }
             cache.positions_stamp = body.positions_stamp();
-            cache.bounds.refit_above_leaves(&cache.clustering.shape);
-            let spread = cache.spread();
+            cache.bounds.refit_above(1, &cache.clustering.shape);
+            let spread = cache.bounds.spread(self.isa);
             if options.recluster == Recluster::Auto && spread > STALE * cache.best_spread {
                 let start = Instant::now();
                 **cache = workers.install(|| BodyCache::new(body));
@@ -247,7 +251,7 @@ impl Clusters {
                 }
                 cache.refit_all(body);
                 cache.positions_stamp = body.positions_stamp();
-                cache.best_spread = cache.spread();
+                cache.best_spread = cache.bounds.spread(self.isa);
                 stats.n_clustered += 1;
                 stats.n_reclustered += 1;
                 stats.add_ms("clustering", start.elapsed().as_secs_f64() * 1e3);
@@ -295,17 +299,24 @@ impl Clusters {
 fn leaves<S: Simd>(simd: S, world: World<'_>, task: RefitTask) -> bool {
     let positions = world.body(task.participant).positions;
     let clustering = &world.cache(task.participant).clustering;
-    // SAFETY: no two tasks name the same cluster of the same body, and nobody reads leaf boxes before
-    // all tasks are done.
-    unsafe {
-        bounds::of_clusters(
-            simd,
-            positions,
-            clustering,
-            task.first..task.end,
-            task.leaves,
-        )
+    let mut all_finite = true;
+    for node in task.first as usize..task.end as usize {
+        let clusters = match task.parents {
+            Some(_) => clustering.shape.children(1, node),
+            None => node..node + 1,
+        };
+        // SAFETY: no two tasks name the same node of the same body, and nobody reads boxes before all
+        // tasks are done.
+        unsafe {
+            let (bounds, finite) =
+                bounds::of_clusters(simd, positions, clustering, clusters, task.leaves);
+            if let Some(parents) = task.parents {
+                parents.put(node, &bounds);
+            }
+            all_finite &= finite;
+        }
     }
+    all_finite
 }
 
 /// What the method is told.
@@ -348,20 +359,6 @@ impl BodyCache {
             let bounds = bounds::of_vertices(body.positions(), vertices);
             self.bounds.levels[0].put(cluster, &bounds);
         }
-        self.bounds.refit_above_leaves(&self.clustering.shape);
-    }
-
-    /// The clusters' summed surface over the body's: how well the clusters fit the pose at hand.
-    fn spread(&self) -> f64 {
-        let Some(leaves) = self.bounds.levels.first() else {
-            return 1.0;
-        };
-        let sum: f64 = (0..leaves.len()).map(|ix| leaves.at(ix).half_area()).sum();
-        let whole = self.bounds.root().half_area();
-        if whole > 0.0 && sum.is_finite() {
-            sum / whole
-        } else {
-            1.0
-        }
+        self.bounds.refit_above(0, &self.clustering.shape);
     }
 }

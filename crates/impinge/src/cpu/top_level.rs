@@ -77,7 +77,7 @@ impl TopLevel {
         for (place, &ix) in self.order.iter().enumerate() {
             self.bounds.levels[0].put(place, &root(ix));
         }
-        self.bounds.refit_above_leaves(&self.shape);
+        self.bounds.refit_above(0, &self.shape);
     }
 
     /// The summed surface of the nodes above the leaves over that of the whole.
