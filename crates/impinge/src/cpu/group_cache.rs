@@ -100,30 +100,47 @@ impl GroupCache {
         size_of::<u64>() * self.keys.capacity() + size_of::<Group>() * self.groups.capacity()
     }
 
-    /// Two clusters, found now if they are not there.
+    fn key((participant, cluster): (u32, u32)) -> u64 {
+        u64::from(participant) << 32 | u64::from(cluster)
+    }
+
+    fn first_place(&self, (participant, cluster): (u32, u32)) -> usize {
+        let hash = participant.wrapping_mul(67).wrapping_add(cluster) as usize;
+        hash & (self.keys.len() - 1)
+    }
+
+    /// Whether a cluster of a participant is here.
     #[inline(always)]
-    pub fn both<S: Simd>(
+    pub fn holds(&self, whose: (u32, u32)) -> bool {
+        let (key, first) = (Self::key(whose), self.first_place(whose));
+        self.keys[first] == key || self.keys[first ^ 1] == key
+    }
+
+    /// The place of a cluster of a participant, which is found now if it is not here; what is at the place `pinned`
+    /// stays.
+    #[inline(always)]
+    pub fn place<S: Simd>(
         &mut self,
         simd: S,
         world: World<'_>,
-        clusters: [(u32, u32); 2],
-    ) -> [&Group; 2] {
-        let mut places = [usize::MAX; 2];
-        for (ix, (participant, cluster)) in clusters.into_iter().enumerate() {
-            let key = u64::from(participant) << 32 | u64::from(cluster);
-            let hash = participant.wrapping_mul(67).wrapping_add(cluster) as usize;
-            let first = hash & (self.keys.len() - 1);
-            places[ix] = if self.keys[first] == key {
-                first
-            } else if self.keys[first ^ 1] == key {
-                first ^ 1
-            } else {
-                let place = if first == places[0] { first ^ 1 } else { first };
-                self.keys[place] = key;
-                self.groups[place].fill(simd, world, participant, cluster as usize);
-                place
-            };
+        whose: (u32, u32),
+        pinned: usize,
+    ) -> usize {
+        let (key, first) = (Self::key(whose), self.first_place(whose));
+        for place in [first, first ^ 1] {
+            if self.keys[place] == key {
+                return place;
+            }
         }
-        places.map(|place| &self.groups[place])
+        let place = if first == pinned { first ^ 1 } else { first };
+        self.keys[place] = key;
+        self.groups[place].fill(simd, world, whose.0, whose.1 as usize);
+        place
+    }
+
+    /// What is at a place.
+    #[inline(always)]
+    pub fn at(&self, place: usize) -> &Group {
+        &self.groups[place]
     }
 }

@@ -101,7 +101,8 @@ impl Settler {
             let batch = met.batch(first);
             let lanes = u64::MAX >> (64 - (met.len() - first).min(BATCH));
             let verdict = if in_tables {
-                filter::classify_in_tables::<S::F32>(&group_a.corners, &group_b.corners, batch)
+                let tables = [&group_a.corners, &group_b.corners];
+                filter::classify_in_tables::<S::F32>(tables, batch, lanes as u16)
             } else {
                 Verdict16::default()
             };

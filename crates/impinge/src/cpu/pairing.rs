@@ -23,7 +23,7 @@ use crate::query::SharedVertex;
 
 use super::group_cache::{Group, GroupCache};
 use super::narrow::Settler;
-use super::simd::{Isa, LaneBounds, Lanes, Masks, Simd};
+use super::simd::{Isa, Lanes, Masks, Simd};
 use super::world::{BodyRef, World};
 
 /// One work item in so many has its narrow stage timed: looking at the clock takes longer than some take.
@@ -139,13 +139,15 @@ pub(crate) fn run<S: Simd>(
         masks,
     } = worker;
     for (ix, item) in items.iter().enumerate() {
-        let clusters = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
-        let groups = groups.both(simd, world, clusters);
+        let Some(Culled { places, lanes }) = cull(simd, world, item, groups) else {
+            continue;
+        };
+        let groups = places.map(|place| groups.at(place));
         met.n = 0;
         if item.a == item.b {
-            within_body(simd, world, item, groups, masks, met, settler);
+            within_body(simd, world, item, (groups, lanes), masks, met, settler);
         } else {
-            between_bodies(simd, world, item, groups, masks, met);
+            between_bodies(simd, (groups, lanes), masks, met);
         }
         if met.n > 0 {
             let is_sample = ix % SAMPLED == 0;
@@ -160,40 +162,54 @@ pub(crate) fn run<S: Simd>(
     settler.settle(isa, world);
 }
 
-/// The boxes of the two groups and the lanes of each that meet the box in which their clusters meet; none if
-/// one side has no such lane.
+/// Where the groups of a work item are, and the lanes of each that meet the box in which their clusters meet.
+struct Culled {
+    places: [usize; 2],
+    lanes: [u64; 2],
+}
+
+/// None if one side has no lane that meets the box.
 #[inline(always)]
 fn cull<S: Simd>(
     simd: S,
     world: World<'_>,
     item: &WorkItem,
-    [boxes_a, boxes_b]: [&LaneBounds; 2],
-) -> Option<[u64; 2]> {
-    let (a, b) = (world.cache(item.a), world.cache(item.b));
-    let (cluster_a, cluster_b) = (item.cluster_a as usize, item.cluster_b as usize);
-    let (leaves_a, leaves_b) = (&a.bounds.levels[0], &b.bounds.levels[0]);
-    let both = leaves_a.at(cluster_a).intersection(&leaves_b.at(cluster_b));
-    let lanes_a = simd.overlaps_64(boxes_a, &both, full(a.clustering.size(cluster_a)));
-    if lanes_a == 0 {
-        return None;
+    groups: &mut GroupCache,
+) -> Option<Culled> {
+    const NOWHERE: usize = usize::MAX;
+    let sides = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
+    let caches = [world.cache(item.a), world.cache(item.b)];
+    let size = |side: usize| caches[side].clustering.size(sides[side].1 as usize);
+    let leaf = |side: usize| caches[side].bounds.levels[0].at(sides[side].1 as usize);
+    let both = leaf(0).intersection(&leaf(1));
+    let mut places = [NOWHERE; 2];
+    let mut lanes = [0; 2];
+    // Where it leaves no lane of the one that is there, the other need not be found.
+    let first = usize::from(!groups.holds(sides[0]) && groups.holds(sides[1]));
+    for side in [first, 1 - first] {
+        places[side] = groups.place(simd, world, sides[side], places[1 - side]);
+        let all = full(size(side));
+        if sides[0] == sides[1] {
+            places = [places[side]; 2];
+            lanes = [all; 2];
+            break;
+        }
+        lanes[side] = simd.overlaps_64(&groups.at(places[side]).boxes, &both, all);
+        if lanes[side] == 0 {
+            return None;
+        }
     }
-    let lanes_b = simd.overlaps_64(boxes_b, &both, full(b.clustering.size(cluster_b)));
-    (lanes_b != 0).then_some([lanes_a, lanes_b])
+    Some(Culled { places, lanes })
 }
 
 #[inline(always)]
 fn between_bodies<S: Simd>(
     simd: S,
-    world: World<'_>,
-    item: &WorkItem,
-    [group_a, group_b]: [&Group; 2],
+    ([group_a, group_b], [lanes_a, lanes_b]): ([&Group; 2], [u64; 2]),
     masks: &mut Masks,
     met: &mut Met,
 ) {
     let (boxes_a, boxes_b) = (&group_a.boxes, &group_b.boxes);
-    let Some([lanes_a, lanes_b]) = cull(simd, world, item, [boxes_a, boxes_b]) else {
-        return;
-    };
     let (side, rows) = if lanes_a.count_ones() <= lanes_b.count_ones() {
         simd.overlaps_rows(boxes_b, lanes_b, boxes_a, lanes_a, masks);
         (Side::A, lanes_a)
@@ -211,7 +227,7 @@ fn within_body<S: Simd>(
     simd: S,
     world: World<'_>,
     item: &WorkItem,
-    [group_a, group_b]: [&Group; 2],
+    ([group_a, group_b], [lanes_a, lanes_b]): ([&Group; 2], [u64; 2]),
     masks: &mut Masks,
     met: &mut Met,
     settler: &mut Settler,
@@ -228,16 +244,12 @@ fn within_body<S: Simd>(
         shared_vertex: world.frame.shared_vertex,
     };
     if cluster_a == cluster_b {
-        let all = full(cache.clustering.size(cluster_a));
-        simd.overlaps_within(boxes_a, all, masks);
+        simd.overlaps_within(boxes_a, lanes_a, masks);
         for (lane, &shared) in adjacency.own(cluster_a).iter().enumerate() {
             rule.put_row(simd, Side::A, lane, masks.0[lane], shared, met, settler);
         }
         return;
     }
-    let Some([lanes_a, lanes_b]) = cull(simd, world, item, [boxes_a, boxes_b]) else {
-        return;
-    };
     let mut shared = [0u64; GROUP];
     // Adjacency is kept by lanes of a: turning it round costs more than some rows.
     let (side, rows) = if lanes_a.count_ones() <= 2 * lanes_b.count_ones() {

@@ -35,14 +35,14 @@ pub fn classify<V: Vector>(pairs: &TrianglePairs8) -> Verdict {
     verdict
 }
 
-/// As [`classify`], in `f32`: for triangles of two groups, named by their places in each. Coordinates must not be
-/// larger than [`LARGEST_F32`](super::LARGEST_F32).
+/// As [`classify`], in `f32`: for triangles of two groups, named by their places in each; only lanes of `among` are
+/// needed. Coordinates must not be larger than [`LARGEST_F32`](super::LARGEST_F32).
 #[inline(always)]
 #[must_use]
 pub fn classify_in_tables<V: Lookup>(
-    a: &Triangles64,
-    b: &Triangles64,
+    [a, b]: [&Triangles64; 2],
     [places_a, places_b]: [&[u8; BATCH]; 2],
+    among: u16,
 ) -> Verdict16 {
     let mut verdict = Verdict16::default();
     for first in (0..BATCH).step_by(V::N) {
@@ -50,9 +50,14 @@ pub fn classify_in_tables<V: Lookup>(
         let b = look_up::<V>(b, V::places(places_b, first));
         let sides = Sides::new(&a, &b);
         let (apart, sure) = (sides.are_apart(), sides.are_sure());
+        verdict.no |= V::bits(apart) << first;
+        let left = V::bits(sure & !apart) << first;
+        if left & among == 0 {
+            continue;
+        }
         let (meet, miss) = cross_on_line(&a, &b, &sides);
-        verdict.yes |= V::bits(sure & !apart & meet) << first;
-        verdict.no |= V::bits(apart | (sure & miss)) << first;
+        verdict.yes |= left & V::bits(meet) << first;
+        verdict.no |= left & V::bits(miss) << first;
     }
     verdict
 }
