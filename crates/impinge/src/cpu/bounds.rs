@@ -15,7 +15,7 @@ use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
 use crate::scene::{Elements, Positions};
 
-use super::simd::{Isa, LaneBounds, Simd, dispatch};
+use super::simd::{LaneBounds, Simd};
 
 /// x, y, z and a fourth number that nobody looks at.
 #[cfg(target_arch = "x86_64")]
@@ -227,8 +227,35 @@ pub(crate) fn of_run(positions: &Positions, run: std::ops::Range<usize>) -> Boun
     bounds
 }
 
-/// The boxes of some clusters; the box of them all, and whether all positions that were looked at are certainly
-/// finite. (f64 ones are checked before.)
+/// What is found of some clusters besides their boxes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Summary {
+    /// The box of them all.
+    pub bounds: Bounds,
+    /// Half their summed surface; infinite where squares of extents overflow.
+    pub surface: f32,
+    /// Whether all positions that were looked at are certainly finite. (f64 ones are checked before.)
+    pub all_finite: bool,
+}
+
+impl Summary {
+    /// Of no clusters.
+    pub const EMPTY: Summary = Summary {
+        bounds: Bounds::EMPTY,
+        surface: 0.0,
+        all_finite: true,
+    };
+
+    /// Adds other clusters.
+    #[inline(always)]
+    pub fn join(&mut self, other: &Summary) {
+        self.bounds.join(&other.bounds);
+        self.surface += other.surface;
+        self.all_finite &= other.all_finite;
+    }
+}
+
+/// The boxes of some clusters.
 ///
 /// # Safety
 /// `into` must be as long as the clustering, and nobody else may look at these clusters' boxes meanwhile.
@@ -239,22 +266,25 @@ pub(crate) unsafe fn of_clusters<S: Simd>(
     clustering: &Clustering,
     clusters: Range<usize>,
     into: RawBoundsArray,
-) -> (Bounds, bool) {
-    let mut all = Bounds::EMPTY;
-    let mut all_finite = true;
+) -> Summary {
+    let mut summary = Summary::EMPTY;
     for cluster in clusters {
         let vertices = clustering.vertices(cluster);
-        let (bounds, finite) = match positions {
+        let (bounds, all_finite) = match positions {
             // SAFETY: a cluster's vertices ascend.
             Positions::F32(positions) => unsafe { simd.of_ascending(positions, vertices) },
             Positions::F64(_) => (of_vertices(positions, vertices), true),
         };
-        all.join(&bounds);
-        all_finite &= finite;
+        let [x, y, z] = [0, 1, 2].map(|axis| bounds.max[axis] - bounds.min[axis]);
+        summary.join(&Summary {
+            bounds,
+            surface: x * y + y * z + z * x,
+            all_finite,
+        });
         // SAFETY: the caller's.
         unsafe { into.put(cluster, &bounds) };
     }
-    (all, all_finite)
+    summary
 }
 
 /// The boxes of a cluster's primitives, a lane each; lanes past its size are emptied.
@@ -323,29 +353,6 @@ fn extent<const N: usize>(positions: &[[f32; 3]], corners: &[u32; N]) -> (Vec4, 
     (min, max)
 }
 
-/// Half the summed surface of boxes whose extents are scaled.
-#[inline(always)]
-fn surface<S: Simd>(_: S, boxes: &BoundsArray, scale: f32) -> f32 {
-    const N: usize = 16;
-    let extents = |axis: usize, first: usize| {
-        let (min, max) = (&boxes.min[axis][first..], &boxes.max[axis][first..]);
-        let mut extents = [0.0f32; N];
-        for k in 0..N.min(min.len()) {
-            // The padding holds empty boxes.
-            extents[k] = greater((max[k] - min[k]) * scale, 0.0);
-        }
-        extents
-    };
-    let mut sums = [0.0f32; N];
-    for first in (0..boxes.len()).step_by(N) {
-        let [x, y, z] = [extents(0, first), extents(1, first), extents(2, first)];
-        for k in 0..N {
-            sums[k] += x[k] * y[k] + y[k] * z[k] + z[k] * x[k];
-        }
-    }
-    sums.iter().sum()
-}
-
 /// The boxes of a tree, level by level, leaves first.
 #[derive(Debug, Default)]
 pub(crate) struct TreeBounds {
@@ -374,24 +381,6 @@ impl TreeBounds {
                 }
                 nodes.put(node, &bounds);
             }
-        }
-    }
-
-    /// The leaves' summed surface over that of everything; 1 where that cannot be told.
-    pub fn spread(&self, isa: Isa) -> f64 {
-        let whole = self.root().half_area();
-        let Some(leaves) = self.levels.first() else {
-            return 1.0;
-        };
-        let scale = (1.0 / whole).sqrt() as f32;
-        let spread = dispatch!(isa, surface, (
-            boxes: &BoundsArray = leaves,
-            scale: f32 = scale,
-        ) -> f32);
-        if whole > 0.0 && spread.is_finite() {
-            spread.into()
-        } else {
-            1.0
         }
     }
 

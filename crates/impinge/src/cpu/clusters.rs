@@ -12,7 +12,7 @@
 //! Memory: what is cached a body, and a slab of work items. When that is full it is paired and settled,
 //! and dispatch goes on.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use crate::error::Error;
@@ -23,7 +23,7 @@ use crate::settings::{InstructionSet, Recluster};
 use crate::stats::Statistics;
 
 use super::Job;
-use super::bounds::{self, TreeBounds};
+use super::bounds::{self, Summary, TreeBounds};
 use super::dispatch::NodePair;
 use super::pairing::{WorkItem, Worker};
 use super::simd::{Isa, Simd, dispatch};
@@ -38,7 +38,7 @@ const REFIT_TASK: usize = 32;
 const CALL_FROM: u64 = 30_000;
 /// Primitives of all bodies together below which one thread finds the boxes. Positions have just been written,
 /// mostly by one thread, and what fits in its cache another fetches from there more slowly than it reads it.
-const PARALLEL_FROM: u64 = 300_000;
+const PARALLEL_FROM: u64 = 120_000;
 /// How much the clusters' surface may grow against the body's before it is clustered again.
 pub(super) const STALE: f64 = 1.5;
 
@@ -48,6 +48,8 @@ pub(crate) struct Clusters {
     caches: Caches,
     top: TopLevel,
     tasks: Vec<RefitTask>,
+    /// What each task has found.
+    found: Vec<Mutex<Summary>>,
     items: Vec<WorkItem>,
     scratches: Vec<Worker>,
     stack: Vec<NodePair>,
@@ -72,6 +74,7 @@ impl Clusters {
             caches: Vec::new(),
             top: TopLevel::default(),
             tasks: Vec::new(),
+            found: Vec::new(),
             items: Vec::new(),
             scratches: Vec::new(),
             stack: Vec::new(),
@@ -218,6 +221,7 @@ impl Clusters {
                 [leaves] => (1, leaves.raw(), None),
                 [leaves, parents, ..] => (parents.len() as u32, leaves.raw(), Some(parents.raw())),
             };
+            cache.surface = 0.0;
             let tasks = (0..n).step_by(REFIT_TASK).map(|first| RefitTask {
                 participant: ix as u32,
                 first,
@@ -229,7 +233,16 @@ impl Clusters {
         }
         // Positions are mostly written in order: the last ones are in the nearest cache.
         self.tasks.reverse();
-        if !self.refit_leaves(job) {
+        self.refit_leaves(job);
+        let mut all_finite = true;
+        for (task, found) in self.tasks.iter().zip(&mut self.found) {
+            let found = found.get_mut().unwrap_or_else(PoisonError::into_inner);
+            all_finite &= found.all_finite;
+            let slot = frame.participants[task.participant as usize].id.index();
+            let cache = self.caches[slot].as_mut().expect("clustered");
+            cache.surface += f64::from(found.surface);
+        }
+        if !all_finite {
             frame.check(scene)?;
         }
         for (ix, participant) in frame.participants.iter().enumerate() {
@@ -242,7 +255,7 @@ impl Clusters {
             }
             cache.positions_stamp = body.positions_stamp();
             cache.bounds.refit_above(1, &cache.clustering.shape);
-            let spread = cache.bounds.spread(self.isa);
+            let spread = cache.spread();
             if options.recluster == Recluster::Auto && spread > STALE * cache.best_spread {
                 let start = Instant::now();
                 **cache = workers.install(|| BodyCache::new(body));
@@ -251,7 +264,6 @@ impl Clusters {
                 }
                 cache.refit_all(body);
                 cache.positions_stamp = body.positions_stamp();
-                cache.best_spread = cache.bounds.spread(self.isa);
                 stats.n_clustered += 1;
                 stats.n_reclustered += 1;
                 stats.add_ms("clustering", start.elapsed().as_secs_f64() * 1e3);
@@ -262,44 +274,42 @@ impl Clusters {
         Ok(())
     }
 
-    /// Boxes of clusters; whether all positions that were looked at are certainly finite.
-    fn refit_leaves(&mut self, job: Job<'_>) -> bool {
+    /// Boxes of clusters and of the nodes above them.
+    fn refit_leaves(&mut self, job: Job<'_>) {
         let Job {
             scene,
             frame,
             workers,
             ..
         } = job;
-        let (isa, tasks, caches) = (self.isa, &self.tasks, Some(&self.caches));
+        let n_tasks = self.tasks.len();
+        self.found
+            .resize_with(n_tasks, || Mutex::new(Summary::EMPTY));
+        let (isa, tasks, found) = (self.isa, &self.tasks, &self.found);
         let world = World {
             scene,
             frame,
-            caches,
+            caches: Some(&self.caches),
         };
-        let all_finite = AtomicBool::new(true);
         let refit = |_: &mut Worker, ix: usize| {
-            let task = tasks[ix];
-            let finite = dispatch!(isa, leaves, (
+            let summary = dispatch!(isa, leaves, (
                 world: World<'_> = world,
-                task: RefitTask = task,
-            ) -> bool);
-            if !finite {
-                all_finite.store(false, Ordering::Relaxed);
-            }
+                task: RefitTask = tasks[ix],
+            ) -> Summary);
+            *found[ix].lock().unwrap_or_else(PoisonError::into_inner) = summary;
         };
         let parallel = frame.n_primitives() >= PARALLEL_FROM;
         let n_workers = if parallel { workers.n() } else { 1 };
-        workers.for_each(&mut self.scratches[..n_workers], tasks.len(), refit);
-        all_finite.into_inner()
+        workers.for_each(&mut self.scratches[..n_workers], n_tasks, refit);
     }
 }
 
-/// The boxes of one task's clusters; whether all positions that were looked at are certainly finite.
+/// The boxes of one task's clusters and of the nodes above them.
 #[inline(always)]
-fn leaves<S: Simd>(simd: S, world: World<'_>, task: RefitTask) -> bool {
+fn leaves<S: Simd>(simd: S, world: World<'_>, task: RefitTask) -> Summary {
     let positions = world.body(task.participant).positions;
     let clustering = &world.cache(task.participant).clustering;
-    let mut all_finite = true;
+    let mut summary = Summary::EMPTY;
     for node in task.first as usize..task.end as usize {
         let clusters = match task.parents {
             Some(_) => clustering.shape.children(1, node),
@@ -308,15 +318,14 @@ fn leaves<S: Simd>(simd: S, world: World<'_>, task: RefitTask) -> bool {
         // SAFETY: no two tasks name the same node of the same body, and nobody reads boxes before all
         // tasks are done.
         unsafe {
-            let (bounds, finite) =
-                bounds::of_clusters(simd, positions, clustering, clusters, task.leaves);
+            let of_node = bounds::of_clusters(simd, positions, clustering, clusters, task.leaves);
             if let Some(parents) = task.parents {
-                parents.put(node, &bounds);
+                parents.put(node, &of_node.bounds);
             }
-            all_finite &= finite;
+            summary.join(&of_node);
         }
     }
-    all_finite
+    summary
 }
 
 /// What the method is told.
@@ -341,6 +350,7 @@ impl BodyCache {
             positions_stamp: 0,
             clustering,
             bounds,
+            surface: 0.0,
             best_spread: f64::INFINITY,
         }
     }
@@ -353,12 +363,26 @@ impl BodyCache {
         }
     }
 
+    /// All boxes, on this thread: those of clusters made anew are the best so far.
     fn refit_all(&mut self, body: &Body) {
+        self.surface = 0.0;
         for cluster in 0..self.clustering.n_clusters() {
             let vertices = self.clustering.vertices(cluster);
             let bounds = bounds::of_vertices(body.positions(), vertices);
+            self.surface += bounds.half_area();
             self.bounds.levels[0].put(cluster, &bounds);
         }
         self.bounds.refit_above(0, &self.clustering.shape);
+        self.best_spread = self.spread();
+    }
+
+    /// The clusters' summed surface over the body's: how well the clusters fit the pose at hand.
+    fn spread(&self) -> f64 {
+        let whole = self.bounds.root().half_area();
+        if whole > 0.0 && self.surface.is_finite() {
+            self.surface / whole
+        } else {
+            1.0
+        }
     }
 }

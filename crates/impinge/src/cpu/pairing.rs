@@ -27,7 +27,7 @@ use super::simd::{Isa, Lanes, Masks, Simd};
 use super::world::{BodyRef, World};
 
 /// One work item in so many has its narrow stage timed: looking at the clock takes longer than some take.
-const SAMPLED: usize = 16;
+const SAMPLED: u32 = 16;
 
 /// Two clusters that may meet: participants and their clusters.
 #[derive(Debug, Clone, Copy)]
@@ -45,12 +45,15 @@ pub(crate) struct Worker {
     groups: GroupCache,
     met: Met,
     masks: Masks,
+    /// Work items whose candidates were settled.
+    n_settled: u32,
 }
 
 impl Worker {
     /// Makes ready for a frame of so many clusters.
     pub fn begin(&mut self, n_clusters: u64) {
         self.settler.clear();
+        self.n_settled = 0;
         self.groups.begin(n_clusters);
     }
 
@@ -137,8 +140,9 @@ pub(crate) fn run<S: Simd>(
         groups,
         met,
         masks,
+        n_settled,
     } = worker;
-    for (ix, item) in items.iter().enumerate() {
+    for item in items {
         let Some(Culled { places, lanes }) = cull(simd, world, item, groups) else {
             continue;
         };
@@ -150,11 +154,12 @@ pub(crate) fn run<S: Simd>(
             between_bodies(simd, (groups, lanes), masks, met);
         }
         if met.n > 0 {
-            let is_sample = ix % SAMPLED == 0;
+            *n_settled += 1;
+            let is_sample = n_settled.is_multiple_of(SAMPLED);
             let start = is_sample.then(Instant::now);
             settler.settle_item(simd, world, item, groups, met);
             if let Some(start) = start {
-                settler.busy += start.elapsed() * SAMPLED as u32;
+                settler.busy += start.elapsed() * SAMPLED;
             }
         }
         settler.settle_when_full(isa, world);

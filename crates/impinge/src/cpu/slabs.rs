@@ -18,9 +18,9 @@ const MOST_ITEMS: usize = 1 << 20;
 const FEWEST_ITEMS: usize = 256;
 /// Work items a task pairs, at most and at least. Neighbours in the slab are neighbours in space, and a
 /// worker keeps the boxes of the clusters it has just seen: long tasks find more of them.
-const TASK: std::ops::RangeInclusive<usize> = 32..=512;
+const TASK: std::ops::RangeInclusive<usize> = 16..=512;
 /// Tasks a worker should get, so that none waits long for the last one.
-const TASKS_EACH: usize = 6;
+const TASKS_EACH: usize = 12;
 /// Work items below which one worker takes them all.
 const PARALLEL_FROM: usize = 64;
 

@@ -17,7 +17,9 @@ pub(crate) struct BodyCache {
     pub positions_stamp: u64,
     pub clustering: Clustering,
     pub bounds: TreeBounds,
-    /// Summed surface of the clusters over that of the body, at its best so far.
+    /// Half the summed surface of the clusters.
+    pub surface: f64,
+    /// That over the body's, at its best so far.
     pub best_spread: f64,
 }
 
