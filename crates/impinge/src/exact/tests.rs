@@ -3,8 +3,8 @@
 
 use super::Point;
 use super::filter::{
-    self, LANES, TetrahedronPairs8, TrianglePairs8, Triangles8, Verdict, number, shared_edge,
-    shared_vertex, tetrahedra_answer, triangles_answer,
+    self, BATCH, LANES, TABLE, TetrahedronPairs8, TrianglePairs8, Triangles8, Triangles64, Verdict,
+    Verdict16, number, shared_edge, shared_vertex, tetrahedra_answer, triangles_answer,
 };
 use super::tetrahedron::tetrahedra_intersect_by_signs;
 use super::triangle::triangles_intersect_by_signs;
@@ -72,6 +72,92 @@ fn classify(pairs: &TrianglePairs8) -> Verdict {
         #[cfg(target_arch = "x86_64")]
         avx512,
     )
+}
+
+/// Two groups of triangles in f32, and the places of a batch of pairs.
+struct InTables {
+    tables: [Triangles64; 2],
+    places: [[u8; BATCH]; 2],
+}
+
+impl InTables {
+    /// Two groups from a generator, and random places.
+    fn new(random: &mut Random, mut triangle: impl FnMut(&mut Random) -> [Point; 3]) -> Self {
+        let mut tables = [[[[0.0f32; TABLE]; 3]; 3]; 2];
+        for table in &mut tables {
+            for place in 0..TABLE {
+                for (corner, point) in table.iter_mut().zip(triangle(random)) {
+                    for (row, x) in corner.iter_mut().zip(point) {
+                        row[place] = x as f32;
+                    }
+                }
+            }
+        }
+        let places = [(); 2].map(|()| [(); BATCH].map(|()| (random.bits() % TABLE as u64) as u8));
+        InTables { tables, places }
+    }
+
+    /// The triangles of a pair.
+    fn get(&self, lane: usize) -> [[Point; 3]; 2] {
+        std::array::from_fn(|side| {
+            let place = usize::from(self.places[side][lane]);
+            self.tables[side].map(|corner| corner.map(|row| f64::from(row[place])))
+        })
+    }
+
+    fn classify<V: number::Lookup>(&self) -> Verdict16 {
+        let InTables { tables, places } = self;
+        let (tables, places) = ([&tables[0], &tables[1]], [&places[0], &places[1]]);
+        filter::classify_in_tables::<V>(tables, places, u16::MAX)
+    }
+}
+
+fn classify_in_tables(pairs: &InTables) -> Verdict16 {
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn avx2(pairs: &InTables) -> Verdict16 {
+        pairs.classify::<number::Avx2F32>()
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    fn avx512(pairs: &InTables) -> Verdict16 {
+        pairs.classify::<number::Avx512F32>()
+    }
+    on_all(
+        pairs,
+        InTables::classify::<number::Portable32>,
+        #[cfg(target_arch = "x86_64")]
+        avx2,
+        #[cfg(target_arch = "x86_64")]
+        avx512,
+    )
+}
+
+/// Compares what the filter in f32 says of many batches with the truth; gives how many pairs it settled, and how
+/// many of them meet.
+fn check_in_tables(
+    random: &mut Random,
+    n_batches: u32,
+    mut triangle: impl FnMut(&mut Random) -> [Point; 3],
+) -> (u32, u32) {
+    let (mut n_settled, mut n_yes) = (0, 0);
+    for _ in 0..n_batches {
+        let pairs = InTables::new(random, &mut triangle);
+        let Verdict16 { yes, no } = classify_in_tables(&pairs);
+        assert_eq!(yes & no, 0, "a lane with both answers");
+        for lane in 0..BATCH {
+            let [a, b] = pairs.get(lane);
+            let wrong = if triangles_intersect_by_signs(&a, &b) {
+                no
+            } else {
+                yes
+            };
+            assert_eq!(wrong >> lane & 1, 0, "the filter is wrong: {a:?} {b:?}");
+        }
+        n_settled += (yes | no).count_ones();
+        n_yes += yes.count_ones();
+    }
+    (n_settled, n_yes)
 }
 
 fn reject_by_planes(pairs: &TrianglePairs8) -> u8 {
@@ -302,6 +388,58 @@ fn filter_is_never_wrong_on_troublesome_triangles() {
     assert!(
         n_settled > n / 10 && n_settled < n,
         "{n_settled} of {n} settled"
+    );
+}
+
+#[test]
+fn filter_in_f32_settles_random_triangles_and_is_right() {
+    let mut random = Random(11);
+    // The largest coordinates, the usual ones, and some whose determinants nearly underflow.
+    for (scale, share_settled) in [(2.0f64.powi(24), 95), (1.0, 95), (2.0f64.powi(-18), 80)] {
+        let scaled = |point: Point| point.map(|x| x * scale);
+        let (n_settled, n_yes) =
+            check_in_tables(&mut random, 1000, |random| random.plain().map(scaled));
+        let n = 1000 * BATCH as u32;
+        assert!(
+            n_settled * 100 > n * share_settled && n_yes > n / 20,
+            "scale {scale}: {n_settled} of {n} settled, {n_yes} meet"
+        );
+    }
+    // What underflows is unsure, all of it.
+    let scale = 2.0f64.powi(-120);
+    let tiny = |random: &mut Random| random.plain().map(|point| point.map(|x| x * scale));
+    assert_eq!(check_in_tables(&mut random, 100, tiny), (0, 0));
+}
+
+#[test]
+fn filter_in_f32_is_never_wrong_on_troublesome_triangles() {
+    let mut random = Random(12);
+    let within = |point: Point| {
+        let largest = f64::from(filter::LARGEST_F32);
+        point.map(|x| x.clamp(-largest, largest))
+    };
+    let n_batches = 3000;
+    let (n_settled, _) = check_in_tables(&mut random, n_batches, |random| {
+        random.troublesome().map(within)
+    });
+    let n = n_batches * BATCH as u32;
+    assert!(
+        n_settled > n / 20 && n_settled < n,
+        "{n_settled} of {n} settled"
+    );
+    // Nearly coplanar, nearly touching: corners a few units in the last place from a lattice.
+    let (n_settled, n_yes) = check_in_tables(&mut random, n_batches, |random| {
+        [(); 3].map(|()| {
+            [(); 3].map(|()| {
+                let bits = random.bits();
+                let x = (bits % 4) as f32 * 0.1 + 1.0;
+                f64::from(f32::from_bits(x.to_bits() + (bits >> 32) as u32 % 8))
+            })
+        })
+    });
+    assert!(
+        n_yes > 100 && n_settled < n,
+        "{n_settled} settled, {n_yes} meet"
     );
 }
 

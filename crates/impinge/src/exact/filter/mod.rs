@@ -18,7 +18,7 @@
 //!
 //! Invariant: every determinant here is a sum of the six products of three vectors d, e, f, each a
 //! difference of two input points. Its computed value is wrong by less than
-//! 2^-47 |d| |e| |f| in `f64`, 2^-18 |d| |e| |f| + 2^-100 in `f32`, with |.| the largest coordinate, whatever the order of
+//! 2^-47 |d| |e| |f| in `f64`, 2^-18 |d| |e| |f| + 2^-69 in `f32`, with |.| the largest coordinate, whatever the order of
 //! operations and whether or not products and sums are fused (`docs/exactness.md`, "The batch
 //! filter"). NaN and overflow make comparisons fail, and so end as unsure.
 
@@ -45,8 +45,9 @@ pub const BATCH: usize = 16;
 /// How many triangles a table holds.
 pub const TABLE: usize = 64;
 
-/// The largest magnitude of a coordinate with which the filter in `f32` may be asked: larger ones overflow.
-pub const LARGEST_F32: f32 = f32::from_bits((127 + 40) << 23);
+/// The largest magnitude of a coordinate with which the filter in `f32` may be asked, 2^24: what underflow may do to
+/// a determinant grows with its square.
+pub const LARGEST_F32: f32 = f32::from_bits((127 + 24) << 23);
 
 /// The triangles of a group: `[vertex][axis][place]`.
 pub type Triangles64 = [[[f32; TABLE]; 3]; 3];

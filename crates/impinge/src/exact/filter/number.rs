@@ -23,8 +23,8 @@ pub trait Number:
     /// derivation needs a little more than 60.
     const BOUND: f64;
 
-    /// A bound with what underflow may add: nothing for `f64` within the range that a scene admits, 2^-100 for
-    /// `f32` with coordinates up to 2^40.
+    /// A bound with what underflow may add: nothing for `f64` within the range that a scene admits, 2^-69 for
+    /// `f32` with coordinates up to 2^24.
     fn with_underflow(self) -> Self;
     /// The same number everywhere; rounded to `f32` where the numbers are.
     fn splat(x: f64) -> Self;
@@ -88,8 +88,9 @@ mod sealed {
 const BOUND_F64: f64 = f64::from_bits((1023 - 47) << 52);
 /// 2^-18.
 const BOUND_F32: f64 = f64::from_bits((1023 - 18) << 52);
-/// 2^-100: products of three lose at most 2^-105 to underflow, and their bound as much.
-const UNDERFLOW_F32: f64 = f64::from_bits((1023 - 100) << 52);
+/// 2^-69: with coordinates up to 2^24, a determinant and its bound lose less than 2^-70 to underflow, even where the
+/// processor flushes subnormal numbers to zero.
+const UNDERFLOW_F32: f64 = f64::from_bits((1023 - 69) << 52);
 
 impl Number for f64 {
     type Mask = bool;
