@@ -104,6 +104,7 @@ impl Detector {
             }
         }
         let start = Instant::now();
+        let _shift = self.workers.shift();
         self.frame.resolve(scene, query)?;
         self.pairs.begin(&self.frame);
         let (keys, stats) = self.pairs.parts_mut();

@@ -61,6 +61,7 @@ impl Host {
         method: impl FnOnce(Job<'_>, &mut Vec<u64>, &mut Statistics) -> Result<(), Error>,
     ) -> Result<&Pairs, Error> {
         let start = Instant::now();
+        let _shift = self.workers.shift();
         self.frame.resolve(scene, query)?;
         self.pairs.begin(&self.frame);
         self.frame.check(scene)?;

@@ -90,7 +90,6 @@ impl Clusters {
         keys: &mut Vec<u64>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let _shift = job.workers.shift();
         self.scratches.resize_with(job.workers.n(), Worker::default);
         stats.time("clustering", |stats| self.cluster(job, stats))?;
         if job.frame.n_primitives() >= CALL_FROM {
