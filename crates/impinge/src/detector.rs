@@ -104,8 +104,8 @@ impl Detector {
             }
         }
         let start = Instant::now();
-        let _shift = self.workers.shift();
         self.frame.resolve(scene, query)?;
+        let _shift = self.workers.shift(self.frame.n_primitives());
         self.pairs.begin(&self.frame);
         let (keys, stats) = self.pairs.parts_mut();
         let settings = &self.settings;

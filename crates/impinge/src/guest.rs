@@ -61,8 +61,8 @@ impl Host {
         method: impl FnOnce(Job<'_>, &mut Vec<u64>, &mut Statistics) -> Result<(), Error>,
     ) -> Result<&Pairs, Error> {
         let start = Instant::now();
-        let _shift = self.workers.shift();
         self.frame.resolve(scene, query)?;
+        let _shift = self.workers.shift(self.frame.n_primitives());
         self.pairs.begin(&self.frame);
         self.frame.check(scene)?;
         let (keys, stats) = self.pairs.parts_mut();

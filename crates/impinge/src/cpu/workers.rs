@@ -15,7 +15,7 @@ use std::any::Any;
 use std::cell::UnsafeCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering, fence};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -25,6 +25,10 @@ use crate::error::Error;
 const SPIN: Duration = Duration::from_micros(50);
 /// How long a helper lingers within a shift, and at most after one.
 const LINGER: Duration = Duration::from_millis(1);
+/// How long a frame must take to be worth waking a helper for, if it will sleep again before the next one.
+const WORTH: Duration = Duration::from_micros(800);
+/// Primitives from which on a frame is thought to take that long, whatever the last one took.
+const LARGE: u64 = 300_000;
 /// Looks at the gate between two at the clock.
 const LOOKS: u32 = 64;
 
@@ -34,22 +38,26 @@ pub struct Workers {
     crew: Arc<Crew>,
     /// Started when first needed.
     helpers: OnceLock<Vec<JoinHandle<()>>>,
+    /// When the last shift ended and how long it took.
+    last: Mutex<Option<(Instant, Duration)>>,
+    /// Whether helpers that sleep are woken in this shift.
+    wakes: AtomicBool,
     /// For what uses rayon; `None` for the global pool.
     pool: Option<rayon::ThreadPool>,
 }
 
 /// While it lives, helpers expect more to do.
 pub struct Shift<'a> {
-    crew: &'a Crew,
+    workers: &'a Workers,
     start: Instant,
 }
 
 impl Drop for Shift<'_> {
     fn drop(&mut self) {
-        let linger = self.start.elapsed().min(LINGER);
-        self.crew
-            .linger_ns
-            .store(linger.as_nanos() as u64, Ordering::Relaxed);
+        let end = Instant::now();
+        let took = end - self.start;
+        *self.workers.last() = Some((end, took));
+        self.workers.crew.linger(took.min(LINGER));
     }
 }
 
@@ -83,6 +91,8 @@ impl Workers {
             n,
             crew: Arc::new(Crew::new(n - 1)),
             helpers: OnceLock::new(),
+            last: Mutex::new(None),
+            wakes: AtomicBool::new(true),
             pool,
         })
     }
@@ -93,13 +103,25 @@ impl Workers {
     }
 
     /// Keeps helpers awake between regions until what it returns is dropped.
-    pub fn shift(&self) -> Shift<'_> {
-        let linger = LINGER.as_nanos() as u64;
-        self.crew.linger_ns.store(linger, Ordering::Relaxed);
+    ///
+    /// Those that sleep are woken unless the frame, of so many primitives, will be over before they come: if it follows
+    /// the last one closely, they stay awake for the next; if the last one was long, this one will be.
+    pub fn shift(&self, n_primitives: u64) -> Shift<'_> {
+        let start = Instant::now();
+        let wakes = n_primitives >= LARGE
+            || self
+                .last()
+                .is_none_or(|(end, took)| took >= WORTH || start - end <= LINGER);
+        self.wakes.store(wakes, Ordering::Relaxed);
+        self.crew.linger(LINGER);
         Shift {
-            crew: &self.crew,
-            start: Instant::now(),
+            workers: self,
+            start,
         }
+    }
+
+    fn last(&self) -> MutexGuard<'_, Option<(Instant, Duration)>> {
+        self.last.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Runs something that uses rayon on its own, within the limits of this pool.
@@ -151,8 +173,11 @@ impl Workers {
         self.call(self.n - 1);
     }
 
-    /// Wakes so many helpers, those that sleep.
+    /// Wakes so many helpers, those that sleep, where it is worth it.
     fn call(&self, n: usize) {
+        if !self.wakes.load(Ordering::Relaxed) {
+            return;
+        }
         let helpers = self.helpers.get_or_init(|| {
             let start = |seat| {
                 let crew = Arc::clone(&self.crew);
@@ -253,6 +278,12 @@ impl Crew {
             asleep: (0..n_helpers).map(|_| AtomicBool::new(false)).collect(),
             panic: Mutex::new(None),
         }
+    }
+
+    /// Sets how long helpers that have nothing to do stay awake.
+    fn linger(&self, time: Duration) {
+        self.linger_ns
+            .store(time.as_nanos() as u64, Ordering::Relaxed);
     }
 
     /// Does some work as worker 0, with those helpers that come. Panics if one of them did.
@@ -375,7 +406,7 @@ mod tests {
     fn every_task_is_done_once_whoever_comes() {
         for threads in [1, 2, 5] {
             let workers = Workers::new(threads).expect("threads");
-            let _shift = workers.shift();
+            let _shift = workers.shift(LARGE);
             let mut sums = vec![0u64; threads];
             for n_tasks in (0..200).chain([10_000]) {
                 sums.fill(0);
@@ -390,7 +421,7 @@ mod tests {
     fn helpers_come_again_after_they_slept() {
         let workers = Workers::new(2).expect("threads");
         for _ in 0..3 {
-            let shift = workers.shift();
+            let shift = workers.shift(LARGE);
             let deadline = Instant::now() + Duration::from_secs(60);
             let mut helped = [false; 2];
             while !helped[1] {
