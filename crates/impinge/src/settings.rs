@@ -57,7 +57,8 @@ pub enum InstructionSet {
     Portable,
     /// 256 bits on x86-64.
     Avx2,
-    /// 512 bits on x86-64.
+    /// 512 bits on x86-64, where the processor has AVX-512 with its extensions VL, DQ, BW and VBMI2 (Ice Lake, Zen 4
+    /// and later); else 256.
     #[default]
     Avx512,
 }

@@ -292,6 +292,8 @@ impl Crew {
             // A region within a region, or of another thread: helpers are taken.
             return work(0);
         }
+        // One that was left behind when the caller's own part panicked.
+        *self.panic() = None;
         // SAFETY: only the lifetime changes; `Closing` sees to it that everybody is out before it ends.
         let work_ptr =
             unsafe { std::mem::transmute::<*const Work<'_>, *const Work<'static>>(work) };
@@ -303,11 +305,14 @@ impl Crew {
         let closing = Closing(self);
         work(0);
         drop(closing);
-        let mut panic = self.panic.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(payload) = panic.take() {
-            drop(panic);
+        let panic = self.panic().take();
+        if let Some(payload) = panic {
             resume_unwind(payload);
         }
+    }
+
+    fn panic(&self) -> MutexGuard<'_, Option<Box<dyn Any + Send>>> {
+        self.panic.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// A helper's life.
@@ -366,7 +371,7 @@ impl Crew {
         let work = unsafe { (*self.work.get()).map(|work| &*work) };
         let Some(work) = work else { return };
         if let Err(payload) = catch_unwind(AssertUnwindSafe(|| work(seat))) {
-            *self.panic.lock().unwrap_or_else(PoisonError::into_inner) = Some(payload);
+            *self.panic() = Some(payload);
         }
     }
 }
