@@ -97,7 +97,7 @@ impl Clusters {
         }
         stats.time("bounds", |stats| self.refit(job, options, stats))?;
         for worker in &mut self.scratches {
-            worker.begin(stats.n_clusters);
+            worker.begin(stats.n_clusters, options.memory_budget.is_some());
         }
         let most_items = slabs::most_items(options.memory_budget, self.bytes() as u64)?;
         self.items.clear();

@@ -64,7 +64,7 @@ impl Group {
     }
 }
 
-/// Whether products of three differences of coordinates do not overflow.
+/// Whether all coordinates are small enough for the filter in f32.
 fn is_small(bounds: &Bounds) -> bool {
     let largest = |ends: &[f32; 3]| ends.iter().all(|x| x.abs() <= LARGEST_F32);
     largest(&bounds.min) && largest(&bounds.max)
@@ -84,11 +84,14 @@ pub(super) struct GroupCache {
 const NOBODY: u64 = u64::MAX;
 /// Clusters kept: 500 KB, which a second-level cache holds.
 const MOST: u64 = 128;
+/// Clusters kept under a memory budget, 31 KB: hardly slower, for neighbours come after each other.
+const MOST_IN_BUDGET: u64 = 8;
 
 impl GroupCache {
     /// Makes ready for a frame of so many clusters.
-    pub fn begin(&mut self, n_clusters: u64) {
-        let n = n_clusters.clamp(4, MOST).next_power_of_two() as usize;
+    pub fn begin(&mut self, n_clusters: u64, in_budget: bool) {
+        let most = if in_budget { MOST_IN_BUDGET } else { MOST };
+        let n = n_clusters.clamp(4, most).next_power_of_two() as usize;
         if self.groups.len() < n {
             self.groups.resize(n, Group::EMPTY);
         }

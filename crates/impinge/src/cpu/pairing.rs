@@ -51,10 +51,10 @@ pub(crate) struct Worker {
 
 impl Worker {
     /// Makes ready for a frame of so many clusters.
-    pub fn begin(&mut self, n_clusters: u64) {
+    pub fn begin(&mut self, n_clusters: u64, in_budget: bool) {
         self.settler.clear();
         self.n_settled = 0;
-        self.groups.begin(n_clusters);
+        self.groups.begin(n_clusters, in_budget);
     }
 
     pub fn bytes(&self) -> usize {
