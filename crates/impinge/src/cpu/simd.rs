@@ -126,6 +126,7 @@ pub(crate) trait Simd: Copy {
 
     /// For each lane of `rows`, the mask of the lanes of `boxes` that its box among `queries` overlaps; only
     /// lanes of `among` are looked at. Masks of other rows are zero.
+    #[inline(always)]
     fn overlaps_rows(
         self,
         boxes: &LaneBounds,
@@ -133,14 +134,33 @@ pub(crate) trait Simd: Copy {
         queries: &LaneBounds,
         rows: u64,
         masks: &mut Masks,
-    );
+    ) {
+        masks.0 = [0; GROUP];
+        for row in Lanes(rows) {
+            masks.0[row] = self.overlaps_64(boxes, &queries.at(row), among);
+        }
+    }
 
     /// For each lane of `among`, the mask of the lanes of `among` beyond it that it overlaps. Other masks are
     /// zero.
-    fn overlaps_within(self, boxes: &LaneBounds, among: u64, masks: &mut Masks);
+    #[inline(always)]
+    fn overlaps_within(self, boxes: &LaneBounds, among: u64, masks: &mut Masks) {
+        masks.0 = [0; GROUP];
+        for row in Lanes(among) {
+            masks.0[row] = self.overlaps_64(boxes, &boxes.at(row), among & !up_to(row));
+        }
+    }
 
     /// Writes the lanes of a mask, lowest first, and anything after them; returns how many there are.
-    fn list_lanes(self, mask: u64, list: &mut [u8; GROUP]) -> usize;
+    #[inline(always)]
+    fn list_lanes(self, mask: u64, list: &mut [u8; GROUP]) -> usize {
+        let mut n = 0;
+        for lane in Lanes(mask) {
+            list[n] = lane as u8;
+            n += 1;
+        }
+        n
+    }
 
     /// Bit `k`: lane `k` equals `query`; only lanes of `among` are looked at.
     fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64;
@@ -186,17 +206,6 @@ fn put_vertices(positions: &[[f32; 3]], vertices: [u32; LANES], rows: &mut [[f64
         rows[1][lane] = y.into();
         rows[2][lane] = z.into();
     }
-}
-
-/// Lane by lane.
-#[inline(always)]
-fn list_lanes(mask: u64, list: &mut [u8; GROUP]) -> usize {
-    let mut n = 0;
-    for lane in Lanes(mask) {
-        list[n] = lane as u8;
-        n += 1;
-    }
-    n
 }
 
 /// One coordinate after the other, from a place on.
@@ -257,34 +266,6 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    fn overlaps_rows(
-        self,
-        boxes: &LaneBounds,
-        among: u64,
-        queries: &LaneBounds,
-        rows: u64,
-        masks: &mut Masks,
-    ) {
-        masks.0 = [0; GROUP];
-        for row in Lanes(rows) {
-            masks.0[row] = self.overlaps_64(boxes, &queries.at(row), among);
-        }
-    }
-
-    #[inline(always)]
-    fn overlaps_within(self, boxes: &LaneBounds, among: u64, masks: &mut Masks) {
-        masks.0 = [0; GROUP];
-        for row in Lanes(among) {
-            masks.0[row] = self.overlaps_64(boxes, &boxes.at(row), among & !up_to(row));
-        }
-    }
-
-    #[inline(always)]
-    fn list_lanes(self, mask: u64, list: &mut [u8; GROUP]) -> usize {
-        list_lanes(mask, list)
-    }
-
-    #[inline(always)]
     fn equals_64(self, lanes: &Lanes32, query: u32, mut among: u64) -> u64 {
         let mut mask = 0;
         while among != 0 {
@@ -333,7 +314,7 @@ mod x86 {
 
     use super::{
         Bounds, BoundsArray, CHUNK, ClusterFaces, GROUP, LANES, LaneBounds, Lanes, Lanes32, Masks,
-        Simd, Triangles64, list_lanes, number, of_vertices_f32, put_corners, put_vertices, up_to,
+        Simd, Triangles64, number, of_vertices_f32, put_corners, put_vertices, up_to,
     };
 
     /// 256-bit registers. Only made where `avx2` was detected.
@@ -594,34 +575,6 @@ mod x86 {
                 }
                 mask & among
             }
-        }
-
-        #[inline(always)]
-        fn overlaps_rows(
-            self,
-            boxes: &LaneBounds,
-            among: u64,
-            queries: &LaneBounds,
-            rows: u64,
-            masks: &mut Masks,
-        ) {
-            masks.0 = [0; GROUP];
-            for row in Lanes(rows) {
-                masks.0[row] = self.overlaps_64(boxes, &queries.at(row), among);
-            }
-        }
-
-        #[inline(always)]
-        fn overlaps_within(self, boxes: &LaneBounds, among: u64, masks: &mut Masks) {
-            masks.0 = [0; GROUP];
-            for row in Lanes(among) {
-                masks.0[row] = self.overlaps_64(boxes, &boxes.at(row), among & !up_to(row));
-            }
-        }
-
-        #[inline(always)]
-        fn list_lanes(self, mask: u64, list: &mut [u8; GROUP]) -> usize {
-            list_lanes(mask, list)
         }
 
         #[inline(always)]

@@ -22,10 +22,19 @@ pub trait Number:
     /// 64 unit roundoffs: what a determinant may be wrong by, in parts of the product of its vectors' sizes. The
     /// derivation needs a little more than 60.
     const BOUND: f64;
+    /// What underflow may add: nothing for `f64` within the range that a scene admits, 2^-69 for `f32` with
+    /// coordinates up to 2^24, even where the processor flushes subnormal numbers to zero.
+    const UNDERFLOW: f64;
 
-    /// A bound with what underflow may add: nothing for `f64` within the range that a scene admits, 2^-69 for
-    /// `f32` with coordinates up to 2^24.
-    fn with_underflow(self) -> Self;
+    /// A bound with what underflow may add.
+    #[inline(always)]
+    fn with_underflow(self) -> Self {
+        if Self::UNDERFLOW > 0.0 {
+            self + Self::splat(Self::UNDERFLOW)
+        } else {
+            self
+        }
+    }
     /// The same number everywhere; rounded to `f32` where the numbers are.
     fn splat(x: f64) -> Self;
     /// The magnitude.
@@ -88,19 +97,13 @@ mod sealed {
 const BOUND_F64: f64 = f64::from_bits((1023 - 47) << 52);
 /// 2^-18.
 const BOUND_F32: f64 = f64::from_bits((1023 - 18) << 52);
-/// 2^-69: with coordinates up to 2^24, a determinant and its bound lose less than 2^-70 to underflow, even where the
-/// processor flushes subnormal numbers to zero.
+/// 2^-69.
 const UNDERFLOW_F32: f64 = f64::from_bits((1023 - 69) << 52);
 
 impl Number for f64 {
     type Mask = bool;
-
     const BOUND: f64 = BOUND_F64;
-
-    #[inline(always)]
-    fn with_underflow(self) -> Self {
-        self
-    }
+    const UNDERFLOW: f64 = 0.0;
 
     #[inline(always)]
     fn splat(x: f64) -> Self {
@@ -125,31 +128,6 @@ impl Number for f64 {
     }
 }
 
-/// Numbers side by side where no wider set is known: 128 bits, which SSE2 and NEON have.
-const PORTABLE: usize = 2;
-
-/// Two numbers as an array: whatever the compiler makes of it.
-#[derive(Debug, Clone, Copy)]
-pub struct Portable([f64; PORTABLE]);
-
-/// Two conditions, all bits set or none.
-#[derive(Debug, Clone, Copy)]
-pub struct PortableMask([u64; PORTABLE]);
-
-impl Portable {
-    #[inline(always)]
-    fn zip(self, other: Self, op: impl Fn(f64, f64) -> f64) -> Self {
-        Portable(std::array::from_fn(|k| op(self.0[k], other.0[k])))
-    }
-}
-
-impl PortableMask {
-    #[inline(always)]
-    fn zip(self, other: Self, op: impl Fn(u64, u64) -> u64) -> Self {
-        PortableMask(std::array::from_fn(|k| op(self.0[k], other.0[k])))
-    }
-}
-
 macro_rules! operator {
     ($type:ty, $trait:ident, $method:ident, |$a:ident, $b:ident| $body:expr) => {
         impl $trait for $type {
@@ -163,56 +141,97 @@ macro_rules! operator {
     };
 }
 
-operator!(Portable, Add, add, |a, b| a.zip(b, |x, y| x + y));
-operator!(Portable, Sub, sub, |a, b| a.zip(b, |x, y| x - y));
-operator!(Portable, Mul, mul, |a, b| a.zip(b, |x, y| x * y));
-operator!(PortableMask, BitAnd, bitand, |a, b| a.zip(b, |x, y| x & y));
-operator!(PortableMask, BitOr, bitor, |a, b| a.zip(b, |x, y| x | y));
-operator!(PortableMask, BitXor, bitxor, |a, b| a.zip(b, |x, y| x ^ y));
+/// Numbers side by side as an array, where no wider set is known: whatever the compiler makes of it.
+macro_rules! portable {
+    ($type:ident, $mask:ident, $number:ty, $bits:ty, $n:expr, $bound:expr, $underflow:expr) => {
+        #[doc = concat!("Some `", stringify!($number), "` in 128 bits, which SSE2 and NEON have.")]
+        #[derive(Debug, Clone, Copy)]
+        pub struct $type([$number; $n]);
 
-impl Not for PortableMask {
-    type Output = Self;
-    #[inline(always)]
-    fn not(self) -> Self {
-        PortableMask(self.0.map(|x| !x))
-    }
+        /// As many conditions, all bits set or none.
+        #[derive(Debug, Clone, Copy)]
+        pub struct $mask([$bits; $n]);
+
+        impl $type {
+            #[inline(always)]
+            fn zip(self, other: Self, op: impl Fn($number, $number) -> $number) -> Self {
+                $type(std::array::from_fn(|k| op(self.0[k], other.0[k])))
+            }
+        }
+
+        impl $mask {
+            #[inline(always)]
+            fn zip(self, other: Self, op: impl Fn($bits, $bits) -> $bits) -> Self {
+                $mask(std::array::from_fn(|k| op(self.0[k], other.0[k])))
+            }
+        }
+
+        operator!($type, Add, add, |a, b| a.zip(b, |x, y| x + y));
+        operator!($type, Sub, sub, |a, b| a.zip(b, |x, y| x - y));
+        operator!($type, Mul, mul, |a, b| a.zip(b, |x, y| x * y));
+        operator!($mask, BitAnd, bitand, |a, b| a.zip(b, |x, y| x & y));
+        operator!($mask, BitOr, bitor, |a, b| a.zip(b, |x, y| x | y));
+        operator!($mask, BitXor, bitxor, |a, b| a.zip(b, |x, y| x ^ y));
+
+        impl Not for $mask {
+            type Output = Self;
+            #[inline(always)]
+            fn not(self) -> Self {
+                $mask(self.0.map(|x| !x))
+            }
+        }
+
+        impl Number for $type {
+            type Mask = $mask;
+            const BOUND: f64 = $bound;
+            const UNDERFLOW: f64 = $underflow;
+
+            #[inline(always)]
+            fn splat(x: f64) -> Self {
+                $type([x as $number; $n])
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                $type(self.0.map(<$number>::abs))
+            }
+            #[inline(always)]
+            fn larger(self, other: Self) -> Self {
+                self.zip(other, |x, y| if x > y { x } else { y })
+            }
+            #[inline(always)]
+            fn gt(self, other: Self) -> $mask {
+                $mask(std::array::from_fn(|k| {
+                    if self.0[k] > other.0[k] {
+                        <$bits>::MAX
+                    } else {
+                        0
+                    }
+                }))
+            }
+            #[inline(always)]
+            fn select(mask: $mask, yes: Self, no: Self) -> Self {
+                $type(std::array::from_fn(|k| {
+                    let (yes, no) = (yes.0[k].to_bits(), no.0[k].to_bits());
+                    <$number>::from_bits((yes & mask.0[k]) | (no & !mask.0[k]))
+                }))
+            }
+        }
+    };
 }
 
-impl Number for Portable {
-    type Mask = PortableMask;
+const PORTABLE: usize = 2;
+const PORTABLE_F32: usize = 4;
 
-    const BOUND: f64 = BOUND_F64;
-
-    #[inline(always)]
-    fn with_underflow(self) -> Self {
-        self
-    }
-
-    #[inline(always)]
-    fn splat(x: f64) -> Self {
-        Portable([x; PORTABLE])
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Portable(self.0.map(f64::abs))
-    }
-    #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        self.zip(other, Number::larger)
-    }
-    #[inline(always)]
-    fn gt(self, other: Self) -> PortableMask {
-        PortableMask(std::array::from_fn(|k| {
-            if self.0[k] > other.0[k] { u64::MAX } else { 0 }
-        }))
-    }
-    #[inline(always)]
-    fn select(mask: PortableMask, yes: Self, no: Self) -> Self {
-        Portable(std::array::from_fn(|k| {
-            f64::from_bits((yes.0[k].to_bits() & mask.0[k]) | (no.0[k].to_bits() & !mask.0[k]))
-        }))
-    }
-}
+portable!(Portable, PortableMask, f64, u64, PORTABLE, BOUND_F64, 0.0);
+portable!(
+    Portable32,
+    Portable32Mask,
+    f32,
+    u32,
+    PORTABLE_F32,
+    BOUND_F32,
+    UNDERFLOW_F32
+);
 
 impl Vector for Portable {
     const N: usize = PORTABLE;
@@ -224,84 +243,6 @@ impl Vector for Portable {
     #[inline(always)]
     fn bits(mask: PortableMask) -> u8 {
         (mask.0[0] & 1) as u8 | ((mask.0[1] & 1) as u8) << 1
-    }
-}
-
-/// `f32` side by side where no wider set is known.
-const PORTABLE_F32: usize = 4;
-
-/// Four `f32` as an array.
-#[derive(Debug, Clone, Copy)]
-pub struct Portable32([f32; PORTABLE_F32]);
-
-/// Four conditions, all bits set or none.
-#[derive(Debug, Clone, Copy)]
-pub struct Portable32Mask([u32; PORTABLE_F32]);
-
-impl Portable32 {
-    #[inline(always)]
-    fn zip(self, other: Self, op: impl Fn(f32, f32) -> f32) -> Self {
-        Portable32(std::array::from_fn(|k| op(self.0[k], other.0[k])))
-    }
-}
-
-impl Portable32Mask {
-    #[inline(always)]
-    fn zip(self, other: Self, op: impl Fn(u32, u32) -> u32) -> Self {
-        Portable32Mask(std::array::from_fn(|k| op(self.0[k], other.0[k])))
-    }
-}
-
-operator!(Portable32, Add, add, |a, b| a.zip(b, |x, y| x + y));
-operator!(Portable32, Sub, sub, |a, b| a.zip(b, |x, y| x - y));
-operator!(Portable32, Mul, mul, |a, b| a.zip(b, |x, y| x * y));
-operator!(Portable32Mask, BitAnd, bitand, |a, b| a
-    .zip(b, |x, y| x & y));
-operator!(Portable32Mask, BitOr, bitor, |a, b| a.zip(b, |x, y| x | y));
-operator!(Portable32Mask, BitXor, bitxor, |a, b| a
-    .zip(b, |x, y| x ^ y));
-
-impl Not for Portable32Mask {
-    type Output = Self;
-    #[inline(always)]
-    fn not(self) -> Self {
-        Portable32Mask(self.0.map(|x| !x))
-    }
-}
-
-impl Number for Portable32 {
-    type Mask = Portable32Mask;
-
-    const BOUND: f64 = BOUND_F32;
-
-    #[inline(always)]
-    fn with_underflow(self) -> Self {
-        self + Self::splat(UNDERFLOW_F32)
-    }
-
-    #[inline(always)]
-    fn splat(x: f64) -> Self {
-        Portable32([x as f32; PORTABLE_F32])
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Portable32(self.0.map(f32::abs))
-    }
-    #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        self.zip(other, |x, y| if x > y { x } else { y })
-    }
-    #[inline(always)]
-    fn gt(self, other: Self) -> Portable32Mask {
-        Portable32Mask(std::array::from_fn(|k| {
-            if self.0[k] > other.0[k] { u32::MAX } else { 0 }
-        }))
-    }
-    #[inline(always)]
-    fn select(mask: Portable32Mask, yes: Self, no: Self) -> Self {
-        Portable32(std::array::from_fn(|k| {
-            f32::from_bits((yes.0[k].to_bits() & mask.0[k]) | (no.0[k].to_bits() & !mask.0[k]))
-        }))
     }
 }
 
@@ -333,108 +274,158 @@ mod x86 {
     use super::*;
     use std::arch::x86_64::*;
 
-    /// Four numbers in a 256-bit register. To be used where `avx2` was detected.
-    #[derive(Debug, Clone, Copy)]
-    pub struct Avx2(__m256d);
-
-    /// Four conditions in a register.
-    #[derive(Debug, Clone, Copy)]
-    pub struct Avx2Mask(__m256d);
-
-    /// Eight numbers in a 512-bit register. To be used where `avx512f` and `avx512dq` were detected.
-    #[derive(Debug, Clone, Copy)]
-    pub struct Avx512(__m512d);
-
-    /// Eight conditions in a mask register.
-    #[derive(Debug, Clone, Copy)]
-    pub struct Avx512Mask(__mmask8);
-
     // SAFETY (all below): these types are used inside functions compiled for, and called on
     // processors with, their instruction set; the intrinsics touch no memory but that of `load`,
     // whose array has eight numbers, and of `places` and `look_up`.
-    macro_rules! on_256 {
-        ($type:ident, $trait:ident, $method:ident, $intrinsic:ident) => {
-            operator!($type, $trait, $method, |a, b| {
+    macro_rules! register {
+        (
+            $(#[$doc:meta])* $type:ident($register:ty), $mask:ident($bits:ty),
+            $bound:expr, $underflow:expr,
+            add $add:ident, sub $sub:ident, mul $mul:ident, max $max:ident, splat |$x:ident| $splat:expr,
+            abs |$y:ident| $abs:expr, gt |$a:ident, $b:ident| $gt:expr,
+            select |$m:ident, $yes:ident, $no:ident| $select:expr,
+            and |$p:ident, $q:ident| $and:expr, or |$r:ident, $s:ident| $or:expr,
+            xor |$t:ident, $u:ident| $xor:expr, not |$v:ident| $not:expr $(,)?
+        ) => {
+            $(#[$doc])*
+            #[derive(Debug, Clone, Copy)]
+            pub struct $type($register);
+
+            /// A condition for each number.
+            #[derive(Debug, Clone, Copy)]
+            pub struct $mask($bits);
+
+            operator!($type, Add, add, |a, b| {
                 // SAFETY: see above.
-                unsafe { $type($intrinsic(a.0, b.0)) }
+                unsafe { $type($add(a.0, b.0)) }
             });
+            operator!($type, Sub, sub, |a, b| {
+                // SAFETY: see above.
+                unsafe { $type($sub(a.0, b.0)) }
+            });
+            operator!($type, Mul, mul, |a, b| {
+                // SAFETY: see above.
+                unsafe { $type($mul(a.0, b.0)) }
+            });
+            operator!($mask, BitAnd, bitand, |a, b| {
+                let ($p, $q) = (a.0, b.0);
+                #[allow(unused_unsafe, reason = "masks of 512 bits are integers")]
+                // SAFETY: see above.
+                let bits = unsafe { $and };
+                $mask(bits)
+            });
+            operator!($mask, BitOr, bitor, |a, b| {
+                let ($r, $s) = (a.0, b.0);
+                #[allow(unused_unsafe, reason = "masks of 512 bits are integers")]
+                // SAFETY: see above.
+                let bits = unsafe { $or };
+                $mask(bits)
+            });
+            operator!($mask, BitXor, bitxor, |a, b| {
+                let ($t, $u) = (a.0, b.0);
+                #[allow(unused_unsafe, reason = "masks of 512 bits are integers")]
+                // SAFETY: see above.
+                let bits = unsafe { $xor };
+                $mask(bits)
+            });
+
+            impl Not for $mask {
+                type Output = Self;
+                #[inline(always)]
+                fn not(self) -> Self {
+                    let $v = self.0;
+                    #[allow(unused_unsafe, reason = "masks of 512 bits are integers")]
+                    // SAFETY: see above.
+                    let bits = unsafe { $not };
+                    $mask(bits)
+                }
+            }
+
+            impl Number for $type {
+                type Mask = $mask;
+                const BOUND: f64 = $bound;
+                const UNDERFLOW: f64 = $underflow;
+
+                #[inline(always)]
+                fn splat($x: f64) -> Self {
+                    // SAFETY: see above.
+                    $type(unsafe { $splat })
+                }
+                #[inline(always)]
+                fn abs(self) -> Self {
+                    let $y = self.0;
+                    // SAFETY: see above.
+                    $type(unsafe { $abs })
+                }
+                #[inline(always)]
+                fn larger(self, other: Self) -> Self {
+                    // SAFETY: see above.
+                    $type(unsafe { $max(self.0, other.0) })
+                }
+                #[inline(always)]
+                fn gt(self, other: Self) -> $mask {
+                    let ($a, $b) = (self.0, other.0);
+                    // SAFETY: see above.
+                    $mask(unsafe { $gt })
+                }
+                #[inline(always)]
+                fn select(mask: $mask, yes: Self, no: Self) -> Self {
+                    let ($m, $yes, $no) = (mask.0, yes.0, no.0);
+                    // SAFETY: see above.
+                    $type(unsafe { $select })
+                }
+            }
         };
     }
-    macro_rules! on_512 {
-        ($type:ident, $trait:ident, $method:ident, $intrinsic:ident) => {
-            operator!($type, $trait, $method, |a, b| {
-                // SAFETY: see above.
-                unsafe { $type($intrinsic(a.0, b.0)) }
-            });
-        };
+
+    register! {
+        /// Four numbers in a 256-bit register. To be used where `avx2` was detected.
+        Avx2(__m256d), Avx2Mask(__m256d), BOUND_F64, 0.0,
+        add _mm256_add_pd, sub _mm256_sub_pd, mul _mm256_mul_pd, max _mm256_max_pd,
+        splat |x| _mm256_set1_pd(x),
+        abs |x| _mm256_andnot_pd(_mm256_set1_pd(-0.0), x),
+        gt |a, b| _mm256_cmp_pd::<_CMP_GT_OQ>(a, b),
+        select |mask, yes, no| _mm256_blendv_pd(no, yes, mask),
+        and |a, b| _mm256_and_pd(a, b),
+        or |a, b| _mm256_or_pd(a, b),
+        xor |a, b| _mm256_xor_pd(a, b),
+        not |a| _mm256_xor_pd(a, _mm256_castsi256_pd(_mm256_set1_epi32(-1))),
     }
 
-    on_256!(Avx2, Add, add, _mm256_add_pd);
-    on_256!(Avx2, Sub, sub, _mm256_sub_pd);
-    on_256!(Avx2, Mul, mul, _mm256_mul_pd);
-    on_256!(Avx2Mask, BitAnd, bitand, _mm256_and_pd);
-    on_256!(Avx2Mask, BitOr, bitor, _mm256_or_pd);
-    on_256!(Avx2Mask, BitXor, bitxor, _mm256_xor_pd);
-    on_512!(Avx512, Add, add, _mm512_add_pd);
-    on_512!(Avx512, Sub, sub, _mm512_sub_pd);
-    on_512!(Avx512, Mul, mul, _mm512_mul_pd);
-    operator!(Avx512Mask, BitAnd, bitand, |a, b| Avx512Mask(a.0 & b.0));
-    operator!(Avx512Mask, BitOr, bitor, |a, b| Avx512Mask(a.0 | b.0));
-    operator!(Avx512Mask, BitXor, bitxor, |a, b| Avx512Mask(a.0 ^ b.0));
-
-    impl Not for Avx2Mask {
-        type Output = Self;
-        #[inline(always)]
-        fn not(self) -> Self {
-            // SAFETY: see above.
-            let all = unsafe { _mm256_castsi256_pd(_mm256_set1_epi32(-1)) };
-            self ^ Avx2Mask(all)
-        }
+    register! {
+        /// Eight `f32` in a 256-bit register. To be used where `avx2` was detected.
+        Avx2F32(__m256), Avx2F32Mask(__m256), BOUND_F32, UNDERFLOW_F32,
+        add _mm256_add_ps, sub _mm256_sub_ps, mul _mm256_mul_ps, max _mm256_max_ps,
+        splat |x| _mm256_set1_ps(x as f32),
+        abs |x| _mm256_andnot_ps(_mm256_set1_ps(-0.0), x),
+        gt |a, b| _mm256_cmp_ps::<_CMP_GT_OQ>(a, b),
+        select |mask, yes, no| _mm256_blendv_ps(no, yes, mask),
+        and |a, b| _mm256_and_ps(a, b),
+        or |a, b| _mm256_or_ps(a, b),
+        xor |a, b| _mm256_xor_ps(a, b),
+        not |a| _mm256_xor_ps(a, _mm256_castsi256_ps(_mm256_set1_epi32(-1))),
     }
 
-    impl Not for Avx512Mask {
-        type Output = Self;
-        #[inline(always)]
-        fn not(self) -> Self {
-            Avx512Mask(!self.0)
-        }
+    register! {
+        /// Eight numbers in a 512-bit register. To be used where `avx512f` and `avx512dq` were detected.
+        Avx512(__m512d), Avx512Mask(__mmask8), BOUND_F64, 0.0,
+        add _mm512_add_pd, sub _mm512_sub_pd, mul _mm512_mul_pd, max _mm512_max_pd,
+        splat |x| _mm512_set1_pd(x),
+        abs |x| _mm512_abs_pd(x),
+        gt |a, b| _mm512_cmp_pd_mask::<_CMP_GT_OQ>(a, b),
+        select |mask, yes, no| _mm512_mask_blend_pd(mask, no, yes),
+        and |a, b| a & b, or |a, b| a | b, xor |a, b| a ^ b, not |a| !a,
     }
 
-    impl Number for Avx2 {
-        type Mask = Avx2Mask;
-
-        const BOUND: f64 = BOUND_F64;
-
-        #[inline(always)]
-        fn with_underflow(self) -> Self {
-            self
-        }
-
-        #[inline(always)]
-        fn splat(x: f64) -> Self {
-            // SAFETY: see above.
-            Avx2(unsafe { _mm256_set1_pd(x) })
-        }
-        #[inline(always)]
-        fn abs(self) -> Self {
-            // SAFETY: see above.
-            Avx2(unsafe { _mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0) })
-        }
-        #[inline(always)]
-        fn larger(self, other: Self) -> Self {
-            // SAFETY: see above.
-            Avx2(unsafe { _mm256_max_pd(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn gt(self, other: Self) -> Avx2Mask {
-            // SAFETY: see above.
-            Avx2Mask(unsafe { _mm256_cmp_pd::<_CMP_GT_OQ>(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn select(mask: Avx2Mask, yes: Self, no: Self) -> Self {
-            // SAFETY: see above.
-            Avx2(unsafe { _mm256_blendv_pd(no.0, yes.0, mask.0) })
-        }
+    register! {
+        /// Sixteen `f32` in a 512-bit register. To be used where `avx512f` and `avx512dq` were detected.
+        Avx512F32(__m512), Avx512F32Mask(__mmask16), BOUND_F32, UNDERFLOW_F32,
+        add _mm512_add_ps, sub _mm512_sub_ps, mul _mm512_mul_ps, max _mm512_max_ps,
+        splat |x| _mm512_set1_ps(x as f32),
+        abs |x| _mm512_abs_ps(x),
+        gt |a, b| _mm512_cmp_ps_mask::<_CMP_GT_OQ>(a, b),
+        select |mask, yes, no| _mm512_mask_blend_ps(mask, no, yes),
+        and |a, b| a & b, or |a, b| a | b, xor |a, b| a ^ b, not |a| !a,
     }
 
     impl Vector for Avx2 {
@@ -453,43 +444,6 @@ mod x86 {
         }
     }
 
-    impl Number for Avx512 {
-        type Mask = Avx512Mask;
-
-        const BOUND: f64 = BOUND_F64;
-
-        #[inline(always)]
-        fn with_underflow(self) -> Self {
-            self
-        }
-
-        #[inline(always)]
-        fn splat(x: f64) -> Self {
-            // SAFETY: see above.
-            Avx512(unsafe { _mm512_set1_pd(x) })
-        }
-        #[inline(always)]
-        fn abs(self) -> Self {
-            // SAFETY: see above.
-            Avx512(unsafe { _mm512_abs_pd(self.0) })
-        }
-        #[inline(always)]
-        fn larger(self, other: Self) -> Self {
-            // SAFETY: see above.
-            Avx512(unsafe { _mm512_max_pd(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn gt(self, other: Self) -> Avx512Mask {
-            // SAFETY: see above.
-            Avx512Mask(unsafe { _mm512_cmp_pd_mask::<_CMP_GT_OQ>(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn select(mask: Avx512Mask, yes: Self, no: Self) -> Self {
-            // SAFETY: see above.
-            Avx512(unsafe { _mm512_mask_blend_pd(mask.0, no.0, yes.0) })
-        }
-    }
-
     impl Vector for Avx512 {
         const N: usize = LANES;
 
@@ -501,94 +455,6 @@ mod x86 {
         #[inline(always)]
         fn bits(mask: Avx512Mask) -> u8 {
             mask.0
-        }
-    }
-
-    /// Eight `f32` in a 256-bit register. To be used where `avx2` was detected.
-    #[derive(Debug, Clone, Copy)]
-    pub struct Avx2F32(__m256);
-
-    /// Eight conditions in a register.
-    #[derive(Debug, Clone, Copy)]
-    pub struct Avx2F32Mask(__m256);
-
-    /// Sixteen `f32` in a 512-bit register. To be used where `avx512f` and `avx512dq` were detected.
-    #[derive(Debug, Clone, Copy)]
-    pub struct Avx512F32(__m512);
-
-    /// Sixteen conditions in a mask register.
-    #[derive(Debug, Clone, Copy)]
-    pub struct Avx512F32Mask(__mmask16);
-
-    on_256!(Avx2F32, Add, add, _mm256_add_ps);
-    on_256!(Avx2F32, Sub, sub, _mm256_sub_ps);
-    on_256!(Avx2F32, Mul, mul, _mm256_mul_ps);
-    on_256!(Avx2F32Mask, BitAnd, bitand, _mm256_and_ps);
-    on_256!(Avx2F32Mask, BitOr, bitor, _mm256_or_ps);
-    on_256!(Avx2F32Mask, BitXor, bitxor, _mm256_xor_ps);
-    on_512!(Avx512F32, Add, add, _mm512_add_ps);
-    on_512!(Avx512F32, Sub, sub, _mm512_sub_ps);
-    on_512!(Avx512F32, Mul, mul, _mm512_mul_ps);
-    operator!(Avx512F32Mask, BitAnd, bitand, |a, b| Avx512F32Mask(
-        a.0 & b.0
-    ));
-    operator!(Avx512F32Mask, BitOr, bitor, |a, b| Avx512F32Mask(a.0 | b.0));
-    operator!(Avx512F32Mask, BitXor, bitxor, |a, b| Avx512F32Mask(
-        a.0 ^ b.0
-    ));
-
-    impl Not for Avx2F32Mask {
-        type Output = Self;
-        #[inline(always)]
-        fn not(self) -> Self {
-            // SAFETY: see above.
-            let all = unsafe { _mm256_castsi256_ps(_mm256_set1_epi32(-1)) };
-            self ^ Avx2F32Mask(all)
-        }
-    }
-
-    impl Not for Avx512F32Mask {
-        type Output = Self;
-        #[inline(always)]
-        fn not(self) -> Self {
-            Avx512F32Mask(!self.0)
-        }
-    }
-
-    impl Number for Avx2F32 {
-        type Mask = Avx2F32Mask;
-
-        const BOUND: f64 = BOUND_F32;
-
-        #[inline(always)]
-        fn with_underflow(self) -> Self {
-            self + Self::splat(UNDERFLOW_F32)
-        }
-
-        #[inline(always)]
-        fn splat(x: f64) -> Self {
-            // SAFETY: see above.
-            Avx2F32(unsafe { _mm256_set1_ps(x as f32) })
-        }
-        #[inline(always)]
-        fn abs(self) -> Self {
-            // SAFETY: see above.
-            Avx2F32(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
-        }
-        #[inline(always)]
-        fn larger(self, other: Self) -> Self {
-            // SAFETY: see above.
-            Avx2F32(unsafe { _mm256_max_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn gt(self, other: Self) -> Avx2F32Mask {
-            // SAFETY: see above.
-            Avx2F32Mask(unsafe { _mm256_cmp_ps::<_CMP_GT_OQ>(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn select(mask: Avx2F32Mask, yes: Self, no: Self) -> Self {
-            // SAFETY: see above.
-            Avx2F32(unsafe { _mm256_blendv_ps(no.0, yes.0, mask.0) })
         }
     }
 
@@ -614,43 +480,6 @@ mod x86 {
         fn bits(mask: Avx2F32Mask) -> u16 {
             // SAFETY: see above.
             unsafe { _mm256_movemask_ps(mask.0) as u16 }
-        }
-    }
-
-    impl Number for Avx512F32 {
-        type Mask = Avx512F32Mask;
-
-        const BOUND: f64 = BOUND_F32;
-
-        #[inline(always)]
-        fn with_underflow(self) -> Self {
-            self + Self::splat(UNDERFLOW_F32)
-        }
-
-        #[inline(always)]
-        fn splat(x: f64) -> Self {
-            // SAFETY: see above.
-            Avx512F32(unsafe { _mm512_set1_ps(x as f32) })
-        }
-        #[inline(always)]
-        fn abs(self) -> Self {
-            // SAFETY: see above.
-            Avx512F32(unsafe { _mm512_abs_ps(self.0) })
-        }
-        #[inline(always)]
-        fn larger(self, other: Self) -> Self {
-            // SAFETY: see above.
-            Avx512F32(unsafe { _mm512_max_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn gt(self, other: Self) -> Avx512F32Mask {
-            // SAFETY: see above.
-            Avx512F32Mask(unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn select(mask: Avx512F32Mask, yes: Self, no: Self) -> Self {
-            // SAFETY: see above.
-            Avx512F32(unsafe { _mm512_mask_blend_ps(mask.0, no.0, yes.0) })
         }
     }
 
