@@ -30,7 +30,7 @@ use super::simd::{Isa, Simd, dispatch};
 use super::slabs::{self, Slabs};
 use super::top_level::TopLevel;
 use super::workers::Workers;
-use super::world::{BodyCache, Caches, World};
+use super::world::{BodyCache, Caches, STALE, World};
 
 /// Nodes a task refits, of up to eight clusters each.
 const REFIT_TASK: usize = 32;
@@ -39,8 +39,6 @@ const CALL_FROM: u64 = 30_000;
 /// Primitives of all bodies together below which one thread finds the boxes. Positions have just been written,
 /// mostly by one thread, and what fits in its cache another fetches from there more slowly than it reads it.
 const PARALLEL_FROM: u64 = 120_000;
-/// How much the clusters' surface may grow against the body's before it is clustered again.
-pub(super) const STALE: f64 = 1.5;
 
 /// Caches and scratch of the method; kept from frame to frame.
 pub(crate) struct Clusters {

@@ -4,9 +4,9 @@ use crate::grouping::bounds::Bounds;
 use crate::grouping::hierarchy::{Entry, Shape, order};
 
 use super::bounds::TreeBounds;
-use super::clusters::STALE;
 use super::dispatch::{self, NodePair, Tree};
 use super::simd::Simd;
+use super::world::STALE;
 
 /// A tree over the participants' boxes, for frames of more than two bodies. Its order is kept from
 /// frame to frame and made anew when bodies have moved apart from their neighbours in it.

@@ -8,6 +8,9 @@ use crate::scene::{Elements, Positions, Scene};
 use super::bounds::TreeBounds;
 use super::dispatch::Tree;
 
+/// How much summed surface may grow against that of the whole before an order is made anew.
+pub(super) const STALE: f64 = 1.5;
+
 /// What is kept of a body from frame to frame.
 #[derive(Debug)]
 pub(crate) struct BodyCache {

@@ -1,0 +1,411 @@
+//! Box tests, many at a time: AVX-512, AVX2, or plain loops that any compiler vectorises (NEON).
+//!
+//! A binary built for plain x86-64 finds out at run time what the processor has. Kernels are
+//! generic over [`Simd`] and wrapped once per instruction set by `dispatch!`; everything between wrapper
+//! and intrinsic is `inline(always)`, so a kernel is compiled whole for its set. Kernels pass no closures
+//! to library functions: those would be compiled on their own, without the set.
+//! The answers are bit masks of exact comparisons: no set can differ from another.
+
+use crate::exact::filter::number::{self, Lookup, Vector};
+use crate::exact::filter::{LANES, Triangles64};
+use crate::grouping::GROUP;
+use crate::grouping::bounds::{Bounds, BoundsArray};
+#[cfg(target_arch = "x86_64")]
+use crate::grouping::clusters::CHUNK;
+use crate::grouping::clusters::LocalFaces;
+use crate::settings::InstructionSet;
+
+use super::bounds::of_vertices_f32;
+
+/// The boxes of one group, a lane each; lanes past the group's size hold empty boxes.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub struct LaneBounds {
+    /// Low ends, an axis a row.
+    pub min: [[f32; GROUP]; 3],
+    /// High ends.
+    pub max: [[f32; GROUP]; 3],
+}
+
+impl LaneBounds {
+    /// Nothing in any lane.
+    pub const EMPTY: LaneBounds = LaneBounds {
+        min: [[f32::INFINITY; GROUP]; 3],
+        max: [[f32::NEG_INFINITY; GROUP]; 3],
+    };
+
+    /// The box of a lane.
+    #[inline(always)]
+    pub fn at(&self, lane: usize) -> Bounds {
+        Bounds {
+            min: [self.min[0][lane], self.min[1][lane], self.min[2][lane]],
+            max: [self.max[0][lane], self.max[1][lane], self.max[2][lane]],
+        }
+    }
+
+    /// Sets the box of a lane.
+    #[inline(always)]
+    pub fn put(&mut self, lane: usize, bounds: &Bounds) {
+        for axis in 0..3 {
+            self.min[axis][lane] = bounds.min[axis];
+            self.max[axis][lane] = bounds.max[axis];
+        }
+    }
+
+    /// Empties the lanes from this one on.
+    pub fn clear_from(&mut self, lane: usize) {
+        for axis in 0..3 {
+            self.min[axis][lane..].fill(f32::INFINITY);
+            self.max[axis][lane..].fill(f32::NEG_INFINITY);
+        }
+    }
+}
+
+/// Lanes of a mask, lowest first.
+pub(crate) struct Lanes(pub u64);
+
+impl Iterator for Lanes {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        (self.0 != 0).then(|| {
+            let lane = self.0.trailing_zeros() as usize;
+            self.0 &= self.0 - 1;
+            lane
+        })
+    }
+}
+
+/// The triangles of a cluster, twice: for those who load each corner, and for those who load each vertex once.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ClusterFaces<'a> {
+    /// At most 64.
+    pub faces: &'a [[u32; 3]],
+    /// Unique vertices, in whole chunks of [`CHUNK`](crate::grouping::clusters::CHUNK).
+    pub vertices: &'a [u32],
+    /// The corners as numbers of `vertices`.
+    pub local: &'a LocalFaces,
+}
+
+/// A mask for each primitive of a group.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub struct Masks(pub [u64; GROUP]);
+
+impl Default for Masks {
+    fn default() -> Self {
+        Masks([0; GROUP])
+    }
+}
+
+/// The lanes from the first to a lane.
+#[inline(always)]
+pub(crate) fn up_to(lane: usize) -> u64 {
+    u64::MAX >> (GROUP - 1 - lane)
+}
+
+/// A number for each primitive of a group.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub(crate) struct Lanes32(pub [u32; GROUP]);
+
+/// An instruction set: the box tests that kernels are made of.
+pub(crate) trait Simd: Copy {
+    /// The f64 of the narrow stage's filters.
+    type F64: Vector;
+
+    /// The f32 of the filter that settles most pairs of triangles.
+    type F32: Lookup;
+
+    /// Bit `k`: box `first + k` overlaps `query`, for `k` below 8.
+    fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32;
+
+    /// Bit `k`: lane `k` overlaps `query`; only lanes of `among` are looked at.
+    fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64;
+
+    /// For each lane of `rows`, the mask of the lanes of `boxes` that its box among `queries` overlaps; only
+    /// lanes of `among` are looked at. Masks of other rows are zero.
+    #[inline(always)]
+    fn overlaps_rows(
+        self,
+        boxes: &LaneBounds,
+        among: u64,
+        queries: &LaneBounds,
+        rows: u64,
+        masks: &mut Masks,
+    ) {
+        masks.0 = [0; GROUP];
+        for row in Lanes(rows) {
+            masks.0[row] = self.overlaps_64(boxes, &queries.at(row), among);
+        }
+    }
+
+    /// For each lane of `among`, the mask of the lanes of `among` beyond it that it overlaps. Other masks are
+    /// zero.
+    #[inline(always)]
+    fn overlaps_within(self, boxes: &LaneBounds, among: u64, masks: &mut Masks) {
+        masks.0 = [0; GROUP];
+        for row in Lanes(among) {
+            masks.0[row] = self.overlaps_64(boxes, &boxes.at(row), among & !up_to(row));
+        }
+    }
+
+    /// Writes the lanes of a mask, lowest first, and anything after them; returns how many there are.
+    #[inline(always)]
+    fn list_lanes(self, mask: u64, list: &mut [u8; GROUP]) -> usize {
+        let mut n = 0;
+        for lane in Lanes(mask) {
+            list[n] = lane as u8;
+            n += 1;
+        }
+        n
+    }
+
+    /// Bit `k`: lane `k` equals `query`; only lanes of `among` are looked at.
+    fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64;
+
+    /// The box of some vertices, and whether all are certainly finite, as [`of_vertices_f32`] finds them.
+    ///
+    /// # Panics
+    /// If there is no such vertex.
+    ///
+    /// # Safety
+    /// `vertices` must not descend.
+    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool);
+
+    /// The corners of a cluster's triangles as tables; places past its size hold anything.
+    ///
+    /// # Panics
+    /// If there is no such vertex.
+    fn put_corners(
+        self,
+        positions: &[[f32; 3]],
+        cluster: &ClusterFaces<'_>,
+        into: &mut Triangles64,
+    );
+
+    /// Eight vertices as rows of x, y and z in double precision.
+    ///
+    /// # Panics
+    /// If there is no such vertex.
+    fn put_vertices(
+        self,
+        positions: &[[f32; 3]],
+        vertices: [u32; LANES],
+        rows: &mut [[f64; LANES]; 3],
+    );
+}
+
+/// One coordinate after the other.
+#[inline(always)]
+fn put_vertices(positions: &[[f32; 3]], vertices: [u32; LANES], rows: &mut [[f64; LANES]; 3]) {
+    for (lane, &vertex) in vertices.iter().enumerate() {
+        let [x, y, z] = positions[vertex as usize];
+        rows[0][lane] = x.into();
+        rows[1][lane] = y.into();
+        rows[2][lane] = z.into();
+    }
+}
+
+/// One coordinate after the other, from a place on.
+#[inline(always)]
+fn put_corners(positions: &[[f32; 3]], faces: &[[u32; 3]], first: usize, into: &mut Triangles64) {
+    for (place, face) in (first..).zip(faces) {
+        for (corner, &vertex) in face.iter().enumerate() {
+            let point = &positions[vertex as usize];
+            for axis in 0..3 {
+                into[corner][axis][place] = point[axis];
+            }
+        }
+    }
+}
+
+/// Plain loops.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Portable;
+
+impl Simd for Portable {
+    type F64 = number::Portable;
+    type F32 = number::Portable32;
+
+    #[inline(always)]
+    fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
+        let mut overlap = [1u8; 8];
+        for axis in 0..3 {
+            let min: &[f32; 8] = boxes.min[axis][first..].first_chunk().expect("padded");
+            let max: &[f32; 8] = boxes.max[axis][first..].first_chunk().expect("padded");
+            for k in 0..8 {
+                overlap[k] &=
+                    u8::from(min[k] <= query.max[axis]) & u8::from(query.min[axis] <= max[k]);
+            }
+        }
+        (0..8).fold(0, |mask, k| mask | u32::from(overlap[k]) << k)
+    }
+
+    #[inline(always)]
+    fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64 {
+        let mut mask = 0;
+        for chunk in 0..8 {
+            if among >> (8 * chunk) & 0xff == 0 {
+                continue;
+            }
+            let mut overlap = [1u8; 8];
+            for axis in 0..3 {
+                for (k, bit) in overlap.iter_mut().enumerate() {
+                    let lane = 8 * chunk + k;
+                    *bit &= u8::from(boxes.min[axis][lane] <= query.max[axis])
+                        & u8::from(query.min[axis] <= boxes.max[axis][lane]);
+                }
+            }
+            for (k, bit) in overlap.into_iter().enumerate() {
+                mask |= u64::from(bit) << (8 * chunk + k);
+            }
+        }
+        mask & among
+    }
+
+    #[inline(always)]
+    fn equals_64(self, lanes: &Lanes32, query: u32, mut among: u64) -> u64 {
+        let mut mask = 0;
+        while among != 0 {
+            let lane = among.trailing_zeros() as usize;
+            mask |= u64::from(lanes.0[lane] == query) << lane;
+            among &= among - 1;
+        }
+        mask
+    }
+
+    #[inline(always)]
+    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
+        of_vertices_f32(positions, vertices)
+    }
+
+    #[inline(always)]
+    fn put_corners(
+        self,
+        positions: &[[f32; 3]],
+        cluster: &ClusterFaces<'_>,
+        into: &mut Triangles64,
+    ) {
+        put_corners(positions, cluster.faces, 0, into);
+    }
+
+    #[inline(always)]
+    fn put_vertices(
+        self,
+        positions: &[[f32; 3]],
+        vertices: [u32; LANES],
+        rows: &mut [[f64; LANES]; 3],
+    ) {
+        put_vertices(positions, vertices, rows);
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) use x86::{Avx2, Avx512};
+
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+/// The instruction sets that kernels are compiled for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Isa {
+    /// Plain loops.
+    Portable,
+    /// 256 bits.
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    /// 512 bits.
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+}
+
+impl Isa {
+    /// The best one that this processor has, and that is allowed.
+    pub fn detect(allowed: InstructionSet) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if allowed >= InstructionSet::Avx512
+                && is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("avx512bw")
+                && is_x86_feature_detected!("avx512vbmi2")
+                && is_x86_feature_detected!("bmi1")
+                && is_x86_feature_detected!("bmi2")
+                && is_x86_feature_detected!("popcnt")
+                && is_x86_feature_detected!("lzcnt")
+            {
+                return Isa::Avx512;
+            }
+            if allowed >= InstructionSet::Avx2
+                && is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("bmi1")
+                && is_x86_feature_detected!("bmi2")
+                && is_x86_feature_detected!("popcnt")
+                && is_x86_feature_detected!("lzcnt")
+            {
+                return Isa::Avx2;
+            }
+        }
+        let _ = allowed;
+        Isa::Portable
+    }
+}
+
+/// Calls a kernel `fn kernel(simd: impl Simd, …)`, marked `inline(always)`, compiled for `$isa`.
+macro_rules! dispatch {
+    ($isa:expr, $kernel:path, ($($name:ident: $type:ty = $value:expr),* $(,)?) $(-> $result:ty)?) => {{
+        // A function of its own, as the others are: not optimised, a kernel's frame is half a megabyte.
+        fn portable($($name: $type),*) $(-> $result)? {
+            $kernel($crate::cpu::simd::Portable, $($name),*)
+        }
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2,bmi1,bmi2,popcnt,lzcnt")]
+        fn avx2($($name: $type),*) $(-> $result)? {
+            // SAFETY: the caller's features include AVX2.
+            $kernel(unsafe { $crate::cpu::simd::Avx2::new() }, $($name),*)
+        }
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx512vbmi2,avx2,bmi1,bmi2,popcnt,lzcnt")]
+        fn avx512($($name: $type),*) $(-> $result)? {
+            // SAFETY: the caller's features include AVX-512 F, VL, DQ, BW and VBMI2.
+            $kernel(unsafe { $crate::cpu::simd::Avx512::new() }, $($name),*)
+        }
+        match $isa {
+            $crate::cpu::simd::Isa::Portable => portable($($value),*),
+            // SAFETY: an `Isa` is only ever one that `Isa::detect` found on this processor.
+            #[cfg(target_arch = "x86_64")]
+            $crate::cpu::simd::Isa::Avx2 => unsafe { avx2($($value),*) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            $crate::cpu::simd::Isa::Avx512 => unsafe { avx512($($value),*) },
+        }
+    }};
+}
+pub(crate) use dispatch;
+
+/// For each query, which of the lanes of `among` it overlaps: `overlaps_64` for callers that are not
+/// themselves compiled once an instruction set. As many queries are answered as there are masks.
+pub fn masks(isa: Isa, boxes: &LaneBounds, among: u64, queries: &[Bounds], masks: &mut [u64]) {
+    dispatch!(isa, all_masks, (
+        boxes: &LaneBounds = boxes,
+        among: u64 = among,
+        queries: &[Bounds] = queries,
+        masks: &mut [u64] = masks,
+    ));
+}
+
+#[inline(always)]
+fn all_masks<S: Simd>(
+    simd: S,
+    boxes: &LaneBounds,
+    among: u64,
+    queries: &[Bounds],
+    masks: &mut [u64],
+) {
+    for (mask, query) in masks.iter_mut().zip(queries) {
+        *mask = simd.overlaps_64(boxes, query, among);
+    }
+}

@@ -1,0 +1,533 @@
+//! The registers of x86-64: 256 and 512 bits.
+
+use std::arch::x86_64::*;
+
+use crate::exact::filter::number::Lookup;
+use crate::exact::filter::{BATCH, TABLE};
+
+use super::{
+    Bounds, BoundsArray, CHUNK, ClusterFaces, GROUP, LANES, LaneBounds, Lanes, Lanes32, Masks,
+    Simd, Triangles64, number, of_vertices_f32, put_corners, put_vertices, up_to,
+};
+
+/// 256-bit registers. Only made where `avx2` was detected.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Avx2(());
+
+/// 512-bit registers and mask registers. Only made where `avx512f` and its extensions `vl`, `dq`, `bw` and
+/// `vbmi2` were detected.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Avx512(());
+
+impl Avx2 {
+    /// # Safety
+    /// The processor must have AVX2.
+    pub(crate) unsafe fn new() -> Self {
+        Avx2(())
+    }
+}
+
+impl Avx512 {
+    /// # Safety
+    /// The processor must have AVX-512 F, VL, DQ, BW and VBMI2.
+    pub(crate) unsafe fn new() -> Self {
+        Avx512(())
+    }
+}
+
+/// Eight vertices as rows of x, y and z: two columns of four, transposed side by side. None where one
+/// of them is the last one or past it: a vertex is read as 16 bytes, of which its successor has four.
+///
+/// # Safety
+/// The caller must be compiled for AVX2.
+#[inline(always)]
+unsafe fn rows(positions: &[[f32; 3]], vertices: [u32; LANES]) -> Option<[__m256; 3]> {
+    let end = positions.len().saturating_sub(1);
+    let mut all_inside = true;
+    for vertex in vertices {
+        all_inside &= (vertex as usize) < end;
+    }
+    if !all_inside {
+        return None;
+    }
+    let first = positions.as_ptr();
+    // SAFETY: all vertices have a successor, as was just seen, so 16 bytes lie in the slice.
+    unsafe {
+        let load = [
+            _mm_loadu_ps(first.add(vertices[0] as usize).cast()),
+            _mm_loadu_ps(first.add(vertices[1] as usize).cast()),
+            _mm_loadu_ps(first.add(vertices[2] as usize).cast()),
+            _mm_loadu_ps(first.add(vertices[3] as usize).cast()),
+            _mm_loadu_ps(first.add(vertices[4] as usize).cast()),
+            _mm_loadu_ps(first.add(vertices[5] as usize).cast()),
+            _mm_loadu_ps(first.add(vertices[6] as usize).cast()),
+            _mm_loadu_ps(first.add(vertices[7] as usize).cast()),
+        ];
+        let a = _mm256_set_m128(load[4], load[0]);
+        let b = _mm256_set_m128(load[5], load[1]);
+        let c = _mm256_set_m128(load[6], load[2]);
+        let d = _mm256_set_m128(load[7], load[3]);
+        let xy_ab = _mm256_unpacklo_ps(a, b);
+        let xy_cd = _mm256_unpacklo_ps(c, d);
+        let z_ab = _mm256_unpackhi_ps(a, b);
+        let z_cd = _mm256_unpackhi_ps(c, d);
+        Some([
+            _mm256_shuffle_ps::<0b01_00_01_00>(xy_ab, xy_cd),
+            _mm256_shuffle_ps::<0b11_10_11_10>(xy_ab, xy_cd),
+            _mm256_shuffle_ps::<0b01_00_01_00>(z_ab, z_cd),
+        ])
+    }
+}
+
+/// As `Simd::put_corners`.
+///
+/// # Safety
+/// The caller must be compiled for AVX2.
+#[inline(always)]
+unsafe fn put_corners_by_eights(
+    positions: &[[f32; 3]],
+    faces: &[[u32; 3]],
+    into: &mut Triangles64,
+) {
+    assert!(faces.len() <= TABLE);
+    let (eights, rest) = faces.as_chunks::<8>();
+    for (eight_ix, eight) in eights.iter().enumerate() {
+        let place = 8 * eight_ix;
+        for corner in 0..3 {
+            let vertices = [
+                eight[0][corner],
+                eight[1][corner],
+                eight[2][corner],
+                eight[3][corner],
+                eight[4][corner],
+                eight[5][corner],
+                eight[6][corner],
+                eight[7][corner],
+            ];
+            // SAFETY: the caller's.
+            let Some(rows) = (unsafe { rows(positions, vertices) }) else {
+                put_corners(positions, eight, place, into);
+                break;
+            };
+            for axis in 0..3 {
+                let row = into[corner][axis][place..].first_chunk_mut::<8>();
+                let row = row.expect("at most 64 faces");
+                // SAFETY: a row of eight.
+                unsafe { _mm256_storeu_ps(row.as_mut_ptr(), rows[axis]) };
+            }
+        }
+    }
+    put_corners(positions, rest, 8 * eights.len(), into);
+}
+
+/// As `Simd::put_corners`, for at most 64 vertices: each is loaded once, and corners are looked up.
+///
+/// # Safety
+/// The caller must be compiled for AVX-512.
+#[inline(always)]
+unsafe fn put_corners_by_vertices(
+    positions: &[[f32; 3]],
+    cluster: &ClusterFaces<'_>,
+    into: &mut Triangles64,
+) {
+    let mut points = Table([[0.0f32; TABLE]; 3]);
+    let (chunks, _) = cluster.vertices.as_chunks::<CHUNK>();
+    for (chunk_ix, &chunk) in chunks.iter().take(TABLE / CHUNK).enumerate() {
+        let first = CHUNK * chunk_ix;
+        // SAFETY: the caller's.
+        if let Some(rows) = unsafe { rows(positions, chunk) } {
+            for (table, row) in points.0.iter_mut().zip(rows) {
+                let eight = table[first..].first_chunk_mut::<CHUNK>();
+                let eight = eight.expect("at most 64 vertices");
+                // SAFETY: a row of eight.
+                unsafe { _mm256_storeu_ps(eight.as_mut_ptr(), row) };
+            }
+        } else {
+            for (place, vertex) in (first..).zip(chunk) {
+                for (table, x) in points.0.iter_mut().zip(positions[vertex as usize]) {
+                    table[place] = x;
+                }
+            }
+        }
+    }
+    for (local, corner) in cluster.local.iter().zip(into) {
+        let (batches, _) = local.as_chunks::<BATCH>();
+        for (batch_ix, batch) in batches.iter().enumerate() {
+            let places = number::Avx512F32::places(batch, 0);
+            for (table, row) in points.0.iter().zip(&mut *corner) {
+                number::Avx512F32::look_up(table, places).store(row, BATCH * batch_ix);
+            }
+        }
+    }
+}
+
+#[repr(C, align(64))]
+struct Table([[f32; TABLE]; 3]);
+
+/// As `Simd::of_ascending`: two vertices a register and four chains, which hide the latency of minimum
+/// and maximum.
+///
+/// # Safety
+/// The caller must be compiled for AVX2, and `vertices` must not descend.
+#[inline(always)]
+unsafe fn of_ascending(positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
+    let (chunks, rest) = vertices.as_chunks::<CHUNK>();
+    let last = vertices.last().map_or(0, |&last| last as usize);
+    if !rest.is_empty() || last + 1 >= positions.len() {
+        return of_vertices_f32(positions, vertices);
+    }
+    let first = positions.as_ptr();
+    // SAFETY: no vertex is higher than the last one, which has a successor: the 16 bytes of which a vertex
+    // is the first 12 lie within the slice.
+    unsafe {
+        let mut min = [_mm256_set1_ps(f32::INFINITY); CHUNK / 2];
+        let mut max = [_mm256_set1_ps(f32::NEG_INFINITY); CHUNK / 2];
+        let mut sum = [_mm256_setzero_ps(); CHUNK / 2];
+        for chunk in chunks {
+            for k in 0..CHUNK / 2 {
+                let low = _mm_loadu_ps(first.add(chunk[2 * k] as usize).cast());
+                let high = _mm_loadu_ps(first.add(chunk[2 * k + 1] as usize).cast());
+                let two = _mm256_set_m128(high, low);
+                min[k] = _mm256_min_ps(min[k], two);
+                max[k] = _mm256_max_ps(max[k], two);
+                sum[k] = _mm256_add_ps(sum[k], two);
+            }
+        }
+        let min = _mm256_min_ps(_mm256_min_ps(min[0], min[1]), _mm256_min_ps(min[2], min[3]));
+        let max = _mm256_max_ps(_mm256_max_ps(max[0], max[1]), _mm256_max_ps(max[2], max[3]));
+        let sum = _mm256_add_ps(_mm256_add_ps(sum[0], sum[1]), _mm256_add_ps(sum[2], sum[3]));
+        let (low, high) = (_mm256_castps256_ps128(min), _mm256_extractf128_ps::<1>(min));
+        let min = xyz(_mm_min_ps(low, high));
+        let (low, high) = (_mm256_castps256_ps128(max), _mm256_extractf128_ps::<1>(max));
+        let max = xyz(_mm_max_ps(low, high));
+        let (low, high) = (_mm256_castps256_ps128(sum), _mm256_extractf128_ps::<1>(sum));
+        let [x, y, z] = xyz(_mm_add_ps(low, high));
+        (Bounds { min, max }, (x + y + z).is_finite())
+    }
+}
+
+#[inline(always)]
+fn xyz(row: __m128) -> [f32; 3] {
+    let mut out = [0.0f32; 4];
+    // SAFETY: SSE belongs to every x86-64 processor, and `out` holds 16 bytes.
+    unsafe { _mm_storeu_ps(out.as_mut_ptr(), row) };
+    [out[0], out[1], out[2]]
+}
+
+impl Simd for Avx2 {
+    type F64 = number::Avx2;
+    type F32 = number::Avx2F32;
+
+    #[inline(always)]
+    fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
+        assert!(first <= boxes.len());
+        // SAFETY: `Avx2` exists only where the processor has it; arrays are padded by
+        // `READ_AHEAD` past `len`, and `first <= len` was just asserted.
+        unsafe {
+            let mut all = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+            for axis in 0..3 {
+                let min = _mm256_loadu_ps(boxes.min[axis].as_ptr().add(first));
+                let max = _mm256_loadu_ps(boxes.max[axis].as_ptr().add(first));
+                let low = _mm256_cmp_ps::<_CMP_LE_OQ>(min, _mm256_set1_ps(query.max[axis]));
+                let high = _mm256_cmp_ps::<_CMP_LE_OQ>(_mm256_set1_ps(query.min[axis]), max);
+                all = _mm256_and_ps(all, _mm256_and_ps(low, high));
+            }
+            _mm256_movemask_ps(all) as u32
+        }
+    }
+
+    #[inline(always)]
+    fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64 {
+        // SAFETY: `Avx2` exists only where the processor has it; lanes 8 c .. 8 c + 8 of 64
+        // lie within their array, which is aligned to 64 bytes.
+        unsafe {
+            let query_min = [
+                _mm256_set1_ps(query.min[0]),
+                _mm256_set1_ps(query.min[1]),
+                _mm256_set1_ps(query.min[2]),
+            ];
+            let query_max = [
+                _mm256_set1_ps(query.max[0]),
+                _mm256_set1_ps(query.max[1]),
+                _mm256_set1_ps(query.max[2]),
+            ];
+            let mut mask = 0u64;
+            for chunk in 0..8 {
+                if (among >> (8 * chunk)) & 0xff == 0 {
+                    continue;
+                }
+                let mut all = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+                for axis in 0..3 {
+                    let min = _mm256_load_ps(boxes.min[axis].as_ptr().add(8 * chunk));
+                    let max = _mm256_load_ps(boxes.max[axis].as_ptr().add(8 * chunk));
+                    let low = _mm256_cmp_ps::<_CMP_LE_OQ>(min, query_max[axis]);
+                    let high = _mm256_cmp_ps::<_CMP_LE_OQ>(query_min[axis], max);
+                    all = _mm256_and_ps(all, _mm256_and_ps(low, high));
+                }
+                mask |= u64::from(_mm256_movemask_ps(all) as u32) << (8 * chunk);
+            }
+            mask & among
+        }
+    }
+
+    #[inline(always)]
+    fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64 {
+        // SAFETY: as above, lane for lane.
+        unsafe {
+            let query = _mm256_set1_epi32(query as i32);
+            let mut mask = 0u64;
+            for chunk in 0..8 {
+                if (among >> (8 * chunk)) & 0xff == 0 {
+                    continue;
+                }
+                let lanes = _mm256_load_si256(lanes.0.as_ptr().add(8 * chunk).cast());
+                let equal = _mm256_castsi256_ps(_mm256_cmpeq_epi32(lanes, query));
+                mask |= u64::from(_mm256_movemask_ps(equal) as u32) << (8 * chunk);
+            }
+            mask & among
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
+        // SAFETY: `Avx2` exists only where the processor has AVX2; the caller keeps the order.
+        unsafe { of_ascending(positions, vertices) }
+    }
+
+    #[inline(always)]
+    fn put_corners(
+        self,
+        positions: &[[f32; 3]],
+        cluster: &ClusterFaces<'_>,
+        into: &mut Triangles64,
+    ) {
+        // SAFETY: `Avx2` exists only where the processor has AVX2.
+        unsafe { put_corners_by_eights(positions, cluster.faces, into) };
+    }
+
+    #[inline(always)]
+    fn put_vertices(
+        self,
+        positions: &[[f32; 3]],
+        vertices: [u32; LANES],
+        into: &mut [[f64; LANES]; 3],
+    ) {
+        // SAFETY: `Avx2` exists only where the processor has it; a row holds two times four.
+        unsafe {
+            let Some(rows) = rows(positions, vertices) else {
+                return put_vertices(positions, vertices, into);
+            };
+            for axis in 0..3 {
+                let low = _mm256_cvtps_pd(_mm256_castps256_ps128(rows[axis]));
+                let high = _mm256_cvtps_pd(_mm256_extractf128_ps::<1>(rows[axis]));
+                _mm256_storeu_pd(into[axis].as_mut_ptr(), low);
+                _mm256_storeu_pd(into[axis].as_mut_ptr().add(4), high);
+            }
+        }
+    }
+}
+
+/// What sixteen lanes add to the masks of some rows. The lanes' boxes stay in registers.
+///
+/// # Safety
+/// The caller must be compiled for AVX-512.
+#[inline(always)]
+unsafe fn chunk_overlaps(
+    boxes: &LaneBounds,
+    chunk: usize,
+    among: u64,
+    queries: &LaneBounds,
+    rows: u64,
+    masks: &mut Masks,
+) {
+    let among = (among >> (16 * chunk)) as __mmask16;
+    if among == 0 {
+        return;
+    }
+    // SAFETY: lanes 16 c .. 16 c + 16 of 64 lie within their array, which is aligned to 64 bytes.
+    unsafe {
+        let row = |axis: &[f32; GROUP]| _mm512_load_ps(axis.as_ptr().add(16 * chunk));
+        let min = [row(&boxes.min[0]), row(&boxes.min[1]), row(&boxes.min[2])];
+        let max = [row(&boxes.max[0]), row(&boxes.max[1]), row(&boxes.max[2])];
+        for row in Lanes(rows) {
+            let mut all = among;
+            for axis in 0..3 {
+                let query_min = _mm512_set1_ps(queries.min[axis][row]);
+                let query_max = _mm512_set1_ps(queries.max[axis][row]);
+                all = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(all, min[axis], query_max);
+                all = _mm512_mask_cmp_ps_mask::<_CMP_GE_OQ>(all, max[axis], query_min);
+            }
+            masks.0[row] |= u64::from(all) << (16 * chunk);
+        }
+    }
+}
+
+/// The number of each lane.
+#[repr(C, align(64))]
+struct Numbers([u8; GROUP]);
+
+static LANE: Numbers = {
+    let mut lanes = [0; GROUP];
+    let mut lane = 0;
+    while lane < GROUP {
+        lanes[lane] = lane as u8;
+        lane += 1;
+    }
+    Numbers(lanes)
+};
+
+impl Simd for Avx512 {
+    type F64 = number::Avx512;
+    type F32 = number::Avx512F32;
+
+    #[inline(always)]
+    fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
+        assert!(first <= boxes.len());
+        // SAFETY: as for `Avx2`, with the mask comparisons of AVX-512 VL.
+        unsafe {
+            let mut all: __mmask8 = 0xff;
+            for axis in 0..3 {
+                let min = _mm256_loadu_ps(boxes.min[axis].as_ptr().add(first));
+                let max = _mm256_loadu_ps(boxes.max[axis].as_ptr().add(first));
+                let query_max = _mm256_set1_ps(query.max[axis]);
+                let query_min = _mm256_set1_ps(query.min[axis]);
+                all = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(all, min, query_max);
+                all = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(all, query_min, max);
+            }
+            u32::from(all)
+        }
+    }
+
+    #[inline(always)]
+    fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64 {
+        // SAFETY: `Avx512` exists only where the processor has it; lanes 16 c .. 16 c + 16 of
+        // 64 lie within their array, which is aligned to 64 bytes.
+        unsafe {
+            let query_min = [
+                _mm512_set1_ps(query.min[0]),
+                _mm512_set1_ps(query.min[1]),
+                _mm512_set1_ps(query.min[2]),
+            ];
+            let query_max = [
+                _mm512_set1_ps(query.max[0]),
+                _mm512_set1_ps(query.max[1]),
+                _mm512_set1_ps(query.max[2]),
+            ];
+            let mut mask = 0u64;
+            for chunk in 0..4 {
+                let mut all = (among >> (16 * chunk)) as __mmask16;
+                if all == 0 {
+                    continue;
+                }
+                for axis in 0..3 {
+                    let min = _mm512_load_ps(boxes.min[axis].as_ptr().add(16 * chunk));
+                    let max = _mm512_load_ps(boxes.max[axis].as_ptr().add(16 * chunk));
+                    all = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(all, min, query_max[axis]);
+                    all = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(all, query_min[axis], max);
+                }
+                mask |= u64::from(all) << (16 * chunk);
+            }
+            mask
+        }
+    }
+
+    #[inline(always)]
+    fn overlaps_rows(
+        self,
+        boxes: &LaneBounds,
+        among: u64,
+        queries: &LaneBounds,
+        rows: u64,
+        masks: &mut Masks,
+    ) {
+        masks.0 = [0; GROUP];
+        for chunk in 0..4 {
+            // SAFETY: `Avx512` exists only where the processor has it.
+            unsafe { chunk_overlaps(boxes, chunk, among, queries, rows, masks) };
+        }
+    }
+
+    #[inline(always)]
+    fn overlaps_within(self, boxes: &LaneBounds, among: u64, masks: &mut Masks) {
+        masks.0 = [0; GROUP];
+        for chunk in 0..4 {
+            // A lane of this chunk is beyond no row that is past the chunk.
+            let rows = among & up_to(16 * chunk + 15);
+            // SAFETY: `Avx512` exists only where the processor has it.
+            unsafe { chunk_overlaps(boxes, chunk, among, boxes, rows, masks) };
+        }
+        for (row, mask) in masks.0.iter_mut().enumerate() {
+            *mask &= !up_to(row);
+        }
+    }
+
+    #[inline(always)]
+    fn list_lanes(self, mask: u64, list: &mut [u8; GROUP]) -> usize {
+        // SAFETY: `Avx512` exists only where the processor has it; one store of 64 bytes.
+        unsafe {
+            let lanes = _mm512_maskz_compress_epi8(mask, _mm512_load_si512(LANE.0.as_ptr().cast()));
+            _mm512_storeu_si512(list.as_mut_ptr().cast(), lanes);
+        }
+        mask.count_ones() as usize
+    }
+
+    #[inline(always)]
+    fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64 {
+        // SAFETY: as above, lane for lane.
+        unsafe {
+            let query = _mm512_set1_epi32(query as i32);
+            let mut mask = 0u64;
+            for chunk in 0..4 {
+                let among = (among >> (16 * chunk)) as __mmask16;
+                if among == 0 {
+                    continue;
+                }
+                let lanes = _mm512_load_si512(lanes.0.as_ptr().add(16 * chunk).cast());
+                let equal = _mm512_mask_cmpeq_epi32_mask(among, lanes, query);
+                mask |= u64::from(equal) << (16 * chunk);
+            }
+            mask
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
+        // SAFETY: `Avx512` exists only where the processor has AVX2 too; the caller keeps the order.
+        unsafe { of_ascending(positions, vertices) }
+    }
+
+    #[inline(always)]
+    fn put_corners(
+        self,
+        positions: &[[f32; 3]],
+        cluster: &ClusterFaces<'_>,
+        into: &mut Triangles64,
+    ) {
+        // SAFETY: `Avx512` exists only where the processor has it, and AVX2 too.
+        unsafe {
+            if cluster.vertices.len() > TABLE {
+                put_corners_by_eights(positions, cluster.faces, into);
+            } else {
+                put_corners_by_vertices(positions, cluster, into);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn put_vertices(
+        self,
+        positions: &[[f32; 3]],
+        vertices: [u32; LANES],
+        into: &mut [[f64; LANES]; 3],
+    ) {
+        // SAFETY: `Avx512` exists only where the processor has it; a row holds eight.
+        unsafe {
+            let Some(rows) = rows(positions, vertices) else {
+                return put_vertices(positions, vertices, into);
+            };
+            for axis in 0..3 {
+                _mm512_storeu_pd(into[axis].as_mut_ptr(), _mm512_cvtps_pd(rows[axis]));
+            }
+        }
+    }
+}
