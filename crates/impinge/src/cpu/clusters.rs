@@ -174,7 +174,8 @@ impl Clusters {
                 .is_some_and(|cache| cache.topology_stamp == body.topology_stamp());
             if !known {
                 control.step(ix as u64, frame.participants.len() as u64)?;
-                *cache = Some(Box::new(workers.install(|| BodyCache::new(body))));
+                let found = workers.install(body.n_primitives(), || BodyCache::new(body));
+                *cache = Some(Box::new(found));
                 stats.n_clustered += 1;
             }
             let cache = cache.as_ref().expect("just clustered");
@@ -255,7 +256,7 @@ impl Clusters {
             let spread = cache.spread();
             if options.recluster == Recluster::Auto && spread > STALE * cache.best_spread {
                 let start = Instant::now();
-                **cache = workers.install(|| BodyCache::new(body));
+                **cache = workers.install(body.n_primitives(), || BodyCache::new(body));
                 if participant.within {
                     cache.find_adjacency(workers);
                 }
@@ -356,7 +357,8 @@ impl BodyCache {
     /// when it is known.
     fn find_adjacency(&self, workers: &Workers) {
         if !self.clustering.knows_adjacency() {
-            workers.install(|| self.clustering.adjacency());
+            let n_primitives = self.clustering.order.len();
+            workers.install(n_primitives, || self.clustering.adjacency());
         }
     }
 

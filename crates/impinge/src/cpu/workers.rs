@@ -29,6 +29,8 @@ const LINGER: Duration = Duration::from_millis(1);
 const WORTH: Duration = Duration::from_micros(800);
 /// Primitives from which on a frame is thought to take that long, whatever the last one took.
 const LARGE: u64 = 300_000;
+/// Primitives from which on clustering is spread over threads.
+const SPREAD_FROM: usize = 4096;
 /// Looks at the gate between two at the clock.
 const LOOKS: u32 = 64;
 
@@ -124,9 +126,11 @@ impl Workers {
         self.last.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Runs something that uses rayon on its own, within the limits of this pool.
-    pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+    /// Runs something that uses rayon on its own, within the limits of this pool. What is about few primitives is
+    /// not spread by rayon: it runs here, for going to a pool takes 70 µs.
+    pub fn install<T: Send>(&self, n_primitives: usize, work: impl FnOnce() -> T + Send) -> T {
         match &self.pool {
+            _ if n_primitives < SPREAD_FROM => work(),
             Some(pool) => pool.install(work),
             None if self.n == 1 => match single() {
                 Some(pool) => pool.install(work),
