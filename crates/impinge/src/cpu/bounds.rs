@@ -20,7 +20,7 @@ use super::simd::{LaneBounds, Simd};
 /// x, y, z and a fourth number that nobody looks at.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
-struct Vec4(std::arch::x86_64::__m128);
+pub(super) struct Vec4(pub(super) std::arch::x86_64::__m128);
 
 #[cfg(target_arch = "x86_64")]
 impl Vec4 {
@@ -64,7 +64,7 @@ impl Vec4 {
     }
 
     #[inline(always)]
-    fn xyz(self) -> [f32; 3] {
+    pub(super) fn xyz(self) -> [f32; 3] {
         let mut out = [0.0f32; 4];
         // SAFETY: `out` holds 16 bytes.
         unsafe { std::arch::x86_64::_mm_storeu_ps(out.as_mut_ptr(), self.0) };

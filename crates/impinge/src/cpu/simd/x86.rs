@@ -5,6 +5,7 @@ use std::arch::x86_64::*;
 use crate::exact::filter::number::Lookup;
 use crate::exact::filter::{BATCH, TABLE};
 
+use super::super::bounds::Vec4;
 use super::{
     Bounds, BoundsArray, CHUNK, ClusterFaces, GROUP, LANES, LaneBounds, Lanes, Lanes32, Masks,
     Simd, Triangles64, number, of_vertices_f32, put_corners, put_vertices, up_to,
@@ -197,21 +198,13 @@ unsafe fn of_ascending(positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, boo
         let max = _mm256_max_ps(_mm256_max_ps(max[0], max[1]), _mm256_max_ps(max[2], max[3]));
         let sum = _mm256_add_ps(_mm256_add_ps(sum[0], sum[1]), _mm256_add_ps(sum[2], sum[3]));
         let (low, high) = (_mm256_castps256_ps128(min), _mm256_extractf128_ps::<1>(min));
-        let min = xyz(_mm_min_ps(low, high));
+        let min = Vec4(_mm_min_ps(low, high)).xyz();
         let (low, high) = (_mm256_castps256_ps128(max), _mm256_extractf128_ps::<1>(max));
-        let max = xyz(_mm_max_ps(low, high));
+        let max = Vec4(_mm_max_ps(low, high)).xyz();
         let (low, high) = (_mm256_castps256_ps128(sum), _mm256_extractf128_ps::<1>(sum));
-        let [x, y, z] = xyz(_mm_add_ps(low, high));
+        let [x, y, z] = Vec4(_mm_add_ps(low, high)).xyz();
         (Bounds { min, max }, (x + y + z).is_finite())
     }
-}
-
-#[inline(always)]
-fn xyz(row: __m128) -> [f32; 3] {
-    let mut out = [0.0f32; 4];
-    // SAFETY: SSE belongs to every x86-64 processor, and `out` holds 16 bytes.
-    unsafe { _mm_storeu_ps(out.as_mut_ptr(), row) };
-    [out[0], out[1], out[2]]
 }
 
 impl Simd for Avx2 {
