@@ -166,6 +166,7 @@ impl Clusters {
                 }
             }
         }
+        let isa = self.isa;
         for (ix, participant) in frame.participants.iter().enumerate() {
             let body = frame.body(scene, ix);
             let cache = &mut self.caches[participant.id.index()];
@@ -174,7 +175,7 @@ impl Clusters {
                 .is_some_and(|cache| cache.topology_stamp == body.topology_stamp());
             if !known {
                 control.step(ix as u64, frame.participants.len() as u64)?;
-                let found = workers.install(body.n_primitives(), || BodyCache::new(body));
+                let found = workers.install(body.n_primitives(), || BodyCache::new(body, isa));
                 *cache = Some(Box::new(found));
                 stats.n_clustered += 1;
             }
@@ -255,8 +256,8 @@ impl Clusters {
             cache.bounds.refit_above(1, &cache.clustering.shape);
             let spread = cache.spread();
             if options.recluster == Recluster::Auto && spread > STALE * cache.best_spread {
-                let start = Instant::now();
-                **cache = workers.install(body.n_primitives(), || BodyCache::new(body));
+                let (start, isa) = (Instant::now(), self.isa);
+                **cache = workers.install(body.n_primitives(), || BodyCache::new(body, isa));
                 if participant.within {
                     cache.find_adjacency(workers);
                 }
@@ -335,12 +336,14 @@ pub(crate) struct Options {
 
 impl BodyCache {
     /// Clusters a body in the pose at hand.
-    pub fn new(body: &Body) -> Self {
+    pub fn new(body: &Body, isa: Isa) -> Self {
         let (elements, positions) = (body.elements(), body.positions());
         let clustering = Clustering::new(elements, |primitive| {
             bounds::of_vertices(positions, elements.corners(primitive))
         });
-        clustering.local_faces();
+        if isa.looks_corners_up() {
+            clustering.find_local_faces();
+        }
         let mut bounds = TreeBounds::default();
         bounds.resize(&clustering.shape);
         BodyCache {

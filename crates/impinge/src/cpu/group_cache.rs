@@ -46,7 +46,7 @@ impl Group {
         let faces = ClusterFaces {
             faces: &faces[cluster * GROUP..cluster * GROUP + size],
             vertices: clustering.vertices(cluster),
-            local: &clustering.local_faces()[cluster],
+            local: clustering.local_faces(cluster),
         };
         simd.put_corners(points, &faces, &mut self.corners);
         let [p, q, r] = &self.corners;

@@ -113,9 +113,8 @@ impl Clustering {
         })
     }
 
-    /// For each cluster of triangles, its corners as numbers of its own vertices; found at the first call. Empty for
-    /// tetrahedra.
-    pub fn local_faces(&self) -> &[LocalFaces] {
+    /// Finds the corners of each cluster's triangles as numbers of its own vertices, for kernels that look them up.
+    pub fn find_local_faces(&self) {
         self.local_faces.get_or_init(|| match &self.corners {
             Elements::Triangles(faces) => (0..self.n_clusters())
                 .into_par_iter()
@@ -126,7 +125,13 @@ impl Clustering {
                 })
                 .collect(),
             Elements::Tetrahedra(_) => Vec::new(),
-        })
+        });
+    }
+
+    /// Those of a cluster, where they have been found.
+    #[inline(always)]
+    pub fn local_faces(&self, cluster: usize) -> Option<&LocalFaces> {
+        self.local_faces.get()?.get(cluster)
     }
 
     /// Whether [`adjacency`](Self::adjacency) has been found.

@@ -84,8 +84,8 @@ pub(crate) struct ClusterFaces<'a> {
     pub faces: &'a [[u32; 3]],
     /// Unique vertices, in whole chunks of [`CHUNK`](crate::grouping::clusters::CHUNK).
     pub vertices: &'a [u32],
-    /// The corners as numbers of `vertices`.
-    pub local: &'a LocalFaces,
+    /// The corners as numbers of `vertices`, where the instruction set looks them up.
+    pub local: Option<&'a LocalFaces>,
 }
 
 /// A mask for each primitive of a group.
@@ -322,6 +322,18 @@ pub enum Isa {
 }
 
 impl Isa {
+    /// Whether `put_corners` looks corners up among a cluster's own vertices.
+    pub(crate) fn looks_corners_up(self) -> bool {
+        #[cfg(target_arch = "x86_64")]
+        {
+            self == Isa::Avx512
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        {
+            false
+        }
+    }
+
     /// The best one that this processor has, and that is allowed.
     pub fn detect(allowed: InstructionSet) -> Self {
         #[cfg(target_arch = "x86_64")]

@@ -7,8 +7,8 @@ use crate::exact::filter::{BATCH, TABLE};
 
 use super::super::bounds::Vec4;
 use super::{
-    Bounds, BoundsArray, CHUNK, ClusterFaces, GROUP, LANES, LaneBounds, Lanes, Lanes32, Masks,
-    Simd, Triangles64, number, of_vertices_f32, put_corners, put_vertices, up_to,
+    Bounds, BoundsArray, CHUNK, ClusterFaces, GROUP, LANES, LaneBounds, Lanes, Lanes32, LocalFaces,
+    Masks, Simd, Triangles64, number, of_vertices_f32, put_corners, put_vertices, up_to,
 };
 
 /// 256-bit registers. Only made where `avx2` was detected.
@@ -128,11 +128,12 @@ unsafe fn put_corners_by_eights(
 #[inline(always)]
 unsafe fn put_corners_by_vertices(
     positions: &[[f32; 3]],
-    cluster: &ClusterFaces<'_>,
+    vertices: &[u32],
+    local: &LocalFaces,
     into: &mut Triangles64,
 ) {
     let mut points = Table([[0.0f32; TABLE]; 3]);
-    let (chunks, _) = cluster.vertices.as_chunks::<CHUNK>();
+    let (chunks, _) = vertices.as_chunks::<CHUNK>();
     for (chunk_ix, &chunk) in chunks.iter().take(TABLE / CHUNK).enumerate() {
         let first = CHUNK * chunk_ix;
         // SAFETY: the caller's.
@@ -151,7 +152,7 @@ unsafe fn put_corners_by_vertices(
             }
         }
     }
-    for (local, corner) in cluster.local.iter().zip(into) {
+    for (local, corner) in local.iter().zip(into) {
         let (batches, _) = local.as_chunks::<BATCH>();
         for (batch_ix, batch) in batches.iter().enumerate() {
             let places = number::Avx512F32::places(batch, 0);
@@ -498,10 +499,11 @@ impl Simd for Avx512 {
     ) {
         // SAFETY: `Avx512` exists only where the processor has it, and AVX2 too.
         unsafe {
-            if cluster.vertices.len() > TABLE {
-                put_corners_by_eights(positions, cluster.faces, into);
-            } else {
-                put_corners_by_vertices(positions, cluster, into);
+            match cluster.local {
+                Some(local) if cluster.vertices.len() <= TABLE => {
+                    put_corners_by_vertices(positions, cluster.vertices, local, into);
+                }
+                _ => put_corners_by_eights(positions, cluster.faces, into),
             }
         }
     }
