@@ -61,6 +61,7 @@ fn counters(stats: &Statistics) -> Value {
         "n_subdivided": stats.n_subdivided,
         "n_entries": stats.n_entries,
         "n_clusters": stats.n_clusters,
+        "n_remote": stats.n_remote,
         "n_work_items": stats.n_work_items,
         "n_candidates": stats.n_candidates,
         "n_unsure": stats.n_unsure,

@@ -69,6 +69,12 @@ impl Statistics {
         self.inner.n_clusters
     }
 
+    /// int : ``"clusters"`` on the CPU: those proven to lie beside all other bodies, whose boxes were not needed.
+    #[getter]
+    fn n_remote(&self) -> u64 {
+        self.inner.n_remote
+    }
+
     /// int : pairs of groups that were paired.
     #[getter]
     fn n_work_items(&self) -> u64 {
@@ -151,6 +157,7 @@ impl Statistics {
         all.set_item("n_subdivided", self.n_subdivided())?;
         all.set_item("n_entries", self.n_entries())?;
         all.set_item("n_clusters", self.n_clusters())?;
+        all.set_item("n_remote", self.n_remote())?;
         all.set_item("n_work_items", self.n_work_items())?;
         all.set_item("n_candidates", self.n_candidates())?;
         all.set_item("n_unsure", self.n_unsure())?;

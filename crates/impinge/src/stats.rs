@@ -34,6 +34,9 @@ pub struct Statistics {
     pub n_entries: u64,
     /// `Clusters`: clusters of all participants.
     pub n_clusters: u64,
+    /// `Clusters` on the CPU: those that were proven to lie beside all other bodies, so that their boxes were not
+    /// needed.
+    pub n_remote: u64,
     /// Pairs of groups that were paired.
     pub n_work_items: u64,
     /// Pairs whose boxes overlap and that the adjacency rule lets through.

@@ -5,8 +5,6 @@
 //! Cost: every vertex of a body once for each cluster that has it (about 1.35 times a closed mesh).
 //! Invariant: a box holds all its vertices; f64 positions are rounded outward.
 
-use std::ops::Range;
-
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{
     Bounds, BoundsArray, RawBoundsArray, greater, lesser, round_down, round_up,
@@ -264,7 +262,7 @@ pub(crate) unsafe fn of_clusters<S: Simd>(
     simd: S,
     positions: &Positions,
     clustering: &Clustering,
-    clusters: Range<usize>,
+    clusters: impl Iterator<Item = usize>,
     into: RawBoundsArray,
 ) -> Summary {
     let mut summary = Summary::EMPTY;

@@ -9,6 +9,8 @@ mod group_cache;
 pub(crate) mod kept;
 pub(crate) mod narrow;
 pub(crate) mod pairing;
+mod refit;
+pub(crate) mod remote;
 pub(crate) mod simd;
 pub(crate) mod slabs;
 pub(crate) mod subcells;

@@ -7,6 +7,7 @@ use crate::scene::{Elements, Positions, Scene};
 
 use super::bounds::TreeBounds;
 use super::dispatch::Tree;
+use super::remote::{Extents, Remote};
 
 /// How much summed surface may grow against that of the whole before an order is made anew.
 pub(super) const STALE: f64 = 1.5;
@@ -20,6 +21,10 @@ pub(crate) struct BodyCache {
     pub positions_stamp: u64,
     pub clustering: Clustering,
     pub bounds: TreeBounds,
+    /// How far the positions reach.
+    pub extents: Extents,
+    /// Which clusters lie beside all that the body could meet.
+    pub remote: Remote,
     /// Half the summed surface of the clusters.
     pub surface: f64,
     /// That over the body's, at its best so far.

@@ -16,6 +16,7 @@ use crate::grouping::clusters::LocalFaces;
 use crate::settings::InstructionSet;
 
 use super::bounds::of_vertices_f32;
+use super::remote::{self, Members, RUN, RunExtents};
 
 /// The boxes of one group, a lane each; lanes past the group's size hold empty boxes.
 #[derive(Debug, Clone)]
@@ -173,6 +174,12 @@ pub(crate) trait Simd: Copy {
     /// # Safety
     /// `vertices` must not descend.
     unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool);
+
+    /// Adds runs of vertices, with as many members, to what is found of others.
+    #[inline(always)]
+    fn add_runs(self, runs: &[[[f32; 3]; RUN]], members: &[Members], into: &mut RunExtents) {
+        remote::add_runs(runs, members, into);
+    }
 
     /// The corners of a cluster's triangles as tables; places past its size hold anything.
     ///
@@ -332,6 +339,11 @@ impl Isa {
         {
             false
         }
+    }
+
+    /// Whether `add_runs` is faster than finding boxes: plain loops are not.
+    pub(crate) fn reads_runs(self) -> bool {
+        self != Isa::Portable
     }
 
     /// The best one that this processor has, and that is allowed.

@@ -6,9 +6,11 @@ use crate::exact::filter::number::Lookup;
 use crate::exact::filter::{BATCH, TABLE};
 
 use super::super::bounds::Vec4;
+use super::super::remote::{BLOCK, COORDINATES, no_members};
 use super::{
     Bounds, BoundsArray, CHUNK, ClusterFaces, GROUP, LANES, LaneBounds, Lanes, Lanes32, LocalFaces,
-    Masks, Simd, Triangles64, number, of_vertices_f32, put_corners, put_vertices, up_to,
+    Masks, Members, RUN, RunExtents, Simd, Triangles64, number, of_vertices_f32, put_corners,
+    put_vertices, up_to,
 };
 
 /// 256-bit registers. Only made where `avx2` was detected.
@@ -166,6 +168,60 @@ unsafe fn put_corners_by_vertices(
 #[repr(C, align(64))]
 struct Table([[f32; TABLE]; 3]);
 
+/// As `Simd::add_runs`, for one eight of the runs' coordinates: so few that all that is found of them stays in registers.
+///
+/// # Safety
+/// The caller must be compiled for AVX2.
+#[inline(always)]
+unsafe fn add_eight(
+    runs: &[[[f32; 3]; RUN]],
+    members: &[Members],
+    eight: usize,
+    into: &mut RunExtents,
+) {
+    let first = 8 * eight;
+    assert!(first + 8 <= COORDINATES);
+    // SAFETY: eight coordinates from `first` on lie within a run, and within each row of `into`.
+    unsafe {
+        let mut min = _mm256_loadu_ps(into.min.as_ptr().add(first));
+        let mut max = _mm256_loadu_ps(into.max.as_ptr().add(first));
+        let mut sum = _mm256_loadu_ps(into.sum.as_ptr().add(first));
+        let mut group_min =
+            [0, 1].map(|side| _mm256_loadu_ps(into.group_min[side].as_ptr().add(first)));
+        let mut group_max =
+            [0, 1].map(|side| _mm256_loadu_ps(into.group_max[side].as_ptr().add(first)));
+        for (run, members) in runs.iter().zip(members) {
+            let x = _mm256_loadu_ps(run.as_ptr().cast::<f32>().add(first));
+            min = _mm256_min_ps(x, min);
+            max = _mm256_max_ps(x, max);
+            sum = _mm256_add_ps(sum, x);
+            for side in 0..2 {
+                let none = no_members(members, side, eight);
+                let x = _mm256_or_ps(x, _mm256_loadu_ps(none.as_ptr().cast()));
+                // Of a NaN and a number, the second one.
+                group_min[side] = _mm256_min_ps(x, group_min[side]);
+                group_max[side] = _mm256_max_ps(x, group_max[side]);
+            }
+        }
+        _mm256_storeu_ps(into.min.as_mut_ptr().add(first), min);
+        _mm256_storeu_ps(into.max.as_mut_ptr().add(first), max);
+        _mm256_storeu_ps(into.sum.as_mut_ptr().add(first), sum);
+        for side in 0..2 {
+            _mm256_storeu_ps(
+                into.group_min[side].as_mut_ptr().add(first),
+                group_min[side],
+            );
+            _mm256_storeu_ps(
+                into.group_max[side].as_mut_ptr().add(first),
+                group_max[side],
+            );
+        }
+    }
+}
+
+/// Coordinates in 4 KiB: what the processor fetches ahead by itself ends with the page.
+const PAGE: usize = 1024;
+
 /// As `Simd::of_ascending`: two vertices a register and four chains, which hide the latency of minimum
 /// and maximum.
 ///
@@ -286,6 +342,16 @@ impl Simd for Avx2 {
     unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
         // SAFETY: `Avx2` exists only where the processor has AVX2; the caller keeps the order.
         unsafe { of_ascending(positions, vertices) }
+    }
+
+    #[inline(always)]
+    fn add_runs(self, runs: &[[[f32; 3]; RUN]], members: &[Members], into: &mut RunExtents) {
+        for (runs, members) in runs.chunks(BLOCK).zip(members.chunks(BLOCK)) {
+            for eight in 0..COORDINATES / 8 {
+                // SAFETY: `Avx2` exists only where the processor has it.
+                unsafe { add_eight(runs, members, eight, into) };
+            }
+        }
     }
 
     #[inline(always)]
@@ -488,6 +554,54 @@ impl Simd for Avx512 {
     unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
         // SAFETY: `Avx512` exists only where the processor has AVX2 too; the caller keeps the order.
         unsafe { of_ascending(positions, vertices) }
+    }
+
+    #[inline(always)]
+    fn add_runs(self, runs: &[[[f32; 3]; RUN]], members: &[Members], into: &mut RunExtents) {
+        // SAFETY: `Avx512` exists only where the processor has it; a run is three registers of coordinates,
+        // as is each row of `into`.
+        unsafe {
+            let load = |row: &[f32; 3 * RUN]| {
+                let first = row.as_ptr();
+                [
+                    _mm512_loadu_ps(first),
+                    _mm512_loadu_ps(first.add(16)),
+                    _mm512_loadu_ps(first.add(32)),
+                ]
+            };
+            let mut min = load(&into.min);
+            let mut max = load(&into.max);
+            let mut sum = load(&into.sum);
+            let mut group_min = [load(&into.group_min[0]), load(&into.group_min[1])];
+            let mut group_max = [load(&into.group_max[0]), load(&into.group_max[1])];
+            for (run, members) in runs.iter().zip(members) {
+                let first = run.as_ptr().cast::<f32>();
+                for k in 0..3 {
+                    let x = _mm512_loadu_ps(first.add(16 * k));
+                    _mm_prefetch::<_MM_HINT_T0>(first.wrapping_add(16 * k + PAGE).cast());
+                    min[k] = _mm512_min_ps(min[k], x);
+                    max[k] = _mm512_max_ps(max[k], x);
+                    sum[k] = _mm512_add_ps(sum[k], x);
+                    for side in 0..2 {
+                        let (low, high) = (&mut group_min[side][k], &mut group_max[side][k]);
+                        *low = _mm512_mask_min_ps(*low, members[side][k], *low, x);
+                        *high = _mm512_mask_max_ps(*high, members[side][k], *high, x);
+                    }
+                }
+            }
+            let store = |row: &mut [f32; 3 * RUN], registers: [__m512; 3]| {
+                for (k, register) in registers.into_iter().enumerate() {
+                    _mm512_storeu_ps(row.as_mut_ptr().add(16 * k), register);
+                }
+            };
+            store(&mut into.min, min);
+            store(&mut into.max, max);
+            store(&mut into.sum, sum);
+            for side in 0..2 {
+                store(&mut into.group_min[side], group_min[side]);
+                store(&mut into.group_max[side], group_max[side]);
+            }
+        }
     }
 
     #[inline(always)]

@@ -1,0 +1,362 @@
+//! Stage `bounds` of `Clusters`: boxes of the clusters of bodies that moved, and of the trees above them.
+//!
+//! ```text
+//! read    all boxes of a body whose clusters are not sorted; else its positions in the order of memory
+//! prove   whether its groups are beside all bodies that it could meet (see `remote`)
+//! near    then the boxes of what is in no group; else all boxes after all
+//! above   nodes; bodies that have flowed away from their clusters are clustered anew; clusters are sorted
+//! ```
+
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+use crate::error::Error;
+use crate::frame::Frame;
+use crate::grouping::bounds::{Bounds, RawBoundsArray};
+use crate::scene::Positions;
+use crate::settings::Recluster;
+use crate::stats::Statistics;
+
+use super::Job;
+use super::bounds::{self, Summary};
+use super::clusters::Options;
+use super::pairing::Worker;
+use super::remote::{Children, Extents};
+use super::simd::{Isa, Simd, dispatch};
+use super::world::{BodyCache, Caches, STALE, World};
+
+/// Nodes a task refits, of up to eight clusters each.
+const NODES: usize = 32;
+/// Runs of vertices a task reads: 48 KiB of positions.
+const RUNS: usize = 256;
+/// Primitives of all bodies together below which one thread finds the boxes. Positions have just been written,
+/// mostly by one thread, and what fits in its cache another fetches from there more slowly than it reads it.
+const PARALLEL_FROM: u64 = 120_000;
+/// Primitives of a body from which on its clusters are sorted.
+const SORTED_FROM: usize = 2_048;
+/// Bodies of a frame up to which clusters are sorted: more are everywhere.
+const SORTED_TO: usize = 8;
+
+/// What the stage is done with; kept from frame to frame.
+#[derive(Default)]
+pub(super) struct Refit {
+    tasks: Vec<Task>,
+    /// What each task has found.
+    found: Vec<Mutex<Found>>,
+}
+
+/// What a task does with the run `first..end` of something.
+#[derive(Debug, Clone, Copy)]
+enum What {
+    /// Reads runs of vertices.
+    Read,
+    /// Finds the boxes of nodes of level 1 and of all their clusters; of clusters where there is one only.
+    All,
+    /// The same of what is near, node by node.
+    Near,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Task {
+    participant: u32,
+    what: What,
+    first: u32,
+    end: u32,
+    /// Where the body's boxes go; valid within the frame that made the task.
+    leaves: RawBoundsArray,
+    parents: Option<RawBoundsArray>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Found {
+    extents: Extents,
+    /// Half the summed surface of the clusters.
+    surface: f32,
+}
+
+impl Refit {
+    /// All boxes that the frame needs.
+    pub fn run(
+        &mut self,
+        isa: Isa,
+        job: Job<'_>,
+        options: &Options,
+        caches: &mut Caches,
+        scratches: &mut [Worker],
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        let Job { scene, frame, .. } = job;
+        let sorts = isa.reads_runs()
+            && frame.between()
+            && frame.participants.len() <= SORTED_TO
+            && options.memory_budget.is_none();
+        self.tasks.clear();
+        for (ix, participant) in frame.participants.iter().enumerate() {
+            let body = frame.body(scene, ix);
+            let cache = caches[participant.id.index()].as_mut().expect("clustered");
+            let is_single = matches!(body.positions(), Positions::F32(_));
+            let is_fit = is_single && cache.remote.is_fit_for(body.n_vertices());
+            if participant.within || !sorts || !is_fit {
+                cache.unsort();
+            }
+            let stamp = body.positions_stamp();
+            if cache.positions_stamp == stamp {
+                continue;
+            }
+            let covered = cache.clustering.n_vertices_covered == Some(body.n_vertices());
+            if !(covered && is_single) {
+                frame.check_one(scene, ix)?;
+            }
+            cache.remote.grow_older();
+            let what = if cache.remote.is_sorted() {
+                What::Read
+            } else {
+                What::All
+            };
+            cache.extents = Extents::EMPTY;
+            self.push(ix, cache, what);
+        }
+        if !self.work(isa, job, caches, scratches) {
+            frame.check(scene)?;
+        }
+        self.tasks.clear();
+        for (ix, participant) in frame.participants.iter().enumerate() {
+            let slot = participant.id.index();
+            let is_beside = is_beside(frame, caches, ix);
+            let cache = caches[slot].as_mut().expect("clustered");
+            if !cache.remote.is_sorted() {
+                continue;
+            }
+            if !is_beside {
+                cache.unsort();
+                self.push(ix, cache, What::All);
+                continue;
+            }
+            stats.n_remote += cache.remote.n_clusters() as u64;
+            if cache.positions_stamp != frame.body(scene, ix).positions_stamp() {
+                self.push(ix, cache, What::Near);
+            }
+        }
+        self.work(isa, job, caches, scratches);
+        self.above(isa, job, options, caches, stats);
+        if sorts {
+            sort(job, caches);
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, participant_ix: usize, cache: &mut BodyCache, what: What) {
+        let (n_nodes, leaves, parents) = match &mut cache.bounds.levels[..] {
+            [] => return,
+            [leaves] => (1, leaves.raw(), None),
+            [leaves, parents, ..] => (parents.len(), leaves.raw(), Some(parents.raw())),
+        };
+        let (n, step) = match what {
+            What::Read => (cache.remote.n_runs(), RUNS),
+            What::All => (n_nodes, NODES),
+            What::Near => (cache.remote.near().len(), NODES),
+        };
+        if !matches!(what, What::Read) {
+            cache.surface = 0.0;
+        }
+        let tasks = (0..n).step_by(step).map(|first| Task {
+            participant: participant_ix as u32,
+            what,
+            first: first as u32,
+            end: n.min(first + step) as u32,
+            leaves,
+            parents,
+        });
+        self.tasks.extend(tasks);
+    }
+
+    /// Does the tasks; whether all positions that they read are certainly finite.
+    fn work(
+        &mut self,
+        isa: Isa,
+        job: Job<'_>,
+        caches: &mut Caches,
+        scratches: &mut [Worker],
+    ) -> bool {
+        let Job {
+            scene,
+            frame,
+            workers,
+            ..
+        } = job;
+        // Positions are mostly written in order: the last ones are in the nearest cache.
+        self.tasks.reverse();
+        let n_tasks = self.tasks.len();
+        self.found
+            .resize_with(n_tasks, || Mutex::new(Found::NOTHING));
+        let (tasks, found) = (&self.tasks, &self.found);
+        let world = World {
+            scene,
+            frame,
+            caches: Some(caches),
+        };
+        let work = |_: &mut Worker, ix: usize| {
+            let result = dispatch!(isa, work, (
+                world: World<'_> = world,
+                task: Task = tasks[ix],
+            ) -> Found);
+            *found[ix].lock().unwrap_or_else(PoisonError::into_inner) = result;
+        };
+        let parallel = frame.n_primitives() >= PARALLEL_FROM;
+        let n_workers = if parallel { workers.n() } else { 1 };
+        workers.for_each(&mut scratches[..n_workers], n_tasks, work);
+        let mut all_finite = true;
+        for (task, found) in self.tasks.iter().zip(&mut self.found) {
+            let found = found.get_mut().unwrap_or_else(PoisonError::into_inner);
+            all_finite &= found.extents.all_finite;
+            let slot = frame.participants[task.participant as usize].id.index();
+            let cache = caches[slot].as_mut().expect("clustered");
+            cache.surface += f64::from(found.surface);
+            match task.what {
+                What::Read => cache.extents.join(&found.extents),
+                What::All => cache.extents.whole.join(&found.extents.whole),
+                // Read before.
+                What::Near => {}
+            }
+        }
+        all_finite
+    }
+
+    /// Boxes of nodes above those of level 1; clusters anew what has flowed away from its clusters.
+    fn above(
+        &mut self,
+        isa: Isa,
+        job: Job<'_>,
+        options: &Options,
+        caches: &mut Caches,
+        stats: &mut Statistics,
+    ) {
+        let Job {
+            scene,
+            frame,
+            workers,
+            ..
+        } = job;
+        for (ix, participant) in frame.participants.iter().enumerate() {
+            let body = frame.body(scene, ix);
+            let cache = caches[participant.id.index()].as_mut().expect("clustered");
+            if cache.positions_stamp == body.positions_stamp() {
+                continue;
+            }
+            cache.positions_stamp = body.positions_stamp();
+            cache.bounds.refit_above(1, &cache.clustering.shape);
+            if cache.remote.is_sorted() {
+                continue;
+            }
+            let spread = cache.spread();
+            if options.recluster == Recluster::Auto && spread > STALE * cache.best_spread {
+                let start = Instant::now();
+                **cache = workers.install(body.n_primitives(), || BodyCache::new(body, isa));
+                if participant.within {
+                    cache.find_adjacency(workers);
+                }
+                cache.refit_all(body);
+                cache.positions_stamp = body.positions_stamp();
+                stats.n_clustered += 1;
+                stats.n_reclustered += 1;
+                stats.add_ms("clustering", start.elapsed().as_secs_f64() * 1e3);
+            } else {
+                cache.best_spread = cache.best_spread.min(spread);
+            }
+        }
+    }
+}
+
+/// Whether a participant's groups are beside all that it could meet.
+fn is_beside(frame: &Frame, caches: &Caches, ix: usize) -> bool {
+    let cache = |ix: usize| {
+        let slot = frame.participants[ix].id.index();
+        caches[slot].as_ref().expect("clustered")
+    };
+    let extents = &cache(ix).extents;
+    met(frame, ix).all(|other| extents.are_beside(&cache(other).extents.whole))
+}
+
+/// Whom a participant could meet.
+fn met(frame: &Frame, ix: usize) -> impl Iterator<Item = usize> {
+    (0..frame.participants.len()).filter(move |&other| other != ix && frame.meets(ix, other))
+}
+
+/// Sorts the clusters of participants for which it is time.
+fn sort(job: Job<'_>, caches: &mut Caches) {
+    let Job { scene, frame, .. } = job;
+    for (ix, participant) in frame.participants.iter().enumerate() {
+        let body = frame.body(scene, ix);
+        let slot = participant.id.index();
+        let cache = caches[slot].as_mut().expect("clustered");
+        let could = !participant.within
+            && body.n_primitives() >= SORTED_FROM
+            && matches!(body.positions(), Positions::F32(_));
+        if !could || cache.remote.is_sorted() {
+            continue;
+        }
+        let mut others = Bounds::EMPTY;
+        for other in met(frame, ix) {
+            let slot = frame.participants[other].id.index();
+            others.join(&caches[slot].as_ref().expect("clustered").extents.whole);
+        }
+        let cache = &mut **caches[slot].as_mut().expect("clustered");
+        let (clustering, bounds) = (&cache.clustering, &mut cache.bounds);
+        let (n_vertices, extents) = (body.n_vertices(), &mut cache.extents);
+        cache
+            .remote
+            .sort(clustering, n_vertices, bounds, &others, extents);
+    }
+}
+
+impl Found {
+    const NOTHING: Found = Found {
+        extents: Extents::EMPTY,
+        surface: 0.0,
+    };
+}
+
+/// One task.
+#[inline(always)]
+fn work<S: Simd>(simd: S, world: World<'_>, task: Task) -> Found {
+    let positions = world.body(task.participant).positions;
+    let cache = world.cache(task.participant);
+    let (clustering, run) = (&cache.clustering, task.first as usize..task.end as usize);
+    let mut summary = Summary::EMPTY;
+    if let (What::Read, Positions::F32(positions)) = (task.what, positions) {
+        return Found {
+            extents: cache.remote.read(simd, positions, run),
+            surface: 0.0,
+        };
+    }
+    for ix in run {
+        let (node, only) = match (task.what, task.parents) {
+            (What::Near, _) => {
+                let near = cache.remote.near()[ix];
+                (near.node as usize, near.children)
+            }
+            _ => (ix, u8::MAX),
+        };
+        let clusters = match task.parents {
+            Some(_) => Children::new(clustering.shape.children(1, node), only),
+            None => Children::new(node..node + 1, only),
+        };
+        // SAFETY: no two tasks name the same node of the same body, and nobody reads boxes before all
+        // tasks are done.
+        unsafe {
+            let of_node = bounds::of_clusters(simd, positions, clustering, clusters, task.leaves);
+            if let Some(parents) = task.parents {
+                parents.put(node, &of_node.bounds);
+            }
+            summary.join(&of_node);
+        }
+    }
+    Found {
+        extents: Extents {
+            whole: summary.bounds,
+            all_finite: summary.all_finite,
+            ..Extents::EMPTY
+        },
+        surface: summary.surface,
+    }
+}
