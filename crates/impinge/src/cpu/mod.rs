@@ -9,6 +9,7 @@ mod group_cache;
 pub(crate) mod kept;
 pub(crate) mod narrow;
 pub(crate) mod pairing;
+mod places;
 mod refit;
 pub(crate) mod remote;
 pub(crate) mod simd;

@@ -21,6 +21,8 @@ use std::time::{Duration, Instant};
 
 use crate::error::Error;
 
+use super::places::Places;
+
 /// How long a helper spins for the next region before it yields between looks.
 const SPIN: Duration = Duration::from_micros(50);
 /// How long a helper lingers within a shift, and at most after one.
@@ -182,6 +184,7 @@ impl Workers {
         if !self.wakes.load(Ordering::Relaxed) {
             return;
         }
+        self.crew.places.caller_is_here();
         let helpers = self.helpers.get_or_init(|| {
             let start = |seat| {
                 let crew = Arc::clone(&self.crew);
@@ -258,6 +261,7 @@ struct Crew {
     /// Which helpers sleep, or are about to.
     asleep: Box<[AtomicBool]>,
     panic: Mutex<Option<Box<dyn Any + Send>>>,
+    places: Places,
 }
 
 const OPEN: u64 = 1;
@@ -281,6 +285,7 @@ impl Crew {
             quit: AtomicBool::new(false),
             asleep: (0..n_helpers).map(|_| AtomicBool::new(false)).collect(),
             panic: Mutex::new(None),
+            places: Places::new(n_helpers),
         }
     }
 
@@ -321,6 +326,7 @@ impl Crew {
 
     /// A helper's life.
     fn serve(&self, seat: usize) {
+        self.places.helper_is_here(seat);
         let mut last_region = 0;
         let mut since = Instant::now();
         let mut looks = 0u32;
