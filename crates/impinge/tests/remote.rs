@@ -136,7 +136,7 @@ fn no_motion_loses_a_pair() {
                 let t = frame as f32 / 24.0;
                 for (ix, body) in [a, b].into_iter().enumerate() {
                     let motion = if ix == mover % 2 { motion } else { still };
-                    if ix == mover || mover == 2 || frame == 0 {
+                    if ix == mover || mover == 2 || frame < 5 {
                         place(&mut scene, body, &ball, motion, t);
                     }
                 }
@@ -231,7 +231,7 @@ fn whoever_asks_for_all_boxes_gets_them() {
         }
     }
     assert!(contest.n_frames_with > 10);
-    for _ in 0..4 {
+    for _ in 0..20 {
         scene.set_positions(a, &folded.positions).unwrap();
         scene.set_filter(c, alone).unwrap();
         contest.frame(&scene, &Query::all(), "c meets nobody");
@@ -319,4 +319,32 @@ fn meshes_change_while_clusters_are_left_out() {
         .add_to(&mut scene)
         .unwrap();
     contest.frame(&scene, &Query::between(a, b), "another on the other side");
+}
+
+#[test]
+fn bodies_that_come_to_touch_meet() {
+    let sheet = surfaces::cloth(40, 40, 1.0);
+    let mut scene = Scene::new();
+    let a = sheet.add_to(&mut scene).unwrap();
+    let b = sheet.add_to(&mut scene).unwrap();
+    let (low, high) = sheet.bounds().unwrap();
+    // Along each axis in which it has an extent, from either side: beside it at first, then edge to edge.
+    for axis in [0, 1, 2].into_iter().filter(|&axis| low[axis] < high[axis]) {
+        for width in [low[axis] - high[axis], high[axis] - low[axis]] {
+            let mut contest = Contest::new();
+            for gap in [3.0, 3.0, 3.0, 3.0, 0.0, 3.0, 3.0, 0.0] {
+                let mut offset = [0.0; 3];
+                offset[axis] = width + width.signum() * gap;
+                scene.set_positions(a, &sheet.positions).unwrap();
+                scene
+                    .set_positions(b, &sheet.translated(offset).positions)
+                    .unwrap();
+                let n_frames_with_pairs = contest.n_frames_with_pairs;
+                contest.frame(&scene, &Query::between(a, b), &format!("{offset:?}"));
+                let met = contest.n_frames_with_pairs > n_frames_with_pairs;
+                assert_eq!(met, gap == 0.0, "{offset:?}");
+            }
+            assert!(contest.n_frames_with > 3);
+        }
+    }
 }

@@ -13,7 +13,7 @@ use std::time::Instant;
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::grouping::bounds::{Bounds, RawBoundsArray};
-use crate::scene::Positions;
+use crate::scene::{Body, Positions};
 use crate::settings::Recluster;
 use crate::stats::Statistics;
 
@@ -21,7 +21,7 @@ use super::Job;
 use super::bounds::{self, Summary};
 use super::clusters::Options;
 use super::pairing::Worker;
-use super::remote::{Children, Extents};
+use super::remote::{Children, Extents, Groups};
 use super::simd::{Isa, Simd, dispatch};
 use super::world::{BodyCache, Caches, STALE, World};
 
@@ -122,17 +122,20 @@ impl Refit {
         self.tasks.clear();
         for (ix, participant) in frame.participants.iter().enumerate() {
             let slot = participant.id.index();
-            let is_beside = is_beside(frame, caches, ix);
-            let cache = caches[slot].as_mut().expect("clustered");
+            let back = back(frame, caches, ix);
+            let cache = &mut **caches[slot].as_mut().expect("clustered");
             if !cache.remote.is_sorted() {
                 continue;
             }
-            if !is_beside {
-                cache.unsort();
-                self.push(ix, cache, What::All);
-                continue;
+            if !back.is_empty() {
+                cache.positions_stamp = 0;
+                if !cache.remote.come_back(back, &cache.clustering) {
+                    cache.unsort();
+                    self.push(ix, cache, What::All);
+                    continue;
+                }
             }
-            stats.n_remote += cache.remote.n_clusters() as u64;
+            stats.n_remote += (cache.clustering.n_clusters() - cache.remote.n_near()) as u64;
             if cache.positions_stamp != frame.body(scene, ix).positions_stamp() {
                 self.push(ix, cache, What::Near);
             }
@@ -140,7 +143,7 @@ impl Refit {
         self.work(isa, job, caches, scratches);
         self.above(isa, job, options, caches, stats);
         if sorts {
-            sort(job, caches);
+            sort(job, caches, scratches);
         }
         Ok(())
     }
@@ -267,45 +270,90 @@ impl Refit {
     }
 }
 
-/// Whether a participant's groups are beside all that it could meet.
-fn is_beside(frame: &Frame, caches: &Caches, ix: usize) -> bool {
-    let cache = |ix: usize| {
-        let slot = frame.participants[ix].id.index();
-        caches[slot].as_ref().expect("clustered")
-    };
-    let extents = &cache(ix).extents;
-    met(frame, ix).all(|other| extents.are_beside(&cache(other).extents.whole))
-}
-
 /// Whom a participant could meet.
 fn met(frame: &Frame, ix: usize) -> impl Iterator<Item = usize> {
     (0..frame.participants.len()).filter(move |&other| other != ix && frame.meets(ix, other))
 }
 
+/// How far a participant reaches.
+fn extents<'a>(frame: &Frame, caches: &'a Caches, ix: usize) -> &'a Extents {
+    let slot = frame.participants[ix].id.index();
+    &caches[slot].as_ref().expect("clustered").extents
+}
+
+/// The groups of a participant that are not beside all that it could meet.
+fn back(frame: &Frame, caches: &Caches, ix: usize) -> Groups {
+    let own = extents(frame, caches, ix);
+    met(frame, ix).fold(Groups::default(), |back, other| {
+        back.union(own.back_at(&extents(frame, caches, other).whole))
+    })
+}
+
+/// A body whose clusters are to be sorted, and the joint box of all that it could meet.
+struct Due<'a> {
+    body: &'a Body,
+    cache: &'a mut BodyCache,
+    others: Bounds,
+}
+
 /// Sorts the clusters of participants for which it is time.
-fn sort(job: Job<'_>, caches: &mut Caches) {
-    let Job { scene, frame, .. } = job;
+fn sort(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker]) {
+    let Job {
+        scene,
+        frame,
+        workers,
+        ..
+    } = job;
+    let mut others = [Bounds::EMPTY; SORTED_TO];
+    for (ix, others) in others[..frame.participants.len()].iter_mut().enumerate() {
+        for other in met(frame, ix) {
+            others.join(&extents(frame, caches, other).whole);
+        }
+    }
+    let mut due: [Mutex<Option<Due<'_>>>; SORTED_TO] = Default::default();
+    let mut n_due = 0;
+    let mut caches = caches.iter_mut().enumerate();
     for (ix, participant) in frame.participants.iter().enumerate() {
-        let body = frame.body(scene, ix);
         let slot = participant.id.index();
-        let cache = caches[slot].as_mut().expect("clustered");
+        // They come in the order of their slots.
+        let cache = caches.find(|&(other, _)| other == slot);
+        let Some((_, Some(cache))) = cache else {
+            continue;
+        };
+        let body = frame.body(scene, ix);
         let could = !participant.within
             && body.n_primitives() >= SORTED_FROM
             && matches!(body.positions(), Positions::F32(_));
-        if !could || cache.remote.is_sorted() {
-            continue;
+        if could && cache.remote.is_due() {
+            due[n_due] = Mutex::new(Some(Due {
+                body,
+                cache,
+                others: others[ix],
+            }));
+            n_due += 1;
         }
-        let mut others = Bounds::EMPTY;
-        for other in met(frame, ix) {
-            let slot = frame.participants[other].id.index();
-            others.join(&caches[slot].as_ref().expect("clustered").extents.whole);
+    }
+    workers.for_each(scratches, n_due, |_, ix| {
+        let mut due = due[ix].lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(due) = &mut *due {
+            due.sort();
         }
-        let cache = &mut **caches[slot].as_mut().expect("clustered");
-        let (clustering, bounds) = (&cache.clustering, &mut cache.bounds);
-        let (n_vertices, extents) = (body.n_vertices(), &mut cache.extents);
-        cache
-            .remote
-            .sort(clustering, n_vertices, bounds, &others, extents);
+    });
+}
+
+impl Due<'_> {
+    fn sort(&mut self) {
+        let BodyCache {
+            clustering,
+            bounds,
+            extents,
+            remote,
+            ..
+        } = &mut *self.cache;
+        let n_vertices = self.body.n_vertices();
+        if !remote.sort(clustering, n_vertices, bounds, &self.others, extents) {
+            self.cache.unsort();
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! A cluster's box takes a look at its vertices wherever they lie in memory; read in the order of memory, vertices
 //! cost a fraction of that. Bodies that meet mostly do so with a part of them, and what lies beside the
-//! other body mostly stays there for many frames. So now and then clusters are *sorted*: those that lie beside all
+//! other body mostly stays there for many frames. So clusters are *sorted*: those that lie beside all
 //! that their body could meet go into one of six groups, below or above it along x, y or z.
 //!
 //! ```text
@@ -14,7 +14,8 @@
 //! Each frame reads all positions in order and finds the interval that each group spans along its axis, and the box of
 //! the whole. A group whose interval touches none of the other boxes is proven *remote*, whatever has moved and
 //! however: none of its primitives can be in a pair, and its clusters keep empty boxes. A group that touches one has come
-//! back: then all boxes are found, as without sorting.
+//! back: its clusters are near in this frame, and are sorted again at its end, with more room between them and the others if
+//! the group has come back soon.
 //!
 //! In: positions, groups. Out: [`Extents`]. Cost: 12 bytes of positions and 0.75 of membership a vertex, read once.
 
@@ -151,12 +152,17 @@ impl Extents {
         self.all_finite &= other.all_finite;
     }
 
-    /// Whether every group is beside a box: closed intervals that share no number.
-    pub fn are_beside(&self, other: &Bounds) -> bool {
-        self.groups.iter().all(|group| {
-            (0..3)
-                .all(|axis| group.max[axis] < other.min[axis] || other.max[axis] < group.min[axis])
-        })
+    /// The groups that are not beside a box, that is, closed intervals that share a number.
+    pub fn back_at(&self, other: &Bounds) -> Groups {
+        let mut back = Groups::default();
+        for (is_above, group) in [(false, &self.groups[0]), (true, &self.groups[1])] {
+            for axis in 0..3 {
+                if group.min[axis] <= other.max[axis] && other.min[axis] <= group.max[axis] {
+                    back.insert(Side { axis, is_above });
+                }
+            }
+        }
+        back
     }
 }
 
@@ -191,20 +197,48 @@ fn extents<S: Simd>(simd: S, positions: &[[f32; 3]], members: &[Members]) -> Ext
     extents
 }
 
-/// The clusters of a body, sorted or not, and when to sort them. Memory is kept.
-#[derive(Debug, Default)]
-pub(crate) struct Remote {
-    /// Frames since clusters were sorted. Those in a group have empty boxes as long as there is an age.
-    age: Option<u32>,
-    /// Run by run.
-    members: Vec<Members>,
-    n_vertices: usize,
-    n_beside: usize,
-    /// What is in no group.
-    near: Vec<SomeClusters>,
-    outlook: Outlook,
-    /// Of each cluster, while they are sorted.
-    sides: Vec<Option<Side>>,
+/// Where a cluster lies beside others: the name of its group.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Side {
+    axis: usize,
+    is_above: bool,
+}
+
+impl Side {
+    fn number(self) -> usize {
+        3 * usize::from(self.is_above) + self.axis
+    }
+}
+
+/// Some of the groups.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Groups(u8);
+
+impl Groups {
+    const ALL: Groups = Groups(0b11_1111);
+
+    fn insert(&mut self, side: Side) {
+        self.0 |= 1 << side.number();
+    }
+
+    fn contains(self, side: Side) -> bool {
+        self.0 >> side.number() & 1 == 1
+    }
+
+    pub fn union(self, other: Groups) -> Groups {
+        Groups(self.0 | other.0)
+    }
+
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    fn sides(self) -> impl Iterator<Item = Side> {
+        [false, true]
+            .into_iter()
+            .flat_map(|is_above| (0..3).map(move |axis| Side { axis, is_above }))
+            .filter(move |&side| self.contains(side))
+    }
 }
 
 /// Some clusters of a node of level 1: bit `k` for its child `k`.
@@ -214,30 +248,44 @@ pub(crate) struct SomeClusters {
     pub children: u8,
 }
 
-/// Where a cluster lies beside others.
-#[derive(Debug, Clone, Copy)]
-struct Side {
-    axis: u8,
-    is_above: bool,
+/// The clusters of a body, sorted or not, and when to sort them. Memory is kept.
+#[derive(Debug, Default)]
+pub(crate) struct Remote {
+    is_sorted: bool,
+    /// The group of each cluster, none for those that are near. Those in a group have empty boxes.
+    sides: Vec<Option<Side>>,
+    /// What is near.
+    near: Vec<SomeClusters>,
+    /// The groups by vertices, run by run.
+    members: Vec<Members>,
+    n_vertices: usize,
+    /// Groups whose clusters are to be sorted at the frame's end.
+    unsorted: Groups,
+    /// Clusters that have just been found to lie beside the others.
+    fresh: Vec<u32>,
+    outlook: Outlook,
 }
-
-/// Groups that hold a lesser share of the clusters gain nothing.
-const LEAST_SHARE: f32 = 0.25;
 
 impl Remote {
     /// Whether the clusters are sorted.
     pub fn is_sorted(&self) -> bool {
-        self.age.is_some()
+        self.is_sorted
     }
 
-    /// How many clusters are in groups.
-    pub fn n_clusters(&self) -> usize {
-        self.age.map_or(0, |_| self.n_beside)
+    /// Whether clusters are to be sorted at the frame's end, once boxes of all that is near have been found.
+    pub fn is_due(&self) -> bool {
+        !self.unsorted.is_empty() || (!self.is_sorted && self.outlook.wait == 0)
     }
 
-    /// What is in no group.
+    /// What is near.
     pub fn near(&self) -> &[SomeClusters] {
         &self.near
+    }
+
+    /// How many clusters are near.
+    pub fn n_near(&self) -> usize {
+        let near = self.near.iter().map(|near| near.children.count_ones());
+        near.sum::<u32>() as usize
     }
 
     /// How many runs of vertices there are.
@@ -247,22 +295,35 @@ impl Remote {
 
     /// Whether it can be read with so many positions, and need not be renewed.
     pub fn is_fit_for(&self, n_vertices: usize) -> bool {
-        self.n_vertices == n_vertices && self.age.is_some_and(|age| age < RENEWED_AFTER)
+        self.n_vertices == n_vertices && self.outlook.age < RENEWED_AFTER
     }
 
-    /// The positions are read once more.
+    /// A frame of a body that moved begins.
     pub fn grow_older(&mut self) {
-        self.age = self.age.map(|age| age + 1);
+        self.outlook.grow_older(self.is_sorted);
     }
 
     /// Ends it. All boxes must be found again if this says so.
     #[must_use]
     pub fn end(&mut self) -> bool {
-        let age = self.age.take();
-        if let Some(age) = age {
-            self.outlook.ended(age);
+        self.unsorted = Groups::default();
+        std::mem::take(&mut self.is_sorted)
+    }
+
+    /// Some groups have come back: their clusters are near from now on. Or else, if too many have come back of late, this says so:
+    /// then it should be ended.
+    pub fn come_back(&mut self, groups: Groups, clustering: &Clustering) -> bool {
+        if !self.outlook.affords(groups) {
+            return false;
         }
-        age.is_some()
+        self.unsorted = groups;
+        for side in &mut self.sides {
+            if side.is_some_and(|side| groups.contains(side)) {
+                *side = None;
+            }
+        }
+        self.list_near(clustering);
+        true
     }
 
     /// The extents of some of the body's runs of vertices.
@@ -272,8 +333,9 @@ impl Remote {
         extents(simd, &positions[vertices], &self.members[runs])
     }
 
-    /// To be called in a frame that has found all boxes. Where it is time, sorts clusters by their boxes against the joint box
-    /// of `others`, empties the boxes of those that lie beside it, and finds how far their groups reach.
+    /// Sorts what is near, by its boxes, against the joint box of `others`: empties the boxes of clusters that lie beside it, and
+    /// finds how far their groups reach. Whether there are enough of them: else it should be ended.
+    #[must_use]
     pub fn sort(
         &mut self,
         clustering: &Clustering,
@@ -281,55 +343,98 @@ impl Remote {
         bounds: &mut TreeBounds,
         others: &Bounds,
         extents: &mut Extents,
-    ) {
+    ) -> bool {
         let [leaves, parents, ..] = &mut bounds.levels[..] else {
-            return;
+            return false;
         };
-        if !self.outlook.is_due() {
-            return;
+        if !self.is_sorted {
+            self.unsorted = Groups::ALL;
+            self.outlook.begin();
+            self.n_vertices = n_vertices;
+            self.sides.clear();
+            self.sides.resize(leaves.len(), None);
+            self.members.clear();
+            self.members
+                .resize(n_vertices.div_ceil(RUN), Members::default());
         }
         let slack = self.outlook.slack(&extents.whole);
-        self.sides.clear();
-        self.sides
-            .extend((0..leaves.len()).map(|cluster| side(&leaves.at(cluster), others, slack)));
-        self.n_beside = self.sides.iter().flatten().count();
-        if (self.n_beside as f32) < LEAST_SHARE * self.sides.len() as f32 {
-            self.outlook.nothing_found();
-            return;
-        }
-        self.age = Some(0);
-        self.n_vertices = n_vertices;
-        self.members.clear();
-        self.members
-            .resize(n_vertices.div_ceil(RUN), Members::default());
-        self.near.clear();
-        extents.groups = Extents::EMPTY.groups;
-        for node in 0..parents.len() {
-            let mut near = 0u8;
-            for (child, cluster) in clustering.shape.children(1, node).enumerate() {
-                let Some(side) = self.sides[cluster] else {
-                    near |= 1 << child;
-                    continue;
-                };
-                let bounds = leaves.at(cluster);
-                leaves.put(cluster, &Bounds::EMPTY);
-                let (group, axis) = (usize::from(side.is_above), usize::from(side.axis));
-                let extent = &mut extents.groups[group];
-                extent.min[axis] = lesser(extent.min[axis], bounds.min[axis]);
-                extent.max[axis] = greater(extent.max[axis], bounds.max[axis]);
-                for &vertex in clustering.vertices(cluster) {
-                    let (run, place) = (vertex as usize / RUN, vertex as usize % RUN);
-                    let coordinate = 3 * place + axis;
-                    self.members[run][group][coordinate / RUN] |= 1 << (coordinate % RUN);
+        self.fresh.clear();
+        let mut n_beside = 0;
+        for (cluster, known) in self.sides.iter_mut().enumerate() {
+            if known.is_none() {
+                *known = side(&leaves.at(cluster), others, &slack);
+                if known.is_some() {
+                    self.fresh.push(cluster as u32);
                 }
             }
-            if near == 0 {
+            n_beside += usize::from(known.is_some());
+        }
+        if 4 * n_beside < leaves.len() {
+            self.outlook.too_few();
+            return false;
+        }
+        self.is_sorted = true;
+        let unsorted = std::mem::take(&mut self.unsorted);
+        self.empty(unsorted, extents);
+        for &cluster in &self.fresh {
+            let cluster = cluster as usize;
+            let Some(side) = self.sides[cluster] else {
+                continue;
+            };
+            let found = leaves.at(cluster);
+            leaves.put(cluster, &Bounds::EMPTY);
+            let (group, axis) = (usize::from(side.is_above), side.axis);
+            let extent = &mut extents.groups[group];
+            extent.min[axis] = lesser(extent.min[axis], found.min[axis]);
+            extent.max[axis] = greater(extent.max[axis], found.max[axis]);
+            for &vertex in clustering.vertices(cluster) {
+                let (run, place) = (vertex as usize / RUN, vertex as usize % RUN);
+                let coordinate = 3 * place + axis;
+                self.members[run][group][coordinate / RUN] |= 1 << (coordinate % RUN);
+            }
+        }
+        self.list_near(clustering);
+        let mut near = self.near.iter().map(|near| near.node as usize).peekable();
+        for node in 0..parents.len() {
+            if near.next_if_eq(&node).is_none() {
                 parents.put(node, &Bounds::EMPTY);
-            } else {
-                self.near.push(SomeClusters {
-                    node: node as u32,
-                    children: near,
-                });
+            }
+        }
+        true
+    }
+
+    /// Empties some groups.
+    fn empty(&mut self, groups: Groups, extents: &mut Extents) {
+        let mut kept = [[!0u16; 3]; 2];
+        for side in groups.sides() {
+            let group = usize::from(side.is_above);
+            for coordinate in (side.axis..COORDINATES).step_by(3) {
+                kept[group][coordinate / RUN] &= !(1 << (coordinate % RUN));
+            }
+            extents.groups[group].min[side.axis] = f32::INFINITY;
+            extents.groups[group].max[side.axis] = f32::NEG_INFINITY;
+        }
+        for members in &mut self.members {
+            for (members, kept) in members
+                .as_flattened_mut()
+                .iter_mut()
+                .zip(kept.as_flattened())
+            {
+                *members &= kept;
+            }
+        }
+    }
+
+    fn list_near(&mut self, clustering: &Clustering) {
+        self.near.clear();
+        for node in 0..clustering.shape.n_nodes(1) {
+            let mut children = 0u8;
+            for (child, cluster) in clustering.shape.children(1, node).enumerate() {
+                children |= u8::from(self.sides[cluster].is_none()) << child;
+            }
+            if children != 0 {
+                let node = node as u32;
+                self.near.push(SomeClusters { node, children });
             }
         }
     }
@@ -341,22 +446,24 @@ impl Remote {
     }
 }
 
-/// Where a box is farthest beside another, if by more than `slack`.
-fn side(cluster: &Bounds, others: &Bounds, slack: f32) -> Option<Side> {
-    let mut side = None;
-    let mut widest = slack;
+/// The side on which a box is farthest beside others, measured by the slack that is asked for there, if it is beside them by more
+/// than that.
+fn side(cluster: &Bounds, others: &Bounds, slack: &[f32; 6]) -> Option<Side> {
+    let mut best = None;
+    let mut farthest = 1.0;
     for axis in 0..3 {
         let below = others.min[axis] - cluster.max[axis];
         let above = cluster.min[axis] - others.max[axis];
         for (gap, is_above) in [(below, false), (above, true)] {
-            if gap > widest {
-                widest = gap;
-                let axis = axis as u8;
-                side = Some(Side { axis, is_above });
+            let side = Side { axis, is_above };
+            let far = gap / slack[side.number()];
+            if gap > 0.0 && far > farthest {
+                farthest = far;
+                best = Some(side);
             }
         }
     }
-    side
+    best
 }
 
 /// The clusters among a node's children.
@@ -394,61 +501,91 @@ impl Iterator for Children {
 struct Outlook {
     /// Frames to wait.
     wait: u32,
-    /// What the next failure makes of it.
+    /// The same, when the groups come back too often.
     next_wait: u32,
-    /// How far beside the others a cluster must be, as a share of the body's longest side.
-    slack: f32,
+    /// Frames since all were sorted.
+    age: u32,
+    /// Frames since each group was.
+    ages: [u32; 6],
+    /// Frames that sorting has paid for.
+    credit: u32,
+    /// How far beside the others a cluster must be to be in a group, as a share of the body's longest side.
+    slack: [f32; 6],
 }
 
 /// Frames after which all boxes are found again, to see what else is remote by now and how well clusters fit.
 const RENEWED_AFTER: u32 = 64;
-/// Groups that did not last for so many frames were not worth their making.
-const WORTH: u32 = 8;
+/// Frames that a group should last. To sort it again costs what it saves in some of them.
+const LASTS: u32 = 24;
+const COST: u32 = 6;
+const MOST_CREDIT: u32 = 4 * COST;
 const SLACK: RangeInclusive<f32> = 1.0 / 128.0..=0.25;
 
 impl Default for Outlook {
     fn default() -> Self {
         Outlook {
             // The second frame shows whether the body moves.
-            wait: 1,
+            wait: 2,
             next_wait: 1,
-            slack: *SLACK.start(),
+            age: 0,
+            ages: [0; 6],
+            credit: 0,
+            slack: [*SLACK.start(); 6],
         }
     }
 }
 
 impl Outlook {
-    /// Whether this frame should sort.
-    fn is_due(&mut self) -> bool {
-        let is_due = self.wait == 0;
-        self.wait = self.wait.saturating_sub(1);
-        is_due
-    }
-
-    /// The slack for a body of this size.
-    fn slack(&self, whole: &Bounds) -> f32 {
+    /// The slacks for a body of this size.
+    fn slack(&self, whole: &Bounds) -> [f32; 6] {
         let sides = [0, 1, 2].map(|axis| whole.max[axis] - whole.min[axis]);
-        self.slack * greater(sides[0], greater(sides[1], sides[2]))
+        let longest = greater(sides[0], greater(sides[1], sides[2]));
+        self.slack.map(|slack| slack * longest)
     }
 
-    /// Too little was beside the others.
-    fn nothing_found(&mut self) {
+    fn grow_older(&mut self, is_sorted: bool) {
+        self.wait = self.wait.saturating_sub(1);
+        self.age += u32::from(is_sorted);
+        self.ages = self.ages.map(|age| age + 1);
+        self.credit = (self.credit + 1).min(MOST_CREDIT);
+    }
+
+    /// All are sorted.
+    fn begin(&mut self) {
+        if self.age >= RENEWED_AFTER {
+            self.next_wait = 1;
+            self.slack = self.slack.map(|slack| slack_for(slack, RENEWED_AFTER));
+        }
+        self.age = 0;
+        self.ages = [0; 6];
+        self.credit = COST;
+    }
+
+    /// Groups have come back: whether it pays to sort them again.
+    fn affords(&mut self, groups: Groups) -> bool {
+        for side in groups.sides() {
+            let group = side.number();
+            self.slack[group] = slack_for(self.slack[group], self.ages[group]);
+            self.ages[group] = 0;
+        }
+        if self.credit >= COST {
+            self.credit -= COST;
+            return true;
+        }
+        self.wait = self.next_wait;
+        self.next_wait = (2 * self.next_wait).min(RENEWED_AFTER);
+        false
+    }
+
+    /// Hardly any cluster lies beside the others.
+    fn too_few(&mut self) {
         self.wait = RENEWED_AFTER / 4;
     }
+}
 
-    /// Groups have ended at this age.
-    fn ended(&mut self, age: u32) {
-        if age < WORTH {
-            self.slack = (2.0 * self.slack).min(*SLACK.end());
-            self.wait = self.next_wait;
-            self.next_wait = (2 * self.next_wait).min(RENEWED_AFTER);
-        } else {
-            self.next_wait = 1;
-            if age >= RENEWED_AFTER {
-                self.slack = (0.5 * self.slack).max(*SLACK.start());
-            }
-        }
-    }
+/// The slack with which a group would have lasted, by how long it lasted with this one.
+fn slack_for(slack: f32, age: u32) -> f32 {
+    (slack * LASTS as f32 / (age + 1) as f32).clamp(*SLACK.start(), *SLACK.end())
 }
 
 #[cfg(test)]
