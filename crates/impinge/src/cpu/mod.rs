@@ -5,6 +5,7 @@ pub(crate) mod cells;
 pub(crate) mod clusters;
 pub(crate) mod cull;
 pub(crate) mod dispatch;
+pub(crate) mod extents;
 mod group_cache;
 pub(crate) mod kept;
 pub(crate) mod narrow;

@@ -20,8 +20,9 @@ use crate::stats::Statistics;
 use super::Job;
 use super::bounds::{self, Summary};
 use super::clusters::Options;
+use super::extents::{Extents, Groups};
 use super::pairing::Worker;
-use super::remote::{Children, Extents, Groups};
+use super::remote::Children;
 use super::simd::{Isa, Simd, dispatch};
 use super::world::{BodyCache, Caches, STALE, World};
 

@@ -17,229 +17,16 @@
 //! back: its clusters are near in this frame, and are sorted again at its end, with more room between them and the others if
 //! the group has come back soon.
 //!
-//! In: positions, groups. Out: [`Extents`]. Cost: 12 bytes of positions and 0.75 of membership a vertex, read once.
+//! In: boxes of clusters, then positions frame by frame. Out: which clusters' boxes a frame needs.
 
 use std::ops::{Range, RangeInclusive};
 
-use crate::grouping::bounds::{Bounds, greater, lesser};
+use crate::grouping::bounds::{Bounds, greater};
 use crate::grouping::clusters::Clustering;
 
 use super::bounds::TreeBounds;
+use super::extents::{self, Extents, Groups, Members, RUN, Side};
 use super::simd::{Lanes, Simd};
-
-/// Vertices read together.
-pub(crate) const RUN: usize = 16;
-/// Their coordinates.
-pub(crate) const COORDINATES: usize = 3 * RUN;
-
-/// Which coordinates of a run belong to a group: those along x of what is beside others along x, and so on. One bit
-/// each, first below, then above; a vertex of several clusters may be in several groups.
-pub(crate) type Members = [[u16; 3]; 2];
-
-/// What a kernel finds, coordinate by coordinate of a run.
-#[derive(Debug, Clone)]
-#[repr(C, align(64))]
-pub(crate) struct RunExtents {
-    pub min: [f32; COORDINATES],
-    pub max: [f32; COORDINATES],
-    pub sum: [f32; COORDINATES],
-    pub group_min: [[f32; COORDINATES]; 2],
-    pub group_max: [[f32; COORDINATES]; 2],
-}
-
-impl RunExtents {
-    pub const EMPTY: RunExtents = RunExtents {
-        min: [f32::INFINITY; COORDINATES],
-        max: [f32::NEG_INFINITY; COORDINATES],
-        sum: [0.0; COORDINATES],
-        group_min: [[f32::INFINITY; COORDINATES]; 2],
-        group_max: [[f32::NEG_INFINITY; COORDINATES]; 2],
-    };
-}
-
-/// For each byte of members, all ones in the place of what is none: as f32 a NaN, which minimum and maximum pass over.
-static NO_MEMBERS: [[u32; 8]; 256] = {
-    let mut table = [[0; 8]; 256];
-    let mut k = 0;
-    while k < 8 * 256 {
-        if (k / 8) >> (k % 8) & 1 == 0 {
-            table[k / 8][k % 8] = u32::MAX;
-        }
-        k += 1;
-    }
-    table
-};
-
-/// Those of one eight of a run's coordinates that are not in a group.
-#[inline(always)]
-pub(crate) fn no_members(members: &Members, side: usize, eight: usize) -> &'static [u32; 8] {
-    let byte = members[side][eight / 2] >> (8 * (eight % 2)) & 0xff;
-    &NO_MEMBERS[usize::from(byte)]
-}
-
-/// Runs looked at again and again, eight coordinates of each at a time, while they are in the first-level cache.
-pub(crate) const BLOCK: usize = 32;
-
-/// Adds runs with their members, as plain loops.
-#[inline(always)]
-pub(crate) fn add_runs(runs: &[[[f32; 3]; RUN]], members: &[Members], into: &mut RunExtents) {
-    for (runs, members) in runs.chunks(BLOCK).zip(members.chunks(BLOCK)) {
-        for eight in 0..COORDINATES / 8 {
-            add_eight(runs, members, eight, into);
-        }
-    }
-}
-
-/// The same for one eight of their coordinates: so few that all that is found of them stays in registers.
-#[inline(always)]
-fn add_eight(runs: &[[[f32; 3]; RUN]], members: &[Members], eight: usize, into: &mut RunExtents) {
-    let mut min = [f32::INFINITY; 8];
-    let mut max = [f32::NEG_INFINITY; 8];
-    let mut sum = [0.0f32; 8];
-    let mut group_min = [[f32::INFINITY; 8]; 2];
-    let mut group_max = [[f32::NEG_INFINITY; 8]; 2];
-    for (run, members) in runs.iter().zip(members) {
-        let x = &run.as_flattened().as_chunks::<8>().0[eight];
-        let none = [0, 1].map(|side| no_members(members, side, eight));
-        for k in 0..8 {
-            min[k] = lesser(x[k], min[k]);
-            max[k] = greater(x[k], max[k]);
-            sum[k] += x[k];
-            for side in 0..2 {
-                let x = f32::from_bits(x[k].to_bits() | none[side][k]);
-                group_min[side][k] = lesser(x, group_min[side][k]);
-                group_max[side][k] = greater(x, group_max[side][k]);
-            }
-        }
-    }
-    for k in 0..8 {
-        let at = 8 * eight + k;
-        into.min[at] = lesser(min[k], into.min[at]);
-        into.max[at] = greater(max[k], into.max[at]);
-        into.sum[at] += sum[k];
-        for side in 0..2 {
-            into.group_min[side][at] = lesser(group_min[side][k], into.group_min[side][at]);
-            into.group_max[side][at] = greater(group_max[side][k], into.group_max[side][at]);
-        }
-    }
-}
-
-/// How far a body and its groups reach.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Extents {
-    /// The box of all vertices.
-    pub whole: Bounds,
-    /// The groups below and above: each axis by itself, so not boxes. Groups without members span nothing.
-    pub groups: [Bounds; 2],
-    /// Whether all positions are certainly finite; the rest is of use only if they are.
-    pub all_finite: bool,
-}
-
-impl Extents {
-    /// Of no vertices.
-    pub const EMPTY: Extents = Extents {
-        whole: Bounds::EMPTY,
-        groups: [Bounds::EMPTY; 2],
-        all_finite: true,
-    };
-
-    /// Adds those of other vertices.
-    pub fn join(&mut self, other: &Extents) {
-        self.whole.join(&other.whole);
-        for (group, other) in self.groups.iter_mut().zip(&other.groups) {
-            group.join(other);
-        }
-        self.all_finite &= other.all_finite;
-    }
-
-    /// The groups that are not beside a box, that is, closed intervals that share a number.
-    pub fn back_at(&self, other: &Bounds) -> Groups {
-        let mut back = Groups::default();
-        for (is_above, group) in [(false, &self.groups[0]), (true, &self.groups[1])] {
-            for axis in 0..3 {
-                if group.min[axis] <= other.max[axis] && other.min[axis] <= group.max[axis] {
-                    back.insert(Side { axis, is_above });
-                }
-            }
-        }
-        back
-    }
-}
-
-/// Those of a run of runs; the last one may be shorter. Positions and members begin at the same vertex.
-#[inline(always)]
-fn extents<S: Simd>(simd: S, positions: &[[f32; 3]], members: &[Members]) -> Extents {
-    let mut found = RunExtents::EMPTY;
-    let (runs, rest) = positions.as_chunks::<RUN>();
-    let (members, last_members) = members.split_at(runs.len());
-    simd.add_runs(runs, members, &mut found);
-    if let [first, ..] = rest {
-        // Its first vertex again and again: no member in those places.
-        let mut run = [*first; RUN];
-        run[..rest.len()].copy_from_slice(rest);
-        simd.add_runs(&[run], &last_members[..1], &mut found);
-    }
-    let mut extents = Extents::EMPTY;
-    let mut sum = 0.0;
-    for k in 0..COORDINATES {
-        let axis = k % 3;
-        let Extents { whole, groups, .. } = &mut extents;
-        whole.min[axis] = lesser(whole.min[axis], found.min[k]);
-        whole.max[axis] = greater(whole.max[axis], found.max[k]);
-        for (side, group) in groups.iter_mut().enumerate() {
-            group.min[axis] = lesser(group.min[axis], found.group_min[side][k]);
-            group.max[axis] = greater(group.max[axis], found.group_max[side][k]);
-        }
-        // Finite only if all terms are. It may overflow on finite ones: then they are looked at.
-        sum += found.sum[k];
-    }
-    extents.all_finite = sum.is_finite();
-    extents
-}
-
-/// Where a cluster lies beside others: the name of its group.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Side {
-    axis: usize,
-    is_above: bool,
-}
-
-impl Side {
-    fn number(self) -> usize {
-        3 * usize::from(self.is_above) + self.axis
-    }
-}
-
-/// Some of the groups.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Groups(u8);
-
-impl Groups {
-    const ALL: Groups = Groups(0b11_1111);
-
-    fn insert(&mut self, side: Side) {
-        self.0 |= 1 << side.number();
-    }
-
-    fn contains(self, side: Side) -> bool {
-        self.0 >> side.number() & 1 == 1
-    }
-
-    pub fn union(self, other: Groups) -> Groups {
-        Groups(self.0 | other.0)
-    }
-
-    pub fn is_empty(self) -> bool {
-        self.0 == 0
-    }
-
-    fn sides(self) -> impl Iterator<Item = Side> {
-        [false, true]
-            .into_iter()
-            .flat_map(|is_above| (0..3).map(move |axis| Side { axis, is_above }))
-            .filter(move |&side| self.contains(side))
-    }
-}
 
 /// Some clusters of a node of level 1: bit `k` for its child `k`.
 #[derive(Debug, Clone, Copy)]
@@ -330,7 +117,7 @@ impl Remote {
     #[inline(always)]
     pub fn read<S: Simd>(&self, simd: S, positions: &[[f32; 3]], runs: Range<usize>) -> Extents {
         let vertices = RUN * runs.start..positions.len().min(RUN * runs.end);
-        extents(simd, &positions[vertices], &self.members[runs])
+        extents::of(simd, &positions[vertices], &self.members[runs])
     }
 
     /// Sorts what is near, by its boxes, against the joint box of `others`: empties the boxes of clusters that lie beside it, and
@@ -342,7 +129,7 @@ impl Remote {
         n_vertices: usize,
         bounds: &mut TreeBounds,
         others: &Bounds,
-        extents: &mut Extents,
+        reach: &mut Extents,
     ) -> bool {
         let [leaves, parents, ..] = &mut bounds.levels[..] else {
             return false;
@@ -357,7 +144,7 @@ impl Remote {
             self.members
                 .resize(n_vertices.div_ceil(RUN), Members::default());
         }
-        let slack = self.outlook.slack(&extents.whole);
+        let slack = self.outlook.slack(&reach.whole);
         self.fresh.clear();
         let mut n_beside = 0;
         for (cluster, known) in self.sides.iter_mut().enumerate() {
@@ -375,22 +162,16 @@ impl Remote {
         }
         self.is_sorted = true;
         let unsorted = std::mem::take(&mut self.unsorted);
-        self.empty(unsorted, extents);
+        extents::clear(&mut self.members, unsorted);
+        reach.clear(unsorted);
         for &cluster in &self.fresh {
-            let cluster = cluster as usize;
-            let Some(side) = self.sides[cluster] else {
+            let Some(side) = self.sides[cluster as usize] else {
                 continue;
             };
-            let found = leaves.at(cluster);
-            leaves.put(cluster, &Bounds::EMPTY);
-            let (group, axis) = (usize::from(side.is_above), side.axis);
-            let extent = &mut extents.groups[group];
-            extent.min[axis] = lesser(extent.min[axis], found.min[axis]);
-            extent.max[axis] = greater(extent.max[axis], found.max[axis]);
-            for &vertex in clustering.vertices(cluster) {
-                let (run, place) = (vertex as usize / RUN, vertex as usize % RUN);
-                let coordinate = 3 * place + axis;
-                self.members[run][group][coordinate / RUN] |= 1 << (coordinate % RUN);
+            reach.extend(side, &leaves.at(cluster as usize));
+            leaves.put(cluster as usize, &Bounds::EMPTY);
+            for &vertex in clustering.vertices(cluster as usize) {
+                extents::insert(&mut self.members, vertex, side);
             }
         }
         self.list_near(clustering);
@@ -401,28 +182,6 @@ impl Remote {
             }
         }
         true
-    }
-
-    /// Empties some groups.
-    fn empty(&mut self, groups: Groups, extents: &mut Extents) {
-        let mut kept = [[!0u16; 3]; 2];
-        for side in groups.sides() {
-            let group = usize::from(side.is_above);
-            for coordinate in (side.axis..COORDINATES).step_by(3) {
-                kept[group][coordinate / RUN] &= !(1 << (coordinate % RUN));
-            }
-            extents.groups[group].min[side.axis] = f32::INFINITY;
-            extents.groups[group].max[side.axis] = f32::NEG_INFINITY;
-        }
-        for members in &mut self.members {
-            for (members, kept) in members
-                .as_flattened_mut()
-                .iter_mut()
-                .zip(kept.as_flattened())
-            {
-                *members &= kept;
-            }
-        }
     }
 
     fn list_near(&mut self, clustering: &Clustering) {
@@ -586,86 +345,4 @@ impl Outlook {
 /// The slack with which a group would have lasted, by how long it lasted with this one.
 fn slack_for(slack: f32, age: u32) -> f32 {
     (slack * LASTS as f32 / (age + 1) as f32).clamp(*SLACK.start(), *SLACK.end())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::simd::{Isa, dispatch};
-    use super::*;
-    use crate::settings::InstructionSet;
-
-    /// Numbers without a pattern.
-    fn hash(x: usize) -> u32 {
-        let mut x = (x as u32).wrapping_add(1).wrapping_mul(0x9e37_79b9);
-        x ^= x >> 15;
-        x = x.wrapping_mul(0x85eb_ca6b);
-        x ^ x >> 13
-    }
-
-    fn one_by_one(positions: &[[f32; 3]], members: &[Members]) -> Extents {
-        let mut extents = Extents::EMPTY;
-        for (vertex, point) in positions.iter().enumerate() {
-            let only = Bounds {
-                min: *point,
-                max: *point,
-            };
-            extents.whole.join(&only);
-            for axis in 0..3 {
-                let coordinate = 3 * (vertex % RUN) + axis;
-                for side in 0..2 {
-                    let row = members[vertex / RUN][side][coordinate / RUN];
-                    if row >> (coordinate % RUN) & 1 == 1 {
-                        let group = &mut extents.groups[side];
-                        group.min[axis] = group.min[axis].min(point[axis]);
-                        group.max[axis] = group.max[axis].max(point[axis]);
-                    }
-                }
-            }
-            extents.all_finite &= point.iter().all(|x| x.is_finite());
-        }
-        extents
-    }
-
-    #[test]
-    fn kernels_find_the_extents_of_single_vertices() {
-        let sets = [
-            InstructionSet::Portable,
-            InstructionSet::Avx2,
-            InstructionSet::Avx512,
-        ];
-        for n in (1..70).chain([16 * BLOCK, 16 * BLOCK + 5, 3000]) {
-            let mut positions: Vec<[f32; 3]> = (0..n)
-                .map(|vertex| {
-                    [0, 1, 2].map(|axis| (hash(3 * vertex + axis) as i32 >> 8) as f32 / 4096.0)
-                })
-                .collect();
-            let n_runs = n.div_ceil(RUN);
-            let bits = |run: usize, ix: usize| {
-                // A few members; none past the last vertex.
-                let bits = hash(6 * run + ix + 77) & hash(6 * run + ix + 99) & 0xffff;
-                let end = (3 * (n - RUN * run)).saturating_sub(RUN * (ix % 3));
-                (bits as u16) & (((1u32 << end.min(RUN)) - 1) as u16)
-            };
-            let members: Vec<Members> = (0..n_runs)
-                .map(|run| [0, 3].map(|side| [0, 1, 2].map(|row| bits(run, side + row))))
-                .collect();
-            for bad in [None, Some(f32::NAN), Some(f32::INFINITY)] {
-                if let Some(bad) = bad {
-                    positions[n - 1][n % 3] = bad;
-                }
-                let expected = one_by_one(&positions, &members);
-                for isa in sets.map(Isa::detect) {
-                    let found = dispatch!(isa, extents, (
-                        positions: &[[f32; 3]] = &positions,
-                        members: &[Members] = &members,
-                    ) -> Extents);
-                    assert_eq!(found.all_finite, bad.is_none(), "{n} {isa:?}");
-                    if found.all_finite {
-                        assert_eq!(found.whole, expected.whole, "{n} {isa:?}");
-                        assert_eq!(found.groups, expected.groups, "{n} {isa:?}");
-                    }
-                }
-            }
-        }
-    }
 }

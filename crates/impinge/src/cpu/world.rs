@@ -7,7 +7,8 @@ use crate::scene::{Elements, Positions, Scene};
 
 use super::bounds::TreeBounds;
 use super::dispatch::Tree;
-use super::remote::{Extents, Remote};
+use super::extents::Extents;
+use super::remote::Remote;
 
 /// How much summed surface may grow against that of the whole before an order is made anew.
 pub(super) const STALE: f64 = 1.5;

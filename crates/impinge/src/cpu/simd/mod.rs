@@ -16,7 +16,7 @@ use crate::grouping::clusters::LocalFaces;
 use crate::settings::InstructionSet;
 
 use super::bounds::of_vertices_f32;
-use super::remote::{self, Members, RUN, RunExtents};
+use super::extents::{self, Members, RUN, RunExtents};
 
 /// The boxes of one group, a lane each; lanes past the group's size hold empty boxes.
 #[derive(Debug, Clone)]
@@ -178,7 +178,7 @@ pub(crate) trait Simd: Copy {
     /// Adds runs of vertices, with as many members, to what is found of others.
     #[inline(always)]
     fn add_runs(self, runs: &[[[f32; 3]; RUN]], members: &[Members], into: &mut RunExtents) {
-        remote::add_runs(runs, members, into);
+        extents::add_runs(runs, members, into);
     }
 
     /// The corners of a cluster's triangles as tables; places past its size hold anything.

@@ -6,7 +6,7 @@ use crate::exact::filter::number::Lookup;
 use crate::exact::filter::{BATCH, TABLE};
 
 use super::super::bounds::Vec4;
-use super::super::remote::{BLOCK, COORDINATES, no_members};
+use super::super::extents::{BLOCK, COORDINATES, no_members};
 use super::{
     Bounds, BoundsArray, CHUNK, ClusterFaces, GROUP, LANES, LaneBounds, Lanes, Lanes32, LocalFaces,
     Masks, Members, RUN, RunExtents, Simd, Triangles64, number, of_vertices_f32, put_corners,
