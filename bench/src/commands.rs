@@ -14,7 +14,7 @@ use crate::{Failure, Options, files, gpu};
 /// Runs a command by its name.
 pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
     let mut report = match command {
-        "two-body" | "self" | "tets" | "bodies" | "sizes" | "adversarial" | "gpu" => {
+        "two-body" | "motion" | "self" | "tets" | "bodies" | "sizes" | "adversarial" | "gpu" => {
             Report::new(command)
         }
         "device" => {
@@ -25,6 +25,7 @@ pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
     };
     match command {
         "two-body" => two_body(options, &mut report)?,
+        "motion" => motion(options, &mut report)?,
         "self" => within(options, &mut report)?,
         "tets" => tets(options, &mut report)?,
         "bodies" => bodies(options, &mut report)?,
@@ -141,6 +142,19 @@ fn two_body(options: &Options, report: &mut Report) -> Result<(), Failure> {
             40,
             true,
         )?);
+    }
+    Ok(())
+}
+
+/// Relative speeds, in widths of a body a frame.
+const SPEEDS: [f32; 4] = [0.001, 0.003, 0.01, 0.03];
+
+fn motion(options: &Options, report: &mut Report) -> Result<(), Failure> {
+    let scene = options.scene.as_deref().unwrap_or("dragon");
+    let mut peers = Peers::default();
+    for speed in SPEEDS {
+        let problem = files::passing(scene, speed)?;
+        report.contest(&contest(&problem, options, &mut peers, 120, false)?);
     }
     Ok(())
 }

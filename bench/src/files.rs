@@ -48,8 +48,8 @@ fn mesh(file: &str, stand_in: impl FnOnce() -> Model) -> Result<(Model, String),
 
 const MIRRORED: &str = "frames alternate with the mirror image, whose pairs are the same because changing signs is exact";
 
-/// Two copies of a body: `ball15k`, `ball` (30,000), `bunny`, `buddha`, `dragon`.
-pub fn two_body(scene: &str) -> Result<Problem, Failure> {
+/// Two copies of a body, how many pairs they have, and what they are: `ball15k`, `ball` (30,000), `bunny`, `buddha`, `dragon`.
+fn twice(scene: &str) -> Result<(Vec<Model>, Option<u64>, String), Failure> {
     let (model, offset, expected, about) = match scene {
         "ball15k" => (
             surfaces::ball(15_000),
@@ -94,9 +94,32 @@ pub fn two_body(scene: &str) -> Result<Problem, Failure> {
         }
     };
     let moved = model.translated(offset);
-    Ok(Problem::mirrored(scene, vec![model, moved], Ask::Between)
+    Ok((vec![model, moved], expected, about))
+}
+
+/// Two copies of a body, in place.
+pub fn two_body(scene: &str) -> Result<Problem, Failure> {
+    let (models, expected, about) = twice(scene)?;
+    Ok(Problem::mirrored(scene, models, Ask::Between)
         .about(format!("{about}; {MIRRORED}"))
         .expecting(expected))
+}
+
+/// Steps of a passing body from one end of its way to the other.
+const N_STEPS: usize = 15;
+
+/// Two copies of a body, one of which passes by: `step` is the part of its width that it moves in a frame.
+pub fn passing(scene: &str, step: f32) -> Result<Problem, Failure> {
+    let (models, ..) = twice(scene)?;
+    let width = models[0].bounds().map_or(0.0, |(min, max)| max[0] - min[0]);
+    let name = format!("{scene}, {} % a frame", 100.0 * step);
+    Ok(
+        Problem::passing(&name, models, Ask::Between, step * width, N_STEPS).about(format!(
+            "the second body goes to and fro along x around its place of `two-body`, {N_STEPS} steps of {} % of its width \
+             each way; pairs of the first pose",
+            100.0 * step
+        )),
+    )
 }
 
 /// Offset and number of pairs of a two-body scene from `expected/two_body.json`.

@@ -98,7 +98,7 @@ fn row(
         for (&id, body) in ids.iter().zip(&problem.bodies) {
             scene
                 .positions_mut::<f32>(id)?
-                .copy_from_slice(&body.poses[frame % 2]);
+                .copy_from_slice(&body.poses[frame % problem.n_poses()]);
         }
         let answer = gpu.detect(&scene, &query)?;
         let n_pairs = answer.len() as u64;

@@ -42,6 +42,7 @@ usage: impinge-bench COMMAND [options]
 
 commands:
   two-body      two copies of a mesh: --scene ball15k|ball|bunny|buddha|dragon, or all but ball15k
+  motion        the same, the second copy passing by at four speeds: --scene; the dragon if not said
   self          self-collision of one mesh: --scene ball|bunny|buddha|dragon|cow|camelhead;
                 the dragon if not said
   tets          two solids of tetrahedra
@@ -52,7 +53,7 @@ commands:
   device        prints the name of the GPU in a form that fits --record
 
 options:
-  --scene NAME       one scene only (two-body, self, adversarial)
+  --scene NAME       one scene only (two-body, motion, self, adversarial)
   --frames N         timed frames of each contestant (default 40; fewer for large scenes)
   --turn N           frames of one contestant in a row (default 10); with 1 all caches are cold
   --size N           adversarial: primitives (default 1,000,000); sizes, bodies: the largest size

@@ -11,7 +11,7 @@ use crate::Failure;
 use crate::problem::Problem;
 use crate::runner::{Answer, Runner};
 
-/// Frames that are run before the clock counts, of either pose half of them.
+/// Frames that are run before the clock counts; more if there are more poses, for answers are verified in these.
 const N_WARM: usize = 4;
 
 /// Between one contestant's turn and the next one's.
@@ -26,6 +26,8 @@ pub struct Row {
     pub setting: String,
     /// Median over frames, milliseconds.
     pub median_ms: f64,
+    /// Mean over frames, milliseconds.
+    pub mean_ms: f64,
     /// Fastest frame, milliseconds.
     pub min_ms: f64,
     /// The very first frame, which builds what later frames reuse.
@@ -66,6 +68,7 @@ impl Table {
                     "name": row.name,
                     "setting": row.setting,
                     "median_ms": row.median_ms,
+                    "mean_ms": row.mean_ms,
                     "min_ms": row.min_ms,
                     "first_ms": row.first_ms,
                     "ratio": row.median_ms / self.rows[0].median_ms,
@@ -98,22 +101,32 @@ pub fn run(
     turn: usize,
 ) -> Result<Table, Failure> {
     let (n_frames, turn) = (n_frames.max(1), turn.max(1));
-    let mut records: Vec<Record> = runners.iter().map(|_| Record::default()).collect();
-    let mut hashes = [None, None];
+    let n_poses = problem.n_poses();
+    let n_warm = N_WARM.max(n_poses);
+    let mut records: Vec<Record> = runners.iter().map(|_| Record::new(n_poses)).collect();
+    let mut hashes = vec![None; n_poses];
     let timed = (0..n_frames).step_by(turn).map(|from| {
         let to = (from + turn).min(n_frames);
-        N_WARM + from..N_WARM + to
+        n_warm + from..n_warm + to
     });
-    for frames in std::iter::once(0..N_WARM).chain(timed) {
+    for frames in std::iter::once(0..n_warm).chain(timed) {
         for (runner, record) in runners.iter_mut().zip(&mut records) {
             // Idle workers of the contestant before spin for a while: let them fall asleep.
             std::thread::sleep(PAUSE);
             for frame in frames.clone() {
-                runner.load(problem, frame % 2)?;
-                let answer = runner.frame(frame < N_WARM)?;
-                record.add(frame, &answer);
-                let agreed = &mut hashes[frame % 2];
-                check(problem, &runner.name(), frame, &answer, record, agreed)?;
+                let (pose, is_warm) = (frame % n_poses, frame < n_warm);
+                runner.load(problem, pose)?;
+                let answer = runner.frame(is_warm)?;
+                record.add(frame, pose, !is_warm, &answer);
+                let seen = record.n_pairs[pose];
+                check(
+                    problem,
+                    &runner.name(),
+                    frame,
+                    &answer,
+                    seen,
+                    &mut hashes[pose],
+                )?;
             }
         }
     }
@@ -126,6 +139,7 @@ pub fn run(
                 name: runner.name(),
                 setting: runner.setting(),
                 median_ms: record.times[record.times.len() / 2],
+                mean_ms: record.times.iter().sum::<f64>() / record.times.len() as f64,
                 min_ms: record.times[0],
                 first_ms: record.first_ms,
                 n_pairs: record.n_pairs[0].unwrap_or(0),
@@ -145,36 +159,45 @@ pub fn run(
 }
 
 /// What one contestant has done so far.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Record {
     times: Vec<f64>,
     first_ms: f64,
-    /// Pairs in either pose.
-    n_pairs: [Option<u64>; 2],
+    /// Pairs in each pose, where it has been seen.
+    n_pairs: Vec<Option<u64>>,
 }
 
 impl Record {
-    fn add(&mut self, frame: usize, answer: &Answer) {
+    fn new(n_poses: usize) -> Record {
+        Record {
+            times: Vec::new(),
+            first_ms: 0.0,
+            n_pairs: vec![None; n_poses],
+        }
+    }
+
+    fn add(&mut self, frame: usize, pose: usize, is_timed: bool, answer: &Answer) {
         if frame == 0 {
             self.first_ms = answer.ms;
         }
-        if frame >= N_WARM {
+        if is_timed {
             self.times.push(answer.ms);
         }
-        self.n_pairs[frame % 2].get_or_insert(answer.n_pairs);
+        self.n_pairs[pose].get_or_insert(answer.n_pairs);
     }
 }
 
-/// Holds an answer against what is known: `agreed` is the hash of this pose and who gave it first.
+/// Holds an answer against what is known of this pose: how many pairs the contestant has found before, and the hash that is
+/// agreed on with who gave it first.
 fn check(
     problem: &Problem,
     name: &str,
     frame: usize,
     answer: &Answer,
-    record: &Record,
+    seen: Option<u64>,
     agreed: &mut Option<(u64, String)>,
 ) -> Result<(), Failure> {
-    if let Some(seen) = record.n_pairs[frame % 2].filter(|&seen| seen != answer.n_pairs) {
+    if let Some(seen) = seen.filter(|&seen| seen != answer.n_pairs) {
         return Err(format!(
             "{}: {name} found {} pairs in frame {frame} and {seen} in the same pose before",
             problem.name, answer.n_pairs

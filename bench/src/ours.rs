@@ -29,7 +29,8 @@ pub struct Ours {
     feed: Feed,
     /// What `Feed::Copied` copies in the next frame.
     next: Vec<Arc<[[f32; 3]]>>,
-    poses: [Vec<Arc<[[f32; 3]]>>; 2],
+    /// What it copies, pose by pose.
+    poses: Vec<Vec<Arc<[[f32; 3]]>>>,
     stats: Statistics,
 }
 
@@ -51,7 +52,7 @@ impl Ours {
             detector: Detector::with_settings(settings)?,
             feed,
             next: Vec::new(),
-            poses: [pose(0), pose(1)],
+            poses: (0..problem.n_poses()).map(pose).collect(),
             stats: Statistics::default(),
         })
     }

@@ -1,4 +1,4 @@
-//! What is measured: bodies, the question, and two poses between which frames alternate.
+//! What is measured: bodies, the question, and the poses that frames go through.
 
 use std::sync::Arc;
 
@@ -24,8 +24,8 @@ pub enum Ask {
 pub struct Body {
     /// Its primitives.
     pub elements: Arc<Elements>,
-    /// Its positions in either pose.
-    pub poses: [Vec<[f32; 3]>; 2],
+    /// Its positions in each pose; all bodies have as many.
+    pub poses: Vec<Vec<[f32; 3]>>,
 }
 
 /// A scene to be measured.
@@ -39,7 +39,7 @@ pub struct Problem {
     pub bodies: Vec<Body>,
     /// The question.
     pub ask: Ask,
-    /// The number of pairs in either pose, where it is the same and known from elsewhere.
+    /// The number of pairs in every pose, where it is the same and known from elsewhere.
     pub expected: Option<u64>,
 }
 
@@ -48,9 +48,25 @@ impl Problem {
     /// exact, so both poses have the same pairs, and yet every vertex moves in every frame: nothing
     /// static can be exploited.
     pub fn mirrored(name: &str, models: Vec<Model>, ask: Ask) -> Problem {
-        Problem::new(name, models, ask, |positions| {
+        Problem::new(name, models, ask, |_, positions| {
             let mirror = positions.iter().map(|&[x, y, z]| [-x, y, z]).collect();
-            [positions, mirror]
+            vec![positions, mirror]
+        })
+    }
+
+    /// A problem whose last body goes to and fro along x while the others stay, though their positions are written all the same:
+    /// `n_steps` steps there and as many back, each of `step`, from its place to both sides. Pairs differ.
+    pub fn passing(name: &str, models: Vec<Model>, ask: Ask, step: f32, n_steps: usize) -> Problem {
+        let last = models.len().saturating_sub(1);
+        let middle = n_steps as f32 / 2.0;
+        Problem::new(name, models, ask, |ix, rest| {
+            (0..2 * n_steps)
+                .map(|pose| {
+                    let n = pose.min(2 * n_steps - pose) as f32 - middle;
+                    let offset = if ix == last { n * step } else { 0.0 };
+                    rest.iter().map(|&[x, y, z]| [x + offset, y, z]).collect()
+                })
+                .collect()
         })
     }
 
@@ -62,12 +78,13 @@ impl Problem {
         motion: &impl Deform,
         times: [f32; 2],
     ) -> Problem {
-        Problem::new(name, models, ask, |rest| {
-            times.map(|t| {
+        Problem::new(name, models, ask, |_, rest| {
+            let pose = |t| {
                 let mut now = rest.clone();
                 motion.apply(&rest, t, &mut now);
                 now
-            })
+            };
+            times.map(pose).to_vec()
         })
     }
 
@@ -75,12 +92,13 @@ impl Problem {
         name: &str,
         models: Vec<Model>,
         ask: Ask,
-        poses: impl Fn(Vec<[f32; 3]>) -> [Vec<[f32; 3]>; 2],
+        poses: impl Fn(usize, Vec<[f32; 3]>) -> Vec<Vec<[f32; 3]>>,
     ) -> Problem {
         let bodies = models
             .into_iter()
-            .map(|model| Body {
-                poses: poses(model.positions),
+            .enumerate()
+            .map(|(ix, model)| Body {
+                poses: poses(ix, model.positions),
                 elements: Arc::new(model.elements),
             })
             .collect();
@@ -120,6 +138,11 @@ impl Problem {
         let n_pairs = oracle.detect(&scene, &query)?.len() as u64;
         let about = format!("{}; pairs counted by the oracle in this run", self.about);
         Ok(self.about(about).expecting(Some(n_pairs)))
+    }
+
+    /// How many poses there are.
+    pub fn n_poses(&self) -> usize {
+        self.bodies.first().map_or(1, |body| body.poses.len())
     }
 
     /// Primitives of all bodies.

@@ -50,8 +50,8 @@ impl Report {
             table.n_frames,
             table.turn,
         );
-        text += "| | median ms | min ms | first frame ms | ratio | pairs | setting |\n";
-        text += "|---|---:|---:|---:|---:|---:|---|\n";
+        text += "| | median ms | mean ms | min ms | first frame ms | ratio | pairs | setting |\n";
+        text += "|---|---:|---:|---:|---:|---:|---:|---|\n";
         let best = &table.rows[0];
         for row in &table.rows {
             let difference = i128::from(row.n_pairs) - i128::from(best.n_pairs);
@@ -61,9 +61,10 @@ impl Report {
             };
             let _ = writeln!(
                 text,
-                "| {} | {} | {} | {} | {:.2} | {pairs} | {} |",
+                "| {} | {} | {} | {} | {} | {:.2} | {pairs} | {} |",
                 row.name,
                 figures(row.median_ms),
+                figures(row.mean_ms),
                 figures(row.min_ms),
                 figures(row.first_ms),
                 row.median_ms / best.median_ms,

@@ -289,14 +289,12 @@ mod tests {
                 max: *point,
             };
             extents.whole.join(&only);
-            for axis in 0..3 {
+            for (axis, x) in point.iter().enumerate() {
                 let coordinate = 3 * (vertex % RUN) + axis;
-                for side in 0..2 {
-                    let row = members[vertex / RUN][side][coordinate / RUN];
-                    if row >> (coordinate % RUN) & 1 == 1 {
-                        let group = &mut extents.groups[side];
-                        group.min[axis] = group.min[axis].min(point[axis]);
-                        group.max[axis] = group.max[axis].max(point[axis]);
+                for (group, rows) in extents.groups.iter_mut().zip(&members[vertex / RUN]) {
+                    if rows[coordinate / RUN] >> (coordinate % RUN) & 1 == 1 {
+                        group.min[axis] = group.min[axis].min(*x);
+                        group.max[axis] = group.max[axis].max(*x);
                     }
                 }
             }
