@@ -13,6 +13,7 @@
 //! and dispatch goes on.
 
 use crate::error::Error;
+use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::scene::Body;
 use crate::settings::{InstructionSet, Recluster};
@@ -21,9 +22,8 @@ use crate::stats::Statistics;
 use super::Job;
 use super::bounds::{self, TreeBounds};
 use super::dispatch::NodePair;
-use super::extents::Extents;
 use super::pairing::{WorkItem, Worker};
-use super::refit::Refit;
+use super::refit::{Refit, SORTED_FROM};
 use super::remote::Remote;
 use super::simd::Isa;
 use super::slabs::{self, Slabs};
@@ -121,8 +121,8 @@ impl Clusters {
             .iter()
             .flatten()
             .map(|cache| {
-                let boxes = cache.bounds.bytes() + cache.remote.bytes();
-                size_of::<BodyCache>() + cache.clustering.bytes() + boxes
+                let remote = cache.remote.as_ref().map_or(0, |remote| remote.bytes());
+                size_of::<BodyCache>() + cache.clustering.bytes() + cache.bounds.bytes() + remote
             })
             .sum();
         let scratches: usize = self.scratches.iter().map(Worker::bytes).sum();
@@ -199,8 +199,8 @@ impl BodyCache {
             positions_stamp: 0,
             clustering,
             bounds,
-            extents: Extents::EMPTY,
-            remote: Remote::default(),
+            whole: Bounds::EMPTY,
+            remote: (body.n_primitives() >= SORTED_FROM).then(Box::default),
             surface: 0.0,
             best_spread: f64::INFINITY,
         }
@@ -225,13 +225,19 @@ impl BodyCache {
             self.bounds.levels[0].put(cluster, &bounds);
         }
         self.bounds.refit_above(0, &self.clustering.shape);
-        self.extents.whole = self.bounds.root();
+        self.whole = self.bounds.root();
         self.best_spread = self.spread();
+    }
+
+    /// What is sorted, if anything is.
+    #[inline(always)]
+    pub(super) fn sorted(&self) -> Option<&Remote> {
+        self.remote.as_deref().filter(|remote| remote.is_sorted())
     }
 
     /// Forgets what was sorted; all boxes must be found again.
     pub(super) fn unsort(&mut self) {
-        if self.remote.end() {
+        if self.remote.as_mut().is_some_and(|remote| remote.end()) {
             self.positions_stamp = 0;
         }
     }

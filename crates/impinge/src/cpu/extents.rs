@@ -22,16 +22,16 @@ pub(crate) type Members = [[u16; 3]; 2];
 #[inline(always)]
 pub(super) fn insert(members: &mut [Members], vertex: u32, side: Side) {
     let (run, place) = (vertex as usize / RUN, vertex as usize % RUN);
-    let coordinate = 3 * place + side.axis;
-    members[run][usize::from(side.is_above)][coordinate / RUN] |= 1 << (coordinate % RUN);
+    let coordinate = 3 * place + side.axis();
+    members[run][side.end()][coordinate / RUN] |= 1 << (coordinate % RUN);
 }
 
 /// Leaves groups without members.
 pub(super) fn clear(members: &mut [Members], groups: Groups) {
     let mut kept: Members = [[!0; 3]; 2];
     for side in groups.sides() {
-        for coordinate in (side.axis..COORDINATES).step_by(3) {
-            let row = &mut kept[usize::from(side.is_above)][coordinate / RUN];
+        for coordinate in (side.axis()..COORDINATES).step_by(3) {
+            let row = &mut kept[side.end()][coordinate / RUN];
             *row &= !(1 << (coordinate % RUN));
         }
     }
@@ -164,7 +164,7 @@ impl Extents {
 
     /// Lets a group reach as far as a box.
     pub fn extend(&mut self, side: Side, bounds: &Bounds) {
-        let (group, axis) = (&mut self.groups[usize::from(side.is_above)], side.axis);
+        let (group, axis) = (&mut self.groups[side.end()], side.axis());
         group.min[axis] = lesser(group.min[axis], bounds.min[axis]);
         group.max[axis] = greater(group.max[axis], bounds.max[axis]);
     }
@@ -172,20 +172,19 @@ impl Extents {
     /// Lets groups span nothing.
     pub fn clear(&mut self, groups: Groups) {
         for side in groups.sides() {
-            let group = &mut self.groups[usize::from(side.is_above)];
-            group.min[side.axis] = f32::INFINITY;
-            group.max[side.axis] = f32::NEG_INFINITY;
+            let (group, axis) = (&mut self.groups[side.end()], side.axis());
+            group.min[axis] = f32::INFINITY;
+            group.max[axis] = f32::NEG_INFINITY;
         }
     }
 
     /// The groups that are not beside a box, that is, closed intervals that share a number.
     pub fn back_at(&self, other: &Bounds) -> Groups {
         let mut back = Groups::default();
-        for (is_above, group) in [(false, &self.groups[0]), (true, &self.groups[1])] {
-            for axis in 0..3 {
-                if group.min[axis] <= other.max[axis] && other.min[axis] <= group.max[axis] {
-                    back.insert(Side { axis, is_above });
-                }
+        for side in Groups::ALL.sides() {
+            let (group, axis) = (&self.groups[side.end()], side.axis());
+            if group.min[axis] <= other.max[axis] && other.min[axis] <= group.max[axis] {
+                back.insert(side);
             }
         }
         back
@@ -223,16 +222,29 @@ pub(super) fn of<S: Simd>(simd: S, positions: &[[f32; 3]], members: &[Members]) 
     extents
 }
 
-/// Where a cluster lies beside others: the name of its group.
+/// Where a cluster lies beside others, which is its group: below (0 to 2) or above (3 to 5) them along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Side {
-    pub axis: usize,
-    pub is_above: bool,
-}
+pub(crate) struct Side(u8);
 
 impl Side {
+    #[inline(always)]
+    pub fn new(axis: usize, is_above: bool) -> Side {
+        Side(axis as u8 + 3 * u8::from(is_above))
+    }
+
+    #[inline(always)]
+    fn axis(self) -> usize {
+        usize::from(self.0 % 3)
+    }
+
+    /// 0 for below, 1 for above.
+    #[inline(always)]
+    fn end(self) -> usize {
+        usize::from(self.0 / 3)
+    }
+
     pub fn number(self) -> usize {
-        3 * usize::from(self.is_above) + self.axis
+        self.0.into()
     }
 }
 
@@ -260,10 +272,7 @@ impl Groups {
     }
 
     pub fn sides(self) -> impl Iterator<Item = Side> {
-        [false, true]
-            .into_iter()
-            .flat_map(|is_above| (0..3).map(move |axis| Side { axis, is_above }))
-            .filter(move |&side| self.contains(side))
+        (0..6).map(Side).filter(move |&side| self.contains(side))
     }
 }
 

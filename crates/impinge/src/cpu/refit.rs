@@ -12,8 +12,8 @@ use std::time::Instant;
 
 use crate::error::Error;
 use crate::frame::Frame;
-use crate::grouping::bounds::{Bounds, RawBoundsArray};
-use crate::scene::{Body, Positions};
+use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
+use crate::scene::Positions;
 use crate::settings::Recluster;
 use crate::stats::Statistics;
 
@@ -22,7 +22,7 @@ use super::bounds::{self, Summary};
 use super::clusters::Options;
 use super::extents::{Extents, Groups};
 use super::pairing::Worker;
-use super::remote::Children;
+use super::remote::{Children, Remote};
 use super::simd::{Isa, Simd, dispatch};
 use super::world::{BodyCache, Caches, STALE, World};
 
@@ -34,7 +34,7 @@ const RUNS: usize = 256;
 /// mostly by one thread, and what fits in its cache another fetches from there more slowly than it reads it.
 const PARALLEL_FROM: u64 = 120_000;
 /// Primitives of a body from which on its clusters are sorted.
-const SORTED_FROM: usize = 2_048;
+pub(super) const SORTED_FROM: usize = 2_048;
 /// Bodies of a frame up to which clusters are sorted: more are everywhere.
 const SORTED_TO: usize = 8;
 
@@ -96,8 +96,8 @@ impl Refit {
             let body = frame.body(scene, ix);
             let cache = caches[participant.id.index()].as_mut().expect("clustered");
             let is_single = matches!(body.positions(), Positions::F32(_));
-            let is_fit = is_single && cache.remote.is_fit_for(body.n_vertices());
-            if participant.within || !sorts || !is_fit {
+            let is_fit = |sorted: &Remote| is_single && sorted.is_fit_for(body.n_vertices());
+            if participant.within || !sorts || !cache.sorted().is_some_and(is_fit) {
                 cache.unsort();
             }
             let stamp = body.positions_stamp();
@@ -108,14 +108,17 @@ impl Refit {
             if !(covered && is_single) {
                 frame.check_one(scene, ix)?;
             }
-            cache.remote.grow_older();
-            let what = if cache.remote.is_sorted() {
-                What::Read
-            } else {
-                What::All
-            };
-            cache.extents = Extents::EMPTY;
-            self.push(ix, cache, what);
+            cache.whole = Bounds::EMPTY;
+            if let Some(remote) = &mut cache.remote {
+                remote.begin();
+            }
+            match cache.sorted() {
+                Some(sorted) => {
+                    let n = sorted.n_runs();
+                    self.push(ix, cache, What::Read, n);
+                }
+                None => self.push_all(ix, cache),
+            }
         }
         if !self.work(isa, job, caches, scratches) {
             frame.check(scene)?;
@@ -123,22 +126,25 @@ impl Refit {
         self.tasks.clear();
         for (ix, participant) in frame.participants.iter().enumerate() {
             let slot = participant.id.index();
-            let back = back(frame, caches, ix);
-            let cache = &mut **caches[slot].as_mut().expect("clustered");
-            if !cache.remote.is_sorted() {
+            let Some(back) = back(frame, caches, ix) else {
                 continue;
-            }
+            };
+            let cache = caches[slot].as_mut().expect("clustered");
+            let Some(remote) = &mut cache.remote else {
+                continue;
+            };
             if !back.is_empty() {
                 cache.positions_stamp = 0;
-                if !cache.remote.come_back(back, &cache.clustering) {
+                if !remote.come_back(back, &cache.clustering) {
                     cache.unsort();
-                    self.push(ix, cache, What::All);
+                    self.push_all(ix, cache);
                     continue;
                 }
             }
-            stats.n_remote += (cache.clustering.n_clusters() - cache.remote.n_near()) as u64;
+            let (n_near, n) = (remote.n_near(), remote.near().len());
+            stats.n_remote += (cache.clustering.n_clusters() - n_near) as u64;
             if cache.positions_stamp != frame.body(scene, ix).positions_stamp() {
-                self.push(ix, cache, What::Near);
+                self.push(ix, cache, What::Near, n);
             }
         }
         self.work(isa, job, caches, scratches);
@@ -149,20 +155,26 @@ impl Refit {
         Ok(())
     }
 
-    fn push(&mut self, participant_ix: usize, cache: &mut BodyCache, what: What) {
-        let (n_nodes, leaves, parents) = match &mut cache.bounds.levels[..] {
+    /// Tasks to find all boxes.
+    fn push_all(&mut self, participant_ix: usize, cache: &mut BodyCache) {
+        let n_nodes = cache.bounds.levels.get(1).map_or(1, BoundsArray::len);
+        self.push(participant_ix, cache, What::All, n_nodes);
+    }
+
+    /// Tasks for `n` of something.
+    fn push(&mut self, participant_ix: usize, cache: &mut BodyCache, what: What, n: usize) {
+        let (leaves, parents) = match &mut cache.bounds.levels[..] {
             [] => return,
-            [leaves] => (1, leaves.raw(), None),
-            [leaves, parents, ..] => (parents.len(), leaves.raw(), Some(parents.raw())),
+            [leaves] => (leaves.raw(), None),
+            [leaves, parents, ..] => (leaves.raw(), Some(parents.raw())),
         };
-        let (n, step) = match what {
-            What::Read => (cache.remote.n_runs(), RUNS),
-            What::All => (n_nodes, NODES),
-            What::Near => (cache.remote.near().len(), NODES),
+        let step = match what {
+            What::Read => RUNS,
+            What::All | What::Near => {
+                cache.surface = 0.0;
+                NODES
+            }
         };
-        if !matches!(what, What::Read) {
-            cache.surface = 0.0;
-        }
         let tasks = (0..n).step_by(step).map(|first| Task {
             participant: participant_ix as u32,
             what,
@@ -216,11 +228,9 @@ impl Refit {
             let slot = frame.participants[task.participant as usize].id.index();
             let cache = caches[slot].as_mut().expect("clustered");
             cache.surface += f64::from(found.surface);
-            match task.what {
-                What::Read => cache.extents.join(&found.extents),
-                What::All => cache.extents.whole.join(&found.extents.whole),
-                // Read before.
-                What::Near => {}
+            cache.whole.join(&found.extents.whole);
+            if let (What::Read, Some(remote)) = (task.what, &mut cache.remote) {
+                remote.add(&found.extents);
             }
         }
         all_finite
@@ -249,7 +259,7 @@ impl Refit {
             }
             cache.positions_stamp = body.positions_stamp();
             cache.bounds.refit_above(1, &cache.clustering.shape);
-            if cache.remote.is_sorted() {
+            if cache.sorted().is_some() {
                 continue;
             }
             let spread = cache.spread();
@@ -276,23 +286,22 @@ fn met(frame: &Frame, ix: usize) -> impl Iterator<Item = usize> {
     (0..frame.participants.len()).filter(move |&other| other != ix && frame.meets(ix, other))
 }
 
-/// How far a participant reaches.
-fn extents<'a>(frame: &Frame, caches: &'a Caches, ix: usize) -> &'a Extents {
+/// What is kept of a participant.
+fn cache<'a>(frame: &Frame, caches: &'a Caches, ix: usize) -> &'a BodyCache {
     let slot = frame.participants[ix].id.index();
-    &caches[slot].as_ref().expect("clustered").extents
+    caches[slot].as_ref().expect("clustered")
 }
 
-/// The groups of a participant that are not beside all that it could meet.
-fn back(frame: &Frame, caches: &Caches, ix: usize) -> Groups {
-    let own = extents(frame, caches, ix);
-    met(frame, ix).fold(Groups::default(), |back, other| {
-        back.union(own.back_at(&extents(frame, caches, other).whole))
-    })
+/// The groups of a participant that are not beside all that it could meet, if its clusters are sorted.
+fn back(frame: &Frame, caches: &Caches, ix: usize) -> Option<Groups> {
+    let sorted = cache(frame, caches, ix).sorted()?;
+    let groups = met(frame, ix).map(|other| sorted.back_at(&cache(frame, caches, other).whole));
+    Some(groups.fold(Groups::default(), Groups::union))
 }
 
 /// A body whose clusters are to be sorted, and the joint box of all that it could meet.
 struct Due<'a> {
-    body: &'a Body,
+    n_vertices: usize,
     cache: &'a mut BodyCache,
     others: Bounds,
 }
@@ -308,7 +317,7 @@ fn sort(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker]) {
     let mut others = [Bounds::EMPTY; SORTED_TO];
     for (ix, others) in others[..frame.participants.len()].iter_mut().enumerate() {
         for other in met(frame, ix) {
-            others.join(&extents(frame, caches, other).whole);
+            others.join(&cache(frame, caches, other).whole);
         }
     }
     let mut due: [Mutex<Option<Due<'_>>>; SORTED_TO] = Default::default();
@@ -322,12 +331,11 @@ fn sort(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker]) {
             continue;
         };
         let body = frame.body(scene, ix);
-        let could = !participant.within
-            && body.n_primitives() >= SORTED_FROM
-            && matches!(body.positions(), Positions::F32(_));
-        if could && cache.remote.is_due() {
+        let could = !participant.within && matches!(body.positions(), Positions::F32(_));
+        let is_due = cache.remote.as_ref().is_some_and(|remote| remote.is_due());
+        if could && is_due {
             due[n_due] = Mutex::new(Some(Due {
-                body,
+                n_vertices: body.n_vertices(),
                 cache,
                 others: others[ix],
             }));
@@ -347,12 +355,14 @@ impl Due<'_> {
         let BodyCache {
             clustering,
             bounds,
-            extents,
+            whole,
             remote,
             ..
         } = &mut *self.cache;
-        let n_vertices = self.body.n_vertices();
-        if !remote.sort(clustering, n_vertices, bounds, &self.others, extents) {
+        let Some(remote) = remote else {
+            return;
+        };
+        if !remote.sort(clustering, self.n_vertices, bounds, whole, &self.others) {
             self.cache.unsort();
         }
     }
@@ -372,19 +382,20 @@ fn work<S: Simd>(simd: S, world: World<'_>, task: Task) -> Found {
     let cache = world.cache(task.participant);
     let (clustering, run) = (&cache.clustering, task.first as usize..task.end as usize);
     let mut summary = Summary::EMPTY;
-    if let (What::Read, Positions::F32(positions)) = (task.what, positions) {
-        return Found {
-            extents: cache.remote.read(simd, positions, run),
-            surface: 0.0,
-        };
-    }
+    let near = match (task.what, cache.sorted(), positions) {
+        (What::Read, Some(sorted), Positions::F32(positions)) => {
+            return Found {
+                extents: sorted.read(simd, positions, run),
+                surface: 0.0,
+            };
+        }
+        (What::Near, Some(sorted), _) => Some(sorted.near()),
+        _ => None,
+    };
     for ix in run {
-        let (node, only) = match (task.what, task.parents) {
-            (What::Near, _) => {
-                let near = cache.remote.near()[ix];
-                (near.node as usize, near.children)
-            }
-            _ => (ix, u8::MAX),
+        let (node, only) = match near {
+            Some(near) => (near[ix].node as usize, near[ix].children),
+            None => (ix, u8::MAX),
         };
         let clusters = match task.parents {
             Some(_) => Children::new(clustering.shape.children(1, node), only),

@@ -36,7 +36,7 @@ pub(crate) struct SomeClusters {
 }
 
 /// The clusters of a body, sorted or not, and when to sort them. Memory is kept.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Remote {
     is_sorted: bool,
     /// The group of each cluster, none for those that are near. Those in a group have empty boxes.
@@ -46,11 +46,29 @@ pub(crate) struct Remote {
     /// The groups by vertices, run by run.
     members: Vec<Members>,
     n_vertices: usize,
+    /// How far they reach in the pose at hand.
+    extents: Extents,
     /// Groups whose clusters are to be sorted at the frame's end.
     unsorted: Groups,
     /// Clusters that have just been found to lie beside the others.
     fresh: Vec<u32>,
     outlook: Outlook,
+}
+
+impl Default for Remote {
+    fn default() -> Self {
+        Remote {
+            is_sorted: false,
+            sides: Vec::new(),
+            near: Vec::new(),
+            members: Vec::new(),
+            n_vertices: 0,
+            extents: Extents::EMPTY,
+            unsorted: Groups::default(),
+            fresh: Vec::new(),
+            outlook: Outlook::default(),
+        }
+    }
 }
 
 impl Remote {
@@ -85,9 +103,20 @@ impl Remote {
         self.n_vertices == n_vertices && self.outlook.age < RENEWED_AFTER
     }
 
-    /// A frame of a body that moved begins.
-    pub fn grow_older(&mut self) {
+    /// A frame of a body that moved begins: nothing is known of its positions.
+    pub fn begin(&mut self) {
         self.outlook.grow_older(self.is_sorted);
+        self.extents = Extents::EMPTY;
+    }
+
+    /// Adds what has been read of the positions.
+    pub fn add(&mut self, extents: &Extents) {
+        self.extents.join(extents);
+    }
+
+    /// The groups that are not beside a box.
+    pub fn back_at(&self, other: &Bounds) -> Groups {
+        self.extents.back_at(other)
     }
 
     /// Ends it. All boxes must be found again if this says so.
@@ -97,8 +126,8 @@ impl Remote {
         std::mem::take(&mut self.is_sorted)
     }
 
-    /// Some groups have come back: their clusters are near from now on. Or else, if too many have come back of late, this says so:
-    /// then it should be ended.
+    /// Some groups have come back: their clusters are near from now on. False if too many have come back of late: then
+    /// it should be ended.
     pub fn come_back(&mut self, groups: Groups, clustering: &Clustering) -> bool {
         if !self.outlook.affords(groups) {
             return false;
@@ -120,16 +149,16 @@ impl Remote {
         extents::of(simd, &positions[vertices], &self.members[runs])
     }
 
-    /// Sorts what is near, by its boxes, against the joint box of `others`: empties the boxes of clusters that lie beside it, and
-    /// finds how far their groups reach. Whether there are enough of them: else it should be ended.
+    /// Sorts what is near, by its boxes, against the joint box of `others`, and empties the boxes of clusters that lie beside
+    /// it. False if there are few of them: then it should be ended.
     #[must_use]
     pub fn sort(
         &mut self,
         clustering: &Clustering,
         n_vertices: usize,
         bounds: &mut TreeBounds,
+        whole: &Bounds,
         others: &Bounds,
-        reach: &mut Extents,
     ) -> bool {
         let [leaves, parents, ..] = &mut bounds.levels[..] else {
             return false;
@@ -144,7 +173,7 @@ impl Remote {
             self.members
                 .resize(n_vertices.div_ceil(RUN), Members::default());
         }
-        let slack = self.outlook.slack(&reach.whole);
+        let slack = self.outlook.slack(whole);
         self.fresh.clear();
         let mut n_beside = 0;
         for (cluster, known) in self.sides.iter_mut().enumerate() {
@@ -163,12 +192,12 @@ impl Remote {
         self.is_sorted = true;
         let unsorted = std::mem::take(&mut self.unsorted);
         extents::clear(&mut self.members, unsorted);
-        reach.clear(unsorted);
+        self.extents.clear(unsorted);
         for &cluster in &self.fresh {
             let Some(side) = self.sides[cluster as usize] else {
                 continue;
             };
-            reach.extend(side, &leaves.at(cluster as usize));
+            self.extents.extend(side, &leaves.at(cluster as usize));
             leaves.put(cluster as usize, &Bounds::EMPTY);
             for &vertex in clustering.vertices(cluster as usize) {
                 extents::insert(&mut self.members, vertex, side);
@@ -199,9 +228,11 @@ impl Remote {
     }
 
     pub fn bytes(&self) -> usize {
-        size_of::<Members>() * self.members.capacity()
+        size_of::<Remote>()
+            + size_of::<Members>() * self.members.capacity()
             + size_of::<SomeClusters>() * self.near.capacity()
             + size_of::<Option<Side>>() * self.sides.capacity()
+            + size_of::<u32>() * self.fresh.capacity()
     }
 }
 
@@ -214,7 +245,7 @@ fn side(cluster: &Bounds, others: &Bounds, slack: &[f32; 6]) -> Option<Side> {
         let below = others.min[axis] - cluster.max[axis];
         let above = cluster.min[axis] - others.max[axis];
         for (gap, is_above) in [(below, false), (above, true)] {
-            let side = Side { axis, is_above };
+            let side = Side::new(axis, is_above);
             let far = gap / slack[side.number()];
             if gap > 0.0 && far > farthest {
                 farthest = far;
@@ -305,7 +336,7 @@ impl Outlook {
     fn grow_older(&mut self, is_sorted: bool) {
         self.wait = self.wait.saturating_sub(1);
         self.age += u32::from(is_sorted);
-        self.ages = self.ages.map(|age| age + 1);
+        self.ages = self.ages.map(|age| age.saturating_add(1));
         self.credit = (self.credit + 1).min(MOST_CREDIT);
     }
 
@@ -344,5 +375,5 @@ impl Outlook {
 
 /// The slack with which a group would have lasted, by how long it lasted with this one.
 fn slack_for(slack: f32, age: u32) -> f32 {
-    (slack * LASTS as f32 / (age + 1) as f32).clamp(*SLACK.start(), *SLACK.end())
+    (slack * LASTS as f32 / (age as f32 + 1.0)).clamp(*SLACK.start(), *SLACK.end())
 }

@@ -2,12 +2,12 @@
 
 use crate::exact::Point;
 use crate::frame::{Frame, Participant};
+use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::scene::{Elements, Positions, Scene};
 
 use super::bounds::TreeBounds;
 use super::dispatch::Tree;
-use super::extents::Extents;
 use super::remote::Remote;
 
 /// How much summed surface may grow against that of the whole before an order is made anew.
@@ -22,10 +22,10 @@ pub(crate) struct BodyCache {
     pub positions_stamp: u64,
     pub clustering: Clustering,
     pub bounds: TreeBounds,
-    /// How far the positions reach.
-    pub extents: Extents,
-    /// Which clusters lie beside all that the body could meet.
-    pub remote: Remote,
+    /// The box of all vertices, or of those that primitives have.
+    pub whole: Bounds,
+    /// Which clusters lie beside all that the body could meet; for bodies large enough.
+    pub remote: Option<Box<Remote>>,
     /// Half the summed surface of the clusters.
     pub surface: f64,
     /// That over the body's, at its best so far.
