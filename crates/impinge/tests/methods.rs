@@ -216,3 +216,47 @@ fn bodies_that_flow_away_are_clustered_again() {
         0
     );
 }
+
+#[test]
+fn a_frame_that_failed_leaves_nothing_behind() {
+    let ball = surfaces::bumpy_ball(3_000, 0.2);
+    for (method, settled) in [
+        (Method::Clusters, 1),
+        // Long enough for clusters to be left out.
+        (Method::Clusters, 6),
+        (Method::Cells, 1),
+    ] {
+        let mut scene = Scene::new();
+        let a = ball.add_to(&mut scene).unwrap();
+        let b = ball.translated([0.8, 0.1, 0.0]).add_to(&mut scene).unwrap();
+        let query = Query::between(a, b);
+        let mut detector = Detector::with_settings(cpu(method, 1)).unwrap();
+        for _ in 0..settled {
+            scene.set_positions(a, &ball.positions).unwrap();
+            let place = ball.translated([0.8, 0.1, 0.0]).positions;
+            scene.set_positions(b, &place).unwrap();
+            assert!(!detector.detect(&scene, &query).unwrap().is_empty());
+        }
+        // Positions that were good come back with their scene, and nothing tells them from what they were.
+        let saved = scene.clone();
+        for bad in [a, b] {
+            for body in [a, b] {
+                let positions = scene.positions_mut::<f32>(body).unwrap();
+                positions.iter_mut().for_each(|point| point[0] += 100.0);
+            }
+            scene.positions_mut::<f32>(bad).unwrap()[7][1] = f32::NAN;
+            assert!(detector.detect(&scene, &query).is_err());
+            scene = saved.clone();
+            for offset in [[0.8, 0.1, 0.0], [-0.8, 0.1, 0.0], [0.0, 0.0, 0.9]] {
+                let mut fresh = Detector::with_settings(cpu(method, 1)).unwrap();
+                let expected = fresh.detect(&scene, &query).unwrap();
+                assert!(!expected.is_empty());
+                let found = detector.detect(&scene, &query).unwrap();
+                assert!(found.same_as(expected), "{method:?} {settled} {offset:?}");
+                let place = ball.translated(offset).positions;
+                scene.set_positions(b, &place).unwrap();
+            }
+            scene = saved.clone();
+        }
+    }
+}

@@ -3,6 +3,7 @@
 use impinge::{
     Backend, BodyId, Detector, Error, Filter, InstructionSet, Method, Query, Scene, Settings,
 };
+use impinge_scenes::deform::{self, Deform};
 use impinge_scenes::{Model, surfaces};
 
 fn settings(method: Method, threads: usize, instruction_set: InstructionSet) -> Settings {
@@ -12,6 +13,18 @@ fn settings(method: Method, threads: usize, instruction_set: InstructionSet) -> 
         instruction_set,
         backend: Backend::Cpu,
         ..Settings::default()
+    }
+}
+
+/// Whether this processor leaves anything out at all: plain loops gain nothing by it.
+fn leaves_out() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    {
+        is_x86_feature_detected!("avx2")
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        false
     }
 }
 
@@ -65,6 +78,16 @@ impl Contest {
         }
         self.n_frames_with += usize::from(self.n_remote[0] > 0);
         self.n_frames_without += usize::from(self.n_remote[0] == 0);
+    }
+
+    /// Whether more than so many frames left something out, if this processor does.
+    fn left_out_in_more_than(&self, n_frames: usize) -> bool {
+        self.n_frames_with > n_frames || !leaves_out()
+    }
+
+    /// Whether the last frame did.
+    fn has_left_out(&self) -> bool {
+        self.n_remote[0] > 0 || !leaves_out()
     }
 }
 
@@ -146,11 +169,7 @@ fn no_motion_loses_a_pair() {
                     &format!("{what}, {mover} moves, frame {frame}"),
                 );
             }
-            assert!(
-                contest.n_frames_with > 3,
-                "{what}, {mover}: {}",
-                contest.n_frames_with
-            );
+            assert!(contest.left_out_in_more_than(3), "{what}, {mover}");
             assert!(contest.n_frames_with_pairs > 3, "{what}, {mover}");
         }
     }
@@ -170,6 +189,9 @@ fn steady_frames_leave_clusters_out_until_they_are_renewed() {
             place(&mut scene, body, &ball, still, 0.0);
         }
         contest.frame(&scene, &Query::between(a, b), &format!("frame {frame}"));
+    }
+    if !leaves_out() {
+        return;
     }
     assert!((130..139).contains(&contest.n_frames_with));
     assert!(contest.n_frames_without >= 4);
@@ -230,13 +252,13 @@ fn whoever_asks_for_all_boxes_gets_them() {
             contest.frame(&scene, query, &format!("query {ix} again"));
         }
     }
-    assert!(contest.n_frames_with > 10);
+    assert!(contest.left_out_in_more_than(10));
     for _ in 0..20 {
         scene.set_positions(a, &folded.positions).unwrap();
         scene.set_filter(c, alone).unwrap();
         contest.frame(&scene, &Query::all(), "c meets nobody");
     }
-    assert!(contest.n_remote[0] > 0);
+    assert!(contest.has_left_out());
     scene.set_filter(c, Filter::default()).unwrap();
     contest.frame(&scene, &Query::all(), "c meets all");
 }
@@ -268,7 +290,7 @@ fn a_bad_position_in_a_remote_cluster_is_refused() {
                     &format!("{bad} along {axis}, frame {frame}"),
                 );
             }
-            assert!(contest.n_remote[0] > 0);
+            assert!(contest.has_left_out());
             scene.positions_mut::<f32>(a).unwrap()[vertex][axis] = bad;
             for detector in &mut contest.detectors {
                 let error = detector.detect(&scene, &query).map(|_| ()).unwrap_err();
@@ -311,7 +333,8 @@ fn meshes_change_while_clusters_are_left_out() {
             scene.set_positions(a, &model.positions).unwrap();
             contest.frame(&scene, &query, &format!("round {round}, frame {frame}"));
         }
-        assert!(contest.n_remote[0] > 0, "round {round}");
+        // Clusters of a body that has more vertices than its triangles are not sorted.
+        assert!(round >= 2 || contest.has_left_out(), "round {round}");
     }
     scene.remove(b).unwrap();
     let b = ball
@@ -344,7 +367,104 @@ fn bodies_that_come_to_touch_meet() {
                 let met = contest.n_frames_with_pairs > n_frames_with_pairs;
                 assert_eq!(met, gap == 0.0, "{offset:?}");
             }
-            assert!(contest.n_frames_with > 3);
+            assert!(contest.left_out_in_more_than(3));
         }
     }
+}
+
+#[test]
+fn bodies_that_several_tasks_read_lose_no_pair() {
+    // Two threads find boxes from 120,000 primitives on, and a task reads 4,096 vertices.
+    let ball = surfaces::bumpy_ball(64_000, 0.2);
+    let mut scene = Scene::new();
+    let a = ball.add_to(&mut scene).unwrap();
+    let b = ball.translated([0.8, 0.1, 0.0]).add_to(&mut scene).unwrap();
+    let query = Query::between(a, b);
+    let detector =
+        |method, threads, set| Detector::with_settings(settings(method, threads, set)).unwrap();
+    let mut detectors = [
+        detector(Method::Clusters, 2, InstructionSet::Avx512),
+        detector(Method::Clusters, 3, InstructionSet::Avx2),
+    ];
+    let mut other_method = detector(Method::Cells, 2, InstructionSet::Avx512);
+    let mut n_frames_with = 0;
+    for frame in 0..24 {
+        // Drifts, with a jump to the other side; towards the end the first body follows.
+        let x = if frame % 8 == 7 {
+            -0.8
+        } else {
+            0.8 - 0.01 * frame as f32
+        };
+        place(&mut scene, b, &ball, |[x, y, z], t| [x + t, y + 0.1, z], x);
+        if !(4..16).contains(&frame) {
+            place(
+                &mut scene,
+                a,
+                &ball,
+                |[x, y, z], t| [x, y + t, z],
+                0.002 * frame as f32,
+            );
+        }
+        let expected = other_method.detect(&scene, &query).unwrap();
+        assert!(!expected.is_empty());
+        for detector in &mut detectors {
+            let pairs = detector.detect(&scene, &query).unwrap();
+            assert!(pairs.same_as(expected), "frame {frame}");
+            n_frames_with += usize::from(pairs.stats().n_remote > 0);
+        }
+    }
+    assert!(n_frames_with > 20 || !leaves_out());
+}
+
+#[test]
+fn detectors_with_a_past_answer_as_new_ones() {
+    let (ball, scene, a, b) = pair();
+    let query = Query::between(a, b);
+    let mut contest = Contest::new();
+    let settle = |contest: &mut Contest, scene: &mut Scene| {
+        for _ in 0..70 {
+            place(scene, a, &ball, |point, _| point, 0.0);
+            place(scene, b, &ball, |[x, y, z], _| [x + 0.8, y, z], 0.0);
+            contest.frame(scene, &query, "settling");
+            if contest.n_remote[0] > 0 {
+                break;
+            }
+        }
+        assert!(contest.has_left_out());
+    };
+    // A clone of the scene, whose positions another scene with the same stamps has left behind.
+    let mut one = scene.clone();
+    settle(&mut contest, &mut one);
+    let saved = one.clone();
+    place(&mut one, b, &ball, |[x, y, z], _| [x - 0.8, y, z], 0.0);
+    contest.frame(&one, &query, "on the other side");
+    contest.frame(&saved, &query, "back");
+    let mut one = saved.clone();
+    place(&mut one, b, &ball, |[x, y, z], _| [x, y + 0.8, z], 0.0);
+    contest.frame(&one, &query, "above");
+    // More bodies than those whose clusters are sorted, then two again.
+    let mut many = saved.clone();
+    settle(&mut contest, &mut many);
+    for k in 0..10 {
+        let place = [-0.8, 0.1 * k as f32, 0.0];
+        ball.translated(place).add_to(&mut many).unwrap();
+    }
+    contest.frame(&many, &Query::all(), "many");
+    contest.frame(&many, &query, "two of many");
+    // A body that flows so far that it is clustered anew while its clusters are sorted.
+    let mut one = saved.clone();
+    settle(&mut contest, &mut one);
+    let flow = deform::Flow::default();
+    for step in 0..70 {
+        let mut flowed = ball.positions.clone();
+        flow.apply(&ball.positions, 0.5 * step as f32, &mut flowed);
+        one.set_positions(a, &flowed).unwrap();
+        contest.frame(&one, &query, &format!("flows, step {step}"));
+    }
+    // A body in double precision in its place.
+    let mut one = saved;
+    settle(&mut contest, &mut one);
+    one.remesh(a, ball.elements.clone(), ball.positions_f64())
+        .unwrap();
+    contest.frame(&one, &query, "double");
 }

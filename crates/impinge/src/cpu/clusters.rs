@@ -33,6 +33,7 @@ use super::world::{BodyCache, Caches, World};
 
 /// Primitives of all bodies together from which on helpers are woken at a frame's begin.
 const CALL_FROM: u64 = 30_000;
+
 /// Caches and scratch of the method; kept from frame to frame.
 pub(crate) struct Clusters {
     isa: Isa,
@@ -233,6 +234,14 @@ impl BodyCache {
     #[inline(always)]
     pub(super) fn sorted(&self) -> Option<&Remote> {
         self.remote.as_deref().filter(|remote| remote.is_sorted())
+    }
+
+    /// As `unsort`, because a frame asks for what was left out.
+    pub(super) fn interrupt(&mut self) {
+        if let Some(remote) = &mut self.remote {
+            remote.interrupt();
+        }
+        self.unsort();
     }
 
     /// Forgets what was sorted; all boxes must be found again.

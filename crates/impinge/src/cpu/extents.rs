@@ -13,17 +13,19 @@ use super::simd::Simd;
 pub(crate) const RUN: usize = 16;
 /// Their coordinates.
 pub(crate) const COORDINATES: usize = 3 * RUN;
+/// Coordinates in a row of members: the bits of a u16.
+const ROW: usize = u16::BITS as usize;
 
 /// Which coordinates of a run belong to a group: those along x of what is beside others along x, and so on. One bit
-/// each, first below, then above; a vertex of several clusters may be in several groups.
-pub(crate) type Members = [[u16; 3]; 2];
+/// each, in rows, first those of the groups below, then above; a vertex of several clusters may be in several groups.
+pub(crate) type Members = [[u16; COORDINATES / ROW]; 2];
 
 /// Makes a vertex a member of a group.
 #[inline(always)]
 pub(super) fn insert(members: &mut [Members], vertex: u32, side: Side) {
     let (run, place) = (vertex as usize / RUN, vertex as usize % RUN);
     let coordinate = 3 * place + side.axis();
-    members[run][side.end()][coordinate / RUN] |= 1 << (coordinate % RUN);
+    members[run][side.end()][coordinate / ROW] |= 1 << (coordinate % ROW);
 }
 
 /// Leaves groups without members.
@@ -31,8 +33,8 @@ pub(super) fn clear(members: &mut [Members], groups: Groups) {
     let mut kept: Members = [[!0; 3]; 2];
     for side in groups.sides() {
         for coordinate in (side.axis()..COORDINATES).step_by(3) {
-            let row = &mut kept[side.end()][coordinate / RUN];
-            *row &= !(1 << (coordinate % RUN));
+            let row = &mut kept[side.end()][coordinate / ROW];
+            *row &= !(1 << (coordinate % ROW));
         }
     }
     for members in members {
@@ -82,8 +84,8 @@ static NO_MEMBERS: [[u32; 8]; 256] = {
 
 /// Those of one eight of a run's coordinates that are not in a group.
 #[inline(always)]
-pub(crate) fn no_members(members: &Members, side: usize, eight: usize) -> &'static [u32; 8] {
-    let byte = members[side][eight / 2] >> (8 * (eight % 2)) & 0xff;
+pub(crate) fn no_members(members: &Members, end: usize, eight: usize) -> &'static [u32; 8] {
+    let byte = members[end][eight / 2] >> (8 * (eight % 2)) & 0xff;
     &NO_MEMBERS[usize::from(byte)]
 }
 
@@ -110,15 +112,15 @@ fn add_eight(runs: &[[[f32; 3]; RUN]], members: &[Members], eight: usize, into: 
     let mut group_max = [[f32::NEG_INFINITY; 8]; 2];
     for (run, members) in runs.iter().zip(members) {
         let x = &run.as_flattened().as_chunks::<8>().0[eight];
-        let none = [0, 1].map(|side| no_members(members, side, eight));
+        let none = [no_members(members, 0, eight), no_members(members, 1, eight)];
         for k in 0..8 {
             min[k] = lesser(x[k], min[k]);
             max[k] = greater(x[k], max[k]);
             sum[k] += x[k];
-            for side in 0..2 {
-                let x = f32::from_bits(x[k].to_bits() | none[side][k]);
-                group_min[side][k] = lesser(x, group_min[side][k]);
-                group_max[side][k] = greater(x, group_max[side][k]);
+            for end in 0..2 {
+                let x = f32::from_bits(x[k].to_bits() | none[end][k]);
+                group_min[end][k] = lesser(x, group_min[end][k]);
+                group_max[end][k] = greater(x, group_max[end][k]);
             }
         }
     }
@@ -127,20 +129,19 @@ fn add_eight(runs: &[[[f32; 3]; RUN]], members: &[Members], eight: usize, into: 
         into.min[at] = lesser(min[k], into.min[at]);
         into.max[at] = greater(max[k], into.max[at]);
         into.sum[at] += sum[k];
-        for side in 0..2 {
-            into.group_min[side][at] = lesser(group_min[side][k], into.group_min[side][at]);
-            into.group_max[side][at] = greater(group_max[side][k], into.group_max[side][at]);
+        for end in 0..2 {
+            into.group_min[end][at] = lesser(group_min[end][k], into.group_min[end][at]);
+            into.group_max[end][at] = greater(group_max[end][k], into.group_max[end][at]);
         }
     }
 }
 
-/// How far a body and its groups reach.
+/// How far some vertices reach, and those of each group.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Extents {
-    /// The box of all vertices.
+    /// The box of all of them.
     pub whole: Bounds,
-    /// The groups below and above: each axis by itself, so not boxes. Groups without members span nothing.
-    pub groups: [Bounds; 2],
+    pub groups: Intervals,
     /// Whether all positions are certainly finite; the rest is of use only if they are.
     pub all_finite: bool,
 }
@@ -149,32 +150,39 @@ impl Extents {
     /// Of no vertices.
     pub const EMPTY: Extents = Extents {
         whole: Bounds::EMPTY,
-        groups: [Bounds::EMPTY; 2],
+        groups: Intervals::EMPTY,
         all_finite: true,
     };
+}
+
+/// What the groups span: those below along x, y and z, then those above. Each axis by itself, so these are no
+/// boxes. Groups without members span nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Intervals([Bounds; 2]);
+
+impl Intervals {
+    pub const EMPTY: Intervals = Intervals([Bounds::EMPTY; 2]);
 
     /// Adds those of other vertices.
-    pub fn join(&mut self, other: &Extents) {
-        self.whole.join(&other.whole);
-        for (group, other) in self.groups.iter_mut().zip(&other.groups) {
-            group.join(other);
+    pub fn join(&mut self, other: &Intervals) {
+        for (groups, other) in self.0.iter_mut().zip(&other.0) {
+            groups.join(other);
         }
-        self.all_finite &= other.all_finite;
     }
 
     /// Lets a group reach as far as a box.
     pub fn extend(&mut self, side: Side, bounds: &Bounds) {
-        let (group, axis) = (&mut self.groups[side.end()], side.axis());
-        group.min[axis] = lesser(group.min[axis], bounds.min[axis]);
-        group.max[axis] = greater(group.max[axis], bounds.max[axis]);
+        let (groups, axis) = (&mut self.0[side.end()], side.axis());
+        groups.min[axis] = lesser(groups.min[axis], bounds.min[axis]);
+        groups.max[axis] = greater(groups.max[axis], bounds.max[axis]);
     }
 
     /// Lets groups span nothing.
-    pub fn clear(&mut self, groups: Groups) {
-        for side in groups.sides() {
-            let (group, axis) = (&mut self.groups[side.end()], side.axis());
-            group.min[axis] = f32::INFINITY;
-            group.max[axis] = f32::NEG_INFINITY;
+    pub fn clear(&mut self, which: Groups) {
+        for side in which.sides() {
+            let (groups, axis) = (&mut self.0[side.end()], side.axis());
+            groups.min[axis] = f32::INFINITY;
+            groups.max[axis] = f32::NEG_INFINITY;
         }
     }
 
@@ -182,8 +190,8 @@ impl Extents {
     pub fn back_at(&self, other: &Bounds) -> Groups {
         let mut back = Groups::default();
         for side in Groups::ALL.sides() {
-            let (group, axis) = (&self.groups[side.end()], side.axis());
-            if group.min[axis] <= other.max[axis] && other.min[axis] <= group.max[axis] {
+            let (groups, axis) = (&self.0[side.end()], side.axis());
+            if groups.min[axis] <= other.max[axis] && other.min[axis] <= groups.max[axis] {
                 back.insert(side);
             }
         }
@@ -211,9 +219,9 @@ pub(super) fn of<S: Simd>(simd: S, positions: &[[f32; 3]], members: &[Members]) 
         let Extents { whole, groups, .. } = &mut extents;
         whole.min[axis] = lesser(whole.min[axis], found.min[k]);
         whole.max[axis] = greater(whole.max[axis], found.max[k]);
-        for (side, group) in groups.iter_mut().enumerate() {
-            group.min[axis] = lesser(group.min[axis], found.group_min[side][k]);
-            group.max[axis] = greater(group.max[axis], found.group_max[side][k]);
+        for (end, groups) in groups.0.iter_mut().enumerate() {
+            groups.min[axis] = lesser(groups.min[axis], found.group_min[end][k]);
+            groups.max[axis] = greater(groups.max[axis], found.group_max[end][k]);
         }
         // Finite only if all terms are. It may overflow on finite ones: then they are looked at.
         sum += found.sum[k];
@@ -300,8 +308,8 @@ mod tests {
             extents.whole.join(&only);
             for (axis, x) in point.iter().enumerate() {
                 let coordinate = 3 * (vertex % RUN) + axis;
-                for (group, rows) in extents.groups.iter_mut().zip(&members[vertex / RUN]) {
-                    if rows[coordinate / RUN] >> (coordinate % RUN) & 1 == 1 {
+                for (group, rows) in extents.groups.0.iter_mut().zip(&members[vertex / RUN]) {
+                    if rows[coordinate / ROW] >> (coordinate % ROW) & 1 == 1 {
                         group.min[axis] = group.min[axis].min(*x);
                         group.max[axis] = group.max[axis].max(*x);
                     }

@@ -4,9 +4,10 @@
 //! late; and two that both run on a core are not soon moved apart. (Linux wakes threads there when it thinks that the other
 //! cores are busy, and one of two cores is enough for that: on the machine of the records every second
 //! burst of frames began so, with 1.0 ms a frame in place of 0.55.) So helpers are told to keep off the core that the caller
-//! is on, anew when it has changed. It costs the caller one look at its core's number a region.
+//! is on: one look at its number a region, and a request a helper when it has changed.
 //!
-//! Where the system has no such request, or refuses it, helpers run wherever it lets them.
+//! Where there is no such request, or it fails, or helpers are many (then a core is free for them), they run where the
+//! system lets them.
 
 #[cfg(target_os = "linux")]
 pub(super) use linux::Places;
@@ -15,63 +16,91 @@ pub(super) use other::Places;
 
 #[cfg(target_os = "linux")]
 mod linux {
-    use std::sync::atomic::{AtomicI32, AtomicUsize, Ordering};
+    use std::sync::OnceLock;
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     use rustix::thread::{CpuSet, Pid, gettid, sched_getaffinity, sched_getcpu, sched_setaffinity};
 
     /// The core of the caller, and who its helpers are.
     pub(crate) struct Places {
         caller: AtomicUsize,
-        /// Thread ids; 0 before a helper has started.
-        helpers: Box<[AtomicI32]>,
+        helpers: Box<[OnceLock<Helper>]>,
+        /// Whose threads they are: a process that was forked has none of them.
+        process: u32,
+    }
+
+    struct Helper {
+        thread: Pid,
+        /// Where it may run by itself.
+        cores: CpuSet,
     }
 
     const UNKNOWN: usize = usize::MAX;
+    /// Helpers from which on they are left alone.
+    const MANY: usize = 8;
 
     impl Places {
         pub fn new(n_helpers: usize) -> Self {
+            let n = if n_helpers < MANY { n_helpers } else { 0 };
             Places {
                 caller: AtomicUsize::new(UNKNOWN),
-                helpers: (0..n_helpers).map(|_| AtomicI32::new(0)).collect(),
+                helpers: (0..n).map(|_| OnceLock::new()).collect(),
+                process: std::process::id(),
             }
         }
 
         /// To be called by the caller before it calls helpers.
         pub fn caller_is_here(&self) {
-            let core = sched_getcpu();
-            // Of a caller that moves and a helper that starts, one sees the other.
-            if self.caller.swap(core, Ordering::SeqCst) == core {
+            if self.helpers.is_empty() {
                 return;
             }
-            for helper in &self.helpers {
-                if let Some(helper) = Pid::from_raw(helper.load(Ordering::SeqCst)) {
-                    keep_off(helper, core);
-                }
+            let core = sched_getcpu();
+            if self.caller.swap(core, Ordering::SeqCst) == core
+                || self.process != std::process::id()
+            {
+                return;
+            }
+            for helper in self.helpers.iter().filter_map(OnceLock::get) {
+                helper.keep_off(core);
             }
         }
 
         /// To be called by a helper when it starts.
         pub fn helper_is_here(&self, seat: usize) {
-            let helper = gettid();
-            self.helpers[seat - 1].store(Pid::as_raw(Some(helper)), Ordering::SeqCst);
-            let core = self.caller.load(Ordering::SeqCst);
-            if core != UNKNOWN {
-                keep_off(helper, core);
+            let Some(place) = self.helpers.get(seat - 1) else {
+                return;
+            };
+            let Ok(cores) = sched_getaffinity(None) else {
+                return;
+            };
+            let helper = place.get_or_init(|| Helper {
+                thread: gettid(),
+                cores,
+            });
+            // The caller sees the helper from here on; what it said before is looked up, until it has not changed.
+            let mut core = UNKNOWN;
+            loop {
+                let now = self.caller.load(Ordering::SeqCst);
+                if now == core {
+                    return;
+                }
+                core = now;
+                helper.keep_off(core);
             }
         }
     }
 
-    /// Lets a thread run on all cores that this thread may run on, but one; if that is the only one, wherever it did.
-    fn keep_off(thread: Pid, core: usize) {
-        let Ok(mut cores) = sched_getaffinity(None) else {
-            return;
-        };
-        if core < CpuSet::MAX_CPU {
-            cores.unset(core);
-        }
-        if cores.count() > 0 {
-            // A system that refuses has its reasons; the answer is the same.
-            let _ = sched_setaffinity(Some(thread), &cores);
+    impl Helper {
+        /// Lets it run where it may but for one core, unless that is the only one.
+        fn keep_off(&self, core: usize) {
+            let mut cores = self.cores;
+            if core < CpuSet::MAX_CPU {
+                cores.unset(core);
+            }
+            if cores.count() > 0 {
+                // A system that refuses has its reasons; the answer is the same.
+                let _ = sched_setaffinity(Some(self.thread), &cores);
+            }
         }
     }
 
@@ -95,20 +124,13 @@ mod linux {
                     let _ = ended.recv();
                 });
                 is_started.recv().expect("it starts");
-                let helper = Pid::from_raw(places.helpers[0].load(Ordering::SeqCst));
-                let may_run_on = |core| {
-                    let cores = sched_getaffinity(helper).expect("it lives");
-                    cores.is_set(core)
-                };
+                let helper = places.helpers[0].get().expect("it has said so").thread;
                 for _ in 0..2 {
                     let core = places.caller.load(Ordering::SeqCst);
-                    assert_eq!(may_run_on(core), allowed.count() == 1);
-                    let others = (0..CpuSet::MAX_CPU).filter(|&other| other != core);
-                    assert!(
-                        others
-                            .into_iter()
-                            .all(|core| may_run_on(core) == allowed.is_set(core))
-                    );
+                    let cores = sched_getaffinity(Some(helper)).expect("it lives");
+                    assert_eq!(cores.is_set(core), allowed.count() == 1);
+                    let mut others = (0..CpuSet::MAX_CPU).filter(|&other| other != core);
+                    assert!(others.all(|other| cores.is_set(other) == allowed.is_set(other)));
                     // As if the caller had come from elsewhere.
                     places.caller.store(UNKNOWN - 1, Ordering::SeqCst);
                     places.caller_is_here();

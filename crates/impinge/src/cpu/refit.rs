@@ -13,7 +13,7 @@ use std::time::Instant;
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
-use crate::scene::Positions;
+use crate::scene::{Body, Positions, Scene};
 use crate::settings::Recluster;
 use crate::stats::Statistics;
 
@@ -22,7 +22,7 @@ use super::bounds::{self, Summary};
 use super::clusters::Options;
 use super::extents::{Extents, Groups};
 use super::pairing::Worker;
-use super::remote::{Children, Remote};
+use super::remote::Children;
 use super::simd::{Isa, Simd, dispatch};
 use super::world::{BodyCache, Caches, STALE, World};
 
@@ -95,17 +95,21 @@ impl Refit {
         for (ix, participant) in frame.participants.iter().enumerate() {
             let body = frame.body(scene, ix);
             let cache = caches[participant.id.index()].as_mut().expect("clustered");
-            let is_single = matches!(body.positions(), Positions::F32(_));
-            let is_fit = |sorted: &Remote| is_single && sorted.is_fit_for(body.n_vertices());
-            if participant.within || !sorts || !cache.sorted().is_some_and(is_fit) {
+            let n_vertices = body.n_vertices();
+            if participant.within || !sorts {
+                cache.interrupt();
+            } else if !cache
+                .sorted()
+                .is_some_and(|sorted| sorted.is_fit_for(n_vertices))
+            {
                 cache.unsort();
             }
-            let stamp = body.positions_stamp();
-            if cache.positions_stamp == stamp {
+            if cache.positions_stamp == body.positions_stamp() {
                 continue;
             }
-            let covered = cache.clustering.n_vertices_covered == Some(body.n_vertices());
-            if !(covered && is_single) {
+            // Whatever ends this frame before its end, the boxes are of no pose until then.
+            cache.positions_stamp = 0;
+            if !can_be_read(cache, body) {
                 frame.check_one(scene, ix)?;
             }
             cache.whole = Bounds::EMPTY;
@@ -123,13 +127,25 @@ impl Refit {
         if !self.work(isa, job, caches, scratches) {
             frame.check(scene)?;
         }
+        if sorts {
+            self.prove(frame, scene, caches, stats);
+            self.work(isa, job, caches, scratches);
+        }
+        self.above(isa, job, options, caches, stats);
+        if sorts {
+            sort(job, caches, scratches);
+        }
+        Ok(())
+    }
+
+    /// Tasks for what is near, or for all where too much has come back.
+    fn prove(&mut self, frame: &Frame, scene: &Scene, caches: &mut Caches, stats: &mut Statistics) {
         self.tasks.clear();
         for (ix, participant) in frame.participants.iter().enumerate() {
-            let slot = participant.id.index();
             let Some(back) = back(frame, caches, ix) else {
                 continue;
             };
-            let cache = caches[slot].as_mut().expect("clustered");
+            let cache = caches[participant.id.index()].as_mut().expect("clustered");
             let Some(remote) = &mut cache.remote else {
                 continue;
             };
@@ -147,12 +163,6 @@ impl Refit {
                 self.push(ix, cache, What::Near, n);
             }
         }
-        self.work(isa, job, caches, scratches);
-        self.above(isa, job, options, caches, stats);
-        if sorts {
-            sort(job, caches, scratches);
-        }
-        Ok(())
     }
 
     /// Tasks to find all boxes.
@@ -203,8 +213,10 @@ impl Refit {
         // Positions are mostly written in order: the last ones are in the nearest cache.
         self.tasks.reverse();
         let n_tasks = self.tasks.len();
-        self.found
-            .resize_with(n_tasks, || Mutex::new(Found::NOTHING));
+        if self.found.len() < n_tasks {
+            self.found
+                .resize_with(n_tasks, || Mutex::new(Found::NOTHING));
+        }
         let (tasks, found) = (&self.tasks, &self.found);
         let world = World {
             scene,
@@ -218,9 +230,7 @@ impl Refit {
             ) -> Found);
             *found[ix].lock().unwrap_or_else(PoisonError::into_inner) = result;
         };
-        let parallel = frame.n_primitives() >= PARALLEL_FROM;
-        let n_workers = if parallel { workers.n() } else { 1 };
-        workers.for_each(&mut scratches[..n_workers], n_tasks, work);
+        workers.for_each(for_boxes(job, scratches), n_tasks, work);
         let mut all_finite = true;
         for (task, found) in self.tasks.iter().zip(&mut self.found) {
             let found = found.get_mut().unwrap_or_else(PoisonError::into_inner);
@@ -281,6 +291,20 @@ impl Refit {
     }
 }
 
+/// The workers that find boxes.
+fn for_boxes<'a>(job: Job<'_>, scratches: &'a mut [Worker]) -> &'a mut [Worker] {
+    let parallel = job.frame.n_primitives() >= PARALLEL_FROM;
+    let n_workers = if parallel { job.workers.n() } else { 1 };
+    &mut scratches[..n_workers]
+}
+
+/// Whether a body's clusters may be sorted: reading all its positions sees them in single precision, and none that its
+/// primitives do not have.
+fn can_be_read(cache: &BodyCache, body: &Body) -> bool {
+    let is_single = matches!(body.positions(), Positions::F32(_));
+    is_single && cache.clustering.n_vertices_covered == Some(body.n_vertices())
+}
+
 /// Whom a participant could meet.
 fn met(frame: &Frame, ix: usize) -> impl Iterator<Item = usize> {
     (0..frame.participants.len()).filter(move |&other| other != ix && frame.meets(ix, other))
@@ -331,7 +355,7 @@ fn sort(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker]) {
             continue;
         };
         let body = frame.body(scene, ix);
-        let could = !participant.within && matches!(body.positions(), Positions::F32(_));
+        let could = !participant.within && can_be_read(cache, body);
         let is_due = cache.remote.as_ref().is_some_and(|remote| remote.is_due());
         if could && is_due {
             due[n_due] = Mutex::new(Some(Due {
@@ -342,7 +366,7 @@ fn sort(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker]) {
             n_due += 1;
         }
     }
-    workers.for_each(scratches, n_due, |_, ix| {
+    workers.for_each(for_boxes(job, scratches), n_due, |_, ix| {
         let mut due = due[ix].lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(due) = &mut *due {
             due.sort();

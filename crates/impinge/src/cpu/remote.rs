@@ -25,7 +25,7 @@ use crate::grouping::bounds::{Bounds, greater};
 use crate::grouping::clusters::Clustering;
 
 use super::bounds::TreeBounds;
-use super::extents::{self, Extents, Groups, Members, RUN, Side};
+use super::extents::{self, Extents, Groups, Intervals, Members, RUN, Side};
 use super::simd::{Lanes, Simd};
 
 /// Some clusters of a node of level 1: bit `k` for its child `k`.
@@ -46,8 +46,8 @@ pub(crate) struct Remote {
     /// The groups by vertices, run by run.
     members: Vec<Members>,
     n_vertices: usize,
-    /// How far they reach in the pose at hand.
-    extents: Extents,
+    /// What the groups span in the pose at hand.
+    groups: Intervals,
     /// Groups whose clusters are to be sorted at the frame's end.
     unsorted: Groups,
     /// Clusters that have just been found to lie beside the others.
@@ -63,7 +63,7 @@ impl Default for Remote {
             near: Vec::new(),
             members: Vec::new(),
             n_vertices: 0,
-            extents: Extents::EMPTY,
+            groups: Intervals::EMPTY,
             unsorted: Groups::default(),
             fresh: Vec::new(),
             outlook: Outlook::default(),
@@ -106,17 +106,17 @@ impl Remote {
     /// A frame of a body that moved begins: nothing is known of its positions.
     pub fn begin(&mut self) {
         self.outlook.grow_older(self.is_sorted);
-        self.extents = Extents::EMPTY;
+        self.groups = Intervals::EMPTY;
     }
 
     /// Adds what has been read of the positions.
     pub fn add(&mut self, extents: &Extents) {
-        self.extents.join(extents);
+        self.groups.join(&extents.groups);
     }
 
     /// The groups that are not beside a box.
     pub fn back_at(&self, other: &Bounds) -> Groups {
-        self.extents.back_at(other)
+        self.groups.back_at(other)
     }
 
     /// Ends it. All boxes must be found again if this says so.
@@ -124,6 +124,13 @@ impl Remote {
     pub fn end(&mut self) -> bool {
         self.unsorted = Groups::default();
         std::mem::take(&mut self.is_sorted)
+    }
+
+    /// A frame asks for more than what is near: it should be ended, and not begun again at once, for the next frames may ask so too.
+    pub fn interrupt(&mut self) {
+        if self.is_sorted {
+            self.outlook.pause();
+        }
     }
 
     /// Some groups have come back: their clusters are near from now on. False if too many have come back of late: then
@@ -192,12 +199,12 @@ impl Remote {
         self.is_sorted = true;
         let unsorted = std::mem::take(&mut self.unsorted);
         extents::clear(&mut self.members, unsorted);
-        self.extents.clear(unsorted);
+        self.groups.clear(unsorted);
         for &cluster in &self.fresh {
             let Some(side) = self.sides[cluster as usize] else {
                 continue;
             };
-            self.extents.extend(side, &leaves.at(cluster as usize));
+            self.groups.extend(side, &leaves.at(cluster as usize));
             leaves.put(cluster as usize, &Bounds::EMPTY);
             for &vertex in clustering.vertices(cluster as usize) {
                 extents::insert(&mut self.members, vertex, side);
@@ -362,9 +369,14 @@ impl Outlook {
             self.credit -= COST;
             return true;
         }
+        self.pause();
+        false
+    }
+
+    /// Waits, longer each time.
+    fn pause(&mut self) {
         self.wait = self.next_wait;
         self.next_wait = (2 * self.next_wait).min(RENEWED_AFTER);
-        false
     }
 
     /// Hardly any cluster lies beside the others.

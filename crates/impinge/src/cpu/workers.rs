@@ -184,7 +184,10 @@ impl Workers {
         if !self.wakes.load(Ordering::Relaxed) {
             return;
         }
-        self.crew.places.caller_is_here();
+        // Within a region it is a helper that calls, or another thread.
+        if !self.crew.busy.load(Ordering::Relaxed) {
+            self.crew.places.caller_is_here();
+        }
         let helpers = self.helpers.get_or_init(|| {
             let start = |seat| {
                 let crew = Arc::clone(&self.crew);

@@ -22,7 +22,7 @@ pub(crate) struct BodyCache {
     pub positions_stamp: u64,
     pub clustering: Clustering,
     pub bounds: TreeBounds,
-    /// The box of all vertices, or of those that primitives have.
+    /// The box of all primitives.
     pub whole: Bounds,
     /// Which clusters lie beside all that the body could meet; for bodies large enough.
     pub remote: Option<Box<Remote>>,

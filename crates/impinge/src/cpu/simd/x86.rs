@@ -186,35 +186,28 @@ unsafe fn add_eight(
         let mut min = _mm256_loadu_ps(into.min.as_ptr().add(first));
         let mut max = _mm256_loadu_ps(into.max.as_ptr().add(first));
         let mut sum = _mm256_loadu_ps(into.sum.as_ptr().add(first));
-        let mut group_min =
-            [0, 1].map(|side| _mm256_loadu_ps(into.group_min[side].as_ptr().add(first)));
-        let mut group_max =
-            [0, 1].map(|side| _mm256_loadu_ps(into.group_max[side].as_ptr().add(first)));
+        let load = |row: &[f32; COORDINATES]| _mm256_loadu_ps(row.as_ptr().add(first));
+        let mut group_min = [load(&into.group_min[0]), load(&into.group_min[1])];
+        let mut group_max = [load(&into.group_max[0]), load(&into.group_max[1])];
         for (run, members) in runs.iter().zip(members) {
             let x = _mm256_loadu_ps(run.as_ptr().cast::<f32>().add(first));
             min = _mm256_min_ps(x, min);
             max = _mm256_max_ps(x, max);
             sum = _mm256_add_ps(sum, x);
-            for side in 0..2 {
-                let none = no_members(members, side, eight);
+            for end in 0..2 {
+                let none = no_members(members, end, eight);
                 let x = _mm256_or_ps(x, _mm256_loadu_ps(none.as_ptr().cast()));
                 // Of a NaN and a number, the second one.
-                group_min[side] = _mm256_min_ps(x, group_min[side]);
-                group_max[side] = _mm256_max_ps(x, group_max[side]);
+                group_min[end] = _mm256_min_ps(x, group_min[end]);
+                group_max[end] = _mm256_max_ps(x, group_max[end]);
             }
         }
         _mm256_storeu_ps(into.min.as_mut_ptr().add(first), min);
         _mm256_storeu_ps(into.max.as_mut_ptr().add(first), max);
         _mm256_storeu_ps(into.sum.as_mut_ptr().add(first), sum);
-        for side in 0..2 {
-            _mm256_storeu_ps(
-                into.group_min[side].as_mut_ptr().add(first),
-                group_min[side],
-            );
-            _mm256_storeu_ps(
-                into.group_max[side].as_mut_ptr().add(first),
-                group_max[side],
-            );
+        for end in 0..2 {
+            _mm256_storeu_ps(into.group_min[end].as_mut_ptr().add(first), group_min[end]);
+            _mm256_storeu_ps(into.group_max[end].as_mut_ptr().add(first), group_max[end]);
         }
     }
 }
@@ -559,7 +552,7 @@ impl Simd for Avx512 {
     #[inline(always)]
     fn add_runs(self, runs: &[[[f32; 3]; RUN]], members: &[Members], into: &mut RunExtents) {
         // SAFETY: `Avx512` exists only where the processor has it; a run is three registers of coordinates,
-        // as is each row of `into`.
+        // as is each row of `into`. What is fetched ahead may lie past the end: that is a hint and never a fault.
         unsafe {
             let load = |row: &[f32; 3 * RUN]| {
                 let first = row.as_ptr();
@@ -582,10 +575,10 @@ impl Simd for Avx512 {
                     min[k] = _mm512_min_ps(min[k], x);
                     max[k] = _mm512_max_ps(max[k], x);
                     sum[k] = _mm512_add_ps(sum[k], x);
-                    for side in 0..2 {
-                        let (low, high) = (&mut group_min[side][k], &mut group_max[side][k]);
-                        *low = _mm512_mask_min_ps(*low, members[side][k], *low, x);
-                        *high = _mm512_mask_max_ps(*high, members[side][k], *high, x);
+                    for end in 0..2 {
+                        let (low, high) = (&mut group_min[end][k], &mut group_max[end][k]);
+                        *low = _mm512_mask_min_ps(*low, members[end][k], *low, x);
+                        *high = _mm512_mask_max_ps(*high, members[end][k], *high, x);
                     }
                 }
             }
@@ -597,9 +590,9 @@ impl Simd for Avx512 {
             store(&mut into.min, min);
             store(&mut into.max, max);
             store(&mut into.sum, sum);
-            for side in 0..2 {
-                store(&mut into.group_min[side], group_min[side]);
-                store(&mut into.group_max[side], group_max[side]);
+            for end in 0..2 {
+                store(&mut into.group_min[end], group_min[end]);
+                store(&mut into.group_max[end], group_max[end]);
             }
         }
     }
