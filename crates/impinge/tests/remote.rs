@@ -372,10 +372,32 @@ fn bodies_that_come_to_touch_meet() {
     }
 }
 
+/// A model whose vertices are numbered along x, so that no part of them reaches as far as all.
+fn from_low_to_high(model: Model) -> Model {
+    let mut order: Vec<u32> = (0..model.positions.len() as u32).collect();
+    let x = |vertex: u32| model.positions[vertex as usize][0];
+    order.sort_by(|&a, &b| x(a).total_cmp(&x(b)));
+    let mut numbers = vec![0; order.len()];
+    for (number, &vertex) in (0..).zip(&order) {
+        numbers[vertex as usize] = number;
+    }
+    let mut sorted = model.clone();
+    sorted.positions = order
+        .iter()
+        .map(|&vertex| model.positions[vertex as usize])
+        .collect();
+    if let impinge::Elements::Triangles(faces) = &mut sorted.elements {
+        for vertex in faces.as_flattened_mut() {
+            *vertex = numbers[*vertex as usize];
+        }
+    }
+    sorted
+}
+
 #[test]
 fn bodies_that_several_tasks_read_lose_no_pair() {
     // Two threads find boxes from 120,000 primitives on, and a task reads 4,096 vertices.
-    let ball = surfaces::bumpy_ball(64_000, 0.2);
+    let ball = from_low_to_high(surfaces::bumpy_ball(64_000, 0.2));
     let mut scene = Scene::new();
     let a = ball.add_to(&mut scene).unwrap();
     let b = ball.translated([0.8, 0.1, 0.0]).add_to(&mut scene).unwrap();
@@ -388,20 +410,21 @@ fn bodies_that_several_tasks_read_lose_no_pair() {
     ];
     let mut other_method = detector(Method::Cells, 2, InstructionSet::Avx512);
     let mut n_frames_with = 0;
-    for frame in 0..24 {
-        // Drifts, with a jump to the other side; towards the end the first body follows.
-        let x = if frame % 8 == 7 {
-            -0.8
-        } else {
-            0.8 - 0.01 * frame as f32
-        };
-        place(&mut scene, b, &ball, |[x, y, z], t| [x + t, y + 0.1, z], x);
+    for frame in 0..30 {
+        // Trembles, then goes round the first body; towards the end that one moves too.
+        let angle = 0.3 * (frame as f32 - 8.0).max(0.0);
+        let radius = if frame % 2 == 0 { 0.9 } else { 0.89 };
+        place(&mut scene, b, &ball, |point, _| point, 0.0);
+        for [x, y, _] in scene.positions_mut::<f32>(b).unwrap() {
+            *x += radius * angle.cos();
+            *y += radius * angle.sin();
+        }
         if !(4..16).contains(&frame) {
             place(
                 &mut scene,
                 a,
                 &ball,
-                |[x, y, z], t| [x, y + t, z],
+                |[x, y, z], t| [x, y, z + t],
                 0.002 * frame as f32,
             );
         }
