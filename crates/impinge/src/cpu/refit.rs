@@ -1,9 +1,10 @@
 //! Stage `bounds` of `Clusters`: boxes of the clusters of bodies that moved, and of the trees above them.
 //!
 //! ```text
-//! read    all boxes of a body whose clusters are not sorted; else its positions in the order of memory
+//! read    all boxes of a body whose clusters are not sorted; else its positions in the order of memory, and the boxes of
+//!         what is in no group
 //! prove   whether its groups are beside all bodies that it could meet (see `remote`)
-//! near    then the boxes of what is in no group; else all boxes after all
+//! back    if not, boxes of what has come back too
 //! above   nodes; bodies that have flowed away from their clusters are clustered anew; clusters are sorted
 //! ```
 
@@ -13,7 +14,7 @@ use std::time::Instant;
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
-use crate::scene::{Body, Positions, Scene};
+use crate::scene::{Body, Positions};
 use crate::settings::Recluster;
 use crate::stats::Statistics;
 
@@ -116,19 +117,26 @@ impl Refit {
             if let Some(remote) = &mut cache.remote {
                 remote.begin();
             }
-            match cache.sorted() {
-                Some(sorted) => {
-                    let n = sorted.n_runs();
-                    self.push(ix, cache, What::Read, n);
-                }
-                None => self.push_all(ix, cache),
+            let Some(sorted) = cache.sorted() else {
+                self.push_all(ix, cache);
+                continue;
+            };
+            // A body is read and its boxes are found by the same thread, as far as that goes: helpers take tasks from
+            // the first on, the caller from the last.
+            let (n_runs, n_near) = (sorted.n_runs(), sorted.near().len());
+            if 2 * ix < frame.participants.len() {
+                self.push(ix, cache, What::Read, n_runs);
+                self.push(ix, cache, What::Near, n_near);
+            } else {
+                self.push(ix, cache, What::Near, n_near);
+                self.push(ix, cache, What::Read, n_runs);
             }
         }
         if !self.work(isa, job, caches, scratches) {
             frame.check(scene)?;
         }
         if sorts {
-            self.prove(frame, scene, caches, stats);
+            self.prove(frame, caches, stats);
             self.work(isa, job, caches, scratches);
         }
         self.above(isa, job, options, caches, stats);
@@ -139,7 +147,7 @@ impl Refit {
     }
 
     /// Tasks for what is near, or for all where too much has come back.
-    fn prove(&mut self, frame: &Frame, scene: &Scene, caches: &mut Caches, stats: &mut Statistics) {
+    fn prove(&mut self, frame: &Frame, caches: &mut Caches, stats: &mut Statistics) {
         self.tasks.clear();
         for (ix, participant) in frame.participants.iter().enumerate() {
             let Some(back) = back(frame, caches, ix) else {
@@ -156,11 +164,11 @@ impl Refit {
                     self.push_all(ix, cache);
                     continue;
                 }
+                let n_near = remote.near().len();
+                self.push(ix, cache, What::Near, n_near);
             }
-            let (n_near, n) = (remote.n_near(), remote.near().len());
-            stats.n_remote += (cache.clustering.n_clusters() - n_near) as u64;
-            if cache.positions_stamp != frame.body(scene, ix).positions_stamp() {
-                self.push(ix, cache, What::Near, n);
+            if let Some(sorted) = cache.sorted() {
+                stats.n_remote += (cache.clustering.n_clusters() - sorted.n_near()) as u64;
             }
         }
     }
