@@ -69,69 +69,20 @@ impl RunExtents {
     };
 }
 
-/// For each byte of members, all ones in the place of what is none: as f32 a NaN, which minimum and maximum pass over.
-static NO_MEMBERS: [[u32; 8]; 256] = {
-    let mut table = [[0; 8]; 256];
-    let mut k = 0;
-    while k < 8 * 256 {
-        if (k / 8) >> (k % 8) & 1 == 0 {
-            table[k / 8][k % 8] = u32::MAX;
-        }
-        k += 1;
-    }
-    table
-};
-
-/// Those of one eight of a run's coordinates that are not in a group.
-#[inline(always)]
-pub(crate) fn no_members(members: &Members, end: usize, eight: usize) -> &'static [u32; 8] {
-    let byte = members[end][eight / 2] >> (8 * (eight % 2)) & 0xff;
-    &NO_MEMBERS[usize::from(byte)]
-}
-
-/// Runs looked at again and again, eight coordinates of each at a time, while they are in the first-level cache.
-pub(crate) const BLOCK: usize = 32;
-
-/// Adds runs with their members, as plain loops.
+/// Adds runs with their members, one coordinate after the other.
 #[inline(always)]
 pub(crate) fn add_runs(runs: &[[[f32; 3]; RUN]], members: &[Members], into: &mut RunExtents) {
-    for (runs, members) in runs.chunks(BLOCK).zip(members.chunks(BLOCK)) {
-        for eight in 0..COORDINATES / 8 {
-            add_eight(runs, members, eight, into);
-        }
-    }
-}
-
-/// The same for one eight of their coordinates: so few that all that is found of them stays in registers.
-#[inline(always)]
-fn add_eight(runs: &[[[f32; 3]; RUN]], members: &[Members], eight: usize, into: &mut RunExtents) {
-    let mut min = [f32::INFINITY; 8];
-    let mut max = [f32::NEG_INFINITY; 8];
-    let mut sum = [0.0f32; 8];
-    let mut group_min = [[f32::INFINITY; 8]; 2];
-    let mut group_max = [[f32::NEG_INFINITY; 8]; 2];
     for (run, members) in runs.iter().zip(members) {
-        let x = &run.as_flattened().as_chunks::<8>().0[eight];
-        let none = [no_members(members, 0, eight), no_members(members, 1, eight)];
-        for k in 0..8 {
-            min[k] = lesser(x[k], min[k]);
-            max[k] = greater(x[k], max[k]);
-            sum[k] += x[k];
-            for end in 0..2 {
-                let x = f32::from_bits(x[k].to_bits() | none[end][k]);
-                group_min[end][k] = lesser(x, group_min[end][k]);
-                group_max[end][k] = greater(x, group_max[end][k]);
+        for (k, &x) in run.as_flattened().iter().enumerate() {
+            into.min[k] = lesser(x, into.min[k]);
+            into.max[k] = greater(x, into.max[k]);
+            into.sum[k] += x;
+            for (end, members) in members.iter().enumerate() {
+                if members[k / ROW] >> (k % ROW) & 1 == 1 {
+                    into.group_min[end][k] = lesser(x, into.group_min[end][k]);
+                    into.group_max[end][k] = greater(x, into.group_max[end][k]);
+                }
             }
-        }
-    }
-    for k in 0..8 {
-        let at = 8 * eight + k;
-        into.min[at] = lesser(min[k], into.min[at]);
-        into.max[at] = greater(max[k], into.max[at]);
-        into.sum[at] += sum[k];
-        for end in 0..2 {
-            into.group_min[end][at] = lesser(group_min[end][k], into.group_min[end][at]);
-            into.group_max[end][at] = greater(group_max[end][k], into.group_max[end][at]);
         }
     }
 }
@@ -159,6 +110,12 @@ impl Extents {
 /// boxes. Groups without members span nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Intervals([Bounds; 2]);
+
+impl Default for Intervals {
+    fn default() -> Self {
+        Intervals::EMPTY
+    }
+}
 
 impl Intervals {
     pub const EMPTY: Intervals = Intervals([Bounds::EMPTY; 2]);
@@ -327,7 +284,7 @@ mod tests {
             InstructionSet::Avx2,
             InstructionSet::Avx512,
         ];
-        for n in (1..70).chain([16 * BLOCK, 16 * BLOCK + 5, 3000]) {
+        for n in (1..70).chain([512, 517, 3000]) {
             let mut positions: Vec<[f32; 3]> = (0..n)
                 .map(|vertex| {
                     [0, 1, 2].map(|axis| (hash(3 * vertex + axis) as i32 >> 8) as f32 / 4096.0)

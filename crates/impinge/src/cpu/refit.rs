@@ -136,7 +136,7 @@ impl Refit {
             frame.check(scene)?;
         }
         if sorts {
-            self.prove(frame, caches, stats);
+            self.prove(job, caches, stats);
             self.work(isa, job, caches, scratches);
         }
         self.above(isa, job, options, caches, stats);
@@ -146,11 +146,17 @@ impl Refit {
         Ok(())
     }
 
-    /// Tasks for what is near, or for all where too much has come back.
-    fn prove(&mut self, frame: &Frame, caches: &mut Caches, stats: &mut Statistics) {
+    /// Tasks for what is near with what has come back, or for all where too much has.
+    fn prove(&mut self, job: Job<'_>, caches: &mut Caches, stats: &mut Statistics) {
+        let Job { scene, frame, .. } = job;
         self.tasks.clear();
         for (ix, participant) in frame.participants.iter().enumerate() {
-            let Some(back) = back(frame, caches, ix) else {
+            let world = World {
+                scene,
+                frame,
+                caches: Some(caches),
+            };
+            let Some(back) = back(world, ix) else {
                 continue;
             };
             let cache = caches[participant.id.index()].as_mut().expect("clustered");
@@ -318,16 +324,10 @@ fn met(frame: &Frame, ix: usize) -> impl Iterator<Item = usize> {
     (0..frame.participants.len()).filter(move |&other| other != ix && frame.meets(ix, other))
 }
 
-/// What is kept of a participant.
-fn cache<'a>(frame: &Frame, caches: &'a Caches, ix: usize) -> &'a BodyCache {
-    let slot = frame.participants[ix].id.index();
-    caches[slot].as_ref().expect("clustered")
-}
-
 /// The groups of a participant that are not beside all that it could meet, if its clusters are sorted.
-fn back(frame: &Frame, caches: &Caches, ix: usize) -> Option<Groups> {
-    let sorted = cache(frame, caches, ix).sorted()?;
-    let groups = met(frame, ix).map(|other| sorted.back_at(&cache(frame, caches, other).whole));
+fn back(world: World<'_>, ix: usize) -> Option<Groups> {
+    let sorted = world.cache(ix as u32).sorted()?;
+    let groups = met(world.frame, ix).map(|other| sorted.back_at(&world.cache(other as u32).whole));
     Some(groups.fold(Groups::default(), Groups::union))
 }
 
@@ -346,10 +346,15 @@ fn sort(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker]) {
         workers,
         ..
     } = job;
+    let world = World {
+        scene,
+        frame,
+        caches: Some(caches),
+    };
     let mut others = [Bounds::EMPTY; SORTED_TO];
     for (ix, others) in others[..frame.participants.len()].iter_mut().enumerate() {
         for other in met(frame, ix) {
-            others.join(&cache(frame, caches, other).whole);
+            others.join(&world.cache(other as u32).whole);
         }
     }
     let mut due: [Mutex<Option<Due<'_>>>; SORTED_TO] = Default::default();

@@ -36,7 +36,7 @@ pub(crate) struct SomeClusters {
 }
 
 /// The clusters of a body, sorted or not, and when to sort them. Memory is kept.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Remote {
     is_sorted: bool,
     /// The group of each cluster, none for those that are near. Those in a group have empty boxes.
@@ -50,25 +50,9 @@ pub(crate) struct Remote {
     groups: Intervals,
     /// Groups whose clusters are to be sorted at the frame's end.
     unsorted: Groups,
-    /// Clusters that have just been found to lie beside the others.
-    fresh: Vec<u32>,
+    /// Clusters that have just been found to lie beside the others, and where.
+    fresh: Vec<(u32, Side)>,
     outlook: Outlook,
-}
-
-impl Default for Remote {
-    fn default() -> Self {
-        Remote {
-            is_sorted: false,
-            sides: Vec::new(),
-            near: Vec::new(),
-            members: Vec::new(),
-            n_vertices: 0,
-            groups: Intervals::EMPTY,
-            unsorted: Groups::default(),
-            fresh: Vec::new(),
-            outlook: Outlook::default(),
-        }
-    }
 }
 
 impl Remote {
@@ -186,8 +170,8 @@ impl Remote {
         for (cluster, known) in self.sides.iter_mut().enumerate() {
             if known.is_none() {
                 *known = side(&leaves.at(cluster), others, &slack);
-                if known.is_some() {
-                    self.fresh.push(cluster as u32);
+                if let Some(side) = *known {
+                    self.fresh.push((cluster as u32, side));
                 }
             }
             n_beside += usize::from(known.is_some());
@@ -200,10 +184,7 @@ impl Remote {
         let unsorted = std::mem::take(&mut self.unsorted);
         extents::clear(&mut self.members, unsorted);
         self.groups.clear(unsorted);
-        for &cluster in &self.fresh {
-            let Some(side) = self.sides[cluster as usize] else {
-                continue;
-            };
+        for &(cluster, side) in &self.fresh {
             self.groups.extend(side, &leaves.at(cluster as usize));
             leaves.put(cluster as usize, &Bounds::EMPTY);
             for &vertex in clustering.vertices(cluster as usize) {
@@ -239,7 +220,7 @@ impl Remote {
             + size_of::<Members>() * self.members.capacity()
             + size_of::<SomeClusters>() * self.near.capacity()
             + size_of::<Option<Side>>() * self.sides.capacity()
-            + size_of::<u32>() * self.fresh.capacity()
+            + size_of::<(u32, Side)>() * self.fresh.capacity()
     }
 }
 
@@ -264,10 +245,9 @@ fn side(cluster: &Bounds, others: &Bounds, slack: &[f32; 6]) -> Option<Side> {
 }
 
 /// The clusters among a node's children.
-#[derive(Clone)]
 pub(crate) struct Children {
     first: usize,
-    lanes: u8,
+    lanes: Lanes,
 }
 
 impl Children {
@@ -276,7 +256,7 @@ impl Children {
     pub fn new(children: Range<usize>, only: u8) -> Self {
         Children {
             first: children.start,
-            lanes: only & (u8::MAX >> (8 - children.len())),
+            lanes: Lanes(u64::from(only & (u8::MAX >> (8 - children.len())))),
         }
     }
 }
@@ -286,10 +266,7 @@ impl Iterator for Children {
 
     #[inline(always)]
     fn next(&mut self) -> Option<usize> {
-        let mut lanes = Lanes(self.lanes.into());
-        let lane = lanes.next()?;
-        self.lanes = lanes.0 as u8;
-        Some(self.first + lane)
+        Some(self.first + self.lanes.next()?)
     }
 }
 

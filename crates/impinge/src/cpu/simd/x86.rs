@@ -6,7 +6,7 @@ use crate::exact::filter::number::Lookup;
 use crate::exact::filter::{BATCH, TABLE};
 
 use super::super::bounds::Vec4;
-use super::super::extents::{BLOCK, COORDINATES, no_members};
+use super::super::extents::COORDINATES;
 use super::{
     Bounds, BoundsArray, CHUNK, ClusterFaces, GROUP, LANES, LaneBounds, Lanes, Lanes32, LocalFaces,
     Masks, Members, RUN, RunExtents, Simd, Triangles64, number, of_vertices_f32, put_corners,
@@ -167,6 +167,29 @@ unsafe fn put_corners_by_vertices(
 
 #[repr(C, align(64))]
 struct Table([[f32; TABLE]; 3]);
+
+/// For each byte of members, all ones in the place of what is none: as f32 a NaN, which minimum and maximum pass over.
+static NO_MEMBERS: [[u32; 8]; 256] = {
+    let mut table = [[0; 8]; 256];
+    let mut k = 0;
+    while k < 8 * 256 {
+        if (k / 8) >> (k % 8) & 1 == 0 {
+            table[k / 8][k % 8] = u32::MAX;
+        }
+        k += 1;
+    }
+    table
+};
+
+/// Those of one eight of a run's coordinates that are not in a group.
+#[inline(always)]
+fn no_members(members: &Members, end: usize, eight: usize) -> &'static [u32; 8] {
+    let byte = members[end][eight / 2] >> (8 * (eight % 2)) & 0xff;
+    &NO_MEMBERS[usize::from(byte)]
+}
+
+/// Runs looked at again and again, eight coordinates of each at a time, while they are in the first-level cache.
+const BLOCK: usize = 32;
 
 /// As `Simd::add_runs`, for one eight of the runs' coordinates: so few that all that is found of them stays in registers.
 ///
