@@ -1,14 +1,10 @@
 //! The command line: what may be said, and its help.
 
-mod paper;
-
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use impinge_fem::scenes::SceneName;
-
-pub use paper::{BenchArgs, BenchCommand, PaperArgs};
 
 use crate::values::{FrameRange, MeshFile, RowsFile, body_numbers, bytes, lambda};
 #[cfg(feature = "gpu")]
@@ -50,8 +46,6 @@ pub enum Command {
     /// Drop an elastic body on another one and write what happens, step by step
     #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(SimulateArgs),
-    /// Measure benchmarks that have been published, and write a report
-    Bench(BenchArgs),
     /// Draw meshes, the primitives that meet in red and blue
     #[cfg(feature = "gpu")]
     #[command(after_help = RENDER_EXAMPLES)]

@@ -5,7 +5,6 @@ mod demo;
 mod demo_scene;
 #[cfg(feature = "gpu")]
 mod devices;
-mod paper;
 mod record;
 #[cfg(feature = "gpu")]
 mod render;
@@ -16,7 +15,6 @@ pub use answer::{pairs, within};
 pub use demo::demo;
 #[cfg(feature = "gpu")]
 pub use devices::devices;
-pub use paper::paper;
 #[cfg(feature = "gpu")]
 pub use render::render;
 pub use sequence::sequence;

@@ -28,12 +28,6 @@ pub enum Error {
     /// The simulation could not be set up or go on, or was cancelled.
     #[error(transparent)]
     Simulation(#[from] impinge_fem::Error),
-    /// The paper's benchmarks could not be run, or were stopped.
-    #[error(transparent)]
-    Paper(#[from] impinge_paper::Error),
-    /// Contestants of a benchmark gave different answers: a defect.
-    #[error("{n} answers in {} differ from those beside them: please report this", .report.display())]
-    Disagreements { n: usize, report: PathBuf },
     /// A saved state that is damaged or of another simulation.
     #[error("{}: {source}", .path.display())]
     SavedState {
@@ -76,9 +70,7 @@ impl Error {
     /// 2 for bad usage, 0 where the reader of our output went away (it has what it wanted), else 1.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Error::Usage(_)
-            | Error::Detection(impinge::Error::Setting { .. })
-            | Error::Paper(impinge_paper::Error::Options(_)) => 2,
+            Error::Usage(_) | Error::Detection(impinge::Error::Setting { .. }) => 2,
             Error::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
             _ => 1,
         }

@@ -20,7 +20,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use crate::args::{BenchCommand, Cli, Command};
+use crate::args::{Cli, Command};
 
 fn main() -> ExitCode {
     #[cfg(all(feature = "gpu", target_os = "linux"))]
@@ -32,9 +32,6 @@ fn main() -> ExitCode {
         Command::Within(args) => commands::within(&args, &cancel),
         Command::Sequence(args) => commands::sequence(&args, &cancel),
         Command::Simulate(args) => commands::simulate(&args, &cancel),
-        Command::Bench(args) => match args.command {
-            BenchCommand::Paper(args) => commands::paper(&args, &cancel),
-        },
         #[cfg(feature = "gpu")]
         Command::Render(args) => commands::render(&args, &cancel),
         #[cfg(feature = "gpu")]

@@ -4,8 +4,6 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use impinge_paper::SceneName;
-
 /// A file for rows of pairs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RowsFile {
@@ -175,42 +173,6 @@ pub fn lambda(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A benchmark of the paper by its name.
-pub fn benchmark(text: &str) -> Result<SceneName, String> {
-    SceneName::named(text).ok_or_else(|| {
-        let names: Vec<&str> = SceneName::ALL.map(SceneName::name).into();
-        format!("expected one of {}", names.join(", "))
-    })
-}
-
-/// A mesh file, and the benchmark that it is for.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct BenchmarkMesh {
-    pub scene: Option<SceneName>,
-    pub path: PathBuf,
-}
-
-impl FromStr for BenchmarkMesh {
-    type Err = String;
-
-    /// What stands before the first `=` is a name only if it is a benchmark's.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let named = text
-            .split_once('=')
-            .and_then(|(name, path)| Some((SceneName::named(name)?, path)));
-        Ok(match named {
-            Some((scene, path)) => BenchmarkMesh {
-                scene: Some(scene),
-                path: path.into(),
-            },
-            None => BenchmarkMesh {
-                scene: None,
-                path: text.into(),
-            },
-        })
-    }
-}
-
 /// Two body numbers with a comma between them.
 pub fn body_numbers(text: &str) -> Result<(usize, usize), String> {
     text.split_once(',')
@@ -355,19 +317,6 @@ mod tests {
         assert!(part("-0.1").is_err() && part("1.1").is_err());
         assert_eq!("a.PNG".parse(), Ok(PngFile("a.PNG".into())));
         assert!("a.jpg".parse::<PngFile>().is_err());
-    }
-
-    #[test]
-    fn meshes_may_name_their_benchmark() {
-        let parsed = |text: &str| {
-            let mesh: BenchmarkMesh = text.parse().unwrap();
-            (mesh.scene, mesh.path.display().to_string())
-        };
-        let bunny = Some(SceneName::Bunny);
-        assert_eq!(parsed("bunny=a=b.ply"), (bunny, "a=b.ply".to_owned()));
-        assert_eq!(parsed("a=b.ply"), (None, "a=b.ply".to_owned()));
-        assert_eq!(benchmark("dragon-8k"), Ok(SceneName::Dragon8k));
-        assert!(benchmark("dragon-9k").unwrap_err().contains("dragon-8k"));
     }
 
     #[test]

@@ -57,11 +57,6 @@ impl Watch {
         )
     }
 
-    /// Watches a run of several parts through [`part`](Watch::part).
-    pub fn parts(wanted: bool) -> Self {
-        Watch::new(wanted, 0, "{msg} {wide_bar} {pos}/{len}", "")
-    }
-
     fn new(wanted: bool, length: u64, template: &str, what: &'static str) -> Self {
         let bar = (wanted && stderr().is_terminal()).then(|| {
             let style = ProgressStyle::with_template(template)
@@ -88,17 +83,6 @@ impl Watch {
         {
             bar.set_length(progress.total);
             bar.set_position(progress.done);
-        }
-    }
-
-    /// Shows how far one part of a run has come.
-    pub fn part(&self, what: &str, done: usize, total: usize) {
-        if let Some(bar) = &self.bar {
-            if bar.message() != what {
-                bar.set_message(what.to_owned());
-            }
-            bar.set_length(total as u64);
-            bar.set_position(done as u64);
         }
     }
 

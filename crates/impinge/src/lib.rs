@@ -9,42 +9,20 @@
 //!   coordinates are read as real numbers. There is no tolerance anywhere.
 //! * **The same bytes everywhere.** The answer is sorted and depends on the input alone: not on
 //!   method, backend, threads or memory.
+//!
+//! This crate is the stable face of the engine in `impinge-core`.
 
-mod cpu;
-mod detector;
-mod error;
-pub mod exact;
-mod frame;
-#[cfg(feature = "gpu")]
-mod gpu;
-mod grouping;
-#[doc(hidden)]
-pub mod guest;
-mod naive;
-mod narrow;
-mod pairs;
-mod progress;
-mod query;
-mod scene;
-mod settings;
-mod stats;
-
-pub use detector::Detector;
-pub use error::Error;
-#[cfg(feature = "gpu")]
-#[doc(hidden)]
-pub use gpu::Capacities;
-#[cfg(feature = "gpu")]
-pub use gpu::{DeviceInfo, ResidentPairs, devices};
-pub use pairs::{Pairs, Primitive, hash_rows};
-pub use progress::{CancelToken, Control, Progress};
-pub use query::{Query, SharedVertex};
-pub use scene::{Body, BodyId, Elements, Filter, Kind, Positions, Real, Scene};
-pub use settings::{Backend, InstructionSet, Method, Recluster, Settings};
-pub use stats::{Stage, Statistics};
+pub use impinge_core::exact;
 /// The GPU interface that [`Detector::with_device`] and [`Detector::encode`] speak.
 #[cfg(feature = "gpu")]
-pub use wgpu;
+pub use impinge_core::wgpu;
+pub use impinge_core::{
+    Backend, Body, BodyId, CancelToken, Control, Detector, Elements, Error, Filter, InstructionSet,
+    Kind, Method, Pairs, Positions, Primitive, Progress, Query, Real, Recluster, Scene, Settings,
+    SharedVertex, Stage, Statistics, hash_rows,
+};
+#[cfg(feature = "gpu")]
+pub use impinge_core::{DeviceInfo, ResidentPairs, devices};
 
 // What users hold may be moved to, and lent to, other threads.
 const _: () = {

@@ -206,17 +206,3 @@ pub fn keys(value: &Value) -> Vec<&str> {
         .map(String::as_str)
         .collect()
 }
-
-/// A number of a report.
-#[track_caller]
-pub fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap()
-}
-
-/// One number of each object of a list; 0 where it is null.
-pub fn numbers(list: &Value, name: &str) -> Vec<f64> {
-    let list = list.as_array().unwrap();
-    list.iter()
-        .map(|one| one[name].as_f64().unwrap_or(0.0))
-        .collect()
-}

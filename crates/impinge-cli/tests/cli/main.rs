@@ -5,7 +5,6 @@ mod demo;
 #[cfg(feature = "gpu")]
 mod devices;
 mod harness;
-mod paper;
 #[cfg(feature = "gpu")]
 mod render;
 mod sequence;

@@ -71,25 +71,3 @@ fn a_reader_that_has_enough_is_no_error() {
     assert_eq!(child.wait().unwrap().code(), Some(0));
     assert_eq!(said(&mut child), "");
 }
-
-#[test]
-fn a_report_that_is_stopped_leaves_no_files() {
-    let folder = Folder::new();
-    let mut child = folder
-        .command(["bench", "paper", "--frames", "100000", "--out", "report"])
-        .args(["--scene", "ball", "--backend", "cpu"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    // Long enough to have begun; where it has not, the signal ends it in another way.
-    std::thread::sleep(std::time::Duration::from_secs(2));
-    let sent = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status()
-        .unwrap();
-    assert!(sent.success());
-    assert_eq!(child.wait().unwrap().code(), Some(1));
-    assert_eq!(said(&mut child), "impinge: cancelled\n");
-    assert!(!folder.path("report").exists());
-}

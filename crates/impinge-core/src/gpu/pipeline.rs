@@ -1,0 +1,215 @@
+//! Kernels with typed bindings.
+
+use std::marker::PhantomData;
+
+use super::buffers::Access;
+use super::device::Gpu;
+
+/// One binding as a kernel declares it.
+#[derive(Debug, Clone, Copy)]
+pub struct Entry {
+    /// What the kernel calls it; tests compare.
+    pub name: &'static str,
+    pub access: Access,
+    /// Bytes of one element.
+    pub stride: u64,
+}
+
+/// Everything that a kernel binds, in the order of its binding numbers.
+pub trait Bindings {
+    const ENTRIES: &'static [Entry];
+    fn resources(&self) -> Vec<wgpu::BindingResource<'_>>;
+}
+
+/// Declares the bindings of a kernel: `name: Read<T>`, `Write<T>` or `Uniform<T>`, in order.
+#[macro_export]
+#[doc(hidden)]
+macro_rules! bindings {
+    ($(#[$doc:meta])* $name:ident { $($field:ident: $access:ident<$type:ty>),* $(,)? }) => {
+        $(#[$doc])*
+        pub(crate) struct $name {
+            $(pub $field: $crate::gpu::buffers::$access<$type>,)*
+        }
+
+        impl $crate::gpu::pipeline::Bindings for $name {
+            const ENTRIES: &'static [$crate::gpu::pipeline::Entry] = &[
+                $($crate::gpu::pipeline::Entry {
+                    name: stringify!($field),
+                    access: <$crate::gpu::buffers::$access<$type>
+                        as $crate::gpu::buffers::Binding>::ACCESS,
+                    stride: <$crate::gpu::buffers::$access<$type>
+                        as $crate::gpu::buffers::Binding>::STRIDE,
+                },)*
+            ];
+
+            fn resources(&self) -> Vec<wgpu::BindingResource<'_>> {
+                use $crate::gpu::buffers::Binding;
+                vec![$(self.$field.resource(),)*]
+            }
+        }
+    };
+}
+pub use crate::bindings;
+
+/// A kernel's text: its own file behind the shared ones that it builds on.
+pub struct Source {
+    pub name: &'static str,
+    pub parts: &'static [&'static str],
+}
+
+impl Source {
+    pub fn text(&self) -> String {
+        self.parts.join("\n")
+    }
+}
+
+/// The text of a kernel file and of the shared files that it needs.
+macro_rules! source {
+    ($name:literal, [$($shared:literal),*]) => {
+        $crate::gpu::pipeline::Source {
+            name: $name,
+            parts: &[
+                include_str!("kernels/shared/layout.wgsl"),
+                $(include_str!(concat!("kernels/shared/", $shared, ".wgsl")),)*
+                include_str!(concat!("kernels/", $name, ".wgsl")),
+            ],
+        }
+    };
+}
+pub(crate) use source;
+
+/// A compiled kernel that takes the bindings `B`.
+pub struct Kernel<B> {
+    name: &'static str,
+    layout: wgpu::BindGroupLayout,
+    pipeline: wgpu::ComputePipeline,
+    takes: PhantomData<fn(B)>,
+}
+
+impl<B: Bindings> Kernel<B> {
+    /// Compiles; errors go to the error scopes that are open.
+    pub fn new(device: &wgpu::Device, source: &Source, constants: &[(&str, f64)]) -> Self {
+        Kernel::of_text(device, source, source.text(), constants)
+    }
+
+    /// Compiles a text in place of the kernel's own.
+    pub(crate) fn of_text(
+        device: &wgpu::Device,
+        source: &Source,
+        text: String,
+        constants: &[(&str, f64)],
+    ) -> Self {
+        let entries: Vec<wgpu::BindGroupLayoutEntry> = (0u32..)
+            .zip(B::ENTRIES)
+            .map(|(binding, entry)| wgpu::BindGroupLayoutEntry {
+                binding,
+                visibility: wgpu::ShaderStages::COMPUTE,
+                ty: wgpu::BindingType::Buffer {
+                    ty: match entry.access {
+                        Access::Read => wgpu::BufferBindingType::Storage { read_only: true },
+                        Access::Write => wgpu::BufferBindingType::Storage { read_only: false },
+                        Access::Uniform => wgpu::BufferBindingType::Uniform,
+                    },
+                    has_dynamic_offset: entry.access == Access::Uniform,
+                    min_binding_size: wgpu::BufferSize::new(entry.stride),
+                },
+                count: None,
+            })
+            .collect();
+        let label = Some(source.name);
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label,
+            entries: &entries,
+        });
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label,
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label,
+            source: wgpu::ShaderSource::Wgsl(text.into()),
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label,
+            layout: Some(&pipeline_layout),
+            module: &module,
+            entry_point: Some("main"),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants,
+                // Kernels write workgroup memory before they read it.
+                zero_initialize_workgroup_memory: false,
+            },
+            cache: None,
+        });
+        Kernel {
+            name: source.name,
+            layout,
+            pipeline,
+            takes: PhantomData,
+        }
+    }
+
+    /// The kernel with its buffers.
+    pub fn bind(&self, gpu: &Gpu, bindings: &B) -> Bound {
+        let entries: Vec<wgpu::BindGroupEntry<'_>> = (0u32..)
+            .zip(bindings.resources())
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
+        Bound {
+            pipeline: self.pipeline.clone(),
+            group: gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some(self.name),
+                layout: &self.layout,
+                entries: &entries,
+            }),
+            has_params: B::ENTRIES
+                .iter()
+                .any(|entry| entry.access == Access::Uniform),
+        }
+    }
+}
+
+/// Bytes between the parameters of two steps.
+const STEP: u32 = size_of::<super::layout::Step>() as u32;
+
+/// A kernel with its buffers, ready to be dispatched.
+#[derive(Debug)]
+pub struct Bound {
+    pipeline: wgpu::ComputePipeline,
+    group: wgpu::BindGroup,
+    has_params: bool,
+}
+
+/// How many workgroups.
+pub enum Groups<'a> {
+    /// As many as this, in rows if need be.
+    Known(u64),
+    /// As the arguments in this slot say.
+    Indirect(&'a wgpu::Buffer, u32),
+}
+
+/// The widest row of workgroups; `prepare.wgsl` has the same.
+const WIDEST: u64 = 32_768;
+
+impl Bound {
+    /// Dispatches with the parameters of a step.
+    pub fn run(&self, pass: &mut wgpu::ComputePass<'_>, step: u32, groups: Groups<'_>) {
+        pass.set_pipeline(&self.pipeline);
+        let offset = [step * STEP];
+        let offsets: &[u32] = if self.has_params { &offset } else { &[] };
+        pass.set_bind_group(0, &self.group, offsets);
+        match groups {
+            Groups::Known(n) => {
+                // Counts are below 2^32, so both fit.
+                let x = n.min(WIDEST) as u32;
+                let y = n.div_ceil(WIDEST) as u32;
+                pass.dispatch_workgroups(x, y, 1);
+            }
+            Groups::Indirect(arguments, slot) => {
+                let bytes = size_of::<super::layout::Arguments>() as u64;
+                pass.dispatch_workgroups_indirect(arguments, u64::from(slot) * bytes);
+            }
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! The engine of `impinge`: everything inside, public and without a promise of stability.
+//!
+//! Users of the library take the crate `impinge`, which hands on what is stable. Methods that live in
+//! other crates, such as the baselines that impinge is measured against, stand on this one: on the same
+//! frame, boxes, grid, threads, exact test and GPU engine, so that only the method differs.
+
+// Types are documented; fields and small methods of the inside speak for themselves.
+#[allow(missing_docs)]
+pub mod cpu;
+mod detector;
+mod error;
+pub mod exact;
+#[allow(missing_docs)]
+pub mod frame;
+#[cfg(feature = "gpu")]
+pub mod gpu;
+pub mod grouping;
+pub mod host;
+mod naive;
+mod narrow;
+mod pairs;
+mod progress;
+mod query;
+mod scene;
+mod settings;
+mod stats;
+
+pub use detector::Detector;
+pub use error::Error;
+#[cfg(feature = "gpu")]
+pub use gpu::Capacities;
+#[cfg(feature = "gpu")]
+pub use gpu::{DeviceInfo, ResidentPairs, devices};
+pub use pairs::{Pairs, Primitive, hash_rows};
+pub use progress::{CancelToken, Control, Progress};
+pub use query::{Query, SharedVertex};
+pub use scene::{Body, BodyId, Elements, Filter, Kind, Positions, Real, Scene};
+pub use settings::{Backend, InstructionSet, Method, Recluster, Settings};
+pub use stats::{Stage, Statistics};
+#[cfg(feature = "gpu")]
+pub use wgpu;

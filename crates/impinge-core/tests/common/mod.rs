@@ -1,0 +1,251 @@
+//! One list of cases and one way to compare answers, for every method and backend.
+
+#![allow(dead_code)]
+
+use impinge_core::{
+    Backend, BodyId, Detector, Method, Pairs, Query, Scene, Settings, SharedVertex, hash_rows,
+};
+use impinge_scenes::{Model, adversarial, soup, surfaces};
+
+/// A scene and a question.
+pub struct Case {
+    pub name: String,
+    pub scene: Scene,
+    pub query: Query,
+}
+
+/// The rows of an answer.
+pub fn rows(pairs: &Pairs) -> Vec<[u32; 4]> {
+    pairs.rows().collect()
+}
+
+/// What the oracle says.
+pub fn naive(case: &Case) -> Vec<[u32; 4]> {
+    let mut detector = Detector::with_settings(Settings {
+        method: Method::Naive,
+        backend: Backend::Cpu,
+        ..Settings::default()
+    })
+    .unwrap();
+    rows(detector.detect(&case.scene, &case.query).unwrap())
+}
+
+/// Whether an answer is the oracle's: the same rows in the same order, and the same hash.
+pub fn agree(expected: &[[u32; 4]], answer: &[[u32; 4]], hash: u64) -> Result<(), String> {
+    if hash != hash_rows(expected.iter().copied()) {
+        return Err(format!(
+            "hash {hash:016x} of {} pairs, {} expected",
+            answer.len(),
+            expected.len()
+        ));
+    }
+    match expected.iter().zip(answer).position(|(e, a)| e != a) {
+        Some(ix) => Err(format!(
+            "row {ix} is {:?}, expected {:?}",
+            answer[ix], expected[ix]
+        )),
+        None if expected.len() != answer.len() => Err(format!(
+            "{} pairs, {} expected",
+            answer.len(),
+            expected.len()
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Runs a case with these settings and compares.
+pub fn check(case: &Case, expected: &[[u32; 4]], settings: Settings) {
+    let mut detector = Detector::with_settings(settings.clone()).unwrap();
+    // Twice: the second frame runs on what the first has cached.
+    for frame in 0..2 {
+        let pairs = detector.detect(&case.scene, &case.query).unwrap();
+        if let Err(error) = agree(expected, &rows(pairs), pairs.hash()) {
+            panic!("{} frame {frame} with {settings:?}: {error}", case.name);
+        }
+    }
+}
+
+fn two(name: &str, a: &Model, b: &Model, double: bool) -> Case {
+    let mut scene = Scene::new();
+    let add = |scene: &mut Scene, model: &Model| -> BodyId {
+        if double {
+            scene
+                .add(model.elements.clone(), model.positions_f64())
+                .unwrap()
+        } else {
+            scene
+                .add(model.elements.clone(), model.positions.clone())
+                .unwrap()
+        }
+    };
+    let ids = (add(&mut scene, a), add(&mut scene, b));
+    Case {
+        name: format!("{name}{}", if double { ", f64" } else { "" }),
+        scene,
+        query: Query::between(ids.0, ids.1),
+    }
+}
+
+/// Bodies of every kind and precision, some with huge primitives.
+fn many(n: u64, scale: f32) -> Case {
+    let mut scene = Scene::new();
+    for k in 0..n {
+        let at = [0.35 * (k % 4) as f32, 0.3 * (k / 4) as f32, 0.1 * k as f32];
+        let mut model = match k % 3 {
+            0 => soup::tetrahedra(60, 0.15, k),
+            1 => soup::triangles(120, 0.1, k),
+            _ => surfaces::ball(300),
+        }
+        .translated(at);
+        if k % 5 == 4 {
+            model.positions[0] = [9.0, 8.0, 7.0];
+        }
+        for position in &mut model.positions {
+            *position = position.map(|x| x * scale);
+        }
+        let added = if k % 4 == 1 {
+            scene.add(model.elements.clone(), model.positions_f64())
+        } else {
+            scene.add(model.elements, model.positions)
+        };
+        added.unwrap();
+    }
+    Case {
+        name: format!("{n} bodies, scale {scale:e}"),
+        scene,
+        query: Query::all(),
+    }
+}
+
+fn one(name: &str, model: &Model, rule: SharedVertex) -> Case {
+    let mut scene = Scene::new();
+    let id = scene
+        .add(model.elements.clone(), model.positions.clone())
+        .unwrap();
+    Case {
+        name: format!("{name}, {rule:?}"),
+        scene,
+        query: Query::within(id).shared_vertex(rule),
+    }
+}
+
+/// Cases of up to a few thousand primitives: every kind, every query, lattice troublemakers, and the
+/// adversarial scenes in small.
+pub fn cases() -> Vec<Case> {
+    let mut cases = Vec::new();
+    let rules = [SharedVertex::Skip, SharedVertex::Resolve];
+    let ball = surfaces::bumpy_ball(1500, 0.2);
+    let torus = surfaces::torus(40, 20, 1.0, 0.4);
+    for double in [false, true] {
+        cases.push(two(
+            "ball and torus",
+            &ball,
+            &torus.translated([0.3, 0.1, 0.2]),
+            double,
+        ));
+        cases.push(two("coincident balls", &ball, &ball, double));
+        cases.push(two(
+            "disjoint balls",
+            &ball,
+            &ball.translated([9.0, 0.0, 0.0]),
+            double,
+        ));
+        for (n, k) in [(1, 1), (7, 1), (64, 2), (65, 2), (130, 3), (400, 6)] {
+            let a = soup::lattice_triangles(n, k, 1);
+            let b = soup::lattice_triangles(n + 3, k, 2);
+            cases.push(two(
+                &format!("lattice triangles {n} in {k}"),
+                &a,
+                &b,
+                double,
+            ));
+            let t = soup::lattice_tetrahedra(n, k, 3);
+            let u = soup::lattice_tetrahedra(n + 3, k, 4);
+            cases.push(two(
+                &format!("lattice tetrahedra {n} in {k}"),
+                &t,
+                &u,
+                double,
+            ));
+            cases.push(two(&format!("lattice mixed {n} in {k}"), &a, &u, double));
+            cases.push(two(
+                &format!("lattice mixed swapped {n} in {k}"),
+                &t,
+                &b,
+                double,
+            ));
+        }
+        for n in [1, 63, 64, 65, 129, 700] {
+            let a = soup::triangles(n, 0.2, 5);
+            let b = soup::triangles(n, 0.2, 6);
+            cases.push(two(&format!("soup {n}"), &a, &b, double));
+        }
+    }
+    for (n, scale) in [(12, 1.0), (8, 1.0), (7, 1e-30), (6, 1e25)] {
+        cases.push(many(n, scale));
+    }
+    for rule in rules {
+        cases.push(one("soup", &soup::triangles(900, 0.15, 7), rule));
+        cases.push(one("tetrahedra", &soup::tetrahedra(300, 0.2, 8), rule));
+        cases.push(one("torus", &torus, rule));
+        for (n, k) in [(1, 1), (20, 1), (100, 2), (300, 4)] {
+            let web = soup::lattice_web(n, k, 9);
+            cases.push(one(&format!("lattice web {n} in {k}"), &web, rule));
+            let web = soup::lattice_web_tetrahedra(n, k, 10);
+            cases.push(one(
+                &format!("lattice tetrahedra web {n} in {k}"),
+                &web,
+                rule,
+            ));
+        }
+        cases.push(one("fan", &fan(300), rule));
+    }
+    for built in [
+        adversarial::plain(600),
+        adversarial::huge_over_small(600),
+        adversarial::stadium(600),
+        adversarial::one_cell(400),
+        adversarial::one_point(150),
+        adversarial::flat_cloth(600),
+        adversarial::needle_row(400),
+        adversarial::coincident(400),
+        adversarial::outliers(400),
+        adversarial::boxes(60, 3),
+        adversarial::mixed_sizes(1500),
+        adversarial::slivers(300),
+        adversarial::stacked_cubes(60),
+        adversarial::chessboard(60),
+    ] {
+        let built = built.unwrap();
+        for query in [
+            built.query.clone(),
+            Query::everything(),
+            Query::all_within(),
+        ] {
+            cases.push(Case {
+                name: format!("{} {query:?}", built.name),
+                scene: built.scene.clone(),
+                query,
+            });
+        }
+    }
+    cases
+}
+
+/// Triangles that all share one vertex, more than any mesh has: the hub of the adjacency masks.
+fn fan(n: u32) -> Model {
+    let mut positions = vec![[0.0f32; 3]];
+    let mut faces = Vec::new();
+    for k in 0..n {
+        let angle = k as f32 * 0.7;
+        let (sin, cos) = angle.sin_cos();
+        let first = positions.len() as u32;
+        positions.push([cos, sin, 0.1 * k as f32]);
+        positions.push([cos - 0.3 * sin, sin + 0.3 * cos, 0.1 * k as f32 + 0.05]);
+        faces.push([0, first, first + 1]);
+    }
+    Model {
+        positions,
+        elements: faces.into(),
+    }
+}

@@ -1,0 +1,830 @@
+//! The GPU backend against the oracle and the CPU: whole sorted sets and their hash.
+//!
+//! These tests fail where no adapter is found; a software driver is enough.
+#![cfg(feature = "gpu")]
+
+mod common;
+
+use std::future::Future;
+use std::sync::{Mutex, OnceLock};
+
+use common::{Case, agree, cases, check, naive, rows};
+use impinge_core::{
+    Backend, Capacities, Detector, Error, Method, Query, Recluster, Scene, Settings, SharedVertex,
+    devices, wgpu,
+};
+use impinge_scenes::deform::{self, Deform};
+use impinge_scenes::{soup, surfaces};
+
+/// Settings for the GPU. The first call opens a device and keeps it open, so that all tests share
+/// it and its compiled kernels.
+fn gpu(method: Method) -> Settings {
+    static OPEN: OnceLock<Mutex<Detector>> = OnceLock::new();
+    OPEN.get_or_init(|| {
+        let open = Detector::new(Backend::Gpu);
+        Mutex::new(open.expect("these tests need a GPU or a software driver"))
+    });
+    Settings {
+        method,
+        backend: Backend::Gpu,
+        ..Settings::default()
+    }
+}
+
+fn cpu(method: Method) -> Settings {
+    Settings {
+        method,
+        backend: Backend::Cpu,
+        ..Settings::default()
+    }
+}
+
+fn assert_agree(name: &str, expected: &[[u32; 4]], detector: &mut Detector, case: &Case) {
+    let pairs = detector.detect(&case.scene, &case.query).unwrap();
+    if let Err(error) = agree(expected, &rows(pairs), pairs.hash()) {
+        panic!("{name}, {}: {error}", case.name);
+    }
+}
+
+#[test]
+fn clusters_agree_with_the_oracle() {
+    for case in cases() {
+        check(&case, &naive(&case), gpu(Method::Clusters));
+    }
+}
+
+#[test]
+fn cells_agree_with_the_oracle() {
+    for (ix, case) in cases().into_iter().enumerate() {
+        let expected = naive(&case);
+        check(&case, &expected, gpu(Method::Cells));
+        let (lambda, group_size) = [(0.01, 20), (20.0, 64), (1e6, 7)][ix % 3];
+        let settings = Settings {
+            lambda,
+            group_size,
+            ..gpu(Method::Cells)
+        };
+        check(&case, &expected, settings);
+    }
+}
+
+/// Buffers of one scene are used again for the next, which may need more or less of them, and other
+/// kernels.
+#[test]
+fn one_detector_answers_scene_after_scene() {
+    let cases = cases();
+    let expected: Vec<_> = cases.iter().map(naive).collect();
+    for method in [Method::Clusters, Method::Cells] {
+        let mut detector = Detector::with_settings(gpu(method)).unwrap();
+        let order = (0..cases.len()).chain((0..cases.len()).rev());
+        for ix in order {
+            assert_agree(
+                "scene after scene",
+                &expected[ix],
+                &mut detector,
+                &cases[ix],
+            );
+        }
+    }
+}
+
+/// Settings of `Cells` that put everything into one cell, in groups of a few.
+fn one_cell(group_size: u32) -> Settings {
+    Settings {
+        lambda: 1e-9,
+        group_size,
+        ..gpu(Method::Cells)
+    }
+}
+
+#[test]
+fn a_crowded_cell_is_worked_in_tiles() {
+    // Groups of one primitive: more pairs of groups than a pass lists of one cell.
+    let soup = soup::triangles(300, 0.4, 11);
+    let web = soup::lattice_web(290, 4, 9);
+    let mut scene = Scene::new();
+    let id = soup.add_to(&mut scene).unwrap();
+    let within = Query::within(id);
+    let mut both = scene.clone();
+    web.add_to(&mut both).unwrap();
+    let everything = Query::everything().shared_vertex(SharedVertex::Resolve);
+    for (scene, query) in [
+        (&scene, within),
+        (&both, everything.clone()),
+        (&both, Query::all()),
+    ] {
+        let case = Case {
+            name: format!("crowded {query:?}"),
+            scene: scene.clone(),
+            query,
+        };
+        let expected = naive(&case);
+        check(&case, &expected, one_cell(1));
+        let mut detector = Detector::with_settings(one_cell(1)).unwrap();
+        let pairs = detector.detect(&case.scene, &case.query).unwrap();
+        let (stats, n) = (pairs.stats(), pairs.stats().n_entries);
+        assert_eq!((stats.method, stats.grid), ("cells", Some([1; 3])));
+        assert!(n >= 300, "{stats:?}");
+        assert_eq!(stats.n_work_items, n * (n + 1) / 2);
+        assert!(stats.n_slabs > 1, "{stats:?}");
+    }
+    // Buffers that grow between tiles leave the list alone.
+    let mut tiny = Capacities::default();
+    (tiny.items, tiny.candidates, tiny.pairs, tiny.unsure) = (1, 1, 1, 1);
+    (tiny.kept, tiny.entries) = (1, 1);
+    let case = Case {
+        name: "crowded".into(),
+        scene: both,
+        query: everything,
+    };
+    let expected = naive(&case);
+    let mut detector = Detector::with_capacities(one_cell(1), tiny).unwrap();
+    for _ in 0..2 {
+        assert_agree("tiny", &expected, &mut detector, &case);
+    }
+}
+
+#[test]
+fn a_crowded_cell_keeps_to_the_budget_or_is_left_to_clusters() {
+    let case = large();
+    let mut cpu = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+    let expected = rows(cpu.detect(&case.scene, &case.query).unwrap());
+    for (budget, method) in [
+        (None, "cells"),
+        (Some(1_000_000), "cells"),
+        (Some(700_000), "clusters"),
+    ] {
+        let settings = Settings {
+            memory_budget: budget,
+            ..one_cell(20)
+        };
+        let mut detector = Detector::with_settings(settings).unwrap();
+        let pairs = detector.detect(&case.scene, &case.query).unwrap();
+        agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+        let stats = pairs.stats();
+        assert_eq!(stats.method, method, "{budget:?} {stats:?}");
+        assert!(stats.bytes_held <= budget.unwrap_or(u64::MAX), "{stats:?}");
+        assert!(stats.n_slabs > 1, "{stats:?}");
+        // A frame with less in it goes back to the method that was asked for.
+        let mut small = Scene::new();
+        let id = soup::triangles(50, 0.4, 1).add_to(&mut small).unwrap();
+        let pairs = detector.detect(&small, &Query::within(id)).unwrap();
+        assert_eq!(pairs.stats().method, "cells");
+    }
+}
+
+/// 2,000 primitives a body, enough for several rounds and thousands of pairs.
+fn large() -> Case {
+    let mut scene = Scene::new();
+    let knot = surfaces::torus_knot(4000, Default::default());
+    let ball = surfaces::bumpy_ball(2000, 0.3);
+    let soup = soup::tetrahedra(1000, 0.25, 3);
+    knot.add_to(&mut scene).unwrap();
+    ball.add_to(&mut scene).unwrap();
+    soup.add_to(&mut scene).unwrap();
+    Case {
+        name: "large".into(),
+        scene,
+        query: Query::everything().shared_vertex(SharedVertex::Resolve),
+    }
+}
+
+#[test]
+fn buffers_that_overflow_grow_and_nothing_is_lost() {
+    let case = large();
+    let mut cpu = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+    let expected = rows(cpu.detect(&case.scene, &case.query).unwrap());
+    assert!(expected.len() > 1000);
+    let ample = || {
+        let mut capacities = Capacities::default();
+        (capacities.candidates, capacities.unsure) = (1 << 19, 1 << 17);
+        capacities
+    };
+    for method in [Method::Clusters, Method::Cells] {
+        let settings = gpu(method);
+        type Shrink = fn(&mut Capacities);
+        let stages: [(&str, Shrink); 8] = [
+            ("none", |_| ()),
+            ("queue", |room| room.queue = 3),
+            ("items", |room| room.items = 2),
+            ("kept", |room| room.kept = 9),
+            ("entries", |room| room.entries = 7),
+            ("candidates", |room| room.candidates = 5),
+            ("pairs", |room| room.pairs = 1),
+            ("unsure", |room| room.unsure = 1),
+        ];
+        for (stage, shrink) in stages {
+            let mut capacities = ample();
+            shrink(&mut capacities);
+            let mut detector = Detector::with_capacities(settings.clone(), capacities).unwrap();
+            assert_agree(stage, &expected, &mut detector, &case);
+            let reruns = |detector: &mut Detector| {
+                let pairs = detector.detect(&case.scene, &case.query).unwrap();
+                pairs.stats().n_reruns
+            };
+            // Once grown it stays so, and the first frame had to, if the method has this stage.
+            assert_eq!(reruns(&mut detector), 0, "{method:?} {stage}");
+            let mut again = Detector::with_capacities(settings.clone(), capacities).unwrap();
+            let is_there = match stage {
+                "none" => false,
+                "queue" => method == Method::Clusters,
+                "kept" | "entries" => method == Method::Cells,
+                _ => true,
+            };
+            assert_eq!(reruns(&mut again) > 0, is_there, "{method:?} {stage}");
+        }
+        let mut tiny = Capacities::default();
+        for field in [
+            &mut tiny.queue,
+            &mut tiny.items,
+            &mut tiny.kept,
+            &mut tiny.entries,
+            &mut tiny.candidates,
+            &mut tiny.pairs,
+            &mut tiny.unsure,
+        ] {
+            *field = 1;
+        }
+        let mut detector = Detector::with_capacities(settings, tiny).unwrap();
+        assert_agree("all at once", &expected, &mut detector, &case);
+    }
+}
+
+#[test]
+fn a_memory_budget_is_kept_by_working_in_slabs() {
+    let case = large();
+    let mut cpu = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+    let expected = rows(cpu.detect(&case.scene, &case.query).unwrap());
+    let mut free = Detector::with_settings(gpu(Method::Clusters)).unwrap();
+    assert_agree("free", &expected, &mut free, &case);
+    for method in [Method::Clusters, Method::Cells] {
+        let mut seen_slabs = false;
+        for budget in [1_500_000, 1_000_000, 700_000, 300_000] {
+            let mut detector = Detector::with_settings(Settings {
+                memory_budget: Some(budget),
+                ..gpu(method)
+            })
+            .unwrap();
+            assert_agree("budget", &expected, &mut detector, &case);
+            let pairs = detector.detect(&case.scene, &case.query).unwrap();
+            assert!(pairs.stats().bytes_held <= budget, "{:?}", pairs.stats());
+            let stats = pairs.stats();
+            seen_slabs |= stats.n_slabs > 1 && stats.n_pieces == 0;
+            assert_eq!(stats.n_pieces > 0, budget == 300_000, "{stats:?}");
+        }
+        assert!(seen_slabs, "{method:?}");
+        let mut detector = Detector::with_settings(Settings {
+            memory_budget: Some(100_000),
+            ..gpu(method)
+        })
+        .unwrap();
+        assert!(matches!(
+            detector.detect(&case.scene, &case.query),
+            Err(Error::MemoryBudget { .. })
+        ));
+    }
+}
+
+#[test]
+fn what_is_more_than_the_device_binds_is_answered_in_pieces() {
+    let mut n_many = 0;
+    for (ix, case) in cases().into_iter().enumerate() {
+        let expected = naive(&case);
+        let method = [Method::Clusters, Method::Cells][ix % 2];
+        // A cluster takes up to 3 KiB of positions.
+        for most_bound in [1, 8 << 10, 20 << 10] {
+            let mut detector = Detector::with_most_bound(gpu(method), most_bound).unwrap();
+            assert_agree("in pieces", &expected, &mut detector, &case);
+            let pairs = detector.detect(&case.scene, &case.query).unwrap();
+            n_many += u64::from(pairs.stats().n_pieces > 3);
+        }
+    }
+    assert!(n_many > 50, "{n_many}");
+}
+
+#[test]
+fn auto_takes_the_cpu_where_the_gpu_would_need_pieces() {
+    let case = cases().swap_remove(0);
+    let settings = Settings {
+        backend: Backend::Auto,
+        device: Some(devices()[0].name.clone()),
+        ..gpu(Method::Clusters)
+    };
+    let answer = |most_bound| {
+        let mut detector = Detector::with_most_bound(settings.clone(), most_bound).unwrap();
+        assert_agree("auto", &naive(&case), &mut detector, &case);
+        let pairs = detector.detect(&case.scene, &case.query).unwrap();
+        pairs.stats().backend.clone()
+    };
+    assert_eq!(answer(8 << 10), "cpu");
+    assert_ne!(answer(u64::MAX), "cpu");
+}
+
+#[test]
+fn pieces_keep_to_filters_ignored_pairs_and_frames() {
+    let mut scene = Scene::new();
+    let knot = surfaces::torus_knot(1500, Default::default());
+    let web = soup::lattice_web_tetrahedra(300, 4, 3);
+    let a = knot.add_to(&mut scene).unwrap();
+    let b = knot.translated([0.1, 0.2, 0.3]);
+    let b = scene
+        .add(b.elements.clone(), b.positions_f64())
+        .expect("valid");
+    let c = web.add_to(&mut scene).unwrap();
+    let d = soup::triangles(400, 0.4, 7).add_to(&mut scene).unwrap();
+    let filter = |category, mask| impinge_core::Filter { category, mask };
+    scene.set_filter(c, filter(2, 1)).unwrap();
+    scene.set_filter(d, filter(4, 5)).unwrap();
+    let queries = [
+        Query::all(),
+        Query::all().ignore(a, b),
+        Query::everything().shared_vertex(SharedVertex::Resolve),
+        Query::everything().ignore(c, c).ignore(b, a),
+        Query::between(c, d),
+        Query::within(c).shared_vertex(SharedVertex::Resolve),
+    ];
+    let budget = |memory_budget| Settings {
+        memory_budget,
+        ..gpu(Method::Clusters)
+    };
+    let mut detectors = [
+        Detector::with_most_bound(budget(None), 16 << 10).unwrap(),
+        Detector::with_most_bound(budget(Some(400_000)), 24 << 10).unwrap(),
+        Detector::with_settings(budget(Some(250_000))).unwrap(),
+    ];
+    let mut sizes = std::collections::BTreeSet::new();
+    for frame in 0..2 {
+        for query in &queries {
+            let case = Case {
+                name: format!("{query:?} in frame {frame}"),
+                scene: scene.clone(),
+                query: query.clone(),
+            };
+            let expected = naive(&case);
+            sizes.insert(expected.len());
+            for detector in &mut detectors {
+                let pairs = detector.detect(&case.scene, &case.query).unwrap();
+                if let Err(error) = agree(&expected, &rows(pairs), pairs.hash()) {
+                    panic!("{}: {error}", case.name);
+                }
+                let stats = pairs.stats().clone();
+                let budget = detector.settings().memory_budget;
+                assert!(stats.bytes_held <= budget.unwrap_or(u64::MAX), "{stats:?}");
+                if *query == queries[0] {
+                    assert!(stats.n_pieces > 3, "{stats:?}");
+                }
+            }
+        }
+        let moved = knot.translated([0.3, 0.0, 0.1]);
+        scene.set_positions(a, &moved.positions).unwrap();
+    }
+    assert!(sizes.len() > 6, "{sizes:?}");
+    // A scene that fits is answered at once again, and one that does not in pieces again.
+    let small = cases().swap_remove(4);
+    let expected = naive(&small);
+    for detector in &mut detectors {
+        for _ in 0..2 {
+            assert_agree("at once", &expected, detector, &small);
+            let pairs = detector.detect(&small.scene, &small.query).unwrap();
+            assert_eq!(pairs.stats().n_pieces, 0, "{:?}", pairs.stats());
+            let pairs = detector.detect(&scene, &queries[0]).unwrap();
+            assert!(pairs.stats().n_pieces > 3);
+        }
+    }
+}
+
+#[test]
+fn twenty_runs_give_the_same_bytes() {
+    let case = large();
+    let mut first = None;
+    for run in 0..20 {
+        let method = [Method::Clusters, Method::Cells][run % 2];
+        let mut detector = Detector::with_settings(gpu(method)).unwrap();
+        let pairs = detector.detect(&case.scene, &case.query).unwrap();
+        let answer = rows(pairs);
+        let first = first.get_or_insert_with(|| answer.clone());
+        assert!(*first == answer, "run {run} differs");
+    }
+}
+
+#[test]
+fn few_pairs_are_left_to_exact_arithmetic() {
+    let mut scene = Scene::new();
+    let ball = surfaces::bumpy_ball(8000, 0.2);
+    let a = ball.add_to(&mut scene).unwrap();
+    let b = ball
+        .translated([0.31, 0.17, 0.05])
+        .add_to(&mut scene)
+        .unwrap();
+    let mut detector = Detector::with_settings(gpu(Method::Clusters)).unwrap();
+    let pairs = detector.detect(&scene, &Query::between(a, b)).unwrap();
+    let stats = pairs.stats();
+    assert!(stats.n_candidates > 500, "{stats:?}");
+    assert!(100 * stats.n_unsure < stats.n_candidates, "{stats:?}");
+    assert!(!stats.backend.is_empty() && stats.backend != "cpu");
+}
+
+/// Triangles over a few vertices: nearly all share one with many others, some two or three.
+fn web(n: u32, n_vertices: u32, seed: u64) -> impinge_scenes::Model {
+    let mut state = seed;
+    let mut next = |below: u32| {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1);
+        ((state >> 33) % u64::from(below)) as u32
+    };
+    let mut model = soup::triangles(n_vertices as usize / 3, 1.0, seed);
+    let faces: Vec<[u32; 3]> = (0..n)
+        .map(|_| {
+            let a = next(n_vertices);
+            let b = (a + 1 + next(n_vertices - 2)) % n_vertices;
+            let c = (0..).map(|_| next(n_vertices)).find(|&c| c != a && c != b);
+            [a, b, c.unwrap()]
+        })
+        .collect();
+    model.elements = faces.into();
+    model
+}
+
+#[test]
+fn neighbours_are_settled_on_the_device() {
+    let model = web(500, 60, 5);
+    let folded = soup::lattice_web(400, 3, 2);
+    // Nearly coplanar, nearly touching.
+    let nearly = web(400, 60, 6).mapped(|p| p.map(|x| (2.0 * x).round() + 1e-6 * x));
+    let closed = surfaces::bumpy_ball(3000, 0.3);
+    for (name, model, most_unsure) in [
+        ("web", &model, 0.02),
+        ("lattice", &folded, 1.0),
+        ("nearly degenerate", &nearly, 1.0),
+        ("closed surface", &closed, 0.01),
+    ] {
+        for double in [false, true] {
+            let mut scene = Scene::new();
+            let id = match double {
+                false => model.add_to(&mut scene),
+                true => {
+                    let positions = model.positions_f64().into_iter();
+                    let moved = positions.map(|p| p.map(|x| x * (1.0 + 1e-9)));
+                    scene.add(model.elements.clone(), moved.collect::<Vec<_>>())
+                }
+            };
+            let case = Case {
+                name: format!("{name}, f64: {double}"),
+                scene,
+                query: Query::within(id.unwrap()).shared_vertex(SharedVertex::Resolve),
+            };
+            let expected = naive(&case);
+            for method in [Method::Clusters, Method::Cells] {
+                let mut detector = Detector::with_settings(gpu(method)).unwrap();
+                assert_agree("neighbours", &expected, &mut detector, &case);
+                let pairs = detector.detect(&case.scene, &case.query).unwrap();
+                let stats = pairs.stats();
+                let share = stats.n_unsure as f64 / stats.n_candidates as f64;
+                assert!(share <= most_unsure, "{}: {stats:?}", case.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn adapters_are_listed_and_chosen_by_name() {
+    let settings = gpu(Method::Clusters);
+    let all = devices();
+    assert!(!all.is_empty(), "these tests need an adapter");
+    for device in &all {
+        let part = device.name.split(' ').next().unwrap().to_uppercase();
+        let named = Settings {
+            device: Some(part),
+            ..settings.clone()
+        };
+        assert!(Detector::with_settings(named).is_ok(), "{device}");
+    }
+    let nobody = Settings {
+        device: Some("no such adapter".into()),
+        ..settings
+    };
+    let error = Detector::with_settings(nobody.clone()).err().unwrap();
+    assert!(matches!(error, Error::NoAdapter { .. }), "{error}");
+    assert!(error.to_string().contains(&all[0].name), "{error}");
+    // Auto is quiet about it and takes the CPU.
+    let mut auto = Detector::with_settings(Settings {
+        backend: Backend::Auto,
+        ..nobody
+    })
+    .unwrap();
+    let pairs = auto.detect(&Scene::new(), &Query::all()).unwrap();
+    assert_eq!(pairs.stats().backend, "cpu");
+}
+
+#[test]
+fn frames_follow_positions_bodies_and_precision() {
+    let mut scene = Scene::new();
+    let ball = surfaces::ball(600);
+    let a = ball.add_to(&mut scene).unwrap();
+    let b = ball.translated([0.4, 0.0, 0.0]).add_to(&mut scene).unwrap();
+    let mut detectors = [Method::Clusters, Method::Cells]
+        .map(|method| Detector::with_settings(gpu(method)).unwrap());
+    let mut compare = |scene: &Scene, query: Query| {
+        let case = Case {
+            name: "changes".into(),
+            scene: scene.clone(),
+            query,
+        };
+        let expected = naive(&case);
+        for detector in &mut detectors {
+            assert_agree("frames", &expected, detector, &case);
+        }
+        expected.len()
+    };
+    let first = compare(&scene, Query::all());
+    assert!(first > 0);
+    scene
+        .set_positions(b, &ball.translated([0.7, 0.1, 0.0]).positions)
+        .unwrap();
+    assert_ne!(compare(&scene, Query::all()), first);
+    // Positions that only f64 can hold: touching, and apart by less than f32 can tell.
+    let apart = |gap: f64| {
+        let (_, max) = ball.bounds().unwrap();
+        let shift = 2.0 * f64::from(max[0]) + gap;
+        let moved = ball.positions_f64().into_iter();
+        moved.map(|[x, y, z]| [x + shift, y, z]).collect::<Vec<_>>()
+    };
+    for gap in [0.0, 1e-12, -1e-12] {
+        scene.set_positions(b, &apart(gap)).unwrap();
+        compare(&scene, Query::all());
+    }
+    let c = soup::tetrahedra(100, 0.3, 1).add_to(&mut scene).unwrap();
+    assert!(compare(&scene, Query::everything()) > 0);
+    compare(&scene, Query::all().ignore(a, c));
+    scene.remove(b).unwrap();
+    assert!(compare(&scene, Query::between(a, c)) > 0);
+    scene.remove(a).unwrap();
+    compare(&scene, Query::all());
+}
+
+#[test]
+fn topology_that_changes_within_its_room_is_bound_anew() {
+    for method in [Method::Clusters, Method::Cells] {
+        let mut detector = Detector::with_settings(gpu(method)).unwrap();
+        let mut scene = Scene::new();
+        let a = surfaces::ball(100).add_to(&mut scene).unwrap();
+        let b = surfaces::ball(100).add_to(&mut scene).unwrap();
+        // Larger, larger within the quarter to spare, smaller and solid.
+        let solids = soup::tetrahedra(500, 0.3, 1);
+        for model in [
+            surfaces::ball(1000),
+            surfaces::ball(2000),
+            surfaces::ball(2300),
+            solids,
+        ] {
+            let (elements, positions) = (&model.elements, &model.positions);
+            for id in [a, b] {
+                scene
+                    .remesh(id, elements.clone(), positions.clone())
+                    .unwrap();
+            }
+            let shifted = model.translated([0.1, 0.03, 0.2]);
+            scene.set_positions(b, &shifted.positions).unwrap();
+            let case = Case {
+                name: format!("{method:?} of {}", model.n_primitives()),
+                scene: scene.clone(),
+                query: Query::everything(),
+            };
+            assert_agree("remeshed", &naive(&case), &mut detector, &case);
+        }
+    }
+}
+
+#[test]
+fn bodies_that_flow_away_are_clustered_again() {
+    let rest = surfaces::ball(20_000);
+    let other = rest.translated([0.4, 0.0, 0.0]);
+    let mut scene = Scene::new();
+    let a = rest.add_to(&mut scene).unwrap();
+    // One body in each precision.
+    let b = scene.add(other.elements.clone(), other.positions_f64());
+    let query = Query::between(a, b.unwrap());
+    let mut auto = Detector::with_settings(gpu(Method::Clusters)).unwrap();
+    let mut never = Detector::with_settings(Settings {
+        recluster: Recluster::Never,
+        ..gpu(Method::Clusters)
+    })
+    .unwrap();
+    let mut oracle = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+    assert_eq!(auto.detect(&scene, &query).unwrap().stats().n_clustered, 2);
+    never.detect(&scene, &query).unwrap();
+    // A body that moves and bends a little keeps its clusters.
+    scene
+        .set_positions(
+            a,
+            &rest
+                .mapped(|[x, y, z]| [x + 0.1, y + 0.1 * x * x, z])
+                .positions,
+        )
+        .unwrap();
+    let slightly = auto.detect(&scene, &query).unwrap();
+    assert_eq!(slightly.stats().n_clustered, 0);
+    let mut flowed = rest.positions.clone();
+    deform::Flow::default().apply(&rest.positions, 40.0, &mut flowed);
+    scene.set_positions(a, &flowed).unwrap();
+    let by_auto = auto.detect(&scene, &query).unwrap();
+    let by_never = never.detect(&scene, &query).unwrap();
+    assert!(by_auto.same_as(oracle.detect(&scene, &query).unwrap()));
+    assert!(by_auto.same_as(by_never) && !by_auto.is_empty());
+    assert_eq!(by_auto.stats().n_clustered, 1);
+    assert_eq!(by_auto.stats().n_reclustered, 1);
+    assert_eq!(by_never.stats().n_reclustered, 0);
+    assert!(by_auto.stats().n_work_items < by_never.stats().n_work_items);
+    // The next frame has nothing to repair.
+    scene.set_positions(a, &flowed).unwrap();
+    let after = auto.detect(&scene, &query).unwrap();
+    assert_eq!(after.stats().n_reclustered, 0);
+    assert!(after.same_as(oracle.detect(&scene, &query).unwrap()));
+}
+
+#[test]
+fn many_small_bodies_meet_through_the_tree_over_bodies() {
+    let mut scene = Scene::new();
+    for ix in 0..300u32 {
+        let corner = [ix % 7, ix / 7 % 7, ix / 49].map(|k| 0.8 * k as f32);
+        surfaces::cube(corner, 1.0).add_to(&mut scene).unwrap();
+    }
+    let case = Case {
+        name: "cubes".into(),
+        scene,
+        query: Query::everything(),
+    };
+    let expected = naive(&case);
+    assert!(expected.len() > 5000);
+    check(&case, &expected, gpu(Method::Clusters));
+    check(&case, &expected, gpu(Method::Cells));
+}
+
+/// Words of a buffer on the device.
+fn read(device: &wgpu::Device, queue: &wgpu::Queue, buffer: &wgpu::Buffer) -> Vec<u32> {
+    let staging = device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: buffer.size(),
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&Default::default());
+    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
+    queue.submit([encoder.finish()]);
+    staging.map_async(wgpu::MapMode::Read, .., |_| ());
+    device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+    let view = staging.get_mapped_range(..).unwrap();
+    let words = view.chunks_exact(4);
+    words
+        .map(|word| u32::from_le_bytes(word.try_into().unwrap()))
+        .collect()
+}
+
+#[test]
+fn resident_frames_take_positions_and_leave_pairs_on_the_device() {
+    let instance = wgpu::Instance::default();
+    let adapter = pollster::block_on(instance.request_adapter(&Default::default()));
+    let adapter = adapter.expect("these tests need an adapter");
+    let device = pollster::block_on(adapter.request_device(&Default::default()));
+    let (device, queue) = device.unwrap();
+    let ball = surfaces::bumpy_ball(1500, 0.2);
+    let moved = ball.translated([0.3, 0.1, 0.0]);
+    // The scene has the rest pose; where the second ball really is, the device alone knows.
+    let mut scene = Scene::new();
+    let a = ball.add_to(&mut scene).unwrap();
+    let b = ball.add_to(&mut scene).unwrap();
+    let query = Query::between(a, b);
+    let mut truth = scene.clone();
+    truth.set_positions(b, &moved.positions).unwrap();
+    let mut oracle = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+    let expected: Vec<[u32; 2]> = oracle
+        .detect(&truth, &query)
+        .unwrap()
+        .between(a, b)
+        .map(|(i, j)| [i, j + 1500])
+        .collect();
+    assert!(expected.len() > 100);
+    let bytes: Vec<u8> = moved
+        .positions
+        .iter()
+        .flatten()
+        .flat_map(|x| x.to_le_bytes())
+        .collect();
+    let positions = device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: bytes.len() as u64,
+        usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    queue.write_buffer(&positions, 0, &bytes);
+    for method in [Method::Clusters, Method::Cells] {
+        let settings = gpu(method);
+        let mut detector = Detector::with_device(device.clone(), queue.clone(), settings).unwrap();
+        let mut n_tries = 0;
+        let found = loop {
+            let mut encoder = device.create_command_encoder(&Default::default());
+            let resident = [(b, &positions)];
+            let found = detector.encode(&scene, &query, &resident, &mut encoder);
+            queue.submit([encoder.finish()]);
+            n_tries += 1;
+            if detector.make_room().unwrap() {
+                break found.unwrap();
+            }
+            assert!(n_tries < 9);
+        };
+        let counts = read(&device, &queue, &found.counts);
+        let keys = |buffer: &wgpu::Buffer, offset: u64| -> Vec<[u32; 2]> {
+            let n = counts[offset as usize / 4] as usize;
+            let words = read(&device, &queue, buffer);
+            words.as_chunks::<2>().0[..n].to_vec()
+        };
+        let mut pairs = keys(&found.pairs, found.n_pairs_offset);
+        let unsure = keys(&found.unsure, found.n_unsure_offset);
+        assert!(unsure.len() * 20 < pairs.len());
+        // What is left open belongs to the truth or does not; the rest must be right.
+        pairs.extend(unsure.iter().filter(|&pair| expected.contains(pair)));
+        pairs.sort_unstable();
+        assert!(pairs == expected, "{method:?}");
+        // Asked in the other way, the same detector answers from the scene's own positions.
+        let pairs = detector.detect(&truth, &query).unwrap();
+        assert_eq!(pairs.len(), expected.len());
+        let small = device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: 12,
+            usage: wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let refused = detector.encode(&scene, &query, &[(b, &small)], &mut encoder);
+        assert!(matches!(refused, Err(Error::Gpu { .. })));
+    }
+}
+
+#[test]
+fn a_lost_device_is_an_error_and_a_new_detector_works() {
+    let instance = wgpu::Instance::default();
+    let adapter = pollster::block_on(instance.request_adapter(&Default::default()));
+    let adapter = adapter.expect("these tests need an adapter");
+    let device = pollster::block_on(adapter.request_device(&Default::default()));
+    let (device, queue) = device.unwrap();
+    let case = cases().swap_remove(0);
+    let settings = gpu(Method::Clusters);
+    let mut detector = Detector::with_device(device.clone(), queue, settings.clone()).unwrap();
+    assert!(detector.detect(&case.scene, &case.query).is_ok());
+    device.destroy();
+    for _ in 0..2 {
+        let lost = detector.detect(&case.scene, &case.query);
+        assert!(matches!(lost, Err(Error::Gpu { .. })), "{lost:?}");
+    }
+    check(&case, &naive(&case), settings);
+}
+
+#[test]
+fn frames_can_be_awaited() {
+    let case = cases().swap_remove(0);
+    let mut detector = Detector::with_settings(gpu(Method::Clusters)).unwrap();
+    let expected = naive(&case);
+    let mut context = std::task::Context::from_waker(std::task::Waker::noop());
+    let mut n_pending = 0;
+    let answer = {
+        let mut frame = std::pin::pin!(detector.detect_async(&case.scene, &case.query));
+        loop {
+            match frame.as_mut().poll(&mut context) {
+                std::task::Poll::Ready(pairs) => break rows(pairs.unwrap()),
+                std::task::Poll::Pending => n_pending += 1,
+            }
+            // Other detectors of this process poll the device they share with this one.
+            let mut other = Detector::with_settings(gpu(Method::Clusters)).unwrap();
+            other.detect(&case.scene, &case.query).unwrap();
+        }
+    };
+    assert!(answer == expected);
+    assert!(n_pending > 0, "the device was waited for");
+}
+
+#[test]
+fn sizes_to_a_hundred_thousand_and_a_thousand_bodies() {
+    let mut detectors = [Method::Clusters, Method::Cells]
+        .map(|method| Detector::with_settings(gpu(method)).unwrap());
+    let mut compare = |name: String, scene: Scene, query: Query| {
+        let mut cpu = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+        let expected = rows(cpu.detect(&scene, &query).unwrap());
+        let case = Case { name, scene, query };
+        for detector in &mut detectors {
+            assert_agree("sizes", &expected, detector, &case);
+        }
+        expected.len()
+    };
+    for n in [1, 10, 100, 1_000, 10_000, 100_000] {
+        let body = soup::triangles(n, 2.0 / (n as f32).cbrt(), 5);
+        let other = soup::triangles(n, 2.0 / (n as f32).cbrt(), 6);
+        let mut scene = Scene::new();
+        let a = body.add_to(&mut scene).unwrap();
+        let b = other.add_to(&mut scene).unwrap();
+        let found = compare(format!("{n} triangles"), scene, Query::between(a, b));
+        assert!(n < 100 || found > n / 20, "{n}: {found}");
+    }
+    for n in [2, 10, 100, 1_000] {
+        let built = impinge_scenes::adversarial::boxes(n, 3).unwrap();
+        compare(format!("{n} bodies"), built.scene, Query::everything());
+    }
+}

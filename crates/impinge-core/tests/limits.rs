@@ -1,0 +1,295 @@
+//! Bad input, memory budgets, cancellation.
+
+mod common;
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use common::{agree, naive, rows};
+use impinge_core::{
+    Backend, CancelToken, Control, Detector, Error, Method, Query, Scene, Settings, SharedVertex,
+};
+use impinge_scenes::{adversarial, surfaces};
+
+fn cpu(method: Method) -> Settings {
+    Settings {
+        method,
+        backend: Backend::Cpu,
+        threads: 2,
+        ..Settings::default()
+    }
+}
+
+const TRIANGLE: [[f32; 3]; 3] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+
+#[test]
+fn bad_bodies_are_refused_by_name() {
+    let mut scene = Scene::new();
+    let good = scene.add_triangles(&[[0, 1, 2]], &TRIANGLE).unwrap();
+    let error = scene
+        .add_triangles(&[[0, 1, 2], [0, 7, 2]], &TRIANGLE)
+        .unwrap_err();
+    assert!(matches!(
+        error,
+        Error::VertexIndexOutOfRange {
+            primitive: 1,
+            index: 7,
+            n_vertices: 3,
+            ..
+        }
+    ));
+    assert_eq!(
+        error.to_string(),
+        "body 1: primitive 1 names vertex 7, but there are 3 vertices"
+    );
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let mut positions = TRIANGLE;
+        positions[2][1] = bad;
+        let error = scene.add_triangles(&[[0, 1, 2]], &positions).unwrap_err();
+        assert!(
+            matches!(error, Error::NonFinitePosition { vertex: 2, .. }),
+            "{error}"
+        );
+        let error = scene.set_positions(good, &positions).unwrap_err();
+        assert!(
+            matches!(error, Error::NonFinitePosition { vertex: 2, .. }),
+            "{error}"
+        );
+    }
+    let huge = TRIANGLE.map(|p| p.map(|x| f64::from(x) * 1e200));
+    let error = scene.add_triangles(&[[0, 1, 2]], &huge).unwrap_err();
+    assert!(
+        matches!(error, Error::CoordinateOutOfRange { vertex: 1, .. }),
+        "{error}"
+    );
+    let error = scene.set_positions(good, &TRIANGLE[..2]).unwrap_err();
+    assert!(matches!(
+        error,
+        Error::WrongNumberOfPositions {
+            given: 2,
+            expected: 3,
+            ..
+        }
+    ));
+    assert!(matches!(
+        scene.positions_mut::<f64>(good).unwrap_err(),
+        Error::WrongPrecision {
+            stored: "f32",
+            asked: "f64",
+            ..
+        }
+    ));
+    // Nothing of all this was added.
+    assert_eq!(scene.n_bodies(), 1);
+    let mut detector = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+    assert!(matches!(
+        detector.detect(&scene, &Query::between(good, good)),
+        Err(Error::SameBody { .. })
+    ));
+    scene.remove(good).unwrap();
+    assert!(matches!(
+        detector.detect(&scene, &Query::within(good)),
+        Err(Error::UnknownBody { .. })
+    ));
+    assert!(
+        detector
+            .detect(&scene, &Query::everything())
+            .unwrap()
+            .is_empty()
+    );
+}
+
+#[test]
+fn positions_written_in_place_are_checked_wherever_the_vertex_is() {
+    let ball = surfaces::ball(3000);
+    for method in [Method::Clusters, Method::Cells, Method::Naive] {
+        for with_lone_vertex in [false, true] {
+            let mut scene = Scene::new();
+            let mut model = ball.clone();
+            if with_lone_vertex {
+                model.positions.push([0.0; 3]);
+            }
+            let last = model.positions.len() - 1;
+            let a = model.add_to(&mut scene).unwrap();
+            let mut detector = Detector::with_settings(cpu(method)).unwrap();
+            let query = Query::within(a);
+            let n_pairs = detector.detect(&scene, &query).unwrap().len();
+            for vertex in [0, 77, last] {
+                for bad in [f32::NAN, f32::INFINITY] {
+                    scene.positions_mut(a).unwrap()[vertex] = [0.0, bad, 1.0];
+                    match detector.detect(&scene, &query) {
+                        Err(Error::NonFinitePosition { vertex: named, .. }) => {
+                            assert_eq!(named, vertex, "{method:?}");
+                        }
+                        other => panic!("{method:?} vertex {vertex}: {other:?}"),
+                    }
+                }
+                scene.positions_mut(a).unwrap()[vertex] = model.positions[vertex];
+            }
+            assert_eq!(detector.detect(&scene, &query).unwrap().len(), n_pairs);
+        }
+    }
+}
+
+#[test]
+fn the_largest_and_smallest_coordinates_are_answered() {
+    let mut scene = Scene::new();
+    for scale in [f32::MAX, f32::MIN_POSITIVE, 1e-44] {
+        let a = TRIANGLE.map(|p| p.map(|x| x * scale));
+        let b = TRIANGLE.map(|[x, y, z]| [z * scale, (y - 0.5) * scale, x * scale]);
+        scene.add_triangles(&[[0, 1, 2]], &a).unwrap();
+        scene.add_triangles(&[[0, 1, 2]], &b).unwrap();
+    }
+    // Sums of such numbers overflow: the check of in-place positions must not take that for infinity.
+    let first = scene.bodies().next().unwrap().0;
+    scene.positions_mut::<f32>(first).unwrap();
+    let case = common::Case {
+        name: "range".into(),
+        scene,
+        query: Query::everything(),
+    };
+    let expected = naive(&case);
+    assert!(expected.len() >= 3);
+    for method in [Method::Clusters, Method::Cells] {
+        common::check(&case, &expected, cpu(method));
+    }
+}
+
+#[test]
+fn settings_out_of_range_are_refused() {
+    for settings in [
+        Settings {
+            lambda: 0.0,
+            ..Settings::default()
+        },
+        Settings {
+            lambda: f64::NAN,
+            ..Settings::default()
+        },
+        Settings {
+            group_size: 0,
+            ..Settings::default()
+        },
+        Settings {
+            group_size: 65,
+            ..Settings::default()
+        },
+        Settings {
+            threads: 1 << 20,
+            ..Settings::default()
+        },
+    ] {
+        assert!(matches!(
+            Detector::with_settings(settings),
+            Err(Error::Setting { .. })
+        ));
+    }
+}
+
+#[test]
+fn budgets_are_kept_by_slabs() {
+    let built = adversarial::coincident(30_000).unwrap();
+    let query = Query::everything().shared_vertex(SharedVertex::Skip);
+    for method in [Method::Clusters, Method::Cells] {
+        let mut free = Detector::with_settings(cpu(method)).unwrap();
+        let pairs = free.detect(&built.scene, &query).unwrap();
+        let expected = rows(pairs);
+        let held = pairs.stats().bytes_held;
+        // Between what is refused and what is plenty: the least budget that is enough.
+        let (mut refused, mut enough) = (1_000, held);
+        let mut most_slabs = 0;
+        while enough - refused > held / 200 {
+            let budget = (refused + enough) / 2;
+            let settings = Settings {
+                memory_budget: Some(budget),
+                ..cpu(method)
+            };
+            let mut detector = Detector::with_settings(settings).unwrap();
+            match detector.detect(&built.scene, &query) {
+                Ok(pairs) => {
+                    let stats = pairs.stats();
+                    let held = stats.bytes_held;
+                    assert!(held <= budget, "{method:?}: {held} held, {budget} allowed");
+                    most_slabs = most_slabs.max(stats.n_slabs);
+                    agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+                    enough = budget;
+                }
+                Err(Error::MemoryBudget {
+                    needed,
+                    budget: told,
+                    ..
+                }) => {
+                    assert!(needed > told && told == budget);
+                    refused = budget;
+                }
+                Err(error) => panic!("{error}"),
+            }
+        }
+        assert!(refused > 1_000, "a kilobyte is never enough");
+        assert!(enough < held, "{method:?}: {enough} of {held} needed");
+        assert!(most_slabs > 1, "{method:?}: {most_slabs} slabs");
+    }
+}
+
+/// Law 4: memory is bounded by input and output, on scenes made to break that.
+#[test]
+fn adversarial_scenes_hold_memory_in_proportion() {
+    for built in [
+        adversarial::plain(20_000),
+        adversarial::huge_over_small(20_000),
+        adversarial::stadium(20_000),
+        adversarial::one_cell(4_000),
+        adversarial::flat_cloth(20_000),
+        adversarial::needle_row(20_000),
+        adversarial::coincident(10_000),
+        adversarial::outliers(20_000),
+        adversarial::boxes(1_500, 1),
+        adversarial::mixed_sizes(20_000),
+        adversarial::slivers(2_000),
+        adversarial::stacked_cubes(1_000),
+    ] {
+        let built = built.unwrap();
+        for (method, most_each) in [(Method::Clusters, 400), (Method::Cells, 400)] {
+            let mut detector = Detector::with_settings(cpu(method)).unwrap();
+            let pairs = detector.detect(&built.scene, &built.query).unwrap();
+            let (n, n_bodies) = (built.n_primitives() as u64, built.bodies.len() as u64);
+            let most = most_each * n + 2_000 * n_bodies + (16 << 20);
+            let held = pairs.stats().bytes_held;
+            assert!(
+                held <= most,
+                "{} {method:?}: {held} bytes, {most} allowed",
+                built.name
+            );
+        }
+    }
+}
+
+#[test]
+fn runs_can_be_watched_and_cancelled() {
+    let built = adversarial::plain(20_000).unwrap();
+    for method in [Method::Clusters, Method::Cells, Method::Naive] {
+        if method == Method::Naive {
+            continue;
+        }
+        let mut detector = Detector::with_settings(cpu(method)).unwrap();
+        let (calls, token) = (AtomicU64::new(0), CancelToken::new());
+        let count = |progress: impinge_core::Progress| {
+            assert!(progress.done <= progress.total);
+            calls.fetch_add(1, Ordering::Relaxed);
+        };
+        let control = Control::new().cancel(&token).progress(&count);
+        let n_pairs = detector
+            .detect_with(&built.scene, &built.query, &control)
+            .unwrap()
+            .len();
+        assert!(calls.load(Ordering::Relaxed) > 1);
+        let stop = |_: impinge_core::Progress| token.cancel();
+        let control = Control::new().cancel(&token).progress(&stop);
+        let result = detector.detect_with(&built.scene, &built.query, &control);
+        assert!(matches!(result, Err(Error::Cancelled)), "{method:?}");
+        // A cancelled detector goes on as if nothing had happened.
+        assert_eq!(
+            detector.detect(&built.scene, &built.query).unwrap().len(),
+            n_pairs
+        );
+    }
+}

@@ -1,0 +1,262 @@
+//! Every method against the oracle, on every case; and proof that the comparison can fail.
+
+mod common;
+
+use common::{agree, cases, check, naive, rows};
+use impinge_core::{
+    Backend, Detector, InstructionSet, Method, Query, Recluster, Scene, Settings, hash_rows,
+};
+use impinge_scenes::deform::{self, Deform};
+use impinge_scenes::{soup, surfaces};
+
+fn cpu(method: Method, threads: usize) -> Settings {
+    Settings {
+        method,
+        threads,
+        backend: Backend::Cpu,
+        ..Settings::default()
+    }
+}
+
+#[test]
+fn methods_agree_with_the_oracle() {
+    for case in cases() {
+        let expected = naive(&case);
+        check(&case, &expected, cpu(Method::Clusters, 1));
+        check(&case, &expected, cpu(Method::Clusters, 2));
+        for instruction_set in [InstructionSet::Portable, InstructionSet::Avx2] {
+            for method in [Method::Clusters, Method::Cells] {
+                let settings = Settings {
+                    instruction_set,
+                    ..cpu(method, 1)
+                };
+                check(&case, &expected, settings);
+            }
+        }
+        for (lambda, group_size) in [(1.0, 64), (0.01, 5), (20.0, 64)] {
+            let settings = Settings {
+                lambda,
+                group_size,
+                ..cpu(Method::Cells, 1 + usize::from(lambda > 1.0))
+            };
+            check(&case, &expected, settings);
+        }
+    }
+}
+
+#[test]
+fn liars_are_caught() {
+    let case = cases().swap_remove(0);
+    let truth = naive(&case);
+    assert!(truth.len() > 10);
+    let verdict = |answer: Vec<[u32; 4]>| agree(&truth, &answer, hash_rows(answer.iter().copied()));
+    assert_eq!(verdict(truth.clone()), Ok(()));
+    let mut dropped = truth.clone();
+    dropped.remove(5);
+    assert!(verdict(dropped).is_err());
+    let mut added = truth.clone();
+    added.push([0, u32::MAX, 1, u32::MAX]);
+    assert!(verdict(added).is_err());
+    let mut swapped = truth.clone();
+    let [body_a, a, body_b, b] = swapped[3];
+    swapped[3] = [body_a, b, body_b, a];
+    assert!(verdict(swapped).is_err());
+    let mut repeated = truth.clone();
+    repeated[4] = repeated[5];
+    assert!(verdict(repeated).is_err());
+    let mut unsorted = truth.clone();
+    unsorted.swap(1, 2);
+    assert!(verdict(unsorted).is_err());
+}
+
+#[test]
+fn frames_follow_the_positions() {
+    let rest = surfaces::torus_knot(3000, Default::default());
+    let mut scene = Scene::new();
+    let a = rest.add_to(&mut scene).unwrap();
+    let b = rest.translated([0.2, 0.1, 0.3]).add_to(&mut scene).unwrap();
+    let query = Query::everything();
+    let mut clusters = Detector::with_settings(cpu(Method::Clusters, 2)).unwrap();
+    let mut cells = Detector::with_settings(cpu(Method::Cells, 2)).unwrap();
+    let mut seen = std::collections::BTreeSet::new();
+    for frame in 0..6 {
+        let moved = rest.mapped(|[x, y, z]| {
+            let angle = 0.4 * frame as f32 * z;
+            let (sin, cos) = angle.sin_cos();
+            [cos * x - sin * y, sin * x + cos * y, z]
+        });
+        scene.set_positions(a, &moved.positions).unwrap();
+        if frame % 2 == 0 {
+            scene.positions_mut::<f32>(b).unwrap()[frame] = [0.0, 0.1, 0.2];
+        }
+        let case = common::Case {
+            name: "frames".into(),
+            scene: scene.clone(),
+            query: query.clone(),
+        };
+        let expected = naive(&case);
+        seen.insert(expected.len());
+        for detector in [&mut clusters, &mut cells] {
+            let pairs = detector.detect(&scene, &query).unwrap();
+            agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+        }
+    }
+    assert!(seen.len() > 2, "the frames differ: {seen:?}");
+}
+
+#[test]
+fn bodies_come_go_and_change() {
+    let mut scene = Scene::new();
+    let ball = surfaces::ball(400);
+    let a = ball.add_to(&mut scene).unwrap();
+    let b = ball.translated([0.5, 0.0, 0.0]).add_to(&mut scene).unwrap();
+    let mut detectors = [Method::Clusters, Method::Cells]
+        .map(|method| Detector::with_settings(cpu(method, 1)).unwrap());
+    let mut compare = |scene: &Scene| {
+        let case = common::Case {
+            name: "changes".into(),
+            scene: scene.clone(),
+            query: Query::all(),
+        };
+        let expected = naive(&case);
+        for detector in &mut detectors {
+            let pairs = detector.detect(scene, &case.query).unwrap();
+            agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+        }
+        expected.len()
+    };
+    assert!(compare(&scene) > 0);
+    let soup = soup::tetrahedra(100, 0.3, 1);
+    scene
+        .remesh(b, soup.elements.clone(), soup.positions.clone())
+        .unwrap();
+    assert!(compare(&scene) > 0);
+    scene.remove(a).unwrap();
+    assert_eq!(compare(&scene), 0);
+    assert!(matches!(
+        scene.body(a),
+        Err(impinge_core::Error::UnknownBody { .. })
+    ));
+    let again = ball.add_to(&mut scene).unwrap();
+    assert_eq!(again.index(), a.index());
+    assert_ne!(again, a);
+    assert!(compare(&scene) > 0);
+}
+
+#[test]
+fn metamorphic_twins_agree() {
+    let a = surfaces::bumpy_ball(900, 0.3);
+    let b = surfaces::torus(30, 16, 0.8, 0.3);
+    let pairs_of = |a: &impinge_scenes::Model, b: &impinge_scenes::Model, method| {
+        let mut scene = Scene::new();
+        let (id_a, id_b) = (a.add_to(&mut scene).unwrap(), b.add_to(&mut scene).unwrap());
+        let mut detector = Detector::with_settings(cpu(method, 1)).unwrap();
+        let pairs = detector
+            .detect(&scene, &Query::between(id_a, id_b))
+            .unwrap();
+        pairs.between(id_a, id_b).collect::<Vec<_>>()
+    };
+    for method in [Method::Clusters, Method::Cells, Method::Naive] {
+        let plain = pairs_of(&a, &b, method);
+        assert!(plain.len() > 50);
+        let mut swapped: Vec<_> = pairs_of(&b, &a, method)
+            .into_iter()
+            .map(|(i, j)| (j, i))
+            .collect();
+        swapped.sort_unstable();
+        assert_eq!(plain, swapped);
+        // Scaling by a power of two is exact.
+        assert_eq!(plain, pairs_of(&a.scaled(0.125), &b.scaled(0.125), method));
+        let n = a.n_primitives() as u32;
+        let mut reversed = a.clone();
+        let impinge_core::Elements::Triangles(faces) = &mut reversed.elements else {
+            unreachable!()
+        };
+        faces.reverse();
+        for face in faces.iter_mut() {
+            face.rotate_left(1);
+        }
+        let mut permuted: Vec<_> = pairs_of(&reversed, &b, method)
+            .into_iter()
+            .map(|(i, j)| (n - 1 - i, j))
+            .collect();
+        permuted.sort_unstable();
+        assert_eq!(plain, permuted);
+    }
+}
+
+#[test]
+fn bodies_that_flow_away_are_clustered_again() {
+    let rest = surfaces::ball(20_000);
+    let mut scene = Scene::new();
+    let a = rest.add_to(&mut scene).unwrap();
+    let b = rest.translated([0.4, 0.0, 0.0]).add_to(&mut scene).unwrap();
+    let query = Query::between(a, b);
+    let mut auto = Detector::with_settings(cpu(Method::Clusters, 1)).unwrap();
+    let mut never = Detector::with_settings(Settings {
+        recluster: Recluster::Never,
+        ..cpu(Method::Clusters, 1)
+    })
+    .unwrap();
+    assert_eq!(auto.detect(&scene, &query).unwrap().stats().n_clustered, 2);
+    never.detect(&scene, &query).unwrap();
+    let mut flowed = rest.positions.clone();
+    deform::Flow::default().apply(&rest.positions, 40.0, &mut flowed);
+    scene.set_positions(a, &flowed).unwrap();
+    let by_auto = auto.detect(&scene, &query).unwrap();
+    let by_never = never.detect(&scene, &query).unwrap();
+    assert!(by_auto.same_as(by_never));
+    assert_eq!(by_auto.stats().n_reclustered, 1);
+    assert_eq!(by_never.stats().n_reclustered, 0);
+    assert!(by_auto.stats().n_work_items < by_never.stats().n_work_items);
+    // The next frame has nothing to repair.
+    scene.set_positions(a, &flowed).unwrap();
+    assert_eq!(
+        auto.detect(&scene, &query).unwrap().stats().n_reclustered,
+        0
+    );
+}
+
+#[test]
+fn a_frame_that_failed_leaves_nothing_behind() {
+    let ball = surfaces::bumpy_ball(3_000, 0.2);
+    for (method, settled) in [
+        (Method::Clusters, 1),
+        // Long enough for clusters to be left out.
+        (Method::Clusters, 6),
+        (Method::Cells, 1),
+    ] {
+        let mut scene = Scene::new();
+        let a = ball.add_to(&mut scene).unwrap();
+        let b = ball.translated([0.8, 0.1, 0.0]).add_to(&mut scene).unwrap();
+        let query = Query::between(a, b);
+        let mut detector = Detector::with_settings(cpu(method, 1)).unwrap();
+        for _ in 0..settled {
+            scene.set_positions(a, &ball.positions).unwrap();
+            let place = ball.translated([0.8, 0.1, 0.0]).positions;
+            scene.set_positions(b, &place).unwrap();
+            assert!(!detector.detect(&scene, &query).unwrap().is_empty());
+        }
+        // Positions that were good come back with their scene, and nothing tells them from what they were.
+        let saved = scene.clone();
+        for bad in [a, b] {
+            for body in [a, b] {
+                let positions = scene.positions_mut::<f32>(body).unwrap();
+                positions.iter_mut().for_each(|point| point[0] += 100.0);
+            }
+            scene.positions_mut::<f32>(bad).unwrap()[7][1] = f32::NAN;
+            assert!(detector.detect(&scene, &query).is_err());
+            scene = saved.clone();
+            for offset in [[0.8, 0.1, 0.0], [-0.8, 0.1, 0.0], [0.0, 0.0, 0.9]] {
+                let mut fresh = Detector::with_settings(cpu(method, 1)).unwrap();
+                let expected = fresh.detect(&scene, &query).unwrap();
+                assert!(!expected.is_empty());
+                let found = detector.detect(&scene, &query).unwrap();
+                assert!(found.same_as(expected), "{method:?} {settled} {offset:?}");
+                let place = ball.translated(offset).positions;
+                scene.set_positions(b, &place).unwrap();
+            }
+            scene = saved.clone();
+        }
+    }
+}

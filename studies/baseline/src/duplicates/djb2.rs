@@ -1,0 +1,155 @@
+//! A table of pairs that forgets some of them.
+//!
+//! Section 4.2 of the paper says that possible pairs are handled "by a hashing function", that DJB2 was
+//! tested, and that pairs are lost to its conflicts; no more. Here a slot holds one pair. While cells are
+//! paired every possible pair goes to its slot; one that is there already is a repetition and does no harm, and of
+//! different ones only the lowest stays. Afterwards each slot that is taken is tested once.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use impinge_core::cpu::Job;
+use impinge_core::cpu::cells::Rule;
+use impinge_core::cpu::kept::Kept;
+use impinge_core::cpu::narrow::{Candidate, Settler};
+use impinge_core::cpu::simd::Isa;
+use impinge_core::cpu::subcells::Asked;
+use impinge_core::cpu::world::World;
+use impinge_core::{Error, Statistics};
+
+use super::Possible;
+
+/// A slot that nobody has taken. No pair: there are fewer than 2^32 primitives.
+const FREE: u64 = u64::MAX;
+/// Slots of one task.
+const TASK: usize = 4096;
+
+/// The table and the memory of its tests.
+pub(super) struct Table {
+    isa: Isa,
+    /// `primitive of a << 32 | primitive of b`.
+    slots: Vec<AtomicU64>,
+    settlers: Vec<Settler>,
+}
+
+impl Table {
+    pub fn new(isa: Isa) -> Self {
+        Table {
+            isa,
+            slots: Vec::new(),
+            settlers: Vec::new(),
+        }
+    }
+
+    /// Makes it empty, with so many slots.
+    pub fn clear(&mut self, n_slots: usize) -> Result<(), Error> {
+        if n_slots == 0 || n_slots as u64 > 1 << 32 {
+            return Err(Error::Setting {
+                setting: "table size",
+                given: n_slots.to_string(),
+                allowed: "1 to 2^32",
+            });
+        }
+        self.slots.truncate(n_slots);
+        self.slots
+            .iter_mut()
+            .for_each(|slot| *slot.get_mut() = FREE);
+        self.slots.resize_with(n_slots, || AtomicU64::new(FREE));
+        Ok(())
+    }
+
+    pub fn rule(&self, possible: Possible) -> Insert<'_> {
+        Insert {
+            possible,
+            slots: &self.slots,
+        }
+    }
+
+    /// Tests the pairs in the table.
+    pub fn settle(&mut self, job: Job<'_>, keys: &mut Vec<u64>, stats: &mut Statistics) {
+        let Table {
+            isa,
+            slots,
+            settlers,
+        } = self;
+        settlers.resize_with(job.workers.n(), Settler::default);
+        settlers.iter_mut().for_each(Settler::clear);
+        let world = World::new(job.scene, job.frame);
+        let (isa, slots) = (*isa, &slots[..]);
+        stats.time("narrow", |_| {
+            let n_tasks = slots.len().div_ceil(TASK);
+            job.workers.for_each(settlers, n_tasks, |settler, ix| {
+                for slot in slots[ix * TASK..].iter().take(TASK) {
+                    let pair = slot.load(Ordering::Relaxed);
+                    if pair != FREE {
+                        settler.push(Candidate {
+                            a: 0,
+                            b: 1,
+                            place_a: (pair >> 32) as u32,
+                            place_b: pair as u32,
+                        });
+                    }
+                    settler.settle_when_full(isa, world);
+                }
+                settler.settle(isa, world);
+            });
+        });
+        for settler in settlers {
+            keys.extend_from_slice(&settler.keys);
+            stats.n_candidates += settler.n_candidates;
+            stats.n_unsure += settler.n_unsure;
+        }
+        stats.bytes_held += size_of_val(slots) as u64;
+    }
+}
+
+/// Nothing is tested yet; every possible pair goes to its slot.
+pub(super) struct Insert<'a> {
+    possible: Possible,
+    slots: &'a [AtomicU64],
+}
+
+impl Rule for Insert<'_> {
+    fn asked(&self) -> Asked {
+        self.possible.asked()
+    }
+
+    #[inline(always)]
+    fn admits(&self, a: &Kept, b: &Kept, _: &mut Vec<u64>) -> bool {
+        let pair = u64::from(a.primitive) << 32 | u64::from(b.primitive);
+        let slot = &self.slots[djb2(a.primitive, b.primitive) as usize % self.slots.len()];
+        // Repetitions are many: most find what they would write.
+        if slot.load(Ordering::Relaxed) > pair {
+            slot.fetch_min(pair, Ordering::Relaxed);
+        }
+        false
+    }
+}
+
+/// Bernstein's hash of the bytes of two numbers, low bytes first: `hash = 33 hash + byte`, from 5381, in 32 bits.
+#[inline(always)]
+fn djb2(a: u32, b: u32) -> u32 {
+    let bytes = [a.to_le_bytes(), b.to_le_bytes()];
+    bytes.as_flattened().iter().fold(5381, |hash: u32, &byte| {
+        hash.wrapping_mul(33).wrapping_add(u32::from(byte))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::djb2;
+
+    #[test]
+    fn hashes_bytes_as_bernstein_does() {
+        // The string "abcdefgh".
+        let text = b"abcdefgh";
+        let mut expected = 5381u32;
+        for &byte in text {
+            expected = (expected << 5)
+                .wrapping_add(expected)
+                .wrapping_add(byte.into());
+        }
+        let [a, b] = [&text[..4], &text[4..]]
+            .map(|four| u32::from_le_bytes(four.try_into().expect("four bytes")));
+        assert_eq!(djb2(a, b), expected);
+    }
+}

@@ -1,0 +1,154 @@
+//! All pairs of a cell: every primitive of one body against every primitive of the other.
+//!
+//! In: runs of the sorted entries. Out: candidates, which the exact test settles in runs of about a
+//! thousand, while they are in the cache.
+//! A small cell is two loops of box tests. In a larger one the boxes of 64 primitives of `b` are laid out a
+//! lane each, and a primitive of `a` is tested against 8 or 16 of them at a time.
+//! Cost: `n_a n_b` box tests a cell; nothing is culled before them, that is the method.
+
+use impinge_core::cpu::kept::Kept;
+use impinge_core::cpu::narrow::{Candidate, Settler};
+use impinge_core::cpu::simd::{Isa, LaneBounds, masks};
+use impinge_core::cpu::world::World;
+use impinge_core::grouping::GROUP;
+use impinge_core::grouping::bounds::Bounds;
+use impinge_core::grouping::grid::Grid;
+
+/// Box tests up to which laying out lanes is not worth it.
+const FEW: usize = 24;
+
+/// The entries of one cell that has primitives of both bodies, or as many of `a` as make a group.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Run {
+    pub cell: u32,
+    /// Entries `first_a .. end_a` are of body `a`, at most a group of them.
+    pub first_a: u32,
+    pub end_a: u32,
+    /// Entries `first_b .. end_b` are of body `b`.
+    pub first_b: u32,
+    pub end_b: u32,
+}
+
+/// What the pairs of a cell are looked up in.
+#[derive(Clone, Copy)]
+pub(crate) struct Lists<'a> {
+    pub world: World<'a>,
+    pub grid: &'a Grid,
+    pub kept: &'a [Kept],
+    /// `cell << 32 | place in kept`, sorted.
+    pub entries: &'a [u64],
+    /// Whether a pair is tested by one of its cells only.
+    pub owner_rule: bool,
+}
+
+/// What one worker has of its own.
+#[derive(Debug)]
+pub(crate) struct Scratch {
+    pub settler: Settler,
+    pub n_box_tests: u64,
+    lanes: LaneBounds,
+    boxes: Vec<Bounds>,
+    masks: [u64; GROUP],
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Scratch {
+            settler: Settler::default(),
+            n_box_tests: 0,
+            lanes: LaneBounds::EMPTY,
+            boxes: Vec::with_capacity(GROUP),
+            masks: [0; GROUP],
+        }
+    }
+}
+
+impl Scratch {
+    pub fn clear(&mut self) {
+        self.settler.clear();
+        self.n_box_tests = 0;
+    }
+
+    pub fn bytes(&self) -> usize {
+        size_of::<Scratch>() + self.settler.bytes() + size_of::<Bounds>() * self.boxes.capacity()
+    }
+
+    /// Tests all pairs of these cells, and settles what their boxes leave.
+    pub fn pair(&mut self, isa: Isa, lists: Lists<'_>, runs: &[Run]) {
+        for run in runs {
+            let a = &lists.entries[run.first_a as usize..run.end_a as usize];
+            let b = &lists.entries[run.first_b as usize..run.end_b as usize];
+            self.n_box_tests += a.len() as u64 * b.len() as u64;
+            if a.len() * b.len() <= FEW {
+                self.pair_few(lists, run.cell, a, b);
+            } else {
+                self.pair_many(isa, lists, run.cell, a, b);
+            }
+            self.settler.settle_when_full(isa, lists.world);
+        }
+        self.settler.settle(isa, lists.world);
+    }
+
+    fn pair_few(&mut self, lists: Lists<'_>, cell: u32, a: &[u64], b: &[u64]) {
+        for &entry_a in a {
+            let kept_a = lists.kept(entry_a);
+            for &entry_b in b {
+                let kept_b = lists.kept(entry_b);
+                if kept_a.bounds.overlaps(&kept_b.bounds) {
+                    self.put(lists, cell, kept_a, kept_b);
+                }
+            }
+        }
+    }
+
+    fn pair_many(&mut self, isa: Isa, lists: Lists<'_>, cell: u32, a: &[u64], b: &[u64]) {
+        self.boxes.clear();
+        self.boxes
+            .extend(a.iter().map(|&entry| lists.kept(entry).bounds));
+        for b in b.chunks(GROUP) {
+            for (lane, &entry) in b.iter().enumerate() {
+                self.lanes.put(lane, &lists.kept(entry).bounds);
+            }
+            // Lanes past the last hold what was there before, and are not looked at.
+            let among = u64::MAX >> (GROUP - b.len());
+            masks(isa, &self.lanes, among, &self.boxes, &mut self.masks);
+            for (row, &entry_a) in a.iter().enumerate() {
+                let mut rest = self.masks[row];
+                while rest != 0 {
+                    let entry_b = b[rest.trailing_zeros() as usize];
+                    rest &= rest - 1;
+                    self.put(lists, cell, lists.kept(entry_a), lists.kept(entry_b));
+                }
+            }
+            self.settler.settle_when_full(isa, lists.world);
+        }
+    }
+
+    #[inline(always)]
+    fn put(&mut self, lists: Lists<'_>, cell: u32, a: &Kept, b: &Kept) {
+        if lists.owner_rule && lists.owner(a, b) != cell as usize {
+            return;
+        }
+        self.settler.push(Candidate {
+            a: a.participant,
+            b: b.participant,
+            place_a: a.primitive,
+            place_b: b.primitive,
+        });
+    }
+}
+
+impl<'a> Lists<'a> {
+    #[inline(always)]
+    fn kept(&self, entry: u64) -> &'a Kept {
+        &self.kept[entry as u32 as usize]
+    }
+
+    /// The one of all common cells to which a pair belongs, as in `impinge`'s owner rule.
+    #[inline(always)]
+    fn owner(&self, a: &Kept, b: &Kept) -> usize {
+        self.grid.index(std::array::from_fn(|axis| {
+            u32::from(a.range.lo[axis].max(b.range.lo[axis]) >> 2)
+        }))
+    }
+}

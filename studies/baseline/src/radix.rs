@@ -1,0 +1,162 @@
+//! A radix sort of cell-primitive pairs: least significant digit first, stable, on all threads.
+//!
+//! In: entries `cell << 32 | primitive`. Out: the same, cells rising, and within a cell in the order in
+//! which they came. Only the bits that cells have are sorted by, in as few digits as there can be:
+//!
+//! ```text
+//!  63        48 47    41 40    32 31                0
+//! +------------+--------+--------+-------------------+
+//! |     0      | digit 1| digit 0|     primitive     |     2^16 … 2^18 cells: two digits of 8 or 9 bits
+//! +------------+--------+--------+-------------------+
+//! ```
+//!
+//! A round counts the digits of each task's run of entries, sums the counts up, digit by digit and within
+//! one task by task, and scatters: every task then knows where its entries go, and no two write to the
+//! same place. Cost: each entry read twice and written once a round.
+
+use std::sync::Mutex;
+
+use impinge_core::cpu::workers::Workers;
+
+/// Bits of a digit, at most: 2,048 places that are written to at a time.
+const MOST_BITS: u32 = 11;
+/// Entries of a task, at least.
+const TASK: usize = 1 << 14;
+/// Where an entry's cell begins.
+const CELL: u32 = 32;
+
+/// The memory of a sort, kept from frame to frame.
+#[derive(Debug, Default)]
+pub(crate) struct Radix {
+    sorted: Vec<u64>,
+    /// For each task its counts, then its places.
+    counts: Vec<Mutex<Vec<u32>>>,
+}
+
+/// Where tasks put entries, each in places of its own.
+#[derive(Clone, Copy)]
+struct Places(*mut u64);
+
+// SAFETY: a pointer does nothing by itself; `put` says what its callers owe.
+unsafe impl Send for Places {}
+// SAFETY: as above.
+unsafe impl Sync for Places {}
+
+impl Places {
+    /// # Safety
+    /// `at` must lie within the memory pointed to, and be given to nobody else in the same round.
+    #[inline(always)]
+    unsafe fn put(self, at: usize, entry: u64) {
+        // SAFETY: said above.
+        unsafe { self.0.add(at).write(entry) }
+    }
+}
+
+impl Radix {
+    /// Sorts by cells, of which there are `n_cells`. `scratches` are one a worker and only counted.
+    pub fn sort<S: Send>(
+        &mut self,
+        entries: &mut Vec<u64>,
+        n_cells: u64,
+        workers: &Workers,
+        scratches: &mut [S],
+    ) {
+        let bits = u64::BITS - n_cells.saturating_sub(1).leading_zeros();
+        let n_rounds = bits.div_ceil(MOST_BITS);
+        if entries.len() < 2 || n_rounds == 0 {
+            return;
+        }
+        let digit = bits.div_ceil(n_rounds);
+        self.sorted.clear();
+        self.sorted.resize(entries.len(), 0);
+        for round in 0..n_rounds {
+            self.round(entries, CELL + round * digit, digit, workers, scratches);
+            std::mem::swap(entries, &mut self.sorted);
+        }
+    }
+
+    pub fn bytes(&self) -> usize {
+        size_of::<u64>() * self.sorted.capacity()
+            + size_of::<u32>() * (self.counts.len() << MOST_BITS)
+    }
+
+    fn round<S: Send>(
+        &mut self,
+        entries: &[u64],
+        shift: u32,
+        bits: u32,
+        workers: &Workers,
+        scratches: &mut [S],
+    ) {
+        // Some tasks a worker, so that none waits long for the last one.
+        let task = entries.len().div_ceil(4 * workers.n()).max(TASK);
+        let n_tasks = entries.len().div_ceil(task);
+        let n_digits = 1usize << bits;
+        let digit = |entry: u64| (entry >> shift) as usize & (n_digits - 1);
+        if self.counts.len() < n_tasks {
+            self.counts.resize_with(n_tasks, Mutex::default);
+        }
+        let run = |ix: usize| &entries[ix * task..entries.len().min((ix + 1) * task)];
+        let counts = &self.counts;
+        workers.for_each(scratches, n_tasks, |_, ix| {
+            let mut counts = counts[ix].lock().expect("no task panics");
+            counts.clear();
+            counts.resize(n_digits, 0);
+            for &entry in run(ix) {
+                counts[digit(entry)] += 1;
+            }
+        });
+        // Entries are fewer than 2^32, see `UniformGrid`.
+        let mut place = 0u32;
+        for digit in 0..n_digits {
+            for counts in &mut self.counts[..n_tasks] {
+                let count = &mut counts.get_mut().expect("no task panics")[digit];
+                place += std::mem::replace(count, place);
+            }
+        }
+        let counts = &self.counts;
+        let sorted = Places(self.sorted.as_mut_ptr());
+        let n = self.sorted.len();
+        assert_eq!(n, entries.len());
+        workers.for_each(scratches, n_tasks, |_, ix| {
+            let mut places = counts[ix].lock().expect("no task panics");
+            for &entry in run(ix) {
+                let place = &mut places[digit(entry)];
+                debug_assert!((*place as usize) < n);
+                // SAFETY: the counts of all tasks and digits add up to `n`, and each task takes as many
+                // places of a digit as it has counted, from where the one before it has ended.
+                unsafe { sorted.put(*place as usize, entry) };
+                *place += 1;
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sorts_as_the_standard_library_does() {
+        let mut state = 7u64;
+        let mut next = move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(99);
+            state >> 33
+        };
+        let mut radix = Radix::default();
+        for threads in [1, 2, 3] {
+            let workers = Workers::new(threads).unwrap();
+            let mut scratches = vec![(); workers.n()];
+            for n_cells in [1, 2, 3, 256, 257, 5000, 1 << 22, (1 << 25) - 3] {
+                for n in [0u64, 1, 2, 1000, 100_000] {
+                    let mut entries: Vec<u64> =
+                        (0..n).map(|ix| (next() % n_cells) << 32 | ix).collect();
+                    let mut expected = entries.clone();
+                    expected.sort_unstable();
+                    radix.sort(&mut entries, n_cells, &workers, &mut scratches);
+                    assert!(entries == expected, "{n} entries of {n_cells} cells");
+                }
+            }
+        }
+    }
+}

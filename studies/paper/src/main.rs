@@ -1,0 +1,91 @@
+//! The program `impinge-paper`: the paper's benchmarks as a report.
+
+mod args;
+
+use std::io::{IsTerminal, stderr};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use impinge::CancelToken;
+use impinge_paper::{Control, Error, Options};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::args::Args;
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    match run(&args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("impinge-paper: {failure}");
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}
+
+/// What ends the program without success.
+#[derive(Debug, thiserror::Error)]
+enum Failure {
+    #[error(transparent)]
+    Run(#[from] Error),
+    #[error("{n} answers in {} differ from those beside them: please report this", .report.display())]
+    Disagreements { n: usize, report: PathBuf },
+    #[error("cannot listen to Ctrl-C: {0}")]
+    Signal(#[from] ctrlc::Error),
+}
+
+impl Failure {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Failure::Run(Error::Options(_)) => 2,
+            Failure::Run(error) if error.is_cancelled() => 130,
+            _ => 1,
+        }
+    }
+}
+
+fn run(args: &Args) -> Result<(), Failure> {
+    let options = Options::try_from(args)?;
+    let cancel = CancelToken::new();
+    let held = cancel.clone();
+    ctrlc::set_handler(move || held.cancel())?;
+    let bar = bar(!args.no_progress);
+    let outcome = impinge_paper::run(
+        &options,
+        &Control {
+            cancel: &cancel,
+            progress: &|progress| {
+                if bar.message() != progress.what {
+                    bar.set_message(progress.what.to_owned());
+                }
+                bar.set_length(progress.total as u64);
+                bar.set_position(progress.done as u64);
+            },
+        },
+    );
+    bar.finish_and_clear();
+    let outcome = outcome?;
+    outcome.write(&args.out)?;
+    let report = args.out.join("report.md");
+    println!(
+        "{} surface benchmarks and {} volume benchmarks: {}",
+        outcome.report.surfaces.len(),
+        outcome.report.volumes.len(),
+        report.display()
+    );
+    match outcome.report.n_disagreements() {
+        0 => Ok(()),
+        n => Err(Failure::Disagreements { n, report }),
+    }
+}
+
+/// A progress bar on standard error, if that is a terminal and a bar is wanted.
+fn bar(is_wanted: bool) -> ProgressBar {
+    if !(is_wanted && stderr().is_terminal()) {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(0).with_style(style)
+}
