@@ -2,6 +2,25 @@
 
 use crate::error::{Error, Name, Place};
 
+/// Makes room for `n` things more, or says that there is no memory for them; the process goes on.
+pub(crate) fn reserve<T>(name: Name, place: Place, to: &mut Vec<T>, n: u64) -> Result<(), Error> {
+    usize::try_from(n)
+        .ok()
+        .and_then(|n| to.try_reserve_exact(n).ok())
+        .ok_or_else(|| Error::NoMemory {
+            at: name.at(place),
+            needed: n.saturating_mul(size_of::<T>() as u64),
+        })
+}
+
+/// The most bytes that compressed data of a file of `length` bytes may become. Meshes are seldom compressed to less than a
+/// tenth; constant arrays are, by a factor of a thousand, but they are a small part of a mesh.
+pub(crate) fn most_expanded(length: u64, limit: u64) -> u64 {
+    const FACTOR: u64 = 200;
+    const FLOOR: u64 = 64 << 20;
+    limit.min(length.saturating_mul(FACTOR).max(FLOOR))
+}
+
 /// A number of bytes that may still be used.
 #[derive(Debug)]
 pub(crate) struct Budget {

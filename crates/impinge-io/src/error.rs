@@ -47,6 +47,23 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
+    /// Something that is no regular file: a pipe, a device, a socket or a folder. Check the name, or copy its content to a file.
+    #[error("{}: is {what}, not a regular file", .path.display())]
+    NotAFile {
+        /// The path.
+        path: PathBuf,
+        /// What it is.
+        what: &'static str,
+    },
+    /// A mesh file or a pattern names a file elsewhere, perhaps by a link. Check that the mesh is what it seems to be, or put
+    /// the file beside it.
+    #[error("{}: is not in {}; only files in the folder of the mesh or below it are read", .path.display(), .folder.display())]
+    Outside {
+        /// The file that was named.
+        path: PathBuf,
+        /// The folder in which it should be.
+        folder: PathBuf,
+    },
     /// The format is chosen by the file's extension, and this one is not known. Check the name.
     #[error("{}: no mesh format has the extension '{extension}' (known: {known})", .path.display())]
     UnknownFormat {
@@ -154,6 +171,14 @@ pub enum Error {
         limit: u64,
         /// How much there is.
         found: u64,
+    },
+    /// There is no memory for what the file holds. Check that the file is what it seems to be, or give the process more memory.
+    #[error("{at}: {needed} bytes of memory are needed, and cannot be had")]
+    NoMemory {
+        /// The file, and what in it.
+        at: Location,
+        /// Bytes that were asked for.
+        needed: u64,
     },
     /// What was given to a writer, or asked of a sequence, does not fit together. Check the call.
     #[error("{file}: {what}: expected {expected}, found {found}")]

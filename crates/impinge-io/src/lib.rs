@@ -41,6 +41,7 @@ mod binary;
 mod budget;
 mod collect;
 mod error;
+mod files;
 mod format;
 mod formats;
 mod mesh;
@@ -57,4 +58,7 @@ pub use read::{
     read_with_summary,
 };
 pub use sequence::{Sequence, SequenceFormat};
-pub use write::{ColoredMesh, GrowingPc2, Pc2Writer, write_glb, write_ply, write_vtu};
+pub use write::{
+    AtomicFile, ColoredMesh, GrowingPc2, Pc2Writer, remove_temporary_files, write_glb, write_ply,
+    write_vtu,
+};

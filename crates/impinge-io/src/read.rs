@@ -1,10 +1,10 @@
 //! Reading a mesh: by path or from bytes.
 
-use std::fs;
 use std::path::Path;
 
 use crate::collect::Collector;
 use crate::error::{Error, Name, Place};
+use crate::files::{Source, folder_of};
 use crate::format::Format;
 use crate::formats::{gltf, medit, msh, obj, off, ply, stl, tetgen, vtk, vtu};
 use crate::mesh::Mesh;
@@ -29,8 +29,11 @@ pub struct ReadOptions {
     /// Which primitives to take where there are both kinds.
     pub prefer: Prefer,
     /// The most bytes that data may take which is larger in memory than in the file by its nature: compressed arrays,
-    /// and glTF meshes placed many times. 4 GiB by default.
+    /// and glTF meshes placed many times. 4 GiB by default. Compressed arrays may not take more than 200 times the bytes of
+    /// their file either, or 64 MiB where that is more.
     pub max_expanded_bytes: u64,
+    /// The most bytes that a file may have; a longer one is refused before it is read. 16 GiB by default.
+    pub max_file_bytes: u64,
 }
 
 impl Default for ReadOptions {
@@ -39,6 +42,7 @@ impl Default for ReadOptions {
             weld: false,
             prefer: Prefer::Volume,
             max_expanded_bytes: 4 << 30,
+            max_file_bytes: 16 << 30,
         }
     }
 }
@@ -64,6 +68,8 @@ pub struct Summary {
 /// Reads the mesh at `path`; the format goes by the extension ([`Format::from_path`]).
 ///
 /// All bodies, groups and nodes of a file become one mesh. Of TetGen's files either may be named, the other is found beside it.
+/// Only regular files are read, and of files that the mesh file names or that are found beside it only those in its own
+/// folder or below, links resolved.
 ///
 /// # Errors
 /// Any [`Error`] but [`Error::Mismatch`].
@@ -131,10 +137,26 @@ pub(crate) fn collect_file<T>(
     options: &ReadOptions,
     then: impl FnOnce(Collector) -> Result<T, Error>,
 ) -> Result<T, Error> {
+    collect(Source::Named(path), options, then)
+}
+
+/// As [`collect_file`], for a file that the caller or a pattern named.
+pub(crate) fn collect<T>(
+    source: Source,
+    options: &ReadOptions,
+    then: impl FnOnce(Collector) -> Result<T, Error>,
+) -> Result<T, Error> {
+    let path = source.path();
+    let folder = folder_of(path);
     let format = Format::from_path(path)?;
     if format == Format::Tetgen {
         let (nodes_path, cells_path) = tetgen::paths(path);
-        let (nodes, cells) = (read_file(&nodes_path)?, read_file(&cells_path)?);
+        let of = |companion| match companion == path {
+            true => source,
+            false => Source::Beside(companion, folder),
+        };
+        let nodes = of(&nodes_path).read(options)?;
+        let cells = of(&cells_path).read(options)?;
         let (nodes_name, cells_name) = (
             nodes_path.display().to_string(),
             cells_path.display().to_string(),
@@ -146,13 +168,13 @@ pub(crate) fn collect_file<T>(
             Name(&cells_name),
         )?);
     }
-    let bytes = read_file(path)?;
+    let bytes = source.read(options)?;
     let name = path.display().to_string();
     then(collect_bytes(
         &bytes,
         format,
         Name(&name),
-        path.parent(),
+        Some(folder),
         options,
     )?)
 }
@@ -165,6 +187,7 @@ fn collect_bytes<'a>(
     folder: Option<&Path>,
     options: &ReadOptions,
 ) -> Result<Collector<'a>, Error> {
+    check_encoding(bytes, format, name)?;
     match format {
         Format::Obj => obj::read(bytes, name),
         Format::Ply => ply::read(bytes, name),
@@ -182,7 +205,18 @@ fn collect_bytes<'a>(
     }
 }
 
-/// All bytes of a file.
-pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, Error> {
-    fs::read(path).map_err(|source| Error::io(path, "read", source))
+/// Refuses text in UTF-16, which some editors and shells write, by name.
+///
+/// Without a byte order mark UTF-16 shows by a zero in every other byte. No format starts like that but binary STL, whose
+/// title may be anything: it is told by its length.
+pub(crate) fn check_encoding(bytes: &[u8], format: Format, name: Name) -> Result<(), Error> {
+    let is_utf16 = match bytes {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => true,
+        &[a, 0, b, 0, ..] | &[0, a, 0, b, ..] => a != 0 && b != 0 && a.is_ascii() && b.is_ascii(),
+        _ => false,
+    };
+    if is_utf16 && !(format == Format::Stl && stl::is_binary(bytes)) {
+        return Err(name.unsupported(Place::File, "text in UTF-16 (UTF-8 is: save it as that)"));
+    }
+    Ok(())
 }

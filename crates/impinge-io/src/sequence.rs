@@ -6,9 +6,11 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use crate::binary::{Cursor, Endian, Scalar, array};
+use crate::budget::reserve;
 use crate::error::{Error, Name, Place, shown};
+use crate::files::{Source as Input, folder_of};
 use crate::mesh::Positions;
-use crate::read::{ReadOptions, collect_file};
+use crate::read::{ReadOptions, collect};
 
 /// A format that holds the frames of a sequence in one file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -49,8 +51,8 @@ enum Frames {
         start: u64,
         endian: Endian,
     },
-    /// A mesh file each.
-    Files(Vec<PathBuf>),
+    /// A mesh file each, in the folder of the path that named them.
+    Files { files: Vec<PathBuf>, named: PathBuf },
 }
 
 #[derive(Debug)]
@@ -133,10 +135,11 @@ impl Sequence {
                 start,
                 endian,
             } => self.cached_frame(source, *start, *endian, frame_ix),
-            Frames::Files(files) => {
+            Frames::Files { files, named } => {
                 let path = &files[frame_ix];
-                let positions =
-                    collect_file(path, &ReadOptions::default(), |parts| Ok(parts.positions))?;
+                let positions = collect(input(path, named), &ReadOptions::default(), |parts| {
+                    Ok(parts.positions)
+                })?;
                 if positions.len() != self.n_points {
                     return Err(mismatch(
                         &path.display().to_string(),
@@ -151,11 +154,7 @@ impl Sequence {
     }
 
     fn open_cache(path: &Path, format: SequenceFormat) -> Result<Self, Error> {
-        let mut file = File::open(path).map_err(|source| Error::io(path, "open", source))?;
-        let length = file
-            .metadata()
-            .map_err(|source| Error::io(path, "read", source))?
-            .len();
+        let (mut file, length) = Input::Named(path).open()?;
         let mut start = Vec::new();
         file.by_ref()
             .take(32)
@@ -193,12 +192,14 @@ impl Sequence {
     ) -> Result<Positions, Error> {
         let size = self.n_points * 12;
         let offset = start + frame_ix as u64 * size as u64;
+        let name = Name(&self.name);
         let mut buffer = Vec::new();
         let bytes = match source {
             // The header was held against the length of the bytes.
             Source::Bytes(bytes) => &bytes[offset as usize..offset as usize + size],
             Source::File(path, file) => {
                 let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
+                reserve(name, Place::File, &mut buffer, size as u64)?;
                 buffer.resize(size, 0);
                 let read = file
                     .seek(SeekFrom::Start(offset))
@@ -207,11 +208,12 @@ impl Sequence {
                 &buffer
             }
         };
-        let mut positions = Vec::with_capacity(self.n_points);
+        let mut positions = Vec::new();
+        reserve(name, Place::File, &mut positions, self.n_points as u64)?;
         for (vertex, record) in bytes.chunks_exact(12).enumerate() {
             let position = [0, 4, 8].map(|at| f32::from_le_bytes(array(&record[at..], endian)));
             let place = Place::Byte(offset + vertex as u64 * 12);
-            crate::collect::finite(Name(&self.name), place, vertex, position.map(f64::from))?;
+            crate::collect::finite(name, place, vertex, position.map(f64::from))?;
             positions.push(position);
         }
         Ok(Positions::F32(positions))
@@ -219,14 +221,18 @@ impl Sequence {
 
     fn open_files(path: &Path) -> Result<Self, Error> {
         let files = numbered_files(path)?;
-        let n_points = collect_file(&files[0], &ReadOptions::default(), |parts| {
+        let first = input(&files[0], path);
+        let n_points = collect(first, &ReadOptions::default(), |parts| {
             Ok(parts.positions.len())
         })?;
         Ok(Sequence {
             name: path.display().to_string(),
             n_frames: files.len(),
             n_points,
-            frames: Frames::Files(files),
+            frames: Frames::Files {
+                files,
+                named: path.to_owned(),
+            },
         })
     }
 }
@@ -286,6 +292,15 @@ impl Header {
     }
 }
 
+/// A file of a sequence: the very one that the caller named, or one that was found by that name.
+fn input<'p>(path: &'p Path, named: &'p Path) -> Input<'p> {
+    if path == named {
+        Input::Named(path)
+    } else {
+        Input::Beside(path, folder_of(path))
+    }
+}
+
 /// The files that `path` names: a first one, a printf pattern, or a glob pattern; at least one, in order.
 fn numbered_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let shown_path = path.display().to_string();
@@ -302,10 +317,7 @@ fn numbered_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
         .and_then(|n| n.to_str())
         .ok_or_else(|| wrong("none"))?;
     let matcher = Matcher::new(pattern).ok_or_else(|| wrong(&format!("'{pattern}'")))?;
-    let folder = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
+    let folder = folder_of(path);
     let mut found = Vec::new();
     let failed = |source| Error::io(folder, "list", source);
     for entry in fs::read_dir(folder).map_err(failed)? {

@@ -28,7 +28,11 @@ pub(crate) fn read<'a>(
     let (json, binary) = if bytes.starts_with(b"glTF") {
         chunks(bytes, name)?
     } else {
-        ((bytes, None), None)
+        // A byte order mark does not belong here, but some editors write one.
+        (
+            (bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), None),
+            None,
+        )
     };
     let root = parse(json, name)?;
     let scene = Scene {
@@ -39,6 +43,7 @@ pub(crate) fn read<'a>(
             binary,
             folder,
             Budget::new(options.max_expanded_bytes.max(16 * bytes.len() as u64)),
+            options,
         ),
         root: &root,
         is_f64: false,

@@ -1,6 +1,7 @@
 //! One file a format; each reads bytes into a [`Collector`](crate::collect::Collector).
 
 use crate::binary::{Endian, Scalar};
+use crate::budget::reserve;
 use crate::collect::finite;
 use crate::error::{Error, Name, Place};
 use crate::mesh::Positions;
@@ -26,18 +27,23 @@ fn positions(
     place: impl Fn(usize) -> Place,
 ) -> Result<Positions, Error> {
     let size = scalar.size();
+    let n = (bytes.len() / (3 * size)) as u64;
     let records = bytes.chunks_exact(3 * size).enumerate();
     if scalar.fits_f32() {
-        let narrow = records.map(|(vertex, record)| {
+        let mut positions = Vec::new();
+        reserve(name, Place::File, &mut positions, n)?;
+        for (vertex, record) in records {
             let position = [0, 1, 2].map(|axis| scalar.narrow(&record[axis * size..], endian));
             finite(name, place(vertex), vertex, position.map(f64::from))?;
-            Ok(position)
-        });
-        return Ok(Positions::F32(narrow.collect::<Result<_, Error>>()?));
+            positions.push(position);
+        }
+        return Ok(Positions::F32(positions));
     }
-    let wide = records.map(|(vertex, record)| {
+    let mut positions = Vec::new();
+    reserve(name, Place::File, &mut positions, n)?;
+    for (vertex, record) in records {
         let position = [0, 1, 2].map(|axis| scalar.float(&record[axis * size..], endian));
-        finite(name, place(vertex), vertex, position)
-    });
-    Ok(Positions::F64(wide.collect::<Result<_, Error>>()?))
+        positions.push(finite(name, place(vertex), vertex, position)?);
+    }
+    Ok(Positions::F64(positions))
 }

@@ -17,11 +17,12 @@ const START: usize = TITLE + 4;
 const RECORD: usize = 12 + 36 + 2;
 
 pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error> {
-    // Titles of binary files may start with 'solid' too; only they have exactly the length that they announce.
-    if announced(bytes).is_some_and(|length| length == bytes.len() as u64) {
+    if is_binary(bytes) {
         return read_binary(bytes, name);
     }
     if bytes
+        .strip_prefix(b"\xef\xbb\xbf")
+        .unwrap_or(bytes)
         .trim_ascii_start()
         .get(..5)
         .is_some_and(|start| start.eq_ignore_ascii_case(b"solid"))
@@ -30,6 +31,12 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
         return read_ascii(bytes, name);
     }
     read_binary(bytes, name)
+}
+
+/// Whether this is a whole binary file. Titles may start with 'solid' too; only binary files have exactly the length that
+/// they announce.
+pub(crate) fn is_binary(bytes: &[u8]) -> bool {
+    announced(bytes).is_some_and(|length| length == bytes.len() as u64)
 }
 
 /// The length of a binary file with this start.

@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 
 use crate::collect::{Collector, check_n_vertices, finite, vertex_ix};
 use crate::error::{Error, Name};
+use crate::format::Format;
 use crate::mesh::Positions;
+use crate::read::check_encoding;
 use crate::text::{Line, Text, number};
 
 /// The `.node` file and the file of cells that belong to `path`, which is one of them: `.ele` where it exists, else `.face`.
@@ -33,6 +35,8 @@ pub(crate) fn read<'a>(
     cells: &[u8],
     cells_name: Name,
 ) -> Result<Collector<'a>, Error> {
+    check_encoding(nodes, Format::Tetgen, nodes_name)?;
+    check_encoding(cells, Format::Tetgen, cells_name)?;
     let mut parts = Collector::new(nodes_name);
     let first = read_nodes(nodes, &mut parts)?;
     let is_face = Path::new(cells_name.0)

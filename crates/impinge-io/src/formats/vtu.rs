@@ -9,7 +9,7 @@ mod xml;
 use self::array::Arrays;
 use self::xml::{Document, Node};
 use super::cells;
-use crate::budget::Budget;
+use crate::budget::{self, Budget};
 use crate::collect::{Collector, check_n_vertices};
 use crate::error::{Error, Name, Place, shown};
 use crate::mesh::Positions;
@@ -82,7 +82,10 @@ pub(crate) fn read<'a>(
                 ));
             }
         },
-        budget: Budget::new(options.max_expanded_bytes.max(4 * bytes.len() as u64)),
+        budget: Budget::new(budget::most_expanded(
+            bytes.len() as u64,
+            options.max_expanded_bytes.max(16 * bytes.len() as u64),
+        )),
     };
     let mut parts = Collector::new(name);
     let grid = root
@@ -233,6 +236,8 @@ fn read_piece(arrays: &mut Arrays, piece: Node, parts: &mut Collector) -> Result
                 values.len() as u64,
             ));
         }
+        // Small integers become f32.
+        arrays.budget.charge(name, points.place(), n_points, 12)?;
         append(
             &mut parts.positions,
             values.positions(name, points.place(), first)?,
@@ -267,6 +272,13 @@ fn read_piece(arrays: &mut Arrays, piece: Node, parts: &mut Collector) -> Result
             return Err(name.count(at, what, n_cells, values.len() as u64));
         }
     }
+    // Indices of one byte become corners of four, and a polygon of n corners n - 2 triangles.
+    arrays.budget.charge(
+        name,
+        connectivity_at,
+        connectivity.len() as u64,
+        size_of::<[u32; 3]>() as u64,
+    )?;
     let mut start = 0usize;
     let mut indices = Vec::new();
     for cell in 0..offsets.len() {

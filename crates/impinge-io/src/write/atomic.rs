@@ -1,16 +1,35 @@
-//! A file that appears under its name only when it is complete.
+//! Files that appear under their name only when they are complete.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::error::Error;
 
-/// Bytes go to a file beside the target, which [`finish`](Self::finish) renames; dropping without it removes that file.
-/// A target that exists and is not a plain file (a device, a pipe) is written directly.
+/// A file that appears under its name only when it is complete.
+///
+/// Bytes go to a file beside the target, which [`finish`](Self::finish) renames; dropping without it removes that file, and
+/// an older file of that name stays as it was. A link keeps being one: the file that it leads to is replaced.
+/// A target that exists and is no regular file (a device, a pipe) is written directly.
+///
+/// ```
+/// use impinge_io::AtomicFile;
+/// use std::io::Write;
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("rows.csv");
+/// let mut file = AtomicFile::create(&path)?;
+/// file.write_all(b"a,b\n")?;
+/// assert!(!path.exists());
+/// file.finish()?;
+/// assert_eq!(std::fs::read(&path)?, b"a,b\n");
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
-pub(super) struct AtomicFile {
+pub struct AtomicFile {
     /// What the caller named, for messages.
     path: PathBuf,
     /// What is written, and what it becomes; the same where the target is no plain file.
@@ -21,8 +40,28 @@ pub(super) struct AtomicFile {
     is_finished: bool,
 }
 
+/// Temporary files that exist now.
+static PARTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn parts() -> MutexGuard<'static, Vec<PathBuf>> {
+    PARTS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the temporary files of all outputs that are being written: for a program that is about to end at once, as on a
+/// second Ctrl-C, from whatever thread.
+pub fn remove_temporary_files() {
+    for part in parts().drain(..) {
+        // There is nobody left to tell of a failure; the file's name says what it is.
+        let _ = fs::remove_file(part);
+    }
+}
+
 impl AtomicFile {
-    pub(super) fn create(path: &Path) -> Result<Self, Error> {
+    /// Starts a file that is to be `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where no file can be made in that folder.
+    pub fn create(path: &Path) -> Result<Self, Error> {
         let error = |source| Error::io(path, "create", source);
         let (written, target, file) = match fs::metadata(path) {
             Ok(metadata) if !metadata.is_file() => {
@@ -37,6 +76,10 @@ impl AtomicFile {
                     path.to_owned()
                 };
                 let (written, file) = create_beside(&target).map_err(error)?;
+                if let Ok(replaced) = found {
+                    // What others may not read stays so. Where that can't be set, the usual permissions are a fair answer.
+                    let _ = file.set_permissions(replaced.permissions());
+                }
                 (written, target, file)
             }
         };
@@ -49,7 +92,8 @@ impl AtomicFile {
         })
     }
 
-    pub(super) fn path(&self) -> &Path {
+    /// The path that the file will have, as the caller named it.
+    pub fn path(&self) -> &Path {
         &self.path
     }
 
@@ -73,15 +117,21 @@ impl AtomicFile {
     }
 
     /// Gives the file its name.
-    pub(super) fn finish(mut self) -> Result<(), Error> {
+    ///
+    /// # Errors
+    /// [`Error::Io`]; nothing is left of the new file then, and an older one is as it was.
+    pub fn finish(mut self) -> Result<(), Error> {
         // Until the rename has succeeded, dropping removes what was written.
         if let Some(file) = self.file.take() {
             file.into_inner()
                 .map_err(|error| Error::io(&self.path, "write", error.into_error()))?;
         }
         if self.written != self.target {
+            // Held while renaming, so that nobody removes the file in between.
+            let mut parts = parts();
             fs::rename(&self.written, &self.target)
                 .map_err(|source| Error::io(&self.path, "rename the complete file to", source))?;
+            parts.retain(|part| *part != self.written);
         }
         self.is_finished = true;
         Ok(())
@@ -97,7 +147,21 @@ impl Drop for AtomicFile {
         if !self.is_finished && self.written != self.target {
             // There is nobody left to tell of a failure; the file's name says what it is.
             let _ = fs::remove_file(&self.written);
+            parts().retain(|part| *part != self.written);
         }
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match &mut self.file {
+            Some(file) => file.write(bytes),
+            None => Ok(bytes.len()),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.as_mut().map_or(Ok(()), BufWriter::flush)
     }
 }
 
@@ -114,13 +178,18 @@ fn create_beside(target: &Path) -> io::Result<(PathBuf, File)> {
             name.to_string_lossy(),
             std::process::id()
         ));
+        let mut parts = parts();
         match OpenOptions::new()
             .write(true)
             .create_new(true)
             .open(&written)
         {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
-            other => return other.map(|file| (written, file)),
+            Err(error) => return Err(error),
+            Ok(file) => {
+                parts.push(written.clone());
+                return Ok((written, file));
+            }
         }
     }
 }

@@ -4,6 +4,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use super::atomic::AtomicFile;
 use crate::error::{Error, Name, Place};
 
 /// The bytes before the number of frames: magic, version, points, start, rate.
@@ -32,22 +33,17 @@ impl GrowingPc2 {
     pub fn create(path: &Path, n_points: usize, start: f32, rate: f32) -> Result<Self, Error> {
         let count = i32::try_from(n_points)
             .map_err(|_| too_large(path, "number of points", n_points as u64))?;
-        let file = File::create(path).map_err(|source| Error::io(path, "create", source))?;
-        let mut cache = GrowingPc2 {
-            path: path.to_owned(),
-            file: BufWriter::with_capacity(1 << 16, file),
-            n_points,
-            n_frames: 0,
-        };
         let mut header = b"POINTCACHE2\0".to_vec();
         header.extend(1i32.to_le_bytes());
         header.extend(count.to_le_bytes());
         header.extend(start.to_le_bytes());
         header.extend(rate.to_le_bytes());
         header.extend(0i32.to_le_bytes());
-        cache.tried("write", |file| file.write_all(&header))?;
-        cache.save()?;
-        Ok(cache)
+        // The file that is there is replaced once its successor has a header on the disk.
+        let mut file = AtomicFile::create(path)?;
+        file.put(&header)?;
+        file.finish()?;
+        Self::resume(path, n_points, 0)
     }
 
     /// Goes on after the first `n_frames` frames of a cache that [`create`](Self::create) started; later ones are cut off.

@@ -9,6 +9,7 @@ mod ply;
 mod surface;
 mod vtu;
 
+pub use atomic::{AtomicFile, remove_temporary_files};
 pub use glb::write_glb;
 pub use growing::GrowingPc2;
 pub use pc2::Pc2Writer;

@@ -6,12 +6,13 @@ use std::path::Path;
 
 use super::index_error;
 use super::json::{Accessor, Root};
+use crate::ReadOptions;
 use crate::base64;
 use crate::binary::{Endian, Scalar};
 use crate::budget::Budget;
 use crate::error::{Error, Name, Place, shown};
+use crate::files::{Source, leads_out, outside};
 use crate::mesh::Positions;
-use crate::read::read_file;
 
 /// The buffers of a file, loaded when they are needed.
 pub(super) struct Data<'a, 'r> {
@@ -23,6 +24,7 @@ pub(super) struct Data<'a, 'r> {
     folder: Option<&'r Path>,
     buffers: HashMap<usize, Cow<'r, [u8]>>,
     budget: Budget,
+    options: &'r ReadOptions,
 }
 
 impl<'a, 'r> Data<'a, 'r> {
@@ -32,6 +34,7 @@ impl<'a, 'r> Data<'a, 'r> {
         binary: Option<&'r [u8]>,
         folder: Option<&'r Path>,
         budget: Budget,
+        options: &'r ReadOptions,
     ) -> Self {
         Data {
             name,
@@ -40,6 +43,7 @@ impl<'a, 'r> Data<'a, 'r> {
             folder,
             buffers: HashMap::new(),
             budget,
+            options,
         }
     }
 
@@ -279,15 +283,16 @@ impl<'a, 'r> Data<'a, 'r> {
             .folder
             .ok_or_else(|| refused("files beside a mesh in memory are not read"))?;
         let relative = unescaped(uri).ok_or_else(|| refused("not a path in UTF-8"))?;
-        if relative.contains(':') || Path::new(&relative).has_root() {
-            return Err(refused("only files beside the mesh are read"));
+        let relative = Path::new(&relative);
+        // A colon ends a scheme, such as `http:`, or a drive's letter.
+        if uri.contains(':') || relative.to_string_lossy().contains(':') || leads_out(relative) {
+            return Err(outside(Path::new(uri), folder));
         }
         let path = folder.join(relative);
-        let length = std::fs::metadata(&path)
-            .map_err(|source| Error::io(&path, "open", source))?
-            .len();
+        let source = Source::Beside(&path, folder);
+        let (_, length) = source.open()?;
         self.charge(length, 1)?;
-        read_file(&path)
+        source.read(self.options)
     }
 }
 

@@ -6,7 +6,7 @@ use super::Appended;
 use super::xml::Node;
 use crate::base64;
 use crate::binary::{Endian, Scalar};
-use crate::budget::Budget;
+use crate::budget::{Budget, reserve};
 use crate::collect::finite;
 use crate::error::{Error, Name, Place, shown};
 use crate::mesh::Positions;
@@ -275,57 +275,66 @@ impl<'b> Arrays<'b> {
             .iter()
             .fold(header_length, |sum, &size| sum.saturating_add(size));
         let all = self.fetch(encoded, length, "compressed data")?;
-        // The sizes sum up to no more than was fetched, so they are small.
-        let mut rest = &all[header_length as usize..];
-        let mut out = Vec::new();
+        // Whole blocks, and a last one that may be shorter.
+        let expanded = |ix: u64| match last {
+            1.. if ix == n_blocks => last,
+            _ => block,
+        };
+        let mut total = 0u64;
         for (ix, &compressed) in (1..).zip(&sizes) {
-            let (bytes, behind) = rest.split_at(compressed as usize);
-            rest = behind;
-            let expected = if ix == n_blocks && last > 0 {
-                last
-            } else {
-                block
-            };
-            self.budget.charge(name, at, expected, 1)?;
             // Neither method makes data longer than this; a header that says so lies, and no memory is reserved for it.
             let most = compressed.saturating_mul(1100).saturating_add(64);
-            if expected > most {
+            if expanded(ix) > most {
                 return Err(name.too_large(
                     at,
                     format!("length of block {ix} out of {compressed} bytes"),
                     most,
-                    expected,
+                    expanded(ix),
                 ));
             }
-            let block = decompress(bytes, expected as usize, compressor).map_err(|message| {
+            total = total.saturating_add(expanded(ix));
+        }
+        self.budget.charge(name, at, total, 1)?;
+        let mut out: Vec<u8> = Vec::new();
+        reserve(name, at, &mut out, total)?;
+        // The sizes sum up to no more than was fetched, so they are small.
+        let mut rest = &all[header_length as usize..];
+        for (ix, &compressed) in (1..).zip(&sizes) {
+            let (bytes, behind) = rest.split_at(compressed as usize);
+            rest = behind;
+            let (start, expected) = (out.len(), expanded(ix) as usize);
+            out.resize(start + expected, 0);
+            let found = decompress(bytes, &mut out[start..], compressor).map_err(|message| {
                 name.syntax(
                     at,
                     format!("a compressed block {ix} of {expected} bytes"),
                     message,
                 )
             })?;
-            if block.len() as u64 != expected {
-                return Err(name.count(
-                    at,
-                    format!("bytes in block {ix}"),
-                    expected,
-                    block.len() as u64,
-                ));
+            if found != expected {
+                let what = format!("bytes in block {ix}");
+                return Err(name.count(at, what, expected as u64, found as u64));
             }
-            out.extend_from_slice(&block);
         }
         Ok(out)
     }
 }
 
-/// Decompresses a block of at most `expected` bytes.
-fn decompress(bytes: &[u8], expected: usize, compressor: Compressor) -> Result<Vec<u8>, String> {
+/// Decompresses a block into `out`, and says how much of it was filled.
+fn decompress(bytes: &[u8], out: &mut [u8], compressor: Compressor) -> Result<usize, String> {
+    use miniz_oxide::inflate::{TINFLStatus, core};
     match compressor {
         Compressor::Zlib => {
-            miniz_oxide::inflate::decompress_to_vec_zlib_with_limit(bytes, expected)
-                .map_err(|error| format!("zlib: {:?}", error.status))
+            let flags = core::inflate_flags::TINFL_FLAG_PARSE_ZLIB_HEADER
+                | core::inflate_flags::TINFL_FLAG_USING_NON_WRAPPING_OUTPUT_BUF;
+            let mut state = Box::<core::DecompressorOxide>::default();
+            let (status, _, n_written) = core::decompress(&mut state, bytes, out, 0, flags);
+            match status {
+                TINFLStatus::Done => Ok(n_written),
+                status => Err(format!("zlib: {status:?}")),
+            }
         }
-        Compressor::Lz4 => lz4_flex::block::decompress(bytes, expected)
+        Compressor::Lz4 => lz4_flex::block::decompress_into(bytes, out)
             .map_err(|error| format!("LZ4: {error}").replace('\n', " ")),
     }
 }
