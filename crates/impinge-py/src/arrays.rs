@@ -12,8 +12,6 @@ use numpy::{
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::errors::number;
-
 /// Positions in the precision in which they are answered, in C order.
 pub enum PositionArray<'py> {
     F32(PyReadonlyArray2<'py, f32>),
@@ -319,4 +317,13 @@ fn collect<T: Element>(
         }
     }
     Ok(indices)
+}
+
+/// A float as Python writes it.
+pub fn number(x: f64) -> String {
+    if x.is_nan() {
+        "nan".into()
+    } else {
+        format!("{x:?}")
+    }
 }

@@ -5,7 +5,7 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::PositionArray;
+use crate::arrays::{PositionArray, number};
 
 create_exception!(
     impinge,
@@ -71,13 +71,4 @@ pub fn refuse(error: Error, names: Names<'_>, positions: &PositionArray<'_>) -> 
         _ => return raise(error),
     };
     PyValueError::new_err(message)
-}
-
-/// A float as Python writes it.
-pub fn number(x: f64) -> String {
-    if x.is_nan() {
-        "nan".into()
-    } else {
-        format!("{x:?}")
-    }
 }

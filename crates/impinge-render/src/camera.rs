@@ -1,7 +1,6 @@
-//! Where a picture is seen from, and how the camera fits itself to what there is to see.
+//! Where a picture is seen from.
 
 use crate::error::Error;
-use crate::picture::Picture;
 
 /// Which axis points up in a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -74,7 +73,7 @@ impl Camera {
     }
 
     /// Directions to the right, up and towards the viewer, and the up axis of the scene.
-    fn axes(&self) -> Axes {
+    pub(crate) fn axes(&self) -> Axes {
         let (sin_a, cos_a) = self.azimuth.to_radians().sin_cos();
         let (sin_e, cos_e) = self.elevation.to_radians().sin_cos();
         // As with y up; then, for z up, (x, y, z) becomes (x, -z, y).
@@ -98,172 +97,9 @@ impl Camera {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Axes {
-    right: [f64; 3],
-    up: [f64; 3],
-    back: [f64; 3],
-    sky: [f64; 3],
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// The coordinates that are drawn: the middle of everything at 0, the longest half extent 1. Computed in
-/// f64, so that a scene far from the origin keeps its shape in f32.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Frame {
-    middle: [f64; 3],
-    half: f64,
-}
-
-impl Frame {
-    /// The frame of all vertices that faces use.
-    pub fn of(picture: &Picture) -> Frame {
-        let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for surface in &picture.surfaces {
-            for face in &surface.faces {
-                for point in surface.points(face) {
-                    for k in 0..3 {
-                        min[k] = min[k].min(point[k]);
-                        max[k] = max[k].max(point[k]);
-                    }
-                }
-            }
-        }
-        if min[0] > max[0] {
-            return Frame {
-                middle: [0.0; 3],
-                half: 1.0,
-            };
-        }
-        // Halves first: the sum of two coordinates may not be finite.
-        let middle = std::array::from_fn(|k| 0.5 * min[k] + 0.5 * max[k]);
-        let half = (0..3)
-            .map(|k| 0.5 * max[k] - 0.5 * min[k])
-            .fold(0.0, f64::max);
-        Frame {
-            middle,
-            half: if half > 0.0 { half } else { 1.0 },
-        }
-    }
-
-    /// A point in it.
-    pub fn place(&self, point: [f64; 3]) -> [f64; 3] {
-        std::array::from_fn(|k| (point[k] - self.middle[k]) / self.half)
-    }
-}
-
-/// A camera that has been fitted: what shaders need to know of it, in the coordinates of a [`Frame`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct View {
-    /// Axes to the right, up and towards the viewer; `w` moves the eye to 0.
-    pub axes: [[f64; 4]; 3],
-    /// The scene's up axis as seen by the viewer.
+pub(crate) struct Axes {
+    pub right: [f64; 3],
+    pub up: [f64; 3],
+    pub back: [f64; 3],
     pub sky: [f64; 3],
-    /// Factors of x and y, and `a`, `b` of depth `a z + b` (before division by `-z` in perspective).
-    pub projection: [f64; 4],
-    pub is_perspective: bool,
-}
-
-/// The part of the picture's half width and half height that is used.
-const FILLED: f64 = 0.93;
-
-impl View {
-    /// Fits a camera to the picture's faces, each side of the picture to what lies outermost there.
-    pub fn fit(picture: &Picture, frame: &Frame) -> View {
-        let camera = &picture.camera;
-        let axes = camera.axes();
-        let aspect = f64::from(picture.size[0]) / f64::from(picture.size[1]);
-        // Half width and half height of what is seen: of everything, or at distance 1.
-        let (wide, high) = match camera.projection {
-            Projection::Perspective { degrees } => {
-                let high = (0.5 * degrees.to_radians()).tan();
-                (high * aspect, high)
-            }
-            Projection::Orthographic => (aspect, 1.0),
-        };
-        let slope = match camera.projection {
-            Projection::Perspective { .. } => [FILLED * wide, FILLED * high],
-            Projection::Orthographic => [f64::INFINITY; 2],
-        };
-        // In perspective, x stays within the right edge where x / slope + z is at most the eye's distance
-        // (for an eye at x = 0): the outermost point of each edge is the one with the largest sum. In
-        // orthographic projection, the one with the largest x.
-        let mut outermost = [[f64::NEG_INFINITY; 2]; 2];
-        let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
-        for surface in &picture.surfaces {
-            for face in &surface.faces {
-                for point in surface.points(face).map(|point| frame.place(point)) {
-                    let z = dot(axes.back, point);
-                    (near, far) = (near.max(z), far.min(z));
-                    for (k, axis) in [axes.right, axes.up].into_iter().enumerate() {
-                        let x = dot(axis, point);
-                        let [low, high] = &mut outermost[k];
-                        let (left, right) = if slope[k].is_finite() {
-                            (z - x / slope[k], z + x / slope[k])
-                        } else {
-                            (-x, x)
-                        };
-                        (*low, *high) = (low.max(left), high.max(right));
-                    }
-                }
-            }
-        }
-        if near < far {
-            (near, far) = (1.0, -1.0);
-            outermost = [[1.0; 2]; 2];
-        }
-        let half = outermost.map(|[low, high]| 0.5 * (low + high));
-        let offset = outermost.map(|[low, high]| 0.5 * (high - low));
-        let room = 1e-3 + 0.01 * (near - far);
-        match camera.projection {
-            Projection::Perspective { .. } => {
-                let distance = half[0].max(half[1]).max(near + 2.0 * room);
-                let eye = [offset[0] * slope[0], offset[1] * slope[1], distance];
-                let (near, far) = (distance - near - room, distance - far + room);
-                View::new(
-                    &axes,
-                    eye,
-                    [
-                        1.0 / wide,
-                        1.0 / high,
-                        far / (near - far),
-                        near * far / (near - far),
-                    ],
-                    true,
-                )
-            }
-            Projection::Orthographic => {
-                let high = (half[1].max(half[0] / aspect) / FILLED).max(1e-3);
-                let eye = [offset[0], offset[1], near + room];
-                let (near, far) = (0.0, near - far + 2.0 * room);
-                View::new(
-                    &axes,
-                    eye,
-                    [
-                        1.0 / (high * aspect),
-                        1.0 / high,
-                        1.0 / (near - far),
-                        near / (near - far),
-                    ],
-                    false,
-                )
-            }
-        }
-    }
-
-    /// `eye` is along the axes.
-    fn new(axes: &Axes, eye: [f64; 3], projection: [f64; 4], is_perspective: bool) -> View {
-        let all = [axes.right, axes.up, axes.back];
-        View {
-            axes: std::array::from_fn(|k| {
-                let [x, y, z] = all[k];
-                [x, y, z, -eye[k]]
-            }),
-            sky: all.map(|axis| dot(axis, axes.sky)),
-            projection,
-            is_perspective,
-        }
-    }
 }

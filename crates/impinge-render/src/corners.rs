@@ -4,8 +4,8 @@ use bytemuck::{Pod, Zeroable};
 
 use impinge::wgpu;
 
-use crate::camera::Frame;
 use crate::picture::{Face, Normals, Picture, Surface};
+use crate::view::Frame;
 
 /// A corner of a face as the vertex shader takes it.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]

@@ -46,6 +46,7 @@ mod picture;
 mod pipelines;
 mod renderer;
 mod targets;
+mod view;
 
 pub use body::Colors;
 pub use camera::{Camera, Projection, UpAxis};

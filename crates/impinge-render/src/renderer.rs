@@ -2,7 +2,6 @@
 
 use impinge::wgpu;
 
-use crate::camera::{Frame, View};
 use crate::corners::{FACE_BYTES, chunks};
 use crate::device::Gpu;
 use crate::error::Error;
@@ -10,6 +9,7 @@ use crate::image::Image;
 use crate::picture::Picture;
 use crate::pipelines::{FrameUniform, Pipelines};
 use crate::targets::{Chunks, Targets};
+use crate::view::{Frame, View};
 
 /// Draws pictures on one device. Textures are kept from picture to picture.
 #[derive(Debug)]
