@@ -55,4 +55,6 @@ pub use image::Image;
 /// The GPU interface that [`Renderer::with_device`] speaks.
 pub use impinge::wgpu;
 pub use picture::{Face, Normals, Picture, Surface};
+#[doc(hidden)]
+pub use pipelines::shaders;
 pub use renderer::Renderer;

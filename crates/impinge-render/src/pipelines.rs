@@ -48,6 +48,13 @@ pub(crate) const SHADERS: [(&str, &str); 3] = [
     ),
 ];
 
+/// The name and the text of every shader that this crate compiles, for compilers other than naga to check.
+pub fn shaders() -> impl Iterator<Item = (&'static str, String)> {
+    SHADERS
+        .map(|(name, text)| (name, text.to_owned()))
+        .into_iter()
+}
+
 pub(crate) const SAMPLES: u32 = 4;
 pub(crate) const LIGHT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;

@@ -23,6 +23,8 @@ use impinge_core::{BodyId, Query, Scene};
 
 use crate::{Counts, Error, Outcome, check_lambda};
 use kernels::Kernels;
+#[doc(hidden)]
+pub use kernels::shaders;
 use plan::Plan;
 
 /// What a [`UniformGrid`] on a GPU may be told.

@@ -231,7 +231,6 @@ macro_rules! kernels {
         }
 
         /// Every kernel's source and what it binds.
-        #[cfg(test)]
         pub(crate) const ALL: &[(Source, &[super::pipeline::Entry])] = &[
             $(($source, <$bindings as super::pipeline::Bindings>::ENTRIES),)*
         ];
@@ -265,4 +264,9 @@ kernels! {
     dispatch_tile: DispatchTile = DISPATCH_TILE [] from "dispatch_tile" ("reserve", "groups");
     pairing_cells: PairingCells = PAIRING_CELLS []
         from "pairing_cells" ("boxes", "meets", "ids", "reserve", "groups");
+}
+
+/// The name and the text of every shader that this crate compiles, for compilers other than naga to check.
+pub fn shaders() -> impl Iterator<Item = (&'static str, String)> {
+    ALL.iter().map(|(source, _)| (source.name, source.text()))
 }

@@ -44,6 +44,7 @@ pub use room::Capacities;
 
 pub use device::{Gpu, Wanted};
 pub(crate) use engine::{Engine, Options};
+pub use kernels::shaders;
 
 /// Text that kernels are put together from: `LAYOUT` first, it has the structs of all.
 pub mod shared {

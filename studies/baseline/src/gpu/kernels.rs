@@ -170,7 +170,6 @@ macro_rules! kernels {
         }
 
         /// Every kernel's source and what it binds.
-        #[cfg(test)]
         fn all() -> Vec<(Source, &'static [impinge_core::gpu::pipeline::Entry])> {
             use impinge_core::gpu::pipeline::Bindings;
             vec![$((source::$name(), $bindings::ENTRIES),)*]
@@ -187,6 +186,12 @@ kernels! {
     sort_scatter: SortScatter from "sort_scatter" (GROUPS, SUMS);
     compact: Compact from "compact" (GROUPS, RESERVE);
     pairing: Pairing from "pairing" (BOXES, COARSE, GROUPS, RESERVE);
+}
+
+/// The name and the text of every shader that this crate compiles, for compilers other than naga to check.
+pub fn shaders() -> impl Iterator<Item = (&'static str, String)> {
+    let sources = all().into_iter();
+    sources.map(|(source, _)| (source.name, source.text()))
 }
 
 #[cfg(test)]

@@ -103,8 +103,8 @@ fn main(
     for (var at = first; at < min(first + mine, arrayLength(&items)); at++) {
         let n_a = min(size, n - row * size);
         let n_b = min(size, n - column * size);
-        let sizes = (n_a - 1u) | (n_b - 1u) << 7u | z << 14u;
-        items[at] = CellItem(x | y << 14u, sizes, start + row * size, start + column * size);
+        let sizes = (n_a - 1u) | ((n_b - 1u) << 7u) | (z << 14u);
+        items[at] = CellItem(x | (y << 14u), sizes, start + row * size, start + column * size);
         column++;
         if column >= groups {
             row++;

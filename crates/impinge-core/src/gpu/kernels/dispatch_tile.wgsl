@@ -54,7 +54,7 @@ fn main(
         let z = cell / grid[0].resolution.x / grid[0].resolution.y;
         let n_a = min(size, params.n_entries - row * size);
         let n_b = min(size, params.n_entries - column * size);
-        let sizes = (n_a - 1u) | (n_b - 1u) << 7u | z << 14u;
-        items[at] = CellItem(x | y << 14u, sizes, row * size, column * size);
+        let sizes = (n_a - 1u) | ((n_b - 1u) << 7u) | (z << 14u);
+        items[at] = CellItem(x | (y << 14u), sizes, row * size, column * size);
     }
 }

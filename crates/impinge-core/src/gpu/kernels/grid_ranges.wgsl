@@ -37,7 +37,7 @@ fn main(
     if ix < min(atomicLoad(&counters[N_KEPT]), arrayLength(&kept)) {
         let low = cells(values(kept[ix].low), -MARGIN);
         let high = max(cells(values(kept[ix].high), MARGIN), low);
-        kept[ix].range = low | high << vec3<u32>(16u);
+        kept[ix].range = low | (high << vec3<u32>(16u));
         for (var shift = 0u; shift < SHIFTS; shift++) {
             let coarse = vec3<u32>(shift + 2u);
             let touched = (high >> coarse) - (low >> coarse) + vec3<u32>(1u);

@@ -36,7 +36,8 @@ fn main() {
     let sizes = log2(max(extent, vec3<f32>(THINNEST)));
     var cells = vec3<f32>(1.0);
     for (var attempt = 0u; attempt < 3u; attempt++) {
-        let n_along = f32(countOneBits(u32(is_along.x) | u32(is_along.y) << 1u | u32(is_along.z) << 2u));
+        let axes = u32(is_along.x) | (u32(is_along.y) << 1u) | (u32(is_along.z) << 2u);
+        let n_along = f32(countOneBits(axes));
         let volume = select(0.0, sizes.x, is_along.x) + select(0.0, sizes.y, is_along.y)
             + select(0.0, sizes.z, is_along.z);
         let density = (wanted - volume) / max(n_along, 1.0);

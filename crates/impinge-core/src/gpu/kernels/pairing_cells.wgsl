@@ -49,8 +49,10 @@ fn occupancy(range: vec3<u32>, cell: vec3<u32>) -> vec2<u32> {
     let x = along(range.x, cell.x);
     let y = along(range.y, cell.y);
     let z = along(range.z, cell.z);
-    let plane = x * ((y & 1u) | (y & 2u) << 3u | (y & 4u) << 6u | (y & 8u) << 9u);
-    return plane * vec2<u32>((z & 1u) | (z & 2u) << 15u, (z & 4u) >> 2u | (z & 8u) << 13u);
+    let plane = x * ((y & 1u) | ((y & 2u) << 3u) | ((y & 4u) << 6u) | ((y & 8u) << 9u));
+    let low = (z & 1u) | ((z & 2u) << 15u);
+    let high = ((z & 4u) >> 2u) | ((z & 8u) << 13u);
+    return plane * vec2<u32>(low, high);
 }
 
 fn bit_of(mask: vec2<u32>, bit: u32) -> u32 {

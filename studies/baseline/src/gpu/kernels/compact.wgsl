@@ -104,7 +104,7 @@ fn main(
     for (var at = place; at < min(place + mine, arrayLength(&items)); at++) {
         let n_a = min(GROUP, middle - first_a);
         let n_b = min(GROUP, end - first_b);
-        items[at] = CellItem(cell, (n_a - 1u) | (n_b - 1u) << 7u, first_a, first_b);
+        items[at] = CellItem(cell, (n_a - 1u) | ((n_b - 1u) << 7u), first_a, first_b);
         first_b += GROUP;
         if first_b >= end {
             first_b = middle;

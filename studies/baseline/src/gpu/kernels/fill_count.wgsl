@@ -24,7 +24,7 @@ fn main(
         let shift = vec3<u32>(grid[0].shift);
         let low = (fine & vec3<u32>(0xffffu)) >> shift;
         let high = fine >> (shift + vec3<u32>(16u));
-        let range = low | high << vec3<u32>(16u);
+        let range = low | (high << vec3<u32>(16u));
         kept[ix].range = range;
         n = n_touched(coarse(range));
     }

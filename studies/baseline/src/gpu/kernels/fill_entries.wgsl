@@ -27,7 +27,7 @@ fn main(
     var cell = touched.first;
     for (var left = n_touched(touched); left > 0u; left--) {
         if at < arrayLength(&entries) {
-            entries[at] = Entry(cell_number(cell, grid[0].resolution) << 1u | body, ix);
+            entries[at] = Entry((cell_number(cell, grid[0].resolution) << 1u) | body, ix);
         }
         at++;
         cell = next_cell(cell, touched);

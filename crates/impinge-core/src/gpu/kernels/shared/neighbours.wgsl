@@ -16,8 +16,9 @@
 
 // One bit a vertex of `a`, set when `b` names it too.
 fn shared_by(a: vec3<u32>, b: vec3<u32>) -> u32 {
-    return u32(any(vec3<u32>(a.x) == b)) | u32(any(vec3<u32>(a.y) == b)) << 1u
-        | u32(any(vec3<u32>(a.z) == b)) << 2u;
+    return u32(any(vec3<u32>(a.x) == b))
+        | (u32(any(vec3<u32>(a.y) == b)) << 1u)
+        | (u32(any(vec3<u32>(a.z) == b)) << 2u);
 }
 
 fn is_repeating(ids: vec3<u32>) -> bool {
