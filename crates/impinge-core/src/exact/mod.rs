@@ -16,10 +16,12 @@
 //!
 //! `docs/exactness.md` derives every bound and draws every case.
 
+mod algebra;
 pub(crate) mod filter;
 mod orientation;
 mod segment;
 mod shared;
+mod sweep;
 mod tetrahedron;
 mod triangle;
 
@@ -31,6 +33,7 @@ pub use shared::{
     tetrahedra_intersect_beyond_shared, triangle_tetrahedron_intersect_beyond_shared,
     triangles_intersect_beyond_shared,
 };
+pub use sweep::{Contact, ElementPair, first_contact, touch};
 pub use tetrahedron::{tetrahedra_intersect, triangle_tetrahedron_intersect};
 pub use triangle::triangles_intersect;
 

@@ -1,0 +1,334 @@
+//! Integers of any size: sign and magnitude.
+
+use std::cmp::Ordering;
+use std::ops::{Add, Mul, Neg, Sub};
+
+use smallvec::SmallVec;
+
+use crate::exact::Sign;
+
+/// Limbs of 64 bits that are kept without allocation: 512 bits.
+const INLINE: usize = 8;
+
+type Limbs = SmallVec<[u64; INLINE]>;
+
+/// An integer of any size.
+///
+/// Zero has no limbs and is not negative; the last limb of any other number is not zero.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(in crate::exact) struct Integer {
+    is_negative: bool,
+    limbs: Limbs,
+}
+
+impl Integer {
+    pub(in crate::exact) const fn zero() -> Self {
+        Self {
+            is_negative: false,
+            limbs: SmallVec::new_const(),
+        }
+    }
+
+    #[inline]
+    pub(in crate::exact) fn is_zero(&self) -> bool {
+        self.limbs.is_empty()
+    }
+
+    #[inline]
+    pub(in crate::exact) fn sign(&self) -> Sign {
+        match (self.limbs.is_empty(), self.is_negative) {
+            (true, _) => Sign::Zero,
+            (_, true) => Sign::Negative,
+            _ => Sign::Positive,
+        }
+    }
+
+    /// Bits of the magnitude; 0 for zero.
+    pub(in crate::exact) fn n_bits(&self) -> u64 {
+        self.limbs.last().map_or(0, |last| {
+            64 * self.limbs.len() as u64 - u64::from(last.leading_zeros())
+        })
+    }
+
+    /// The number times 2^`shift`.
+    pub(in crate::exact) fn shifted(&self, shift: u64) -> Self {
+        if self.is_zero() || shift == 0 {
+            return self.clone();
+        }
+        let n_limbs = usize::try_from(shift / 64).expect("a shift below the size of the memory");
+        let n_bits = shift % 64;
+        let mut limbs: Limbs = SmallVec::from_elem(0, n_limbs);
+        if n_bits == 0 {
+            limbs.extend_from_slice(&self.limbs);
+        } else {
+            let mut carry = 0;
+            for &limb in &self.limbs {
+                limbs.push(limb << n_bits | carry);
+                carry = limb >> (64 - n_bits);
+            }
+            if carry != 0 {
+                limbs.push(carry);
+            }
+        }
+        Self {
+            is_negative: self.is_negative,
+            limbs,
+        }
+    }
+
+    /// How many times 2 divides the number; 0 for zero.
+    pub(in crate::exact) fn trailing_zeros(&self) -> u64 {
+        self.limbs
+            .iter()
+            .position(|&limb| limb != 0)
+            .map_or(0, |ix| {
+                64 * ix as u64 + u64::from(self.limbs[ix].trailing_zeros())
+            })
+    }
+
+    /// The number divided by 2^`shift`, which must divide it.
+    pub(in crate::exact) fn unshifted(&self, shift: u64) -> Self {
+        if self.is_zero() || shift == 0 {
+            return self.clone();
+        }
+        let n_limbs = usize::try_from(shift / 64).expect("a shift below the size of the number");
+        let n_bits = shift % 64;
+        let kept = &self.limbs[n_limbs..];
+        let mut limbs: Limbs = SmallVec::with_capacity(kept.len());
+        for (ix, &limb) in kept.iter().enumerate() {
+            let above = kept.get(ix + 1).copied().unwrap_or(0);
+            limbs.push(if n_bits == 0 {
+                limb
+            } else {
+                limb >> n_bits | above << (64 - n_bits)
+            });
+        }
+        Self::new(self.is_negative, limbs)
+    }
+
+    /// `self * factor`, for a small factor.
+    pub(in crate::exact) fn times(&self, factor: u64) -> Self {
+        if factor == 1 {
+            return self.clone();
+        }
+        self * &Self::from(factor)
+    }
+
+    /// `x * 2^exponent` with 1 <= |x| < 2, rounded towards zero; (0, 0) for zero. Only for guesses.
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_wrap,
+        reason = "a guess; fewer than 2^63 bits fit any memory"
+    )]
+    pub(in crate::exact) fn approximate(&self) -> (f64, i64) {
+        let n_bits = self.n_bits();
+        if n_bits == 0 {
+            return (0.0, 0);
+        }
+        let last = self.limbs.len() - 1;
+        let below = if last > 0 { self.limbs[last - 1] } else { 0 };
+        let top = (u128::from(self.limbs[last]) << 64 | u128::from(below))
+            << self.limbs[last].leading_zeros();
+        let magnitude = ((top >> 75) as f64) * f64::from_bits((1023 - 52) << 52);
+        let x = if self.is_negative {
+            -magnitude
+        } else {
+            magnitude
+        };
+        (x, n_bits as i64 - 1)
+    }
+
+    /// Drops leading zeros.
+    fn new(is_negative: bool, mut limbs: Limbs) -> Self {
+        while limbs.last() == Some(&0) {
+            limbs.pop();
+        }
+        Self {
+            is_negative: is_negative && !limbs.is_empty(),
+            limbs,
+        }
+    }
+
+    fn sum(&self, other: &Self, other_is_negative: bool) -> Self {
+        if other.is_zero() {
+            return self.clone();
+        }
+        if self.is_zero() {
+            return Self {
+                is_negative: other_is_negative,
+                limbs: other.limbs.clone(),
+            };
+        }
+        if self.is_negative == other_is_negative {
+            let limbs = add_magnitudes(&self.limbs, &other.limbs);
+            return Self {
+                is_negative: self.is_negative,
+                limbs,
+            };
+        }
+        match compare_magnitudes(&self.limbs, &other.limbs) {
+            Ordering::Equal => Self::zero(),
+            Ordering::Greater => Self::new(
+                self.is_negative,
+                subtract_magnitudes(&self.limbs, &other.limbs),
+            ),
+            Ordering::Less => Self::new(
+                other_is_negative,
+                subtract_magnitudes(&other.limbs, &self.limbs),
+            ),
+        }
+    }
+}
+
+impl From<u64> for Integer {
+    fn from(x: u64) -> Self {
+        let mut limbs = Limbs::new();
+        if x != 0 {
+            limbs.push(x);
+        }
+        Self {
+            is_negative: false,
+            limbs,
+        }
+    }
+}
+
+fn compare_magnitudes(a: &[u64], b: &[u64]) -> Ordering {
+    a.len()
+        .cmp(&b.len())
+        .then_with(|| a.iter().rev().cmp(b.iter().rev()))
+}
+
+fn add_magnitudes(a: &[u64], b: &[u64]) -> Limbs {
+    let (long, short) = if a.len() < b.len() { (b, a) } else { (a, b) };
+    let mut sum = Limbs::from_slice(long);
+    let mut carry = false;
+    for (limb, &other) in sum.iter_mut().zip(short) {
+        let (x, first) = limb.overflowing_add(other);
+        let (x, second) = x.overflowing_add(u64::from(carry));
+        *limb = x;
+        carry = first | second;
+    }
+    for limb in &mut sum[short.len()..] {
+        if !carry {
+            break;
+        }
+        (*limb, carry) = limb.overflowing_add(1);
+    }
+    if carry {
+        sum.push(1);
+    }
+    sum
+}
+
+/// a - b where a > b.
+fn subtract_magnitudes(a: &[u64], b: &[u64]) -> Limbs {
+    let mut difference = Limbs::from_slice(a);
+    let mut borrow = false;
+    for (limb, &other) in difference.iter_mut().zip(b) {
+        let (x, first) = limb.overflowing_sub(other);
+        let (x, second) = x.overflowing_sub(u64::from(borrow));
+        *limb = x;
+        borrow = first | second;
+    }
+    for limb in &mut difference[b.len()..] {
+        if !borrow {
+            break;
+        }
+        (*limb, borrow) = limb.overflowing_sub(1);
+    }
+    difference
+}
+
+impl Add for &Integer {
+    type Output = Integer;
+
+    fn add(self, other: Self) -> Integer {
+        self.sum(other, other.is_negative)
+    }
+}
+
+impl Sub for &Integer {
+    type Output = Integer;
+
+    fn sub(self, other: Self) -> Integer {
+        self.sum(other, !other.is_negative)
+    }
+}
+
+impl Neg for &Integer {
+    type Output = Integer;
+
+    fn neg(self) -> Integer {
+        Integer {
+            is_negative: !self.is_negative && !self.is_zero(),
+            limbs: self.limbs.clone(),
+        }
+    }
+}
+
+impl Mul for &Integer {
+    type Output = Integer;
+
+    #[allow(clippy::cast_possible_truncation, reason = "limbs of wide products")]
+    fn mul(self, other: Self) -> Integer {
+        let (a, b) = (&self.limbs, &other.limbs);
+        if a.is_empty() || b.is_empty() {
+            return Integer::zero();
+        }
+        let mut limbs: Limbs = SmallVec::from_elem(0, a.len() + b.len());
+        for (i, &x) in a.iter().enumerate() {
+            let mut carry = 0_u64;
+            let (row, above) = limbs[i..].split_at_mut(b.len());
+            for (limb, &y) in row.iter_mut().zip(b) {
+                let wide = u128::from(x) * u128::from(y) + u128::from(*limb) + u128::from(carry);
+                *limb = wide as u64;
+                carry = (wide >> 64) as u64;
+            }
+            above[0] = carry;
+        }
+        Integer::new(self.is_negative != other.is_negative, limbs)
+    }
+}
+
+/// Finite floats as integers over one power of two.
+///
+/// Returns the integers n and the exponent e: each number is n * 2^e. All zero: e is 0.
+pub(in crate::exact) fn common_integers<const N: usize>(numbers: [f64; N]) -> ([Integer; N], i64) {
+    let parts = numbers.map(parts);
+    let lowest = parts
+        .iter()
+        .filter(|(mantissa, _)| *mantissa != 0)
+        .map(|&(_, exponent)| exponent)
+        .min()
+        .unwrap_or(0);
+    let integers = std::array::from_fn(|ix| {
+        let (mantissa, exponent) = parts[ix];
+        if mantissa == 0 {
+            return Integer::zero();
+        }
+        let mut integer = Integer::from(mantissa)
+            .shifted(u64::try_from(exponent - lowest).expect("not below the lowest"));
+        integer.is_negative = numbers[ix] < 0.0;
+        integer
+    });
+    (integers, lowest)
+}
+
+/// Magnitude of a finite float as mantissa * 2^exponent; the mantissa is odd or zero.
+#[allow(clippy::cast_possible_wrap, reason = "eleven bits")]
+fn parts(x: f64) -> (u64, i64) {
+    let bits = x.to_bits();
+    let biased = (bits >> 52 & 0x7ff) as i64;
+    let fraction = bits & ((1 << 52) - 1);
+    let (mantissa, exponent) = if biased == 0 {
+        (fraction, -1074)
+    } else {
+        (fraction | 1 << 52, biased - 1075)
+    };
+    if mantissa == 0 {
+        return (0, 0);
+    }
+    let shift = mantissa.trailing_zeros();
+    (mantissa >> shift, exponent + i64::from(shift))
+}

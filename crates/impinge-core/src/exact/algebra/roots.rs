@@ -1,0 +1,383 @@
+//! Real roots in (0, 1]: isolation, the sign of another polynomial at a root, rounding down.
+//!
+//! Isolation is by Descartes' rule of signs on dyadic intervals (Collins and Akritas, *Polynomial real root isolation
+//! using Descartes' rule of signs*, 1976; in Bernstein form, Lane and Riesenfeld 1981): no variation, no root; one
+//! variation, one simple root; else the interval is halved. Halving ends if no root is multiple, so a
+//! polynomial that keeps two variations for long is divided by the common divisor with its derivative.
+
+use std::cmp::Ordering;
+
+use super::integer::{Integer, common_integers};
+use super::polynomial::{Controls, Polynomial};
+use crate::exact::Sign;
+
+/// Halvings before multiple roots, or a common root, are looked for by a common divisor.
+const PATIENCE: usize = 10;
+
+/// The way to an interval by halving [0, 1]: true is the right half.
+type Path = Vec<bool>;
+
+/// A root, exactly: the time is algebraic.
+#[derive(Debug)]
+pub(in crate::exact) struct Root {
+    /// The interval, or for a dyadic root the interval that starts (or, at t = 1, ends) with it.
+    path: Path,
+    place: Place,
+}
+
+#[derive(Debug)]
+enum Place {
+    /// The only root of `polynomial` inside the interval, and simple. `controls` are over the interval.
+    Inside {
+        polynomial: Polynomial,
+        controls: Controls,
+    },
+    /// `numerator / 2^depth`.
+    At { numerator: Integer, depth: u64 },
+}
+
+/// A root rounded down: `floor <= root < floor.next_up()`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::exact) struct Time {
+    /// The largest `f64` that is not above the root.
+    pub(in crate::exact) floor: f64,
+    /// Whether it is the root.
+    pub(in crate::exact) is_exact: bool,
+}
+
+impl Time {
+    /// The earlier one of two roots, as far as their floors tell them apart.
+    pub(in crate::exact) fn earlier(self, other: Self) -> Self {
+        match self.floor.total_cmp(&other.floor) {
+            Ordering::Less => self,
+            Ordering::Greater => other,
+            // Above a common floor, the root that is the floor is the earlier one.
+            Ordering::Equal => Self {
+                floor: self.floor,
+                is_exact: self.is_exact || other.is_exact,
+            },
+        }
+    }
+}
+
+/// The roots of a polynomial in (0, 1], ascending, each once whatever its multiplicity.
+///
+/// The polynomial must not be zero everywhere.
+pub(in crate::exact) struct Roots {
+    polynomial: Polynomial,
+    is_squarefree: bool,
+    /// What is left to look at, the earliest last.
+    stack: Vec<Part>,
+}
+
+enum Part {
+    Inside(Path, Controls),
+    At(Integer, u64),
+}
+
+impl Roots {
+    pub(in crate::exact) fn of(polynomial: Polynomial) -> Self {
+        debug_assert!(!polynomial.is_zero(), "everything is a root of zero");
+        let mut stack = Vec::new();
+        if polynomial.sign_at_end().is_zero() {
+            stack.push(Part::At(Integer::from(1), 0));
+        }
+        if polynomial.variations() > 0 {
+            stack.push(Part::Inside(Path::new(), polynomial.controls()));
+        }
+        Self {
+            polynomial,
+            is_squarefree: false,
+            stack,
+        }
+    }
+
+    /// Divides by the common divisor with the derivative, which leaves every root once.
+    fn remove_multiple_roots(&mut self) {
+        self.is_squarefree = true;
+        let divisor = self
+            .polynomial
+            .common_divisor(&self.polynomial.derivative());
+        if divisor.is_constant() {
+            return;
+        }
+        self.polynomial = self.polynomial.quotient(&divisor);
+        for part in &mut self.stack {
+            if let Part::Inside(path, controls) = part {
+                *controls = self.polynomial.controls_over(path);
+            }
+        }
+    }
+}
+
+impl Iterator for Roots {
+    type Item = Root;
+
+    fn next(&mut self) -> Option<Root> {
+        loop {
+            let (path, controls) = match self.stack.pop()? {
+                Part::At(numerator, depth) => {
+                    return Some(Root {
+                        path: Path::new(),
+                        place: Place::At { numerator, depth },
+                    });
+                }
+                Part::Inside(path, controls) => (path, controls),
+            };
+            match controls.variations() {
+                0 => {}
+                1 => {
+                    let place = Place::Inside {
+                        polynomial: self.polynomial.clone(),
+                        controls,
+                    };
+                    return Some(Root { path, place });
+                }
+                _ if path.len() >= PATIENCE && !self.is_squarefree => {
+                    self.stack.push(Part::Inside(path, controls));
+                    self.remove_multiple_roots();
+                }
+                _ => {
+                    let [left, right] = controls.halves();
+                    let middle = left.sign_at_end();
+                    let mut right_path = path.clone();
+                    right_path.push(true);
+                    let mut left_path = path;
+                    left_path.push(false);
+                    if middle.is_zero() {
+                        let at = Part::At(start_of(&right_path), right_path.len() as u64);
+                        self.stack.push(Part::Inside(right_path, right));
+                        self.stack.push(at);
+                    } else {
+                        self.stack.push(Part::Inside(right_path, right));
+                    }
+                    self.stack.push(Part::Inside(left_path, left));
+                }
+            }
+        }
+    }
+}
+
+/// The numerator of an interval's start, over 2^(length of the path).
+fn start_of(path: &[bool]) -> Integer {
+    let mut start = Integer::zero();
+    for bits in path.chunks(32) {
+        let number = bits.iter().fold(0, |n, &bit| n << 1 | u64::from(bit));
+        start = &start.shifted(bits.len() as u64) + &Integer::from(number);
+    }
+    start
+}
+
+impl Root {
+    /// The sign of a polynomial at the root.
+    pub(in crate::exact) fn sign_of(&mut self, other: &Polynomial) -> Sign {
+        if other.is_zero() {
+            return Sign::Zero;
+        }
+        let mut controls = match &self.place {
+            Place::At { numerator, depth } => return other.sign_at(numerator, *depth),
+            Place::Inside { .. } => other.controls_over(&self.path),
+        };
+        for round in 0.. {
+            if let Some(sign) = controls.sign() {
+                return sign;
+            }
+            match &self.place {
+                Place::At { numerator, depth } => return other.sign_at(numerator, *depth),
+                // A root of the divisor is one of the polynomial: inside there is this one at most, and it is simple.
+                // So the number of variations, which is right up to an even number, tells whether there is one.
+                Place::Inside { polynomial, .. } if round == PATIENCE => {
+                    let divisor = polynomial.common_divisor(other);
+                    if divisor.controls_over(&self.path).variations() % 2 == 1 {
+                        return Sign::Zero;
+                    }
+                }
+                Place::Inside { .. } => {}
+            }
+            if let Some(is_right) = self.halve() {
+                let [left, right] = controls.halves();
+                controls = if is_right { right } else { left };
+            }
+        }
+        unreachable!("halving ends where the sign is not zero")
+    }
+
+    /// Halves the interval: the half that has the root, or none where the root is its middle and is known now.
+    fn halve(&mut self) -> Option<bool> {
+        let Place::Inside { controls, .. } = &mut self.place else {
+            return None;
+        };
+        let [left, right] = controls.halves();
+        let middle = left.sign_at_end();
+        if middle.is_zero() {
+            self.path.push(true);
+            self.place = Place::At {
+                numerator: start_of(&self.path),
+                depth: self.path.len() as u64,
+            };
+            return None;
+        }
+        // The sign changes once inside, so the root is on the left where the middle has the later sign.
+        let is_right = middle == controls.first_sign();
+        *controls = if is_right { right } else { left };
+        self.path.push(is_right);
+        Some(is_right)
+    }
+
+    /// The root rounded down.
+    pub(in crate::exact) fn floor(&self) -> Time {
+        // Floats from 0 to 1 are ordered as their bits are: search there, from a guess outwards.
+        let is_below = |bits: u64| self.compare(f64::from_bits(bits)) == Ordering::Less;
+        let one = 1.0_f64.to_bits();
+        let (mut low, mut high) = (0, one + 1);
+        let mut at = self.guess().clamp(0.0, 1.0).to_bits();
+        let mut step = 1_u64;
+        while high - low > 1 {
+            if is_below(at) {
+                high = at;
+            } else {
+                low = at;
+            }
+            // Outwards by growing steps while one side is open, then to the middle.
+            at = match (low, high) {
+                (0, _) => high.saturating_sub(step),
+                (_, high) if high == one + 1 => low.saturating_add(step).min(one),
+                _ => low + (high - low) / 2,
+            };
+            step = step.saturating_mul(2);
+            if at <= low || at >= high {
+                at = low + (high - low) / 2;
+            }
+        }
+        let floor = f64::from_bits(low);
+        Time {
+            floor,
+            is_exact: self.compare(floor) == Ordering::Equal,
+        }
+    }
+
+    /// The root compared with a float in [0, 1].
+    fn compare(&self, x: f64) -> Ordering {
+        let ([numerator], exponent) = common_integers([x]);
+        // x is an integer only where it is 0 or 1.
+        let (numerator, depth) = match u64::try_from(-exponent) {
+            Ok(depth) => (numerator, depth),
+            Err(_) => unreachable!("a number of at most 1"),
+        };
+        let order_of = |sign: Sign| match sign {
+            Sign::Negative => Ordering::Less,
+            Sign::Zero => Ordering::Equal,
+            Sign::Positive => Ordering::Greater,
+        };
+        match &self.place {
+            Place::At {
+                numerator: root,
+                depth: root_depth,
+            } => order_of((&root.shifted(depth) - &numerator.shifted(*root_depth)).sign()),
+            Place::Inside {
+                polynomial,
+                controls,
+            } => {
+                let path_depth = self.path.len() as u64;
+                let start = start_of(&self.path);
+                let x_here = numerator.shifted(path_depth);
+                if (&x_here - &start.shifted(depth)).sign() != Sign::Positive {
+                    return Ordering::Greater;
+                }
+                let end = &start + &Integer::from(1);
+                if (&x_here - &end.shifted(depth)).sign() != Sign::Negative {
+                    return Ordering::Less;
+                }
+                match polynomial.sign_at(&numerator, depth) {
+                    Sign::Zero => Ordering::Equal,
+                    sign if sign == controls.first_sign() => Ordering::Greater,
+                    _ => Ordering::Less,
+                }
+            }
+        }
+    }
+
+    /// The root as a float, nearly always to the last bit or two.
+    fn guess(&self) -> f64 {
+        match &self.place {
+            Place::At { numerator, depth } => scaled(numerator.approximate(), *depth),
+            Place::Inside { controls, .. } => {
+                let inside = guess_inside(controls);
+                let depth = self.path.len() as u64;
+                scaled(start_of(&self.path).approximate(), depth) + scaled((inside, 0), depth)
+            }
+        }
+    }
+}
+
+/// `x * 2^exponent / 2^depth`; only for guesses.
+fn scaled((x, exponent): (f64, i64), depth: u64) -> f64 {
+    let exponent = i128::from(exponent) - i128::from(depth);
+    match i32::try_from(exponent) {
+        Ok(exponent) => x * 2.0_f64.powi(exponent.clamp(-1200, 1023)),
+        Err(_) => 0.0,
+    }
+}
+
+/// The one root of Bernstein coefficients with one variation, as a part of the interval: Newton's method, kept between
+/// bounds that halving moves.
+fn guess_inside(controls: &Controls) -> f64 {
+    let parts: Vec<(f64, i64)> = controls
+        .coefficients()
+        .iter()
+        .map(Integer::approximate)
+        .collect();
+    let top = parts
+        .iter()
+        .filter(|(x, _)| *x != 0.0)
+        .map(|&(_, exponent)| exponent)
+        .max()
+        .unwrap_or(0);
+    let row: Vec<f64> = parts
+        .iter()
+        .map(|&(x, exponent)| {
+            i32::try_from(exponent - top)
+                .map_or(0.0, |exponent| x * 2.0_f64.powi(exponent.max(-1100)))
+        })
+        .collect();
+    let starts_positive = controls.first_sign() == Sign::Positive;
+    let (mut low, mut high) = (0.0, 1.0);
+    let mut at: f64 = 0.5;
+    for _ in 0..100 {
+        let (value, slope) = value_and_slope(&row, at);
+        if (value > 0.0) == starts_positive && value != 0.0 {
+            low = at;
+        } else {
+            high = at;
+        }
+        let newton = at - value / slope;
+        let next = if newton > low && newton < high {
+            newton
+        } else {
+            low + (high - low) / 2.0
+        };
+        if (next - at).abs() <= at * f64::EPSILON / 2.0 {
+            return next;
+        }
+        at = next;
+    }
+    at
+}
+
+fn value_and_slope(controls: &[f64], at: f64) -> (f64, f64) {
+    let mut row = [0.0; 7];
+    let row = &mut row[..controls.len()];
+    row.copy_from_slice(controls);
+    let mut slope = 0.0;
+    for level in (1..row.len()).rev() {
+        if level == 1 {
+            slope = row[1] - row[0];
+        }
+        for ix in 0..level {
+            row[ix] = row[ix] * (1.0 - at) + row[ix + 1] * at;
+        }
+    }
+    #[allow(clippy::cast_precision_loss, reason = "at most six")]
+    let degree = (controls.len() - 1) as f64;
+    (row[0], slope * degree)
+}

@@ -1,0 +1,135 @@
+//! The moving difference polygon, and when the origin first lies in it.
+
+use crate::exact::algebra::{
+    Polynomial, Root, Roots, Time, Vector, common_integers, cross, difference, dot,
+};
+use crate::exact::{Point, Sign};
+
+/// A convex polygon of one to four corners, which move linearly.
+pub(super) struct Polygon {
+    corners: Vec<Vector>,
+}
+
+impl Polygon {
+    /// The polygon whose corners are differences of points, each given by two numbers of points.
+    pub(super) fn new(corners: &[[usize; 2]], start: &[Point; 4], end: &[Point; 4]) -> Self {
+        let numbers: [f64; 24] = std::array::from_fn(|ix| {
+            let points = if ix < 12 { start } else { end };
+            let x = points[ix % 12 / 3][ix % 3];
+            // Points that do not belong to the pair.
+            if x.is_finite() { x } else { 0.0 }
+        });
+        let (integers, _) = common_integers(numbers);
+        let corners = corners
+            .iter()
+            .map(|&[i, j]| {
+                std::array::from_fn(|axis| {
+                    let between =
+                        |at: usize| &integers[at + 3 * i + axis] - &integers[at + 3 * j + axis];
+                    Polynomial::linear(between(0), between(12))
+                })
+            })
+            .collect();
+        Self { corners }
+    }
+
+    /// The first time in (0, 1] at which the origin is in the polygon, if it is not at the start.
+    pub(super) fn first_time(&self) -> Option<Time> {
+        match &self.corners[..] {
+            [corner] => first_at_corner(corner),
+            [a, b] => Edge::new(a, b).first_time(),
+            corners => first_in_face(corners),
+        }
+    }
+}
+
+/// For a triangle or a parallelogram.
+///
+/// With f = N . V_0 and w_i = N . (V_i x V_(i+1)): the origin is inside at t if and only if f(t) = 0 and all
+/// w_i(t) > 0, or it is on an edge. If all w_i(t) are at least 0 and one is greater, f(t) = 0 suffices.
+fn first_in_face(corners: &[Vector]) -> Option<Time> {
+    let normal = cross(
+        &difference(&corners[1], &corners[0]),
+        &difference(&corners[2], &corners[1]),
+    );
+    let f = dot(&normal, &corners[0]);
+    if f.is_zero() {
+        // The first contact is on an edge.
+        return edges(corners)
+            .filter_map(|edge| edge.first_time())
+            .reduce(Time::earlier);
+    }
+    if f.has_no_root() {
+        return None;
+    }
+    let edges: Vec<Edge> = edges(corners).collect();
+    let sides: Vec<Polynomial> = edges.iter().map(|edge| dot(&normal, &edge.cross)).collect();
+    Roots::of(f).find_map(|mut root| is_inside(&mut root, &sides, &edges).then(|| root.floor()))
+}
+
+/// Whether the origin is in the polygon at a root of f.
+fn is_inside(root: &mut Root, sides: &[Polynomial], edges: &[Edge]) -> bool {
+    let mut all_zero = true;
+    for side in sides {
+        match root.sign_of(side) {
+            Sign::Negative => return false,
+            Sign::Zero => {}
+            Sign::Positive => all_zero = false,
+        }
+    }
+    !all_zero || edges.iter().any(|edge| edge.has_origin(root))
+}
+
+fn edges(corners: &[Vector]) -> impl Iterator<Item = Edge> {
+    (0..corners.len()).map(|ix| Edge::new(&corners[ix], &corners[(ix + 1) % corners.len()]))
+}
+
+/// An edge AB of the polygon. The origin is on it at t if and only if A x B = 0 and A . B <= 0 there.
+struct Edge {
+    cross: Vector,
+    dot: Polynomial,
+}
+
+impl Edge {
+    fn new(a: &Vector, b: &Vector) -> Self {
+        Self {
+            cross: cross(a, b),
+            dot: dot(a, b),
+        }
+    }
+
+    /// Whether the origin is on the edge at a root of something.
+    fn has_origin(&self, root: &mut Root) -> bool {
+        self.cross.iter().all(|x| root.sign_of(x).is_zero())
+            && root.sign_of(&self.dot) != Sign::Positive
+    }
+
+    /// The first time in (0, 1] at which the origin is on the edge, if it is not at the start.
+    fn first_time(&self) -> Option<Time> {
+        let moving: Vec<&Polynomial> = self.cross.iter().filter(|x| !x.is_zero()).collect();
+        if moving.iter().any(|x| x.has_no_root()) {
+            return None;
+        }
+        let Some(&first) = moving.first() else {
+            // The edge's line passes the origin at all times: A . B is positive at the start, and the origin comes
+            // onto the edge when it becomes zero.
+            return (!self.dot.is_zero())
+                .then(|| Roots::of(self.dot.clone()).next())
+                .flatten()
+                .map(|root| root.floor());
+        };
+        Roots::of(first.clone())
+            .find_map(|mut root| self.has_origin(&mut root).then(|| root.floor()))
+    }
+}
+
+/// The first time in (0, 1] at which a corner is the origin, if it is not at the start.
+fn first_at_corner(corner: &Vector) -> Option<Time> {
+    let first = corner.iter().find(|x| !x.is_zero())?;
+    Roots::of(first.clone()).find_map(|mut root| {
+        corner
+            .iter()
+            .all(|x| root.sign_of(x).is_zero())
+            .then(|| root.floor())
+    })
+}

@@ -1,0 +1,8 @@
+//! Exact continuous collision against an oracle of another make, published answers, and itself in other words.
+
+mod data;
+#[path = "../exact/generators.rs"]
+#[allow(dead_code, reason = "made for another test")]
+mod generators;
+mod moving;
+mod oracle;
