@@ -7,6 +7,7 @@
 
 use crate::grouping::bounds::Bounds;
 use crate::grouping::hierarchy::Shape;
+use crate::grouping::hubs::Hubs;
 
 use super::bounds::TreeBounds;
 use super::simd::Simd;
@@ -102,14 +103,20 @@ pub(crate) fn between<S: Simd, E>(
 }
 
 /// Calls `emit(leaf, other)`, `leaf <= other`, for every leaf with itself and every pair of different
-/// leaves of one tree whose boxes overlap.
+/// leaves of one tree whose boxes overlap, but for nodes whose primitives all name a common hub.
 #[inline(always)]
 pub(crate) fn within<S: Simd, E>(
     simd: S,
     tree: Tree<'_>,
+    hubs: Option<&Hubs>,
     stack: &mut Vec<NodePair>,
     mut emit: impl FnMut(u32, u32) -> Result<(), E>,
 ) -> Result<(), E> {
+    let share_hub = |a: (u32, u32), b: (u32, u32)| hubs.is_some_and(|hubs| hubs.hold_all(a, b));
+    let mut emit = |a: u32, b: u32| match share_hub((0, a), (0, b)) {
+        true => Ok(()),
+        false => emit(a, b),
+    };
     let Some(level) = tree.top() else {
         return Ok(());
     };
@@ -121,6 +128,9 @@ pub(crate) fn within<S: Simd, E>(
         b: 0,
     });
     while let Some(pair) = stack.pop() {
+        if share_hub((pair.level_a, pair.a), (pair.level_b, pair.b)) {
+            continue;
+        }
         if pair.level_a != pair.level_b || pair.a != pair.b {
             descend(simd, tree, tree, pair, stack, &mut emit)?;
             continue;

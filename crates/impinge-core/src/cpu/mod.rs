@@ -7,6 +7,7 @@ pub(crate) mod cull;
 pub(crate) mod dispatch;
 pub(crate) mod extents;
 mod group_cache;
+mod hubs;
 pub mod kept;
 pub mod narrow;
 pub(crate) mod pairing;

@@ -4,6 +4,7 @@
 use std::time::Instant;
 
 use crate::error::Error;
+use crate::query::SharedVertex;
 
 use super::Job;
 use super::dispatch::{self, NodePair};
@@ -73,6 +74,10 @@ impl Slabs<'_> {
         let stats = &mut *self.stats;
         let total_ms = start.elapsed().as_secs_f64() * 1e3;
         stats.add_ms("dispatch", total_ms - self.ms);
+        if self.job.frame.shared_vertex == SharedVertex::Resolve {
+            self.resolve_hubs()?;
+        }
+        let stats = &mut *self.stats;
         let mut busy_ms = 0.0;
         for worker in &*self.scratches {
             busy_ms += worker.settler.busy.as_secs_f64() * 1e3;
@@ -82,6 +87,31 @@ impl Slabs<'_> {
         let narrow_ms = (busy_ms / self.scratches.len() as f64).min(self.ms);
         stats.add_ms("pairing", self.ms - narrow_ms);
         stats.add_ms("narrow", narrow_ms);
+        Ok(())
+    }
+
+    /// Pairs that share a hub, which `dispatch` and `pairing` have left out.
+    fn resolve_hubs(&mut self) -> Result<(), Error> {
+        for (ix, participant) in (0u32..).zip(&self.job.frame.participants) {
+            let Some(hubs) = self.world.cache(ix).clustering.hubs() else {
+                continue;
+            };
+            if !participant.within {
+                continue;
+            }
+            let start = Instant::now();
+            let body = self.world.body(ix);
+            let Worker {
+                settler, around, ..
+            } = &mut self.scratches[0];
+            let n = hubs.n_to_settle();
+            for (done, (shared, places)) in hubs.to_settle().enumerate() {
+                self.job.control.step(done as u64, n as u64)?;
+                around.settle(&body, hubs, shared, places, settler);
+            }
+            self.stats
+                .add_ms("hubs", start.elapsed().as_secs_f64() * 1e3);
+        }
         Ok(())
     }
 
@@ -166,8 +196,9 @@ fn all<S: Simd>(
     }
     for (ix, participant) in (0u32..).zip(&frame.participants) {
         if participant.within {
-            let tree = world.cache(ix).tree();
-            dispatch::within(simd, tree, stack, |cluster_a, cluster_b| {
+            let cache = world.cache(ix);
+            let (tree, hubs) = (cache.tree(), cache.clustering.hubs());
+            dispatch::within(simd, tree, hubs, stack, |cluster_a, cluster_b| {
                 // Adjacency masks are kept with the lower cluster.
                 slabs.put(WorkItem {
                     a: ix,

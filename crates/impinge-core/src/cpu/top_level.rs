@@ -32,7 +32,7 @@ impl TopLevel {
             shape: &self.shape,
             bounds: &self.bounds,
         };
-        dispatch::within(simd, tree, stack, |i, j| {
+        dispatch::within(simd, tree, None, stack, |i, j| {
             let (a, b) = (self.order[i as usize], self.order[j as usize]);
             if a == b {
                 return Ok(());
@@ -63,7 +63,7 @@ impl TopLevel {
                 center: root(ix).center(),
                 number: ix,
             }));
-            order(&self.shape, 1, 1, &mut self.entries);
+            order(&self.shape, 1, 1, None, &mut self.entries);
             for (place, entry) in self.entries.iter().enumerate() {
                 self.order[place] = entry.number;
             }

@@ -28,7 +28,9 @@ mod triangle;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use orientation::collinear;
 pub use orientation::{Sign, orient2d, orient3d};
+pub(crate) use segment::strictly_between;
 pub use shared::{
     tetrahedra_intersect_beyond_shared, triangle_tetrahedron_intersect_beyond_shared,
     triangles_intersect_beyond_shared,

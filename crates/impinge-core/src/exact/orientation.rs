@@ -196,6 +196,6 @@ impl Projection {
 
 /// Whether three points lie on one line (or coincide).
 #[inline]
-pub(super) fn collinear(a: &Point, b: &Point, c: &Point) -> bool {
+pub(crate) fn collinear(a: &Point, b: &Point, c: &Point) -> bool {
     Projection::injective(a, b, c).is_none()
 }

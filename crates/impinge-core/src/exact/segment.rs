@@ -31,7 +31,7 @@ fn overlap_on_line<const N: usize>(p: &[f64; N], q: &[f64; N], r: &[f64; N], s: 
 }
 
 /// Whether `v` lies strictly between `u` and `z`, three points of one line.
-pub(super) fn strictly_between(v: &Point, u: &Point, z: &Point) -> bool {
+pub(crate) fn strictly_between(v: &Point, u: &Point, z: &Point) -> bool {
     let (low, high) = sorted(u, z);
     !same(v, low) && !same(v, high) && no_later(low, v) && no_later(v, high)
 }

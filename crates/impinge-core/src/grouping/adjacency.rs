@@ -11,7 +11,7 @@
 //! ```
 //!
 //! A vertex with very many primitives (the hub of a fan) would make these masks quadratic. Hubs are
-//! left out; the clusters that touch one are marked, and their candidates compare vertex ids.
+//! left out: [`hubs`](super::hubs) has masks of its own.
 //!
 //! Cost: `O(n · valence)` once a topology; about 8 bytes a primitive for the own masks and about as much
 //! for those of neighbours, at most `HUB` entries a corner.
@@ -19,9 +19,7 @@
 use rayon::prelude::*;
 
 use super::GROUP;
-
-/// A vertex with more primitives than this is a hub.
-const HUB: u32 = 96;
+use super::hubs::{self, HUB};
 
 /// The masks of one body's clusters.
 #[derive(Debug)]
@@ -33,7 +31,6 @@ pub(crate) struct Adjacency {
     neighbor_starts: Vec<u32>,
     lanes: Vec<u8>,
     masks: Vec<u64>,
-    touches_hub: Vec<bool>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -48,7 +45,6 @@ struct Part {
     own: Vec<u64>,
     /// `(neighbour cluster, lane, mask)`, sorted.
     entries: Vec<(u32, u8, u64)>,
-    touches_hub: bool,
 }
 
 impl Adjacency {
@@ -67,11 +63,9 @@ impl Adjacency {
             neighbor_starts: vec![0],
             lanes: Vec::new(),
             masks: Vec::new(),
-            touches_hub: Vec::with_capacity(n_clusters),
         };
         for part in parts {
             adjacency.own.extend_from_slice(&part.own);
-            adjacency.touches_hub.push(part.touches_hub);
             let mut last = None;
             for (cluster, lane, mask) in part.entries {
                 if last != Some(cluster) {
@@ -119,19 +113,12 @@ impl Adjacency {
             .map(|(&lane, &mask)| (lane as usize, mask))
     }
 
-    /// Whether candidates of these two clusters must compare vertex ids, masks apart.
-    #[inline(always)]
-    pub fn needs_ids(&self, a: usize, b: usize) -> bool {
-        self.touches_hub[a] && self.touches_hub[b]
-    }
-
     pub fn bytes(&self) -> usize {
         size_of_val(&self.own[..])
             + size_of_val(&self.neighbors[..])
             + size_of_val(&self.neighbor_starts[..])
             + size_of_val(&self.lanes[..])
             + size_of_val(&self.masks[..])
-            + size_of_val(&self.touches_hub[..])
     }
 }
 
@@ -144,23 +131,21 @@ struct Incidence {
 impl Incidence {
     fn new<const N: usize>(corners: &[[u32; N]]) -> Self {
         let flat = corners.as_flattened();
-        let n_vertices = flat.iter().max().map_or(0, |&last| last as usize + 1);
-        let mut counts = vec![0u32; n_vertices + 1];
-        for &vertex in flat {
-            counts[vertex as usize + 1] += 1;
-        }
-        // Hubs keep no places: their count is dropped before the sums are taken.
-        let hub: Vec<bool> = counts[1..].iter().map(|&count| count > HUB).collect();
-        let mut starts = counts;
-        for vertex in 0..n_vertices {
-            let count = if hub[vertex] { 0 } else { starts[vertex + 1] };
-            starts[vertex + 1] = starts[vertex] + count;
+        let counts = hubs::counts(corners);
+        let is_hub = |vertex: usize| counts[vertex] > HUB;
+        let mut starts = Vec::with_capacity(counts.len() + 1);
+        let mut start = 0;
+        starts.push(start);
+        for (vertex, &count) in counts.iter().enumerate() {
+            // Hubs keep no places.
+            start += if is_hub(vertex) { 0 } else { count };
+            starts.push(start);
         }
         let mut next = starts.clone();
         let mut places = vec![0u32; *starts.last().expect("never empty") as usize];
         for (slot, &vertex) in flat.iter().enumerate() {
             let vertex = vertex as usize;
-            if !hub[vertex] {
+            if !is_hub(vertex) {
                 places[next[vertex] as usize] = (slot / N) as u32;
                 next[vertex] += 1;
             }
@@ -180,13 +165,10 @@ fn part<const N: usize>(cluster: usize, corners: &[[u32; N]], incidence: &Incide
     let group = &corners[start..corners.len().min(start + GROUP)];
     let mut own = vec![0u64; group.len()];
     let mut entries: Vec<(u32, u8, u64)> = Vec::new();
-    let mut touches_hub = false;
     for (lane, primitive) in group.iter().enumerate() {
         own[lane] |= 1 << lane;
         for &vertex in primitive {
-            let places = incidence.of(vertex);
-            touches_hub |= places.is_empty();
-            for &place in places {
+            for &place in incidence.of(vertex) {
                 let (other, bit) = (place as usize / GROUP, 1u64 << (place as usize % GROUP));
                 if other == cluster {
                     own[lane] |= bit;
@@ -204,9 +186,5 @@ fn part<const N: usize>(cluster: usize, corners: &[[u32; N]], incidence: &Incide
         }
         same
     });
-    Part {
-        own,
-        entries,
-        touches_hub,
-    }
+    Part { own, entries }
 }

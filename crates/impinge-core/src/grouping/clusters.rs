@@ -17,6 +17,7 @@ use super::GROUP;
 use super::adjacency::Adjacency;
 use super::bounds::Bounds;
 use super::hierarchy::{Entry, Shape};
+use super::hubs::{self, Hubs};
 use crate::scene::Elements;
 
 /// Runs this short are not split further inside a cluster.
@@ -42,6 +43,7 @@ pub(crate) struct Clustering {
     pub n_vertices_covered: Option<usize>,
     /// The tree over the clusters.
     pub shape: Shape,
+    hubs: Option<Hubs>,
     adjacency: OnceLock<Adjacency>,
     local_faces: OnceLock<Vec<LocalFaces>>,
 }
@@ -65,7 +67,12 @@ impl Clustering {
                 number: primitive as u32,
             })
             .collect();
-        super::hierarchy::order(&shape, GROUP, FINEST_RUN, &mut entries);
+        let classes = match elements {
+            Elements::Triangles(faces) => hubs::classes(faces),
+            Elements::Tetrahedra(tets) => hubs::classes(tets),
+        };
+        let classes = classes.as_deref();
+        super::hierarchy::order(&shape, GROUP, FINEST_RUN, classes, &mut entries);
         let order: Vec<u32> = entries.iter().map(|entry| entry.number).collect();
         drop(entries);
         let corners = match elements {
@@ -76,6 +83,10 @@ impl Clustering {
             Elements::Triangles(faces) => unique_vertices(faces),
             Elements::Tetrahedra(tets) => unique_vertices(tets),
         };
+        let hubs = classes.is_some().then(|| match &corners {
+            Elements::Triangles(faces) => Hubs::new(faces, &shape),
+            Elements::Tetrahedra(tets) => Hubs::new(tets, &shape),
+        });
         Clustering {
             n_vertices_covered: covered(&vertices),
             order,
@@ -83,6 +94,7 @@ impl Clustering {
             vertices,
             vertex_starts,
             shape,
+            hubs,
             adjacency: OnceLock::new(),
             local_faces: OnceLock::new(),
         }
@@ -105,7 +117,13 @@ impl Clustering {
         &self.vertices[starts[cluster] as usize..starts[cluster + 1] as usize]
     }
 
-    /// Who shares vertices with whom; found at the first self-collision query.
+    /// Vertices that very many primitives name, if there are any.
+    #[inline(always)]
+    pub fn hubs(&self) -> Option<&Hubs> {
+        self.hubs.as_ref()
+    }
+
+    /// Who shares vertices with whom, hubs apart; found at the first self-collision query.
     pub fn adjacency(&self) -> &Adjacency {
         self.adjacency.get_or_init(|| match &self.corners {
             Elements::Triangles(faces) => Adjacency::new(faces),
@@ -149,6 +167,7 @@ impl Clustering {
             + size_of_val(&self.vertices[..])
             + size_of_val(&self.vertex_starts[..])
             + self.shape.bytes()
+            + self.hubs.as_ref().map_or(0, Hubs::bytes)
             + self.adjacency.get().map_or(0, Adjacency::bytes)
             + self
                 .local_faces

@@ -108,13 +108,21 @@ const PARALLEL_FROM: usize = 8 * 1024;
 
 /// Puts entries in the order of the shape, whose leaves hold `leaf_size` entries each, the last
 /// one what remains. Inside a leaf, entries stay split at medians down to `finest` of them.
-pub(crate) fn order(shape: &Shape, leaf_size: usize, finest: usize, entries: &mut [Entry]) {
+/// Where entries have classes, by number, those of one class follow each other, whatever their centers.
+pub(crate) fn order(
+    shape: &Shape,
+    leaf_size: usize,
+    finest: usize,
+    classes: Option<&[Option<u32>]>,
+    entries: &mut [Entry],
+) {
     debug_assert_eq!(shape.n_leaves, entries.len().div_ceil(leaf_size));
     if shape.n_levels() > 0 {
         let split = Split {
             shape,
             leaf_size,
             finest,
+            classes,
         };
         split.nodes(shape.n_levels() - 1, 0..1, 0, entries);
     }
@@ -124,6 +132,7 @@ struct Split<'a> {
     shape: &'a Shape,
     leaf_size: usize,
     finest: usize,
+    classes: Option<&'a [Option<u32>]>,
 }
 
 impl Split<'_> {
@@ -131,7 +140,7 @@ impl Split<'_> {
     fn nodes(&self, level: usize, nodes: Range<usize>, first_leaf: usize, entries: &mut [Entry]) {
         if nodes.len() == 1 {
             match level {
-                0 => halve(entries, self.finest),
+                0 => self.halve(entries),
                 _ => {
                     let children = self.shape.children(level, nodes.start);
                     self.nodes(level - 1, children, first_leaf, entries);
@@ -142,7 +151,7 @@ impl Split<'_> {
         let middle = nodes.start + nodes.len() / 2;
         let middle_leaf = self.first_leaf(level, middle);
         let cut = (middle_leaf - first_leaf) * self.leaf_size;
-        split_at(entries, cut);
+        split_at(entries, cut, self.classes);
         let (low, high) = entries.split_at_mut(cut);
         let parallel = low.len() + high.len() >= PARALLEL_FROM;
         let mut low = || self.nodes(level, nodes.start..middle, first_leaf, low);
@@ -160,22 +169,22 @@ impl Split<'_> {
             .rev()
             .fold(node, |node, level| self.shape.children(level, node).start)
     }
-}
 
-/// Halves a leaf's entries again and again, so that runs of `finest` lie close together.
-fn halve(entries: &mut [Entry], finest: usize) {
-    if entries.len() > finest {
-        let cut = (entries.len() / 2).next_multiple_of(finest);
-        split_at(entries, cut);
-        let (low, high) = entries.split_at_mut(cut);
-        halve(low, finest);
-        halve(high, finest);
+    /// Halves a leaf's entries again and again, so that runs of `finest` lie close together.
+    fn halve(&self, entries: &mut [Entry]) {
+        if entries.len() > self.finest {
+            let cut = (entries.len() / 2).next_multiple_of(self.finest);
+            split_at(entries, cut, self.classes);
+            let (low, high) = entries.split_at_mut(cut);
+            self.halve(low);
+            self.halve(high);
+        }
     }
 }
 
-/// Moves the `cut` entries that are lowest along the longest axis to the front. Ties are broken by
-/// number, so the two sets depend on nothing but the input.
-fn split_at(entries: &mut [Entry], cut: usize) {
+/// Moves the `cut` entries that are lowest along the longest axis to the front, those of lower classes before
+/// all others. Ties are broken by number, so the two sets depend on nothing but the input.
+fn split_at(entries: &mut [Entry], cut: usize, classes: Option<&[Option<u32>]>) {
     if cut == 0 || cut >= entries.len() {
         return;
     }
@@ -189,11 +198,19 @@ fn split_at(entries: &mut [Entry], cut: usize) {
     }
     let extent: [f64; 3] = std::array::from_fn(|k| f64::from(max[k]) - f64::from(min[k]));
     let axis = (0..3).fold(0, |best, k| if extent[k] > extent[best] { k } else { best });
-    entries.select_nth_unstable_by(cut, |a, b| {
+    let by_center = |a: &Entry, b: &Entry| {
         a.center[axis]
             .total_cmp(&b.center[axis])
             .then(a.number.cmp(&b.number))
-    });
+    };
+    match classes {
+        None => entries.select_nth_unstable_by(cut, by_center),
+        Some(classes) => entries.select_nth_unstable_by(cut, |a, b| {
+            classes[a.number as usize]
+                .cmp(&classes[b.number as usize])
+                .then_with(|| by_center(a, b))
+        }),
+    };
 }
 
 #[cfg(test)]
@@ -231,7 +248,7 @@ mod tests {
                     number,
                 })
                 .collect();
-            order(&leaves, 64, 8, &mut entries);
+            order(&leaves, 64, 8, None, &mut entries);
             let mut numbers: Vec<u32> = entries.iter().map(|entry| entry.number).collect();
             numbers.sort_unstable();
             assert!(numbers.into_iter().eq(0..n as u32));

@@ -8,6 +8,7 @@ pub(crate) mod clusters;
 #[allow(missing_docs)]
 pub mod grid;
 pub(crate) mod hierarchy;
+pub(crate) mod hubs;
 
 /// The most primitives a group holds: one bit each in a 64-bit mask.
 pub const GROUP: usize = 64;

@@ -1,0 +1,376 @@
+//! Pairs that share a hub, under `SharedVertex::Resolve`: asked by the directions in which they lie.
+//!
+//! In: the hubs and axes of a body, and its positions. Out: pairs for the exact test.
+//!
+//! The boxes of all primitives around a hub v overlap there, so boxes in space tell nothing. Seen from v, each
+//! primitive is a cone of directions, and two primitives that meet in a point other than v share the direction
+//! of that point. So each cone gets a box on the surface of the cube of all directions, and a tree over these
+//! boxes finds those that overlap:
+//!
+//! ```text
+//!    +-------*--*---+      * directions of a triangle's two other vertices:
+//!    |        \ |   |        its cone meets the cube between them
+//!    |         \|   *
+//!    |          v---|*     boxes of cones that do not overlap: the triangles
+//!    |              |      meet in v alone
+//!    +--------------+
+//! ```
+//!
+//! All that share an axis uv share the direction of the other vertex, too. They are asked by half-planes around
+//! the axis: that of a point p is told by the direction of (v - u) x (p - u).
+//!
+//! Cost: `O(n log n)` per hub for n primitives, and one exact test per pair whose cones' boxes overlap.
+//! Reason for each discard: cones without a common direction. `docs/exactness.md`, "Hubs", has the proof and the bound.
+
+use crate::exact::{Point, collinear, strictly_between};
+use crate::grouping::bounds::{Bounds, round_down, round_up};
+use crate::grouping::hubs::{HubSet, Hubs};
+
+use super::narrow::Settler;
+use super::world::BodyRef;
+
+/// Entries of a leaf.
+const LEAF: usize = 4;
+/// What rounding may do to a direction's coordinate: 2^-24.
+const ERROR: f64 = f64::from_bits((1023 - 24) << 52);
+/// A normal shorter than this part of its factors' sizes has no certain direction: 2^-23.
+const SHORTEST: f64 = f64::from_bits((1023 - 23) << 52);
+
+/// All directions.
+const EVERYWHERE: Bounds = Bounds {
+    min: [-1.0; 3],
+    max: [1.0; 3],
+};
+
+/// Scratch; kept from frame to frame.
+#[derive(Debug, Default)]
+pub(super) struct Around {
+    entries: Vec<Entry>,
+    nodes: Vec<Node>,
+    stack: Vec<NodePair>,
+    /// Places of primitives that lie in what is shared.
+    nowhere: Vec<u32>,
+    /// Places of triangles on the axis' line that go on beyond its first and beyond its second hub.
+    beyond: [Vec<u32>; 2],
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    cone: Bounds,
+    place: u32,
+    /// The hubs with which the hub at hand makes an axis.
+    partners: HubSet,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    cone: Bounds,
+    partners: HubSet,
+}
+
+/// Two nodes of one depth.
+#[derive(Debug, Clone, Copy)]
+struct NodePair {
+    depth: u32,
+    a: usize,
+    b: usize,
+}
+
+/// Where a primitive lies as seen from what is shared.
+enum Seen {
+    Cone(Bounds),
+    Nowhere,
+    Beyond(usize),
+}
+
+impl Around {
+    pub fn bytes(&self) -> usize {
+        size_of::<Entry>() * self.entries.capacity()
+            + size_of::<Node>() * self.nodes.capacity()
+            + size_of::<NodePair>() * self.stack.capacity()
+            + size_of::<u32>()
+                * (self.nowhere.capacity() + self.beyond[0].capacity() + self.beyond[1].capacity())
+    }
+
+    /// Settles the pairs that share one hub, or an axis.
+    pub fn settle(
+        &mut self,
+        body: &BodyRef<'_>,
+        hubs: &Hubs,
+        shared: &[u32],
+        places: &[u32],
+        settler: &mut Settler,
+    ) {
+        self.entries.clear();
+        self.nowhere.clear();
+        self.beyond.iter_mut().for_each(Vec::clear);
+        for &place in places {
+            match seen(body, shared, place) {
+                Seen::Nowhere => self.nowhere.push(place),
+                Seen::Beyond(end) => self.beyond[end].push(place),
+                Seen::Cone(cone) => self.entries.push(Entry {
+                    cone,
+                    place,
+                    partners: match shared {
+                        &[hub] => hubs.partners(hub, body.corners(place)),
+                        _ => HubSet::EMPTY,
+                    },
+                }),
+            }
+        }
+        let mut settle = |a: u32, b: u32| {
+            if hubs.owns(shared, body.corners(a), body.corners(b)) {
+                settler.settle_shared(body, a.min(b), a.max(b));
+            }
+        };
+        // All these meet beyond what is shared.
+        for on_line in &self.beyond {
+            each_pair(on_line, &mut settle);
+        }
+        // What lies in the shared vertices meets only primitives of the same vertices by the rule.
+        let ids = |place: u32| sorted_ids(body.corners(place));
+        self.nowhere.sort_unstable_by_key(|&place| ids(place));
+        for same in self.nowhere.chunk_by(|&a, &b| ids(a) == ids(b)) {
+            each_pair(same, &mut settle);
+        }
+        self.meet(&mut settle);
+    }
+
+    /// Calls `emit` for all entries whose cones' boxes overlap and that have no common partner.
+    fn meet(&mut self, emit: &mut impl FnMut(u32, u32)) {
+        let n = self.entries.len();
+        if n < 2 {
+            return;
+        }
+        let depth = n.div_ceil(LEAF).next_power_of_two().ilog2();
+        let nothing = Node {
+            cone: Bounds::EMPTY,
+            partners: HubSet::EMPTY,
+        };
+        self.nodes.clear();
+        self.nodes.resize(2 << depth, nothing);
+        Tree {
+            entries: &mut self.entries,
+            nodes: &mut self.nodes,
+            depth,
+        }
+        .build(0, 0);
+        self.stack.clear();
+        let root = NodePair {
+            depth: 0,
+            a: 0,
+            b: 0,
+        };
+        self.stack.push(root);
+        while let Some(NodePair { depth: at, a, b }) = self.stack.pop() {
+            let first = 1 << at;
+            let (node_a, node_b) = (&self.nodes[first + a], &self.nodes[first + b]);
+            if !node_a.cone.overlaps(&node_b.cone) || node_a.partners.meets(&node_b.partners) {
+                continue;
+            }
+            if at < depth {
+                let (low, high) = (2 * a, 2 * a + 1);
+                for (a, b) in [
+                    (low, 2 * b),
+                    (low, 2 * b + 1),
+                    (high, 2 * b),
+                    (high, 2 * b + 1),
+                ] {
+                    if a <= b {
+                        self.stack.push(NodePair {
+                            depth: at + 1,
+                            a,
+                            b,
+                        });
+                    }
+                }
+                continue;
+            }
+            for (ix, entry) in self.entries[range(n, at, a)].iter().enumerate() {
+                let skipped = if a == b { ix + 1 } else { 0 };
+                for other in &self.entries[range(n, at, b)][skipped..] {
+                    if entry.cone.overlaps(&other.cone) && !entry.partners.meets(&other.partners) {
+                        emit(entry.place, other.place);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn each_pair(places: &[u32], emit: &mut impl FnMut(u32, u32)) {
+    for (ix, &a) in places.iter().enumerate() {
+        for &b in &places[ix + 1..] {
+            emit(a, b);
+        }
+    }
+}
+
+/// The entries of a node.
+fn range(n: usize, depth: u32, node: usize) -> std::ops::Range<usize> {
+    let start = |node: usize| (node as u64 * n as u64 >> depth) as usize;
+    start(node)..start(node + 1)
+}
+
+/// The entries of a body's hub as a tree whose nodes are numbered as those of a heap.
+struct Tree<'a> {
+    entries: &'a mut [Entry],
+    nodes: &'a mut [Node],
+    depth: u32,
+}
+
+impl Tree<'_> {
+    /// Puts the entries of a node in order, by partners and then by cones, and fills the nodes.
+    fn build(&mut self, at: u32, node: usize) -> Node {
+        let n = self.entries.len();
+        let entries = &mut self.entries[range(n, at, node)];
+        let mut all = Node {
+            cone: Bounds::EMPTY,
+            partners: entries[0].partners,
+        };
+        for entry in &*entries {
+            all.cone.join(&entry.cone);
+            all.partners = all.partners.and(&entry.partners);
+        }
+        self.nodes[(1 << at) + node] = all;
+        if at < self.depth {
+            let extent = |axis: usize| all.cone.max[axis] - all.cone.min[axis];
+            let axis = (0..3).fold(0, |best, k| if extent(k) > extent(best) { k } else { best });
+            let center = |entry: &Entry| entry.cone.min[axis] + entry.cone.max[axis];
+            let cut = range(n, at + 1, 2 * node).len();
+            entries.select_nth_unstable_by(cut, |a, b| {
+                (a.partners.cmp(&b.partners))
+                    .then(center(a).total_cmp(&center(b)))
+                    .then(a.place.cmp(&b.place))
+            });
+            self.build(at + 1, 2 * node);
+            self.build(at + 1, 2 * node + 1);
+        }
+        all
+    }
+}
+
+/// A primitive's vertices, each once, ascending, then the largest number.
+fn sorted_ids(corners: &[u32]) -> [u32; 4] {
+    let mut ids = [u32::MAX; 4];
+    for (ix, &id) in corners.iter().enumerate() {
+        if !corners[..ix].contains(&id) {
+            ids[ix] = id;
+        }
+    }
+    ids.sort_unstable();
+    ids
+}
+
+/// Where a primitive lies as seen from a hub or from an axis.
+fn seen(body: &BodyRef<'_>, shared: &[u32], place: u32) -> Seen {
+    let corners = body.corners(place);
+    let point = |id: u32| body.positions.point(id as usize);
+    let rest = corners
+        .iter()
+        .filter(|id| !shared.contains(id))
+        .map(|&id| point(id));
+    let u = point(shared[0]);
+    let axis = shared.get(1).map(|&id| point(id)).filter(|v| *v != u);
+    let mut cone = Cone::default();
+    for p in rest {
+        let Some(v) = axis else {
+            cone.add(difference(&p, &u));
+            continue;
+        };
+        let (along, to) = (difference(&v, &u), difference(&p, &u));
+        let normal = cross(&along, &to);
+        if size(&normal) > SHORTEST * (size(&along) * size(&to)) {
+            cone.add(normal);
+        } else if corners.len() > 3 || !collinear(&u, &v, &p) {
+            return Seen::Cone(EVERYWHERE);
+        } else if strictly_between(&u, &v, &p) {
+            return Seen::Beyond(0);
+        } else if strictly_between(&v, &u, &p) {
+            return Seen::Beyond(1);
+        }
+    }
+    cone.bounds().map_or(Seen::Nowhere, Seen::Cone)
+}
+
+/// The directions of some points: a box of them on the surface of the cube.
+#[derive(Default)]
+struct Cone {
+    min: [f64; 3],
+    max: [f64; 3],
+    n: u32,
+}
+
+impl Cone {
+    /// Adds a direction; zero is none.
+    fn add(&mut self, direction: Point) {
+        let size = size(&direction);
+        if size == 0.0 {
+            return;
+        }
+        for axis in 0..3 {
+            let at = direction[axis] / size;
+            if self.n == 0 {
+                (self.min[axis], self.max[axis]) = (at, at);
+            }
+            self.min[axis] = self.min[axis].min(at);
+            self.max[axis] = self.max[axis].max(at);
+        }
+        self.n += 1;
+    }
+
+    /// The box of all directions between those added.
+    fn bounds(&self) -> Option<Bounds> {
+        if self.n == 0 {
+            return None;
+        }
+        let min = self.min.map(|x| x - ERROR);
+        let max = self.max.map(|x| x + ERROR);
+        // A point between directions on the cube lies within the box of them, at least this far from the
+        // middle by its largest coordinate. Moved out to the cube, it gets so many times larger at most.
+        let least = (0..3).fold(0.0, |least: f64, k| least.max(min[k]).max(-max[k]));
+        let most = 1.0 / least;
+        let out = |x: f64| {
+            if least > 0.0 {
+                x * most
+            } else {
+                x * f64::INFINITY
+            }
+        };
+        let low = |x: f64| {
+            if x < 0.0 {
+                (out(x) - ERROR).max(-1.0)
+            } else {
+                x
+            }
+        };
+        let high = |x: f64| {
+            if x > 0.0 {
+                (out(x) + ERROR).min(1.0)
+            } else {
+                x
+            }
+        };
+        Some(Bounds {
+            min: min.map(|x| round_down(low(x))),
+            max: max.map(|x| round_up(high(x))),
+        })
+    }
+}
+
+fn difference(p: &Point, q: &Point) -> Point {
+    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
+}
+
+fn cross(d: &Point, e: &Point) -> Point {
+    [
+        d[1] * e[2] - d[2] * e[1],
+        d[2] * e[0] - d[0] * e[2],
+        d[0] * e[1] - d[1] * e[0],
+    ]
+}
+
+/// The largest magnitude of a coordinate.
+fn size(d: &Point) -> f64 {
+    d.iter().fold(0.0, |size: f64, x| size.max(x.abs()))
+}
