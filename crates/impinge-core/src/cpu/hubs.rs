@@ -208,7 +208,7 @@ fn each_pair(places: &[u32], emit: &mut impl FnMut(u32, u32)) {
 
 /// The entries of a node.
 fn range(n: usize, depth: u32, node: usize) -> std::ops::Range<usize> {
-    let start = |node: usize| (node as u64 * n as u64 >> depth) as usize;
+    let start = |node: usize| ((node as u64 * n as u64) >> depth) as usize;
     start(node)..start(node + 1)
 }
 
@@ -308,8 +308,8 @@ impl Cone {
         if size == 0.0 {
             return;
         }
-        for axis in 0..3 {
-            let at = direction[axis] / size;
+        for (axis, x) in direction.iter().enumerate() {
+            let at = x / size;
             if self.n == 0 {
                 (self.min[axis], self.max[axis]) = (at, at);
             }

@@ -1,0 +1,232 @@
+//! Vertices that very many primitives name: the oracle's answers, with work bounded by input plus output.
+
+mod common;
+
+use common::{Case, check, naive};
+use impinge_core::{
+    Backend, Detector, Elements, Method, Query, Scene, Settings, SharedVertex, Statistics,
+};
+
+const RULES: [SharedVertex; 2] = [SharedVertex::Skip, SharedVertex::Resolve];
+
+fn settings() -> Settings {
+    Settings {
+        method: Method::Clusters,
+        backend: Backend::Cpu,
+        threads: 2,
+        ..Settings::default()
+    }
+}
+
+fn case(name: &str, elements: Elements, positions: &[[f64; 3]], rule: SharedVertex) -> Case {
+    let mut scene = Scene::new();
+    let body = scene.add(elements, positions.to_vec()).unwrap();
+    Case {
+        name: format!("{name}, {rule:?}"),
+        scene,
+        query: Query::within(body).shared_vertex(rule),
+    }
+}
+
+fn check_both(name: &str, elements: &Elements, positions: &[[f64; 3]]) {
+    for rule in RULES {
+        let case = case(name, elements.clone(), positions, rule);
+        check(&case, &naive(&case), settings());
+    }
+}
+
+/// SplitMix64.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ z >> 31
+    }
+
+    fn below(&mut self, n: u64) -> u64 {
+        self.next() % n
+    }
+
+    fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// A fan around vertex 0 whose rim winds round so many times; not closed.
+fn fan(n: u32, turns: f64, height: impl Fn(f64) -> f64) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
+    let faces = (0..n).map(|k| [0, k + 1, k + 2]).collect();
+    let rim = (0..=n).map(|k| {
+        let angle = std::f64::consts::TAU * turns * f64::from(k) / f64::from(n);
+        [angle.cos(), angle.sin(), height(angle)]
+    });
+    (faces, std::iter::once([0.0; 3]).chain(rim).collect())
+}
+
+/// Primitives of few vertices on a small lattice; some vertices are named very often.
+fn lattice<const N: usize>(
+    n: usize,
+    n_hubs: u64,
+    side: u64,
+    seed: u64,
+) -> (Vec<[u32; N]>, Vec<[f64; 3]>) {
+    let mut random = Random(seed);
+    let positions: Vec<[f64; 3]> = (0..60)
+        .map(|_| std::array::from_fn(|_| random.below(side) as f64))
+        .collect();
+    let elements = (0..n)
+        .map(|_| {
+            std::array::from_fn(|_| match random.below(2) {
+                0 => random.below(n_hubs) as u32,
+                _ => random.below(positions.len() as u64) as u32,
+            })
+        })
+        .collect();
+    (elements, positions)
+}
+
+#[test]
+fn fans_are_answered_as_by_the_oracle() {
+    for (turns, bend) in [(1.0, 0.0), (0.9, 0.3), (2.5, 0.0), (2.5, 0.2), (0.3, 1.0)] {
+        let (faces, positions) = fan(300, turns, |angle| bend * (3.0 * angle).sin());
+        check_both("fan", &faces.into(), &positions);
+    }
+    // Triangles that point anywhere, two hubs, some of their vertices at a hub.
+    let mut random = Random(7);
+    for spread in [0.05, 0.3, 1.0] {
+        let mut positions = vec![[0.0; 3], [0.0, 0.0, 0.5]];
+        let mut faces = Vec::new();
+        for k in 0..320u32 {
+            let at: [f64; 3] = std::array::from_fn(|_| random.unit() - 0.5);
+            for _ in 0..2 {
+                positions.push(at.map(|x| x + spread * (random.unit() - 0.5)));
+            }
+            let first = positions.len() as u32 - 2;
+            if k % 40 == 0 {
+                positions[first as usize] = positions[k as usize % 2];
+            }
+            faces.push([first, k % 2, first + 1]);
+        }
+        check_both("anywhere", &faces.into(), &positions);
+    }
+}
+
+#[test]
+fn books_are_answered_as_by_the_oracle() {
+    let mut random = Random(3);
+    for quarter_turns in [true, false] {
+        let mut positions = vec![[0.25, -0.5, 0.125], [0.25, 1.5, 0.125]];
+        for k in 0..300 {
+            let angle = match quarter_turns {
+                true => std::f64::consts::FRAC_PI_2 * random.below(4) as f64,
+                false => std::f64::consts::TAU * random.unit(),
+            };
+            let along = 4.0 * random.unit() - 1.5;
+            // Some on the spine's line, before, on and behind it.
+            let out = if k % 5 == 0 { 0.0 } else { random.unit() };
+            let (x, z) = (out * angle.cos(), out * angle.sin());
+            positions.push([0.25 + x, along, 0.125 + z]);
+        }
+        let pages: Vec<[u32; 3]> = (2..302).map(|page| [page, 0, 1]).collect();
+        check_both("book", &pages.into(), &positions);
+        let pages: Vec<[u32; 4]> = (2..301).map(|page| [page, 1, page + 1, 0]).collect();
+        check_both("book of tetrahedra", &pages.into(), &positions);
+        // A spine without length.
+        positions[1] = positions[0];
+        let pages: Vec<[u32; 3]> = (2..302).map(|page| [page, 0, 1]).collect();
+        check_both("book without a spine", &pages.into(), &positions);
+    }
+}
+
+#[test]
+fn lattices_with_hubs_are_answered_as_by_the_oracle() {
+    for seed in 0..12 {
+        let (n_hubs, side) = (1 + seed % 4, 2 + seed % 3);
+        let (faces, positions) = lattice::<3>(350, n_hubs, side, seed);
+        check_both(&format!("lattice {seed}"), &faces.into(), &positions);
+        let (tets, positions) = lattice::<4>(220, n_hubs, side, seed);
+        check_both(
+            &format!("lattice of tetrahedra {seed}"),
+            &tets.into(),
+            &positions,
+        );
+        // The same, not axis-aligned and hardly exact.
+        let (faces, positions) = lattice::<3>(350, n_hubs, side + 2, seed);
+        let turned: Vec<[f64; 3]> = (positions.iter())
+            .map(|[x, y, z]| [0.1 * x + 0.7 * y, 0.3 * y - 0.2 * z, 0.9 * z + 0.4 * x])
+            .collect();
+        check_both(&format!("turned lattice {seed}"), &faces.into(), &turned);
+    }
+}
+
+fn statistics(
+    elements: Elements,
+    positions: &[[f64; 3]],
+    rule: SharedVertex,
+) -> (usize, Statistics) {
+    let case = case("large", elements, positions, rule);
+    let mut detector = Detector::with_settings(settings()).unwrap();
+    let pairs = detector.detect(&case.scene, &case.query).unwrap();
+    (pairs.len(), pairs.stats().clone())
+}
+
+#[test]
+fn a_million_faces_of_one_vertex_cost_nothing() {
+    let faces = vec![[0u32; 3]; 1_000_000];
+    let (n_pairs, stats) = statistics(faces.into(), &[[0.0; 3]], SharedVertex::Skip);
+    assert_eq!((n_pairs, stats.n_candidates, stats.n_work_items), (0, 0, 0));
+}
+
+#[test]
+fn work_around_a_hub_is_bounded_by_its_primitives() {
+    let n = 50_000;
+    let bound = |name: &str, elements: Elements, positions: &[[f64; 3]], expected: usize| {
+        let (n_pairs, stats) = statistics(elements.clone(), positions, SharedVertex::Skip);
+        assert_eq!((n_pairs, stats.n_candidates), (0, 0), "{name}");
+        assert!(stats.n_work_items < 4_000, "{name}: {}", stats.n_work_items);
+        let (n_pairs, stats) = statistics(elements, positions, SharedVertex::Resolve);
+        assert_eq!(n_pairs, expected, "{name}");
+        let most = 6 * (u64::from(n) + expected as u64);
+        assert!(stats.n_candidates < most, "{name}: {}", stats.n_candidates);
+        assert!(stats.n_work_items < 4_000, "{name}: {}", stats.n_work_items);
+    };
+    let (faces, positions) = fan(n, 0.99, |_| 0.0);
+    bound("flat fan", faces.into(), &positions, 0);
+    let (faces, positions) = fan(n, 0.99, |angle| 0.3 * (5.0 * angle).sin());
+    bound("bent fan", faces.into(), &positions, 0);
+    // Two caps, one above the other: their triangles lie mixed in the plane.
+    let (mut faces, mut positions) = fan(n / 2, 0.99, |_| 0.0);
+    let above = positions.len() as u32;
+    faces.extend_from_within(..);
+    faces[n as usize / 2..]
+        .iter_mut()
+        .for_each(|face| *face = face.map(|id| id + above));
+    positions.extend(positions.clone().iter().map(|[x, y, _]| [*x, *y, 1.0]));
+    bound("two caps", faces.into(), &positions, 0);
+    // The same two hubs in all; half of the pages lie on the line of the spine.
+    let mut positions = vec![[0.0; 3], [0.0, 0.0, 1.0]];
+    positions.extend((0..n).map(|k| {
+        let angle = std::f64::consts::TAU * f64::from(k) / f64::from(n);
+        let out = f64::from(k % 2);
+        [out * angle.cos(), out * angle.sin(), 0.5]
+    }));
+    let pages: Vec<[u32; 3]> = (0..n).map(|k| [0, 1, k + 2]).collect();
+    bound("book", pages.into(), &positions, 0);
+    // All vertices in one place, under numbers of their own.
+    let faces: Vec<[u32; 3]> = (0..n).map(|k| [0, 2 * k + 1, 2 * k + 2]).collect();
+    bound(
+        "points",
+        faces.into(),
+        &vec![[1.0; 3]; 2 * n as usize + 1],
+        0,
+    );
+    // A fan of tetrahedra around a segment of a hub and a point beside it.
+    let (faces, mut positions) = fan(n, 0.99, |_| 0.0);
+    let tip = positions.len() as u32;
+    positions.push([0.0, 0.0, 1.0]);
+    let tets: Vec<[u32; 4]> = faces.iter().map(|&[a, b, c]| [a, b, c, tip]).collect();
+    bound("fan of tetrahedra", tets.into(), &positions, 0);
+}
