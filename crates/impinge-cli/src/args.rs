@@ -1,7 +1,7 @@
 //! The command line: what may be said, and its help.
 
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use impinge_fem::scenes::SceneName;
@@ -26,7 +26,8 @@ Examples:
   impinge sequence body.ply run.pc2 --self      the same, frame after frame
   impinge simulate blocks --out out/blocks      bodies that fall, deform and collide
 
-Exit codes: 0 done, 2 bad usage, 1 any other error (one line on stderr).
+Exit codes: 0 done, 2 bad usage, 130 stopped by Ctrl-C (128 and the signal's number), 1 any other
+error (one line on stderr).
 `impinge help COMMAND` explains a command.";
 
 #[derive(Debug, Subcommand)]
@@ -189,6 +190,22 @@ pub struct AnswerArgs {
     #[cfg(feature = "gpu")]
     #[command(flatten)]
     pub picture: PictureArgs,
+}
+
+impl AnswerArgs {
+    /// The files to be written, each with its option.
+    pub fn outputs(&self) -> Vec<(&'static str, &Path)> {
+        let pairs = self
+            .pairs
+            .as_ref()
+            .map(|file| ("--pairs", file.path.as_path()));
+        let out = self.out.as_ref().map(|file| ("--out", file.path.as_path()));
+        #[cfg(feature = "gpu")]
+        let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
+        #[cfg(not(feature = "gpu"))]
+        let png = None;
+        [pairs, out, png].into_iter().flatten().collect()
+    }
 }
 
 /// How a picture looks.

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::PathBuf;
 
+use crate::stop;
+
 /// Everything that ends the program early.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -52,7 +54,7 @@ pub enum Error {
     Output(#[from] io::Error),
     /// Ctrl-C can't be listened to.
     #[error("cannot listen to Ctrl-C: {0}")]
-    Signal(#[from] ctrlc::Error),
+    Signal(io::Error),
     /// Two methods gave different answers: a defect of the library.
     #[error(
         "frame {frame}: {n_found} pairs by {method}, but {n_expected} by {reference}, or others: please report this"
@@ -67,9 +69,20 @@ pub enum Error {
 }
 
 impl Error {
-    /// 2 for bad usage, 0 where the reader of our output went away (it has what it wanted), else 1.
+    /// Whether somebody has asked to stop, and nothing else is wrong.
+    fn is_cancelled(&self) -> bool {
+        matches!(
+            self,
+            Error::Detection(impinge::Error::Cancelled)
+                | Error::Simulation(impinge_fem::Error::Detection(impinge::Error::Cancelled))
+                | Error::Stopped { .. }
+        )
+    }
+
+    /// 128 and the signal's number where one has ended the program, 2 for bad usage, 0 where the reader of our output went away (it has what it wanted), else 1.
     pub fn exit_code(&self) -> u8 {
         match self {
+            error if error.is_cancelled() => stop::exit_code().unwrap_or(1),
             Error::Usage(_) | Error::Detection(impinge::Error::Setting { .. }) => 2,
             Error::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
             _ => 1,

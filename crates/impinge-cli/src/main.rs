@@ -1,5 +1,6 @@
 //! The program `impinge`: the library from the command line.
 
+mod apart;
 mod args;
 mod commands;
 mod detection;
@@ -12,10 +13,10 @@ mod palette;
 #[cfg(feature = "gpu")]
 mod picture;
 mod rows;
+mod stop;
 mod values;
 mod watch;
 
-use std::io::{Write, stderr};
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -26,7 +27,7 @@ fn main() -> ExitCode {
     #[cfg(all(feature = "gpu", target_os = "linux"))]
     keep_mesa_quiet();
     let cli = Cli::parse();
-    let result = watch::cancel_on_signal().and_then(|cancel| match cli.command {
+    let result = stop::cancel_on_signal().and_then(|cancel| match cli.command {
         Command::Demo(args) => commands::demo(&args, &cancel),
         Command::Pairs(args) => commands::pairs(&args, &cancel),
         Command::Within(args) => commands::within(&args, &cancel),
@@ -42,8 +43,7 @@ fn main() -> ExitCode {
         Err(error) => {
             let code = error.exit_code();
             if code != 0 {
-                // Where standard error is closed there is nobody left to tell.
-                let _ = writeln!(stderr(), "impinge: {}", error.line());
+                stop::say(&error.line());
             }
             ExitCode::from(code)
         }

@@ -1,8 +1,10 @@
 //! Bodies as a picture.
 
+use std::io::Write;
 use std::path::Path;
 
 use impinge::{BodyId, Pairs, Scene};
+use impinge_io::AtomicFile;
 use impinge_render::{Camera, Colors, Picture, Projection, Renderer, Surface};
 
 use crate::args::PictureArgs;
@@ -39,8 +41,17 @@ pub fn write(
         None => Renderer::new()?,
         Some(name) => Renderer::on_device_named(name)?,
     };
-    renderer.render(&picture)?.write_png(path)?;
-    Ok(())
+    let written = renderer.render(&picture)?.to_png();
+    let png = written.map_err(|source| Error::Write {
+        path: path.to_owned(),
+        source,
+    })?;
+    let mut to = AtomicFile::create(path)?;
+    to.write_all(&png).map_err(|source| Error::Write {
+        path: path.to_owned(),
+        source,
+    })?;
+    Ok(to.finish()?)
 }
 
 /// A surface a body, in the colours of the palette.

@@ -1,27 +1,25 @@
 //! Rows of pairs as files: NumPy arrays and CSV.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 
 use impinge::Pairs;
+use impinge_io::AtomicFile;
 
 use crate::error::Error;
 use crate::values::{RowsFile, RowsFormat};
 
 /// Writes rows `body_a, primitive_a, body_b, primitive_b`, sorted.
 pub fn write(file: &RowsFile, pairs: &Pairs) -> Result<(), Error> {
-    let written = File::create(&file.path).and_then(|opened| {
-        let mut to = BufWriter::new(opened);
-        match file.format {
-            RowsFormat::Npy => npy(&mut to, pairs.rows())?,
-            RowsFormat::Csv => csv(&mut to, pairs.rows())?,
-        }
-        to.flush()
-    });
+    let mut to = AtomicFile::create(&file.path)?;
+    let written = match file.format {
+        RowsFormat::Npy => npy(&mut to, pairs.rows()),
+        RowsFormat::Csv => csv(&mut to, pairs.rows()),
+    };
     written.map_err(|source| Error::Write {
         path: file.path.clone(),
         source,
-    })
+    })?;
+    Ok(to.finish()?)
 }
 
 /// NumPy's array format, version 1.0 (NEP 1): magic, version, length of the header, header padded

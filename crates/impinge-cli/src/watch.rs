@@ -1,4 +1,4 @@
-//! Ctrl-C and progress bars.
+//! Progress bars, and whether to go on.
 
 use std::io::{IsTerminal, stderr, stdout};
 use std::time::{Duration, Instant};
@@ -10,20 +10,6 @@ use crate::error::Error;
 
 /// A detection that is done sooner than this shows no bar.
 const PATIENCE: Duration = Duration::from_millis(500);
-
-/// A token that the first Ctrl-C (or a request to terminate) cancels; the second one ends the
-/// program at once.
-pub fn cancel_on_signal() -> Result<CancelToken, Error> {
-    let token = CancelToken::new();
-    let held = token.clone();
-    ctrlc::set_handler(move || {
-        if held.is_cancelled() {
-            std::process::exit(1);
-        }
-        held.cancel();
-    })?;
-    Ok(token)
-}
 
 /// Fails where somebody has asked to stop: for the time between detections.
 pub fn go_on(cancel: &CancelToken) -> Result<(), Error> {

@@ -13,7 +13,7 @@ use crate::load::{Bodies, Loading};
 #[cfg(feature = "gpu")]
 use crate::picture;
 use crate::watch::Watch;
-use crate::{json, meshes, output, rows};
+use crate::{apart, json, meshes, output, rows};
 
 /// `impinge pairs`.
 pub fn pairs(args: &PairsArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -52,6 +52,7 @@ fn answer(
     how: &DetectorArgs,
     cancel: &CancelToken,
 ) -> Result<(), Error> {
+    apart::check(answer.outputs(), paths)?;
     let mut detector = detector(how)?;
     let loading = Loading {
         weld: ask.weld,

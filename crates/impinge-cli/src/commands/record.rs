@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use impinge::{BodyId, Pairs, Positions, Scene};
 use impinge_fem::{Simulation, State, StepReport};
-use impinge_io::GrowingPc2;
+use impinge_io::{AtomicFile, GrowingPc2};
 
 use crate::args::{SequenceFormatArg, SimulateArgs};
 use crate::error::Error;
@@ -199,14 +199,12 @@ impl Record {
         }
         self.steps.save()?;
         // A state that is being written never takes the place of one that is whole.
-        let (part, path) = (self.folder.join("state.part"), self.folder.join(STATE));
-        let written = File::create(&part)
-            .and_then(|mut file| {
-                file.write_all(&state.to_bytes())?;
-                file.sync_all()
-            })
-            .and_then(|()| fs::rename(&part, &path));
-        written.map_err(|source| Error::Write { path, source })
+        let path = self.folder.join(STATE);
+        let mut file = AtomicFile::create(&path)?;
+        file.write_all(&state.to_bytes())
+            .and_then(|()| file.sync())
+            .map_err(|source| Error::Write { path, source })?;
+        Ok(file.finish()?)
     }
 
     /// What there is to look at.
@@ -272,9 +270,13 @@ struct Log {
 
 impl Log {
     fn create(path: PathBuf, header: &str) -> Result<Self, Error> {
-        let mut log = Log::open(path, |path| File::create(path))?;
-        log.put(header)?;
-        Ok(log)
+        // The file that is there is replaced once its successor has a header on the disk.
+        let mut file = AtomicFile::create(&path)?;
+        if let Err(source) = file.write_all(header.as_bytes()) {
+            return Err(Error::Write { path, source });
+        }
+        file.finish()?;
+        Log::open(path, |path| OpenOptions::new().append(true).open(path))
     }
 
     /// Keeps the rows of steps before `step`, and says how many there are.

@@ -11,11 +11,12 @@ use crate::error::Error;
 use crate::load::{Bodies, Loading};
 use crate::output::{body_table, counted, out};
 use crate::watch::Watch;
-use crate::{json, picture};
+use crate::{apart, json, picture};
 
 /// Draws meshes, and says what collides in them.
 pub fn render(args: &RenderArgs, cancel: &CancelToken) -> Result<(), Error> {
     let how = &args.detector;
+    apart::check([("--png", args.png.0.as_path())], &args.meshes)?;
     let mut detector = detector(how)?;
     let loading = Loading {
         weld: args.ask.weld,

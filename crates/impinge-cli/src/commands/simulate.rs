@@ -12,6 +12,7 @@ use crate::commands::record::{Found, Record};
 use crate::detection::{Times, detector, percentile};
 use crate::error::Error;
 use crate::output::{counted, grouped, out, stage_table, table};
+use crate::stop::Patience;
 use crate::watch::Watch;
 
 /// Steps between two saved states.
@@ -65,6 +66,8 @@ pub fn simulate(args: &SimulateArgs, cancel: &CancelToken) -> Result<(), Error> 
         usize::try_from(n_left).unwrap_or(usize::MAX),
         false,
     );
+    // A step is short; what it found is saved before the program ends.
+    let _patience = Patience::new();
     let mut summary = Summary::default();
     let result = run(
         &mut simulation,

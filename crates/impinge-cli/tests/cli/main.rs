@@ -5,6 +5,7 @@ mod demo;
 #[cfg(feature = "gpu")]
 mod devices;
 mod harness;
+mod hostile;
 #[cfg(feature = "gpu")]
 mod render;
 mod sequence;

@@ -1,8 +1,9 @@
 //! Ctrl-C, and readers that go away, in the middle of a long run.
 #![cfg(unix)]
 
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
 
 use impinge_io::Pc2Writer;
 use impinge_scenes::surfaces::ball;
@@ -45,22 +46,106 @@ fn said(child: &mut Child) -> String {
     text
 }
 
-#[test]
-fn ctrl_c_stops_cleanly() {
-    let folder = Folder::new();
-    let (mut child, mut stdout) = started(&folder);
+fn send(child: &Child, signal: &str) {
     let sent = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
+        .args([signal, &child.id().to_string()])
         .status()
         .unwrap();
     assert!(sent.success());
-    let mut rest = String::new();
-    stdout.read_to_string(&mut rest).unwrap();
-    assert_eq!(child.wait().unwrap().code(), Some(1));
-    assert_eq!(said(&mut child), "impinge: cancelled\n");
-    // Whole lines, and not all of them.
-    assert!(rest.is_empty() || rest.ends_with("}\n"));
-    assert!(rest.lines().count() < 1_999);
+}
+
+/// Waits until the child has ended, and says how long that took.
+fn ended(child: &mut Child) -> (Option<i32>, Duration) {
+    let started = Instant::now();
+    let code = child.wait().unwrap().code();
+    (code, started.elapsed())
+}
+
+/// The second that a user waits at most, and what a loaded machine takes to notice.
+const SOON: Duration = Duration::from_secs(4);
+
+#[test]
+fn ctrl_c_stops_cleanly() {
+    for (signal, expected) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
+        let folder = Folder::new();
+        let (mut child, mut stdout) = started(&folder);
+        send(&child, signal);
+        let mut rest = String::new();
+        stdout.read_to_string(&mut rest).unwrap();
+        let (code, took) = ended(&mut child);
+        assert_eq!(code, Some(expected), "{signal}");
+        assert!(took < SOON);
+        assert_eq!(said(&mut child), "impinge: cancelled\n");
+        // Whole lines, and not all of them.
+        assert!(rest.is_empty() || rest.ends_with("}\n"));
+        assert!(rest.lines().count() < 1_999);
+    }
+}
+
+/// Starts a run, lets it get to work for a while, and stops it.
+fn stopped(folder: &Folder, args: &[&str], signal: &str) -> (Option<i32>, Duration, String) {
+    let mut child = folder
+        .command(args)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    send(&child, signal);
+    let (code, took) = ended(&mut child);
+    (code, took, said(&mut child))
+}
+
+#[test]
+fn reading_and_writing_are_stopped_too() {
+    let folder = Folder::new();
+    // Reading takes longer than the half second before the signal.
+    let mut file = std::fs::File::create(folder.path("long.obj")).unwrap();
+    let lines = "v 0.1234567890123456789 0.9876543210987654321 0.5555555555555555\n".repeat(20_000);
+    for _ in 0..200 {
+        file.write_all(lines.as_bytes()).unwrap();
+    }
+    drop(file);
+    let (code, took, said) = stopped(&folder, &["self", "long.obj"], "-INT");
+    assert_eq!((code, said.as_str()), (Some(130), "impinge: cancelled\n"));
+    assert!(took < SOON, "{took:?}");
+    std::fs::remove_file(folder.path("long.obj")).unwrap();
+
+    // A pipe that nobody reads.
+    folder.ply("a.ply", &ball(2_000));
+    folder.ply("b.ply", &ball(2_000).translated([0.1, 0.0, 0.0]));
+    let made = Command::new("mkfifo").arg(folder.path("rows.csv")).status();
+    assert!(made.unwrap().success());
+    let args = ["pairs", "a.ply", "b.ply", "--pairs", "rows.csv"];
+    let (code, took, said) = stopped(&folder, &args, "-TERM");
+    assert_eq!((code, said.as_str()), (Some(143), "impinge: cancelled\n"));
+    assert!(took < SOON, "{took:?}");
+}
+
+/// As `nohup` starts programs: what it asks to be ignored is.
+#[test]
+fn an_ignored_signal_stays_ignored() {
+    let folder = Folder::new();
+    folder.ply("ball.ply", &ball(6_000));
+    let script = r#"trap '' HUP; exec "$0" "$@""#;
+    let mut child = Command::new("sh")
+        .args(["-c", script, env!("CARGO_BIN_EXE_impinge")])
+        .args([
+            "self", "ball.ply", "--method", "naive", "--json", "--repeat", "40",
+        ])
+        .current_dir(folder.path(""))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    send(&child, "-HUP");
+    let mut printed = String::new();
+    let mut stdout = child.stdout.take().unwrap();
+    stdout.read_to_string(&mut printed).unwrap();
+    let (code, _) = ended(&mut child);
+    assert_eq!((code, said(&mut child).as_str()), (Some(0), ""));
+    assert!(printed.starts_with('{'), "{printed}");
 }
 
 #[test]

@@ -146,7 +146,8 @@ fn ctrl_c_saves_and_resume_goes_on_as_if_nothing_had_been() {
     assert!(sent.success());
     child.wait().unwrap();
     let stopped: Run = child.wait_with_output().unwrap().into();
-    let said = stopped.error();
+    assert_eq!(stopped.code, Some(130));
+    let said = stopped.stderr.trim_end().strip_prefix("impinge: ").unwrap();
     let step: u32 = said
         .strip_prefix("stopped after step ")
         .and_then(|rest| rest.split(' ').next())

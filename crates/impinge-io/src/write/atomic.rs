@@ -116,6 +116,17 @@ impl AtomicFile {
         patched.map_err(|source| Error::io(&self.path, "write", source))
     }
 
+    /// Waits until all that was written so far is on the disk, for what must outlive a loss of power.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn sync(&mut self) -> io::Result<()> {
+        self.file.as_mut().map_or(Ok(()), |file| {
+            file.flush()?;
+            file.get_ref().sync_all()
+        })
+    }
+
     /// Gives the file its name.
     ///
     /// # Errors

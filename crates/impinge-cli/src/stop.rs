@@ -1,0 +1,133 @@
+//! Ctrl-C and requests to terminate.
+//!
+//! The first one cancels a token that every detection watches. Not all that takes long can watch it (reading a file, a
+//! driver's compiler, a pipe that nobody reads), so a thread ends the program itself where it has not ended within
+//! [`GRACE`]. A second request ends it at once.
+
+use std::io::{Write, stderr};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicUsize, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use impinge::CancelToken;
+
+use crate::error::Error;
+
+/// How long the program may take to end by itself.
+const GRACE: Duration = Duration::from_millis(600);
+
+/// The exit code that the first request asks for: 128 and the number of the signal, as shells have it; 0 while there is none.
+static CODE: AtomicU8 = AtomicU8::new(0);
+
+/// Parts of the program that must not be ended before they are done.
+static N_PATIENT: AtomicUsize = AtomicUsize::new(0);
+
+/// A token that the first Ctrl-C, or a request to terminate, cancels.
+pub fn cancel_on_signal() -> Result<CancelToken, Error> {
+    let token = CancelToken::new();
+    listen(token.clone()).map_err(Error::Signal)?;
+    Ok(token)
+}
+
+/// The exit code of a program that was asked to stop, if it was.
+pub fn exit_code() -> Option<u8> {
+    Some(CODE.load(Ordering::Acquire)).filter(|&code| code > 0)
+}
+
+/// While this is held, the first request waits: for what must be saved. The second one does not.
+pub struct Patience;
+
+impl Patience {
+    pub fn new() -> Self {
+        N_PATIENT.fetch_add(1, Ordering::AcqRel);
+        Patience
+    }
+}
+
+impl Drop for Patience {
+    fn drop(&mut self) {
+        N_PATIENT.fetch_sub(1, Ordering::AcqRel);
+    }
+}
+
+/// Says on standard error why the program ends, once.
+pub fn say(line: &str) {
+    static IS_SAID: AtomicBool = AtomicBool::new(false);
+    if !IS_SAID.swap(true, Ordering::AcqRel) {
+        // Where standard error is closed there is nobody left to tell.
+        let _ = writeln!(stderr(), "impinge: {line}");
+    }
+}
+
+#[cfg(unix)]
+fn listen(token: CancelToken) -> std::io::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    use signal_hook::iterator::Signals;
+    // Whoever started the program with a signal ignored (`nohup`) does not want to be stopped by it.
+    let wanted = [SIGINT, SIGTERM, SIGHUP]
+        .into_iter()
+        .filter(|&signal| !is_ignored(signal));
+    let mut signals = Signals::new(wanted)?;
+    thread::Builder::new()
+        .name("signals".to_owned())
+        .spawn(move || {
+            for signal in signals.forever() {
+                // Signals have small numbers.
+                asked(&token, 128 + signal.unsigned_abs() as u8);
+            }
+        })?;
+    Ok(())
+}
+
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    let mut action = std::mem::MaybeUninit::<libc::sigaction>::zeroed();
+    // SAFETY: no action is set, and the present one is written to memory of its size; all zeros are a valid value of it.
+    let action = unsafe {
+        libc::sigaction(signal, std::ptr::null(), action.as_mut_ptr());
+        action.assume_init()
+    };
+    action.sa_sigaction == libc::SIG_IGN
+}
+
+#[cfg(not(unix))]
+fn listen(token: CancelToken) -> std::io::Result<()> {
+    const INTERRUPTED: u8 = 130;
+    ctrlc::set_handler(move || asked(&token, INTERRUPTED))
+        .map_err(|error| std::io::Error::other(error.to_string()))
+}
+
+/// Takes a request to stop.
+fn asked(token: &CancelToken, code: u8) {
+    let first = CODE.compare_exchange(0, code, Ordering::AcqRel, Ordering::Acquire);
+    token.cancel();
+    if first.is_err() {
+        end(code);
+    }
+    let watch = move || {
+        loop {
+            thread::sleep(GRACE);
+            if N_PATIENT.load(Ordering::Acquire) == 0 {
+                end(code);
+            }
+        }
+    };
+    if thread::Builder::new().spawn(watch).is_err() {
+        // Without a thread to wait on, there is no reason to.
+        end(code);
+    }
+}
+
+/// Ends the program, whatever it is at.
+fn end(code: u8) -> ! {
+    impinge_io::remove_temporary_files();
+    say("cancelled");
+    // What a driver or a library wants to do at exit may wait for threads that are still at work.
+    #[cfg(unix)]
+    // SAFETY: ends the process at once; nothing of it runs any more.
+    unsafe {
+        libc::_exit(i32::from(code))
+    }
+    #[cfg(not(unix))]
+    std::process::exit(i32::from(code))
+}
