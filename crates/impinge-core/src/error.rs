@@ -77,6 +77,20 @@ pub enum Error {
         /// The body named twice.
         body: BodyId,
     },
+    /// Pairs of another scene, or from before a body was re-meshed. Detect again.
+    #[error(
+        "body {body}: a pair names primitive {primitive}, but the body has {n_primitives} {kind} now"
+    )]
+    ForeignPair {
+        /// The body.
+        body: BodyId,
+        /// The highest primitive that a pair names.
+        primitive: u32,
+        /// How many primitives the body has.
+        n_primitives: usize,
+        /// What the body is made of: `"triangles"` or `"tetrahedra"`.
+        kind: &'static str,
+    },
     /// More primitives or vertices than 32-bit indices can name.
     #[error("{what}: {given} given, at most {limit} can be held")]
     TooMany {

@@ -5,6 +5,7 @@
 //! frame, boxes, grid, threads, exact test and GPU engine, so that only the method differs.
 
 // Types are documented; fields and small methods of the inside speak for themselves.
+pub mod contact;
 #[allow(missing_docs)]
 pub mod cpu;
 mod detector;

@@ -12,7 +12,6 @@
 //!
 //! This crate is the stable face of the engine in `impinge-core`.
 
-pub use impinge_core::exact;
 /// The GPU interface that [`Detector::with_device`] and [`Detector::encode`] speak.
 #[cfg(feature = "gpu")]
 pub use impinge_core::wgpu;
@@ -23,6 +22,7 @@ pub use impinge_core::{
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{DeviceInfo, ResidentPairs, devices};
+pub use impinge_core::{contact, exact};
 
 // What users hold may be moved to, and lent to, other threads.
 const _: () = {

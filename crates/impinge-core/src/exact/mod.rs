@@ -28,7 +28,7 @@ mod triangle;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use orientation::collinear;
+pub(crate) use orientation::{Projection, collinear};
 pub use orientation::{Sign, orient2d, orient3d};
 pub(crate) use segment::strictly_between;
 pub use shared::{

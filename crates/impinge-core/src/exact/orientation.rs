@@ -37,13 +37,13 @@ impl Sign {
 
     /// Whether both numbers are nonzero and of the same sign: two points strictly on one side.
     #[inline]
-    pub(super) fn strictly_same(self, other: Self) -> bool {
+    pub(crate) fn strictly_same(self, other: Self) -> bool {
         self as i8 * other as i8 > 0
     }
 
     /// Whether the numbers are nonzero and of different signs: two points strictly apart.
     #[inline]
-    pub(super) fn strictly_opposite(self, other: Self) -> bool {
+    pub(crate) fn strictly_opposite(self, other: Self) -> bool {
         (self as i8) * (other as i8) < 0
     }
 }
@@ -160,15 +160,15 @@ fn orient3d_adaptive(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
 
 /// A projection onto a coordinate plane: the axis that is dropped, as the two that stay.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Projection([usize; 2]);
+pub(crate) struct Projection([usize; 2]);
 
 impl Projection {
     /// The three projections.
-    pub(super) const ALL: [Self; 3] = [Self([0, 1]), Self([1, 2]), Self([2, 0])];
+    pub(crate) const ALL: [Self; 3] = [Self([0, 1]), Self([1, 2]), Self([2, 0])];
 
     /// The two coordinates that stay.
     #[inline]
-    pub(super) fn apply(self, p: &Point) -> [f64; 2] {
+    pub(crate) fn apply(self, p: &Point) -> [f64; 2] {
         [p[self.0[0]], p[self.0[1]]]
     }
 
@@ -180,14 +180,14 @@ impl Projection {
 
     /// The turn of the projected points.
     #[inline]
-    pub(super) fn turn(self, a: &Point, b: &Point, c: &Point) -> Sign {
+    pub(crate) fn turn(self, a: &Point, b: &Point, c: &Point) -> Sign {
         orient2d(self.apply(a), self.apply(b), self.apply(c))
     }
 
     /// A projection that keeps a, b, c apart from a line, and so is one-to-one on their plane;
     /// none when the three lie on one line.
     #[inline]
-    pub(super) fn injective(a: &Point, b: &Point, c: &Point) -> Option<Self> {
+    pub(crate) fn injective(a: &Point, b: &Point, c: &Point) -> Option<Self> {
         Self::ALL
             .into_iter()
             .find(|projection| !projection.turn(a, b, c).is_zero())

@@ -1,0 +1,282 @@
+//! Contacts from pairs: corners by name first, then each point's coordinates once.
+//!
+//! In: a scene and the pairs found in it. Out: [`Contacts`]. Cost: a few hundred nanoseconds per pair for
+//! signs and coordinates, `O(n log n)` for the names; both in parallel, in chunks whose results are
+//! put together in order.
+
+use rayon::prelude::*;
+
+use super::coordinates::{Place, Precision};
+use super::meet::{Local, ends, meet};
+use super::{Contacts, Feature, PointName, Shape};
+use crate::error::Error;
+use crate::exact::Point;
+use crate::pairs::Pairs;
+use crate::scene::{Body, BodyId, Elements, Kind, Positions, Scene, check_positions};
+
+/// Pairs per task.
+const CHUNK: usize = 256;
+
+pub(super) fn contacts(scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> {
+    let bodies = Bodies::new(scene, pairs)?;
+    let rows: Vec<[u32; 4]> = pairs.rows().collect();
+    let met: Vec<Met> = rows
+        .par_chunks(CHUNK)
+        .map(|rows| {
+            let mut met = Met::default();
+            for row in rows {
+                met.add(&bodies, row);
+            }
+            met
+        })
+        .collect();
+
+    let mut names: Vec<PointName> = met.iter().flat_map(|met| &met.names).copied().collect();
+    names.par_sort_unstable();
+    names.dedup();
+    if u32::try_from(names.len()).is_err() {
+        return Err(Error::TooMany {
+            what: "points of contact",
+            given: names.len() as u64,
+            limit: u64::from(u32::MAX),
+        });
+    }
+    let number = |name: &PointName| names.partition_point(|held| held < name) as u32;
+    let corners: Vec<u32> = met
+        .par_iter()
+        .flat_map_iter(|met| met.names.iter().map(number))
+        .collect();
+    let points = names
+        .par_iter()
+        .with_min_len(CHUNK)
+        .map(|name| bodies.place(name).rounded(bodies.precision(name.bodies)))
+        .collect();
+
+    let n = rows.len();
+    let mut contacts = Contacts {
+        rows,
+        shapes: Vec::with_capacity(n),
+        directed: Vec::with_capacity(n),
+        starts: Vec::with_capacity(n + 1),
+        corners,
+        names,
+        points,
+    };
+    let mut start = 0;
+    contacts.starts.push(0);
+    for found in met.iter().flat_map(|met| &met.contacts) {
+        start += found.n_corners;
+        contacts.starts.push(start);
+        contacts.shapes.push(found.shape);
+        contacts.directed.push(found.directed);
+    }
+    Ok(contacts)
+}
+
+/// What a chunk of pairs has in common.
+#[derive(Default)]
+struct Met {
+    contacts: Vec<Found>,
+    names: Vec<PointName>,
+}
+
+struct Found {
+    shape: Shape,
+    n_corners: usize,
+    directed: bool,
+}
+
+impl Met {
+    fn add(&mut self, bodies: &Bodies<'_>, &[body_a, a, body_b, b]: &[u32; 4]) {
+        let sides = [(body_a, a), (body_b, b)].map(|(body, face)| bodies.triangle(body, face));
+        let [Some(a), Some(b)] = sides else {
+            self.contacts.push(Found {
+                shape: Shape::Solid,
+                n_corners: 0,
+                directed: false,
+            });
+            return;
+        };
+        let meeting = meet(&a.points, &b.points);
+        let corners = meeting.corners();
+        self.names.extend(corners.iter().map(|&[in_a, in_b]| {
+            let mut features = [a.feature(in_a), b.feature(in_b)];
+            if body_a == body_b {
+                features.sort_unstable();
+            }
+            PointName {
+                bodies: [body_a, body_b],
+                features,
+            }
+        }));
+        self.contacts.push(Found {
+            shape: match corners.len() {
+                0 => Shape::Apart,
+                1 => Shape::Point,
+                2 => Shape::Segment,
+                _ => Shape::Polygon,
+            },
+            n_corners: corners.len(),
+            directed: meeting.directed,
+        });
+    }
+}
+
+/// A triangle, and what its features are called.
+struct Triangle {
+    points: [Point; 3],
+    vertices: [u32; 3],
+    face: u32,
+}
+
+impl Triangle {
+    fn feature(&self, local: Local) -> Feature {
+        match local {
+            Local::Vertex(corner) => Feature::Vertex(self.vertices[corner]),
+            Local::Edge(edge) => {
+                let mut vertices = ends(edge).map(|corner| self.vertices[corner]);
+                vertices.sort_unstable();
+                Feature::Edge(vertices)
+            }
+            Local::Face => Feature::Face(self.face),
+        }
+    }
+}
+
+/// The bodies that take part, by number.
+struct Bodies<'a> {
+    bodies: Vec<Option<Taking<'a>>>,
+}
+
+struct Taking<'a> {
+    body: &'a Body,
+    /// Vertices of the triangles in contact that are not the lowest one at their position, with the
+    /// one that is; sorted. Empty for most meshes.
+    doubles: Vec<(u32, u32)>,
+}
+
+impl<'a> Bodies<'a> {
+    fn new(scene: &'a Scene, pairs: &Pairs) -> Result<Self, Error> {
+        let mut bodies: Vec<Option<Taking<'a>>> = Vec::new();
+        for (id, kind) in pairs.bodies() {
+            let body = scene.body(id)?;
+            let colliding = pairs.colliding(id);
+            check(id, body, kind, &colliding)?;
+            bodies.resize_with(bodies.len().max(id.index() + 1), || None);
+            bodies[id.index()] = Some(Taking {
+                body,
+                doubles: doubles(body, &colliding),
+            });
+        }
+        Ok(Bodies { bodies })
+    }
+
+    fn taking(&self, body: u32) -> &Taking<'a> {
+        self.bodies[body as usize]
+            .as_ref()
+            .expect("rows name bodies that take part")
+    }
+
+    /// A triangle by its body and number; none for a tetrahedron.
+    fn triangle(&self, body: u32, face: u32) -> Option<Triangle> {
+        let taking = self.taking(body);
+        let Elements::Triangles(faces) = taking.body.elements() else {
+            return None;
+        };
+        let corners = faces[face as usize];
+        Some(Triangle {
+            points: corners.map(|vertex| taking.body.positions().point(vertex as usize)),
+            vertices: corners.map(|vertex| taking.lowest(vertex)),
+            face,
+        })
+    }
+
+    fn precision(&self, bodies: [u32; 2]) -> Precision {
+        let is_single = |body: u32| matches!(self.taking(body).body.positions(), Positions::F32(_));
+        if bodies.into_iter().all(is_single) {
+            Precision::Single
+        } else {
+            Precision::Double
+        }
+    }
+
+    /// The points that define a corner.
+    fn place(&self, name: &PointName) -> Place {
+        let point = |side: usize, vertex: u32| {
+            let body = self.taking(name.bodies[side]).body;
+            body.positions().point(vertex as usize)
+        };
+        let edge = |side: usize, vertices: [u32; 2]| vertices.map(|vertex| point(side, vertex));
+        let face = |side: usize, face: u32| {
+            let body = self.taking(name.bodies[side]).body;
+            let corners = body.elements().corners(face as usize);
+            [0, 1, 2].map(|k| point(side, corners[k]))
+        };
+        match name.features {
+            [Feature::Vertex(vertex), _] => Place::Vertex(point(0, vertex)),
+            [_, Feature::Vertex(vertex)] => Place::Vertex(point(1, vertex)),
+            [Feature::Edge(a), Feature::Face(b)] => Place::OnPlane(edge(0, a), face(1, b)),
+            [Feature::Face(a), Feature::Edge(b)] => Place::OnPlane(edge(1, b), face(0, a)),
+            [Feature::Edge(a), Feature::Edge(b)] => Place::OnLine(edge(0, a), edge(1, b)),
+            [Feature::Face(a), Feature::Face(_)] => Place::Vertex(face(0, a)[0]),
+        }
+    }
+}
+
+impl Taking<'_> {
+    fn lowest(&self, vertex: u32) -> u32 {
+        self.doubles
+            .binary_search_by_key(&vertex, |&(double, _)| double)
+            .map_or(vertex, |ix| self.doubles[ix].1)
+    }
+}
+
+/// Whether pairs fit the body, and its positions are good.
+fn check(id: BodyId, body: &Body, kind: Kind, colliding: &[u32]) -> Result<(), Error> {
+    let n_primitives = body.n_primitives();
+    if let Some(&primitive) = colliding.last()
+        && (primitive as usize >= n_primitives || body.kind() != kind)
+    {
+        return Err(Error::ForeignPair {
+            body: id,
+            primitive,
+            n_primitives,
+            kind: body.kind().name(),
+        });
+    }
+    if body.is_checked() {
+        return Ok(());
+    }
+    match body.positions() {
+        Positions::F32(positions) => check_positions(id, positions),
+        Positions::F64(positions) => check_positions(id, positions),
+    }
+}
+
+/// The vertices of some triangles that are not the lowest one at their position, with that one.
+///
+/// Meshes that repeat their vertices for each face would fall apart into single triangles otherwise.
+fn doubles(body: &Body, colliding: &[u32]) -> Vec<(u32, u32)> {
+    let Elements::Triangles(faces) = body.elements() else {
+        return Vec::new();
+    };
+    let mut vertices: Vec<u32> = colliding
+        .iter()
+        .flat_map(|&face| faces[face as usize])
+        .collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    let bits = |vertex: u32| {
+        let point = body.positions().point(vertex as usize);
+        // Minus zero and zero are one number.
+        point.map(|x| (x + 0.0).to_bits())
+    };
+    let mut at: Vec<([u64; 3], u32)> = vertices.iter().map(|&v| (bits(v), v)).collect();
+    at.par_sort_unstable();
+    let mut doubles: Vec<(u32, u32)> = at
+        .chunk_by(|(x, _), (y, _)| x == y)
+        .flat_map(|same| same[1..].iter().map(|&(_, vertex)| (vertex, same[0].1)))
+        .collect();
+    doubles.sort_unstable();
+    doubles
+}

@@ -1,0 +1,284 @@
+//! Curves: segments chained at the points that they share.
+//!
+//! In: contacts. Out: chains of points. Segments that several pairs have in common (an edge that lies in a
+//! face is found from both of its triangles) count once. At most two segments meet at most points, and
+//! a chain goes on there. Where three or more meet (surfaces that touch in an edge, three sheets at one point) all
+//! chains end: a junction. Two closed surfaces in general position have closed chains only.
+//!
+//! Nothing is compared but names of points, so no tolerance decides what is connected. Cost: `O(n log n)`.
+
+use super::{Contacts, Shape};
+
+/// Intersection curves as chains of points.
+#[derive(Debug, Clone, Default)]
+pub struct Curves {
+    /// Where each curve's points start, and one past the last.
+    starts: Vec<usize>,
+    points: Vec<u32>,
+    closed: Vec<bool>,
+    directed: Vec<bool>,
+    lengths: Vec<f64>,
+    isolated: Vec<u32>,
+}
+
+/// Two different points with a segment between them, and its direction: 1 from the lower point to the
+/// higher, -1 the other way, 0 when it has none or pairs disagree.
+#[derive(Clone, Copy)]
+struct Link {
+    ends: [u32; 2],
+    direction: i8,
+}
+
+impl Curves {
+    pub(super) fn new(contacts: &Contacts) -> Self {
+        let links = links(contacts);
+        let mut curves = Curves {
+            starts: vec![0],
+            isolated: isolated(contacts),
+            ..Curves::default()
+        };
+        let at = Incidence::new(contacts.points().len(), &links);
+        let mut is_used = vec![false; links.len()];
+        // Open chains first, from each end or junction; then loops, each from its lowest segment.
+        for point in 0..contacts.points().len() {
+            if at.links(point).len() != 2 {
+                for &link in at.links(point) {
+                    if !is_used[link as usize] {
+                        let chain = Chain::follow(&links, &at, &mut is_used, link, point as u32);
+                        curves.push(contacts, chain);
+                    }
+                }
+            }
+        }
+        for link in 0..links.len() {
+            if !is_used[link] {
+                let Link { ends, direction } = links[link];
+                let start = ends[usize::from(direction < 0)];
+                let chain = Chain::follow(&links, &at, &mut is_used, link as u32, start);
+                curves.push(contacts, chain);
+            }
+        }
+        curves
+    }
+
+    fn push(&mut self, contacts: &Contacts, chain: Chain) {
+        let Chain {
+            mut points,
+            n_forward,
+            n_backward,
+        } = chain;
+        let n_links = points.len() - 1;
+        let is_closed = n_links > 1 && points[0] == points[n_links];
+        if n_backward == n_links {
+            points.reverse();
+        }
+        if is_closed {
+            points.pop();
+        }
+        let position = |ix: usize| contacts.points()[points[ix % points.len()] as usize];
+        let length = (0..n_links)
+            .map(|ix| distance(position(ix), position(ix + 1)))
+            .sum();
+        self.lengths.push(length);
+        self.closed.push(is_closed);
+        self.directed
+            .push(n_forward == n_links || n_backward == n_links);
+        self.points.extend(points);
+        self.starts.push(self.points.len());
+    }
+
+    /// How many curves there are.
+    pub fn len(&self) -> usize {
+        self.closed.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.closed.is_empty()
+    }
+
+    /// The points of a curve in order, as numbers of [`Contacts::points`]. A closed one does not repeat
+    /// its first point.
+    pub fn points(&self, curve: usize) -> &[u32] {
+        &self.points[self.starts[curve]..self.starts[curve + 1]]
+    }
+
+    /// The points of all curves, one curve after the other.
+    pub fn all_points(&self) -> &[u32] {
+        &self.points
+    }
+
+    /// Where each curve's points start in [`all_points`](Curves::all_points), and one past the last.
+    pub fn starts(&self) -> &[usize] {
+        &self.starts
+    }
+
+    /// Whether a curve is a loop.
+    pub fn is_closed(&self, curve: usize) -> bool {
+        self.closed[curve]
+    }
+
+    /// Whether all segments of a curve point the same way along it, which is then its direction: seen from
+    /// outside of the first body, what of it is beneath the second one's surface lies to the left. Holds
+    /// between bodies whose faces are oriented; within one body the order of a pair says nothing, and
+    /// neither does this.
+    pub fn is_directed(&self, curve: usize) -> bool {
+        self.directed[curve]
+    }
+
+    /// The length of a curve in the unit of the scene: the sum of the distances of its rounded points in `f64`.
+    pub fn length(&self, curve: usize) -> f64 {
+        self.lengths[curve]
+    }
+
+    /// How many curves are loops.
+    pub fn n_closed(&self) -> usize {
+        self.closed.iter().filter(|&&closed| closed).count()
+    }
+
+    /// The lengths of all curves together.
+    pub fn total_length(&self) -> f64 {
+        self.lengths.iter().sum()
+    }
+
+    /// Points of contact that no segment and no polygon has as a corner: two bodies touch there and nowhere
+    /// around. Sorted.
+    pub fn isolated(&self) -> &[u32] {
+        &self.isolated
+    }
+}
+
+pub(super) fn distance(p: [f64; 3], q: [f64; 3]) -> f64 {
+    let [x, y, z] = [0, 1, 2].map(|k| q[k] - p[k]);
+    (x * x + y * y + z * z).sqrt()
+}
+
+/// All segments, each once, sorted.
+fn links(contacts: &Contacts) -> Vec<Link> {
+    let mut links: Vec<Link> = (0..contacts.len())
+        .filter(|&contact| contacts.shape(contact) == Shape::Segment)
+        .filter_map(|contact| {
+            let &[from, to] = contacts.corners(contact) else {
+                return None;
+            };
+            let (ends, direction) = if from < to {
+                ([from, to], 1)
+            } else {
+                ([to, from], -1)
+            };
+            Some(Link {
+                ends,
+                direction: if contacts.is_directed(contact) {
+                    direction
+                } else {
+                    0
+                },
+            })
+        })
+        .collect();
+    links.sort_unstable_by_key(|link| (link.ends, link.direction));
+    links
+        .chunk_by(|x, y| x.ends == y.ends)
+        .map(|same| {
+            // Pairs without a direction leave the word to those that have one.
+            let has = |direction: i8| same.iter().any(|link| link.direction == direction);
+            Link {
+                ends: same[0].ends,
+                direction: i8::from(has(1)) - i8::from(has(-1)),
+            }
+        })
+        .collect()
+}
+
+fn isolated(contacts: &Contacts) -> Vec<u32> {
+    let mut is_corner = vec![false; contacts.points().len()];
+    for contact in 0..contacts.len() {
+        if matches!(contacts.shape(contact), Shape::Segment | Shape::Polygon) {
+            for &point in contacts.corners(contact) {
+                is_corner[point as usize] = true;
+            }
+        }
+    }
+    (0u32..)
+        .zip(is_corner)
+        .filter_map(|(point, is_corner)| (!is_corner).then_some(point))
+        .collect()
+}
+
+/// The links at each point.
+struct Incidence {
+    starts: Vec<usize>,
+    links: Vec<u32>,
+}
+
+impl Incidence {
+    fn new(n_points: usize, links: &[Link]) -> Self {
+        let mut starts = vec![0; n_points + 2];
+        for end in links.iter().flat_map(|link| link.ends) {
+            starts[end as usize + 2] += 1;
+        }
+        for point in 2..starts.len() {
+            starts[point] += starts[point - 1];
+        }
+        let mut at = vec![0; 2 * links.len()];
+        for (number, link) in (0u32..).zip(links) {
+            for end in link.ends {
+                let place = &mut starts[end as usize + 1];
+                at[*place] = number;
+                *place += 1;
+            }
+        }
+        Incidence { starts, links: at }
+    }
+
+    fn links(&self, point: usize) -> &[u32] {
+        &self.links[self.starts[point]..self.starts[point + 1]]
+    }
+}
+
+/// A chain of points; a loop ends with its first one.
+struct Chain {
+    points: Vec<u32>,
+    n_forward: usize,
+    n_backward: usize,
+}
+
+impl Chain {
+    /// Follows links from a point until an end, a junction, or back to the start.
+    fn follow(
+        links: &[Link],
+        at: &Incidence,
+        is_used: &mut [bool],
+        first: u32,
+        start: u32,
+    ) -> Chain {
+        let mut chain = Chain {
+            points: vec![start],
+            n_forward: 0,
+            n_backward: 0,
+        };
+        let (mut link, mut here) = (first, start);
+        loop {
+            is_used[link as usize] = true;
+            let Link {
+                ends: [low, high],
+                direction,
+            } = links[link as usize];
+            let (next, along) = if here == low {
+                (high, direction)
+            } else {
+                (low, -direction)
+            };
+            chain.n_forward += usize::from(along > 0);
+            chain.n_backward += usize::from(along < 0);
+            chain.points.push(next);
+            here = next;
+            let onward = at.links(here as usize);
+            let unused = onward.iter().find(|&&other| !is_used[other as usize]);
+            match unused {
+                Some(&other) if onward.len() == 2 && here != start => link = other,
+                _ => return chain,
+            }
+        }
+    }
+}
