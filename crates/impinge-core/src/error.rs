@@ -91,6 +91,31 @@ pub enum Error {
         /// What the body is made of: `"triangles"` or `"tetrahedra"`.
         kind: &'static str,
     },
+    /// A surface with a border, or with faces whose orientations disagree. Weld vertices, fill holes, orient faces.
+    #[error(
+        "body {body}: the surface is not closed: the edge of vertices {} and {} has {n_forward} faces along it and {n_backward} against it",
+        edge[0], edge[1]
+    )]
+    NotClosed {
+        /// The body.
+        body: BodyId,
+        /// An edge by its vertices.
+        edge: [u32; 2],
+        /// How many faces run from its first vertex to its second.
+        n_forward: usize,
+        /// How many faces run the other way.
+        n_backward: usize,
+    },
+    /// A body of the other kind is needed here.
+    #[error("body {body} is made of {kind}, where {expected} are needed")]
+    WrongKind {
+        /// The body.
+        body: BodyId,
+        /// What it is made of.
+        kind: &'static str,
+        /// What is needed.
+        expected: &'static str,
+    },
     /// More primitives or vertices than 32-bit indices can name.
     #[error("{what}: {given} given, at most {limit} can be held")]
     TooMany {

@@ -61,6 +61,7 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> 
         corners,
         names,
         points,
+        doubles: bodies.doubles(),
     };
     let mut start = 0;
     contacts.starts.push(0);
@@ -169,6 +170,15 @@ impl<'a> Bodies<'a> {
             });
         }
         Ok(Bodies { bodies })
+    }
+
+    /// Those of all bodies that have any.
+    fn doubles(self) -> Vec<(u32, Vec<(u32, u32)>)> {
+        (0u32..)
+            .zip(self.bodies)
+            .filter_map(|(number, taking)| Some((number, taking?.doubles)))
+            .filter(|(_, doubles)| !doubles.is_empty())
+            .collect()
     }
 
     fn taking(&self, body: u32) -> &Taking<'a> {

@@ -1,14 +1,15 @@
-//! Contact geometry: where triangles meet, and the curves in which surfaces cross.
+//! Contact geometry: where triangles meet, the curves in which surfaces cross, how deep.
 //!
 //! [`Contacts`] turns the pairs of a detection into points, segments and polygons; [`Curves`] chains these
-//! into loops.
+//! into loops; [`Penetration`] finds what of two closed bodies lies inside the other, and per connected
+//! region of contact a normal, a depth and a volume.
 //!
 //! **Exact combinatorics.** Which edge crosses which face, in which order, which points are one point,
 //! which segments follow each other: decided by the signs of [`exact`](crate::exact), without
 //! tolerance. **Rounded coordinates.** Each coordinate is the exact number rounded to nearest: to `f32` where both
 //! bodies hold `f32`, else to `f64`. It depends on the point alone, so the bytes are the same on
-//! every machine and for every number of threads. Lengths are computed from rounded
-//! coordinates in `f64`, in a fixed order.
+//! every machine and for every number of threads. Lengths, areas,
+//! normals, depths and volumes are computed from rounded coordinates in `f64`, in a fixed order.
 //!
 //! ```
 //! use impinge_core::contact::{Contacts, Shape};
@@ -33,10 +34,16 @@ mod build;
 mod coordinates;
 mod curves;
 mod double;
+mod inside;
 mod integer;
 mod meet;
+mod penetration;
+mod regions;
+mod topology;
 
 pub use curves::Curves;
+pub use penetration::{Overlap, Penetration};
+pub use regions::Region;
 
 use crate::error::Error;
 use crate::pairs::Pairs;
@@ -99,6 +106,8 @@ pub struct Contacts {
     corners: Vec<u32>,
     names: Vec<PointName>,
     points: Vec<[f64; 3]>,
+    /// Of each body: vertices that are not the lowest one at their position, with that one.
+    doubles: Vec<(u32, Vec<(u32, u32)>)>,
 }
 
 impl Contacts {
@@ -172,5 +181,23 @@ impl Contacts {
     /// The segments chained into loops and open curves.
     pub fn curves(&self) -> Curves {
         Curves::new(self)
+    }
+
+    /// The contacts in connected regions, each with its position, its size and a normal. What lies inside, and
+    /// how deep, is found by [`Penetration`].
+    pub fn regions(&self) -> Vec<Region> {
+        let mut sets = regions::Sets::new(self.points.len());
+        regions::join_contacts(self, &mut sets);
+        regions::regions(self, &self.curves(), &mut sets).0
+    }
+
+    /// The vertex that names have for this one: the lowest one at its position.
+    fn lowest(&self, body: u32, vertex: u32) -> u32 {
+        let Some((_, doubles)) = self.doubles.iter().find(|(held, _)| *held == body) else {
+            return vertex;
+        };
+        doubles
+            .binary_search_by_key(&vertex, |&(double, _)| double)
+            .map_or(vertex, |ix| doubles[ix].1)
     }
 }

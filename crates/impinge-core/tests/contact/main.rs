@@ -2,6 +2,7 @@
 
 mod curves;
 mod oracle;
+mod penetration;
 
 use dashu_int::IBig;
 use impinge_core::contact::{Contacts, Shape};

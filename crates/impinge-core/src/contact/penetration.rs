@@ -1,0 +1,506 @@
+//! What of two closed bodies lies inside the other, region by region: normals, depths, volumes.
+//!
+//! 1. Vertices inside: exact winding numbers (see `inside`).
+//! 2. Each edge that crosses the other surface is cut at its crossings; between two of them it is inside or
+//!    not, by the signs of the faces crossed. Crossings at the ends of a piece that is inside belong to one
+//!    region, and so does a vertex inside with the crossings next to it.
+//! 3. The border of what both have in common consists of the faces' parts inside; each part is a polygon
+//!    whose sides are segments of contact and such pieces of edges. So the volume is a sum over these sides,
+//!    without polygons ever being put together (divergence theorem, then Stokes' on each face).
+//!
+//! Decisions are exact but for one: the order of crossings along an edge is taken from their rounded
+//! coordinates. Crossings that round to one place may be taken the wrong way round; the piece between
+//! them is then no longer than the rounding.
+
+use std::collections::HashMap;
+
+use super::curves::Curves;
+use super::inside::{Asked, Parts};
+use super::regions::{
+    NO_REGION, Region, Sets, Vector, add, cross, dot, join_contacts, regions, scaled, sub,
+};
+use super::topology::Topology;
+use super::{Contacts, Feature, PointName, Shape};
+use crate::error::Error;
+use crate::exact::{Sign, orient3d};
+use crate::scene::{Body, BodyId, Elements, Kind, Scene};
+
+/// Finds how deep closed bodies are in each other. Keeps what it knows of their topology from call to call.
+///
+/// ```
+/// use impinge_core::contact::{Contacts, Penetration};
+/// use impinge_core::{Backend, Detector, Query, Scene};
+/// # fn main() -> Result<(), impinge_core::Error> {
+/// let tetrahedron = [[0u32, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+/// let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// let mut scene = Scene::new();
+/// let a = scene.add_triangles(&tetrahedron, &corners)?;
+/// let b = scene.add_triangles(&tetrahedron, &corners.map(|[x, y, z]| [x + 0.1, y + 0.125, z - 0.875]))?;
+/// let mut detector = Detector::new(Backend::Cpu)?;
+/// let pairs = detector.detect(&scene, &Query::between(a, b))?;
+/// let contacts = Contacts::new(&scene, pairs)?;
+/// let overlap = Penetration::new().between(&scene, &contacts, a, b)?;
+/// assert_eq!(overlap.inside[1], [3]); // The tip of b is in a.
+/// let region = &overlap.regions[0];
+/// assert!(region.depth.is_some_and(|depth| depth <= 0.125));
+/// assert!(region.normal.is_some_and(|normal| normal[2] > 0.9)); // Push a up.
+/// # Ok(()) }
+/// ```
+#[derive(Debug, Default)]
+pub struct Penetration {
+    /// By the number of the body, with the stamp of the topology.
+    topologies: HashMap<usize, (u64, Topology)>,
+}
+
+/// What two closed bodies have in common.
+#[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Overlap {
+    /// Vertices of the first body strictly inside the second, and of the second strictly inside the first: sorted.
+    /// The body with the lower number comes first.
+    pub inside: [Vec<u32>; 2],
+    /// Connected regions: those with contacts in the order of these, then shells wholly inside the other body.
+    pub regions: Vec<Region>,
+}
+
+impl Overlap {
+    /// The volume of all regions together; none where any region's is not known.
+    pub fn volume(&self) -> Option<f64> {
+        self.regions.iter().map(|region| region.volume).sum()
+    }
+}
+
+impl Penetration {
+    /// Knows no body yet.
+    pub fn new() -> Self {
+        Penetration::default()
+    }
+
+    /// What two closed bodies of triangles have in common, from all contacts between them.
+    ///
+    /// A vertex is inside where the other surface's winding number around it is not 0; a vertex on the surface
+    /// is not inside. The body with the lower number is the first one, whatever the order here. Runs in rayon's current
+    /// thread pool; the result does not depend on it.
+    ///
+    /// # Errors
+    /// A body that the scene does not have, twice the same body, a body of tetrahedra, a surface that is not closed.
+    pub fn between(
+        &mut self,
+        scene: &Scene,
+        contacts: &Contacts,
+        a: BodyId,
+        b: BodyId,
+    ) -> Result<Overlap, Error> {
+        if a == b {
+            return Err(Error::SameBody { body: a });
+        }
+        let ids = [a.min(b), a.max(b)];
+        for id in ids {
+            self.know(scene, id)?;
+        }
+        let bodies = [scene.body(ids[0])?, scene.body(ids[1])?];
+        let topologies = ids.map(|id| &self.topologies[&id.index()].1);
+        let numbers = ids.map(|id| id.index() as u32);
+        let crossings = [0, 1].map(|side| Crossings::new(contacts, numbers, side));
+        let parts = [0, 1].map(|side| {
+            let crossings = &crossings[side];
+            let asked = Asked {
+                body: bodies[side],
+                topology: topologies[side],
+                is_on: &|vertex| crossings.is_on(vertex),
+                is_crossed: &|edge| crossings.is_crossed(edge),
+            };
+            Parts::new(&asked, bodies[1 - side])
+        });
+        let work = Work {
+            contacts,
+            bodies,
+            crossings,
+            parts,
+        };
+        Ok(work.overlap())
+    }
+
+    /// Knows the topology of a body from now on.
+    fn know(&mut self, scene: &Scene, id: BodyId) -> Result<(), Error> {
+        let body = scene.body(id)?;
+        let stamp = body.topology_stamp();
+        let known = self.topologies.get(&id.index());
+        if known.is_some_and(|(known, _)| *known == stamp) {
+            return Ok(());
+        }
+        let Elements::Triangles(faces) = body.elements() else {
+            return Err(Error::WrongKind {
+                body: id,
+                kind: body.kind().name(),
+                expected: Kind::Triangles.name(),
+            });
+        };
+        let topology = Topology::new(id, faces, body.n_vertices())?;
+        self.topologies.insert(id.index(), (stamp, topology));
+        Ok(())
+    }
+}
+
+/// The points of contact on the edges and vertices of one body.
+struct Crossings<'a> {
+    contacts: &'a Contacts,
+    body: u32,
+    /// Edges with the points on them, sorted.
+    on_edges: Vec<([u32; 2], u32)>,
+    /// Vertices on the other surface, sorted.
+    on_vertices: Vec<u32>,
+    /// Whether any edge at a vertex is crossed.
+    is_touched: Vec<bool>,
+}
+
+impl<'a> Crossings<'a> {
+    fn new(contacts: &'a Contacts, bodies: [u32; 2], side: usize) -> Self {
+        let names = contacts.names();
+        let first = names.partition_point(|name| name.bodies < bodies);
+        let end = names.partition_point(|name| name.bodies <= bodies);
+        let mut crossings = Crossings {
+            contacts,
+            body: bodies[side],
+            on_edges: Vec::new(),
+            on_vertices: Vec::new(),
+            is_touched: Vec::new(),
+        };
+        for (point, name) in (0u32..).zip(names).skip(first).take(end - first) {
+            match name.features[side] {
+                Feature::Edge(edge) => crossings.on_edges.push((edge, point)),
+                Feature::Vertex(vertex) => crossings.on_vertices.push(vertex),
+                Feature::Face(_) => {}
+            }
+        }
+        crossings.on_edges.sort_unstable();
+        crossings.on_vertices.sort_unstable();
+        crossings.on_vertices.dedup();
+        for (edge, _) in &crossings.on_edges {
+            let n = edge[1] as usize + 1;
+            if crossings.is_touched.len() < n {
+                crossings.is_touched.resize(n, false);
+            }
+            for vertex in edge {
+                crossings.is_touched[*vertex as usize] = true;
+            }
+        }
+        crossings
+    }
+
+    fn lowest(&self, vertex: u32) -> u32 {
+        self.contacts.lowest(self.body, vertex)
+    }
+
+    fn is_on(&self, vertex: u32) -> bool {
+        !self.on_vertices.is_empty() && self.on_vertices.binary_search(&self.lowest(vertex)).is_ok()
+    }
+
+    fn is_touched(&self, vertex: u32) -> bool {
+        self.is_touched.get(self.lowest(vertex) as usize) == Some(&true)
+    }
+
+    fn name(&self, edge: [u32; 2]) -> [u32; 2] {
+        let mut name = edge.map(|vertex| self.lowest(vertex));
+        name.sort_unstable();
+        name
+    }
+
+    fn is_crossed(&self, edge: [u32; 2]) -> bool {
+        let [low, high] = self.name(edge);
+        let is_touched = |vertex: u32| self.is_touched.get(vertex as usize) == Some(&true);
+        if !(is_touched(low) && is_touched(high)) {
+            return false;
+        }
+        let first = self
+            .on_edges
+            .partition_point(|(held, _)| *held < [low, high]);
+        self.on_edges
+            .get(first)
+            .is_some_and(|(held, _)| *held == [low, high])
+    }
+}
+
+/// A piece of an edge that is inside the other body, from the lower vertex on, and a number of its region's set.
+struct Piece {
+    edge: [u32; 2],
+    from: Vector,
+    to: Vector,
+    node: u32,
+}
+
+struct Work<'a> {
+    contacts: &'a Contacts,
+    bodies: [&'a Body; 2],
+    crossings: [Crossings<'a>; 2],
+    parts: [Parts; 2],
+}
+
+impl Work<'_> {
+    fn overlap(&self) -> Overlap {
+        let n_points = self.contacts.points().len();
+        let n_parts = self.parts.each_ref().map(Parts::n_parts);
+        let mut sets = Sets::new(n_points + n_parts[0] + n_parts[1]);
+        join_contacts(self.contacts, &mut sets);
+        let pieces = [0, 1].map(|side| self.pieces(side, &mut sets));
+        let curves = Curves::new(self.contacts);
+        let (mut regions, mut region_of) = regions(self.contacts, &curves, &mut sets);
+        let numbers = [0, 1].map(|side| self.crossings[side].body);
+        let mut inside = [Vec::new(), Vec::new()];
+        for side in 0..2 {
+            for vertex in 0..self.bodies[side].n_vertices() as u32 {
+                let Some(node) = self.node(side, vertex) else {
+                    continue;
+                };
+                inside[side].push(vertex);
+                let at = self.bodies[side].positions().point(vertex as usize);
+                let region = &mut region_of[sets.find(node) as usize];
+                if *region == NO_REGION {
+                    // A shell of one body that no contact of the other reaches.
+                    *region = regions.len() as u32;
+                    regions.push(Region::at(numbers, at));
+                }
+                let region = &mut regions[*region as usize];
+                region.inside[side].push(vertex);
+                region.cover(at);
+            }
+        }
+        let mut region = |node: u32| region_of[sets.find(node) as usize] as usize;
+        let volumes = self.volumes(&regions, &pieces, &mut region);
+        let is_asked = |region: &Region| region.bodies == numbers;
+        for (region, volume) in regions.iter_mut().zip(volumes).filter(|(r, _)| is_asked(r)) {
+            region.volume = self.is_generic(region).then_some(volume);
+            region.depth = region.normal.map(|normal| self.extent(region, normal));
+            if region.contacts.is_empty() {
+                region.position = scaled(add(region.bounds[0], region.bounds[1]), 0.5);
+            }
+        }
+        regions.retain(is_asked);
+        Overlap { inside, regions }
+    }
+
+    /// The set's number of a vertex that is inside.
+    fn node(&self, side: usize, vertex: u32) -> Option<u32> {
+        let n_before = match side {
+            0 => 0,
+            _ => self.parts[0].n_parts(),
+        };
+        let part = self.parts[side].inside(vertex)?;
+        Some((self.contacts.points().len() + n_before) as u32 + part)
+    }
+
+    fn position(&self, side: usize, vertex: u32) -> Vector {
+        self.bodies[side].positions().point(vertex as usize)
+    }
+
+    /// The pieces of crossed edges that are inside, sorted by edge; joins what they join.
+    fn pieces(&self, side: usize, sets: &mut Sets) -> Vec<Piece> {
+        let mut pieces = Vec::new();
+        for crossed in self.crossings[side].on_edges.chunk_by(|x, y| x.0 == y.0) {
+            let edge = crossed[0].0;
+            let mut points: Vec<u32> = crossed.iter().map(|&(_, point)| point).collect();
+            self.sort_along(side, edge, &mut points);
+            match self.cut(side, edge, &points) {
+                Some(cut) => {
+                    for (piece, ends) in cut {
+                        sets.join(ends[0], ends[1]);
+                        pieces.push(piece);
+                    }
+                }
+                None => {
+                    let ends = edge.map(|vertex| self.node(side, vertex));
+                    let nodes: Vec<u32> = points
+                        .into_iter()
+                        .chain(ends.into_iter().flatten())
+                        .collect();
+                    for pair in nodes.windows(2) {
+                        sets.join(pair[0], pair[1]);
+                    }
+                }
+            }
+        }
+        pieces
+    }
+
+    /// Puts points in their order along an edge.
+    fn sort_along(&self, side: usize, edge: [u32; 2], points: &mut [u32]) {
+        let [from, to] = edge.map(|vertex| self.position(side, vertex));
+        let along = sub(to, from);
+        let axis = (1..3).fold(0, |best, k| {
+            if along[k].abs() > along[best].abs() {
+                k
+            } else {
+                best
+            }
+        });
+        let height =
+            |point: u32| self.contacts.points()[point as usize][axis] * along[axis].signum();
+        points.sort_by(|&p, &q| height(p).total_cmp(&height(q)).then(p.cmp(&q)));
+    }
+
+    /// The pieces of one edge that are inside, each with the two numbers that it joins; none where the edge
+    /// meets more than faces.
+    fn cut(&self, side: usize, edge: [u32; 2], points: &[u32]) -> Option<Vec<(Piece, [u32; 2])>> {
+        let [low, high] = edge;
+        let crossings = &self.crossings[side];
+        if crossings.is_on(low) || crossings.is_on(high) {
+            return None;
+        }
+        let mut pieces = Vec::new();
+        let mut winding = self.parts[side].winding(low);
+        let mut last = (self.node(side, low), self.position(side, low));
+        let ends = points.iter().map(|&point| Some(point)).chain([None]);
+        for end in ends {
+            let next = match end {
+                Some(point) => (Some(point), self.contacts.points()[point as usize]),
+                None => (self.node(side, high), self.position(side, high)),
+            };
+            if winding != 0 {
+                let (from, to) = (last.0?, next.0?);
+                let piece = Piece {
+                    edge,
+                    from: last.1,
+                    to: next.1,
+                    node: from,
+                };
+                pieces.push((piece, [from, to]));
+            }
+            if let Some(point) = end {
+                let Feature::Face(face) = self.contacts.names()[point as usize].features[1 - side]
+                else {
+                    return None;
+                };
+                winding += self.step(side, low, face);
+            }
+            last = next;
+        }
+        (winding == self.parts[side].winding(high)).then_some(pieces)
+    }
+
+    /// By how much the winding number grows where an edge crosses a face of the other body, coming from a vertex.
+    fn step(&self, side: usize, from: u32, face: u32) -> i32 {
+        let corners = self.bodies[1 - side].elements().corners(face as usize);
+        let [a, b, c] = [0, 1, 2].map(|k| self.position(1 - side, corners[k]));
+        match orient3d(&a, &b, &c, &self.position(side, from)) {
+            // Beneath the face: out through it.
+            Sign::Positive => -1,
+            Sign::Zero => 0,
+            Sign::Negative => 1,
+        }
+    }
+
+    /// Whether the bodies meet in a region by edges that cross faces only.
+    fn is_generic(&self, region: &Region) -> bool {
+        region.contacts.iter().all(|&contact| {
+            let contact = contact as usize;
+            let is_crossing = |point: &u32| {
+                let PointName { features, .. } = self.contacts.names()[*point as usize];
+                matches!(
+                    features,
+                    [Feature::Edge(_), Feature::Face(_)] | [Feature::Face(_), Feature::Edge(_)]
+                )
+            };
+            self.contacts.shape(contact) == Shape::Segment
+                && self.contacts.is_directed(contact)
+                && self.contacts.corners(contact).iter().all(is_crossing)
+        })
+    }
+
+    /// How far a region extends along a direction.
+    fn extent(&self, region: &Region, normal: Vector) -> f64 {
+        let corners = region.contacts.iter().flat_map(|&contact| {
+            let corners = self.contacts.corners(contact as usize).iter();
+            corners.map(|&point| self.contacts.points()[point as usize])
+        });
+        let inside = (0..2).flat_map(|side| {
+            let vertices = region.inside[side].iter();
+            vertices.map(move |&vertex| self.position(side, vertex))
+        });
+        let heights = corners.chain(inside).map(|point| dot(point, normal));
+        let (low, high) = heights
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), height| {
+                (low.min(height), high.max(height))
+            });
+        (high - low).max(0.0)
+    }
+
+    /// The volume of each region: a sixth of the sum of `(x - o) · ((p - o) × (q - o))` over the sides pq of
+    /// all faces' parts inside, x any point of the face, o any one point.
+    fn volumes(
+        &self,
+        regions: &[Region],
+        pieces: &[Vec<Piece>; 2],
+        region: &mut dyn FnMut(u32) -> usize,
+    ) -> Vec<f64> {
+        let origins: Vec<Vector> = regions
+            .iter()
+            .map(|region| scaled(add(region.bounds[0], region.bounds[1]), 0.5))
+            .collect();
+        let mut volumes = vec![0.0; regions.len()];
+        let mut add_side = |at: usize, on: Vector, from: Vector, to: Vector| {
+            let [x, p, q] = [on, from, to].map(|point| sub(point, origins[at]));
+            volumes[at] += dot(x, cross(p, q)) / 6.0;
+        };
+        for (number, held) in regions.iter().enumerate() {
+            for &contact in &held.contacts {
+                let contact = contact as usize;
+                let &[from, to] = self.contacts.corners(contact) else {
+                    continue;
+                };
+                let [from, to] = [from, to].map(|point| self.contacts.points()[point as usize]);
+                let [_, a, _, b] = self.contacts.rows()[contact];
+                if held.bodies != [0, 1].map(|side| self.crossings[side].body) {
+                    continue;
+                }
+                let on = |side: usize, face: u32| {
+                    let corners = self.bodies[side].elements().corners(face as usize);
+                    self.position(side, corners[0])
+                };
+                // What is inside lies to the left as seen from outside of a, to the right as seen from outside of b.
+                add_side(number, on(0, a), from, to);
+                add_side(number, on(1, b), to, from);
+            }
+        }
+        for side in 0..2 {
+            let Elements::Triangles(faces) = self.bodies[side].elements() else {
+                continue;
+            };
+            let crossings = &self.crossings[side];
+            for face in faces {
+                let is_touched = |vertex: &u32| {
+                    self.parts[side].inside(*vertex).is_some() || crossings.is_touched(*vertex)
+                };
+                if !face.iter().any(is_touched) {
+                    continue;
+                }
+                let on = self.position(side, face[0]);
+                for k in 0..3 {
+                    let (from, to) = (face[k], face[(k + 1) % 3]);
+                    if !crossings.is_crossed([from, to]) {
+                        if let (Some(node), Some(_)) = (self.node(side, from), self.node(side, to))
+                        {
+                            let (p, q) = (self.position(side, from), self.position(side, to));
+                            add_side(region(node), on, p, q);
+                        }
+                        continue;
+                    }
+                    let name = crossings.name([from, to]);
+                    let is_forward = crossings.lowest(from) == name[0];
+                    let first = pieces[side].partition_point(|piece| piece.edge < name);
+                    for piece in pieces[side][first..]
+                        .iter()
+                        .take_while(|piece| piece.edge == name)
+                    {
+                        let (p, q) = if is_forward {
+                            (piece.from, piece.to)
+                        } else {
+                            (piece.to, piece.from)
+                        };
+                        add_side(region(piece.node), on, p, q);
+                    }
+                }
+            }
+        }
+        volumes
+    }
+}

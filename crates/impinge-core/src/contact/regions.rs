@@ -1,0 +1,276 @@
+//! Regions: contacts that hang together, each with a position, a size, a normal and a depth.
+//!
+//! Two contacts belong together when they have a point in common. Where bodies are closed, what lies inside
+//! holds regions together too ([`Penetration`](super::Penetration)).
+//!
+//! **Normal.** Let L be the curves of a region, directed, and `a = ½ ∮ x × dx` the area that they span. By
+//! Stokes' theorem `a` is the integral of the first body's normals over what of it lies inside the second one;
+//! when the first body moves by u, the volume that they have in common grows by `a · u`. So `-a` is
+//! the way in which that volume falls fastest (Allard et al., *Volume contact constraints at arbitrary resolution*, 2010):
+//! the direction in which to push the first body. Where bodies touch in a patch only, `a` is the area of that.
+
+use super::curves::{Curves, distance};
+use super::{Contacts, Shape};
+
+/// Contacts of two bodies (or within one) that hang together.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Region {
+    /// The bodies by their [`index`](crate::BodyId::index).
+    pub bodies: [u32; 2],
+    /// Numbers of contacts: rows of the pairs, sorted.
+    pub contacts: Vec<u32>,
+    /// The middle of the region: of its curves by length, else of its patches by area, else of its points.
+    pub position: [f64; 3],
+    /// The lowest and the highest coordinates of its points, and of the vertices inside.
+    pub bounds: [[f64; 3]; 2],
+    /// The length of its curves, in the unit of the scene.
+    pub length: f64,
+    /// The area of its patches, where faces of both bodies lie in one plane; in square units.
+    pub patch_area: f64,
+    /// The area that its curves span, as a vector: of the first body's surface inside the second one,
+    /// projected. In square units.
+    pub area: [f64; 3],
+    /// The unit direction in which to push the first body so that the overlap shrinks fastest; the second one
+    /// goes the other way. None where curves span no area in sum (a rod through a wall) or faces are not
+    /// oriented consistently.
+    pub normal: Option<[f64; 3]>,
+    /// Vertices of the first body inside the second one, and the other way round: sorted. Empty where it was
+    /// not asked for.
+    pub inside: [Vec<u32>; 2],
+    /// How far the region extends along the normal: pushed so far, the bodies no longer overlap in this
+    /// region. None without a normal, or where it was not asked what is inside.
+    pub depth: Option<f64>,
+    /// The volume that the bodies have in common, in cubic units; a cavity that no edge joins to its surroundings
+    /// is a region of negative volume. None where it was not asked what is inside, or where the bodies meet
+    /// otherwise than by edges that cross faces (vertices on faces, edges on edges, common planes).
+    pub volume: Option<f64>,
+}
+
+/// Sets of numbers that are joined step by step. The lowest number of a set stands for it.
+#[derive(Debug, Clone)]
+pub(super) struct Sets(Vec<u32>);
+
+impl Sets {
+    pub fn new(n: usize) -> Self {
+        Sets((0u32..).take(n).collect())
+    }
+
+    pub fn find(&mut self, mut x: u32) -> u32 {
+        while self.0[x as usize] != x {
+            let above = self.0[self.0[x as usize] as usize];
+            self.0[x as usize] = above;
+            x = above;
+        }
+        x
+    }
+
+    pub fn join(&mut self, x: u32, y: u32) {
+        let (x, y) = (self.find(x), self.find(y));
+        self.0[x.max(y) as usize] = x.min(y);
+    }
+}
+
+/// Joins the points of each contact.
+pub(super) fn join_contacts(contacts: &Contacts, sets: &mut Sets) {
+    for contact in 0..contacts.len() {
+        for pair in contacts.corners(contact).windows(2) {
+            sets.join(pair[0], pair[1]);
+        }
+    }
+}
+
+pub(super) type Vector = [f64; 3];
+
+pub(super) fn sub(p: Vector, q: Vector) -> Vector {
+    [0, 1, 2].map(|k| p[k] - q[k])
+}
+
+pub(super) fn add(p: Vector, q: Vector) -> Vector {
+    [0, 1, 2].map(|k| p[k] + q[k])
+}
+
+pub(super) fn scaled(p: Vector, factor: f64) -> Vector {
+    p.map(|x| x * factor)
+}
+
+pub(super) fn cross(p: Vector, q: Vector) -> Vector {
+    [0, 1, 2].map(|k| {
+        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        p[i] * q[j] - p[j] * q[i]
+    })
+}
+
+pub(super) fn dot(p: Vector, q: Vector) -> f64 {
+    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+}
+
+/// The regions of sets of points, in the order of their first contacts, and the region of each point that
+/// is the lowest of its set ([`NO_REGION`] elsewhere).
+pub(super) fn regions(
+    contacts: &Contacts,
+    curves: &Curves,
+    sets: &mut Sets,
+) -> (Vec<Region>, Vec<u32>) {
+    let mut region_of = vec![NO_REGION; sets.0.len()];
+    let mut regions: Vec<Region> = Vec::new();
+    let mut middles: Vec<Middles> = Vec::new();
+    for contact in 0..contacts.len() {
+        let corners = contacts.corners(contact);
+        let Some(&first) = corners.first() else {
+            continue;
+        };
+        let region = &mut region_of[sets.find(first) as usize];
+        if *region == NO_REGION {
+            *region = regions.len() as u32;
+            let at = contacts.points()[first as usize];
+            regions.push(Region::at(contacts.names()[first as usize].bodies, at));
+            middles.push(Middles::default());
+        }
+        let at = *region as usize;
+        let (region, middle) = (&mut regions[at], &mut middles[at]);
+        region.contacts.push(contact as u32);
+        let points: Vec<Vector> = corners
+            .iter()
+            .map(|&point| contacts.points()[point as usize])
+            .collect();
+        for &point in &points {
+            region.cover(point);
+            middle.points.take(point, 1.0);
+            middle.is_single &= point.iter().all(|&x| f64::from(x as f32) == x);
+        }
+        if contacts.shape(contact) == Shape::Polygon {
+            for k in 2..points.len() {
+                let (p, q, r) = (points[0], points[k - 1], points[k]);
+                let area = scaled(cross(sub(q, p), sub(r, p)), 0.5);
+                let size = dot(area, area).sqrt();
+                region.patch_area += size;
+                middle.patch = add(middle.patch, area);
+                middle
+                    .patches
+                    .take(scaled(add(add(p, q), r), 1.0 / 3.0), size);
+            }
+        }
+    }
+    for curve in 0..curves.len() {
+        let points = curves.points(curve);
+        let at = region_of[sets.find(points[0]) as usize] as usize;
+        let (region, middle) = (&mut regions[at], &mut middles[at]);
+        let origin = scaled(add(region.bounds[0], region.bounds[1]), 0.5);
+        let n_links = points.len() - usize::from(!curves.is_closed(curve));
+        for k in 0..n_links {
+            let [p, q] = [k, (k + 1) % points.len()].map(|k| contacts.points()[points[k] as usize]);
+            let length = distance(p, q);
+            region.length += length;
+            middle.curves.take(scaled(add(p, q), 0.5), length);
+            if curves.is_closed(curve) && curves.is_directed(curve) {
+                let area = scaled(cross(sub(p, origin), sub(q, origin)), 0.5);
+                region.area = add(region.area, area);
+            }
+        }
+    }
+    for (region, middle) in regions.iter_mut().zip(middles) {
+        region.finish(middle);
+    }
+    (regions, region_of)
+}
+
+/// No region has this number.
+pub(super) const NO_REGION: u32 = u32::MAX;
+
+/// Weighted sums of places.
+#[derive(Default)]
+struct Sum {
+    place: Vector,
+    weight: f64,
+}
+
+impl Sum {
+    fn take(&mut self, place: Vector, weight: f64) {
+        self.place = add(self.place, scaled(place, weight));
+        self.weight += weight;
+    }
+
+    fn middle(&self) -> Option<Vector> {
+        (self.weight > 0.0).then(|| scaled(self.place, 1.0 / self.weight))
+    }
+}
+
+struct Middles {
+    /// Whether all coordinates are numbers of `f32`.
+    is_single: bool,
+    curves: Sum,
+    patches: Sum,
+    points: Sum,
+    /// The area of all patches as a vector.
+    patch: Vector,
+}
+
+impl Default for Middles {
+    fn default() -> Self {
+        Middles {
+            is_single: true,
+            curves: Sum::default(),
+            patches: Sum::default(),
+            points: Sum::default(),
+            patch: [0.0; 3],
+        }
+    }
+}
+
+impl Region {
+    pub(super) fn at(bodies: [u32; 2], point: Vector) -> Self {
+        Region {
+            bodies,
+            contacts: Vec::new(),
+            position: point,
+            bounds: [point; 2],
+            length: 0.0,
+            patch_area: 0.0,
+            area: [0.0; 3],
+            normal: None,
+            inside: [Vec::new(), Vec::new()],
+            depth: None,
+            volume: None,
+        }
+    }
+
+    /// Extends the bounds.
+    pub(super) fn cover(&mut self, point: Vector) {
+        let [low, high] = &mut self.bounds;
+        for k in 0..3 {
+            low[k] = low[k].min(point[k]);
+            high[k] = high[k].max(point[k]);
+        }
+    }
+
+    /// An area that rounded coordinates may add up to where exact ones cancel: their error along all curves.
+    fn noise(&self, is_single: bool) -> f64 {
+        let epsilon = if is_single {
+            f64::from(f32::EPSILON)
+        } else {
+            f64::EPSILON
+        };
+        let size = self
+            .bounds
+            .as_flattened()
+            .iter()
+            .fold(0.0f64, |size, x| size.max(x.abs()));
+        4.0 * epsilon * size * (self.length + distance(self.bounds[0], self.bounds[1]))
+    }
+
+    fn finish(&mut self, middles: Middles) {
+        let is_single = middles.is_single;
+        let found = middles.curves.middle();
+        let found = found.or_else(|| middles.patches.middle());
+        self.position = found
+            .or_else(|| middles.points.middle())
+            .unwrap_or(self.position);
+        let noise = self.noise(is_single);
+        let normal = |area: Vector| {
+            let length = dot(area, area).sqrt();
+            (length > noise).then(|| scaled(area, -1.0 / length))
+        };
+        self.normal = normal(self.area).or_else(|| normal(middles.patch));
+    }
+}

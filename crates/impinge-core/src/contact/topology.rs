@@ -1,0 +1,75 @@
+//! The topology of a closed surface: which vertices are joined by edges.
+//!
+//! A surface is closed when every edge has as many faces along it as against it; then winding numbers are
+//! whole and do not change but at faces. Several shells, and edges of more than two faces, are fine.
+//!
+//! Cost: `O(n log n)` once per topology.
+
+use rayon::prelude::*;
+
+use crate::error::Error;
+use crate::scene::BodyId;
+
+/// The edges at each vertex.
+#[derive(Debug)]
+pub(super) struct Topology {
+    starts: Vec<u32>,
+    neighbours: Vec<u32>,
+}
+
+impl Topology {
+    /// # Errors
+    /// The surface is not closed; the error names an edge.
+    pub fn new(body: BodyId, faces: &[[u32; 3]], n_vertices: usize) -> Result<Self, Error> {
+        // Low vertex, high vertex, direction: packed so that sorting brings an edge's faces together.
+        let mut sides: Vec<(u64, bool)> = faces
+            .par_iter()
+            .flat_map_iter(|face| {
+                (0..3).filter_map(|k| {
+                    let (from, to) = (face[k], face[(k + 1) % 3]);
+                    let (low, high) = (from.min(to), from.max(to));
+                    // A face that names a vertex twice has one edge there and back.
+                    (low != high).then_some((u64::from(low) << 32 | u64::from(high), from < to))
+                })
+            })
+            .collect();
+        sides.par_sort_unstable();
+        let mut edges: Vec<[u32; 2]> = Vec::with_capacity(sides.len() / 2);
+        for edge in sides.chunk_by(|x, y| x.0 == y.0) {
+            let ends = [(edge[0].0 >> 32) as u32, edge[0].0 as u32];
+            let n_forward = edge.iter().filter(|side| side.1).count();
+            let n_backward = edge.len() - n_forward;
+            if n_forward != n_backward {
+                return Err(Error::NotClosed {
+                    body,
+                    edge: ends,
+                    n_forward,
+                    n_backward,
+                });
+            }
+            edges.push(ends);
+        }
+        let mut starts = vec![0u32; n_vertices + 2];
+        for end in edges.as_flattened() {
+            starts[*end as usize + 2] += 1;
+        }
+        for vertex in 2..starts.len() {
+            starts[vertex] += starts[vertex - 1];
+        }
+        let mut neighbours = vec![0; 2 * edges.len()];
+        for &[low, high] in &edges {
+            for (at, other) in [(low, high), (high, low)] {
+                let place = &mut starts[at as usize + 1];
+                neighbours[*place as usize] = other;
+                *place += 1;
+            }
+        }
+        Ok(Topology { starts, neighbours })
+    }
+
+    /// The vertices that share an edge with this one; none for a vertex of no face.
+    pub fn neighbours(&self, vertex: u32) -> &[u32] {
+        let at = vertex as usize;
+        &self.neighbours[self.starts[at] as usize..self.starts[at + 1] as usize]
+    }
+}

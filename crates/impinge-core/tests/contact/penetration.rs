@@ -1,0 +1,308 @@
+//! What lies inside, and the regions' normals, depths and volumes.
+
+use impinge_core::contact::{Contacts, Overlap, Penetration, Region};
+use impinge_core::{Query, Scene};
+use impinge_scenes::{Model, surfaces};
+
+use super::detect;
+
+fn overlap(a: &Model, b: &Model) -> Overlap {
+    let mut scene = Scene::new();
+    let ids = [a, b].map(|model| model.add_to(&mut scene).unwrap());
+    let pairs = detect(&scene, &Query::between(ids[0], ids[1]));
+    let contacts = Contacts::new(&scene, &pairs).unwrap();
+    let mut penetration = Penetration::new();
+    let found = penetration
+        .between(&scene, &contacts, ids[0], ids[1])
+        .unwrap();
+    // Whichever is named first, and knowing the bodies from before.
+    let again = penetration
+        .between(&scene, &contacts, ids[1], ids[0])
+        .unwrap();
+    assert_eq!(found, again);
+    found
+}
+
+/// The winding number by solid angles (Van Oosterom & Strackee 1983), in floating point.
+fn winding(model: &Model, [x, y, z]: [f32; 3]) -> f64 {
+    let at = [x, y, z].map(f64::from);
+    let mut sum = 0.0;
+    for face in 0..model.elements.len() {
+        let corners = model.elements.corners(face);
+        let [a, b, c] = [0, 1, 2].map(|k| {
+            let p = model.positions[corners[k] as usize].map(f64::from);
+            [0, 1, 2].map(|k| p[k] - at[k])
+        });
+        let dot = |p: [f64; 3], q: [f64; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
+        let length = |p| f64::sqrt(dot(p, p));
+        let det = a[0] * (b[1] * c[2] - b[2] * c[1])
+            + a[1] * (b[2] * c[0] - b[0] * c[2])
+            + a[2] * (b[0] * c[1] - b[1] * c[0]);
+        let (la, lb, lc) = (length(a), length(b), length(c));
+        let around = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+        sum += 2.0 * det.atan2(around);
+    }
+    sum / (4.0 * std::f64::consts::PI)
+}
+
+fn volume(model: &Model) -> f64 {
+    (0..model.elements.len())
+        .map(|face| {
+            let corners = model.elements.corners(face);
+            let [a, b, c] = [0, 1, 2].map(|k| model.positions[corners[k] as usize].map(f64::from));
+            (a[0] * (b[1] * c[2] - b[2] * c[1])
+                + a[1] * (b[2] * c[0] - b[0] * c[2])
+                + a[2] * (b[0] * c[1] - b[1] * c[0]))
+                / 6.0
+        })
+        .sum()
+}
+
+/// Two models as the shells of one body.
+fn both(a: &Model, b: &Model) -> Model {
+    let n = a.positions.len() as u32;
+    let faces: Vec<[u32; 3]> = [(a, 0), (b, n)]
+        .into_iter()
+        .flat_map(|(model, first)| {
+            (0..model.elements.len()).map(move |face| {
+                let corners = model.elements.corners(face);
+                [0, 1, 2].map(|k| corners[k] + first)
+            })
+        })
+        .collect();
+    Model {
+        positions: [&a.positions[..], &b.positions[..]].concat(),
+        elements: faces.into(),
+    }
+}
+
+fn turned(model: &Model) -> Model {
+    // 3, 4, 5 and 5, 12, 13 about two axes.
+    let (c, s, d, t) = (0.6, 0.8, 12.0 / 13.0, 5.0 / 13.0);
+    model.mapped(|[x, y, z]| {
+        let (x, y) = (c * x - s * y, s * x + c * y);
+        [x, d * y - t * z, t * y + d * z]
+    })
+}
+
+#[test]
+fn vertices_inside_are_those_of_solid_angles() {
+    let ball = surfaces::bumpy_ball(1_500, 0.25);
+    for other in [
+        surfaces::torus(40, 24, 0.5, 0.2).translated([0.3, 0.1, 0.05]),
+        ball.translated([0.3, 0.21, 0.11]),
+        both(
+            &surfaces::ball(300).scaled(0.3),
+            &surfaces::ball(300).translated([0.6, 0.1, 0.0]),
+        ),
+    ] {
+        let found = overlap(&ball, &other);
+        for (side, (model, there)) in [(&ball, &other), (&other, &ball)].into_iter().enumerate() {
+            let expected: Vec<u32> = (0u32..)
+                .zip(&model.positions)
+                .filter(|(_, at)| winding(there, **at).abs() > 0.5)
+                .map(|(vertex, _)| vertex)
+                .collect();
+            assert!(expected.len() > 20);
+            assert_eq!(found.inside[side], expected);
+        }
+    }
+}
+
+/// The unit direction and what it says.
+fn normal(region: &Region) -> [f64; 3] {
+    region.normal.expect("a normal")
+}
+
+#[test]
+fn cubes_overlap_in_a_box() {
+    let cube = surfaces::cube([0.0; 3], 1.0);
+    let moved = cube.translated([0.31, 0.42, 0.73]);
+    for (a, b) in [
+        (cube.clone(), moved.clone()),
+        (turned(&cube), turned(&moved)),
+    ] {
+        let found = overlap(&a, &b);
+        assert_eq!(found.regions.len(), 1);
+        let expected = 0.69 * 0.58 * 0.27;
+        let volume = found.volume().unwrap();
+        assert!((volume - expected).abs() < 1e-6, "{volume} {expected}");
+        // The overlap's faces have areas 0.58 · 0.27, 0.69 · 0.27 and 0.69 · 0.58.
+        let area = found.regions[0].area;
+        let size = area.iter().map(|x| x * x).sum::<f64>();
+        let expected: f64 = [0.58 * 0.27, 0.69 * 0.27, 0.69 * 0.58]
+            .iter()
+            .map(|x| x * x)
+            .sum();
+        assert!((size - expected).abs() < 1e-6, "{area:?}");
+    }
+}
+
+/// The derivative of the volume by the position of the first body is the area.
+#[test]
+fn the_area_is_how_the_volume_grows() {
+    let a = surfaces::bumpy_ball(2_000, 0.2);
+    let b = surfaces::torus(40, 24, 0.4, 0.2).translated([0.4, 0.1, 0.05]);
+    let found = overlap(&a, &b);
+    let area = found.regions.iter().fold([0.0; 3], |sum, region| {
+        [0, 1, 2].map(|k| sum[k] + region.area[k])
+    });
+    let step = 1e-3f32;
+    for axis in 0..3 {
+        let mut there = [0.0; 3];
+        there[axis] = step;
+        let ahead = overlap(&a.translated(there), &b).volume().unwrap();
+        let behind = overlap(&a.translated(there.map(|x| -x)), &b)
+            .volume()
+            .unwrap();
+        let slope = (ahead - behind) / (2.0 * f64::from(step));
+        assert!(
+            (slope - area[axis]).abs() < 2e-3,
+            "{axis}: {slope} {area:?}"
+        );
+    }
+}
+
+#[test]
+fn a_ball_that_dips_into_a_floor() {
+    let floor = surfaces::cuboid([-2.1, -2.2, -1.0], [2.3, 2.0, 0.0]);
+    let depth = 0.1;
+    let ball = surfaces::icosphere(5).translated([0.123, 0.071, 0.5 - depth]);
+    let found = overlap(&ball, &floor);
+    assert_eq!(found.regions.len(), 1);
+    let region = &found.regions[0];
+    assert!(normal(region)[2] > 0.999_99);
+    assert!(
+        (region.depth.unwrap() - f64::from(depth)).abs() < 2e-3,
+        "{region:?}"
+    );
+    let h = f64::from(depth);
+    let cap = std::f64::consts::PI * h * h * (1.5 - h) / 3.0;
+    assert!((found.volume().unwrap() / cap - 1.0).abs() < 0.01);
+    assert!(region.position[2].abs() < 1e-6 && (region.position[0] - 0.123).abs() < 1e-3);
+    // The other way round the normal is the opposite one.
+    let other = overlap(&floor, &ball);
+    assert!(normal(&other.regions[0])[2] < -0.999_99);
+    assert!((other.volume().unwrap() - found.volume().unwrap()).abs() < 1e-9);
+}
+
+#[test]
+fn regions_are_told_apart_and_held_together() {
+    let floor = surfaces::cuboid([-4.1, -4.2, -1.0], [4.3, 4.0, 0.0]);
+    // Two balls of one body on two triangles of the floor: two regions.
+    let ball = surfaces::ball(500);
+    let balls = both(
+        &ball.translated([-1.07, 0.11, 0.4]),
+        &ball.translated([1.03, 0.13, 0.45]),
+    );
+    let found = overlap(&balls, &floor);
+    assert_eq!(found.regions.len(), 2);
+    let inside: usize = found
+        .regions
+        .iter()
+        .map(|region| region.inside[0].len())
+        .sum();
+    assert_eq!(inside, found.inside[0].len());
+    let mut depths: Vec<f64> = found
+        .regions
+        .iter()
+        .map(|region| region.depth.unwrap())
+        .collect();
+    depths.sort_by(f64::total_cmp);
+    assert!(
+        (depths[0] - 0.05).abs() < 5e-3 && (depths[1] - 0.1).abs() < 5e-3,
+        "{depths:?}"
+    );
+    // A rod through the floor, without a vertex inside: two loops, one region, nowhere to push.
+    let rod = surfaces::cuboid([0.11, 0.21, -3.0], [0.31, 0.42, 3.0]);
+    let found = overlap(&rod, &floor);
+    assert_eq!(found.regions.len(), 1);
+    assert_eq!(
+        (found.regions[0].normal, found.regions[0].depth),
+        (None, None)
+    );
+    assert!(found.inside[0].is_empty());
+    let expected = 0.2 * 0.21;
+    assert!(
+        (found.volume().unwrap() - expected).abs() < 1e-6,
+        "{:?}",
+        found.volume()
+    );
+}
+
+#[test]
+fn a_body_inside_another_is_a_region_without_contacts() {
+    let big = surfaces::bumpy_ball(1_000, 0.1).scaled(3.0);
+    let small = surfaces::torus(20, 12, 0.2, 0.1);
+    let found = overlap(&big, &small);
+    assert_eq!(found.regions.len(), 1);
+    assert!(found.regions[0].contacts.is_empty());
+    assert_eq!(found.inside[1].len(), small.positions.len());
+    assert!(found.inside[0].is_empty());
+    assert!((found.volume().unwrap() - volume(&small)).abs() < 1e-9);
+    // Inside the hole of a ring is outside.
+    let ring = surfaces::torus(40, 20, 1.0, 0.3);
+    let found = overlap(&ring, &surfaces::ball(100));
+    assert!(found.regions.is_empty() && found.volume() == Some(0.0));
+}
+
+#[test]
+fn touching_bodies_have_a_normal_and_no_depth() {
+    let low = surfaces::cuboid([-1.0, -1.0, -1.0], [1.0, 1.0, 0.0]);
+    let high = surfaces::cuboid([-0.5, -0.75, 0.0], [0.5, 0.5, 2.0]);
+    let found = overlap(&high, &low);
+    assert_eq!(found.regions.len(), 1);
+    let region = &found.regions[0];
+    assert_eq!(normal(region), [0.0, 0.0, 1.0]);
+    assert_eq!(region.depth, Some(0.0));
+    assert_eq!(region.volume, None);
+    assert!((region.patch_area - 1.25).abs() < 1e-12 && (region.length - 4.5).abs() < 1e-12);
+    assert!(found.inside.iter().all(Vec::is_empty));
+}
+
+/// Coincident bodies, and bodies that share a plane: degenerate all over, and still an answer.
+#[test]
+fn degenerate_overlaps_do_not_panic() {
+    let cube = surfaces::cube([0.0; 3], 1.0);
+    for offset in [
+        [0.0; 3],
+        [0.5, 0.0, 0.0],
+        [0.5, 0.5, 0.0],
+        [0.5, 0.5, 0.5],
+        [1.0, 0.0, 0.0],
+        [1.0; 3],
+    ] {
+        let found = overlap(&cube, &cube.translated(offset));
+        assert_eq!(found.regions.len(), 1, "{offset:?}");
+        // Corners of one that are strictly inside the other, as solid angles see them.
+        for corner in &found.inside[1] {
+            let at = cube.positions[*corner as usize];
+            let at = [0, 1, 2].map(|k| at[k] + offset[k]);
+            assert!(at.iter().all(|x| x.abs() < 0.5), "{offset:?}");
+        }
+        let expected = usize::from(offset == [0.5; 3]);
+        assert_eq!(
+            found.inside.each_ref().map(Vec::len),
+            [expected; 2],
+            "{offset:?}"
+        );
+    }
+}
+
+#[test]
+fn open_surfaces_are_refused_by_name() {
+    let mut scene = Scene::new();
+    let sheet = surfaces::cloth(4, 4, 0.3).add_to(&mut scene).unwrap();
+    let ball = surfaces::ball(100).add_to(&mut scene).unwrap();
+    let pairs = detect(&scene, &Query::between(sheet, ball));
+    let contacts = Contacts::new(&scene, &pairs).unwrap();
+    let error = Penetration::new()
+        .between(&scene, &contacts, ball, sheet)
+        .unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .starts_with("body 0: the surface is not closed"),
+        "{error}"
+    );
+}
