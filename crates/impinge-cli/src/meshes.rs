@@ -59,6 +59,13 @@ impl<'a> Part<'a> {
             elements: match body.elements() {
                 Elements::Triangles(faces) => impinge_io::Elements::Triangles(faces.clone()),
                 Elements::Tetrahedra(tets) => impinge_io::Elements::Tetrahedra(tets.clone()),
+                // Mesh files hold surfaces and solids: an edge is written as the flat triangle that it is.
+                Elements::Edges(edges) => {
+                    impinge_io::Elements::Triangles(edges.iter().map(|&[a, b]| [a, b, b]).collect())
+                }
+                Elements::Points(points) => {
+                    impinge_io::Elements::Triangles(points.iter().map(|&[a]| [a; 3]).collect())
+                }
             },
             colors: primitive_colors,
             colliding,

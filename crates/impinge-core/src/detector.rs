@@ -2,6 +2,7 @@
 
 #[cfg(feature = "gpu")]
 mod gpu;
+mod steps;
 
 use std::time::Instant;
 
@@ -12,6 +13,7 @@ use crate::cpu::workers::Workers;
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::naive;
+use crate::narrow::Intersection;
 use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
@@ -39,6 +41,7 @@ pub struct Detector {
     workers: Workers,
     clusters: Clusters,
     cells: Cells,
+    steps: steps::Steps,
     #[cfg(feature = "gpu")]
     gpu: Option<crate::gpu::Engine>,
 }
@@ -69,6 +72,7 @@ impl Detector {
             pairs: Pairs::default(),
             clusters: Clusters::new(settings.instruction_set),
             cells: Cells::new(settings.instruction_set),
+            steps: steps::Steps::default(),
             settings,
         })
     }
@@ -122,7 +126,16 @@ impl Detector {
             Method::Naive => {
                 self.frame.check(scene)?;
                 stats.time("naive", |stats| {
-                    naive::run(scene, &self.frame, control, keys, stats)
+                    naive::run(
+                        &Intersection,
+                        scene,
+                        &self.frame,
+                        control,
+                        stats,
+                        |_, key, ()| {
+                            keys.push(key);
+                        },
+                    )
                 })?;
             }
             Method::Cells => {

@@ -1,4 +1,4 @@
-use crate::scene::BodyId;
+use crate::ids::BodyId;
 
 /// Everything that can go wrong, by name: which body, which index, and both numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

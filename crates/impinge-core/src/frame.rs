@@ -1,9 +1,11 @@
-//! One question about one scene, resolved: who takes part, in what order, who meets whom.
+//! One question about one scene, resolved: which layers take part, in what order, which meet and under which test.
 //!
-//! The primitives of all participants are numbered through, body after body in slot order:
-//! primitive `i` of participant `p` has the global number `first(p) + i`. A pair is then one
-//! 64-bit key, `lower << 32 | higher`, and sorting keys sorts rows
-//! `(body_a, primitive_a, body_b, primitive_b)`.
+//! A *layer* is a part of a body whose elements are of one kind. Intersections are asked of one layer per body: the
+//! elements that it was given as. Steps are asked of up to three: its edges, its vertices and its faces.
+//!
+//! The elements of all layers are numbered through, part after part and body after body in slot order: element `i` of
+//! layer `l` has the global number `first(l) + i`. A pair is then one 64-bit key, `lower << 32 | higher`, and sorting
+//! the keys of one test sorts rows `(body_a, element_a, body_b, element_b)`.
 //!
 //! ```text
 //!  63            32 31             0
@@ -14,31 +16,75 @@
 
 use std::collections::BTreeSet;
 
+use crate::elements::{Kind, Part};
 use crate::error::Error;
+use crate::ids::BodyId;
+use crate::pair_kind::{PairKind, PairKinds};
+use crate::positions::{Positions, check_positions};
 use crate::query::{Query, Scope, SharedVertex};
-use crate::scene::{Body, BodyId, Filter, Kind, Positions, Scene, check_positions};
+use crate::scene::{Body, Filter, Scene};
 
-/// One body that takes part in a frame.
+/// One part of one body that takes part in a frame.
 #[derive(Debug, Clone, Copy)]
-pub struct Participant {
+pub struct Layer {
     /// The body.
     pub id: BodyId,
-    /// Global number of its first primitive.
+    /// Which of its elements.
+    pub part: Part,
+    /// Global number of its first element.
     pub first: u32,
-    /// How many primitives it has.
+    /// How many numbers its elements have. Vertices are numbered as positions are, whether they take part or not.
     pub n_primitives: u32,
     /// What they are.
     pub kind: Kind,
     /// Whether its self-collision is asked for.
     pub within: bool,
+    /// Whether the body has no faces.
+    is_bare: bool,
+    /// Whether the body has no edges either.
+    is_points: bool,
     filter: Filter,
 }
 
-/// Participants and rules; the memory is kept from frame to frame.
+/// What is asked of pairs of elements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Ask {
+    /// Whether those that the bodies were given as share a point.
+    #[default]
+    Intersections,
+    /// Whether and when vertices, edges and faces touch during a step.
+    Impacts,
+    /// Which vertices, edges and faces have boxes that overlap during a step.
+    Candidates(PairKinds),
+}
+
+impl Ask {
+    /// The parts of bodies that are looked at, in the order of their layers. A pair's lower number is then that of the
+    /// element which its kind names first, but for a vertex and a face: there it is the vertex, which lies before faces.
+    fn parts(self) -> &'static [Part] {
+        match self {
+            Ask::Intersections => &[Part::Given],
+            Ask::Impacts | Ask::Candidates(_) => &[Part::Edges, Part::Vertices, Part::Faces],
+        }
+    }
+}
+
+/// The test of a pair of elements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TestId {
+    /// Whether the elements that bodies were given as share a point.
+    Intersection,
+    /// What is asked of vertices, edges and faces.
+    Elements(PairKind),
+}
+
+/// Layers and rules; the memory is kept from frame to frame.
 #[derive(Debug, Default)]
 pub struct Frame {
-    /// In slot order.
-    pub participants: Vec<Participant>,
+    /// Part after part, in slot order.
+    pub layers: Vec<Layer>,
+    /// What is asked of pairs.
+    pub ask: Ask,
     /// The adjacency rule of self-collision.
     pub shared_vertex: SharedVertex,
     between: bool,
@@ -46,33 +92,48 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Resolves a query. Positions that were written in place are not checked yet.
+    /// Resolves a query for intersections. Positions that were written in place are not checked yet.
     pub fn resolve(&mut self, scene: &Scene, query: &Query) -> Result<(), Error> {
-        self.participants.clear();
+        self.resolve_for(scene, query, Ask::Intersections)
+    }
+
+    /// Resolves a query for anything.
+    pub fn resolve_for(&mut self, scene: &Scene, query: &Query, ask: Ask) -> Result<(), Error> {
+        self.layers.clear();
+        self.ask = ask;
         self.shared_vertex = query.shared_vertex;
         if self.ignored != query.ignored {
             self.ignored.clone_from(&query.ignored);
         }
+        if let Scope::Between(a, b) = query.scope {
+            scene.body(a)?;
+            scene.body(b)?;
+            if a == b {
+                return Err(Error::SameBody { body: a });
+            }
+        }
+        for &part in ask.parts() {
+            self.push_part(scene, query, part)?;
+        }
+        Ok(())
+    }
+
+    fn push_part(&mut self, scene: &Scene, query: &Query, part: Part) -> Result<(), Error> {
         match query.scope {
             Scope::Between(a, b) => {
-                scene.body(a)?;
-                scene.body(b)?;
-                if a == b {
-                    return Err(Error::SameBody { body: a });
-                }
                 self.between = true;
                 for id in [a.min(b), a.max(b)] {
-                    self.push(scene, id, false, Some(Filter::default()))?;
+                    self.push(scene, id, part, false, Some(Filter::default()))?;
                 }
             }
             Scope::Within(body) => {
                 self.between = false;
-                self.push(scene, body, true, None)?;
+                self.push(scene, body, part, true, None)?;
             }
             Scope::All { between, within } => {
                 self.between = between;
                 for (id, _) in scene.bodies() {
-                    self.push(scene, id, within, None)?;
+                    self.push(scene, id, part, within, None)?;
                 }
             }
         }
@@ -81,7 +142,7 @@ impl Frame {
 
     /// Refuses positions that were written in place and are not finite or out of range.
     pub fn check(&self, scene: &Scene) -> Result<(), Error> {
-        (0..self.participants.len()).try_for_each(|ix| self.check_one(scene, ix))
+        (0..self.layers.len()).try_for_each(|ix| self.check_one(scene, ix))
     }
 
     /// As [`check`](Frame::check), for one participant.
@@ -90,7 +151,7 @@ impl Frame {
         if body.is_checked() {
             return Ok(());
         }
-        let id = self.participants[participant_ix].id;
+        let id = self.layers[participant_ix].id;
         match body.positions() {
             Positions::F32(positions) => check_positions(id, positions),
             Positions::F64(positions) => check_positions(id, positions),
@@ -101,12 +162,20 @@ impl Frame {
         &mut self,
         scene: &Scene,
         id: BodyId,
+        part: Part,
         within: bool,
         filter: Option<Filter>,
     ) -> Result<(), Error> {
         let body = scene.body(id)?;
+        let elements = body.part(part);
+        if part != Part::Given && elements.is_empty() {
+            return Ok(());
+        }
         let first = self.n_primitives();
-        let n = body.n_primitives() as u64;
+        let n = match part {
+            Part::Vertices => body.n_vertices() as u64,
+            _ => elements.len() as u64,
+        };
         let limit = u64::from(u32::MAX);
         if first + n > limit {
             return Err(Error::TooMany {
@@ -115,33 +184,64 @@ impl Frame {
                 limit,
             });
         }
-        self.participants.push(Participant {
+        self.layers.push(Layer {
             id,
+            part,
             first: first as u32,
             n_primitives: n as u32,
-            kind: body.kind(),
+            kind: elements.kind(),
+            is_bare: body.kind() < Kind::Triangles,
+            is_points: body.kind() == Kind::Points,
             within: within && !self.ignored.contains(&(id, id)),
             filter: filter.unwrap_or(body.filter()),
         });
         Ok(())
     }
 
-    /// Primitives of all participants together.
+    /// Elements of all layers together.
     pub fn n_primitives(&self) -> u64 {
-        self.participants.last().map_or(0, |last| {
+        self.layers.last().map_or(0, |last| {
             u64::from(last.first) + u64::from(last.n_primitives)
         })
     }
 
-    /// Whether pairs of two different participants are asked for at all.
+    /// Whether pairs of two different layers are asked for at all.
     pub fn between(&self) -> bool {
-        self.between && self.participants.len() > 1
+        self.layers.len() > 1 && (self.between || self.ask != Ask::Intersections)
     }
 
-    /// Whether pairs of these two different participants are asked for.
+    /// The test for pairs of elements of two layers, or of one with itself; none where no pair is asked for.
     #[inline]
-    pub fn meets(&self, a_ix: usize, b_ix: usize) -> bool {
-        let (a, b) = (&self.participants[a_ix], &self.participants[b_ix]);
+    pub fn test(&self, a_ix: usize, b_ix: usize) -> Option<TestId> {
+        let (a, b) = (&self.layers[a_ix], &self.layers[b_ix]);
+        let is_asked = if a.id == b.id {
+            a.within
+        } else {
+            self.meet(a, b)
+        };
+        if !is_asked {
+            return None;
+        }
+        if self.ask == Ask::Intersections {
+            return Some(TestId::Intersection);
+        }
+        let kind = PairKind::of(a.part, b.part)?;
+        let is_asked = match self.ask {
+            Ask::Candidates(kinds) => kinds.contains(kind),
+            // What has faces is met by its faces and edges. Of edges without faces a vertex may meet one that its own
+            // edges are neighbours of.
+            _ => match kind {
+                PairKind::VertexFace | PairKind::EdgeEdge => true,
+                PairKind::EdgeVertex => a.is_bare && b.is_bare,
+                PairKind::VertexVertex => a.is_points && b.is_points,
+                PairKind::EdgeFace | PairKind::FaceFace => false,
+            },
+        };
+        is_asked.then_some(TestId::Elements(kind))
+    }
+
+    #[inline]
+    fn meet(&self, a: &Layer, b: &Layer) -> bool {
         self.between
             && a.filter.meets(b.filter)
             && (self.ignored.is_empty()
@@ -151,14 +251,14 @@ impl Frame {
     /// Who a participant meets.
     #[cfg(feature = "gpu")]
     pub fn filter(&self, participant_ix: usize) -> Filter {
-        self.participants[participant_ix].filter
+        self.layers[participant_ix].filter
     }
 
-    /// Pairs of participants, lower first and sorted, that do not meet whatever their filters say.
+    /// Pairs of layers, lower first and sorted, that do not meet whatever their filters say.
     #[cfg(feature = "gpu")]
     pub fn ignored_pairs(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let find = |id: BodyId| {
-            self.participants
+            self.layers
                 .binary_search_by_key(&id, |participant| participant.id)
                 .ok()
         };
@@ -168,16 +268,34 @@ impl Frame {
             .filter_map(move |&(a, b)| Some((find(a)?, find(b)?)))
     }
 
-    /// The body behind a participant.
-    #[inline]
-    pub fn body<'a>(&self, scene: &'a Scene, participant_ix: usize) -> &'a Body {
-        scene.body_in(self.participants[participant_ix].id.slot())
+    /// The elements of a layer, and their numbers.
+    pub(crate) fn elements<'a>(
+        &self,
+        scene: &'a Scene,
+        layer_ix: usize,
+    ) -> impl Iterator<Item = (u32, &'a [u32])> + use<'a> {
+        let Layer { part, first, .. } = self.layers[layer_ix];
+        let elements = self.body(scene, layer_ix).part(part);
+        (0..elements.len()).map(move |ix| {
+            let corners = elements.corners(ix);
+            let number = match part {
+                Part::Vertices => corners[0],
+                _ => ix as u32,
+            };
+            (first + number, corners)
+        })
     }
 
-    /// The participant that a global primitive number belongs to.
+    /// The body behind a layer.
+    #[inline]
+    pub fn body<'a>(&self, scene: &'a Scene, participant_ix: usize) -> &'a Body {
+        scene.body_in(self.layers[participant_ix].id.slot())
+    }
+
+    /// The layer that a global primitive number belongs to.
     #[inline]
     pub fn owner(&self, global: u32) -> usize {
-        owner_by_first(&self.participants, global, |participant| participant.first)
+        owner_by_first(&self.layers, global, |participant| participant.first)
     }
 }
 

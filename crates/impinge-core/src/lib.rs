@@ -9,6 +9,7 @@ pub mod contact;
 #[allow(missing_docs)]
 pub mod cpu;
 mod detector;
+mod elements;
 mod error;
 pub mod exact;
 #[allow(missing_docs)]
@@ -17,26 +18,37 @@ pub mod frame;
 pub mod gpu;
 pub mod grouping;
 pub mod host;
+mod ids;
+mod impacts;
 mod naive;
 mod narrow;
+mod pair_kind;
 mod pairs;
+mod positions;
 mod progress;
 mod query;
 mod scene;
 mod settings;
 mod stats;
+mod step;
 
 pub use detector::Detector;
+pub use elements::{Elements, Kind, Part};
 pub use error::Error;
 #[cfg(feature = "gpu")]
 pub use gpu::Capacities;
 #[cfg(feature = "gpu")]
 pub use gpu::{DeviceInfo, ResidentPairs, devices};
+pub use ids::BodyId;
+pub use impacts::{Candidates, Impact, Impacts};
+pub use pair_kind::{PairKind, PairKinds};
 pub use pairs::{Pairs, Primitive, hash_rows};
+pub use positions::{Positions, Real};
 pub use progress::{CancelToken, Control, Progress};
 pub use query::{Query, SharedVertex};
-pub use scene::{Body, BodyId, Elements, Filter, Kind, Positions, Real, Scene};
+pub use scene::{Body, Filter, Scene};
 pub use settings::{Backend, InstructionSet, Method, Recluster, Settings};
 pub use stats::{Stage, Statistics};
+pub use step::{Advance, CandidateQuery, Start, Step, Toi};
 #[cfg(feature = "gpu")]
 pub use wgpu;

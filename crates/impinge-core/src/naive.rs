@@ -1,49 +1,37 @@
 //! The oracle: every box against every box, then the exact test. It defines what is correct.
 //!
-//! Cost: quadratic in primitives; memory: the boxes. A box is the extent of a primitive's corners
-//! in double precision; boxes that do not overlap (closed) hold primitives that cannot meet.
+//! Cost: quadratic in elements; memory: the boxes. A box is the extent of an element's corners
+//! in double precision; boxes that do not overlap (closed) hold elements that cannot meet.
 
 use crate::error::Error;
-use crate::frame::{Frame, pair_key};
-use crate::narrow::settle;
+use crate::frame::{Frame, TestId, pair_key};
+use crate::narrow::{Element, Extent, Test};
 use crate::progress::Control;
 use crate::scene::Scene;
 use crate::stats::Statistics;
 
-#[derive(Clone, Copy)]
-struct Box64 {
-    min: [f64; 3],
-    max: [f64; 3],
-}
-
-fn overlap(a: &Box64, b: &Box64) -> bool {
-    (0..3).all(|axis| a.min[axis] <= b.max[axis] && b.min[axis] <= a.max[axis])
-}
-
-/// Appends the keys of all pairs that the frame asks for, sorted.
-pub(crate) fn run(
+/// Calls `emit` with the test, the key and the value of every pair that the frame asks for and that passes, in the order of
+/// the keys.
+pub(crate) fn run<T: Test>(
+    test: &T,
     scene: &Scene,
     frame: &Frame,
     control: &Control<'_>,
-    keys: &mut Vec<u64>,
     stats: &mut Statistics,
+    mut emit: impl FnMut(TestId, u64, T::Value),
 ) -> Result<(), Error> {
-    let boxes = boxes(scene, frame);
-    let n = boxes.len();
-    for a in 0..n {
-        control.step(a as u64, n as u64)?;
-        let a_ix = frame.owner(a as u32);
-        for b in a + 1..n {
-            let b_ix = frame.owner(b as u32);
-            let asked = if a_ix == b_ix {
-                frame.participants[a_ix].within
-            } else {
-                frame.meets(a_ix, b_ix)
+    let elements = elements(test, scene, frame);
+    let n = elements.len();
+    for (ix, (number_a, a, box_a)) in elements.iter().enumerate() {
+        control.step(ix as u64, n as u64)?;
+        for (number_b, b, box_b) in &elements[ix + 1..] {
+            let Some(id) = frame.test(a.layer, b.layer) else {
+                continue;
             };
-            if asked && overlap(&boxes[a], &boxes[b]) {
+            if box_a.overlaps(box_b) {
                 stats.n_candidates += 1;
-                if settle(scene, frame, a as u32, b as u32) {
-                    keys.push(pair_key(a as u32, b as u32));
+                if let Some(value) = test.settle(id, *a, *b) {
+                    emit(id, pair_key(*number_a, *number_b), value);
                 }
             }
         }
@@ -51,23 +39,24 @@ pub(crate) fn run(
     Ok(())
 }
 
-fn boxes(scene: &Scene, frame: &Frame) -> Vec<Box64> {
-    let mut boxes = Vec::new();
-    for participant_ix in 0..frame.participants.len() {
-        let body = frame.body(scene, participant_ix);
-        boxes.extend((0..body.n_primitives()).map(|primitive| {
-            let corners = body.corner_points(primitive);
-            Box64 {
-                min: std::array::from_fn(|axis| {
-                    corners.iter().fold(f64::INFINITY, |m, p| m.min(p[axis]))
-                }),
-                max: std::array::from_fn(|axis| {
-                    corners
-                        .iter()
-                        .fold(f64::NEG_INFINITY, |m, p| m.max(p[axis]))
-                }),
-            }
-        }));
-    }
-    boxes
+/// All elements in the order of their numbers, with their boxes.
+fn elements<'a, T: Test>(
+    test: &T,
+    scene: &'a Scene,
+    frame: &'a Frame,
+) -> Vec<(u32, Element<'a>, Extent)> {
+    (0..frame.layers.len())
+        .flat_map(|layer| {
+            frame.elements(scene, layer).map(move |(number, corners)| {
+                let element = Element {
+                    scene,
+                    frame,
+                    layer,
+                    corners,
+                };
+                (number, element)
+            })
+        })
+        .map(|(number, element)| (number, element, test.extent(element)))
+        .collect()
 }

@@ -1,7 +1,8 @@
 //! The answer: sorted pairs, colliding primitives, a hash, statistics.
 
+use crate::elements::Kind;
 use crate::frame::{Frame, owner_by_first};
-use crate::scene::{BodyId, Kind};
+use crate::ids::BodyId;
 use crate::stats::Statistics;
 
 /// One primitive of one body.
@@ -37,7 +38,7 @@ impl Pairs {
         self.keys.clear();
         self.bodies.clear();
         self.bodies
-            .extend(frame.participants.iter().map(|participant| PairBody {
+            .extend(frame.layers.iter().map(|participant| PairBody {
                 id: participant.id,
                 first: participant.first,
                 kind: participant.kind,
@@ -190,7 +191,7 @@ pub fn hash_rows(rows: impl IntoIterator<Item = [u32; 4]>) -> u64 {
     })
 }
 
-fn mix(mut x: u64) -> u64 {
+pub(crate) fn mix(mut x: u64) -> u64 {
     x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

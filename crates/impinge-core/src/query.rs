@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::scene::BodyId;
+use crate::ids::BodyId;
 
 /// How pairs of one body that share vertices are treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -13,7 +13,8 @@ pub enum SharedVertex {
     /// They are reported when they meet in more than what they share. Triangles: sharing one
     /// vertex, when the edge opposite it in one meets the other triangle; sharing an edge, when
     /// they are coplanar and fold to the same side; sharing all three, always. Tetrahedra: when
-    /// the intersection is larger than the common vertex, edge or face.
+    /// the intersection is larger than the common vertex, edge or face. Edges and points of one body
+    /// that share a vertex are left out under either rule.
     Resolve,
 }
 

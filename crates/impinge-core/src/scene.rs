@@ -1,234 +1,14 @@
 //! Bodies: topology once, positions every frame.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+pub(crate) use crate::elements::{Elements, Kind};
+use crate::elements::{Part, Topology};
 use crate::error::Error;
-use crate::exact;
-
-/// Names a body of a [`Scene`]: a slot and the generation of its use.
-///
-/// Ids are ordered by slot. A slot is used again after its body was removed, under a new
-/// generation, so an old id never names a new body by mistake.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct BodyId {
-    slot: u32,
-    generation: u32,
-}
-
-impl BodyId {
-    /// The body's number in the scene: 0 for the first body added, and so on.
-    pub fn index(self) -> usize {
-        self.slot as usize
-    }
-
-    pub(crate) fn slot(self) -> u32 {
-        self.slot
-    }
-}
-
-impl std::fmt::Display for BodyId {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}", self.slot)
-    }
-}
-
-/// What a body is made of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Kind {
-    /// Surface triangles, three vertex indices each.
-    Triangles,
-    /// Solid tetrahedra, four vertex indices each.
-    Tetrahedra,
-}
-
-impl Kind {
-    /// `"triangles"` or `"tetrahedra"`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Kind::Triangles => "triangles",
-            Kind::Tetrahedra => "tetrahedra",
-        }
-    }
-}
-
-/// The primitives of a body as vertex indices.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Elements {
-    /// `(n, 3)` vertex indices.
-    Triangles(Vec<[u32; 3]>),
-    /// `(n, 4)` vertex indices.
-    Tetrahedra(Vec<[u32; 4]>),
-}
-
-impl Elements {
-    /// How many primitives there are.
-    pub fn len(&self) -> usize {
-        match self {
-            Elements::Triangles(faces) => faces.len(),
-            Elements::Tetrahedra(tets) => tets.len(),
-        }
-    }
-
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Triangles or tetrahedra.
-    pub fn kind(&self) -> Kind {
-        match self {
-            Elements::Triangles(_) => Kind::Triangles,
-            Elements::Tetrahedra(_) => Kind::Tetrahedra,
-        }
-    }
-
-    /// The vertex indices of one primitive, three or four of them.
-    pub fn corners(&self, primitive: usize) -> &[u32] {
-        match self {
-            Elements::Triangles(faces) => &faces[primitive],
-            Elements::Tetrahedra(tets) => &tets[primitive],
-        }
-    }
-
-    fn bytes(&self) -> usize {
-        match self {
-            Elements::Triangles(faces) => size_of_val(&faces[..]),
-            Elements::Tetrahedra(tets) => size_of_val(&tets[..]),
-        }
-    }
-}
-
-impl From<Vec<[u32; 3]>> for Elements {
-    fn from(faces: Vec<[u32; 3]>) -> Self {
-        Elements::Triangles(faces)
-    }
-}
-
-impl From<Vec<[u32; 4]>> for Elements {
-    fn from(tets: Vec<[u32; 4]>) -> Self {
-        Elements::Tetrahedra(tets)
-    }
-}
-
-/// Vertex positions in the precision in which they were given.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Positions {
-    /// `(n, 3)` single precision.
-    F32(Vec<[f32; 3]>),
-    /// `(n, 3)` double precision.
-    F64(Vec<[f64; 3]>),
-}
-
-impl Positions {
-    /// How many vertices there are.
-    pub fn len(&self) -> usize {
-        match self {
-            Positions::F32(positions) => positions.len(),
-            Positions::F64(positions) => positions.len(),
-        }
-    }
-
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// One position in double precision (exact for both).
-    #[inline]
-    pub fn point(&self, vertex: usize) -> [f64; 3] {
-        match self {
-            Positions::F32(positions) => {
-                let [x, y, z] = positions[vertex];
-                [f64::from(x), f64::from(y), f64::from(z)]
-            }
-            Positions::F64(positions) => positions[vertex],
-        }
-    }
-
-    fn precision(&self) -> &'static str {
-        match self {
-            Positions::F32(_) => "f32",
-            Positions::F64(_) => "f64",
-        }
-    }
-
-    fn bytes(&self) -> usize {
-        match self {
-            Positions::F32(positions) => size_of_val(&positions[..]),
-            Positions::F64(positions) => size_of_val(&positions[..]),
-        }
-    }
-}
-
-impl From<Vec<[f32; 3]>> for Positions {
-    fn from(positions: Vec<[f32; 3]>) -> Self {
-        Positions::F32(positions)
-    }
-}
-
-impl From<Vec<[f64; 3]>> for Positions {
-    fn from(positions: Vec<[f64; 3]>) -> Self {
-        Positions::F64(positions)
-    }
-}
-
-mod sealed {
-    pub trait Sealed {}
-    impl Sealed for f32 {}
-    impl Sealed for f64 {}
-}
-
-/// `f32` or `f64`: both are taken as they are and answered exactly.
-pub trait Real: sealed::Sealed + Copy + Send + Sync + 'static {
-    #[doc(hidden)]
-    fn in_range(self) -> bool;
-    #[doc(hidden)]
-    fn widen(self) -> f64;
-    #[doc(hidden)]
-    fn stored(positions: &mut Positions) -> Option<&mut Vec<[Self; 3]>>;
-    #[doc(hidden)]
-    fn store(positions: &[[Self; 3]]) -> Positions;
-}
-
-impl Real for f32 {
-    #[inline(always)]
-    fn in_range(self) -> bool {
-        self.is_finite()
-    }
-    #[inline(always)]
-    fn widen(self) -> f64 {
-        f64::from(self)
-    }
-    fn stored(positions: &mut Positions) -> Option<&mut Vec<[f32; 3]>> {
-        match positions {
-            Positions::F32(positions) => Some(positions),
-            Positions::F64(_) => None,
-        }
-    }
-    fn store(positions: &[[f32; 3]]) -> Positions {
-        Positions::F32(positions.to_vec())
-    }
-}
-
-impl Real for f64 {
-    #[inline(always)]
-    fn in_range(self) -> bool {
-        exact::in_range(self)
-    }
-    #[inline(always)]
-    fn widen(self) -> f64 {
-        self
-    }
-    fn stored(positions: &mut Positions) -> Option<&mut Vec<[f64; 3]>> {
-        match positions {
-            Positions::F64(positions) => Some(positions),
-            Positions::F32(_) => None,
-        }
-    }
-    fn store(positions: &[[f64; 3]]) -> Positions {
-        Positions::F64(positions.to_vec())
-    }
-}
+pub(crate) use crate::ids::BodyId;
+use crate::positions::Real;
+pub(crate) use crate::positions::{Positions, check_positions};
 
 /// Who meets whom in [`Query::all`](crate::Query::all): two bodies meet when each one's
 /// `category` shares a bit with the other one's `mask`. By default everybody meets everybody.
@@ -264,37 +44,54 @@ fn new_stamp() -> u64 {
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
-/// One body: primitives, positions, filter.
+/// One body: elements, positions, filter.
 #[derive(Debug, Clone)]
 pub struct Body {
-    elements: Elements,
+    topology: Arc<Topology>,
     positions: Positions,
+    /// Where the vertices are at the end of a step; as many as `positions`, or none yet.
+    end: Option<Positions>,
+    /// Whether `end` is to be looked at: its memory is kept when it is not.
+    moves: bool,
     filter: Filter,
     topology_stamp: u64,
     positions_stamp: u64,
+    step_stamp: u64,
     /// False while positions written in place have not been looked at.
     checked: bool,
 }
 
 impl Body {
-    /// The primitives.
+    /// The elements that it was given as.
     pub fn elements(&self) -> &Elements {
-        &self.elements
+        self.topology.given()
     }
 
-    /// The current positions.
+    /// Some of its elements: those it was given as, or its vertices, edges or faces, which are found once per topology.
+    /// Their numbers depend on the given elements alone.
+    pub fn part(&self, part: Part) -> &Elements {
+        self.topology.part(part)
+    }
+
+    /// The current positions: where a step starts.
     pub fn positions(&self) -> &Positions {
         &self.positions
     }
 
-    /// Triangles or tetrahedra.
+    /// The positions at the end of a step, in the precision of [`positions`](Body::positions). `None` for a body that
+    /// stands still.
+    pub fn end_positions(&self) -> Option<&Positions> {
+        self.end.as_ref().filter(|_| self.moves)
+    }
+
+    /// Points, edges, triangles or tetrahedra.
     pub fn kind(&self) -> Kind {
-        self.elements.kind()
+        self.elements().kind()
     }
 
     /// How many primitives it has.
     pub fn n_primitives(&self) -> usize {
-        self.elements.len()
+        self.elements().len()
     }
 
     /// How many vertices it has.
@@ -317,18 +114,20 @@ impl Body {
         self.positions_stamp
     }
 
+    /// Changes whenever positions at the start or the end of a step may have changed.
+    pub(crate) fn step_stamp(&self) -> u64 {
+        self.step_stamp
+    }
+
     pub(crate) fn is_checked(&self) -> bool {
         self.checked
     }
 
-    /// The corners of one primitive in double precision; a triangle repeats its last corner.
-    #[inline]
-    pub(crate) fn corner_points(&self, primitive: usize) -> [[f64; 3]; 4] {
-        let corners = self.elements.corners(primitive);
-        std::array::from_fn(|k| {
-            self.positions
-                .point(corners[k.min(corners.len() - 1)] as usize)
-        })
+    fn has_moved(&mut self, checked: bool) {
+        self.positions_stamp = new_stamp();
+        self.step_stamp = self.positions_stamp;
+        self.moves = false;
+        self.checked = checked;
     }
 }
 
@@ -385,6 +184,27 @@ impl Scene {
         self.add(Elements::Tetrahedra(tets.to_vec()), R::store(positions))
     }
 
+    /// Adds a body of edges, such as strands of hair: `edges` is `(n, 2)` vertex indices, `positions` `(v, 3)`.
+    ///
+    /// # Errors
+    /// As [`add_triangles`](Scene::add_triangles).
+    pub fn add_edges<R: Real>(
+        &mut self,
+        edges: &[[u32; 2]],
+        positions: &[[R; 3]],
+    ) -> Result<BodyId, Error> {
+        self.add(Elements::Edges(edges.to_vec()), R::store(positions))
+    }
+
+    /// Adds a body of points, one for each of `positions`, `(v, 3)`.
+    ///
+    /// # Errors
+    /// As [`add_triangles`](Scene::add_triangles).
+    pub fn add_points<R: Real>(&mut self, positions: &[[R; 3]]) -> Result<BodyId, Error> {
+        let points = (0u32..).zip(positions).map(|(vertex, _)| [vertex]);
+        self.add(Elements::Points(points.collect()), R::store(positions))
+    }
+
     /// Adds a body whose arrays are handed over without a copy.
     ///
     /// # Errors
@@ -406,7 +226,7 @@ impl Scene {
             .slots
             .get(slot as usize)
             .map_or(1, |slot| slot.generation.wrapping_add(1).max(1));
-        let id = BodyId { slot, generation };
+        let id = BodyId::new(slot, generation);
         let body = checked_body(id, elements.into(), positions.into(), Filter::default())?;
         if self.free.pop().is_none() {
             self.slots.push(Slot::default());
@@ -425,7 +245,7 @@ impl Scene {
     pub fn remove(&mut self, body: BodyId) -> Result<(), Error> {
         self.body(body)?;
         self.slots[body.index()].body = None;
-        self.free.push(body.slot);
+        self.free.push(body.slot());
         Ok(())
     }
 
@@ -446,7 +266,8 @@ impl Scene {
     }
 
     /// Moves the vertices: `(v, 3)` positions, as many as the body has vertices. The precision
-    /// may differ from frame to frame; the array is copied and checked.
+    /// may differ from frame to frame; the array is copied and checked. A new step starts: the body has no end positions
+    /// until they are [set](Scene::set_end_positions), and stands still without.
     ///
     /// # Errors
     /// A wrong number of positions, or one that is refused: the body keeps its old positions then.
@@ -468,20 +289,66 @@ impl Scene {
             Some(stored) => stored.copy_from_slice(positions),
             None => target.positions = R::store(positions),
         }
-        target.positions_stamp = new_stamp();
-        target.checked = true;
+        target.has_moved(true);
+        Ok(())
+    }
+
+    /// Says where the vertices are at the end of a step, `(v, 3)`: between [`positions`](Body::positions) and these, each
+    /// moves on a straight line at constant speed. They hold until the next [`set_positions`](Scene::set_positions),
+    /// [`positions_mut`](Scene::positions_mut), [`remesh`](Scene::remesh) or
+    /// [`clear_end_positions`](Scene::clear_end_positions). A body that has none stands still.
+    ///
+    /// Where start and end come in different precisions, the single one is widened, which is exact.
+    ///
+    /// # Errors
+    /// A wrong number of positions, or one that is refused: the body keeps its old end positions then.
+    pub fn set_end_positions<R: Real>(
+        &mut self,
+        body: BodyId,
+        positions: &[[R; 3]],
+    ) -> Result<(), Error> {
+        let target = self.body_mut(body)?;
+        if positions.len() != target.n_vertices() {
+            return Err(Error::WrongNumberOfPositions {
+                body,
+                given: positions.len(),
+                expected: target.n_vertices(),
+            });
+        }
+        check_positions(body, positions)?;
+        match target.end.as_mut().and_then(R::stored) {
+            Some(stored) => stored.copy_from_slice(positions),
+            None => target.end = Some(R::store(positions)),
+        }
+        if let Some(end) = &mut target.end {
+            target.positions.widen_as(end);
+            end.widen_as(&target.positions);
+        }
+        target.moves = true;
+        target.step_stamp = new_stamp();
+        Ok(())
+    }
+
+    /// Forgets where a body is at the end of a step: it stands still.
+    ///
+    /// # Errors
+    /// The id names no body.
+    pub fn clear_end_positions(&mut self, body: BodyId) -> Result<(), Error> {
+        let target = self.body_mut(body)?;
+        target.moves = false;
+        target.step_stamp = new_stamp();
         Ok(())
     }
 
     /// The positions of a body that stores `R`, to be written in place: the way without a copy.
-    /// What is written is checked by the next detection, which names a refused vertex.
+    /// What is written is checked by the next detection, which names a refused vertex. End positions are forgotten, as by
+    /// [`set_positions`](Scene::set_positions).
     ///
     /// # Errors
     /// The id names no body, or it stores the other precision.
     pub fn positions_mut<R: Real>(&mut self, body: BodyId) -> Result<&mut [[R; 3]], Error> {
         let target = self.body_mut(body)?;
-        target.positions_stamp = new_stamp();
-        target.checked = false;
+        target.has_moved(false);
         let stored = target.positions.precision();
         match R::stored(&mut target.positions) {
             Some(positions) => Ok(positions),
@@ -508,7 +375,7 @@ impl Scene {
     /// The id names no body.
     pub fn body(&self, body: BodyId) -> Result<&Body, Error> {
         match self.slots.get(body.index()) {
-            Some(slot) if slot.generation == body.generation && slot.body.is_some() => {
+            Some(slot) if slot.generation == body.generation() && slot.body.is_some() => {
                 Ok(slot.body.as_ref().expect("just looked"))
             }
             slot => Err(Error::UnknownBody {
@@ -529,7 +396,7 @@ impl Scene {
             let generation = held.generation;
             held.body
                 .as_ref()
-                .map(|body| (BodyId { slot, generation }, body))
+                .map(|body| (BodyId::new(slot, generation), body))
         })
     }
 
@@ -541,7 +408,11 @@ impl Scene {
     /// Bytes held for topology and positions.
     pub fn bytes(&self) -> usize {
         self.bodies()
-            .map(|(_, body)| body.elements.bytes() + body.positions.bytes())
+            .map(|(_, body)| {
+                body.topology.bytes()
+                    + body.positions.bytes()
+                    + body.end.as_ref().map_or(0, Positions::bytes)
+            })
             .sum()
     }
 
@@ -580,10 +451,7 @@ fn checked_body(
         Positions::F64(positions) => check_positions(id, positions)?,
     }
     let n_vertices = positions.len();
-    let bad_index = match &elements {
-        Elements::Triangles(faces) => first_bad_index(faces, n_vertices),
-        Elements::Tetrahedra(tets) => first_bad_index(tets, n_vertices),
-    };
+    let bad_index = elements.first_bad_index(n_vertices);
     if let Some((primitive, index)) = bad_index {
         return Err(Error::VertexIndexOutOfRange {
             body: id,
@@ -592,60 +460,16 @@ fn checked_body(
             n_vertices,
         });
     }
+    let stamp = new_stamp();
     Ok(Body {
-        elements,
+        topology: Arc::new(Topology::new(elements)),
         positions,
+        end: None,
+        moves: false,
         filter,
         topology_stamp: new_stamp(),
-        positions_stamp: new_stamp(),
+        positions_stamp: stamp,
+        step_stamp: stamp,
         checked: true,
     })
-}
-
-fn first_bad_index<const N: usize>(
-    elements: &[[u32; N]],
-    n_vertices: usize,
-) -> Option<(usize, u32)> {
-    elements
-        .iter()
-        .enumerate()
-        .find_map(|(primitive, corners)| {
-            corners
-                .iter()
-                .find(|&&index| index as usize >= n_vertices)
-                .map(|&index| (primitive, index))
-        })
-}
-
-/// Refuses the first position that is not finite or outside the exact range.
-pub(crate) fn check_positions<R: Real>(body: BodyId, positions: &[[R; 3]]) -> Result<(), Error> {
-    // One branch a chunk keeps the common case, all good, at memory speed.
-    for (chunk_ix, chunk) in positions.chunks(1024).enumerate() {
-        let good = chunk
-            .as_flattened()
-            .iter()
-            .fold(true, |good, x| good & x.in_range());
-        if good {
-            continue;
-        }
-        for (vertex, position) in chunk.iter().enumerate() {
-            let vertex = chunk_ix * 1024 + vertex;
-            let value = position.map(R::widen);
-            if value.iter().any(|x| !x.is_finite()) {
-                return Err(Error::NonFinitePosition {
-                    body,
-                    vertex,
-                    value,
-                });
-            }
-            if let Some(&value) = value.iter().find(|&&x| !exact::in_range(x)) {
-                return Err(Error::CoordinateOutOfRange {
-                    body,
-                    vertex,
-                    value,
-                });
-            }
-        }
-    }
-    Ok(())
 }

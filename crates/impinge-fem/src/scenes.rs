@@ -189,7 +189,7 @@ pub fn ball(n_tets: usize, material: Material) -> Solid {
 fn tetrahedra(elements: Elements) -> Vec<[u32; 4]> {
     match elements {
         Elements::Tetrahedra(tets) => tets,
-        Elements::Triangles(_) => Vec::new(),
+        _ => Vec::new(),
     }
 }
 

@@ -70,7 +70,7 @@ impl<'py> PositionArray<'py> {
     }
 }
 
-/// Vertex indices, three or four a row.
+/// Vertex indices: three or four per row, or as many as an element of the kind has corners.
 pub fn elements(
     argument: &Bound<'_, PyAny>,
     name: &str,
@@ -81,6 +81,8 @@ pub fn elements(
     let numbers = NumberKind::of(&array, name)?;
     let allowed: &[usize] = match kind {
         None => &[3, 4],
+        Some(Kind::Points) => &[1],
+        Some(Kind::Edges) => &[2],
         Some(Kind::Triangles) => &[3],
         Some(Kind::Tetrahedra) => &[4],
     };
@@ -95,6 +97,8 @@ pub fn elements(
         )));
     }
     Ok(match n_columns {
+        1 => Elements::Points(indices.as_chunks().0.to_vec()),
+        2 => Elements::Edges(indices.as_chunks().0.to_vec()),
         3 => Elements::Triangles(indices.as_chunks().0.to_vec()),
         _ => Elements::Tetrahedra(indices.as_chunks().0.to_vec()),
     })

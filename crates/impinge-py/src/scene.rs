@@ -264,7 +264,7 @@ impl Scene {
     ///
     /// Returns
     /// -------
-    /// numpy.ndarray of uint32, shape (n, 3) or (n, 4)
+    /// numpy.ndarray of uint32, shape (n, 1), (n, 2), (n, 3) or (n, 4)
     ///     A copy.
     fn elements<'py>(
         &self,
@@ -273,6 +273,8 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyAny>> {
         let body = self.body(body)?;
         let (flat, n_columns) = match body.elements() {
+            Elements::Points(points) => (points.as_flattened(), 1),
+            Elements::Edges(edges) => (edges.as_flattened(), 2),
             Elements::Triangles(faces) => (faces.as_flattened(), 3),
             Elements::Tetrahedra(tets) => (tets.as_flattened(), 4),
         };
@@ -280,7 +282,7 @@ impl Scene {
         Ok(PyArray1::from_slice(py, flat).reshape(shape)?.into_any())
     }
 
-    /// ``"triangles"`` or ``"tetrahedra"``: what a body is made of.
+    /// ``"points"``, ``"edges"``, ``"triangles"`` or ``"tetrahedra"``: what a body is made of.
     fn kind(&self, body: &Bound<'_, PyAny>) -> PyResult<&'static str> {
         Ok(self.body(body)?.kind().name())
     }

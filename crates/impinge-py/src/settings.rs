@@ -49,7 +49,7 @@ pub fn unexpected(argument: &Bound<'_, PyAny>, name: &str, expected: &str) -> Py
 
 /// What the rows of an index array are; `None` leaves it to their length.
 pub fn kind(argument: Argument<'_, '_>) -> PyResult<Option<Kind>> {
-    let kinds = [Kind::Triangles, Kind::Tetrahedra].map(|kind| (kind.name(), Some(kind)));
+    let kinds = Kind::ALL.map(|kind| (kind.name(), Some(kind)));
     choose(argument, "kind", &kinds)
 }
 

@@ -59,10 +59,12 @@ impl Surface {
                 Elements::Tetrahedra(tets) => shown_sides(tets, &collides)
                     .map(|side| face(side.corners, side.collides))
                     .collect(),
+                // Edges and points have no surface to show.
+                Elements::Edges(_) | Elements::Points(_) => Vec::new(),
             },
             normals: match body.elements() {
                 Elements::Triangles(_) => Normals::Smooth,
-                Elements::Tetrahedra(_) => Normals::Flat,
+                _ => Normals::Flat,
             },
         })
     }

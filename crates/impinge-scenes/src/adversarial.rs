@@ -261,7 +261,7 @@ pub fn outliers(n: usize) -> Result<BuiltScene, Error> {
 fn faces_of(model: &Model) -> Vec<[u32; 3]> {
     match &model.elements {
         impinge::Elements::Triangles(faces) => faces.clone(),
-        impinge::Elements::Tetrahedra(_) => Vec::new(),
+        _ => Vec::new(),
     }
 }
 

@@ -10,14 +10,14 @@ use impinge_scenes::{Model, Random, solids, soup, surfaces};
 fn faces(model: &Model) -> &[[u32; 3]] {
     match &model.elements {
         Elements::Triangles(faces) => faces,
-        Elements::Tetrahedra(_) => panic!("a surface was expected"),
+        _ => panic!("a surface was expected"),
     }
 }
 
 fn tets(model: &Model) -> &[[u32; 4]] {
     match &model.elements {
         Elements::Tetrahedra(tets) => tets,
-        Elements::Triangles(_) => panic!("a solid was expected"),
+        _ => panic!("a solid was expected"),
     }
 }
 

@@ -16,9 +16,10 @@
 #[cfg(feature = "gpu")]
 pub use impinge_core::wgpu;
 pub use impinge_core::{
-    Backend, Body, BodyId, CancelToken, Control, Detector, Elements, Error, Filter, InstructionSet,
-    Kind, Method, Pairs, Positions, Primitive, Progress, Query, Real, Recluster, Scene, Settings,
-    SharedVertex, Stage, Statistics, hash_rows,
+    Advance, Backend, Body, BodyId, CancelToken, CandidateQuery, Candidates, Control, Detector,
+    Elements, Error, Filter, Impact, Impacts, InstructionSet, Kind, Method, PairKind, PairKinds,
+    Pairs, Part, Positions, Primitive, Progress, Query, Real, Recluster, Scene, Settings,
+    SharedVertex, Stage, Start, Statistics, Step, Toi, hash_rows,
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{DeviceInfo, ResidentPairs, devices};
@@ -31,4 +32,6 @@ const _: () = {
     threads_may_share::<Scene>();
     threads_may_share::<Pairs>();
     threads_may_share::<Query>();
+    threads_may_share::<Impacts>();
+    threads_may_share::<Step>();
 };

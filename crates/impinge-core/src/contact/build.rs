@@ -9,10 +9,13 @@ use rayon::prelude::*;
 use super::coordinates::{Place, Precision};
 use super::meet::{Local, ends, meet};
 use super::{Contacts, Feature, PointName, Shape};
+use crate::elements::{Elements, Kind};
 use crate::error::Error;
 use crate::exact::Point;
+use crate::ids::BodyId;
 use crate::pairs::Pairs;
-use crate::scene::{Body, BodyId, Elements, Kind, Positions, Scene, check_positions};
+use crate::positions::{Positions, check_positions};
+use crate::scene::{Body, Scene};
 
 /// Pairs per task.
 const CHUNK: usize = 256;

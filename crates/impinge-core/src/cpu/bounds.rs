@@ -5,13 +5,14 @@
 //! Cost: every vertex of a body once for each cluster that has it (about 1.35 times a closed mesh).
 //! Invariant: a box holds all its vertices; f64 positions are rounded outward.
 
+use crate::elements::with_corners;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{
     Bounds, BoundsArray, RawBoundsArray, greater, lesser, round_down, round_up,
 };
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
-use crate::scene::{Elements, Positions};
+use crate::positions::Positions;
 
 use super::simd::{LaneBounds, Simd};
 
@@ -293,10 +294,11 @@ pub(crate) fn of_cluster_primitives(
     lanes: &mut LaneBounds,
 ) {
     let places = cluster * GROUP..cluster * GROUP + clustering.size(cluster);
-    match &clustering.corners {
-        Elements::Triangles(faces) => of_primitives(positions, &faces[places], lanes),
-        Elements::Tetrahedra(tets) => of_primitives(positions, &tets[places], lanes),
-    }
+    with_corners!(&clustering.corners, |corners| of_primitives(
+        positions,
+        &corners[places],
+        lanes
+    ));
 }
 
 fn of_primitives<const N: usize>(

@@ -401,7 +401,7 @@ impl Lists<'_> {
         let mut a = list.start;
         while a < list.end {
             let (ix_a, run_a) = self.run(a, list.end);
-            if frame.participants[ix_a].within && run_a.len() > 1 {
+            if frame.layers[ix_a].within && run_a.len() > 1 {
                 for group_a in groups(run_a.clone(), group_size) {
                     for group_b in groups(group_a.start..run_a.end, group_size) {
                         emit(group_a.clone(), group_b)?;
@@ -411,7 +411,7 @@ impl Lists<'_> {
             let mut b = run_a.end;
             while b < list.end && frame.between() {
                 let (ix_b, run_b) = self.run(b, list.end);
-                if frame.meets(ix_a, ix_b) {
+                if frame.test(ix_a, ix_b).is_some() {
                     for group_a in groups(run_a.clone(), group_size) {
                         for group_b in groups(run_b.clone(), group_size) {
                             emit(group_a.clone(), group_b)?;

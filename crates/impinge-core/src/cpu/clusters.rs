@@ -138,10 +138,7 @@ impl Clusters {
             workers,
             control,
         } = job;
-        let n_slots = frame
-            .participants
-            .last()
-            .map_or(0, |last| last.id.index() + 1);
+        let n_slots = frame.layers.last().map_or(0, |last| last.id.index() + 1);
         if self.caches.len() < n_slots {
             self.caches.resize_with(n_slots, || None);
         }
@@ -154,14 +151,14 @@ impl Clusters {
             }
         }
         let isa = self.isa;
-        for (ix, participant) in frame.participants.iter().enumerate() {
+        for (ix, participant) in frame.layers.iter().enumerate() {
             let body = frame.body(scene, ix);
             let cache = &mut self.caches[participant.id.index()];
             let known = cache
                 .as_ref()
                 .is_some_and(|cache| cache.topology_stamp == body.topology_stamp());
             if !known {
-                control.step(ix as u64, frame.participants.len() as u64)?;
+                control.step(ix as u64, frame.layers.len() as u64)?;
                 let found = workers.install(body.n_primitives(), || BodyCache::new(body, isa));
                 *cache = Some(Box::new(found));
                 stats.n_clustered += 1;

@@ -17,6 +17,7 @@ mod codes;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
+use crate::elements::with_corners;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::Grid;
 
@@ -102,7 +103,7 @@ impl Cull {
         self.firsts.clear();
         self.alone = 0;
         let mut n_codes = 0;
-        for (ix, participant) in frame.participants.iter().enumerate() {
+        for (ix, participant) in frame.layers.iter().enumerate() {
             self.firsts.push(n_codes);
             n_codes += world.body(ix as u32).positions.len();
             self.alone |= u32::from(participant.within) << ix;
@@ -110,7 +111,7 @@ impl Cull {
         self.codes.resize(n_codes, 0);
         *self.everywhere.get_mut() = 0;
         self.maps.clear();
-        let n_maps = frame.participants.len();
+        let n_maps = frame.layers.len();
         self.maps
             .resize_with(n_maps * self.n_rows(), AtomicU64::default);
         self.near
@@ -152,14 +153,8 @@ impl Cull {
             self.function.code(&reach.min),
             self.function.code(&reach.max),
         );
-        match body.elements {
-            crate::Elements::Triangles(faces) => {
-                self.mark_all(codes, faces, run, reach, &mut near);
-            }
-            crate::Elements::Tetrahedra(tets) => {
-                self.mark_all(codes, tets, run, reach, &mut near);
-            }
-        }
+        with_corners!(body.elements, |corners| self
+            .mark_all(codes, corners, run, reach, &mut near));
     }
 
     fn mark_all<const N: usize>(

@@ -4,10 +4,11 @@
 //! corners as tables, so that the filter takes them from the first-level cache and not from all over the
 //! body. Cost: each corner of a cluster once, when it is first needed; 3.8 KB a cluster.
 
+use crate::elements::Elements;
 use crate::exact::filter::{LARGEST_F32, Triangles64};
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, greater, lesser};
-use crate::scene::{Elements, Positions};
+use crate::positions::Positions;
 
 use super::bounds::of_cluster_primitives;
 use super::simd::{ClusterFaces, LaneBounds, Simd};
@@ -75,7 +76,7 @@ fn is_small(bounds: &Bounds) -> bool {
 /// A cluster has two places, `h` and `h ^ 1`; the one that is not in use makes room.
 #[derive(Debug, Default)]
 pub(super) struct GroupCache {
-    /// Participant and cluster of each place.
+    /// Layer and cluster of each place.
     keys: Vec<u64>,
     groups: Vec<Group>,
 }

@@ -168,7 +168,7 @@ impl KeptList {
     ) -> usize {
         let scratches = few(world, scratches);
         // One that is asked for itself keeps all it has, and among many hardly anything is alone.
-        let participants = &world.frame.participants;
+        let participants = &world.frame.layers;
         if !world.frame.between()
             || participants.len() > MOST_MAPS
             || participants.iter().all(|participant| participant.within)
@@ -219,7 +219,7 @@ impl KeptList {
     fn begin<S: Send>(&mut self, world: World<'_>, workers: &Workers, scratches: &mut [S]) {
         self.runs.clear();
         self.vertices.clear();
-        for (ix, participant) in world.frame.participants.iter().enumerate() {
+        for (ix, participant) in world.frame.layers.iter().enumerate() {
             let n_vertices = match participant.n_primitives {
                 0 => 0,
                 _ => world.body(ix as u32).positions.len() as u32,
@@ -240,8 +240,7 @@ impl KeptList {
             *bounds.lock().expect("no task panics") = bounds::of_run(positions, range);
         });
         self.bodies.clear();
-        self.bodies
-            .resize(world.frame.participants.len(), Bounds::EMPTY);
+        self.bodies.resize(world.frame.layers.len(), Bounds::EMPTY);
         for (run, bounds) in &mut self.vertices {
             let bounds = bounds.get_mut().expect("no task panics");
             self.bodies[run.participant as usize].join(bounds);
@@ -279,7 +278,7 @@ impl KeptList {
         reach.clear();
         reach.extend(
             frame
-                .participants
+                .layers
                 .iter()
                 .zip(&*bodies)
                 .map(|(participant, bounds)| match participant.within {
@@ -325,7 +324,7 @@ fn reach_pairs<S: Simd>(
 ) {
     let met = top.pairs(simd, stack, |a, b| {
         let (a, b) = (a as usize, b as usize);
-        if frame.meets(a, b) {
+        if frame.test(a, b).is_some() {
             let both = bodies[a].intersection(&bodies[b]);
             reach[a].join(&both);
             reach[b].join(&both);

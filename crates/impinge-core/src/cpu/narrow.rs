@@ -8,13 +8,14 @@
 
 use std::time::{Duration, Instant};
 
+use crate::elements::Elements;
 use crate::exact::filter::{
     self, BATCH, LANES, TetrahedronPairs8, TrianglePairs8, Verdict, Verdict16,
 };
 use crate::frame::pair_key;
 use crate::grouping::GROUP;
 use crate::narrow::{intersect, intersect_shared};
-use crate::scene::{Elements, Positions};
+use crate::positions::Positions;
 
 use super::group_cache::Group;
 use super::pairing::{Met, WorkItem};
@@ -24,7 +25,7 @@ use super::world::{BodyRef, World};
 /// Two primitives whose boxes overlap: participants, and places in their clusters' orders.
 #[derive(Debug, Clone, Copy)]
 pub struct Candidate {
-    /// Participant.
+    /// Layer.
     pub a: u32,
     /// The other participant.
     pub b: u32,
@@ -311,7 +312,7 @@ impl<'a> Lookup<'a> {
         let TrianglePairs8 { a, b } = batch;
         self.fill(simd, chunk, [a, b], |elements| match elements {
             Elements::Triangles(faces) => Some(faces),
-            Elements::Tetrahedra(_) => None,
+            _ => None,
         })
     }
 
@@ -326,7 +327,7 @@ impl<'a> Lookup<'a> {
         let TetrahedronPairs8 { a, b } = batch;
         self.fill(simd, chunk, [a, b], |elements| match elements {
             Elements::Tetrahedra(tets) => Some(tets),
-            Elements::Triangles(_) => None,
+            _ => None,
         })
     }
 

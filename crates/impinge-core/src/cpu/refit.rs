@@ -14,7 +14,8 @@ use std::time::Instant;
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
-use crate::scene::{Body, Positions};
+use crate::positions::Positions;
+use crate::scene::Body;
 use crate::settings::Recluster;
 use crate::stats::Statistics;
 
@@ -90,10 +91,10 @@ impl Refit {
         let Job { scene, frame, .. } = job;
         let sorts = isa.reads_runs()
             && frame.between()
-            && frame.participants.len() <= SORTED_TO
+            && frame.layers.len() <= SORTED_TO
             && options.memory_budget.is_none();
         self.tasks.clear();
-        for (ix, participant) in frame.participants.iter().enumerate() {
+        for (ix, participant) in frame.layers.iter().enumerate() {
             let body = frame.body(scene, ix);
             let cache = caches[participant.id.index()].as_mut().expect("clustered");
             let n_vertices = body.n_vertices();
@@ -124,7 +125,7 @@ impl Refit {
             // A body is read and its boxes are found by the same thread, as far as that goes: helpers take tasks from
             // the first on, the caller from the last.
             let (n_runs, n_near) = (sorted.n_runs(), sorted.near().len());
-            if 2 * ix < frame.participants.len() {
+            if 2 * ix < frame.layers.len() {
                 self.push(ix, cache, What::Read, n_runs);
                 self.push(ix, cache, What::Near, n_near);
             } else {
@@ -150,7 +151,7 @@ impl Refit {
     fn prove(&mut self, job: Job<'_>, caches: &mut Caches, stats: &mut Statistics) {
         let Job { scene, frame, .. } = job;
         self.tasks.clear();
-        for (ix, participant) in frame.participants.iter().enumerate() {
+        for (ix, participant) in frame.layers.iter().enumerate() {
             let world = World {
                 scene,
                 frame,
@@ -249,7 +250,7 @@ impl Refit {
         for (task, found) in self.tasks.iter().zip(&mut self.found) {
             let found = found.get_mut().unwrap_or_else(PoisonError::into_inner);
             all_finite &= found.extents.all_finite;
-            let slot = frame.participants[task.participant as usize].id.index();
+            let slot = frame.layers[task.participant as usize].id.index();
             let cache = caches[slot].as_mut().expect("clustered");
             cache.surface += f64::from(found.surface);
             cache.whole.join(&found.extents.whole);
@@ -275,7 +276,7 @@ impl Refit {
             workers,
             ..
         } = job;
-        for (ix, participant) in frame.participants.iter().enumerate() {
+        for (ix, participant) in frame.layers.iter().enumerate() {
             let body = frame.body(scene, ix);
             let cache = caches[participant.id.index()].as_mut().expect("clustered");
             if cache.positions_stamp == body.positions_stamp() {
@@ -321,7 +322,7 @@ fn can_be_read(cache: &BodyCache, body: &Body) -> bool {
 
 /// Whom a participant could meet.
 fn met(frame: &Frame, ix: usize) -> impl Iterator<Item = usize> {
-    (0..frame.participants.len()).filter(move |&other| other != ix && frame.meets(ix, other))
+    (0..frame.layers.len()).filter(move |&other| other != ix && frame.test(ix, other).is_some())
 }
 
 /// The groups of a participant that are not beside all that it could meet, if its clusters are sorted.
@@ -352,7 +353,7 @@ fn sort(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker]) {
         caches: Some(caches),
     };
     let mut others = [Bounds::EMPTY; SORTED_TO];
-    for (ix, others) in others[..frame.participants.len()].iter_mut().enumerate() {
+    for (ix, others) in others[..frame.layers.len()].iter_mut().enumerate() {
         for other in met(frame, ix) {
             others.join(&world.cache(other as u32).whole);
         }
@@ -360,7 +361,7 @@ fn sort(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker]) {
     let mut due: [Mutex<Option<Due<'_>>>; SORTED_TO] = Default::default();
     let mut n_due = 0;
     let mut caches = caches.iter_mut().enumerate();
-    for (ix, participant) in frame.participants.iter().enumerate() {
+    for (ix, participant) in frame.layers.iter().enumerate() {
         let slot = participant.id.index();
         // They come in the order of their slots.
         let cache = caches.find(|&(other, _)| other == slot);

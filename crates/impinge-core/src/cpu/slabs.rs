@@ -92,7 +92,7 @@ impl Slabs<'_> {
 
     /// Pairs that share a hub, which `dispatch` and `pairing` have left out.
     fn resolve_hubs(&mut self) -> Result<(), Error> {
-        for (ix, participant) in (0u32..).zip(&self.job.frame.participants) {
+        for (ix, participant) in (0u32..).zip(&self.job.frame.layers) {
             let Some(hubs) = self.world.cache(ix).clustering.hubs() else {
                 continue;
             };
@@ -175,14 +175,14 @@ fn all<S: Simd>(
     body_stack: &mut Vec<NodePair>,
 ) -> Result<(), Error> {
     let (world, frame) = (slabs.world, slabs.job.frame);
-    if frame.between() && frame.participants.len() == 2 {
-        if frame.meets(0, 1) {
+    if frame.between() && frame.layers.len() == 2 {
+        if frame.test(0, 1).is_some() {
             between(simd, 0, 1, stack, slabs)?;
         }
     } else if frame.between() {
-        top.refit(frame.participants.len(), |ix| world.cache(ix).bounds.root());
+        top.refit(frame.layers.len(), |ix| world.cache(ix).bounds.root());
         top.pairs(simd, body_stack, |a, b| {
-            if !frame.meets(a as usize, b as usize) {
+            if frame.test(a as usize, b as usize).is_none() {
                 return Ok(());
             }
             // Compiled on its own: inside this closure the instruction set would be lost.
@@ -194,7 +194,7 @@ fn all<S: Simd>(
             ) -> Result<(), Error>)
         })?;
     }
-    for (ix, participant) in (0u32..).zip(&frame.participants) {
+    for (ix, participant) in (0u32..).zip(&frame.layers) {
         if participant.within {
             let cache = world.cache(ix);
             let (tree, hubs) = (cache.tree(), cache.clustering.hubs());

@@ -1,10 +1,12 @@
 //! What the stages look at: a scene, who takes part, and what is cached a body.
 
+use crate::elements::Elements;
 use crate::exact::Point;
-use crate::frame::{Frame, Participant};
+use crate::frame::{Frame, Layer};
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
-use crate::scene::{Elements, Positions, Scene};
+use crate::positions::Positions;
+use crate::scene::Scene;
 
 use super::bounds::TreeBounds;
 use super::dispatch::Tree;
@@ -51,7 +53,7 @@ pub struct World<'a> {
 #[derive(Clone, Copy)]
 pub struct BodyRef<'a> {
     /// Who it is.
-    pub participant: &'a Participant,
+    pub participant: &'a Layer,
     /// Where its vertices are.
     pub positions: &'a Positions,
     /// The corners at each place.
@@ -72,7 +74,7 @@ impl<'a> World<'a> {
     /// A participant, looked up.
     #[inline(always)]
     pub fn body(&self, participant_ix: u32) -> BodyRef<'a> {
-        let participant = &self.frame.participants[participant_ix as usize];
+        let participant = &self.frame.layers[participant_ix as usize];
         let body = self.scene.body_in(participant.id.slot());
         let clustering = self.caches.map(|_| &self.cache(participant_ix).clustering);
         BodyRef {
@@ -86,7 +88,7 @@ impl<'a> World<'a> {
     /// `Clusters` only: what is kept of a participant.
     #[inline(always)]
     pub(crate) fn cache(&self, participant_ix: u32) -> &'a BodyCache {
-        let slot = self.frame.participants[participant_ix as usize].id.index();
+        let slot = self.frame.layers[participant_ix as usize].id.index();
         self.caches
             .and_then(|caches| caches[slot].as_deref())
             .expect("every participant was clustered")
@@ -116,16 +118,10 @@ impl<'a> BodyRef<'a> {
         self.elements.corners(place as usize)
     }
 
-    /// The corners at a place in double precision; a triangle repeats its last one.
+    /// The corners at a place in double precision; an element of fewer than four repeats its last one.
     #[inline(always)]
     pub fn points(&self, place: u32) -> [Point; 4] {
-        let corners: [u32; 4] = match self.elements {
-            Elements::Triangles(faces) => {
-                let [a, b, c] = faces[place as usize];
-                [a, b, c, c]
-            }
-            Elements::Tetrahedra(tets) => tets[place as usize],
-        };
+        let corners = self.elements.four_corners(place as usize);
         corners.map(|corner| self.positions.point(corner as usize))
     }
 }

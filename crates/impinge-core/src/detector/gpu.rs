@@ -11,10 +11,11 @@ use crate::cpu::workers::Workers;
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::gpu::{Capacities, Engine, Gpu, Options, ResidentPairs, Wanted};
+use crate::ids::BodyId;
 use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
-use crate::scene::{BodyId, Scene};
+use crate::scene::Scene;
 use crate::settings::Recluster;
 
 /// The GPU that the settings ask for, if they ask for one.
@@ -135,6 +136,7 @@ impl Detector {
             pairs: Pairs::default(),
             clusters: Clusters::new(settings.instruction_set),
             cells: Cells::new(settings.instruction_set),
+            steps: super::steps::Steps::default(),
             settings,
         })
     }

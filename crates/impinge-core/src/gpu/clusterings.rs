@@ -6,7 +6,9 @@ use std::sync::Arc;
 use crate::frame::Frame;
 use crate::grouping::bounds::{Bounds, round_down, round_up};
 use crate::grouping::clusters::Clustering;
-use crate::scene::{Body, BodyId, Positions, Scene};
+use crate::ids::BodyId;
+use crate::positions::Positions;
+use crate::scene::{Body, Scene};
 use crate::stats::Statistics;
 
 /// How much the clusters' surface may grow against the body's before it is clustered again.
@@ -51,10 +53,7 @@ impl Clusterings {
         recluster: bool,
         stats: &mut Statistics,
     ) {
-        let n_slots = frame
-            .participants
-            .last()
-            .map_or(0, |last| last.id.index() + 1);
+        let n_slots = frame.layers.last().map_or(0, |last| last.id.index() + 1);
         if self.known.len() < n_slots {
             self.known.resize_with(n_slots, || None);
         }
@@ -65,7 +64,7 @@ impl Clusterings {
                 }
             }
         }
-        for (ix, participant) in frame.participants.iter().enumerate() {
+        for (ix, participant) in frame.layers.iter().enumerate() {
             let body = frame.body(scene, ix);
             let cache = &mut self.known[participant.id.index()];
             let known = cache

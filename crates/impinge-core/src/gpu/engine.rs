@@ -18,8 +18,9 @@ use super::topology::Most;
 use super::world::World;
 use crate::error::Error;
 use crate::frame::Frame;
+use crate::ids::BodyId;
 use crate::progress::Control;
-use crate::scene::{BodyId, Scene};
+use crate::scene::Scene;
 use crate::settings::Method;
 use crate::stats::Statistics;
 
@@ -392,7 +393,7 @@ impl Engine {
         let asked = (frame.n_primitives() as f64 * self.options.lambda).min(MOST_CELLS as f64);
         Some(CellsWanted {
             n_cells: (asked.ceil() as u64).min(most).max(1),
-            n_bodies: count(frame.participants.len()),
+            n_bodies: count(frame.layers.len()),
         })
     }
 

@@ -28,7 +28,8 @@ use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
-use crate::scene::{Positions, Scene};
+use crate::positions::Positions;
+use crate::scene::Scene;
 
 /// Neighbouring clusters of one participant.
 #[derive(Debug)]
@@ -55,7 +56,7 @@ pub fn cut<'a>(
 ) -> Vec<Chunk> {
     let mut chunks: Vec<Chunk> = Vec::new();
     let mut weight = Weight::default();
-    for participant in 0..frame.participants.len() {
+    for participant in 0..frame.layers.len() {
         let clustering = clustering(participant);
         for cluster in 0..clustering.n_clusters() {
             let (n, n_vertices) = (clustering.size(cluster), clustering.vertices(cluster).len());
@@ -114,7 +115,7 @@ pub fn meeting(frame: &Frame, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
     let mut runs: Vec<(usize, u32, &Run)> = (0..chunks.len()).flat_map(numbered).collect();
     runs.sort_by(|a, b| a.2.bounds.min[0].total_cmp(&b.2.bounds.min[0]));
     for (ix, &(chunk_a, a, run_a)) in runs.iter().enumerate() {
-        if chunks.len() == 1 && frame.participants[run_a.participant].within {
+        if chunks.len() == 1 && frame.layers[run_a.participant].within {
             pairs.push([a, a]);
         }
         for &(chunk_b, b, run_b) in &runs[ix + 1..] {
@@ -132,9 +133,9 @@ pub fn meeting(frame: &Frame, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
 
 fn meets(frame: &Frame, a: &Run, b: &Run) -> bool {
     if a.participant == b.participant {
-        frame.participants[a.participant].within
+        frame.layers[a.participant].within
     } else {
-        frame.meets(a.participant, b.participant)
+        frame.test(a.participant, b.participant).is_some()
     }
 }
 
@@ -201,7 +202,7 @@ impl Loaded {
         }
         let body = self.is_rounded.len() as u32;
         self.is_rounded.push(matches!(positions, Positions::F64(_)));
-        let first = frame.participants[participant].first;
+        let first = frame.layers[participant].first;
         for run in runs {
             self.topology
                 .push(clustering, run.first..run.end, first, body, |vertex| {

@@ -7,7 +7,8 @@ use super::layout::{Counter, N_COUNTERS, N_PAIRS, N_UNSURE};
 use super::room::{Capacities, Counts, Verdict};
 use crate::error::Error;
 use crate::frame::Frame;
-use crate::scene::{BodyId, Scene};
+use crate::ids::BodyId;
+use crate::scene::Scene;
 use crate::stats::Statistics;
 
 /// Where the pairs of an encoded frame are once its commands have run.

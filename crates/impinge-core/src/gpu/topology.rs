@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use super::layout::{Body, Cluster, ClusterVertex, Coordinate, Corners, Node, Order};
+use crate::elements::Kind;
 use crate::grouping::GROUP;
 use crate::grouping::clusters::Clustering;
-use crate::scene::Elements;
 
 /// Clusters as kernels read them.
 #[derive(Debug, Default)]
@@ -46,21 +46,13 @@ impl Topology {
             });
             self.cluster_vertices.extend(vertices);
         }
-        match &clustering.corners {
-            Elements::Triangles(faces) => {
-                let corners = faces[primitives.clone()].iter().map(|&[a, b, c]| Corners {
-                    vertices: [a, b, c, c].map(&place),
-                });
-                self.corners.extend(corners);
-            }
-            Elements::Tetrahedra(tets) => {
-                self.has_solids |= !primitives.is_empty();
-                let corners = tets[primitives.clone()].iter().map(|tet| Corners {
-                    vertices: tet.map(&place),
-                });
-                self.corners.extend(corners);
-            }
-        }
+        let is_solid = clustering.corners.kind() == Kind::Tetrahedra;
+        self.has_solids |= is_solid && !primitives.is_empty();
+        // Edges and points are the degenerate triangles that they look like.
+        let corners = primitives.clone().map(|primitive| Corners {
+            vertices: clustering.corners.four_corners(primitive).map(&place),
+        });
+        self.corners.extend(corners);
         let order = clustering.order[primitives].iter();
         self.numbers.extend(order.map(|&primitive| Order {
             number: first + primitive,

@@ -21,7 +21,9 @@ use crate::error::Error;
 use crate::frame::Frame;
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
-use crate::scene::{BodyId, Filter, Positions, Scene};
+use crate::ids::BodyId;
+use crate::positions::Positions;
+use crate::scene::{Filter, Scene};
 use crate::stats::Statistics;
 
 use super::buffers::{Storage, count};
@@ -151,17 +153,17 @@ impl World {
     }
 
     fn is_resident(&self, frame: &Frame) -> bool {
-        self.residents.len() == frame.participants.len()
+        self.residents.len() == frame.layers.len()
             && self.residents.iter().enumerate().all(|(ix, resident)| {
                 let cache = self.clusterings.of(resident.id);
-                resident.id == frame.participants[ix].id
+                resident.id == frame.layers[ix].id
                     && cache.is_some_and(|cache| cache.number == resident.number)
             })
     }
 
     fn send_topology(&mut self, gpu: &Gpu, scene: &Scene, frame: &Frame) -> Result<(), Error> {
         let caches: Vec<(u64, Arc<Clustering>)> = frame
-            .participants
+            .layers
             .iter()
             .map(|participant| {
                 let cache = self.clusterings.of(participant.id);
@@ -174,7 +176,7 @@ impl World {
         let mut first_vertex = 0u64;
         for (ix, (number, clustering)) in caches.iter().enumerate() {
             let n_vertices = count(frame.body(scene, ix).n_vertices());
-            let participant = &frame.participants[ix];
+            let participant = &frame.layers[ix];
             let limit = u64::from(u32::MAX) / 3;
             if first_vertex + n_vertices > limit {
                 return Err(Error::TooMany {
@@ -268,7 +270,7 @@ impl World {
 
     /// The clusters of a participant, which are known.
     pub(crate) fn clustering(&self, frame: &Frame, participant_ix: usize) -> &Clustering {
-        let id = frame.participants[participant_ix].id;
+        let id = frame.layers[participant_ix].id;
         let cache = self.clusterings.of(id);
         &cache.expect("just clustered").clustering
     }
@@ -276,7 +278,7 @@ impl World {
     /// What all of a frame would take on the device.
     pub fn weigh(&self, scene: &Scene, frame: &Frame) -> Weight {
         let mut weight = Weight::default();
-        for ix in 0..frame.participants.len() {
+        for ix in 0..frame.layers.len() {
             let clustering = self.clustering(frame, ix);
             weight.n_primitives += count(clustering.order.len());
             weight.n_vertices += count(frame.body(scene, ix).n_vertices());
@@ -355,8 +357,8 @@ impl World {
             self.is_moved = true;
         }
         let words = |bits: u64| [bits as u32, (bits >> 32) as u32];
-        let mut bodies = Vec::with_capacity(frame.participants.len());
-        for (ix, participant) in frame.participants.iter().enumerate() {
+        let mut bodies = Vec::with_capacity(frame.layers.len());
+        for (ix, participant) in frame.layers.iter().enumerate() {
             // Bodies without a category meet nobody.
             let filter = match frame.between() {
                 true => frame.filter(ix),
@@ -432,11 +434,11 @@ impl World {
             return vec![NodePair { a: top, b: top }];
         }
         if frame.between() {
-            let filled: Vec<usize> = (0..frame.participants.len())
+            let filled: Vec<usize> = (0..frame.layers.len())
                 .filter(|&ix| forest.is_filled(ix))
                 .collect();
             if let [a, b] = filled[..]
-                && frame.meets(a, b)
+                && frame.test(a, b).is_some()
             {
                 seeds.push(NodePair {
                     a: root(a),
@@ -444,7 +446,7 @@ impl World {
                 });
             }
         }
-        for (ix, participant) in frame.participants.iter().enumerate() {
+        for (ix, participant) in frame.layers.iter().enumerate() {
             if participant.within && forest.is_filled(ix) {
                 seeds.push(NodePair {
                     a: root(ix),
@@ -476,9 +478,9 @@ impl World {
         if a.is_gate() && b.is_gate() {
             let (body_a, body_b) = (a.first_child as usize, b.first_child as usize);
             let meets = if body_a == body_b {
-                frame.participants[body_a].within
+                frame.layers[body_a].within
             } else {
-                frame.meets(body_a, body_b)
+                frame.test(body_a, body_b).is_some()
             };
             if meets {
                 into.push(NodePair {

@@ -18,7 +18,7 @@ use super::adjacency::Adjacency;
 use super::bounds::Bounds;
 use super::hierarchy::{Entry, Shape};
 use super::hubs::{self, Hubs};
-use crate::scene::Elements;
+use crate::elements::{Elements, with_corners};
 
 /// Runs this short are not split further inside a cluster.
 const FINEST_RUN: usize = 8;
@@ -67,26 +67,16 @@ impl Clustering {
                 number: primitive as u32,
             })
             .collect();
-        let classes = match elements {
-            Elements::Triangles(faces) => hubs::classes(faces),
-            Elements::Tetrahedra(tets) => hubs::classes(tets),
-        };
+        let classes = with_corners!(elements, |corners| hubs::classes(corners));
         let classes = classes.as_deref();
         super::hierarchy::order(&shape, GROUP, FINEST_RUN, classes, &mut entries);
         let order: Vec<u32> = entries.iter().map(|entry| entry.number).collect();
         drop(entries);
-        let corners = match elements {
-            Elements::Triangles(faces) => Elements::Triangles(gather(faces, &order)),
-            Elements::Tetrahedra(tets) => Elements::Tetrahedra(gather(tets, &order)),
-        };
-        let (vertices, vertex_starts) = match &corners {
-            Elements::Triangles(faces) => unique_vertices(faces),
-            Elements::Tetrahedra(tets) => unique_vertices(tets),
-        };
-        let hubs = classes.is_some().then(|| match &corners {
-            Elements::Triangles(faces) => Hubs::new(faces, &shape),
-            Elements::Tetrahedra(tets) => Hubs::new(tets, &shape),
-        });
+        let corners = with_corners!(elements, |corners| gather(corners, &order).into());
+        let (vertices, vertex_starts) = with_corners!(&corners, |corners| unique_vertices(corners));
+        let hubs = classes
+            .is_some()
+            .then(|| with_corners!(&corners, |corners| Hubs::new(corners, &shape)));
         Clustering {
             n_vertices_covered: covered(&vertices),
             order,
@@ -125,10 +115,8 @@ impl Clustering {
 
     /// Who shares vertices with whom, hubs apart; found at the first self-collision query.
     pub fn adjacency(&self) -> &Adjacency {
-        self.adjacency.get_or_init(|| match &self.corners {
-            Elements::Triangles(faces) => Adjacency::new(faces),
-            Elements::Tetrahedra(tets) => Adjacency::new(tets),
-        })
+        self.adjacency
+            .get_or_init(|| with_corners!(&self.corners, |corners| Adjacency::new(corners)))
     }
 
     /// Finds the corners of each cluster's triangles as numbers of its own vertices, for kernels that look them up.
@@ -142,7 +130,7 @@ impl Clustering {
                     local_faces(&faces[places], self.vertices(cluster))
                 })
                 .collect(),
-            Elements::Tetrahedra(_) => Vec::new(),
+            _ => Vec::new(),
         });
     }
 
@@ -158,11 +146,7 @@ impl Clustering {
     }
 
     pub fn bytes(&self) -> usize {
-        let corners = match &self.corners {
-            Elements::Triangles(faces) => size_of_val(&faces[..]),
-            Elements::Tetrahedra(tets) => size_of_val(&tets[..]),
-        };
-        corners
+        self.corners.bytes()
             + size_of_val(&self.order[..])
             + size_of_val(&self.vertices[..])
             + size_of_val(&self.vertex_starts[..])

@@ -30,7 +30,7 @@ _Method: TypeAlias = Literal["clusters", "cells", "naive"]
 _Backend: TypeAlias = Literal["auto", "cpu", "gpu"]
 _Recluster: TypeAlias = Literal["auto", "never"]
 _InstructionSet: TypeAlias = Literal["portable", "avx2", "avx512"]
-_Kind: TypeAlias = Literal["triangles", "tetrahedra"]
+_Kind: TypeAlias = Literal["points", "edges", "triangles", "tetrahedra"]
 _SharedVertex: TypeAlias = Literal["skip", "resolve"]
 
 class _Settings(TypedDict, total=False):

@@ -46,7 +46,7 @@ impl Rule for Recorded<'_> {
     #[inline(always)]
     fn admits(&self, a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool {
         let global =
-            |kept: &Kept| self.frame.participants[kept.participant as usize].first + kept.primitive;
+            |kept: &Kept| self.frame.layers[kept.participant as usize].first + kept.primitive;
         keys.push(pair_key(global(a), global(b)));
         false
     }

@@ -1,7 +1,7 @@
 //! The cells of a coarse map that vertices lie in, a byte an axis: x + 2^8 y + 2^16 z.
 
 use crate::grouping::bounds::{greater, lesser};
-use crate::scene::Positions;
+use crate::positions::Positions;
 
 use crate::cpu::simd::{Isa, Simd, dispatch};
 

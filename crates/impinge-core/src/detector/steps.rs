@@ -1,0 +1,242 @@
+//! What a detector says of a step: which elements touch while bodies move from their positions to their end positions,
+//! when first, and how far the step can be taken.
+
+use std::time::Instant;
+
+use super::Detector;
+use crate::error::Error;
+use crate::exact::Contact;
+use crate::frame::{Ask, Frame, TestId};
+use crate::impacts::{Candidates, Found, Impact, Impacts};
+use crate::naive;
+use crate::narrow::{FirstContact, Overlap};
+use crate::pair_kind::PairKind;
+use crate::positions::Positions;
+use crate::progress::Control;
+use crate::scene::Scene;
+use crate::stats::Statistics;
+use crate::step::{Advance, CandidateQuery, Start, Step, Toi, blend};
+
+/// What is kept from step to step.
+#[derive(Default)]
+pub(super) struct Steps {
+    frame: Frame,
+    impacts: Impacts,
+    candidates: Candidates,
+    found: [Vec<Found<Contact>>; PairKind::ALL.len()],
+}
+
+impl Detector {
+    /// All pairs of elements that touch during a step, each with the first time at which it does.
+    ///
+    /// In: a scene whose bodies have positions, and end positions if they move
+    /// ([`Scene::set_end_positions`]). Every vertex moves on a straight line at constant speed, from time 0 to time 1. Pairs
+    /// are of a vertex and a face and of two edges; where a body is made of edges or points alone also of an edge and a
+    /// vertex and of two vertices. Of tetrahedra the surface takes part. Pairs of one body that share a vertex are left out.
+    ///
+    /// The answer is exact: a pair is reported if and only if the two closed elements share a point at some time, and its
+    /// time is that of the first contact, rounded down: `toi <= first < toi.next_up()`.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, PairKind, Scene, Step};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]])?;
+    /// let point = scene.add_points(&[[1.0f32, 1.0, 1.0]])?;
+    /// scene.set_end_positions(point, &[[1.0f32, 1.0, -3.0]])?;
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let impacts = detector.impacts(&scene, &Step::default())?;
+    /// assert_eq!(impacts.len(), 1);
+    /// let impact = impacts.as_slice()[0];
+    /// assert_eq!((impact.kind, impact.toi), (PairKind::VertexFace, 0.25));
+    /// assert!(!detector.is_free(&scene, &Step::default())?);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// A stale id, refused positions, a memory budget too small for even one slab.
+    pub fn impacts(&mut self, scene: &Scene, step: &Step) -> Result<&Impacts, Error> {
+        self.impacts_with(scene, step, &Control::new())
+    }
+
+    /// [`impacts`](Detector::impacts) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `impacts`, and [`Error::Cancelled`].
+    pub fn impacts_with(
+        &mut self,
+        scene: &Scene,
+        step: &Step,
+        control: &Control<'_>,
+    ) -> Result<&Impacts, Error> {
+        let start = Instant::now();
+        let n_threads = self.workers.n();
+        let Steps {
+            frame,
+            impacts,
+            found,
+            ..
+        } = &mut self.steps;
+        frame.resolve_for(scene, &step.query, Ask::Impacts)?;
+        impacts.begin(frame);
+        frame.check(scene)?;
+        let stats = impacts.stats_mut();
+        begin(stats, "naive", n_threads);
+        found.iter_mut().for_each(Vec::clear);
+        stats.time("naive", |stats| {
+            naive::run(
+                &FirstContact,
+                scene,
+                frame,
+                control,
+                stats,
+                |test, key, value| {
+                    if let TestId::Elements(kind) = test
+                        && !(step.start == Start::Skip && value.at_start)
+                    {
+                        found[kind as usize].push(Found { key, value });
+                    }
+                },
+            )
+        })?;
+        for (kind, found) in PairKind::ALL.into_iter().zip(found) {
+            found.sort_unstable_by_key(|found| found.key);
+            impacts.extend(kind, step.toi, found);
+        }
+        impacts.stats_mut().total_ms = start.elapsed().as_secs_f64() * 1e3;
+        Ok(&self.steps.impacts)
+    }
+
+    /// The impact with the least time, of several the one whose row comes first; `None` where the step is free.
+    /// The one that [`Impacts::earliest`] finds among all, but found faster.
+    ///
+    /// # Errors
+    /// As [`impacts`](Detector::impacts).
+    pub fn earliest(&mut self, scene: &Scene, step: &Step) -> Result<Option<Impact>, Error> {
+        Ok(self.impacts(scene, step)?.earliest())
+    }
+
+    /// Whether nothing touches during the step; with [`Start::Skip`], but for pairs that touch at its start.
+    ///
+    /// # Errors
+    /// As [`impacts`](Detector::impacts).
+    pub fn is_free(&mut self, scene: &Scene, step: &Step) -> Result<bool, Error> {
+        Ok(self.impacts(scene, step)?.is_empty())
+    }
+
+    /// How far the step can be taken: the largest fraction of it, backed off as little as the precision of positions
+    /// allows, for which the straight way from the start to the *rounded* positions is free.
+    ///
+    /// Positions that are stored are rounded, and rounding alone may make elements touch that did not. So each fraction is
+    /// tried: positions are rounded first, and [`is_free`](Detector::is_free) is asked of the way to those. A chain of such
+    /// steps is free from the first to the last, whatever the rounding. The first fraction tried is that of the first
+    /// contact; then the back-off doubles, from the last bit on.
+    ///
+    /// Pairs that touch at the start allow no step at all under [`Start::Report`], and are not looked at under
+    /// [`Start::Skip`].
+    ///
+    /// # Errors
+    /// As [`impacts`](Detector::impacts).
+    pub fn advance(&mut self, scene: &Scene, step: &Step) -> Result<Advance, Error> {
+        let step = step.clone().toi(Toi::F64);
+        let first = self.earliest(scene, &step)?;
+        let moving = || {
+            let bodies = scene.bodies();
+            bodies.filter_map(|(id, body)| Some((id, body.positions(), body.end_positions()?)))
+        };
+        let mut advance = Advance {
+            fraction: 1.0,
+            first,
+            positions: Vec::new(),
+            n_tried: 1,
+        };
+        let Some(first) = first else {
+            advance.positions = moving().map(|(id, _, end)| (id, end.clone())).collect();
+            return Ok(advance);
+        };
+        let single = moving().any(|(_, start, _)| matches!(start, Positions::F32(_)));
+        let last_bit = f64::from(if single { f32::EPSILON } else { 0.0 }).max(f64::EPSILON);
+        let mut trial = scene.clone();
+        let mut back_off = 0.0;
+        loop {
+            advance.fraction = first.toi * (1.0 - back_off);
+            advance.positions.clear();
+            let mut moves = false;
+            for (id, start, end) in moving() {
+                let positions = blend(start, end, advance.fraction);
+                moves |= positions != *start;
+                match &positions {
+                    Positions::F32(positions) => trial.set_end_positions(id, positions)?,
+                    Positions::F64(positions) => trial.set_end_positions(id, positions)?,
+                }
+                advance.positions.push((id, positions));
+            }
+            if !moves {
+                advance.fraction = 0.0;
+                return Ok(advance);
+            }
+            advance.n_tried += 1;
+            if self.is_free(&trial, &step)? {
+                return Ok(advance);
+            }
+            back_off = if back_off == 0.0 {
+                last_bit
+            } else {
+                f64::min(2.0 * back_off, 1.0)
+            };
+        }
+    }
+
+    /// Pairs of elements whose boxes overlap during a step, each box inflated by a distance: for those who bring a test of
+    /// their own. Sorted and complete.
+    ///
+    /// # Errors
+    /// As [`impacts`](Detector::impacts), and a distance that is negative or not finite.
+    pub fn candidates(
+        &mut self,
+        scene: &Scene,
+        query: &CandidateQuery,
+    ) -> Result<&Candidates, Error> {
+        let start = Instant::now();
+        query.check()?;
+        let n_threads = self.workers.n();
+        let Steps {
+            frame, candidates, ..
+        } = &mut self.steps;
+        frame.resolve_for(scene, &query.query, Ask::Candidates(query.kinds))?;
+        candidates.begin(frame);
+        frame.check(scene)?;
+        let (keys, stats) = candidates.parts_mut();
+        begin(stats, "naive", n_threads);
+        let test = Overlap {
+            distance: query.distance,
+        };
+        naive::run(
+            &test,
+            scene,
+            frame,
+            &Control::new(),
+            stats,
+            |test, key, ()| {
+                if let TestId::Elements(kind) = test {
+                    keys[kind as usize].push(key);
+                }
+            },
+        )?;
+        keys.iter_mut().for_each(|keys| keys.sort_unstable());
+        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
+        Ok(&self.steps.candidates)
+    }
+
+    /// How the last answer about a step was found: that of [`impacts`](Detector::impacts),
+    /// [`earliest`](Detector::earliest), [`is_free`](Detector::is_free) or [`advance`](Detector::advance).
+    pub fn step_stats(&self) -> &Statistics {
+        self.steps.impacts.stats()
+    }
+}
+
+fn begin(stats: &mut Statistics, method: &'static str, n_threads: usize) {
+    stats.method = method;
+    stats.n_threads = n_threads;
+    stats.backend.push_str("cpu");
+}

@@ -1,0 +1,255 @@
+//! The answers about a step: what touches and when, and what might.
+
+use crate::exact::Contact;
+use crate::frame::{Frame, owner_by_first};
+use crate::ids::BodyId;
+use crate::pair_kind::PairKind;
+use crate::pairs::{Primitive, mix};
+use crate::stats::Statistics;
+use crate::step::Toi;
+
+/// A key and what comes with it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Found<V> {
+    pub key: u64,
+    pub value: V,
+}
+
+/// What global numbers stand for.
+#[derive(Debug, Clone, Default)]
+struct Numbering {
+    /// Bodies, and the first number of each of their layers.
+    layers: Vec<(BodyId, u32)>,
+}
+
+impl Numbering {
+    fn begin(&mut self, frame: &Frame) {
+        self.layers.clear();
+        let layers = frame.layers.iter().map(|layer| (layer.id, layer.first));
+        self.layers.extend(layers);
+    }
+
+    fn name(&self, number: u32) -> Primitive {
+        let (body, first) = self.layers[owner_by_first(&self.layers, number, |layer| layer.1)];
+        Primitive {
+            body,
+            primitive: number - first,
+        }
+    }
+
+    fn pair(&self, key: u64) -> (Primitive, Primitive) {
+        (self.name((key >> 32) as u32), self.name(key as u32))
+    }
+}
+
+/// Two elements that touch during a step, and when first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Impact {
+    /// What they are.
+    pub kind: PairKind,
+    /// The element that the kind names first: the vertex of a vertex and a face, the edge of an edge and a vertex.
+    ///
+    /// Vertices are numbered as positions are, faces as they were given (those of tetrahedra: by tetrahedron, then by the
+    /// corner opposite), edges that were given as they were given, and others as unique pairs `(low, high)` in the order of
+    /// `(high, low)`: [`Body::part`](crate::Body::part) has them.
+    pub a: Primitive,
+    /// The other element. Where both are of the same kind, it is of a body with a higher id, or the higher element.
+    pub b: Primitive,
+    /// The first time in [0, 1] at which they touch, rounded down to `f32` or `f64`, as [`Step::toi`](crate::Step::toi) says.
+    pub toi: f64,
+    /// Whether they touch at the start, at time 0.
+    pub at_start: bool,
+}
+
+impl Impact {
+    /// The row `[body_a, element_a, body_b, element_b]`, with bodies by their [`index`](BodyId::index).
+    pub fn row(&self) -> [u32; 4] {
+        row(self.a, self.b)
+    }
+
+    /// What rows are sorted by.
+    fn order(&self) -> (PairKind, [u32; 4]) {
+        (self.kind, self.row())
+    }
+
+    /// The earlier one, or of two at the same time the one whose row comes first.
+    pub(crate) fn earlier(self, other: Impact) -> Impact {
+        let is_later = self.toi.total_cmp(&other.toi);
+        match is_later.then_with(|| self.order().cmp(&other.order())) {
+            std::cmp::Ordering::Greater => other,
+            _ => self,
+        }
+    }
+}
+
+fn row(a: Primitive, b: Primitive) -> [u32; 4] {
+    let index = |body: BodyId| body.index() as u32;
+    [index(a.body), a.primitive, index(b.body), b.primitive]
+}
+
+/// All pairs of elements that touch during a step, sorted by `(kind, body_a, element_a, body_b, element_b)`.
+///
+/// The same input gives the same bytes on every method, backend, thread count and budget.
+#[derive(Debug, Clone, Default)]
+pub struct Impacts {
+    numbering: Numbering,
+    impacts: Vec<Impact>,
+    stats: Statistics,
+}
+
+impl Impacts {
+    /// Takes over the frame's numbering.
+    pub(crate) fn begin(&mut self, frame: &Frame) {
+        self.numbering.begin(frame);
+        self.impacts.clear();
+        self.stats.clear();
+    }
+
+    pub(crate) fn stats_mut(&mut self) -> &mut Statistics {
+        &mut self.stats
+    }
+
+    /// What was found of one kind, in the order of the keys. Kinds come in their order.
+    pub(crate) fn extend(&mut self, kind: PairKind, toi: Toi, found: &[Found<Contact>]) {
+        let numbering = &self.numbering;
+        self.impacts.extend(found.iter().map(|found| {
+            let (a, b) = numbering.pair(found.key);
+            Impact {
+                kind,
+                a,
+                b,
+                toi: toi.round(&found.value),
+                at_start: found.value.at_start,
+            }
+        }));
+    }
+
+    /// How many pairs touch.
+    pub fn len(&self) -> usize {
+        self.impacts.len()
+    }
+
+    /// Whether the step is free of contact.
+    pub fn is_empty(&self) -> bool {
+        self.impacts.is_empty()
+    }
+
+    /// All of them, sorted.
+    pub fn as_slice(&self) -> &[Impact] {
+        &self.impacts
+    }
+
+    /// All of them, sorted.
+    pub fn iter(&self) -> std::slice::Iter<'_, Impact> {
+        self.impacts.iter()
+    }
+
+    /// Those of one kind.
+    pub fn of(&self, kind: PairKind) -> &[Impact] {
+        let start = self.impacts.partition_point(|impact| impact.kind < kind);
+        let end = self.impacts.partition_point(|impact| impact.kind <= kind);
+        &self.impacts[start..end]
+    }
+
+    /// The one with the least time; of several, the one whose row comes first.
+    pub fn earliest(&self) -> Option<Impact> {
+        self.impacts.iter().copied().reduce(Impact::earlier)
+    }
+
+    /// How many pairs touch at the start.
+    pub fn touching_at_start(&self) -> usize {
+        let at_start = self.impacts.iter().filter(|impact| impact.at_start);
+        at_start.count()
+    }
+
+    /// A hash of the set of impacts, times included, that does not depend on their order: the wrapping sum of a mixed
+    /// 64-bit word per impact.
+    pub fn hash(&self) -> u64 {
+        self.impacts.iter().fold(0, |sum, impact| {
+            let time = mix(impact.toi.to_bits() ^ impact.kind as u64);
+            sum.wrapping_add(mix(hash_row(impact.row()) ^ time))
+        })
+    }
+
+    /// How the answer was found.
+    pub fn stats(&self) -> &Statistics {
+        &self.stats
+    }
+}
+
+impl<'a> IntoIterator for &'a Impacts {
+    type Item = &'a Impact;
+    type IntoIter = std::slice::Iter<'a, Impact>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+/// Pairs of elements whose boxes overlap during a step, sorted by `(kind, body_a, element_a, body_b, element_b)`.
+#[derive(Debug, Clone, Default)]
+pub struct Candidates {
+    numbering: Numbering,
+    keys: [Vec<u64>; PairKind::ALL.len()],
+    stats: Statistics,
+}
+
+impl Candidates {
+    /// Takes over the frame's numbering.
+    pub(crate) fn begin(&mut self, frame: &Frame) {
+        self.numbering.begin(frame);
+        self.keys.iter_mut().for_each(Vec::clear);
+        self.stats.clear();
+    }
+
+    pub(crate) fn parts_mut(&mut self) -> (&mut [Vec<u64>; 6], &mut Statistics) {
+        (&mut self.keys, &mut self.stats)
+    }
+
+    /// How many there are of all kinds.
+    pub fn len(&self) -> usize {
+        self.keys.iter().map(Vec::len).sum()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Those of one kind: `(a, b)`, where `a` is what the kind names first.
+    pub fn of(&self, kind: PairKind) -> impl ExactSizeIterator<Item = (Primitive, Primitive)> + '_ {
+        let keys = self.keys[kind as usize].iter();
+        keys.map(|&key| self.numbering.pair(key))
+    }
+
+    /// Rows `[body_a, element_a, body_b, element_b]` of one kind, with bodies by their [`index`](BodyId::index).
+    pub fn rows(&self, kind: PairKind) -> impl ExactSizeIterator<Item = [u32; 4]> + '_ {
+        self.of(kind).map(|(a, b)| row(a, b))
+    }
+
+    /// All of them.
+    pub fn iter(&self) -> impl Iterator<Item = (PairKind, Primitive, Primitive)> + '_ {
+        let kinds = PairKind::ALL.into_iter();
+        kinds.flat_map(|kind| self.of(kind).map(move |(a, b)| (kind, a, b)))
+    }
+
+    /// A hash of the set that does not depend on its order.
+    pub fn hash(&self) -> u64 {
+        PairKind::ALL.into_iter().fold(0, |sum, kind| {
+            self.rows(kind).fold(sum, |sum: u64, row| {
+                sum.wrapping_add(mix(hash_row(row) ^ kind as u64))
+            })
+        })
+    }
+
+    /// How the answer was found.
+    pub fn stats(&self) -> &Statistics {
+        &self.stats
+    }
+}
+
+fn hash_row([body_a, a, body_b, b]: [u32; 4]) -> u64 {
+    let low = mix(u64::from(body_a) << 32 | u64::from(a));
+    let high = mix(u64::from(body_b) << 32 | u64::from(b));
+    mix(low.rotate_left(17) ^ high.wrapping_mul(3))
+}

@@ -1,0 +1,48 @@
+//! Whether two elements touch during a step, and when first.
+
+use crate::exact::{Contact, ElementPair, Point, first_contact};
+use crate::frame::TestId;
+use crate::pair_kind::PairKind;
+
+use super::{Element, Extent, Test};
+
+/// The test of [`Detector::impacts`](crate::Detector::impacts).
+pub(crate) struct FirstContact;
+
+impl Test for FirstContact {
+    type Value = Contact;
+
+    fn extent(&self, element: Element<'_>) -> Extent {
+        Extent::of(element.ends().flatten())
+    }
+
+    fn settle(&self, test: TestId, a: Element<'_>, b: Element<'_>) -> Option<Contact> {
+        let pair = exact_kind(test)?;
+        if a.shares_vertex(&b) {
+            return None;
+        }
+        // An edge and a vertex are named in this order, and tested in the other.
+        let (a, b) = match pair {
+            ElementPair::VertexEdge => (b, a),
+            _ => (a, b),
+        };
+        let mut points: [[Point; 4]; 2] = Default::default();
+        for (ix, ends) in a.ends().chain(b.ends()).enumerate() {
+            for (points, end) in points.iter_mut().zip(ends) {
+                points[ix] = end;
+            }
+        }
+        first_contact(pair, &points[0], &points[1])
+    }
+}
+
+/// The pair as the exact predicate names it; none of what no contact is sought for.
+pub(crate) fn exact_kind(test: TestId) -> Option<ElementPair> {
+    match test {
+        TestId::Elements(PairKind::VertexFace) => Some(ElementPair::VertexFace),
+        TestId::Elements(PairKind::EdgeEdge) => Some(ElementPair::EdgeEdge),
+        TestId::Elements(PairKind::EdgeVertex) => Some(ElementPair::VertexEdge),
+        TestId::Elements(PairKind::VertexVertex) => Some(ElementPair::VertexVertex),
+        TestId::Elements(PairKind::EdgeFace | PairKind::FaceFace) | TestId::Intersection => None,
+    }
+}

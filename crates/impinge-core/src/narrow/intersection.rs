@@ -1,0 +1,104 @@
+//! Whether two elements share a point.
+
+use crate::elements::Kind;
+use crate::exact::{self, Point};
+#[cfg(feature = "gpu")]
+use crate::frame::Frame;
+use crate::frame::TestId;
+use crate::query::SharedVertex;
+#[cfg(feature = "gpu")]
+use crate::scene::Scene;
+
+use super::{Element, Extent, Test};
+
+/// The test of [`Detector::detect`](crate::Detector::detect).
+pub(crate) struct Intersection;
+
+impl Test for Intersection {
+    type Value = ();
+
+    fn extent(&self, element: Element<'_>) -> Extent {
+        Extent::of(element.points().into_iter())
+    }
+
+    fn settle(&self, _: TestId, a: Element<'_>, b: Element<'_>) -> Option<()> {
+        let (points_a, points_b) = (a.points(), b.points());
+        let kind = |element: Element<'_>| element.frame.layers[element.layer].kind;
+        let is_reported = if a.shares_vertex(&b) {
+            let rule = a.frame.shared_vertex;
+            intersect_shared(
+                rule,
+                kind(a),
+                (&points_a, a.corners),
+                (&points_b, b.corners),
+            )
+        } else {
+            intersect(kind(a), &points_a, kind(b), &points_b)
+        };
+        is_reported.then_some(())
+    }
+}
+
+/// Settles a pair of global numbers.
+#[cfg(feature = "gpu")]
+pub(crate) fn settle(scene: &Scene, frame: &Frame, a: u32, b: u32) -> bool {
+    let [a, b] = [a, b].map(|number| {
+        let layer = frame.owner(number);
+        let held = &frame.layers[layer];
+        let elements = frame.body(scene, layer).part(held.part);
+        Element {
+            scene,
+            frame,
+            layer,
+            corners: elements.corners((number - held.first) as usize),
+        }
+    });
+    Intersection.settle(TestId::Intersection, a, b).is_some()
+}
+
+impl Element<'_> {
+    /// The corners in double precision; an element of fewer than four repeats its last one.
+    fn points(&self) -> [Point; 4] {
+        let positions = self.frame.body(self.scene, self.layer).positions();
+        let last = self.corners.len() - 1;
+        std::array::from_fn(|k| positions.point(self.corners[k.min(last)] as usize))
+    }
+}
+
+fn triangle(corners: &[Point; 4]) -> &[Point; 3] {
+    corners.first_chunk().expect("three of four")
+}
+
+/// Whether two primitives of different bodies, or of one body without a common vertex, share a
+/// point. Points and edges are degenerate triangles.
+pub(crate) fn intersect(kind_a: Kind, a: &[Point; 4], kind_b: Kind, b: &[Point; 4]) -> bool {
+    match (kind_a, kind_b) {
+        (Kind::Tetrahedra, Kind::Tetrahedra) => exact::tetrahedra_intersect(a, b),
+        (_, Kind::Tetrahedra) => exact::triangle_tetrahedron_intersect(triangle(a), b),
+        (Kind::Tetrahedra, _) => exact::triangle_tetrahedron_intersect(triangle(b), a),
+        _ => exact::triangles_intersect(triangle(a), triangle(b)),
+    }
+}
+
+/// Whether a pair of one body that shares a vertex index is reported under the rule. Of points and edges none is.
+pub(crate) fn intersect_shared(
+    rule: SharedVertex,
+    kind: Kind,
+    a: (&[Point; 4], &[u32]),
+    b: (&[Point; 4], &[u32]),
+) -> bool {
+    let three = |corners: &[u32]| [corners[0], corners[1], corners[2]];
+    let four = |corners: &[u32]| [corners[0], corners[1], corners[2], corners[3]];
+    match (rule, kind) {
+        (SharedVertex::Skip, _) | (_, Kind::Points | Kind::Edges) => false,
+        (SharedVertex::Resolve, Kind::Triangles) => exact::triangles_intersect_beyond_shared(
+            triangle(a.0),
+            three(a.1),
+            triangle(b.0),
+            three(b.1),
+        ),
+        (SharedVertex::Resolve, Kind::Tetrahedra) => {
+            exact::tetrahedra_intersect_beyond_shared(a.0, four(a.1), b.0, four(b.1))
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! The test of one pair, as a plug: what every method and backend ends in.
+
+mod impact;
+mod intersection;
+mod overlap;
+
+#[cfg(feature = "gpu")]
+pub(crate) use intersection::settle;
+pub(crate) use intersection::{Intersection, intersect, intersect_shared};
+
+pub(crate) use impact::FirstContact;
+pub(crate) use overlap::Overlap;
+
+use crate::frame::{Frame, TestId};
+use crate::scene::Scene;
+
+/// One element of one layer of a frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Element<'a> {
+    pub scene: &'a Scene,
+    pub frame: &'a Frame,
+    /// The layer.
+    pub layer: usize,
+    /// Its corners, as vertices of the layer's body.
+    pub corners: &'a [u32],
+}
+
+/// What is asked of a pair of elements, and what is answered.
+pub(crate) trait Test {
+    /// What comes with a pair that is reported: nothing, a time, a distance.
+    type Value: Copy;
+
+    /// The extent of an element, exactly: pairs whose extents have no point in common are not reported.
+    fn extent(&self, element: Element<'_>) -> Extent;
+
+    /// Whether a pair is reported, decided exactly; adjacency rule included.
+    fn settle(&self, test: TestId, a: Element<'_>, b: Element<'_>) -> Option<Self::Value>;
+}
+
+/// A closed box in double precision.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Extent {
+    pub min: [f64; 3],
+    pub max: [f64; 3],
+}
+
+impl Extent {
+    /// Of some points.
+    pub fn of(points: impl Iterator<Item = [f64; 3]>) -> Self {
+        let nothing = Extent {
+            min: [f64::INFINITY; 3],
+            max: [f64::NEG_INFINITY; 3],
+        };
+        points.fold(nothing, |extent, point| Extent {
+            min: std::array::from_fn(|axis| extent.min[axis].min(point[axis])),
+            max: std::array::from_fn(|axis| extent.max[axis].max(point[axis])),
+        })
+    }
+
+    /// Whether two have a point in common.
+    pub fn overlaps(&self, other: &Extent) -> bool {
+        (0..3).all(|axis| self.min[axis] <= other.max[axis] && other.min[axis] <= self.max[axis])
+    }
+}
+
+impl Element<'_> {
+    /// Whether two elements are of one body and name a common vertex of it.
+    pub fn shares_vertex(&self, other: &Element<'_>) -> bool {
+        let same_body = self.frame.layers[self.layer].id == self.frame.layers[other.layer].id;
+        same_body && share_vertex(self.corners, other.corners)
+    }
+
+    /// Where the corners are at the start of a step and at its end.
+    fn ends(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
+        let body = self.frame.body(self.scene, self.layer);
+        let start = body.positions();
+        let end = body.end_positions().unwrap_or(start);
+        self.corners
+            .iter()
+            .map(move |&corner| [start, end].map(|positions| positions.point(corner as usize)))
+    }
+}
+
+/// Whether two elements of one body name a common vertex.
+#[inline]
+pub(crate) fn share_vertex(a: &[u32], b: &[u32]) -> bool {
+    a.iter().any(|corner| b.contains(corner))
+}

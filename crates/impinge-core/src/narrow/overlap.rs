@@ -1,0 +1,65 @@
+//! Whether the boxes of two elements overlap during a step.
+
+use crate::frame::TestId;
+
+use super::{Element, Extent, Test};
+
+/// The test of [`Detector::candidates`](crate::Detector::candidates): boxes over the whole step, of which no axis leaves a
+/// gap of more than twice `distance`, as if each was inflated by that much.
+pub(crate) struct Overlap {
+    pub distance: f64,
+}
+
+impl Test for Overlap {
+    type Value = ();
+
+    fn extent(&self, element: Element<'_>) -> Extent {
+        let extent = Extent::of(element.ends().flatten());
+        // Outward: what is rounded is tested again.
+        Extent {
+            min: extent.min.map(|x| (x - self.distance).next_down()),
+            max: extent.max.map(|x| (x + self.distance).next_up()),
+        }
+    }
+
+    fn settle(&self, _: TestId, a: Element<'_>, b: Element<'_>) -> Option<()> {
+        if a.shares_vertex(&b) {
+            return None;
+        }
+        let [a, b] = [a, b].map(|element| Extent::of(element.ends().flatten()));
+        are_near(&a, &b, self.distance).then_some(())
+    }
+}
+
+/// Whether two boxes overlap once each is inflated by `distance`, decided exactly.
+pub(crate) fn are_near(a: &Extent, b: &Extent, distance: f64) -> bool {
+    (0..3).all(|axis| {
+        !is_beyond(a.min[axis], b.max[axis], distance)
+            && !is_beyond(b.min[axis], a.max[axis], distance)
+    })
+}
+
+/// Whether `low - high > 2 distance`, as real numbers.
+fn is_beyond(low: f64, high: f64, distance: f64) -> bool {
+    // The difference and its rounding error, which is a float (Knuth's two-sum).
+    let gap = low - high;
+    let back = gap - low;
+    let error = (low - (gap - back)) - (high + back);
+    let most = 2.0 * distance;
+    gap > most || (gap == most && error > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_are_compared_as_real_numbers() {
+        let least = f64::MIN_POSITIVE;
+        assert!(!is_beyond(1.0, 0.0, 0.5));
+        assert!(is_beyond(1.0, -least, 0.5), "the difference rounds to 1");
+        assert!(!is_beyond(1.0, least, 0.5), "and so does this one");
+        assert!(is_beyond(1.0_f64.next_up(), 0.0, 0.5));
+        assert!(is_beyond(least, 0.0, 0.0) && !is_beyond(0.0, 0.0, 0.0));
+    }
+}

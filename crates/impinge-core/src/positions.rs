@@ -1,0 +1,165 @@
+//! Where vertices are: single or double precision, checked once.
+
+use crate::error::Error;
+use crate::exact;
+use crate::ids::BodyId;
+
+/// Vertex positions in the precision in which they were given.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Positions {
+    /// `(n, 3)` single precision.
+    F32(Vec<[f32; 3]>),
+    /// `(n, 3)` double precision.
+    F64(Vec<[f64; 3]>),
+}
+
+impl Positions {
+    /// How many vertices there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Positions::F32(positions) => positions.len(),
+            Positions::F64(positions) => positions.len(),
+        }
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// One position in double precision (exact for both).
+    #[inline]
+    pub fn point(&self, vertex: usize) -> [f64; 3] {
+        match self {
+            Positions::F32(positions) => {
+                let [x, y, z] = positions[vertex];
+                [f64::from(x), f64::from(y), f64::from(z)]
+            }
+            Positions::F64(positions) => positions[vertex],
+        }
+    }
+
+    /// Becomes double precision if the others are.
+    pub(crate) fn widen_as(&mut self, others: &Positions) {
+        if let (Positions::F32(positions), Positions::F64(_)) = (&*self, others) {
+            let wide = positions.iter().map(|position| position.map(f64::from));
+            *self = Positions::F64(wide.collect());
+        }
+    }
+
+    pub(crate) fn precision(&self) -> &'static str {
+        match self {
+            Positions::F32(_) => "f32",
+            Positions::F64(_) => "f64",
+        }
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        match self {
+            Positions::F32(positions) => size_of_val(&positions[..]),
+            Positions::F64(positions) => size_of_val(&positions[..]),
+        }
+    }
+}
+
+impl From<Vec<[f32; 3]>> for Positions {
+    fn from(positions: Vec<[f32; 3]>) -> Self {
+        Positions::F32(positions)
+    }
+}
+
+impl From<Vec<[f64; 3]>> for Positions {
+    fn from(positions: Vec<[f64; 3]>) -> Self {
+        Positions::F64(positions)
+    }
+}
+
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for f32 {}
+    impl Sealed for f64 {}
+}
+
+/// `f32` or `f64`: both are taken as they are and answered exactly.
+pub trait Real: sealed::Sealed + Copy + Send + Sync + 'static {
+    #[doc(hidden)]
+    fn in_range(self) -> bool;
+    #[doc(hidden)]
+    fn widen(self) -> f64;
+    #[doc(hidden)]
+    fn stored(positions: &mut Positions) -> Option<&mut Vec<[Self; 3]>>;
+    #[doc(hidden)]
+    fn store(positions: &[[Self; 3]]) -> Positions;
+}
+
+impl Real for f32 {
+    #[inline(always)]
+    fn in_range(self) -> bool {
+        self.is_finite()
+    }
+    #[inline(always)]
+    fn widen(self) -> f64 {
+        f64::from(self)
+    }
+    fn stored(positions: &mut Positions) -> Option<&mut Vec<[f32; 3]>> {
+        match positions {
+            Positions::F32(positions) => Some(positions),
+            Positions::F64(_) => None,
+        }
+    }
+    fn store(positions: &[[f32; 3]]) -> Positions {
+        Positions::F32(positions.to_vec())
+    }
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn in_range(self) -> bool {
+        exact::in_range(self)
+    }
+    #[inline(always)]
+    fn widen(self) -> f64 {
+        self
+    }
+    fn stored(positions: &mut Positions) -> Option<&mut Vec<[f64; 3]>> {
+        match positions {
+            Positions::F64(positions) => Some(positions),
+            Positions::F32(_) => None,
+        }
+    }
+    fn store(positions: &[[f64; 3]]) -> Positions {
+        Positions::F64(positions.to_vec())
+    }
+}
+/// Refuses the first position that is not finite or outside the exact range.
+pub(crate) fn check_positions<R: Real>(body: BodyId, positions: &[[R; 3]]) -> Result<(), Error> {
+    // One branch a chunk keeps the common case, all good, at memory speed.
+    for (chunk_ix, chunk) in positions.chunks(1024).enumerate() {
+        let good = chunk
+            .as_flattened()
+            .iter()
+            .fold(true, |good, x| good & x.in_range());
+        if good {
+            continue;
+        }
+        for (vertex, position) in chunk.iter().enumerate() {
+            let vertex = chunk_ix * 1024 + vertex;
+            let value = position.map(R::widen);
+            if value.iter().any(|x| !x.is_finite()) {
+                return Err(Error::NonFinitePosition {
+                    body,
+                    vertex,
+                    value,
+                });
+            }
+            if let Some(&value) = value.iter().find(|&&x| !exact::in_range(x)) {
+                return Err(Error::CoordinateOutOfRange {
+                    body,
+                    vertex,
+                    value,
+                });
+            }
+        }
+    }
+    Ok(())
+}

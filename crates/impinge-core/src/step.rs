@@ -1,0 +1,198 @@
+//! What is asked of a step: bodies that move on straight lines from their positions to their end positions.
+
+use crate::error::Error;
+use crate::ids::BodyId;
+use crate::impacts::Impact;
+use crate::pair_kind::{PairKind, PairKinds};
+use crate::positions::Positions;
+use crate::query::Query;
+use crate::scene::Scene;
+
+/// What becomes of pairs that touch at the start of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Start {
+    /// They are reported with the time 0.
+    #[default]
+    Report,
+    /// They are left out, whatever they do later in the step.
+    Skip,
+}
+
+/// To which precision times are rounded down.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Toi {
+    /// The largest `f32` that is not above the first time.
+    #[default]
+    F32,
+    /// The largest `f64` that is not above it.
+    F64,
+}
+
+impl Toi {
+    /// A time that was rounded down to `f64`, rounded down further.
+    pub(crate) fn round(self, contact: &crate::exact::Contact) -> f64 {
+        match self {
+            Toi::F32 => f64::from(contact.time_f32()),
+            Toi::F64 => contact.time,
+        }
+    }
+}
+
+/// What is asked of a step: of which bodies, and what is reported.
+///
+/// Pairs of one body that share a vertex are left out, whatever the query says of them.
+///
+/// ```
+/// use impinge::{Query, Start, Step, Toi};
+/// let step = Step::new(Query::everything()).start(Start::Skip).toi(Toi::F64);
+/// assert_eq!(Step::default(), Step::new(Query::everything()));
+/// # let _ = step;
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Step {
+    pub(crate) query: Query,
+    pub(crate) start: Start,
+    pub(crate) toi: Toi,
+}
+
+impl Step {
+    /// Of the bodies of a query.
+    pub fn new(query: Query) -> Self {
+        Step {
+            query,
+            start: Start::default(),
+            toi: Toi::default(),
+        }
+    }
+
+    /// What becomes of pairs that touch at the start.
+    pub fn start(mut self, start: Start) -> Self {
+        self.start = start;
+        self
+    }
+
+    /// To which precision times are rounded down.
+    pub fn toi(mut self, toi: Toi) -> Self {
+        self.toi = toi;
+        self
+    }
+}
+
+impl Default for Step {
+    /// Pairs of different bodies and of one body, all together.
+    fn default() -> Self {
+        Step::new(Query::everything())
+    }
+}
+
+impl From<Query> for Step {
+    fn from(query: Query) -> Self {
+        Step::new(query)
+    }
+}
+
+/// Which pairs of elements are candidates for a test of the caller's own.
+///
+/// Two elements are when their boxes over the whole step, each inflated by `distance` on all sides, overlap (closed): when
+/// no axis leaves a gap of more than twice the distance. This is decided exactly. Pairs of one body that share a vertex are
+/// left out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CandidateQuery {
+    pub(crate) query: Query,
+    pub(crate) kinds: PairKinds,
+    pub(crate) distance: f64,
+}
+
+impl CandidateQuery {
+    /// Of the bodies of a query: vertices and faces, edges and edges, with a distance of 0.
+    pub fn new(query: Query) -> Self {
+        CandidateQuery {
+            query,
+            kinds: [PairKind::VertexFace, PairKind::EdgeEdge]
+                .into_iter()
+                .collect(),
+            distance: 0.0,
+        }
+    }
+
+    /// Which kinds of pairs.
+    pub fn kinds(mut self, kinds: impl IntoIterator<Item = PairKind>) -> Self {
+        self.kinds = kinds.into_iter().collect();
+        self
+    }
+
+    /// By how much boxes are inflated on all sides: 0 or more.
+    pub fn distance(mut self, distance: f64) -> Self {
+        self.distance = distance;
+        self
+    }
+
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        if self.distance >= 0.0 && self.distance.is_finite() {
+            return Ok(());
+        }
+        Err(Error::Setting {
+            setting: "distance",
+            given: self.distance.to_string(),
+            allowed: "a finite number that is not below 0",
+        })
+    }
+}
+
+/// How far a step can be taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Advance {
+    /// The part of the step that can be taken: 1 for all of it, 0 for none.
+    pub fraction: f64,
+    /// The first contact of the whole step, its time rounded down to `f64`. `None` where the whole step is free.
+    pub first: Option<Impact>,
+    /// Where the vertices of all bodies that move are then, rounded to the precision in which they are stored. The straight
+    /// way from the start to these rounded positions is free, but for what touches at the start.
+    pub positions: Vec<(BodyId, Positions)>,
+    /// How many fractions were tried.
+    pub n_tried: u32,
+}
+
+impl Advance {
+    /// Takes the step: these positions become those of the scene.
+    ///
+    /// # Errors
+    /// A body that is gone, or that has another number of vertices now.
+    pub fn apply(&self, scene: &mut Scene) -> Result<(), Error> {
+        self.positions
+            .iter()
+            .try_for_each(|(body, positions)| match positions {
+                Positions::F32(positions) => scene.set_positions(*body, positions),
+                Positions::F64(positions) => scene.set_positions(*body, positions),
+            })
+    }
+}
+
+/// `start + fraction (end - start)`, each coordinate computed in double precision and rounded to that of the positions.
+#[allow(clippy::cast_possible_truncation, reason = "positions are stored so")]
+pub(crate) fn blend(start: &Positions, end: &Positions, fraction: f64) -> Positions {
+    if fraction >= 1.0 {
+        return end.clone();
+    }
+    let at = |x: f64, y: f64| {
+        // Never beyond the ends, whatever the rounding.
+        (x + fraction * (y - x)).clamp(x.min(y), x.max(y))
+    };
+    match (start, end) {
+        (Positions::F32(start), Positions::F32(end)) => Positions::F32(
+            start
+                .iter()
+                .zip(end)
+                .map(|(x, y)| std::array::from_fn(|axis| at(x[axis].into(), y[axis].into()) as f32))
+                .collect(),
+        ),
+        _ => Positions::F64(
+            (0..start.len())
+                .map(|vertex| {
+                    let (x, y) = (start.point(vertex), end.point(vertex));
+                    std::array::from_fn(|axis| at(x[axis], y[axis]))
+                })
+                .collect(),
+        ),
+    }
+}
