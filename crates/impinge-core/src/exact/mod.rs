@@ -35,7 +35,7 @@ pub use shared::{
     tetrahedra_intersect_beyond_shared, triangle_tetrahedron_intersect_beyond_shared,
     triangles_intersect_beyond_shared,
 };
-pub use sweep::{Contact, ElementPair, first_contact, touch};
+pub use sweep::{Contact, ElementPair, first_contact, touch, touch_during};
 pub use tetrahedron::{tetrahedra_intersect, triangle_tetrahedron_intersect};
 pub use triangle::triangles_intersect;
 

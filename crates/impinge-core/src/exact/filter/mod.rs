@@ -23,6 +23,10 @@
 //! filter"). NaN and overflow make comparisons fail, and so end as unsure.
 
 mod determinant;
+#[allow(dead_code, reason = "see `moving`")]
+pub mod motion;
+#[allow(dead_code, reason = "the pipeline for moving elements takes these up")]
+mod moving;
 mod neighbours;
 pub mod number;
 mod tetrahedra;
@@ -30,6 +34,15 @@ mod triangles;
 
 use super::Point;
 
+pub(super) use moving::contact_answer;
+#[allow(
+    unused_imports,
+    reason = "the pipeline for moving elements takes these up"
+)]
+pub use moving::{
+    Contacts8, Moving64, Steps8, edge_edge_apart, edge_edge_apart_in_tables, edge_edge_contacts,
+    vertex_face_apart, vertex_face_apart_in_tables, vertex_face_contacts,
+};
 pub(super) use neighbours::{shared_edge, shared_vertex};
 pub(super) use tetrahedra::tetrahedra_answer;
 pub use tetrahedra::{classify_by_faces, classify_tetrahedra};

@@ -4,13 +4,18 @@
 //! selects. Additions, subtractions and multiplications are those of IEEE 754 in every
 //! implementation, one rounding each, so every instruction set gives the same masks.
 
-use std::ops::{Add, BitAnd, BitOr, BitXor, Mul, Not, Sub};
+use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Not, Sub};
 
 use super::{BATCH, LANES, TABLE};
 
 /// One number or several, side by side.
 pub trait Number:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + sealed::Sealed
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + sealed::Sealed
 {
     /// A condition for each.
     type Mask: Copy
@@ -25,6 +30,12 @@ pub trait Number:
     /// What underflow may add: nothing for `f64` within the range that a scene admits, 2^-69 for `f32` with
     /// coordinates up to 2^24, even where the processor flushes subnormal numbers to zero.
     const UNDERFLOW: f64;
+
+    /// The largest difference of coordinates with which moving elements may be asked; see `motion`.
+    const LARGEST: f64;
+    /// What underflow may add, with such differences, to a product of one vector with a known one, to a determinant of
+    /// three, and to a product of four.
+    const TINY: [f64; 3];
 
     /// A bound with what underflow may add.
     #[inline(always)]
@@ -41,6 +52,8 @@ pub trait Number:
     fn abs(self) -> Self;
     /// The larger one; either where one is NaN.
     fn larger(self, other: Self) -> Self;
+    /// Whether a condition holds anywhere.
+    fn any(mask: Self::Mask) -> bool;
     /// Whether `self > other`; false for NaN.
     fn gt(self, other: Self) -> Self::Mask;
     /// `yes` where the mask is set, else `no`.
@@ -53,6 +66,8 @@ pub trait Vector: Number {
     const N: usize;
     /// `N` numbers from memory, from lane `first` on.
     fn load(lanes: &[f64; LANES], first: usize) -> Self;
+    /// Writes the numbers to memory, from lane `first` on.
+    fn store(self, lanes: &mut [f64; LANES], first: usize);
     /// Bit k for number k.
     fn bits(mask: Self::Mask) -> u8;
 }
@@ -100,10 +115,22 @@ const BOUND_F32: f64 = f64::from_bits((1023 - 18) << 52);
 /// 2^-69.
 const UNDERFLOW_F32: f64 = f64::from_bits((1023 - 69) << 52);
 
+/// A power of two.
+const fn power(exponent: i64) -> f64 {
+    f64::from_bits(((1023 + exponent) as u64) << 52)
+}
+
+const LARGEST_DIFFERENCE_F64: f64 = power(100);
+const LARGEST_DIFFERENCE_F32: f64 = power(16);
+const TINY_F64: [f64; 3] = [power(-800), power(-800), power(-700)];
+const TINY_F32: [f64; 3] = [power(-80), power(-80), power(-60)];
+
 impl Number for f64 {
     type Mask = bool;
     const BOUND: f64 = BOUND_F64;
     const UNDERFLOW: f64 = 0.0;
+    const LARGEST: f64 = LARGEST_DIFFERENCE_F64;
+    const TINY: [f64; 3] = TINY_F64;
 
     #[inline(always)]
     fn splat(x: f64) -> Self {
@@ -117,6 +144,10 @@ impl Number for f64 {
     #[inline(always)]
     fn larger(self, other: Self) -> Self {
         if self > other { self } else { other }
+    }
+    #[inline(always)]
+    fn any(mask: bool) -> bool {
+        mask
     }
     #[inline(always)]
     fn gt(self, other: Self) -> bool {
@@ -143,7 +174,10 @@ macro_rules! operator {
 
 /// Numbers side by side as an array, where no wider set is known: whatever the compiler makes of it.
 macro_rules! portable {
-    ($type:ident, $mask:ident, $number:ty, $bits:ty, $n:expr, $bound:expr, $underflow:expr) => {
+    (
+        $type:ident, $mask:ident, $number:ty, $bits:ty, $n:expr, $bound:expr, $underflow:expr,
+        $largest:expr, $tiny:expr
+    ) => {
         #[doc = concat!("Some `", stringify!($number), "` in 128 bits, which SSE2 and NEON have.")]
         #[derive(Debug, Clone, Copy)]
         pub struct $type([$number; $n]);
@@ -169,6 +203,7 @@ macro_rules! portable {
         operator!($type, Add, add, |a, b| a.zip(b, |x, y| x + y));
         operator!($type, Sub, sub, |a, b| a.zip(b, |x, y| x - y));
         operator!($type, Mul, mul, |a, b| a.zip(b, |x, y| x * y));
+        operator!($type, Div, div, |a, b| a.zip(b, |x, y| x / y));
         operator!($mask, BitAnd, bitand, |a, b| a.zip(b, |x, y| x & y));
         operator!($mask, BitOr, bitor, |a, b| a.zip(b, |x, y| x | y));
         operator!($mask, BitXor, bitxor, |a, b| a.zip(b, |x, y| x ^ y));
@@ -185,7 +220,13 @@ macro_rules! portable {
             type Mask = $mask;
             const BOUND: f64 = $bound;
             const UNDERFLOW: f64 = $underflow;
+            const LARGEST: f64 = $largest;
+            const TINY: [f64; 3] = $tiny;
 
+            #[inline(always)]
+            fn any(mask: $mask) -> bool {
+                mask.0.iter().fold(0, |bits, more| bits | more) != 0
+            }
             #[inline(always)]
             fn splat(x: f64) -> Self {
                 $type([x as $number; $n])
@@ -222,7 +263,17 @@ macro_rules! portable {
 const PORTABLE: usize = 2;
 const PORTABLE_F32: usize = 4;
 
-portable!(Portable, PortableMask, f64, u64, PORTABLE, BOUND_F64, 0.0);
+portable!(
+    Portable,
+    PortableMask,
+    f64,
+    u64,
+    PORTABLE,
+    BOUND_F64,
+    0.0,
+    LARGEST_DIFFERENCE_F64,
+    TINY_F64
+);
 portable!(
     Portable32,
     Portable32Mask,
@@ -230,7 +281,9 @@ portable!(
     u32,
     PORTABLE_F32,
     BOUND_F32,
-    UNDERFLOW_F32
+    UNDERFLOW_F32,
+    LARGEST_DIFFERENCE_F32,
+    TINY_F32
 );
 
 impl Vector for Portable {
@@ -239,6 +292,10 @@ impl Vector for Portable {
     #[inline(always)]
     fn load(lanes: &[f64; LANES], first: usize) -> Self {
         Portable([lanes[first], lanes[first + 1]])
+    }
+    #[inline(always)]
+    fn store(self, lanes: &mut [f64; LANES], first: usize) {
+        lanes[first..][..PORTABLE].copy_from_slice(&self.0);
     }
     #[inline(always)]
     fn bits(mask: PortableMask) -> u8 {
@@ -280,12 +337,13 @@ mod x86 {
     macro_rules! register {
         (
             $(#[$doc:meta])* $type:ident($register:ty), $mask:ident($bits:ty),
-            $bound:expr, $underflow:expr,
-            add $add:ident, sub $sub:ident, mul $mul:ident, max $max:ident, splat |$x:ident| $splat:expr,
+            $bound:expr, $underflow:expr, $largest:expr, $tiny:expr,
+            add $add:ident, sub $sub:ident, mul $mul:ident, div $div:ident, max $max:ident, splat |$x:ident| $splat:expr,
             abs |$y:ident| $abs:expr, gt |$a:ident, $b:ident| $gt:expr,
             select |$m:ident, $yes:ident, $no:ident| $select:expr,
             and |$p:ident, $q:ident| $and:expr, or |$r:ident, $s:ident| $or:expr,
-            xor |$t:ident, $u:ident| $xor:expr, not |$v:ident| $not:expr $(,)?
+            xor |$t:ident, $u:ident| $xor:expr, not |$v:ident| $not:expr,
+            any |$z:ident| $any:expr $(,)?
         ) => {
             $(#[$doc])*
             #[derive(Debug, Clone, Copy)]
@@ -306,6 +364,10 @@ mod x86 {
             operator!($type, Mul, mul, |a, b| {
                 // SAFETY: see above.
                 unsafe { $type($mul(a.0, b.0)) }
+            });
+            operator!($type, Div, div, |a, b| {
+                // SAFETY: see above.
+                unsafe { $type($div(a.0, b.0)) }
             });
             operator!($mask, BitAnd, bitand, |a, b| {
                 let ($p, $q) = (a.0, b.0);
@@ -345,6 +407,18 @@ mod x86 {
                 type Mask = $mask;
                 const BOUND: f64 = $bound;
                 const UNDERFLOW: f64 = $underflow;
+                const LARGEST: f64 = $largest;
+                const TINY: [f64; 3] = $tiny;
+
+                #[inline(always)]
+                fn any(mask: $mask) -> bool {
+                    let $z = mask.0;
+                    #[allow(unused_unsafe, reason = "masks of 512 bits are integers")]
+                    // SAFETY: see above.
+                    unsafe {
+                        $any
+                    }
+                }
 
                 #[inline(always)]
                 fn splat($x: f64) -> Self {
@@ -380,8 +454,8 @@ mod x86 {
 
     register! {
         /// Four numbers in a 256-bit register. To be used where `avx2` was detected.
-        Avx2(__m256d), Avx2Mask(__m256d), BOUND_F64, 0.0,
-        add _mm256_add_pd, sub _mm256_sub_pd, mul _mm256_mul_pd, max _mm256_max_pd,
+        Avx2(__m256d), Avx2Mask(__m256d), BOUND_F64, 0.0, LARGEST_DIFFERENCE_F64, TINY_F64,
+        add _mm256_add_pd, sub _mm256_sub_pd, mul _mm256_mul_pd, div _mm256_div_pd, max _mm256_max_pd,
         splat |x| _mm256_set1_pd(x),
         abs |x| _mm256_andnot_pd(_mm256_set1_pd(-0.0), x),
         gt |a, b| _mm256_cmp_pd::<_CMP_GT_OQ>(a, b),
@@ -390,12 +464,13 @@ mod x86 {
         or |a, b| _mm256_or_pd(a, b),
         xor |a, b| _mm256_xor_pd(a, b),
         not |a| _mm256_xor_pd(a, _mm256_castsi256_pd(_mm256_set1_epi32(-1))),
+        any |x| _mm256_movemask_pd(x) != 0,
     }
 
     register! {
         /// Eight `f32` in a 256-bit register. To be used where `avx2` was detected.
-        Avx2F32(__m256), Avx2F32Mask(__m256), BOUND_F32, UNDERFLOW_F32,
-        add _mm256_add_ps, sub _mm256_sub_ps, mul _mm256_mul_ps, max _mm256_max_ps,
+        Avx2F32(__m256), Avx2F32Mask(__m256), BOUND_F32, UNDERFLOW_F32, LARGEST_DIFFERENCE_F32, TINY_F32,
+        add _mm256_add_ps, sub _mm256_sub_ps, mul _mm256_mul_ps, div _mm256_div_ps, max _mm256_max_ps,
         splat |x| _mm256_set1_ps(x as f32),
         abs |x| _mm256_andnot_ps(_mm256_set1_ps(-0.0), x),
         gt |a, b| _mm256_cmp_ps::<_CMP_GT_OQ>(a, b),
@@ -404,28 +479,31 @@ mod x86 {
         or |a, b| _mm256_or_ps(a, b),
         xor |a, b| _mm256_xor_ps(a, b),
         not |a| _mm256_xor_ps(a, _mm256_castsi256_ps(_mm256_set1_epi32(-1))),
+        any |x| _mm256_movemask_ps(x) != 0,
     }
 
     register! {
         /// Eight numbers in a 512-bit register. To be used where `avx512f` and `avx512dq` were detected.
-        Avx512(__m512d), Avx512Mask(__mmask8), BOUND_F64, 0.0,
-        add _mm512_add_pd, sub _mm512_sub_pd, mul _mm512_mul_pd, max _mm512_max_pd,
+        Avx512(__m512d), Avx512Mask(__mmask8), BOUND_F64, 0.0, LARGEST_DIFFERENCE_F64, TINY_F64,
+        add _mm512_add_pd, sub _mm512_sub_pd, mul _mm512_mul_pd, div _mm512_div_pd, max _mm512_max_pd,
         splat |x| _mm512_set1_pd(x),
         abs |x| _mm512_abs_pd(x),
         gt |a, b| _mm512_cmp_pd_mask::<_CMP_GT_OQ>(a, b),
         select |mask, yes, no| _mm512_mask_blend_pd(mask, no, yes),
         and |a, b| a & b, or |a, b| a | b, xor |a, b| a ^ b, not |a| !a,
+        any |x| x != 0,
     }
 
     register! {
         /// Sixteen `f32` in a 512-bit register. To be used where `avx512f` and `avx512dq` were detected.
-        Avx512F32(__m512), Avx512F32Mask(__mmask16), BOUND_F32, UNDERFLOW_F32,
-        add _mm512_add_ps, sub _mm512_sub_ps, mul _mm512_mul_ps, max _mm512_max_ps,
+        Avx512F32(__m512), Avx512F32Mask(__mmask16), BOUND_F32, UNDERFLOW_F32, LARGEST_DIFFERENCE_F32, TINY_F32,
+        add _mm512_add_ps, sub _mm512_sub_ps, mul _mm512_mul_ps, div _mm512_div_ps, max _mm512_max_ps,
         splat |x| _mm512_set1_ps(x as f32),
         abs |x| _mm512_abs_ps(x),
         gt |a, b| _mm512_cmp_ps_mask::<_CMP_GT_OQ>(a, b),
         select |mask, yes, no| _mm512_mask_blend_ps(mask, no, yes),
         and |a, b| a & b, or |a, b| a | b, xor |a, b| a ^ b, not |a| !a,
+        any |x| x != 0,
     }
 
     impl Vector for Avx2 {
@@ -436,6 +514,12 @@ mod x86 {
             let four: &[f64; 4] = lanes[first..].first_chunk().expect("four lanes");
             // SAFETY: see above; one load of four.
             Avx2(unsafe { _mm256_loadu_pd(four.as_ptr()) })
+        }
+        #[inline(always)]
+        fn store(self, lanes: &mut [f64; LANES], first: usize) {
+            let four: &mut [f64; 4] = lanes[first..].first_chunk_mut().expect("four lanes");
+            // SAFETY: see above; one store of four.
+            unsafe { _mm256_storeu_pd(four.as_mut_ptr(), self.0) }
         }
         #[inline(always)]
         fn bits(mask: Avx2Mask) -> u8 {
@@ -451,6 +535,11 @@ mod x86 {
         fn load(lanes: &[f64; LANES], _: usize) -> Self {
             // SAFETY: see above; one load of eight.
             Avx512(unsafe { _mm512_loadu_pd(lanes.as_ptr()) })
+        }
+        #[inline(always)]
+        fn store(self, lanes: &mut [f64; LANES], _: usize) {
+            // SAFETY: see above; one store of eight.
+            unsafe { _mm512_storeu_pd(lanes.as_mut_ptr(), self.0) }
         }
         #[inline(always)]
         fn bits(mask: Avx512Mask) -> u8 {

@@ -18,9 +18,12 @@
 //! `docs/exactness.md`, "Continuous collision", has the proofs.
 
 mod polygon;
+#[cfg(test)]
+mod tests;
 
 use super::Point;
 use super::algebra::Time;
+use super::filter::contact_answer;
 use super::segment::segments_intersect;
 use super::triangle::segment_meets_triangle;
 use polygon::Polygon;
@@ -107,7 +110,7 @@ impl Contact {
 
 /// The largest `f32` that is not above a number in [0, 1].
 #[allow(clippy::cast_possible_truncation, reason = "rounded here")]
-fn round_down(x: f64) -> f32 {
+pub(super) fn round_down(x: f64) -> f32 {
     let nearest = x as f32;
     if f64::from(nearest) > x {
         nearest.next_down()
@@ -135,12 +138,34 @@ pub fn first_contact(pair: ElementPair, start: &[Point; 4], end: &[Point; 4]) ->
     if is_apart_on_an_axis(pair, start, end) || !are_finite(pair, start, end) {
         return None;
     }
+    if contact_answer(pair, start, end) == Some(false) {
+        return None;
+    }
+    first_contact_by_roots(pair, start, end)
+}
+
+/// [`first_contact`] by exact arithmetic alone.
+fn first_contact_by_roots(
+    pair: ElementPair,
+    start: &[Point; 4],
+    end: &[Point; 4],
+) -> Option<Contact> {
     if touch(pair, start) {
         return Some(Contact::AT_START);
     }
     Polygon::new(pair.corners(), start, end)
         .first_time()
         .map(Contact::later)
+}
+
+/// Whether two elements share a point at some time in [0, 1]: [`first_contact`] without the time, and faster.
+#[must_use]
+pub fn touch_during(pair: ElementPair, start: &[Point; 4], end: &[Point; 4]) -> bool {
+    if is_apart_on_an_axis(pair, start, end) || !are_finite(pair, start, end) {
+        return false;
+    }
+    contact_answer(pair, start, end)
+        .unwrap_or_else(|| first_contact_by_roots(pair, start, end).is_some())
 }
 
 /// Whether two elements share a point at one moment.

@@ -1,0 +1,549 @@
+//! Moving elements: certainly apart, certainly in contact within known times, or unsure.
+//!
+//! What it does: asks the difference polygon of two moving elements (see `exact::sweep`) about an interval of time, in
+//! plain `f64` or `f32`, and searches [0, 1] for the first contact by halving intervals. One pair a lane.
+//!
+//! In: the points at the start and at the end ([`Motion`]). Out: masks and times ([`Search`]). Cost in operations for
+//! all lanes: [`Motion::are_apart`] about 300, each step of [`Motion::search`] 200 to 1,200.
+//!
+//! Method: over [a, b] the corners V and edges E of the polygon are computed at a and at b, and from them the Bernstein
+//! coefficients over [a, b] of the cubic f = N . V_0 and of the quartics w = N . (V x E), one per edge. All
+//! coefficients of f of one sign, or all of some w negative: no contact. f of different signs at a and b, and all
+//! coefficients of all w positive: contact. Else the interval is halved.
+//!
+//! Invariant: with |.| the largest coordinate at either end of the step and u the unit roundoff, computed
+//! coefficients are wrong by less than 128 u |E_0| |E_1| |V_0| (f; three times that for the inner ones, which are kept
+//! three times as large) and 384 u |E_0| |E_1| |V| |E| (w; times 4, 6, 4 for the inner ones), at any time in any
+//! interval (`docs/exactness.md`, "The filter for moving elements"). NaN and overflow end as unsure.
+
+use super::number::Number;
+
+/// The difference polygon of pairs of moving elements: a triangle (K = 3) or a parallelogram (K = 4).
+#[derive(Clone, Copy)]
+pub struct Motion<T: Number, const K: usize> {
+    /// At the start and at the end.
+    corners: [[[T; 3]; K]; 2],
+    /// From each corner to the next. Of a parallelogram two: the others are their opposites.
+    edges: [[[T; 3]; 3]; 2],
+    /// The largest coordinate of a corner, at either end.
+    corner_sizes: [T; K],
+    edge_sizes: [T; 3],
+    /// Where all of this is small enough for what underflow may do.
+    is_small: T::Mask,
+}
+
+/// What a [search](Motion::search) found.
+#[derive(Clone, Copy)]
+pub struct Search<T: Number> {
+    /// Certainly no contact in the whole interval.
+    pub no: T::Mask,
+    /// Certainly contact. The first one is inside [`low`, `high`], and there f has one root.
+    pub yes: T::Mask,
+    /// Not before this time is there contact, whatever the masks say.
+    pub low: T,
+    /// Where `yes`: no later than this time there is contact.
+    pub high: T,
+}
+
+/// Which Bernstein coefficients of f over an interval are certainly positive, and which certainly negative.
+struct Cubic<T: Number> {
+    positive: [T::Mask; 4],
+    negative: [T::Mask; 4],
+}
+
+impl<T: Number> Cubic<T> {
+    #[inline(always)]
+    fn new(f: &[T; 4], bound: T, inner_bound: T) -> Self {
+        let zero = T::splat(0.0);
+        Self {
+            positive: [
+                f[0].gt(bound),
+                f[1].gt(inner_bound),
+                f[2].gt(inner_bound),
+                f[3].gt(bound),
+            ],
+            negative: [
+                (zero - bound).gt(f[0]),
+                (zero - inner_bound).gt(f[1]),
+                (zero - inner_bound).gt(f[2]),
+                (zero - bound).gt(f[3]),
+            ],
+        }
+    }
+
+    #[inline(always)]
+    fn has_no_root(&self) -> T::Mask {
+        let ([a, b, c, d], [e, f, g, h]) = (self.positive, self.negative);
+        (a & b & c & d) | (e & f & g & h)
+    }
+
+    /// The outer coefficients are opposite, and not each inner one has the sign of the outer one further away: then the
+    /// signs change once.
+    #[inline(always)]
+    fn has_one_root(&self) -> T::Mask {
+        let ([a, b, c, d], [e, f, g, h]) = (self.positive, self.negative);
+        (a & h & (b | g)) | (e & d & (f | c))
+    }
+
+    /// If no coefficient is certain, none will be over shorter intervals.
+    #[inline(always)]
+    fn is_sure_anywhere(&self) -> T::Mask {
+        let ([a, b, c, d], [e, f, g, h]) = (self.positive, self.negative);
+        a | b | c | d | e | f | g | h
+    }
+}
+
+type Vector<T> = [T; 3];
+
+// Here and below no closures are passed to library functions: those would be compiled on their
+// own, without the instruction set, and every operation would become a call.
+
+impl<T: Number> Motion<T, 3> {
+    /// A vertex, point 0, and a face, points 1 to 3.
+    #[inline(always)]
+    pub fn vertex_face(start: &[Vector<T>; 4], end: &[Vector<T>; 4]) -> Self {
+        Self::new(
+            [face_corners(start), face_corners(end)],
+            [face_edges(start), face_edges(end)],
+        )
+    }
+}
+
+impl<T: Number> Motion<T, 4> {
+    /// Two edges, points 0 and 1, and points 2 and 3.
+    #[inline(always)]
+    pub fn edge_edge(start: &[Vector<T>; 4], end: &[Vector<T>; 4]) -> Self {
+        Self::new(
+            [edge_corners(start), edge_corners(end)],
+            [edge_edges(start), edge_edges(end)],
+        )
+    }
+}
+
+#[inline(always)]
+fn face_corners<T: Number>([p, a, b, c]: &[Vector<T>; 4]) -> [Vector<T>; 3] {
+    [difference(a, p), difference(b, p), difference(c, p)]
+}
+
+#[inline(always)]
+fn face_edges<T: Number>([_, a, b, c]: &[Vector<T>; 4]) -> [Vector<T>; 3] {
+    [difference(b, a), difference(c, b), difference(a, c)]
+}
+
+#[inline(always)]
+fn edge_corners<T: Number>([p, q, r, s]: &[Vector<T>; 4]) -> [Vector<T>; 4] {
+    [
+        difference(p, r),
+        difference(q, r),
+        difference(q, s),
+        difference(p, s),
+    ]
+}
+
+#[inline(always)]
+fn edge_edges<T: Number>([p, q, r, s]: &[Vector<T>; 4]) -> [Vector<T>; 3] {
+    let zero = T::splat(0.0);
+    [difference(q, p), difference(r, s), [zero, zero, zero]]
+}
+
+impl<T: Number, const K: usize> Motion<T, K> {
+    /// How many edges are kept.
+    const N_EDGES: usize = if K == 3 { 3 } else { 2 };
+
+    #[inline(always)]
+    fn new(corners: [[Vector<T>; K]; 2], edges: [[Vector<T>; 3]; 2]) -> Self {
+        let zero = T::splat(0.0);
+        let (mut corner_sizes, mut edge_sizes) = ([zero; K], [zero; 3]);
+        let mut largest = zero;
+        for ix in 0..K {
+            corner_sizes[ix] = size(&corners[0][ix]).larger(size(&corners[1][ix]));
+            largest = largest.larger(corner_sizes[ix]);
+        }
+        for ix in 0..Self::N_EDGES {
+            edge_sizes[ix] = size(&edges[0][ix]).larger(size(&edges[1][ix]));
+            largest = largest.larger(edge_sizes[ix]);
+        }
+        Self {
+            corners,
+            edges,
+            corner_sizes,
+            edge_sizes,
+            is_small: T::splat(T::LARGEST).gt(largest),
+        }
+    }
+
+    /// Where the elements are certainly apart from t = 0 to `until`: because they are on an axis, or along a direction,
+    /// at both ends of that time, or because f has one sign. The cheap first step.
+    #[inline(always)]
+    #[must_use]
+    pub fn are_apart(&self, until: f64) -> T::Mask {
+        let t = T::splat(until);
+        let start = &self.corners[0];
+        let mut end = *start;
+        let mut sum = start[0];
+        let mut size = self.corner_sizes[0];
+        for ix in 0..K {
+            end[ix] = self.corner_at(ix, t);
+            size = size.larger(self.corner_sizes[ix]);
+            for axis in 0..3 {
+                sum[axis] = sum[axis] + end[ix][axis];
+                if ix > 0 {
+                    sum[axis] = sum[axis] + start[ix][axis];
+                }
+            }
+        }
+        let edges = [
+            [self.edges[0][0], self.edge_at(0, t)],
+            [self.edges[0][1], self.edge_at(1, t)],
+        ];
+        let normal = cross_over(&edges[0], &edges[1]);
+        let along = are_before(&sum, start, &end, size)
+            | are_before(&normal[0], start, &end, size)
+            | are_before(&normal[2], start, &end, size);
+        let cubic = self.signs(&cubic(&normal, &[start[0], end[0]]));
+        // At t = 1 nothing is rounded but differences, whose signs are right.
+        let bound = if until == 1.0 {
+            T::splat(0.0)
+        } else {
+            T::splat(T::BOUND / 4.0) * size + T::splat(T::TINY[0])
+        };
+        ((along | cubic.has_no_root()) & self.is_small) | are_apart_on_an_axis(start, &end, bound)
+    }
+
+    /// Searches [0, `until`] for the first contact, at most in `n_steps` steps. Only lanes of `among` are needed.
+    #[inline(always)]
+    #[must_use]
+    pub fn search(&self, among: T::Mask, until: f64, n_steps: usize) -> Search<T> {
+        let (zero, last_end) = (T::splat(0.0), T::splat(until));
+        let shortest = T::splat(until * SHORTEST);
+        let never = zero.gt(zero);
+        let mut found = Search {
+            no: never,
+            yes: never,
+            low: zero,
+            high: last_end,
+        };
+        let mut active = among & self.is_small;
+        let mut length = last_end;
+        for _ in 0..n_steps {
+            if !T::any(active) {
+                break;
+            }
+            let end = smaller(found.low + length, last_end);
+            let cubic = self.cubic_over(found.low, end);
+            let mut no = active & cubic.has_no_root();
+            let single = active & cubic.has_one_root();
+            // One root: here is the first contact, or none in this interval.
+            let mut hopeless = active & !cubic.is_sure_anywhere();
+            if T::any(single) {
+                let [first, last] = self.narrowed(found.low, end);
+                let (inside, outside) = self.sides_over(first, last);
+                let yes = single & inside;
+                no = no | (single & outside);
+                // As short as rounding allows, and still unsure: a tie.
+                let is_short = (length * T::splat(0.25)).gt(last - first);
+                hopeless = hopeless | (single & is_short & !inside & !outside);
+                found.yes = found.yes | yes;
+                found.low = T::select(yes, first, found.low);
+                found.high = T::select(yes, last, found.high);
+                active = active & !yes;
+            }
+            if T::any(active & !no & !single) {
+                let (_, outside) = self.sides_over(found.low, end);
+                no = no | (active & outside);
+            }
+            // On: twice as far as this interval, at most to the end.
+            found.low = T::select(no, end, found.low);
+            let at_end = no & !last_end.gt(end);
+            found.no = found.no | at_end;
+            let twice = smaller(length + length, last_end - found.low);
+            length = T::select(no, twice, length * T::splat(0.5));
+            active = active & !at_end & (no | (!hopeless & length.gt(shortest)));
+        }
+        found
+    }
+
+    /// What is known of f over [a, b].
+    #[inline(always)]
+    fn cubic_over(&self, a: T, b: T) -> Cubic<T> {
+        self.signs(&self.f_over(a, b))
+    }
+
+    /// The signs that coefficients of f certainly have.
+    #[inline(always)]
+    fn signs(&self, f: &[T; 4]) -> Cubic<T> {
+        let tiny = T::splat(T::TINY[1]);
+        let sizes = self.edge_sizes[0] * self.edge_sizes[1] * self.corner_sizes[0];
+        let bound = T::splat(2.0 * T::BOUND) * sizes + tiny;
+        let inner_bound = T::splat(6.0 * T::BOUND) * sizes + tiny;
+        Cubic::new(f, bound, inner_bound)
+    }
+
+    /// Whether over [a, b] all w are certainly positive, and whether some w is certainly negative.
+    #[inline(always)]
+    fn sides_over(&self, a: T, b: T) -> (T::Mask, T::Mask) {
+        let zero = T::splat(0.0);
+        let mut edges = [[[zero; 3]; 2]; 3];
+        for (ix, edge) in edges.iter_mut().enumerate().take(Self::N_EDGES) {
+            *edge = self.edge_over(ix, a, b);
+        }
+        let normal = cross_over(&edges[0], &edges[1]);
+        let edges_size = self.edge_sizes[0] * self.edge_sizes[1];
+        let (mut inside, mut outside) = (!zero.gt(zero), zero.gt(zero));
+        for ix in 0..K {
+            let corner = self.corner_over(ix, a, b);
+            let edge = &edges[ix % Self::N_EDGES];
+            let (positive, negative) = self.sides(&normal, &corner, edge, ix, edges_size);
+            inside = inside & positive;
+            outside = outside | negative;
+        }
+        (inside, outside)
+    }
+
+    /// f over an interval: f_0, 3 f_1, 3 f_2, f_3.
+    #[inline(always)]
+    fn f_over(&self, a: T, b: T) -> [T; 4] {
+        let normal = cross_over(&self.edge_over(0, a, b), &self.edge_over(1, a, b));
+        cubic(&normal, &self.corner_over(0, a, b))
+    }
+
+    /// Whether all coefficients of w over an interval are certainly positive, and whether all are certainly negative.
+    #[inline(always)]
+    fn sides(
+        &self,
+        normal: &[Vector<T>; 3],
+        corner: &[Vector<T>; 2],
+        edge: &[Vector<T>; 2],
+        ix: usize,
+        edges_size: T,
+    ) -> (T::Mask, T::Mask) {
+        let kept = ix % Self::N_EDGES;
+        let moment = cross_over(corner, edge);
+        // w_0, 4 w_1, 6 w_2, 4 w_3, w_4.
+        let w = [
+            dot(&normal[0], &moment[0]),
+            dot(&normal[0], &moment[1]) + dot(&normal[1], &moment[0]),
+            dot(&normal[0], &moment[2]) + dot(&normal[1], &moment[1]) + dot(&normal[2], &moment[0]),
+            dot(&normal[1], &moment[2]) + dot(&normal[2], &moment[1]),
+            dot(&normal[2], &moment[2]),
+        ];
+        let sizes = edges_size * (self.corner_sizes[ix] * self.edge_sizes[kept]);
+        let bound = T::splat(6.0 * T::BOUND) * sizes;
+        let tiny = T::splat(T::TINY[2]);
+        let outer = bound + tiny;
+        let next = bound * T::splat(4.0) + tiny;
+        let middle = bound * T::splat(6.0) + tiny;
+        let zero = T::splat(0.0);
+        let positive =
+            w[0].gt(outer) & w[1].gt(next) & w[2].gt(middle) & w[3].gt(next) & w[4].gt(outer);
+        let negative = (zero - outer).gt(w[0])
+            & (zero - next).gt(w[1])
+            & (zero - middle).gt(w[2])
+            & (zero - next).gt(w[3])
+            & (zero - outer).gt(w[4]);
+        if ix < Self::N_EDGES {
+            (positive, negative)
+        } else {
+            // The edge from this corner is the opposite of the one that is kept.
+            (negative, positive)
+        }
+    }
+
+    /// Where [low, high] has one root of f: an interval inside it, as short as rounding allows, that certainly has the root.
+    #[inline(always)]
+    #[must_use]
+    pub fn narrowed(&self, low: T, high: T) -> [T; 2] {
+        let (zero, one, two, three) = (T::splat(0.0), T::splat(1.0), T::splat(2.0), T::splat(3.0));
+        let f = self.f_over(low, high);
+        let is_rising = f[3].gt(f[0]);
+        // f in powers of the part s of the interval, and Newton's method from the chord's root, kept inside.
+        let powers = [
+            f[0],
+            f[1] - three * f[0],
+            three * f[0] - two * f[1] + f[2],
+            f[3] - f[2] + f[1] - f[0],
+        ];
+        let (mut before, mut after) = (zero, one);
+        let mut s = f[0] / (f[0] - f[3]);
+        let mut slope = one;
+        for _ in 0..N_NEWTON {
+            let value = ((powers[3] * s + powers[2]) * s + powers[1]) * s + powers[0];
+            slope = (three * powers[3] * s + two * powers[2]) * s + powers[1];
+            let is_before = is_rising ^ value.gt(zero);
+            before = T::select(is_before, s, before);
+            after = T::select(is_before, after, s);
+            let next = s - value / slope;
+            let is_inside = !before.gt(next) & !next.gt(after);
+            s = T::select(is_inside, next, (before + after) * T::splat(0.5));
+        }
+        let length = high - low;
+        let root = low + s * length;
+        let bound = self.f_at(root).1;
+        // So far from the root f is certain, if it goes on as steep as it is there; else sixteen times as far.
+        let reach = bound * T::splat(1.5) * length / slope.abs() + root * T::splat(T::BOUND / 16.0);
+        let (mut first, mut last) = (low, high);
+        for widening in WIDENINGS {
+            let reach = reach * T::splat(widening);
+            let (before, after) = (root - reach, root + reach);
+            let f_before = self.f_at(before).0;
+            let f_after = self.f_at(after).0;
+            let has_passed = certainly(is_rising, f_before, bound, true);
+            first = T::select(before.gt(first) & has_passed, before, first);
+            let has_passed = certainly(is_rising, f_after, bound, false);
+            last = T::select(last.gt(after) & has_passed, after, last);
+        }
+        [first, last]
+    }
+
+    /// f at one time, and the bound of its error.
+    #[inline(always)]
+    fn f_at(&self, t: T) -> (T, T) {
+        let normal = cross(&self.edge_at(0, t), &self.edge_at(1, t));
+        let sizes = self.edge_sizes[0] * self.edge_sizes[1] * self.corner_sizes[0];
+        let bound = T::splat(2.0 * T::BOUND) * sizes + T::splat(T::TINY[1]);
+        (dot(&normal, &self.corner_at(0, t)), bound)
+    }
+
+    #[inline(always)]
+    fn corner_at(&self, ix: usize, t: T) -> Vector<T> {
+        between(&self.corners[0][ix], &self.corners[1][ix], t)
+    }
+
+    #[inline(always)]
+    fn edge_at(&self, ix: usize, t: T) -> Vector<T> {
+        between(&self.edges[0][ix], &self.edges[1][ix], t)
+    }
+
+    #[inline(always)]
+    fn corner_over(&self, ix: usize, a: T, b: T) -> [Vector<T>; 2] {
+        [self.corner_at(ix, a), self.corner_at(ix, b)]
+    }
+
+    #[inline(always)]
+    fn edge_over(&self, ix: usize, a: T, b: T) -> [Vector<T>; 2] {
+        [self.edge_at(ix, a), self.edge_at(ix, b)]
+    }
+}
+
+/// The shortest interval that is looked at, in parts of the whole: 2^-12. Then comes exact arithmetic.
+const SHORTEST: f64 = 1.0 / 4096.0;
+
+/// Steps of Newton's method: from the root of a chord to the last bits of an `f64`, nearly always.
+const N_NEWTON: usize = 8;
+
+/// How wide the interval around a root is made, in parts of the likely width; the narrowest that is certain counts.
+const WIDENINGS: [f64; 2] = [16.0, 1.0];
+
+/// f = N . V over an interval: f_0, 3 f_1, 3 f_2, f_3.
+#[inline(always)]
+fn cubic<T: Number>(normal: &[Vector<T>; 3], corner: &[Vector<T>; 2]) -> [T; 4] {
+    [
+        dot(&normal[0], &corner[0]),
+        dot(&normal[0], &corner[1]) + dot(&normal[1], &corner[0]),
+        dot(&normal[1], &corner[1]) + dot(&normal[2], &corner[0]),
+        dot(&normal[2], &corner[1]),
+    ]
+}
+
+/// Whether on an axis all corners at both ends are further from the origin than a bound, on one side.
+#[inline(always)]
+fn are_apart_on_an_axis<T: Number, const K: usize>(
+    start: &[Vector<T>; K],
+    end: &[Vector<T>; K],
+    bound: T,
+) -> T::Mask {
+    let (mut least, mut most) = (start[0], start[0]);
+    for ix in 0..K {
+        for axis in 0..3 {
+            let (x, y) = (start[ix][axis], end[ix][axis]);
+            most[axis] = most[axis].larger(x).larger(y);
+            least[axis] = smaller(smaller(least[axis], x), y);
+        }
+    }
+    let opposite = T::splat(0.0) - bound;
+    (opposite.gt(most[0]) | opposite.gt(most[1]) | opposite.gt(most[2]))
+        | (least[0].gt(bound) | least[1].gt(bound) | least[2].gt(bound))
+}
+
+/// Whether all corners at both ends are certainly on one side of the plane through the origin with this normal,
+/// which is taken as exact. `corner_size` is the largest one.
+#[inline(always)]
+fn are_before<T: Number, const K: usize>(
+    normal: &Vector<T>,
+    start: &[Vector<T>; K],
+    end: &[Vector<T>; K],
+    corner_size: T,
+) -> T::Mask {
+    let bound = T::splat(T::BOUND) * (size(normal) * corner_size) + T::splat(T::TINY[0]);
+    let first = dot(normal, &start[0]);
+    let (mut least, mut most) = (first, first);
+    for ix in 0..K {
+        let (x, y) = (dot(normal, &start[ix]), dot(normal, &end[ix]));
+        most = most.larger(x).larger(y);
+        least = smaller(smaller(least, x), y);
+    }
+    least.gt(bound) | (T::splat(0.0) - bound).gt(most)
+}
+
+/// Whether a value is certainly of the sign that f has before (or after) its root.
+#[inline(always)]
+fn certainly<T: Number>(is_rising: T::Mask, value: T, bound: T, before: bool) -> T::Mask {
+    let is_positive = value.gt(bound);
+    let is_negative = (T::splat(0.0) - bound).gt(value);
+    if before {
+        (is_rising & is_negative) | (!is_rising & is_positive)
+    } else {
+        (is_rising & is_positive) | (!is_rising & is_negative)
+    }
+}
+
+#[inline(always)]
+fn smaller<T: Number>(a: T, b: T) -> T {
+    T::select(b.gt(a), a, b)
+}
+
+#[inline(always)]
+fn between<T: Number>(p: &Vector<T>, q: &Vector<T>, t: T) -> Vector<T> {
+    let rest = T::splat(1.0) - t;
+    [
+        p[0] * rest + q[0] * t,
+        p[1] * rest + q[1] * t,
+        p[2] * rest + q[2] * t,
+    ]
+}
+
+/// Bernstein coefficients of a product of two vectors that move: the first, twice the middle one, the last.
+#[inline(always)]
+fn cross_over<T: Number>(d: &[Vector<T>; 2], e: &[Vector<T>; 2]) -> [Vector<T>; 3] {
+    let (one, two) = (cross(&d[0], &e[1]), cross(&d[1], &e[0]));
+    [
+        cross(&d[0], &e[0]),
+        [one[0] + two[0], one[1] + two[1], one[2] + two[2]],
+        cross(&d[1], &e[1]),
+    ]
+}
+
+#[inline(always)]
+fn cross<T: Number>(d: &Vector<T>, e: &Vector<T>) -> Vector<T> {
+    [
+        d[1] * e[2] - d[2] * e[1],
+        d[2] * e[0] - d[0] * e[2],
+        d[0] * e[1] - d[1] * e[0],
+    ]
+}
+
+#[inline(always)]
+fn dot<T: Number>(d: &Vector<T>, e: &Vector<T>) -> T {
+    d[0] * e[0] + d[1] * e[1] + d[2] * e[2]
+}
+
+#[inline(always)]
+fn difference<T: Number>(p: &Vector<T>, q: &Vector<T>) -> Vector<T> {
+    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
+}
+
+/// The largest magnitude of the three coordinates.
+#[inline(always)]
+fn size<T: Number>(d: &Vector<T>) -> T {
+    d[0].abs().larger(d[1].abs()).larger(d[2].abs())
+}

@@ -1,0 +1,320 @@
+//! What the filter for moving elements says against what exact roots say. The roots themselves are held against an
+//! independent oracle in `tests/sweep`.
+
+use super::{Contact, ElementPair, first_contact_by_roots};
+use crate::exact::Point;
+use crate::exact::filter::{
+    self, BATCH, Contacts8, LANES, Moving64, Steps8, TABLE, contact_answer, number,
+};
+
+const PAIRS: [ElementPair; 2] = [ElementPair::VertexFace, ElementPair::EdgeEdge];
+
+struct Random(u64);
+
+impl Random {
+    /// splitmix64 (Steele, Lea, Flood 2014).
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number in [-1, 1) of 24 bits.
+    fn unit(&mut self) -> f64 {
+        (self.bits() >> 40) as f64 / f64::from(1 << 23) - 1.0
+    }
+
+    fn below(&mut self, n: u64) -> u64 {
+        self.bits() % n
+    }
+}
+
+/// How a step is made.
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    /// Anywhere in a cube.
+    Plain,
+    /// On a small lattice: ties.
+    Lattice,
+    /// One of the lattice, turned, and moved by a last bit.
+    NearlyTied,
+    /// Elements next to each other, moving little.
+    Close,
+    /// All in one plane at all times.
+    Flat,
+    /// As `Plain`, but so small or large that numbers underflow or are beyond the filter's range.
+    Extreme,
+}
+
+const KINDS: [Kind; 6] = [
+    Kind::Plain,
+    Kind::Lattice,
+    Kind::NearlyTied,
+    Kind::Close,
+    Kind::Flat,
+    Kind::Extreme,
+];
+
+fn narrow(x: f64) -> f64 {
+    f64::from(x as f32)
+}
+
+/// A step whose coordinates are `f32`.
+fn step(kind: Kind, random: &mut Random) -> [[Point; 4]; 2] {
+    let mut points = [[[0.0; 3]; 4]; 2];
+    let axes = [[(); 3]; 3].map(|axis| axis.map(|()| random.unit()));
+    let scale = 2.0_f64.powi(random.below(160) as i32 - 120);
+    for end in 0..2 {
+        for ix in 0..4 {
+            let lattice = [(); 3].map(|()| random.below(4) as f64);
+            let plain = [(); 3].map(|()| random.unit());
+            points[end][ix] = match kind {
+                Kind::Plain => plain,
+                Kind::Lattice => lattice,
+                Kind::NearlyTied => std::array::from_fn(|k| {
+                    let x: f64 = (0..3).map(|axis| lattice[axis] * axes[axis][k]).sum();
+                    let x = x as f32;
+                    f64::from(match random.below(4) {
+                        0 => x.next_up(),
+                        1 => x.next_down(),
+                        _ => x,
+                    })
+                }),
+                Kind::Close if end == 0 => plain.map(|x| narrow(100.0 + x)),
+                Kind::Close => std::array::from_fn(|k| narrow(points[0][ix][k] + 0.2 * plain[k])),
+                Kind::Flat => std::array::from_fn(|k| {
+                    narrow(lattice[0] * axes[0][k].round() + lattice[1] * axes[1][k].round())
+                }),
+                Kind::Extreme => plain.map(|x| x * scale),
+            };
+        }
+    }
+    points
+}
+
+impl Steps8 {
+    fn set(&mut self, lane: usize, step: &[[Point; 4]; 2]) {
+        for end in 0..2 {
+            for ix in 0..4 {
+                for axis in 0..3 {
+                    self.0[end][ix][axis][lane] = step[end][ix][axis];
+                }
+            }
+        }
+    }
+}
+
+/// What a set of instructions says: apart, and contacts.
+type Answer = (u8, Contacts8);
+
+#[inline(always)]
+fn ask<V: number::Vector>(pair: ElementPair, steps: &Steps8, until: f64) -> Answer {
+    match pair {
+        ElementPair::VertexFace => (
+            filter::vertex_face_apart::<V>(steps, until),
+            filter::vertex_face_contacts::<V>(steps, u8::MAX, until),
+        ),
+        _ => (
+            filter::edge_edge_apart::<V>(steps, until),
+            filter::edge_edge_contacts::<V>(steps, u8::MAX, until),
+        ),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn ask_avx2(pair: ElementPair, steps: &Steps8, until: f64) -> Answer {
+    ask::<number::Avx2>(pair, steps, until)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq")]
+fn ask_avx512(pair: ElementPair, steps: &Steps8, until: f64) -> Answer {
+    ask::<number::Avx512>(pair, steps, until)
+}
+
+/// What every instruction set of this processor says, after it was found to be the same.
+fn ask_all(pair: ElementPair, steps: &Steps8, until: f64) -> Answer {
+    let answer = ask::<number::Portable>(pair, steps, until);
+    #[cfg(target_arch = "x86_64")]
+    {
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: just detected.
+            assert_eq!(answer, unsafe { ask_avx2(pair, steps, until) });
+        }
+        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
+            // SAFETY: just detected.
+            assert_eq!(answer, unsafe { ask_avx512(pair, steps, until) });
+        }
+    }
+    answer
+}
+
+/// The same pairs in tables, in `f32`: which are apart.
+#[inline(always)]
+fn ask_tables<V: number::Lookup>(pair: ElementPair, steps: &[[[Point; 4]; 2]], until: f32) -> u16 {
+    // Elements at odd places, in reverse.
+    let place = |lane: usize| (2 * (BATCH - lane) - 1) as u8;
+    let places: [u8; BATCH] = std::array::from_fn(place);
+    fn table<const N: usize>(
+        steps: &[[[Point; 4]; 2]],
+        first: usize,
+        places: &[u8; BATCH],
+    ) -> Moving64<N> {
+        let mut table = [[[[0.0; TABLE]; 3]; N]; 2];
+        for (lane, step) in steps.iter().enumerate() {
+            for (end, ends) in table.iter_mut().enumerate() {
+                for (ix, point) in ends.iter_mut().enumerate() {
+                    for (axis, row) in point.iter_mut().enumerate() {
+                        row[places[lane] as usize] = step[end][first + ix][axis] as f32;
+                    }
+                }
+            }
+        }
+        table
+    }
+    match pair {
+        ElementPair::VertexFace => filter::vertex_face_apart_in_tables::<V>(
+            (&table(steps, 0, &places), &table(steps, 1, &places)),
+            [&places, &places],
+            until,
+        ),
+        _ => filter::edge_edge_apart_in_tables::<V>(
+            [&table(steps, 0, &places), &table(steps, 2, &places)],
+            [&places, &places],
+            until,
+        ),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn ask_tables_avx2(pair: ElementPair, steps: &[[[Point; 4]; 2]], until: f32) -> u16 {
+    ask_tables::<number::Avx2F32>(pair, steps, until)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq")]
+fn ask_tables_avx512(pair: ElementPair, steps: &[[[Point; 4]; 2]], until: f32) -> u16 {
+    ask_tables::<number::Avx512F32>(pair, steps, until)
+}
+
+fn ask_all_tables(pair: ElementPair, steps: &[[[Point; 4]; 2]], until: f32) -> u16 {
+    let answer = ask_tables::<number::Portable32>(pair, steps, until);
+    #[cfg(target_arch = "x86_64")]
+    {
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: just detected.
+            assert_eq!(answer, unsafe { ask_tables_avx2(pair, steps, until) });
+        }
+        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
+            // SAFETY: just detected.
+            assert_eq!(answer, unsafe { ask_tables_avx512(pair, steps, until) });
+        }
+    }
+    answer
+}
+
+/// Whether a contact comes at `until` or earlier.
+fn is_in_time(contact: Option<Contact>, until: f64) -> bool {
+    contact.is_some_and(|contact| contact.is_within(until))
+}
+
+#[test]
+fn filter_never_contradicts_exact_roots() {
+    let mut random = Random(21);
+    for kind in KINDS {
+        for pair in PAIRS {
+            let (mut n_yes, mut n_no, mut n_unsure, mut n_rounded) = (0, 0, 0, 0);
+            for round in 0..150 {
+                let until = [1.0, 0.5, 0.328_125, 1e-3][round % 4];
+                let steps = [(); BATCH].map(|()| step(kind, &mut random));
+                let exact = steps.map(|[start, end]| first_contact_by_roots(pair, &start, &end));
+                let apart = ask_all_tables(pair, &steps, until as f32);
+                for (lane, contact) in exact.iter().enumerate() {
+                    let until = f64::from(until as f32);
+                    let is_right = apart >> lane & 1 == 0 || !is_in_time(*contact, until);
+                    assert!(is_right, "{kind:?} {pair:?} {until} {:?}", steps[lane]);
+                }
+                for (steps, exact) in steps.chunks(LANES).zip(exact.chunks(LANES)) {
+                    let mut batch = Steps8::default();
+                    for (lane, step) in steps.iter().enumerate() {
+                        batch.set(lane, step);
+                    }
+                    let (apart, found) = ask_all(pair, &batch, until);
+                    assert_eq!(found.yes & found.no, 0);
+                    assert_eq!(apart & !found.no, 0);
+                    for lane in 0..LANES {
+                        let case = || format!("{kind:?} {pair:?} {until} {:?}", steps[lane]);
+                        let contact = exact[lane];
+                        let is_early = contact.is_some_and(|c| c.time < found.low[lane])
+                            && found.no >> lane & 1 == 0;
+                        // A time below `low` only by its own rounding is none.
+                        let is_early = is_early && !is_floor_of(contact, found.low[lane]);
+                        assert!(!is_early, "{} {contact:?} {found:?}", case());
+                        if found.no >> lane & 1 == 1 {
+                            n_no += 1;
+                            assert!(!is_in_time(contact, until), "{}", case());
+                        } else if found.yes >> lane & 1 == 1 {
+                            n_yes += 1;
+                            let contact = contact.unwrap_or_else(|| panic!("{}", case()));
+                            assert!(!contact.at_start, "{}", case());
+                            assert!(contact.is_within(found.high[lane]), "{}", case());
+                            assert!(found.high[lane] <= until, "{}", case());
+                            if let Some(time) = found.time_f32(lane) {
+                                n_rounded += 1;
+                                assert_eq!(time, contact.time_f32(), "{}", case());
+                            }
+                        } else {
+                            n_unsure += 1;
+                        }
+                        let [start, end] = &steps[lane];
+                        if let Some(answer) = contact_answer(pair, start, end) {
+                            assert_eq!(answer, contact.is_some(), "{}", case());
+                        }
+                    }
+                }
+            }
+            match kind {
+                Kind::Plain | Kind::Close => {
+                    assert!(n_yes > 3 && n_no > 1000, "{kind:?} {n_yes} {n_no}");
+                    assert!(n_unsure * 500 < n_yes + n_no, "{kind:?} unsure {n_unsure}");
+                    assert!(n_rounded * 50 > n_yes * 49, "{kind:?} {n_rounded} {n_yes}");
+                }
+                Kind::Lattice | Kind::NearlyTied => assert!(n_yes > 0 && n_unsure > 0),
+                Kind::Flat => assert!(n_yes == 0 && n_unsure > 0),
+                Kind::Extreme => assert!(n_no > 0),
+            }
+        }
+    }
+}
+
+/// Whether the first time lies in [low, next after its floor).
+fn is_floor_of(contact: Option<Contact>, low: f64) -> bool {
+    contact.is_some_and(|contact| !contact.is_exact && contact.time.next_up() >= low)
+}
+
+#[test]
+fn numbers_that_are_none_are_unsure() {
+    for x in [f64::NAN, f64::INFINITY, f64::MAX] {
+        let mut steps = Steps8::default();
+        for lane in 0..LANES {
+            let mut points = [[[0.25; 3]; 4]; 2];
+            points[lane % 2][lane / 2] = [x, -x, x];
+            points[0][(lane / 2 + 1) % 4] = [1.0, 2.0, -0.5];
+            steps.set(lane, &points);
+        }
+        for pair in PAIRS {
+            let (_, found) = ask_all_bits(pair, &steps);
+            assert_eq!(found, 0, "{x} {pair:?}");
+        }
+    }
+}
+
+/// Yes or no of any instruction set, where contacts need not be equal bit for bit: NaN has many.
+fn ask_all_bits(pair: ElementPair, steps: &Steps8) -> (u8, u8) {
+    let answer = ask::<number::Portable>(pair, steps, 1.0);
+    (answer.0, answer.1.yes)
+}
