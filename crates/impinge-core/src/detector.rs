@@ -4,7 +4,7 @@
 mod gpu;
 mod steps;
 
-use std::time::Instant;
+use crate::clock::Instant;
 
 use crate::cpu::Job;
 use crate::cpu::cells::{self, Cells};
@@ -64,9 +64,38 @@ impl Detector {
     /// A setting out of its range; no adapter for `Backend::Gpu`; threads that do not start.
     pub fn with_settings(settings: Settings) -> Result<Self, Error> {
         settings.check()?;
+        #[cfg(feature = "gpu")]
+        let gpu = gpu::open(&settings)?;
+        Detector::assemble(
+            settings,
+            #[cfg(feature = "gpu")]
+            gpu,
+        )
+    }
+
+    /// [`with_settings`](Detector::with_settings) without blocking, for pages in a browser: there a GPU
+    /// is opened in no other way.
+    ///
+    /// # Errors
+    /// As `with_settings`.
+    pub async fn with_settings_async(settings: Settings) -> Result<Self, Error> {
+        settings.check()?;
+        #[cfg(feature = "gpu")]
+        let gpu = gpu::open_async(&settings).await?;
+        Detector::assemble(
+            settings,
+            #[cfg(feature = "gpu")]
+            gpu,
+        )
+    }
+
+    fn assemble(
+        settings: Settings,
+        #[cfg(feature = "gpu")] gpu: Option<crate::gpu::Engine>,
+    ) -> Result<Self, Error> {
         Ok(Detector {
             #[cfg(feature = "gpu")]
-            gpu: gpu::open(&settings)?,
+            gpu,
             workers: Workers::new(settings.threads)?,
             frame: Frame::default(),
             pairs: Pairs::default(),

@@ -3,7 +3,7 @@
 #[cfg(feature = "gpu")]
 pub mod gpu;
 
-use std::time::Instant;
+use crate::clock::Instant;
 
 use crate::cpu::Job;
 use crate::cpu::workers::Workers;

@@ -4,6 +4,7 @@
 //! other crates, such as the baselines that impinge is measured against, stand on this one: on the same
 //! frame, boxes, grid, threads, exact test and GPU engine, so that only the method differs.
 
+pub mod clock;
 // Types are documented; fields and small methods of the inside speak for themselves.
 pub mod contact;
 #[allow(missing_docs)]
@@ -38,7 +39,7 @@ pub use error::Error;
 #[cfg(feature = "gpu")]
 pub use gpu::Capacities;
 #[cfg(feature = "gpu")]
-pub use gpu::{DeviceInfo, ResidentPairs, devices};
+pub use gpu::{DeviceInfo, ResidentPairs, devices, devices_async};
 pub use ids::BodyId;
 pub use impacts::{Candidates, Impact, Impacts};
 pub use pair_kind::{PairKind, PairKinds};

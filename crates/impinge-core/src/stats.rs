@@ -1,6 +1,6 @@
 //! What a frame cost and what it went through.
 
-use std::time::Instant;
+use crate::clock::Instant;
 
 /// Time spent in one stage.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,9 +1,8 @@
 //! The loop: detect, then a step of backward Euler.
 
-use std::time::Instant;
-
 use impinge::{BodyId, Control, Detector, Pairs, Query, Scene, Statistics};
 use rayon::prelude::*;
+use web_time::Instant;
 
 use crate::contact::{Couplings, Now, numbered, outward_directions};
 use crate::elasticity::{GRAIN, Turned, energy, forces, turn};

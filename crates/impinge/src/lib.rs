@@ -22,7 +22,7 @@ pub use impinge_core::{
     SharedVertex, Stage, Start, Statistics, Step, Toi, hash_rows,
 };
 #[cfg(feature = "gpu")]
-pub use impinge_core::{DeviceInfo, ResidentPairs, devices};
+pub use impinge_core::{DeviceInfo, ResidentPairs, devices, devices_async};
 pub use impinge_core::{contact, exact};
 
 // What users hold may be moved to, and lent to, other threads.

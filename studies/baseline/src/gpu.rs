@@ -56,7 +56,7 @@ pub struct UniformGrid {
 }
 
 impl UniformGrid {
-    /// Opens the adapter, or shares the device that impinge has open on it, and compiles the kernels.
+    /// Opens the adapter, or shares the device that impinge has open on it. Kernels are compiled by the first frame.
     ///
     /// # Errors
     /// A setting out of its range; no adapter fits; the driver refuses.
@@ -85,10 +85,14 @@ impl UniformGrid {
     ) -> Result<Self, Error> {
         check_lambda(settings.lambda)?;
         let device = settings.device.as_deref();
-        let host = Host::new(device, settings.lambda, first, memory_budget, |gpu| {
-            let kernels = Arc::new(gpu.make(Kernels::new)?);
-            Ok(Box::new(Plan::new(kernels, settings.owner_rule)))
-        })?;
+        let plan = Plan::new(Arc::new(Kernels::new()), settings.owner_rule);
+        let host = Host::new(
+            device,
+            settings.lambda,
+            first,
+            memory_budget,
+            Box::new(plan),
+        )?;
         Ok(UniformGrid { settings, host })
     }
 

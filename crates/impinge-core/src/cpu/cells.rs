@@ -16,7 +16,7 @@
 //! coarser until the lists hold at most [`MOST_ENTRIES_EACH`] entries a primitive. That keeps memory
 //! bounded; the price is more pairs a cell, and `n_reruns` and `grid` in the statistics tell it.
 
-use std::time::Instant;
+use crate::clock::Instant;
 
 use crate::error::Error;
 use crate::grouping::bounds::Bounds;

@@ -6,7 +6,8 @@
 //! Tetrahedron pairs are classified by their faces, what is left by faces and edges. What the filters leave
 //! open goes to exact arithmetic, and so do pairs of a triangle and a tetrahedron; that code filters too.
 
-use std::time::{Duration, Instant};
+use crate::clock::Instant;
+use std::time::Duration;
 
 use crate::elements::Elements;
 use crate::exact::filter::{

@@ -15,7 +15,7 @@
 //! Invariant: a pair of primitives lies in one work item only, so no candidate comes twice.
 //! On a CPU these box tests beat the 4x4x4 sub-cell masks of the paper, see `docs/performance.md`.
 
-use std::time::Instant;
+use crate::clock::Instant;
 
 use crate::exact::filter::BATCH;
 use crate::grouping::GROUP;

@@ -8,8 +8,8 @@
 //! above   nodes; bodies that have flowed away from their clusters are clustered anew; clusters are sorted
 //! ```
 
+use crate::clock::Instant;
 use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
 
 use crate::error::Error;
 use crate::frame::Frame;

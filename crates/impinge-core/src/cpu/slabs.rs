@@ -1,7 +1,7 @@
 //! The stages of `Clusters` from `dispatch` on: work items come in slabs, and a full slab is paired and
 //! settled before dispatch goes on.
 
-use std::time::Instant;
+use crate::clock::Instant;
 
 use crate::error::Error;
 use crate::query::SharedVertex;

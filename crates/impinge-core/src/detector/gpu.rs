@@ -1,15 +1,11 @@
 //! What a detector does on a GPU: its own device, or the caller's.
 
+use crate::clock::Instant;
 use std::cell::Cell;
 use std::sync::Arc;
-use std::time::Instant;
 
 use super::{Backend, Detector, Method, Settings};
-use crate::cpu::cells::Cells;
-use crate::cpu::clusters::Clusters;
-use crate::cpu::workers::Workers;
 use crate::error::Error;
-use crate::frame::Frame;
 use crate::gpu::{Capacities, Engine, Gpu, Options, ResidentPairs, Wanted};
 use crate::ids::BodyId;
 use crate::pairs::Pairs;
@@ -20,18 +16,39 @@ use crate::settings::Recluster;
 
 /// The GPU that the settings ask for, if they ask for one.
 pub(super) fn open(settings: &Settings) -> Result<Option<Engine>, Error> {
-    let named = settings.device.as_deref().map(Wanted::Named);
-    let gpu = match settings.backend {
-        Backend::Cpu => return Ok(None),
-        Backend::Auto if settings.method == Method::Naive => return Ok(None),
-        // A driver that runs on the CPU is slower than the CPU backend.
-        Backend::Auto => match Gpu::open(named.unwrap_or(Wanted::Hardware)) {
-            Ok(gpu) => gpu,
-            Err(_) => return Ok(None),
-        },
-        Backend::Gpu => Gpu::open(named.unwrap_or(Wanted::Any))?,
+    let gpu = wanted(settings).map(Gpu::open).transpose();
+    engine_of(gpu, settings)
+}
+
+/// [`open`] without blocking.
+pub(super) async fn open_async(settings: &Settings) -> Result<Option<Engine>, Error> {
+    let gpu = match wanted(settings) {
+        Some(wanted) => Gpu::open_async(wanted).await.map(Some),
+        None => Ok(None),
     };
-    Ok(Some(engine(gpu, settings, Capacities::default())))
+    engine_of(gpu, settings)
+}
+
+fn wanted(settings: &Settings) -> Option<Wanted<'_>> {
+    let named = settings.device.as_deref().map(Wanted::Named);
+    match settings.backend {
+        Backend::Cpu => None,
+        Backend::Auto if settings.method == Method::Naive => None,
+        // A driver that runs on the CPU is slower than the CPU backend.
+        Backend::Auto => Some(named.unwrap_or(Wanted::Hardware)),
+        Backend::Gpu => Some(named.unwrap_or(Wanted::Any)),
+    }
+}
+
+fn engine_of(
+    gpu: Result<Option<Arc<Gpu>>, Error>,
+    settings: &Settings,
+) -> Result<Option<Engine>, Error> {
+    match gpu {
+        Ok(gpu) => Ok(gpu.map(|gpu| engine(gpu, settings, Capacities::default()))),
+        Err(_) if settings.backend == Backend::Auto => Ok(None),
+        Err(error) => Err(error),
+    }
 }
 
 fn engine(gpu: Arc<Gpu>, settings: &Settings, first: Capacities) -> Engine {
@@ -80,10 +97,11 @@ impl Detector {
     /// workgroups of 256 (WebGPU's defaults do). `settings.backend` and `settings.device` are passed over.
     ///
     /// Such a detector answers [`detect`](Detector::detect) as any other, and besides
-    /// [`encode`](Detector::encode), where positions and pairs stay on the device.
+    /// [`encode`](Detector::encode), where positions and pairs stay on the device. Nothing is waited for, so
+    /// it works in a browser too. Kernels are compiled when the first frame needs them.
     ///
     /// # Errors
-    /// A setting out of its range; a device that allows too little; a kernel that does not compile.
+    /// A setting out of its range; a device that allows too little.
     pub fn with_device(
         device: wgpu::Device,
         queue: wgpu::Queue,
@@ -108,11 +126,8 @@ impl Detector {
         let gpu = Gpu::of_caller_with(device, queue, |source| {
             let text = source.text();
             let is_it = source.name == kernel && text.contains(line);
-            if !is_it {
-                return text;
-            }
-            is_damaged.set(true);
-            text.replace(line, damaged)
+            is_damaged.set(is_damaged.get() || is_it);
+            is_it.then(|| text.replace(line, damaged))
         })?;
         if !is_damaged.get() {
             let what = format!("kernel {kernel} has no line \"{line}\"");
@@ -128,17 +143,8 @@ impl Detector {
             ..settings
         };
         settings.check()?;
-        let gpu = Arc::new(gpu);
-        Ok(Detector {
-            gpu: Some(engine(gpu, &settings, Capacities::default())),
-            workers: Workers::new(settings.threads)?,
-            frame: Frame::default(),
-            pairs: Pairs::default(),
-            clusters: Clusters::new(settings.instruction_set),
-            cells: Cells::new(settings.instruction_set),
-            steps: super::steps::Steps::default(),
-            settings,
-        })
+        let engine = engine(Arc::new(gpu), &settings, Capacities::default());
+        Detector::assemble(settings, Some(engine))
     }
 
     pub(super) fn gpu_in_use(&self) -> Option<Arc<Gpu>> {

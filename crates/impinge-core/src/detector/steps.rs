@@ -1,7 +1,7 @@
 //! What a detector says of a step: which elements touch while bodies move from their positions to their end positions,
 //! when first, and how far the step can be taken.
 
-use std::time::Instant;
+use crate::clock::Instant;
 
 use super::Detector;
 use crate::error::Error;

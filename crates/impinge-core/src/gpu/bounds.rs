@@ -1,8 +1,8 @@
 //! Stage `bounds`: the boxes of clusters and of the forest above them, for both methods.
 
-use super::device::Gpu;
 use super::kernels::{BoundsClusters, BoundsLevel, BoundsTop};
 use super::layout::Params;
+use super::open::Gpu;
 use super::pipeline::{Bound, Groups};
 use super::steps::Steps;
 use super::world::World;

@@ -8,7 +8,7 @@ use std::marker::PhantomData;
 
 use bytemuck::Pod;
 
-use super::device::Gpu;
+use super::device::Device;
 use super::layout::{Params, Step};
 use crate::error::Error;
 
@@ -62,7 +62,7 @@ impl<T: Pod> Storage<T> {
     const SIZE: u64 = size_of::<T>() as u64;
 
     /// Elements that one binding may hold on this device.
-    pub fn limit(gpu: &Gpu) -> u64 {
+    pub fn limit(gpu: &Device) -> u64 {
         (gpu.max_binding() / Self::SIZE).min(u64::from(u32::MAX))
     }
 
@@ -71,7 +71,7 @@ impl<T: Pod> Storage<T> {
     ///
     /// # Errors
     /// More than one binding may hold.
-    pub fn resize(&mut self, gpu: &Gpu, len: u64) -> Result<bool, Error> {
+    pub fn resize(&mut self, gpu: &Device, len: u64) -> Result<bool, Error> {
         let limit = Self::limit(gpu);
         if len > limit {
             return Err(Error::Gpu {
@@ -95,14 +95,14 @@ impl<T: Pod> Storage<T> {
     }
 
     /// Binds exactly `len` elements with no room to spare, whatever was there.
-    pub fn resize_exactly(&mut self, gpu: &Gpu, len: u64) {
+    pub fn resize_exactly(&mut self, gpu: &Device, len: u64) {
         self.len = len.clamp(1, Self::limit(gpu));
         if self.capacity != self.len {
             self.allocate(gpu, self.len);
         }
     }
 
-    fn allocate(&mut self, gpu: &Gpu, capacity: u64) {
+    fn allocate(&mut self, gpu: &Device, capacity: u64) {
         // The old one goes first: both may not fit.
         self.buffer = None;
         self.capacity = capacity;
@@ -118,14 +118,14 @@ impl<T: Pod> Storage<T> {
     ///
     /// # Errors
     /// As [`resize`](Storage::resize).
-    pub fn upload(&mut self, gpu: &Gpu, data: &[T]) -> Result<bool, Error> {
+    pub fn upload(&mut self, gpu: &Device, data: &[T]) -> Result<bool, Error> {
         let grew = self.resize(gpu, count(data.len()))?;
         self.write(gpu, 0, data);
         Ok(grew)
     }
 
     /// Writes elements from `first` on, which must fit.
-    pub fn write(&self, gpu: &Gpu, first: u64, data: &[T]) {
+    pub fn write(&self, gpu: &Device, first: u64, data: &[T]) {
         if !data.is_empty() {
             let bytes = bytemuck::cast_slice(data);
             gpu.queue

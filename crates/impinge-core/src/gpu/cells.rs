@@ -13,10 +13,10 @@
 
 use std::fmt;
 
-use super::device::Gpu;
 use super::kernels::{DispatchCells, DispatchScatter, DispatchTile, GridCount, PairingCells};
 use super::layout::{N_ITEMS, Params, ROUNDS};
 use super::narrow::{Settling, prepare};
+use super::open::Gpu;
 use super::pipeline::{Bound, Groups};
 use super::reaching::{CELLS, KEPT, Reaching, ReachingSteps};
 use super::room::Room;

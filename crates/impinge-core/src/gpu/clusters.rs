@@ -8,10 +8,10 @@
 //! ```
 
 use super::bounds::{Bounds, BoundsSteps};
-use super::device::Gpu;
 use super::kernels::{Dispatch, Pairing};
 use super::layout::{N_ITEMS, Params, ROUNDS};
 use super::narrow::{Settling, prepare};
+use super::open::Gpu;
 use super::pipeline::{Bound, Groups};
 use super::room::Room;
 use super::steps::{Stages, Steps};

@@ -11,8 +11,8 @@ use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll, Waker};
 
-use super::device::Gpu;
 use super::layout::{Counter, Grid, N_COUNTERS, PairKey, UnsureKey};
+use super::open::Gpu;
 use super::room::{Counts, Room};
 use crate::error::Error;
 

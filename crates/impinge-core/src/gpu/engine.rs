@@ -2,15 +2,16 @@
 //!
 //! What is done with them, pass after pass, is in [`passes`](super::passes).
 
+use crate::clock::Instant;
 use std::sync::Arc;
-use std::time::Instant;
 
 use super::buffers::{Storage, count};
 use super::cells::{self, InCells};
 use super::clusters;
 use super::collect::Collector;
-use super::device::{Gpu, Scopes};
+use super::device::Scopes;
 use super::layout::Cell;
+use super::open::Gpu;
 use super::passes::Answer;
 use super::pieces;
 use super::room::{Capacities, CellsWanted, Counts, Room};

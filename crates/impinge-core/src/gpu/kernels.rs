@@ -1,4 +1,4 @@
-//! All kernels: their sources, their bindings, and the compiled set.
+//! All kernels: their sources, their bindings, and the set that a device has.
 
 use super::layout::{
     Arguments, Body, Candidate, Cell, CellItem, Cluster, ClusterVertex, Coordinate, Corners,
@@ -206,11 +206,11 @@ bindings! {
     }
 }
 
-/// Declares the compiled set: for each kernel its source, constants and bindings.
+/// Declares the set: for each kernel its source, constants and bindings.
 macro_rules! kernels {
     ($($name:ident: $bindings:ident = $source:ident [$($constant:expr),*]
         from $file:literal ($($shared:literal),*);)*) => {
-        /// Every kernel, compiled.
+        /// Every kernel, compiled when it is first bound.
         pub(crate) struct Kernels {
             $(pub $name: Kernel<$bindings>,)*
         }
@@ -218,14 +218,10 @@ macro_rules! kernels {
         $(pub(crate) const $source: Source = source!($file, [$($shared),*]);)*
 
         impl Kernels {
-            /// Compiles all of them, each from what `text` makes of its source; errors go to the error
-            /// scopes that are open.
-            pub fn new(device: &wgpu::Device, text: impl Fn(&Source) -> String) -> Self {
+            /// All of them. `damage` may give another text than the source's own.
+            pub fn new(damage: impl Fn(&Source) -> Option<String>) -> Self {
                 Kernels {
-                    $($name: {
-                        let text = text(&$source);
-                        Kernel::of_text(device, &$source, text, &[$($constant),*])
-                    },)*
+                    $($name: Kernel::new($source, &[$($constant),*]).with_text(damage(&$source)),)*
                 }
             }
         }

@@ -3,7 +3,7 @@
 //! Stages carry the names that they have on the CPU; each kernel file begins with a card. One
 //! submission a frame: positions go up, counters and results come back, see [`clusters`] and [`cells`]. What the filter on
 //! the device leaves open is settled exactly on the CPU from the numbers as given. Nothing here
-//! blocks but [`device::Gpu::block_on`].
+//! blocks but what is in [`waiting`].
 
 mod bounds;
 mod clusterings;
@@ -11,6 +11,7 @@ mod clusters;
 mod collect;
 mod device;
 mod forest;
+mod open;
 mod passes;
 mod pieces;
 mod resident;
@@ -35,16 +36,17 @@ pub mod room;
 #[allow(missing_docs)]
 pub mod steps;
 mod topology;
+mod waiting;
 #[allow(missing_docs)]
 pub mod world;
 
-pub use device::{DeviceInfo, devices};
+pub use device::{Device, DeviceInfo};
 pub use resident::ResidentPairs;
 pub use room::Capacities;
 
-pub use device::{Gpu, Wanted};
 pub(crate) use engine::{Engine, Options};
 pub use kernels::shaders;
+pub use open::{Gpu, Wanted, devices, devices_async};
 
 /// Text that kernels are put together from: `LAYOUT` first, it has the structs of all.
 pub mod shared {

@@ -1,8 +1,8 @@
 //! Stage `narrow`: the filter over all candidates, for both methods.
 
-use super::device::Gpu;
 use super::kernels::{Narrow, Prepare};
 use super::layout::{N_CANDIDATES, Params, ROUNDS};
+use super::open::Gpu;
 use super::pipeline::{Bound, Groups};
 use super::room::Room;
 use super::steps::Steps;

@@ -1,9 +1,10 @@
 //! Kernels with typed bindings.
 
 use std::marker::PhantomData;
+use std::sync::OnceLock;
 
 use super::buffers::Access;
-use super::device::Gpu;
+use super::device::Device;
 
 /// One binding as a kernel declares it.
 #[derive(Debug, Clone, Copy)]
@@ -78,29 +79,32 @@ macro_rules! source {
 }
 pub(crate) use source;
 
-/// A compiled kernel that takes the bindings `B`.
+/// A kernel that takes the bindings `B`, compiled when it is first bound.
 pub struct Kernel<B> {
-    name: &'static str,
-    layout: wgpu::BindGroupLayout,
-    pipeline: wgpu::ComputePipeline,
+    source: Source,
+    constants: &'static [(&'static str, f64)],
+    /// In place of the text of `source`.
+    damaged: Option<String>,
+    compiled: OnceLock<Compiled>,
     takes: PhantomData<fn(B)>,
 }
 
-impl<B: Bindings> Kernel<B> {
-    /// Compiles; errors go to the error scopes that are open.
-    pub fn new(device: &wgpu::Device, source: &Source, constants: &[(&str, f64)]) -> Self {
-        Kernel::of_text(device, source, source.text(), constants)
-    }
+struct Compiled {
+    layout: wgpu::BindGroupLayout,
+    pipeline: wgpu::ComputePipeline,
+}
 
-    /// Compiles a text in place of the kernel's own.
-    pub(crate) fn of_text(
+impl Compiled {
+    /// Errors go to the error scopes that are open.
+    fn new(
         device: &wgpu::Device,
-        source: &Source,
+        name: &str,
         text: String,
         constants: &[(&str, f64)],
+        entries: &[Entry],
     ) -> Self {
         let entries: Vec<wgpu::BindGroupLayoutEntry> = (0u32..)
-            .zip(B::ENTRIES)
+            .zip(entries)
             .map(|(binding, entry)| wgpu::BindGroupLayoutEntry {
                 binding,
                 visibility: wgpu::ShaderStages::COMPUTE,
@@ -116,7 +120,7 @@ impl<B: Bindings> Kernel<B> {
                 count: None,
             })
             .collect();
-        let label = Some(source.name);
+        let label = Some(name);
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label,
             entries: &entries,
@@ -142,25 +146,48 @@ impl<B: Bindings> Kernel<B> {
             },
             cache: None,
         });
+        Compiled { layout, pipeline }
+    }
+}
+
+impl<B: Bindings> Kernel<B> {
+    /// Not compiled yet.
+    pub fn new(source: Source, constants: &'static [(&'static str, f64)]) -> Self {
         Kernel {
-            name: source.name,
-            layout,
-            pipeline,
+            source,
+            constants,
+            damaged: None,
+            compiled: OnceLock::new(),
             takes: PhantomData,
         }
     }
 
-    /// The kernel with its buffers.
-    pub fn bind(&self, gpu: &Gpu, bindings: &B) -> Bound {
+    /// The same with another text, or with its own for `None`.
+    pub(crate) fn with_text(self, damaged: Option<String>) -> Self {
+        Kernel { damaged, ..self }
+    }
+
+    fn compiled(&self, device: &wgpu::Device) -> &Compiled {
+        self.compiled.get_or_init(|| {
+            let text = self.damaged.clone();
+            let text = text.unwrap_or_else(|| self.source.text());
+            Compiled::new(device, self.source.name, text, self.constants, B::ENTRIES)
+        })
+    }
+
+    /// The kernel with its buffers. The first call of any detector on this device compiles it; errors go to
+    /// the error scopes that are open.
+    pub fn bind(&self, gpu: &Device, bindings: &B) -> Bound {
+        let compiled = self.compiled(&gpu.device);
         let entries: Vec<wgpu::BindGroupEntry<'_>> = (0u32..)
             .zip(bindings.resources())
             .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
             .collect();
         Bound {
-            pipeline: self.pipeline.clone(),
+            pipeline: compiled.pipeline.clone(),
             group: gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some(self.name),
-                layout: &self.layout,
+                label: Some(self.source.name),
+                layout: &compiled.layout,
                 entries: &entries,
             }),
             has_params: B::ENTRIES

@@ -7,9 +7,9 @@
 
 use super::bounds::{Bounds, BoundsSteps};
 use super::cells::Told;
-use super::device::Gpu;
 use super::kernels::{BoundsKeep, BoundsReach, GridRanges, GridResolution, GridShift};
 use super::layout::{NO_ROOT, Params};
+use super::open::Gpu;
 use super::pipeline::{Bound, Groups};
 use super::room::Room;
 use super::steps::Steps;

@@ -5,13 +5,13 @@
 //! allows no more, the engine splits the pass instead.
 
 use super::buffers::Storage;
-use super::device::Gpu;
 use super::layout::{
     Arguments, Candidate, Cell, CellItem, Counter, Grid, Kept, ListEntry, N_BOX_TESTS,
     N_BOX_TESTS_HIGH, N_CANDIDATES, N_COUNTERS, N_ENTRIES, N_ITEMS, N_KEPT, N_PAIRS, N_SUBDIVIDED,
     N_TALLIES, N_UNSURE, NodePair, PairKey, ROUNDS, Reach, Start, TOO_MUCH, Tally, UnsureKey,
     WorkItem,
 };
+use super::open::Gpu;
 use crate::error::Error;
 use crate::settings::Method;
 

@@ -1,8 +1,8 @@
 //! What both methods' plans are made of: the table of parameters, and timed passes.
 
 use super::buffers::{Storage, Uniform};
-use super::device::Gpu;
 use super::layout::{Params, Step};
+use super::open::Gpu;
 use crate::error::Error;
 
 /// The parameters of all steps of a plan, sent when they change.

@@ -28,11 +28,11 @@ use crate::stats::Statistics;
 
 use super::buffers::{Storage, count};
 use super::clusterings::Clusterings;
-use super::device::Gpu;
 use super::forest::Forest;
 use super::layout::{
     Body, Cluster, ClusterVertex, Coordinate, Corners, Level, NO_ROOT, Node, NodePair, Order,
 };
+use super::open::Gpu;
 use super::pieces::{Chunk, Loaded};
 use super::topology::{Topology, Weight};
 

@@ -1,7 +1,7 @@
 //! The same for the GPU: a method from outside is a plan of passes that work in cells.
 
+use crate::clock::Instant;
 use std::sync::Arc;
-use std::time::Instant;
 
 use crate::error::Error;
 use crate::frame::Frame;
@@ -28,16 +28,15 @@ impl Host {
     /// have: beyond it, the work is done in parts.
     ///
     /// # Errors
-    /// No adapter fits; the driver refuses; those of `plan`, which compiles its kernels.
+    /// No adapter fits; the driver refuses.
     pub fn new(
         device: Option<&str>,
         lambda: f64,
         first: Option<Capacities>,
         memory_budget: Option<u64>,
-        plan: impl FnOnce(&Gpu) -> Result<Box<dyn InCells>, Error>,
+        plan: Box<dyn InCells>,
     ) -> Result<Self, Error> {
         let gpu = Gpu::open(device.map_or(Wanted::Any, Wanted::Named))?;
-        let plan = plan(&gpu)?;
         let options = Options {
             method: Method::Cells,
             lambda,

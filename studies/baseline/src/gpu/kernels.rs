@@ -133,19 +133,19 @@ mod shared {
     pub const SUMS: &str = include_str!("kernels/sums.wgsl");
 }
 
-/// Declares the compiled set: for each kernel its bindings and the shared text that it builds on.
+/// Declares the set: for each kernel its bindings and the shared text that it builds on.
 macro_rules! kernels {
     ($($name:ident: $bindings:ident from $file:literal ($($shared:ident),*);)*) => {
-        /// Every kernel, compiled.
+        /// Every kernel, compiled when it is first bound.
         pub(crate) struct Kernels {
             $(pub $name: Kernel<$bindings>,)*
         }
 
         impl Kernels {
-            /// Compiles all of them; errors go to the error scopes that are open.
-            pub fn new(device: &wgpu::Device) -> Self {
+            /// All of them.
+            pub fn new() -> Self {
                 Kernels {
-                    $($name: Kernel::new(device, &source::$name(), &[]),)*
+                    $($name: Kernel::new(source::$name(), &[]),)*
                 }
             }
         }

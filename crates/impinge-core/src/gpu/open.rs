@@ -1,0 +1,199 @@
+//! Finding adapters, and opening one for all detectors that want it.
+
+use std::fmt;
+use std::ops::Deref;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
+
+use super::device::{Device, DeviceInfo, STORAGE_BUFFERS, describe, suffices};
+use super::kernels::Kernels;
+use super::pipeline::Source;
+use super::waiting::wait;
+use crate::error::Error;
+
+/// The adapters on this machine that can run the kernels, hardware first. In a browser, which does not let
+/// a program wait for the answer, none: ask [`devices_async`].
+pub fn devices() -> Vec<DeviceInfo> {
+    wait(async { Ok(devices_async().await) }).unwrap_or_default()
+}
+
+/// [`devices`] without blocking. A browser has one adapter at most.
+pub async fn devices_async() -> Vec<DeviceInfo> {
+    let adapters = adapters().await;
+    adapters.into_iter().map(|(_, info)| info).collect()
+}
+
+async fn adapters() -> Vec<(wgpu::Adapter, DeviceInfo)> {
+    if wgpu::Instance::enabled_backend_features().is_empty() {
+        return Vec::new();
+    }
+    static INSTANCE: OnceLock<wgpu::Instance> = OnceLock::new();
+    let instance = INSTANCE.get_or_init(|| {
+        wgpu::Instance::new(wgpu::InstanceDescriptor {
+            backends: wgpu::Backends::PRIMARY,
+            // Indirect arguments come from our own kernel, which keeps to the limits.
+            flags: wgpu::InstanceFlags::empty(),
+            ..wgpu::InstanceDescriptor::new_without_display_handle()
+        })
+    });
+    let found = instance.enumerate_adapters(wgpu::Backends::PRIMARY).await;
+    let mut adapters: Vec<_> = found
+        .into_iter()
+        .filter(|adapter| suffices(&adapter.limits()))
+        .map(|adapter| {
+            let info = describe(&adapter.get_info(), &adapter.limits());
+            (adapter, info)
+        })
+        .collect();
+    adapters.sort_by_key(|(_, info)| info.is_software);
+    adapters
+}
+
+/// A device and its kernels, compiled when first needed. Detectors on the same adapter share one.
+pub struct Gpu {
+    opened: Device,
+    pub(crate) kernels: Kernels,
+}
+
+impl fmt::Debug for Gpu {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.opened.fmt(f)
+    }
+}
+
+impl Deref for Gpu {
+    type Target = Device;
+
+    fn deref(&self) -> &Device {
+        &self.opened
+    }
+}
+
+/// Which adapters come into question.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wanted<'a> {
+    /// Any, hardware before software.
+    Any,
+    /// Hardware only.
+    Hardware,
+    /// Those whose name contains this, whatever the case.
+    Named(&'a str),
+}
+
+/// Devices in use, by name and interface.
+static SHARED: Mutex<Vec<(DeviceInfo, Weak<Gpu>)>> = Mutex::new(Vec::new());
+
+impl Gpu {
+    /// Opens an adapter, or shares the device of another detector.
+    ///
+    /// # Errors
+    /// No adapter fits; the driver refuses. In a browser always.
+    pub fn open(wanted: Wanted<'_>) -> Result<Arc<Gpu>, Error> {
+        wait(Gpu::open_async(wanted))
+    }
+
+    /// [`open`](Gpu::open) without blocking.
+    ///
+    /// # Errors
+    /// No adapter fits; the driver refuses.
+    pub async fn open_async(wanted: Wanted<'_>) -> Result<Arc<Gpu>, Error> {
+        let adapters = adapters().await;
+        let fits = |info: &DeviceInfo| match wanted {
+            Wanted::Any => true,
+            Wanted::Hardware => !info.is_software,
+            Wanted::Named(name) => info.name.to_lowercase().contains(&name.to_lowercase()),
+        };
+        let Some((adapter, info)) = adapters.iter().find(|(_, info)| fits(info)) else {
+            let names: Vec<String> = adapters.iter().map(|(_, info)| info.to_string()).collect();
+            let there = match &names[..] {
+                [] => "there is none on this machine".to_owned(),
+                names => format!("there are {}", names.join(", ")),
+            };
+            let found = match wanted {
+                Wanted::Any => there,
+                Wanted::Hardware => format!("none in hardware; {there}"),
+                Wanted::Named(name) => format!("none is called \"{name}\"; {there}"),
+            };
+            return Err(Error::NoAdapter { found });
+        };
+        if let Some(gpu) = Gpu::shared(info) {
+            return Ok(gpu);
+        }
+        // The lock is not held while the device is awaited, so another one may have come first.
+        let gpu = Arc::new(Gpu::request(adapter, info.clone()).await?);
+        if let Some(gpu) = Gpu::shared(info) {
+            return Ok(gpu);
+        }
+        let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+        shared.push((info.clone(), Arc::downgrade(&gpu)));
+        Ok(gpu)
+    }
+
+    /// The device that another detector has open on this adapter.
+    fn shared(info: &DeviceInfo) -> Option<Arc<Gpu>> {
+        let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+        shared.retain(|(_, gpu)| gpu.strong_count() > 0);
+        shared
+            .iter()
+            .filter(|(known, _)| known == info)
+            .find_map(|(_, gpu)| gpu.upgrade().filter(|gpu| gpu.check_lost().is_ok()))
+    }
+
+    async fn request(adapter: &wgpu::Adapter, info: DeviceInfo) -> Result<Gpu, Error> {
+        let offered = adapter.limits();
+        // The least that WebGPU promises, but buffers as large as the adapter has them.
+        let required_limits = wgpu::Limits {
+            max_buffer_size: offered.max_buffer_size,
+            max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
+            max_storage_buffers_per_shader_stage: STORAGE_BUFFERS,
+            ..wgpu::Limits::downlevel_defaults()
+        };
+        let request = adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("impinge"),
+            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
+            required_limits,
+            ..Default::default()
+        });
+        let (device, queue) = request.await.map_err(|error| Error::Gpu {
+            what: format!("{info}: {error}"),
+        })?;
+        let opened = Device::new(device, queue, info);
+        opened.listen();
+        Ok(Gpu {
+            opened,
+            kernels: Kernels::new(|_| None),
+        })
+    }
+
+    /// A device that is the caller's. Its callbacks are left alone.
+    ///
+    /// # Errors
+    /// It allows too little.
+    pub fn of_caller(device: wgpu::Device, queue: wgpu::Queue) -> Result<Gpu, Error> {
+        Gpu::of_caller_with(device, queue, |_| None)
+    }
+
+    /// The same, where `damage` may give another text than a kernel's own.
+    pub(crate) fn of_caller_with(
+        device: wgpu::Device,
+        queue: wgpu::Queue,
+        damage: impl Fn(&Source) -> Option<String>,
+    ) -> Result<Gpu, Error> {
+        let limits = device.limits();
+        if !suffices(&limits) {
+            return Err(Error::Gpu {
+                what: format!(
+                    "the device allows {} storage buffers a stage, {} invocations a workgroup \
+                     and {} workgroups along an axis; {STORAGE_BUFFERS}, 256 and 32768 are needed",
+                    limits.max_storage_buffers_per_shader_stage,
+                    limits.max_compute_invocations_per_workgroup,
+                    limits.max_compute_workgroups_per_dimension,
+                ),
+            });
+        }
+        let info = describe(&device.adapter_info(), &limits);
+        Ok(Gpu {
+            opened: Device::new(device, queue, info),
+            kernels: Kernels::new(damage),
+        })
+    }
+}
