@@ -17,6 +17,7 @@
 //! `docs/exactness.md` derives every bound and draws every case.
 
 mod algebra;
+mod distance;
 pub(crate) mod filter;
 mod orientation;
 mod segment;
@@ -28,6 +29,10 @@ mod triangle;
 #[cfg(test)]
 mod tests;
 
+pub use distance::{
+    Closest, Feature, Nearest, are_within, closest_points, edge_face_are_within, faces_are_within,
+    first_within, nearest_features,
+};
 pub(crate) use orientation::{Projection, collinear};
 pub use orientation::{Sign, orient2d, orient3d};
 pub(crate) use segment::strictly_between;

@@ -1,6 +1,7 @@
-//! Exact continuous collision against an oracle of another make, published answers, and itself in other words.
+//! Exact continuous collision and distances against an oracle of another make, published answers, and itself in other words.
 
 mod data;
+mod distance;
 #[path = "../exact/generators.rs"]
 #[allow(dead_code, reason = "made for another test")]
 mod generators;

@@ -6,9 +6,9 @@ use impinge_core::exact::{Contact, ElementPair, first_contact, touch};
 use crate::generators::{Kind, Random};
 use crate::oracle;
 
-type Point = [f64; 3];
+pub type Point = [f64; 3];
 
-const PAIRS: [ElementPair; 4] = [
+pub const PAIRS: [ElementPair; 4] = [
     ElementPair::VertexVertex,
     ElementPair::VertexEdge,
     ElementPair::VertexFace,
@@ -16,7 +16,7 @@ const PAIRS: [ElementPair; 4] = [
 ];
 
 /// The difference polygon's corners as the definition of a pair gives them.
-fn corners(pair: ElementPair) -> &'static [[usize; 2]] {
+pub fn corners(pair: ElementPair) -> &'static [[usize; 2]] {
     match pair {
         ElementPair::VertexVertex => &[[1, 0]],
         ElementPair::VertexEdge => &[[1, 0], [2, 0]],
@@ -26,9 +26,9 @@ fn corners(pair: ElementPair) -> &'static [[usize; 2]] {
 }
 
 /// Floats as integers over one power of two.
-fn integers(points: &[Point]) -> Vec<[IBig; 3]> {
+pub fn integers_over(numbers: &[f64]) -> Vec<IBig> {
     let lowest = -1074;
-    let integer = |x: f64| {
+    let integer = |x: &f64| {
         let bits = x.to_bits();
         let biased = (bits >> 52 & 0x7ff) as i32;
         let fraction = bits & ((1 << 52) - 1);
@@ -37,20 +37,24 @@ fn integers(points: &[Point]) -> Vec<[IBig; 3]> {
             _ => (fraction | 1 << 52, biased - 1075),
         };
         let magnitude = IBig::from(mantissa) << (exponent - lowest) as usize;
-        if x < 0.0 { -magnitude } else { magnitude }
+        if *x < 0.0 { -magnitude } else { magnitude }
     };
-    let mut points: Vec<[IBig; 3]> = points.iter().map(|point| point.map(integer)).collect();
-    let zeros = points
+    let integers: Vec<IBig> = numbers.iter().map(integer).collect();
+    let zeros = integers
         .iter()
-        .flatten()
         .filter(|x| **x != IBig::ZERO)
         .map(|x| x.trailing_zeros().unwrap())
         .min()
         .unwrap_or(0);
-    for x in points.iter_mut().flatten() {
-        *x = &*x >> zeros;
-    }
-    points
+    integers.iter().map(|x| x >> zeros).collect()
+}
+
+fn integers(points: &[Point]) -> Vec<[IBig; 3]> {
+    let numbers: Vec<f64> = points.iter().flatten().copied().collect();
+    integers_over(&numbers)
+        .chunks_exact(3)
+        .map(|point| std::array::from_fn(|k| point[k].clone()))
+        .collect()
 }
 
 fn expected(pair: ElementPair, start: &[Point; 4], end: &[Point; 4]) -> oracle::Moments {
@@ -94,7 +98,7 @@ fn check(pair: ElementPair, start: &[Point; 4], end: &[Point; 4], note: &str) ->
 
 /// How the points of a lattice move.
 #[derive(Clone, Copy, Debug)]
-enum Motion {
+pub enum Motion {
     /// Each on its own.
     Free,
     /// All in one plane at all times: f is zero everywhere.
@@ -113,7 +117,7 @@ enum Motion {
     Twins,
 }
 
-const MOTIONS: [Motion; 8] = [
+pub const MOTIONS: [Motion; 8] = [
     Motion::Free,
     Motion::Flat,
     Motion::FlatAtEnds,
@@ -124,7 +128,7 @@ const MOTIONS: [Motion; 8] = [
     Motion::Twins,
 ];
 
-fn step_on_lattice(motion: Motion, size: u64, random: &mut Random) -> [[Point; 4]; 2] {
+pub fn step_on_lattice(motion: Motion, size: u64, random: &mut Random) -> [[Point; 4]; 2] {
     let mut points = || -> [Point; 4] { Kind::Lattice(size).points(random) };
     let [mut start, mut end] = [points(), points()];
     match motion {

@@ -12,6 +12,6 @@ mod integer;
 mod polynomial;
 mod roots;
 
-pub(super) use integer::common_integers;
-pub(super) use polynomial::{Polynomial, Vector, cross, difference, dot};
+pub(super) use integer::{Integer, common_integers};
+pub(super) use polynomial::{Polynomial, Vector, cross, difference, dot, square_of_sum};
 pub(super) use roots::{Root, Roots, Time};

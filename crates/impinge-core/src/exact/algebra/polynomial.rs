@@ -59,6 +59,10 @@ impl Polynomial {
         Self(sums)
     }
 
+    pub(in crate::exact) fn times(&self, factor: &Integer) -> Self {
+        Self(self.0.iter().map(|x| x * factor).collect())
+    }
+
     /// The sign at `numerator / 2^depth`, a time in [0, 1].
     pub(super) fn sign_at(&self, numerator: &Integer, depth: u64) -> Sign {
         let rest = &Integer::from(1).shifted(depth) - numerator;
@@ -202,6 +206,12 @@ impl Sub for &Polynomial {
         debug_assert_eq!(self.0.len(), other.0.len(), "polynomials of one degree");
         Polynomial(self.0.iter().zip(&other.0).map(|(x, y)| x - y).collect())
     }
+}
+
+/// 1 as a polynomial of degree 2, ((1-t) + t)^2: times this, a polynomial stays what it is and has a degree that is
+/// higher by 2.
+pub(in crate::exact) fn square_of_sum() -> Polynomial {
+    Polynomial([1, 2, 1].map(Integer::from).to_vec())
 }
 
 /// a - b

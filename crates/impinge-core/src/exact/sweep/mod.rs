@@ -26,7 +26,7 @@ use super::algebra::Time;
 use super::filter::contact_answer;
 use super::segment::segments_intersect;
 use super::triangle::segment_meets_triangle;
-use polygon::Polygon;
+pub(super) use polygon::Polygon;
 
 /// A pair of elements by their kinds, with the order of its points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -54,7 +54,7 @@ impl ElementPair {
     }
 
     /// The corners of the difference polygon, in cyclic order: which point minus which.
-    fn corners(self) -> &'static [[usize; 2]] {
+    pub(super) fn corners(self) -> &'static [[usize; 2]] {
         match self {
             Self::VertexVertex => &[[1, 0]],
             Self::VertexEdge => &[[1, 0], [2, 0]],
@@ -79,7 +79,7 @@ pub struct Contact {
 
 impl Contact {
     /// Contact at t = 0.
-    const AT_START: Self = Self {
+    pub(super) const AT_START: Self = Self {
         time: 0.0,
         is_exact: true,
         at_start: true,
@@ -99,7 +99,7 @@ impl Contact {
         self.time < end || (self.is_exact && self.time == end)
     }
 
-    fn later(time: Time) -> Self {
+    pub(super) fn later(time: Time) -> Self {
         Self {
             time: time.floor,
             is_exact: time.is_exact,

@@ -1,21 +1,34 @@
 //! The moving difference polygon, and when the origin first lies in it.
 
 use crate::exact::algebra::{
-    Polynomial, Root, Roots, Time, Vector, common_integers, cross, difference, dot,
+    Integer, Polynomial, Root, Roots, Time, Vector, common_integers, cross, difference, dot,
 };
 use crate::exact::{Point, Sign};
 
 /// A convex polygon of one to four corners, which move linearly.
-pub(super) struct Polygon {
+pub(in crate::exact) struct Polygon {
     corners: Vec<Vector>,
 }
 
 impl Polygon {
     /// The polygon whose corners are differences of points, each given by two numbers of points.
     pub(super) fn new(corners: &[[usize; 2]], start: &[Point; 4], end: &[Point; 4]) -> Self {
-        let numbers: [f64; 24] = std::array::from_fn(|ix| {
-            let points = if ix < 12 { start } else { end };
-            let x = points[ix % 12 / 3][ix % 3];
+        Self::with_distance(corners, start, end, 0.0).0
+    }
+
+    /// [`Polygon::new`], and a distance as an integer over the same power of two.
+    pub(in crate::exact) fn with_distance(
+        corners: &[[usize; 2]],
+        start: &[Point; 4],
+        end: &[Point; 4],
+        distance: f64,
+    ) -> (Self, Integer) {
+        let numbers: [f64; 25] = std::array::from_fn(|ix| {
+            let x = match ix {
+                0..12 => start[ix / 3][ix % 3],
+                12..24 => end[ix % 12 / 3][ix % 3],
+                _ => distance,
+            };
             // Points that do not belong to the pair.
             if x.is_finite() { x } else { 0.0 }
         });
@@ -30,7 +43,12 @@ impl Polygon {
                 })
             })
             .collect();
-        Self { corners }
+        let [.., distance] = integers;
+        (Self { corners }, distance)
+    }
+
+    pub(in crate::exact) fn corners(&self) -> &[Vector] {
+        &self.corners
     }
 
     /// The first time in (0, 1] at which the origin is in the polygon, if it is not at the start.

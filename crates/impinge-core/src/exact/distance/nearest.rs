@@ -1,0 +1,262 @@
+//! Which features of two elements are nearest, and the decision by them, in integers.
+
+use std::cmp::Ordering;
+
+use super::{Vector, cross, difference, dot};
+use crate::exact::algebra::{Integer, common_integers};
+use crate::exact::sweep::ElementPair;
+use crate::exact::{Point, Sign};
+
+/// A feature of an element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Feature {
+    /// A vertex of the element, by its number in the element.
+    Vertex(u8),
+    /// An edge: edge k of a face goes from vertex k to the next. An edge itself is its edge 0.
+    Edge(u8),
+    /// The face.
+    Face,
+}
+
+/// The features of two elements that are nearest: those with the nearest points in their inside.
+///
+/// A nearest point on the border of a feature belongs to the smaller feature. Where there are several nearest points (of
+/// parallel edges, or flat elements), they belong to the first of the smallest features in the order of ipc-toolkit's names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Nearest {
+    /// The feature of the first element.
+    pub a: Feature,
+    /// The feature of the second element.
+    pub b: Feature,
+    /// Whether the elements are edges that are parallel (or points), or a face that is flat: nearest points may then
+    /// not be the only ones.
+    pub is_parallel: bool,
+}
+
+impl Nearest {
+    /// ipc-toolkit's name of the distance type: `P_T`, `P_E0`, `P_T0`; `EA_EB`, `EA_EB0`, `EA0_EB1`; for a vertex and an
+    /// edge `P_E`, `P_E0`, `P_E1`; for two vertices `P_P`.
+    #[must_use]
+    pub fn name(&self, pair: ElementPair) -> &'static str {
+        use Feature::{Edge, Vertex};
+        let pick = |names: [&'static str; 3], ix: u8| names[usize::from(ix) % 3];
+        match (pair, self.a, self.b) {
+            (ElementPair::VertexVertex, ..) => "P_P",
+            (ElementPair::VertexEdge, _, Vertex(ix)) => pick(["P_E0", "P_E1", ""], ix),
+            (ElementPair::VertexEdge, ..) => "P_E",
+            (ElementPair::VertexFace, _, Vertex(ix)) => pick(["P_T0", "P_T1", "P_T2"], ix),
+            (ElementPair::VertexFace, _, Edge(ix)) => pick(["P_E0", "P_E1", "P_E2"], ix),
+            (ElementPair::VertexFace, ..) => "P_T",
+            (ElementPair::EdgeEdge, Vertex(0), Vertex(ix)) => pick(["EA0_EB0", "EA0_EB1", ""], ix),
+            (ElementPair::EdgeEdge, Vertex(_), Vertex(ix)) => pick(["EA1_EB0", "EA1_EB1", ""], ix),
+            (ElementPair::EdgeEdge, _, Vertex(ix)) => pick(["EA_EB0", "EA_EB1", ""], ix),
+            (ElementPair::EdgeEdge, Vertex(ix), _) => pick(["EA0_EB", "EA1_EB", ""], ix),
+            (ElementPair::EdgeEdge, ..) => "EA_EB",
+        }
+    }
+}
+
+/// The features of two elements that are nearest.
+///
+/// The points and their order are those of the [`ElementPair`]. Exact for coordinates [`in_range`](crate::exact::in_range).
+///
+/// ```
+/// use impinge::exact::{ElementPair, Feature, nearest_features};
+/// let points = [[0.0, -9.0, 3.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]];
+/// let nearest = nearest_features(ElementPair::VertexFace, &points);
+/// assert_eq!((nearest.a, nearest.b), (Feature::Vertex(0), Feature::Edge(0)));
+/// assert_eq!(nearest.name(ElementPair::VertexFace), "P_E0");
+/// ```
+#[must_use]
+pub fn nearest_features(pair: ElementPair, points: &[Point; 4]) -> Nearest {
+    let polygon = Polygon::new(pair, points, 0.0);
+    polygon.nearest().named(pair, polygon.is_flat())
+}
+
+/// [`are_within`](super::are_within) by integers alone, for a distance that is finite and not below zero.
+pub(super) fn are_within(pair: ElementPair, points: &[Point; 4], distance: f64) -> bool {
+    let polygon = Polygon::new(pair, points, distance);
+    let nearest = polygon.nearest();
+    let (over, under) = polygon.square_of_distance(nearest);
+    let square = &polygon.distance * &polygon.distance;
+    (&over - &(&square * &under)).sign() != Sign::Positive
+}
+
+/// A part of the difference polygon.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    Face,
+    /// From this corner to the next.
+    Edge(usize),
+    Corner(usize),
+}
+
+impl Part {
+    /// The features whose difference the part is.
+    pub(super) fn named(self, pair: ElementPair, is_flat: bool) -> Nearest {
+        use Feature::{Edge, Face, Vertex};
+        let number = |ix: usize| u8::try_from(ix).unwrap_or(0);
+        let (a, b) = match (pair, self) {
+            (ElementPair::EdgeEdge, Self::Face) => (Edge(0), Edge(0)),
+            (ElementPair::EdgeEdge, Self::Edge(ix)) => [
+                (Edge(0), Vertex(0)),
+                (Vertex(1), Edge(0)),
+                (Edge(0), Vertex(1)),
+                (Vertex(0), Edge(0)),
+            ][ix],
+            (ElementPair::EdgeEdge, Self::Corner(ix)) => [
+                (Vertex(0), Vertex(0)),
+                (Vertex(1), Vertex(0)),
+                (Vertex(1), Vertex(1)),
+                (Vertex(0), Vertex(1)),
+            ][ix],
+            (_, Self::Face) => (Vertex(0), Face),
+            (_, Self::Edge(ix)) => (Vertex(0), Edge(number(ix))),
+            (_, Self::Corner(ix)) => (Vertex(0), Vertex(number(ix))),
+        };
+        Nearest {
+            a,
+            b,
+            is_parallel: is_flat,
+        }
+    }
+}
+
+/// The difference polygon at one moment, and a distance, over one power of two.
+pub(super) struct Polygon {
+    pub(super) corners: Vec<Vector>,
+    /// From each corner to the next; none of a single corner, one of a segment.
+    pub(super) edges: Vec<Vector>,
+    normal: Option<Vector>,
+    distance: Integer,
+    /// Of the power of two.
+    pub(super) exponent: i64,
+}
+
+impl Polygon {
+    pub(super) fn new(pair: ElementPair, points: &[Point; 4], distance: f64) -> Self {
+        let finite = |x: f64| if x.is_finite() { x } else { 0.0 };
+        let numbers: [f64; 13] = std::array::from_fn(|ix| match ix {
+            12 => finite(distance),
+            _ => finite(points[ix / 3][ix % 3]),
+        });
+        let (integers, exponent) = common_integers(numbers);
+        let point = |ix: usize| -> Vector { std::array::from_fn(|k| integers[3 * ix + k].clone()) };
+        let corners: Vec<Vector> = pair
+            .corners()
+            .iter()
+            .map(|&[i, j]| difference(&point(i), &point(j)))
+            .collect();
+        let n = corners.len();
+        let n_edges = if n > 2 { n } else { n - 1 };
+        let edges: Vec<Vector> = (0..n_edges)
+            .map(|ix| difference(&corners[(ix + 1) % n], &corners[ix]))
+            .collect();
+        let normal = (n > 2)
+            .then(|| cross(&edges[0], &edges[1]))
+            .filter(|normal| !normal.iter().all(Integer::is_zero));
+        let [.., distance] = integers;
+        Self {
+            corners,
+            edges,
+            normal,
+            distance,
+            exponent,
+        }
+    }
+
+    /// Whether it should have a face and has none.
+    pub(super) fn is_flat(&self) -> bool {
+        self.corners.len() > 2 && self.normal.is_none()
+    }
+
+    fn after(&self, ix: usize) -> &Vector {
+        &self.corners[(ix + 1) % self.corners.len()]
+    }
+
+    /// Whether the origin's projection onto the line of an edge is strictly between the ends.
+    fn is_beside(&self, ix: usize) -> bool {
+        dot(&self.corners[ix], &self.edges[ix]).sign() == Sign::Negative
+            && dot(self.after(ix), &self.edges[ix]).sign() == Sign::Positive
+    }
+
+    /// The part with the nearest point in its inside.
+    pub(super) fn nearest(&self) -> Part {
+        match &self.normal {
+            Some(normal) => self.nearest_of_polygon(normal),
+            None => self.nearest_of_segment(),
+        }
+    }
+
+    /// Of a polygon that has an inside: the origin's projection is in it; or beyond an edge and between its ends; else the
+    /// nearest point is a corner, from which both edges lead away from the origin.
+    fn nearest_of_polygon(&self, normal: &Vector) -> Part {
+        let is_inner: Vec<Sign> = (0..self.edges.len())
+            .map(|ix| dot(normal, &cross(&self.corners[ix], &self.edges[ix])).sign())
+            .collect();
+        if is_inner.iter().all(|&sign| sign == Sign::Positive) {
+            return Part::Face;
+        }
+        let edge =
+            (0..self.edges.len()).find(|&ix| is_inner[ix] != Sign::Positive && self.is_beside(ix));
+        if let Some(ix) = edge {
+            return Part::Edge(ix);
+        }
+        let n = self.corners.len();
+        let is_nearest = |ix: &usize| {
+            let before = (ix + n - 1) % n;
+            dot(&self.corners[*ix], &self.edges[*ix]).sign() != Sign::Negative
+                && dot(&self.corners[*ix], &self.edges[before]).sign() != Sign::Positive
+        };
+        Part::Corner((0..n).find(is_nearest).unwrap_or(0))
+    }
+
+    /// Of a segment or a point: the nearest of the corners and of the edges that the origin is beside.
+    fn nearest_of_segment(&self) -> Part {
+        // The order of ipc-toolkit's names: EA0_EB0, EA0_EB1, EA1_EB0, EA1_EB1, EA_EB0, EA_EB1, EA0_EB, EA1_EB.
+        let (corner_order, edge_order): (&[usize], &[usize]) = match self.corners.len() {
+            1 => (&[0], &[]),
+            2 => (&[0, 1], &[0]),
+            3 => (&[0, 1, 2], &[0, 1, 2]),
+            _ => (&[0, 3, 1, 2], &[0, 2, 3, 1]),
+        };
+        let corners = corner_order.iter().map(|&ix| Part::Corner(ix));
+        let edges = edge_order
+            .iter()
+            .filter(|&&ix| self.is_beside(ix))
+            .map(|&ix| Part::Edge(ix));
+        corners
+            .chain(edges)
+            .reduce(|best, part| match self.compare(part, best) {
+                Ordering::Less => part,
+                _ => best,
+            })
+            .unwrap_or(Part::Corner(0))
+    }
+
+    fn compare(&self, a: Part, b: Part) -> Ordering {
+        let (over_a, under_a) = self.square_of_distance(a);
+        let (over_b, under_b) = self.square_of_distance(b);
+        match (&(&over_a * &under_b) - &(&over_b * &under_a)).sign() {
+            Sign::Negative => Ordering::Less,
+            Sign::Zero => Ordering::Equal,
+            Sign::Positive => Ordering::Greater,
+        }
+    }
+
+    /// The square of the origin's distance from the line, plane or point of a part, as a fraction.
+    pub(super) fn square_of_distance(&self, part: Part) -> (Integer, Integer) {
+        match (part, &self.normal) {
+            (Part::Face, Some(normal)) => {
+                let f = dot(normal, &self.corners[0]);
+                (&f * &f, dot(normal, normal))
+            }
+            (Part::Edge(ix), _) => {
+                let moment = cross(&self.corners[ix], &self.edges[ix]);
+                (dot(&moment, &moment), dot(&self.edges[ix], &self.edges[ix]))
+            }
+            (Part::Corner(ix), _) => (dot(&self.corners[ix], &self.corners[ix]), Integer::from(1)),
+            (Part::Face, None) => unreachable!("a polygon without inside has no face"),
+        }
+    }
+}
