@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use impinge_fem::scenes::SceneName;
 
-use crate::values::{FrameRange, MeshFile, RowsFile, body_numbers, bytes, lambda};
+use crate::values::{CurvesFile, FrameRange, MeshFile, RowsFile, body_numbers, bytes, lambda};
 #[cfg(feature = "gpu")]
 use crate::values::{PngFile, azimuth, elevation, part, size};
 
@@ -41,6 +41,9 @@ pub enum Command {
     /// Find the pairs of primitives that meet within each mesh given
     #[command(name = "self", after_help = SELF_EXAMPLES)]
     Within(WithinArgs),
+    /// Find the smallest distance of two meshes, and where it is
+    #[command(after_help = DISTANCE_EXAMPLES)]
+    Distance(DistanceArgs),
     /// Follow a deforming mesh through the frames of a sequence
     #[command(after_help = SEQUENCE_EXAMPLES)]
     Sequence(SequenceArgs),
@@ -91,9 +94,20 @@ Examples:
   impinge pairs a.ply b.ply --json | jq .pairs
   impinge pairs a.ply b.ply --repeat 100 --threads 2
   impinge pairs a.ply b.ply c.ply --ignore 0,1 --out seen.glb
+  impinge pairs a.ply b.ply --curves curves.obj --contacts contacts.csv
 
 Rows of --pairs are body_a, primitive_a, body_b, primitive_b (u32, sorted): bodies numbered
-from 0 as given, primitives as in the file.";
+from 0 as given, primitives as in the file. --contacts has a row for each corner of what two triangles have in
+common: a point, a segment's two ends, or the corners of a polygon where they lie in one plane. feature_a and
+feature_b say where it lies: on vertex 7 (v7), edge 7-9 (e7-9) or face 3 (f3).";
+
+const DISTANCE_EXAMPLES: &str = "\
+Examples:
+  impinge distance a.obj b.ply
+  impinge distance a.obj b.ply --json
+
+The distance is 0 if and only if the meshes touch, which is decided exactly; else it is rounded. Meshes of
+triangles are surfaces: one that lies wholly inside another has a distance from it.";
 
 const SELF_EXAMPLES: &str = "\
 Examples:
@@ -180,6 +194,12 @@ pub struct AnswerArgs {
     /// Write the pairs (.npy or .csv)
     #[arg(long, value_name = "FILE")]
     pub pairs: Option<RowsFile>,
+    /// Write where the triangles of each pair meet, a row for each corner (.npy or .csv)
+    #[arg(long, value_name = "FILE")]
+    pub contacts: Option<RowsFile>,
+    /// Write the curves in which surfaces cross (.ply, .obj or .vtu)
+    #[arg(long, value_name = "FILE")]
+    pub curves: Option<CurvesFile>,
     /// Write the meshes, colliding primitives coloured (.ply, .glb or .vtu)
     #[arg(long, value_name = "FILE")]
     pub out: Option<MeshFile>,
@@ -199,12 +219,19 @@ impl AnswerArgs {
             .pairs
             .as_ref()
             .map(|file| ("--pairs", file.path.as_path()));
+        let contacts = self.contacts.as_ref();
+        let contacts = contacts.map(|file| ("--contacts", file.path.as_path()));
+        let curves = self.curves.as_ref();
+        let curves = curves.map(|file| ("--curves", file.path.as_path()));
         let out = self.out.as_ref().map(|file| ("--out", file.path.as_path()));
         #[cfg(feature = "gpu")]
         let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
         #[cfg(not(feature = "gpu"))]
         let png = None;
-        [pairs, out, png].into_iter().flatten().collect()
+        [pairs, contacts, curves, out, png]
+            .into_iter()
+            .flatten()
+            .collect()
     }
 }
 
@@ -300,6 +327,19 @@ pub struct PairsArgs {
     pub answer: AnswerArgs,
     #[command(flatten)]
     pub detector: DetectorArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct DistanceArgs {
+    /// A mesh file
+    #[arg(value_name = "A")]
+    pub a: PathBuf,
+    /// Another one
+    #[arg(value_name = "B")]
+    pub b: PathBuf,
+    /// Print JSON and nothing else
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -5,6 +5,7 @@ mod demo;
 mod demo_scene;
 #[cfg(feature = "gpu")]
 mod devices;
+mod distance;
 mod record;
 #[cfg(feature = "gpu")]
 mod render;
@@ -15,6 +16,7 @@ pub use answer::{pairs, within};
 pub use demo::demo;
 #[cfg(feature = "gpu")]
 pub use devices::devices;
+pub use distance::distance;
 #[cfg(feature = "gpu")]
 pub use render::render;
 pub use sequence::sequence;

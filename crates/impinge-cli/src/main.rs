@@ -3,6 +3,7 @@
 mod apart;
 mod args;
 mod commands;
+mod contacts;
 mod detection;
 mod error;
 mod json;
@@ -29,6 +30,7 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let result = stop::cancel_on_signal().and_then(|cancel| match cli.command {
         Command::Demo(args) => commands::demo(&args, &cancel),
+        Command::Distance(args) => commands::distance(&args, &cancel),
         Command::Pairs(args) => commands::pairs(&args, &cancel),
         Command::Within(args) => commands::within(&args, &cancel),
         Command::Sequence(args) => commands::sequence(&args, &cancel),

@@ -22,25 +22,27 @@ pub fn write(file: &RowsFile, pairs: &Pairs) -> Result<(), Error> {
     Ok(to.finish()?)
 }
 
-/// NumPy's array format, version 1.0 (NEP 1): magic, version, length of the header, header padded
-/// with spaces so that data starts at a multiple of 64, data: `(n, 4)`, u32, little endian, C order.
 fn npy(to: &mut impl Write, rows: impl ExactSizeIterator<Item = [u32; 4]>) -> io::Result<()> {
-    const PREAMBLE: usize = 10;
-    let mut header = format!(
-        "{{'descr': '<u4', 'fortran_order': False, 'shape': ({}, 4), }}",
-        rows.len()
-    );
-    let length = (PREAMBLE + header.len() + 1).next_multiple_of(64) - PREAMBLE;
-    header.extend(std::iter::repeat_n(' ', length - 1 - header.len()));
-    header.push('\n');
-    to.write_all(b"\x93NUMPY\x01\x00")?;
-    // The header has no more than 128 bytes whatever the number of rows.
-    to.write_all(&u16::try_from(length).unwrap_or(u16::MAX).to_le_bytes())?;
-    to.write_all(header.as_bytes())?;
+    to.write_all(&npy_header("'<u4'", &format!("({}, 4)", rows.len())))?;
     for row in rows {
         to.write_all(row.map(u32::to_le_bytes).as_flattened())?;
     }
     Ok(())
+}
+
+/// The header of NumPy's array format, version 1.0 (NEP 1): magic, version, length of the description, description
+/// padded with spaces so that data starts at a multiple of 64. Data are little endian, in C order.
+pub fn npy_header(kind: &str, shape: &str) -> Vec<u8> {
+    const PREAMBLE: usize = 10;
+    let mut text = format!("{{'descr': {kind}, 'fortran_order': False, 'shape': {shape}, }}");
+    let length = (PREAMBLE + text.len() + 1).next_multiple_of(64) - PREAMBLE;
+    text.extend(std::iter::repeat_n(' ', length - 1 - text.len()));
+    text.push('\n');
+    let mut header = b"\x93NUMPY\x01\x00".to_vec();
+    // Some hundred bytes at most, whatever the number of rows.
+    header.extend(u16::try_from(length).unwrap_or(u16::MAX).to_le_bytes());
+    header.extend(text.as_bytes());
+    header
 }
 
 fn csv(to: &mut impl Write, rows: impl Iterator<Item = [u32; 4]>) -> io::Result<()> {

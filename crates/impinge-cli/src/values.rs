@@ -25,9 +25,41 @@ impl FromStr for RowsFile {
         let format = match extension(text).as_str() {
             "npy" => RowsFormat::Npy,
             "csv" => RowsFormat::Csv,
-            _ => return Err("pairs are written as .npy or .csv".to_owned()),
+            _ => return Err("rows are written as .npy or .csv".to_owned()),
         };
         Ok(RowsFile {
+            path: text.into(),
+            format,
+        })
+    }
+}
+
+/// A file for curves.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CurvesFile {
+    pub path: PathBuf,
+    pub format: CurvesFormat,
+}
+
+/// How curves are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CurvesFormat {
+    Ply,
+    Obj,
+    Vtu,
+}
+
+impl FromStr for CurvesFile {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let format = match extension(text).as_str() {
+            "ply" => CurvesFormat::Ply,
+            "obj" => CurvesFormat::Obj,
+            "vtu" => CurvesFormat::Vtu,
+            _ => return Err("curves are written as .ply, .obj or .vtu".to_owned()),
+        };
+        Ok(CurvesFile {
             path: text.into(),
             format,
         })

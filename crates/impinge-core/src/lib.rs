@@ -27,6 +27,7 @@ mod pair_kind;
 mod pairs;
 mod positions;
 mod progress;
+pub mod proximity;
 mod query;
 mod scene;
 mod settings;

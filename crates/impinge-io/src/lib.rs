@@ -59,6 +59,6 @@ pub use read::{
 };
 pub use sequence::{Sequence, SequenceFormat};
 pub use write::{
-    AtomicFile, ColoredMesh, GrowingPc2, Pc2Writer, remove_temporary_files, write_glb, write_ply,
-    write_vtu,
+    AtomicFile, ColoredMesh, GrowingPc2, Pc2Writer, Polylines, remove_temporary_files, write_glb,
+    write_ply, write_polylines_obj, write_polylines_ply, write_polylines_vtu, write_vtu,
 };

@@ -23,7 +23,7 @@ pub use impinge_core::{
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{DeviceInfo, ResidentPairs, devices, devices_async};
-pub use impinge_core::{contact, exact};
+pub use impinge_core::{contact, exact, proximity};
 
 // What users hold may be moved to, and lent to, other threads.
 const _: () = {

@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+use impinge::contact::Contacts;
 use impinge::{BodyId, CancelToken, Query};
 use serde_json::Value;
 
@@ -13,7 +14,7 @@ use crate::load::{Bodies, Loading};
 #[cfg(feature = "gpu")]
 use crate::picture;
 use crate::watch::Watch;
-use crate::{apart, json, meshes, output, rows};
+use crate::{apart, contacts, json, meshes, output, rows};
 
 /// `impinge pairs`.
 pub fn pairs(args: &PairsArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -82,11 +83,32 @@ fn answer(
     if let Some(file) = &answer.out {
         meshes::write(file, &scene, &bodies, pairs)?;
     }
+    let met = if answer.contacts.is_some() || answer.curves.is_some() {
+        let contacts = Contacts::new(&scene, pairs)?;
+        let curves = contacts.curves();
+        Some((contacts, curves))
+    } else {
+        None
+    };
+    if let Some((found, curves)) = &met {
+        if let Some(file) = &answer.contacts {
+            contacts::write(file, found)?;
+        }
+        if let Some(file) = &answer.curves {
+            contacts::write_curves(file, found, curves)?;
+        }
+    }
     if ask.json {
-        let object = Value::Object(json::answer(&scene, &bodies, pairs, &times)?);
-        writeln!(output::out(), "{object}")?;
+        let mut object = json::answer(&scene, &bodies, pairs, &times)?;
+        if let Some((found, curves)) = &met {
+            object.insert("contacts".into(), contacts::object(found, curves));
+        }
+        writeln!(output::out(), "{}", Value::Object(object))?;
     } else {
         output::print_answer(&scene, &bodies, pairs, &times)?;
+        if let Some((found, curves)) = &met {
+            writeln!(output::out(), "{}", contacts::summary(found, curves))?;
+        }
     }
     // Last: whoever has no adapter has the answer.
     #[cfg(feature = "gpu")]

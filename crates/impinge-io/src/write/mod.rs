@@ -6,6 +6,7 @@ mod glb;
 mod growing;
 mod pc2;
 mod ply;
+mod polylines;
 mod surface;
 mod vtu;
 
@@ -14,6 +15,7 @@ pub use glb::write_glb;
 pub use growing::GrowingPc2;
 pub use pc2::Pc2Writer;
 pub use ply::write_ply;
+pub use polylines::{Polylines, write_polylines_obj, write_polylines_ply, write_polylines_vtu};
 pub use vtu::write_vtu;
 
 use std::path::Path;

@@ -30,6 +30,21 @@ pub fn write_vtu(path: &Path, meshes: &[ColoredMesh]) -> Result<(), Error> {
     let n_points: usize = meshes.iter().map(|mesh| mesh.positions.len()).sum();
     let n_cells: usize = meshes.iter().map(|mesh| mesh.elements.len()).sum();
 
+    document(
+        path,
+        &data,
+        [n_points, n_cells],
+        [&points, &cells, &cell_data],
+    )
+}
+
+/// Writes a file of points, cells and cell data, announced by elements, with the appended data.
+pub(super) fn document(
+    path: &Path,
+    data: &Appended,
+    [n_points, n_cells]: [usize; 2],
+    [points, cells, cell_data]: [&str; 3],
+) -> Result<(), Error> {
     let mut file = AtomicFile::create(path)?;
     file.put(
         format!(
@@ -48,13 +63,13 @@ pub fn write_vtu(path: &Path, meshes: &[ColoredMesh]) -> Result<(), Error> {
 
 /// The appended data: arrays, each after its length in bytes.
 #[derive(Default)]
-struct Appended {
+pub(super) struct Appended {
     bytes: Vec<u8>,
 }
 
 impl Appended {
     /// Adds an array and returns the element that announces it.
-    fn array<const N: usize>(
+    pub fn array<const N: usize>(
         &mut self,
         kind: &str,
         name: &str,

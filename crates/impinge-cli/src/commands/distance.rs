@@ -1,0 +1,58 @@
+//! `impinge distance`: how near two meshes are.
+
+use std::io::Write;
+use std::time::Instant;
+
+use impinge::CancelToken;
+use impinge::proximity::{Distances, Nearest};
+use serde_json::json;
+
+use crate::args::DistanceArgs;
+use crate::error::Error;
+use crate::load::{Bodies, Loading};
+use crate::output::out;
+
+/// `impinge distance`.
+pub fn distance(args: &DistanceArgs, cancel: &CancelToken) -> Result<(), Error> {
+    let loading = Loading {
+        weld: false,
+        notes: !args.json,
+        cancel,
+    };
+    let paths = [args.a.clone(), args.b.clone()];
+    let Bodies { scene, ids, names } = Bodies::read(&paths, loading)?;
+    let start = Instant::now();
+    let nearest = Distances::new().between(&scene, ids[0], ids[1])?;
+    let ms = start.elapsed().as_secs_f64() * 1e3;
+    let Some(Nearest {
+        distance,
+        primitives: [a, b],
+        points,
+        ..
+    }) = nearest
+    else {
+        return Err(Error::Usage(
+            "a mesh without primitives has no distance".to_owned(),
+        ));
+    };
+    let mut to = out();
+    if args.json {
+        let object = json!({
+            "distance": distance,
+            "primitives": [a, b],
+            "points": points,
+            "ms": ms,
+        });
+        writeln!(to, "{object}")?;
+        return Ok(());
+    }
+    writeln!(to, "distance {distance}")?;
+    for (side, primitive) in [a, b].into_iter().enumerate() {
+        let name = &names[side];
+        match points.map(|points| points[side]) {
+            Some([x, y, z]) => writeln!(to, "primitive {primitive} of {name} at {x} {y} {z}")?,
+            None => writeln!(to, "primitive {primitive} of {name}")?,
+        }
+    }
+    Ok(())
+}

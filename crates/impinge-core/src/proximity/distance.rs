@@ -1,0 +1,260 @@
+//! The smallest distance of two bodies, by branch and bound over their clusters' trees.
+//!
+//! Pairs of nodes wait in order of the distance of their boxes. The nearest one is taken: two clusters have
+//! their primitives compared, else the larger node is replaced by its children. When the next pair is farther
+//! than the best found so far, that is the answer.
+//!
+//! A pair of nodes is left out only if its boxes are farther apart than the best distance by more than
+//! all rounding in it, so no pair of primitives that would be as near or nearer by its own computed distance is
+//! lost, and the answer does not depend on the order of the search.
+
+use std::cmp::{Ordering, Reverse};
+use std::collections::{BinaryHeap, HashMap};
+
+use super::features::{Gap, gap};
+use super::tree::{Node, Tree};
+use crate::error::Error;
+use crate::exact::Point;
+use crate::ids::BodyId;
+use crate::narrow::intersect;
+use crate::positions::{Positions, check_positions};
+use crate::scene::{Body, Scene};
+
+/// Finds distances; keeps the bodies' trees from call to call.
+///
+/// ```
+/// use impinge_core::Scene;
+/// use impinge_core::proximity::Distances;
+/// # fn main() -> Result<(), impinge_core::Error> {
+/// let mut scene = Scene::new();
+/// let triangle = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let a = scene.add_triangles(&[[0, 1, 2]], &triangle)?;
+/// let b = scene.add_triangles(&[[0, 1, 2]], &triangle.map(|[x, y, z]| [x + 0.25, y + 0.25, z + 3.0]))?;
+/// let nearest = Distances::new().between(&scene, a, b)?.expect("both have primitives");
+/// assert_eq!(nearest.distance, 3.0);
+/// assert_eq!(nearest.primitives, [0, 0]);
+/// # Ok(()) }
+/// ```
+#[derive(Debug, Default)]
+pub struct Distances {
+    /// By the number of the body.
+    trees: HashMap<usize, Tree>,
+}
+
+/// The pair of primitives of two bodies that are nearest to each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Nearest {
+    /// Their distance in the unit of the scene. 0 if and only if they share a point, which is decided exactly;
+    /// else rounded: computed in `f64` from two points of the primitives, so that its error is a few units
+    /// in the last place of the largest coordinate.
+    pub distance: f64,
+    /// The primitive of the first body, and of the second. Of several pairs at the same computed distance it is
+    /// the lowest, by the first body's primitive and then the second's.
+    pub primitives: [u32; 2],
+    /// A point of each that is nearest to the other, rounded. None where they share points: the
+    /// geometry of that is [`contact`](crate::contact)'s.
+    pub points: Option<[[f64; 3]; 2]>,
+}
+
+impl Distances {
+    /// Knows no body yet.
+    pub fn new() -> Self {
+        Distances::default()
+    }
+
+    /// The smallest distance of two bodies and the pair of primitives that has it; none where one of them has
+    /// no primitive. Tetrahedra are solid: a body inside one has distance 0.
+    ///
+    /// # Errors
+    /// A body that the scene does not have, twice the same body, refused positions that were written in place.
+    pub fn between(
+        &mut self,
+        scene: &Scene,
+        a: BodyId,
+        b: BodyId,
+    ) -> Result<Option<Nearest>, Error> {
+        if a == b {
+            return Err(Error::SameBody { body: a });
+        }
+        for id in [a, b] {
+            self.know(scene, id)?;
+        }
+        let search = Search {
+            bodies: [scene.body(a)?, scene.body(b)?],
+            trees: [a, b].map(|id| &self.trees[&id.index()]),
+        };
+        Ok(search.nearest())
+    }
+
+    fn know(&mut self, scene: &Scene, id: BodyId) -> Result<(), Error> {
+        let body = scene.body(id)?;
+        if !body.is_checked() {
+            match body.positions() {
+                Positions::F32(positions) => check_positions(id, positions)?,
+                Positions::F64(positions) => check_positions(id, positions)?,
+            }
+        }
+        match self.trees.get_mut(&id.index()) {
+            Some(tree) if tree.fits(body) => tree.refit(body),
+            _ => {
+                self.trees.insert(id.index(), Tree::new(body));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Two nodes, nearest first; equal ones by number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Waiting {
+    squared: f64,
+    nodes: [Node; 2],
+}
+
+impl Eq for Waiting {}
+
+impl Ord for Waiting {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let by_distance = self.squared.total_cmp(&other.squared);
+        by_distance.then(self.nodes.cmp(&other.nodes))
+    }
+}
+
+impl PartialOrd for Waiting {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+struct Search<'a> {
+    bodies: [&'a Body; 2],
+    trees: [&'a Tree; 2],
+}
+
+/// The best pair so far.
+struct Best {
+    squared: f64,
+    primitives: [u32; 2],
+    points: Option<[Point; 2]>,
+}
+
+/// How much of the largest coordinate rounding may take from a computed distance, compared with that of the boxes.
+const ROUNDING: f64 = 32.0 * f64::EPSILON;
+
+impl Search<'_> {
+    fn nearest(&self) -> Option<Nearest> {
+        let (Some(a), Some(b)) = (self.trees[0].root(), self.trees[1].root()) else {
+            return None;
+        };
+        let magnitude = self.trees[0].bounds(a).magnitude();
+        let error = ROUNDING * magnitude.max(self.trees[1].bounds(b).magnitude());
+        let mut best = Best {
+            squared: f64::INFINITY,
+            primitives: [u32::MAX; 2],
+            points: None,
+        };
+        let mut waiting = BinaryHeap::from([Reverse(self.waiting([a, b]))]);
+        while let Some(Reverse(next)) = waiting.pop() {
+            if next.squared > limit(best.squared, error) {
+                break;
+            }
+            if next.nodes.iter().all(|node| node.level == 0) {
+                self.compare(next.nodes, error, &mut best);
+                continue;
+            }
+            // The higher of two nodes is opened; of two as high, the larger.
+            let [x, y] = next.nodes;
+            let sizes = [0, 1].map(|side| {
+                let bounds = self.trees[side].bounds(next.nodes[side]);
+                bounds.squared_diagonal()
+            });
+            let side = match x.level.cmp(&y.level) {
+                Ordering::Greater => 0,
+                Ordering::Less => 1,
+                Ordering::Equal => usize::from(sizes[1] > sizes[0]),
+            };
+            for child in self.trees[side].children(next.nodes[side]) {
+                let nodes = if side == 0 { [child, y] } else { [x, child] };
+                let pair = self.waiting(nodes);
+                if pair.squared <= limit(best.squared, error) {
+                    waiting.push(Reverse(pair));
+                }
+            }
+        }
+        Some(Nearest {
+            distance: best.squared.sqrt(),
+            primitives: best.primitives,
+            points: best.points,
+        })
+    }
+
+    fn waiting(&self, nodes: [Node; 2]) -> Waiting {
+        let [x, y] = [0, 1].map(|side| self.trees[side].bounds(nodes[side]));
+        Waiting {
+            squared: x.squared_distance(y),
+            nodes,
+        }
+    }
+
+    /// Compares all primitives of two clusters.
+    fn compare(&self, nodes: [Node; 2], error: f64, best: &mut Best) {
+        let there = self.trees[1].bounds(nodes[1]);
+        for (a, of_a) in self.trees[0].primitives(nodes[0]) {
+            if of_a.squared_distance(there) > limit(best.squared, error) {
+                continue;
+            }
+            for (b, of_b) in self.trees[1].primitives(nodes[1]) {
+                let apart = of_a.squared_distance(of_b);
+                if apart > limit(best.squared, error) {
+                    continue;
+                }
+                if best.squared == 0.0 && [a, b] > best.primitives {
+                    continue;
+                }
+                let found = self.gap(a, b, apart);
+                let is_less = found.squared < best.squared
+                    || (found.squared == best.squared && [a, b] < best.primitives);
+                if is_less {
+                    *best = Best {
+                        squared: found.squared,
+                        primitives: [a, b],
+                        points: (found.squared > 0.0).then_some(found.points),
+                    };
+                }
+            }
+        }
+    }
+
+    /// The distance of two primitives: 0 if and only if they meet.
+    fn gap(&self, a: u32, b: u32, apart: f64) -> Gap {
+        let [body_a, body_b] = self.bodies;
+        let (a, b) = (corners(body_a, a), corners(body_b, b));
+        // Boxes that are apart hold primitives that do not meet. Their distance may underflow.
+        if apart == 0.0 && intersect(body_a.kind(), &a, body_b.kind(), &b) {
+            return Gap {
+                squared: 0.0,
+                points: [a[0], b[0]],
+            };
+        }
+        // Points and edges are triangles that repeat their last corner.
+        let [n_a, n_b] = [body_a, body_b].map(|body| body.kind().n_corners().max(3));
+        let found = gap(&a[..n_a], &b[..n_b]);
+        Gap {
+            squared: found.squared.max(f64::MIN_POSITIVE),
+            ..found
+        }
+    }
+}
+
+/// The corners of a primitive; one of fewer than four repeats its last.
+fn corners(body: &Body, primitive: u32) -> [Point; 4] {
+    let vertices = body.elements().four_corners(primitive as usize);
+    vertices.map(|vertex| body.positions().point(vertex as usize))
+}
+
+/// The largest squared distance of boxes that may hold a pair as near as the best.
+fn limit(best_squared: f64, error: f64) -> f64 {
+    let distance = best_squared.sqrt() + error;
+    distance * distance * (1.0 + 8.0 * f64::EPSILON)
+}

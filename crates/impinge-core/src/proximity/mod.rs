@@ -1,0 +1,7 @@
+//! Proximity: how near two bodies are.
+
+mod distance;
+mod features;
+mod tree;
+
+pub use distance::{Distances, Nearest};

@@ -1,0 +1,154 @@
+//! Distances of bodies against every pair, and what must hold of them.
+
+use impinge_core::proximity::{Distances, Nearest};
+use impinge_core::{Backend, BodyId, Detector, Query, Scene};
+use impinge_scenes::{Model, solids, soup, surfaces};
+
+fn scene(a: &Model, b: &Model) -> (Scene, [BodyId; 2]) {
+    let mut scene = Scene::new();
+    let ids = [a, b].map(|model| model.add_to(&mut scene).unwrap());
+    (scene, ids)
+}
+
+fn nearest(a: &Model, b: &Model) -> Nearest {
+    let (scene, [a, b]) = scene(a, b);
+    Distances::new().between(&scene, a, b).unwrap().unwrap()
+}
+
+/// One primitive of a model as a model.
+fn alone(model: &Model, primitive: usize) -> Model {
+    let corners = model.elements.corners(primitive);
+    let positions = corners
+        .iter()
+        .map(|&v| model.positions[v as usize])
+        .collect();
+    Model {
+        positions,
+        elements: match corners.len() {
+            3 => vec![[0u32, 1, 2]].into(),
+            _ => vec![[0u32, 1, 2, 3]].into(),
+        },
+    }
+}
+
+/// The search finds what comparing all pairs one by one finds: the same distance to the last bit, and the
+/// lowest pair that has it.
+#[test]
+fn the_search_loses_nothing() {
+    let far = [2.0, 0.3, 0.1];
+    for (a, b) in [
+        (
+            soup::triangles(30, 0.3, 1),
+            soup::triangles(40, 0.3, 2).translated([1.5, 0.2, 0.1]),
+        ),
+        // A lattice has many pairs at the least distance.
+        (
+            soup::lattice_triangles(30, 2, 1),
+            soup::lattice_triangles(30, 2, 2).translated([4.0, 0.0, 0.0]),
+        ),
+        (
+            soup::tetrahedra(20, 0.3, 3),
+            soup::triangles(30, 0.3, 4).translated(far),
+        ),
+        (
+            surfaces::cube([0.0; 3], 1.0),
+            surfaces::cube([2.0, 0.0, 0.0], 1.0),
+        ),
+        (soup::triangles(30, 0.5, 5), soup::triangles(30, 0.5, 6)),
+    ] {
+        let found = nearest(&a, &b);
+        let mut least = (f64::INFINITY, [0, 0]);
+        for i in 0..a.elements.len() {
+            for j in 0..b.elements.len() {
+                let pair = nearest(&alone(&a, i), &alone(&b, j)).distance;
+                if pair < least.0 {
+                    least = (pair, [i as u32, j as u32]);
+                }
+            }
+        }
+        assert_eq!((found.distance, found.primitives), least);
+    }
+}
+
+#[test]
+fn known_distances() {
+    let ball = surfaces::icosphere(4);
+    let found = nearest(&ball, &ball.translated([3.0, 0.0, 0.0]));
+    assert!((found.distance - 2.0).abs() < 5e-3, "{found:?}");
+    let [p, q] = found.points.unwrap();
+    assert!((q[0] - p[0] - found.distance).abs() < 1e-3);
+    // A solid holds what is inside it, a surface does not.
+    let small = surfaces::ball(100).scaled(0.1);
+    assert_eq!(
+        nearest(
+            &solids::solid_cube(500),
+            &small.translated([0.01, 0.02, 0.03])
+        )
+        .distance,
+        0.0
+    );
+    let inside = nearest(&surfaces::cube([0.0; 3], 1.0), &small);
+    assert!((inside.distance - 0.45).abs() < 1e-2, "{inside:?}");
+    // Whichever comes first.
+    let back = nearest(&ball.translated([3.0, 0.0, 0.0]), &ball);
+    assert!((back.distance - found.distance).abs() < 1e-12);
+}
+
+/// Zero if and only if the detector finds a pair; then it is that pair.
+#[test]
+fn zero_means_that_they_touch() {
+    let a = surfaces::bumpy_ball(1_500, 0.2);
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let mut distances = Distances::new();
+    let (mut scene, [x, y]) = scene(&a, &a);
+    let (mut n_touching, mut n_apart) = (0, 0);
+    for step in 0..40 {
+        let moved = a.translated([0.8 + 0.01 * step as f32, 0.03, 0.01]);
+        scene.set_positions(y, &moved.positions).unwrap();
+        let first = detector
+            .detect(&scene, &Query::between(x, y))
+            .unwrap()
+            .rows()
+            .next();
+        let found = distances.between(&scene, x, y).unwrap().unwrap();
+        match first {
+            Some([_, a, _, b]) => {
+                assert_eq!((found.distance, found.primitives), (0.0, [a, b]));
+                assert_eq!(found.points, None);
+                n_touching += 1;
+            }
+            None => {
+                assert!(found.distance > 0.0 && found.points.is_some());
+                n_apart += 1;
+            }
+        }
+    }
+    assert!(n_touching > 5 && n_apart > 5, "{n_touching} {n_apart}");
+    // A hair's breadth.
+    let cube = surfaces::cube([0.0; 3], 1.0);
+    let beside = cube.mapped(|[x, y, z]| [x + 1.0, y, z]);
+    assert_eq!(nearest(&cube, &beside).distance, 0.0);
+    let apart = beside.mapped(|[x, y, z]| [x.next_up(), y, z]);
+    assert_eq!(
+        nearest(&cube, &apart).distance,
+        f64::from(0.5f32.next_up()) - 0.5
+    );
+}
+
+#[test]
+fn bodies_without_primitives_and_wrong_questions() {
+    let mut scene = Scene::new();
+    let empty = scene.add_triangles::<f32>(&[], &[]).unwrap();
+    let ball = surfaces::ball(20).add_to(&mut scene).unwrap();
+    let mut distances = Distances::new();
+    assert_eq!(distances.between(&scene, empty, ball).unwrap(), None);
+    assert!(distances.between(&scene, ball, ball).is_err());
+    scene.positions_mut::<f32>(ball).unwrap()[3] = [f32::NAN; 3];
+    let error = distances
+        .between(&scene, ball, empty)
+        .unwrap_err()
+        .to_string();
+    assert!(error.starts_with("body 1: vertex 3"), "{error}");
+    scene.remove(ball).unwrap();
+    assert!(distances.between(&scene, ball, empty).is_err());
+}
