@@ -217,7 +217,7 @@ impl Detector {
     ///
     /// # Errors
     /// A stale id, a buffer too small or without its usage, a detector without a GPU. The device's own
-    /// errors go where its owner sends them.
+    /// errors go where its owner sends them, and so do those of kernels, which the first frame compiles.
     pub fn encode(
         &mut self,
         scene: &Scene,

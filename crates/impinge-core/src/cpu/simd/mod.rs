@@ -84,8 +84,10 @@ pub(crate) struct ClusterFaces<'a> {
     /// At most 64.
     pub faces: &'a [[u32; 3]],
     /// Unique vertices, in whole chunks of [`CHUNK`](crate::grouping::clusters::CHUNK).
+    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
     pub vertices: &'a [u32],
     /// The corners as numbers of `vertices`, where the instruction set looks them up.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
     pub local: Option<&'a LocalFaces>,
 }
 
