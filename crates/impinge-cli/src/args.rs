@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use impinge_fem::scenes::SceneName;
 
+use crate::commands::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs};
 use crate::values::{CurvesFile, FrameRange, MeshFile, RowsFile, body_numbers, bytes, lambda};
 #[cfg(feature = "gpu")]
 use crate::values::{PngFile, azimuth, elevation, part, size};
@@ -23,6 +24,7 @@ Examples:
   impinge demo                                  a built-in scene: no files needed
   impinge pairs a.obj b.obj                     which primitives of two meshes meet
   impinge self cloth.ply --weld                 where a mesh runs into itself
+  impinge check parts/*.stl                     what is wrong with each mesh
   impinge sequence body.ply run.pc2 --self      the same, frame after frame
   impinge simulate blocks --out out/blocks      bodies that fall, deform and collide
 
@@ -50,6 +52,12 @@ pub enum Command {
     /// Drop an elastic body on another one and write what happens, step by step
     #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(SimulateArgs),
+    /// Say what is wrong with meshes: self-intersections, degenerate faces, borders, …
+    #[command(after_help = CHECK_EXAMPLES)]
+    Check(CheckArgs),
+    /// Answer paths on standard input by rows: a child of `check`
+    #[command(hide = true)]
+    CheckWorker(CheckWorkerArgs),
     /// Draw meshes, the primitives that meet in red and blue
     #[cfg(feature = "gpu")]
     #[command(after_help = RENDER_EXAMPLES)]

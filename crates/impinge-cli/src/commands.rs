@@ -1,6 +1,7 @@
 //! One file a command.
 
 mod answer;
+mod check;
 mod demo;
 mod demo_scene;
 #[cfg(feature = "gpu")]
@@ -13,6 +14,7 @@ mod sequence;
 mod simulate;
 
 pub use answer::{pairs, within};
+pub use check::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, check, check_worker};
 pub use demo::demo;
 #[cfg(feature = "gpu")]
 pub use devices::devices;

@@ -55,6 +55,15 @@ pub enum Error {
     /// Ctrl-C can't be listened to.
     #[error("cannot listen to Ctrl-C: {0}")]
     Signal(io::Error),
+    /// Rows of checked meshes can't be kept on disk.
+    #[error(transparent)]
+    Rows(#[from] impinge_check::StoreError),
+    /// Child processes that check meshes can't be run.
+    #[error(transparent)]
+    Pool(#[from] impinge_check::PoolError),
+    /// Meshes have what `--fail-on` names.
+    #[error("{0}")]
+    CheckFailed(String),
     /// Two methods gave different answers: a defect of the library.
     #[error(
         "frame {frame}: {n_found} pairs by {method}, but {n_expected} by {reference}, or others: please report this"

@@ -35,6 +35,8 @@ fn main() -> ExitCode {
         Command::Within(args) => commands::within(&args, &cancel),
         Command::Sequence(args) => commands::sequence(&args, &cancel),
         Command::Simulate(args) => commands::simulate(&args, &cancel),
+        Command::Check(args) => commands::check(&args, &cancel),
+        Command::CheckWorker(args) => commands::check_worker(&args),
         #[cfg(feature = "gpu")]
         Command::Render(args) => commands::render(&args, &cancel),
         #[cfg(feature = "gpu")]

@@ -25,6 +25,16 @@ pub fn write(
     let mut surfaces = surfaces(scene, bodies, pairs)?;
     let contacts = Contacts::new(scene, pairs)?;
     surfaces.push(tubes(&contacts, &contacts.curves(), diagonal(&surfaces)));
+    draw(path, args, device, surfaces)
+}
+
+/// Draws surfaces, on the first adapter or on the one whose name contains `device`.
+pub fn draw(
+    path: &Path,
+    args: &PictureArgs,
+    device: Option<&str>,
+    surfaces: Vec<Surface>,
+) -> Result<(), Error> {
     let picture = Picture {
         surfaces,
         camera: Camera {

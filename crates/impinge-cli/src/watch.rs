@@ -43,6 +43,14 @@ impl Watch {
         )
     }
 
+    /// Watches `n` things of a kind through [`frame_done`](Watch::frame_done). No bar is shown where rows are printed on
+    /// the terminal, `prints_rows`.
+    pub fn things(wanted: bool, n: usize, what: &'static str, prints_rows: bool) -> Self {
+        let wanted = wanted && !(prints_rows && stdout().is_terminal());
+        let template = "{msg} {wide_bar} {pos}/{len} {eta:>4}";
+        Watch::new(wanted, n as u64, template, what)
+    }
+
     fn new(wanted: bool, length: u64, template: &str, what: &'static str) -> Self {
         let bar = (wanted && stderr().is_terminal()).then(|| {
             let style = ProgressStyle::with_template(template)

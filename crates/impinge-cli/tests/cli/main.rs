@@ -1,6 +1,7 @@
 //! The program from outside: the built binary, on files made for the test.
 
 mod answer;
+mod check;
 mod contacts;
 mod demo;
 #[cfg(feature = "gpu")]

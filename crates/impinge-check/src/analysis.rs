@@ -1,0 +1,311 @@
+//! The check of one mesh in memory.
+//!
+//! What comes in: a mesh with indices in range. What goes out: [`Counts`], and the [`Marks`] of each primitive.
+//! Welding, facets, union of neighbours, zero areas and self-intersections follow each other; each is exact.
+
+use impinge::exact::{Point, orient2d, orient3d};
+use impinge::{Backend, Detector, Error, Query, Scene, Settings, SharedVertex};
+use impinge_io::{Elements, Mesh, Positions, weld};
+
+use crate::facets::{Facet, facets, groups, is_simplex};
+use crate::marks::{Marks, Problem};
+use crate::row::Counts;
+use crate::union_find::UnionFind;
+
+/// How a mesh is checked.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Options {
+    /// Whether vertices at exactly the same position become one first. On by default: most formats repeat vertices
+    /// per face, and every edge would be a border otherwise.
+    pub weld: bool,
+    /// CPU threads of the self-intersection search; 0 means one per core. No count depends on it.
+    pub threads: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options {
+            weld: true,
+            threads: 0,
+        }
+    }
+}
+
+/// What was found, and where.
+#[derive(Debug, Clone)]
+pub struct Checked {
+    /// How many of each.
+    pub counts: Counts,
+    /// The problems of each primitive, in the order of the mesh.
+    pub marks: Vec<Marks>,
+    /// The mesh that was looked at: welded, if that was asked for.
+    pub mesh: Mesh,
+}
+
+/// Checks a mesh. Its indices must be in range; positions may be anything.
+///
+/// # Errors
+/// Positions or indices that [`Scene::add`] refuses (NaN, infinities, coordinates outside the exact range), and more
+/// corners than 32 bits can number.
+pub fn check_mesh(mut mesh: Mesh, options: &Options) -> Result<Checked, Error> {
+    let n_vertices = mesh.n_vertices();
+    let n_welded = if options.weld { weld(&mut mesh) } else { 0 };
+    mesh.positions.narrow_if_exact();
+    let mut counts = Counts {
+        n_vertices: n_vertices as u64,
+        n_welded: n_welded as u64,
+        ..Counts::default()
+    };
+    let mut marks = vec![Marks::default(); mesh.n_primitives()];
+    // First, for it refuses what the steps below rely on: indices in range, finite coordinates.
+    intersections(&mesh, options, &mut counts, &mut marks)?;
+    match &mesh.elements {
+        Elements::Triangles(triangles) => {
+            counts.n_triangles = triangles.len() as u64;
+            topology(triangles, mesh.n_vertices(), &mut counts, &mut marks)?;
+            degenerate(
+                &mesh.positions,
+                triangles,
+                is_flat_triangle,
+                &mut counts,
+                &mut marks,
+            );
+        }
+        Elements::Tetrahedra(tets) => {
+            counts.n_tetrahedra = tets.len() as u64;
+            topology(tets, mesh.n_vertices(), &mut counts, &mut marks)?;
+            degenerate(
+                &mesh.positions,
+                tets,
+                is_flat_tetrahedron,
+                &mut counts,
+                &mut marks,
+            );
+        }
+    }
+    Ok(Checked {
+        counts,
+        marks,
+        mesh,
+    })
+}
+
+/// Pairs that meet in more than what they share.
+fn intersections(
+    mesh: &Mesh,
+    options: &Options,
+    counts: &mut Counts,
+    marks: &mut [Marks],
+) -> Result<(), Error> {
+    let mut scene = Scene::new();
+    let elements: impinge::Elements = match &mesh.elements {
+        Elements::Triangles(triangles) => triangles.clone().into(),
+        Elements::Tetrahedra(tets) => tets.clone().into(),
+    };
+    let positions: impinge::Positions = match &mesh.positions {
+        Positions::F32(positions) => positions.clone().into(),
+        Positions::F64(positions) => positions.clone().into(),
+    };
+    let body = scene.add(elements, positions)?;
+    let mut detector = Detector::with_settings(Settings {
+        backend: Backend::Cpu,
+        threads: options.threads,
+        ..Settings::default()
+    })?;
+    let query = Query::within(body).shared_vertex(SharedVertex::Resolve);
+    let pairs = detector.detect(&scene, &query)?;
+    counts.self_intersections = pairs.len() as u64;
+    counts.hash = pairs.hash();
+    for (a, b) in pairs.within(body) {
+        marks[a as usize].add(Problem::SelfIntersection);
+        marks[b as usize].add(Problem::SelfIntersection);
+    }
+    let is_marked = |marks: &&Marks| marks.has(Problem::SelfIntersection);
+    counts.n_intersecting = marks.iter().filter(is_marked).count() as u64;
+    Ok(())
+}
+
+/// Everything that vertex indices alone say.
+fn topology<const K: usize>(
+    elements: &[[u32; K]],
+    n_vertices: usize,
+    counts: &mut Counts,
+    marks: &mut [Marks],
+) -> Result<(), Error> {
+    let n_corners = u32::try_from(elements.len() * K).map_err(|_| Error::TooMany {
+        what: "corners of primitives",
+        given: (elements.len() * K) as u64,
+        limit: u64::from(u32::MAX),
+    })?;
+    duplicates(elements, n_vertices, counts, marks);
+    let mut corners = UnionFind::new(n_corners);
+    let mut pieces = UnionFind::new(n_corners / K as u32);
+    let mut borders = UnionFind::new(n_vertices as u32);
+    let mut on_border = vec![false; n_vertices];
+    let sorted = facets(elements, n_vertices);
+    for group in groups(&sorted) {
+        let problem = match group {
+            [alone] => {
+                counts.boundary_facets += 1;
+                for vertex in alone.vertices {
+                    on_border[vertex as usize] = true;
+                    borders.join(alone.vertices[0], vertex);
+                }
+                (K == 3).then_some(Problem::Boundary)
+            }
+            [a, b] if a.is_even != b.is_even => None,
+            [_, _] => {
+                counts.inconsistent_facets += 1;
+                Some(Problem::Inconsistent)
+            }
+            _ => {
+                counts.non_manifold_facets += 1;
+                Some(Problem::NonManifold)
+            }
+        };
+        for facet in group {
+            if let Some(problem) = problem {
+                marks[facet.element as usize].add(problem);
+            }
+            join_neighbours(elements, &group[0], facet, &mut corners, &mut pieces);
+        }
+    }
+    drop(sorted);
+    counts.boundaries = n_roots(&mut borders, |vertex| on_border[vertex as usize]);
+    counts.components = n_roots(&mut pieces, |element| {
+        is_simplex(&elements[element as usize])
+    });
+    count_vertices(elements, n_vertices, &mut corners, counts);
+    Ok(())
+}
+
+/// Two primitives that have a facet in common are of one piece, and around each vertex of the facet of one fan.
+fn join_neighbours<const K: usize>(
+    elements: &[[u32; K]],
+    a: &Facet,
+    b: &Facet,
+    corners: &mut UnionFind,
+    pieces: &mut UnionFind,
+) {
+    pieces.join(a.element, b.element);
+    let corner = |element: u32, vertex: u32| {
+        let ix = elements[element as usize]
+            .iter()
+            .position(|&held| held == vertex);
+        element * K as u32 + ix.unwrap_or_default() as u32
+    };
+    for vertex in a.vertices {
+        corners.join(corner(a.element, vertex), corner(b.element, vertex));
+    }
+}
+
+/// How many sets have their smallest number among those that count.
+fn n_roots(sets: &mut UnionFind, counts: impl Fn(u32) -> bool) -> u64 {
+    let n = sets.len();
+    (0..n).filter(|&x| counts(x) && sets.root(x) == x).count() as u64
+}
+
+/// Vertices of no primitive, and vertices around which primitives form several fans.
+fn count_vertices<const K: usize>(
+    elements: &[[u32; K]],
+    n_vertices: usize,
+    corners: &mut UnionFind,
+    counts: &mut Counts,
+) {
+    const UNUSED: u8 = 0;
+    const USED: u8 = 1;
+    const ONE_FAN: u8 = 2;
+    const SEVERAL_FANS: u8 = 3;
+    let mut states = vec![UNUSED; n_vertices];
+    for (element, held) in (0u32..).zip(elements) {
+        let is_simplex = is_simplex(held);
+        for (ix, &vertex) in (0u32..).zip(held) {
+            let state = &mut states[vertex as usize];
+            let corner = element * K as u32 + ix;
+            if is_simplex && corners.root(corner) == corner {
+                *state = if *state < ONE_FAN {
+                    ONE_FAN
+                } else {
+                    SEVERAL_FANS
+                };
+            } else {
+                *state = (*state).max(USED);
+            }
+        }
+    }
+    let count = |sought: u8| states.iter().filter(|&&state| state == sought).count() as u64;
+    counts.unused_vertices = count(UNUSED);
+    counts.non_manifold_vertices = count(SEVERAL_FANS);
+}
+
+/// Primitives with the vertices of an earlier one, in whatever order.
+fn duplicates<const K: usize>(
+    elements: &[[u32; K]],
+    n_vertices: usize,
+    counts: &mut Counts,
+    marks: &mut [Marks],
+) {
+    let sorted = |corners: &[u32; K]| {
+        let mut key = *corners;
+        key.sort_unstable();
+        key
+    };
+    let mut starts = vec![0usize; n_vertices + 1];
+    for corners in elements {
+        starts[sorted(corners)[0] as usize + 1] += 1;
+    }
+    for ix in 1..starts.len() {
+        starts[ix] += starts[ix - 1];
+    }
+    let mut next = starts.clone();
+    let mut by_first = vec![0u32; elements.len()];
+    for (element, corners) in (0u32..).zip(elements) {
+        let place = &mut next[sorted(corners)[0] as usize];
+        by_first[*place] = element;
+        *place += 1;
+    }
+    let mut run = Vec::new();
+    for bounds in starts.windows(2) {
+        run.clear();
+        let members = &by_first[bounds[0]..bounds[1]];
+        run.extend(members.iter().map(|&e| (sorted(&elements[e as usize]), e)));
+        run.sort_unstable();
+        for same in run.chunk_by(|a, b| a.0 == b.0) {
+            for &(_, element) in &same[1..] {
+                counts.duplicates += 1;
+                marks[element as usize].add(Problem::Duplicate);
+            }
+        }
+    }
+}
+
+fn degenerate<const K: usize>(
+    positions: &Positions,
+    elements: &[[u32; K]],
+    is_flat: impl Fn(&[Point; K]) -> bool,
+    counts: &mut Counts,
+    marks: &mut [Marks],
+) {
+    for (corners, marks) in elements.iter().zip(marks) {
+        let points = corners.map(|vertex| match positions {
+            Positions::F32(held) => held[vertex as usize].map(f64::from),
+            Positions::F64(held) => held[vertex as usize],
+        });
+        if is_flat(&points) {
+            counts.degenerate += 1;
+            marks.add(Problem::Degenerate);
+        }
+    }
+}
+
+/// A triangle has zero area if and only if its projections onto three coordinate planes all have.
+fn is_flat_triangle([a, b, c]: &[Point; 3]) -> bool {
+    [[0, 1], [1, 2], [2, 0]].iter().all(|&[u, v]| {
+        let drop = |p: &Point| [p[u], p[v]];
+        orient2d(drop(a), drop(b), drop(c)).is_zero()
+    })
+}
+
+fn is_flat_tetrahedron([a, b, c, d]: &[Point; 4]) -> bool {
+    orient3d(a, b, c, d).is_zero()
+}

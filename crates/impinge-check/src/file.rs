@@ -1,0 +1,56 @@
+//! The check of one file.
+
+use std::path::Path;
+
+use impinge_io::{Error as FileError, ReadOptions, read};
+
+use crate::analysis::{Checked, Options, check_mesh};
+use crate::row::{ErrorKind, Failure, Row};
+
+/// Checks the mesh of one file. What goes wrong is in the row.
+pub fn check_file(path: &Path, options: &Options) -> Row {
+    check_file_marked(path, options).0
+}
+
+/// As [`check_file`], and gives the mesh with the marks of its primitives, where it could be checked.
+pub fn check_file_marked(path: &Path, options: &Options) -> (Row, Option<Checked>) {
+    let (result, checked) = match checked(path, options) {
+        Ok(checked) => (Ok(checked.counts), Some(checked)),
+        Err(failure) => (Err(failure), None),
+    };
+    let row = Row {
+        path: path.display().to_string(),
+        is_welded: options.weld,
+        result,
+    };
+    (row, checked)
+}
+
+fn checked(path: &Path, options: &Options) -> Result<Checked, Failure> {
+    let mesh = read(path, &ReadOptions::default()).map_err(|error| Failure {
+        kind: match error {
+            FileError::NotFinite { .. } => ErrorKind::NotFinite,
+            FileError::Io { ref source, .. }
+                if source.kind() == std::io::ErrorKind::OutOfMemory =>
+            {
+                ErrorKind::Memory
+            }
+            _ => ErrorKind::File,
+        },
+        message: one_line(&error.to_string()),
+    })?;
+    check_mesh(mesh, options).map_err(|error| Failure {
+        kind: match error {
+            impinge::Error::NonFinitePosition { .. } => ErrorKind::NotFinite,
+            // Threads do not start where their stacks do not fit.
+            impinge::Error::MemoryBudget { .. } | impinge::Error::Threads(_) => ErrorKind::Memory,
+            _ => ErrorKind::Refused,
+        },
+        message: one_line(&error.to_string()),
+    })
+}
+
+fn one_line(text: &str) -> String {
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    lines.collect::<Vec<_>>().join("; ")
+}

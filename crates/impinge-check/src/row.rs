@@ -1,0 +1,286 @@
+//! One row per mesh: what is printed, stored and sent between processes, as a line of JSON.
+
+use serde_json::{Map, Value, json};
+
+/// What was counted in one mesh. Facets are edges of triangles and faces of tetrahedra.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Vertices, as in the file.
+    pub n_vertices: u64,
+    /// Vertices that became one with another at exactly the same position.
+    pub n_welded: u64,
+    /// Triangles; 0 for a mesh of tetrahedra.
+    pub n_triangles: u64,
+    /// Tetrahedra; 0 for a mesh of triangles.
+    pub n_tetrahedra: u64,
+    /// Pairs of primitives that meet in more than the vertices that they share
+    /// ([`SharedVertex::Resolve`](impinge::SharedVertex::Resolve)).
+    pub self_intersections: u64,
+    /// Primitives in any such pair.
+    pub n_intersecting: u64,
+    /// [`Pairs::hash`](impinge::Pairs::hash) of these pairs.
+    pub hash: u64,
+    /// Primitives of exactly zero area, or volume.
+    pub degenerate: u64,
+    /// Primitives with the vertices of an earlier one, in any order.
+    pub duplicates: u64,
+    /// Facets of more than two primitives.
+    pub non_manifold_facets: u64,
+    /// Vertices around which the primitives form more than one fan.
+    pub non_manifold_vertices: u64,
+    /// Facets of one primitive only.
+    pub boundary_facets: u64,
+    /// Connected pieces of the border: holes, for most surfaces.
+    pub boundaries: u64,
+    /// Facets of two primitives that are oriented against each other.
+    pub inconsistent_facets: u64,
+    /// Pieces connected through facets. Primitives that name a vertex twice belong to none.
+    pub components: u64,
+    /// Vertices of no primitive, counted after welding.
+    pub unused_vertices: u64,
+}
+
+/// Why a mesh has no counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ErrorKind {
+    /// The file can't be read: missing, damaged, of an unknown format, without primitives.
+    File,
+    /// A coordinate is NaN or infinite.
+    NotFinite,
+    /// The library refuses the content, such as coordinates outside the exact range.
+    Refused,
+    /// The time limit was reached.
+    Timeout,
+    /// The memory limit was reached.
+    Memory,
+    /// The child process ended without an answer.
+    Crash,
+}
+
+impl ErrorKind {
+    const ALL: [ErrorKind; 6] = [
+        ErrorKind::File,
+        ErrorKind::NotFinite,
+        ErrorKind::Refused,
+        ErrorKind::Timeout,
+        ErrorKind::Memory,
+        ErrorKind::Crash,
+    ];
+
+    /// Its name in a row: `file`, `not_finite`, `refused`, `timeout`, `memory` or `crash`.
+    pub fn name(self) -> &'static str {
+        match self {
+            ErrorKind::File => "file",
+            ErrorKind::NotFinite => "not_finite",
+            ErrorKind::Refused => "refused",
+            ErrorKind::Timeout => "timeout",
+            ErrorKind::Memory => "memory",
+            ErrorKind::Crash => "crash",
+        }
+    }
+
+    /// Whether another attempt, with other limits or on another machine, may succeed.
+    pub fn may_pass(self) -> bool {
+        matches!(
+            self,
+            ErrorKind::Timeout | ErrorKind::Memory | ErrorKind::Crash
+        )
+    }
+}
+
+/// A mesh that could not be checked.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Failure {
+    /// What kind of failure it is.
+    pub kind: ErrorKind,
+    /// One line for people.
+    pub message: String,
+}
+
+/// What is known of one mesh.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Row {
+    /// The file, as it was named.
+    pub path: String,
+    /// Whether vertices at one position were welded first.
+    pub is_welded: bool,
+    /// The counts, or why there are none.
+    pub result: Result<Counts, Failure>,
+}
+
+impl Row {
+    /// The row of a mesh that could not be checked.
+    pub fn failed(path: &str, is_welded: bool, kind: ErrorKind, message: &str) -> Self {
+        let lines = message
+            .lines()
+            .map(str::trim)
+            .filter(|line| !line.is_empty());
+        Row {
+            path: path.to_owned(),
+            is_welded,
+            result: Err(Failure {
+                kind,
+                message: lines.collect::<Vec<_>>().join("; "),
+            }),
+        }
+    }
+
+    /// The row as an object. The keys are the same for every mesh; what does not apply is `null`: all counts of a
+    /// mesh with an `error`, and the counts of edges of a mesh of tetrahedra, which has those of faces instead.
+    pub fn to_json(&self) -> Value {
+        let counts = self.result.as_ref().ok();
+        let number = |get: fn(&Counts) -> u64| counts.map(get);
+        let is_solid = counts.is_some_and(|counts| counts.n_tetrahedra > 0);
+        let of_kind =
+            |solid: bool, get: fn(&Counts) -> u64| counts.filter(|_| is_solid == solid).map(get);
+        let mut object = Map::new();
+        let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
+        put("path", json!(self.path));
+        put("welded", json!(self.is_welded));
+        put("vertices", json!(number(|c| c.n_vertices)));
+        put("vertices_welded", json!(number(|c| c.n_welded)));
+        put("triangles", json!(number(|c| c.n_triangles)));
+        put("tetrahedra", json!(number(|c| c.n_tetrahedra)));
+        put(
+            "self_intersections",
+            json!(number(|c| c.self_intersections)),
+        );
+        put(
+            "intersecting_primitives",
+            json!(number(|c| c.n_intersecting)),
+        );
+        put("hash", json!(counts.map(|c| format!("{:016x}", c.hash))));
+        put("degenerate", json!(number(|c| c.degenerate)));
+        put("duplicate_faces", json!(of_kind(false, |c| c.duplicates)));
+        put(
+            "non_manifold_edges",
+            json!(of_kind(false, |c| c.non_manifold_facets)),
+        );
+        put(
+            "non_manifold_vertices",
+            json!(number(|c| c.non_manifold_vertices)),
+        );
+        put(
+            "boundary_edges",
+            json!(of_kind(false, |c| c.boundary_facets)),
+        );
+        put("boundaries", json!(number(|c| c.boundaries)));
+        put(
+            "inconsistent_edges",
+            json!(of_kind(false, |c| c.inconsistent_facets)),
+        );
+        put("components", json!(number(|c| c.components)));
+        put("unused_vertices", json!(number(|c| c.unused_vertices)));
+        if is_solid {
+            put(
+                "duplicate_tetrahedra",
+                json!(of_kind(true, |c| c.duplicates)),
+            );
+            put(
+                "non_manifold_faces",
+                json!(of_kind(true, |c| c.non_manifold_facets)),
+            );
+            put(
+                "boundary_faces",
+                json!(of_kind(true, |c| c.boundary_facets)),
+            );
+            put(
+                "inconsistent_faces",
+                json!(of_kind(true, |c| c.inconsistent_facets)),
+            );
+        }
+        let failure = self.result.as_ref().err();
+        put("error", json!(failure.map(|failure| &failure.message)));
+        put(
+            "error_kind",
+            json!(failure.map(|failure| failure.kind.name())),
+        );
+        Value::Object(object)
+    }
+
+    /// A row from the object that [`to_json`](Self::to_json) made; `None` where it is none.
+    pub fn from_json(value: &Value) -> Option<Self> {
+        let result = match value.get("error")? {
+            Value::Null => Ok(counts(value)?),
+            message => {
+                let name = value.get("error_kind")?.as_str()?;
+                let kind = ErrorKind::ALL
+                    .into_iter()
+                    .find(|kind| kind.name() == name)?;
+                let message = message.as_str()?.to_owned();
+                Err(Failure { kind, message })
+            }
+        };
+        Some(Row {
+            path: value.get("path")?.as_str()?.to_owned(),
+            is_welded: value.get("welded")?.as_bool()?,
+            result,
+        })
+    }
+}
+
+fn counts(value: &Value) -> Option<Counts> {
+    let number = |key: &str| value.get(key)?.as_u64();
+    let either = |edges: &str, faces: &str| number(edges).or_else(|| number(faces));
+    Some(Counts {
+        n_vertices: number("vertices")?,
+        n_welded: number("vertices_welded")?,
+        n_triangles: number("triangles")?,
+        n_tetrahedra: number("tetrahedra")?,
+        self_intersections: number("self_intersections")?,
+        n_intersecting: number("intersecting_primitives")?,
+        hash: u64::from_str_radix(value.get("hash")?.as_str()?, 16).ok()?,
+        degenerate: number("degenerate")?,
+        duplicates: either("duplicate_faces", "duplicate_tetrahedra")?,
+        non_manifold_facets: either("non_manifold_edges", "non_manifold_faces")?,
+        non_manifold_vertices: number("non_manifold_vertices")?,
+        boundary_facets: either("boundary_edges", "boundary_faces")?,
+        boundaries: number("boundaries")?,
+        inconsistent_facets: either("inconsistent_edges", "inconsistent_faces")?,
+        components: number("components")?,
+        unused_vertices: number("unused_vertices")?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn counted(n_triangles: u64, n_tetrahedra: u64) -> Row {
+        Row {
+            path: "a \"b\".ply".to_owned(),
+            is_welded: true,
+            result: Ok(Counts {
+                n_vertices: 1,
+                n_welded: 2,
+                n_triangles,
+                n_tetrahedra,
+                self_intersections: 5,
+                n_intersecting: 6,
+                hash: u64::MAX - 6,
+                degenerate: 8,
+                duplicates: 9,
+                non_manifold_facets: 10,
+                non_manifold_vertices: 11,
+                boundary_facets: 12,
+                boundaries: 13,
+                inconsistent_facets: 14,
+                components: 15,
+                unused_vertices: 16,
+            }),
+        }
+    }
+
+    #[test]
+    fn rows_survive_json() {
+        let failed = Row::failed("x", false, ErrorKind::Memory, "too\n\n  much\n");
+        assert_eq!(failed.result.as_ref().unwrap_err().message, "too; much");
+        for row in [counted(3, 0), counted(0, 3), failed] {
+            let text = row.to_json().to_string();
+            assert!(!text.contains('\n'));
+            let value = serde_json::from_str(&text).unwrap();
+            assert_eq!(Row::from_json(&value), Some(row));
+        }
+        assert_eq!(Row::from_json(&json!({"path": "x", "error": null})), None);
+    }
+}

@@ -1,0 +1,247 @@
+//! Rows on disk: a run that was interrupted goes on where it stopped.
+//!
+//! The list of meshes is cut into batches of equal length. The rows of batch 12 are in `rows-00000012.jsonl`, a line per
+//! mesh, in the order of the list. A file is replaced as a whole by a rename, at most once per second while
+//! its batch is under way, so at every moment it holds complete lines only. Batch b belongs to the process whose rank is
+//! b modulo the number of processes; no two processes write one file. The rows of all are `cat rows-*.jsonl`.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use crate::row::Row;
+
+/// How long rows may wait for the disk.
+const WAIT: Duration = Duration::from_secs(1);
+
+/// Why rows can't be kept.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StoreError {
+    /// The operating system refused. Check the folder and the room on its disk.
+    #[error("{}: cannot {action}: {source}", .path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A line is no row of this program. Remove the file, and its meshes are checked again.
+    #[error("{}:{line}: not a row; remove the file to check its meshes again", .path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+    },
+    /// The folder holds rows of another list, batch length or welding. Take a new folder.
+    #[error("{}:{line}: the row of '{found}' is not of this run: {why}", .path.display())]
+    OtherRun {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+        /// The mesh of the row.
+        found: String,
+        /// What does not fit.
+        why: &'static str,
+    },
+}
+
+/// The rows of one process, in memory and on disk.
+#[derive(Debug)]
+pub struct RowStore {
+    folder: PathBuf,
+    batches: Vec<Batch>,
+    batch_len: usize,
+    world_size: usize,
+}
+
+#[derive(Debug)]
+struct Batch {
+    /// Its number in the whole list.
+    number: usize,
+    rows: Vec<Option<Row>>,
+    /// When the oldest row came that is not on disk.
+    waiting: Option<Instant>,
+}
+
+impl RowStore {
+    /// Opens or creates a folder for the rows of the meshes `paths`, the whole list. Takes the batches of process `rank` of
+    /// `world_size` and reads the rows that are there. With `retry`, rows of kind `timeout`, `memory` and `crash` count as missing.
+    ///
+    /// # Errors
+    /// A folder that can't be made or read; a file with a line that is no row, or of another run.
+    pub fn open(
+        folder: &Path,
+        paths: &[PathBuf],
+        weld: bool,
+        batch_len: usize,
+        (rank, world_size): (usize, usize),
+        retry: bool,
+    ) -> Result<Self, StoreError> {
+        let io_error = |action| {
+            move |source| StoreError::Io {
+                path: folder.to_owned(),
+                action,
+                source,
+            }
+        };
+        fs::create_dir_all(folder).map_err(io_error("create the folder"))?;
+        let batch_len = batch_len.max(1);
+        let world_size = world_size.max(1);
+        let mut batches = Vec::new();
+        for (number, meshes) in paths.chunks(batch_len).enumerate() {
+            if number % world_size == rank {
+                let mut rows = vec![None; meshes.len()];
+                read_batch(&file(folder, number), meshes, weld, &mut rows)?;
+                if retry {
+                    for held in &mut rows {
+                        held.take_if(|row| matches!(&row.result, Err(why) if why.kind.may_pass()));
+                    }
+                }
+                batches.push(Batch {
+                    number,
+                    rows,
+                    waiting: None,
+                });
+            }
+        }
+        Ok(RowStore {
+            folder: folder.to_owned(),
+            batches,
+            batch_len,
+            world_size,
+        })
+    }
+
+    /// The number in the list of each mesh of this process that has no row yet, ascending.
+    pub fn missing(&self) -> Vec<usize> {
+        self.numbered()
+            .filter_map(|(ix, row)| row.is_none().then_some(ix))
+            .collect()
+    }
+
+    /// All rows of this process that are there, in the order of the list.
+    pub fn rows(&self) -> impl Iterator<Item = (usize, &Row)> {
+        self.numbered().filter_map(|(ix, row)| Some((ix, row?)))
+    }
+
+    fn numbered(&self) -> impl Iterator<Item = (usize, Option<&Row>)> {
+        self.batches.iter().flat_map(|batch| {
+            let first = batch.number * self.batch_len;
+            (first..).zip(batch.rows.iter().map(Option::as_ref))
+        })
+    }
+
+    /// Keeps the row of mesh `ix` of the list, and writes it soon.
+    ///
+    /// # Errors
+    /// A file that can't be written.
+    pub fn put(&mut self, ix: usize, row: Row) -> Result<(), StoreError> {
+        let held = ix / self.batch_len / self.world_size;
+        let batch = &mut self.batches[held];
+        batch.rows[ix % self.batch_len] = Some(row);
+        let since = *batch.waiting.get_or_insert_with(Instant::now);
+        let is_complete = batch.rows.iter().all(Option::is_some);
+        if is_complete || since.elapsed() >= WAIT {
+            write_batch(&self.folder, batch)?;
+        }
+        Ok(())
+    }
+
+    /// Writes every row that is not on disk yet.
+    ///
+    /// # Errors
+    /// A file that can't be written.
+    pub fn flush(&mut self) -> Result<(), StoreError> {
+        let waiting = self
+            .batches
+            .iter_mut()
+            .filter(|batch| batch.waiting.is_some());
+        for batch in waiting {
+            write_batch(&self.folder, batch)?;
+        }
+        Ok(())
+    }
+}
+
+fn file(folder: &Path, batch: usize) -> PathBuf {
+    folder.join(format!("rows-{batch:08}.jsonl"))
+}
+
+/// Reads the rows of a batch, of which some may be missing, into their places.
+fn read_batch(
+    path: &Path,
+    meshes: &[PathBuf],
+    weld: bool,
+    rows: &mut [Option<Row>],
+) -> Result<(), StoreError> {
+    let text = match fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(source) => {
+            return Err(StoreError::Io {
+                path: path.to_owned(),
+                action: "read",
+                source,
+            });
+        }
+    };
+    let mut ix = 0;
+    for (line, held) in (1..).zip(text.lines()) {
+        let value = serde_json::from_str(held).ok();
+        let row = value.as_ref().and_then(Row::from_json);
+        let row = row.ok_or_else(|| StoreError::Damaged {
+            path: path.to_owned(),
+            line,
+        })?;
+        let other = |why| StoreError::OtherRun {
+            path: path.to_owned(),
+            line,
+            found: row.path.clone(),
+            why,
+        };
+        if row.is_welded != weld {
+            return Err(other("its vertices were treated differently (--no-weld)"));
+        }
+        let is_its = |mesh: &PathBuf| mesh.display().to_string() == row.path;
+        match meshes[ix..].iter().position(is_its) {
+            None => return Err(other("its batch has no such mesh at this place")),
+            Some(skipped) => ix += skipped,
+        }
+        rows[ix] = Some(row);
+        ix += 1;
+    }
+    Ok(())
+}
+
+/// Writes the rows of a batch beside their file and renames them to it.
+fn write_batch(folder: &Path, batch: &mut Batch) -> Result<(), StoreError> {
+    let path = file(folder, batch.number);
+    let part = folder.join(format!(
+        ".rows-{:08}.{}.part",
+        batch.number,
+        std::process::id()
+    ));
+    let mut text = String::new();
+    for row in batch.rows.iter().flatten() {
+        text += &row.to_json().to_string();
+        text.push('\n');
+    }
+    let written = File::create(&part).and_then(|mut to| {
+        to.write_all(text.as_bytes())?;
+        to.sync_data()
+    });
+    let renamed = written.and_then(|()| fs::rename(&part, &path));
+    renamed.map_err(|source| StoreError::Io {
+        path,
+        action: "write",
+        source,
+    })?;
+    batch.waiting = None;
+    Ok(())
+}

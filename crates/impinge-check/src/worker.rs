@@ -1,0 +1,28 @@
+//! The child's side: paths in, rows out, a line of JSON each.
+
+use std::io::{self, BufRead, Write};
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::analysis::Options;
+use crate::file::check_file;
+
+/// Answers each line of `input`, a path as a JSON string, by the row of its mesh on a line of `output`, until the input ends.
+///
+/// # Errors
+/// Input that is no JSON string; input or output that fails.
+pub fn serve(input: impl BufRead, mut output: impl Write, options: &Options) -> io::Result<()> {
+    for line in input.lines() {
+        let Value::String(path) = serde_json::from_str(&line?)? else {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidData,
+                "expected a path as a JSON string",
+            ));
+        };
+        let row = check_file(Path::new(&path), options);
+        writeln!(output, "{}", row.to_json())?;
+        output.flush()?;
+    }
+    Ok(())
+}

@@ -1,0 +1,357 @@
+//! Counts against closed forms, against definitions written out plainly, and against published numbers.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use impinge_check::{Counts, ErrorKind, Options, Problem, check_file, check_mesh};
+use impinge_io::{Elements, Mesh, Positions};
+
+fn triangles(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Mesh {
+    Mesh {
+        positions: Positions::F64(positions),
+        elements: Elements::Triangles(faces),
+    }
+}
+
+fn counts(mesh: Mesh) -> Counts {
+    check_mesh(mesh, &Options::default()).unwrap().counts
+}
+
+/// The boundary of a tetrahedron, oriented.
+fn tetrahedron(at: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+    ];
+    let positions = corners.map(|p: [f64; 3]| p.map(|x| x + at)).to_vec();
+    (positions, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+}
+
+#[test]
+fn a_closed_surface_has_nothing() {
+    let (positions, faces) = tetrahedron(0.0);
+    let counts = counts(triangles(positions, faces));
+    let expected = Counts {
+        n_vertices: 4,
+        n_triangles: 4,
+        components: 1,
+        ..Counts::default()
+    };
+    assert_eq!(counts, expected);
+}
+
+#[test]
+fn unwelded_files_are_welded_first() {
+    let (corners, faces) = tetrahedron(0.1);
+    let positions: Vec<_> = faces
+        .iter()
+        .flatten()
+        .map(|&ix| corners[ix as usize])
+        .collect();
+    let soup: Vec<[u32; 3]> = (0..4).map(|ix| [3 * ix, 3 * ix + 1, 3 * ix + 2]).collect();
+    let welded = counts(triangles(positions.clone(), soup.clone()));
+    assert_eq!((welded.n_vertices, welded.n_welded), (12, 8));
+    assert_eq!(
+        (
+            welded.boundary_facets,
+            welded.self_intersections,
+            welded.components
+        ),
+        (0, 0, 1)
+    );
+    let options = Options {
+        weld: false,
+        ..Options::default()
+    };
+    let apart = check_mesh(triangles(positions, soup), &options)
+        .unwrap()
+        .counts;
+    assert_eq!(
+        (apart.n_welded, apart.boundary_facets, apart.components),
+        (0, 12, 4)
+    );
+    // All four touch each other.
+    assert_eq!(apart.self_intersections, 6);
+}
+
+#[test]
+fn each_fault_is_counted_as_what_it_is() {
+    let (positions, mut faces) = tetrahedron(0.0);
+    faces[1].swap(0, 1);
+    let turned = counts(triangles(positions.clone(), faces));
+    assert_eq!((turned.inconsistent_facets, turned.boundary_facets), (3, 0));
+
+    let (_, mut faces) = tetrahedron(0.0);
+    faces.push([1, 2, 0]);
+    let doubled = check_mesh(triangles(positions.clone(), faces), &Options::default()).unwrap();
+    assert_eq!(
+        (
+            doubled.counts.duplicates,
+            doubled.counts.non_manifold_facets
+        ),
+        (1, 3)
+    );
+    // Equal triangles meet in more than their vertices.
+    assert_eq!(doubled.counts.self_intersections, 1);
+    assert!(doubled.marks[4].has(Problem::Duplicate) && !doubled.marks[0].has(Problem::Duplicate));
+    assert_eq!(doubled.marks[4].first(), Some(Problem::SelfIntersection));
+
+    let (_, mut faces) = tetrahedron(0.0);
+    faces.pop();
+    let open = counts(triangles(positions.clone(), faces));
+    assert_eq!((open.boundary_facets, open.boundaries), (3, 1));
+
+    // Two closed surfaces that touch in one vertex.
+    let (mut both, mut faces) = tetrahedron(0.0);
+    let (other, more) = tetrahedron(0.0);
+    both.extend(other.iter().map(|p| p.map(|x| -x)));
+    faces.extend(more.iter().map(|face| face.map(|ix| ix + 4)));
+    let bow_tie = counts(triangles(both, faces));
+    assert_eq!((bow_tie.non_manifold_vertices, bow_tie.components), (1, 2));
+    assert_eq!((bow_tie.self_intersections, bow_tie.n_welded), (0, 1));
+
+    let mut positions = positions;
+    positions.push([9.0; 3]);
+    let (_, faces) = tetrahedron(0.0);
+    assert_eq!(counts(triangles(positions, faces)).unused_vertices, 1);
+}
+
+#[test]
+fn degenerate_is_exactly_zero_area() {
+    // 0.1, 0.2, 0.3 lie on a line in x = y = z; 0.1 + 0.2 is one bit more than 0.3.
+    let line = vec![[0.1; 3], [0.2; 3], [0.3; 3]];
+    assert_eq!(counts(triangles(line, vec![[0, 1, 2]])).degenerate, 1);
+    let thin = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 1e-60, 0.0]];
+    assert_eq!(counts(triangles(thin, vec![[0, 1, 2]])).degenerate, 0);
+    let near = vec![[0.1; 3], [0.2; 3], [0.3, 0.3, 0.1 + 0.2]];
+    assert_eq!(counts(triangles(near, vec![[0, 1, 2]])).degenerate, 0);
+    let twice = counts(triangles(vec![[0.0; 3], [1.0; 3]], vec![[0, 1, 1]]));
+    assert_eq!(
+        (twice.degenerate, twice.components, twice.boundary_facets),
+        (1, 0, 0)
+    );
+}
+
+#[test]
+fn tetrahedra_are_checked_by_their_faces() {
+    let positions = vec![
+        [0.0; 3],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [1.0; 3],
+    ];
+    let check = |tets: Vec<[u32; 4]>| {
+        let mesh = Mesh {
+            positions: Positions::F64(positions.clone()),
+            elements: Elements::Tetrahedra(tets),
+        };
+        counts(mesh)
+    };
+    let two = check(vec![[0, 1, 2, 3], [4, 1, 3, 2]]);
+    assert_eq!(
+        (
+            two.n_tetrahedra,
+            two.boundary_facets,
+            two.inconsistent_facets
+        ),
+        (2, 6, 0)
+    );
+    assert_eq!(
+        (two.components, two.boundaries, two.self_intersections),
+        (1, 1, 0)
+    );
+    assert_eq!(
+        check(vec![[0, 1, 2, 3], [4, 1, 2, 3]]).inconsistent_facets,
+        1
+    );
+    assert_eq!(check(vec![[0, 1, 2, 2]]).degenerate, 1);
+}
+
+/// The same counts, written out from their definitions over maps and repeated searches.
+fn plainly(n_vertices: u32, faces: &[[u32; 3]]) -> [u64; 8] {
+    let is_simplex = |f: &[u32; 3]| f[0] != f[1] && f[1] != f[2] && f[2] != f[0];
+    let mut edges: BTreeMap<(u32, u32), Vec<(usize, bool)>> = BTreeMap::new();
+    for (ix, face) in faces
+        .iter()
+        .enumerate()
+        .filter(|(_, face)| is_simplex(face))
+    {
+        for k in 0..3 {
+            let (a, b) = (face[k], face[(k + 1) % 3]);
+            edges
+                .entry((a.min(b), a.max(b)))
+                .or_default()
+                .push((ix, a < b));
+        }
+    }
+    let n = |pick: &dyn Fn(&Vec<(usize, bool)>) -> bool| {
+        edges.values().filter(|e| pick(e)).count() as u64
+    };
+    let boundary = n(&|users| users.len() == 1);
+    let non_manifold = n(&|users| users.len() > 2);
+    let inconsistent = n(&|users| users.len() == 2 && users[0].1 == users[1].1);
+    // Pieces of things that are linked: labels sink to the smallest until nothing changes.
+    let pieces = |members: &BTreeSet<usize>, linked: &dyn Fn(usize, usize) -> bool| -> u64 {
+        let mut labels: BTreeMap<usize, usize> = members.iter().map(|&x| (x, x)).collect();
+        loop {
+            let before = labels.clone();
+            for &a in members {
+                for &b in members {
+                    if linked(a, b) {
+                        let least = labels[&a].min(labels[&b]);
+                        labels.insert(a, least);
+                        labels.insert(b, least);
+                    }
+                }
+            }
+            if labels == before {
+                return labels.values().collect::<BTreeSet<_>>().len() as u64;
+            }
+        }
+    };
+    let share = |a: usize, b: usize, through: Option<u32>| {
+        edges.iter().any(|(edge, users)| {
+            through.is_none_or(|v| edge.0 == v || edge.1 == v)
+                && users.iter().any(|user| user.0 == a)
+                && users.iter().any(|user| user.0 == b)
+        })
+    };
+    let proper: BTreeSet<usize> = (0..faces.len())
+        .filter(|&ix| is_simplex(&faces[ix]))
+        .collect();
+    let components = pieces(&proper, &|a, b| share(a, b, None));
+    let bow_ties = (0..n_vertices).filter(|&v| {
+        let around: BTreeSet<usize> = proper
+            .iter()
+            .copied()
+            .filter(|&ix| faces[ix].contains(&v))
+            .collect();
+        pieces(&around, &|a, b| share(a, b, Some(v))) > 1
+    });
+    let open: Vec<(u32, u32)> = edges
+        .iter()
+        .filter(|(_, users)| users.len() == 1)
+        .map(|(&e, _)| e)
+        .collect();
+    let on_border: BTreeSet<usize> = open
+        .iter()
+        .flat_map(|e| [e.0 as usize, e.1 as usize])
+        .collect();
+    let borders = pieces(&on_border, &|a, b| {
+        open.contains(&(a.min(b) as u32, a.max(b) as u32))
+    });
+    let sets: BTreeSet<[u32; 3]> = faces
+        .iter()
+        .map(|face| {
+            let mut face = *face;
+            face.sort();
+            face
+        })
+        .collect();
+    let duplicates = (faces.len() - sets.len()) as u64;
+    let unused = (0..n_vertices)
+        .filter(|v| !faces.iter().flatten().any(|held| held == v))
+        .count() as u64;
+    [
+        boundary,
+        non_manifold,
+        inconsistent,
+        components,
+        bow_ties.count() as u64,
+        borders,
+        duplicates,
+        unused,
+    ]
+}
+
+#[test]
+fn random_meshes_agree_with_the_definitions() {
+    let mut state = 7u64;
+    let mut below = |n: u32| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 33) % u64::from(n)) as u32
+    };
+    let mut seen = [0u64; 8];
+    for _ in 0..400 {
+        let n_vertices = 3 + below(8);
+        let n_faces = 1 + below(14);
+        let faces: Vec<[u32; 3]> = (0..n_faces)
+            .map(|_| [below(n_vertices), below(n_vertices), below(n_vertices)])
+            .collect();
+        // All apart, so that nothing is welded.
+        let positions = (0..n_vertices)
+            .map(|v| [f64::from(v), f64::from(v * v), f64::from(v % 3)])
+            .collect();
+        let found = counts(triangles(positions, faces.clone()));
+        let found = [
+            found.boundary_facets,
+            found.non_manifold_facets,
+            found.inconsistent_facets,
+            found.components,
+            found.non_manifold_vertices,
+            found.boundaries,
+            found.duplicates,
+            found.unused_vertices,
+        ];
+        assert_eq!(found, plainly(n_vertices, &faces), "{faces:?}");
+        for (total, n) in seen.iter_mut().zip(found) {
+            *total += n;
+        }
+    }
+    // Every count was something else than zero in some mesh.
+    assert!(seen.iter().all(|&n| n > 0), "{seen:?}");
+}
+
+fn shared_data() -> PathBuf {
+    let given = std::env::var_os("IMPINGE_DATA").map(PathBuf::from);
+    given.unwrap_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"))
+}
+
+#[test]
+fn real_meshes_have_the_published_self_intersections() {
+    let text = match std::fs::read_to_string(shared_data().join("expected/self_intersections.json"))
+    {
+        Ok(text) => text,
+        Err(error) => {
+            eprintln!("skipped: the shared data is not here: {error}");
+            return;
+        }
+    };
+    let published: serde_json::Value = serde_json::from_str(&text).unwrap();
+    for (name, expected) in published.as_object().unwrap() {
+        let row = check_file(&shared_data().join(name), &Options::default());
+        let counts = row.result.unwrap();
+        let hits = ["hits_noshared", "hits_shared1", "hits_shared2"]
+            .map(|key| expected[key].as_u64().unwrap());
+        assert_eq!(
+            counts.self_intersections,
+            hits.iter().sum::<u64>(),
+            "{name}"
+        );
+        assert_eq!(Some(counts.n_triangles), expected["F"].as_u64(), "{name}");
+        assert_eq!(Some(counts.duplicates), expected["dup"].as_u64(), "{name}");
+    }
+}
+
+#[test]
+fn files_that_cannot_be_read_are_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    let check = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        check_file(&path, &Options::default()).result.unwrap_err()
+    };
+    assert_eq!(check("a.txt", "").kind, ErrorKind::File);
+    assert_eq!(check("a.obj", "v 0 0 0\nf 1 2 3\n").kind, ErrorKind::File);
+    let nan = check("b.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    assert_eq!(nan.kind, ErrorKind::NotFinite, "{}", nan.message);
+    let far = check("c.obj", "v 0 0 1e300\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    assert_eq!(far.kind, ErrorKind::Refused, "{}", far.message);
+    let missing = check_file("nowhere.ply".as_ref(), &Options::default());
+    assert_eq!(missing.result.unwrap_err().kind, ErrorKind::File);
+}

@@ -1,0 +1,249 @@
+//! `impinge check`: what is wrong with one mesh, or with a million.
+
+mod args;
+mod shown;
+mod table;
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, Write, stdin, stdout};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use impinge::CancelToken;
+use impinge_check::{Options, Pool, PoolError, Row, RowStore, apply_limits, serve};
+
+pub use self::args::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs};
+use crate::error::Error;
+use crate::output;
+use crate::stop::Patience;
+use crate::watch::Watch;
+
+/// `impinge check`.
+pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
+    let paths = paths(args)?;
+    let mine: Vec<usize> = share(args, paths.len()).collect();
+    let watch = Watch::things(!args.no_progress, mine.len(), "meshes", args.json);
+    let rows = match &args.out {
+        Some(args::Out::Folder(folder)) => kept(args, folder, &paths, &watch, cancel)?,
+        _ => {
+            let mut rows = Ordered::new(args.json, &mine);
+            run(args, &paths, &mine, &watch, cancel, |ix, row| {
+                rows.put(ix, row)
+            })?;
+            rows.finish()
+        }
+    };
+    drop(watch);
+    if let Some(args::Out::Mesh(file)) = &args.out {
+        shown::write_mesh(file, &rows, args)?;
+    }
+    if !args.json {
+        table::print(&rows)?;
+        if matches!(args.out, Some(args::Out::Mesh(_))) {
+            shown::print_legend()?;
+        }
+    }
+    // Last: whoever has no adapter has the answer.
+    #[cfg(feature = "gpu")]
+    if let Some(png) = &args.png {
+        shown::draw(&png.0, &rows, args)?;
+    }
+    table::fail_on(&rows, &args.fail_on)
+}
+
+/// `impinge check-worker`.
+pub fn check_worker(args: &CheckWorkerArgs) -> Result<(), Error> {
+    let limits = impinge_check::Limits {
+        memory: args.memory,
+    };
+    apply_limits(&limits)?;
+    let options = Options {
+        weld: !args.no_weld,
+        threads: args.threads,
+    };
+    Ok(serve(stdin().lock(), stdout().lock(), &options)?)
+}
+
+/// The meshes named, and those of the list.
+fn paths(args: &CheckArgs) -> Result<Vec<PathBuf>, Error> {
+    let mut paths = args.meshes.clone();
+    if let Some(list) = &args.list {
+        let read = |source| Error::Read {
+            path: list.clone(),
+            source,
+        };
+        let lines: Box<dyn BufRead> = if list == Path::new("-") {
+            Box::new(stdin().lock())
+        } else {
+            let file = std::fs::File::open(list).map_err(read)?;
+            Box::new(std::io::BufReader::new(file))
+        };
+        for line in lines.lines() {
+            let line = line.map_err(read)?;
+            let line = line.strip_suffix('\r').unwrap_or(&line);
+            if !line.is_empty() {
+                paths.push(line.into());
+            }
+        }
+    }
+    if args.rank >= args.world_size.get() {
+        return Err(Error::Usage(format!(
+            "--rank {} of --world-size {}: ranks begin at 0",
+            args.rank, args.world_size
+        )));
+    }
+    Ok(paths)
+}
+
+/// The numbers of the meshes of this process: whole batches in turn.
+fn share(args: &CheckArgs, n: usize) -> impl Iterator<Item = usize> {
+    let (batch, rank, world_size) = (args.batch.get(), args.rank, args.world_size.get());
+    (0..n).filter(move |ix| ix / batch % world_size == rank)
+}
+
+/// Checks the meshes numbered `wanted`.
+fn run(
+    args: &CheckArgs,
+    paths: &[PathBuf],
+    wanted: &[usize],
+    watch: &Watch,
+    cancel: &CancelToken,
+    mut put: impl FnMut(usize, Row) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let n_cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let jobs = args
+        .jobs
+        .map_or(n_cores, usize::from)
+        .clamp(1, wanted.len().max(1));
+    let threads = (n_cores / jobs).max(1);
+    let program = std::env::current_exe()?;
+    let command = || {
+        let mut command = Command::new(&program);
+        command
+            .arg("check-worker")
+            .arg("--threads")
+            .arg(threads.to_string());
+        if args.no_weld {
+            command.arg("--no-weld");
+        }
+        if let Some(memory) = args.memory {
+            command.arg("--memory").arg(memory.to_string());
+        }
+        command
+    };
+    let pool = Pool {
+        command: &command,
+        jobs,
+        timeout: args.timeout.map(Duration::from_secs_f64),
+        weld: !args.no_weld,
+    };
+    let chosen: Vec<PathBuf> = wanted.iter().map(|&ix| paths[ix].clone()).collect();
+    // A row that can't be printed or kept stops the run.
+    let stop = CancelToken::new();
+    let mut result = Ok(());
+    let ran = std::thread::scope(|scope| {
+        let (done, over) = std::sync::mpsc::channel::<()>();
+        let stop_too = &stop;
+        scope.spawn(move || {
+            while over.recv_timeout(Duration::from_millis(50))
+                == Err(std::sync::mpsc::RecvTimeoutError::Timeout)
+            {
+                if cancel.is_cancelled() {
+                    stop_too.cancel();
+                }
+            }
+        });
+        let ran = pool.run(&chosen, &stop, |ix, row| {
+            watch.frame_done();
+            if result.is_ok() {
+                result = put(wanted[ix], row);
+                if result.is_err() {
+                    stop.cancel();
+                }
+            }
+        });
+        drop(done);
+        ran
+    });
+    result?;
+    match ran {
+        Err(PoolError::Cancelled) => Err(impinge::Error::Cancelled.into()),
+        other => Ok(other?),
+    }
+}
+
+/// Checks what has no row in the folder yet; gives all rows of this process.
+fn kept(
+    args: &CheckArgs,
+    folder: &Path,
+    paths: &[PathBuf],
+    watch: &Watch,
+    cancel: &CancelToken,
+) -> Result<Vec<Row>, Error> {
+    let share = (args.rank, args.world_size.get());
+    let batch = args.batch.get();
+    let mut store = RowStore::open(folder, paths, !args.no_weld, batch, share, args.retry)?;
+    let missing = store.missing();
+    let mut printed = Ordered::new(args.json, &share_of(args, paths.len()));
+    for (ix, row) in store.rows() {
+        watch.frame_done();
+        printed.put(ix, row.clone())?;
+    }
+    // Whoever asks to stop waits for what is known to be written.
+    let _patience = Patience::new();
+    let ran = run(args, paths, &missing, watch, cancel, |ix, row| {
+        printed.put(ix, row.clone())?;
+        Ok(store.put(ix, row)?)
+    });
+    store.flush()?;
+    ran?;
+    Ok(printed.finish())
+}
+
+fn share_of(args: &CheckArgs, n: usize) -> Vec<usize> {
+    share(args, n).collect()
+}
+
+/// Rows in the order of the list, printed as soon as all before them are there.
+struct Ordered {
+    prints: bool,
+    /// Place in this process's share of each mesh.
+    places: BTreeMap<usize, usize>,
+    rows: Vec<Option<Row>>,
+    n_printed: usize,
+}
+
+impl Ordered {
+    fn new(prints: bool, meshes: &[usize]) -> Self {
+        Ordered {
+            prints,
+            places: meshes
+                .iter()
+                .enumerate()
+                .map(|(place, &ix)| (ix, place))
+                .collect(),
+            rows: vec![None; meshes.len()],
+            n_printed: 0,
+        }
+    }
+
+    fn put(&mut self, ix: usize, row: Row) -> Result<(), Error> {
+        if let Some(&place) = self.places.get(&ix) {
+            self.rows[place] = Some(row);
+        }
+        while let Some(Some(row)) = self.rows.get(self.n_printed) {
+            if self.prints {
+                let mut to = output::out();
+                writeln!(to, "{}", row.to_json())?;
+                to.flush()?;
+            }
+            self.n_printed += 1;
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Vec<Row> {
+        self.rows.into_iter().flatten().collect()
+    }
+}

@@ -1,0 +1,166 @@
+//! The command line of `impinge check`.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, ValueEnum};
+
+#[cfg(feature = "gpu")]
+use crate::args::PictureArgs;
+#[cfg(feature = "gpu")]
+use crate::values::PngFile;
+use crate::values::{MeshFile, bytes};
+
+/// Shown below the help.
+pub const CHECK_EXAMPLES: &str = "\
+Examples:
+  impinge check part.stl
+  impinge check *.obj --json | jq 'select(.self_intersections > 0) | .path'
+  impinge check part.ply --fail-on self-intersections,boundary       exit code 1 in CI
+  impinge check part.ply --out wrong.glb                             what is wrong, in colours
+  impinge check --list meshes.txt --out rows --timeout 60 --memory 4G
+  impinge check --list meshes.txt --out rows --rank $SLURM_ARRAY_TASK_ID --world-size 64
+
+Every count is exact. Vertices at one position are welded first, unless --no-weld says otherwise.
+Self-intersections are pairs that meet in more than the vertices that they share; degenerate
+faces have exactly zero area. Of a mesh of tetrahedra, faces take the place of edges.
+
+Each mesh is checked in a child process. A mesh that can't be read, takes too long or runs out
+of memory gets a row with its `error`, and the run goes on. The exit code is 0 unless --fail-on
+names what was found. Run the same command again to go on with an interrupted run in --out.";
+
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// Mesh files
+    #[arg(value_name = "MESH", required_unless_present = "list")]
+    pub meshes: Vec<PathBuf>,
+    /// A file with one path per line (- for standard input)
+    #[arg(long, value_name = "FILE")]
+    pub list: Option<PathBuf>,
+    /// Print one line of JSON per mesh and nothing else
+    #[arg(long)]
+    pub json: bool,
+    /// A folder for rows, in which an interrupted run goes on; or a mesh file that shows what is wrong (.glb, .ply, .vtu)
+    #[arg(long, value_name = "DIR|MESH")]
+    pub out: Option<Out>,
+    /// Exit with code 1 where any mesh has one of these (comma-separated)
+    #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',')]
+    pub fail_on: Vec<FailOn>,
+    /// Leave vertices at one position apart
+    #[arg(long)]
+    pub no_weld: bool,
+    /// Show no progress bar
+    #[arg(long)]
+    pub no_progress: bool,
+    /// Seconds that one mesh may take [default: as long as it takes]
+    #[arg(long, value_name = "S", value_parser = seconds, help_heading = "Many meshes")]
+    pub timeout: Option<f64>,
+    /// Address space of each child process, such as 4G (Unix) [default: no limit]
+    #[arg(long, value_name = "BYTES", value_parser = bytes, help_heading = "Many meshes")]
+    pub memory: Option<u64>,
+    /// Child processes at a time [default: one per core]
+    #[arg(long, value_name = "N", help_heading = "Many meshes")]
+    pub jobs: Option<NonZeroUsize>,
+    /// The share of this process, from 0
+    #[arg(
+        long,
+        value_name = "R",
+        default_value = "0",
+        help_heading = "Many meshes"
+    )]
+    pub rank: usize,
+    /// How many processes share the list
+    #[arg(
+        long,
+        value_name = "W",
+        default_value = "1",
+        help_heading = "Many meshes"
+    )]
+    pub world_size: NonZeroUsize,
+    /// Meshes per file of rows; processes take batches in turn
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "64",
+        help_heading = "Many meshes"
+    )]
+    pub batch: NonZeroUsize,
+    /// Check again what ended by a limit or a crash in an earlier run in --out
+    #[arg(long, help_heading = "Many meshes")]
+    pub retry: bool,
+    /// Draw what is wrong as a picture (.png)
+    #[cfg(feature = "gpu")]
+    #[arg(long, value_name = "FILE")]
+    pub png: Option<PngFile>,
+    #[cfg(feature = "gpu")]
+    #[command(flatten)]
+    pub picture: PictureArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct CheckWorkerArgs {
+    /// CPU threads
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub threads: usize,
+    /// Leave vertices at one position apart
+    #[arg(long)]
+    pub no_weld: bool,
+    /// Address space
+    #[arg(long, value_name = "BYTES")]
+    pub memory: Option<u64>,
+}
+
+/// Where results go besides standard output.
+#[derive(Debug, Clone)]
+pub enum Out {
+    /// Rows.
+    Folder(PathBuf),
+    /// The meshes in colours.
+    Mesh(MeshFile),
+}
+
+impl FromStr for Out {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if let Ok(file) = text.parse::<MeshFile>() {
+            return Ok(Out::Mesh(file));
+        }
+        let path = PathBuf::from(text);
+        if path.is_file() {
+            return Err("expected a folder, or a mesh file (.glb, .ply, .vtu)".to_owned());
+        }
+        Ok(Out::Folder(path))
+    }
+}
+
+/// What makes a run fail.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum FailOn {
+    /// Pairs that meet in more than what they share
+    SelfIntersections,
+    /// Primitives of zero area or volume
+    Degenerate,
+    /// Primitives with the vertices of an earlier one
+    Duplicates,
+    /// Edges of more than two triangles, vertices of several fans
+    NonManifold,
+    /// Edges of one triangle only
+    Boundary,
+    /// Neighbours oriented against each other
+    Orientation,
+    /// Coordinates that are NaN or infinite
+    Nan,
+    /// Meshes that could not be checked, whatever the reason
+    Error,
+    /// Any of these
+    Any,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value <= 1e9 => Ok(value),
+        _ => Err("expected a number of seconds above 0".to_owned()),
+    }
+}

@@ -1,0 +1,129 @@
+//! What is wrong with meshes, in colours: mesh files and pictures.
+//!
+//! Marks of primitives do not travel between processes: meshes that have a finding are checked once more, in this one.
+
+use std::io::Write;
+use std::path::Path;
+
+use impinge_check::{Checked, Options, Problem, Row, check_file_marked};
+use impinge_io::{ColoredMesh, write_glb, write_ply, write_vtu};
+
+use super::args::CheckArgs;
+use crate::error::Error;
+use crate::output::out;
+use crate::values::{MeshFile, MeshFormat};
+
+/// The colour of primitives without a finding.
+const FINE: [u8; 3] = [200, 200, 200];
+
+/// All meshes that could be checked, with the marks of their primitives.
+fn marked(rows: &[Row], args: &CheckArgs) -> Result<Vec<(String, Checked)>, Error> {
+    let options = Options {
+        weld: !args.no_weld,
+        threads: 0,
+    };
+    let sound = rows.iter().filter(|row| row.result.is_ok());
+    let checked: Vec<(String, Checked)> = sound
+        .filter_map(|row| {
+            let (_, checked) = check_file_marked(Path::new(&row.path), &options);
+            Some((row.path.clone(), checked?))
+        })
+        .collect();
+    if checked.is_empty() {
+        return Err(Error::Usage(
+            "no mesh could be checked, so there is nothing to show".to_owned(),
+        ));
+    }
+    Ok(checked)
+}
+
+fn color(checked: &Checked, primitive: usize) -> [u8; 3] {
+    checked.marks[primitive]
+        .first()
+        .map_or(FINE, Problem::color)
+}
+
+/// Writes the meshes, welded as they were checked; each primitive has the colour of its most serious problem.
+pub fn write_mesh(file: &MeshFile, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
+    let checked = marked(rows, args)?;
+    let colors: Vec<Vec<[u8; 3]>> = checked
+        .iter()
+        .map(|(_, checked)| {
+            (0..checked.marks.len())
+                .map(|ix| color(checked, ix))
+                .collect()
+        })
+        .collect();
+    let colliding: Vec<Vec<bool>> = checked
+        .iter()
+        .map(|(_, checked)| {
+            checked
+                .marks
+                .iter()
+                .map(|marks| marks.has(Problem::SelfIntersection))
+                .collect()
+        })
+        .collect();
+    let meshes: Vec<ColoredMesh> = checked
+        .iter()
+        .zip(&colors)
+        .zip(&colliding)
+        .map(|(((name, checked), colors), colliding)| ColoredMesh {
+            positions: &checked.mesh.positions,
+            elements: &checked.mesh.elements,
+            primitive_colors: Some(colors),
+            colliding: Some(colliding),
+            name,
+        })
+        .collect();
+    match file.format {
+        MeshFormat::Ply => write_ply(&file.path, &meshes)?,
+        MeshFormat::Glb => write_glb(&file.path, &meshes)?,
+        MeshFormat::Vtu => write_vtu(&file.path, &meshes)?,
+    }
+    Ok(())
+}
+
+/// What the colours mean.
+pub fn print_legend() -> Result<(), Error> {
+    let entries =
+        Problem::ALL.map(|problem| format!("{} {}", problem.color_name(), problem.name()));
+    writeln!(out(), "colours: {}", entries.join(", "))?;
+    Ok(())
+}
+
+/// Draws the meshes in the same colours. Primitives with a problem show through what hides them.
+#[cfg(feature = "gpu")]
+pub fn draw(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
+    use impinge_io::Elements;
+    use impinge_render::{Face, Normals, Surface};
+    const SIDES: [[usize; 3]; 4] = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
+    let surfaces = marked(rows, args)?.into_iter().map(|(_, checked)| {
+        let face = |corners: [u32; 3], primitive: usize| Face {
+            corners,
+            color: color(&checked, primitive),
+            shows_through: checked.marks[primitive].first().is_some(),
+        };
+        let (faces, normals) = match &checked.mesh.elements {
+            Elements::Triangles(triangles) => {
+                let faces = triangles
+                    .iter()
+                    .enumerate()
+                    .map(|(ix, &corners)| face(corners, ix));
+                (faces.collect(), Normals::Smooth)
+            }
+            Elements::Tetrahedra(tets) => {
+                let sides = tets.iter().enumerate().flat_map(|(ix, corners)| {
+                    SIDES.map(|side| face(side.map(|corner| corners[corner]), ix))
+                });
+                (sides.collect(), Normals::Flat)
+            }
+        };
+        Surface {
+            positions: checked.mesh.positions.to_f64(),
+            faces,
+            normals,
+        }
+    });
+    crate::picture::draw(path, &args.picture, None, surfaces.collect())
+}

@@ -1,0 +1,281 @@
+//! `impinge check`: rows, tables, exit codes, and children that fail.
+
+use serde_json::Value;
+
+use crate::harness::{Folder, Run, keys};
+
+/// A closed tetrahedron as OBJ, and what may be added to it.
+const CLOSED: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+
+fn meshes() -> Folder {
+    let folder = Folder::new();
+    folder.text("closed.obj", CLOSED);
+    let pierced = "v 0.2 0.2 -1\nv 0.3 0.2 -1\nv 0.2 0.2 1\nf 5 6 7\n";
+    folder.text("pierced.obj", &format!("{CLOSED}{pierced}"));
+    folder.text("open.obj", &CLOSED.replace("f 1 4 3\n", ""));
+    folder.text("nan.obj", &CLOSED.replace("v 0 0 1", "v 0 0 nan"));
+    folder.text("broken.obj", "v 0 0 0\nf 1 2 3\n");
+    folder
+}
+
+fn rows(run: Run) -> Vec<Value> {
+    assert_eq!(run.stderr, "");
+    let text = run.printed();
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+#[test]
+fn a_line_per_mesh_in_their_order() {
+    let folder = meshes();
+    let names = [
+        "closed.obj",
+        "missing.ply",
+        "pierced.obj",
+        "open.obj",
+        "nan.obj",
+        "broken.obj",
+    ];
+    let rows = rows(folder.run([&["check", "--json"], &names[..]].concat()));
+    assert_eq!(
+        rows.iter()
+            .map(|row| row["path"].as_str().unwrap())
+            .collect::<Vec<_>>(),
+        names
+    );
+    for key in [
+        "path",
+        "vertices",
+        "triangles",
+        "self_intersections",
+        "degenerate",
+        "duplicate_faces",
+        "non_manifold_edges",
+        "boundary_edges",
+        "components",
+        "error",
+    ] {
+        assert!(keys(&rows[0]).contains(&key), "{key}");
+    }
+    assert!(rows.iter().all(|row| keys(row) == keys(&rows[0])));
+    assert_eq!(
+        (&rows[0]["boundary_edges"], &rows[0]["error"]),
+        (&0.into(), &Value::Null)
+    );
+    assert_eq!(rows[1]["error_kind"], "file");
+    assert_eq!(rows[1]["triangles"], Value::Null);
+    // Through the bottom, and through the slanted face.
+    assert_eq!(
+        (&rows[2]["self_intersections"], &rows[2]["components"]),
+        (&2.into(), &2.into())
+    );
+    assert_eq!(
+        (&rows[3]["boundary_edges"], &rows[3]["boundaries"]),
+        (&3.into(), &1.into())
+    );
+    assert_eq!(rows[4]["error_kind"], "not_finite");
+    assert_eq!(rows[5]["error_kind"], "file");
+}
+
+#[test]
+fn a_table_and_what_it_sums_up_to() {
+    let folder = meshes();
+    let text = folder
+        .run(["check", "closed.obj", "pierced.obj", "nan.obj"])
+        .printed();
+    assert!(
+        text.contains("pierced.obj") && text.contains("self-int."),
+        "{text}"
+    );
+    let last = text.lines().last().unwrap();
+    assert_eq!(
+        last,
+        "3 meshes: 1 without any finding, 1 with self-intersections, 1 with an open border, \
+         1 with coordinates that are not finite, 1 with an error"
+    );
+}
+
+#[test]
+fn exit_codes_are_chosen() {
+    let folder = meshes();
+    let code = |args: &[&str]| folder.run([&["check"], args].concat()).code;
+    assert_eq!(code(&["pierced.obj", "missing.ply"]), Some(0));
+    assert_eq!(code(&["closed.obj", "--fail-on", "any"]), Some(0));
+    assert_eq!(
+        code(&["open.obj", "--fail-on", "self-intersections,degenerate"]),
+        Some(0)
+    );
+    assert_eq!(
+        code(&["open.obj", "--fail-on", "degenerate,boundary"]),
+        Some(1)
+    );
+    assert_eq!(code(&["nan.obj", "--fail-on", "nan"]), Some(1));
+    assert_eq!(code(&["missing.ply", "--fail-on", "nan"]), Some(0));
+    assert_eq!(code(&["missing.ply", "--fail-on", "error"]), Some(1));
+    assert_eq!(
+        code(&["closed.obj", "--rank", "2", "--world-size", "2"]),
+        Some(2)
+    );
+    assert_eq!(code(&[]), Some(2));
+    let run = folder.run(["check", "pierced.obj", "--fail-on", "any"]);
+    let said = "impinge: 1 of 1 meshes failed: 1 with self-intersections, 1 with an open border\n";
+    assert_eq!(run.stderr, said);
+}
+
+#[test]
+fn vertices_stay_apart_where_asked() {
+    let folder = meshes();
+    let soup = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\nf 5 4 6\n";
+    folder.text("soup.obj", soup);
+    let welded = &rows(folder.run(["check", "--json", "soup.obj"]))[0];
+    assert_eq!(
+        (&welded["welded"], &welded["vertices_welded"]),
+        (&true.into(), &2.into())
+    );
+    assert_eq!(welded["self_intersections"], 0);
+    let apart = &rows(folder.run(["check", "--json", "--no-weld", "soup.obj"]))[0];
+    assert_eq!(
+        (&apart["welded"], &apart["vertices_welded"]),
+        (&false.into(), &0.into())
+    );
+    assert_eq!(apart["self_intersections"], 1);
+}
+
+fn read(folder: &Folder, name: &str) -> String {
+    std::fs::read_to_string(folder.path(name)).unwrap()
+}
+
+#[test]
+fn ranks_make_the_rows_of_one_process_and_a_run_goes_on() {
+    let folder = meshes();
+    let names = [
+        "closed.obj",
+        "missing.ply",
+        "pierced.obj",
+        "open.obj",
+        "nan.obj",
+    ];
+    folder.text("list.txt", &(names.join("\n") + "\n"));
+    let one = folder
+        .run(["check", "--json", "--list", "list.txt", "--out", "one"])
+        .printed();
+    assert_eq!(read(&folder, "one/rows-00000000.jsonl"), one);
+    let mut all = String::new();
+    for rank in ["0", "1"] {
+        let args = [
+            "check", "--json", "--list", "list.txt", "--out", "two", "--batch", "2",
+        ];
+        folder
+            .run(
+                args.into_iter()
+                    .chain(["--rank", rank, "--world-size", "2"]),
+            )
+            .printed();
+    }
+    for batch in 0..3 {
+        all += &read(&folder, &format!("two/rows-{batch:08}.jsonl"));
+    }
+    assert_eq!(all, one);
+    // Rows that are there are not made again: this one would be another now.
+    folder.text("open.obj", CLOSED);
+    let args = ["check", "--json", "--list", "list.txt", "--out", "one"];
+    assert_eq!(folder.run(args).printed(), one);
+    let first_two: String = one
+        .lines()
+        .take(2)
+        .map(|line| format!("{line}\n"))
+        .collect();
+    folder.text("one/rows-00000000.jsonl", &first_two);
+    assert_ne!(folder.run(args).printed(), one);
+    // Another list is not mixed with it.
+    let error = folder.run(["check", "pierced.obj", "--out", "one"]).error();
+    assert!(
+        error.contains("rows-00000000.jsonl:1") && error.contains("not of this run"),
+        "{error}"
+    );
+}
+
+#[test]
+fn what_is_wrong_is_shown_in_colours() {
+    let folder = meshes();
+    let text = folder
+        .run(["check", "pierced.obj", "--out", "wrong.glb"])
+        .printed();
+    assert!(text.contains("red self-intersection"), "{text}");
+    assert!(
+        std::fs::read(folder.path("wrong.glb"))
+            .unwrap()
+            .starts_with(b"glTF")
+    );
+    folder
+        .run(["check", "pierced.obj", "--out", "wrong.ply", "--json"])
+        .printed();
+    let ply = std::fs::read(folder.path("wrong.ply")).unwrap();
+    assert!(
+        ply.windows(3).any(|color| color == [214, 39, 40]),
+        "some face is red"
+    );
+}
+
+#[test]
+fn a_mesh_that_takes_too_long_is_a_row() {
+    let folder = meshes();
+    // No child answers in a microsecond.
+    let rows = rows(folder.run([
+        "check",
+        "--json",
+        "closed.obj",
+        "open.obj",
+        "--timeout",
+        "0.000001",
+    ]));
+    assert_eq!(rows[0]["error_kind"], "timeout");
+    assert_eq!(rows[1]["error"], "took longer than 0.000001 s");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_mesh_that_is_too_large_is_a_row() {
+    let folder = meshes();
+    // Three gigabytes of nothing, in no room on the disk.
+    let sparse = std::fs::File::create(folder.path("large.stl")).unwrap();
+    sparse.set_len(3 << 30).unwrap();
+    let args = [
+        "check",
+        "--json",
+        "large.stl",
+        "closed.obj",
+        "--memory",
+        "2G",
+        "--jobs",
+        "1",
+    ];
+    let rows = rows(folder.run(args));
+    assert_eq!(rows[0]["error_kind"], "memory", "{}", rows[0]);
+    assert_eq!(rows[1]["error"], Value::Null);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_child_answers_until_its_input_ends() {
+    use std::io::{BufRead, BufReader, Write};
+    use std::process::Stdio;
+    let folder = meshes();
+    let mut command = folder.command(["check-worker"]);
+    let mut child = command
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut input = child.stdin.take().unwrap();
+    let mut answers = BufReader::new(child.stdout.take().unwrap()).lines();
+    writeln!(input, "\"closed.obj\"").unwrap();
+    let row: Value = serde_json::from_str(&answers.next().unwrap().unwrap()).unwrap();
+    assert_eq!(row["triangles"], 4);
+    writeln!(input, "\"missing.ply\"").unwrap();
+    let row: Value = serde_json::from_str(&answers.next().unwrap().unwrap()).unwrap();
+    assert_eq!(row["error_kind"], "file");
+    drop(input);
+    assert!(child.wait().unwrap().success());
+}
