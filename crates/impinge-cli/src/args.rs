@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use impinge_fem::scenes::SceneName;
 
-use crate::commands::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs};
+use crate::commands::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, TILES_EXAMPLES, TilesArgs};
 use crate::values::{CurvesFile, FrameRange, MeshFile, RowsFile, body_numbers, bytes, lambda};
 #[cfg(feature = "gpu")]
 use crate::values::{PngFile, azimuth, elevation, part, size};
@@ -55,6 +55,9 @@ pub enum Command {
     /// Say what is wrong with meshes: self-intersections, degenerate faces, borders, …
     #[command(after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),
+    /// Find the pairs of a scene that is larger than memory, tile by tile
+    #[command(after_help = TILES_EXAMPLES)]
+    Tiles(TilesArgs),
     /// Answer paths on standard input by rows: a child of `check`
     #[command(hide = true)]
     CheckWorker(CheckWorkerArgs),

@@ -12,6 +12,7 @@ mod record;
 mod render;
 mod sequence;
 mod simulate;
+mod tiles;
 
 pub use answer::{pairs, within};
 pub use check::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, check, check_worker};
@@ -23,3 +24,4 @@ pub use distance::distance;
 pub use render::render;
 pub use sequence::sequence;
 pub use simulate::simulate;
+pub use tiles::{TILES_EXAMPLES, TilesArgs, tiles};

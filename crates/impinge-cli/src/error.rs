@@ -61,6 +61,9 @@ pub enum Error {
     /// Child processes that check meshes can't be run.
     #[error(transparent)]
     Pool(#[from] impinge_check::PoolError),
+    /// A step of `impinge tiles` failed.
+    #[error(transparent)]
+    Tiles(#[from] impinge_tiles::Error),
     /// Meshes have what `--fail-on` names.
     #[error("{0}")]
     CheckFailed(String),
@@ -84,6 +87,7 @@ impl Error {
             self,
             Error::Detection(impinge::Error::Cancelled)
                 | Error::Simulation(impinge_fem::Error::Detection(impinge::Error::Cancelled))
+                | Error::Tiles(impinge_tiles::Error::Cancelled)
                 | Error::Stopped { .. }
         )
     }
@@ -92,7 +96,9 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             error if error.is_cancelled() => stop::exit_code().unwrap_or(1),
-            Error::Usage(_) | Error::Detection(impinge::Error::Setting { .. }) => 2,
+            Error::Usage(_)
+            | Error::Tiles(impinge_tiles::Error::Argument { .. })
+            | Error::Detection(impinge::Error::Setting { .. }) => 2,
             Error::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
             _ => 1,
         }

@@ -37,6 +37,7 @@ fn main() -> ExitCode {
         Command::Simulate(args) => commands::simulate(&args, &cancel),
         Command::Check(args) => commands::check(&args, &cancel),
         Command::CheckWorker(args) => commands::check_worker(&args),
+        Command::Tiles(args) => commands::tiles(&args, &cancel),
         #[cfg(feature = "gpu")]
         Command::Render(args) => commands::render(&args, &cancel),
         #[cfg(feature = "gpu")]

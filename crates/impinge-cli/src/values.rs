@@ -212,6 +212,27 @@ pub fn body_numbers(text: &str) -> Result<(usize, usize), String> {
         .ok_or_else(|| "expected two body numbers, such as 0,1".to_owned())
 }
 
+/// A number of things above 0, with an optional suffix: `k`, `M`, `G` are powers of 1000.
+pub fn count(text: &str) -> Result<u64, String> {
+    let expected = || "expected a number such as 250000, 250k or 2M".to_owned();
+    let split = text
+        .find(|c: char| !c.is_ascii_digit())
+        .unwrap_or(text.len());
+    let (digits, suffix) = text.split_at(split);
+    let factor: u64 = match suffix {
+        "" => 1,
+        "k" | "K" => 1_000,
+        "M" | "m" => 1_000_000,
+        "G" | "g" => 1_000_000_000,
+        _ => return Err(expected()),
+    };
+    let n = digits
+        .parse::<u64>()
+        .ok()
+        .and_then(|n| n.checked_mul(factor));
+    n.filter(|&n| n > 0).ok_or_else(expected)
+}
+
 /// A number of bytes with an optional suffix: `k`, `M`, `G`, `T` (or `KiB`, `MiB`, …) are powers of
 /// 1024, `kB`, `MB`, … powers of 1000, as GNU tools have it.
 pub fn bytes(text: &str) -> Result<u64, String> {

@@ -14,4 +14,5 @@ mod sequence;
 mod shared_data;
 mod signals;
 mod simulate;
+mod tiles;
 mod usage;

@@ -1,0 +1,216 @@
+//! `impinge tiles`: scenes larger than memory, step by step.
+
+mod args;
+
+use std::io::Write;
+
+use impinge::{Backend, CancelToken, Control, Settings};
+use impinge_tiles::{Ask, Plan, PlanOptions, RunOptions, ScatterOptions, TileResult};
+use serde_json::{Value, json};
+
+use self::args::{MergeArgs, PlanArgs, RunArgs, ScatterArgs, TilesCommand};
+pub use self::args::{TILES_EXAMPLES, TilesArgs};
+use crate::error::Error;
+use crate::output::{counted, grouped, out};
+use crate::watch::Watch;
+
+/// `impinge tiles`.
+pub fn tiles(args: &TilesArgs, cancel: &CancelToken) -> Result<(), Error> {
+    match &args.command {
+        TilesCommand::Plan(args) => plan(args, cancel),
+        TilesCommand::Scatter(args) => scatter(args, cancel),
+        TilesCommand::Run(args) => run(args, cancel),
+        TilesCommand::Merge(args) => merge(args),
+    }
+}
+
+fn print(json: bool, object: &Value, text: &str) -> Result<(), Error> {
+    if json {
+        writeln!(out(), "{object}")?;
+    } else {
+        writeln!(out(), "{text}")?;
+    }
+    Ok(())
+}
+
+fn hex(hash: u64) -> String {
+    format!("{hash:016x}")
+}
+
+fn plan(args: &PlanArgs, cancel: &CancelToken) -> Result<(), Error> {
+    let options = PlanOptions {
+        cap: args.cap,
+        chunk: args.chunk,
+        weld: args.weld,
+        cells: None,
+        replace: args.replace,
+    };
+    let watch = Watch::detection(!args.no_progress, "looking at primitives");
+    let plan = Plan::make(
+        &args.folder,
+        &args.meshes,
+        &options,
+        cancel,
+        &mut |done, total| {
+            watch.report(impinge::Progress { done, total });
+        },
+    )?;
+    drop(watch);
+    let n: u64 = plan.files().iter().map(|file| file.n_primitives).sum();
+    let object = json!({
+        "plan": hex(plan.id()),
+        "files": plan.files().len(),
+        "primitives": n,
+        "tiles": plan.n_tiles(),
+        "units": plan.n_units(),
+    });
+    let text = format!(
+        "{} of {} in {}; {} to scatter",
+        counted(n, "primitive"),
+        counted(plan.files().len() as u64, "file"),
+        counted(u64::from(plan.n_tiles()), "tile"),
+        counted(plan.n_units() as u64, "unit"),
+    );
+    print(args.json, &object, &text)
+}
+
+fn scatter(args: &ScatterArgs, cancel: &CancelToken) -> Result<(), Error> {
+    let plan = Plan::open(&args.folder)?;
+    let options = ScatterOptions {
+        rank: args.share.rank,
+        world_size: args.share.world_size.get(),
+        threads: args.threads.map_or(0, usize::from),
+    };
+    let watch = Watch::detection(!args.no_progress, "scattering");
+    let scattered = plan.scatter(&options, cancel, &|done, total| {
+        watch.report(impinge::Progress { done, total });
+    })?;
+    drop(watch);
+    let object = json!({
+        "written": scattered.n_written,
+        "kept": scattered.n_kept,
+        "primitives": scattered.n_primitives,
+        "records": scattered.n_records,
+    });
+    let text = format!(
+        "{} written, {} kept; {} as {}",
+        counted(scattered.n_written, "part"),
+        grouped(scattered.n_kept),
+        counted(scattered.n_primitives, "primitive"),
+        counted(scattered.n_records, "record"),
+    );
+    print(args.json, &object, &text)
+}
+
+fn run(args: &RunArgs, cancel: &CancelToken) -> Result<(), Error> {
+    let plan = Plan::open(&args.folder)?;
+    let tiles: Vec<u32> = match args.tile {
+        Some(tile) => vec![tile],
+        None => {
+            let (rank, world_size) = (args.share.rank, args.share.world_size.get());
+            if rank >= world_size {
+                return Err(Error::Usage(format!(
+                    "--rank {rank} of --world-size {world_size}: ranks begin at 0"
+                )));
+            }
+            (0..plan.n_tiles())
+                .filter(|&tile| tile as usize % world_size == rank)
+                .collect()
+        }
+    };
+    let options = RunOptions {
+        ask: Ask {
+            between: !args.within,
+            within: !args.between,
+            shared_vertex: args.shared_vertex.into(),
+        },
+        settings: Settings {
+            backend: Backend::Cpu,
+            method: args.method.into(),
+            threads: args.threads.map_or(0, usize::from),
+            memory_budget: args.memory_budget,
+            ..Settings::default()
+        },
+        again: args.again,
+    };
+    let watch = Watch::things(!args.no_progress, tiles.len(), "tiles", args.json);
+    let control = Control::new().cancel(cancel);
+    let mut results: Vec<TileResult> = Vec::new();
+    let mut printed = Ok(());
+    plan.run(tiles, &options, &control, &mut |result| {
+        watch.frame_done();
+        if args.json && printed.is_ok() {
+            printed = print(true, &row(result), "");
+        }
+        results.push(result.clone());
+    })?;
+    drop(watch);
+    printed?;
+    if !args.json {
+        summarise(&results)?;
+    }
+    Ok(())
+}
+
+fn row(result: &TileResult) -> Value {
+    json!({
+        "tile": result.tile,
+        "primitives": result.n_primitives,
+        "pairs": result.n_pairs,
+        "hash": hex(result.hash),
+        "elsewhere": result.n_elsewhere,
+        "pieces": result.n_pieces,
+        "kept": result.was_kept,
+    })
+}
+
+fn summarise(results: &[TileResult]) -> Result<(), Error> {
+    let mut to = out();
+    for result in results.iter().filter(|result| result.n_pieces > 1) {
+        writeln!(
+            to,
+            "tile {}: {} that no cut of space parts; asked in {} pieces, each with each",
+            result.tile,
+            counted(result.n_primitives, "primitive"),
+            grouped(result.n_pieces),
+        )?;
+    }
+    let n_pairs = results.iter().map(|result| result.n_pairs).sum();
+    let n_kept = results.iter().filter(|result| result.was_kept).count() as u64;
+    writeln!(
+        to,
+        "{}, {} kept; {}",
+        counted(results.len() as u64, "tile"),
+        grouped(n_kept),
+        counted(n_pairs, "pair"),
+    )?;
+    Ok(())
+}
+
+fn merge(args: &MergeArgs) -> Result<(), Error> {
+    let plan = Plan::open(&args.folder)?;
+    let merged = plan.merge()?;
+    let files: Vec<String> = plan
+        .files()
+        .iter()
+        .map(|file| file.path.display().to_string())
+        .collect();
+    let object = json!({
+        "pairs": merged.n_pairs,
+        "hash": hex(merged.hash),
+        "asked": merged.asked,
+        "tiles": plan.n_tiles(),
+        "records": merged.n_records,
+        "uncut_tiles": merged.n_uncut,
+        "rows": merged.rows.display().to_string(),
+        "files": files,
+    });
+    let text = format!(
+        "{}, hash {} ({}); rows in {}",
+        counted(merged.n_pairs, "pair"),
+        hex(merged.hash),
+        merged.asked,
+        merged.rows.display(),
+    );
+    print(args.json, &object, &text)
+}

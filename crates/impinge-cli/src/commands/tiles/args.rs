@@ -1,0 +1,149 @@
+//! The command line of `impinge tiles`.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use crate::args::{MethodArg, SharedVertexArg};
+use crate::values::{bytes, count};
+
+/// Shown below the help.
+pub const TILES_EXAMPLES: &str = "\
+Examples:
+  impinge tiles plan big scan.ply --cap 2M
+  impinge tiles scatter big
+  impinge tiles run big --self
+  impinge tiles merge big --json                                     pairs and hash of the whole
+  impinge tiles run big --rank $SLURM_ARRAY_TASK_ID --world-size 64  one of 64 processes
+
+Space is cut into tiles of about --cap primitives each. Every step reads and writes the folder
+alone, may be run by many processes on any machine that sees it, and may be killed and run again:
+the bytes are the same. Answers are those of the whole scene in one process.
+
+Binary PLY of triangles, binary STL and .npy arrays (n, 3, 3) or (n, 4, 3) are read in chunks.
+Other formats are read whole, a file at a time.";
+
+#[derive(Debug, Args)]
+pub struct TilesArgs {
+    #[command(subcommand)]
+    pub command: TilesCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum TilesCommand {
+    /// Look at the meshes once and decide where to cut
+    Plan(PlanArgs),
+    /// Write the primitives of each tile
+    Scatter(ScatterArgs),
+    /// Find the pairs of tiles
+    Run(RunArgs),
+    /// Merge the pairs of all tiles into one sorted answer
+    Merge(MergeArgs),
+}
+
+/// Which share of the work is this process's.
+#[derive(Debug, Clone, Args)]
+pub struct ShareArgs {
+    /// The share of this process, from 0
+    #[arg(long, value_name = "R", default_value = "0")]
+    pub rank: usize,
+    /// How many processes share the work
+    #[arg(long, value_name = "W", default_value = "1")]
+    pub world_size: NonZeroUsize,
+}
+
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// A folder for the plan and all that follows
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// Mesh files, a body each
+    #[arg(value_name = "MESH", required = true)]
+    pub meshes: Vec<PathBuf>,
+    /// About how many primitives a tile may hold, such as 500k or 2M: about 500 bytes each
+    #[arg(long, value_name = "N", value_parser = count, default_value = "2M")]
+    pub cap: u64,
+    /// Primitives that are scattered at a time: about 200 bytes each, per thread
+    #[arg(long, value_name = "N", value_parser = count, default_value = "500k")]
+    pub chunk: u64,
+    /// Make vertices at the same position one, in each file by itself
+    #[arg(long)]
+    pub weld: bool,
+    /// Replace another plan in this folder, and all that was made by it
+    #[arg(long)]
+    pub replace: bool,
+    /// Print JSON and nothing else
+    #[arg(long)]
+    pub json: bool,
+    /// Show no progress bar
+    #[arg(long)]
+    pub no_progress: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct ScatterArgs {
+    /// The folder of the plan
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    #[command(flatten)]
+    pub share: ShareArgs,
+    /// CPU threads [default: one per core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// Print JSON and nothing else
+    #[arg(long)]
+    pub json: bool,
+    /// Show no progress bar
+    #[arg(long)]
+    pub no_progress: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// The folder of the plan
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// One tile instead of this process's share
+    #[arg(long, value_name = "I")]
+    pub tile: Option<u32>,
+    #[command(flatten)]
+    pub share: ShareArgs,
+    /// Pairs within each file alone [default: within and between]
+    #[arg(long = "self", conflicts_with = "between")]
+    pub within: bool,
+    /// Pairs between files alone
+    #[arg(long)]
+    pub between: bool,
+    /// Pairs of one body that share a vertex: not reported, or where they meet in more than that
+    #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Skip)]
+    pub shared_vertex: SharedVertexArg,
+    /// How candidates are found; all methods give the same pairs
+    #[arg(long, value_enum, default_value_t = MethodArg::Clusters)]
+    pub method: MethodArg,
+    /// CPU threads [default: one per core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// Memory for the detector besides the answer, such as 512M [default: what it takes]
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    pub memory_budget: Option<u64>,
+    /// Run tiles again that have a result for this question
+    #[arg(long)]
+    pub again: bool,
+    /// Print one line of JSON per tile and nothing else
+    #[arg(long)]
+    pub json: bool,
+    /// Show no progress bar
+    #[arg(long)]
+    pub no_progress: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct MergeArgs {
+    /// The folder of the plan
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// Print JSON and nothing else
+    #[arg(long)]
+    pub json: bool,
+}

@@ -1,0 +1,156 @@
+//! `impinge tiles`: the answer of the whole scene, in steps that may be killed.
+
+use impinge_scenes::{Model, soup};
+use serde_json::Value;
+
+use crate::harness::Folder;
+
+/// Two bodies that run into themselves and each other.
+fn bodies() -> Folder {
+    let folder = Folder::new();
+    let model: Model = soup::triangles(3_000, 0.08, 7);
+    folder.ply("a.ply", &model);
+    folder.ply("b.ply", &model.translated([0.01, 0.02, 0.03]));
+    folder
+}
+
+fn whole(folder: &Folder) -> Value {
+    let args = [
+        "pairs",
+        "a.ply",
+        "b.ply",
+        "--self",
+        "--json",
+        "--backend",
+        "cpu",
+        "--pairs",
+        "whole.npy",
+    ];
+    folder.run(args).json()
+}
+
+fn plan(folder: &Folder) {
+    let args = [
+        "tiles", "plan", "big", "a.ply", "b.ply", "--cap", "700", "--chunk", "1k", "--json",
+    ];
+    let plan = folder.run(args).json();
+    assert!(
+        plan["tiles"].as_u64().unwrap() > 5 && plan["units"] == 6,
+        "{plan}"
+    );
+}
+
+#[test]
+fn steps_give_the_answer_of_the_whole() {
+    let folder = bodies();
+    let expected = whole(&folder);
+    plan(&folder);
+    for rank in ["0", "1"] {
+        folder
+            .run([
+                "tiles",
+                "scatter",
+                "big",
+                "--rank",
+                rank,
+                "--world-size",
+                "2",
+            ])
+            .printed();
+    }
+    folder.run(["tiles", "run", "big", "--tile", "3"]).printed();
+    let printed = folder.run(["tiles", "run", "big", "--json"]).printed();
+    let rows: Vec<Value> = printed
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(
+        (&rows[3]["kept"], &rows[2]["kept"]),
+        (&true.into(), &false.into())
+    );
+    let merged = folder.run(["tiles", "merge", "big", "--json"]).json();
+    assert!(merged["pairs"].as_u64().unwrap() > 1000);
+    assert_eq!(
+        (&merged["pairs"], &merged["hash"]),
+        (&expected["pairs"], &expected["hash"])
+    );
+    let read = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    assert_eq!(read("big/rows.npy"), read("whole.npy"));
+}
+
+#[test]
+fn questions_are_chosen() {
+    let folder = bodies();
+    plan(&folder);
+    folder.run(["tiles", "scatter", "big"]).printed();
+    for (option, args) in [
+        ("--self", &["self", "a.ply", "b.ply"][..]),
+        ("--between", &["pairs", "a.ply", "b.ply"][..]),
+    ] {
+        let expected = folder
+            .run([args, &["--json", "--backend", "cpu"]].concat())
+            .json();
+        folder.run(["tiles", "run", "big", option]).printed();
+        let merged = folder.run(["tiles", "merge", "big", "--json"]).json();
+        assert_eq!(merged["hash"], expected["hash"], "{option}");
+    }
+}
+
+#[test]
+fn what_is_missing_is_said() {
+    let folder = bodies();
+    let error = folder.run(["tiles", "scatter", "big"]).error();
+    assert!(
+        error.contains("plan.json: missing; run `plan` first"),
+        "{error}"
+    );
+    plan(&folder);
+    let error = folder.run(["tiles", "merge", "big"]).error();
+    assert!(
+        error.contains("tile-00000000.json: missing; run `tiles run` first"),
+        "{error}"
+    );
+    folder
+        .run(["tiles", "run", "big", "--self", "--between"])
+        .misuse();
+    folder
+        .run(["tiles", "scatter", "big", "--rank", "1"])
+        .misuse();
+    let again = ["tiles", "plan", "big", "a.ply", "--cap", "700"];
+    assert!(folder.run(again).error().contains("another plan"));
+    folder.run(again.into_iter().chain(["--replace"])).printed();
+}
+
+/// The kernel ends a process that writes more than it may: in the middle of whatever file that is.
+#[cfg(target_os = "linux")]
+#[test]
+fn killed_while_writing_and_run_again_the_answer_is_the_same() {
+    let folder = bodies();
+    let expected = whole(&folder);
+    plan(&folder);
+    let program = env!("CARGO_BIN_EXE_impinge");
+    let mut n_killed = 0;
+    for step in ["scatter", "run", "merge"] {
+        // In units of 512 bytes.
+        for limit in [0, 1, 4, 20] {
+            let script = format!("ulimit -f {limit}; exec {program} tiles {step} big --threads 1");
+            let script = if step == "merge" {
+                script.replace(" --threads 1", "")
+            } else {
+                script
+            };
+            let mut shell = std::process::Command::new("sh");
+            let output = shell
+                .args(["-c", &script])
+                .current_dir(folder.path("."))
+                .output()
+                .unwrap();
+            n_killed += usize::from(!output.status.success());
+        }
+        folder.run(["tiles", step, "big"]).printed();
+    }
+    assert!(n_killed > 6, "{n_killed}");
+    let answer: Value =
+        serde_json::from_slice(&std::fs::read(folder.path("big/answer.json")).unwrap()).unwrap();
+    assert_eq!(answer["hash"], expected["hash"]);
+}

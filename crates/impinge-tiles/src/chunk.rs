@@ -1,0 +1,147 @@
+//! Primitives with everything that a tile needs of them.
+
+use std::path::Path;
+
+use impinge::exact::in_range;
+
+use crate::cells::Bounds;
+use crate::error::Error;
+
+/// What the primitives of a file are, and how wide their coordinates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shape {
+    /// Corners per primitive: 3 or 4.
+    pub corners: usize,
+    /// Bytes per coordinate: 4 or 8.
+    pub width: usize,
+}
+
+impl Shape {
+    /// Bytes per record: the primitive's number, its vertices' numbers, their coordinates.
+    pub fn stride(self) -> usize {
+        4 + self.corners * (4 + 3 * self.width)
+    }
+}
+
+/// Consecutive primitives of one file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chunk {
+    /// The number of the first primitive.
+    pub first: u64,
+    /// Vertex numbers, `corners` per primitive.
+    pub vertices: Vec<u32>,
+    /// Positions of these, `corners` per primitive.
+    pub positions: Vec<[f64; 3]>,
+}
+
+impl Chunk {
+    /// The box of each primitive.
+    pub fn bounds(&self, shape: Shape) -> impl Iterator<Item = Bounds> {
+        self.positions.chunks_exact(shape.corners).map(bounds)
+    }
+
+    /// Refuses coordinates that no tile would hold, or that no exact test can take.
+    pub fn check(&self, path: &Path, shape: Shape) -> Result<(), Error> {
+        let bad = |x: &f64| !in_range(*x);
+        match self.positions.iter().position(|p| p.iter().any(bad)) {
+            None => Ok(()),
+            Some(ix) => {
+                let value = self.positions[ix].into_iter().find(bad).unwrap_or_default();
+                Err(Error::Coordinate {
+                    path: path.to_owned(),
+                    primitive: self.first + (ix / shape.corners) as u64,
+                    value,
+                    why: if value.is_finite() {
+                        "outside the range of exact answers"
+                    } else {
+                        "not a finite number"
+                    },
+                })
+            }
+        }
+    }
+
+    /// Appends the record of a primitive of this chunk.
+    pub fn encode(&self, shape: Shape, ix: usize, to: &mut Vec<u8>) {
+        let corners = ix * shape.corners..(ix + 1) * shape.corners;
+        to.extend(((self.first + ix as u64) as u32).to_le_bytes());
+        for vertex in &self.vertices[corners.clone()] {
+            to.extend(vertex.to_le_bytes());
+        }
+        for position in &self.positions[corners] {
+            for &x in position {
+                if shape.width == 4 {
+                    to.extend(back_to_f32(x).to_le_bytes());
+                } else {
+                    to.extend(x.to_le_bytes());
+                }
+            }
+        }
+    }
+}
+
+/// An f32 that was widened, as it was.
+fn back_to_f32(x: f64) -> f32 {
+    x as f32
+}
+
+/// The box of points.
+pub fn bounds(points: &[[f64; 3]]) -> Bounds {
+    points[1..]
+        .iter()
+        .fold((points[0], points[0]), |(lo, hi), p| {
+            (
+                std::array::from_fn(|axis| lo[axis].min(p[axis])),
+                std::array::from_fn(|axis| hi[axis].max(p[axis])),
+            )
+        })
+}
+
+/// A record as it lies on disk and in memory.
+#[derive(Clone, Copy)]
+pub struct Record<'a> {
+    shape: Shape,
+    bytes: &'a [u8],
+}
+
+impl<'a> Record<'a> {
+    /// `bytes` has the stride of the shape.
+    pub fn new(shape: Shape, bytes: &'a [u8]) -> Self {
+        Record { shape, bytes }
+    }
+
+    fn word(&self, at: usize) -> u32 {
+        u32::from_le_bytes(std::array::from_fn(|ix| self.bytes[at + ix]))
+    }
+
+    /// The number of the primitive in its file.
+    pub fn primitive(&self) -> u32 {
+        self.word(0)
+    }
+
+    /// The number of a vertex in its file.
+    pub fn vertex(&self, corner: usize) -> u32 {
+        self.word(4 + 4 * corner)
+    }
+
+    /// The position of a corner.
+    pub fn position(&self, corner: usize) -> [f64; 3] {
+        let Shape { corners, width } = self.shape;
+        let start = 4 + 4 * corners + 3 * width * corner;
+        std::array::from_fn(|axis| {
+            let at = start + width * axis;
+            if width == 4 {
+                f64::from(f32::from_bits(self.word(at)))
+            } else {
+                f64::from_le_bytes(std::array::from_fn(|ix| self.bytes[at + ix]))
+            }
+        })
+    }
+
+    /// The box of the primitive: the same comparisons of the same numbers as when it was scattered.
+    pub fn bounds(&self) -> Bounds {
+        let points: [[f64; 3]; 4] =
+            std::array::from_fn(|corner| self.position(corner.min(self.shape.corners - 1)));
+        bounds(&points)
+    }
+}

@@ -1,0 +1,149 @@
+//! Everything that can go wrong, by name.
+
+use std::path::{Path, PathBuf};
+
+/// What went wrong with a plan, its files or its meshes.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The operating system refused. Check the path, and the room on its disk.
+    #[error("{}: cannot {action}: {source}", .path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A mesh file that can't be read.
+    #[error(transparent)]
+    Mesh(#[from] impinge_io::Error),
+    /// The detection in a tile failed or was cancelled.
+    #[error("tile {tile}: {source}")]
+    Detection {
+        /// The tile.
+        tile: u32,
+        /// What the library said.
+        source: impinge::Error,
+    },
+    /// The caller asked to stop. What is done stays done.
+    #[error("cancelled")]
+    Cancelled,
+    /// A coordinate that is not finite, or outside the range of exact answers. Its box would lie in no tile.
+    #[error("{}: primitive {primitive} has the coordinate {value:e}: {why}", .path.display())]
+    Coordinate {
+        /// The mesh file.
+        path: PathBuf,
+        /// The primitive, counted from 0.
+        primitive: u64,
+        /// The coordinate.
+        value: f64,
+        /// What is wrong with it.
+        why: &'static str,
+    },
+    /// A primitive names a vertex that the file does not have.
+    #[error("{}: primitive {primitive} names vertex {index}, but there are {n_vertices} vertices", .path.display())]
+    VertexIndex {
+        /// The mesh file.
+        path: PathBuf,
+        /// The primitive, counted from 0.
+        primitive: u64,
+        /// The vertex it names.
+        index: i64,
+        /// How many there are.
+        n_vertices: u64,
+    },
+    /// More of something than 32-bit numbers can name. Split the file.
+    #[error("{}: {given} {what}, at most {limit} can be numbered", .path.display())]
+    TooMany {
+        /// The mesh file.
+        path: PathBuf,
+        /// What there is too much of.
+        what: &'static str,
+        /// How many there are.
+        given: u64,
+        /// The most there may be.
+        limit: u64,
+    },
+    /// A mesh file is not what it was when the plan was made. Make a new plan.
+    #[error("{}: changed since the plan was made", .path.display())]
+    Changed {
+        /// The mesh file.
+        path: PathBuf,
+    },
+    /// The folder holds another plan. Take a new folder, or replace it.
+    #[error("{}: there is another plan in this folder", .path.display())]
+    OtherPlan {
+        /// The plan's file.
+        path: PathBuf,
+    },
+    /// A file of this folder is damaged. Remove it, and run the step that writes it again.
+    #[error("{}: damaged ({what}); remove it and run `{step}` again", .path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        what: String,
+        /// The step that writes it.
+        step: &'static str,
+    },
+    /// A file of this folder was made by another plan. Run the step that writes it again.
+    #[error("{}: stale, made by another plan; run `{step}` again", .path.display())]
+    Stale {
+        /// The file.
+        path: PathBuf,
+        /// The step that writes it.
+        step: &'static str,
+    },
+    /// A step has not been run to its end.
+    #[error("{}: missing; run `{step}` first ({n_missing} of {n} are missing)", .path.display())]
+    Missing {
+        /// The first file that is missing.
+        path: PathBuf,
+        /// The step that writes it.
+        step: &'static str,
+        /// How many are missing.
+        n_missing: u64,
+        /// How many there should be.
+        n: u64,
+    },
+    /// Tiles were asked different questions. Run them all with the same options.
+    #[error("tile {tile} was asked for {found}, tile 0 for {expected}; run all tiles alike")]
+    MixedQuestions {
+        /// The tile.
+        tile: u32,
+        /// Its question.
+        found: String,
+        /// The question of the first tile.
+        expected: String,
+    },
+    /// An argument outside its range.
+    #[error("{what}: {given} given, {allowed} allowed")]
+    Argument {
+        /// The argument.
+        what: &'static str,
+        /// Its value.
+        given: String,
+        /// What is allowed.
+        allowed: String,
+    },
+}
+
+impl Error {
+    pub(crate) fn io(path: &Path, action: &'static str, source: std::io::Error) -> Self {
+        Error::Io {
+            path: path.to_owned(),
+            action,
+            source,
+        }
+    }
+
+    pub(crate) fn damaged(path: &Path, what: impl Into<String>, step: &'static str) -> Self {
+        Error::Damaged {
+            path: path.to_owned(),
+            what: what.into(),
+            step,
+        }
+    }
+}

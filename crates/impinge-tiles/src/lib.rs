@@ -1,0 +1,42 @@
+//! Scenes larger than memory, or than one machine: exact collision detection tile by tile.
+//!
+//! Space is cut by a kd-tree into half-open cells that fill it. A primitive goes to each cell that its box touches; a
+//! pair belongs to the cell that holds the larger of the two lower corners. So every pair is found, and no pair twice
+//! (the proof is in [`Cells`]). The hash of the whole answer is the sum of the tiles' hashes.
+//!
+//! Four steps work on one folder, and its files are all that they share. Any of them may run on any machine that sees
+//! the folder, in any number of processes; a step that was killed is run again and ends with the same bytes.
+//!
+//! | step | reads | writes |
+//! |---|---|---|
+//! | [`Plan::make`] | the meshes | `plan.json`: files, cuts, units of work |
+//! | [`Plan::scatter`] | the meshes, unit by unit | `parts/unit-*.bin`: primitives by tile |
+//! | [`Plan::run`] | one tile of every part | `results/tile-*.npy` (rows) and `results/tile-*.json` |
+//! | [`Plan::merge`] | all results | `rows.npy` (sorted) and `answer.json` |
+//!
+//! Binary PLY of triangles, binary STL and `.npy` arrays `(n, 3, 3)` or `(n, 4, 3)` are read in chunks; any other mesh
+//! file is read whole. The positions of an indexed file (12 or 24 bytes per vertex) stay in memory while it is scattered.
+
+mod cells;
+mod chunk;
+mod cuts;
+mod disk;
+mod error;
+mod hash;
+mod merge;
+mod npy;
+mod parts;
+mod plan;
+mod run;
+mod scatter;
+mod source;
+
+#[cfg(test)]
+mod tests;
+
+pub use cells::Cells;
+pub use error::Error;
+pub use merge::Merged;
+pub use plan::{File, Plan, PlanOptions};
+pub use run::{Ask, RunOptions, TileResult};
+pub use scatter::{ScatterOptions, Scattered};

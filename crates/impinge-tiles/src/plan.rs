@@ -1,0 +1,383 @@
+//! The plan: which files, which cells, which units of work. Everything else in the folder names the plan it belongs to.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use impinge::CancelToken;
+use serde_json::{Map, Value, json};
+
+use crate::cells::{Bounds, Cells};
+use crate::chunk::Shape;
+use crate::cuts;
+use crate::disk;
+use crate::error::Error;
+use crate::hash::checksum;
+use crate::source::{self, Source};
+
+/// The version of all files of a folder.
+const VERSION: u64 = 1;
+
+/// About how many boxes the cuts are made from.
+const SAMPLE: u64 = 500_000;
+
+/// How a plan is made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanOptions {
+    /// About how many primitives a tile may hold; one tile is in memory at a time. 2 million by default: about 1 GB.
+    pub cap: u64,
+    /// Primitives per unit of scattering: what a process reads, sorts and writes at a time. 500,000 by default.
+    pub chunk: u64,
+    /// Whether vertices of one file at exactly the same position become one, as formats without shared vertices (STL) need.
+    pub weld: bool,
+    /// Cells to take instead of those that the plan would choose.
+    pub cells: Option<Cells>,
+    /// Whether a plan that is in the folder already, and all that was made by it, is removed.
+    pub replace: bool,
+}
+
+impl Default for PlanOptions {
+    fn default() -> Self {
+        PlanOptions {
+            cap: 2_000_000,
+            chunk: 500_000,
+            weld: false,
+            cells: None,
+            replace: false,
+        }
+    }
+}
+
+/// A mesh file of a plan: one body, numbered by its place in [`Plan::files`].
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct File {
+    /// Its path, absolute.
+    pub path: PathBuf,
+    /// How many primitives it has.
+    pub n_primitives: u64,
+    /// How many vertices.
+    pub n_vertices: u64,
+    pub(crate) reader: String,
+    pub(crate) shape: Shape,
+    length: u64,
+    checksum: u64,
+}
+
+/// A plan in its folder.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    folder: PathBuf,
+    id: u64,
+    pub(crate) cap: u64,
+    pub(crate) chunk: u64,
+    pub(crate) weld: bool,
+    pub(crate) files: Vec<File>,
+    pub(crate) cells: Cells,
+}
+
+/// A run of primitives of one file: what one part file holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Unit {
+    pub file: usize,
+    pub first: u64,
+    pub n: usize,
+}
+
+impl Plan {
+    /// Looks at every primitive of `files` once (they must be finite), takes a sample, cuts space and writes `plan.json`.
+    /// A folder with the very same plan is left as it is. `progress` hears of primitives done and in all.
+    ///
+    /// # Errors
+    /// Files that can't be read, coordinates that are refused, another plan in the folder, cancellation.
+    pub fn make(
+        folder: &Path,
+        files: &[PathBuf],
+        options: &PlanOptions,
+        cancel: &CancelToken,
+        progress: &mut dyn FnMut(u64, u64),
+    ) -> Result<Self, Error> {
+        let at_least_one = |what, given: u64| match given {
+            0 => Err(Error::Argument {
+                what,
+                given: "0".to_owned(),
+                allowed: "1 or more".to_owned(),
+            }),
+            _ => Ok(given),
+        };
+        at_least_one("files", files.len() as u64)?;
+        at_least_one("cap", options.cap)?;
+        let chunk = at_least_one("chunk", options.chunk)?;
+        let mut sources = files
+            .iter()
+            .map(|path| source::open(path))
+            .collect::<Result<Vec<_>, _>>()?;
+        let total: u64 = sources.iter().map(|source| source.n_primitives()).sum();
+        let step = (total / SAMPLE).max(1);
+        let mut sample = Vec::new();
+        let mut done = 0;
+        for (path, source) in files.iter().zip(&mut sources) {
+            look_at(path, source, chunk, step, cancel, &mut sample, &mut |n| {
+                done += n;
+                progress(done.min(total), total);
+            })?;
+        }
+        let cells = match &options.cells {
+            Some(cells) => cells.clone(),
+            None => cuts::cells(&sample, step as f64, options.cap),
+        };
+        let files = files
+            .iter()
+            .zip(&sources)
+            .map(|(path, source)| file(path, source.as_ref()));
+        let mut plan = Plan {
+            folder: folder.to_owned(),
+            id: 0,
+            cap: options.cap,
+            chunk,
+            weld: options.weld,
+            files: files.collect::<Result<_, _>>()?,
+            cells,
+        };
+        plan.id = checksum(plan.text().as_bytes());
+        plan.write(options.replace)?;
+        Ok(plan)
+    }
+
+    /// The plan of a folder.
+    ///
+    /// # Errors
+    /// No plan, or a damaged one.
+    pub fn open(folder: &Path) -> Result<Self, Error> {
+        let path = folder.join("plan.json");
+        let text = match fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return Err(Error::Missing {
+                    path,
+                    step: "plan",
+                    n_missing: 1,
+                    n: 1,
+                });
+            }
+            Err(source) => return Err(Error::io(&path, "read", source)),
+        };
+        let value: Option<Value> = serde_json::from_str(&text).ok();
+        let plan = value
+            .as_ref()
+            .and_then(|value| Plan::from_json(folder, value));
+        plan.ok_or_else(|| Error::damaged(&path, "not a plan of this version", "plan"))
+    }
+
+    fn write(&self, replace: bool) -> Result<(), Error> {
+        disk::folder(&self.folder)?;
+        let path = self.folder.join("plan.json");
+        if path.exists() {
+            match Plan::open(&self.folder) {
+                Ok(held) if held.id == self.id => return Ok(()),
+                _ if !replace => return Err(Error::OtherPlan { path }),
+                _ => {}
+            }
+        }
+        let mut object = self.to_json();
+        object.insert("id".to_owned(), json!(format!("{:016x}", self.id)));
+        let text = serde_json::to_string_pretty(&object)
+            .map_err(|error| Error::io(&path, "write", error.into()))?;
+        disk::replace(&path, |to| writeln!(to, "{text}"))?;
+        if replace {
+            // Files of another plan would be found stale one by one; this frees the disk.
+            for name in ["parts", "results"] {
+                let old = self.folder.join(name);
+                if old.exists() {
+                    fs::remove_dir_all(&old).map_err(|source| Error::io(&old, "remove", source))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// What names this plan in all its files: a checksum of files, cells and options.
+    pub fn id(&self) -> u64 {
+        self.id
+    }
+
+    /// The mesh files, a body each.
+    pub fn files(&self) -> &[File] {
+        &self.files
+    }
+
+    /// The cells, one per tile.
+    pub fn cells(&self) -> &Cells {
+        &self.cells
+    }
+
+    /// How many tiles there are.
+    pub fn n_tiles(&self) -> u32 {
+        self.cells.n_tiles()
+    }
+
+    /// How many units of scattering there are.
+    pub fn n_units(&self) -> usize {
+        self.files.iter().map(|file| file.n_units(self.chunk)).sum()
+    }
+
+    pub(crate) fn units(&self) -> impl Iterator<Item = Unit> {
+        let chunk = self.chunk;
+        self.files.iter().enumerate().flat_map(move |(ix, file)| {
+            (0..file.n_units(chunk) as u64).map(move |unit| Unit {
+                file: ix,
+                first: unit * chunk,
+                n: chunk.min(file.n_primitives - unit * chunk) as usize,
+            })
+        })
+    }
+
+    /// What the id is a checksum of.
+    fn text(&self) -> String {
+        Value::Object(self.to_json()).to_string()
+    }
+
+    /// Without the id.
+    fn to_json(&self) -> Map<String, Value> {
+        let file = |file: &File| {
+            json!({
+                "path": file.path,
+                "reader": file.reader,
+                "corners": file.shape.corners,
+                "coordinate_bytes": file.shape.width,
+                "primitives": file.n_primitives,
+                "vertices": file.n_vertices,
+                "bytes": file.length,
+                "checksum": format!("{:016x}", file.checksum),
+            })
+        };
+        let mut object = Map::new();
+        object.insert("impinge_tiles".to_owned(), json!(VERSION));
+        object.insert("cap".to_owned(), json!(self.cap));
+        object.insert("chunk".to_owned(), json!(self.chunk));
+        object.insert("weld".to_owned(), json!(self.weld));
+        object.insert("tiles".to_owned(), json!(self.n_tiles()));
+        object.insert("units".to_owned(), json!(self.n_units()));
+        object.insert("files".to_owned(), self.files.iter().map(file).collect());
+        object.insert("cells".to_owned(), self.cells.to_json());
+        object
+    }
+
+    fn from_json(folder: &Path, value: &Value) -> Option<Self> {
+        let hex =
+            |value: &Value, key: &str| u64::from_str_radix(value.get(key)?.as_str()?, 16).ok();
+        let number = |value: &Value, key: &str| value.get(key)?.as_u64();
+        (number(value, "impinge_tiles")? == VERSION).then_some(())?;
+        let file = |value: &Value| {
+            let shape = Shape {
+                corners: number(value, "corners").filter(|n| [3, 4].contains(n))? as usize,
+                width: number(value, "coordinate_bytes").filter(|n| [4, 8].contains(n))? as usize,
+            };
+            Some(File {
+                path: value.get("path")?.as_str()?.into(),
+                reader: value.get("reader")?.as_str()?.to_owned(),
+                shape,
+                n_primitives: number(value, "primitives")?,
+                n_vertices: number(value, "vertices")?,
+                length: number(value, "bytes")?,
+                checksum: hex(value, "checksum")?,
+            })
+        };
+        let plan = Plan {
+            folder: folder.to_owned(),
+            id: hex(value, "id")?,
+            cap: number(value, "cap")?,
+            chunk: number(value, "chunk").filter(|&n| n > 0)?,
+            weld: value.get("weld")?.as_bool()?,
+            files: value
+                .get("files")?
+                .as_array()?
+                .iter()
+                .map(file)
+                .collect::<Option<_>>()?,
+            cells: Cells::from_json(value.get("cells")?)?,
+        };
+        // Whatever was changed by hand is not what the other files belong to.
+        (checksum(plan.text().as_bytes()) == plan.id).then_some(plan)
+    }
+}
+
+impl File {
+    fn n_units(&self, chunk: u64) -> usize {
+        self.n_primitives.div_ceil(chunk) as usize
+    }
+
+    /// Opens the file, if it is what it was.
+    pub(crate) fn open(&self) -> Result<Box<dyn Source>, Error> {
+        let changed = || Error::Changed {
+            path: self.path.clone(),
+        };
+        if source::fingerprint(&self.path)? != (self.length, self.checksum) {
+            return Err(changed());
+        }
+        let source = source::open_as(&self.path, &self.reader)?;
+        let is_same = (source.shape(), source.n_primitives(), source.n_vertices())
+            == (self.shape, self.n_primitives, self.n_vertices);
+        if is_same { Ok(source) } else { Err(changed()) }
+    }
+}
+
+fn file(path: &Path, source: &dyn Source) -> Result<File, Error> {
+    let absolute = fs::canonicalize(path).map_err(|error| Error::io(path, "open", error))?;
+    if absolute.to_str().is_none() {
+        return Err(Error::Argument {
+            what: "path of a mesh",
+            given: path.display().to_string(),
+            allowed: "UTF-8".to_owned(),
+        });
+    }
+    let (length, checksum) = source::fingerprint(path)?;
+    Ok(File {
+        path: absolute,
+        reader: source.reader().to_owned(),
+        shape: source.shape(),
+        n_primitives: source.n_primitives(),
+        n_vertices: source.n_vertices(),
+        length,
+        checksum,
+    })
+}
+
+/// Checks all primitives of a file and takes every `step`th of them. A file that turns out to hold other polygons than
+/// triangles is replaced by one that is read whole.
+fn look_at(
+    path: &Path,
+    source: &mut Box<dyn Source>,
+    chunk: u64,
+    step: u64,
+    cancel: &CancelToken,
+    sample: &mut Vec<Bounds>,
+    done: &mut dyn FnMut(u64),
+) -> Result<(), Error> {
+    let n_before = sample.len();
+    let mut first = 0;
+    while first < source.n_primitives() {
+        if cancel.is_cancelled() {
+            return Err(Error::Cancelled);
+        }
+        let n = chunk.min(source.n_primitives() - first);
+        let Some(held) = source.read(first, n as usize)? else {
+            *source = source::open_whole(path)?;
+            sample.truncate(n_before);
+            first = 0;
+            continue;
+        };
+        let shape = source.shape();
+        held.check(path, shape)?;
+        let wanted = (first..)
+            .zip(held.bounds(shape))
+            .filter(|(ix, _)| ix % step == 0);
+        sample.extend(wanted.map(|(_, bounds)| bounds));
+        first += n;
+        done(n);
+    }
+    Ok(())
+}

@@ -1,0 +1,284 @@
+//! One tile: its primitives from all parts, the pairs among them, and those that the tile owns.
+
+mod records;
+
+use std::fs;
+use std::path::PathBuf;
+
+use impinge::{Backend, Control, Detector, Query, Settings, SharedVertex, hash_rows};
+use serde_json::{Value, json};
+
+use self::records::Records;
+use crate::disk;
+use crate::error::Error;
+use crate::npy;
+use crate::plan::Plan;
+
+/// What is asked of the whole scene. All tiles must be asked the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Ask {
+    /// Pairs of different files.
+    pub between: bool,
+    /// Pairs within each file.
+    pub within: bool,
+    /// How pairs of one file that share a vertex are treated.
+    pub shared_vertex: SharedVertex,
+}
+
+impl Default for Ask {
+    fn default() -> Self {
+        Ask {
+            between: true,
+            within: true,
+            shared_vertex: SharedVertex::Skip,
+        }
+    }
+}
+
+impl Ask {
+    /// In words, as results carry it.
+    pub fn name(self) -> &'static str {
+        let resolve = self.shared_vertex == SharedVertex::Resolve;
+        match (self.between, self.within, resolve) {
+            (true, false, _) => "between",
+            (false, _, false) => "self, shared vertices skipped",
+            (false, _, true) => "self, shared vertices resolved",
+            (true, true, false) => "everything, shared vertices skipped",
+            (true, true, true) => "everything, shared vertices resolved",
+        }
+    }
+
+    fn query(self) -> Query {
+        match (self.between, self.within) {
+            (true, true) => Query::everything(),
+            (true, false) => Query::all(),
+            (false, _) => Query::all_within(),
+        }
+        .shared_vertex(self.shared_vertex)
+    }
+}
+
+/// How a tile is run.
+#[derive(Debug, Clone, Default)]
+pub struct RunOptions {
+    /// What is asked.
+    pub ask: Ask,
+    /// Settings of the detector. The backend is the CPU unless they name a GPU.
+    pub settings: Settings,
+    /// Whether tiles that have a result for the same question are run again.
+    pub again: bool,
+}
+
+/// What one tile found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TileResult {
+    /// The tile.
+    pub tile: u32,
+    /// Primitives in it.
+    pub n_primitives: u64,
+    /// Pairs that belong to it.
+    pub n_pairs: u64,
+    /// The sum of the hashes of these pairs; see [`hash_rows`].
+    pub hash: u64,
+    /// Pairs that were found here and belong to another tile.
+    pub n_elsewhere: u64,
+    /// Into how many pieces the tile was cut, each asked with each other: more than 1 where its primitives lie on one
+    /// another so that no cut of space parts them.
+    pub n_pieces: u64,
+    /// Whether the result was there already.
+    pub was_kept: bool,
+    pub(crate) ask: String,
+}
+
+impl Plan {
+    pub(crate) fn rows_path(&self, tile: u32) -> PathBuf {
+        self.folder()
+            .join("results")
+            .join(format!("tile-{tile:08}.npy"))
+    }
+
+    pub(crate) fn result_path(&self, tile: u32) -> PathBuf {
+        self.folder()
+            .join("results")
+            .join(format!("tile-{tile:08}.json"))
+    }
+
+    /// Finds the pairs of each of `tiles` and writes them, one tile in memory at a time. Tiles that have a result for the same question
+    /// are kept. `done` hears of each.
+    ///
+    /// # Errors
+    /// No such tile; parts that are missing, stale or damaged; what [`Detector::detect_with`] refuses; cancellation.
+    pub fn run(
+        &self,
+        tiles: impl IntoIterator<Item = u32>,
+        options: &RunOptions,
+        control: &Control<'_>,
+        done: &mut dyn FnMut(&TileResult),
+    ) -> Result<(), Error> {
+        let mut settings = options.settings.clone();
+        if settings.backend == Backend::Auto {
+            settings.backend = Backend::Cpu;
+        }
+        let refused = |source| Error::Detection { tile: 0, source };
+        let mut detector = Detector::with_settings(settings).map_err(refused)?;
+        self.check_parts()?;
+        disk::folder(&self.folder().join("results"))?;
+        for tile in tiles {
+            if tile >= self.n_tiles() {
+                return Err(Error::Argument {
+                    what: "tile",
+                    given: tile.to_string(),
+                    allowed: format!("0 to {}", self.n_tiles() - 1),
+                });
+            }
+            let held = self.result(tile).ok().filter(|held| {
+                held.ask == options.ask.name() && !options.again && self.rows_path(tile).exists()
+            });
+            let result = match held {
+                Some(held) => TileResult {
+                    was_kept: true,
+                    ..held
+                },
+                None => self.run_tile(tile, options.ask, &mut detector, control)?,
+            };
+            done(&result);
+        }
+        Ok(())
+    }
+
+    /// Every part must be there before any tile can be whole.
+    fn check_parts(&self) -> Result<(), Error> {
+        let missing: Vec<usize> = (0..self.n_units())
+            .filter(|&unit| !self.part_path(unit).exists())
+            .collect();
+        match missing.first() {
+            None => Ok(()),
+            Some(&first) => Err(Error::Missing {
+                path: self.part_path(first),
+                step: "tiles scatter",
+                n_missing: missing.len() as u64,
+                n: self.n_units() as u64,
+            }),
+        }
+    }
+
+    fn run_tile(
+        &self,
+        tile: u32,
+        ask: Ask,
+        detector: &mut Detector,
+        control: &Control<'_>,
+    ) -> Result<TileResult, Error> {
+        let mut records = Records::default();
+        for (unit_ix, unit) in self.units().enumerate() {
+            records.add(self.read_segment(unit_ix, unit, tile)?);
+        }
+        let n = records.len();
+        // The plan aims at `cap`; twice that is left only where no cut was worth its copies.
+        let piece = if n as u64 > 2 * self.cap {
+            self.cap as usize
+        } else {
+            n.max(1)
+        };
+        let n_pieces = n.div_ceil(piece).max(1);
+        let bounds = |ix: usize| ix * piece..((ix + 1) * piece).min(n);
+        let (mut rows, mut n_elsewhere) = (Vec::new(), 0);
+        let refused = |source| match source {
+            impinge::Error::Cancelled => Error::Cancelled,
+            source => Error::Detection { tile, source },
+        };
+        for a in 0..n_pieces {
+            for b in a..n_pieces {
+                let ranges = if a == b {
+                    vec![bounds(a)]
+                } else {
+                    vec![bounds(a), bounds(b)]
+                };
+                let part = records.scene(&ranges, self.weld).map_err(refused)?;
+                let query = ask.query();
+                let pairs = detector
+                    .detect_with(&part.scene, &query, control)
+                    .map_err(refused)?;
+                for row in pairs.rows() {
+                    let (first, second) =
+                        (part.record(row[0], row[1]), part.record(row[2], row[3]));
+                    // Two pieces are asked for the pairs between them; each was asked by itself before.
+                    if a != b && (first / piece == second / piece) {
+                        continue;
+                    }
+                    if self.cells.owner(records.owner_point(first, second)) == tile {
+                        rows.push(records.row(first, second));
+                    } else {
+                        n_elsewhere += 1;
+                    }
+                }
+            }
+        }
+        if n_pieces > 1 {
+            rows.sort_unstable();
+        }
+        let result = TileResult {
+            tile,
+            n_primitives: n as u64,
+            n_pairs: rows.len() as u64,
+            hash: hash_rows(rows.iter().copied()),
+            n_elsewhere,
+            n_pieces: n_pieces as u64,
+            was_kept: false,
+            ask: ask.name().to_owned(),
+        };
+        self.write_result(&result, &rows)?;
+        Ok(result)
+    }
+
+    /// The rows first, then the result that vouches for them; an older one must not.
+    fn write_result(&self, result: &TileResult, rows: &[[u32; 4]]) -> Result<(), Error> {
+        let path = self.result_path(result.tile);
+        if path.exists() {
+            fs::remove_file(&path).map_err(|source| Error::io(&path, "remove", source))?;
+        }
+        disk::replace(&self.rows_path(result.tile), |to| {
+            to.write_all(&npy::rows_header(rows.len() as u64))?;
+            rows.iter().try_for_each(|&row| npy::write_row(to, row))
+        })?;
+        let object = json!({
+            "plan": format!("{:016x}", self.id()),
+            "tile": result.tile,
+            "asked": result.ask,
+            "primitives": result.n_primitives,
+            "pairs": result.n_pairs,
+            "hash": format!("{:016x}", result.hash),
+            "elsewhere": result.n_elsewhere,
+            "pieces": result.n_pieces,
+        });
+        disk::replace(&path, |to| writeln!(to, "{object}"))
+    }
+
+    /// The result of a tile, if it is there and of this plan.
+    pub(crate) fn result(&self, tile: u32) -> Result<TileResult, Error> {
+        const STEP: &str = "tiles run";
+        let path = self.result_path(tile);
+        let text = fs::read_to_string(&path).map_err(|source| Error::io(&path, "read", source))?;
+        let read = || {
+            let value: Value = serde_json::from_str(&text).ok()?;
+            let number = |key: &str| value.get(key)?.as_u64();
+            let hex = |key: &str| u64::from_str_radix(value.get(key)?.as_str()?, 16).ok();
+            let result = TileResult {
+                tile,
+                n_primitives: number("primitives")?,
+                n_pairs: number("pairs")?,
+                hash: hex("hash")?,
+                n_elsewhere: number("elsewhere")?,
+                n_pieces: number("pieces")?,
+                was_kept: false,
+                ask: value.get("asked")?.as_str()?.to_owned(),
+            };
+            (number("tile")? == u64::from(tile)).then_some((hex("plan")?, result))
+        };
+        match read() {
+            None => Err(Error::damaged(&path, "not a result of this tile", STEP)),
+            Some((plan, _)) if plan != self.id() => Err(Error::Stale { path, step: STEP }),
+            Some((_, result)) => Ok(result),
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! Mesh files as chunks of primitives.
+//!
+//! Binary PLY of triangles, binary STL and `.npy` arrays have primitives of equal length on disk, so any run of them is read by
+//! itself. Whatever else `impinge-io` reads is held in memory as a whole.
+
+mod npy;
+mod ply;
+mod stl;
+mod whole;
+
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
+
+use crate::chunk::{Chunk, Shape};
+use crate::error::Error;
+use crate::hash::checksum;
+
+/// A mesh file that is read run by run, by several threads at a time.
+pub trait Source: Send + Sync {
+    /// `ply`, `stl`, `npy` or `whole`.
+    fn reader(&self) -> &'static str;
+    /// What its primitives are.
+    fn shape(&self) -> Shape;
+    /// How many there are.
+    fn n_primitives(&self) -> u64;
+    /// How many vertices there are.
+    fn n_vertices(&self) -> u64;
+    /// Primitives `first..first + n`, in range; `None` where they are no triangles and the file must be read whole.
+    fn read(&self, first: u64, n: usize) -> Result<Option<Chunk>, Error>;
+}
+
+/// Opens a mesh file in the way that suits it.
+pub fn open(path: &Path) -> Result<Box<dyn Source>, Error> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    match extension.to_ascii_lowercase().as_str() {
+        "ply" => {
+            if let Some(source) = ply::Ply::open(path)? {
+                return Ok(Box::new(source));
+            }
+        }
+        "stl" => {
+            if let Some(source) = stl::Stl::open(path)? {
+                return Ok(Box::new(source));
+            }
+        }
+        "npy" => return Ok(Box::new(npy::Npy::open(path)?)),
+        _ => {}
+    }
+    open_whole(path)
+}
+
+/// Opens a mesh file by reading all of it.
+pub fn open_whole(path: &Path) -> Result<Box<dyn Source>, Error> {
+    Ok(Box::new(whole::Whole::open(path)?))
+}
+
+/// Opens a file in the way that a plan says.
+pub fn open_as(path: &Path, reader: &str) -> Result<Box<dyn Source>, Error> {
+    let source = if reader == "whole" {
+        open_whole(path)?
+    } else {
+        open(path)?
+    };
+    if source.reader() != reader {
+        return Err(Error::Changed {
+            path: path.to_owned(),
+        });
+    }
+    Ok(source)
+}
+
+/// The length of a file, and a checksum of up to 16 blocks spread evenly over it: enough to notice another file.
+pub fn fingerprint(path: &Path) -> Result<(u64, u64), Error> {
+    const BLOCK: u64 = 4096;
+    const N: u64 = 16;
+    let length = length(path)?;
+    let mut bytes = Vec::new();
+    for block in 0..N {
+        let start = length.saturating_sub(BLOCK) / (N - 1) * block;
+        let n = BLOCK.min(length - start);
+        bytes.extend(read_at(path, start, n as usize)?);
+    }
+    Ok((length, checksum(&bytes)))
+}
+
+fn length(path: &Path) -> Result<u64, Error> {
+    let metadata = std::fs::metadata(path).map_err(|source| Error::io(path, "open", source))?;
+    if !metadata.is_file() {
+        let source = std::io::Error::other("not a regular file");
+        return Err(Error::io(path, "read", source));
+    }
+    Ok(metadata.len())
+}
+
+/// Exactly `n` bytes of a file from `start` on.
+fn read_at(path: &Path, start: u64, n: usize) -> Result<Vec<u8>, Error> {
+    let read = || {
+        let mut file = File::open(path)?;
+        file.seek(SeekFrom::Start(start))?;
+        let mut bytes = vec![0; n];
+        file.read_exact(&mut bytes)?;
+        Ok(bytes)
+    };
+    read().map_err(|source| Error::io(path, "read", source))
+}
+
+/// The first bytes of a file, up to `most`.
+fn head(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
+    let n = length(path)?.min(most);
+    read_at(path, 0, n as usize)
+}
+
+fn f32_at(bytes: &[u8], at: usize) -> f64 {
+    f64::from(f32::from_le_bytes(std::array::from_fn(|ix| bytes[at + ix])))
+}
+
+fn f64_at(bytes: &[u8], at: usize) -> f64 {
+    f64::from_le_bytes(std::array::from_fn(|ix| bytes[at + ix]))
+}
+
+/// Refuses more than 32-bit numbers can name.
+fn check_count(path: &Path, what: &'static str, given: u64) -> Result<(), Error> {
+    let limit = u64::from(u32::MAX);
+    if given > limit {
+        return Err(Error::TooMany {
+            path: path.to_owned(),
+            what,
+            given,
+            limit,
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,6 @@
+//! Tests that need the inside of the crate.
+
+mod lattice;
+mod made;
+mod refusals;
+mod stops;

@@ -1,0 +1,230 @@
+//! Tiles against the oracle, where everything touches: any cuts, both precisions, both rules, triangles and tetrahedra.
+//! And that wrong comparisons would be noticed.
+
+use std::collections::BTreeMap;
+
+use impinge::SharedVertex;
+
+use super::made::{Random, answer, cells, lattice, oracle, rows, write};
+use crate::cells::{Bounds, Cells, HalfOpen, Rule, owner_point};
+use crate::{Ask, PlanOptions};
+
+#[test]
+fn tiles_have_the_rows_of_the_whole() {
+    let mut random = Random(1);
+    let (mut n_pairs, mut n_copies) = (0, 0);
+    for scene in 0..120 {
+        let folder = tempfile::tempdir().unwrap();
+        let is_f64 = random.chance(2);
+        let n_bodies = 1 + random.below(3);
+        let meshes: Vec<_> = (0..n_bodies)
+            .map(|_| {
+                let (n, is_solid) = (10 + random.below(60) as usize, random.chance(3));
+                lattice(&mut random, n, is_solid, is_f64)
+            })
+            .collect();
+        let files: Vec<_> = meshes
+            .iter()
+            .enumerate()
+            .map(|(ix, mesh)| write(folder.path(), &format!("body{ix}"), mesh))
+            .collect();
+        let (between, within) =
+            [(true, true), (true, false), (false, true)][random.below(3) as usize];
+        let shared_vertex = [SharedVertex::Skip, SharedVertex::Resolve][random.below(2) as usize];
+        let ask = Ask {
+            between,
+            within,
+            shared_vertex,
+        };
+        let cuts = cells(&mut random, if is_f64 { 1.0 / 3.0 } else { 0.25 });
+        let options = PlanOptions {
+            // Sometimes so small that tiles fall apart into pieces.
+            cap: if random.chance(3) { 7 } else { 1000 },
+            chunk: 1 + u64::from(random.below(20)),
+            cells: random.chance(8).then(Cells::whole).or(Some(cuts)),
+            ..PlanOptions::default()
+        };
+        let merged = answer(&folder.path().join("tiles"), &files, &options, ask).unwrap();
+        let (expected, hash) = oracle(&meshes, ask);
+        assert_eq!(
+            rows(&merged),
+            expected,
+            "scene {scene}: {ask:?}, {options:?}"
+        );
+        assert_eq!(merged.hash, hash);
+        n_pairs += expected.len();
+        n_copies += merged.n_records as usize
+            - meshes.iter().map(|mesh| mesh.n_primitives()).sum::<usize>();
+    }
+    // Not for want of pairs, nor of primitives in several tiles.
+    assert!(
+        n_pairs > 5_000 && n_copies > 1_000,
+        "{n_pairs} pairs, {n_copies} copies"
+    );
+}
+
+#[test]
+fn cuts_of_the_plan_have_the_rows_of_the_whole() {
+    let mut random = Random(2);
+    for cap in [3, 10, 30] {
+        let folder = tempfile::tempdir().unwrap();
+        let meshes = [
+            lattice(&mut random, 150, false, false),
+            lattice(&mut random, 100, true, false),
+        ];
+        let files = [
+            write(folder.path(), "a", &meshes[0]),
+            write(folder.path(), "b", &meshes[1]),
+        ];
+        let options = PlanOptions {
+            cap,
+            chunk: 64,
+            ..PlanOptions::default()
+        };
+        let merged = answer(
+            &folder.path().join("tiles"),
+            &files,
+            &options,
+            Ask::default(),
+        )
+        .unwrap();
+        let (expected, hash) = oracle(&meshes, Ask::default());
+        assert_eq!((rows(&merged), merged.hash), (expected, hash));
+    }
+}
+
+#[test]
+fn a_pile_that_no_cut_parts_falls_apart_into_pieces() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = Random(3);
+    let mut mesh = lattice(&mut random, 90, false, false);
+    // All boxes are the same.
+    if let impinge_io::Positions::F32(positions) = &mut mesh.positions {
+        positions[0] = [-9.0; 3];
+        positions[1] = [9.0; 3];
+    }
+    if let impinge_io::Elements::Triangles(faces) = &mut mesh.elements {
+        for face in faces {
+            (face[0], face[1]) = (0, 1);
+        }
+    }
+    let file = write(folder.path(), "pile", &mesh);
+    let ask = Ask {
+        shared_vertex: SharedVertex::Resolve,
+        ..Ask::default()
+    };
+    let options = PlanOptions {
+        cap: 8,
+        ..PlanOptions::default()
+    };
+    let merged = answer(&folder.path().join("tiles"), &[file], &options, ask).unwrap();
+    assert_eq!((merged.n_uncut, merged.n_records), (1, 90));
+    let (expected, hash) = oracle(&[mesh], ask);
+    assert_eq!((rows(&merged), merged.hash), (expected, hash));
+}
+
+/// Boxes on a lattice, all pairs that meet, and how often each is found by the tiles of a rule.
+fn found<R: Rule>(seed: u64) -> (usize, usize) {
+    let mut random = Random(seed);
+    let (mut n_lost, mut n_twice) = (0, 0);
+    for _ in 0..40 {
+        let cells = cells(&mut random, 1.0);
+        let boxes: Vec<Bounds> = (0..40)
+            .map(|_| {
+                let lo: [f64; 3] = std::array::from_fn(|_| f64::from(random.below(10)));
+                (lo, lo.map(|x| x + f64::from(random.below(4))))
+            })
+            .collect();
+        let mut tiles: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (ix, bounds) in boxes.iter().enumerate() {
+            cells.route::<R>(bounds, |tile| tiles.entry(tile).or_default().push(ix));
+        }
+        let mut times: BTreeMap<(usize, usize), usize> = BTreeMap::new();
+        for (&tile, members) in &tiles {
+            for &a in members {
+                for &b in members.iter().filter(|&&b| a < b) {
+                    if cells.owner_by::<R>(owner_point(&boxes[a].0, &boxes[b].0)) == tile {
+                        *times.entry((a, b)).or_default() += 1;
+                    }
+                }
+            }
+        }
+        for a in 0..boxes.len() {
+            for b in a + 1..boxes.len() {
+                let meet = (0..3).all(|axis| {
+                    boxes[a].0[axis] <= boxes[b].1[axis] && boxes[b].0[axis] <= boxes[a].1[axis]
+                });
+                let n = times.get(&(a, b)).copied().unwrap_or(0);
+                n_lost += usize::from(meet && n == 0);
+                n_twice += usize::from(n > 1);
+            }
+        }
+    }
+    (n_lost, n_twice)
+}
+
+macro_rules! spoiled {
+    ($name:ident, $low:expr, $high:expr, $lies:expr) => {
+        struct $name;
+        impl Rule for $name {
+            fn goes_low(lo: f64, cut: f64) -> bool {
+                $low(lo, cut)
+            }
+            fn goes_high(hi: f64, cut: f64) -> bool {
+                $high(hi, cut)
+            }
+            fn lies_low(x: f64, cut: f64) -> bool {
+                $lies(x, cut)
+            }
+        }
+    };
+}
+
+fn lt(a: f64, b: f64) -> bool {
+    a < b
+}
+fn le(a: f64, b: f64) -> bool {
+    a <= b
+}
+fn gt(a: f64, b: f64) -> bool {
+    a > b
+}
+fn ge(a: f64, b: f64) -> bool {
+    a >= b
+}
+
+spoiled!(HighIsOpen, lt, gt, lt);
+spoiled!(PointsOnCutsAreLow, lt, ge, le);
+
+#[test]
+fn every_pair_is_found_once_and_wrong_comparisons_are_noticed() {
+    for seed in 10..20 {
+        assert_eq!(found::<HalfOpen>(seed), (0, 0));
+        assert!(found::<HighIsOpen>(seed).0 > 0);
+        assert!(found::<PointsOnCutsAreLow>(seed).0 > 0);
+    }
+}
+
+#[test]
+fn cells_survive_json_and_nonsense_does_not() {
+    let mut random = Random(5);
+    for _ in 0..50 {
+        let cells = cells(&mut random, 0.1);
+        assert_eq!(Cells::from_json(&cells.to_json()), Some(cells));
+    }
+    for text in [
+        "[]",
+        "{}",
+        "[{\"tile\": 1}]",
+        "[{\"tile\": 0}, {\"tile\": 0}]",
+        "[{\"axis\": 0, \"cut_bits\": \"0\", \"low\": 0, \"high\": 0}]",
+        "[{\"axis\": 3, \"cut_bits\": \"0\", \"low\": 1, \"high\": 2}, {\"tile\": 0}, {\"tile\": 1}]",
+        "[{\"axis\": 0, \"cut_bits\": \"7ff0000000000000\", \"low\": 1, \"high\": 2}, {\"tile\": 0}, {\"tile\": 1}]",
+    ] {
+        assert_eq!(
+            Cells::from_json(&serde_json::from_str(text).unwrap()),
+            None,
+            "{text}"
+        );
+    }
+}

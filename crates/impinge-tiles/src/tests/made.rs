@@ -1,0 +1,207 @@
+//! Scenes for tests, as files and as the oracle sees them.
+
+use std::path::{Path, PathBuf};
+
+use impinge::{CancelToken, Control, Detector, Method, Scene, Settings};
+use impinge_io::{ColoredMesh, Elements, Mesh, Positions, write_ply};
+
+use crate::{Ask, Cells, Merged, Plan, PlanOptions, RunOptions, ScatterOptions};
+
+/// A linear congruential generator (Knuth's MMIX).
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn below(&mut self, n: u32) -> u32 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 33) % u64::from(n)) as u32
+    }
+
+    pub fn chance(&mut self, one_in: u32) -> bool {
+        self.below(one_in) == 0
+    }
+}
+
+/// Primitives between few vertices of a lattice: everything touches, lies on cuts, or is degenerate. One in eight is a giant.
+pub fn lattice(random: &mut Random, n: usize, is_solid: bool, is_f64: bool) -> Mesh {
+    let width = 4 + random.below(8);
+    let n_vertices = 4 + n as u32 / 2;
+    // A third of a lattice step is no f32: then the numbers need f64.
+    let unit = if is_f64 { 1.0 / 3.0 } else { 0.25 };
+    let positions: Vec<[f64; 3]> = (0..n_vertices)
+        .map(|_| std::array::from_fn(|_| f64::from(random.below(width)) * unit))
+        .collect();
+    // Near vertices mostly, so that primitives are small against the whole.
+    let near = |random: &mut Random, start: u32| {
+        if random.chance(8) {
+            return random.below(n_vertices);
+        }
+        let distance = |v: &u32| -> f64 {
+            let (a, b) = (positions[*v as usize], positions[start as usize]);
+            (0..3).map(|axis| (a[axis] - b[axis]).abs()).sum()
+        };
+        let tries: Vec<u32> = (0..6).map(|_| random.below(n_vertices)).collect();
+        tries
+            .into_iter()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .unwrap()
+    };
+    let corners = |random: &mut Random| {
+        let start = random.below(n_vertices);
+        [
+            start,
+            near(random, start),
+            near(random, start),
+            near(random, start),
+        ]
+    };
+    let elements = if is_solid {
+        Elements::Tetrahedra((0..n).map(|_| corners(random)).collect())
+    } else {
+        Elements::Triangles(
+            (0..n)
+                .map(|_| corners(random))
+                .map(|[a, b, c, _]| [a, b, c])
+                .collect(),
+        )
+    };
+    let positions = if is_f64 {
+        Positions::F64(positions)
+    } else {
+        Positions::F32(positions.iter().map(|p| p.map(|x| x as f32)).collect())
+    };
+    Mesh {
+        positions,
+        elements,
+    }
+}
+
+/// Writes a mesh in a format that keeps it: PLY for triangles, Medit for tetrahedra.
+pub fn write(folder: &Path, name: &str, mesh: &Mesh) -> PathBuf {
+    match &mesh.elements {
+        Elements::Triangles(_) => {
+            let path = folder.join(format!("{name}.ply"));
+            let colored = ColoredMesh {
+                positions: &mesh.positions,
+                elements: &mesh.elements,
+                primitive_colors: None,
+                colliding: None,
+                name,
+            };
+            write_ply(&path, &[colored]).unwrap();
+            path
+        }
+        Elements::Tetrahedra(tets) => {
+            let path = folder.join(format!("{name}.mesh"));
+            let mut text = format!(
+                "MeshVersionFormatted 2\nDimension 3\nVertices {}\n",
+                mesh.n_vertices()
+            );
+            for [x, y, z] in mesh.positions.to_f64() {
+                text += &format!("{x} {y} {z} 0\n");
+            }
+            text += &format!("Tetrahedra {}\n", tets.len());
+            for [a, b, c, d] in tets.iter().map(|tet| tet.map(|v| v + 1)) {
+                text += &format!("{a} {b} {c} {d} 0\n");
+            }
+            std::fs::write(&path, text + "End\n").unwrap();
+            path
+        }
+    }
+}
+
+/// Rows and hash by every box against every box.
+pub fn oracle(meshes: &[Mesh], ask: Ask) -> (Vec<[u32; 4]>, u64) {
+    let mut scene = Scene::new();
+    for mesh in meshes {
+        let elements: impinge::Elements = match mesh.elements.clone() {
+            Elements::Triangles(faces) => faces.into(),
+            Elements::Tetrahedra(tets) => tets.into(),
+        };
+        let positions: impinge::Positions = match mesh.positions.clone() {
+            Positions::F32(positions) => positions.into(),
+            Positions::F64(positions) => positions.into(),
+        };
+        scene.add(elements, positions).unwrap();
+    }
+    let mut detector = Detector::with_settings(Settings {
+        method: Method::Naive,
+        threads: 1,
+        ..Settings::default()
+    })
+    .unwrap();
+    let query = match (ask.between, ask.within) {
+        (true, true) => impinge::Query::everything(),
+        (true, false) => impinge::Query::all(),
+        _ => impinge::Query::all_within(),
+    };
+    let pairs = detector
+        .detect(&scene, &query.shared_vertex(ask.shared_vertex))
+        .unwrap();
+    (pairs.rows().collect(), pairs.hash())
+}
+
+pub fn one_thread() -> Settings {
+    Settings {
+        threads: 1,
+        ..Settings::default()
+    }
+}
+
+pub fn plan(folder: &Path, files: &[PathBuf], options: &PlanOptions) -> Result<Plan, crate::Error> {
+    Plan::make(folder, files, options, &CancelToken::new(), &mut |_, _| {})
+}
+
+pub fn scatter(plan: &Plan) -> Result<crate::Scattered, crate::Error> {
+    let options = ScatterOptions {
+        threads: 1,
+        ..ScatterOptions::default()
+    };
+    plan.scatter(&options, &CancelToken::new(), &|_, _| {})
+}
+
+pub fn run(plan: &Plan, ask: Ask) -> Result<(), crate::Error> {
+    let options = RunOptions {
+        ask,
+        settings: one_thread(),
+        again: false,
+    };
+    plan.run(0..plan.n_tiles(), &options, &Control::new(), &mut |_| {})
+}
+
+/// All steps.
+pub fn answer(
+    folder: &Path,
+    files: &[PathBuf],
+    options: &PlanOptions,
+    ask: Ask,
+) -> Result<Merged, crate::Error> {
+    let plan = plan(folder, files, options)?;
+    scatter(&plan)?;
+    run(&plan, ask)?;
+    plan.merge()
+}
+
+pub fn rows(merged: &Merged) -> Vec<[u32; 4]> {
+    let bytes = std::fs::read(&merged.rows).unwrap();
+    let header = crate::npy::parse(&bytes).unwrap();
+    assert_eq!(header.shape, [merged.n_pairs, 4]);
+    let (words, rest) = bytes[header.start as usize..].as_chunks::<4>();
+    assert!(rest.is_empty());
+    let words: Vec<u32> = words.iter().map(|word| u32::from_le_bytes(*word)).collect();
+    words.as_chunks::<4>().0.to_vec()
+}
+
+/// Random cuts, at coordinates of the lattice as often as beside them.
+pub fn cells(random: &mut Random, unit: f64) -> Cells {
+    let mut cells = Cells::whole();
+    for _ in 0..random.below(12) {
+        let tile = random.below(cells.n_tiles());
+        let half = f64::from(random.below(2)) * 0.5;
+        let at = (f64::from(random.below(11)) + half) * unit;
+        cells.cut(tile, random.below(3) as usize, at);
+    }
+    cells
+}
