@@ -30,6 +30,7 @@ fn checked(path: &Path, options: &Options) -> Result<Checked, Failure> {
     let mesh = read(path, &ReadOptions::default()).map_err(|error| Failure {
         kind: match error {
             FileError::NotFinite { .. } => ErrorKind::NotFinite,
+            FileError::NoMemory { .. } => ErrorKind::Memory,
             FileError::Io { ref source, .. }
                 if source.kind() == std::io::ErrorKind::OutOfMemory =>
             {
