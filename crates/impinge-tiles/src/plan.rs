@@ -23,7 +23,7 @@ const SAMPLE: u64 = 500_000;
 /// How a plan is made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanOptions {
-    /// About how many primitives a tile may hold; one tile is in memory at a time. 2 million by default: about 1 GB.
+    /// About how many primitives a tile may hold; one tile is in memory at a time. 2 million by default: about 600 MB.
     pub cap: u64,
     /// Primitives per unit of scattering: what a process reads, sorts and writes at a time. 500,000 by default.
     pub chunk: u64,

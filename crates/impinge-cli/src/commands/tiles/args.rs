@@ -61,7 +61,7 @@ pub struct PlanArgs {
     /// Mesh files, a body each
     #[arg(value_name = "MESH", required = true)]
     pub meshes: Vec<PathBuf>,
-    /// About how many primitives a tile may hold, such as 500k or 2M: about 500 bytes each
+    /// About how many primitives a tile may hold, such as 500k or 2M: about 300 bytes each
     #[arg(long, value_name = "N", value_parser = count, default_value = "2M")]
     pub cap: u64,
     /// Primitives that are scattered at a time: about 200 bytes each, per thread
