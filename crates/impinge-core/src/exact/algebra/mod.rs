@@ -14,4 +14,4 @@ mod roots;
 
 pub(super) use integer::{Integer, common_integers};
 pub(super) use polynomial::{Polynomial, Vector, cross, difference, dot, square_of_sum};
-pub(super) use roots::{Root, Roots, Time};
+pub(super) use roots::{Root, Roots, Time, floor_between};

@@ -65,6 +65,11 @@ impl Polynomial {
 
     /// The sign at `numerator / 2^depth`, a time in [0, 1].
     pub(super) fn sign_at(&self, numerator: &Integer, depth: u64) -> Sign {
+        self.value_at(numerator, depth).sign()
+    }
+
+    /// The value at `numerator / 2^depth`, times 2^(degree * depth).
+    pub(super) fn value_at(&self, numerator: &Integer, depth: u64) -> Integer {
         let rest = &Integer::from(1).shifted(depth) - numerator;
         // Horner in (1-t) and t: ((c_n t + c_(n-1) (1-t)) t + c_(n-2) (1-t)^2) t + ...
         let mut power = rest.clone();
@@ -74,7 +79,11 @@ impl Polynomial {
             value = &(&value * numerator) + &(coefficient * &power);
             power = &power * &rest;
         }
-        value.sign()
+        value
+    }
+
+    pub(super) fn degree(&self) -> u64 {
+        self.0.len() as u64 - 1
     }
 
     /// Bernstein coefficients over [0, 1], times a positive number.

@@ -226,44 +226,12 @@ impl Root {
 
     /// The root rounded down.
     pub(in crate::exact) fn floor(&self) -> Time {
-        // Floats from 0 to 1 are ordered as their bits are: search there, from a guess outwards.
-        let is_below = |bits: u64| self.compare(f64::from_bits(bits)) == Ordering::Less;
-        let one = 1.0_f64.to_bits();
-        let (mut low, mut high) = (0, one + 1);
-        let mut at = self.guess().clamp(0.0, 1.0).to_bits();
-        let mut step = 1_u64;
-        while high - low > 1 {
-            if is_below(at) {
-                high = at;
-            } else {
-                low = at;
-            }
-            // Outwards by growing steps while one side is open, then to the middle.
-            at = match (low, high) {
-                (0, _) => high.saturating_sub(step),
-                (_, high) if high == one + 1 => low.saturating_add(step).min(one),
-                _ => low + (high - low) / 2,
-            };
-            step = step.saturating_mul(2);
-            if at <= low || at >= high {
-                at = low + (high - low) / 2;
-            }
-        }
-        let floor = f64::from_bits(low);
-        Time {
-            floor,
-            is_exact: self.compare(floor) == Ordering::Equal,
-        }
+        floor_of(self.guess(), |x| self.compare(x))
     }
 
     /// The root compared with a float in [0, 1].
     fn compare(&self, x: f64) -> Ordering {
-        let ([numerator], exponent) = common_integers([x]);
-        // x is an integer only where it is 0 or 1.
-        let (numerator, depth) = match u64::try_from(-exponent) {
-            Ok(depth) => (numerator, depth),
-            Err(_) => unreachable!("a number of at most 1"),
-        };
+        let (numerator, depth) = dyadic(x);
         let order_of = |sign: Sign| match sign {
             Sign::Negative => Ordering::Less,
             Sign::Zero => Ordering::Equal,
@@ -307,6 +275,76 @@ impl Root {
                 scaled(start_of(&self.path).approximate(), depth) + scaled((inside, 0), depth)
             }
         }
+    }
+}
+
+/// The only root of a polynomial between two floats in [0, 1], which are no roots, rounded down.
+pub(in crate::exact) fn floor_between(polynomial: &Polynomial, low: f64, high: f64) -> Time {
+    let value_at = |x: f64| {
+        let (numerator, depth) = dyadic(x);
+        polynomial.value_at(&numerator, depth)
+    };
+    let (at_low, at_high) = (value_at(low), value_at(high));
+    // The root of the chord, as a guess: the values are over 2^(degree * depth).
+    let power = |x: f64| i64::try_from(dyadic(x).1 * polynomial.degree()).unwrap_or(0);
+    let ((a, i), (b, j)) = (at_low.approximate(), at_high.approximate());
+    let apart = (j - power(high)) - (i - power(low));
+    let b = b * 2.0_f64.powi(i32::try_from(apart.clamp(-1000, 1000)).unwrap_or(0));
+    let guess = low + (high - low) * (a / (a - b));
+    let before = at_low.sign();
+    floor_of(guess, |x| {
+        if x <= low {
+            return Ordering::Greater;
+        }
+        if x >= high {
+            return Ordering::Less;
+        }
+        match value_at(x).sign() {
+            Sign::Zero => Ordering::Equal,
+            sign if sign == before => Ordering::Greater,
+            _ => Ordering::Less,
+        }
+    })
+}
+
+/// A root in [0, 1] rounded down, from a guess and a comparison of the root with floats.
+fn floor_of(guess: f64, compare: impl Fn(f64) -> Ordering) -> Time {
+    // Floats from 0 to 1 are ordered as their bits are: search there, from a guess outwards.
+    let is_below = |bits: u64| compare(f64::from_bits(bits)) == Ordering::Less;
+    let one = 1.0_f64.to_bits();
+    let (mut low, mut high) = (0, one + 1);
+    let mut at = guess.clamp(0.0, 1.0).to_bits();
+    let mut step = 1_u64;
+    while high - low > 1 {
+        if is_below(at) {
+            high = at;
+        } else {
+            low = at;
+        }
+        // Outwards by growing steps while one side is open, then to the middle.
+        at = match (low, high) {
+            (0, _) => high.saturating_sub(step),
+            (_, high) if high == one + 1 => low.saturating_add(step).min(one),
+            _ => low + (high - low) / 2,
+        };
+        step = step.saturating_mul(2);
+        if at <= low || at >= high {
+            at = low + (high - low) / 2;
+        }
+    }
+    let floor = f64::from_bits(low);
+    Time {
+        floor,
+        is_exact: compare(floor) == Ordering::Equal,
+    }
+}
+
+/// A float in [0, 1] as an integer over 2^depth.
+fn dyadic(x: f64) -> (Integer, u64) {
+    let ([numerator], exponent) = common_integers([x]);
+    match u64::try_from(-exponent) {
+        Ok(depth) => (numerator, depth),
+        Err(_) => unreachable!("a number of at most 1"),
     }
 }
 

@@ -34,7 +34,7 @@ mod triangles;
 
 use super::Point;
 
-pub(super) use moving::contact_answer;
+pub(super) use motion::Search;
 #[allow(
     unused_imports,
     reason = "the pipeline for moving elements takes these up"
@@ -43,6 +43,7 @@ pub use moving::{
     Contacts8, Moving64, Steps8, edge_edge_apart, edge_edge_apart_in_tables, edge_edge_contacts,
     vertex_face_apart, vertex_face_apart_in_tables, vertex_face_contacts,
 };
+pub(super) use moving::{contact_answer, contact_search};
 pub(super) use neighbours::{shared_edge, shared_vertex};
 pub(super) use tetrahedra::tetrahedra_answer;
 pub use tetrahedra::{classify_by_faces, classify_tetrahedra};

@@ -219,19 +219,28 @@ fn look_up<V: Lookup>([x, y, z]: &[[f32; TABLE]; 3], places: V::Places) -> [V; 3
     ]
 }
 
-/// The same for one pair, in `f64`.
+/// The same for one pair, in `f64`; none for pairs without a face of their difference polygon.
+#[inline]
+pub(in super::super) fn contact_search(
+    pair: ElementPair,
+    start: &[Point; 4],
+    end: &[Point; 4],
+) -> Option<Search<f64>> {
+    match pair {
+        ElementPair::VertexFace => Some(search_one(&Motion::vertex_face(start, end))),
+        ElementPair::EdgeEdge => Some(search_one(&Motion::edge_edge(start, end))),
+        ElementPair::VertexVertex | ElementPair::VertexEdge => None,
+    }
+}
+
+/// Whether they touch, if that is certain.
 #[inline]
 pub(in super::super) fn contact_answer(
     pair: ElementPair,
     start: &[Point; 4],
     end: &[Point; 4],
 ) -> Option<bool> {
-    let found = match pair {
-        ElementPair::VertexFace => search_one(&Motion::vertex_face(start, end)),
-        ElementPair::EdgeEdge => search_one(&Motion::edge_edge(start, end)),
-        ElementPair::VertexVertex | ElementPair::VertexEdge => return None,
-    };
-    match found {
+    match contact_search(pair, start, end)? {
         Search { yes: true, .. } => Some(true),
         Search { no: true, .. } => Some(false),
         _ => None,

@@ -23,7 +23,7 @@ mod tests;
 
 use super::Point;
 use super::algebra::Time;
-use super::filter::contact_answer;
+use super::filter::{Search, contact_answer, contact_search};
 use super::segment::segments_intersect;
 use super::triangle::segment_meets_triangle;
 pub(super) use polygon::Polygon;
@@ -138,10 +138,20 @@ pub fn first_contact(pair: ElementPair, start: &[Point; 4], end: &[Point; 4]) ->
     if is_apart_on_an_axis(pair, start, end) || !are_finite(pair, start, end) {
         return None;
     }
-    if contact_answer(pair, start, end) == Some(false) {
-        return None;
+    match contact_search(pair, start, end) {
+        Some(Search { no: true, .. }) => None,
+        // One root of f is between these times, and they are none: it is the first contact.
+        Some(Search {
+            yes: true,
+            low,
+            high,
+            ..
+        }) => {
+            let polygon = Polygon::new(pair.corners(), start, end);
+            Some(Contact::later(polygon.time_between(low, high)))
+        }
+        _ => first_contact_by_roots(pair, start, end),
     }
-    first_contact_by_roots(pair, start, end)
 }
 
 /// [`first_contact`] by exact arithmetic alone.

@@ -2,6 +2,7 @@
 
 use crate::exact::algebra::{
     Integer, Polynomial, Root, Roots, Time, Vector, common_integers, cross, difference, dot,
+    floor_between,
 };
 use crate::exact::{Point, Sign};
 
@@ -47,6 +48,11 @@ impl Polygon {
         (Self { corners }, distance)
     }
 
+    /// The only root of f between two times, which are no roots, rounded down. For triangles and parallelograms.
+    pub(super) fn time_between(&self, low: f64, high: f64) -> Time {
+        floor_between(&plane_and_height(&self.corners).1, low, high)
+    }
+
     pub(in crate::exact) fn corners(&self) -> &[Vector] {
         &self.corners
     }
@@ -66,11 +72,7 @@ impl Polygon {
 /// With f = N . V_0 and w_i = N . (V_i x V_(i+1)): the origin is inside at t if and only if f(t) = 0 and all
 /// w_i(t) > 0, or it is on an edge. If all w_i(t) are at least 0 and one is greater, f(t) = 0 suffices.
 fn first_in_face(corners: &[Vector]) -> Option<Time> {
-    let normal = cross(
-        &difference(&corners[1], &corners[0]),
-        &difference(&corners[2], &corners[1]),
-    );
-    let f = dot(&normal, &corners[0]);
+    let (normal, f) = plane_and_height(corners);
     if f.is_zero() {
         // The first contact is on an edge.
         return edges(corners)
@@ -83,6 +85,16 @@ fn first_in_face(corners: &[Vector]) -> Option<Time> {
     let edges: Vec<Edge> = edges(corners).collect();
     let sides: Vec<Polynomial> = edges.iter().map(|edge| dot(&normal, &edge.cross)).collect();
     Roots::of(f).find_map(|mut root| is_inside(&mut root, &sides, &edges).then(|| root.floor()))
+}
+
+/// N and f.
+fn plane_and_height(corners: &[Vector]) -> (Vector, Polynomial) {
+    let normal = cross(
+        &difference(&corners[1], &corners[0]),
+        &difference(&corners[2], &corners[1]),
+    );
+    let f = dot(&normal, &corners[0]);
+    (normal, f)
 }
 
 /// Whether the origin is in the polygon at a root of f.

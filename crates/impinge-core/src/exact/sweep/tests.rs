@@ -1,7 +1,7 @@
 //! What the filter for moving elements says against what exact roots say. The roots themselves are held against an
 //! independent oracle in `tests/sweep`.
 
-use super::{Contact, ElementPair, first_contact_by_roots};
+use super::{Contact, ElementPair, first_contact, first_contact_by_roots};
 use crate::exact::Point;
 use crate::exact::filter::{
     self, BATCH, Contacts8, LANES, Moving64, Steps8, TABLE, contact_answer, number,
@@ -273,6 +273,8 @@ fn filter_never_contradicts_exact_roots() {
                         let [start, end] = &steps[lane];
                         if let Some(answer) = contact_answer(pair, start, end) {
                             assert_eq!(answer, contact.is_some(), "{}", case());
+                            // The quick way to the time is the same time.
+                            assert_eq!(first_contact(pair, start, end), contact, "{}", case());
                         }
                     }
                 }
