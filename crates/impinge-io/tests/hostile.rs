@@ -395,3 +395,46 @@ fn a_binary_stl_may_have_any_title() {
         assert_eq!(sample.read(&bytes).unwrap(), sample.mesh);
     }
 }
+
+/// Reading is linear in the corners of a polygon: where it is not, this takes hours.
+#[test]
+fn a_polygon_of_many_corners_is_read_at_once() {
+    const N: usize = 300_000;
+    let vertices: String = (0..N)
+        .map(|ix| format!("{} {} 0\n", ix % 1000, ix / 1000))
+        .collect();
+    let corners =
+        |first: usize| -> String { (first..N + first).map(|ix| format!(" {ix}")).collect() };
+    let obj = format!(
+        "{}f{}\n",
+        vertices
+            .lines()
+            .map(|line| format!("v {line}\n"))
+            .collect::<String>(),
+        corners(1)
+    );
+    let off = format!("OFF\n{N} 1 0\n{vertices}{N}{}\n", corners(0));
+    let ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex {N}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face 1\nproperty list uint uint vertex_indices\nend_header\n{vertices}{N}{}\n",
+        corners(0)
+    );
+    let vtk = format!(
+        "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS {N} float\n{vertices}POLYGONS 1 {}\n{N}{}\n",
+        N + 1,
+        corners(0)
+    );
+    // Each corner on a line of its own, which OBJ continues.
+    let long = obj.replacen(&corners(1), &corners(1).replace(' ', " \\\n"), 1);
+    for (format, text) in [
+        (Format::Obj, obj),
+        (Format::Obj, long),
+        (Format::Off, off),
+        (Format::Ply, ply),
+        (Format::Vtk, vtk),
+    ] {
+        let read = move || read_bytes(text.as_bytes(), format, "file", &ReadOptions::default());
+        let mesh = soon("a polygon", read).unwrap();
+        assert_eq!(mesh.n_primitives(), N - 2, "{format:?}");
+    }
+}
