@@ -4,28 +4,30 @@ use std::path::{Path, PathBuf};
 
 use crate::error::Error;
 
-/// Fails where an output is one of the inputs, by whatever name or link: what is written has less in it than a mesh file may
-/// have (normals, colours, attributes, groups), and the input would be gone.
-pub fn check<'p>(
-    outputs: impl IntoIterator<Item = (&'static str, &'p Path)>,
-    inputs: &[PathBuf],
-) -> Result<(), Error> {
-    for (option, output) in outputs {
+/// The files that are read.
+pub struct Inputs(Vec<(PathBuf, Id)>);
+
+impl Inputs {
+    pub fn new<'p>(paths: impl IntoIterator<Item = &'p PathBuf>) -> Self {
+        let known = |path: &PathBuf| Some((path.clone(), Id::of(path)?));
+        Inputs(paths.into_iter().filter_map(known).collect())
+    }
+
+    /// Fails where an output is one of them, by whatever name or link: what is written has less in it than a mesh file may
+    /// have (normals, colours, attributes, groups), and the input would be gone.
+    pub fn check(&self, option: &str, output: &Path) -> Result<(), Error> {
         let Some(output_id) = Id::of(output) else {
-            continue;
+            return Ok(());
         };
-        if let Some(input) = inputs
-            .iter()
-            .find(|input| Id::of(input).is_some_and(|id| id == output_id))
-        {
-            return Err(Error::Usage(format!(
+        match self.0.iter().find(|(_, id)| *id == output_id) {
+            None => Ok(()),
+            Some((input, _)) => Err(Error::Usage(format!(
                 "{option} {} is the input {}, which would be lost: choose another name",
                 output.display(),
                 input.display()
-            )));
+            ))),
         }
     }
-    Ok(())
 }
 
 /// What tells a regular file from all others, however it is named.

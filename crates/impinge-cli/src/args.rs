@@ -7,7 +7,10 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use impinge_fem::scenes::SceneName;
 
 use crate::commands::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, TILES_EXAMPLES, TilesArgs};
-use crate::values::{CurvesFile, FrameRange, MeshFile, RowsFile, body_numbers, bytes, lambda};
+use crate::values::{
+    CurvesFile, FrameRange, FramesFile, MeshFile, RowsFile, RowsFormat, at_least_one, body_numbers,
+    bytes, lambda, mesh_format,
+};
 #[cfg(feature = "gpu")]
 use crate::values::{PngFile, azimuth, elevation, part, size};
 
@@ -23,13 +26,15 @@ const EXAMPLES: &str = "\
 Examples:
   impinge demo                                  a built-in scene: no files needed
   impinge pairs a.obj b.obj                     which primitives of two meshes meet
-  impinge self cloth.ply --weld                 where a mesh runs into itself
+  impinge self cloth.ply                        where a mesh runs into itself
+  impinge self part.stl --fail-on-hit           the same as a check: exit code 3 where it does
+  impinge pairs a.obj b.obj --pairs -           the pairs themselves, as CSV
   impinge check parts/*.stl                     what is wrong with each mesh
   impinge sequence body.ply run.pc2 --self      the same, frame after frame
   impinge simulate blocks --out out/blocks      bodies that fall, deform and collide
 
-Exit codes: 0 done, 2 bad usage, 130 stopped by Ctrl-C (128 and the signal's number), 1 any other
-error (one line on stderr).
+Exit codes: 0 done, 2 bad usage, 3 pairs were found and --fail-on-hit was given, 130 stopped by Ctrl-C
+(128 and the signal's number), 1 any other error (one line on stderr).
 `impinge help COMMAND` explains a command.";
 
 #[derive(Debug, Subcommand)]
@@ -65,7 +70,7 @@ pub enum Command {
     #[cfg(feature = "gpu")]
     #[command(after_help = RENDER_EXAMPLES)]
     Render(RenderArgs),
-    /// List the GPUs, and drivers that imitate one, for --device
+    /// List GPUs and software drivers, for --device
     #[cfg(feature = "gpu")]
     Devices(DevicesArgs),
 }
@@ -84,7 +89,7 @@ const RENDER_EXAMPLES: &str = "\
 Examples:
   impinge render a.obj b.obj --png out.png
   impinge render a.ply b.msh --png out.png --size 1920x1080 --azimuth -60 --up z
-  impinge render cow.off --self --weld --png cow.png --see-through 1
+  impinge render cow.off --self --png cow.png --see-through 1
   impinge pairs a.ply b.ply --png out.png           the answer, and its picture
 
 A software driver suffices where there is no GPU. The colliding primitives of body 0 are red, of body 1
@@ -102,13 +107,14 @@ const PAIRS_EXAMPLES: &str = "\
 Examples:
   impinge pairs a.obj b.obj
   impinge pairs a.stl b.ply c.msh --self --pairs pairs.npy
+  impinge pairs a.ply b.ply --pairs -
   impinge pairs a.ply b.ply --json | jq .pairs
   impinge pairs a.ply b.ply --repeat 100 --threads 2
   impinge pairs a.ply b.ply c.ply --ignore 0,1 --out seen.glb
   impinge pairs a.ply b.ply --curves curves.obj --contacts contacts.csv
 
 Rows of --pairs are body_a, primitive_a, body_b, primitive_b (u32, sorted): bodies numbered
-from 0 as given, primitives as in the file. --contacts has a row for each corner of what two triangles have in
+from 0 as given, primitives as in the file. With `--pairs -` the summary goes to standard error. --contacts has a row for each corner of what two triangles have in
 common: a point, a segment's two ends, or the corners of a polygon where they lie in one plane. feature_a and
 feature_b say where it lies: on vertex 7 (v7), edge 7-9 (e7-9) or face 3 (f3).";
 
@@ -122,12 +128,15 @@ triangles are surfaces: one that lies wholly inside another has a distance from 
 
 const SELF_EXAMPLES: &str = "\
 Examples:
-  impinge self cow.off --weld
-  impinge self cow.off --weld --shared-vertex resolve --pairs pairs.csv
-  impinge self cloth.ply --out seen.ply
+  impinge self cow.off
+  impinge self cow.off --pairs pairs.csv --out seen.ply
+  impinge self part.stl --fail-on-hit
+  cat cow.off | impinge self - --format off --pairs - --pairs-format jsonl
+  impinge self cow.off --no-weld --shared-vertex skip
 
-Many files repeat a vertex for each face that uses it. Then neighbours share no vertex index and
-are reported wherever they touch: weld such files.";
+Many files repeat a vertex for each face that uses it, so vertices at one position count as one. Pairs of
+neighbours are reported where they share more points than the vertices they have in common, as folded
+faces do. --no-weld and --shared-vertex skip turn either off.";
 
 const SEQUENCE_EXAMPLES: &str = "\
 Examples:
@@ -135,6 +144,7 @@ Examples:
   impinge sequence body.ply run.pc2 --other floor.obj --self
   impinge sequence body.obj frames_0001.obj --frames 10..20 --json
   impinge sequence body.obj 'frames_%04d.obj' --json | head
+  impinge sequence body.ply run.pc2 --pairs pairs.csv --out seen_%04d.ply
 
 FRAMES is a .pc2 or .mdd file, the first of numbered mesh files, or a pattern of their names.
 Without --other, self-collision is what is asked for.";
@@ -162,8 +172,8 @@ pub struct DetectorArgs {
     /// A part of the GPU's name, to choose among several (`impinge devices` lists them)
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
-    /// CPU threads [default: one a core]
-    #[arg(long, value_name = "N")]
+    /// CPU threads [default: one per core]
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
     pub threads: Option<NonZeroUsize>,
     /// Density coefficient of the grid of `--method cells`
     #[arg(long, value_name = "X", value_parser = lambda, default_value = "1")]
@@ -182,16 +192,28 @@ pub struct DetectorArgs {
 /// What is asked of meshes from files.
 #[derive(Debug, Clone, Args)]
 pub struct AskArgs {
-    /// Pairs of one body that share a vertex: not reported, or where they meet in more than that
-    #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Skip)]
+    /// Which neighbours are reported: pairs of primitives of one body that share a vertex
+    #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Resolve)]
     pub shared_vertex: SharedVertexArg,
-    /// Make vertices at the same position one, in each file by itself
-    #[arg(long)]
+    /// Make vertices at the same position one, in each file by itself [default wherever a body may meet itself]
+    #[arg(long, overrides_with = "no_weld")]
     pub weld: bool,
+    /// Keep vertices at the same position apart, but for STL files, whose triangles share nothing else
+    #[arg(long, overrides_with = "weld")]
+    pub no_weld: bool,
+    /// The format of the mesh that is read from standard input, named "-": ply, off, stl, …
+    #[arg(long, value_name = "EXT", value_parser = mesh_format)]
+    pub format: Option<impinge_io::Format>,
     /// Leave out the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
     #[arg(long, value_name = "A,B", value_parser = body_numbers)]
     pub ignore: Vec<(usize, usize)>,
-    /// Print JSON and nothing else
+    /// End with exit code 3 where there is any pair
+    #[arg(long)]
+    pub fail_on_hit: bool,
+    /// Print the bodies, the time of each stage, counters and the hash of the answer as well
+    #[arg(short, long)]
+    pub verbose: bool,
+    /// Print JSON and nothing else (see docs/cli.md)
     #[arg(long)]
     pub json: bool,
 }
@@ -200,11 +222,14 @@ pub struct AskArgs {
 #[derive(Debug, Clone, Args)]
 pub struct AnswerArgs {
     /// Run N frames, positions rewritten before each, and show median times
-    #[arg(long, value_name = "N", default_value = "1")]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = at_least_one)]
     pub repeat: NonZeroUsize,
-    /// Write the pairs (.npy or .csv)
+    /// Write the pairs (.csv, .jsonl or .npy; "-" is standard output, as CSV unless --pairs-format says otherwise)
     #[arg(long, value_name = "FILE")]
     pub pairs: Option<RowsFile>,
+    /// How pairs are written, whatever the file is called
+    #[arg(long, value_enum, value_name = "FORMAT", requires = "pairs")]
+    pub pairs_format: Option<RowsFormat>,
     /// Write where the triangles of each pair meet, a row for each corner (.npy or .csv)
     #[arg(long, value_name = "FILE")]
     pub contacts: Option<RowsFile>,
@@ -226,10 +251,8 @@ pub struct AnswerArgs {
 impl AnswerArgs {
     /// The files to be written, each with its option.
     pub fn outputs(&self) -> Vec<(&'static str, &Path)> {
-        let pairs = self
-            .pairs
-            .as_ref()
-            .map(|file| ("--pairs", file.path.as_path()));
+        let rows = self.pairs.as_ref().filter(|file| !file.is_stdout());
+        let pairs = rows.map(|file| ("--pairs", file.path.as_path()));
         let contacts = self.contacts.as_ref();
         let contacts = contacts.map(|file| ("--contacts", file.path.as_path()));
         let curves = self.curves.as_ref();
@@ -243,6 +266,13 @@ impl AnswerArgs {
             .into_iter()
             .flatten()
             .collect()
+    }
+
+    /// Where the pairs go, in the format that was asked for.
+    pub fn rows(&self) -> Option<RowsFile> {
+        let file = self.pairs.clone()?;
+        let format = self.pairs_format.unwrap_or(file.format);
+        Some(RowsFile { format, ..file })
     }
 }
 
@@ -383,6 +413,19 @@ pub struct SequenceArgs {
     /// Frames from A up to, but not including, B, counted from 0; either may be left out
     #[arg(long, value_name = "A..B", default_value = "..")]
     pub frames: FrameRange,
+    /// Write the pairs of all frames, the number of the frame first (.csv or .jsonl; "-" is standard output, as CSV)
+    #[arg(long, value_name = "FILE")]
+    pub pairs: Option<RowsFile>,
+    /// Write the meshes of each frame, colliding primitives coloured (seen_%04d.ply, .glb or .vtu)
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<FramesFile<MeshFile>>,
+    /// Draw each frame (seen_%04d.png)
+    #[cfg(feature = "gpu")]
+    #[arg(long, value_name = "FILE")]
+    pub png: Option<FramesFile<PngFile>>,
+    #[cfg(feature = "gpu")]
+    #[command(flatten)]
+    pub picture: PictureArgs,
     #[command(flatten)]
     pub ask: AskArgs,
     #[command(flatten)]
@@ -512,9 +555,9 @@ impl From<BackendArg> for impinge::Backend {
 /// [`impinge::SharedVertex`] as an option.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SharedVertexArg {
-    /// Never reported
+    /// None
     Skip,
-    /// Reported where they meet in more than what they share
+    /// Those that share more points than the vertices they have in common
     Resolve,
 }
 

@@ -55,7 +55,8 @@ pub fn write(file: &RowsFile, contacts: &Contacts) -> Result<(), Error> {
     let mut to = AtomicFile::create(&file.path)?;
     let written = match file.format {
         RowsFormat::Npy => npy(&mut to, contacts),
-        RowsFormat::Csv => csv(&mut to, contacts),
+        // Lines of JSON are refused when the options are looked at.
+        RowsFormat::Csv | RowsFormat::Jsonl => csv(&mut to, contacts),
     };
     written.map_err(|source| Error::Write {
         path: file.path.clone(),

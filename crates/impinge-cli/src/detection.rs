@@ -1,8 +1,10 @@
 //! Running a detector as the command line says, and its times over many frames.
 
-use impinge::{BodyId, CancelToken, Control, Detector, Pairs, Positions, Query, Scene, Settings};
+use impinge::{
+    Backend, BodyId, CancelToken, Control, Detector, Pairs, Positions, Query, Scene, Settings,
+};
 
-use crate::args::{AskArgs, DetectorArgs};
+use crate::args::{AskArgs, BackendArg, DetectorArgs};
 use crate::error::Error;
 use crate::watch::Watch;
 
@@ -15,7 +17,7 @@ pub fn detector(args: &DetectorArgs) -> Result<Detector, Error> {
 pub fn settings(args: &DetectorArgs) -> Settings {
     Settings {
         method: args.method.into(),
-        backend: args.backend.into(),
+        backend: backend(args),
         threads: args.threads.map_or(0, Into::into),
         lambda: args.lambda,
         group_size: args.group_size,
@@ -23,6 +25,36 @@ pub fn settings(args: &DetectorArgs) -> Settings {
         device: args.device.clone(),
         ..Settings::default()
     }
+}
+
+/// Where the work is done.
+fn backend(args: &DetectorArgs) -> Backend {
+    match (args.backend, &args.device) {
+        // A device that is named is wanted: one that is not there is an error.
+        (BackendArg::Auto, Some(_)) => Backend::Gpu,
+        (BackendArg::Auto, None) if !may_have_gpu() => Backend::Cpu,
+        (backend, _) => backend.into(),
+    }
+}
+
+/// Whether this machine may have a GPU in hardware. Looking for one loads every driver, and software drivers write to
+/// standard error then. On Linux a GPU has a file in `/dev`: of the kernel's graphics drivers, of NVIDIA's, of Windows
+/// below it, or of a phone.
+fn may_have_gpu() -> bool {
+    if !cfg!(target_os = "linux") {
+        return true;
+    }
+    let has = |folder: &str, start: &str| {
+        std::fs::read_dir(folder).is_ok_and(|mut entries| {
+            entries.any(|entry| {
+                entry.is_ok_and(|entry| entry.file_name().to_string_lossy().starts_with(start))
+            })
+        })
+    };
+    has("/dev/dri", "render")
+        || ["nvidia", "dxg", "kgsl", "mali"]
+            .iter()
+            .any(|start| has("/dev", start))
 }
 
 /// The question with its adjacency rule and the pairs of bodies to leave out.

@@ -49,6 +49,9 @@ pub enum Error {
     /// Rows of pairs, or the folder of an output file, could not be written.
     #[error("{}: cannot write: {source}", .path.display())]
     Write { path: PathBuf, source: io::Error },
+    /// Pairs were found, and that was to be told.
+    #[error("pairs were found")]
+    Hit,
     /// What is printed could not be.
     #[error("standard output: {0}")]
     Output(#[from] io::Error),
@@ -99,9 +102,15 @@ impl Error {
             Error::Usage(_)
             | Error::Tiles(impinge_tiles::Error::Argument { .. })
             | Error::Detection(impinge::Error::Setting { .. }) => 2,
+            Error::Hit => 3,
             Error::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
             _ => 1,
         }
+    }
+
+    /// Whether nothing need be said on standard error.
+    pub fn is_silent(&self) -> bool {
+        matches!(self, Error::Hit) || self.exit_code() == 0
     }
 
     /// The message on one line.

@@ -4,17 +4,25 @@ use impinge::{BodyId, Error, Pairs, Scene, Statistics};
 use serde_json::{Map, Value, json};
 
 use crate::detection::Times;
+use crate::load::Vertices;
+use crate::regions::Region;
 
-/// `pairs`, `hash`, `backend`, `method`, `bodies`, `ms` and `stats`; times are medians.
+/// The most regions that are described; all of them are counted.
+const MOST_REGIONS: usize = 100;
+
+/// The object that `docs/answer.schema.json` describes, times as medians.
 pub fn answer(
     scene: &Scene,
     bodies: &[(BodyId, &str)],
+    vertices: &[Vertices],
     pairs: &Pairs,
+    regions: Option<&[Region]>,
     times: &Times,
 ) -> Result<Map<String, Value>, Error> {
     let described: Vec<Value> = bodies
         .iter()
-        .map(|&(id, name)| {
+        .zip(vertices)
+        .map(|(&(id, name), vertices)| {
             let body = scene.body(id)?;
             Ok(json!({
                 "name": name,
@@ -22,6 +30,8 @@ pub fn answer(
                 "primitives": body.n_primitives(),
                 "vertices": body.n_vertices(),
                 "colliding": pairs.colliding(id).len(),
+                "welded": vertices.n_welded,
+                "coincident": vertices.n_coincident,
             }))
         })
         .collect::<Result<_, Error>>()?;
@@ -40,6 +50,20 @@ pub fn answer(
         json!({ "total": rounded(times.total_ms(50)), "stages": stages }),
     );
     object.insert("stats".into(), counters(pairs.stats()));
+    object.insert("n_regions".into(), regions.map(<[_]>::len).into());
+    let most = regions.unwrap_or_default().iter().take(MOST_REGIONS);
+    let described: Vec<Value> = most
+        .map(|region| {
+            json!({
+                "bodies": region.bodies,
+                "pairs": region.n_pairs,
+                "center": region.center(),
+                "size": region.size(),
+                "first": region.first,
+            })
+        })
+        .collect();
+    object.insert("regions".into(), described.into());
     Ok(object)
 }
 

@@ -1,14 +1,20 @@
 //! Mesh files to bodies of a scene.
 
-use std::io::{Write, stderr};
+use std::io::{Read, Write, stderr, stdin};
 use std::path::{Path, PathBuf};
 
 use impinge::{BodyId, CancelToken, Scene};
-use impinge_io::{Mesh, ReadOptions, Summary, Weld, read_with_summary, weld};
+use impinge_io::{
+    Format, Mesh, ReadOptions, Summary, Weld, read_bytes_with_summary, read_with_summary,
+};
 
+use crate::args::AskArgs;
 use crate::error::Error;
 use crate::output::grouped;
 use crate::watch::go_on;
+
+/// The path that stands for standard input.
+const STDIN: &str = "-";
 
 /// A scene and what its bodies are called.
 #[derive(Debug, Default)]
@@ -16,16 +22,66 @@ pub struct Bodies {
     pub scene: Scene,
     pub ids: Vec<BodyId>,
     pub names: Vec<String>,
+    pub vertices: Vec<Vertices>,
+}
+
+/// What became of a file's vertices that share their position.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Vertices {
+    /// How many were made one with another.
+    pub n_welded: usize,
+    /// How many lie where another one does, and are apart; `None` where nobody looked.
+    pub n_coincident: Option<usize>,
 }
 
 /// How files are read.
 #[derive(Debug, Clone, Copy)]
 pub struct Loading<'a> {
-    /// Make vertices at the same position one.
-    pub weld: bool,
-    /// Say on standard error what was fanned, left out and welded.
-    pub notes: bool,
-    pub cancel: &'a CancelToken,
+    /// Whether vertices at one position become one, told by the user.
+    weld: Option<bool>,
+    /// Whether it is asked where a body meets itself: then it matters which vertices are one.
+    is_self: bool,
+    /// The format of standard input.
+    format: Option<Format>,
+    /// Whether to say on standard error what was fanned, left out and welded.
+    notes: bool,
+    cancel: &'a CancelToken,
+}
+
+impl<'a> Loading<'a> {
+    pub fn new(ask: &AskArgs, is_self: bool, cancel: &'a CancelToken) -> Self {
+        Loading {
+            weld: match (ask.weld, ask.no_weld) {
+                (true, _) => Some(true),
+                (_, true) => Some(false),
+                _ => None,
+            },
+            is_self,
+            format: ask.format,
+            notes: !ask.json,
+            cancel,
+        }
+    }
+
+    /// Files as they are, for questions between bodies.
+    pub fn as_they_are(notes: bool, cancel: &'a CancelToken) -> Self {
+        Loading {
+            weld: None,
+            is_self: false,
+            format: None,
+            notes,
+            cancel,
+        }
+    }
+
+    /// Whether vertices at one position become one. Those of an STL file share nothing but that.
+    fn welds(&self, format: Format) -> bool {
+        match self.weld {
+            Some(true) => true,
+            Some(false) => self.is_self && format == Format::Stl,
+            None => self.is_self,
+        }
+    }
 }
 
 impl Bodies {
@@ -45,16 +101,23 @@ impl Bodies {
         loading: Loading<'_>,
     ) -> Result<(BodyId, Option<Weld>), Error> {
         go_on(loading.cancel)?;
-        let name = path.display().to_string();
-        let (mut mesh, summary) = read_with_summary(path, &ReadOptions::default())?;
-        let mut n_welded = 0;
-        let welding = loading.weld.then(|| {
-            let welding = Weld::by_position(&mesh.positions);
-            n_welded = weld(&mut mesh);
-            welding
-        });
+        let (name, format, (mut mesh, summary)) = self.read_one(path, loading)?;
+        let welds = loading.welds(format);
+        let mut vertices = Vertices::default();
+        let mut welding = None;
+        if welds || loading.is_self {
+            let weld = Weld::by_position(&mesh.positions);
+            if welds {
+                weld.apply(&mut mesh);
+                vertices.n_welded = weld.n_welded();
+                vertices.n_coincident = Some(0);
+                welding = Some(weld);
+            } else {
+                vertices.n_coincident = Some(weld.n_welded());
+            }
+        }
         if loading.notes {
-            note(&name, &summary, n_welded);
+            note(&name, &summary, vertices);
         }
         // No coordinate changes its value here; half the memory is saved where all of them allow it.
         mesh.positions.narrow_if_exact();
@@ -71,12 +134,51 @@ impl Bodies {
             })?;
         self.ids.push(id);
         self.names.push(name);
+        self.vertices.push(vertices);
         Ok((id, welding))
+    }
+
+    /// A file, or standard input, as it is.
+    fn read_one(
+        &self,
+        path: &Path,
+        loading: Loading<'_>,
+    ) -> Result<(String, Format, (Mesh, Summary)), Error> {
+        let options = ReadOptions::default();
+        if path != Path::new(STDIN) {
+            let format = Format::from_path(path)?;
+            let read = read_with_summary(path, &options)?;
+            return Ok((path.display().to_string(), format, read));
+        }
+        let name = "standard input";
+        let Some(format) = loading.format else {
+            let text = "a mesh from standard input needs its format, such as --format ply";
+            return Err(Error::Usage(text.to_owned()));
+        };
+        if self.names.iter().any(|other| other == name) {
+            let text = "only one mesh can come from standard input";
+            return Err(Error::Usage(text.to_owned()));
+        }
+        let mut bytes = Vec::new();
+        let most = options.max_file_bytes;
+        stdin()
+            .lock()
+            .take(most.saturating_add(1))
+            .read_to_end(&mut bytes)
+            .map_err(|source| Error::Read {
+                path: name.into(),
+                source,
+            })?;
+        if bytes.len() as u64 > most {
+            return Err(Error::Usage(format!("{name}: more than {most} bytes")));
+        }
+        let read = read_bytes_with_summary(&bytes, format, name, &options)?;
+        Ok((name.to_owned(), format, read))
     }
 }
 
-/// What a user should know about a file who looks at primitive numbers.
-fn note(name: &str, summary: &Summary, n_welded: usize) {
+/// What a user should know about a file who looks at primitive numbers, or wonders about pairs.
+fn note(name: &str, summary: &Summary, vertices: Vertices) {
     for (n, what) in [
         (
             summary.n_polygons_fanned,
@@ -86,7 +188,11 @@ fn note(name: &str, summary: &Summary, n_welded: usize) {
             summary.n_triangles_skipped,
             "triangles beside tetrahedra left out",
         ),
-        (n_welded as u64, "vertices welded to others"),
+        (vertices.n_welded as u64, "vertices welded to others"),
+        (
+            vertices.n_coincident.unwrap_or(0) as u64,
+            "vertices at the position of another, not welded to it",
+        ),
     ] {
         if n > 0 {
             // A note that nobody can read does no harm.

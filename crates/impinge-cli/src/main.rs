@@ -6,6 +6,7 @@ mod commands;
 mod contacts;
 mod detection;
 mod error;
+mod headline;
 mod json;
 mod load;
 mod meshes;
@@ -13,6 +14,7 @@ mod output;
 mod palette;
 #[cfg(feature = "gpu")]
 mod picture;
+mod regions;
 mod rows;
 mod stop;
 mod values;
@@ -47,7 +49,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let code = error.exit_code();
-            if code != 0 {
+            if !error.is_silent() {
                 stop::say(&error.line());
             }
             ExitCode::from(code)

@@ -1,5 +1,7 @@
 //! Bodies as coloured meshes for a viewer.
 
+use std::path::Path;
+
 use impinge::{BodyId, Elements, Pairs, Positions, Scene};
 use impinge_io::{ColoredMesh, write_glb, write_ply, write_vtu};
 
@@ -26,6 +28,12 @@ pub fn write(
         MeshFormat::Vtu => write_vtu(&file.path, &meshes)?,
     }
     Ok(())
+}
+
+/// The last part of a path.
+fn file_name(path: &str) -> &str {
+    let name = Path::new(path).file_name().and_then(|name| name.to_str());
+    name.unwrap_or(path)
 }
 
 struct Part<'a> {
@@ -69,7 +77,8 @@ impl<'a> Part<'a> {
             },
             colors: primitive_colors,
             colliding,
-            name,
+            // Where the file is on this machine is no business of the mesh that is written.
+            name: file_name(name),
         })
     }
 

@@ -66,17 +66,17 @@ pub fn table(
     table.trim_fmt()
 }
 
-/// Bodies, stages and the pairs' count and hash.
-pub fn print_answer(
+/// Bodies, stages, counters and the hash.
+pub fn print_details(
+    to: &mut impl Write,
     scene: &Scene,
     bodies: &[(BodyId, &str)],
     pairs: &Pairs,
     times: &Times,
 ) -> Result<(), Error> {
-    let mut to = out();
-    writeln!(to, "{}\n", body_table(scene, bodies, pairs)?)?;
+    writeln!(to, "\n{}\n", body_table(scene, bodies, pairs)?)?;
     writeln!(to, "{}\n", stage_table(times))?;
-    print_summary(&mut to, pairs)?;
+    print_summary(to, pairs)?;
     Ok(())
 }
 

@@ -12,60 +12,64 @@ use crate::args::PictureArgs;
 use crate::error::Error;
 use crate::palette;
 
-/// Draws bodies as they are in the scene now, colliding primitives coloured, on the first adapter or on the one
-/// whose name contains `device`.
-pub fn write(
-    path: &Path,
-    args: &PictureArgs,
-    device: Option<&str>,
-    scene: &Scene,
-    bodies: &[(BodyId, &str)],
-    pairs: &Pairs,
-) -> Result<(), Error> {
-    let mut surfaces = surfaces(scene, bodies, pairs)?;
-    let contacts = Contacts::new(scene, pairs)?;
-    surfaces.push(tubes(&contacts, &contacts.curves(), diagonal(&surfaces)));
-    draw(path, args, device, surfaces)
+/// Draws pictures, all of one kind.
+pub struct Drawer<'a> {
+    args: &'a PictureArgs,
+    renderer: Renderer,
 }
 
-/// Draws surfaces, on the first adapter or on the one whose name contains `device`.
-pub fn draw(
-    path: &Path,
-    args: &PictureArgs,
-    device: Option<&str>,
-    surfaces: Vec<Surface>,
-) -> Result<(), Error> {
-    let picture = Picture {
-        surfaces,
-        camera: Camera {
-            azimuth: args.azimuth,
-            elevation: args.elevation,
-            up: args.up.into(),
-            projection: if args.orthographic {
-                Projection::Orthographic
-            } else {
-                Camera::default().projection
+impl<'a> Drawer<'a> {
+    /// Opens the first adapter, or the one whose name contains `device`.
+    pub fn new(args: &'a PictureArgs, device: Option<&str>) -> Result<Self, Error> {
+        let renderer = match device {
+            None => Renderer::new()?,
+            Some(name) => Renderer::on_device_named(name)?,
+        };
+        Ok(Drawer { args, renderer })
+    }
+
+    /// Draws bodies as they are in the scene now, colliding primitives coloured.
+    pub fn write(
+        &mut self,
+        path: &Path,
+        scene: &Scene,
+        bodies: &[(BodyId, &str)],
+        pairs: &Pairs,
+    ) -> Result<(), Error> {
+        let mut surfaces = surfaces(scene, bodies, pairs)?;
+        let contacts = Contacts::new(scene, pairs)?;
+        surfaces.push(tubes(&contacts, &contacts.curves(), diagonal(&surfaces)));
+        self.draw(path, surfaces)
+    }
+
+    /// Draws surfaces.
+    pub fn draw(&mut self, path: &Path, surfaces: Vec<Surface>) -> Result<(), Error> {
+        let args = self.args;
+        let picture = Picture {
+            surfaces,
+            camera: Camera {
+                azimuth: args.azimuth,
+                elevation: args.elevation,
+                up: args.up.into(),
+                projection: if args.orthographic {
+                    Projection::Orthographic
+                } else {
+                    Camera::default().projection
+                },
             },
-        },
-        size: args.size,
-        see_through: args.see_through,
-        ..Picture::default()
-    };
-    let mut renderer = match device {
-        None => Renderer::new()?,
-        Some(name) => Renderer::on_device_named(name)?,
-    };
-    let written = renderer.render(&picture)?.to_png();
-    let png = written.map_err(|source| Error::Write {
-        path: path.to_owned(),
-        source,
-    })?;
-    let mut to = AtomicFile::create(path)?;
-    to.write_all(&png).map_err(|source| Error::Write {
-        path: path.to_owned(),
-        source,
-    })?;
-    Ok(to.finish()?)
+            size: args.size,
+            see_through: args.see_through,
+            ..Picture::default()
+        };
+        let failed = |source| Error::Write {
+            path: path.to_owned(),
+            source,
+        };
+        let png = self.renderer.render(&picture)?.to_png().map_err(failed)?;
+        let mut to = AtomicFile::create(path)?;
+        to.write_all(&png).map_err(failed)?;
+        Ok(to.finish()?)
+    }
 }
 
 /// The length of the diagonal of the box of all vertices.

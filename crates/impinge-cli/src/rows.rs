@@ -1,25 +1,101 @@
-//! Rows of pairs as files: NumPy arrays and CSV.
+//! Rows of pairs: CSV, lines of JSON, NumPy arrays.
 
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 
 use impinge::Pairs;
 use impinge_io::AtomicFile;
 
 use crate::error::Error;
+use crate::output::out;
 use crate::values::{RowsFile, RowsFormat};
 
 /// Writes rows `body_a, primitive_a, body_b, primitive_b`, sorted.
 pub fn write(file: &RowsFile, pairs: &Pairs) -> Result<(), Error> {
+    if file.is_stdout() {
+        let mut to = BufWriter::new(out());
+        put(&mut to, file.format, pairs)?;
+        return Ok(to.flush()?);
+    }
     let mut to = AtomicFile::create(&file.path)?;
-    let written = match file.format {
-        RowsFormat::Npy => npy(&mut to, pairs.rows()),
-        RowsFormat::Csv => csv(&mut to, pairs.rows()),
-    };
-    written.map_err(|source| Error::Write {
+    put(&mut to, file.format, pairs).map_err(|source| Error::Write {
         path: file.path.clone(),
         source,
     })?;
     Ok(to.finish()?)
+}
+
+fn put(to: &mut impl Write, format: RowsFormat, pairs: &Pairs) -> io::Result<()> {
+    match format {
+        RowsFormat::Npy => npy(to, pairs.rows()),
+        RowsFormat::Csv => csv(to, pairs.rows()),
+        RowsFormat::Jsonl => jsonl(to, pairs.rows()),
+    }
+}
+
+/// The rows of the frames of a sequence, each behind the number of its frame.
+pub struct FrameRows {
+    file: RowsFile,
+    /// `None` where they go to standard output.
+    to: Option<AtomicFile>,
+}
+
+impl FrameRows {
+    /// Starts a file.
+    pub fn create(file: &RowsFile) -> Result<Self, Error> {
+        if file.format == RowsFormat::Npy {
+            let text = "--pairs: the pairs of a sequence are written as .csv or .jsonl";
+            return Err(Error::Usage(text.to_owned()));
+        }
+        let mut rows = FrameRows {
+            to: match file.is_stdout() {
+                true => None,
+                false => Some(AtomicFile::create(&file.path)?),
+            },
+            file: file.clone(),
+        };
+        if file.format == RowsFormat::Csv {
+            rows.put(|to| writeln!(to, "frame,body_a,primitive_a,body_b,primitive_b"))?;
+        }
+        Ok(rows)
+    }
+
+    /// Adds the pairs of a frame.
+    pub fn frame(&mut self, frame_ix: usize, pairs: &Pairs) -> Result<(), Error> {
+        let is_csv = self.file.format == RowsFormat::Csv;
+        self.put(|to| {
+            for [body_a, a, body_b, b] in pairs.rows() {
+                if is_csv {
+                    writeln!(to, "{frame_ix},{body_a},{a},{body_b},{b}")?;
+                } else {
+                    write!(to, "{{\"frame\":{frame_ix},")?;
+                    members(to, [body_a, a, body_b, b])?;
+                }
+            }
+            Ok(())
+        })
+    }
+
+    /// Gives the file its name.
+    pub fn finish(self) -> Result<(), Error> {
+        match self.to {
+            Some(file) => Ok(file.finish()?),
+            None => Ok(()),
+        }
+    }
+
+    fn put(&mut self, act: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Error> {
+        match &mut self.to {
+            Some(file) => act(file).map_err(|source| Error::Write {
+                path: self.file.path.clone(),
+                source,
+            }),
+            None => {
+                let mut to = BufWriter::new(out());
+                act(&mut to)?;
+                Ok(to.flush()?)
+            }
+        }
+    }
 }
 
 fn npy(to: &mut impl Write, rows: impl ExactSizeIterator<Item = [u32; 4]>) -> io::Result<()> {
@@ -51,6 +127,22 @@ fn csv(to: &mut impl Write, rows: impl Iterator<Item = [u32; 4]>) -> io::Result<
         writeln!(to, "{body_a},{a},{body_b},{b}")?;
     }
     Ok(())
+}
+
+fn jsonl(to: &mut impl Write, rows: impl Iterator<Item = [u32; 4]>) -> io::Result<()> {
+    for row in rows {
+        to.write_all(b"{")?;
+        members(to, row)?;
+    }
+    Ok(())
+}
+
+/// The members of a JSON object, and its end.
+fn members(to: &mut (impl Write + ?Sized), [body_a, a, body_b, b]: [u32; 4]) -> io::Result<()> {
+    writeln!(
+        to,
+        "\"body_a\":{body_a},\"primitive_a\":{a},\"body_b\":{body_b},\"primitive_b\":{b}}}"
+    )
 }
 
 #[cfg(test)]

@@ -1,8 +1,12 @@
 //! Values of options: files by their extension, sizes with a suffix, ranges.
 
+use std::marker::PhantomData;
+use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+
+use clap::ValueEnum;
 
 /// A file for rows of pairs.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -12,10 +16,21 @@ pub struct RowsFile {
 }
 
 /// How rows of pairs are written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum RowsFormat {
-    Npy,
+    /// A line for each pair, numbers with commas between them
     Csv,
+    /// A JSON object for each pair, on a line
+    Jsonl,
+    /// An array of NumPy's
+    Npy,
+}
+
+impl RowsFile {
+    /// Whether the pairs go to standard output.
+    pub fn is_stdout(&self) -> bool {
+        self.path == Path::new("-")
+    }
 }
 
 impl FromStr for RowsFile {
@@ -25,7 +40,9 @@ impl FromStr for RowsFile {
         let format = match extension(text).as_str() {
             "npy" => RowsFormat::Npy,
             "csv" => RowsFormat::Csv,
-            _ => return Err("rows are written as .npy or .csv".to_owned()),
+            "jsonl" | "ndjson" => RowsFormat::Jsonl,
+            _ if text == "-" => RowsFormat::Csv,
+            _ => return Err("rows are written as .csv, .jsonl or .npy".to_owned()),
         };
         Ok(RowsFile {
             path: text.into(),
@@ -107,6 +124,64 @@ impl FromStr for MeshFile {
             format,
         })
     }
+}
+
+/// Files for the frames of a sequence: a name in which `%d` or `%04d` stands for the number of the frame.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FramesFile<T> {
+    before: String,
+    width: usize,
+    after: String,
+    made_of: PhantomData<T>,
+}
+
+impl<T: FromStr<Err = String>> FramesFile<T> {
+    /// The file of a frame.
+    pub fn frame(&self, frame_ix: usize) -> Result<T, String> {
+        let (before, width, after) = (&self.before, self.width, &self.after);
+        format!("{before}{frame_ix:0width$}{after}").parse()
+    }
+}
+
+impl<T: FromStr<Err = String>> FromStr for FramesFile<T> {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || {
+            "expected a name with a number for the frame in it, such as seen_%04d.ply".to_owned()
+        };
+        let (before, rest) = text.split_once('%').ok_or_else(expected)?;
+        let (width, after) = rest.split_once('d').ok_or_else(expected)?;
+        let width = match width {
+            "" => 0,
+            width => width
+                .parse()
+                .ok()
+                .filter(|width| *width <= 20)
+                .ok_or_else(expected)?,
+        };
+        let files = FramesFile {
+            before: before.to_owned(),
+            width,
+            after: after.to_owned(),
+            made_of: PhantomData,
+        };
+        files.frame(0)?;
+        Ok(files)
+    }
+}
+
+/// A format of meshes by its extension.
+pub fn mesh_format(text: &str) -> Result<impinge_io::Format, String> {
+    impinge_io::Format::from_extension(text)
+        .filter(|format| *format != impinge_io::Format::Tetgen)
+        .ok_or_else(|| "expected the extension of a mesh file, such as ply, obj or stl".to_owned())
+}
+
+/// A number of at least 1.
+pub fn at_least_one(text: &str) -> Result<NonZeroUsize, String> {
+    text.parse()
+        .map_err(|_| "expected a whole number of at least 1".to_owned())
 }
 
 fn extension(path: &str) -> String {
@@ -346,7 +421,17 @@ mod tests {
     fn files_by_extension() {
         assert_eq!("a.NPY".parse::<RowsFile>().unwrap().format, RowsFormat::Npy);
         assert_eq!("a.csv".parse::<RowsFile>().unwrap().format, RowsFormat::Csv);
+        assert_eq!(
+            "a.jsonl".parse::<RowsFile>().unwrap().format,
+            RowsFormat::Jsonl
+        );
+        assert!("-".parse::<RowsFile>().unwrap().is_stdout());
         assert!("a.txt".parse::<RowsFile>().is_err());
+        let frames: FramesFile<MeshFile> = "f_%03d.glb".parse().unwrap();
+        assert_eq!(frames.frame(7).unwrap(), "f_007.glb".parse().unwrap());
+        for text in ["f.glb", "f_%03d.txt", "f_%s.glb", "f_%99999d.glb"] {
+            assert!(text.parse::<FramesFile<MeshFile>>().is_err(), "{text}");
+        }
         assert_eq!(
             "a.b.vtu".parse::<MeshFile>().unwrap().format,
             MeshFormat::Vtu

@@ -17,7 +17,7 @@ pub enum Error {
     /// A coordinate lies outside the range in which the predicates are exact
     /// (see [`exact::in_range`](crate::exact::in_range)). Rescale the scene.
     #[error(
-        "body {body}: vertex {vertex} has the coordinate {value:e}, outside the exact range (0 or {} to {} in magnitude)",
+        "body {body}: vertex {vertex} has the coordinate {value:e}, outside the exact range (0, or {:e} to {:e} in magnitude)",
         crate::exact::MIN_MAGNITUDE,
         crate::exact::MAX_MAGNITUDE
     )]

@@ -85,7 +85,7 @@ pub enum Error {
         found: String,
     },
     /// The file ends before what its header announces. Check that it was written and copied whole.
-    #[error("{at}: {what} needs {expected} bytes, but {found} are left")]
+    #[error("{at}: {what}: {expected} bytes are needed, but {found} are left")]
     Truncated {
         /// Where the data in question starts.
         at: Location,

@@ -201,6 +201,33 @@ impl Weld {
         &self.map
     }
 
+    /// Welds the mesh that this was made of: its vertices, and the indices of its primitives.
+    pub fn apply(&self, mesh: &mut Mesh) {
+        if self.n_welded() == 0 {
+            return;
+        }
+        if let Some(positions) = self.positions(&mesh.positions) {
+            mesh.positions = positions;
+            for ix in mesh.elements.indices_mut() {
+                // An index that is out of range stays out of range: fewer vertices are left.
+                if let Some(&welded) = self.map.get(*ix as usize) {
+                    *ix = welded;
+                }
+            }
+        }
+    }
+
+    /// Two vertices that are welded, but not at one position in these positions; `None` where there are none.
+    ///
+    /// In a frame of a sequence this says that the mesh comes apart where it was welded.
+    pub fn torn(&self, positions: &Positions) -> Option<[u32; 2]> {
+        (0u32..).zip(&self.map).find_map(|(ix, &welded)| {
+            let first = *self.firsts.get(welded as usize)?;
+            let (a, b) = (positions.get(first as usize)?, positions.get(ix as usize)?);
+            (a != b).then_some([first, ix])
+        })
+    }
+
     /// The positions of the welded vertices, taken from those of all vertices (of any frame); `None` where their number differs.
     pub fn positions(&self, positions: &Positions) -> Option<Positions> {
         if positions.len() != self.map.len() {
@@ -223,17 +250,7 @@ impl Weld {
 /// degenerate and stay. To weld the frames of a sequence alike, see [`Weld`].
 pub fn weld(mesh: &mut Mesh) -> usize {
     let weld = Weld::by_position(&mesh.positions);
-    if weld.n_welded() > 0 {
-        if let Some(positions) = weld.positions(&mesh.positions) {
-            mesh.positions = positions;
-        }
-        for ix in mesh.elements.indices_mut() {
-            // An index that is out of range stays out of range: fewer vertices are left.
-            if let Some(&welded) = weld.map.get(*ix as usize) {
-                *ix = welded;
-            }
-        }
-    }
+    weld.apply(mesh);
     weld.n_welded()
 }
 

@@ -104,6 +104,45 @@ impl Sequence {
         self.n_frames
     }
 
+    /// The files that hold the frames: one for each frame, or one for all of them; none where they are in memory.
+    pub fn files(&self) -> &[PathBuf] {
+        match &self.frames {
+            Frames::Files { files, .. } => files,
+            Frames::Cache {
+                source: Source::File(path, _),
+                ..
+            } => std::slice::from_ref(path),
+            Frames::Cache { .. } => &[],
+        }
+    }
+
+    /// Gaps in the numbers of numbered files: the files before and after each, where more numbers lie between two files than
+    /// between those that are closest. A sequence of every tenth number has no gap.
+    pub fn gaps(&self) -> Vec<[&Path; 2]> {
+        let Frames::Files { files, .. } = &self.frames else {
+            return Vec::new();
+        };
+        let number = |path: &PathBuf| {
+            let name = path.file_name()?.to_str()?;
+            let key = natural_key(name);
+            // The last number of the name without its extension, as in the matcher.
+            let stem = name.rfind('.').map_or(name, |dot| &name[..dot]);
+            let n_numbers = natural_key(stem).len();
+            key.get(n_numbers - 1).map(|(number, _)| *number)
+        };
+        let numbers: Option<Vec<u128>> = files.iter().map(number).collect();
+        let Some(numbers) = numbers else {
+            return Vec::new();
+        };
+        let steps = || numbers.windows(2).map(|two| two[1].saturating_sub(two[0]));
+        let least = steps().min().unwrap_or(1).max(1);
+        steps()
+            .zip(files.windows(2))
+            .filter(|(step, _)| *step > least)
+            .map(|(_, two)| [two[0].as_path(), two[1].as_path()])
+            .collect()
+    }
+
     /// How many vertices each frame has.
     pub fn n_points(&self) -> usize {
         self.n_points

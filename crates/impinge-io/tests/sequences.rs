@@ -90,12 +90,12 @@ fn cache_errors() {
         (
             Pc2,
             truncated(pc2(2, 2, &VALUES)),
-            "c: a sequence of 2 frames of 2 points needs 80 bytes, but 79 are left",
+            "c: a sequence of 2 frames of 2 points: 80 bytes are needed, but 79 are left",
         ),
         (
             Mdd,
             truncated(mdd(2, 2, &VALUES)),
-            "c: a sequence of 2 frames of 2 points needs 64 bytes, but 63 are left",
+            "c: a sequence of 2 frames of 2 points: 64 bytes are needed, but 63 are left",
         ),
         (
             Pc2,
@@ -110,7 +110,7 @@ fn cache_errors() {
         (
             Pc2,
             pc2(i32::MAX, i32::MAX, &VALUES),
-            "c: a sequence of 2147483647 frames of 2147483647 points needs 18446744073709551615 bytes, but 80 are left",
+            "c: a sequence of 2147483647 frames of 2147483647 points: 18446744073709551615 bytes are needed, but 80 are left",
         ),
     ] {
         assert_eq!(

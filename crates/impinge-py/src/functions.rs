@@ -75,8 +75,10 @@ pub fn pairs<'py>(
 /// faces : array_like of int, shape (n, 3) or (n, 4)
 ///     Triangles or tetrahedra as vertex indices.
 /// shared_vertex : {"skip", "resolve"}
-///     Primitives that share a vertex index are not reported, or reported when they meet in more
-///     than what they share.
+///     Primitives that share a vertex index are not reported, or reported when they share more points
+///     than the vertices they have in common. Vertices at one position with different indices are not
+///     shared: weld them first (``numpy.unique(vertices, axis=0, return_inverse=True)``) to get the
+///     answer of the program ``impinge self``, which welds and uses ``"resolve"``.
 /// **settings
 ///     As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given: waking a GPU
 ///     does not pay for one question.

@@ -34,7 +34,7 @@ impl Gpu {
                 .map(|adapter| adapter.get_info().name)
                 .collect();
             let there = match &names[..] {
-                [] => "there is none on this machine".to_owned(),
+                [] => format!("there is none on this machine{}", advice()),
                 names => format!("there are {}", names.join(", ")),
             };
             let found = match name {
@@ -118,6 +118,15 @@ impl Gpu {
         drop(view);
         buffer.unmap();
         Ok(taken)
+    }
+}
+
+/// What to do where there is no adapter.
+fn advice() -> &'static str {
+    if cfg!(target_os = "linux") {
+        "; install a Vulkan driver (a software one suffices: mesa-vulkan-drivers on Debian, Ubuntu and Fedora)"
+    } else {
+        ""
     }
 }
 

@@ -1,20 +1,22 @@
 //! `impinge pairs` and `impinge self`: one answer about one set of meshes.
 
-use std::io::Write;
+use std::io::{Write, stderr};
 use std::path::PathBuf;
 
 use impinge::contact::Contacts;
 use impinge::{BodyId, CancelToken, Query};
 use serde_json::Value;
 
+use crate::apart::Inputs;
 use crate::args::{AnswerArgs, AskArgs, DetectorArgs, PairsArgs, WithinArgs};
 use crate::detection::{detector, query, repeat};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
 #[cfg(feature = "gpu")]
-use crate::picture;
+use crate::picture::Drawer;
+use crate::values::{RowsFile, RowsFormat};
 use crate::watch::Watch;
-use crate::{apart, contacts, json, meshes, output, rows};
+use crate::{contacts, headline, json, meshes, output, regions, rows};
 
 /// `impinge pairs`.
 pub fn pairs(args: &PairsArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -24,7 +26,7 @@ pub fn pairs(args: &PairsArgs, cancel: &CancelToken) -> Result<(), Error> {
         Query::all()
     };
     answer(
-        asked,
+        (asked, args.within),
         &args.meshes,
         &args.ask,
         &args.answer,
@@ -36,7 +38,7 @@ pub fn pairs(args: &PairsArgs, cancel: &CancelToken) -> Result<(), Error> {
 /// `impinge self`.
 pub fn within(args: &WithinArgs, cancel: &CancelToken) -> Result<(), Error> {
     answer(
-        Query::all_within(),
+        (Query::all_within(), true),
         &args.meshes,
         &args.ask,
         &args.answer,
@@ -46,26 +48,38 @@ pub fn within(args: &WithinArgs, cancel: &CancelToken) -> Result<(), Error> {
 }
 
 fn answer(
-    asked: Query,
+    (asked, is_self): (Query, bool),
     paths: &[PathBuf],
     ask: &AskArgs,
     answer: &AnswerArgs,
     how: &DetectorArgs,
     cancel: &CancelToken,
 ) -> Result<(), Error> {
-    apart::check(answer.outputs(), paths)?;
-    let mut detector = detector(how)?;
-    let loading = Loading {
-        weld: ask.weld,
-        notes: !ask.json,
-        cancel,
-    };
+    let inputs = Inputs::new(paths);
+    for (option, path) in answer.outputs() {
+        inputs.check(option, path)?;
+    }
+    let rows_file = answer.rows();
+    if let Some(file) = &answer.contacts
+        && (file.is_stdout() || file.format == RowsFormat::Jsonl)
+    {
+        let text = "--contacts: contacts are written to files, as .npy or .csv";
+        return Err(Error::Usage(text.to_owned()));
+    }
+    let is_stdout_taken = rows_file.as_ref().is_some_and(RowsFile::is_stdout);
+    if ask.json && is_stdout_taken {
+        let text = "--json and --pairs - both write to standard output: give one of them a file";
+        return Err(Error::Usage(text.to_owned()));
+    }
     let Bodies {
         mut scene,
         ids,
         names,
-    } = Bodies::read(paths, loading)?;
+        vertices,
+    } = Bodies::read(paths, Loading::new(ask, is_self, cancel))?;
     let query = query(asked, ask, &ids)?;
+    // Only now: opening a GPU takes time, and some drivers talk.
+    let mut detector = detector(how)?;
 
     let watch = Watch::detection(!how.no_progress, "detecting");
     let n_frames = answer.repeat.get();
@@ -77,7 +91,7 @@ fn answer(
         .zip(names.iter().map(String::as_str))
         .collect();
     // Files come first: where one can't be written, no answer is printed that looks like success.
-    if let Some(file) = &answer.pairs {
+    if let Some(file) = &rows_file {
         rows::write(file, pairs)?;
     }
     if let Some(file) = &answer.out {
@@ -98,23 +112,43 @@ fn answer(
             contacts::write_curves(file, found, curves)?;
         }
     }
+    let regions = regions::regions(&scene, &bodies, pairs)?;
+    let regions = regions.as_deref();
     if ask.json {
-        let mut object = json::answer(&scene, &bodies, pairs, &times)?;
+        let mut object = json::answer(&scene, &bodies, &vertices, pairs, regions, &times)?;
         if let Some((found, curves)) = &met {
             object.insert("contacts".into(), contacts::object(found, curves));
         }
         writeln!(output::out(), "{}", Value::Object(object))?;
     } else {
-        output::print_answer(&scene, &bodies, pairs, &times)?;
+        let mut text = Vec::new();
+        headline::write(&mut text, &scene, &bodies, pairs, regions)?;
         if let Some((found, curves)) = &met {
-            writeln!(output::out(), "{}", contacts::summary(found, curves))?;
+            writeln!(text, "{}", contacts::summary(found, curves))?;
+        }
+        if ask.verbose {
+            output::print_details(&mut text, &scene, &bodies, pairs, &times)?;
+        }
+        if is_stdout_taken {
+            // Where standard error is closed nobody wants a summary.
+            let _ = stderr().write_all(&text);
+        } else {
+            output::out().write_all(&text)?;
         }
     }
     // Last: whoever has no adapter has the answer.
     #[cfg(feature = "gpu")]
     if let Some(png) = &answer.png {
-        let device = how.device.as_deref();
-        picture::write(&png.0, &answer.picture, device, &scene, &bodies, pairs)?;
+        let mut drawer = Drawer::new(&answer.picture, how.device.as_deref())?;
+        drawer.write(&png.0, &scene, &bodies, pairs)?;
     }
-    Ok(())
+    hit(ask, pairs.len())
+}
+
+/// What `--fail-on-hit` makes of a number of pairs.
+pub fn hit(ask: &AskArgs, n_pairs: usize) -> Result<(), Error> {
+    match ask.fail_on_hit && n_pairs > 0 {
+        true => Err(Error::Hit),
+        false => Ok(()),
+    }
 }

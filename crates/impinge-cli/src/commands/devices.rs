@@ -28,7 +28,7 @@ pub fn devices(args: &DevicesArgs) -> Result<(), Error> {
         return Ok(());
     }
     if devices.is_empty() {
-        writeln!(out(), "no GPU, and no driver that imitates one").map_err(Error::Output)?;
+        writeln!(out(), "no GPU and no software driver").map_err(Error::Output)?;
         return Ok(());
     }
     let rows = devices.iter().map(|device| {

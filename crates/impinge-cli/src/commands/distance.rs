@@ -14,13 +14,11 @@ use crate::output::out;
 
 /// `impinge distance`.
 pub fn distance(args: &DistanceArgs, cancel: &CancelToken) -> Result<(), Error> {
-    let loading = Loading {
-        weld: false,
-        notes: !args.json,
-        cancel,
-    };
+    let loading = Loading::as_they_are(!args.json, cancel);
     let paths = [args.a.clone(), args.b.clone()];
-    let Bodies { scene, ids, names } = Bodies::read(&paths, loading)?;
+    let Bodies {
+        scene, ids, names, ..
+    } = Bodies::read(&paths, loading)?;
     let start = Instant::now();
     let nearest = Distances::new().between(&scene, ids[0], ids[1])?;
     let ms = start.elapsed().as_secs_f64() * 1e3;

@@ -5,35 +5,37 @@ use std::io::Write;
 use impinge::{BodyId, CancelToken, Query};
 use serde_json::Value;
 
+use crate::apart::Inputs;
 use crate::args::RenderArgs;
+use crate::commands::answer::hit;
 use crate::detection::{detector, query, repeat};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
-use crate::output::{body_table, counted, out};
+use crate::output::{out, print_details};
+use crate::picture::Drawer;
 use crate::watch::Watch;
-use crate::{apart, json, picture};
+use crate::{headline, json, regions};
 
 /// Draws meshes, and says what collides in them.
 pub fn render(args: &RenderArgs, cancel: &CancelToken) -> Result<(), Error> {
     let how = &args.detector;
-    apart::check([("--png", args.png.0.as_path())], &args.meshes)?;
-    let mut detector = detector(how)?;
-    let loading = Loading {
-        weld: args.ask.weld,
-        notes: !args.ask.json,
-        cancel,
-    };
+    let path = &args.png.0;
+    Inputs::new(&args.meshes).check("--png", path)?;
     let Bodies {
         mut scene,
         ids,
         names,
-    } = Bodies::read(&args.meshes, loading)?;
+        vertices,
+    } = Bodies::read(&args.meshes, Loading::new(&args.ask, args.within, cancel))?;
     let asked = if args.within {
         Query::everything()
     } else {
         Query::all()
     };
     let query = query(asked, &args.ask, &ids)?;
+    // Before anything is searched for: without an adapter there will be no picture.
+    let mut drawer = Drawer::new(&args.picture, how.device.as_deref())?;
+    let mut detector = detector(how)?;
     let watch = Watch::detection(!how.no_progress, "detecting");
     let (pairs, times) = repeat(&mut detector, &mut scene, &query, 1, cancel, &watch)?;
     drop(watch);
@@ -42,17 +44,19 @@ pub fn render(args: &RenderArgs, cancel: &CancelToken) -> Result<(), Error> {
         .into_iter()
         .zip(names.iter().map(String::as_str))
         .collect();
-    let path = &args.png.0;
-    let device = how.device.as_deref();
-    picture::write(path, &args.picture, device, &scene, &bodies, pairs)?;
+    drawer.write(path, &scene, &bodies, pairs)?;
+    let regions = regions::regions(&scene, &bodies, pairs)?;
+    let regions = regions.as_deref();
     if args.ask.json {
-        let object = Value::Object(json::answer(&scene, &bodies, pairs, &times)?);
-        writeln!(out(), "{object}")?;
+        let answer = json::answer(&scene, &bodies, &vertices, pairs, regions, &times)?;
+        writeln!(out(), "{}", Value::Object(answer))?;
     } else {
         let mut to = out();
-        writeln!(to, "{}\n", body_table(&scene, &bodies, pairs)?)?;
-        let n_pairs = counted(pairs.len() as u64, "pair");
-        writeln!(to, "wrote {}: {n_pairs}", path.display())?;
+        headline::write(&mut to, &scene, &bodies, pairs, regions)?;
+        if args.ask.verbose {
+            print_details(&mut to, &scene, &bodies, pairs, &times)?;
+        }
+        writeln!(to, "wrote {}", path.display())?;
     }
-    Ok(())
+    hit(&args.ask, pairs.len())
 }

@@ -1,27 +1,39 @@
 //! `impinge sequence`: a frame after the other.
 
-use std::io::Write;
+use std::io::{Write, stderr};
 
-use impinge::{BodyId, CancelToken, Pairs, Query};
+use impinge::{BodyId, CancelToken, Pairs, Query, Scene};
 use impinge_io::{Sequence, Weld};
 use serde_json::{Map, Value};
 
+use crate::apart::Inputs;
 use crate::args::SequenceArgs;
+use crate::commands::answer::hit;
 use crate::detection::{Times, detect, detector, query, set_positions};
 use crate::error::Error;
-use crate::json;
 use crate::load::{Bodies, Loading, to_positions};
 use crate::output::{counted, grouped, out};
+#[cfg(feature = "gpu")]
+use crate::picture::Drawer;
+use crate::rows::FrameRows;
+use crate::values::RowsFile;
 use crate::watch::{Watch, go_on};
+use crate::{json, meshes, regions};
 
 /// `impinge sequence`.
 pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> {
-    let mut detector = detector(&args.detector)?;
-    let loading = Loading {
-        weld: args.ask.weld,
-        notes: !args.ask.json,
-        cancel,
+    let rows_on_stdout = args.pairs.as_ref().is_some_and(RowsFile::is_stdout);
+    if args.ask.json && rows_on_stdout {
+        let text = "--json and --pairs - both write to standard output: give one of them a file";
+        return Err(Error::Usage(text.to_owned()));
+    }
+    let asked = match (args.within, args.others.is_empty()) {
+        (_, true) => Query::all_within(),
+        (true, false) => Query::everything(),
+        (false, false) => Query::all(),
     };
+    let is_self = args.within || args.others.is_empty();
+    let loading = Loading::new(&args.ask, is_self, cancel);
     let mut bodies = Bodies::default();
     let (moving, weld) = bodies.add(&args.mesh, loading)?;
     let frames = Frames::open(args, weld)?;
@@ -32,12 +44,8 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         mut scene,
         ids,
         names,
+        vertices,
     } = bodies;
-    let asked = match (args.within, args.others.is_empty()) {
-        (_, true) => Query::all_within(),
-        (true, false) => Query::everything(),
-        (false, false) => Query::all(),
-    };
     let query = query(asked, &args.ask, &ids)?;
     let bodies: Vec<(BodyId, &str)> = ids
         .into_iter()
@@ -54,37 +62,107 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
                 frames.name
             ))
         })?;
+    let mut detector = detector(&args.detector)?;
+    let mut outputs = Outputs::new(args, &frames)?;
+    let prints = !args.ask.json && !rows_on_stdout;
     let watch = Watch::frames(!args.detector.no_progress, range.len(), true);
     let still = Watch::detection(false, "");
     let mut lines = Lines::default();
-    if !args.ask.json {
+    if prints {
         Lines::begin()?;
     }
+    let mut n_pairs = 0;
     for frame_ix in range {
         go_on(cancel)?;
         let positions = frames.read(frame_ix)?;
         set_positions(&mut scene, moving, &positions)
             .map_err(|source| frames.refused(frame_ix, source))?;
         let pairs = detect(&mut detector, &scene, &query, cancel, &still)?;
+        n_pairs += pairs.len();
+        outputs.frame(frame_ix, &scene, &bodies, pairs)?;
         if args.ask.json {
             let mut times = Times::default();
             times.add(pairs);
+            let regions = regions::regions(&scene, &bodies, pairs)?;
+            let regions = regions.as_deref();
             let mut line = Map::new();
             line.insert("frame".into(), frame_ix.into());
-            line.extend(json::answer(&scene, &bodies, pairs, &times)?);
+            let answer = json::answer(&scene, &bodies, &vertices, pairs, regions, &times)?;
+            line.extend(answer);
             let mut to = out();
             writeln!(to, "{}", Value::Object(line))?;
             to.flush()?;
-        } else {
+        } else if prints {
             lines.frame(frame_ix, &bodies, pairs)?;
         }
         watch.frame_done();
     }
     drop(watch);
-    if !args.ask.json {
+    outputs.finish()?;
+    if prints {
         lines.end()?;
     }
-    Ok(())
+    hit(&args.ask, n_pairs)
+}
+
+/// What is written of each frame, besides what is printed.
+struct Outputs<'a> {
+    args: &'a SequenceArgs,
+    inputs: Inputs,
+    rows: Option<FrameRows>,
+    #[cfg(feature = "gpu")]
+    drawer: Option<Drawer<'a>>,
+}
+
+impl<'a> Outputs<'a> {
+    fn new(args: &'a SequenceArgs, frames: &Frames) -> Result<Self, Error> {
+        let meshes = std::iter::once(&args.mesh).chain(&args.others);
+        let inputs = Inputs::new(meshes.chain(frames.sequence.files()));
+        if let Some(file) = args.pairs.as_ref().filter(|file| !file.is_stdout()) {
+            inputs.check("--pairs", &file.path)?;
+        }
+        Ok(Outputs {
+            args,
+            inputs,
+            rows: args.pairs.as_ref().map(FrameRows::create).transpose()?,
+            #[cfg(feature = "gpu")]
+            drawer: match args.png {
+                Some(_) => {
+                    let device = args.detector.device.as_deref();
+                    Some(Drawer::new(&args.picture, device)?)
+                }
+                None => None,
+            },
+        })
+    }
+
+    fn frame(
+        &mut self,
+        frame_ix: usize,
+        scene: &Scene,
+        bodies: &[(BodyId, &str)],
+        pairs: &Pairs,
+    ) -> Result<(), Error> {
+        if let Some(rows) = &mut self.rows {
+            rows.frame(frame_ix, pairs)?;
+        }
+        if let Some(files) = &self.args.out {
+            let file = files.frame(frame_ix).map_err(Error::Usage)?;
+            self.inputs.check("--out", &file.path)?;
+            meshes::write(&file, scene, bodies, pairs)?;
+        }
+        #[cfg(feature = "gpu")]
+        if let (Some(files), Some(drawer)) = (&self.args.png, &mut self.drawer) {
+            let file = files.frame(frame_ix).map_err(Error::Usage)?;
+            self.inputs.check("--png", &file.0)?;
+            drawer.write(&file.0, scene, bodies, pairs)?;
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Result<(), Error> {
+        self.rows.map_or(Ok(()), FrameRows::finish)
+    }
 }
 
 /// The frames of the sequence, welded as the mesh is.
@@ -96,8 +174,18 @@ struct Frames {
 
 impl Frames {
     fn open(args: &SequenceArgs, weld: Option<Weld>) -> Result<Self, Error> {
+        let sequence = Sequence::open(&args.sequence)?;
+        for [before, after] in sequence.gaps() {
+            // A note that nobody can read does no harm.
+            let _ = writeln!(
+                stderr(),
+                "note: no frame between {} and {}",
+                before.display(),
+                after.display()
+            );
+        }
         Ok(Frames {
-            sequence: Sequence::open(&args.sequence)?,
+            sequence,
             weld,
             name: args.sequence.display().to_string(),
         })
@@ -108,6 +196,13 @@ impl Frames {
         let positions = match &self.weld {
             None => positions,
             Some(weld) => {
+                if let Some([a, b]) = weld.torn(&positions) {
+                    return Err(Error::Usage(format!(
+                        "{}: frame {frame_ix}: vertices {a} and {b} are apart, but welded since they are at one position in the \
+                         mesh: use --no-weld",
+                        self.name
+                    )));
+                }
                 weld.positions(&positions)
                     .ok_or_else(|| impinge_io::Error::Mismatch {
                         file: self.name.clone(),
@@ -165,7 +260,10 @@ impl Lines {
             grouped(pairs.len() as u64),
             grouped(colliding as u64),
             pairs.stats().total_ms,
-            json::hash(pairs)
+            match pairs.is_empty() {
+                true => "-".to_owned(),
+                false => json::hash(pairs),
+            }
         )?;
         to.flush()?;
         self.times.add(pairs);

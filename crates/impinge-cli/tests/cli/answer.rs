@@ -24,7 +24,15 @@ fn json_has_the_shape_that_is_promised() {
     assert_eq!(
         keys(&object),
         [
-            "pairs", "hash", "backend", "method", "bodies", "ms", "stats"
+            "pairs",
+            "hash",
+            "backend",
+            "method",
+            "bodies",
+            "ms",
+            "stats",
+            "n_regions",
+            "regions"
         ]
     );
     assert_eq!(object["pairs"], json!(rows.len()));
@@ -45,6 +53,7 @@ fn json_has_the_shape_that_is_promised() {
     let described = |name: &str, primitives: usize, vertices: usize, colliding: usize| {
         json!({
             "name": name, "kind": "triangles", "primitives": primitives, "vertices": vertices, "colliding": colliding,
+            "welded": 0, "coincident": null,
         })
     };
     assert_eq!(
@@ -109,7 +118,14 @@ fn written_rows_are_the_library_s() {
             });
             assert!(!rows.is_empty(), "{args:?}");
             for file in ["rows.npy", "rows.csv"] {
-                let options = ["--shared-vertex", rule, "--pairs", file, "--json"];
+                let options = [
+                    "--no-weld",
+                    "--shared-vertex",
+                    rule,
+                    "--pairs",
+                    file,
+                    "--json",
+                ];
                 let object = folder.run(args.iter().chain(&names).chain(&options)).json();
                 assert_eq!(object["hash"], json!(hash), "{args:?}");
                 assert_eq!(object["pairs"], json!(rows.len()), "{args:?}");
@@ -167,7 +183,15 @@ fn no_option_of_the_search_changes_the_answer() {
         ],
     ] {
         let args = [
-            "pairs", "a.ply", "b.mesh", "--self", "--json", "--pairs", "rows.npy",
+            "pairs",
+            "a.ply",
+            "b.mesh",
+            "--self",
+            "--json",
+            "--pairs",
+            "rows.npy",
+            "--shared-vertex",
+            "skip",
         ];
         let object = folder.run(args.iter().chain(options)).json();
         assert_eq!(object["hash"], json!(hash), "{options:?}");
@@ -192,7 +216,7 @@ fn text_for_people_holds_the_numbers() {
     folder.ply("b.ply", &b);
     let (rows, hash) = oracle(&[&a, &b], |_| Query::all());
     let text = folder
-        .run(["pairs", "a.ply", "b.ply", "--backend", "cpu"])
+        .run(["pairs", "a.ply", "b.ply", "--backend", "cpu", "-v"])
         .printed();
     for word in [
         "a.ply",
@@ -210,30 +234,9 @@ fn text_for_people_holds_the_numbers() {
         "{text}"
     );
     let text = folder
-        .run(["pairs", "a.ply", "b.ply", "--repeat", "5"])
+        .run(["pairs", "a.ply", "b.ply", "--repeat", "5", "--verbose"])
         .printed();
     assert!(text.contains("median of 5"), "{text}");
-}
-
-#[test]
-fn welding_is_asked_for_and_said() {
-    let folder = Folder::new();
-    // Two triangles over one edge whose vertices the file repeats.
-    folder.text(
-        "split.obj",
-        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 0 1 0\nv 1 1 0.5\nf 1 2 3\nf 4 6 5\n",
-    );
-    let apart = folder.run(["self", "split.obj", "--json"]).json();
-    assert_eq!(apart["pairs"], json!(1));
-    assert_eq!(apart["bodies"][0]["vertices"], json!(6));
-    let welded = folder.run(["self", "split.obj", "--weld", "--json"]).json();
-    assert_eq!(welded["pairs"], json!(0));
-    assert_eq!(welded["bodies"][0]["vertices"], json!(4));
-    let run = folder.run(["self", "split.obj", "--weld"]);
-    assert_eq!(
-        run.stderr,
-        "note: split.obj: vertices welded to others: 2\n"
-    );
 }
 
 #[test]

@@ -6,10 +6,12 @@ mod contacts;
 mod demo;
 #[cfg(feature = "gpu")]
 mod devices;
+mod first_sight;
 mod harness;
 mod hostile;
 #[cfg(feature = "gpu")]
 mod render;
+mod schema;
 mod sequence;
 mod shared_data;
 mod signals;

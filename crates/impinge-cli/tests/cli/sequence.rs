@@ -1,6 +1,6 @@
 //! `impinge sequence`.
 
-use impinge::Query;
+use impinge::{Query, SharedVertex};
 use impinge_io::Pc2Writer;
 use impinge_scenes::Model;
 use impinge_scenes::surfaces::{ball, torus};
@@ -65,7 +65,8 @@ fn every_frame_is_the_oracle_s() {
                 } else {
                     vec![frame]
                 };
-                let (rows, hash) = oracle(&models, |_| query.clone());
+                let rule = SharedVertex::Resolve;
+                let (rows, hash) = oracle(&models, |_| query.clone().shared_vertex(rule));
                 (json!(rows.len()), json!(hash))
             })
             .collect();
@@ -82,7 +83,16 @@ fn every_frame_is_the_oracle_s() {
                 assert_eq!(
                     keys(line),
                     [
-                        "frame", "pairs", "hash", "backend", "method", "bodies", "ms", "stats"
+                        "frame",
+                        "pairs",
+                        "hash",
+                        "backend",
+                        "method",
+                        "bodies",
+                        "ms",
+                        "stats",
+                        "n_regions",
+                        "regions"
                     ]
                 );
                 assert_eq!(line["frame"], json!(frame_ix));
@@ -164,7 +174,8 @@ fn frames_are_welded_as_the_mesh_is() {
         .run(["sequence", "soup.ply", "soup_0.ply", "--weld", "--json"])
         .printed();
     for (line, frame) in lines(&text).iter().zip(&frames) {
-        let (rows, hash) = oracle(&[frame], |_| Query::all_within());
+        let rule = SharedVertex::Resolve;
+        let (rows, hash) = oracle(&[frame], |_| Query::all_within().shared_vertex(rule));
         assert_eq!(
             (&line["pairs"], &line["hash"]),
             (&json!(rows.len()), &json!(hash))
@@ -189,4 +200,89 @@ fn frames_that_do_not_fit_are_named() {
     }
     let line = folder.run(["sequence", "ball.ply", "missing.pc2"]).error();
     assert!(line.contains("missing.pc2"), "{line}");
+}
+
+#[test]
+fn pairs_and_meshes_of_every_frame_are_written() {
+    let folder = Folder::new();
+    let frames = write(&folder, 4);
+    let rule = SharedVertex::Resolve;
+    let mut expected = vec!["frame,body_a,primitive_a,body_b,primitive_b".to_owned()];
+    for (frame_ix, frame) in frames.iter().enumerate() {
+        let (rows, _) = oracle(&[frame], |_| Query::all_within().shared_vertex(rule));
+        expected.extend(
+            rows.iter()
+                .map(|[body_a, a, body_b, b]| format!("{frame_ix},{body_a},{a},{body_b},{b}")),
+        );
+    }
+    assert!(expected.len() > 20);
+    let base = ["sequence", "ball.ply", "run.pc2"];
+    let run = |options: &[&str]| folder.run(base.iter().chain(options)).printed();
+    run(&["--pairs", "rows.csv", "--out", "seen_%02d.ply"]);
+    let text = std::fs::read_to_string(folder.path("rows.csv")).unwrap();
+    assert_eq!(text.lines().collect::<Vec<_>>(), expected);
+    for (frame_ix, frame) in frames.iter().enumerate() {
+        let path = folder.path(&format!("seen_{frame_ix:02}.ply"));
+        let mesh = impinge_io::read(&path, &Default::default()).unwrap();
+        assert_eq!(
+            mesh.positions,
+            impinge_io::Positions::F32(frame.positions.clone())
+        );
+    }
+    let printed = run(&["--pairs", "-"]);
+    assert_eq!(printed.lines().collect::<Vec<_>>(), expected);
+    run(&["--pairs", "rows.jsonl"]);
+    let text = std::fs::read_to_string(folder.path("rows.jsonl")).unwrap();
+    assert_eq!(text.lines().count(), expected.len() - 1);
+    let first: Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
+    assert_eq!(
+        keys(&first),
+        ["frame", "body_a", "primitive_a", "body_b", "primitive_b"]
+    );
+    // Frames that are read are not written over, and one file cannot hold them all.
+    for out in ["run_%03d.ply", "seen.ply"] {
+        let args = ["sequence", "ball.ply", "run_000.ply", "--out", out];
+        folder.run(args).code.filter(|code| *code == 2).expect(out);
+    }
+    let frame = impinge_io::read(&folder.path("run_000.ply"), &Default::default()).unwrap();
+    assert_eq!(
+        frame.positions,
+        impinge_io::Positions::F32(frames[0].positions.clone())
+    );
+}
+
+#[test]
+fn a_missing_frame_is_named() {
+    let folder = Folder::new();
+    write(&folder, 6);
+    for frame in [3, 4] {
+        std::fs::remove_file(folder.path(&format!("run_00{frame}.ply"))).unwrap();
+    }
+    let run = folder.run(["sequence", "ball.ply", "run_%03d.ply"]);
+    assert_eq!(
+        run.stderr,
+        "note: no frame between run_002.ply and run_005.ply\n"
+    );
+    assert!(run.printed().contains("4 frames"));
+}
+
+#[test]
+fn a_mesh_that_comes_apart_where_it_was_welded_is_refused() {
+    let folder = Folder::new();
+    let face = |z: f32| {
+        format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {z}\nv 1 1 {z}\nv 2 0 {z}\nf 1 2 3\nf 4 5 6\n")
+    };
+    folder.text("a.obj", &face(0.0));
+    folder.text("f_1.obj", &face(0.0));
+    folder.text("f_2.obj", &face(1.0));
+    let args = ["sequence", "a.obj", "f_1.obj", "--pairs", "-"];
+    let run = folder.run(args);
+    assert_eq!(run.code, Some(2));
+    assert!(
+        run.stderr.contains("frame 1: vertices 0 and 3 are apart"),
+        "{}",
+        run.stderr
+    );
+    let text = folder.run(args.iter().chain(&["--no-weld"])).printed();
+    assert_eq!(text.lines().collect::<Vec<_>>()[1..], ["0,0,0,0,1"]);
 }

@@ -31,6 +31,9 @@ fn help_shows_every_command_with_examples() {
                 "--threads",
                 "--shared-vertex",
                 "--weld",
+                "--no-weld",
+                "--fail-on-hit",
+                "--format",
                 "--lambda",
                 "--repeat",
                 "--pairs",
@@ -44,7 +47,7 @@ fn help_shows_every_command_with_examples() {
         ),
         (
             "self",
-            &["--shared-vertex", "--weld", "impinge self cow.off --weld"],
+            &["--shared-vertex", "--weld", "impinge self cow.off"],
         ),
         (
             "sequence",

@@ -120,7 +120,7 @@ fn gltf_errors() {
         (
             r#""count":9"#,
             r#""count":10"#,
-            "file: 10 values in buffer view 1 needs 20 bytes, but 18 are left",
+            "file: 10 values in buffer view 1: 20 bytes are needed, but 18 are left",
         ),
         (
             r#""count":9"#,
@@ -155,12 +155,12 @@ fn gltf_errors() {
         (
             r#""byteLength":18"#,
             r#""byteLength":9000"#,
-            "file: buffer view 1 needs 9060 bytes, but 80 are left",
+            "file: buffer view 1: 9060 bytes are needed, but 80 are left",
         ),
         (
             r#""byteLength":80"#,
             r#""byteLength":81"#,
-            "file: buffer 0 needs 81 bytes, but 80 are left",
+            "file: buffer 0: 81 bytes are needed, but 80 are left",
         ),
         (
             r#""2.0""#,

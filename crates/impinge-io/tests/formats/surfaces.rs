@@ -284,6 +284,6 @@ fn stl_of_several_solids() {
     );
     assert_eq!(
         message(Format::Stl, "garbage"),
-        "file: byte 0: the title needs 80 bytes, but 7 are left"
+        "file: byte 0: the title: 80 bytes are needed, but 7 are left"
     );
 }

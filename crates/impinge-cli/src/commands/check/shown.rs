@@ -125,5 +125,5 @@ pub fn draw(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
             normals,
         }
     });
-    crate::picture::draw(path, &args.picture, None, surfaces.collect())
+    crate::picture::Drawer::new(&args.picture, None)?.draw(path, surfaces.collect())
 }
