@@ -153,14 +153,16 @@ mod tests {
 
     use super::*;
 
-    /// A horizontal sheet of two triangles that two upright triangles pierce, far apart, and a third one of another body.
+    /// A horizontal sheet of two triangles, no vertex shared, that two upright triangles pierce, far apart, and a third one of another body.
     #[test]
     fn pairs_that_hang_together_are_one_region() {
-        let sheet = [[0u32, 1, 2], [2, 1, 3]];
+        let sheet = [[0u32, 1, 2], [3, 4, 5]];
         let corners = [
             [0f32, 0.0, 0.0],
             [9.0, 0.0, 0.0],
             [0.0, 9.0, 0.0],
+            [0.0, 9.0, 0.0],
+            [9.0, 0.0, 0.0],
             [9.0, 9.0, 0.0],
         ];
         let upright = |x: f32, y: f32| [[x, y, -1.0], [x + 0.25, y, 1.0], [x, y + 0.25, 1.0]];
@@ -171,7 +173,7 @@ mod tests {
             .add_triangles(&[[0, 1, 2], [3, 4, 5]], &spikes)
             .unwrap();
         let c = scene
-            .add_triangles(&[[0, 1, 2]], &upright(4.5, 4.25))
+            .add_triangles(&[[0, 1, 2]], &upright(4.5, 4.375))
             .unwrap();
         let mut detector = Detector::new(Backend::Cpu).unwrap();
         let pairs = detector.detect(&scene, &Query::all()).unwrap();
