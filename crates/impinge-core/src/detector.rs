@@ -101,7 +101,7 @@ impl Detector {
             pairs: Pairs::default(),
             clusters: Clusters::new(settings.instruction_set),
             cells: Cells::new(settings.instruction_set),
-            steps: steps::Steps::default(),
+            steps: steps::Steps::new(&settings),
             settings,
         })
     }

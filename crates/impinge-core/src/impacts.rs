@@ -37,6 +37,17 @@ impl Numbering {
         }
     }
 
+    fn impact(&self, kind: PairKind, toi: Toi, found: &Found<Contact>) -> Impact {
+        let (a, b) = self.pair(found.key);
+        Impact {
+            kind,
+            a,
+            b,
+            toi: toi.round(&found.value),
+            at_start: found.value.at_start,
+        }
+    }
+
     fn pair(&self, key: u64) -> (Primitive, Primitive) {
         (self.name((key >> 32) as u32), self.name(key as u32))
     }
@@ -112,16 +123,13 @@ impl Impacts {
     /// What was found of one kind, in the order of the keys. Kinds come in their order.
     pub(crate) fn extend(&mut self, kind: PairKind, toi: Toi, found: &[Found<Contact>]) {
         let numbering = &self.numbering;
-        self.impacts.extend(found.iter().map(|found| {
-            let (a, b) = numbering.pair(found.key);
-            Impact {
-                kind,
-                a,
-                b,
-                toi: toi.round(&found.value),
-                at_start: found.value.at_start,
-            }
-        }));
+        let named = found.iter().map(|found| numbering.impact(kind, toi, found));
+        self.impacts.extend(named);
+    }
+
+    /// What was found, by its names.
+    pub(crate) fn impact(&self, kind: PairKind, toi: Toi, found: &Found<Contact>) -> Impact {
+        self.numbering.impact(kind, toi, found)
     }
 
     /// How many pairs touch.

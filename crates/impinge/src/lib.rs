@@ -9,6 +9,9 @@
 //!   coordinates are read as real numbers. There is no tolerance anywhere.
 //! * **The same bytes everywhere.** The answer is sorted and depends on the input alone: not on
 //!   method, backend, threads or memory.
+//! * **Continuous, too.** [`Detector::impacts`] finds which vertices, edges and faces touch while bodies move from their
+//!   positions to their [end positions](Scene::set_end_positions), and the first time of each pair, exactly and rounded down;
+//!   [`Detector::earliest`], [`Detector::is_free`] and [`Detector::advance`] answer what solvers ask of a step.
 //!
 //! This crate is the stable face of the engine in `impinge-core`.
 

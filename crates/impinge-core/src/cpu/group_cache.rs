@@ -26,7 +26,7 @@ pub(super) struct Group {
     pub in_tables: bool,
 }
 
-impl Group {
+impl Kept<World<'_>> for Group {
     const EMPTY: Group = Group {
         boxes: LaneBounds::EMPTY,
         corners: [[[0.0; GROUP]; 3]; 3],
@@ -71,14 +71,32 @@ fn is_small(bounds: &Bounds) -> bool {
     largest(&bounds.min) && largest(&bounds.max)
 }
 
+/// What is kept of one cluster.
+pub(super) trait Kept<W>: Clone {
+    /// Of no cluster.
+    const EMPTY: Self;
+
+    /// Finds it for a cluster of a layer.
+    fn fill<S: Simd>(&mut self, simd: S, world: W, layer: u32, cluster: usize);
+}
+
 /// The clusters that a worker has seen last.
 ///
 /// A cluster has two places, `h` and `h ^ 1`; the one that is not in use makes room.
-#[derive(Debug, Default)]
-pub(super) struct GroupCache {
+#[derive(Debug)]
+pub(super) struct GroupCache<G> {
     /// Layer and cluster of each place.
     keys: Vec<u64>,
-    groups: Vec<Group>,
+    groups: Vec<G>,
+}
+
+impl<G> Default for GroupCache<G> {
+    fn default() -> Self {
+        GroupCache {
+            keys: Vec::new(),
+            groups: Vec::new(),
+        }
+    }
 }
 
 /// No participant has this number: there are fewer than 2^32 of them.
@@ -88,20 +106,23 @@ const MOST: u64 = 128;
 /// Clusters kept under a memory budget, 31 KB: hardly slower, for neighbours come after each other.
 const MOST_IN_BUDGET: u64 = 8;
 
-impl GroupCache {
+impl<G> GroupCache<G> {
     /// Makes ready for a frame of so many clusters.
-    pub fn begin(&mut self, n_clusters: u64, in_budget: bool) {
+    pub fn begin<W>(&mut self, n_clusters: u64, in_budget: bool)
+    where
+        G: Kept<W>,
+    {
         let most = if in_budget { MOST_IN_BUDGET } else { MOST };
         let n = n_clusters.clamp(4, most).next_power_of_two() as usize;
         if self.groups.len() < n {
-            self.groups.resize(n, Group::EMPTY);
+            self.groups.resize(n, G::EMPTY);
         }
         self.keys.clear();
         self.keys.resize(self.groups.len(), NOBODY);
     }
 
     pub fn bytes(&self) -> usize {
-        size_of::<u64>() * self.keys.capacity() + size_of::<Group>() * self.groups.capacity()
+        size_of::<u64>() * self.keys.capacity() + size_of::<G>() * self.groups.capacity()
     }
 
     fn key((participant, cluster): (u32, u32)) -> u64 {
@@ -123,13 +144,16 @@ impl GroupCache {
     /// The place of a cluster of a participant, which is found now if it is not here; what is at the place `pinned`
     /// stays.
     #[inline(always)]
-    pub fn place<S: Simd>(
+    pub fn place<S: Simd, W>(
         &mut self,
         simd: S,
-        world: World<'_>,
+        world: W,
         whose: (u32, u32),
         pinned: usize,
-    ) -> usize {
+    ) -> usize
+    where
+        G: Kept<W>,
+    {
         let (key, first) = (Self::key(whose), self.first_place(whose));
         for place in [first, first ^ 1] {
             if self.keys[place] == key {
@@ -144,7 +168,7 @@ impl GroupCache {
 
     /// What is at a place.
     #[inline(always)]
-    pub fn at(&self, place: usize) -> &Group {
+    pub fn at(&self, place: usize) -> &G {
         &self.groups[place]
     }
 }

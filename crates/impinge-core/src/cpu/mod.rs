@@ -16,6 +16,7 @@ mod refit;
 pub(crate) mod remote;
 pub mod simd;
 pub(crate) mod slabs;
+pub(crate) mod steps;
 pub mod subcells;
 pub(crate) mod top_level;
 pub mod workers;

@@ -46,7 +46,7 @@ pub(crate) struct Worker {
     pub settler: Settler,
     /// For pairs that share a hub.
     pub(super) around: Around,
-    groups: GroupCache,
+    groups: GroupCache<Group>,
     met: Met,
     masks: Masks,
     /// Work items whose candidates were settled.
@@ -58,7 +58,7 @@ impl Worker {
     pub fn begin(&mut self, n_clusters: u64, in_budget: bool) {
         self.settler.clear();
         self.n_settled = 0;
-        self.groups.begin(n_clusters, in_budget);
+        self.groups.begin::<World<'_>>(n_clusters, in_budget);
     }
 
     pub fn bytes(&self) -> usize {
@@ -68,7 +68,7 @@ impl Worker {
 
 /// The candidates of one work item: lanes of its two groups.
 #[derive(Debug, Default)]
-pub(super) struct Met {
+pub(crate) struct Met {
     lanes: Box<MetLanes>,
     n: usize,
 }
@@ -93,7 +93,7 @@ impl Default for MetLanes {
 
 /// The group whose lanes are rows.
 #[derive(Debug, Clone, Copy)]
-enum Side {
+pub(super) enum Side {
     A,
     B,
 }
@@ -101,7 +101,7 @@ enum Side {
 impl Met {
     /// A lane of one group with some of the other.
     #[inline(always)]
-    fn push_row<S: Simd>(&mut self, simd: S, side: Side, row: usize, mask: u64) {
+    pub(super) fn push_row<S: Simd>(&mut self, simd: S, side: Side, row: usize, mask: u64) {
         let MetLanes { a, b } = &mut *self.lanes;
         let (own, other) = match side {
             Side::A => (a, b),
@@ -112,8 +112,21 @@ impl Met {
         self.n += simd.list_lanes(mask, list);
     }
 
+    /// Bytes held.
+    pub const BYTES: usize = size_of::<MetLanes>();
+
+    pub fn clear(&mut self) {
+        self.n = 0;
+    }
+
     pub fn len(&self) -> usize {
         self.n
+    }
+
+    /// The lanes of a candidate.
+    #[inline(always)]
+    pub fn lanes(&self, ix: usize) -> [u8; 2] {
+        [self.lanes.a[ix], self.lanes.b[ix]]
     }
 
     /// The lanes of candidates from `first` on; those past the last one are any lanes.
@@ -184,7 +197,7 @@ fn cull<S: Simd>(
     simd: S,
     world: World<'_>,
     item: &WorkItem,
-    groups: &mut GroupCache,
+    groups: &mut GroupCache<Group>,
 ) -> Option<Culled> {
     const NOWHERE: usize = usize::MAX;
     let sides = [(item.a, item.cluster_a), (item.b, item.cluster_b)];

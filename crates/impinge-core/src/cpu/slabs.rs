@@ -1,13 +1,16 @@
 //! The stages of `Clusters` from `dispatch` on: work items come in slabs, and a full slab is paired and
 //! settled before dispatch goes on.
 
-use crate::clock::Instant;
+use std::time::Duration;
 
+use crate::clock::Instant;
 use crate::error::Error;
+use crate::grouping::hubs::Hubs;
 use crate::query::SharedVertex;
+use crate::stats::Statistics;
 
 use super::Job;
-use super::dispatch::{self, NodePair};
+use super::dispatch::{self, NodePair, Tree};
 use super::pairing::{self, WorkItem, Worker};
 use super::simd::{Isa, Simd, dispatch};
 use super::top_level::TopLevel;
@@ -42,20 +45,113 @@ pub(crate) fn most_items(budget: Option<u64>, held: u64) -> Result<usize, Error>
     Ok(((budget - held) / each).min(MOST_ITEMS as u64) as usize)
 }
 
+/// What becomes of work items, and where the trees are that they come from.
+pub(crate) trait Stage: Copy + Sync {
+    /// What one worker has of its own.
+    type Worker: Send;
+
+    /// The tree over the clusters of a layer.
+    fn tree(&self, layer: u32) -> Tree<'_>;
+
+    /// Pairs the elements of some work items, and settles the candidates.
+    fn pair<S: Simd>(self, simd: S, isa: Isa, items: &[WorkItem], worker: &mut Self::Worker);
+
+    /// What a worker has counted.
+    fn counts(worker: &Self::Worker) -> Counts;
+
+    /// Vertices of a layer that very many elements name.
+    fn hubs(&self, layer: u32) -> Option<&Hubs>;
+
+    /// What is left to do when all work items are settled.
+    fn finish(&self, _: Job<'_>, _: &mut [Self::Worker], _: &mut Statistics) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// Whether the answer is known, so that what is left need not be looked at.
+    fn is_over(&self) -> bool {
+        false
+    }
+}
+
+/// What one worker has counted in a frame.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Counts {
+    /// Time spent on candidates.
+    pub busy: Duration,
+    pub n_candidates: u64,
+    pub n_unsure: u64,
+}
+
+impl Stage for World<'_> {
+    type Worker = Worker;
+
+    #[inline(always)]
+    fn tree(&self, layer: u32) -> Tree<'_> {
+        self.cache(layer).tree()
+    }
+
+    #[inline(always)]
+    fn pair<S: Simd>(self, simd: S, isa: Isa, items: &[WorkItem], worker: &mut Worker) {
+        pairing::run(simd, isa, self, items, worker);
+    }
+
+    #[inline(always)]
+    fn hubs(&self, layer: u32) -> Option<&Hubs> {
+        self.cache(layer).clustering.hubs()
+    }
+
+    /// Pairs that share a hub, which `dispatch` and `pairing` have left out.
+    fn finish(
+        &self,
+        job: Job<'_>,
+        scratches: &mut [Worker],
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        if job.frame.shared_vertex != SharedVertex::Resolve {
+            return Ok(());
+        }
+        for (ix, layer) in (0u32..).zip(&job.frame.layers) {
+            let Some(hubs) = Stage::hubs(self, ix).filter(|_| layer.within) else {
+                continue;
+            };
+            let start = Instant::now();
+            let body = self.body(ix);
+            let Worker {
+                settler, around, ..
+            } = &mut scratches[0];
+            let n = hubs.n_to_settle();
+            for (done, (shared, places)) in hubs.to_settle().enumerate() {
+                job.control.step(done as u64, n as u64)?;
+                around.settle(&body, hubs, shared, places, settler);
+            }
+            stats.add_ms("hubs", start.elapsed().as_secs_f64() * 1e3);
+        }
+        Ok(())
+    }
+
+    fn counts(worker: &Worker) -> Counts {
+        Counts {
+            busy: worker.settler.busy,
+            n_candidates: worker.settler.n_candidates,
+            n_unsure: worker.settler.n_unsure,
+        }
+    }
+}
+
 /// A frame from `dispatch` on.
-pub(crate) struct Slabs<'a> {
+pub(crate) struct Slabs<'a, W: Stage> {
     pub isa: Isa,
     pub job: Job<'a>,
-    pub world: World<'a>,
+    pub world: W,
     pub items: &'a mut Vec<WorkItem>,
     pub most_items: usize,
-    pub scratches: &'a mut [Worker],
-    pub stats: &'a mut crate::stats::Statistics,
+    pub scratches: &'a mut [W::Worker],
+    pub stats: &'a mut Statistics,
     /// Time spent on full slabs.
     pub ms: f64,
 }
 
-impl Slabs<'_> {
+impl<W: Stage> Slabs<'_, W> {
     /// All that the frame asks for; pairs stay with the workers.
     pub fn run(
         &mut self,
@@ -64,8 +160,8 @@ impl Slabs<'_> {
         body_stack: &mut Vec<NodePair>,
     ) -> Result<(), Error> {
         let start = Instant::now();
-        dispatch!(self.isa, all, (
-            slabs: &mut Slabs<'_> = self,
+        dispatch!(self.isa, all, <W: Stage> (
+            slabs: &mut Slabs<'_, W> = self,
             top: &mut TopLevel = top,
             stack: &mut Vec<NodePair> = stack,
             body_stack: &mut Vec<NodePair> = body_stack,
@@ -74,44 +170,18 @@ impl Slabs<'_> {
         let stats = &mut *self.stats;
         let total_ms = start.elapsed().as_secs_f64() * 1e3;
         stats.add_ms("dispatch", total_ms - self.ms);
-        if self.job.frame.shared_vertex == SharedVertex::Resolve {
-            self.resolve_hubs()?;
-        }
+        self.world.finish(self.job, self.scratches, self.stats)?;
         let stats = &mut *self.stats;
         let mut busy_ms = 0.0;
         for worker in &*self.scratches {
-            busy_ms += worker.settler.busy.as_secs_f64() * 1e3;
-            stats.n_candidates += worker.settler.n_candidates;
-            stats.n_unsure += worker.settler.n_unsure;
+            let counts = W::counts(worker);
+            busy_ms += counts.busy.as_secs_f64() * 1e3;
+            stats.n_candidates += counts.n_candidates;
+            stats.n_unsure += counts.n_unsure;
         }
         let narrow_ms = (busy_ms / self.scratches.len() as f64).min(self.ms);
         stats.add_ms("pairing", self.ms - narrow_ms);
         stats.add_ms("narrow", narrow_ms);
-        Ok(())
-    }
-
-    /// Pairs that share a hub, which `dispatch` and `pairing` have left out.
-    fn resolve_hubs(&mut self) -> Result<(), Error> {
-        for (ix, participant) in (0u32..).zip(&self.job.frame.layers) {
-            let Some(hubs) = self.world.cache(ix).clustering.hubs() else {
-                continue;
-            };
-            if !participant.within {
-                continue;
-            }
-            let start = Instant::now();
-            let body = self.world.body(ix);
-            let Worker {
-                settler, around, ..
-            } = &mut self.scratches[0];
-            let n = hubs.n_to_settle();
-            for (done, (shared, places)) in hubs.to_settle().enumerate() {
-                self.job.control.step(done as u64, n as u64)?;
-                around.settle(&body, hubs, shared, places, settler);
-            }
-            self.stats
-                .add_ms("hubs", start.elapsed().as_secs_f64() * 1e3);
-        }
         Ok(())
     }
 
@@ -145,15 +215,15 @@ impl Slabs<'_> {
         let n_tasks = items.len().div_ceil(task);
         let scratches = &mut self.scratches[..n_workers];
         workers.for_each(scratches, n_tasks, |worker, ix| {
-            if control.step(ix as u64, n_tasks as u64).is_err() {
+            if control.step(ix as u64, n_tasks as u64).is_err() || world.is_over() {
                 return;
             }
             let items = &items[ix * task..items.len().min((ix + 1) * task)];
-            dispatch!(isa, pairing::run, (
+            dispatch!(isa, pair, <W: Stage> (
+                world: W = world,
                 isa: Isa = isa,
-                world: World<'_> = world,
                 items: &[WorkItem] = items,
-                worker: &mut Worker = worker,
+                worker: &mut W::Worker = worker,
             ));
         });
         control.step(n_tasks as u64, n_tasks as u64)?;
@@ -165,11 +235,22 @@ impl Slabs<'_> {
     }
 }
 
-/// Dispatch for every pair of bodies and every body that the frame asks for.
 #[inline(always)]
-fn all<S: Simd>(
+fn pair<S: Simd, W: Stage>(
     simd: S,
-    slabs: &mut Slabs<'_>,
+    world: W,
+    isa: Isa,
+    items: &[WorkItem],
+    worker: &mut W::Worker,
+) {
+    world.pair(simd, isa, items, worker);
+}
+
+/// Dispatch for every pair of layers and every layer that the frame asks for.
+#[inline(always)]
+fn all<S: Simd, W: Stage>(
+    simd: S,
+    slabs: &mut Slabs<'_, W>,
     top: &mut TopLevel,
     stack: &mut Vec<NodePair>,
     body_stack: &mut Vec<NodePair>,
@@ -180,24 +261,23 @@ fn all<S: Simd>(
             between(simd, 0, 1, stack, slabs)?;
         }
     } else if frame.between() {
-        top.refit(frame.layers.len(), |ix| world.cache(ix).bounds.root());
+        top.refit(frame.layers.len(), |ix| world.tree(ix).bounds.root());
         top.pairs(simd, body_stack, |a, b| {
             if frame.test(a as usize, b as usize).is_none() {
                 return Ok(());
             }
             // Compiled on its own: inside this closure the instruction set would be lost.
-            dispatch!(slabs.isa, between, (
+            dispatch!(slabs.isa, between, <W: Stage> (
                 a: u32 = a,
                 b: u32 = b,
                 stack: &mut Vec<NodePair> = stack,
-                slabs: &mut Slabs<'_> = slabs,
+                slabs: &mut Slabs<'_, W> = slabs,
             ) -> Result<(), Error>)
         })?;
     }
-    for (ix, participant) in (0u32..).zip(&frame.layers) {
-        if participant.within {
-            let cache = world.cache(ix);
-            let (tree, hubs) = (cache.tree(), cache.clustering.hubs());
+    for ix in 0..frame.layers.len() as u32 {
+        if frame.test(ix as usize, ix as usize).is_some() {
+            let (tree, hubs) = (world.tree(ix), world.hubs(ix));
             dispatch::within(simd, tree, hubs, stack, |cluster_a, cluster_b| {
                 // Adjacency masks are kept with the lower cluster.
                 slabs.put(WorkItem {
@@ -213,14 +293,15 @@ fn all<S: Simd>(
 }
 
 #[inline(always)]
-fn between<S: Simd>(
+fn between<S: Simd, W: Stage>(
     simd: S,
     a: u32,
     b: u32,
     stack: &mut Vec<NodePair>,
-    slabs: &mut Slabs<'_>,
+    slabs: &mut Slabs<'_, W>,
 ) -> Result<(), Error> {
-    let (tree_a, tree_b) = (slabs.world.cache(a).tree(), slabs.world.cache(b).tree());
+    let world = slabs.world;
+    let (tree_a, tree_b) = (world.tree(a), world.tree(b));
     dispatch::between(simd, tree_a, tree_b, stack, |cluster_a, cluster_b| {
         slabs.put(WorkItem {
             a,

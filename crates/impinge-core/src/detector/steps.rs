@@ -4,8 +4,10 @@
 use crate::clock::Instant;
 
 use super::Detector;
+use crate::cpu::Job;
+use crate::cpu::clusters::Options;
+use crate::cpu::steps::{Asked, FoundByKind, Pose, Sought, StepClusters};
 use crate::error::Error;
-use crate::exact::Contact;
 use crate::frame::{Ask, Frame, TestId};
 use crate::impacts::{Candidates, Found, Impact, Impacts};
 use crate::naive;
@@ -14,17 +16,44 @@ use crate::pair_kind::PairKind;
 use crate::positions::Positions;
 use crate::progress::Control;
 use crate::scene::Scene;
+use crate::settings::{Method, Settings};
 use crate::stats::Statistics;
 use crate::step::{Advance, CandidateQuery, Start, Step, Toi, blend};
 
 /// What is kept from step to step.
-#[derive(Default)]
 pub(super) struct Steps {
     frame: Frame,
     impacts: Impacts,
     candidates: Candidates,
-    found: [Vec<Found<Contact>>; PairKind::ALL.len()],
+    clusters: StepClusters,
+    found: FoundByKind,
 }
+
+impl Steps {
+    pub fn new(settings: &Settings) -> Self {
+        Steps {
+            frame: Frame::default(),
+            impacts: Impacts::default(),
+            candidates: Candidates::default(),
+            clusters: StepClusters::new(settings.instruction_set),
+            found: FoundByKind::default(),
+        }
+    }
+
+    /// All that was found, unless it is sorted out, as impacts.
+    fn named(&self, toi: Toi) -> impl Iterator<Item = Impact> + '_ {
+        let kinds = PairKind::ALL.into_iter().zip(&self.found);
+        kinds.flat_map(move |(kind, found)| {
+            let named = found.iter().map(move |found| (kind, toi, found));
+            named.map(|(kind, toi, found)| self.impacts.impact(kind, toi, found))
+        })
+    }
+}
+
+/// How far into a step the earliest contact is sought first: what is near the start is a small part of all.
+const FIRST_UNTIL: f64 = 1.0 / 1024.0;
+/// How much further it is sought when there is none.
+const FURTHER: f64 = 32.0;
 
 impl Detector {
     /// All pairs of elements that touch during a step, each with the first time at which it does.
@@ -70,37 +99,21 @@ impl Detector {
         control: &Control<'_>,
     ) -> Result<&Impacts, Error> {
         let start = Instant::now();
-        let n_threads = self.workers.n();
-        let Steps {
-            frame,
-            impacts,
-            found,
-            ..
-        } = &mut self.steps;
-        frame.resolve_for(scene, &step.query, Ask::Impacts)?;
-        impacts.begin(frame);
-        frame.check(scene)?;
-        let stats = impacts.stats_mut();
-        begin(stats, "naive", n_threads);
-        found.iter_mut().for_each(Vec::clear);
-        stats.time("naive", |stats| {
-            naive::run(
-                &FirstContact,
-                scene,
-                frame,
-                control,
-                stats,
-                |test, key, value| {
-                    if let TestId::Elements(kind) = test
-                        && !(step.start == Start::Skip && value.at_start)
-                    {
-                        found[kind as usize].push(Found { key, value });
-                    }
-                },
-            )
-        })?;
+        self.begin(scene, step)?;
+        self.find(
+            scene,
+            step,
+            Sought::All,
+            (Pose::WHOLE, f64::INFINITY),
+            control,
+        )?;
+        let Steps { impacts, found, .. } = &mut self.steps;
+        impacts.stats_mut().time("collect", |_| {
+            found
+                .iter_mut()
+                .for_each(|found| found.sort_unstable_by_key(|found| found.key));
+        });
         for (kind, found) in PairKind::ALL.into_iter().zip(found) {
-            found.sort_unstable_by_key(|found| found.key);
             impacts.extend(kind, step.toi, found);
         }
         impacts.stats_mut().total_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -113,7 +126,92 @@ impl Detector {
     /// # Errors
     /// As [`impacts`](Detector::impacts).
     pub fn earliest(&mut self, scene: &Scene, step: &Step) -> Result<Option<Impact>, Error> {
-        Ok(self.impacts(scene, step)?.earliest())
+        let start = Instant::now();
+        self.begin(scene, step)?;
+        let control = Control::new();
+        let mut until = FIRST_UNTIL;
+        let mut first: Option<Impact> = None;
+        loop {
+            let pose = Pose {
+                until,
+                ..Pose::WHOLE
+            };
+            let latest = first.map_or(f64::INFINITY, |first| beyond(first.toi));
+            self.find(scene, step, Sought::Earliest, (pose, latest), &control)?;
+            let found = self.steps.named(step.toi);
+            first = found.chain(first).reduce(Impact::earlier);
+            // Of contacts up to this time none is left out; some later ones may have been found, too.
+            let bound = first.map_or(f64::INFINITY, |first| beyond(first.toi));
+            if bound <= until || until == 1.0 {
+                break;
+            }
+            until = bound.min(until * FURTHER).min(1.0);
+        }
+        self.steps.impacts.stats_mut().total_ms = start.elapsed().as_secs_f64() * 1e3;
+        Ok(first)
+    }
+
+    /// Resolves a step.
+    fn begin(&mut self, scene: &Scene, step: &Step) -> Result<(), Error> {
+        let Steps { frame, impacts, .. } = &mut self.steps;
+        frame.resolve_for(scene, &step.query, Ask::Impacts)?;
+        impacts.begin(frame);
+        frame.check(scene)?;
+        begin(impacts.stats_mut(), &self.settings, self.workers.n());
+        Ok(())
+    }
+
+    /// Finds what is sought, in no order.
+    fn find(
+        &mut self,
+        scene: &Scene,
+        step: &Step,
+        sought: Sought,
+        (pose, latest): (Pose, f64),
+        control: &Control<'_>,
+    ) -> Result<(), Error> {
+        let Steps {
+            frame,
+            impacts,
+            clusters,
+            found,
+            ..
+        } = &mut self.steps;
+        let stats = impacts.stats_mut();
+        found.iter_mut().for_each(Vec::clear);
+        if self.settings.method == Method::Naive {
+            return stats.time("naive", |stats| {
+                naive::run(
+                    &FirstContact,
+                    scene,
+                    frame,
+                    control,
+                    stats,
+                    |test, key, value| {
+                        if let TestId::Elements(kind) = test
+                            && !(step.start == Start::Skip && value.at_start)
+                        {
+                            found[kind as usize].push(Found { key, value });
+                        }
+                    },
+                )
+            });
+        }
+        let _shift = self.workers.shift(frame.n_primitives());
+        let job = Job {
+            scene,
+            frame,
+            workers: &self.workers,
+            control,
+        };
+        let asked = Asked {
+            sought,
+            start: step.start,
+            toi: step.toi,
+            pose,
+            latest,
+        };
+        clusters.run(job, &options(&self.settings), asked, found, stats)
     }
 
     /// Whether nothing touches during the step; with [`Start::Skip`], but for pairs that touch at its start.
@@ -121,7 +219,12 @@ impl Detector {
     /// # Errors
     /// As [`impacts`](Detector::impacts).
     pub fn is_free(&mut self, scene: &Scene, step: &Step) -> Result<bool, Error> {
-        Ok(self.impacts(scene, step)?.is_empty())
+        let start = Instant::now();
+        self.begin(scene, step)?;
+        let whole = (Pose::WHOLE, f64::INFINITY);
+        self.find(scene, step, Sought::Any, whole, &Control::new())?;
+        self.steps.impacts.stats_mut().total_ms = start.elapsed().as_secs_f64() * 1e3;
+        Ok(self.steps.found.iter().all(Vec::is_empty))
     }
 
     /// How far the step can be taken: the largest fraction of it, backed off as little as the precision of positions
@@ -199,30 +302,53 @@ impl Detector {
     ) -> Result<&Candidates, Error> {
         let start = Instant::now();
         query.check()?;
-        let n_threads = self.workers.n();
         let Steps {
-            frame, candidates, ..
+            frame,
+            candidates,
+            clusters,
+            found,
+            ..
         } = &mut self.steps;
         frame.resolve_for(scene, &query.query, Ask::Candidates(query.kinds))?;
         candidates.begin(frame);
         frame.check(scene)?;
         let (keys, stats) = candidates.parts_mut();
-        begin(stats, "naive", n_threads);
-        let test = Overlap {
-            distance: query.distance,
-        };
-        naive::run(
-            &test,
-            scene,
-            frame,
-            &Control::new(),
-            stats,
-            |test, key, ()| {
+        begin(stats, &self.settings, self.workers.n());
+        let control = Control::new();
+        if self.settings.method == Method::Naive {
+            let test = Overlap {
+                distance: query.distance,
+            };
+            naive::run(&test, scene, frame, &control, stats, |test, key, ()| {
                 if let TestId::Elements(kind) = test {
                     keys[kind as usize].push(key);
                 }
-            },
-        )?;
+            })?;
+        } else {
+            let _shift = self.workers.shift(frame.n_primitives());
+            found.iter_mut().for_each(Vec::clear);
+            let job = Job {
+                scene,
+                frame,
+                workers: &self.workers,
+                control: &control,
+            };
+            let asked = Asked {
+                sought: Sought::Boxes(query.distance),
+                start: Start::Report,
+                toi: Toi::F32,
+                pose: Pose {
+                    until: 1.0,
+                    margin: query.distance,
+                    is_swept: true,
+                },
+                latest: f64::INFINITY,
+            };
+            clusters.run(job, &options(&self.settings), asked, found, stats)?;
+            for (keys, found) in keys.iter_mut().zip(found) {
+                keys.extend(found.iter().map(|found| found.key));
+            }
+        }
         keys.iter_mut().for_each(|keys| keys.sort_unstable());
         stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(&self.steps.candidates)
@@ -235,8 +361,25 @@ impl Detector {
     }
 }
 
-fn begin(stats: &mut Statistics, method: &'static str, n_threads: usize) {
-    stats.method = method;
+/// A time above all that are rounded down to this one, even to `f32`.
+fn beyond(toi: f64) -> f64 {
+    (toi * (1.0 + 2f64.powi(-20))).max(f64::from(f32::MIN_POSITIVE))
+}
+
+fn begin(stats: &mut Statistics, settings: &Settings, n_threads: usize) {
+    stats.method = match settings.method {
+        Method::Naive => Method::Naive,
+        // The grid is for intersections.
+        Method::Clusters | Method::Cells => Method::Clusters,
+    }
+    .name();
     stats.n_threads = n_threads;
     stats.backend.push_str("cpu");
+}
+
+fn options(settings: &Settings) -> Options {
+    Options {
+        recluster: settings.recluster,
+        memory_budget: settings.memory_budget,
+    }
 }

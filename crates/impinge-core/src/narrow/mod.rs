@@ -8,8 +8,8 @@ mod overlap;
 pub(crate) use intersection::settle;
 pub(crate) use intersection::{Intersection, intersect, intersect_shared};
 
-pub(crate) use impact::FirstContact;
-pub(crate) use overlap::Overlap;
+pub(crate) use impact::{FirstContact, exact_kind};
+pub(crate) use overlap::{Overlap, are_near};
 
 use crate::frame::{Frame, TestId};
 use crate::scene::Scene;

@@ -127,6 +127,38 @@ pub(crate) trait Simd: Copy {
     /// Bit `k`: lane `k` overlaps `query`; only lanes of `among` are looked at.
     fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64;
 
+    /// Bit `k`: lane `k`, whose box moves from `start` to `end`, is not beside `query` on the same side of one axis at both
+    /// ends; only lanes of `among` are looked at. What is beside it at both ends is so all the time.
+    #[inline(always)]
+    fn meets_64(
+        self,
+        [start, end]: [&LaneBounds; 2],
+        [query_start, query_end]: &[Bounds; 2],
+        among: u64,
+    ) -> u64 {
+        let mut mask = 0;
+        for chunk in 0..8 {
+            if among >> (8 * chunk) & 0xff == 0 {
+                continue;
+            }
+            let mut meets = [1u8; 8];
+            for axis in 0..3 {
+                for (k, bit) in meets.iter_mut().enumerate() {
+                    let lane = 8 * chunk + k;
+                    let below = u8::from(start.min[axis][lane] <= query_start.max[axis])
+                        | u8::from(end.min[axis][lane] <= query_end.max[axis]);
+                    let above = u8::from(query_start.min[axis] <= start.max[axis][lane])
+                        | u8::from(query_end.min[axis] <= end.max[axis][lane]);
+                    *bit &= below & above;
+                }
+            }
+            for (k, bit) in meets.into_iter().enumerate() {
+                mask |= u64::from(bit) << (8 * chunk + k);
+            }
+        }
+        mask & among
+    }
+
     /// For each lane of `rows`, the mask of the lanes of `boxes` that its box among `queries` overlaps; only
     /// lanes of `among` are looked at. Masks of other rows are zero.
     #[inline(always)]
@@ -382,20 +414,20 @@ impl Isa {
 
 /// Calls a kernel `fn kernel(simd: impl Simd, …)`, marked `inline(always)`, compiled for `$isa`.
 macro_rules! dispatch {
-    ($isa:expr, $kernel:path, ($($name:ident: $type:ty = $value:expr),* $(,)?) $(-> $result:ty)?) => {{
+    ($isa:expr, $kernel:path, $(<$generic:ident: $bound:ident>)? ($($name:ident: $type:ty = $value:expr),* $(,)?) $(-> $result:ty)?) => {{
         // A function of its own, as the others are: not optimised, a kernel's frame is half a megabyte.
-        fn portable($($name: $type),*) $(-> $result)? {
+        fn portable$(<$generic: $bound>)?($($name: $type),*) $(-> $result)? {
             $kernel($crate::cpu::simd::Portable, $($name),*)
         }
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2,bmi1,bmi2,popcnt,lzcnt")]
-        fn avx2($($name: $type),*) $(-> $result)? {
+        fn avx2$(<$generic: $bound>)?($($name: $type),*) $(-> $result)? {
             // SAFETY: the caller's features include AVX2.
             $kernel(unsafe { $crate::cpu::simd::Avx2::new() }, $($name),*)
         }
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx512vbmi2,avx2,bmi1,bmi2,popcnt,lzcnt")]
-        fn avx512($($name: $type),*) $(-> $result)? {
+        fn avx512$(<$generic: $bound>)?($($name: $type),*) $(-> $result)? {
             // SAFETY: the caller's features include AVX-512 F, VL, DQ, BW and VBMI2.
             $kernel(unsafe { $crate::cpu::simd::Avx512::new() }, $($name),*)
         }

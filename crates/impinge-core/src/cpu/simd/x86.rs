@@ -337,6 +337,45 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn meets_64(
+        self,
+        [start, end]: [&LaneBounds; 2],
+        [query_start, query_end]: &[Bounds; 2],
+        among: u64,
+    ) -> u64 {
+        let mut mask = 0u64;
+        for chunk in 0..8 {
+            if (among >> (8 * chunk)) & 0xff == 0 {
+                continue;
+            }
+            // SAFETY: as above.
+            unsafe {
+                let load = |row: &[f32; GROUP]| _mm256_load_ps(row.as_ptr().add(8 * chunk));
+                let mut all = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+                for axis in 0..3 {
+                    let low_start = _mm256_set1_ps(query_start.min[axis]);
+                    let low_end = _mm256_set1_ps(query_end.min[axis]);
+                    let high_start = _mm256_set1_ps(query_start.max[axis]);
+                    let high_end = _mm256_set1_ps(query_end.max[axis]);
+                    let (min_start, min_end) = (load(&start.min[axis]), load(&end.min[axis]));
+                    let (max_start, max_end) = (load(&start.max[axis]), load(&end.max[axis]));
+                    let below = _mm256_or_ps(
+                        _mm256_cmp_ps::<_CMP_LE_OQ>(min_start, high_start),
+                        _mm256_cmp_ps::<_CMP_LE_OQ>(min_end, high_end),
+                    );
+                    let above = _mm256_or_ps(
+                        _mm256_cmp_ps::<_CMP_LE_OQ>(low_start, max_start),
+                        _mm256_cmp_ps::<_CMP_LE_OQ>(low_end, max_end),
+                    );
+                    all = _mm256_and_ps(all, _mm256_and_ps(below, above));
+                }
+                mask |= u64::from(_mm256_movemask_ps(all) as u32) << (8 * chunk);
+            }
+        }
+        mask & among
+    }
+
+    #[inline(always)]
     fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64 {
         // SAFETY: as above, lane for lane.
         unsafe {
@@ -505,6 +544,40 @@ impl Simd for Avx512 {
             }
             mask
         }
+    }
+
+    #[inline(always)]
+    fn meets_64(
+        self,
+        [start, end]: [&LaneBounds; 2],
+        [query_start, query_end]: &[Bounds; 2],
+        among: u64,
+    ) -> u64 {
+        let mut mask = 0u64;
+        for chunk in 0..4 {
+            let mut all = (among >> (16 * chunk)) as __mmask16;
+            for axis in 0..3 {
+                if all == 0 {
+                    break;
+                }
+                // SAFETY: as above.
+                unsafe {
+                    let load = |row: &[f32; GROUP]| _mm512_load_ps(row.as_ptr().add(16 * chunk));
+                    let low_start = _mm512_set1_ps(query_start.min[axis]);
+                    let low_end = _mm512_set1_ps(query_end.min[axis]);
+                    let high_start = _mm512_set1_ps(query_start.max[axis]);
+                    let high_end = _mm512_set1_ps(query_end.max[axis]);
+                    let (min_start, min_end) = (load(&start.min[axis]), load(&end.min[axis]));
+                    let (max_start, max_end) = (load(&start.max[axis]), load(&end.max[axis]));
+                    all &= _mm512_cmp_ps_mask::<_CMP_LE_OQ>(min_start, high_start)
+                        | _mm512_cmp_ps_mask::<_CMP_LE_OQ>(min_end, high_end);
+                    all &= _mm512_cmp_ps_mask::<_CMP_LE_OQ>(low_start, max_start)
+                        | _mm512_cmp_ps_mask::<_CMP_LE_OQ>(low_end, max_end);
+                }
+            }
+            mask |= u64::from(all) << (16 * chunk);
+        }
+        mask
     }
 
     #[inline(always)]

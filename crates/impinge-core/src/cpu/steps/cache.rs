@@ -1,0 +1,247 @@
+//! What is kept of a layer: its clusters, and their boxes at the start and at the end of a step.
+
+use crate::clock::Instant;
+use crate::cpu::Job;
+use crate::cpu::bounds::{self, TreeBounds};
+use crate::cpu::clusters::Options;
+use crate::cpu::dispatch::Tree;
+use crate::cpu::simd::{Isa, Simd, dispatch};
+use crate::cpu::world::STALE;
+use crate::elements::{Elements, Part};
+use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
+use crate::grouping::clusters::Clustering;
+use crate::positions::Positions;
+use crate::scene::Body;
+use crate::settings::Recluster;
+use crate::stats::Statistics;
+
+use super::hull::Pose;
+use super::{Caches, Worker, part_ix};
+
+/// Clusters whose boxes a task finds.
+const CLUSTERS: usize = 128;
+/// Elements of all layers together below which one thread finds the boxes.
+const PARALLEL_FROM: u64 = 60_000;
+
+/// What is kept of a layer from step to step.
+#[derive(Debug)]
+pub(super) struct LayerCache {
+    /// The topology that was clustered.
+    pub topology_stamp: u64,
+    /// The step that the boxes belong to, and how they were made.
+    of: Option<(u64, Pose)>,
+    pub clustering: Clustering,
+    /// Boxes that hold the start and the end.
+    bounds: TreeBounds,
+    /// Those of the clusters at the start, and at the end.
+    ends: [BoundsArray; 2],
+    /// The clusters' summed surface over the layer's, at its best so far.
+    best_spread: f64,
+}
+
+impl LayerCache {
+    /// Clusters a part of a body in the pose at its start.
+    pub fn new(body: &Body, part: Part) -> Self {
+        let (elements, positions) = (body.part(part), body.positions());
+        let mut clustering = Clustering::new(elements, |element| {
+            bounds::of_vertices(positions, elements.corners(element))
+        });
+        if let (Part::Vertices, Elements::Points(vertices)) = (part, &clustering.corners) {
+            // They are numbered as positions are.
+            clustering.order = vertices.iter().map(|&[vertex]| vertex).collect();
+        }
+        let mut bounds = TreeBounds::default();
+        bounds.resize(&clustering.shape);
+        let mut ends = [BoundsArray::default(), BoundsArray::default()];
+        for end in &mut ends {
+            end.resize(clustering.n_clusters());
+        }
+        LayerCache {
+            topology_stamp: body.topology_stamp(),
+            of: None,
+            clustering,
+            bounds,
+            ends,
+            best_spread: f64::INFINITY,
+        }
+    }
+
+    #[inline(always)]
+    pub fn tree(&self) -> Tree<'_> {
+        Tree {
+            shape: &self.clustering.shape,
+            bounds: &self.bounds,
+        }
+    }
+
+    /// The boxes of a cluster at the start and at the end.
+    #[inline(always)]
+    pub fn ends(&self, cluster: usize) -> [Bounds; 2] {
+        [self.ends[0].at(cluster), self.ends[1].at(cluster)]
+    }
+
+    pub fn bytes(&self) -> usize {
+        let ends: usize = self.ends.iter().map(BoundsArray::bytes).sum();
+        size_of::<LayerCache>() + self.clustering.bytes() + self.bounds.bytes() + ends
+    }
+
+    /// How well the clusters fit the pose at hand: the clusters' summed surface over the layer's.
+    fn spread(&self) -> f64 {
+        let whole = self.bounds.root().half_area();
+        let clusters = 0..self.clustering.n_clusters();
+        let surface: f64 = clusters.map(|ix| self.ends[0].at(ix).half_area()).sum();
+        if whole > 0.0 && whole.is_finite() && surface.is_finite() {
+            surface / whole
+        } else {
+            1.0
+        }
+    }
+}
+
+/// Some clusters of a layer.
+#[derive(Debug, Clone, Copy)]
+struct Task {
+    layer: usize,
+    first: usize,
+    end: usize,
+    /// Where boxes go.
+    leaves: RawBoundsArray,
+    ends: [RawBoundsArray; 2],
+}
+
+/// The boxes of all layers that moved, or that were looked at otherwise; layers that have flowed away from their clusters
+/// are clustered anew.
+pub(super) fn refit(
+    isa: Isa,
+    job: Job<'_>,
+    options: &Options,
+    pose: Pose,
+    caches: &mut Caches,
+    scratches: &mut [Worker],
+    stats: &mut Statistics,
+) {
+    find_boxes(isa, job, pose, caches, scratches);
+    let Job {
+        scene,
+        frame,
+        workers,
+        ..
+    } = job;
+    let mut is_stale = false;
+    for (ix, layer) in frame.layers.iter().enumerate() {
+        let body = frame.body(scene, ix);
+        let Some(cache) = &mut caches[layer.id.index()][part_ix(layer.part)] else {
+            continue;
+        };
+        if cache.of == Some((body.step_stamp(), pose)) {
+            continue;
+        }
+        cache.bounds.refit_above(0, &cache.clustering.shape);
+        cache.of = Some((body.step_stamp(), pose));
+        let spread = cache.spread();
+        if options.recluster == Recluster::Auto && spread > STALE * cache.best_spread {
+            let start = Instant::now();
+            let n_elements = cache.clustering.order.len();
+            **cache = workers.install(n_elements, || LayerCache::new(body, layer.part));
+            stats.n_clustered += 1;
+            stats.n_reclustered += 1;
+            stats.add_ms("clustering", start.elapsed().as_secs_f64() * 1e3);
+            is_stale = true;
+        } else {
+            cache.best_spread = cache.best_spread.min(spread);
+        }
+    }
+    if is_stale {
+        // Those made anew have the best spread so far, so this ends here.
+        refit(isa, job, options, pose, caches, scratches, stats);
+    }
+}
+
+fn find_boxes(isa: Isa, job: Job<'_>, pose: Pose, caches: &mut Caches, scratches: &mut [Worker]) {
+    let Job {
+        scene,
+        frame,
+        workers,
+        ..
+    } = job;
+    let mut tasks = Vec::new();
+    for (ix, layer) in frame.layers.iter().enumerate() {
+        let body = frame.body(scene, ix);
+        let Some(cache) = &mut caches[layer.id.index()][part_ix(layer.part)] else {
+            continue;
+        };
+        if cache.of == Some((body.step_stamp(), pose)) {
+            continue;
+        }
+        cache.of = None;
+        let LayerCache {
+            clustering,
+            bounds,
+            ends: [start, end],
+            ..
+        } = &mut **cache;
+        let Some(leaves) = bounds.levels.first_mut() else {
+            continue;
+        };
+        let n = clustering.n_clusters();
+        let task = Task {
+            layer: ix,
+            first: 0,
+            end: 0,
+            leaves: leaves.raw(),
+            ends: [start.raw(), end.raw()],
+        };
+        tasks.extend((0..n).step_by(CLUSTERS).map(|first| Task {
+            first,
+            end: n.min(first + CLUSTERS),
+            ..task
+        }));
+    }
+    let parallel = frame.n_primitives() >= PARALLEL_FROM;
+    let n_workers = if parallel { workers.n() } else { 1 };
+    let caches = &*caches;
+    workers.for_each(&mut scratches[..n_workers], tasks.len(), |_, ix| {
+        let task = tasks[ix];
+        let layer = &frame.layers[task.layer];
+        let cache = &caches[layer.id.index()][part_ix(layer.part)];
+        let clustering = &cache.as_ref().expect("clustered").clustering;
+        let body = frame.body(scene, task.layer);
+        dispatch!(isa, find, (
+            clustering: &Clustering = clustering,
+            body: &Body = body,
+            pose: Pose = pose,
+            task: Task = task,
+        ));
+    });
+}
+
+#[inline(always)]
+fn find<S: Simd>(simd: S, clustering: &Clustering, body: &Body, pose: Pose, task: Task) {
+    let (start, end) = (body.positions(), body.end_positions());
+    for cluster in task.first..task.end {
+        let vertices = clustering.vertices(cluster);
+        let at_start = of_cluster(simd, start, vertices);
+        let at_end = match end {
+            Some(end) => of_cluster(simd, end, vertices),
+            None => at_start,
+        };
+        let ends = pose.close([at_start, at_end]);
+        let mut both = ends[0];
+        both.join(&ends[1]);
+        // SAFETY: no two tasks have the same cluster, and nobody reads boxes before all tasks are done.
+        unsafe {
+            task.leaves.put(cluster, &both);
+            task.ends[0].put(cluster, &ends[0]);
+            task.ends[1].put(cluster, &ends[1]);
+        }
+    }
+}
+
+#[inline(always)]
+fn of_cluster<S: Simd>(simd: S, positions: &Positions, vertices: &[u32]) -> Bounds {
+    match positions {
+        // SAFETY: a cluster's vertices ascend.
+        Positions::F32(positions) => unsafe { simd.of_ascending(positions, vertices) }.0,
+        Positions::F64(_) => bounds::of_vertices(positions, vertices),
+    }
+}

@@ -1,0 +1,310 @@
+//! `Clusters` for steps: vertices, edges and faces that move from a start to an end, and pairs of them.
+//!
+//! ```text
+//! clustering  the vertices, edges and faces of each body, once per topology
+//! bounds      two boxes per cluster, at the start and at the end; the tree above holds both
+//! dispatch    layers whose boxes meet, then tree against tree: as for intersections
+//! pairing     boxes of elements at both ends; candidates per work item
+//! narrow      filters, then exact arithmetic
+//! ```
+//!
+//! Reason for each discard: what moves linearly is, at any time, in the hull of its boxes at both ends. Two elements of which
+//! one is beside the other on the same side of an axis at both ends never touch.
+
+mod cache;
+mod group;
+mod hull;
+mod narrow;
+mod pairing;
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use crate::elements::Part;
+use crate::error::Error;
+use crate::exact::Contact;
+use crate::frame::Frame;
+use crate::grouping::hubs::Hubs;
+use crate::impacts::Found;
+use crate::pair_kind::PairKind;
+use crate::scene::Scene;
+use crate::settings::InstructionSet;
+use crate::stats::Statistics;
+use crate::step::{Start, Toi};
+
+use super::Job;
+use super::clusters::Options;
+use super::dispatch::{NodePair, Tree};
+use super::pairing::WorkItem;
+use super::simd::{Isa, Simd};
+use super::slabs::{self, Counts, Slabs, Stage};
+use super::top_level::TopLevel;
+
+use cache::LayerCache;
+pub(crate) use hull::Pose;
+pub(crate) use pairing::Worker;
+
+/// What is sought in a step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Sought {
+    /// Every contact.
+    All,
+    /// The earliest contact, and all that may be at the same time when rounded.
+    Earliest,
+    /// Any contact.
+    Any,
+    /// Boxes that overlap when inflated by this much.
+    Boxes(f64),
+}
+
+/// What is asked of a step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Asked {
+    pub sought: Sought,
+    pub start: Start,
+    pub toi: Toi,
+    pub pose: Pose,
+    /// No contact is wanted that is later than this.
+    pub latest: f64,
+}
+
+/// What is known of the answer while workers look for it.
+#[derive(Debug)]
+pub(crate) struct Known {
+    /// The earliest time found, as the bits of a number that is not negative.
+    earliest: AtomicU64,
+    is_over: AtomicBool,
+}
+
+impl Known {
+    fn new(latest: f64) -> Self {
+        Known {
+            earliest: AtomicU64::new(latest.to_bits()),
+            is_over: AtomicBool::new(false),
+        }
+    }
+
+    /// The earliest time found so far.
+    fn earliest(&self) -> f64 {
+        f64::from_bits(self.earliest.load(Ordering::Relaxed))
+    }
+
+    fn found(&self, sought: Sought, time: f64) {
+        match sought {
+            // Bits of numbers that are not negative are in their order.
+            Sought::Earliest => {
+                self.earliest.fetch_min(time.to_bits(), Ordering::Relaxed);
+            }
+            Sought::Any => self.is_over.store(true, Ordering::Relaxed),
+            Sought::All | Sought::Boxes(_) => {}
+        }
+    }
+}
+
+/// What the stages look at.
+#[derive(Clone, Copy)]
+pub(crate) struct World<'a> {
+    pub scene: &'a Scene,
+    pub frame: &'a Frame,
+    pub asked: Asked,
+    known: &'a Known,
+    caches: &'a Caches,
+}
+
+/// By slot of the body, then by part.
+type Caches = Vec<[Option<Box<LayerCache>>; PARTS]>;
+
+/// Vertices, edges and faces.
+const PARTS: usize = 3;
+
+fn part_ix(part: Part) -> usize {
+    match part {
+        Part::Vertices => 0,
+        Part::Edges => 1,
+        Part::Faces | Part::Given => 2,
+    }
+}
+
+impl<'a> World<'a> {
+    /// No contact is wanted that is later than this.
+    #[inline(always)]
+    fn until(&self) -> f64 {
+        match self.asked.sought {
+            // Those that are later by less than rounding are wanted, for their keys may be lower.
+            Sought::Earliest => {
+                let time = self.known.earliest();
+                let later = (time * (1.0 + 2f64.powi(-22))).max(f64::from(f32::MIN_POSITIVE));
+                later.min(1.0)
+            }
+            Sought::All | Sought::Any | Sought::Boxes(_) => 1.0,
+        }
+    }
+
+    /// What is kept of a layer.
+    #[inline(always)]
+    fn cache(&self, layer: u32) -> &'a LayerCache {
+        let layer = &self.frame.layers[layer as usize];
+        self.caches[layer.id.index()][part_ix(layer.part)]
+            .as_deref()
+            .expect("every layer was clustered")
+    }
+}
+
+impl Stage for World<'_> {
+    type Worker = Worker;
+
+    #[inline(always)]
+    fn tree(&self, layer: u32) -> Tree<'_> {
+        self.cache(layer).tree()
+    }
+
+    #[inline(always)]
+    fn pair<S: Simd>(self, simd: S, isa: Isa, items: &[WorkItem], worker: &mut Worker) {
+        pairing::run(simd, isa, self, items, worker);
+    }
+
+    #[inline(always)]
+    fn hubs(&self, layer: u32) -> Option<&Hubs> {
+        self.cache(layer).clustering.hubs()
+    }
+
+    fn counts(worker: &Worker) -> Counts {
+        worker.counts()
+    }
+
+    fn is_over(&self) -> bool {
+        self.known.is_over.load(Ordering::Relaxed)
+    }
+}
+
+/// What was found, by kind of pair.
+pub(crate) type FoundByKind = [Vec<Found<Contact>>; PairKind::ALL.len()];
+
+/// Caches and scratch of the method; kept from step to step.
+pub(crate) struct StepClusters {
+    isa: Isa,
+    caches: Caches,
+    top: TopLevel,
+    items: Vec<WorkItem>,
+    scratches: Vec<Worker>,
+    stack: Vec<NodePair>,
+    layer_stack: Vec<NodePair>,
+}
+
+impl StepClusters {
+    pub fn new(allowed: InstructionSet) -> Self {
+        StepClusters {
+            isa: Isa::detect(allowed),
+            caches: Vec::new(),
+            top: TopLevel::default(),
+            items: Vec::new(),
+            scratches: Vec::new(),
+            stack: Vec::new(),
+            layer_stack: Vec::new(),
+        }
+    }
+
+    /// Appends what is sought, unsorted.
+    pub fn run(
+        &mut self,
+        job: Job<'_>,
+        options: &Options,
+        asked: Asked,
+        found: &mut FoundByKind,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        self.scratches.resize_with(job.workers.n(), Worker::default);
+        stats.n_clusters = 0;
+        stats.time("clustering", |stats| self.cluster(job, stats))?;
+        stats.time("bounds", |stats| {
+            self.refit(job, options, asked.pose, stats)
+        });
+        for worker in &mut self.scratches {
+            worker.begin(stats.n_clusters, options.memory_budget.is_some());
+        }
+        let most_items = slabs::most_items(options.memory_budget, self.bytes() as u64)?;
+        self.items.clear();
+        self.items.shrink_to(most_items);
+        let known = Known::new(asked.latest);
+        let mut slabs = Slabs {
+            isa: self.isa,
+            job,
+            world: World {
+                scene: job.scene,
+                frame: job.frame,
+                asked,
+                known: &known,
+                caches: &self.caches,
+            },
+            items: &mut self.items,
+            most_items,
+            scratches: &mut self.scratches,
+            stats,
+            ms: 0.0,
+        };
+        slabs.run(&mut self.top, &mut self.stack, &mut self.layer_stack)?;
+        for worker in &self.scratches {
+            for (found, of_worker) in found.iter_mut().zip(worker.found()) {
+                found.extend_from_slice(of_worker);
+            }
+        }
+        stats.bytes_held = (self.bytes() + size_of::<WorkItem>() * self.items.capacity()) as u64;
+        Ok(())
+    }
+
+    fn bytes(&self) -> usize {
+        let caches = self.caches.iter().flatten().flatten();
+        let caches: usize = caches.map(|cache| cache.bytes()).sum();
+        let scratches: usize = self.scratches.iter().map(Worker::bytes).sum();
+        caches + scratches + self.top.bytes()
+    }
+
+    /// Clusters layers that are new or were re-meshed; forgets those of bodies that are gone.
+    fn cluster(&mut self, job: Job<'_>, stats: &mut Statistics) -> Result<(), Error> {
+        let Job {
+            scene,
+            frame,
+            workers,
+            control,
+        } = job;
+        let slots = frame.layers.iter().map(|layer| layer.id.index() + 1);
+        let n_slots = slots.max().unwrap_or(0);
+        if self.caches.len() < n_slots {
+            self.caches.resize_with(n_slots, Default::default);
+        }
+        for (slot, caches) in self.caches.iter_mut().enumerate() {
+            if !scene.holds(slot) {
+                *caches = Default::default();
+            }
+        }
+        for (ix, layer) in frame.layers.iter().enumerate() {
+            let body = frame.body(scene, ix);
+            let cache = &mut self.caches[layer.id.index()][part_ix(layer.part)];
+            let known = cache
+                .as_ref()
+                .is_some_and(|cache| cache.topology_stamp == body.topology_stamp());
+            if !known {
+                control.step(ix as u64, frame.layers.len() as u64)?;
+                let n_elements = body.part(layer.part).len();
+                let new = workers.install(n_elements, || LayerCache::new(body, layer.part));
+                *cache = Some(Box::new(new));
+                stats.n_clustered += 1;
+            }
+            let cache = cache.as_ref().expect("just clustered");
+            stats.n_clusters += cache.clustering.n_clusters() as u64;
+        }
+        Ok(())
+    }
+
+    /// The boxes of layers that moved.
+    fn refit(&mut self, job: Job<'_>, options: &Options, pose: Pose, stats: &mut Statistics) {
+        cache::refit(
+            self.isa,
+            job,
+            options,
+            pose,
+            &mut self.caches,
+            &mut self.scratches,
+            stats,
+        );
+    }
+}

@@ -1,0 +1,152 @@
+//! Stages `pairing` and `narrow` of steps: which elements of two clusters have boxes that meet at both ends, and what
+//! becomes of those that do.
+
+use std::time::Duration;
+
+use crate::clock::Instant;
+use crate::cpu::group_cache::GroupCache;
+use crate::cpu::pairing::{Met, Side, WorkItem, full};
+use crate::cpu::simd::{Isa, Lanes, Simd, up_to};
+use crate::cpu::slabs::{Counts, Stage};
+use crate::frame::TestId;
+use crate::grouping::bounds::Bounds;
+
+use super::group::Group;
+use super::narrow::{Between, Settler};
+use super::{FoundByKind, World};
+
+/// One work item in so many has its narrow stage timed.
+const SAMPLED: u32 = 16;
+
+/// What one worker has of its own.
+#[derive(Debug, Default)]
+pub(crate) struct Worker {
+    groups: GroupCache<Group>,
+    met: Met,
+    settler: Settler,
+    busy: Duration,
+    n_settled: u32,
+}
+
+impl Worker {
+    /// Makes ready for a step of so many clusters.
+    pub fn begin(&mut self, n_clusters: u64, in_budget: bool) {
+        self.groups.begin::<World<'_>>(n_clusters, in_budget);
+        self.settler.clear();
+        self.n_settled = 0;
+        self.busy = Duration::ZERO;
+    }
+
+    pub fn found(&self) -> &FoundByKind {
+        &self.settler.found
+    }
+
+    pub fn counts(&self) -> Counts {
+        Counts {
+            busy: self.busy,
+            n_candidates: self.settler.n_candidates,
+            n_unsure: self.settler.n_unsure,
+        }
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.groups.bytes() + self.settler.bytes() + Met::BYTES
+    }
+}
+
+/// Pairs the elements of some work items and settles the candidates.
+#[inline(always)]
+pub(super) fn run<S: Simd>(
+    simd: S,
+    isa: Isa,
+    world: World<'_>,
+    items: &[WorkItem],
+    worker: &mut Worker,
+) {
+    for item in items {
+        if world.is_over() {
+            break;
+        }
+        let test = world.frame.test(item.a as usize, item.b as usize);
+        let Some(TestId::Elements(kind)) = test else {
+            continue;
+        };
+        if !pair(simd, world, item, worker) {
+            continue;
+        }
+        worker.n_settled += 1;
+        let is_sample = worker.n_settled.is_multiple_of(SAMPLED);
+        let start = is_sample.then(Instant::now);
+        let between = Between {
+            a: item.a,
+            b: item.b,
+            kind,
+        };
+        let Worker { settler, met, .. } = worker;
+        settler.settle_item(simd, isa, world, (item, between), met);
+        if let Some(start) = start {
+            worker.busy += start.elapsed() * SAMPLED;
+        }
+    }
+    let start = Instant::now();
+    worker.settler.search(isa, world);
+    worker.busy += start.elapsed();
+}
+
+/// Lists the candidates of a work item; whether there is any.
+#[inline(always)]
+fn pair<S: Simd>(simd: S, world: World<'_>, item: &WorkItem, worker: &mut Worker) -> bool {
+    let Worker { groups, met, .. } = worker;
+    met.clear();
+    let sides = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
+    let is_own = sides[0] == sides[1];
+    let ends = sides.map(|(layer, cluster)| world.cache(layer).ends(cluster as usize));
+    if !is_own && !meet(&ends[0], &ends[1]) {
+        return false;
+    }
+    let place_a = groups.place(simd, world, sides[0], usize::MAX);
+    let place_b = groups.place(simd, world, sides[1], place_a);
+    let (a, b) = (groups.at(place_a), groups.at(place_b));
+    let (mut lanes_a, mut lanes_b) = (full(a.size), full(b.size));
+    if !is_own {
+        lanes_a = simd.meets_64([&a.start, &a.end], &ends[1], lanes_a);
+        if lanes_a == 0 {
+            return false;
+        }
+        lanes_b = simd.meets_64([&b.start, &b.end], &ends[0], lanes_b);
+    }
+    let layers = &world.frame.layers;
+    let same_body = layers[item.a as usize].id == layers[item.b as usize].id;
+    // The side with fewer lanes has the rows.
+    let (side, rows, lanes, [own, other]) = if lanes_a.count_ones() <= lanes_b.count_ones() {
+        (Side::A, lanes_a, lanes_b, [a, b])
+    } else {
+        (Side::B, lanes_b, lanes_a, [b, a])
+    };
+    for row in Lanes(rows) {
+        let query = [own.start.at(row), own.end.at(row)];
+        let lanes = if is_own { lanes & !up_to(row) } else { lanes };
+        let mut mask = simd.meets_64([&other.start, &other.end], &query, lanes);
+        if mask != 0 && same_body {
+            // What shares a vertex is left out.
+            for corner in own.corners(row) {
+                for of_other in &other.corners[..other.n_corners.min(3)] {
+                    mask &= !simd.equals_64(of_other, corner, mask);
+                }
+            }
+        }
+        if mask != 0 {
+            met.push_row(simd, side, row, mask);
+        }
+    }
+    met.len() > 0
+}
+
+/// Whether two boxes that move are not beside each other on the same side of an axis at both ends.
+#[inline(always)]
+fn meet(a: &[Bounds; 2], b: &[Bounds; 2]) -> bool {
+    let beside = |a: &[Bounds; 2], b: &[Bounds; 2], axis: usize| {
+        (0..2).all(|end| a[end].max[axis] < b[end].min[axis])
+    };
+    (0..3).all(|axis| !beside(a, b, axis) && !beside(b, a, axis))
+}

@@ -1,0 +1,208 @@
+//! Steps of real scenes against answers that were not made by this project: every pair that touches, and every time to the
+//! last bit. Fails where the data folder (`../shared/data` or `$IMPINGE_DATA`) is absent.
+
+use std::path::PathBuf;
+
+use impinge_core::{
+    Backend, CandidateQuery, Detector, Impact, InstructionSet, PairKind, Query, Scene, Settings,
+    Start, Step, Toi,
+};
+
+fn file(path: &str) -> PathBuf {
+    let found = impinge_scenes::data::data_file(path);
+    found.unwrap_or_else(|| panic!("{path} is not there: set IMPINGE_DATA"))
+}
+
+/// The numbers of an array in NumPy's format, little-endian and in C order.
+fn npy<T, const N: usize>(path: &str, kind: &str, read: impl Fn([u8; N]) -> T) -> Vec<T> {
+    let bytes = std::fs::read(file(path)).expect("readable");
+    let header_end = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let header = std::str::from_utf8(&bytes[10..header_end]).expect("ASCII");
+    assert!(
+        header.contains(kind) && header.contains("'fortran_order': False"),
+        "{header}"
+    );
+    let (numbers, rest) = bytes[header_end..].as_chunks::<N>();
+    assert!(rest.is_empty());
+    numbers.iter().map(|&bytes| read(bytes)).collect()
+}
+
+struct Scenario {
+    name: &'static str,
+    frames: [&'static str; 2],
+}
+
+const SCENARIOS: [Scenario; 2] = [
+    Scenario {
+        name: "cloth-ball",
+        frames: ["cloth_ball92", "cloth_ball93"],
+    },
+    Scenario {
+        name: "cloth-funnel",
+        frames: ["227", "228"],
+    },
+];
+
+impl Scenario {
+    fn scene(&self) -> Scene {
+        let [start, end] = self.frames.map(|frame| {
+            let path = file(&format!("ccd/{}/frames/{frame}.ply", self.name));
+            impinge_io::read(&path, &impinge_io::ReadOptions::default()).expect("a mesh")
+        });
+        let impinge_io::Elements::Triangles(faces) = start.elements else {
+            panic!("a surface");
+        };
+        let mut scene = Scene::new();
+        match (start.positions, end.positions) {
+            (impinge_io::Positions::F32(start), impinge_io::Positions::F32(end)) => {
+                let body = scene.add(faces, start).expect("good");
+                scene.set_end_positions(body, &end).expect("good");
+            }
+            (impinge_io::Positions::F64(start), impinge_io::Positions::F64(end)) => {
+                let body = scene.add(faces, start).expect("good");
+                scene.set_end_positions(body, &end).expect("good");
+            }
+            _ => panic!("one precision"),
+        }
+        scene
+    }
+
+    /// Pairs and times of one kind.
+    fn expected(&self, kind: PairKind, toi: Toi) -> Vec<(u32, u32, f64)> {
+        let path = |what: &str| format!("ccd/{}/{}_{what}.npy", self.name, kind.name());
+        let numbers = npy(&path("contacts"), "<u4", u32::from_le_bytes);
+        let times: Vec<f64> = match toi {
+            Toi::F32 => npy(&path("toi_f32"), "<f4", |b| {
+                f64::from(f32::from_le_bytes(b))
+            }),
+            Toi::F64 => npy(&path("toi_f64"), "<f8", f64::from_le_bytes),
+        };
+        let pairs = numbers.chunks_exact(2).zip(times);
+        pairs.map(|(pair, time)| (pair[0], pair[1], time)).collect()
+    }
+}
+
+fn rows(impacts: &[Impact]) -> Vec<(u32, u32, f64)> {
+    let rows = impacts.iter();
+    rows.map(|i| (i.a.primitive, i.b.primitive, i.toi))
+        .collect()
+}
+
+fn detector(threads: usize, instruction_set: InstructionSet, budget: Option<u64>) -> Detector {
+    let settings = Settings {
+        backend: Backend::Cpu,
+        threads,
+        instruction_set,
+        memory_budget: budget,
+        ..Settings::default()
+    };
+    Detector::with_settings(settings).expect("settings")
+}
+
+#[test]
+fn every_pair_and_every_time_is_that_of_the_exact_prototype() {
+    for scenario in SCENARIOS {
+        let scene = scenario.scene();
+        for toi in [Toi::F32, Toi::F64] {
+            let mut detector = detector(2, InstructionSet::default(), None);
+            let step = Step::default().toi(toi);
+            let impacts = detector.impacts(&scene, &step).expect("good").clone();
+            for kind in [PairKind::VertexFace, PairKind::EdgeEdge] {
+                let (found, expected) = (rows(impacts.of(kind)), scenario.expected(kind, toi));
+                assert_eq!(
+                    found.len(),
+                    expected.len(),
+                    "{} {}",
+                    scenario.name,
+                    kind.name()
+                );
+                for (found, expected) in found.iter().zip(&expected) {
+                    assert_eq!(found, expected, "{} {} {toi:?}", scenario.name, kind.name());
+                }
+            }
+            let both =
+                impacts.of(PairKind::VertexFace).len() + impacts.of(PairKind::EdgeEdge).len();
+            assert_eq!(both, impacts.len(), "a surface has no bare edges or points");
+            let earliest = detector.earliest(&scene, &step).expect("good");
+            assert_eq!(earliest, impacts.earliest(), "{} {toi:?}", scenario.name);
+            assert!(!detector.is_free(&scene, &step).expect("good"));
+        }
+    }
+}
+
+#[test]
+fn bytes_are_the_same_for_all_instruction_sets_threads_and_budgets() {
+    for scenario in SCENARIOS {
+        let scene = scenario.scene();
+        let step = Step::default();
+        let all = detector(2, InstructionSet::default(), None)
+            .impacts(&scene, &step)
+            .expect("good")
+            .clone();
+        for (threads, set, budget) in [
+            (1, InstructionSet::Portable, None),
+            (3, InstructionSet::Avx2, None),
+            (1, InstructionSet::Avx512, Some(80_000_000)),
+        ] {
+            let mut other = detector(threads, set, budget);
+            let impacts = other.impacts(&scene, &step).expect("good");
+            assert!(
+                impacts.as_slice() == all.as_slice(),
+                "{threads} {set:?} {budget:?}"
+            );
+            let earliest = other.earliest(&scene, &step).expect("good");
+            assert_eq!(earliest, all.earliest(), "{threads} {set:?} {budget:?}");
+        }
+    }
+}
+
+#[test]
+fn boxes_overlap_as_often_as_others_counted() {
+    let counts = std::fs::File::open(file("expected/swept_box_pairs.json")).expect("readable");
+    let counts: serde_json::Value = serde_json::from_reader(counts).expect("JSON");
+    for scenario in SCENARIOS {
+        let scene = scenario.scene();
+        let mut detector = detector(2, InstructionSet::default(), None);
+        let query = CandidateQuery::new(Query::everything());
+        let candidates = detector.candidates(&scene, &query).expect("good");
+        for kind in [PairKind::VertexFace, PairKind::EdgeEdge] {
+            let expected = counts[scenario.name]["recomputed_f64"][kind.name()].as_u64();
+            assert_eq!(
+                Some(candidates.of(kind).len() as u64),
+                expected,
+                "{}",
+                scenario.name
+            );
+        }
+        let rows: Vec<_> = candidates.rows(PairKind::EdgeEdge).collect();
+        assert!(rows.is_sorted_by(|a, b| a < b), "sorted, each once");
+    }
+}
+
+#[test]
+fn a_step_of_cloth_can_be_taken_up_to_its_first_contact() {
+    for scenario in SCENARIOS {
+        let mut scene = scenario.scene();
+        let mut detector = detector(2, InstructionSet::default(), None);
+        let step = Step::default().start(Start::Skip);
+        let first = detector
+            .earliest(&scene, &step.clone().toi(Toi::F64))
+            .expect("good");
+        let advance = detector.advance(&scene, &step).expect("good");
+        assert_eq!(advance.first, first);
+        let first = first.expect("contacts").toi;
+        println!(
+            "{}: {} of {first}, {} tried",
+            scenario.name, advance.fraction, advance.n_tried
+        );
+        assert!(advance.fraction <= first && advance.fraction > 0.5 * first);
+        for (body, positions) in &advance.positions {
+            match positions {
+                impinge_core::Positions::F32(end) => scene.set_end_positions(*body, end),
+                impinge_core::Positions::F64(end) => scene.set_end_positions(*body, end),
+            }
+            .expect("good");
+        }
+        assert!(detector.is_free(&scene, &step).expect("good"));
+    }
+}
