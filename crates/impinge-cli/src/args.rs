@@ -1,5 +1,7 @@
 //! The command line: what may be said, and its help.
 
+mod step;
+
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -13,6 +15,8 @@ use crate::values::{
 };
 #[cfg(feature = "gpu")]
 use crate::values::{PngFile, azimuth, elevation, part, size};
+
+pub use step::{StepArgs, StepHow, ToiArg};
 
 /// Exact collision detection for deforming meshes of triangles and tetrahedra.
 #[derive(Debug, Parser)]
@@ -31,6 +35,7 @@ Examples:
   impinge pairs a.obj b.obj --pairs -           the pairs themselves, as CSV
   impinge check parts/*.stl                     what is wrong with each mesh
   impinge sequence body.ply run.pc2 --self      the same, frame after frame
+  impinge step cloth_0.ply cloth_1.ply          does anything touch on the way, and when first
   impinge simulate blocks --out out/blocks      bodies that fall, deform and collide
 
 Exit codes: 0 done, 2 bad usage, 3 pairs were found and --fail-on-hit was given, 130 stopped by Ctrl-C
@@ -54,6 +59,9 @@ pub enum Command {
     /// Follow a deforming mesh through the frames of a sequence
     #[command(after_help = SEQUENCE_EXAMPLES)]
     Sequence(SequenceArgs),
+    /// Find what touches while meshes move from one pose to another, and when first
+    #[command(after_help = step::STEP_EXAMPLES)]
+    Step(StepArgs),
     /// Drop an elastic body on another one and write what happens, step by step
     #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(SimulateArgs),
@@ -145,6 +153,7 @@ Examples:
   impinge sequence body.obj frames_0001.obj --frames 10..20 --json
   impinge sequence body.obj 'frames_%04d.obj' --json | head
   impinge sequence body.ply run.pc2 --pairs pairs.csv --out seen_%04d.ply
+  impinge sequence body.ply run.pc2 --ccd       a line per step from one frame to the next
 
 FRAMES is a .pc2 or .mdd file, the first of numbered mesh files, or a pattern of their names.
 Without --other, self-collision is what is asked for.";
@@ -426,6 +435,11 @@ pub struct SequenceArgs {
     #[cfg(feature = "gpu")]
     #[command(flatten)]
     pub picture: PictureArgs,
+    /// What touches on the way from each frame to the next, vertices moving on straight lines, and when first
+    #[arg(long)]
+    pub ccd: bool,
+    #[command(flatten)]
+    pub step: StepHow,
     #[command(flatten)]
     pub ask: AskArgs,
     #[command(flatten)]

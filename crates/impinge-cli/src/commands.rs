@@ -12,6 +12,7 @@ mod record;
 mod render;
 mod sequence;
 mod simulate;
+mod step;
 mod tiles;
 
 pub use answer::{pairs, within};
@@ -24,4 +25,5 @@ pub use distance::distance;
 pub use render::render;
 pub use sequence::sequence;
 pub use simulate::simulate;
+pub use step::step;
 pub use tiles::{TILES_EXAMPLES, TilesArgs, tiles};

@@ -24,6 +24,9 @@ pub enum Error {
         what: String,
         source: impinge::Error,
     },
+    /// The end of a step has other elements than its start.
+    #[error("{0}")]
+    Ends(String),
     /// The detection failed, or was cancelled.
     #[error(transparent)]
     Detection(#[from] impinge::Error),

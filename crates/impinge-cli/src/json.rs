@@ -68,17 +68,22 @@ pub fn answer(
 }
 
 /// Milliseconds in whole nanoseconds: the clock has no more, sums and medians only look so.
-fn rounded(ms: f64) -> f64 {
+pub fn rounded(ms: f64) -> f64 {
     (ms * 1e6).round() / 1e6
 }
 
 /// The hash as it is shown: 16 hexadecimal digits.
 pub fn hash(pairs: &Pairs) -> String {
-    format!("{:016x}", pairs.hash())
+    hex(pairs.hash())
+}
+
+/// A hash as 16 hexadecimal digits.
+pub fn hex(hash: u64) -> String {
+    format!("{hash:016x}")
 }
 
 /// Every counter of the statistics under its own name.
-fn counters(stats: &Statistics) -> Value {
+pub fn counters(stats: &Statistics) -> Value {
     json!({
         "n_threads": stats.n_threads,
         "grid": stats.grid,

@@ -178,7 +178,7 @@ impl Bodies {
 }
 
 /// What a user should know about a file who looks at primitive numbers, or wonders about pairs.
-fn note(name: &str, summary: &Summary, vertices: Vertices) {
+pub fn note(name: &str, summary: &Summary, vertices: Vertices) {
     for (n, what) in [
         (
             summary.n_polygons_fanned,
@@ -209,7 +209,7 @@ pub fn to_positions(positions: impinge_io::Positions) -> impinge::Positions {
     }
 }
 
-fn to_elements(elements: impinge_io::Elements) -> impinge::Elements {
+pub fn to_elements(elements: impinge_io::Elements) -> impinge::Elements {
     match elements {
         impinge_io::Elements::Triangles(faces) => faces.into(),
         impinge_io::Elements::Tetrahedra(tets) => tets.into(),

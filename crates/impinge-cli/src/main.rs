@@ -36,6 +36,7 @@ fn main() -> ExitCode {
         Command::Pairs(args) => commands::pairs(&args, &cancel),
         Command::Within(args) => commands::within(&args, &cancel),
         Command::Sequence(args) => commands::sequence(&args, &cancel),
+        Command::Step(args) => commands::step(&args, &cancel),
         Command::Simulate(args) => commands::simulate(&args, &cancel),
         Command::Check(args) => commands::check(&args, &cancel),
         Command::CheckWorker(args) => commands::check_worker(&args),

@@ -22,10 +22,15 @@ pub fn write(
         .map(|(ix, &(id, name))| Part::new(scene, id, name, palette::body(ix), pairs))
         .collect::<Result<_, _>>()?;
     let meshes: Vec<ColoredMesh> = parts.iter().map(Part::mesh).collect();
+    write_colored(file, &meshes)
+}
+
+/// Writes meshes in the format of the file's name.
+pub fn write_colored(file: &MeshFile, meshes: &[ColoredMesh<'_>]) -> Result<(), Error> {
     match file.format {
-        MeshFormat::Ply => write_ply(&file.path, &meshes)?,
-        MeshFormat::Glb => write_glb(&file.path, &meshes)?,
-        MeshFormat::Vtu => write_vtu(&file.path, &meshes)?,
+        MeshFormat::Ply => write_ply(&file.path, meshes)?,
+        MeshFormat::Glb => write_glb(&file.path, meshes)?,
+        MeshFormat::Vtu => write_vtu(&file.path, meshes)?,
     }
     Ok(())
 }
@@ -34,6 +39,29 @@ pub fn write(
 fn file_name(path: &str) -> &str {
     let name = Path::new(path).file_name().and_then(|name| name.to_str());
     name.unwrap_or(path)
+}
+
+/// The library's arrays as mesh files take them.
+pub fn from_positions(positions: &Positions) -> impinge_io::Positions {
+    match positions {
+        Positions::F32(positions) => impinge_io::Positions::F32(positions.clone()),
+        Positions::F64(positions) => impinge_io::Positions::F64(positions.clone()),
+    }
+}
+
+/// The library's elements as mesh files take them. Those hold surfaces and solids: an edge is written as the flat triangle
+/// that it is, and so is a point.
+pub fn from_elements(elements: &Elements) -> impinge_io::Elements {
+    match elements {
+        Elements::Triangles(faces) => impinge_io::Elements::Triangles(faces.clone()),
+        Elements::Tetrahedra(tets) => impinge_io::Elements::Tetrahedra(tets.clone()),
+        Elements::Edges(edges) => {
+            impinge_io::Elements::Triangles(edges.iter().map(|&[a, b]| [a, b, b]).collect())
+        }
+        Elements::Points(points) => {
+            impinge_io::Elements::Triangles(points.iter().map(|&[a]| [a; 3]).collect())
+        }
+    }
 }
 
 struct Part<'a> {
@@ -60,21 +88,8 @@ impl<'a> Part<'a> {
             colliding[primitive as usize] = true;
         }
         Ok(Part {
-            positions: match body.positions() {
-                Positions::F32(positions) => impinge_io::Positions::F32(positions.clone()),
-                Positions::F64(positions) => impinge_io::Positions::F64(positions.clone()),
-            },
-            elements: match body.elements() {
-                Elements::Triangles(faces) => impinge_io::Elements::Triangles(faces.clone()),
-                Elements::Tetrahedra(tets) => impinge_io::Elements::Tetrahedra(tets.clone()),
-                // Mesh files hold surfaces and solids: an edge is written as the flat triangle that it is.
-                Elements::Edges(edges) => {
-                    impinge_io::Elements::Triangles(edges.iter().map(|&[a, b]| [a, b, b]).collect())
-                }
-                Elements::Points(points) => {
-                    impinge_io::Elements::Triangles(points.iter().map(|&[a]| [a; 3]).collect())
-                }
-            },
+            positions: from_positions(body.positions()),
+            elements: from_elements(body.elements()),
             colors: primitive_colors,
             colliding,
             // Where the file is on this machine is no business of the mesh that is written.

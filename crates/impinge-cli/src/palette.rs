@@ -24,6 +24,13 @@ const COLLIDING: [[u8; 3]; 8] = [
 /// Greys that can just be told apart.
 const OTHER: [[u8; 3]; 2] = [[200, 200, 200], [172, 178, 188]];
 
+/// The colour of what collides at a time of a step: red at its start, yellow at its end.
+pub fn time(toi: f64) -> [u8; 3] {
+    const EARLY: [f64; 3] = [214.0, 39.0, 40.0];
+    const LATE: [f64; 3] = [255.0, 221.0, 87.0];
+    std::array::from_fn(|k| (EARLY[k] + toi * (LATE[k] - EARLY[k])).round() as u8)
+}
+
 /// The colours of a body by its number; after the last ones, they begin again.
 pub fn body(ix: usize) -> BodyColors {
     BodyColors {

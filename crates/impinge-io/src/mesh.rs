@@ -191,6 +191,16 @@ impl Weld {
         Weld { map, firsts }
     }
 
+    /// Welds the vertices that both weldings make one: of the same vertices in two poses, those that are together in both.
+    ///
+    /// # Panics
+    /// Where the two are of different numbers of vertices.
+    pub fn and(&self, other: &Weld) -> Self {
+        assert_eq!(self.map.len(), other.map.len(), "of the same vertices");
+        let both = self.map.iter().zip(&other.map);
+        Self::by_key(both.map(|(&a, &b)| [Some(a), Some(b), Some(0)]))
+    }
+
     /// How many vertices went away.
     pub fn n_welded(&self) -> usize {
         self.map.len() - self.firsts.len()

@@ -2,10 +2,11 @@
 
 use std::io::{Write, stderr};
 
-use impinge::{BodyId, CancelToken, Pairs, Query, Scene};
+use impinge::{BodyId, CancelToken, Control, Pairs, Query, Scene, Step};
 use impinge_io::{Sequence, Weld};
 use serde_json::{Map, Value};
 
+use super::step::{self, Frames as _, steps_of_sequence};
 use crate::apart::Inputs;
 use crate::args::SequenceArgs;
 use crate::commands::answer::hit;
@@ -66,6 +67,20 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let mut outputs = Outputs::new(args, &frames)?;
     let prints = !args.ask.json && !rows_on_stdout;
     let watch = Watch::frames(!args.detector.no_progress, range.len(), true);
+    if args.ccd {
+        let step = Step::new(query)
+            .start(args.step.start.into())
+            .toi(args.step.toi.into());
+        return steps_of_sequence(
+            (&mut detector, &mut scene, moving),
+            &step,
+            &frames,
+            range,
+            args.ask.json,
+            &Control::new().cancel(cancel),
+            || watch.frame_done(),
+        );
+    }
     let still = Watch::detection(false, "");
     let mut lines = Lines::default();
     if prints {
@@ -190,7 +205,9 @@ impl Frames {
             name: args.sequence.display().to_string(),
         })
     }
+}
 
+impl step::Frames for Frames {
     fn read(&self, frame_ix: usize) -> Result<impinge::Positions, Error> {
         let positions = self.sequence.frame(frame_ix)?;
         let positions = match &self.weld {

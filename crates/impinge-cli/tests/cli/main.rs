@@ -16,5 +16,6 @@ mod sequence;
 mod shared_data;
 mod signals;
 mod simulate;
+mod step;
 mod tiles;
 mod usage;

@@ -1,0 +1,108 @@
+//! `impinge step`: what touches while bodies move from one pose to another, and when.
+
+mod answer;
+mod colors;
+mod frames;
+mod load;
+mod rows;
+
+use std::io::Write;
+
+use impinge::{CancelToken, Control, Query, Step};
+use serde_json::Value;
+
+use crate::apart::Inputs;
+use crate::args::StepArgs;
+use crate::detection::detector;
+use crate::error::Error;
+use crate::output::out;
+#[cfg(feature = "gpu")]
+use crate::picture::Drawer;
+use crate::values::RowsFile;
+use crate::watch::Watch;
+
+use answer::Found;
+pub use frames::{Frames, steps_of_sequence};
+use load::Moving;
+
+/// `impinge step`.
+pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
+    let inputs = Inputs::new(&args.meshes);
+    for (option, path) in args.outputs() {
+        inputs.check(option, path)?;
+    }
+    let rows_on_stdout = args.impacts.as_ref().is_some_and(RowsFile::is_stdout);
+    if args.json && rows_on_stdout {
+        let text = "--json and --impacts - both write to standard output: give one of them a file";
+        return Err(Error::Usage(text.to_owned()));
+    }
+    let mut detector = detector(&args.detector)?;
+    let bodies = Moving::read(args, cancel)?;
+    let step = Step::new(query(args, &bodies)?)
+        .start(args.how.start.into())
+        .toi(args.how.toi.into());
+
+    let watch = Watch::detection(!args.detector.no_progress, "detecting");
+    let report = |progress| watch.report(progress);
+    let mut control = Control::new().cancel(cancel);
+    if watch.is_shown() {
+        control = control.progress(&report);
+    }
+    if args.earliest {
+        let earliest = detector.earliest(&bodies.scene, &step)?;
+        drop(watch);
+        let found = Found::first(earliest, detector.step_stats());
+        return print(args, &bodies, &found);
+    }
+    let impacts = detector.impacts_with(&bodies.scene, &step, &control)?;
+    drop(watch);
+    // Files come first: where one can't be written, no answer is printed that looks like success.
+    if let Some(file) = &args.impacts {
+        rows::write(file, args.how.toi, impacts)?;
+    }
+    if let Some(file) = &args.out {
+        colors::write(file, &bodies, impacts)?;
+    }
+    if !rows_on_stdout {
+        print(args, &bodies, &Found::all(impacts))?;
+    }
+    #[cfg(feature = "gpu")]
+    if let Some(png) = &args.png {
+        let surfaces = colors::surfaces(&bodies, impacts)?;
+        let device = args.detector.device.as_deref();
+        Drawer::new(&args.picture, device)?.draw(&png.0, surfaces)?;
+    }
+    Ok(())
+}
+
+fn query(args: &StepArgs, bodies: &Moving) -> Result<Query, Error> {
+    if args.no_self && bodies.ids.len() < 2 {
+        return Err(Error::Usage(
+            "--no-self leaves nothing to test where one body is given".to_owned(),
+        ));
+    }
+    let asked = match args.no_self {
+        true => Query::all(),
+        false => Query::everything(),
+    };
+    let body = |number: usize| {
+        bodies.ids.get(number).copied().ok_or_else(|| {
+            Error::Usage(format!(
+                "--ignore names body {number}, but {} bodies are given, numbered from 0",
+                bodies.ids.len()
+            ))
+        })
+    };
+    args.ignore
+        .iter()
+        .try_fold(asked, |asked, &(a, b)| Ok(asked.ignore(body(a)?, body(b)?)))
+}
+
+fn print(args: &StepArgs, bodies: &Moving, found: &Found<'_>) -> Result<(), Error> {
+    if args.json {
+        let object = Value::Object(found.json(bodies)?);
+        writeln!(out(), "{object}")?;
+        return Ok(());
+    }
+    found.print(bodies)
+}

@@ -1,0 +1,172 @@
+//! The answer about a step, as JSON and for people.
+
+use std::io::Write;
+
+use impinge::{Error, Impact, Impacts, PairKind, Statistics};
+use serde_json::{Map, Value, json};
+
+use crate::json::{counters, hex, rounded};
+use crate::output::{counted, grouped, out};
+
+use super::load::Moving;
+
+/// The kinds that a step may have, in their order.
+const KINDS: [PairKind; 4] = [
+    PairKind::VertexFace,
+    PairKind::EdgeEdge,
+    PairKind::EdgeVertex,
+    PairKind::VertexVertex,
+];
+
+/// What was found: all impacts, or the first alone.
+pub struct Found<'a> {
+    earliest: Option<Impact>,
+    all: Option<&'a Impacts>,
+    stats: &'a Statistics,
+}
+
+impl<'a> Found<'a> {
+    pub fn all(impacts: &'a Impacts) -> Self {
+        Found {
+            earliest: impacts.earliest(),
+            all: Some(impacts),
+            stats: impacts.stats(),
+        }
+    }
+
+    pub fn first(earliest: Option<Impact>, stats: &'a Statistics) -> Self {
+        Found {
+            earliest,
+            all: None,
+            stats,
+        }
+    }
+
+    /// `free`, `earliest`, `impacts`, `kinds`, `touching_at_start`, `hash`, `backend`, `bodies`, `ms`, `stats`; counts and
+    /// the hash are null where only the first was asked for.
+    pub fn json(&self, bodies: &Moving) -> Result<Map<String, Value>, Error> {
+        let described: Vec<Value> = bodies
+            .ids
+            .iter()
+            .zip(&bodies.names)
+            .map(|(&id, [start, end])| {
+                let body = bodies.scene.body(id)?;
+                Ok(json!({
+                    "name": start,
+                    "end": end,
+                    "kind": body.kind().name(),
+                    "primitives": body.n_primitives(),
+                    "vertices": body.n_vertices(),
+                }))
+            })
+            .collect::<Result<_, Error>>()?;
+        let mut object = self.numbers();
+        object.insert("bodies".into(), described.into());
+        object.insert("ms".into(), self.ms());
+        object.insert("stats".into(), counters(self.stats));
+        Ok(object)
+    }
+
+    /// The part of it that a line per step has, too.
+    pub fn numbers(&self) -> Map<String, Value> {
+        let kinds = |impacts: &Impacts| {
+            let counted = KINDS.map(|kind| (kind.name().to_owned(), impacts.of(kind).len().into()));
+            Value::Object(counted.into_iter().collect())
+        };
+        let mut object = Map::new();
+        object.insert("free".into(), self.earliest.is_none().into());
+        object.insert("earliest".into(), self.earliest.map_or(Value::Null, impact));
+        object.insert("impacts".into(), json!(self.all.map(Impacts::len)));
+        object.insert("kinds".into(), self.all.map_or(Value::Null, kinds));
+        object.insert(
+            "touching_at_start".into(),
+            json!(self.all.map(Impacts::touching_at_start)),
+        );
+        object.insert("hash".into(), json!(self.all.map(|all| hex(all.hash()))));
+        object.insert("backend".into(), self.stats.backend.as_str().into());
+        object.insert("method".into(), self.stats.method.into());
+        object
+    }
+
+    /// Times of stages and of the whole.
+    pub fn ms(&self) -> Value {
+        let stages = self.stats.stages.iter();
+        let stages: Map<String, Value> = stages
+            .map(|stage| (stage.name.to_owned(), rounded(stage.ms).into()))
+            .collect();
+        json!({ "total": rounded(self.stats.total_ms), "stages": stages })
+    }
+
+    /// The answer in the first line, then counts.
+    pub fn print(&self, bodies: &Moving) -> Result<(), crate::error::Error> {
+        let mut to = out();
+        let name = |body: impinge::BodyId| bodies.names[body.index()][0].as_str();
+        match self.earliest {
+            None => writeln!(to, "free: nothing touches from start to end")?,
+            Some(first) => writeln!(
+                to,
+                "not free: {} of {} and {} of {} touch first, {}",
+                element(first.kind, first.a.primitive, true),
+                name(first.a.body),
+                element(first.kind, first.b.primitive, false),
+                name(first.b.body),
+                match first.at_start {
+                    true => "at the start".to_owned(),
+                    false => format!("at time {:?}", first.toi),
+                }
+            )?,
+        }
+        if let Some(all) = self.all.filter(|all| !all.is_empty()) {
+            let counts: Vec<String> = KINDS
+                .iter()
+                .map(|&kind| (kind, all.of(kind).len()))
+                .filter(|&(_, n)| n > 0)
+                .map(|(kind, n)| format!("{} {}", grouped(n as u64), kind.name()))
+                .collect();
+            writeln!(
+                to,
+                "{} ({}), {} touching at the start, hash {}",
+                counted(all.len() as u64, "impact"),
+                counts.join(", "),
+                grouped(all.touching_at_start() as u64),
+                hex(all.hash())
+            )?;
+        }
+        writeln!(
+            to,
+            "{} on {}, {}; {}, {} unsure; {:.3} ms",
+            self.stats.method,
+            self.stats.backend,
+            counted(self.stats.n_threads as u64, "thread"),
+            counted(self.stats.n_candidates, "candidate"),
+            grouped(self.stats.n_unsure),
+            self.stats.total_ms
+        )?;
+        Ok(())
+    }
+}
+
+/// An element in words.
+fn element(kind: PairKind, number: u32, is_first: bool) -> String {
+    let name = match (kind, is_first) {
+        (PairKind::VertexFace, true)
+        | (PairKind::VertexVertex, _)
+        | (PairKind::EdgeVertex, false) => "vertex",
+        (PairKind::EdgeEdge, _) | (PairKind::EdgeVertex | PairKind::EdgeFace, true) => "edge",
+        _ => "face",
+    };
+    format!("{name} {number}")
+}
+
+/// An impact as a JSON object.
+pub fn impact(impact: Impact) -> Value {
+    let [body_a, a, body_b, b] = impact.row();
+    json!({
+        "toi": impact.toi,
+        "kind": impact.kind.name(),
+        "body_a": body_a,
+        "element_a": a,
+        "body_b": body_b,
+        "element_b": b,
+    })
+}

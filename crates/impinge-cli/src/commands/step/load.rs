@@ -1,0 +1,141 @@
+//! Bodies of a step: each from a file for its start and a file for its end.
+
+use std::path::Path;
+
+use impinge::{BodyId, CancelToken, Positions, Scene};
+use impinge_io::{Mesh, ReadOptions, Weld, read_with_summary};
+
+use crate::args::StepArgs;
+use crate::error::Error;
+use crate::load::{Vertices, note, to_elements, to_positions};
+use crate::watch::go_on;
+
+/// A scene whose bodies have end positions, and the files that they came from.
+#[derive(Debug, Default)]
+pub struct Moving {
+    pub scene: Scene,
+    pub ids: Vec<BodyId>,
+    /// The files of each body's start and end.
+    pub names: Vec<[String; 2]>,
+}
+
+impl Moving {
+    /// Reads files in pairs.
+    pub fn read(args: &StepArgs, cancel: &CancelToken) -> Result<Self, Error> {
+        let (pairs, rest) = args.meshes.as_chunks::<2>();
+        if let [alone] = rest {
+            return Err(Error::Usage(format!(
+                "a body is two files, its start and its end: {} has no end ({} files are given)",
+                alone.display(),
+                args.meshes.len()
+            )));
+        }
+        let mut bodies = Moving::default();
+        for [start, end] in pairs {
+            go_on(cancel)?;
+            bodies.add(start, end, args)?;
+        }
+        Ok(bodies)
+    }
+
+    fn add(&mut self, start: &Path, end: &Path, args: &StepArgs) -> Result<(), Error> {
+        let names = [start, end].map(|path| path.display().to_string());
+        let (mut at_start, summary) = read_with_summary(start, &ReadOptions::default())?;
+        let (mut at_end, _) = read_with_summary(end, &ReadOptions::default())?;
+        same_elements(&names, &at_start, &at_end)?;
+        let mut n_welded = 0;
+        if args.weld {
+            let weld =
+                Weld::by_position(&at_start.positions).and(&Weld::by_position(&at_end.positions));
+            n_welded = weld.n_welded();
+            weld.apply(&mut at_start);
+            weld.apply(&mut at_end);
+        }
+        if !args.json {
+            let vertices = Vertices {
+                n_welded,
+                ..Vertices::default()
+            };
+            note(&names[0], &summary, vertices);
+        }
+        // No coordinate changes its value; half the memory is saved where all of them allow it.
+        at_start.positions.narrow_if_exact();
+        at_end.positions.narrow_if_exact();
+        let refused = |name: &str| {
+            let what = name.to_owned();
+            move |source| Error::Refused { what, source }
+        };
+        let (elements, positions) = (
+            to_elements(at_start.elements),
+            to_positions(at_start.positions),
+        );
+        let id = self
+            .scene
+            .add(elements, positions)
+            .map_err(refused(&names[0]))?;
+        set_end_positions(&mut self.scene, id, &to_positions(at_end.positions))
+            .map_err(refused(&names[1]))?;
+        self.ids.push(id);
+        self.names.push(names);
+        Ok(())
+    }
+}
+
+/// Says where a body's vertices are at the end of the step, in whatever precision.
+pub fn set_end_positions(
+    scene: &mut Scene,
+    body: BodyId,
+    positions: &Positions,
+) -> Result<(), impinge::Error> {
+    match positions {
+        Positions::F32(positions) => scene.set_end_positions(body, positions),
+        Positions::F64(positions) => scene.set_end_positions(body, positions),
+    }
+}
+
+/// Fails where the two files of a body differ in anything but positions.
+fn same_elements(names: &[String; 2], start: &Mesh, end: &Mesh) -> Result<(), Error> {
+    let [name, other] = names;
+    let differ = |what: String| {
+        let message =
+            format!("{other}: the end of the step must have the elements of {name}: {what}");
+        Err(Error::Ends(message))
+    };
+    if start.n_vertices() != end.n_vertices() {
+        return differ(format!(
+            "{} vertices at the end, {} at the start",
+            end.n_vertices(),
+            start.n_vertices()
+        ));
+    }
+    if start.n_primitives() != end.n_primitives() {
+        return differ(format!(
+            "{} primitives at the end, {} at the start",
+            end.n_primitives(),
+            start.n_primitives()
+        ));
+    }
+    if start.elements == end.elements {
+        return Ok(());
+    }
+    let (a, b) = (start.elements.indices(), end.elements.indices());
+    if a.len() != b.len() {
+        return differ("triangles in one file, tetrahedra in the other".to_owned());
+    }
+    let n_corners = (a.len() / start.n_primitives().max(1)).max(1);
+    match a
+        .chunks(n_corners)
+        .zip(b.chunks(n_corners))
+        .position(|(a, b)| a != b)
+    {
+        Some(ix) => {
+            let of = |corners: &[u32]| format!("{:?}", &corners[ix * n_corners..][..n_corners]);
+            differ(format!(
+                "primitive {ix} has the vertices {} at the end, {} at the start",
+                of(b),
+                of(a)
+            ))
+        }
+        None => Ok(()),
+    }
+}

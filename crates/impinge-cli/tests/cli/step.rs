@@ -1,0 +1,302 @@
+//! `impinge step` and `impinge sequence --ccd`.
+
+use std::path::Path;
+
+use impinge::{Backend, Detector, Impact, Scene, Step, Toi};
+use impinge_scenes::Model;
+use impinge_scenes::surfaces::{ball, cube};
+use serde_json::Value;
+
+use crate::harness::{Folder, keys};
+
+/// Two bodies, each at the start and at the end of a step in which one runs into the other.
+fn crash() -> [(&'static str, Model); 4] {
+    let (a, b) = (ball(80), cube([2.0, 0.125, 0.0], 1.0));
+    [
+        ("a0.ply", a.clone()),
+        ("a1.ply", a.translated([0.5, 0.0, 0.0]).scaled(1.125)),
+        ("b0.ply", b.clone()),
+        ("b1.ply", b.translated([-1.0, 0.0, 0.25])),
+    ]
+}
+
+const FILES: [&str; 4] = ["a0.ply", "a1.ply", "b0.ply", "b1.ply"];
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    for (name, model) in crash() {
+        folder.ply(name, &model);
+    }
+    folder
+}
+
+/// All impacts, by the library.
+fn expected(toi: Toi) -> (Vec<Impact>, u64) {
+    let [a0, a1, b0, b1] = crash().map(|(_, model)| model);
+    let mut scene = Scene::new();
+    for (start, end) in [(a0, a1), (b0, b1)] {
+        let id = start.add_to(&mut scene).unwrap();
+        scene.set_end_positions(id, &end.positions).unwrap();
+    }
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let impacts = detector.impacts(&scene, &Step::default().toi(toi)).unwrap();
+    (impacts.as_slice().to_vec(), impacts.hash())
+}
+
+type Row = (String, [u32; 4], f64);
+
+fn row(impact: &Impact) -> Row {
+    (impact.kind.name().to_owned(), impact.row(), impact.toi)
+}
+
+fn csv(path: &Path) -> Vec<Row> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines();
+    let header = "kind,body_a,element_a,body_b,element_b,toi";
+    assert_eq!(lines.next(), Some(header));
+    let row = |line: &str| {
+        let fields: Vec<&str> = line.split(',').collect();
+        let numbers = std::array::from_fn(|k| fields[k + 1].parse().unwrap());
+        (fields[0].to_owned(), numbers, fields[5].parse().unwrap())
+    };
+    lines.map(row).collect()
+}
+
+/// A structured array: `kind` of two characters, four numbers, a time of `N` bytes.
+fn npy<const N: usize>(path: &Path, time: impl Fn([u8; N]) -> f64) -> Vec<Row> {
+    let bytes = std::fs::read(path).unwrap();
+    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    assert_eq!(start % 64, 0);
+    let header = std::str::from_utf8(&bytes[10..start]).unwrap();
+    assert!(header.contains(&format!("('toi', '<f{N}')")), "{header}");
+    let word = |at: &[u8]| u32::from_le_bytes(at[..4].try_into().unwrap());
+    let row = |row: &[u8]| {
+        let kind = [word(row), word(&row[4..])].map(|c| char::from_u32(c).unwrap());
+        let numbers = std::array::from_fn(|k| word(&row[8 + 4 * k..]));
+        (
+            kind.iter().collect(),
+            numbers,
+            time(row[24..].try_into().unwrap()),
+        )
+    };
+    let rows: Vec<Row> = bytes[start..].chunks_exact(24 + N).map(row).collect();
+    assert!(
+        header.contains(&format!("'shape': ({},)", rows.len())),
+        "{header}"
+    );
+    rows
+}
+
+#[test]
+fn the_json_holds_what_the_library_says() {
+    let folder = folder();
+    let run = folder.run(["step"].iter().chain(&FILES).chain(&["--json"]));
+    let answer = run.json();
+    let names = [
+        "free",
+        "earliest",
+        "impacts",
+        "kinds",
+        "touching_at_start",
+        "hash",
+        "backend",
+        "method",
+        "bodies",
+        "ms",
+        "stats",
+    ];
+    assert_eq!(keys(&answer), names);
+    let (impacts, hash) = expected(Toi::F32);
+    assert!(impacts.len() > 10);
+    assert_eq!(answer["free"], false);
+    assert_eq!(answer["impacts"], impacts.len());
+    assert_eq!(answer["hash"], format!("{hash:016x}"));
+    assert_eq!(answer["touching_at_start"], 0);
+    let total: u64 = ["vf", "ee", "ev", "vv"]
+        .map(|kind| answer["kinds"][kind].as_u64().unwrap())
+        .iter()
+        .sum();
+    assert_eq!(total, impacts.len() as u64);
+    let first = impacts
+        .iter()
+        .min_by(|a, b| a.toi.total_cmp(&b.toi))
+        .unwrap();
+    assert_eq!(answer["earliest"]["toi"], first.toi);
+    assert_eq!(answer["earliest"]["kind"], first.kind.name());
+    assert_eq!(answer["bodies"][1]["name"], "b0.ply");
+    assert_eq!(answer["bodies"][1]["end"], "b1.ply");
+
+    // The first alone is the same.
+    let alone = folder.run(
+        ["step"]
+            .iter()
+            .chain(&FILES)
+            .chain(&["--json", "--earliest"]),
+    );
+    let alone = alone.json();
+    assert_eq!(alone["earliest"], answer["earliest"]);
+    assert_eq!(
+        (&alone["free"], &alone["impacts"]),
+        (&Value::Bool(false), &Value::Null)
+    );
+
+    // And in words.
+    let printed = folder.run(["step"].iter().chain(&FILES)).printed();
+    assert!(printed.starts_with("not free: "), "{printed}");
+    assert!(
+        printed.contains(&format!("at time {:?}", first.toi)),
+        "{printed}"
+    );
+}
+
+#[test]
+fn impacts_read_back_to_the_same_bits() {
+    let folder = folder();
+    for (name, toi) in [("f32", Toi::F32), ("f64", Toi::F64)] {
+        let rows: Vec<Row> = expected(toi).0.iter().map(row).collect();
+        for file in ["impacts.csv", "impacts.npy"] {
+            let options = ["--toi", name, "--impacts", file];
+            let run = folder.run(["step"].iter().chain(&FILES).chain(&options));
+            run.printed();
+        }
+        assert_eq!(csv(&folder.path("impacts.csv")), rows);
+        let read = match toi {
+            Toi::F32 => npy(&folder.path("impacts.npy"), |bytes| {
+                f32::from_le_bytes(bytes).into()
+            }),
+            Toi::F64 => npy(&folder.path("impacts.npy"), f64::from_le_bytes),
+        };
+        assert_eq!(read, rows);
+    }
+}
+
+#[test]
+fn a_free_step_says_so() {
+    let folder = folder();
+    let run = folder.run([
+        "step",
+        "a0.ply",
+        "a0.ply",
+        "b0.ply",
+        "b0.ply",
+        "--no-self",
+        "--json",
+    ]);
+    let answer = run.json();
+    assert_eq!(
+        (&answer["free"], &answer["earliest"]),
+        (&Value::Bool(true), &Value::Null)
+    );
+    assert_eq!(answer["impacts"], 0);
+    let run = folder.run(["step", "a0.ply", "a0.ply", "b0.ply", "b0.ply"]);
+    assert!(run.printed().starts_with("free: "));
+}
+
+#[test]
+fn meshes_are_coloured_by_time() {
+    let folder = folder();
+    let run = folder.run(["step"].iter().chain(&FILES).chain(&["--out", "seen.ply"]));
+    run.printed();
+    let mesh = impinge_io::read(
+        &folder.path("seen.ply"),
+        &impinge_io::ReadOptions::default(),
+    );
+    assert_eq!(mesh.unwrap().n_primitives(), 80 + 12);
+    let bytes = std::fs::read(folder.path("seen.ply")).unwrap();
+    assert!(String::from_utf8_lossy(&bytes).contains("colliding"));
+}
+
+#[test]
+fn ends_of_another_body_are_refused() {
+    let folder = folder();
+    let error = folder.run(["step", "a0.ply", "b1.ply"]).error();
+    assert!(
+        error.contains("b1.ply") && error.contains("a0.ply"),
+        "{error}"
+    );
+    assert!(error.contains("8 vertices at the end"), "{error}");
+    folder.text("one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    folder.text("turned.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 3 2\n");
+    let error = folder.run(["step", "one.obj", "turned.obj"]).error();
+    assert!(
+        error.contains("primitive 0 has the vertices [0, 2, 1]"),
+        "{error}"
+    );
+    folder.text("nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    assert!(
+        folder
+            .run(["step", "one.obj", "nan.obj"])
+            .error()
+            .contains("nan.obj")
+    );
+    let misuse = folder.run(["step", "a0.ply", "a1.ply", "b0.ply"]).misuse();
+    assert!(misuse.contains("b0.ply has no end (3 files"), "{misuse}");
+    let misuse = folder
+        .run(["step", "a0.ply", "a1.ply", "--no-self"])
+        .misuse();
+    assert!(misuse.contains("nothing to test"), "{misuse}");
+}
+
+/// Two triangles with a vertex each at one position at the start; at the end it has parted.
+#[test]
+fn welding_keeps_what_parts() {
+    let folder = Folder::new();
+    let faces = "f 1 2 3\nf 4 5 6\n";
+    let start = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv -1 0 0\nv 0 -1 0\n";
+    let parted = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv -1 0 1\nv 0 -1 1\n";
+    folder.text("start.obj", &format!("{start}{faces}"));
+    folder.text("parted.obj", &format!("{parted}{faces}"));
+    let at_start = |end: &str, more: &[&str]| {
+        let run = folder.run(["step", "start.obj", end, "--json"].iter().chain(more));
+        let answer = run.json();
+        (
+            answer["touching_at_start"].as_u64(),
+            answer["bodies"][0]["vertices"].as_u64(),
+        )
+    };
+    let (touching, vertices) = at_start("start.obj", &[]);
+    assert!(touching > Some(0) && vertices == Some(6));
+    assert_eq!(at_start("start.obj", &["--weld"]), (Some(0), Some(5)));
+    assert_eq!(
+        at_start("parted.obj", &["--weld"]),
+        at_start("parted.obj", &[])
+    );
+    assert_eq!(at_start("start.obj", &["--start", "skip"]).0, Some(0));
+}
+
+#[test]
+fn a_sequence_is_followed_step_by_step() {
+    let folder = Folder::new();
+    let still = cube([0.0; 3], 1.0);
+    folder.ply("still.ply", &still);
+    for (frame, x) in [3.0, 2.0, 0.5, 0.25].into_iter().enumerate() {
+        folder.ply(&format!("f{frame}.ply"), &cube([x, 0.125, 0.25], 1.0));
+    }
+    let arguments = [
+        "sequence",
+        "f0.ply",
+        "f%d.ply",
+        "--other",
+        "still.ply",
+        "--ccd",
+        "--json",
+    ];
+    let run = folder.run(arguments);
+    assert_eq!(run.stderr, "");
+    let lines: Vec<Value> = run
+        .stdout
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(lines.len(), 3);
+    assert_eq!(lines[0]["free"], true);
+    // The gap of 1 is closed after two thirds of the second step.
+    let toi = lines[1]["earliest"]["toi"].as_f64().unwrap();
+    assert!(toi <= 2.0 / 3.0 && toi > 2.0 / 3.0 - 1e-7, "{toi}");
+    assert!(lines[2]["touching_at_start"].as_u64() > Some(0));
+    let printed = folder.run(&arguments[..6]).printed();
+    assert!(
+        printed.ends_with("3 steps, 1 free of contact\n"),
+        "{printed}"
+    );
+}
