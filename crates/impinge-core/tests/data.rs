@@ -1,6 +1,6 @@
 //! Real meshes against answers that were not made by this project: pair lists of CGAL's exact kernel,
-//! published self-intersections, the oracle on frames of a sequence. Skipped, and said so, where the
-//! data folder (`../shared/data` or `$IMPINGE_DATA`) is absent.
+//! published self-intersections, the oracle on frames of a sequence. Without the data folder
+//! (`../shared/data` or `$IMPINGE_DATA`) they fail, unless `IMPINGE_NO_DATA=1` says that it may be absent.
 
 mod common;
 #[path = "common/published.rs"]
@@ -17,11 +17,7 @@ use impinge_io::{Mesh, ReadOptions, Sequence};
 use published::Published;
 
 fn file(path: &str) -> Option<PathBuf> {
-    let found = impinge_scenes::data::data_file(path);
-    if found.is_none() {
-        eprintln!("skipped: {path} is not there (set IMPINGE_DATA)");
-    }
-    found
+    impinge_scenes::data::test_file(path)
 }
 
 /// A detector of each method and backend. Without an adapter that of the GPU fails.

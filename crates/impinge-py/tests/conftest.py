@@ -22,5 +22,7 @@ def data():
     """The folder with meshes and answers that were not made by this project."""
     path = pathlib.Path(os.environ.get("IMPINGE_DATA", ROOT.parent / "shared" / "data"))
     if not path.is_dir():
-        pytest.skip("no shared data: set IMPINGE_DATA to the folder that holds it")
+        if os.environ.get("IMPINGE_NO_DATA") == "1":
+            pytest.skip("no shared data, as IMPINGE_NO_DATA=1 allows")
+        pytest.fail(f"no shared data at {path}: set IMPINGE_DATA, or IMPINGE_NO_DATA=1 to go without")
     return path

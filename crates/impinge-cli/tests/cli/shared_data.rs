@@ -4,17 +4,13 @@ use std::path::PathBuf;
 
 use impinge_io::{Positions, ReadOptions, read};
 use impinge_scenes::Model;
-use impinge_scenes::data::data_file;
+use impinge_scenes::data::test_file;
 use serde_json::{Value, json};
 
 use crate::harness::{Folder, npy_rows};
 
 fn file(path: &str) -> Option<PathBuf> {
-    let found = data_file(path);
-    if found.is_none() {
-        eprintln!("skipped: no {path} in the shared data");
-    }
-    found
+    test_file(path)
 }
 
 fn answers(path: &str) -> Option<Value> {

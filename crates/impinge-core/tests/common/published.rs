@@ -1,4 +1,4 @@
-//! Triangle pairs that others published, from the shared data. Without it `None`, and said so.
+//! Triangle pairs that others published, from the shared data. `None` where `IMPINGE_NO_DATA=1` says that it may be absent.
 
 /// A triangle as three corners.
 pub type Triangle = [[f64; 3]; 3];
@@ -11,11 +11,7 @@ pub struct Published {
 }
 
 fn bytes(path: &str) -> Option<Vec<u8>> {
-    let Some(file) = impinge_scenes::data::data_file(path) else {
-        println!("skipped: {path} is not there (set IMPINGE_DATA)");
-        return None;
-    };
-    Some(std::fs::read(file).unwrap())
+    impinge_scenes::data::test_file(path).map(|file| std::fs::read(file).unwrap())
 }
 
 /// The 2,500 + 2,500 random pairs of Shen, Heng and Tang (2003).

@@ -1,5 +1,5 @@
 //! Pairs whose answers others published, and steps whose contacts and times are known to the last bit. The data is
-//! not part of the repository; without it the tests say that they were skipped.
+//! not part of the repository: without it the tests fail, unless `IMPINGE_NO_DATA=1` is set.
 
 use std::path::PathBuf;
 
@@ -12,22 +12,12 @@ type Point = [f64; 3];
 type Step = [[Point; 4]; 2];
 
 fn file(path: &str) -> Option<PathBuf> {
-    let found = impinge_scenes::data::data_file(path);
-    if found.is_none() {
-        println!("skipped: {path} is not there (set IMPINGE_DATA)");
-    }
-    found
+    impinge_scenes::data::test_file(path)
 }
 
 /// Queries of Wang et al. 2021 with exact booleans: eight rows of three fractions, then the truth.
 fn queries(kind: &str) -> Option<Vec<(Step, bool, String)>> {
-    let folder = impinge_scenes::data::data_dir()
-        .map(|folder| folder.join("ccd/queries"))
-        .filter(|folder| folder.is_dir());
-    let Some(folder) = folder else {
-        println!("skipped: ccd/queries is not there (set IMPINGE_DATA)");
-        return None;
-    };
+    let folder = file("ccd/queries")?;
     let mut queries = Vec::new();
     for scene in std::fs::read_dir(folder).unwrap() {
         for file in std::fs::read_dir(scene.unwrap().path().join(kind)).unwrap() {

@@ -1,0 +1,67 @@
+//! One answer, pinned: the same hash for every method and for 1 to 16 threads, on every machine. The scene's coordinates
+//! come from integers and sums alone, so they are the same bits everywhere.
+
+use impinge_core::{Backend, Detector, Method, Query, Scene, Settings};
+use impinge_scenes::soup;
+
+/// How many pairs there are, and their hash. A change of these numbers is a change of the answer.
+const GOLDEN: [(&str, usize, u64); 3] =
+    [("triangles", 0, 0), ("lattice", 0, 0), ("tetrahedra", 0, 0)];
+
+fn scene(name: &str) -> Scene {
+    let (a, b) = match name {
+        "triangles" => (
+            soup::triangles(60_000, 0.04, 1),
+            soup::triangles(60_000, 0.04, 2),
+        ),
+        "lattice" => (
+            soup::lattice_triangles(2_000, 40, 3),
+            soup::lattice_triangles(2_000, 40, 4),
+        ),
+        _ => (
+            soup::tetrahedra(8_000, 0.06, 5),
+            soup::triangles(8_000, 0.06, 6),
+        ),
+    };
+    let mut scene = Scene::new();
+    a.add_to(&mut scene).unwrap();
+    b.add_to(&mut scene).unwrap();
+    scene
+}
+
+#[test]
+fn the_hash_is_the_same_for_1_to_16_threads() {
+    for (name, n_pairs, hash) in GOLDEN {
+        let mut scene = scene(name);
+        for method in [Method::Clusters, Method::Cells] {
+            for threads in 1..=16 {
+                let mut detector = Detector::with_settings(Settings {
+                    backend: Backend::Cpu,
+                    method,
+                    threads,
+                    ..Settings::default()
+                })
+                .unwrap();
+                // A second frame finds caches filled and helpers awake; positions are written again for it.
+                for frame in 0..2 {
+                    let pairs = detector.detect(&scene, &Query::everything()).unwrap();
+                    assert_eq!(
+                        (pairs.len(), format!("{:016x}", pairs.hash())),
+                        (n_pairs, format!("{hash:016x}")),
+                        "{name}, {method:?}, {threads} threads, frame {frame}"
+                    );
+                    let bodies: Vec<_> = scene
+                        .bodies()
+                        .map(|(id, body)| (id, body.positions().clone()))
+                        .collect();
+                    for (id, positions) in bodies {
+                        let impinge_core::Positions::F32(positions) = positions else {
+                            panic!("single precision");
+                        };
+                        scene.set_positions(id, &positions).unwrap();
+                    }
+                }
+            }
+        }
+    }
+}
