@@ -187,12 +187,12 @@ fn plainly(n_vertices: u32, faces: &[[u32; 3]]) -> [u64; 8] {
                 .push((ix, a < b));
         }
     }
-    let n = |pick: &dyn Fn(&Vec<(usize, bool)>) -> bool| {
-        edges.values().filter(|e| pick(e)).count() as u64
-    };
-    let boundary = n(&|users| users.len() == 1);
-    let non_manifold = n(&|users| users.len() > 2);
-    let inconsistent = n(&|users| users.len() == 2 && users[0].1 == users[1].1);
+    /// Whether the faces that use an edge, each with the direction in which it does, are to be counted.
+    type Pick = fn(&[(usize, bool)]) -> bool;
+    let n = |pick: Pick| edges.values().filter(|users| pick(users)).count() as u64;
+    let boundary = n(|users| users.len() == 1);
+    let non_manifold = n(|users| users.len() > 2);
+    let inconsistent = n(|users| users.len() == 2 && users[0].1 == users[1].1);
     // Pieces of things that are linked: labels sink to the smallest until nothing changes.
     let pieces = |members: &BTreeSet<usize>, linked: &dyn Fn(usize, usize) -> bool| -> u64 {
         let mut labels: BTreeMap<usize, usize> = members.iter().map(|&x| (x, x)).collect();

@@ -65,8 +65,8 @@ fn a_mesh_named_twice_has_two_rows() {
     let folder = tempfile::tempdir().unwrap();
     let list = vec![PathBuf::from("a"), PathBuf::from("a"), PathBuf::from("b")];
     let mut store = RowStore::open(folder.path(), &list, true, 8, (0, 1), false).unwrap();
-    for ix in 0..3 {
-        store.put(ix, row(&list[ix])).unwrap();
+    for (ix, path) in list.iter().enumerate() {
+        store.put(ix, row(path)).unwrap();
     }
     let store = RowStore::open(folder.path(), &list, true, 8, (0, 1), false).unwrap();
     assert!(store.missing().is_empty());
@@ -103,8 +103,8 @@ fn rows_of_another_run_and_damaged_ones_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let list = meshes(3);
     let mut store = RowStore::open(folder.path(), &list, true, 8, (0, 1), false).unwrap();
-    for ix in 0..3 {
-        store.put(ix, row(&list[ix])).unwrap();
+    for (ix, path) in list.iter().enumerate() {
+        store.put(ix, row(path)).unwrap();
     }
     let open = |list: &[PathBuf], weld| {
         RowStore::open(folder.path(), list, weld, 8, (0, 1), false).unwrap_err()

@@ -247,12 +247,12 @@ impl Work<'_> {
         let (mut regions, mut region_of) = regions(self.contacts, &curves, &mut sets);
         let numbers = [0, 1].map(|side| self.crossings[side].body);
         let mut inside = [Vec::new(), Vec::new()];
-        for side in 0..2 {
+        for (side, inside) in inside.iter_mut().enumerate() {
             for vertex in 0..self.bodies[side].n_vertices() as u32 {
                 let Some(node) = self.node(side, vertex) else {
                     continue;
                 };
-                inside[side].push(vertex);
+                inside.push(vertex);
                 let at = self.bodies[side].positions().point(vertex as usize);
                 let region = &mut region_of[sets.find(node) as usize];
                 if *region == NO_REGION {
@@ -461,7 +461,7 @@ impl Work<'_> {
                 add_side(number, on(1, b), to, from);
             }
         }
-        for side in 0..2 {
+        for (side, pieces) in pieces.iter().enumerate() {
             let Elements::Triangles(faces) = self.bodies[side].elements() else {
                 continue;
             };
@@ -486,8 +486,8 @@ impl Work<'_> {
                     }
                     let name = crossings.name([from, to]);
                     let is_forward = crossings.lowest(from) == name[0];
-                    let first = pieces[side].partition_point(|piece| piece.edge < name);
-                    for piece in pieces[side][first..]
+                    let first = pieces.partition_point(|piece| piece.edge < name);
+                    for piece in pieces[first..]
                         .iter()
                         .take_while(|piece| piece.edge == name)
                     {

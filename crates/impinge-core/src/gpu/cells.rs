@@ -195,6 +195,7 @@ pub struct Plan {
 }
 
 impl Plan {
+    #[allow(clippy::new_without_default)]
     pub fn new() -> Self {
         Plan {
             steps: Steps::new(),

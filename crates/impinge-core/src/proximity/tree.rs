@@ -22,10 +22,10 @@ impl Box64 {
     };
 
     fn cover(&mut self, point: Point) {
-        for k in 0..3 {
-            self.min[k] = self.min[k].min(point[k]);
-            self.max[k] = self.max[k].max(point[k]);
-        }
+        self.join(&Box64 {
+            min: point,
+            max: point,
+        });
     }
 
     fn join(&mut self, other: &Box64) {

@@ -50,8 +50,9 @@ impl<'a> Kept<World<'a>> for Group {
             let elements = &elements[first..first + self.size];
             self.n_corners = elements.first().map_or(0, |corners| corners.len());
             for (lane, corners) in elements.iter().enumerate() {
-                for (k, &corner) in corners.iter().take(3).enumerate() {
-                    self.corners[k].0[lane] = corner;
+                // Of tetrahedra, which no step has, the fourth corner has no list.
+                for (lanes, &corner) in self.corners.iter_mut().zip(corners) {
+                    lanes.0[lane] = corner;
                 }
             }
         });

@@ -66,6 +66,7 @@ fn step(kind: Kind, random: &mut Random) -> [[Point; 4]; 2] {
     let mut points = [[[0.0; 3]; 4]; 2];
     let axes = [[(); 3]; 3].map(|axis| axis.map(|()| random.unit()));
     let scale = 2.0_f64.powi(random.below(160) as i32 - 120);
+    #[allow(clippy::needless_range_loop)] // `points[0]` is read while `points[1]` is written.
     for end in 0..2 {
         for ix in 0..4 {
             let lattice = [(); 3].map(|()| random.below(4) as f64);
@@ -96,12 +97,9 @@ fn step(kind: Kind, random: &mut Random) -> [[Point; 4]; 2] {
 
 impl Steps8 {
     fn set(&mut self, lane: usize, step: &[[Point; 4]; 2]) {
-        for end in 0..2 {
-            for ix in 0..4 {
-                for axis in 0..3 {
-                    self.0[end][ix][axis][lane] = step[end][ix][axis];
-                }
-            }
+        let lists = self.0.as_flattened_mut().as_flattened_mut();
+        for (list, x) in lists.iter_mut().zip(step.as_flattened().as_flattened()) {
+            list[lane] = *x;
         }
     }
 }
