@@ -1,9 +1,9 @@
 //! The GPU backend: the whole pipeline in WGSL, the same bytes as the CPU.
 //!
 //! Stages carry the names that they have on the CPU; each kernel file begins with a card. One
-//! submission a frame: positions go up, counters and results come back, see [`clusters`] and [`cells`]. What the filter on
+//! submission a frame: positions go up, counters and results come back, see `clusters` and `cells`. What the filter on
 //! the device leaves open is settled exactly on the CPU from the numbers as given. Nothing here
-//! blocks but what is in [`waiting`].
+//! blocks but what is in `waiting`.
 
 mod bounds;
 mod clusterings;

@@ -1,7 +1,7 @@
 //! Box tests, many at a time: AVX-512, AVX2, or plain loops that any compiler vectorises (NEON).
 //!
 //! A binary built for plain x86-64 finds out at run time what the processor has. Kernels are
-//! generic over [`Simd`] and wrapped once per instruction set by `dispatch!`; everything between wrapper
+//! generic over `Simd` and wrapped once per instruction set by `dispatch!`; everything between wrapper
 //! and intrinsic is `inline(always)`, so a kernel is compiled whole for its set. Kernels pass no closures
 //! to library functions: those would be compiled on their own, without the set.
 //! The answers are bit masks of exact comparisons: no set can differ from another.
