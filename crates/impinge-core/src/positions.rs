@@ -83,7 +83,7 @@ mod sealed {
 /// `f32` or `f64`: both are taken as they are and answered exactly.
 pub trait Real: sealed::Sealed + Copy + Send + Sync + 'static {
     #[doc(hidden)]
-    fn in_range(self) -> bool;
+    fn all_in_range(numbers: &[Self]) -> bool;
     #[doc(hidden)]
     fn widen(self) -> f64;
     #[doc(hidden)]
@@ -93,9 +93,16 @@ pub trait Real: sealed::Sealed + Copy + Send + Sync + 'static {
 }
 
 impl Real for f32 {
-    #[inline(always)]
-    fn in_range(self) -> bool {
-        self.is_finite()
+    /// One bit stays set for any infinity or NaN: adding one to an exponent of all ones reaches the bit of the
+    /// sign. The compiler makes vectors of this, and not of `is_finite`.
+    #[inline]
+    fn all_in_range(numbers: &[f32]) -> bool {
+        const EXPONENT: u32 = 0x7f80_0000;
+        const ONE: u32 = 0x0080_0000;
+        let bad = numbers
+            .iter()
+            .fold(0, |bad, x| bad | ((x.to_bits() & EXPONENT) + ONE));
+        bad >> 31 == 0
     }
     #[inline(always)]
     fn widen(self) -> f64 {
@@ -113,9 +120,14 @@ impl Real for f32 {
 }
 
 impl Real for f64 {
-    #[inline(always)]
-    fn in_range(self) -> bool {
-        exact::in_range(self)
+    #[inline]
+    fn all_in_range(numbers: &[f64]) -> bool {
+        let bad = numbers.iter().fold(0, |bad, x| {
+            let size = x.abs();
+            let normal = (size >= exact::MIN_MAGNITUDE) & (size <= exact::MAX_MAGNITUDE);
+            bad | u64::from(!(normal | (size == 0.0)))
+        });
+        bad == 0
     }
     #[inline(always)]
     fn widen(self) -> f64 {
@@ -135,11 +147,7 @@ impl Real for f64 {
 pub(crate) fn check_positions<R: Real>(body: BodyId, positions: &[[R; 3]]) -> Result<(), Error> {
     // One branch a chunk keeps the common case, all good, at memory speed.
     for (chunk_ix, chunk) in positions.chunks(1024).enumerate() {
-        let good = chunk
-            .as_flattened()
-            .iter()
-            .fold(true, |good, x| good & x.in_range());
-        if good {
+        if R::all_in_range(chunk.as_flattened()) {
             continue;
         }
         for (vertex, position) in chunk.iter().enumerate() {

@@ -2,6 +2,7 @@
 //!
 //! * Generators: [`surfaces`] (balls, tori, knots, cloth, boxes), [`solids`] (tetrahedra) and
 //!   [`soup`] (random primitives, on an integer lattice too, where everything is degenerate).
+//! * [`regular`]: flat and regular surfaces, hard for filters.
 //! * [`deform`]: positions as functions of the rest pose and of time, written into a buffer.
 //! * [`BuiltScene`]: bodies and the question asked of them, ready to be detected.
 //! * [`adversarial`]: scenes that break methods which are only fast on average.
@@ -25,6 +26,7 @@ pub mod data;
 pub mod deform;
 mod model;
 mod random;
+pub mod regular;
 pub mod solids;
 pub mod soup;
 pub mod surfaces;

@@ -16,7 +16,7 @@
 //! | 4 | | always |
 
 use super::Point;
-use super::filter::{shared_edge, shared_vertex};
+use super::filter::{angles_apart, shared_edge, shared_vertex, sides_apart};
 use super::orientation::{Projection, Sign, collinear, orient3d};
 use super::segment::{same, segments_intersect, strictly_between};
 use super::tetrahedron::{tetrahedra_intersect, triangle_tetrahedron_intersect};
@@ -72,13 +72,14 @@ fn neighbours_answer(
             match shared_vertex(&a[i], others_a, others_b) {
                 (true, _) => Some(true),
                 (_, true) => Some(false),
-                _ => None,
+                _ => angles_apart(&a[i], others_a, others_b).then_some(false),
             }
         }
         2 => {
             let (i, j) = (first(is_shared_a, false)?, first(is_shared_b, false)?);
             let [u, v] = next(i).map(|vertex| &a[vertex]);
-            shared_edge(u, v, &a[i], &b[j]).then_some(false)
+            let apart = shared_edge(u, v, &a[i], &b[j]) || sides_apart(u, v, &a[i], &b[j]);
+            apart.then_some(false)
         }
         _ => None,
     }

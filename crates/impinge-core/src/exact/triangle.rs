@@ -1,7 +1,7 @@
 //! Triangle against segment and triangle against triangle.
 
 use super::Point;
-use super::filter::triangles_answer;
+use super::filter::{apart_in_a_plane, triangles_answer};
 use super::orientation::{Projection, Sign, on_one_side, orient2d, orient3d, strictly_on_one_side};
 use super::segment::{segments_intersect, segments_intersect_2d};
 
@@ -25,8 +25,9 @@ const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 /// ```
 #[must_use]
 pub fn triangles_intersect(a: &[Point; 3], b: &[Point; 3]) -> bool {
-    triangles_answer(a, b)
-        .unwrap_or_else(|| have_common_point(a, b) || triangles_intersect_by_signs(a, b))
+    triangles_answer(a, b).unwrap_or_else(|| {
+        have_common_point(a, b) || (!apart_in_a_plane(a, b) && triangles_intersect_by_signs(a, b))
+    })
 }
 
 /// Whether some vertex of one primitive is also a vertex of the other, number for number: then they

@@ -2,8 +2,8 @@
 //!
 //! What it does: answers *yes*, *no* or *unsure* for a pair of triangles. Yes and no are certain;
 //! unsure pairs go to [`triangles_intersect`](super::triangles_intersect). Pairs of random
-//! triangles are settled in more than 99 of 100 cases; pairs that touch, are coplanar or
-//! degenerate are always unsure.
+//! triangles are settled in more than 99 of 100 cases. Pairs of one plane are settled where they are apart
+//! ([`projections`]); pairs that touch, or overlap in one plane, are always unsure.
 //!
 //! In: [`TrianglePairs8`], eight pairs with one array a coordinate ("structure of arrays"), in `f64`; or, in
 //! `f32`, the corners of two groups as tables ([`Triangles64`]) and the places of sixteen pairs in them.
@@ -29,6 +29,7 @@ pub mod motion;
 mod moving;
 mod neighbours;
 pub mod number;
+mod projections;
 mod tetrahedra;
 mod triangles;
 
@@ -45,6 +46,7 @@ pub use moving::{
 };
 pub(super) use moving::{contact_answer, contact_search};
 pub(super) use neighbours::{shared_edge, shared_vertex};
+pub(super) use projections::{angles_apart, apart_in_a_plane, sides_apart};
 pub(super) use tetrahedra::tetrahedra_answer;
 pub use tetrahedra::{classify_by_faces, classify_tetrahedra};
 pub(super) use triangles::triangles_answer;

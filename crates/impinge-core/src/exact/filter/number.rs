@@ -54,6 +54,11 @@ pub trait Number:
     fn larger(self, other: Self) -> Self;
     /// Whether a condition holds anywhere.
     fn any(mask: Self::Mask) -> bool;
+    /// The smaller one; either where one is NaN.
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        Self::select(self.gt(other), other, self)
+    }
     /// Whether `self > other`; false for NaN.
     fn gt(self, other: Self) -> Self::Mask;
     /// `yes` where the mask is set, else `no`.

@@ -2,6 +2,7 @@
 
 use super::determinant::{Determinant, Normal, difference};
 use super::number::{Lookup, Number, Vector, load_vertex};
+use super::projections::{self, are_parted};
 use super::{
     BATCH, LANES, Point, TABLE, TrianglePairs8, Triangles8, Triangles64, Verdict, Verdict16,
 };
@@ -29,8 +30,20 @@ pub fn classify<V: Vector>(pairs: &TrianglePairs8) -> Verdict {
         let sides = Sides::new(&a, &b);
         let (apart, sure) = (sides.are_apart(), sides.are_sure());
         let (meet, miss) = cross_on_line(&a, &b, &sides);
-        verdict.yes |= V::bits(sure & !apart & meet) << first;
-        verdict.no |= V::bits(apart | (sure & miss)) << first;
+        let (yes, mut no) = (
+            V::bits(sure & !apart & meet),
+            V::bits(apart | (sure & miss)),
+        );
+        let all = u8::MAX >> (LANES - V::N);
+        let bound = projections::bound(&a, &b);
+        for plane in 0..3 {
+            if (yes | no) & all == all {
+                break;
+            }
+            no |= !yes & V::bits(are_parted(&a, &b, plane, bound));
+        }
+        verdict.yes |= yes << first;
+        verdict.no |= no << first;
     }
     verdict
 }
@@ -50,14 +63,25 @@ pub fn classify_in_tables<V: Lookup>(
         let b = look_up::<V>(b, V::places(places_b, first));
         let sides = Sides::new(&a, &b);
         let (apart, sure) = (sides.are_apart(), sides.are_sure());
-        verdict.no |= V::bits(apart) << first;
-        let left = V::bits(sure & !apart) << first;
-        if left & among == 0 {
-            continue;
+        let among = among >> first & u16::MAX >> (BATCH - V::N);
+        let (mut yes, mut no) = (0, V::bits(apart));
+        let left = V::bits(sure & !apart);
+        if left & among != 0 {
+            let (meet, miss) = cross_on_line(&a, &b, &sides);
+            yes = left & V::bits(meet);
+            no |= left & V::bits(miss);
         }
-        let (meet, miss) = cross_on_line(&a, &b, &sides);
-        verdict.yes |= left & V::bits(meet) << first;
-        verdict.no |= left & V::bits(miss) << first;
+        if among & !(yes | no) != 0 {
+            let bound = projections::bound(&a, &b);
+            for plane in 0..3 {
+                no |= !yes & V::bits(are_parted(&a, &b, plane, bound));
+                if among & !(yes | no) == 0 {
+                    break;
+                }
+            }
+        }
+        verdict.yes |= yes << first;
+        verdict.no |= no << first;
     }
     verdict
 }
