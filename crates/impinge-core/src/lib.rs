@@ -6,6 +6,7 @@
 
 pub mod clock;
 // Types are documented; fields and small methods of the inside speak for themselves.
+mod advance;
 pub mod contact;
 #[allow(missing_docs)]
 pub mod cpu;
@@ -34,6 +35,7 @@ mod settings;
 mod stats;
 mod step;
 
+pub use advance::Advance;
 pub use detector::Detector;
 pub use elements::{Elements, Kind, Part};
 pub use error::Error;
@@ -51,6 +53,6 @@ pub use query::{Query, SharedVertex};
 pub use scene::{Body, Filter, Scene};
 pub use settings::{Backend, InstructionSet, Method, Recluster, Settings};
 pub use stats::{Stage, Statistics};
-pub use step::{Advance, CandidateQuery, Start, Step, Toi};
+pub use step::{CandidateQuery, Start, Step, Toi};
 #[cfg(feature = "gpu")]
 pub use wgpu;

@@ -4,6 +4,7 @@
 use crate::clock::Instant;
 
 use super::Detector;
+use crate::advance::{Advance, blend};
 use crate::cpu::Job;
 use crate::cpu::clusters::Options;
 use crate::cpu::steps::{Asked, FoundByKind, Pose, Sought, StepClusters};
@@ -18,7 +19,7 @@ use crate::progress::Control;
 use crate::scene::Scene;
 use crate::settings::{Method, Settings};
 use crate::stats::Statistics;
-use crate::step::{Advance, CandidateQuery, Start, Step, Toi, blend};
+use crate::step::{CandidateQuery, Start, Step, Toi};
 
 /// What is kept from step to step.
 pub(super) struct Steps {

@@ -16,12 +16,25 @@ use crate::settings::Recluster;
 use crate::stats::Statistics;
 
 use super::hull::Pose;
-use super::{Caches, Worker, part_ix};
 
 /// Clusters whose boxes a task finds.
 const CLUSTERS: usize = 128;
 /// Elements of all layers together below which one thread finds the boxes.
 const PARALLEL_FROM: u64 = 60_000;
+
+/// By slot of the body, then by part.
+pub(super) type Caches = Vec<[Option<Box<LayerCache>>; PARTS]>;
+
+/// Vertices, edges and faces.
+const PARTS: usize = 3;
+
+pub(super) fn part_ix(part: Part) -> usize {
+    match part {
+        Part::Vertices => 0,
+        Part::Edges => 1,
+        Part::Faces | Part::Given => 2,
+    }
+}
 
 /// What is kept of a layer from step to step.
 #[derive(Debug)]
@@ -111,13 +124,13 @@ struct Task {
 
 /// The boxes of all layers that moved, or that were looked at otherwise; layers that have flowed away from their clusters
 /// are clustered anew.
-pub(super) fn refit(
+pub(super) fn refit<S: Send>(
     isa: Isa,
     job: Job<'_>,
     options: &Options,
     pose: Pose,
     caches: &mut Caches,
-    scratches: &mut [Worker],
+    scratches: &mut [S],
     stats: &mut Statistics,
 ) {
     find_boxes(isa, job, pose, caches, scratches);
@@ -157,7 +170,13 @@ pub(super) fn refit(
     }
 }
 
-fn find_boxes(isa: Isa, job: Job<'_>, pose: Pose, caches: &mut Caches, scratches: &mut [Worker]) {
+fn find_boxes<S: Send>(
+    isa: Isa,
+    job: Job<'_>,
+    pose: Pose,
+    caches: &mut Caches,
+    scratches: &mut [S],
+) {
     let Job {
         scene,
         frame,

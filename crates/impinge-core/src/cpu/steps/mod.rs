@@ -16,20 +16,12 @@ mod group;
 mod hull;
 mod narrow;
 mod pairing;
+mod world;
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-
-use crate::elements::Part;
 use crate::error::Error;
-use crate::exact::Contact;
-use crate::frame::Frame;
 use crate::grouping::hubs::Hubs;
-use crate::impacts::Found;
-use crate::pair_kind::PairKind;
-use crate::scene::Scene;
 use crate::settings::InstructionSet;
 use crate::stats::Statistics;
-use crate::step::{Start, Toi};
 
 use super::Job;
 use super::clusters::Options;
@@ -39,115 +31,11 @@ use super::simd::{Isa, Simd};
 use super::slabs::{self, Counts, Slabs, Stage};
 use super::top_level::TopLevel;
 
-use cache::LayerCache;
+use cache::{Caches, LayerCache, part_ix};
 pub(crate) use hull::Pose;
-pub(crate) use pairing::Worker;
-
-/// What is sought in a step.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Sought {
-    /// Every contact.
-    All,
-    /// The earliest contact, and all that may be at the same time when rounded.
-    Earliest,
-    /// Any contact.
-    Any,
-    /// Boxes that overlap when inflated by this much.
-    Boxes(f64),
-}
-
-/// What is asked of a step.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Asked {
-    pub sought: Sought,
-    pub start: Start,
-    pub toi: Toi,
-    pub pose: Pose,
-    /// No contact is wanted that is later than this.
-    pub latest: f64,
-}
-
-/// What is known of the answer while workers look for it.
-#[derive(Debug)]
-pub(crate) struct Known {
-    /// The earliest time found, as the bits of a number that is not negative.
-    earliest: AtomicU64,
-    is_over: AtomicBool,
-}
-
-impl Known {
-    fn new(latest: f64) -> Self {
-        Known {
-            earliest: AtomicU64::new(latest.to_bits()),
-            is_over: AtomicBool::new(false),
-        }
-    }
-
-    /// The earliest time found so far.
-    fn earliest(&self) -> f64 {
-        f64::from_bits(self.earliest.load(Ordering::Relaxed))
-    }
-
-    fn found(&self, sought: Sought, time: f64) {
-        match sought {
-            // Bits of numbers that are not negative are in their order.
-            Sought::Earliest => {
-                self.earliest.fetch_min(time.to_bits(), Ordering::Relaxed);
-            }
-            Sought::Any => self.is_over.store(true, Ordering::Relaxed),
-            Sought::All | Sought::Boxes(_) => {}
-        }
-    }
-}
-
-/// What the stages look at.
-#[derive(Clone, Copy)]
-pub(crate) struct World<'a> {
-    pub scene: &'a Scene,
-    pub frame: &'a Frame,
-    pub asked: Asked,
-    known: &'a Known,
-    caches: &'a Caches,
-}
-
-/// By slot of the body, then by part.
-type Caches = Vec<[Option<Box<LayerCache>>; PARTS]>;
-
-/// Vertices, edges and faces.
-const PARTS: usize = 3;
-
-fn part_ix(part: Part) -> usize {
-    match part {
-        Part::Vertices => 0,
-        Part::Edges => 1,
-        Part::Faces | Part::Given => 2,
-    }
-}
-
-impl<'a> World<'a> {
-    /// No contact is wanted that is later than this.
-    #[inline(always)]
-    fn until(&self) -> f64 {
-        match self.asked.sought {
-            // Those that are later by less than rounding are wanted, for their keys may be lower.
-            Sought::Earliest => {
-                let time = self.known.earliest();
-                let later = (time * (1.0 + 2f64.powi(-22))).max(f64::from(f32::MIN_POSITIVE));
-                later.min(1.0)
-            }
-            Sought::All | Sought::Any | Sought::Boxes(_) => 1.0,
-        }
-    }
-
-    /// What is kept of a layer.
-    #[inline(always)]
-    fn cache(&self, layer: u32) -> &'a LayerCache {
-        let layer = &self.frame.layers[layer as usize];
-        self.caches[layer.id.index()][part_ix(layer.part)]
-            .as_deref()
-            .expect("every layer was clustered")
-    }
-}
+use pairing::Worker;
+pub(crate) use world::{Asked, FoundByKind, Sought};
+use world::{Known, World};
 
 impl Stage for World<'_> {
     type Worker = Worker;
@@ -172,12 +60,9 @@ impl Stage for World<'_> {
     }
 
     fn is_over(&self) -> bool {
-        self.known.is_over.load(Ordering::Relaxed)
+        self.known.is_over()
     }
 }
-
-/// What was found, by kind of pair.
-pub(crate) type FoundByKind = [Vec<Found<Contact>>; PairKind::ALL.len()];
 
 /// Caches and scratch of the method; kept from step to step.
 pub(crate) struct StepClusters {

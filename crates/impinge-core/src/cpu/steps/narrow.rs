@@ -16,7 +16,7 @@ use crate::pair_kind::PairKind;
 use crate::positions::Positions;
 use crate::step::{Start, Toi};
 
-use super::{FoundByKind, Sought, World};
+use super::world::{FoundByKind, Sought, World};
 
 /// Pairs that the filter's first step leaves are searched once this many have gathered.
 const FULL: usize = 1024;

@@ -13,7 +13,7 @@ use crate::grouping::bounds::Bounds;
 
 use super::group::Group;
 use super::narrow::{Between, Settler};
-use super::{FoundByKind, World};
+use super::world::{FoundByKind, World};
 
 /// One work item in so many has its narrow stage timed.
 const SAMPLED: u32 = 16;

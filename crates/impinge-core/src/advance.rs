@@ -1,0 +1,65 @@
+//! How far a step can be taken, and where vertices are then.
+
+use crate::error::Error;
+use crate::ids::BodyId;
+use crate::impacts::Impact;
+use crate::positions::Positions;
+use crate::scene::Scene;
+
+/// How far a step can be taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Advance {
+    /// The part of the step that can be taken: 1 for all of it, 0 for none.
+    pub fraction: f64,
+    /// The first contact of the whole step, its time rounded down to `f64`. `None` where the whole step is free.
+    pub first: Option<Impact>,
+    /// Where the vertices of all bodies that move are then, rounded to the precision in which they are stored. The straight
+    /// way from the start to these rounded positions is free, but for what touches at the start.
+    pub positions: Vec<(BodyId, Positions)>,
+    /// How many fractions were tried.
+    pub n_tried: u32,
+}
+
+impl Advance {
+    /// Takes the step: these positions become those of the scene.
+    ///
+    /// # Errors
+    /// A body that is gone, or that has another number of vertices now.
+    pub fn apply(&self, scene: &mut Scene) -> Result<(), Error> {
+        self.positions
+            .iter()
+            .try_for_each(|(body, positions)| match positions {
+                Positions::F32(positions) => scene.set_positions(*body, positions),
+                Positions::F64(positions) => scene.set_positions(*body, positions),
+            })
+    }
+}
+
+/// `start + fraction (end - start)`, each coordinate computed in double precision and rounded to that of the positions.
+#[allow(clippy::cast_possible_truncation, reason = "positions are stored so")]
+pub(crate) fn blend(start: &Positions, end: &Positions, fraction: f64) -> Positions {
+    if fraction >= 1.0 {
+        return end.clone();
+    }
+    let at = |x: f64, y: f64| {
+        // Never beyond the ends, whatever the rounding.
+        (x + fraction * (y - x)).clamp(x.min(y), x.max(y))
+    };
+    match (start, end) {
+        (Positions::F32(start), Positions::F32(end)) => Positions::F32(
+            start
+                .iter()
+                .zip(end)
+                .map(|(x, y)| std::array::from_fn(|axis| at(x[axis].into(), y[axis].into()) as f32))
+                .collect(),
+        ),
+        _ => Positions::F64(
+            (0..start.len())
+                .map(|vertex| {
+                    let (x, y) = (start.point(vertex), end.point(vertex));
+                    std::array::from_fn(|axis| at(x[axis], y[axis]))
+                })
+                .collect(),
+        ),
+    }
+}
