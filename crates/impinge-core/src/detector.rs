@@ -1,24 +1,17 @@
-//! The frame loop: resolves a query, picks method and backend, sorts the answer.
+//! What users hold: it picks the backend, and the frame loop does the rest.
 
 #[cfg(feature = "gpu")]
 mod gpu;
 mod steps;
 
-use crate::clock::Instant;
-
-use crate::cpu::Job;
-use crate::cpu::cells::{self, Cells};
-use crate::cpu::clusters::{self, Clusters};
-use crate::cpu::workers::Workers;
+use crate::cpu::Cpu;
 use crate::error::Error;
-use crate::frame::Frame;
-use crate::naive;
-use crate::narrow::Intersection;
 use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
+use crate::run::{FrameLoop, ready};
 use crate::scene::Scene;
-use crate::settings::{Backend, Method, Settings};
+use crate::settings::{Backend, Settings};
 
 /// Finds intersecting pairs, frame after frame. Scratch memory lives here and is reused.
 ///
@@ -36,18 +29,15 @@ use crate::settings::{Backend, Method, Settings};
 /// ```
 pub struct Detector {
     settings: Settings,
-    frame: Frame,
-    pairs: Pairs,
-    workers: Workers,
-    clusters: Clusters,
-    cells: Cells,
+    frames: FrameLoop,
+    cpu: Cpu,
     steps: steps::Steps,
     #[cfg(feature = "gpu")]
     gpu: Option<crate::gpu::Engine>,
 }
 
 impl Detector {
-    /// A detector with the default method on the given backend.
+    /// Creates a detector with the default method on the given backend.
     ///
     /// # Errors
     /// As [`with_settings`](Detector::with_settings).
@@ -58,19 +48,19 @@ impl Detector {
         })
     }
 
-    /// A detector with everything said.
+    /// Creates a detector with explicit settings.
     ///
     /// # Errors
-    /// A setting out of its range; no adapter for `Backend::Gpu`; threads that do not start.
+    /// A setting out of its range; no adapter for `Backend::Gpu`.
     pub fn with_settings(settings: Settings) -> Result<Self, Error> {
         settings.check()?;
         #[cfg(feature = "gpu")]
         let gpu = gpu::open(&settings)?;
-        Detector::assemble(
+        Ok(Detector::assemble(
             settings,
             #[cfg(feature = "gpu")]
             gpu,
-        )
+        ))
     }
 
     /// [`with_settings`](Detector::with_settings) without blocking, for pages in a browser: there a GPU
@@ -82,31 +72,28 @@ impl Detector {
         settings.check()?;
         #[cfg(feature = "gpu")]
         let gpu = gpu::open_async(&settings).await?;
-        Detector::assemble(
+        Ok(Detector::assemble(
             settings,
             #[cfg(feature = "gpu")]
             gpu,
-        )
+        ))
     }
 
     fn assemble(
         settings: Settings,
         #[cfg(feature = "gpu")] gpu: Option<crate::gpu::Engine>,
-    ) -> Result<Self, Error> {
-        Ok(Detector {
+    ) -> Self {
+        Detector {
             #[cfg(feature = "gpu")]
             gpu,
-            workers: Workers::new(settings.threads)?,
-            frame: Frame::default(),
-            pairs: Pairs::default(),
-            clusters: Clusters::new(settings.instruction_set),
-            cells: Cells::new(settings.instruction_set),
+            frames: FrameLoop::new(settings.threads),
+            cpu: Cpu::new(&settings),
             steps: steps::Steps::new(&settings),
             settings,
-        })
+        }
     }
 
-    /// What it was told.
+    /// The settings it was created with.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
@@ -131,62 +118,37 @@ impl Detector {
     ) -> Result<&Pairs, Error> {
         #[cfg(feature = "gpu")]
         if let Some(gpu) = self.gpu_in_use() {
-            let result = gpu.block_on(self.detect_on_gpu(scene, query, control));
-            if self.is_answered(result)? {
-                return Ok(&self.pairs);
+            gpu.block_on(self.answer(scene, query, control))?;
+            return Ok(self.frames.pairs());
+        }
+        ready(self.answer(scene, query, control))?;
+        Ok(self.frames.pairs())
+    }
+
+    /// [`detect`](Detector::detect) without blocking: on a GPU the future waits for the device, which
+    /// somebody must poll (a browser does; natively `wgpu::Device::poll`). On the CPU it is ready at once.
+    ///
+    /// # Errors
+    /// As `detect`.
+    pub async fn detect_async(&mut self, scene: &Scene, query: &Query) -> Result<&Pairs, Error> {
+        self.answer(scene, query, &Control::new()).await?;
+        Ok(self.frames.pairs())
+    }
+
+    /// One frame. With `Backend::Auto` a GPU that fails, or cannot hold the scene, is given up for the CPU.
+    async fn answer(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        control: &Control<'_>,
+    ) -> Result<(), Error> {
+        #[cfg(feature = "gpu")]
+        if let Some(engine) = &mut self.gpu {
+            match self.frames.run(scene, query, control, engine).await {
+                Err(Error::Gpu { .. }) if self.settings.backend == Backend::Auto => self.gpu = None,
+                result => return result,
             }
         }
-        let start = Instant::now();
-        self.frame.resolve(scene, query)?;
-        let _shift = self.workers.shift(self.frame.n_primitives());
-        self.pairs.begin(&self.frame);
-        let (keys, stats) = self.pairs.parts_mut();
-        let settings = &self.settings;
-        stats.method = settings.method.name();
-        stats.n_threads = self.workers.n();
-        stats.backend.push_str("cpu");
-        let job = Job {
-            scene,
-            frame: &self.frame,
-            workers: &self.workers,
-            control,
-        };
-        match settings.method {
-            Method::Naive => {
-                self.frame.check(scene)?;
-                stats.time("naive", |stats| {
-                    naive::run(
-                        &Intersection,
-                        scene,
-                        &self.frame,
-                        control,
-                        stats,
-                        |_, key, ()| {
-                            keys.push(key);
-                        },
-                    )
-                })?;
-            }
-            Method::Cells => {
-                self.frame.check(scene)?;
-                let options = cells::Options {
-                    lambda: settings.lambda,
-                    group_size: settings.group_size,
-                    memory_budget: settings.memory_budget,
-                };
-                self.cells.run(job, &options, &cells::Owner, keys, stats)?;
-                stats.time("collect", |_| keys.sort_unstable());
-            }
-            Method::Clusters => {
-                let options = clusters::Options {
-                    recluster: settings.recluster,
-                    memory_budget: settings.memory_budget,
-                };
-                self.clusters.run(job, &options, keys, stats)?;
-                stats.time("collect", |_| keys.sort_unstable());
-            }
-        }
-        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
-        Ok(&self.pairs)
+        self.frames.run(scene, query, control, &mut self.cpu).await
     }
 }

@@ -63,13 +63,15 @@ pub enum Error {
         /// What was asked for.
         asked: &'static str,
     },
-    /// The id names no body of this scene: it was removed, or belongs to another scene.
-    #[error("there is no body {body} in this scene (its slot holds generation {present})")]
+    /// The id names no body of this scene: the body was removed, or belongs to another scene.
+    #[error(
+        "there is no such body {body} among the {n_bodies} of this scene: it was removed, or is another scene's"
+    )]
     UnknownBody {
         /// The id as given.
         body: BodyId,
-        /// The generation that the slot holds now; 0 when the slot was never used.
-        present: u32,
+        /// How many bodies the scene has.
+        n_bodies: usize,
     },
     /// A query between two bodies names one body twice. Ask for `within` instead.
     #[error("a query between body {body} and itself: ask for collisions within it instead")]

@@ -1,38 +1,26 @@
-//! The frame loop around a method that lives in another crate: what `Detector` is to the library's own.
+//! Runs a method of another crate in the frame loop of this one.
 
 #[cfg(feature = "gpu")]
 pub mod gpu;
 
-use crate::clock::Instant;
-
-use crate::cpu::Job;
-use crate::cpu::workers::Workers;
 use crate::error::Error;
-use crate::frame::Frame;
 use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
+use crate::run::{Finder, FrameLoop, Job, ready};
 use crate::scene::Scene;
 use crate::stats::Statistics;
 
-/// The frame loop around a method from outside.
+/// The frame loop around a method of another crate, on the CPU.
 pub struct Host {
-    frame: Frame,
-    pairs: Pairs,
-    workers: Workers,
+    frames: FrameLoop,
 }
 
 impl Host {
-    /// With `threads` workers; 0 for one a core.
-    ///
-    /// # Errors
-    /// Threads that do not start.
-    pub fn new(threads: usize) -> Result<Self, Error> {
-        Ok(Host {
-            frame: Frame::default(),
-            pairs: Pairs::default(),
-            workers: Workers::new(threads)?,
-        })
+    /// With `threads` workers; 0 for one per core.
+    pub fn new(threads: usize) -> Self {
+        let frames = FrameLoop::new(threads);
+        Host { frames }
     }
 
     /// One frame: resolves and checks the query, has `method` append the keys of all pairs, in any
@@ -45,29 +33,41 @@ impl Host {
         scene: &Scene,
         query: &Query,
         name: &'static str,
-        method: impl FnOnce(Job<'_>, &mut Vec<u64>, &mut Statistics) -> Result<(), Error>,
+        method: impl FnMut(Job<'_>, &mut Vec<u64>, &mut Statistics) -> Result<(), Error>,
     ) -> Result<&Pairs, Error> {
-        let start = Instant::now();
-        self.frame.resolve(scene, query)?;
-        let _shift = self.workers.shift(self.frame.n_primitives());
-        self.pairs.begin(&self.frame);
-        self.frame.check(scene)?;
-        let (keys, stats) = self.pairs.parts_mut();
-        stats.method = name;
-        stats.n_threads = self.workers.n();
-        stats.backend.push_str("cpu");
-        let job = Job {
-            scene,
-            frame: &self.frame,
-            workers: &self.workers,
-            control: &Control::new(),
-        };
-        method(job, keys, stats)?;
-        stats.time("collect", |_| {
-            keys.sort_unstable();
-            keys.dedup();
-        });
-        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
-        Ok(&self.pairs)
+        let mut guest = Guest { name, method };
+        ready(self.frames.run(scene, query, &Control::new(), &mut guest))?;
+        Ok(self.frames.pairs())
+    }
+}
+
+struct Guest<F> {
+    name: &'static str,
+    method: F,
+}
+
+impl<F> Finder for Guest<F>
+where
+    F: FnMut(Job<'_>, &mut Vec<u64>, &mut Statistics) -> Result<(), Error>,
+{
+    fn method(&self) -> &'static str {
+        self.name
+    }
+
+    fn backend(&self) -> &str {
+        "cpu"
+    }
+
+    fn repeats(&self) -> bool {
+        true
+    }
+
+    async fn find(
+        &mut self,
+        job: Job<'_>,
+        keys: &mut Vec<u64>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        (self.method)(job, keys, stats)
     }
 }

@@ -30,10 +30,14 @@ mod positions;
 mod progress;
 pub mod proximity;
 mod query;
+#[allow(missing_docs)]
+pub mod run;
 mod scene;
 mod settings;
 mod stats;
 mod step;
+#[allow(missing_docs)]
+pub mod workers;
 
 pub use advance::Advance;
 pub use detector::Detector;

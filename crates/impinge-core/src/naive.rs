@@ -29,7 +29,7 @@ pub(crate) fn run<T: Test>(
                 continue;
             };
             if box_a.overlaps(box_b) {
-                stats.n_candidates += 1;
+                stats.n_candidates += u64::from(test.admits(id, *a, *b));
                 if let Some(value) = test.settle(id, *a, *b) {
                     emit(id, pair_key(*number_a, *number_b), value);
                 }

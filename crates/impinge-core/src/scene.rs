@@ -1,12 +1,12 @@
 //! Bodies: topology once, positions every frame.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 pub(crate) use crate::elements::{Elements, Kind};
 use crate::elements::{Part, Topology};
 use crate::error::Error;
 pub(crate) use crate::ids::BodyId;
+use crate::ids::new_stamp;
 use crate::positions::Real;
 pub(crate) use crate::positions::{Positions, check_positions};
 
@@ -35,13 +35,6 @@ impl Filter {
     pub fn meets(self, other: Filter) -> bool {
         self.category & other.mask != 0 && other.category & self.mask != 0
     }
-}
-
-/// Stamps tell a detector what has changed since it last looked. They come from one counter
-/// for the whole process, so no two states of any two bodies ever carry the same one.
-fn new_stamp() -> u64 {
-    static NEXT: AtomicU64 = AtomicU64::new(1);
-    NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
 /// One body: elements, positions, filter.
@@ -131,11 +124,9 @@ impl Body {
     }
 }
 
-#[derive(Debug, Clone, Default)]
-struct Slot {
-    generation: u32,
-    body: Option<Body>,
-}
+/// A slot is empty after its body was removed.
+#[derive(Debug, Clone)]
+struct Slot(Option<(BodyId, Body)>);
 
 /// The bodies and where their vertices are now.
 ///
@@ -222,19 +213,13 @@ impl Scene {
                 limit: u64::from(u32::MAX),
             })?,
         };
-        let generation = self
-            .slots
-            .get(slot as usize)
-            .map_or(1, |slot| slot.generation.wrapping_add(1).max(1));
-        let id = BodyId::new(slot, generation);
+        let id = BodyId::new(slot);
         let body = checked_body(id, elements.into(), positions.into(), Filter::default())?;
-        if self.free.pop().is_none() {
-            self.slots.push(Slot::default());
+        let held = Slot(Some((id, body)));
+        match self.free.pop() {
+            Some(_) => self.slots[id.index()] = held,
+            None => self.slots.push(held),
         }
-        self.slots[slot as usize] = Slot {
-            generation,
-            body: Some(body),
-        };
         Ok(id)
     }
 
@@ -244,7 +229,7 @@ impl Scene {
     /// The id names no body.
     pub fn remove(&mut self, body: BodyId) -> Result<(), Error> {
         self.body(body)?;
-        self.slots[body.index()].body = None;
+        self.slots[body.index()] = Slot(None);
         self.free.push(body.slot());
         Ok(())
     }
@@ -375,29 +360,30 @@ impl Scene {
     /// The id names no body.
     pub fn body(&self, body: BodyId) -> Result<&Body, Error> {
         match self.slots.get(body.index()) {
-            Some(slot) if slot.generation == body.generation() && slot.body.is_some() => {
-                Ok(slot.body.as_ref().expect("just looked"))
-            }
-            slot => Err(Error::UnknownBody {
-                body,
-                present: slot.map_or(0, |slot| slot.generation),
-            }),
+            Some(Slot(Some((id, held)))) if *id == body => Ok(held),
+            _ => Err(self.unknown(body)),
         }
     }
 
     fn body_mut(&mut self, body: BodyId) -> Result<&mut Body, Error> {
-        self.body(body)?;
-        Ok(self.slots[body.index()].body.as_mut().expect("just looked"))
+        let unknown = self.unknown(body);
+        match self.slots.get_mut(body.index()) {
+            Some(Slot(Some((id, held)))) if *id == body => Ok(held),
+            _ => Err(unknown),
+        }
+    }
+
+    fn unknown(&self, body: BodyId) -> Error {
+        Error::UnknownBody {
+            body,
+            n_bodies: self.n_bodies(),
+        }
     }
 
     /// All bodies in the order of their ids.
     pub fn bodies(&self) -> impl Iterator<Item = (BodyId, &Body)> {
-        (0u32..).zip(&self.slots).filter_map(|(slot, held)| {
-            let generation = held.generation;
-            held.body
-                .as_ref()
-                .map(|body| (BodyId::new(slot, generation), body))
-        })
+        let held = self.slots.iter().filter_map(|Slot(held)| held.as_ref());
+        held.map(|(id, body)| (*id, body))
     }
 
     /// How many bodies there are.
@@ -418,16 +404,14 @@ impl Scene {
 
     /// Whether a slot is in use.
     pub(crate) fn holds(&self, slot: usize) -> bool {
-        self.slots.get(slot).is_some_and(|held| held.body.is_some())
+        self.slots.get(slot).is_some_and(|held| held.0.is_some())
     }
 
     /// The body in a slot that is known to be in use.
     #[inline]
     pub(crate) fn body_in(&self, slot: u32) -> &Body {
-        self.slots[slot as usize]
-            .body
-            .as_ref()
-            .expect("a participant's slot is in use")
+        let held = self.slots[slot as usize].0.as_ref();
+        &held.expect("a participant's slot is in use").1
     }
 }
 

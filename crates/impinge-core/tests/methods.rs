@@ -4,7 +4,8 @@ mod common;
 
 use common::{agree, cases, check, naive, rows};
 use impinge_core::{
-    Backend, Detector, InstructionSet, Method, Query, Recluster, Scene, Settings, hash_rows,
+    Backend, Detector, InstructionSet, Method, Positions, Query, Recluster, Scene, Settings,
+    hash_rows,
 };
 use impinge_scenes::deform::{self, Deform};
 use impinge_scenes::{soup, surfaces};
@@ -40,6 +41,33 @@ fn methods_agree_with_the_oracle() {
                 ..cpu(Method::Cells, 1 + usize::from(lambda > 1.0))
             };
             check(&case, &expected, settings);
+        }
+    }
+}
+
+/// A candidate is a pair that the adjacency rule admits and whose boxes overlap. The boxes of bodies in f64 are
+/// rounded to f32 outward, so there are a few more of them.
+#[test]
+fn methods_count_the_same_candidates() {
+    for case in cases() {
+        let count = |method: Method| {
+            let mut detector = Detector::with_settings(cpu(method, 1)).unwrap();
+            let pairs = detector.detect(&case.scene, &case.query).unwrap();
+            pairs.stats().n_candidates
+        };
+        let n = count(Method::Naive);
+        let is_single = |positions: &Positions| matches!(positions, Positions::F32(_));
+        let is_equal = case
+            .scene
+            .bodies()
+            .all(|(_, body)| is_single(body.positions()));
+        for method in [Method::Clusters, Method::Cells] {
+            let found = count(method);
+            assert!(
+                found == n || (!is_equal && found > n),
+                "{} {method:?}: {found} candidates, {n} by the oracle",
+                case.name
+            );
         }
     }
 }

@@ -25,7 +25,7 @@
 mod djb2;
 mod rules;
 
-use impinge_core::cpu::cells::{Cells, Options};
+use impinge_core::cpu::cells::Cells;
 use impinge_core::cpu::simd::Isa;
 use impinge_core::host::Host;
 use impinge_core::{BodyId, InstructionSet, Pairs, Query, Scene};
@@ -146,7 +146,7 @@ impl TwoLevels {
     /// With everything said.
     ///
     /// # Errors
-    /// A setting out of its range; threads that do not start.
+    /// A setting out of its range.
     pub fn new(settings: Settings) -> Result<Self, Error> {
         check_lambda(settings.lambda)?;
         check_threads(settings.threads)?;
@@ -159,7 +159,7 @@ impl TwoLevels {
         }
         Ok(TwoLevels {
             settings,
-            host: Host::new(settings.threads)?,
+            host: Host::new(settings.threads),
             cells: Cells::new(settings.instruction_set),
             table: Table::new(Isa::detect(settings.instruction_set)),
         })
@@ -176,13 +176,13 @@ impl TwoLevels {
     /// # Errors
     /// A stale id, one body named twice, refused positions.
     pub fn detect(&mut self, scene: &Scene, a: BodyId, b: BodyId) -> Result<&Pairs, Error> {
-        let options = options(&self.settings);
+        let settings = of_cells(&self.settings);
         let rule = Every(self.settings.possible);
         let cells = &mut self.cells;
         let query = Query::between(a, b);
         self.host
             .detect(scene, &query, "two levels, repeated", |job, keys, stats| {
-                cells.run(job, &options, &rule, keys, stats)
+                cells.run(job, &settings, &rule, keys, stats)
             })
     }
 
@@ -200,14 +200,14 @@ impl TwoLevels {
         b: BodyId,
         table_size: usize,
     ) -> Result<&Pairs, Error> {
-        let options = options(&self.settings);
+        let settings = of_cells(&self.settings);
         let possible = self.settings.possible;
         let (cells, table) = (&mut self.cells, &mut self.table);
         let query = Query::between(a, b);
         self.host
             .detect(scene, &query, "two levels, DJB2", |job, keys, stats| {
                 stats.time("table", |_| table.clear(table_size))?;
-                cells.run(job, &options, &table.rule(possible), keys, stats)?;
+                cells.run(job, &settings, &table.rule(possible), keys, stats)?;
                 table.settle(job, keys, stats);
                 Ok(())
             })
@@ -219,7 +219,7 @@ impl TwoLevels {
     /// # Errors
     /// As `detect`.
     pub fn count(&mut self, scene: &Scene, a: BodyId, b: BodyId) -> Result<Checks, Error> {
-        let options = options(&self.settings);
+        let settings = of_cells(&self.settings);
         let possible = self.settings.possible;
         let cells = &mut self.cells;
         let mut tested = Vec::new();
@@ -230,7 +230,7 @@ impl TwoLevels {
                     possible,
                     frame: job.frame,
                 };
-                cells.run(job, &options, &rule, &mut tested, stats)
+                cells.run(job, &settings, &rule, &mut tested, stats)
             })?;
         tested.sort_unstable();
         let mut checks = Checks::default();
@@ -243,10 +243,11 @@ impl TwoLevels {
     }
 }
 
-fn options(settings: &Settings) -> Options {
-    Options {
+/// What impinge's own stages are told.
+fn of_cells(settings: &Settings) -> impinge_core::Settings {
+    impinge_core::Settings {
         lambda: settings.lambda,
         group_size: settings.group_size,
-        memory_budget: None,
+        ..impinge_core::Settings::default()
     }
 }

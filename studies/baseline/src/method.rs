@@ -14,13 +14,13 @@
 use std::sync::Mutex;
 use std::time::Instant;
 
-use impinge_core::cpu::Job;
 use impinge_core::cpu::cells::{MOST_ENTRIES_EACH, for_cells};
 use impinge_core::cpu::kept::{Kept, KeptList};
 use impinge_core::cpu::simd::Isa;
 use impinge_core::cpu::world::World;
 use impinge_core::grouping::bounds::Bounds;
 use impinge_core::grouping::grid::Grid;
+use impinge_core::run::Job;
 use impinge_core::{InstructionSet, Statistics};
 
 use crate::pairing::{Lists, Run, Scratch};

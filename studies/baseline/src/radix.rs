@@ -16,7 +16,7 @@
 
 use std::sync::Mutex;
 
-use impinge_core::cpu::workers::Workers;
+use impinge_core::workers::Workers;
 
 /// Bits of a digit, at most: 2,048 places that are written to at a time.
 const MOST_BITS: u32 = 11;
@@ -145,7 +145,7 @@ mod tests {
         };
         let mut radix = Radix::default();
         for threads in [1, 2, 3] {
-            let workers = Workers::new(threads).unwrap();
+            let workers = Workers::new(threads);
             let mut scratches = vec![(); workers.n()];
             for n_cells in [1, 2, 3, 256, 257, 5000, 1 << 22, (1 << 25) - 3] {
                 for n in [0u64, 1, 2, 1000, 100_000] {

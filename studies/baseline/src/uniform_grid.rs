@@ -87,13 +87,13 @@ impl UniformGrid {
     /// With everything said.
     ///
     /// # Errors
-    /// A setting out of its range; threads that do not start.
+    /// A setting out of its range.
     pub fn new(settings: Settings) -> Result<Self, Error> {
         check_lambda(settings.lambda)?;
         check_threads(settings.threads)?;
         Ok(UniformGrid {
             settings,
-            host: Host::new(settings.threads)?,
+            host: Host::new(settings.threads),
             method: Method::new(settings.instruction_set),
         })
     }

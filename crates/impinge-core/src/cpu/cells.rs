@@ -23,34 +23,23 @@ use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::{FineRange, Grid};
 use crate::progress::Control;
 use crate::query::SharedVertex;
-use crate::settings::InstructionSet;
+use crate::settings::{InstructionSet, Settings};
 use crate::stats::Statistics;
 
-use super::Job;
 use super::kept::{Kept, KeptList};
 use super::narrow::{Candidate, Settler};
 use super::simd::Isa;
 use super::simd::Lanes;
 use super::subcells::{Asked, Groups, Lanes64};
-use super::workers::Workers;
 use super::world::World;
+use crate::run::Job;
+use crate::workers::Workers;
 
 /// Entries of the cell lists a primitive, at most, on average.
 pub const MOST_ENTRIES_EACH: u64 = 16;
 /// Work items of one slab, and of one task.
 const SLAB_ITEMS: usize = 1 << 18;
 const PAIRING_TASK: usize = 32;
-
-/// What the method is told.
-#[derive(Debug, Clone, Copy)]
-pub struct Options {
-    /// Cells a primitive, the paper's λ.
-    pub lambda: f64,
-    /// Primitives a group, at most.
-    pub group_size: u32,
-    /// Bytes that may be held.
-    pub memory_budget: Option<u64>,
-}
 
 /// What becomes of two primitives of one cell that touch a common sub-cell.
 ///
@@ -126,7 +115,7 @@ impl Cells {
     pub fn run<R: Rule>(
         &mut self,
         job: Job<'_>,
-        options: &Options,
+        settings: &Settings,
         rule: &R,
         keys: &mut Vec<u64>,
         stats: &mut Statistics,
@@ -156,7 +145,7 @@ impl Cells {
             return Ok(());
         };
         let grid = stats.time("grid", |stats| {
-            self.scatter(&region, n_near as u64, options, control, stats)
+            self.scatter(&region, n_near as u64, settings, control, stats)
         })?;
         stats.grid = Some(grid.resolution);
         let task = Task {
@@ -165,7 +154,7 @@ impl Cells {
             control,
             rule,
         };
-        self.dispatch_items(task, grid, options, stats)?;
+        self.dispatch_items(task, grid, settings, stats)?;
         for scratch in &self.scratches {
             keys.extend_from_slice(&scratch.keys);
             stats.n_candidates += scratch.n_candidates;
@@ -189,19 +178,19 @@ impl Cells {
         &mut self,
         region: &Bounds,
         n_near: u64,
-        options: &Options,
+        settings: &Settings,
         control: &Control<'_>,
         stats: &mut Statistics,
     ) -> Result<Grid, Error> {
         let n = self.reaching.kept.len() as u64;
-        let mut grid = Grid::new(region, n_near, options.lambda);
+        let mut grid = Grid::new(region, n_near, settings.lambda);
         let mut most_entries = n.saturating_mul(MOST_ENTRIES_EACH).min(u64::from(u32::MAX));
         let mut most_cells = u64::MAX;
-        if let Some(budget) = options.memory_budget {
+        if let Some(budget) = settings.memory_budget {
             // What is held by now, primitives' boxes above all, but for what is still to be sized.
             let sized_later = size_of::<u32>() * (self.starts.capacity() + self.entries.capacity())
                 + size_of::<WorkItem>() * self.items.capacity();
-            let fixed = self.bytes() - sized_later as u64 + slab_bytes(options) + 8;
+            let fixed = self.bytes() - sized_later as u64 + slab_bytes(settings) + 8;
             let needed = fixed + 4 * n + 12;
             if needed > budget {
                 return Err(Error::MemoryBudget {
@@ -259,13 +248,13 @@ impl Cells {
         &mut self,
         task: Task<'_, R>,
         grid: Grid,
-        options: &Options,
+        settings: &Settings,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         let start = Instant::now();
         let mut paired_ms = 0.0;
-        let most_items = slab_items(options);
-        if options.memory_budget.is_some() {
+        let most_items = slab_items(settings);
+        if settings.memory_budget.is_some() {
             self.items.reserve_exact(most_items);
         }
         let Cells {
@@ -291,7 +280,7 @@ impl Cells {
             let cell = grid.cell(ix);
             let list = ends[0] as usize..ends[1] as usize;
             let before = stats.n_work_items + items.len() as u64;
-            lists.product(list, options.group_size as usize, |a, b| {
+            lists.product(list, settings.group_size as usize, |a, b| {
                 if items.len() == most_items {
                     let at = (ix as u64, n_cells as u64);
                     paired_ms += pair(*isa, lists, items, scratches, task, at)?;
@@ -324,8 +313,8 @@ impl Cells {
     }
 }
 
-fn slab_items(options: &Options) -> usize {
-    match options.memory_budget {
+fn slab_items(settings: &Settings) -> usize {
+    match settings.memory_budget {
         None => SLAB_ITEMS,
         // A small share of the budget; what is left over is for boxes and lists.
         Some(budget) => {
@@ -334,8 +323,8 @@ fn slab_items(options: &Options) -> usize {
     }
 }
 
-fn slab_bytes(options: &Options) -> u64 {
-    (slab_items(options) * size_of::<WorkItem>()) as u64
+fn slab_bytes(settings: &Settings) -> u64 {
+    (slab_items(settings) * size_of::<WorkItem>()) as u64
 }
 
 /// A frame, with what the rule says of its pairs.

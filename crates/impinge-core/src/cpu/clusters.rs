@@ -16,10 +16,9 @@ use crate::error::Error;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::scene::Body;
-use crate::settings::{InstructionSet, Recluster};
+use crate::settings::{InstructionSet, Settings};
 use crate::stats::Statistics;
 
-use super::Job;
 use super::bounds::{self, TreeBounds};
 use super::dispatch::NodePair;
 use super::pairing::{WorkItem, Worker};
@@ -28,8 +27,9 @@ use super::remote::Remote;
 use super::simd::Isa;
 use super::slabs::{self, Slabs};
 use super::top_level::TopLevel;
-use super::workers::Workers;
 use super::world::{BodyCache, Caches, World};
+use crate::run::Job;
+use crate::workers::Workers;
 
 /// Primitives of all bodies together from which on helpers are woken at a frame's begin.
 const CALL_FROM: u64 = 30_000;
@@ -64,7 +64,7 @@ impl Clusters {
     pub fn run(
         &mut self,
         job: Job<'_>,
-        options: &Options,
+        settings: &Settings,
         keys: &mut Vec<u64>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
@@ -76,12 +76,12 @@ impl Clusters {
         stats.time("bounds", |stats| {
             let (caches, scratches) = (&mut self.caches, &mut self.scratches);
             self.refit
-                .run(self.isa, job, options, caches, scratches, stats)
+                .run(self.isa, job, settings, caches, scratches, stats)
         })?;
         for worker in &mut self.scratches {
-            worker.begin(stats.n_clusters, options.memory_budget.is_some());
+            worker.begin(stats.n_clusters, settings.memory_budget.is_some());
         }
-        let most_items = slabs::most_items(options.memory_budget, self.bytes() as u64)?;
+        let most_items = slabs::most_items(settings.memory_budget, self.bytes() as u64)?;
         self.items.clear();
         self.items.shrink_to(most_items);
         let Clusters {
@@ -159,25 +159,18 @@ impl Clusters {
                 .is_some_and(|cache| cache.topology_stamp == body.topology_stamp());
             if !known {
                 control.step(ix as u64, frame.layers.len() as u64)?;
-                let found = workers.install(body.n_primitives(), || BodyCache::new(body, isa));
+                let found = workers.install(body.n_primitives(), || BodyCache::new(body, isa))?;
                 *cache = Some(Box::new(found));
                 stats.n_clustered += 1;
             }
             let cache = cache.as_ref().expect("just clustered");
             stats.n_clusters += cache.clustering.n_clusters() as u64;
             if participant.within {
-                cache.find_adjacency(workers);
+                cache.find_adjacency(workers)?;
             }
         }
         Ok(())
     }
-}
-
-/// What the method is told.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Options {
-    pub recluster: Recluster,
-    pub memory_budget: Option<u64>,
 }
 
 impl BodyCache {
@@ -206,11 +199,15 @@ impl BodyCache {
 
     /// Who shares vertices with whom, found before workers ask for it. Going to the pool costs 0.1 ms, so not
     /// when it is known.
-    pub(super) fn find_adjacency(&self, workers: &Workers) {
+    pub(super) fn find_adjacency(&self, workers: &Workers) -> Result<(), Error> {
         if !self.clustering.knows_adjacency() {
             let n_primitives = self.clustering.order.len();
-            workers.install(n_primitives, || self.clustering.adjacency());
+            let find = || {
+                self.clustering.adjacency();
+            };
+            workers.install(n_primitives, find)?;
         }
+        Ok(())
     }
 
     /// All boxes, on this thread: those of clusters made anew are the best so far.

@@ -16,8 +16,8 @@ use super::cull::{Cull, MOST_MAPS};
 use super::dispatch::NodePair;
 use super::simd::{Isa, Simd, dispatch};
 use super::top_level::TopLevel;
-use super::workers::Workers;
 use super::world::{BodyRef, World};
+use crate::workers::Workers;
 
 /// Primitives whose boxes a task finds.
 const PRIMITIVES: u32 = 4096;

@@ -11,7 +11,6 @@ mod hubs;
 pub mod kept;
 pub mod narrow;
 pub(crate) mod pairing;
-mod places;
 mod refit;
 pub(crate) mod remote;
 pub mod simd;
@@ -19,24 +18,63 @@ pub(crate) mod slabs;
 pub(crate) mod steps;
 pub mod subcells;
 pub(crate) mod top_level;
-pub mod workers;
 pub mod world;
 
-use crate::frame::Frame;
-use crate::progress::Control;
-use crate::scene::Scene;
+use crate::error::Error;
+use crate::naive;
+use crate::narrow::Intersection;
+use crate::run::{Finder, Job};
+use crate::settings::{Method, Settings};
+use crate::stats::Statistics;
 
-use workers::Workers;
+use cells::Cells;
+use clusters::Clusters;
 
-/// What a method is asked to do, and with whom.
-#[derive(Clone, Copy)]
-pub struct Job<'a> {
-    /// The bodies.
-    pub scene: &'a Scene,
-    /// Who takes part.
-    pub frame: &'a Frame,
-    /// The threads.
-    pub workers: &'a Workers,
-    /// Stops and watches it.
-    pub control: &'a Control<'a>,
+/// The CPU backend of one detector: every method, and the memory that they keep from frame to frame.
+pub(crate) struct Cpu {
+    settings: Settings,
+    clusters: Clusters,
+    cells: Cells,
+}
+
+impl Cpu {
+    pub fn new(settings: &Settings) -> Self {
+        Cpu {
+            clusters: Clusters::new(settings.instruction_set),
+            cells: Cells::new(settings.instruction_set),
+            settings: settings.clone(),
+        }
+    }
+}
+
+impl Finder for Cpu {
+    fn method(&self) -> &'static str {
+        self.settings.method.name()
+    }
+
+    fn backend(&self) -> &str {
+        "cpu"
+    }
+
+    /// `Clusters` checks positions while it reads them.
+    fn checks_positions(&self) -> bool {
+        self.settings.method == Method::Clusters
+    }
+
+    async fn find(
+        &mut self,
+        job: Job<'_>,
+        keys: &mut Vec<u64>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        let settings = &self.settings;
+        match settings.method {
+            Method::Naive => stats.time("naive", |stats| {
+                let put = |_, key, ()| keys.push(key);
+                naive::run(&Intersection, job.scene, job.frame, job.control, stats, put)
+            }),
+            Method::Cells => self.cells.run(job, settings, &cells::Owner, keys, stats),
+            Method::Clusters => self.clusters.run(job, settings, keys, stats),
+        }
+    }
 }

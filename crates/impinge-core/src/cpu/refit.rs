@@ -16,17 +16,16 @@ use crate::frame::Frame;
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
 use crate::positions::Positions;
 use crate::scene::Body;
-use crate::settings::Recluster;
+use crate::settings::{Recluster, Settings};
 use crate::stats::Statistics;
 
-use super::Job;
 use super::bounds::{self, Summary};
-use super::clusters::Options;
 use super::extents::{Extents, Groups};
 use super::pairing::Worker;
 use super::remote::Children;
 use super::simd::{Isa, Simd, dispatch};
 use super::world::{BodyCache, Caches, STALE, World};
+use crate::run::Job;
 
 /// Nodes a task refits, of up to eight clusters each.
 const NODES: usize = 32;
@@ -83,7 +82,7 @@ impl Refit {
         &mut self,
         isa: Isa,
         job: Job<'_>,
-        options: &Options,
+        settings: &Settings,
         caches: &mut Caches,
         scratches: &mut [Worker],
         stats: &mut Statistics,
@@ -92,7 +91,7 @@ impl Refit {
         let sorts = isa.reads_runs()
             && frame.between()
             && frame.layers.len() <= SORTED_TO
-            && options.memory_budget.is_none();
+            && settings.memory_budget.is_none();
         self.tasks.clear();
         for (ix, participant) in frame.layers.iter().enumerate() {
             let body = frame.body(scene, ix);
@@ -140,7 +139,7 @@ impl Refit {
             self.prove(job, caches, stats);
             self.work(isa, job, caches, scratches);
         }
-        self.above(isa, job, options, caches, stats);
+        self.above(isa, job, settings, caches, stats)?;
         if sorts {
             sort(job, caches, scratches);
         }
@@ -266,10 +265,10 @@ impl Refit {
         &mut self,
         isa: Isa,
         job: Job<'_>,
-        options: &Options,
+        settings: &Settings,
         caches: &mut Caches,
         stats: &mut Statistics,
-    ) {
+    ) -> Result<(), Error> {
         let Job {
             scene,
             frame,
@@ -288,11 +287,11 @@ impl Refit {
                 continue;
             }
             let spread = cache.spread();
-            if options.recluster == Recluster::Auto && spread > STALE * cache.best_spread {
+            if settings.recluster == Recluster::Auto && spread > STALE * cache.best_spread {
                 let start = Instant::now();
-                **cache = workers.install(body.n_primitives(), || BodyCache::new(body, isa));
+                **cache = workers.install(body.n_primitives(), || BodyCache::new(body, isa))?;
                 if participant.within {
-                    cache.find_adjacency(workers);
+                    cache.find_adjacency(workers)?;
                 }
                 cache.refit_all(body);
                 cache.positions_stamp = body.positions_stamp();
@@ -303,6 +302,7 @@ impl Refit {
                 cache.best_spread = cache.best_spread.min(spread);
             }
         }
+        Ok(())
     }
 }
 

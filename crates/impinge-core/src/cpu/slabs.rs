@@ -7,9 +7,9 @@ use crate::clock::Instant;
 use crate::error::Error;
 use crate::grouping::hubs::Hubs;
 use crate::query::SharedVertex;
+use crate::run::Job;
 use crate::stats::Statistics;
 
-use super::Job;
 use super::dispatch::{self, NodePair, Tree};
 use super::pairing::{self, WorkItem, Worker};
 use super::simd::{Isa, Simd, dispatch};

@@ -1,18 +1,17 @@
 //! What a detector does on a GPU: its own device, or the caller's.
 
-use crate::clock::Instant;
 use std::cell::Cell;
 use std::sync::Arc;
 
-use super::{Backend, Detector, Method, Settings};
+use super::{Backend, Detector, Settings};
 use crate::error::Error;
-use crate::gpu::{Capacities, Engine, Gpu, Options, ResidentPairs, Wanted};
+use crate::gpu::{Capacities, Engine, Gpu, ResidentPairs, Wanted};
 use crate::ids::BodyId;
-use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
+use crate::run::Job;
 use crate::scene::Scene;
-use crate::settings::Recluster;
+use crate::settings::Method;
 
 /// The GPU that the settings ask for, if they ask for one.
 pub(super) fn open(settings: &Settings) -> Result<Option<Engine>, Error> {
@@ -45,23 +44,10 @@ fn engine_of(
     settings: &Settings,
 ) -> Result<Option<Engine>, Error> {
     match gpu {
-        Ok(gpu) => Ok(gpu.map(|gpu| engine(gpu, settings, Capacities::default()))),
+        Ok(gpu) => Ok(gpu.map(|gpu| Engine::new(gpu, settings, Capacities::default()))),
         Err(_) if settings.backend == Backend::Auto => Ok(None),
         Err(error) => Err(error),
     }
-}
-
-fn engine(gpu: Arc<Gpu>, settings: &Settings, first: Capacities) -> Engine {
-    let options = Options {
-        method: settings.method,
-        lambda: settings.lambda,
-        group_size: settings.group_size,
-        recluster: settings.recluster == Recluster::Auto,
-        memory_budget: settings.memory_budget,
-        // The CPU has no need to send anything twice.
-        in_pieces: settings.backend == Backend::Gpu,
-    };
-    Engine::new(gpu, options, first)
 }
 
 impl Detector {
@@ -74,7 +60,7 @@ impl Detector {
     pub fn with_capacities(settings: Settings, capacities: Capacities) -> Result<Self, Error> {
         let mut detector = Detector::with_settings(settings)?;
         if let Some(gpu) = detector.gpu_in_use() {
-            detector.gpu = Some(engine(gpu, &detector.settings, capacities));
+            detector.gpu = Some(Engine::new(gpu, &detector.settings, capacities));
         }
         Ok(detector)
     }
@@ -143,63 +129,12 @@ impl Detector {
             ..settings
         };
         settings.check()?;
-        let engine = engine(Arc::new(gpu), &settings, Capacities::default());
-        Detector::assemble(settings, Some(engine))
+        let engine = Engine::new(Arc::new(gpu), &settings, Capacities::default());
+        Ok(Detector::assemble(settings, Some(engine)))
     }
 
     pub(super) fn gpu_in_use(&self) -> Option<Arc<Gpu>> {
         self.gpu.as_ref().map(|engine| Arc::clone(engine.gpu()))
-    }
-
-    /// Whether the GPU has answered. With `Backend::Auto` a GPU that fails, or cannot hold the scene, is
-    /// given up for the CPU.
-    pub(super) fn is_answered(&mut self, result: Result<(), Error>) -> Result<bool, Error> {
-        match result {
-            Ok(()) => Ok(true),
-            Err(Error::Gpu { .. }) if self.settings.backend == Backend::Auto => {
-                self.gpu = None;
-                Ok(false)
-            }
-            Err(error) => Err(error),
-        }
-    }
-
-    /// One frame on the GPU. Awaits the device and blocks nowhere.
-    pub(super) async fn detect_on_gpu(
-        &mut self,
-        scene: &Scene,
-        query: &Query,
-        control: &Control<'_>,
-    ) -> Result<(), Error> {
-        let start = Instant::now();
-        self.frame.resolve(scene, query)?;
-        self.frame.check(scene)?;
-        self.pairs.begin(&self.frame);
-        let (keys, stats) = self.pairs.parts_mut();
-        stats.method = self.settings.method.name();
-        stats.n_threads = self.workers.n();
-        if let Some(engine) = &mut self.gpu {
-            stats.backend.push_str(engine.gpu().name());
-            engine.run(scene, &self.frame, control, keys, stats).await?;
-        }
-        stats.time("collect", |_| keys.sort_unstable());
-        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
-        Ok(())
-    }
-
-    /// [`detect`](Detector::detect) without blocking: on a GPU the future waits for the device, which
-    /// somebody must poll (a browser does; natively `wgpu::Device::poll`). On the CPU it is ready at once.
-    ///
-    /// # Errors
-    /// As `detect`.
-    pub async fn detect_async(&mut self, scene: &Scene, query: &Query) -> Result<&Pairs, Error> {
-        if self.gpu.is_some() {
-            let result = self.detect_on_gpu(scene, query, &Control::new()).await;
-            if self.is_answered(result)? {
-                return Ok(&self.pairs);
-            }
-        }
-        self.detect(scene, query)
     }
 
     /// Encodes a whole frame into the caller's encoder: positions come from buffers on the device and
@@ -225,14 +160,19 @@ impl Detector {
         positions: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentPairs, Error> {
-        self.frame.resolve(scene, query)?;
-        self.frame.check(scene)?;
+        let (frame, workers) = self.frames.resolve(scene, query)?;
         let Some(engine) = &mut self.gpu else {
             return Err(Error::NoAdapter {
                 found: "this detector works on the CPU".to_owned(),
             });
         };
-        engine.encode(scene, &self.frame, positions, encoder)
+        let job = Job {
+            scene,
+            frame,
+            workers,
+            control: &Control::new(),
+        };
+        engine.encode(job, positions, encoder)
     }
 
     /// Reads the counts of the frame that was last encoded, and whose commands have been submitted, and

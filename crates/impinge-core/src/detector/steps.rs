@@ -5,8 +5,6 @@ use crate::clock::Instant;
 
 use super::Detector;
 use crate::advance::{Advance, blend};
-use crate::cpu::Job;
-use crate::cpu::clusters::Options;
 use crate::cpu::steps::{Asked, FoundByKind, Pose, Sought, StepClusters};
 use crate::error::Error;
 use crate::frame::{Ask, Frame, TestId};
@@ -16,6 +14,7 @@ use crate::narrow::{FirstContact, Overlap};
 use crate::pair_kind::PairKind;
 use crate::positions::Positions;
 use crate::progress::Control;
+use crate::run::Job;
 use crate::scene::Scene;
 use crate::settings::{Method, Settings};
 use crate::stats::Statistics;
@@ -158,7 +157,11 @@ impl Detector {
         frame.resolve_for(scene, &step.query, Ask::Impacts)?;
         impacts.begin(frame);
         frame.check(scene)?;
-        begin(impacts.stats_mut(), &self.settings, self.workers.n());
+        begin(
+            impacts.stats_mut(),
+            &self.settings,
+            self.frames.workers().n(),
+        );
         Ok(())
     }
 
@@ -198,11 +201,11 @@ impl Detector {
                 )
             });
         }
-        let _shift = self.workers.shift(frame.n_primitives());
+        let _shift = self.frames.workers().shift(frame.n_primitives());
         let job = Job {
             scene,
             frame,
-            workers: &self.workers,
+            workers: self.frames.workers(),
             control,
         };
         let asked = Asked {
@@ -212,7 +215,7 @@ impl Detector {
             pose,
             latest,
         };
-        clusters.run(job, &options(&self.settings), asked, found, stats)
+        clusters.run(job, &self.settings, asked, found, stats)
     }
 
     /// Whether nothing touches during the step; with [`Start::Skip`], but for pairs that touch at its start.
@@ -314,7 +317,7 @@ impl Detector {
         candidates.begin(frame);
         frame.check(scene)?;
         let (keys, stats) = candidates.parts_mut();
-        begin(stats, &self.settings, self.workers.n());
+        begin(stats, &self.settings, self.frames.workers().n());
         let control = Control::new();
         if self.settings.method == Method::Naive {
             let test = Overlap {
@@ -326,12 +329,12 @@ impl Detector {
                 }
             })?;
         } else {
-            let _shift = self.workers.shift(frame.n_primitives());
+            let _shift = self.frames.workers().shift(frame.n_primitives());
             found.iter_mut().for_each(Vec::clear);
             let job = Job {
                 scene,
                 frame,
-                workers: &self.workers,
+                workers: self.frames.workers(),
                 control: &control,
             };
             let asked = Asked {
@@ -345,7 +348,7 @@ impl Detector {
                 },
                 latest: f64::INFINITY,
             };
-            clusters.run(job, &options(&self.settings), asked, found, stats)?;
+            clusters.run(job, &self.settings, asked, found, stats)?;
             for (keys, found) in keys.iter_mut().zip(found) {
                 keys.extend(found.iter().map(|found| found.key));
             }
@@ -376,11 +379,4 @@ fn begin(stats: &mut Statistics, settings: &Settings, n_threads: usize) {
     .name();
     stats.n_threads = n_threads;
     stats.backend.push_str("cpu");
-}
-
-fn options(settings: &Settings) -> Options {
-    Options {
-        recluster: settings.recluster,
-        memory_budget: settings.memory_budget,
-    }
 }

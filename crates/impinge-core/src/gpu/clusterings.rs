@@ -3,12 +3,13 @@
 
 use std::sync::Arc;
 
-use crate::frame::Frame;
+use crate::error::Error;
 use crate::grouping::bounds::{Bounds, round_down, round_up};
 use crate::grouping::clusters::Clustering;
 use crate::ids::BodyId;
 use crate::positions::Positions;
-use crate::scene::{Body, Scene};
+use crate::run::Job;
+use crate::scene::Body;
 use crate::stats::Statistics;
 
 /// How much the clusters' surface may grow against the body's before it is clustered again.
@@ -45,14 +46,22 @@ impl Clusterings {
     /// Clusters bodies that are new or were re-meshed, and those that have flowed away from their clusters;
     /// forgets those that are gone. Of `resident` bodies the host does not know the pose, so they
     /// are not judged.
+    ///
+    /// # Errors
+    /// Threads that do not start.
     pub fn update(
         &mut self,
-        scene: &Scene,
-        frame: &Frame,
+        job: Job<'_>,
         resident: &[BodyId],
         recluster: bool,
         stats: &mut Statistics,
-    ) {
+    ) -> Result<(), Error> {
+        let Job {
+            scene,
+            frame,
+            workers,
+            ..
+        } = job;
         let n_slots = frame.layers.last().map_or(0, |last| last.id.index() + 1);
         if self.known.len() < n_slots {
             self.known.resize_with(n_slots, || None);
@@ -81,8 +90,11 @@ impl Clusterings {
             }
             stats.n_clustered += 1;
             self.n_made += 1;
-            *cache = Some(Box::new(Cached::new(body, self.n_made)));
+            let number = self.n_made;
+            let made = workers.install(body.n_primitives(), || Cached::new(body, number))?;
+            *cache = Some(Box::new(made));
         }
+        Ok(())
     }
 }
 

@@ -20,9 +20,9 @@ use super::world::World;
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::ids::BodyId;
-use crate::progress::Control;
+use crate::run::{Finder, Job};
 use crate::scene::Scene;
-use crate::settings::Method;
+use crate::settings::{Backend, Method, Recluster, Settings};
 use crate::stats::Statistics;
 
 /// Cells at most, whatever lambda says.
@@ -33,28 +33,11 @@ const SHARE_OF_CELLS: u64 = 8;
 /// The largest buffer that 32 bits can number: positions by words, places with a flag.
 const WIDEST: u64 = 1 << 34;
 
-/// What the backend is told.
-#[derive(Debug, Clone, Copy)]
-pub struct Options {
-    /// The method; for one from outside, the one whose room it works in.
-    pub method: Method,
-    /// Cells a primitive, the paper's λ.
-    pub lambda: f64,
-    /// Primitives a group, at most.
-    pub group_size: u32,
-    /// `Clusters`: whether bodies that have flowed away from their clusters are clustered again.
-    pub recluster: bool,
-    /// Bytes on the device, at most.
-    pub memory_budget: Option<u64>,
-    /// Whether a frame that is more than the device binds is answered in pieces, and not by an error.
-    pub in_pieces: bool,
-}
-
 /// The GPU backend of one detector.
 #[derive(Debug)]
 pub struct Engine {
     pub(super) gpu: Arc<Gpu>,
-    pub(super) options: Options,
+    pub(super) settings: Settings,
     first: Capacities,
     /// The method at work: `Clusters` for frames that are too much for `Cells`.
     pub(super) method: Method,
@@ -70,6 +53,8 @@ pub struct Engine {
     /// What each complete pass of the last frame counted.
     pub complete: Vec<Counts>,
     pub(super) collector: Collector,
+    /// Keys that each worker has settled, until they are taken over.
+    pub(super) settled: Vec<Vec<u64>>,
 }
 
 #[derive(Debug)]
@@ -88,26 +73,27 @@ impl Plan {
 }
 
 impl Engine {
-    pub fn new(gpu: Arc<Gpu>, options: Options, first: Capacities) -> Self {
-        Engine::with_plan(gpu, options, first, Plan::of(options.method))
+    pub fn new(gpu: Arc<Gpu>, settings: &Settings, first: Capacities) -> Self {
+        let plan = Plan::of(settings.method);
+        Engine::with_plan(gpu, settings.clone(), first, plan)
     }
 
-    /// With a plan from outside.
-    pub fn of_guest(
+    /// With a plan of another crate.
+    pub fn with_plan_of_guest(
         gpu: Arc<Gpu>,
-        options: Options,
+        settings: Settings,
         first: Capacities,
         plan: Box<dyn InCells>,
     ) -> Self {
-        Engine::with_plan(gpu, options, first, Plan::Cells(plan))
+        Engine::with_plan(gpu, settings, first, Plan::Cells(plan))
     }
 
-    fn with_plan(gpu: Arc<Gpu>, options: Options, first: Capacities, plan: Plan) -> Self {
+    fn with_plan(gpu: Arc<Gpu>, settings: Settings, first: Capacities, plan: Plan) -> Self {
         Engine {
             gpu,
-            options,
             first,
-            method: options.method,
+            method: settings.method,
+            settings,
             too_much: None,
             most_bound: u64::MAX,
             has_pieces: false,
@@ -116,6 +102,7 @@ impl Engine {
             plan,
             complete: Vec::new(),
             collector: Collector::default(),
+            settled: Vec::new(),
         }
     }
 
@@ -123,74 +110,58 @@ impl Engine {
         &self.gpu
     }
 
-    /// Appends the keys of all pairs that the frame asks for, unsorted.
-    ///
-    /// # Errors
-    /// The device's own, a budget too small for the smallest pass, cancellation.
-    pub async fn run(
-        &mut self,
-        scene: &Scene,
-        frame: &Frame,
-        control: &Control<'_>,
-        keys: &mut Vec<u64>,
-        stats: &mut Statistics,
-    ) -> Result<(), Error> {
-        let result = self.answer(scene, frame, control, keys, stats).await;
-        if let Err(Error::Gpu { .. }) = result {
-            // Whatever state the buffers are in, the next frame must not build on it.
-            let plan = match &self.plan {
-                Plan::Cells(plan) => Plan::Cells(plan.anew()),
-                Plan::Clusters(_) => Plan::of(self.options.method),
-            };
-            let gpu = Arc::clone(&self.gpu);
-            *self = Engine {
-                most_bound: self.most_bound,
-                ..Engine::with_plan(gpu, self.options, self.first, plan)
-            };
-        }
-        result
+    /// After an error of the device: whatever state the buffers are in, the next frame must not build on it.
+    fn begin_anew(&mut self) {
+        let plan = match &self.plan {
+            Plan::Cells(plan) => Plan::Cells(plan.anew()),
+            Plan::Clusters(_) => Plan::of(self.settings.method),
+        };
+        let gpu = Arc::clone(&self.gpu);
+        *self = Engine {
+            most_bound: self.most_bound,
+            ..Engine::with_plan(gpu, self.settings.clone(), self.first, plan)
+        };
     }
 
     async fn answer(
         &mut self,
-        scene: &Scene,
-        frame: &Frame,
-        control: &Control<'_>,
+        job: Job<'_>,
         keys: &mut Vec<u64>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
+        let Job { scene, frame, .. } = job;
         self.gpu.check_lost()?;
         self.complete.clear();
         if self.too_much.is_some_and(|n| frame.n_primitives() < n) {
             self.too_much = None;
-            self.take(self.options.method);
+            self.take(self.settings.method);
         }
         let start = Instant::now();
         let recluster = self.reclusters();
         let clusterings = &mut self.world.clusterings;
-        clusterings.update(scene, frame, &[], recluster, stats);
+        clusterings.update(job, &[], recluster, stats)?;
         if !self.is_held(scene, frame) && self.falls_back() {
             self.take_clusters(frame);
         }
         if !self.is_held(scene, frame) && !self.is_guest() {
             stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
             self.may_cut(scene, frame)?;
-            return self.in_pieces(scene, frame, control, keys, stats).await;
+            return self.in_pieces(job, keys, stats).await;
         }
         let scopes = Scopes::open(&self.gpu.device);
-        let updated = self.update(scene, frame, &[], stats);
+        let updated = self.update(job, &[], stats);
         let closed = scopes.close();
         updated?;
         closed.await?;
         if self.first_room(self.cells_wanted(frame)).is_err() {
             // What buffers have to spare is too much for the budget.
             self.world.forget_buffers();
-            self.update(scene, frame, &[], stats)?;
+            self.update(job, &[], stats)?;
         }
         stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
         let before = (keys.len(), self.falls_back().then(|| stats.clone()));
         let work = Vec::from_iter(self.whole(frame));
-        let answer = self.work_off(scene, frame, work, control, keys, stats);
+        let answer = self.work_off(job, work, keys, stats);
         if let (Answer::Crowded(error), (n_keys, before)) = (answer.await?, before) {
             let Some(before) = before else {
                 return Err(error);
@@ -202,10 +173,10 @@ impl Engine {
             stats.n_reruns = n_reruns;
             self.take_clusters(frame);
             if !self.is_held(scene, frame) {
-                return self.in_pieces(scene, frame, control, keys, stats).await;
+                return self.in_pieces(job, keys, stats).await;
             }
             let work = Vec::from_iter(self.whole(frame));
-            let answer = self.work_off(scene, frame, work, control, keys, stats);
+            let answer = self.work_off(job, work, keys, stats);
             if let Answer::Crowded(error) = answer.await? {
                 return Err(error);
             }
@@ -217,12 +188,11 @@ impl Engine {
     /// The same piece by piece, see [`pieces`].
     async fn in_pieces(
         &mut self,
-        scene: &Scene,
-        frame: &Frame,
-        control: &Control<'_>,
+        job: Job<'_>,
         keys: &mut Vec<u64>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
+        let Job { scene, frame, .. } = job;
         if !self.has_pieces {
             // They are sized for all of a frame.
             self.world.forget_buffers();
@@ -238,7 +208,7 @@ impl Engine {
         let world = &self.world;
         stats.n_clusters = world.weigh(scene, frame).n_clusters;
         let clustering = |participant_ix| world.clustering(frame, participant_ix);
-        let chunks = pieces::cut(scene, frame, most, clustering);
+        let chunks = pieces::cut(job, most, clustering)?;
         for (ix, a) in chunks.iter().enumerate() {
             for b in &chunks[ix..] {
                 let both = [a, b];
@@ -261,7 +231,7 @@ impl Engine {
                 stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
                 stats.n_pieces += 1;
                 let work = self.seeds_in_batches(frame, &pairs);
-                let answer = self.work_off(scene, frame, work, control, keys, stats);
+                let answer = self.work_off(job, work, keys, stats);
                 if let Answer::Crowded(error) = answer.await? {
                     return Err(error);
                 }
@@ -280,13 +250,13 @@ impl Engine {
 
     /// In `Cells` clusters only tell what is out of reach, however well they fit.
     fn reclusters(&self) -> bool {
-        self.options.recluster && self.method == Method::Clusters
+        self.settings.recluster == Recluster::Auto && self.method == Method::Clusters
     }
 
     /// The most that may be on the device of topology and positions.
     fn most(&self) -> Most {
         let least = Capacities::LEAST.of(self.method).bytes();
-        let budget = self.options.memory_budget;
+        let budget = self.settings.memory_budget;
         Most {
             binding: self.most_bound.min(self.gpu.max_binding()).min(WIDEST),
             bytes: budget.map_or(u64::MAX, |budget| budget.saturating_sub(least)),
@@ -309,7 +279,7 @@ impl Engine {
     /// The device binds less, and somebody else is to answer then.
     fn may_cut(&self, scene: &Scene, frame: &Frame) -> Result<(), Error> {
         let (needed, most) = (self.world.weigh(scene, frame).binding(), self.most());
-        if self.options.in_pieces || needed <= most.binding {
+        if self.settings.backend == Backend::Gpu || needed <= most.binding {
             return Ok(());
         }
         Err(Error::Gpu {
@@ -346,8 +316,7 @@ impl Engine {
     /// Brings the device up to the frame, but for positions that are on the device already.
     pub(super) fn update(
         &mut self,
-        scene: &Scene,
-        frame: &Frame,
+        job: Job<'_>,
         resident: &[BodyId],
         stats: &mut Statistics,
     ) -> Result<(), Error> {
@@ -355,7 +324,7 @@ impl Engine {
         self.has_pieces = false;
         if self
             .world
-            .update(&self.gpu, scene, frame, resident, recluster, stats)?
+            .update(&self.gpu, job, resident, recluster, stats)?
         {
             self.unbind();
         }
@@ -365,7 +334,7 @@ impl Engine {
     /// What the budget leaves for buffers that grow by themselves.
     pub(super) fn budget_for_room(&self) -> Option<u64> {
         let fixed = self.world.bytes() + self.room.bytes_of_cells();
-        let budget = self.options.memory_budget;
+        let budget = self.settings.memory_budget;
         budget.map(|budget| budget.saturating_sub(fixed))
     }
 
@@ -387,11 +356,11 @@ impl Engine {
             return None;
         }
         let most = MOST_CELLS.min(Storage::<Cell>::limit(&self.gpu));
-        let most = self.options.memory_budget.map_or(most, |budget| {
+        let most = self.settings.memory_budget.map_or(most, |budget| {
             most.min(budget / SHARE_OF_CELLS / CellsWanted::CELL)
         });
         // Below 2^25, so the cast back is exact enough.
-        let asked = (frame.n_primitives() as f64 * self.options.lambda).min(MOST_CELLS as f64);
+        let asked = (frame.n_primitives() as f64 * self.settings.lambda).min(MOST_CELLS as f64);
         Some(CellsWanted {
             n_cells: (asked.ceil() as u64).min(most).max(1),
             n_bodies: count(frame.layers.len()),
@@ -401,7 +370,7 @@ impl Engine {
     /// Room for the first pass: what there is, unless the budget says less.
     pub(super) fn first_room(&self, cells: Option<CellsWanted>) -> Result<Capacities, Error> {
         let wanted = self.first.of(self.method).max(self.room.capacities());
-        let Some(budget) = self.options.memory_budget else {
+        let Some(budget) = self.settings.memory_budget else {
             return Ok(wanted);
         };
         let fixed = self.world.bytes() + cells.map_or(0, |cells| cells.bytes());
@@ -424,7 +393,7 @@ impl Engine {
     }
 
     pub(super) fn too_small(&self, what: &'static str, needed: Capacities) -> Error {
-        match self.options.memory_budget {
+        match self.settings.memory_budget {
             Some(budget) => Error::MemoryBudget {
                 what,
                 needed: self.world.bytes() + needed.bytes(),
@@ -434,5 +403,30 @@ impl Engine {
                 what: format!("{} cannot hold {what}", self.gpu.name()),
             },
         }
+    }
+}
+
+impl Finder for Engine {
+    fn method(&self) -> &'static str {
+        self.settings.method.name()
+    }
+
+    fn backend(&self) -> &str {
+        self.gpu.name()
+    }
+
+    /// # Errors
+    /// The device's own, a budget too small for the smallest pass, cancellation.
+    async fn find(
+        &mut self,
+        job: Job<'_>,
+        keys: &mut Vec<u64>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        let result = self.answer(job, keys, stats).await;
+        if let Err(Error::Gpu { .. }) = result {
+            self.begin_anew();
+        }
+        result
     }
 }

@@ -44,7 +44,7 @@ pub use device::{Device, DeviceInfo};
 pub use resident::ResidentPairs;
 pub use room::Capacities;
 
-pub(crate) use engine::{Engine, Options};
+pub(crate) use engine::Engine;
 pub use kernels::shaders;
 pub use open::{Gpu, Wanted, devices, devices_async};
 

@@ -9,8 +9,6 @@
 //!
 //! In the end a pass has one work item, for which [`Capacities::LEAST`] is enough.
 
-use rayon::prelude::*;
-
 use super::buffers::count;
 use super::cells::{Part, Share, Tile, Told};
 use super::clusters;
@@ -23,9 +21,8 @@ use super::steps::Stages;
 use crate::error::Error;
 use crate::frame::{Frame, pair_key};
 use crate::narrow::settle;
-use crate::progress::Control;
 use crate::query::SharedVertex;
-use crate::scene::Scene;
+use crate::run::Job;
 use crate::settings::Method;
 use crate::stats::Statistics;
 
@@ -33,6 +30,8 @@ use crate::stats::Statistics;
 const SEEDS: usize = 512;
 /// Unsure pairs from which on threads share them.
 const PARALLEL_FROM: usize = 512;
+/// Unsure pairs that a worker takes at a time.
+const SETTLED_BY_A_TASK: usize = 64;
 
 /// What a pass does.
 #[derive(Debug, Clone)]
@@ -53,13 +52,12 @@ impl Engine {
     /// Does all of the work. When it is too much, some of the keys are there already.
     pub(super) async fn work_off(
         &mut self,
-        scene: &Scene,
-        frame: &Frame,
+        job: Job<'_>,
         mut waiting: Vec<Work>,
-        control: &Control<'_>,
         keys: &mut Vec<u64>,
         stats: &mut Statistics,
     ) -> Result<Answer, Error> {
+        let Job { frame, control, .. } = job;
         let cells = self.cells_wanted(frame);
         let mut capacities = self.first_room(cells)?;
         while let Some(work) = waiting.pop() {
@@ -77,11 +75,12 @@ impl Engine {
                 Verdict::Complete => {
                     book(&collected, self.method, stats);
                     self.complete.push(collected.counts);
-                    stats.time("settle", |_| settle_all(scene, frame, &collected, keys));
+                    let settled = &mut self.settled;
+                    stats.time("settle", |_| settle_all(job, &collected, settled, keys));
                     if let Work::Cells(part, Share::Lists) = work {
                         // Nothing touches the list before the last of its tiles is done.
                         let n_entries = collected.counts.needed.entries as u32;
-                        let tile = Tile::all(n_entries, self.options.group_size);
+                        let tile = Tile::all(n_entries, self.settings.group_size);
                         waiting.extend(
                             (n_entries > 0).then_some(Work::Cells(part, Share::Tile(tile))),
                         );
@@ -321,8 +320,8 @@ impl Engine {
             }
             (Plan::Cells(plan), Some(Work::Cells(part, share))) => {
                 let told = Told {
-                    lambda: self.options.lambda,
-                    group_size: self.options.group_size,
+                    lambda: self.settings.lambda,
+                    group_size: self.settings.group_size,
                     resolve,
                     share: *share,
                 };
@@ -359,15 +358,31 @@ fn book(collected: &Collected, method: Method, stats: &mut Statistics) {
 }
 
 /// Takes the certain pairs and settles the others exactly.
-fn settle_all(scene: &Scene, frame: &Frame, collected: &Collected, keys: &mut Vec<u64>) {
+fn settle_all(
+    job: Job<'_>,
+    collected: &Collected,
+    settled: &mut Vec<Vec<u64>>,
+    keys: &mut Vec<u64>,
+) {
     let certain = collected.pairs.iter();
     keys.extend(certain.map(|pair| pair_key(pair.low, pair.high)));
-    let settled = |pair: &super::layout::UnsureKey| {
-        settle(scene, frame, pair.low, pair.high).then(|| pair_key(pair.low, pair.high))
+    settled.resize_with(job.workers.n(), Vec::new);
+    let unsure = &collected.unsure[..];
+    let n_workers = match unsure.len() < PARALLEL_FROM {
+        true => 1,
+        false => settled.len(),
     };
-    if collected.unsure.len() < PARALLEL_FROM {
-        keys.extend(collected.unsure.iter().filter_map(settled));
-    } else {
-        keys.par_extend(collected.unsure.par_iter().filter_map(settled));
+    let n_tasks = unsure.len().div_ceil(SETTLED_BY_A_TASK);
+    job.workers
+        .for_each(&mut settled[..n_workers], n_tasks, |settled, ix| {
+            let first = ix * SETTLED_BY_A_TASK;
+            for pair in &unsure[first..unsure.len().min(first + SETTLED_BY_A_TASK)] {
+                if settle(job.scene, job.frame, pair.low, pair.high) {
+                    settled.push(pair_key(pair.low, pair.high));
+                }
+            }
+        });
+    for settled in settled {
+        keys.append(settled);
     }
 }

@@ -24,11 +24,13 @@ use super::buffers::count;
 use super::clusterings::bounds_of;
 use super::topology::{Most, Topology, Weight};
 use super::world::narrowed;
+use crate::error::Error;
 use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
 use crate::positions::Positions;
+use crate::run::Job;
 use crate::scene::Scene;
 
 /// Neighbouring clusters of one participant.
@@ -48,12 +50,20 @@ pub struct Chunk {
 }
 
 /// Cuts the clusters of a frame into chunks of at most `most`, though of at least one cluster.
+///
+/// # Errors
+/// Threads that do not start.
 pub fn cut<'a>(
-    scene: &Scene,
-    frame: &Frame,
+    job: Job<'_>,
     most: Most,
     clustering: impl Fn(usize) -> &'a Clustering + Sync,
-) -> Vec<Chunk> {
+) -> Result<Vec<Chunk>, Error> {
+    let Job {
+        scene,
+        frame,
+        workers,
+        ..
+    } = job;
     let mut chunks: Vec<Chunk> = Vec::new();
     let mut weight = Weight::default();
     for participant in 0..frame.layers.len() {
@@ -81,7 +91,7 @@ pub fn cut<'a>(
             }
         }
     }
-    chunks.par_iter_mut().for_each(|chunk| {
+    let find_boxes = |chunk: &mut Chunk| {
         for run in &mut chunk.runs {
             let clustering = clustering(run.participant);
             let positions = frame.body(scene, run.participant).positions();
@@ -91,8 +101,12 @@ pub fn cut<'a>(
             }
             chunk.bounds.join(&run.bounds);
         }
-    });
-    chunks
+    };
+    let n_primitives = frame.n_primitives() as usize;
+    workers.install(n_primitives, || {
+        chunks.par_iter_mut().for_each(find_boxes);
+    })?;
+    Ok(chunks)
 }
 
 /// The pairs of runs of a piece that may hold pairs of primitives, lower number first: runs of the first

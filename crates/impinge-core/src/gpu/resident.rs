@@ -6,9 +6,8 @@ use super::engine::Engine;
 use super::layout::{Counter, N_COUNTERS, N_PAIRS, N_UNSURE};
 use super::room::{Capacities, Counts, Verdict};
 use crate::error::Error;
-use crate::frame::Frame;
 use crate::ids::BodyId;
-use crate::scene::Scene;
+use crate::run::Job;
 use crate::stats::Statistics;
 
 /// Where the pairs of an encoded frame are once its commands have run.
@@ -48,11 +47,11 @@ impl Engine {
     /// Those of [`Detector::encode`](crate::Detector::encode).
     pub fn encode(
         &mut self,
-        scene: &Scene,
-        frame: &Frame,
+        job: Job<'_>,
         positions: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentPairs, Error> {
+        let Job { scene, frame, .. } = job;
         for &(body, buffer) in positions {
             let needed = 12 * count(scene.body(body)?.n_vertices());
             if buffer.size() < needed {
@@ -70,7 +69,7 @@ impl Engine {
             }
         }
         let ids: Vec<BodyId> = positions.iter().map(|&(body, _)| body).collect();
-        self.update(scene, frame, &ids, &mut Statistics::default())?;
+        self.update(job, &ids, &mut Statistics::default())?;
         for &(body, buffer) in positions {
             self.world.copy_positions(body, buffer, encoder);
         }

@@ -23,6 +23,7 @@ use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
 use crate::ids::BodyId;
 use crate::positions::Positions;
+use crate::run::Job;
 use crate::scene::{Filter, Scene};
 use crate::stats::Statistics;
 
@@ -124,12 +125,12 @@ impl World {
     pub fn update(
         &mut self,
         gpu: &Gpu,
-        scene: &Scene,
-        frame: &Frame,
+        job: Job<'_>,
         resident: &[BodyId],
         recluster: bool,
         stats: &mut Statistics,
     ) -> Result<bool, Error> {
+        let Job { scene, frame, .. } = job;
         if frame.n_primitives() > MOST_PRIMITIVES {
             return Err(Error::TooMany {
                 what: "primitives in one query on a GPU",
@@ -137,8 +138,7 @@ impl World {
                 limit: MOST_PRIMITIVES,
             });
         }
-        self.clusterings
-            .update(scene, frame, resident, recluster, stats);
+        self.clusterings.update(job, resident, recluster, stats)?;
         let mut is_other = false;
         if !self.is_resident(frame) {
             // Half a topology must not pass for a whole one if an upload fails.

@@ -1,24 +1,22 @@
-//! The same for the GPU: a method from outside is a plan of passes that work in cells.
+//! The same for the GPU: a method of another crate is a plan of passes that work in cells.
 
-use crate::clock::Instant;
 use std::sync::Arc;
 
 use crate::error::Error;
-use crate::frame::Frame;
 use crate::gpu::cells::InCells;
-use crate::gpu::engine::{Engine, Options};
 use crate::gpu::room::{Capacities, Counts};
-use crate::gpu::{Gpu, Wanted};
+use crate::gpu::{Engine, Gpu, Wanted};
 use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
+use crate::run::{Finder, FrameLoop, Job};
 use crate::scene::Scene;
-use crate::settings::Method;
+use crate::settings::{Backend, Method, Settings};
+use crate::stats::Statistics;
 
-/// The frame loop around a plan from outside.
+/// The frame loop around a plan of another crate.
 pub struct Host {
-    frame: Frame,
-    pairs: Pairs,
+    frames: FrameLoop,
     engine: Engine,
 }
 
@@ -37,19 +35,17 @@ impl Host {
         plan: Box<dyn InCells>,
     ) -> Result<Self, Error> {
         let gpu = Gpu::open(device.map_or(Wanted::Any, Wanted::Named))?;
-        let options = Options {
+        let settings = Settings {
             method: Method::Cells,
+            backend: Backend::Gpu,
             lambda,
-            group_size: 64,
-            recluster: false,
             memory_budget,
-            in_pieces: false,
+            ..Settings::default()
         };
         let first = first.unwrap_or_default();
         Ok(Host {
-            frame: Frame::default(),
-            pairs: Pairs::default(),
-            engine: Engine::of_guest(Arc::clone(&gpu), options, first, plan),
+            frames: FrameLoop::new(settings.threads),
+            engine: Engine::with_plan_of_guest(gpu, settings, first, plan),
         })
     }
 
@@ -63,24 +59,38 @@ impl Host {
         query: &Query,
         name: &'static str,
     ) -> Result<(&Pairs, &[Counts]), Error> {
-        let start = Instant::now();
-        self.frame.resolve(scene, query)?;
-        self.frame.check(scene)?;
-        self.pairs.begin(&self.frame);
-        let (keys, stats) = self.pairs.parts_mut();
-        stats.method = name;
-        stats.n_threads = 1;
         let gpu = Arc::clone(self.engine.gpu());
-        stats.backend.push_str(gpu.name());
-        gpu.block_on(
-            self.engine
-                .run(scene, &self.frame, &Control::new(), keys, stats),
-        )?;
-        stats.time("collect", |_| {
-            keys.sort_unstable();
-            keys.dedup();
-        });
-        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
-        Ok((&self.pairs, &self.engine.complete))
+        let engine = &mut self.engine;
+        let mut guest = Guest { name, engine };
+        gpu.block_on(self.frames.run(scene, query, &Control::new(), &mut guest))?;
+        Ok((self.frames.pairs(), &self.engine.complete))
+    }
+}
+
+struct Guest<'a> {
+    name: &'static str,
+    engine: &'a mut Engine,
+}
+
+impl Finder for Guest<'_> {
+    fn method(&self) -> &'static str {
+        self.name
+    }
+
+    fn backend(&self) -> &str {
+        self.engine.backend()
+    }
+
+    fn repeats(&self) -> bool {
+        true
+    }
+
+    async fn find(
+        &mut self,
+        job: Job<'_>,
+        keys: &mut Vec<u64>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        self.engine.find(job, keys, stats).await
     }
 }

@@ -21,6 +21,10 @@ impl Test for Intersection {
         Extent::of(element.points().into_iter())
     }
 
+    fn admits(&self, _: TestId, a: Element<'_>, b: Element<'_>) -> bool {
+        a.frame.shared_vertex == SharedVertex::Resolve || !a.shares_vertex(&b)
+    }
+
     fn settle(&self, _: TestId, a: Element<'_>, b: Element<'_>) -> Option<()> {
         let (points_a, points_b) = (a.points(), b.points());
         let kind = |element: Element<'_>| element.frame.layers[element.layer].kind;

@@ -33,6 +33,11 @@ pub(crate) trait Test {
     /// The extent of an element, exactly: pairs whose extents have no point in common are not reported.
     fn extent(&self, element: Element<'_>) -> Extent;
 
+    /// Whether the adjacency rule lets a pair whose extents meet be a candidate.
+    fn admits(&self, _: TestId, _: Element<'_>, _: Element<'_>) -> bool {
+        true
+    }
+
     /// Whether a pair is reported, decided exactly; adjacency rule included.
     fn settle(&self, test: TestId, a: Element<'_>, b: Element<'_>) -> Option<Self::Value>;
 }

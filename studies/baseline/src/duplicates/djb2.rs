@@ -7,13 +7,13 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use impinge_core::cpu::Job;
 use impinge_core::cpu::cells::Rule;
 use impinge_core::cpu::kept::Kept;
 use impinge_core::cpu::narrow::{Candidate, Settler};
 use impinge_core::cpu::simd::Isa;
 use impinge_core::cpu::subcells::Asked;
 use impinge_core::cpu::world::World;
+use impinge_core::run::Job;
 use impinge_core::{Error, Statistics};
 
 use super::Possible;

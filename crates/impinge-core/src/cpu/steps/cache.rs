@@ -1,18 +1,18 @@
 //! What is kept of a layer: its clusters, and their boxes at the start and at the end of a step.
 
 use crate::clock::Instant;
-use crate::cpu::Job;
 use crate::cpu::bounds::{self, TreeBounds};
-use crate::cpu::clusters::Options;
 use crate::cpu::dispatch::Tree;
 use crate::cpu::simd::{Isa, Simd, dispatch};
 use crate::cpu::world::STALE;
 use crate::elements::{Elements, Part};
+use crate::error::Error;
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
 use crate::grouping::clusters::Clustering;
 use crate::positions::Positions;
+use crate::run::Job;
 use crate::scene::Body;
-use crate::settings::Recluster;
+use crate::settings::{Recluster, Settings};
 use crate::stats::Statistics;
 
 use super::hull::Pose;
@@ -127,12 +127,12 @@ struct Task {
 pub(super) fn refit<S: Send>(
     isa: Isa,
     job: Job<'_>,
-    options: &Options,
+    settings: &Settings,
     pose: Pose,
     caches: &mut Caches,
     scratches: &mut [S],
     stats: &mut Statistics,
-) {
+) -> Result<(), Error> {
     find_boxes(isa, job, pose, caches, scratches);
     let Job {
         scene,
@@ -152,10 +152,10 @@ pub(super) fn refit<S: Send>(
         cache.bounds.refit_above(0, &cache.clustering.shape);
         cache.of = Some((body.step_stamp(), pose));
         let spread = cache.spread();
-        if options.recluster == Recluster::Auto && spread > STALE * cache.best_spread {
+        if settings.recluster == Recluster::Auto && spread > STALE * cache.best_spread {
             let start = Instant::now();
             let n_elements = cache.clustering.order.len();
-            **cache = workers.install(n_elements, || LayerCache::new(body, layer.part));
+            **cache = workers.install(n_elements, || LayerCache::new(body, layer.part))?;
             stats.n_clustered += 1;
             stats.n_reclustered += 1;
             stats.add_ms("clustering", start.elapsed().as_secs_f64() * 1e3);
@@ -166,8 +166,9 @@ pub(super) fn refit<S: Send>(
     }
     if is_stale {
         // Those made anew have the best spread so far, so this ends here.
-        refit(isa, job, options, pose, caches, scratches, stats);
+        refit(isa, job, settings, pose, caches, scratches, stats)?;
     }
+    Ok(())
 }
 
 fn find_boxes<S: Send>(

@@ -23,13 +23,13 @@ use crate::grouping::hubs::Hubs;
 use crate::settings::InstructionSet;
 use crate::stats::Statistics;
 
-use super::Job;
-use super::clusters::Options;
 use super::dispatch::{NodePair, Tree};
 use super::pairing::WorkItem;
 use super::simd::{Isa, Simd};
 use super::slabs::{self, Counts, Slabs, Stage};
 use super::top_level::TopLevel;
+use crate::run::Job;
+use crate::settings::Settings;
 
 use cache::{Caches, LayerCache, part_ix};
 pub(crate) use hull::Pose;
@@ -92,7 +92,7 @@ impl StepClusters {
     pub fn run(
         &mut self,
         job: Job<'_>,
-        options: &Options,
+        settings: &Settings,
         asked: Asked,
         found: &mut FoundByKind,
         stats: &mut Statistics,
@@ -101,12 +101,12 @@ impl StepClusters {
         stats.n_clusters = 0;
         stats.time("clustering", |stats| self.cluster(job, stats))?;
         stats.time("bounds", |stats| {
-            self.refit(job, options, asked.pose, stats)
-        });
+            self.refit(job, settings, asked.pose, stats)
+        })?;
         for worker in &mut self.scratches {
-            worker.begin(stats.n_clusters, options.memory_budget.is_some());
+            worker.begin(stats.n_clusters, settings.memory_budget.is_some());
         }
-        let most_items = slabs::most_items(options.memory_budget, self.bytes() as u64)?;
+        let most_items = slabs::most_items(settings.memory_budget, self.bytes() as u64)?;
         self.items.clear();
         self.items.shrink_to(most_items);
         let known = Known::new(asked.latest);
@@ -170,7 +170,7 @@ impl StepClusters {
             if !known {
                 control.step(ix as u64, frame.layers.len() as u64)?;
                 let n_elements = body.part(layer.part).len();
-                let new = workers.install(n_elements, || LayerCache::new(body, layer.part));
+                let new = workers.install(n_elements, || LayerCache::new(body, layer.part))?;
                 *cache = Some(Box::new(new));
                 stats.n_clustered += 1;
             }
@@ -181,15 +181,21 @@ impl StepClusters {
     }
 
     /// The boxes of layers that moved.
-    fn refit(&mut self, job: Job<'_>, options: &Options, pose: Pose, stats: &mut Statistics) {
+    fn refit(
+        &mut self,
+        job: Job<'_>,
+        settings: &Settings,
+        pose: Pose,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
         cache::refit(
             self.isa,
             job,
-            options,
+            settings,
             pose,
             &mut self.caches,
             &mut self.scratches,
             stats,
-        );
+        )
     }
 }

@@ -11,6 +11,8 @@
 //!
 //! A helper that lingers yields to every other thread. What rayon spreads (clustering) runs in its pool.
 
+mod places;
+
 use crate::clock::Instant;
 use std::any::Any;
 use std::cell::UnsafeCell;
@@ -22,7 +24,7 @@ use std::time::Duration;
 
 use crate::error::Error;
 
-use super::places::Places;
+use places::Places;
 
 /// How long a helper spins for the next region before it yields between looks.
 const SPIN: Duration = Duration::from_micros(50);
@@ -47,8 +49,15 @@ pub struct Workers {
     last: Mutex<Option<(Instant, Duration)>>,
     /// Whether helpers that sleep are woken in this shift.
     wakes: AtomicBool,
-    /// For what uses rayon; `None` for the global pool.
-    pool: Option<rayon::ThreadPool>,
+    /// For [`install`](Workers::install), started when first needed.
+    pool: OnceLock<Pool>,
+}
+
+/// Where rayon spreads work.
+enum Pool {
+    /// As many threads as the process has cores: rayon's own pool, which all detectors share.
+    OfProcess,
+    OfDetector(rayon::ThreadPool),
 }
 
 /// While it lives, helpers expect more to do.
@@ -78,28 +87,20 @@ impl Drop for Workers {
 }
 
 impl Workers {
-    /// `threads` workers, the caller among them; 0 for one a core.
-    pub fn new(threads: usize) -> Result<Self, Error> {
+    /// `threads` workers, the caller among them; 0 for one per core. Threads are started when first needed.
+    pub fn new(threads: usize) -> Self {
         let (pool, n) = match threads {
-            0 => (None, rayon::current_num_threads()),
-            1 => (None, 1),
-            n => {
-                let pool = rayon::ThreadPoolBuilder::new()
-                    .num_threads(n)
-                    .thread_name(|ix| format!("impinge-pool-{ix}"))
-                    .build()
-                    .map_err(|error| Error::Threads(error.to_string()))?;
-                (Some(pool), n)
-            }
+            0 => (Pool::OfProcess.into(), rayon::current_num_threads()),
+            n => (OnceLock::new(), n),
         };
-        Ok(Workers {
+        Workers {
             n,
             crew: Arc::new(Crew::new(n - 1)),
             helpers: OnceLock::new(),
             last: Mutex::new(None),
             wakes: AtomicBool::new(true),
             pool,
-        })
+        }
     }
 
     /// How many there are.
@@ -129,18 +130,37 @@ impl Workers {
         self.last.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Runs something that uses rayon on its own, within the limits of this pool. What is about few primitives is
-    /// not spread by rayon: it runs here, for going to a pool takes 70 µs.
-    pub fn install<T: Send>(&self, n_primitives: usize, work: impl FnOnce() -> T + Send) -> T {
-        match &self.pool {
-            _ if n_primitives < SPREAD_FROM => work(),
-            Some(pool) => pool.install(work),
-            None if self.n == 1 => match single() {
-                Some(pool) => pool.install(work),
-                None => work(),
-            },
-            None => work(),
+    /// Runs something that rayon spreads, on as many threads as there are workers. What is about few primitives is not
+    /// spread: it runs here, for going to a pool takes 70 µs.
+    ///
+    /// This is a second pool beside the helpers, with a reason: clustering divides a body in two again and again, which
+    /// takes a scheduler that steals, and helpers only know a list of equal tasks. It works when a body is new or has
+    /// flowed away from its clusters; in all other frames its threads sleep.
+    ///
+    /// # Errors
+    /// Threads that do not start.
+    pub fn install<T: Send>(
+        &self,
+        n_primitives: usize,
+        work: impl FnOnce() -> T + Send,
+    ) -> Result<T, Error> {
+        if n_primitives < SPREAD_FROM {
+            return Ok(work());
         }
+        if self.n == 1 {
+            return Ok(single()?.install(work));
+        }
+        let pool = match self.pool.get() {
+            Some(pool) => pool,
+            None => {
+                let pool = Pool::OfDetector(build_pool(self.n)?);
+                self.pool.get_or_init(|| pool)
+            }
+        };
+        Ok(match pool {
+            Pool::OfProcess => work(),
+            Pool::OfDetector(pool) => pool.install(work),
+        })
     }
 
     /// Calls `task(scratch, ix)` once for each `ix` below `n_tasks`, each worker with a scratch of its own. The
@@ -409,12 +429,23 @@ impl Drop for Closing<'_> {
     }
 }
 
+fn build_pool(n_threads: usize) -> Result<rayon::ThreadPool, Error> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(n_threads)
+        .thread_name(|ix| format!("impinge-pool-{ix}"))
+        .build()
+        .map_err(|error| Error::Threads(error.to_string()))
+}
+
 /// One thread shared by every detector that was told to use one, so that what rayon would spread
 /// (clustering) stays on one core.
-fn single() -> Option<&'static rayon::ThreadPool> {
-    static POOL: std::sync::OnceLock<Option<rayon::ThreadPool>> = std::sync::OnceLock::new();
-    POOL.get_or_init(|| rayon::ThreadPoolBuilder::new().num_threads(1).build().ok())
-        .as_ref()
+fn single() -> Result<&'static rayon::ThreadPool, Error> {
+    static POOL: OnceLock<rayon::ThreadPool> = OnceLock::new();
+    if let Some(pool) = POOL.get() {
+        return Ok(pool);
+    }
+    let pool = build_pool(1)?;
+    Ok(POOL.get_or_init(|| pool))
 }
 
 #[cfg(test)]
@@ -424,7 +455,7 @@ mod tests {
     #[test]
     fn every_task_is_done_once_whoever_comes() {
         for threads in [1, 2, 5] {
-            let workers = Workers::new(threads).expect("threads");
+            let workers = Workers::new(threads);
             let _shift = workers.shift(LARGE);
             let mut sums = vec![0u64; threads];
             for n_tasks in (0..200).chain([10_000]) {
@@ -438,7 +469,7 @@ mod tests {
 
     #[test]
     fn helpers_come_again_after_they_slept() {
-        let workers = Workers::new(2).expect("threads");
+        let workers = Workers::new(2);
         for _ in 0..3 {
             let shift = workers.shift(LARGE);
             let deadline = Instant::now() + Duration::from_secs(60);
@@ -457,7 +488,7 @@ mod tests {
 
     #[test]
     fn a_panic_of_any_worker_reaches_the_caller() {
-        let workers = Workers::new(3).expect("threads");
+        let workers = Workers::new(3);
         for bad in [0, 63] {
             let mut scratches = [(); 3];
             let run = catch_unwind(AssertUnwindSafe(|| {
@@ -475,7 +506,7 @@ mod tests {
 
     #[test]
     fn regions_nest() {
-        let workers = Workers::new(2).expect("threads");
+        let workers = Workers::new(2);
         let mut sums = [0usize; 2];
         workers.for_each(&mut sums, 10, |sum, _| {
             let mut inner = [0usize; 2];

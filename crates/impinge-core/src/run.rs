@@ -1,0 +1,149 @@
+//! The frame loop: resolves a query, has a [`Finder`] append the keys of all pairs, sorts them.
+//!
+//! There is one loop for every backend and for methods of other crates. It is async because a GPU is waited for. A
+//! finder that works on the CPU never waits: its frame is complete at the first poll, see [`ready`].
+
+use std::pin::pin;
+use std::task::{Context, Poll, Waker};
+
+use crate::clock::Instant;
+use crate::error::Error;
+use crate::frame::Frame;
+use crate::pairs::Pairs;
+use crate::progress::Control;
+use crate::query::Query;
+use crate::scene::Scene;
+use crate::stats::Statistics;
+use crate::workers::Workers;
+
+/// One frame as a finder sees it.
+#[derive(Clone, Copy)]
+pub struct Job<'a> {
+    /// The bodies.
+    pub scene: &'a Scene,
+    /// Who takes part.
+    pub frame: &'a Frame,
+    /// The threads.
+    pub workers: &'a Workers,
+    /// Stops and watches the frame.
+    pub control: &'a Control<'a>,
+}
+
+/// Finds the pairs of a frame: a backend of this crate, or a method of another one.
+pub trait Finder {
+    /// The name of the method, for the statistics.
+    fn method(&self) -> &'static str;
+
+    /// `"cpu"`, or the name of the GPU.
+    fn backend(&self) -> &str;
+
+    /// Whether [`find`](Finder::find) itself refuses positions that were written in place and are not finite. If not,
+    /// the loop checks them before.
+    fn checks_positions(&self) -> bool {
+        false
+    }
+
+    /// Whether a key may come more than once. The loop then drops repetitions.
+    fn repeats(&self) -> bool {
+        false
+    }
+
+    /// Appends the keys of all pairs that the frame asks for, in any order.
+    ///
+    /// # Errors
+    /// Refused positions, cancellation, a memory budget that is too small, a GPU failure.
+    fn find(
+        &mut self,
+        job: Job<'_>,
+        keys: &mut Vec<u64>,
+        stats: &mut Statistics,
+    ) -> impl Future<Output = Result<(), Error>>;
+}
+
+/// What a frame needs whichever finder answers it. The memory is kept from frame to frame.
+pub struct FrameLoop {
+    frame: Frame,
+    pairs: Pairs,
+    workers: Workers,
+}
+
+impl FrameLoop {
+    /// With `threads` workers; 0 for one per core.
+    pub fn new(threads: usize) -> Self {
+        FrameLoop {
+            frame: Frame::default(),
+            pairs: Pairs::default(),
+            workers: Workers::new(threads),
+        }
+    }
+
+    /// One frame. Its answer is in [`pairs`](FrameLoop::pairs).
+    ///
+    /// # Errors
+    /// A stale id, refused positions, those of the finder.
+    pub async fn run(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        control: &Control<'_>,
+        finder: &mut impl Finder,
+    ) -> Result<(), Error> {
+        let start = Instant::now();
+        self.frame.resolve(scene, query)?;
+        let _shift = self.workers.shift(self.frame.n_primitives());
+        self.pairs.begin(&self.frame);
+        if !finder.checks_positions() {
+            self.frame.check(scene)?;
+        }
+        let (keys, stats) = self.pairs.parts_mut();
+        stats.method = finder.method();
+        stats.n_threads = self.workers.n();
+        stats.backend.push_str(finder.backend());
+        let job = Job {
+            scene,
+            frame: &self.frame,
+            workers: &self.workers,
+            control,
+        };
+        finder.find(job, keys, stats).await?;
+        stats.time("collect", |_| {
+            keys.sort_unstable();
+            if finder.repeats() {
+                keys.dedup();
+            }
+        });
+        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
+        Ok(())
+    }
+
+    /// The answer of the last frame, if it had no error.
+    pub fn pairs(&self) -> &Pairs {
+        &self.pairs
+    }
+
+    /// The threads, for answers that are found otherwise.
+    pub fn workers(&self) -> &Workers {
+        &self.workers
+    }
+
+    /// A query resolved and its positions checked, and the threads: for frames that are answered elsewhere.
+    ///
+    /// # Errors
+    /// A stale id, refused positions.
+    pub fn resolve(&mut self, scene: &Scene, query: &Query) -> Result<(&Frame, &Workers), Error> {
+        self.frame.resolve(scene, query)?;
+        self.frame.check(scene)?;
+        Ok((&self.frame, &self.workers))
+    }
+}
+
+/// The result of a future that never waits.
+///
+/// # Panics
+/// If the future does wait.
+pub fn ready<T>(future: impl Future<Output = T>) -> T {
+    match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
+        Poll::Ready(result) => result,
+        Poll::Pending => unreachable!("a finder on the CPU waits for nobody"),
+    }
+}
