@@ -1,5 +1,8 @@
 //! The command line: what may be said, and its help.
 
+mod choices;
+#[cfg(feature = "gpu")]
+mod picture;
 mod step;
 
 use std::num::NonZeroUsize;
@@ -9,13 +12,16 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use impinge_fem::scenes::SceneName;
 
 use crate::commands::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, TILES_EXAMPLES, TilesArgs};
+#[cfg(feature = "gpu")]
+use crate::values::PngFile;
 use crate::values::{
     CurvesFile, FrameRange, FramesFile, MeshFile, RowsFile, RowsFormat, at_least_one, body_numbers,
     bytes, lambda, mesh_format,
 };
-#[cfg(feature = "gpu")]
-use crate::values::{PngFile, azimuth, elevation, part, size};
 
+pub use choices::{BackendArg, MethodArg, SharedVertexArg};
+#[cfg(feature = "gpu")]
+pub use picture::PictureArgs;
 pub use step::{StepArgs, StepHow, ToiArg};
 
 /// Exact collision detection for deforming meshes of triangles and tetrahedra.
@@ -285,63 +291,6 @@ impl AnswerArgs {
     }
 }
 
-/// How a picture looks.
-#[cfg(feature = "gpu")]
-#[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "How it is drawn")]
-pub struct PictureArgs {
-    /// Width and height in pixels
-    #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x960", requires = "png")]
-    pub size: [u32; 2],
-    /// Degrees around the up axis, counter-clockwise seen from above
-    #[arg(
-        long,
-        value_name = "D",
-        value_parser = azimuth,
-        default_value = "-25",
-        allow_negative_numbers = true,
-        requires = "png"
-    )]
-    pub azimuth: f64,
-    /// Degrees above the ground, -90 to 90
-    #[arg(
-        long,
-        value_name = "D",
-        value_parser = elevation,
-        default_value = "20",
-        allow_negative_numbers = true,
-        requires = "png"
-    )]
-    pub elevation: f64,
-    /// The axis that points up; at azimuth 0 the viewer is on the side of +z or of -y
-    #[arg(long, value_enum, value_name = "AXIS", default_value_t = UpArg::Y, requires = "png")]
-    pub up: UpArg,
-    /// How strongly hidden colliding primitives are seen, 0 (not at all) to 1 (as if nothing hid them)
-    #[arg(long, value_name = "X", value_parser = part, default_value = "0.5", requires = "png")]
-    pub see_through: f32,
-    /// Without perspective
-    #[arg(long, requires = "png")]
-    pub orthographic: bool,
-}
-
-/// [`impinge_render::UpAxis`] as an option.
-#[cfg(feature = "gpu")]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum UpArg {
-    Y,
-    Z,
-}
-
-#[cfg(feature = "gpu")]
-impl From<UpArg> for impinge_render::UpAxis {
-    fn from(up: UpArg) -> Self {
-        match up {
-            UpArg::Y => impinge_render::UpAxis::Y,
-            UpArg::Z => impinge_render::UpAxis::Z,
-        }
-    }
-}
-
 /// What is drawn.
 #[cfg(feature = "gpu")]
 #[derive(Debug, Args)]
@@ -522,66 +471,6 @@ pub struct DemoArgs {
     pub out: MeshFile,
     #[command(flatten)]
     pub detector: DetectorArgs,
-}
-
-/// [`impinge::Method`] as an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MethodArg {
-    /// Groups fixed by topology; the fast one
-    Clusters,
-    /// The two-level grid
-    Cells,
-    /// Every box against every box; slow, and what the others are held against
-    Naive,
-}
-
-impl From<MethodArg> for impinge::Method {
-    fn from(method: MethodArg) -> Self {
-        match method {
-            MethodArg::Clusters => impinge::Method::Clusters,
-            MethodArg::Cells => impinge::Method::Cells,
-            MethodArg::Naive => impinge::Method::Naive,
-        }
-    }
-}
-
-/// [`impinge::Backend`] as an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum BackendArg {
-    /// A GPU if there is one, else the CPU
-    Auto,
-    /// The CPU
-    Cpu,
-    /// A GPU, or an error where there is none
-    Gpu,
-}
-
-impl From<BackendArg> for impinge::Backend {
-    fn from(backend: BackendArg) -> Self {
-        match backend {
-            BackendArg::Auto => impinge::Backend::Auto,
-            BackendArg::Cpu => impinge::Backend::Cpu,
-            BackendArg::Gpu => impinge::Backend::Gpu,
-        }
-    }
-}
-
-/// [`impinge::SharedVertex`] as an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum SharedVertexArg {
-    /// None
-    Skip,
-    /// Those that share more points than the vertices they have in common
-    Resolve,
-}
-
-impl From<SharedVertexArg> for impinge::SharedVertex {
-    fn from(rule: SharedVertexArg) -> Self {
-        match rule {
-            SharedVertexArg::Skip => impinge::SharedVertex::Skip,
-            SharedVertexArg::Resolve => impinge::SharedVertex::Resolve,
-        }
-    }
 }
 
 #[cfg(test)]

@@ -9,8 +9,8 @@ use impinge_io::{
 use serde_json::{Value, json};
 
 use crate::error::Error;
-use crate::output::{counted, grouped};
 use crate::rows::npy_header;
+use crate::text::{counted, grouped};
 use crate::values::{CurvesFile, CurvesFormat, RowsFile, RowsFormat};
 
 /// One corner of one contact.

@@ -5,8 +5,8 @@ use std::io::{self, Write};
 use impinge::{BodyId, Pairs, Scene};
 
 use crate::error::Error;
-use crate::output::{counted, grouped};
 use crate::regions::Region;
+use crate::text::{counted, grouped};
 
 /// Lines of places, and of bodies, before the rest is only counted.
 const MOST_LINES: usize = 8;

@@ -6,6 +6,7 @@ use serde_json::{Map, Value, json};
 use crate::detection::Times;
 use crate::load::Vertices;
 use crate::regions::Region;
+use crate::text::hash;
 
 /// The most regions that are described; all of them are counted.
 const MOST_REGIONS: usize = 100;
@@ -70,16 +71,6 @@ pub fn answer(
 /// Milliseconds in whole nanoseconds: the clock has no more, sums and medians only look so.
 pub fn rounded(ms: f64) -> f64 {
     (ms * 1e6).round() / 1e6
-}
-
-/// The hash as it is shown: 16 hexadecimal digits.
-pub fn hash(pairs: &Pairs) -> String {
-    hex(pairs.hash())
-}
-
-/// A hash as 16 hexadecimal digits.
-pub fn hex(hash: u64) -> String {
-    format!("{hash:016x}")
 }
 
 /// Every counter of the statistics under its own name.

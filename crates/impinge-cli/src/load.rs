@@ -10,7 +10,7 @@ use impinge_io::{
 
 use crate::args::AskArgs;
 use crate::error::Error;
-use crate::output::grouped;
+use crate::text::grouped;
 use crate::watch::go_on;
 
 /// The path that stands for standard input.

@@ -17,6 +17,7 @@ mod picture;
 mod regions;
 mod rows;
 mod stop;
+mod text;
 mod values;
 mod watch;
 
@@ -25,12 +26,14 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::args::{Cli, Command};
+use crate::error::Error;
 
 fn main() -> ExitCode {
     #[cfg(all(feature = "gpu", target_os = "linux"))]
     keep_mesa_quiet();
     let cli = Cli::parse();
-    let result = stop::cancel_on_signal().and_then(|cancel| match cli.command {
+    let listening = stop::cancel_on_signal().map_err(Error::Signal);
+    let result = listening.and_then(|cancel| match cli.command {
         Command::Demo(args) => commands::demo(&args, &cancel),
         Command::Distance(args) => commands::distance(&args, &cancel),
         Command::Pairs(args) => commands::pairs(&args, &cancel),

@@ -11,8 +11,6 @@ use std::time::Duration;
 
 use impinge::CancelToken;
 
-use crate::error::Error;
-
 /// How long the program may take to end by itself.
 const GRACE: Duration = Duration::from_millis(600);
 
@@ -23,9 +21,9 @@ static CODE: AtomicU8 = AtomicU8::new(0);
 static N_PATIENT: AtomicUsize = AtomicUsize::new(0);
 
 /// A token that the first Ctrl-C, or a request to terminate, cancels.
-pub fn cancel_on_signal() -> Result<CancelToken, Error> {
+pub fn cancel_on_signal() -> std::io::Result<CancelToken> {
     let token = CancelToken::new();
-    listen(token.clone()).map_err(Error::Signal)?;
+    listen(token.clone())?;
     Ok(token)
 }
 

@@ -25,9 +25,10 @@ use impinge::Pairs;
 use rayon::prelude::*;
 
 use crate::elasticity::GRAIN;
+use crate::element::{Mat3, Vec3};
 use crate::error::Error;
 use crate::lists::Lists;
-use crate::mesh::{Mat3, Mesh, Vec3};
+use crate::mesh::Mesh;
 use crate::overlap::Clipper;
 use crate::rotation::cofactors;
 use crate::settings::Settings;

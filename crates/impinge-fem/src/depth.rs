@@ -8,8 +8,8 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
+use crate::element::{Element, Vec3};
 use crate::lists::Lists;
-use crate::mesh::{Element, Vec3};
 
 /// A vertex waiting for its turn: nearest first, ties by number.
 #[derive(PartialEq)]

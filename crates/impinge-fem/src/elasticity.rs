@@ -9,7 +9,8 @@
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 
-use crate::mesh::{Element, Mat3, Mesh, Vec3};
+use crate::element::{Element, Mat3, Vec3};
+use crate::mesh::Mesh;
 use crate::rotation::rotation;
 
 /// Vertices or elements a thread works on at a time. Results do not depend on it.

@@ -21,6 +21,7 @@
 mod contact;
 mod depth;
 mod elasticity;
+mod element;
 mod error;
 mod lists;
 mod matrix;

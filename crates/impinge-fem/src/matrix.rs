@@ -3,8 +3,9 @@
 use rayon::prelude::*;
 
 use crate::elasticity::{GRAIN, Turned};
+use crate::element::{Mat3, Vec3};
 use crate::lists::Lists;
-use crate::mesh::{Mat3, Mesh, Vec3};
+use crate::mesh::Mesh;
 
 /// Symmetric in values; all blocks are held, so that each row is summed by one thread in one order.
 #[derive(Debug)]

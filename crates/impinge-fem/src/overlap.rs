@@ -1,6 +1,6 @@
 //! What two tetrahedra have in common: a convex polyhedron, cut out piece by piece.
 
-use crate::mesh::Vec3;
+use crate::element::Vec3;
 
 /// The faces' corners, and the corner on the other side.
 const FACES: [([usize; 3], usize); 4] = [

@@ -6,9 +6,10 @@ use web_time::Instant;
 
 use crate::contact::{Couplings, Now, numbered, outward_directions};
 use crate::elasticity::{GRAIN, Turned, energy, forces, turn};
+use crate::element::Vec3;
 use crate::error::Error;
 use crate::matrix::BlockMatrix;
-use crate::mesh::{Mesh, Vec3};
+use crate::mesh::Mesh;
 use crate::settings::Settings;
 use crate::solid::{Solid, check_finite};
 use crate::solver::{Scratch, Solved, System};

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use crate::contact::Couplings;
 use crate::elasticity::GRAIN;
+use crate::element::{Mat3, Vec3};
 use crate::matrix::BlockMatrix;
-use crate::mesh::{Mat3, Vec3};
 
 /// The symmetric positive definite operator: the sparse matrix, and the couplings of bodies in contact.
 pub(crate) struct System<'a> {

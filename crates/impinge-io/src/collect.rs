@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Name, Place};
 use crate::mesh::{Elements, Mesh, Positions};
-use crate::{Prefer, ReadOptions, Summary};
+use crate::options::{Prefer, ReadOptions, Summary};
 
 /// A mesh being read.
 #[derive(Debug)]

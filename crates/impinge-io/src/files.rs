@@ -8,9 +8,9 @@ use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
-use crate::ReadOptions;
 use crate::budget::reserve;
 use crate::error::{Error, Name, Place};
+use crate::options::ReadOptions;
 
 /// A path and who named it.
 #[derive(Debug, Clone, Copy)]

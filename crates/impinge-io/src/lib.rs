@@ -40,11 +40,13 @@ mod base64;
 mod binary;
 mod budget;
 mod collect;
+mod encoding;
 mod error;
 mod files;
 mod format;
 mod formats;
 mod mesh;
+mod options;
 mod read;
 mod sequence;
 mod text;
@@ -53,10 +55,8 @@ mod write;
 pub use error::{Error, Location, Place};
 pub use format::Format;
 pub use mesh::{Elements, Mesh, Positions, Weld, weld};
-pub use read::{
-    Prefer, ReadOptions, Summary, read, read_bytes, read_bytes_with_summary, read_tetgen_bytes,
-    read_with_summary,
-};
+pub use options::{Prefer, ReadOptions, Summary};
+pub use read::{read, read_bytes, read_bytes_with_summary, read_tetgen_bytes, read_with_summary};
 pub use sequence::{Sequence, SequenceFormat};
 pub use write::{
     AtomicFile, ColoredMesh, GrowingPc2, Pc2Writer, Polylines, remove_temporary_files, write_glb,

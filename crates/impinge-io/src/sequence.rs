@@ -10,7 +10,8 @@ use crate::budget::reserve;
 use crate::error::{Error, Name, Place, shown};
 use crate::files::{Source as Input, folder_of};
 use crate::mesh::Positions;
-use crate::read::{ReadOptions, collect};
+use crate::options::ReadOptions;
+use crate::read::collect;
 
 /// A format that holds the frames of a sequence in one file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

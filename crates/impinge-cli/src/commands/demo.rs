@@ -12,7 +12,8 @@ use crate::commands::demo_scene::DemoScene;
 use crate::detection::{Times, detect, detector, settings};
 use crate::error::Error;
 use crate::meshes;
-use crate::output::{body_table, counted, grouped, out, stage_table, table};
+use crate::output::{body_table, out, stage_table, table};
+use crate::text::{counted, grouped};
 use crate::watch::{Watch, go_on};
 
 /// About how many triangles the oracle, quadratic in them, is asked about: it takes a second at most.

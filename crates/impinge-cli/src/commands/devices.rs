@@ -6,7 +6,8 @@ use serde_json::json;
 
 use crate::args::DevicesArgs;
 use crate::error::Error;
-use crate::output::{out, shown_bytes, table};
+use crate::output::{out, table};
+use crate::text::shown_bytes;
 
 /// Lists adapters, hardware first.
 pub fn devices(args: &DevicesArgs) -> Result<(), Error> {

@@ -20,8 +20,8 @@ use impinge_io::{AtomicFile, GrowingPc2};
 
 use crate::args::{SequenceFormatArg, SimulateArgs};
 use crate::error::Error;
-use crate::json::hash;
 use crate::meshes;
+use crate::text::hash;
 use crate::values::{MeshFile, MeshFormat};
 
 const STATE: &str = "state.bin";

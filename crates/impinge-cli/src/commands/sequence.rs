@@ -13,10 +13,11 @@ use crate::commands::answer::hit;
 use crate::detection::{Times, detect, detector, query, set_positions};
 use crate::error::Error;
 use crate::load::{Bodies, Loading, to_positions};
-use crate::output::{counted, grouped, out};
+use crate::output::out;
 #[cfg(feature = "gpu")]
 use crate::picture::Drawer;
 use crate::rows::FrameRows;
+use crate::text::{counted, grouped, hash};
 use crate::values::RowsFile;
 use crate::watch::{Watch, go_on};
 use crate::{json, meshes, regions};
@@ -279,7 +280,7 @@ impl Lines {
             pairs.stats().total_ms,
             match pairs.is_empty() {
                 true => "-".to_owned(),
-                false => json::hash(pairs),
+                false => hash(pairs),
             }
         )?;
         to.flush()?;

@@ -11,8 +11,9 @@ use crate::args::SimulateArgs;
 use crate::commands::record::{Found, Record};
 use crate::detection::{Times, detector, percentile};
 use crate::error::Error;
-use crate::output::{counted, grouped, out, stage_table, table};
+use crate::output::{out, stage_table, table};
 use crate::stop::Patience;
+use crate::text::{counted, grouped};
 use crate::watch::Watch;
 
 /// Steps between two saved states.

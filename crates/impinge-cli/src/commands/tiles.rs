@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 use self::args::{MergeArgs, PlanArgs, RunArgs, ScatterArgs, TilesCommand};
 pub use self::args::{TILES_EXAMPLES, TilesArgs};
 use crate::error::Error;
-use crate::output::{counted, grouped, out};
+use crate::output::out;
+use crate::text::{counted, grouped};
 use crate::watch::Watch;
 
 /// `impinge tiles`.

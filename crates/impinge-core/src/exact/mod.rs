@@ -20,6 +20,7 @@ mod algebra;
 mod distance;
 pub(crate) mod filter;
 mod orientation;
+mod rounding;
 mod segment;
 mod shared;
 mod sweep;

@@ -11,13 +11,13 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use self::accessor::Data;
-use self::json::{Node, Primitive, Root};
-use crate::ReadOptions;
+use self::json::{Node, Primitive, Root, index_error};
 use crate::binary::{Cursor, Endian, Scalar};
 use crate::budget::Budget;
 use crate::collect::{Collector, check_n_vertices, finite, vertex_ix};
 use crate::error::{Error, Name, Place, shown};
 use crate::mesh::Positions;
+use crate::options::ReadOptions;
 
 pub(crate) fn read<'a>(
     bytes: &[u8],
@@ -342,14 +342,6 @@ impl<'a> Scene<'a, '_> {
         }
         Ok((base, n_vertices))
     }
-}
-
-fn index_error(name: Name, what: &str, index: usize, n: usize) -> Error {
-    name.syntax(
-        Place::File,
-        format!("an index of {what} below {n}"),
-        index.to_string(),
-    )
 }
 
 /// What a node does to what it holds.

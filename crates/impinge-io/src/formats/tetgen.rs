@@ -6,10 +6,10 @@
 use std::path::{Path, PathBuf};
 
 use crate::collect::{Collector, check_n_vertices, finite, vertex_ix};
+use crate::encoding::check_encoding;
 use crate::error::{Error, Name};
 use crate::format::Format;
 use crate::mesh::Positions;
-use crate::read::check_encoding;
 use crate::text::{Line, Text, number};
 
 /// The `.node` file and the file of cells that belong to `path`, which is one of them: `.ele` where it exists, else `.face`.

@@ -6,14 +6,15 @@
 mod array;
 mod xml;
 
-use self::array::Arrays;
+use self::array::{Appended, Arrays};
 use self::xml::{Document, Node};
 use super::cells;
+use crate::binary::{Endian, Scalar};
 use crate::budget::{self, Budget};
 use crate::collect::{Collector, check_n_vertices};
 use crate::error::{Error, Name, Place, shown};
 use crate::mesh::Positions;
-use crate::{ReadOptions, binary::Endian, binary::Scalar};
+use crate::options::ReadOptions;
 
 pub(crate) fn read<'a>(
     bytes: &[u8],
@@ -107,15 +108,6 @@ struct File<'b> {
     xml: &'b str,
     /// The bytes behind the `_` that starts the appended data, and the offset of the first.
     behind: Option<(&'b [u8], usize)>,
-}
-
-/// The appended data.
-#[derive(Clone, Copy)]
-struct Appended<'b> {
-    bytes: &'b [u8],
-    /// Where they start in the file.
-    start: usize,
-    is_base64: bool,
 }
 
 impl<'b> File<'b> {

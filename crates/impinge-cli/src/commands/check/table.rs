@@ -6,7 +6,8 @@ use impinge_check::{Counts, ErrorKind, Row};
 
 use super::args::FailOn;
 use crate::error::Error;
-use crate::output::{grouped, out, table};
+use crate::output::{out, table};
+use crate::text::grouped;
 
 /// The most meshes that a table lists.
 const LISTED: usize = 50;

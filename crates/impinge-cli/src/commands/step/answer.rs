@@ -5,8 +5,9 @@ use std::io::Write;
 use impinge::{Error, Impact, Impacts, PairKind, Statistics};
 use serde_json::{Map, Value, json};
 
-use crate::json::{counters, hex, rounded};
-use crate::output::{counted, grouped, out};
+use crate::json::{counters, rounded};
+use crate::output::out;
+use crate::text::{counted, grouped, hex};
 
 use super::load::Moving;
 

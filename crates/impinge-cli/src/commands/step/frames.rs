@@ -8,7 +8,8 @@ use serde_json::{Map, Value};
 
 use crate::detection::set_positions;
 use crate::error::Error;
-use crate::output::{grouped, out};
+use crate::output::out;
+use crate::text::grouped;
 
 use super::answer::Found;
 use super::load::set_end_positions;

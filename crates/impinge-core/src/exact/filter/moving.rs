@@ -3,7 +3,7 @@
 use super::motion::{Motion, Search};
 use super::number::{Lookup, Vector, load_vertex};
 use super::{BATCH, LANES, TABLE};
-use crate::exact::sweep::round_down;
+use crate::exact::rounding::round_down;
 use crate::exact::{ElementPair, Point};
 
 /// The points of eight pairs of moving elements, one pair a lane: `[start or end][point][axis][lane]`, points in the

@@ -24,6 +24,7 @@ mod tests;
 use super::Point;
 use super::algebra::Time;
 use super::filter::{Search, contact_answer, contact_search};
+use super::rounding::round_down;
 use super::segment::segments_intersect;
 use super::triangle::segment_meets_triangle;
 pub(super) use polygon::Polygon;
@@ -105,17 +106,6 @@ impl Contact {
             is_exact: time.is_exact,
             at_start: false,
         }
-    }
-}
-
-/// The largest `f32` that is not above a number in [0, 1].
-#[allow(clippy::cast_possible_truncation, reason = "rounded here")]
-pub(super) fn round_down(x: f64) -> f32 {
-    let nearest = x as f32;
-    if f64::from(nearest) > x {
-        nearest.next_down()
-    } else {
-        nearest
     }
 }
 

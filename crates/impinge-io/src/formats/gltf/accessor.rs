@@ -4,15 +4,14 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::index_error;
-use super::json::{Accessor, Root};
-use crate::ReadOptions;
+use super::json::{Accessor, Root, index_error};
 use crate::base64;
 use crate::binary::{Endian, Scalar};
 use crate::budget::Budget;
 use crate::error::{Error, Name, Place, shown};
 use crate::files::{Source, leads_out, outside};
 use crate::mesh::Positions;
+use crate::options::ReadOptions;
 
 /// The buffers of a file, loaded when they are needed.
 pub(super) struct Data<'a, 'r> {

@@ -4,6 +4,8 @@ use std::collections::HashMap;
 
 use serde::Deserialize;
 
+use crate::error::{Error, Name, Place};
+
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Root {
@@ -123,4 +125,13 @@ pub(super) struct BufferView {
 pub(super) struct Buffer {
     pub uri: Option<String>,
     pub byte_length: usize,
+}
+
+/// The error for an index into `what`, of which there are `n`.
+pub(super) fn index_error(name: Name, what: &str, index: usize, n: usize) -> Error {
+    name.syntax(
+        Place::File,
+        format!("an index of {what} below {n}"),
+        index.to_string(),
+    )
 }

@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 
-use super::Appended;
 use super::xml::Node;
 use crate::base64;
 use crate::binary::{Endian, Scalar};
@@ -81,6 +80,15 @@ impl Values<'_> {
             } => super::super::positions(name, bytes, *scalar, *endian, |_| place),
         }
     }
+}
+
+/// The appended data.
+#[derive(Clone, Copy)]
+pub(super) struct Appended<'b> {
+    pub bytes: &'b [u8],
+    /// Where they start in the file.
+    pub start: usize,
+    pub is_base64: bool,
 }
 
 /// What is needed to read an array of the file.

@@ -1,0 +1,63 @@
+//! The library's enumerations as values of options.
+
+use clap::ValueEnum;
+
+/// [`impinge::Method`] as an option.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MethodArg {
+    /// Groups fixed by topology; the fast one
+    Clusters,
+    /// The two-level grid
+    Cells,
+    /// Every box against every box; slow, and what the others are held against
+    Naive,
+}
+
+impl From<MethodArg> for impinge::Method {
+    fn from(method: MethodArg) -> Self {
+        match method {
+            MethodArg::Clusters => impinge::Method::Clusters,
+            MethodArg::Cells => impinge::Method::Cells,
+            MethodArg::Naive => impinge::Method::Naive,
+        }
+    }
+}
+
+/// [`impinge::Backend`] as an option.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BackendArg {
+    /// A GPU if there is one, else the CPU
+    Auto,
+    /// The CPU
+    Cpu,
+    /// A GPU, or an error where there is none
+    Gpu,
+}
+
+impl From<BackendArg> for impinge::Backend {
+    fn from(backend: BackendArg) -> Self {
+        match backend {
+            BackendArg::Auto => impinge::Backend::Auto,
+            BackendArg::Cpu => impinge::Backend::Cpu,
+            BackendArg::Gpu => impinge::Backend::Gpu,
+        }
+    }
+}
+
+/// [`impinge::SharedVertex`] as an option.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SharedVertexArg {
+    /// None
+    Skip,
+    /// Those that share more points than the vertices they have in common
+    Resolve,
+}
+
+impl From<SharedVertexArg> for impinge::SharedVertex {
+    fn from(rule: SharedVertexArg) -> Self {
+        match rule {
+            SharedVertexArg::Skip => impinge::SharedVertex::Skip,
+            SharedVertexArg::Resolve => impinge::SharedVertex::Resolve,
+        }
+    }
+}

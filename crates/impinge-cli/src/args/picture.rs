@@ -1,0 +1,59 @@
+//! How a picture looks, as options.
+
+use clap::{Args, ValueEnum};
+
+use crate::values::{azimuth, elevation, part, size};
+
+/// How a picture looks.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "How it is drawn")]
+pub struct PictureArgs {
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x960", requires = "png")]
+    pub size: [u32; 2],
+    /// Degrees around the up axis, counter-clockwise seen from above
+    #[arg(
+        long,
+        value_name = "D",
+        value_parser = azimuth,
+        default_value = "-25",
+        allow_negative_numbers = true,
+        requires = "png"
+    )]
+    pub azimuth: f64,
+    /// Degrees above the ground, -90 to 90
+    #[arg(
+        long,
+        value_name = "D",
+        value_parser = elevation,
+        default_value = "20",
+        allow_negative_numbers = true,
+        requires = "png"
+    )]
+    pub elevation: f64,
+    /// The axis that points up; at azimuth 0 the viewer is on the side of +z or of -y
+    #[arg(long, value_enum, value_name = "AXIS", default_value_t = UpArg::Y, requires = "png")]
+    pub up: UpArg,
+    /// How strongly hidden colliding primitives are seen, 0 (not at all) to 1 (as if nothing hid them)
+    #[arg(long, value_name = "X", value_parser = part, default_value = "0.5", requires = "png")]
+    pub see_through: f32,
+    /// Without perspective
+    #[arg(long, requires = "png")]
+    pub orthographic: bool,
+}
+
+/// [`impinge_render::UpAxis`] as an option.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum UpArg {
+    Y,
+    Z,
+}
+
+impl From<UpArg> for impinge_render::UpAxis {
+    fn from(up: UpArg) -> Self {
+        match up {
+            UpArg::Y => impinge_render::UpAxis::Y,
+            UpArg::Z => impinge_render::UpAxis::Z,
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! Numbers and hashes as text.
+
+use impinge::Pairs;
+
+/// A number with a comma after every three digits.
+pub fn grouped(n: u64) -> String {
+    let digits = n.to_string();
+    let mut text = String::with_capacity(digits.len() * 4 / 3);
+    for (ix, digit) in digits.chars().enumerate() {
+        if ix > 0 && (digits.len() - ix).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// `n` of something, in the plural where there is not one.
+pub fn counted(n: u64, one: &str) -> String {
+    format!("{} {one}{}", grouped(n), if n == 1 { "" } else { "s" })
+}
+
+/// Bytes in a unit that keeps the number short.
+pub fn shown_bytes(n: u64) -> String {
+    let mut unit = 1u64;
+    for name in ["bytes", "kB", "MB", "GB"] {
+        if n / unit < 1000 {
+            return match unit {
+                1 => format!("{n} {name}"),
+                _ => format!("{:.1} {name}", n as f64 / unit as f64),
+            };
+        }
+        unit *= 1000;
+    }
+    format!("{:.1} TB", n as f64 / unit as f64)
+}
+
+/// The hash as it is shown: 16 hexadecimal digits.
+pub fn hash(pairs: &Pairs) -> String {
+    hex(pairs.hash())
+}
+
+/// A hash as 16 hexadecimal digits.
+pub fn hex(hash: u64) -> String {
+    format!("{hash:016x}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_in_groups() {
+        assert_eq!(grouped(0), "0");
+        assert_eq!(grouped(999), "999");
+        assert_eq!(grouped(1000), "1,000");
+        assert_eq!(grouped(1234567), "1,234,567");
+    }
+
+    #[test]
+    fn bytes_are_short() {
+        assert_eq!(shown_bytes(0), "0 bytes");
+        assert_eq!(shown_bytes(999), "999 bytes");
+        assert_eq!(shown_bytes(1500), "1.5 kB");
+        assert_eq!(shown_bytes(2_500_000_000_000), "2.5 TB");
+    }
+}

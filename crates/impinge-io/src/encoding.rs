@@ -1,0 +1,21 @@
+//! Which text a reader takes.
+
+use crate::error::{Error, Name, Place};
+use crate::format::Format;
+use crate::formats::stl;
+
+/// Refuses text in UTF-16, which some editors and shells write, by name.
+///
+/// Without a byte order mark UTF-16 shows by a zero in every other byte. No format starts like that but binary STL, whose
+/// title may be anything: it is told by its length.
+pub(crate) fn check_encoding(bytes: &[u8], format: Format, name: Name) -> Result<(), Error> {
+    let is_utf16 = match bytes {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => true,
+        &[a, 0, b, 0, ..] | &[0, a, 0, b, ..] => a != 0 && b != 0 && a.is_ascii() && b.is_ascii(),
+        _ => false,
+    };
+    if is_utf16 && !(format == Format::Stl && stl::is_binary(bytes)) {
+        return Err(name.unsupported(Place::File, "text in UTF-16 (UTF-8 is: save it as that)"));
+    }
+    Ok(())
+}
