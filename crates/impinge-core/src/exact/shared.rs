@@ -1,9 +1,9 @@
 //! Pairs of one body that share vertices (`SharedVertex::Resolve`).
 //!
-//! Neighbours always meet in the simplex that they share: a vertex, an edge, a face. What is
-//! asked is whether they meet *anywhere else*: a pair is reported if and only if the
+//! Neighbours always meet in the simplex that they share: a vertex, an edge, a face. The
+//! question is whether they meet *anywhere else*: a pair is reported if and only if the
 //! intersection is larger than the convex hull of the shared vertices. Two primitives with the
-//! same vertices are reported always.
+//! same vertices are always reported.
 //!
 //! Vertices are shared when their ids are equal, wherever they lie. For primitives that are not
 //! degenerate this is the usual rule (`docs/exactness.md`, "Shared vertices", has the proofs):
@@ -47,7 +47,8 @@ pub fn triangles_intersect_beyond_shared(
         .unwrap_or_else(|| Parts::new(a, ids_a, b, ids_b).meet_beyond_shared())
 }
 
-/// The filter's answer for triangles with three different ids each; none when unsure.
+/// The filter's answer for triangles with three different ids each that share one or two; `None` when
+/// unsure.
 #[inline]
 fn neighbours_answer(
     a: &[Point; 3],
@@ -62,7 +63,7 @@ fn neighbours_answer(
     let is_shared_a = ids_a.map(|id| ids_b.contains(&id));
     let is_shared_b = ids_b.map(|id| ids_a.contains(&id));
     let first = |flags: [bool; 3], sought: bool| flags.iter().position(|&flag| flag == sought);
-    // The vertices after a given one, in the triangle's turn.
+    // The two vertices after a given one, in the triangle's order.
     let next = |vertex: usize| [(vertex + 1) % 3, (vertex + 2) % 3];
     match is_shared_a.iter().filter(|&&shared| shared).count() {
         1 => {
@@ -123,7 +124,7 @@ pub fn triangle_tetrahedron_intersect_beyond_shared(
     Parts::new(t, ids_t, k, ids_k).meet_beyond_shared()
 }
 
-/// Up to four points, without a heap.
+/// Up to four points, without heap allocation.
 #[derive(Clone, Copy)]
 struct Points {
     points: [Point; 4],
@@ -155,7 +156,7 @@ impl Points {
         self
     }
 
-    /// These points but one.
+    /// These points without the one at `left_out_ix`.
     fn without(self, left_out_ix: usize) -> Self {
         let mut rest = Self::EMPTY;
         for (point_ix, &point) in self.as_slice().iter().enumerate() {
@@ -171,7 +172,7 @@ impl Points {
     }
 }
 
-/// Two primitives taken apart: the vertices that they share and the rest of each.
+/// Two primitives split into the vertices that they share and the rest of each.
 struct Parts {
     shared: Points,
     rest_a: Points,
@@ -252,9 +253,9 @@ fn padded<const N: usize>(points: &[Point]) -> [Point; N] {
 
 /// Whether conv(v, a) and conv(v, b) share a point other than v.
 ///
-/// From a common point other than v, go on along the ray from v until one of the two ends. If v
-/// is not in conv(a) and not in conv(b), each ends in its face opposite v: so it must be that
-/// one of these two faces meets the other primitive, and, as v is in neither, that is enough.
+/// Follow the ray from v through a common point until it leaves one of the two primitives. If v is
+/// in neither conv(a) nor conv(b), the ray leaves each primitive through its face opposite v. So one
+/// of these faces must meet the other primitive. As v is in neither face, that is also sufficient.
 fn beyond_vertex(v: &Point, a: Points, b: Points) -> bool {
     if let ([a0, a1], [b0, b1]) = (a.as_slice(), b.as_slice())
         && let Some(answer) = beyond_vertex_in_plane(v, [a0, a1], [b0, b1])
@@ -276,8 +277,8 @@ fn beyond_vertex(v: &Point, a: Points, b: Points) -> bool {
         || hulls_meet(b.as_slice(), a.with(*v).as_slice())
 }
 
-/// [`beyond_vertex`] for two triangles of one plane: whether their angles at v share a direction.
-/// None when they are not in one plane, or one is degenerate.
+/// [`beyond_vertex`] for two coplanar triangles: whether their angles at v share a direction.
+/// `None` when they are not coplanar, or one is degenerate.
 fn beyond_vertex_in_plane(v: &Point, a: [&Point; 2], b: [&Point; 2]) -> Option<bool> {
     if b.iter()
         .any(|point| !orient3d(v, a[0], a[1], point).is_zero())
@@ -300,8 +301,8 @@ fn beyond_vertex_in_plane(v: &Point, a: [&Point; 2], b: [&Point; 2]) -> Option<b
     )
 }
 
-/// Whether a face of the tetrahedron v, a that contains v has all of `b` strictly on its outer
-/// side. What the primitives have in common then lies in the plane, where v, b has v alone.
+/// Whether some face at v of the tetrahedron (v, a) has all of `b` strictly on its outer side. The
+/// two can then only meet in that face's plane, and conv(v, b) has only v in that plane.
 fn parted_by_face(v: &Point, a: &[Point], b: &[Point]) -> bool {
     let &[p, q, r] = a else { return false };
     let orientation = orient3d(v, &p, &q, &r);
@@ -312,21 +313,21 @@ fn parted_by_face(v: &Point, a: &[Point], b: &[Point]) -> bool {
         })
 }
 
-/// When v lies in conv(a), conv(a) is the union of conv(v, f) over the faces f of a. Gives these
-/// faces; none when a is v alone.
+/// If v lies in conv(a), then conv(a) is the union of conv(v, f) over the faces f of a. Returns these
+/// faces; no face if `a` is one point.
 fn parts_around(a: Points) -> impl Iterator<Item = Points> {
     let n_parts = if a.n > 1 { a.n } else { 0 };
     (0..n_parts).map(move |left_out_ix| a.without(left_out_ix))
 }
 
-/// Whether conv(u, v, a) and conv(u, v, b) are more than the segment uv in common, with one or
+/// Whether conv(u, v, a) and conv(u, v, b) have more than the segment uv in common, with one or
 /// two points in each of `a` and `b`.
 fn beyond_edge(u: &Point, v: &Point, a: &[Point], b: &[Point]) -> bool {
     if same(u, v) {
         return beyond_vertex(u, Points::from_slice(a), Points::from_slice(b));
     }
-    // Off the line uv: seen along it, each primitive is a wedge, the cone of the directions in
-    // which its other vertices lie; those on the line itself add none. Two cones of a plane
+    // Off the line uv: seen along the line, each primitive is a wedge, the cone of the directions
+    // towards its other vertices. Vertices on the line add no direction. Two cones in a plane
     // share a direction if and only if one contains an edge of the other.
     let off_line = |points: &[Point]| {
         let mut rest = Points::EMPTY;
@@ -346,7 +347,7 @@ fn beyond_edge(u: &Point, v: &Point, a: &[Point], b: &[Point]) -> bool {
     };
     contains_one(&wedge_a, &wedge_b)
         || contains_one(&wedge_b, &wedge_a)
-        // On the line: both go on beyond v, or both beyond u.
+        // On the line: both extend beyond v, or both beyond u.
         || (extends_beyond(u, v, a) && extends_beyond(u, v, b))
         || (extends_beyond(v, u, a) && extends_beyond(v, u, b))
 }
@@ -389,7 +390,7 @@ fn extends_beyond(u: &Point, v: &Point, a: &[Point]) -> bool {
         }
 }
 
-/// Whether conv(s, a) and conv(s, b) are more than the triangle s in common.
+/// Whether conv(s, a) and conv(s, b) have more than the triangle s in common.
 fn beyond_face(s: [&Point; 3], a: &Point, b: &Point) -> bool {
     let [u, v, w] = s;
     let Some(projection) = Projection::injective(u, v, w) else {
@@ -405,12 +406,12 @@ fn beyond_face(s: [&Point; 3], a: &Point, b: &Point) -> bool {
     };
     let (a_side, b_side) = (orient3d(u, v, w, a), orient3d(u, v, w, b));
     if !(a_side.is_zero() && b_side.is_zero()) {
-        // Where one is flat and the other is not, they meet in the face's plane, and the one
-        // that is not flat meets that in the face alone.
+        // If one is flat and the other is not, they can only meet in the face's plane, and the one
+        // that is not flat meets that plane in the face alone.
         return a_side.strictly_same(b_side);
     }
-    // Both are flat: a common point outside the face lies beyond one of its edges, and then both
-    // a and b do; where both do, they share points next to the middle of that edge.
+    // Both are flat. A common point outside the face lies beyond one of its edges, and then so do a
+    // and b. Conversely, if a and b lie beyond the same edge, they share points next to its middle.
     let inside = projection.turn(u, v, w);
     [(u, v), (v, w), (w, u)].into_iter().any(|(p, q)| {
         let beyond = |point: &Point| -> bool {

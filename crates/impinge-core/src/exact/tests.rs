@@ -1,5 +1,5 @@
-//! What the filter says against what exact signs say. The signs themselves are held against an
-//! independent oracle in `tests/exact`.
+//! The filters' answers compared with those of exact signs. The signs themselves are compared with
+//! an independent oracle in `tests/exact`.
 
 use super::Point;
 use super::filter::{
@@ -31,7 +31,7 @@ fn lane_of(triangles: &Triangles8, lane: usize) -> [Point; 3] {
     std::array::from_fn(|vertex| std::array::from_fn(|axis| triangles[vertex][axis][lane]))
 }
 
-/// What every instruction set of this processor says, after it was found to be the same.
+/// The answer of all instruction sets of this processor, which must be the same.
 fn on_all<P, T: PartialEq + std::fmt::Debug>(
     pairs: &P,
     portable: impl Fn(&P) -> T,
@@ -133,8 +133,8 @@ fn classify_in_tables(pairs: &InTables) -> Verdict16 {
     )
 }
 
-/// Compares what the filter in f32 says of many batches with the truth; gives how many pairs it settled, and how
-/// many of them meet.
+/// Compares the answers of the filter in f32 with the truth, for many batches. Returns how many pairs it settled, and
+/// how many of these intersect.
 fn check_in_tables(
     random: &mut Random,
     n_batches: u32,
@@ -223,7 +223,7 @@ fn classify_tetrahedra(pairs: &TetrahedronPairs8) -> Verdict {
     )
 }
 
-/// One pair in every lane of a batch: the answer of all lanes, none when unsure.
+/// The answer for one pair, put into every lane of a batch; `None` when unsure.
 fn in_all_lanes(
     classify: fn(&TetrahedronPairs8) -> Verdict,
     a: &[Point; 4],
@@ -263,12 +263,12 @@ impl Random {
         (self.bits() >> 40) as f64 / f64::from(1 << 24)
     }
 
-    /// Random points, all next to one another.
+    /// Random points in the unit cube.
     fn plain<const N: usize>(&mut self) -> [Point; N] {
         [(); N].map(|()| [(); 3].map(|()| self.unit()))
     }
 
-    /// Points of which many determinants are zero, or nearly so.
+    /// Points that make many determinants zero, or nearly zero.
     fn troublesome<const N: usize>(&mut self) -> [Point; N] {
         let kind = self.bits() % 6;
         let far = [0.0, 1e6, 1e30][(self.bits() % 3) as usize];
@@ -299,7 +299,7 @@ impl Random {
     }
 }
 
-/// Compares a verdict with the truth, lane by lane; gives the number of settled lanes.
+/// Compares a verdict with the truth, lane by lane; returns the number of settled lanes.
 fn check(yes: u8, no: u8, truth: &[bool; LANES], say: impl Fn(usize) -> String) -> u32 {
     assert_eq!(yes & no, 0, "a lane with both answers");
     for (lane, &truth) in truth.iter().enumerate() {
@@ -405,7 +405,7 @@ fn filter_in_f32_settles_random_triangles_and_is_right() {
             "scale {scale}: {n_settled} of {n} settled, {n_yes} meet"
         );
     }
-    // What underflows is unsure, all of it.
+    // Where everything underflows, every pair is unsure.
     let scale = 2.0f64.powi(-120);
     let tiny = |random: &mut Random| random.plain().map(|point| point.map(|x| x * scale));
     assert_eq!(check_in_tables(&mut random, 100, tiny), (0, 0));
@@ -497,8 +497,8 @@ fn filter_is_right_on_triangles_that_share_a_vertex_or_an_edge() {
     }
 }
 
-/// Beyond the shared vertex 0, asked in a way that no filter sees: the vertex is given twice, as
-/// a third id of a degenerate triangle would be, by way of tetrahedra with a repeated point.
+/// Whether two triangles meet beyond their shared vertex 0, without any filter: each is given as a flat
+/// tetrahedron that repeats the triangle's last point.
 fn beyond_vertex_by_signs(a: &[Point; 3], b: &[Point; 3]) -> bool {
     let flat = |t: &[Point; 3]| [t[0], t[1], t[2], t[2]];
     tetrahedra_intersect_beyond_shared(&flat(a), [0, 1, 2, 3], &flat(b), [0, 4, 5, 6])
@@ -559,7 +559,7 @@ fn filter_is_never_wrong_on_troublesome_tetrahedra() {
     assert!(n_settled > 1000, "{n_settled} settled");
 }
 
-/// Lanes with numbers that were never promised to work are unsure, not wrong and no panic.
+/// NaN and infinity are outside the promised range: their lanes are unsure, and nothing panics.
 #[test]
 fn filter_is_unsure_of_nan_and_overflow() {
     let good: [Point; 3] = [[0.0, 0.0, -1.0], [0.1, 0.0, 1.0], [0.0, 0.1, 1.0]];

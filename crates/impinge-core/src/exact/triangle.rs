@@ -30,8 +30,8 @@ pub fn triangles_intersect(a: &[Point; 3], b: &[Point; 3]) -> bool {
     })
 }
 
-/// Whether some vertex of one primitive is also a vertex of the other, number for number: then they
-/// touch. Most pairs that no filter can settle are such neighbours in a mesh that repeats its vertices.
+/// Whether both primitives have a vertex with the same coordinates: then they touch. Most pairs that
+/// no filter can settle are such neighbours in a mesh that repeats its vertices.
 pub(super) fn have_common_point(a: &[Point], b: &[Point]) -> bool {
     a.iter().any(|point| b.contains(point))
 }
@@ -58,11 +58,11 @@ pub(super) fn triangles_intersect_by_signs(a: &[Point; 3], b: &[Point; 3]) -> bo
     any_edge_meets(a, a_sides, b) || any_edge_meets(b, b_sides, a)
 }
 
-/// Triangle against triangle in one plane; none when one is degenerate.
+/// Whether two coplanar triangles share a point; `None` when one is degenerate.
 ///
-/// Two convex polygons of a plane share no point if and only if the line of an edge of one has the
-/// other strictly on its outer side: seen as the difference of the two, a convex polygon with
-/// edges parallel to theirs, the origin is then strictly beyond one of its edges.
+/// Two convex polygons in a plane are apart if and only if the line of an edge of one has the
+/// other strictly on its outer side. Proof: their difference is a convex polygon with edges parallel
+/// to theirs. If they are apart, the origin lies strictly beyond one of its edges.
 fn intersect_in_plane(a: &[Point; 3], b: &[Point; 3]) -> Option<bool> {
     let projection = Projection::injective(&a[0], &a[1], &a[2])?;
     let (a, b) = (projection.apply_all(a), projection.apply_all(b));
@@ -88,7 +88,7 @@ fn sides(triangle: &[Point; 3], other: &[Point; 3]) -> [Sign; 3] {
     other.each_ref().map(|vertex| orient3d(p, q, r, vertex))
 }
 
-/// Whether an edge of `a` meets `b`, where `sides` are those of `a` by the plane of `b`.
+/// Whether an edge of `a` meets `b`. `sides`: on which side of `b`'s plane each vertex of `a` lies.
 fn any_edge_meets(a: &[Point; 3], sides: [Sign; 3], b: &[Point; 3]) -> bool {
     EDGES
         .iter()
@@ -102,7 +102,7 @@ pub(super) fn segment_meets_triangle(p: &Point, q: &Point, triangle: &[Point; 3]
     segment_meets_triangle_with_sides(p, q, p_side, q_side, triangle)
 }
 
-/// [`segment_meets_triangle`] with the sides of p and q by the triangle's plane already known.
+/// [`segment_meets_triangle`] when it is known on which side of the triangle's plane p and q lie.
 fn segment_meets_triangle_with_sides(
     p: &Point,
     q: &Point,
@@ -126,7 +126,7 @@ fn segment_meets_triangle_with_sides(
     ])
 }
 
-/// Segment against triangle when p and q lie in the triangle's plane, or the triangle has none.
+/// Segment against triangle when p and q lie in the triangle's plane or the triangle is degenerate.
 fn segment_meets_triangle_in_plane(p: &Point, q: &Point, triangle: &[Point; 3]) -> bool {
     let [a, b, c] = triangle;
     let Some(projection) = Projection::injective(a, b, c) else {

@@ -35,7 +35,7 @@ impl Polynomial {
         self.0[self.0.len() - 1].sign()
     }
 
-    /// How often the coefficients change sign, zeros left out. Descartes: the number of roots in the open interval
+    /// How often the coefficients change sign, ignoring zeros. Descartes: the number of roots in the open interval
     /// (0, 1), counted with multiplicity, is this or smaller by an even number.
     pub(in crate::exact) fn variations(&self) -> usize {
         variations(&self.0)
@@ -159,7 +159,8 @@ impl Polynomial {
         self.trimmed().0.len() <= 1
     }
 
-    /// Without leading zeros, and without what powers of two all coefficients share. Zero has no coefficients then.
+    /// Without leading zeros, and divided by the largest power of two that divides all coefficients. Zero becomes a
+    /// polynomial without coefficients.
     fn trimmed(&self) -> Self {
         let n = self
             .0
@@ -217,8 +218,7 @@ impl Sub for &Polynomial {
     }
 }
 
-/// 1 as a polynomial of degree 2, ((1-t) + t)^2: times this, a polynomial stays what it is and has a degree that is
-/// higher by 2.
+/// 1 as a polynomial of degree 2, ((1-t) + t)^2: multiplying by it raises the degree by 2 and changes no value.
 pub(in crate::exact) fn square_of_sum() -> Polynomial {
     Polynomial([1, 2, 1].map(Integer::from).to_vec())
 }
@@ -248,7 +248,7 @@ impl Controls {
         variations(&self.0)
     }
 
-    /// The sign inside the interval, both ends left out, if all coefficients agree on it.
+    /// The sign inside the open interval, if all coefficients agree on it.
     pub(super) fn sign(&self) -> Option<Sign> {
         match self.variations() {
             0 => Some(first_sign(self.0.iter())),

@@ -20,7 +20,7 @@ type Path = Vec<bool>;
 /// A root, exactly: the time is algebraic.
 #[derive(Debug)]
 pub(in crate::exact) struct Root {
-    /// The interval, or for a dyadic root the interval that starts (or, at t = 1, ends) with it.
+    /// The interval that isolates the root; not used for a dyadic root.
     path: Path,
     place: Place,
 }
@@ -46,12 +46,12 @@ pub(in crate::exact) struct Time {
 }
 
 impl Time {
-    /// The earlier one of two roots, as far as their floors tell them apart.
+    /// The earlier of two roots, by their floors.
     pub(in crate::exact) fn earlier(self, other: Self) -> Self {
         match self.floor.total_cmp(&other.floor) {
             Ordering::Less => self,
             Ordering::Greater => other,
-            // Above a common floor, the root that is the floor is the earlier one.
+            // Of two roots with the same floor, one that equals the floor is the earlier.
             Ordering::Equal => Self {
                 floor: self.floor,
                 is_exact: self.is_exact || other.is_exact,
@@ -66,7 +66,7 @@ impl Time {
 pub(in crate::exact) struct Roots {
     polynomial: Polynomial,
     is_squarefree: bool,
-    /// What is left to look at, the earliest last.
+    /// Parts not yet examined, the earliest last.
     stack: Vec<Part>,
 }
 
@@ -92,7 +92,7 @@ impl Roots {
         }
     }
 
-    /// Divides by the common divisor with the derivative, which leaves every root once.
+    /// Divides by the common divisor with the derivative, which makes every root simple.
     fn remove_multiple_roots(&mut self) {
         self.is_squarefree = true;
         let divisor = self
@@ -184,8 +184,8 @@ impl Root {
             }
             match &self.place {
                 Place::At { numerator, depth } => return other.sign_at(numerator, *depth),
-                // A root of the divisor is one of the polynomial: inside there is this one at most, and it is simple.
-                // So the number of variations, which is right up to an even number, tells whether there is one.
+                // A root of the divisor is a root of the polynomial, which has only this one inside, and it is simple.
+                // So the divisor has at most one root inside, and its variations are odd if and only if it has one.
                 Place::Inside { polynomial, .. } if round == PATIENCE => {
                     let divisor = polynomial.common_divisor(other);
                     if divisor.controls_over(&self.path).variations() % 2 == 1 {
@@ -202,7 +202,8 @@ impl Root {
         unreachable!("halving ends where the sign is not zero")
     }
 
-    /// Halves the interval: the half that has the root, or none where the root is its middle and is known now.
+    /// Halves the interval. Returns whether the right half has the root; `None` where the root is the middle, and from
+    /// then on.
     fn halve(&mut self) -> Option<bool> {
         let Place::Inside { controls, .. } = &mut self.place else {
             return None;
@@ -278,7 +279,7 @@ impl Root {
     }
 }
 
-/// The only root of a polynomial between two floats in [0, 1], which are no roots, rounded down.
+/// The only root of a polynomial between two floats in [0, 1] that are not roots themselves, rounded down.
 pub(in crate::exact) fn floor_between(polynomial: &Polynomial, low: f64, high: f64) -> Time {
     let value_at = |x: f64| {
         let (numerator, depth) = dyadic(x);
@@ -321,7 +322,7 @@ fn floor_of(guess: f64, compare: impl Fn(f64) -> Ordering) -> Time {
         } else {
             low = at;
         }
-        // Outwards by growing steps while one side is open, then to the middle.
+        // Outwards in growing steps while one side is unbounded, then bisection.
         at = match (low, high) {
             (0, _) => high.saturating_sub(step),
             (_, high) if high == one + 1 => low.saturating_add(step).min(one),
@@ -357,8 +358,8 @@ fn scaled((x, exponent): (f64, i64), depth: u64) -> f64 {
     }
 }
 
-/// The one root of Bernstein coefficients with one variation, as a part of the interval: Newton's method, kept between
-/// bounds that halving moves.
+/// The only root of Bernstein coefficients with one variation, as a share of the interval: Newton's method, with
+/// bisection where it would leave the bounds found so far.
 fn guess_inside(controls: &Controls) -> f64 {
     let parts: Vec<(f64, i64)> = controls
         .coefficients()

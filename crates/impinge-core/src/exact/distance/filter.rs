@@ -10,9 +10,10 @@ const BOUND: f64 = 32.0 * f64::EPSILON;
 const SMALLEST: f64 = 1e-60;
 const LARGEST: f64 = 1e60;
 
-/// Whether two elements are within a distance; none when unsure.
+/// Whether two elements are within a distance; `None` when unsure.
 ///
-/// Certainly not, if the polygon is beyond a plane further away. Certainly, if some point of the polygon is nearer.
+/// No, if the whole difference polygon lies beyond a plane that is farther from the origin than `distance`. Yes, if
+/// some point of the polygon is nearer than `distance`.
 pub(super) fn answer(pair: ElementPair, points: &[Point; 4], distance: f64) -> Option<bool> {
     let (corners, n) = corners(pair, points);
     let corners = &corners[..n];
@@ -43,7 +44,8 @@ pub(super) fn answer(pair: ElementPair, points: &[Point; 4], distance: f64) -> O
     (length * (1.0 + BOUND) + BOUND * size < distance).then_some(true)
 }
 
-/// Whether two moving elements certainly stay further apart than a distance: beyond one plane at both ends.
+/// Whether two moving elements certainly stay farther apart than a distance: one plane has their difference polygon
+/// beyond it at both ends of the step.
 pub(super) fn stay_apart(
     pair: ElementPair,
     start: &[Point; 4],
@@ -80,7 +82,7 @@ pub(super) fn stay_apart(
         .any(|normal| is_beyond(normal, both(), size, distance))
 }
 
-/// Whether n . V > d |n| for all corners, or < -d |n|, for a normal that is taken as exact.
+/// Whether n . V > d |n| for all corners V, or n . V < -d |n| for all. The normal n is taken as exact.
 fn is_beyond<'a>(
     normal: &Point,
     corners: impl Iterator<Item = &'a Point>,
@@ -91,7 +93,7 @@ fn is_beyond<'a>(
     if !(SMALLEST * SMALLEST..LARGEST * LARGEST).contains(&length) {
         return false;
     }
-    // n . V is wrong by less than BOUND |n| |V|, the length by four roundings.
+    // n . V is wrong by less than BOUND |n| |V|; the length is wrong by four roundings.
     let bound = distance * length * (1.0 + BOUND) + BOUND * length * size;
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
     for corner in corners {
@@ -120,14 +122,14 @@ fn largest(corners: &[Point]) -> f64 {
         .fold(0.0, |size: f64, x| size.max(x.abs()))
 }
 
-/// A point of the border that is nearest to the origin, but for rounding.
+/// The point of the polygon's border that is nearest to the origin, up to rounding.
 fn nearest_on_edges(corners: &[Point]) -> Point {
     let mut best = corners[0];
     for (ix, a) in corners.iter().enumerate() {
         let b = &corners[(ix + 1) % corners.len()];
         let e = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
         let share = -dot(a, &e) / dot(&e, &e);
-        // Also where it is NaN: the edge is a point.
+        // The share is NaN, and becomes 0, where the edge is a point.
         let share = if share > 0.0 { share.min(1.0) } else { 0.0 };
         let rest = 1.0 - share;
         let at = [
@@ -142,7 +144,7 @@ fn nearest_on_edges(corners: &[Point]) -> Point {
     best
 }
 
-/// Where the perpendicular from the origin meets the polygon, as a blend of three corners, if it does.
+/// The foot of the perpendicular from the origin, as a blend of the corners, if it lies in the polygon.
 fn foot_in(corners: &[Point], normal: &Point) -> Option<Point> {
     let [a, b, c] = [corners[0], corners[1], corners[2]];
     let square = dot(normal, normal);
@@ -153,7 +155,7 @@ fn foot_in(corners: &[Point], normal: &Point) -> Option<Point> {
         let weight_b = area(&c, &a);
         [weight_a, weight_b, weight_c, 0.0]
     } else {
-        // Shares along a -> b and b -> c: products of shares are weights that are not negative.
+        // Shares along a -> b and b -> c. Inside the parallelogram, their products are nonnegative weights.
         let (s, t) = (1.0 - weight_a, weight_c);
         [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t]
     };

@@ -4,13 +4,13 @@
 //! exactly and its square never rounded. Names the features (vertex, edge, face) that are nearest. Finds the first time
 //! at which two moving elements are within d, rounded down as in [`first_contact`](super::first_contact).
 //!
-//! How: the distance of two elements is that of the origin from their difference polygon (see `exact::sweep`), and
-//! the nearest point of a convex polygon is inside, on an edge or at a corner, by signs of polynomials of degree
-//! four. Then one comparison of degree six decides. Most pairs are settled before that by a nearest point in `f64` and the
-//! plane through it.
+//! How: the distance of two elements is the distance of the origin from their difference polygon (see `exact::sweep`).
+//! Signs of polynomials of degree four say whether the nearest point of this convex polygon is inside, on an edge or at
+//! a corner. Then one comparison of degree six decides. Most pairs are settled before that by a nearest point in `f64`
+//! and the plane through it.
 //!
 //! In: positions and d. Out: booleans, [`Nearest`], [`Contact`](super::Contact). Distances and points as `f64` are
-//! rounded, but computed in one order of operations, so the same everywhere.
+//! rounded, but computed in one fixed order of operations, so they are the same everywhere.
 //!
 //! `docs/exactness.md`, "Distances", has the proofs.
 

@@ -1,4 +1,4 @@
-//! When two moving elements first are within a distance.
+//! When two moving elements are first within a distance.
 
 use crate::exact::algebra::{
     Polynomial, Root, Roots, Time, Vector, cross, difference, dot, square_of_sum,
@@ -11,8 +11,8 @@ use super::{are_within, filter};
 /// The first time at which the distance of two elements is at most `distance`, while their points move from `start` to
 /// `end` on straight lines.
 ///
-/// As [`first_contact`], which it is for a distance of 0; `at_start` if they are within the distance at t = 0. None for a
-/// distance below zero or NaN.
+/// The time is rounded as in [`first_contact`], which answers for a distance of 0. `at_start` is set if the elements are
+/// within the distance at t = 0. `None` if they never are, or if the distance is NaN or below zero.
 ///
 /// ```
 /// use impinge::exact::{ElementPair, first_within};
@@ -84,7 +84,7 @@ pub fn first_within(
     times.into_iter().reduce(Time::earlier).map(Contact::later)
 }
 
-/// The first root that is valid; none of a polynomial that is zero everywhere.
+/// The first root that is valid; `None` for a polynomial that is zero everywhere.
 fn first_root(polynomial: Polynomial, mut is_valid: impl FnMut(&mut Root) -> bool) -> Option<Time> {
     if polynomial.is_zero() {
         return None;
@@ -101,9 +101,9 @@ struct Edge {
     along: Vector,
     /// Corner x edge.
     moment: Vector,
-    /// Corner . edge: not positive where the origin's projection is not before the edge.
+    /// Corner . edge: at most 0 where the origin's projection does not lie before the edge.
     to_start: Polynomial,
-    /// Next corner . edge: not negative where it is not beyond.
+    /// Next corner . edge: at least 0 where the origin's projection does not lie after the edge.
     to_end: Polynomial,
 }
 

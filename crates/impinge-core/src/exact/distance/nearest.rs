@@ -1,4 +1,4 @@
-//! Which features of two elements are nearest, and the decision by them, in integers.
+//! Which features of two elements are nearest, and whether they are within a distance; in integers.
 
 use std::cmp::Ordering;
 
@@ -18,18 +18,18 @@ pub enum Feature {
     Face,
 }
 
-/// The features of two elements that are nearest: those with the nearest points in their inside.
+/// The nearest features of two elements: those whose relative interiors contain the nearest points.
 ///
 /// A nearest point on the border of a feature belongs to the smaller feature. Where there are several nearest points (of
-/// parallel edges, or flat elements), they belong to the first of the smallest features in the order of ipc-toolkit's names.
+/// parallel edges or flat elements), the first of the smallest features counts, in the order of ipc-toolkit's names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Nearest {
     /// The feature of the first element.
     pub a: Feature,
     /// The feature of the second element.
     pub b: Feature,
-    /// Whether the elements are edges that are parallel (or points), or a face that is flat: nearest points may then
-    /// not be the only ones.
+    /// Whether the edges are parallel (or one is a point), or the face is degenerate. There may then be other nearest
+    /// points.
     pub is_parallel: bool,
 }
 
@@ -56,7 +56,7 @@ impl Nearest {
     }
 }
 
-/// The features of two elements that are nearest.
+/// The nearest features of two elements.
 ///
 /// The points and their order are those of the [`ElementPair`]. Exact for coordinates [`in_range`](crate::exact::in_range).
 ///
@@ -122,14 +122,14 @@ impl Part {
     }
 }
 
-/// The difference polygon at one moment, and a distance, over one power of two.
+/// The difference polygon at one moment, and a distance, as integers times one power of two.
 pub(super) struct Polygon {
     pub(super) corners: Vec<Vector>,
-    /// From each corner to the next; none of a single corner, one of a segment.
+    /// From each corner to the next: no edge for a single corner, one for a segment.
     pub(super) edges: Vec<Vector>,
     normal: Option<Vector>,
     distance: Integer,
-    /// Of the power of two.
+    /// The exponent of the power of two.
     pub(super) exponent: i64,
 }
 
@@ -165,7 +165,7 @@ impl Polygon {
         }
     }
 
-    /// Whether it should have a face and has none.
+    /// Whether it has more than two corners but no normal.
     pub(super) fn is_flat(&self) -> bool {
         self.corners.len() > 2 && self.normal.is_none()
     }
@@ -180,7 +180,7 @@ impl Polygon {
             && dot(self.after(ix), &self.edges[ix]).sign() == Sign::Positive
     }
 
-    /// The part with the nearest point in its inside.
+    /// The part whose relative interior contains the nearest point.
     pub(super) fn nearest(&self) -> Part {
         match &self.normal {
             Some(normal) => self.nearest_of_polygon(normal),
@@ -188,8 +188,9 @@ impl Polygon {
         }
     }
 
-    /// Of a polygon that has an inside: the origin's projection is in it; or beyond an edge and between its ends; else the
-    /// nearest point is a corner, from which both edges lead away from the origin.
+    /// The nearest part of a polygon with a normal. If the origin's projection is in the polygon, that is the face. If the
+    /// projection is beyond an edge and between its ends, it is that edge. Else it is the corner from which both edges lead
+    /// away from the origin.
     fn nearest_of_polygon(&self, normal: &Vector) -> Part {
         let is_inner: Vec<Sign> = (0..self.edges.len())
             .map(|ix| dot(normal, &cross(&self.corners[ix], &self.edges[ix])).sign())
@@ -211,7 +212,7 @@ impl Polygon {
         Part::Corner((0..n).find(is_nearest).unwrap_or(0))
     }
 
-    /// Of a segment or a point: the nearest of the corners and of the edges that the origin is beside.
+    /// The nearest part of a segment or a point: the nearest of its corners and of the edges that the origin is beside.
     fn nearest_of_segment(&self) -> Part {
         // The order of ipc-toolkit's names: EA0_EB0, EA0_EB1, EA1_EB0, EA1_EB1, EA_EB0, EA_EB1, EA0_EB, EA1_EB.
         let (corner_order, edge_order): (&[usize], &[usize]) = match self.corners.len() {

@@ -9,7 +9,7 @@ use crate::exact::sweep::ElementPair;
 /// Nearest points of two elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Closest {
-    /// The features that have them, exactly.
+    /// The features that contain them; exact.
     pub nearest: Nearest,
     /// Their distance, wrong by a few units in the last place at most. For decisions use
     /// [`are_within`](super::are_within).

@@ -2,10 +2,10 @@
 //!
 //! What it does: answers *yes*, *no* or *unsure* for a pair of triangles. Yes and no are certain;
 //! unsure pairs go to [`triangles_intersect`](super::triangles_intersect). Pairs of random
-//! triangles are settled in more than 99 of 100 cases. Pairs of one plane are settled where they are apart
-//! ([`projections`]); pairs that touch, or overlap in one plane, are always unsure.
+//! triangles are settled in more than 99 of 100 cases. Coplanar pairs that are apart are mostly settled by
+//! [`projections`]; pairs that touch, or overlap in one plane, are always unsure.
 //!
-//! In: [`TrianglePairs8`], eight pairs with one array a coordinate ("structure of arrays"), in `f64`; or, in
+//! In: [`TrianglePairs8`], eight pairs with one array per coordinate ("structure of arrays"), in `f64`; or, in
 //! `f32`, the corners of two groups as tables ([`Triangles64`]) and the places of sixteen pairs in them.
 //! Out: bit masks, bit k for pair k. Cost: [`reject_by_planes`] about 120 and [`classify`] about
 //! 330 operations, without a branch, for all eight lanes at once. Both are generic over the vector
@@ -14,7 +14,7 @@
 //!
 //! Method: planes first, then the two edge-edge determinants of Guigue and Devillers, *Fast and
 //! Robust Triangle-Triangle Overlap Test Using Orientation Predicates*, 2003. They permute the
-//! vertices by branches, we by selects; they test for zero, we give up near it.
+//! vertices by branches, we use selects; they test for zero, we answer unsure near it.
 //!
 //! Invariant: every determinant here is a sum of the six products of three vectors d, e, f, each a
 //! difference of two input points. Its computed value is wrong by less than
@@ -61,19 +61,19 @@ pub const BATCH: usize = 16;
 /// How many triangles a table holds.
 pub const TABLE: usize = 64;
 
-/// The largest magnitude of a coordinate with which the filter in `f32` may be asked, 2^24: what underflow may do to
-/// a determinant grows with its square.
+/// The largest coordinate magnitude that the filter in `f32` accepts, 2^24: the error that underflow may add to a
+/// determinant grows with the square of the coordinates.
 pub const LARGEST_F32: f32 = f32::from_bits((127 + 24) << 23);
 
 /// The triangles of a group: `[vertex][axis][place]`.
 pub type Triangles64 = [[[f32; TABLE]; 3]; 3];
 
-/// One triangle a lane: `[vertex][axis][lane]`.
+/// One triangle per lane: `[vertex][axis][lane]`.
 pub type Triangles8 = [[[f64; LANES]; 3]; 3];
 
-/// Eight pairs of triangles, one a lane.
+/// Eight pairs of triangles, one per lane.
 ///
-/// Lanes that are not set hold triangles that are points, which are unsure: mask them out.
+/// Unused lanes hold two points at the origin and come out as unsure: mask them out.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[repr(align(64))]
 pub struct TrianglePairs8 {
@@ -83,10 +83,10 @@ pub struct TrianglePairs8 {
     pub b: Triangles8,
 }
 
-/// One tetrahedron a lane: `[vertex][axis][lane]`.
+/// One tetrahedron per lane: `[vertex][axis][lane]`.
 pub type Tetrahedra8 = [[[f64; LANES]; 3]; 4];
 
-/// Eight pairs of tetrahedra, one a lane.
+/// Eight pairs of tetrahedra, one per lane.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[repr(align(64))]
 pub struct TetrahedronPairs8 {
@@ -96,8 +96,7 @@ pub struct TetrahedronPairs8 {
     pub b: Tetrahedra8,
 }
 
-/// What a filter found out: bit k stands for lane k. A lane with neither bit is unsure; no lane
-/// has both.
+/// A filter's answers: bit k stands for lane k. A lane with neither bit is unsure; no lane has both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Verdict {
     /// The pairs that certainly intersect.

@@ -1,4 +1,4 @@
-//! What the filter computes with: one `f64`, or a vector register of them, or of `f32`.
+//! The numbers that the filters compute with: one `f64`, or a vector register of `f64` or `f32`.
 //!
 //! The filter is written once, generic over [`Number`]; comparisons give a mask and branches are
 //! selects. Additions, subtractions and multiplications are those of IEEE 754 in every
@@ -17,27 +17,27 @@ pub trait Number:
     + Div<Output = Self>
     + sealed::Sealed
 {
-    /// A condition for each.
+    /// One condition per number.
     type Mask: Copy
         + BitAnd<Output = Self::Mask>
         + BitOr<Output = Self::Mask>
         + BitXor<Output = Self::Mask>
         + Not<Output = Self::Mask>;
 
-    /// 64 unit roundoffs: what a determinant may be wrong by, in parts of the product of its vectors' sizes. The
-    /// derivation needs a little more than 60.
+    /// 64 unit roundoffs: the error of a determinant, relative to the product of its vectors' sizes. The derivation
+    /// needs a little more than 60.
     const BOUND: f64;
-    /// What underflow may add: nothing for `f64` within the range that a scene admits, 2^-69 for `f32` with
+    /// The error that underflow may add: none for `f64` within the range that a scene admits, 2^-69 for `f32` with
     /// coordinates up to 2^24, even where the processor flushes subnormal numbers to zero.
     const UNDERFLOW: f64;
 
-    /// The largest difference of coordinates with which moving elements may be asked; see `motion`.
+    /// The largest coordinate difference that the filter for moving elements accepts; see `motion`.
     const LARGEST: f64;
-    /// What underflow may add, with such differences, to a product of one vector with a known one, to a determinant of
-    /// three, and to a product of four.
+    /// The error that underflow may add, with such differences, to the product of a vector with a known one, to a
+    /// determinant of three, and to a product of four.
     const TINY: [f64; 3];
 
-    /// A bound with what underflow may add.
+    /// A bound plus the error that underflow may add.
     #[inline(always)]
     fn with_underflow(self) -> Self {
         if Self::UNDERFLOW > 0.0 {
@@ -46,15 +46,15 @@ pub trait Number:
             self
         }
     }
-    /// The same number everywhere; rounded to `f32` where the numbers are.
+    /// One number in every lane, rounded to `f32` where the lanes are `f32`.
     fn splat(x: f64) -> Self;
     /// The magnitude.
     fn abs(self) -> Self;
-    /// The larger one; either where one is NaN.
+    /// The larger of two; if one is NaN, either.
     fn larger(self, other: Self) -> Self;
-    /// Whether a condition holds anywhere.
+    /// Whether the condition holds in any lane.
     fn any(mask: Self::Mask) -> bool;
-    /// The smaller one; either where one is NaN.
+    /// The smaller of two; if one is NaN, either.
     #[inline(always)]
     fn smaller(self, other: Self) -> Self {
         Self::select(self.gt(other), other, self)
@@ -84,7 +84,7 @@ pub trait Lookup: Number {
     /// Which numbers of a table to take.
     type Places: Copy;
 
-    /// Places from memory, from lane `first` on; those past the table's end start again from its front.
+    /// Places from memory, from lane `first` on, modulo the table's length.
     fn places(places: &[u8; BATCH], first: usize) -> Self::Places;
     /// The numbers at some places.
     fn look_up(table: &[f32; TABLE], places: Self::Places) -> Self;
@@ -177,7 +177,7 @@ macro_rules! operator {
     };
 }
 
-/// Numbers side by side as an array, where no wider set is known: whatever the compiler makes of it.
+/// Numbers as a plain array, for processors without a known vector instruction set; the compiler may vectorise it.
 macro_rules! portable {
     (
         $type:ident, $mask:ident, $number:ty, $bits:ty, $n:expr, $bound:expr, $underflow:expr,
@@ -187,7 +187,7 @@ macro_rules! portable {
         #[derive(Debug, Clone, Copy)]
         pub struct $type([$number; $n]);
 
-        /// As many conditions, all bits set or none.
+        /// One condition per number: all bits set, or none.
         #[derive(Debug, Clone, Copy)]
         pub struct $mask([$bits; $n]);
 
@@ -329,8 +329,8 @@ impl Lookup for Portable32 {
 #[cfg(target_arch = "x86_64")]
 pub use x86::{Avx2, Avx2F32, Avx512, Avx512F32};
 
-/// Every method is sound only inside a function that enables the instruction set, which is why the
-/// types can be had by `load` and `splat` alone and those are called by such functions.
+/// The methods are sound only inside a function that enables the instruction set. Values of these types
+/// start with `load`, `splat` or `look_up`, and only such functions call those.
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use super::*;
@@ -602,8 +602,8 @@ mod x86 {
                 assert!(TABLE == 64, "two permutations of 32 and a choice");
             }
             let first = table.as_ptr();
-            // SAFETY: see above; four loads of sixteen from a table of 64. A permutation looks at the five
-            // lowest bits of a place, the choice at the sixth.
+            // SAFETY: see above; four loads of sixteen from a table of 64. A permutation reads the five
+            // lowest bits of a place, the blend reads the sixth.
             unsafe {
                 let low = _mm512_permutex2var_ps(
                     _mm512_loadu_ps(first),

@@ -1,11 +1,11 @@
-//! Pairs told apart in a coordinate plane: triangles of flat and regular meshes, whose planes tell nothing.
+//! Pairs separated in a coordinate plane: for triangles of flat and regular meshes, whose own planes separate nothing.
 //!
-//! Neighbours in a flat mesh lie in one plane, and every determinant of the other filters is zero. But seen
-//! along a coordinate axis they are apart as triangles of a plane are: by the line of an edge.
+//! Neighbours in a flat mesh lie in one plane, and every determinant of the other filters is zero. But projected
+//! along a coordinate axis, they are separated like triangles in a plane: by the line of an edge.
 //!
 //! ```text
-//!    a2            b2       What is apart in the plane is apart in space. Dropping x, y or z in turn, one of
-//!    | \         / |        the three planes shows each triangle at more than half of its area.
+//!    a2            b2       Triangles that are apart in the projection are apart in space. Of the three
+//!    | \         / |        projections, one shows a triangle at more than half of its area.
 //!    |  \  |    /  |
 //!    a0--a1|   b0--b1       all of b beyond the line of edge a1a2: apart
 //! ```
@@ -37,8 +37,8 @@ fn in_plane<T: Number>(triangle: &[[T; 3]; 3], [i, j]: [usize; 2]) -> [[T; 2]; 3
     [[p[i], p[j]], [q[i], q[j]], [r[i], r[j]]]
 }
 
-/// What two determinants may be wrong by together, for triangles of which no two coordinates of an axis differ by
-/// more than S: 32 u S^2.
+/// The error of two determinants together, for triangles whose coordinates differ by at most S along each axis:
+/// 32 u S^2.
 #[inline(always)]
 pub(super) fn bound<T: Number>(a: &[[T; 3]; 3], b: &[[T; 3]; 3]) -> T {
     let (mut largest, mut sum) = (T::splat(0.0), T::splat(0.0));
@@ -52,13 +52,14 @@ pub(super) fn bound<T: Number>(a: &[[T; 3]; 3], b: &[[T; 3]; 3]) -> T {
         }
         largest = largest.larger(high - low);
     }
-    // Minimum and maximum may pass a NaN over. The sum does not, nor infinity, and times zero it adds nothing else.
+    // Minimum and maximum may drop a NaN. The sum of all coordinates keeps it: times zero, the sum is NaN if a
+    // coordinate is NaN or infinite, else it adds 0.
     let bound = T::splat(0.5 * T::BOUND) * (largest * largest);
     bound.with_underflow() + sum * T::splat(0.0)
 }
 
-/// Whether the triangles are certainly apart in the plane number `plane` of three: one lies strictly beyond the line of an
-/// edge of the other. `bound` is theirs.
+/// Whether the triangles are certainly apart in coordinate plane number `plane` of three: one lies strictly beyond the
+/// line of an edge of the other. `bound` is the result of [`bound`] for the same triangles.
 #[inline(always)]
 pub(super) fn are_parted<T: Number>(
     a: &[[T; 3]; 3],
@@ -78,7 +79,7 @@ fn parts<T: Number>(a: &[[T; 2]; 3], b: &[[T; 2]; 3], bound: T) -> T::Mask {
         minus(&a[2], &a[1]),
         minus(&a[0], &a[2]),
     ];
-    // How far the vertex opposite an edge is from its line: for each of the three twice the area.
+    // How far the vertex opposite an edge is from the edge's line: for all three edges, twice the area.
     let own = cross(&edges[2], &edges[0]);
     let zero = T::splat(0.0);
     let (above, below) = (own.larger(zero) + bound, own.smaller(zero) - bound);
@@ -87,7 +88,7 @@ fn parts<T: Number>(a: &[[T; 2]; 3], b: &[[T; 2]; 3], bound: T) -> T::Mask {
         | is_beyond(&a[2], &edges[2], b, above, below)
 }
 
-/// Whether `b` lies above the one or below the other, as seen from the line of an edge. No closure: it would be
+/// Whether all of `b` is more than `above` over the line of an edge, or less than `below`. No closure: it would be
 /// compiled without the instruction set.
 #[inline(always)]
 fn is_beyond<T: Number>(

@@ -4,10 +4,10 @@ use super::determinant::{Determinant, Normal, difference};
 use super::number::{Number, Vector, load_vertex};
 use super::{LANES, Point, Tetrahedra8, TetrahedronPairs8, Verdict};
 
-/// Which lanes are certainly apart because a face of one parts them, and which certainly intersect
+/// Which lanes are certainly apart because a face of one separates them, and which certainly intersect
 /// because one has a vertex inside the other.
 ///
-/// The cheap first step; unsure lanes, those that only cross at edges among them, are for
+/// The cheap first step. Unsure lanes, including those that only cross at edges, go to
 /// [`classify_tetrahedra`]. About 900 operations for all eight lanes, without a branch.
 #[inline(always)]
 #[must_use]
@@ -24,8 +24,8 @@ pub fn classify_by_faces<V: Vector>(pairs: &TetrahedronPairs8) -> Verdict {
 
 /// Which lanes certainly intersect and which certainly do not, by faces and by edges.
 ///
-/// The reasons are those of [`tetrahedra_answer`], and each of the 36 determinants of two edges serves
-/// both: whether the edge of a passes the edge of b, and the edge of b that of a. About 3,000 operations.
+/// The reasons are those of [`tetrahedra_answer`]. Each of the 36 determinants of two edges is used twice:
+/// for the edge of a against faces of b, and for the edge of b against faces of a. About 3,000 operations.
 #[inline(always)]
 #[must_use]
 pub fn classify_tetrahedra<V: Vector>(pairs: &TetrahedronPairs8) -> Verdict {
@@ -68,7 +68,7 @@ impl<T: Number> Passes<T> {
                 difference(&b[2], &a[from]),
                 difference(&b[3], &a[from]),
             ];
-            // The last vertex is the first one of no edge.
+            // No edge starts at the last vertex.
             let normals = [
                 Normal::new(&along, &corners[0]),
                 Normal::new(&along, &corners[1]),
@@ -83,7 +83,7 @@ impl<T: Number> Passes<T> {
         passes
     }
 
-    /// The same of the other's edges: exchanging two edges keeps the sign of their determinant.
+    /// The table as seen from the other tetrahedron: exchanging two edges keeps the sign of their determinant.
     #[inline(always)]
     fn turned(&self) -> Self {
         let mut turned = Passes {
@@ -99,8 +99,8 @@ impl<T: Number> Passes<T> {
         turned
     }
 
-    /// Whether an edge certainly crosses a face of the other tetrahedron, and whether one may; `sides` are
-    /// those of the edges' ends by these faces.
+    /// Whether an edge certainly crosses a face of the other tetrahedron, and whether one may. `sides`: where
+    /// the edges' ends lie relative to these faces.
     #[inline(always)]
     fn crossings(&self, sides: &Sides<T>) -> (T::Mask, T::Mask) {
         let none = T::splat(0.0).gt(T::splat(0.0));
@@ -139,7 +139,7 @@ struct FaceEdge {
 }
 
 impl FaceEdge {
-    /// Where it is certainly passed on the positive side, and on the negative one.
+    /// The lanes that certainly pass it on the positive side, and on the negative side.
     #[inline(always)]
     fn signs<M: Copy>(self, positive: &[M; 6], negative: &[M; 6]) -> (M, M) {
         match self.backwards {
@@ -181,7 +181,7 @@ fn load<V: Vector>([p, q, r, s]: &Tetrahedra8, first: usize) -> [[V; 3]; 4] {
     ]
 }
 
-/// The answer for one pair, faces first, then edges; none when unsure.
+/// The answer for one pair, faces first, then edges; `None` when unsure.
 ///
 /// A certain crossing of an edge with a face is a certain yes. If all edges certainly miss all
 /// faces of the other, the surfaces share no point, and then either one tetrahedron is inside the
@@ -214,10 +214,10 @@ const FACES: [[usize; 3]; 4] = [[1, 3, 2], [0, 2, 3], [0, 3, 1], [0, 1, 2]];
 /// The edges as vertex numbers.
 const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
-/// Where the four points of one tetrahedron lie by the faces of the other.
+/// Where the four points of one tetrahedron lie relative to the faces of the other.
 struct Sides<T: Number = f64>([FaceSides<T>; 4]);
 
-/// Where four points lie by the plane of one face.
+/// Where four points lie relative to the plane of one face.
 #[derive(Clone, Copy)]
 struct FaceSides<T: Number = f64> {
     /// Whether a point is certainly on the side of the tetrahedron.
@@ -227,7 +227,7 @@ struct FaceSides<T: Number = f64> {
 }
 
 impl<T: Number> FaceSides<T> {
-    /// `points` by the face pqr of a tetrahedron with the fourth vertex `apex`.
+    /// Where `points` lie relative to face pqr of a tetrahedron with the fourth vertex `apex`.
     #[inline(always)]
     fn new([p, q, r]: [&[T; 3]; 3], apex: &[T; 3], points: &[[T; 3]; 4]) -> Self {
         let normal = Normal::new(&difference(q, p), &difference(r, p));
@@ -262,7 +262,7 @@ impl<T: Number> FaceSides<T> {
 }
 
 impl<T: Number> Sides<T> {
-    /// `points` by the faces of `k`.
+    /// Where `points` lie relative to the faces of `k`.
     #[inline(always)]
     fn new([k0, k1, k2, k3]: &[[T; 3]; 4], points: &[[T; 3]; 4]) -> Self {
         Self([
@@ -299,18 +299,18 @@ impl<T: Number> Sides<T> {
     }
 }
 
-/// What is known of the edges of one tetrahedron and the faces of the other.
+/// Whether edges of one tetrahedron cross faces of the other.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Crossing {
     /// An edge certainly crosses a face.
     Certain,
     /// All edges certainly miss all faces.
     None,
-    /// Neither.
+    /// Neither is certain.
     Unsure,
 }
 
-/// The edges of `points` against the faces of `k`, with the sides of `points` by these faces.
+/// The edges of `points` against the faces of `k`. `sides`: where `points` lie relative to these faces.
 fn edges_cross(points: &[Point; 4], sides: &Sides, k: &[Point; 4]) -> Crossing {
     let mut crossing = Crossing::None;
     for [from, to] in EDGES {

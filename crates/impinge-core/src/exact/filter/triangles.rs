@@ -8,7 +8,7 @@ use super::{
 };
 
 /// The lanes whose triangles are certainly apart because the plane of one has the other strictly
-/// on one side. The cheap first step; the rest is for [`classify`].
+/// on one side. The cheap first step; the other lanes go to [`classify`].
 #[inline(always)]
 #[must_use]
 pub fn reject_by_planes<V: Vector>(pairs: &TrianglePairs8) -> u8 {
@@ -48,8 +48,8 @@ pub fn classify<V: Vector>(pairs: &TrianglePairs8) -> Verdict {
     verdict
 }
 
-/// As [`classify`], in `f32`: for triangles of two groups, named by their places in each; only lanes of `among` are
-/// needed. Coordinates must not be larger than [`LARGEST_F32`](super::LARGEST_F32).
+/// [`classify`] in `f32`, for triangles of two groups that are named by their places in the groups' tables. Only the
+/// lanes of `among` are needed. Coordinate magnitudes must not exceed [`LARGEST_F32`](super::LARGEST_F32).
 #[inline(always)]
 #[must_use]
 pub fn classify_in_tables<V: Lookup>(
@@ -116,7 +116,7 @@ fn look_up_vertex<V: Lookup>([x, y, z]: &[[f32; TABLE]; 3], places: V::Places) -
     ]
 }
 
-/// [`classify`] for one pair, with an early end; none when unsure.
+/// [`classify`] for one pair, with an early exit; `None` when unsure.
 #[inline]
 pub(in super::super) fn triangles_answer(a: &[Point; 3], b: &[Point; 3]) -> Option<bool> {
     let sides = Sides::new(a, b);
@@ -155,7 +155,7 @@ impl<T: Number> Sides<T> {
         all_on_one_side(&self.a) | all_on_one_side(&self.b)
     }
 
-    /// Whether no vertex may be in the plane of the other triangle.
+    /// Whether certainly no vertex lies in the plane of the other triangle.
     #[inline(always)]
     fn are_sure(&self) -> T::Mask {
         all_sure(&self.a) & all_sure(&self.b)
