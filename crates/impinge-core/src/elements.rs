@@ -1,9 +1,9 @@
-//! What bodies are made of, and the elements that follow from it: vertices, edges, boundary faces.
+//! The elements of bodies, given and derived: vertices, edges, boundary faces.
 
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
-/// What a body is made of, or what one layer of it is.
+/// The kind of elements of a body, or of one of its layers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
     /// Points, one vertex index each.
@@ -30,7 +30,7 @@ impl Kind {
         }
     }
 
-    /// How many corners such an element has: 1 to 4.
+    /// How many corners an element of this kind has: 1 to 4.
     pub fn n_corners(self) -> usize {
         self as usize + 1
     }
@@ -49,7 +49,7 @@ pub enum Elements {
     Tetrahedra(Vec<[u32; 4]>),
 }
 
-/// Does the same with the corners of every kind: `with_corners!(elements, |corners| …)`, where `corners` is a
+/// Runs the same code for every kind: `with_corners!(elements, |corners| …)`, where `corners` is a
 /// `Vec<[u32; N]>` or a reference to one.
 macro_rules! with_corners {
     ($elements:expr, |$corners:ident| $body:expr) => {
@@ -64,12 +64,12 @@ macro_rules! with_corners {
 pub(crate) use with_corners;
 
 impl Elements {
-    /// How many elements there are.
+    /// The number of elements.
     pub fn len(&self) -> usize {
         with_corners!(self, |corners| corners.len())
     }
 
-    /// Whether there is none.
+    /// Whether there are no elements.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -90,7 +90,7 @@ impl Elements {
         with_corners!(self, |corners| &corners[element])
     }
 
-    /// The vertex indices of one element; one of fewer than four corners repeats its last.
+    /// The vertex indices of one element; one with fewer than four corners repeats its last.
     #[inline(always)]
     pub(crate) fn four_corners(&self, element: usize) -> [u32; 4] {
         match self {
@@ -110,7 +110,7 @@ impl Elements {
         }
     }
 
-    /// The first element that names a vertex beyond `n_vertices`, and that vertex.
+    /// The first element with a vertex index that is not below `n_vertices`, and that index.
     pub(crate) fn first_bad_index(&self, n_vertices: usize) -> Option<(usize, u32)> {
         with_corners!(self, |elements| elements.iter().enumerate().find_map(
             |(element, corners)| {
@@ -154,9 +154,10 @@ impl From<Vec<[u32; 4]>> for Elements {
 /// Which elements of a body a layer holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Part {
-    /// Those that the body was given as.
+    /// The elements that the body was given as.
     Given,
-    /// The vertices that some element names; of tetrahedra, those of the boundary. They are numbered as positions are.
+    /// The vertices that some element names; for tetrahedra, those that a boundary face names. Answers number them as
+    /// positions are numbered.
     Vertices,
     /// The edges of the surface, or those that the body was given as.
     Edges,
@@ -164,7 +165,7 @@ pub enum Part {
     Faces,
 }
 
-/// The elements that a body was given as, and what follows from them, found when it is first asked for.
+/// The elements that a body was given as, and the elements derived from them, each kind found when first needed.
 #[derive(Debug, Clone)]
 pub(crate) struct Topology {
     given: Elements,
@@ -187,7 +188,7 @@ impl Topology {
         &self.given
     }
 
-    /// The part under one name: faces that were given are `Given`.
+    /// One name for equal parts: the faces of a body given as triangles, or the edges of one given as edges, are `Given`.
     pub fn canonical(&self, part: Part) -> Part {
         match (part, self.given.kind()) {
             (Part::Faces, Kind::Triangles) | (Part::Edges, Kind::Edges) => Part::Given,
@@ -195,7 +196,7 @@ impl Topology {
         }
     }
 
-    /// The elements of a part: none where the body has none, as points have no edges.
+    /// The elements of a part; empty if the body has none, as points have no edges.
     pub fn part(&self, part: Part) -> &Elements {
         match self.canonical(part) {
             Part::Given => &self.given,
@@ -205,7 +206,7 @@ impl Topology {
         }
     }
 
-    /// What has a surface: the boundary of tetrahedra, else what was given.
+    /// The boundary of tetrahedra, else the given elements.
     fn surface(&self) -> &Elements {
         match self.given.kind() {
             Kind::Tetrahedra => self.part(Part::Faces),
@@ -224,8 +225,8 @@ impl Topology {
         Elements::Points(vertices.map(|(vertex, _)| [vertex]).collect())
     }
 
-    /// Unique pairs `[low, high]` in the order of `(high, low)`, as `igl::edges` numbers them. A pair of the same vertex
-    /// twice is no edge.
+    /// Unique pairs `[low, high]` in the order of `(high, low)`, as `igl::edges` numbers them. The same vertex twice is not
+    /// an edge.
     fn find_edges(&self) -> Elements {
         let mut keys: Vec<u64> = match self.surface() {
             Elements::Triangles(faces) => faces
@@ -245,9 +246,10 @@ impl Topology {
         )
     }
 
-    /// All faces but those between two different tetrahedra, each once: by the first tetrahedron that has it and the corner
-    /// opposite, oriented outward where that tetrahedron is oriented positively. A face that more than two share counts as
-    /// surface, and so does that of two which name the same vertices: nothing may pass through it unseen.
+    /// All faces except those between two different tetrahedra, each once, in the order of the first tetrahedron that has it
+    /// and of the opposite corner. A face points outward if that tetrahedron is oriented positively. A face that more than
+    /// two tetrahedra share counts as surface, and so does one shared by two tetrahedra with the same vertices: nothing may
+    /// pass through it unseen.
     fn find_boundary(&self) -> Elements {
         let Elements::Tetrahedra(tets) = &self.given else {
             return Elements::Triangles(Vec::new());
@@ -260,7 +262,7 @@ impl Topology {
             face.sort_unstable();
             face
         };
-        /// How many tetrahedra share a face, and the first one's corner opposite.
+        /// How many tetrahedra share a face, and the corner opposite it in the first.
         struct Shared {
             n: u32,
             opposite: u32,
@@ -313,7 +315,7 @@ mod tests {
 
     #[test]
     fn what_lies_inside_tetrahedra_takes_no_part() {
-        // One vertex inside a tetrahedron, joined to its four sides; another that nothing names.
+        // One vertex inside a tetrahedron, joined to its four sides; another vertex that no element names.
         let tets = vec![[5, 1, 2, 3], [0, 5, 2, 3], [0, 1, 5, 3], [0, 1, 2, 5]];
         let topology = Topology::new(Elements::from(tets));
         let vertices = vec![[0], [1], [2], [3]];

@@ -10,8 +10,8 @@ use crate::progress::Control;
 use crate::scene::Scene;
 use crate::stats::Statistics;
 
-/// Calls `emit` with the test, the key and the value of every pair that the frame asks for and that passes, in the order of
-/// the keys.
+/// Calls `emit` with the test, the key and the value of every pair that the frame asks for and that passes its test, in the
+/// order of the keys.
 pub(crate) fn run<T: Test>(
     test: &T,
     scene: &Scene,

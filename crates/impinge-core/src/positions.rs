@@ -1,4 +1,4 @@
-//! Where vertices are: single or double precision, checked once.
+//! Vertex positions: single or double precision, checked once.
 
 use crate::error::Error;
 use crate::exact;
@@ -14,7 +14,7 @@ pub enum Positions {
 }
 
 impl Positions {
-    /// How many vertices there are.
+    /// The number of vertices.
     pub fn len(&self) -> usize {
         match self {
             Positions::F32(positions) => positions.len(),
@@ -22,7 +22,7 @@ impl Positions {
         }
     }
 
-    /// Whether there is none.
+    /// Whether there are no vertices.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -39,7 +39,7 @@ impl Positions {
         }
     }
 
-    /// Becomes double precision if the others are.
+    /// Widens to double precision if the others are in double precision.
     pub(crate) fn widen_as(&mut self, others: &Positions) {
         if let (Positions::F32(positions), Positions::F64(_)) = (&*self, others) {
             let wide = positions.iter().map(|position| position.map(f64::from));
@@ -80,7 +80,7 @@ mod sealed {
     impl Sealed for f64 {}
 }
 
-/// `f32` or `f64`: both are taken as they are and answered exactly.
+/// `f32` or `f64`: both are stored as given, and answers are exact for both.
 pub trait Real: sealed::Sealed + Copy + Send + Sync + 'static {
     #[doc(hidden)]
     fn all_in_range(numbers: &[Self]) -> bool;
@@ -93,8 +93,8 @@ pub trait Real: sealed::Sealed + Copy + Send + Sync + 'static {
 }
 
 impl Real for f32 {
-    /// One bit stays set for any infinity or NaN: adding one to an exponent of all ones reaches the bit of the
-    /// sign. The compiler makes vectors of this, and not of `is_finite`.
+    /// Adding one to an exponent of all ones carries into the sign bit, so any infinity or NaN sets that bit. The
+    /// compiler vectorises this, but not `is_finite`.
     #[inline]
     fn all_in_range(numbers: &[f32]) -> bool {
         const EXPONENT: u32 = 0x7f80_0000;
@@ -143,9 +143,9 @@ impl Real for f64 {
         Positions::F64(positions.to_vec())
     }
 }
-/// Refuses the first position that is not finite or outside the exact range.
+/// Refuses positions that are not finite or outside the exact range; the error names the first.
 pub(crate) fn check_positions<R: Real>(body: BodyId, positions: &[[R; 3]]) -> Result<(), Error> {
-    // One branch a chunk keeps the common case, all good, at memory speed.
+    // One branch per chunk keeps the common case, all positions good, at memory speed.
     for (chunk_ix, chunk) in positions.chunks(1024).enumerate() {
         if R::all_in_range(chunk.as_flattened()) {
             continue;

@@ -1,4 +1,4 @@
-//! What is asked: which bodies, and what a shared vertex means.
+//! Queries: which bodies, and what a shared vertex means.
 
 use std::collections::BTreeSet;
 
@@ -10,11 +10,11 @@ pub enum SharedVertex {
     /// Pairs that share a vertex index are not reported.
     #[default]
     Skip,
-    /// They are reported when they meet in more than what they share. Triangles: sharing one
+    /// They are reported when they meet in more than the parts that they share. Triangles: sharing one
     /// vertex, when the edge opposite it in one meets the other triangle; sharing an edge, when
     /// they are coplanar and fold to the same side; sharing all three, always. Tetrahedra: when
     /// the intersection is larger than the common vertex, edge or face. Edges and points of one body
-    /// that share a vertex are left out under either rule.
+    /// that share a vertex are not reported under either rule.
     Resolve,
 }
 
@@ -29,7 +29,7 @@ pub(crate) enum Scope {
     },
 }
 
-/// What is asked of a scene.
+/// The question put to a scene.
 ///
 /// ```
 /// use impinge::{Query, SharedVertex};

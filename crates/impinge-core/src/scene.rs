@@ -10,13 +10,13 @@ use crate::ids::new_stamp;
 use crate::positions::Real;
 pub(crate) use crate::positions::{Positions, check_positions};
 
-/// Who meets whom in [`Query::all`](crate::Query::all): two bodies meet when each one's
-/// `category` shares a bit with the other one's `mask`. By default everybody meets everybody.
+/// Which bodies meet in [`Query::all`](crate::Query::all): two bodies meet when the `category` of
+/// each shares a bit with the `mask` of the other. By default all bodies meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Filter {
-    /// The groups to which the body belongs.
+    /// The categories to which the body belongs.
     pub category: u64,
-    /// The groups that it meets.
+    /// The categories that it meets.
     pub mask: u64,
 }
 
@@ -42,26 +42,26 @@ impl Filter {
 pub struct Body {
     topology: Arc<Topology>,
     positions: Positions,
-    /// Where the vertices are at the end of a step; as many as `positions`, or none yet.
+    /// Where the vertices are at the end of a step; as many as `positions`, or `None` so far.
     end: Option<Positions>,
-    /// Whether `end` is to be looked at: its memory is kept when it is not.
+    /// Whether `end` counts. If not, only its memory is kept.
     moves: bool,
     filter: Filter,
     topology_stamp: u64,
     positions_stamp: u64,
     step_stamp: u64,
-    /// False while positions written in place have not been looked at.
+    /// False while positions written in place have not been checked.
     checked: bool,
 }
 
 impl Body {
-    /// The elements that it was given as.
+    /// The elements that the body was given as.
     pub fn elements(&self) -> &Elements {
         self.topology.given()
     }
 
-    /// Some of its elements: those it was given as, or its vertices, edges or faces, which are found once per topology.
-    /// Their numbers depend on the given elements alone.
+    /// The elements of one part: those that the body was given as, or its vertices, edges or faces, which are found once per
+    /// topology. Their numbers depend on the given elements alone.
     pub fn part(&self, part: Part) -> &Elements {
         self.topology.part(part)
     }
@@ -82,17 +82,17 @@ impl Body {
         self.elements().kind()
     }
 
-    /// How many primitives it has.
+    /// The number of primitives.
     pub fn n_primitives(&self) -> usize {
         self.elements().len()
     }
 
-    /// How many vertices it has.
+    /// The number of vertices.
     pub fn n_vertices(&self) -> usize {
         self.positions.len()
     }
 
-    /// Who it meets.
+    /// Which bodies it meets.
     pub fn filter(&self) -> Filter {
         self.filter
     }
@@ -124,7 +124,7 @@ impl Body {
     }
 }
 
-/// A slot is empty after its body was removed.
+/// A slot for one body; empty after the body was removed.
 #[derive(Debug, Clone)]
 struct Slot(Option<(BodyId, Body)>);
 
@@ -196,7 +196,7 @@ impl Scene {
         self.add(Elements::Points(points.collect()), R::store(positions))
     }
 
-    /// Adds a body whose arrays are handed over without a copy.
+    /// Adds a body and takes over its arrays, without a copy.
     ///
     /// # Errors
     /// As [`add_triangles`](Scene::add_triangles).
@@ -223,7 +223,7 @@ impl Scene {
         Ok(id)
     }
 
-    /// Removes a body; its slot may be used again by a later one.
+    /// Removes a body; a later body may reuse its slot.
     ///
     /// # Errors
     /// The id names no body.
@@ -251,8 +251,8 @@ impl Scene {
     }
 
     /// Moves the vertices: `(v, 3)` positions, as many as the body has vertices. The precision
-    /// may differ from frame to frame; the array is copied and checked. A new step starts: the body has no end positions
-    /// until they are [set](Scene::set_end_positions), and stands still without.
+    /// may differ from frame to frame; the array is copied and checked. A new step starts: the body stands still until
+    /// its end positions are [set](Scene::set_end_positions).
     ///
     /// # Errors
     /// A wrong number of positions, or one that is refused: the body keeps its old positions then.
@@ -278,12 +278,12 @@ impl Scene {
         Ok(())
     }
 
-    /// Says where the vertices are at the end of a step, `(v, 3)`: between [`positions`](Body::positions) and these, each
-    /// moves on a straight line at constant speed. They hold until the next [`set_positions`](Scene::set_positions),
+    /// Sets the vertex positions at the end of a step, `(v, 3)`. Each vertex moves from [`positions`](Body::positions) to
+    /// its end position on a straight line at constant speed. They hold until the next [`set_positions`](Scene::set_positions),
     /// [`positions_mut`](Scene::positions_mut), [`remesh`](Scene::remesh) or
     /// [`clear_end_positions`](Scene::clear_end_positions). A body that has none stands still.
     ///
-    /// Where start and end come in different precisions, the single one is widened, which is exact.
+    /// If start and end have different precisions, the single-precision one is widened, which is exact.
     ///
     /// # Errors
     /// A wrong number of positions, or one that is refused: the body keeps its old end positions then.
@@ -314,7 +314,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Forgets where a body is at the end of a step: it stands still.
+    /// Clears a body's end positions: it stands still.
     ///
     /// # Errors
     /// The id names no body.
@@ -325,8 +325,8 @@ impl Scene {
         Ok(())
     }
 
-    /// The positions of a body that stores `R`, to be written in place: the way without a copy.
-    /// What is written is checked by the next detection, which names a refused vertex. End positions are forgotten, as by
+    /// The positions of a body that stores `R`, to be written in place without a copy.
+    /// The next detection checks them, and its error names a bad vertex. End positions are cleared, as by
     /// [`set_positions`](Scene::set_positions).
     ///
     /// # Errors
@@ -345,7 +345,7 @@ impl Scene {
         }
     }
 
-    /// Sets who a body meets in [`Query::all`](crate::Query::all).
+    /// Sets which bodies a body meets in [`Query::all`](crate::Query::all).
     ///
     /// # Errors
     /// The id names no body.
@@ -386,7 +386,7 @@ impl Scene {
         held.map(|(id, body)| (*id, body))
     }
 
-    /// How many bodies there are.
+    /// The number of bodies.
     pub fn n_bodies(&self) -> usize {
         self.slots.len() - self.free.len()
     }

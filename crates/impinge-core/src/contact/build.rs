@@ -1,8 +1,8 @@
-//! Contacts from pairs: corners by name first, then each point's coordinates once.
+//! Contacts from pairs: first the names of all corners, then the coordinates of each point, once.
 //!
 //! In: a scene and the pairs found in it. Out: [`Contacts`]. Cost: a few hundred nanoseconds per pair for
 //! signs and coordinates, `O(n log n)` for the names; both in parallel, in chunks whose results are
-//! put together in order.
+//! concatenated in order.
 
 use rayon::prelude::*;
 
@@ -77,7 +77,7 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> 
     Ok(contacts)
 }
 
-/// What a chunk of pairs has in common.
+/// The contacts of a chunk of pairs.
 #[derive(Default)]
 struct Met {
     contacts: Vec<Found>,
@@ -126,7 +126,7 @@ impl Met {
     }
 }
 
-/// A triangle, and what its features are called.
+/// A triangle and the names of its features.
 struct Triangle {
     points: [Point; 3],
     vertices: [u32; 3],
@@ -147,15 +147,15 @@ impl Triangle {
     }
 }
 
-/// The bodies that take part, by number.
+/// The bodies of the pairs, by number.
 struct Bodies<'a> {
     bodies: Vec<Option<Taking<'a>>>,
 }
 
 struct Taking<'a> {
     body: &'a Body,
-    /// Vertices of the triangles in contact that are not the lowest one at their position, with the
-    /// one that is; sorted. Empty for most meshes.
+    /// Vertices of the triangles in contact that are not the lowest one at their position, each with
+    /// the lowest; sorted. Empty for most meshes.
     doubles: Vec<(u32, u32)>,
 }
 
@@ -175,7 +175,7 @@ impl<'a> Bodies<'a> {
         Ok(Bodies { bodies })
     }
 
-    /// Those of all bodies that have any.
+    /// The doubles of all bodies that have any.
     fn doubles(self) -> Vec<(u32, Vec<(u32, u32)>)> {
         (0u32..)
             .zip(self.bodies)
@@ -190,7 +190,7 @@ impl<'a> Bodies<'a> {
             .expect("rows name bodies that take part")
     }
 
-    /// A triangle by its body and number; none for a tetrahedron.
+    /// A triangle by its body and number; `None` if the body is not made of triangles.
     fn triangle(&self, body: u32, face: u32) -> Option<Triangle> {
         let taking = self.taking(body);
         let Elements::Triangles(faces) = taking.body.elements() else {
@@ -244,7 +244,7 @@ impl Taking<'_> {
     }
 }
 
-/// Whether pairs fit the body, and its positions are good.
+/// Refuses pairs that do not fit the body, and bad positions.
 fn check(id: BodyId, body: &Body, kind: Kind, colliding: &[u32]) -> Result<(), Error> {
     let n_primitives = body.n_primitives();
     if let Some(&primitive) = colliding.last()
@@ -266,7 +266,7 @@ fn check(id: BodyId, body: &Body, kind: Kind, colliding: &[u32]) -> Result<(), E
     }
 }
 
-/// The vertices of some triangles that are not the lowest one at their position, with that one.
+/// The vertices of some triangles that are not the lowest one at their position, each with the lowest.
 ///
 /// Meshes that repeat their vertices for each face would fall apart into single triangles otherwise.
 fn doubles(body: &Body, colliding: &[u32]) -> Vec<(u32, u32)> {
@@ -281,7 +281,7 @@ fn doubles(body: &Body, colliding: &[u32]) -> Vec<(u32, u32)> {
     vertices.dedup();
     let bits = |vertex: u32| {
         let point = body.positions().point(vertex as usize);
-        // Minus zero and zero are one number.
+        // Turns minus zero into zero.
         point.map(|x| (x + 0.0).to_bits())
     };
     let mut at: Vec<([u64; 3], u32)> = vertices.iter().map(|&v| (bits(v), v)).collect();

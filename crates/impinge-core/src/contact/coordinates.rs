@@ -1,25 +1,25 @@
-//! Where a corner is: its coordinates, each the exact number rounded to nearest.
+//! The coordinates of a corner, each the exact number rounded to nearest.
 //!
 //! A corner is a vertex, or the point where a segment pq crosses a plane or another segment's line. That point
-//! is `(|Q| p + |P| q) / (|P| + |Q|)`, where P and Q are determinants of different signs that say how far
-//! p and q are from what is crossed: `orient3d` for a plane, `orient2d` in a projection for a line. Nothing
-//! cancels in the sum, so the weight of q is known as well as P and Q are.
+//! is `(|Q| p + |P| q) / (|P| + |Q|)`. P and Q are determinants of different signs that measure how far
+//! p and q are from the plane or line: `orient3d` for a plane, `orient2d` in a projection for a line. Nothing
+//! cancels in the sum, so the weight of q is as precise as P and Q.
 //!
-//! Three stages, each with a bound on its own error; a stage's result counts when all numbers within its bound
+//! Three stages, each with a bound on its own error. A stage's result counts when all numbers within its bound
 //! round to the same one:
 //!
 //! 1. `f64`, for bodies in single precision;
 //! 2. sums of two `f64` ([`Double`]), for either;
-//! 3. whole numbers, which have no error.
+//! 3. integers, which have no error.
 //!
-//! So the coordinates depend on the exact point alone: whichever pair of triangles leads to it, on
-//! whatever machine, they are the same.
+//! So the coordinates depend on the exact point alone. They are the same on every machine, and whichever pair of
+//! triangles leads to the point.
 
 use super::double::{self, Double};
 use super::integer::{Integer, unit_of};
 use crate::exact::{Point, Projection};
 
-/// To what coordinates are rounded.
+/// The precision to which coordinates are rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) enum Precision {
     /// 24 bits.
@@ -49,12 +49,12 @@ impl Place {
             }
             Place::OnLine(ends, line) => crossing(ends, from_line(ends, line), precision),
         };
-        // Minus zero and zero are one number.
+        // Turns minus zero into zero.
         rounded.map(|x| x + 0.0)
     }
 }
 
-/// How far two points are from the line through two others, which crosses theirs.
+/// How far two points are from the line through two others, which crosses the line of the two points.
 fn from_line([p, q]: &[Point; 2], line: &[Point; 2]) -> [Offset; 2] {
     // No end of one lies on the line of the other.
     let projection = Projection::injective(p, q, &line[0]).unwrap_or(Projection::ALL[0]);
@@ -62,14 +62,14 @@ fn from_line([p, q]: &[Point; 2], line: &[Point; 2]) -> [Offset; 2] {
     [p, q].map(|end| Offset::Line(projection.apply(end), line))
 }
 
-/// How far a point is from a plane or a line of its plane, as a determinant.
+/// How far a point is from a plane, or from a line in a plane through the point, as a determinant.
 #[derive(Clone, Copy)]
 enum Offset {
     Plane(Point, [Point; 3]),
     Line([f64; 2], [[f64; 2]; 2]),
 }
 
-/// What the determinants are computed with.
+/// The arithmetic in which determinants are computed.
 trait Number:
     Copy + std::ops::Add<Output = Self> + std::ops::Sub<Output = Self> + std::ops::Mul<Output = Self>
 {
@@ -89,7 +89,7 @@ impl Number for Double {
 }
 
 impl Offset {
-    /// The determinant, in so many bits as the number has.
+    /// The determinant, in the precision of `T`.
     fn value<T: Number>(&self) -> T {
         match *self {
             Offset::Plane(d, [a, b, c]) => {
@@ -105,7 +105,7 @@ impl Offset {
         }
     }
 
-    /// The sum of the products' magnitudes, in `f64`: what errors are measured by.
+    /// The sum of the products' magnitudes, in `f64`: errors are relative to it.
     fn permanent(&self) -> f64 {
         match *self {
             Offset::Plane(d, [a, b, c]) => {
@@ -128,7 +128,7 @@ impl Offset {
         }
     }
 
-    /// The determinant in multiples of a power of two, and which power of the unit that is.
+    /// The determinant as an integer, for coordinates that are multiples of `2^unit`.
     fn exact(&self, unit: i32) -> Integer {
         let whole = |x: f64| Integer::of_multiple(x, unit);
         match self {
@@ -160,7 +160,7 @@ fn crossing(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) -> Po
 /// Beyond these sizes a product's rounding error may underflow, or a sum overflow.
 const SAFE: std::ops::Range<f64> = 1e-200..1e200;
 
-/// More than the relative error of any one operation in `f64`, and than Shewchuk's 7 + 56 u for the
+/// More than the relative error of any one operation in `f64`, and more than Shewchuk's 7 + 56 u for the
 /// determinant.
 const ERROR_F64: f64 = 8.0 * f64::EPSILON / 2.0;
 
@@ -215,14 +215,15 @@ fn in_double(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) -> O
     Some(point)
 }
 
-/// The larger permanent, where it is of a safe size.
+/// The larger permanent; `None` unless its size is safe.
 fn greatest(offsets: [Offset; 2]) -> Option<f64> {
     let [p, q] = offsets.map(|offset| offset.permanent());
     let greatest = p.max(q);
     SAFE.contains(&greatest).then_some(greatest)
 }
 
-/// The number in single precision to which all numbers of a range round whose ends were rounded to `f64`.
+/// The single-precision number to which all numbers from `below` to `above` round; `None` if there are several.
+/// Both ends may have been rounded to `f64`.
 fn single_between(below: f64, above: f64) -> Option<f64> {
     let [below, above] = [below.next_down(), above.next_up()].map(|x| f64::from(x as f32));
     (below == above).then_some(below)
@@ -271,7 +272,7 @@ mod tests {
         ]
     }
 
-    /// A stage is sure of nothing that whole numbers say otherwise, and it is mostly sure.
+    /// A stage that gives a result agrees with integers, and it mostly gives one.
     #[test]
     fn stages_agree() {
         let mut random = impinge_scenes::Random::new(7);
@@ -288,7 +289,7 @@ mod tests {
             };
             let place = match round % 6 {
                 0 | 1 => {
-                    // Of four points of the plane x = z, where the segments between them cross.
+                    // Four points in the plane x = z, and where the segments between them cross.
                     let [p, q, r, s] = [0; 4].map(|_| {
                         let [x, y, _] = point();
                         [x, y, x]

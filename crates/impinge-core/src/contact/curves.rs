@@ -1,11 +1,11 @@
 //! Curves: segments chained at the points that they share.
 //!
-//! In: contacts. Out: chains of points. Segments that several pairs have in common (an edge that lies in a
-//! face is found from both of its triangles) count once. At most two segments meet at most points, and
-//! a chain goes on there. Where three or more meet (surfaces that touch in an edge, three sheets at one point) all
-//! chains end: a junction. Two closed surfaces in general position have closed chains only.
+//! In: contacts. Out: chains of points. A segment that several pairs have in common counts once: an edge that
+//! lies in a face is found from both of its triangles. At most points no more than two segments meet, and a
+//! chain continues there. Where three or more meet (surfaces that touch in an edge, three sheets at one point),
+//! all chains end: a junction. Two closed surfaces in general position have closed chains only.
 //!
-//! Nothing is compared but names of points, so no tolerance decides what is connected. Cost: `O(n log n)`.
+//! Only the names of points are compared, so no tolerance decides what is connected. Cost: `O(n log n)`.
 
 use super::{Contacts, Shape};
 
@@ -21,8 +21,8 @@ pub struct Curves {
     isolated: Vec<u32>,
 }
 
-/// Two different points with a segment between them, and its direction: 1 from the lower point to the
-/// higher, -1 the other way, 0 when it has none or pairs disagree.
+/// A segment between two different points, and its direction: 1 from the lower point to the higher, -1 the
+/// other way, 0 if it has none or pairs disagree.
 #[derive(Clone, Copy)]
 struct Link {
     ends: [u32; 2],
@@ -87,12 +87,12 @@ impl Curves {
         self.starts.push(self.points.len());
     }
 
-    /// How many curves there are.
+    /// The number of curves.
     pub fn len(&self) -> usize {
         self.closed.len()
     }
 
-    /// Whether there is none.
+    /// Whether there are no curves.
     pub fn is_empty(&self) -> bool {
         self.closed.is_empty()
     }
@@ -119,9 +119,9 @@ impl Curves {
     }
 
     /// Whether all segments of a curve point the same way along it, which is then its direction: seen from
-    /// outside of the first body, what of it is beneath the second one's surface lies to the left. Holds
-    /// between bodies whose faces are oriented; within one body the order of a pair says nothing, and
-    /// neither does this.
+    /// outside the first body, the part of it that is beneath the second body's surface lies to the left. True
+    /// between bodies whose faces are oriented. Within one body the order of a pair means nothing, so this means
+    /// nothing either.
     pub fn is_directed(&self, curve: usize) -> bool {
         self.directed[curve]
     }
@@ -131,18 +131,18 @@ impl Curves {
         self.lengths[curve]
     }
 
-    /// How many curves are loops.
+    /// The number of curves that are loops.
     pub fn n_closed(&self) -> usize {
         self.closed.iter().filter(|&&closed| closed).count()
     }
 
-    /// The lengths of all curves together.
+    /// The total length of all curves.
     pub fn total_length(&self) -> f64 {
         self.lengths.iter().sum()
     }
 
-    /// Points of contact that no segment and no polygon has as a corner: two bodies touch there and nowhere
-    /// around. Sorted.
+    /// Points of contact that are not a corner of any segment or polygon: two bodies touch there and nowhere
+    /// nearby. Sorted.
     pub fn isolated(&self) -> &[u32] {
         &self.isolated
     }
@@ -180,7 +180,7 @@ fn links(contacts: &Contacts) -> Vec<Link> {
     links
         .chunk_by(|x, y| x.ends == y.ends)
         .map(|same| {
-            // Pairs without a direction leave the word to those that have one.
+            // Pairs without a direction do not count where other pairs have one.
             let has = |direction: i8| same.iter().any(|link| link.direction == direction);
             Link {
                 ends: same[0].ends,
@@ -236,7 +236,7 @@ impl Incidence {
     }
 }
 
-/// A chain of points; a loop ends with its first one.
+/// A chain of points; a loop ends with its first point.
 struct Chain {
     points: Vec<u32>,
     n_forward: usize,
@@ -244,7 +244,7 @@ struct Chain {
 }
 
 impl Chain {
-    /// Follows links from a point until an end, a junction, or back to the start.
+    /// Follows links from a point to an end, to a junction, or back to the start.
     fn follow(
         links: &[Link],
         at: &Incidence,

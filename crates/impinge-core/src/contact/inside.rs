@@ -1,12 +1,12 @@
 //! Which vertices of a surface lie inside a closed one: exact winding numbers.
 //!
-//! Along an edge that does not meet the other surface the winding number is one number. So vertices
-//! joined by such edges are one *part*, whose winding number is that of any of its vertices: a part that reaches
-//! beyond the other body's box is outside, and each other part costs one ray.
+//! Along an edge that does not meet the other surface, the winding number is constant. So vertices joined by
+//! such edges form one *part* with one winding number. A part that reaches beyond the other body's box is
+//! outside; each other part costs one ray.
 //!
 //! A ray goes from a vertex along +x and counts the faces that it meets, with their orientation. It is
-//! shifted by an infinitely small step along y and a smaller one along z, so that it meets no edge. What the
-//! shift decides is the same for both faces at an edge, so nothing is counted twice or not at all. Signs are exact.
+//! shifted by an infinitely small step along y and a smaller one along z, so that it meets no edge. The shift
+//! decides alike for both faces at an edge, so no crossing is counted twice or missed. Signs are exact.
 //!
 //! Cost: the vertices within the other's box, and per part with a ray the faces that its y value meets.
 
@@ -16,17 +16,17 @@ use super::topology::Topology;
 use crate::exact::{Point, Sign, orient2d, orient3d};
 use crate::scene::{Body, Elements};
 
-/// The part of each vertex, and what parts are.
+/// The part of each vertex, and the winding number of each part.
 pub(super) struct Parts {
     /// For each vertex: its part, or [`NO_PART`].
     part_of: Vec<u32>,
     winding: Vec<i32>,
 }
 
-/// The vertex lies outside, or on the other surface.
+/// The part of a vertex that lies outside, or on the other surface.
 const NO_PART: u32 = u32::MAX;
 
-/// What is known of the surface whose vertices are asked for.
+/// A surface whose vertices inside another body are wanted, and where it meets that body's surface.
 pub(super) struct Asked<'a> {
     pub body: &'a Body,
     pub topology: &'a Topology,
@@ -63,7 +63,7 @@ impl Parts {
             {
                 continue;
             }
-            // All that is joined to the seed, and whether any of it is beyond the box.
+            // All vertices joined to the seed, and whether any of them is beyond the box.
             is_seen[seed as usize] = true;
             members.clear();
             members.push(seed);
@@ -97,7 +97,7 @@ impl Parts {
         parts
     }
 
-    /// The part of a vertex that is inside.
+    /// The part of a vertex; `None` unless it is inside.
     pub fn inside(&self, vertex: u32) -> Option<u32> {
         let part = self.part_of[vertex as usize];
         (part != NO_PART && self.winding[part as usize] != 0).then_some(part)
@@ -168,7 +168,8 @@ fn passes(point: &Point, corners: &[Point; 3]) -> i32 {
     }
     let flat = |p: &Point| [p[1], p[2]];
     let at = flat(point);
-    // The edges above the shifted point in the plane of y and z, by the way in which they pass it.
+    // The edges above the shifted point in the plane of y and z: those that lead to higher y minus those that
+    // lead to lower y.
     let mut around = 0;
     for k in 0..3 {
         let (p, q) = (flat(&corners[k]), flat(&corners[(k + 1) % 3]));

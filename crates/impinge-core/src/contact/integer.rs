@@ -1,13 +1,13 @@
-//! Whole numbers of any size: what exact coordinates are decided with when `f64` is not enough.
+//! Integers of any size, for exact coordinates when `f64` is not enough.
 //!
-//! A sign and a magnitude in 64-bit limbs, lowest first, without leading zero limbs. Only what
+//! A sign and a magnitude in 64-bit limbs, lowest first, without leading zero limbs. It can only do what
 //! [`coordinates`](super::coordinates) needs: conversion from `f64`, sum, product, order, and the
 //! quotient of two numbers rounded to nearest. Products are schoolbook: numbers have at most a few
 //! thousand bits.
 
 use std::cmp::Ordering;
 
-/// A whole number.
+/// An integer of any size.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(super) struct Integer {
     negative: bool,
@@ -105,7 +105,7 @@ impl Integer {
             return 0.0;
         }
         // |self| / divisor lies in [2^(e-1), 2^(e+1)), so with this quantum the quotient has at most
-        // one bit too many, and one bit too few never.
+        // one bit too many, and never too few.
         let mut quantum = (self.bits() - divisor.bits() + unit - precision).max(lowest);
         let (mut whole, mut rest, mut scaled) = self.divided(divisor, quantum - unit);
         if whole >> precision != 0 {
@@ -118,13 +118,13 @@ impl Integer {
             Ordering::Equal => whole += whole & 1,
             Ordering::Less => {}
         }
-        // At most 2^53 of a power of two that is no smaller than the smallest `f64`: exact.
+        // At most 2^53 times a power of two that is not below the smallest `f64`: exact.
         let magnitude = whole as f64 * power(quantum);
         if self.negative { -magnitude } else { magnitude }
     }
 
-    /// Quotient, remainder, and the divisor of that, of `|self|` and `divisor · 2^exponent`.
-    /// The quotient must fit 64 bits.
+    /// Quotient and remainder of `|self|` divided by `divisor · 2^exponent`, and the divisor that belongs to the
+    /// remainder: both are scaled so that they are integers. The quotient must fit 64 bits.
     fn divided(&self, divisor: &Self, exponent: i32) -> (u64, Integer, Integer) {
         let by = |n: i32| n.max(0).unsigned_abs();
         let mut rest = self.clone().abs().shifted(by(-exponent));
@@ -200,7 +200,7 @@ fn sum(a: &[u64], b: &[u64]) -> Vec<u64> {
     limbs
 }
 
-/// `a - b`, where `a` is not the lesser.
+/// `a - b`, where `a >= b`.
 fn difference(a: &[u64], b: &[u64]) -> Vec<u64> {
     let mut borrow = false;
     a.iter()
@@ -291,7 +291,7 @@ mod tests {
         assert_eq!(Integer::of_multiple(-0.0, 5), Integer::default());
     }
 
-    /// No number with 53 bits lies nearer, and of two that are as near it is the even one.
+    /// No number with 53 bits lies nearer; of two equally near, the result is the even one.
     #[test]
     fn quotients_are_the_nearest() {
         let mut numbers = Numbers(3);

@@ -1,9 +1,9 @@
 //! Where two triangles meet: exact combinatorics, no coordinates.
 //!
-//! Two closed triangles are convex, so what they have in common is empty, a point, a segment or a
+//! Two closed triangles are convex, so their intersection is empty, a point, a segment or a
 //! convex polygon: the hull of its corners. A corner lies in the relative interior of exactly one feature
-//! (vertex, edge, face) of either triangle, and the two features have that point alone in common. So a
-//! corner *is* a pair of features, and finding the intersection is finding these pairs:
+//! (vertex, edge, face) of each triangle, and the two features have only that point in common. So a
+//! corner *is* a pair of features, and finding the intersection means finding these pairs:
 //!
 //! ```text
 //! vertex of one, anything of the other     the vertex lies on it
@@ -11,8 +11,8 @@
 //! edge, edge                               they cross, and are not on one line
 //! ```
 //!
-//! All of these are signs of `orient2d` and `orient3d`, which are exact, so nothing here is ever
-//! a little wrong. Degenerate triangles are segments or points with fewer features, and need no other rules.
+//! All of these are decided by signs of `orient2d` and `orient3d`, which are exact. Degenerate triangles are
+//! segments or points with fewer features, and need no other rules.
 //!
 //! Cost: 6 to 18 signs for triangles in general position.
 
@@ -26,19 +26,19 @@ pub(super) enum Local {
     Face,
 }
 
-/// A point of both triangles as the feature of either one in whose relative interior it lies.
+/// A point of both triangles, named by the feature of each triangle in whose relative interior it lies.
 pub(super) type Corner = [Local; 2];
 
-/// What two triangles have in common.
+/// The intersection of two triangles.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Meeting {
     corners: [Corner; MOST_CORNERS],
     n_corners: usize,
-    /// Whether a segment's corners stand in the direction of the product of the two normals.
+    /// Whether a segment leads in the direction of the product of the two normals.
     pub directed: bool,
 }
 
-/// Two triangles of one plane meet in a hexagon at most.
+/// Two coplanar triangles meet in a hexagon at most.
 const MOST_CORNERS: usize = 6;
 
 impl Meeting {
@@ -49,7 +49,7 @@ impl Meeting {
     };
 
     /// The corners: none, a point, a segment's ends, or a polygon in order, counter-clockwise as seen
-    /// from where the first triangle is.
+    /// from the side from which the first triangle is.
     pub fn corners(&self) -> &[Corner] {
         &self.corners[..self.n_corners]
     }
@@ -62,7 +62,7 @@ impl Meeting {
     }
 }
 
-/// A triangle as the convex set that it is.
+/// A triangle as the convex set that it is: point, segment or triangle.
 struct Hull<'a> {
     points: &'a [Point; 3],
     shape: Shape,
@@ -114,7 +114,7 @@ impl<'a> Hull<'a> {
             let at_an_end = points[other] == points[i] || points[other] == points[j];
             if is_between || (at_an_end && outermost.is_none()) {
                 outermost = Some(Shape::Segment {
-                    // Of two corners at one place the lower one stands for both.
+                    // Of several corners at one place, the lowest stands for all.
                     ends: [i, j].map(|k| first_at(points, k)),
                     edge,
                     middle: is_between.then_some(other),
@@ -156,7 +156,7 @@ impl<'a> Hull<'a> {
         -orient3d(a, b, c, point)
     }
 
-    /// The feature in whose relative interior a point lies, whose height is known.
+    /// The feature in whose relative interior a point of known height lies; `None` outside.
     fn locate(&self, point: &Point, height: Sign) -> Option<Local> {
         match self.shape {
             Shape::Point => (*point == self.points[0]).then_some(Local::Vertex(0)),
@@ -190,8 +190,8 @@ fn first_at(points: &[Point; 3], k: usize) -> usize {
         .unwrap_or(k)
 }
 
-/// The feature of a triangle in which a point lies that is on these sides of its edges, where `inside` is
-/// the inner side.
+/// The feature of a triangle that contains a point in the triangle's plane. `sides`: on which side of each edge
+/// the point lies; `inside`: the inner side. `None` outside.
 fn feature_by_sides(sides: [Sign; 3], inside: Sign) -> Option<Local> {
     if sides.iter().any(|side| side.strictly_opposite(inside)) {
         return None;
@@ -204,12 +204,12 @@ fn feature_by_sides(sides: [Sign; 3], inside: Sign) -> Option<Local> {
         [true, false, true] => Some(Local::Vertex(0)),
         [true, true, false] => Some(Local::Vertex(1)),
         [false, true, true] => Some(Local::Vertex(2)),
-        // On three lines at once, which no triangle with a plane allows.
+        // No point lies on all three lines, unless the triangle is degenerate.
         [true, true, true] => None,
     }
 }
 
-/// What two closed triangles have in common.
+/// The intersection of two closed triangles.
 pub(super) fn meet(a: &[Point; 3], b: &[Point; 3]) -> Meeting {
     let hulls = [Hull::new(a), Hull::new(b)];
     let heights = [
@@ -238,7 +238,7 @@ pub(super) fn meet(a: &[Point; 3], b: &[Point; 3]) -> Meeting {
     meeting
 }
 
-/// The heights of the corners over the plane of a hull; zero where it has none.
+/// The heights of the points over the plane of a hull; zero if the hull has no plane.
 fn heights(hull: &Hull<'_>, points: &[Point; 3]) -> [Sign; 3] {
     if hull.is_triangle() {
         points.each_ref().map(|point| hull.height(point))
@@ -298,8 +298,8 @@ impl One<'_> {
         }
     }
 
-    /// The feature of the other triangle that an edge crosses whose ends are strictly on different
-    /// sides of its plane.
+    /// The feature of the other triangle that an edge crosses. The ends of the edge are strictly on different
+    /// sides of that triangle's plane.
     fn crossed(&self, edge: usize) -> Option<Local> {
         let [p, q] = self.hull.edge(edge);
         let sides = [0, 1, 2].map(|edge| {
@@ -317,15 +317,15 @@ fn edges_cross([p, q]: [&Point; 2], [r, s]: [&Point; 2]) -> bool {
         return false;
     }
     let Some(projection) = Projection::injective(p, q, r) else {
-        // r lies on the line through p and q: there is no crossing strictly inside rs but on that line.
+        // r lies on the line through p and q. So rs meets that line only in r, or lies on it.
         return false;
     };
     let turn = |x: &Point, y: &Point, z: &Point| projection.turn(x, y, z);
     turn(p, q, r).strictly_opposite(turn(p, q, s)) && turn(r, s, p).strictly_opposite(turn(r, s, q))
 }
 
-/// A flat triangle's middle corner is a corner of the intersection by that name, not by its edge's: its
-/// neighbours know it by that.
+/// Names a corner at the middle corner of a flat triangle by that vertex, not by the edge: the triangle's
+/// neighbours name it by the vertex too.
 fn name_middles(hulls: &[Hull<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut Meeting) {
     for side in 0..2 {
         let Shape::Segment {
@@ -339,8 +339,7 @@ fn name_middles(hulls: &[Hull<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut Me
         let found = std::mem::replace(meeting, Meeting::EMPTY);
         for &corner in found.corners() {
             let mut corner = corner;
-            // The corner is all that the edge and the other feature have in common, so that is where
-            // the middle is.
+            // The edge and the other feature have only this corner in common, and the middle is in both.
             if matches!(corner[side], Local::Edge(_)) && there == Some(corner[1 - side]) {
                 corner[side] = Local::Vertex(middle);
             }
@@ -349,11 +348,11 @@ fn name_middles(hulls: &[Hull<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut Me
     }
 }
 
-/// Turns a segment in the direction of the product of the normals, where both triangles have one.
+/// Turns a segment in the direction of the product of the normals, if both triangles have one.
 ///
-/// The line of both planes enters triangle a where a's boundary goes up through b's plane, and leaves where
-/// that goes down; for b it is the other way round. (With d = n_a × n_b and an edge e of a, n_a × e leads into a, and
-/// d · (n_a × e) = |n_a|² (n_b · e).)
+/// The line of both planes enters triangle a where a's boundary goes up through b's plane, and leaves a where
+/// the boundary goes down; for b it is the other way round. (With d = n_a × n_b and an edge e of a, n_a × e
+/// leads into a, and d · (n_a × e) = |n_a|² (n_b · e).)
 fn direct(hulls: &[Hull<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut Meeting) {
     if !hulls.iter().all(Hull::is_triangle) {
         return;
@@ -383,9 +382,8 @@ fn direct(hulls: &[Hull<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut Meeting)
 
 /// Puts the corners of a polygon in order: counter-clockwise as seen from above the first triangle.
 ///
-/// A side of the polygon lies on an edge of one of the triangles, and a line that holds an edge holds two
-/// corners if a side lies on it and fewer otherwise. So two corners are neighbours if and only if some edge
-/// has both.
+/// Every side of the polygon lies on an edge of one of the triangles. The line of an edge holds two corners if
+/// a side lies on it, and fewer otherwise. So two corners are neighbours if and only if some edge has both.
 fn order(hulls: &[Hull<'_>; 2], meeting: &mut Meeting) {
     let found = *meeting;
     let n = found.n_corners;
@@ -394,7 +392,7 @@ fn order(hulls: &[Hull<'_>; 2], meeting: &mut Meeting) {
             (0..3).any(|edge| [i, j].iter().all(|&k| is_on(found.corners[k][side], edge)))
         })
     };
-    // The first two neighbours in the right direction, then always on to the other neighbour.
+    // Start with two neighbours in the right direction, then step to the other neighbour each time.
     let Some((mut last, mut here)) = first_side(hulls, &found) else {
         return;
     };
@@ -431,7 +429,7 @@ fn first_side(hulls: &[Hull<'_>; 2], found: &Meeting) -> Option<(usize, usize)> 
                 .filter(|&k| is_on(found.corners[k][side], edge))
                 .collect();
             if let [i, j] = on[..] {
-                // Along the edge as its own triangle turns; against it where that one turns the other way.
+                // In the direction of the edge, or against it if its triangle turns the other way than the first.
                 let forward = comes_first(hulls, side, edge, found.corners[i], found.corners[j]);
                 return Some(if forward == (side == 0 || agree) {
                     (i, j)
@@ -444,7 +442,7 @@ fn first_side(hulls: &[Hull<'_>; 2], found: &Meeting) -> Option<(usize, usize)> 
     None
 }
 
-/// Whether one of two different corners on an edge is nearer to its beginning.
+/// Whether `x` comes before `y`, two different corners on an edge.
 fn comes_first(hulls: &[Hull<'_>; 2], side: usize, edge: usize, x: Corner, y: Corner) -> bool {
     let [start, end] = ends(edge);
     for (corner, is_first) in [(x, true), (y, false)] {
@@ -454,8 +452,8 @@ fn comes_first(hulls: &[Hull<'_>; 2], side: usize, edge: usize, x: Corner, y: Co
             _ => {}
         }
     }
-    // Both lie strictly inside the edge, so each has a vertex of the other triangle or crosses an edge of
-    // that: into it (then it is the first one) or out of it.
+    // Both lie strictly inside the edge, so each is at a vertex of the other triangle or crosses one of its
+    // edges. The corner where the edge enters that triangle is the first.
     let (here, there) = (&hulls[side], &hulls[1 - side]);
     let Shape::Triangle { projection, turn } = there.shape else {
         return true;

@@ -1,12 +1,12 @@
 //! Contact geometry: where triangles meet, the curves in which surfaces cross, how deep.
 //!
 //! [`Contacts`] turns the pairs of a detection into points, segments and polygons; [`Curves`] chains these
-//! into loops; [`Penetration`] finds what of two closed bodies lies inside the other, and per connected
-//! region of contact a normal, a depth and a volume.
+//! into loops; [`Penetration`] finds which parts of two closed bodies lie inside the other, and a normal, a
+//! depth and a volume per connected region of contact.
 //!
 //! **Exact combinatorics.** Which edge crosses which face, in which order, which points are one point,
 //! which segments follow each other: decided by the signs of [`exact`](crate::exact), without
-//! tolerance. **Rounded coordinates.** Each coordinate is the exact number rounded to nearest: to `f32` where both
+//! tolerance. **Rounded coordinates.** Each coordinate is the exact number rounded to nearest: to `f32` if both
 //! bodies hold `f32`, else to `f64`. It depends on the point alone, so the bytes are the same on
 //! every machine and for every number of threads. Lengths, areas,
 //! normals, depths and volumes are computed from rounded coordinates in `f64`, in a fixed order.
@@ -49,10 +49,10 @@ use crate::error::Error;
 use crate::pairs::Pairs;
 use crate::scene::Scene;
 
-/// A vertex, edge or face of a body: what a point of contact lies in the relative interior of.
+/// The vertex, edge or face of a body in whose relative interior a point of contact lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Feature {
-    /// A vertex index. Of several vertices at one position it is the lowest among the
+    /// A vertex index. Of several vertices at one position, the lowest one of the
     /// triangles in contact.
     Vertex(u32),
     /// Two vertex indices, the lower one first.
@@ -61,10 +61,10 @@ pub enum Feature {
     Face(u32),
 }
 
-/// What a pair of triangles has in common.
+/// The intersection of a pair of triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Shape {
-    /// Not a pair of triangles: tetrahedra have a volume in common, which no curve describes.
+    /// Not a pair of triangles. The intersection with a tetrahedron is a solid, which no curve describes.
     Solid,
     /// Nothing: the scene has moved since the pairs were found.
     Apart,
@@ -77,11 +77,11 @@ pub enum Shape {
     Polygon,
 }
 
-/// The name of a point of contact: bodies by number, and the feature of either one in which it lies. Within
-/// one body the lower feature comes first.
+/// The name of a point of contact: the numbers of both bodies, and the feature of each in which the point lies.
+/// Within one body the lower feature comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PointName {
-    /// The bodies by their [`index`](crate::BodyId::index); twice the same within one body.
+    /// The bodies by their [`index`](crate::BodyId::index); the same number twice within one body.
     pub bodies: [u32; 2],
     /// The feature of the first body, and of the second.
     pub features: [Feature; 2],
@@ -91,7 +91,7 @@ pub struct PointName {
 ///
 /// Contact `i` belongs to row `i` of the pairs. Its corners are numbers of points; a point that belongs to
 /// several contacts is held once. A segment of two triangles with different planes points along
-/// `n_a × n_b`, the product of their normals (counter-clockwise rule): seen from outside of body `a`, the part of `a`
+/// `n_a × n_b`, the product of their normals (counter-clockwise rule): seen from outside body `a`, the part of `a`
 /// beneath `b`'s surface lies to its left.
 ///
 /// Degenerate triangles are the segments or points that they are.
@@ -106,43 +106,43 @@ pub struct Contacts {
     corners: Vec<u32>,
     names: Vec<PointName>,
     points: Vec<[f64; 3]>,
-    /// Of each body: vertices that are not the lowest one at their position, with that one.
+    /// For each body that has any: vertices that are not the lowest one at their position, each with the lowest.
     doubles: Vec<(u32, Vec<(u32, u32)>)>,
 }
 
 impl Contacts {
-    /// The contacts of all pairs, which must have been found in the scene as it is now.
+    /// The contacts of all pairs. The scene must not have changed since the pairs were found.
     ///
     /// Runs in rayon's current thread pool; the result does not depend on it.
     ///
     /// # Errors
-    /// A body of the pairs that the scene no longer has, or with fewer primitives; refused positions
-    /// that were written in place since.
+    /// A body of the pairs is no longer in the scene, is of another kind or has too few primitives; positions written in
+    /// place since then are refused.
     pub fn new(scene: &Scene, pairs: &Pairs) -> Result<Self, Error> {
         build::contacts(scene, pairs)
     }
 
-    /// How many contacts there are: as many as pairs.
+    /// The number of contacts, which is the number of pairs.
     pub fn len(&self) -> usize {
         self.shapes.len()
     }
 
-    /// Whether there is none.
+    /// Whether there are no contacts.
     pub fn is_empty(&self) -> bool {
         self.shapes.is_empty()
     }
 
-    /// Rows `[body_a, primitive_a, body_b, primitive_b]`, those of the pairs.
+    /// The rows of the pairs: `[body_a, primitive_a, body_b, primitive_b]`.
     pub fn rows(&self) -> &[[u32; 4]] {
         &self.rows
     }
 
-    /// What each pair has in common.
+    /// The shape of each pair's intersection.
     pub fn shapes(&self) -> &[Shape] {
         &self.shapes
     }
 
-    /// What the triangles of row `contact` have in common.
+    /// The shape of the intersection in row `contact`.
     pub fn shape(&self, contact: usize) -> Shape {
         self.shapes[contact]
     }
@@ -167,8 +167,8 @@ impl Contacts {
         &self.starts
     }
 
-    /// `(n, 3)` coordinates of the points, each the exact one rounded to nearest: to `f32` where both bodies
-    /// hold `f32` (a number that `f32` has, then), else to `f64`.
+    /// `(n, 3)` coordinates of the points, each the exact number rounded to nearest: to an `f32` (widened to `f64`)
+    /// if both bodies hold `f32`, else to an `f64`.
     pub fn points(&self) -> &[[f64; 3]] {
         &self.points
     }
@@ -183,15 +183,15 @@ impl Contacts {
         Curves::new(self)
     }
 
-    /// The contacts in connected regions, each with its position, its size and a normal. What lies inside, and
-    /// how deep, is found by [`Penetration`].
+    /// The contacts in connected regions, each with its position, its size and a normal. [`Penetration`] finds what
+    /// lies inside, and how deep.
     pub fn regions(&self) -> Vec<Region> {
         let mut sets = regions::Sets::new(self.points.len());
         regions::join_contacts(self, &mut sets);
         regions::regions(self, &self.curves(), &mut sets).0
     }
 
-    /// The vertex that names have for this one: the lowest one at its position.
+    /// The vertex that stands for this one in names: the lowest one at its position.
     fn lowest(&self, body: u32, vertex: u32) -> u32 {
         let Some((_, doubles)) = self.doubles.iter().find(|(held, _)| *held == body) else {
             return vertex;

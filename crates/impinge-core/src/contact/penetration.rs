@@ -1,16 +1,16 @@
-//! What of two closed bodies lies inside the other, region by region: normals, depths, volumes.
+//! Which parts of two closed bodies lie inside the other, region by region: normals, depths, volumes.
 //!
 //! 1. Vertices inside: exact winding numbers (see `inside`).
-//! 2. Each edge that crosses the other surface is cut at its crossings; between two of them it is inside or
-//!    not, by the signs of the faces crossed. Crossings at the ends of a piece that is inside belong to one
-//!    region, and so does a vertex inside with the crossings next to it.
-//! 3. The border of what both have in common consists of the faces' parts inside; each part is a polygon
-//!    whose sides are segments of contact and such pieces of edges. So the volume is a sum over these sides,
-//!    without polygons ever being put together (divergence theorem, then Stokes' on each face).
+//! 2. Each edge that crosses the other surface is cut at its crossings. The signs of the crossed faces say
+//!    which pieces are inside. The two ends of a piece inside belong to one region, whether they are
+//!    crossings or vertices.
+//! 3. The border of the overlap consists of the parts of faces that lie inside. Each part is a polygon
+//!    whose sides are segments of contact and pieces of edges. So the volume is a sum over these sides,
+//!    and no polygon is ever assembled (divergence theorem, then Stokes' theorem on each face).
 //!
-//! Decisions are exact but for one: the order of crossings along an edge is taken from their rounded
-//! coordinates. Crossings that round to one place may be taken the wrong way round; the piece between
-//! them is then no longer than the rounding.
+//! All decisions are exact except one: crossings along an edge are ordered by their rounded coordinates.
+//! Crossings that round to one place may be swapped; the piece between them is then no longer than the
+//! rounding error.
 
 use std::collections::HashMap;
 
@@ -25,7 +25,7 @@ use crate::error::Error;
 use crate::exact::{Sign, orient3d};
 use crate::scene::{Body, BodyId, Elements, Kind, Scene};
 
-/// Finds how deep closed bodies are in each other. Keeps what it knows of their topology from call to call.
+/// Finds how deep closed bodies are in each other. Caches their topology from call to call.
 ///
 /// ```
 /// use impinge_core::contact::{Contacts, Penetration};
@@ -48,42 +48,43 @@ use crate::scene::{Body, BodyId, Elements, Kind, Scene};
 /// ```
 #[derive(Debug, Default)]
 pub struct Penetration {
-    /// By the number of the body, with the stamp of the topology.
+    /// By the number of the body; the first of the pair is the stamp of the topology.
     topologies: HashMap<usize, (u64, Topology)>,
 }
 
-/// What two closed bodies have in common.
+/// The overlap of two closed bodies.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Overlap {
     /// Vertices of the first body strictly inside the second, and of the second strictly inside the first: sorted.
     /// The body with the lower number comes first.
     pub inside: [Vec<u32>; 2],
-    /// Connected regions: those with contacts in the order of these, then shells wholly inside the other body.
+    /// Connected regions: first those with contacts, in the order of the contacts, then shells wholly inside the other
+    /// body.
     pub regions: Vec<Region>,
 }
 
 impl Overlap {
-    /// The volume of all regions together; none where any region's is not known.
+    /// The volume of all regions together; `None` if the volume of any region is unknown.
     pub fn volume(&self) -> Option<f64> {
         self.regions.iter().map(|region| region.volume).sum()
     }
 }
 
 impl Penetration {
-    /// Knows no body yet.
+    /// Starts with an empty cache.
     pub fn new() -> Self {
         Penetration::default()
     }
 
-    /// What two closed bodies of triangles have in common, from all contacts between them.
+    /// The overlap of two closed bodies of triangles, from all contacts between them.
     ///
     /// A vertex is inside where the other surface's winding number around it is not 0; a vertex on the surface
-    /// is not inside. The body with the lower number is the first one, whatever the order here. Runs in rayon's current
+    /// is not inside. The body with the lower number is the first, whichever argument it is. Runs in rayon's current
     /// thread pool; the result does not depend on it.
     ///
     /// # Errors
-    /// A body that the scene does not have, twice the same body, a body of tetrahedra, a surface that is not closed.
+    /// A body that is not in the scene, the same body twice, a body not made of triangles, a surface that is not closed.
     pub fn between(
         &mut self,
         scene: &Scene,
@@ -121,7 +122,7 @@ impl Penetration {
         Ok(work.overlap())
     }
 
-    /// Knows the topology of a body from now on.
+    /// Caches the topology of a body.
     fn know(&mut self, scene: &Scene, id: BodyId) -> Result<(), Error> {
         let body = scene.body(id)?;
         let stamp = body.topology_stamp();
@@ -221,7 +222,8 @@ impl<'a> Crossings<'a> {
     }
 }
 
-/// A piece of an edge that is inside the other body, from the lower vertex on, and a number of its region's set.
+/// A piece of an edge that is inside the other body, from the end nearer to the lower vertex, and a member of its
+/// region's set.
 struct Piece {
     edge: [u32; 2],
     from: Vector,
@@ -256,7 +258,7 @@ impl Work<'_> {
                 let at = self.bodies[side].positions().point(vertex as usize);
                 let region = &mut region_of[sets.find(node) as usize];
                 if *region == NO_REGION {
-                    // A shell of one body that no contact of the other reaches.
+                    // A shell of one body that has no contact with the other.
                     *region = regions.len() as u32;
                     regions.push(Region::at(numbers, at));
                 }
@@ -279,7 +281,7 @@ impl Work<'_> {
         Overlap { inside, regions }
     }
 
-    /// The set's number of a vertex that is inside.
+    /// The number, among the members of the sets, of a vertex that is inside.
     fn node(&self, side: usize, vertex: u32) -> Option<u32> {
         let n_before = match side {
             0 => 0,
@@ -293,7 +295,7 @@ impl Work<'_> {
         self.bodies[side].positions().point(vertex as usize)
     }
 
-    /// The pieces of crossed edges that are inside, sorted by edge; joins what they join.
+    /// The pieces of crossed edges that are inside, sorted by edge. Joins the sets of each piece's two ends.
     fn pieces(&self, side: usize, sets: &mut Sets) -> Vec<Piece> {
         let mut pieces = Vec::new();
         for crossed in self.crossings[side].on_edges.chunk_by(|x, y| x.0 == y.0) {
@@ -338,8 +340,8 @@ impl Work<'_> {
         points.sort_by(|&p, &q| height(p).total_cmp(&height(q)).then(p.cmp(&q)));
     }
 
-    /// The pieces of one edge that are inside, each with the two numbers that it joins; none where the edge
-    /// meets more than faces.
+    /// The pieces of one edge that are inside, each with the two set members that it joins; `None` if the edge does
+    /// not just cross faces.
     fn cut(&self, side: usize, edge: [u32; 2], points: &[u32]) -> Option<Vec<(Piece, [u32; 2])>> {
         let [low, high] = edge;
         let crossings = &self.crossings[side];
@@ -377,19 +379,19 @@ impl Work<'_> {
         (winding == self.parts[side].winding(high)).then_some(pieces)
     }
 
-    /// By how much the winding number grows where an edge crosses a face of the other body, coming from a vertex.
+    /// By how much the winding number grows where an edge, coming from vertex `from`, crosses a face of the other body.
     fn step(&self, side: usize, from: u32, face: u32) -> i32 {
         let corners = self.bodies[1 - side].elements().corners(face as usize);
         let [a, b, c] = [0, 1, 2].map(|k| self.position(1 - side, corners[k]));
         match orient3d(&a, &b, &c, &self.position(side, from)) {
-            // Beneath the face: out through it.
+            // The vertex is beneath the face: the edge leaves through it.
             Sign::Positive => -1,
             Sign::Zero => 0,
             Sign::Negative => 1,
         }
     }
 
-    /// Whether the bodies meet in a region by edges that cross faces only.
+    /// Whether all contacts of a region are segments between points where an edge crosses a face.
     fn is_generic(&self, region: &Region) -> bool {
         region.contacts.iter().all(|&contact| {
             let contact = contact as usize;
@@ -425,7 +427,7 @@ impl Work<'_> {
     }
 
     /// The volume of each region: a sixth of the sum of `(x - o) · ((p - o) × (q - o))` over the sides pq of
-    /// all faces' parts inside, x any point of the face, o any one point.
+    /// the parts of faces that lie inside, where x is any point of the face and o is one point for all.
     fn volumes(
         &self,
         regions: &[Region],
@@ -456,7 +458,7 @@ impl Work<'_> {
                     let corners = self.bodies[side].elements().corners(face as usize);
                     self.position(side, corners[0])
                 };
-                // What is inside lies to the left as seen from outside of a, to the right as seen from outside of b.
+                // The part inside lies to the left as seen from outside a, to the right as seen from outside b.
                 add_side(number, on(0, a), from, to);
                 add_side(number, on(1, b), to, from);
             }

@@ -1,18 +1,18 @@
-//! Regions: contacts that hang together, each with a position, a size, a normal and a depth.
+//! Regions: connected contacts, each region with a position, a size, a normal and a depth.
 //!
-//! Two contacts belong together when they have a point in common. Where bodies are closed, what lies inside
-//! holds regions together too ([`Penetration`](super::Penetration)).
+//! Two contacts are connected when they have a point in common. In closed bodies, edges and vertices inside
+//! connect contacts too ([`Penetration`](super::Penetration)).
 //!
-//! **Normal.** Let L be the curves of a region, directed, and `a = ½ ∮ x × dx` the area that they span. By
-//! Stokes' theorem `a` is the integral of the first body's normals over what of it lies inside the second one;
-//! when the first body moves by u, the volume that they have in common grows by `a · u`. So `-a` is
-//! the way in which that volume falls fastest (Allard et al., *Volume contact constraints at arbitrary resolution*, 2010):
-//! the direction in which to push the first body. Where bodies touch in a patch only, `a` is the area of that.
+//! **Normal.** Let L be the directed curves of a region, and `a = ½ ∮ x × dx` the area that they span. By
+//! Stokes' theorem `a` is the integral of the first body's normals over its part inside the second body.
+//! When the first body moves by u, the volume that they have in common grows by `a · u`. So that volume shrinks
+//! fastest when the first body moves along `-a` (Allard et al., *Volume contact constraints at arbitrary
+//! resolution*, 2010): push the first body that way. Where bodies touch only in a patch, `a` is the area of the patch.
 
 use super::curves::{Curves, distance};
 use super::{Contacts, Shape};
 
-/// Contacts of two bodies (or within one) that hang together.
+/// Connected contacts of two bodies, or within one.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Region {
@@ -20,7 +20,8 @@ pub struct Region {
     pub bodies: [u32; 2],
     /// Numbers of contacts: rows of the pairs, sorted.
     pub contacts: Vec<u32>,
-    /// The middle of the region: of its curves by length, else of its patches by area, else of its points.
+    /// The middle of the region: the mean of its curves weighted by length, else of its patches weighted by area, else
+    /// of its points.
     pub position: [f64; 3],
     /// The lowest and the highest coordinates of its points, and of the vertices inside.
     pub bounds: [[f64; 3]; 2],
@@ -28,26 +29,26 @@ pub struct Region {
     pub length: f64,
     /// The area of its patches, where faces of both bodies lie in one plane; in square units.
     pub patch_area: f64,
-    /// The area that its curves span, as a vector: of the first body's surface inside the second one,
-    /// projected. In square units.
+    /// The area that its curves span, as a vector: the projected area of the first body's surface inside the
+    /// second body. In square units.
     pub area: [f64; 3],
-    /// The unit direction in which to push the first body so that the overlap shrinks fastest; the second one
-    /// goes the other way. None where curves span no area in sum (a rod through a wall) or faces are not
+    /// The unit direction in which to push the first body so that the overlap shrinks fastest; push the second
+    /// body the other way. `None` if the curves span no area in total (a rod through a wall), or if faces are not
     /// oriented consistently.
     pub normal: Option<[f64; 3]>,
-    /// Vertices of the first body inside the second one, and the other way round: sorted. Empty where it was
-    /// not asked for.
+    /// Vertices of the first body inside the second, and of the second inside the first; sorted. Empty unless
+    /// [`Penetration`](super::Penetration) found the region.
     pub inside: [Vec<u32>; 2],
-    /// How far the region extends along the normal: pushed so far, the bodies no longer overlap in this
-    /// region. None without a normal, or where it was not asked what is inside.
+    /// How far the region extends along the normal: pushed that far, the bodies no longer overlap in this
+    /// region. `None` without a normal, or unless [`Penetration`](super::Penetration) found the region.
     pub depth: Option<f64>,
-    /// The volume that the bodies have in common, in cubic units; a cavity that no edge joins to its surroundings
-    /// is a region of negative volume. None where it was not asked what is inside, or where the bodies meet
-    /// otherwise than by edges that cross faces (vertices on faces, edges on edges, common planes).
+    /// The volume that the bodies have in common, in cubic units. A cavity that no edge joins to its surroundings
+    /// is a region of negative volume. `None` unless [`Penetration`](super::Penetration) found the region. Also `None` if
+    /// the bodies meet other than by edges that cross faces (vertices on faces, edges on edges, common planes).
     pub volume: Option<f64>,
 }
 
-/// Sets of numbers that are joined step by step. The lowest number of a set stands for it.
+/// Disjoint sets of numbers (union-find). The lowest number of a set stands for it.
 #[derive(Debug, Clone)]
 pub(super) struct Sets(Vec<u32>);
 
@@ -106,7 +107,7 @@ pub(super) fn dot(p: Vector, q: Vector) -> f64 {
 }
 
 /// The regions of sets of points, in the order of their first contacts, and the region of each point that
-/// is the lowest of its set ([`NO_REGION`] elsewhere).
+/// stands for its set ([`NO_REGION`] for other points).
 pub(super) fn regions(
     contacts: &Contacts,
     curves: &Curves,
@@ -178,7 +179,7 @@ pub(super) fn regions(
 /// No region has this number.
 pub(super) const NO_REGION: u32 = u32::MAX;
 
-/// Weighted sums of places.
+/// A weighted sum of positions.
 #[derive(Default)]
 struct Sum {
     place: Vector,
@@ -197,7 +198,7 @@ impl Sum {
 }
 
 struct Middles {
-    /// Whether all coordinates are numbers of `f32`.
+    /// Whether all coordinates are representable in `f32`.
     is_single: bool,
     curves: Sum,
     patches: Sum,
@@ -244,7 +245,7 @@ impl Region {
         }
     }
 
-    /// An area that rounded coordinates may add up to where exact ones cancel: their error along all curves.
+    /// The area that may come from rounding alone: the error of the coordinates along all curves.
     fn noise(&self, is_single: bool) -> f64 {
         let epsilon = if is_single {
             f64::from(f32::EPSILON)

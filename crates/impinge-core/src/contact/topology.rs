@@ -1,7 +1,7 @@
 //! The topology of a closed surface: which vertices are joined by edges.
 //!
-//! A surface is closed when every edge has as many faces along it as against it; then winding numbers are
-//! whole and do not change but at faces. Several shells, and edges of more than two faces, are fine.
+//! A surface is closed when every edge has as many faces along it as against it. Winding numbers are then
+//! integers and change only at faces. Several shells, and edges of more than two faces, are fine.
 //!
 //! Cost: `O(n log n)` once per topology.
 
@@ -21,14 +21,14 @@ impl Topology {
     /// # Errors
     /// The surface is not closed; the error names an edge.
     pub fn new(body: BodyId, faces: &[[u32; 3]], n_vertices: usize) -> Result<Self, Error> {
-        // Low vertex, high vertex, direction: packed so that sorting brings an edge's faces together.
+        // Low vertex, high vertex, direction: packed so that sorting puts an edge's faces next to each other.
         let mut sides: Vec<(u64, bool)> = faces
             .par_iter()
             .flat_map_iter(|face| {
                 (0..3).filter_map(|k| {
                     let (from, to) = (face[k], face[(k + 1) % 3]);
                     let (low, high) = (from.min(to), from.max(to));
-                    // A face that names a vertex twice has one edge there and back.
+                    // A face that names a vertex twice runs along one edge, there and back.
                     (low != high).then_some((u64::from(low) << 32 | u64::from(high), from < to))
                 })
             })

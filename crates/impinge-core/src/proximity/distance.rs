@@ -1,12 +1,12 @@
 //! The smallest distance of two bodies, by branch and bound over their clusters' trees.
 //!
-//! Pairs of nodes wait in order of the distance of their boxes. The nearest one is taken: two clusters have
-//! their primitives compared, else the larger node is replaced by its children. When the next pair is farther
-//! than the best found so far, that is the answer.
+//! A queue holds pairs of nodes, nearest boxes first. The nearest pair is taken: if both are clusters, their
+//! primitives are compared, else one node is replaced by its children. When the next pair is farther than the
+//! best distance found so far, that distance is the answer.
 //!
-//! A pair of nodes is left out only if its boxes are farther apart than the best distance by more than
-//! all rounding in it, so no pair of primitives that would be as near or nearer by its own computed distance is
-//! lost, and the answer does not depend on the order of the search.
+//! A pair of nodes is skipped only if its boxes are farther apart than the best distance by more than
+//! the rounding error. So no pair of primitives is lost whose computed distance is as small or smaller, and the
+//! answer does not depend on the order of the search.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BinaryHeap, HashMap};
@@ -41,33 +41,33 @@ pub struct Distances {
     trees: HashMap<usize, Tree>,
 }
 
-/// The pair of primitives of two bodies that are nearest to each other.
+/// The nearest pair of primitives of two bodies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Nearest {
-    /// Their distance in the unit of the scene. 0 if and only if they share a point, which is decided exactly;
-    /// else rounded: computed in `f64` from two points of the primitives, so that its error is a few units
+    /// Their distance in the unit of the scene. 0 if and only if they share a point, which is decided exactly.
+    /// Otherwise rounded: it is computed in `f64` from two points of the primitives, with an error of a few units
     /// in the last place of the largest coordinate.
     pub distance: f64,
-    /// The primitive of the first body, and of the second. Of several pairs at the same computed distance it is
-    /// the lowest, by the first body's primitive and then the second's.
+    /// The primitive of the first body, and of the second. Of several pairs at the same computed distance, the
+    /// lowest by the first body's primitive and then by the second's.
     pub primitives: [u32; 2],
-    /// A point of each that is nearest to the other, rounded. None where they share points: the
-    /// geometry of that is [`contact`](crate::contact)'s.
+    /// The point of each primitive that is nearest to the other, rounded. `None` if they share points: see
+    /// [`contact`](crate::contact) for that.
     pub points: Option<[[f64; 3]; 2]>,
 }
 
 impl Distances {
-    /// Knows no body yet.
+    /// Starts with an empty cache.
     pub fn new() -> Self {
         Distances::default()
     }
 
-    /// The smallest distance of two bodies and the pair of primitives that has it; none where one of them has
-    /// no primitive. Tetrahedra are solid: a body inside one has distance 0.
+    /// The smallest distance of two bodies and the pair of primitives that has it; `None` if one body has
+    /// no primitives. Tetrahedra are solid: a body inside one has distance 0.
     ///
     /// # Errors
-    /// A body that the scene does not have, twice the same body, refused positions that were written in place.
+    /// A body that is not in the scene, the same body twice, bad positions that were written in place.
     pub fn between(
         &mut self,
         scene: &Scene,
@@ -105,7 +105,7 @@ impl Distances {
     }
 }
 
-/// Two nodes, nearest first; equal ones by number.
+/// Two nodes in the queue: nearest first, equally near ones by number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Waiting {
     squared: f64,
@@ -139,7 +139,8 @@ struct Best {
     points: Option<[Point; 2]>,
 }
 
-/// How much of the largest coordinate rounding may take from a computed distance, compared with that of the boxes.
+/// By how much, relative to the largest coordinate, rounding may make a computed distance smaller than the
+/// distance of the boxes.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
 impl Search<'_> {
@@ -163,7 +164,7 @@ impl Search<'_> {
                 self.compare(next.nodes, error, &mut best);
                 continue;
             }
-            // The higher of two nodes is opened; of two as high, the larger.
+            // The node of higher level is opened; at equal levels, the larger one.
             let [x, y] = next.nodes;
             let sizes = [0, 1].map(|side| {
                 let bounds = self.trees[side].bounds(next.nodes[side]);
@@ -230,7 +231,7 @@ impl Search<'_> {
     fn gap(&self, a: u32, b: u32, apart: f64) -> Gap {
         let [body_a, body_b] = self.bodies;
         let (a, b) = (corners(body_a, a), corners(body_b, b));
-        // Boxes that are apart hold primitives that do not meet. Their distance may underflow.
+        // Primitives in boxes that are apart do not meet. But the distance of such boxes may underflow to 0.
         if apart == 0.0 && intersect(body_a.kind(), &a, body_b.kind(), &b) {
             return Gap {
                 squared: 0.0,
@@ -247,7 +248,7 @@ impl Search<'_> {
     }
 }
 
-/// The corners of a primitive; one of fewer than four repeats its last.
+/// The corners of a primitive; one with fewer than four repeats its last.
 fn corners(body: &Body, primitive: u32) -> [Point; 4] {
     let vertices = body.elements().four_corners(primitive as usize);
     vertices.map(|vertex| body.positions().point(vertex as usize))

@@ -1,10 +1,10 @@
 //! The distance of two primitives that do not meet, in `f64`.
 //!
-//! It is the least distance of a corner of one to a face of the other and of an edge of one to an edge of the
-//! other (Ericson, *Real-Time Collision Detection*, 2005, 5.1.5 and 5.1.9). Either way two points are found, one on
-//! each primitive, and the distance is theirs; so it is never less than the true one by more than the rounding
-//! of these points, whatever becomes of the parameters that led to them. One fixed order of operations, no fused
-//! multiply-add: the same bits everywhere.
+//! It is the least distance of a corner of one to a face of the other, and of an edge of one to an edge of the
+//! other (Ericson, *Real-Time Collision Detection*, 2005, 5.1.5 and 5.1.9). Each case finds one point on each
+//! primitive, and the distance is that of the two points. So it is never less than the true distance by more than
+//! the rounding of these points, however inaccurate the parameters that led to them. One fixed order of
+//! operations, no fused multiply-add: the same bits everywhere.
 
 /// A point, or a difference of points.
 type Vector = [f64; 3];
@@ -46,7 +46,7 @@ impl Gap {
         }
     }
 
-    /// The smaller of two; the first one where they are equal.
+    /// The smaller of two; the first if they are equal.
     fn lesser(self, other: Self) -> Self {
         if other.squared < self.squared {
             other
@@ -56,7 +56,7 @@ impl Gap {
     }
 }
 
-/// 0 to 1; 0 for what is no number.
+/// Clamped to 0 to 1; 0 for NaN.
 fn part(x: f64) -> f64 {
     if x > 0.0 { x.min(1.0) } else { 0.0 }
 }
@@ -69,8 +69,8 @@ fn on_segment(p: Vector, a: Vector, b: Vector) -> Vector {
 
 /// The nearest points of a point and a triangle.
 ///
-/// Whatever rounding says about where the point's foot is, the edges are looked at too: a point of the triangle
-/// in any case.
+/// The edges are always examined too. So a point of the triangle is found even if rounding misplaces the foot of
+/// the perpendicular.
 fn point_triangle(p: Vector, [a, b, c]: [Vector; 3]) -> Gap {
     let (ab, ac, ap) = (sub(b, a), sub(c, a), sub(p, a));
     let (uu, uv, vv) = (dot(ab, ab), dot(ab, ac), dot(ac, ac));
@@ -100,12 +100,12 @@ fn segments([p, q]: [Vector; 2], [r, s]: [Vector; 2]) -> Gap {
         0.0
     };
     let second = part((b * first + g) / c);
-    // For a second point at an end, the first one anew.
+    // The second point may have been clamped to an end: find the first one for it.
     first = part((b * second - f) / a);
     Gap::of(along(p, first, d), along(r, second, e))
 }
 
-/// The features of a triangle or a tetrahedron by its corners.
+/// The features of a triangle or a tetrahedron, as corner numbers.
 struct Features {
     n_corners: usize,
     edges: &'static [[usize; 2]],
@@ -159,14 +159,13 @@ mod tests {
     use super::*;
     use impinge_scenes::Random;
 
-    /// The least distance of two triangles by minimising over a fine net of either, refined: never less than the
-    /// true one.
+    /// The least distance of two triangles by numerical minimisation: never less than the true distance.
     fn sampled(a: [Vector; 3], b: [Vector; 3]) -> f64 {
         let blend = |t: &[Vector; 3], u: f64, v: f64| {
             [0, 1, 2].map(|k| t[0][k] + u * (t[1][k] - t[0][k]) + v * (t[2][k] - t[0][k]))
         };
         let nearest = |p: Vector, t: &[Vector; 3]| {
-            // Projected gradient over barycentric coordinates, coarse to fine.
+            // Grid search over barycentric coordinates, coarse to fine.
             let (mut best, mut at) = (f64::INFINITY, (0.0, 0.0));
             let mut step = 0.25;
             for _ in 0..14 {
@@ -215,7 +214,7 @@ mod tests {
                 found.squared.sqrt() > expected - 2e-3,
                 "{found:?} {expected}"
             );
-            // Whichever comes first.
+            // The order of the two does not matter.
             let swapped = gap(&b, &a);
             assert!((swapped.squared - found.squared).abs() <= 1e-13 * found.squared);
         }

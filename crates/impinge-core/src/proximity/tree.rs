@@ -1,4 +1,4 @@
-//! Boxes over a body: those of its clusters, and of the nodes above them.
+//! The boxes of a body's clusters, and of the tree nodes above them.
 //!
 //! Clusters are found once per topology, in the pose at hand; boxes once per pose. Cost: `O(n log n)` and `O(n)`.
 
@@ -93,12 +93,12 @@ impl Tree {
         tree
     }
 
-    /// Whether it was made for the body's topology.
+    /// Whether the tree was built for the body's current topology.
     pub fn fits(&self, body: &Body) -> bool {
         self.topology_stamp == body.topology_stamp()
     }
 
-    /// Brings the boxes to the body's positions.
+    /// Recomputes the boxes if the body's positions have changed.
     pub fn refit(&mut self, body: &Body) {
         if self.positions_stamp == body.positions_stamp() {
             return;
@@ -127,7 +127,7 @@ impl Tree {
         }
     }
 
-    /// The level and number of the root; none without primitives.
+    /// The root; `None` without primitives.
     pub fn root(&self) -> Option<Node> {
         let n_levels = self.clustering.shape.n_levels();
         (n_levels > 0).then(|| Node {
@@ -140,7 +140,7 @@ impl Tree {
         &self.levels[node.level as usize][node.number as usize]
     }
 
-    /// The nodes below one that is no cluster.
+    /// The children of a node that is not a cluster.
     pub fn children(&self, node: Node) -> impl Iterator<Item = Node> + use<> {
         let children = self
             .clustering
@@ -152,7 +152,7 @@ impl Tree {
         })
     }
 
-    /// The places of a cluster's primitives, and their boxes.
+    /// The numbers of a cluster's primitives, and their boxes.
     pub fn primitives(&self, node: Node) -> impl Iterator<Item = (u32, &Box64)> {
         let first = node.number as usize * GROUP;
         let places = first..first + self.clustering.size(node.number as usize);
