@@ -1,8 +1,8 @@
 // Stage `bounds`, first kernel: the box of each cluster.
 //
 // In: unique vertices of each cluster, positions. Out: the boxes of nodes 0 .. n_clusters.
-// One workgroup a cluster; a lane takes every 64th vertex, then two steps of eight to one.
-// Cost: 12 bytes a vertex and 4 an index, each unique vertex of a cluster once.
+// One workgroup per cluster. Each lane takes every 64th vertex; then two steps reduce eight boxes to one.
+// Cost: 12 bytes per vertex and 4 per index, for each unique vertex of a cluster once.
 // Invariant: a box holds all its vertices exactly, or widened by `slack` when they were rounded.
 
 @group(0) @binding(0) var<storage, read> clusters: array<Cluster>;

@@ -1,7 +1,7 @@
-// Stage `bounds` of `Cells`: the primitives that reach another body, with their boxes.
+// Stage `bounds` of `Cells`: the primitives within their body's reach, with their boxes.
 //
-// In: clusters, corners, positions, reaches. Out: kept primitives, in any order; what does not fit is
-// counted. One workgroup a cluster, a lane a primitive. Cost: every primitive once, unless its cluster
+// In: clusters, corners, positions, reaches. Out: kept primitives, in any order; those that do not fit are
+// counted. One workgroup per cluster, one lane per primitive. Cost: every primitive once, unless its cluster
 // is out of reach.
 
 @group(0) @binding(0) var<storage, read> nodes: array<Node>;

@@ -1,10 +1,10 @@
-// Stage `bounds` of `Cells`: the box in which others may meet each body, and the region of all these.
+// Stage `bounds` of `Cells`: each body's reach, the box in which it may meet others, and the region of all reaches.
 //
-// In: boxes of bodies (roots of the forest), the tree over bodies where there is one. Out: a reach a
+// In: boxes of bodies (roots of the forest), the tree over bodies if there is one. Out: one reach per
 // body; the region, by atomic maxima of keys and of their complements.
-// One thread a body walks the tree over bodies. Cost: the nodes whose boxes meet the body's, up to a
-// limit beyond which the whole box is taken for the reach: that discards less, which is always right.
-// Reason for the discard that follows: a pair's boxes share a point, which lies in both bodies'
+// One thread per body walks the tree over bodies. Cost: the nodes whose boxes meet the body's box. Beyond a limit
+// the whole box becomes the reach: that discards less, which is always right.
+// Reason for the discard in the next kernel: the boxes of a pair share a point. It lies in both bodies'
 // boxes, so each primitive meets the intersection of the two.
 
 @group(0) @binding(0) var<storage, read> nodes: array<Node>;
@@ -14,10 +14,10 @@
 @group(0) @binding(4) var<storage, read_write> tallies: array<atomic<u32>>;
 @group(0) @binding(5) var<uniform> params: Params;
 
-// Nodes that one invocation visits at most: some drivers cut loops off after 65,536 steps.
+// The most nodes that one invocation visits: some drivers stop loops after 65,536 steps.
 const MOST_VISITS: u32 = 16384u;
 
-// What is found for one body.
+// The reach of this invocation's body, as found so far.
 var<private> found: Box;
 
 fn visit(body: u32, other: u32) {
@@ -58,7 +58,7 @@ fn main(
             visit(body, other);
         }
     } else {
-        // Eight children a level: seven wait while one is walked, and no tree over bodies has more than
+        // Eight children per level: seven wait while one is walked, and no tree over bodies has more than
         // eleven levels.
         var stack: array<u32, 88>;
         stack[0] = params.first;

@@ -1,7 +1,7 @@
-// Stage `dispatch`: pairs of clusters whose boxes meet, one level of the forest a launch.
+// Stage `dispatch`: pairs of clusters whose boxes meet, one level of the forest per launch.
 //
 // In: pairs of nodes. Out: pairs of their children that meet, to the next round's queue, and pairs
-// of clusters that meet, to the work items. One workgroup a pair, a lane a pair of children:
+// of clusters that meet, to the work items. One workgroup per pair, one lane per pair of children:
 //
 //             children of b
 //             0 1 2 3 4 5 6 7
@@ -12,7 +12,7 @@
 //
 // Cost: proportional to the pairs of nodes that meet. Reason for each discard: boxes that do not
 // overlap hold primitives that cannot meet; a gate opens only where the bodies' filters agree.
-// Invariant: every pair of clusters comes at most once. Rooms that are too small are counted.
+// Invariant: every pair of clusters comes at most once. Pairs that do not fit are counted.
 
 @group(0) @binding(0) var<storage, read> nodes: array<Node>;
 @group(0) @binding(1) var<storage, read> bodies: array<Body>;
@@ -39,7 +39,7 @@ fn child(node: Node, k: u32) -> u32 {
     return node.first_child + k;
 }
 
-// The pair of nodes that this lane looks at; with itself when there is nothing for it.
+// The pair of nodes that this lane examines; `alive` is false when it has none.
 struct Task {
     a: u32,
     b: u32,
@@ -124,7 +124,7 @@ fn main(
         if is_item {
             place += first_found;
             if place < arrayLength(&items) {
-                // Of one body's clusters the lower one comes first.
+                // The lower cluster comes first.
                 items[place] = WorkItem(min(found.a, found.b), max(found.a, found.b));
             }
         } else {

@@ -1,12 +1,12 @@
 // Stage `dispatch` of `Cells`: room for the lists of cells that matter, and their work items.
 //
 // In: cells. Out: where each list starts; a work item for every pair of groups of the list, equation (4).
-// One thread a cell. Cells with primitives of one body alone are culled, unless its self-collision
-// is asked for. Instead of a prefix sum over all cells, a workgroup reserves the room that its cells
-// need: lists then lie in any order, which nobody minds.
+// One thread per cell. Cells with primitives of only one body are culled, unless its self-collision
+// is queried. Instead of a prefix sum over all cells, a workgroup reserves the room that its cells
+// need: lists then lie in any order, which does no harm.
 //
-// Where we deviate: groups are cut from the whole list, bodies mixed, and level 2 clears partners of bodies that
-// do not meet. A cell of five primitives of one body and five of another is one work item of ten, and
+// Where we deviate from the paper: groups are cut from the whole list, bodies mixed, and level 2 clears partners of
+// bodies that do not meet. A cell of five primitives of one body and five of another is one work item of ten, and
 // no list has to be sorted.
 //
 //   groups   0   1   2          items: the upper triangle, diagonal included
@@ -23,7 +23,7 @@
 @group(0) @binding(6) var<uniform> params: Params;
 
 const NOWHERE: u32 = 0xffffffffu;
-// Work items that one invocation writes at most; a cell with more is worked in tiles.
+// The most work items that one invocation writes; a cell with more is processed in tiles.
 const MOST_ITEMS: u32 = 32768u;
 
 var<workgroup> n_wanted: atomic<u32>;
@@ -32,7 +32,7 @@ var<workgroup> n_cells: atomic<u32>;
 var<workgroup> first_wanted: u32;
 var<workgroup> first_item: u32;
 
-// Entries of the upper triangle; more than MOST_ITEMS are not counted exactly.
+// The number of entries in the upper triangle; numbers above MOST_ITEMS may not be exact.
 fn count_items(groups: u32) -> u32 {
     if groups > MOST_ITEMS {
         return MOST_ITEMS + 1u;

@@ -1,7 +1,7 @@
 // Stage `dispatch` of `Cells`, second kernel: fills the lists of the cells that have one.
 //
-// In: kept primitives, where lists start. Out: entries, numbers of kept primitives, in any order.
-// One thread a kept primitive. Counts run down to hand out places.
+// In: kept primitives, where lists start. Out: entries, which are numbers of kept primitives, in any order.
+// One thread per kept primitive. Counts run down to hand out places.
 
 @group(0) @binding(0) var<storage, read> grid: array<Grid>;
 @group(0) @binding(1) var<storage, read> kept: array<Kept>;

@@ -1,11 +1,11 @@
 // Stage `dispatch` of `Cells` for a crowded cell, whose list an earlier pass has filled: the work items of
 // one tile of the product of its groups, equation (4).
 //
-// In: the number of entries of the list, which begins at entry 0. Out: work items. One thread a pair of groups.
+// In: the number of entries of the list, which begins at entry 0. Out: work items. One thread per pair of groups.
 // Invariant: nothing writes the list between the passes over its tiles, so every pair of entries comes up once.
 //
-//   groups   0   1   2   3      tiles of side 2: (0, 0), (0, 2), (2, 2); of each the part
-//      0     x   x | x   x      on and above the diagonal
+//   groups   0   1   2   3      tiles of side 2: (0, 0), (0, 2), (2, 2); each without its part
+//      0     x   x | x   x      below the diagonal
 //      1         x | x   x
 //           -------+-------
 //      2           | x   x

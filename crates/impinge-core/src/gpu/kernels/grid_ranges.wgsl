@@ -1,10 +1,10 @@
 // Stage `grid`, second kernel: fine cell ranges, equation (3) at four times the resolution.
 //
 // In: kept primitives, the grid. Out: their ranges; entries of the cell lists for every shift.
-// One thread a kept primitive.
-// Invariant: boxes that overlap have ranges that overlap. Reading a coordinate as a number of cells is
-// wrong by less than 2^-4 cells (65,536 cells, four roundings), in whichever way the compiler
-// arranges it; low ends move down and high ends up by a quarter of a cell before they are floored.
+// One thread per kept primitive.
+// Invariant: boxes that overlap have ranges that overlap. A coordinate in units of cells is
+// wrong by less than 2^-4 cells (65,536 cells, four roundings), however the compiler
+// arranges the operations; low ends move down and high ends up by a quarter of a cell before they are floored.
 
 @group(0) @binding(0) var<storage, read> grid: array<Grid>;
 @group(0) @binding(1) var<storage, read_write> kept: array<Kept>;
@@ -12,7 +12,7 @@
 @group(0) @binding(3) var<storage, read_write> tallies: array<atomic<u32>>;
 
 const MARGIN: f32 = 0.25;
-// Cells that one invocation walks over at most: see `next_cell`.
+// The most cells that one invocation may walk over: see `next_cell`.
 const MOST_TOUCHED: u32 = 32768u;
 
 var<workgroup> n_entries: array<atomic<u32>, 15>;

@@ -4,9 +4,9 @@
 //
 // In: the region, the number N of primitives kept. Out: the grid, and arguments for dispatches over kept
 // primitives. Cost: one thread.
-// Where the region is so thin along an axis that this asks for less than one cell, the axis gets
-// one and the cells are shared out over the others: a flat cloth, with V = 0, is a grid of squares.
-// The answer does not depend on the resolution, so plain floats will do.
+// Where the region is so thin along an axis that the equation gives less than one cell, the axis gets
+// one cell and the others share the cells: a flat cloth, with V = 0, gets a grid of squares.
+// The answer does not depend on the resolution, so plain floats are enough.
 
 @group(0) @binding(0) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(1) var<storage, read_write> tallies: array<atomic<u32>>;
@@ -45,7 +45,7 @@ fn main() {
         if all(cells >= vec3<f32>(1.0)) {
             break;
         }
-        // One axis a time, the first that is too thin.
+        // One axis at a time: the first that is too thin.
         if cells.x < 1.0 {
             is_along.x = false;
         } else if cells.y < 1.0 {
@@ -56,7 +56,7 @@ fn main() {
         cells = max(cells, vec3<f32>(1.0));
     }
     var finest = vec3<u32>(clamp(cells, vec3<f32>(1.0), vec3<f32>(MOST_ALONG)));
-    // Logarithms are not exact; the array of cells is.
+    // Logarithms are not exact, but the number of cells must fit exactly.
     while finest.x * finest.y > params.most_cells
         || finest.x * finest.y > params.most_cells / finest.z {
         finest = max(finest / 2u, vec3<u32>(1u));

@@ -1,11 +1,11 @@
 // Stage `narrow`: the filter with three answers.
 //
-// In: candidates. Out: keys of pairs that certainly intersect, keys of pairs that are left to exact
-// arithmetic. One thread a candidate. Cost: 32 bytes of corners and 72 (96) of positions read.
+// In: candidates. Out: keys of pairs that certainly intersect, and keys of unsure pairs for exact arithmetic
+// on the host. One thread per candidate. Cost: 32 bytes of corners and 72 (96) of positions read.
 // Invariant: yes and no are proofs, whatever the device's rounding (`docs/exactness.md`).
 //
 // A triangle's fourth corner repeats its third. `WITH_SOLIDS` is false when no body has
-// tetrahedra, which keeps that code, and the registers it wants, out of the pipeline.
+// tetrahedra, which keeps the code for them, and the registers it needs, out of the pipeline.
 
 override WITH_SOLIDS: bool = true;
 
@@ -43,7 +43,7 @@ fn settle(candidate: Candidate) -> i32 {
     let b1 = vertex_bits(b.y);
     let b2 = vertex_bits(b.z);
     let b3 = vertex_bits(b.w);
-    // Looked at as integers: infinities never reach the arithmetic.
+    // Compared as integers: infinities never reach the arithmetic.
     let of_a = max(max(magnitude(a0), magnitude(a1)), max(magnitude(a2), magnitude(a3)));
     let of_b = max(max(magnitude(b0), magnitude(b1)), max(magnitude(b2), magnitude(b3)));
     let of_both = max(of_a, of_b);

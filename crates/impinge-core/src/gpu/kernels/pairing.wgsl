@@ -1,21 +1,21 @@
 // Stage `pairing`: which primitives of two clusters have boxes that meet.
 //
-// In: work items. Out: candidates. One workgroup of 64 a work item:
+// In: work items. Out: candidates. One workgroup of 64 per work item:
 //
-// 1. Each lane boxes one primitive of either cluster; those outside the intersection of the two
-//    clusters' boxes drop out, for a partner's box lies in its cluster's box.
-// 2. Lanes take the side with more survivors and walk over the survivors of the other: one 64-bit
-//    mask a primitive, bit j for partner j, as two words:
+// 1. Each lane computes the box of one primitive of each cluster. Primitives outside the intersection of the
+//    two clusters' boxes drop out, for a partner's box lies in its cluster's box.
+// 2. Lanes take the side with more survivors and walk over the survivors of the other side: one 64-bit
+//    mask per primitive, bit j for partner j, as two words:
 //
 //       mask.x  bits 0..31  partners  0..31
 //       mask.y  bits 0..31  partners 32..63
 //
-// 3. Within one body, partners that share a vertex id are cleared, or marked for exact arithmetic
-//    when they are to be resolved. The ids are in workgroup memory; comparing them costs less
-//    than reading adjacency masks would, and needs no case for vertices with many primitives.
-// 4. One atomic a workgroup reserves room; what does not fit is counted.
+// 3. Within one body, partners that share a vertex id are cleared, or marked as neighbours if they are
+//    to be resolved. The ids are in workgroup memory; comparing them costs less
+//    than reading adjacency masks would, and needs no special case for vertices with many primitives.
+// 4. One atomic per workgroup reserves room; candidates that do not fit are counted.
 //
-// Cost: 128 primitives read, min(survivors) steps of one box test a lane.
+// Cost: 128 primitives read, min(survivors) steps of one box test per lane.
 // Invariant: a pair of primitives lies in one work item only, so no candidate comes twice.
 
 @group(0) @binding(0) var<storage, read> nodes: array<Node>;
@@ -36,7 +36,7 @@ var<workgroup> survivors: array<atomic<u32>, 4>;
 var<workgroup> n_found: atomic<u32>;
 var<workgroup> first_found: u32;
 
-// Boxes a primitive into its entry; false when there is none or its box misses `both`.
+// Stores a primitive's box in its entry; false if there is no primitive or its box misses `both`.
 fn load(cluster: Cluster, lane: u32, entry: u32, both: Box) -> bool {
     if lane >= (cluster.sizes & 0xffffu) {
         return false;
@@ -49,7 +49,7 @@ fn load(cluster: Cluster, lane: u32, entry: u32, both: Box) -> bool {
     return overlap(own, both);
 }
 
-// Puts candidates of the lane's primitive and the partners in one word of its mask.
+// Writes candidates: the lane's primitive with each partner in one word of its mask.
 fn put(mask: u32, first_partner: u32, mine: u32, flags: vec2<u32>, swap: bool, room: u32) -> u32 {
     var rest = mask;
     var at = room;
@@ -99,7 +99,7 @@ fn main(
     let alive_b = vec2<u32>(atomicLoad(&survivors[2]), atomicLoad(&survivors[3]));
     let count_a = countOneBits(alive_a.x) + countOneBits(alive_a.y);
     let count_b = countOneBits(alive_b.x) + countOneBits(alive_b.y);
-    // Lanes hold the larger side; the smaller one is walked over.
+    // Lanes hold the larger side and walk over the smaller one.
     let swap = count_a < count_b;
     let lanes = select(alive_a, alive_b, swap);
     var walked = select(alive_b, alive_a, swap);
@@ -111,7 +111,7 @@ fn main(
     var shared_ids = vec2<u32>(0u);
     if alive {
         if item.a == item.b {
-            // Each pair once: partners after the lane.
+            // A cluster with itself: only partners after the lane, so that each pair comes once.
             let after = select(vec2<u32>(~((bit << 1u) - 1u), 0xffffffffu),
                 vec2<u32>(0u, ~((bit << 1u) - 1u)), lane >= 32u);
             walked &= after;

@@ -1,4 +1,4 @@
-// Stage `pairing` of `Cells`: the paper's second level. One workgroup of 64 a work item.
+// Stage `pairing` of `Cells`: the paper's second level. One workgroup of 64 per work item.
 //
 // 1. Each lane writes the occupancy of one primitive of group b: bit x + 4 y + 16 z for sub-cell (x, y, z):
 //
@@ -15,7 +15,7 @@
 // 3. The partners of a primitive of group a are the OR of the memberships of its own sub-cells.
 // 4. Partners whose boxes do not meet, whose bodies do not meet, or which another cell owns are cleared.
 //    The owner of a pair is the cell with max(low_a, low_b): exact, and without the paper's hash table.
-// 5. One atomic a workgroup reserves room for candidates; what does not fit is counted.
+// 5. One atomic per workgroup reserves room for candidates; those that do not fit are counted.
 //
 // Source: "Real-time Collision Detection with Two-level Spatial Hashing on GPU", section 3.2.
 // Reasons for each discard: primitives without a common sub-cell have ranges, and so boxes, that do
@@ -37,7 +37,7 @@ var<workgroup> membership: array<vec2<u32>, 64>;
 var<workgroup> n_found: atomic<u32>;
 var<workgroup> first_found: u32;
 
-// Sub-cells of one axis that a range touches, four bits.
+// The sub-cells along one axis that a range touches, as four bits.
 fn along(range: u32, cell: u32) -> u32 {
     let first = 4u * cell;
     let low = max(range & 0xffffu, first) - first;
@@ -71,7 +71,7 @@ fn is_owner(cell: vec3<u32>, a: vec3<u32>, b: vec3<u32>) -> bool {
     return all(low >> vec3<u32>(2u) == cell);
 }
 
-// Partners of one word of a mask that stay, and those that share a vertex.
+// Of the partners in one word of a mask: those that stay, and those that share a vertex and are to be resolved.
 fn settle_partners(partners: u32, first: u32, own: Kept, cell: vec3<u32>) -> vec2<u32> {
     var rest = partners;
     var stay = vec2<u32>(0u);
@@ -154,7 +154,7 @@ fn main(
             partners |= membership[32u + firstTrailingBit(rest)];
         }
         if item.first_a == item.first_b {
-            // Each pair once: partners after the lane.
+            // A group with itself: only partners after the lane, so that each pair comes once.
             let after = ~(((1u << (lane & 31u)) << 1u) - 1u);
             partners &= select(vec2<u32>(after, 0xffffffffu), vec2<u32>(0u, after), lane >= 32u);
         }

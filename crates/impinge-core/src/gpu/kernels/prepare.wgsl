@@ -1,4 +1,4 @@
-// Between stages: turns a counter into the arguments of the next, indirect, dispatch.
+// Between stages: turns a counter into the arguments of the next dispatch, an indirect one.
 //
 // In: one counter. Out: workgroups in x and y, neither above 32,768, for the elements that fitted.
 // Cost: one thread.

@@ -1,4 +1,4 @@
-// Workgroups of the next, indirect, dispatch: rows of at most WIDEST.
+// Workgroups of the next dispatch, an indirect one: rows of at most WIDEST.
 const WIDEST: u32 = 32768u;
 
 fn arguments_for(n: u32, per_group: u32) -> Arguments {

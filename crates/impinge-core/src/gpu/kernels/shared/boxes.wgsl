@@ -3,8 +3,8 @@
 //   sign 0   1 b30 … b0       (set the sign bit)
 //   sign 1   ~b31 … ~b0       (flip everything)        -0 is taken as +0
 //
-// Integers are exact on every device: no flushing of subnormals, no rounding, no NaN. Two keys more
-// or less are at least one f32 more or less (the key of -0 is never used, hence two).
+// Integers are exact on every device: no flushing of subnormals, no rounding, no NaN. Moving by two keys moves
+// by at least one f32 (the key of -0 is never used, hence two).
 
 fn key(bits: u32) -> u32 {
     let canonical = select(bits, 0u, bits == FLAG);

@@ -13,8 +13,8 @@ fn n_touched(touched: Coarse) -> u32 {
     return along.x * along.y * along.z;
 }
 
-// The cell after this one. One loop steps through all three axes: some drivers cut an invocation off
-// after 65,536 steps of its loops, and nested loops of unequal lanes add up.
+// The cell after this one. One loop steps through all three axes: some drivers stop an invocation
+// after 65,536 loop steps, and nested loops of lanes with different counts add up.
 fn next_cell(cell: vec3<u32>, touched: Coarse) -> vec3<u32> {
     var next = cell + vec3<u32>(1u, 0u, 0u);
     if next.x > touched.last.x {

@@ -1,9 +1,9 @@
-// The floating-point filter: signs of determinants that are certain, or no sign at all.
+// The floating-point filter: the sign of a determinant where it is certain, else 0.
 //
 // Constants, bounds and their proof: `docs/exactness.md`, "The GPU filter". They hold under any
 // rounding direction, contraction and reassociation, with subnormals flushed or kept. The one
 // determinant is (d x e) . f, where d, e, f are differences of input points, never of differences.
-// Positions that the host has rounded from f64 widen each size by `slack`.
+// For positions that the host has rounded from f64, each size grows by `slack`.
 
 const BOUND: f32 = 0x1p-16f;
 const SMALLEST: f32 = 0x1p-32f;

@@ -1,4 +1,4 @@
-// What crosses the line between host and device. The Rust twins are in `gpu/layout.rs`; a test
+// The data that host and device exchange. The Rust twins are in `gpu/layout.rs`; a test
 // parses this file and compares sizes, offsets and constants.
 
 // A node of the forest: a box in ordered keys (see boxes.wgsl) and where its children are.
@@ -8,8 +8,8 @@
 //         |       0       | gate |  height  | children |
 //         +---------------+------+----------+----------+
 //
-// Height 0: a cluster, `first_child` is its number. Gate: the door to a body, `first_child` is the
-// body's number and the only child is the body's root. Else: children are neighbours.
+// Height 0: a cluster; `first_child` is its number. Gate: the entrance to a body; `first_child` is the
+// body's number and the only child is the body's root. Else: children have consecutive numbers.
 struct Node {
     low: vec3<u32>,
     first_child: u32,
@@ -23,7 +23,7 @@ const GATE: u32 = 0x1000u;
 // The nodes of one height.
 struct Level { first: u32, count: u32 }
 
-// One participant. `slack`: how many keys its boxes are widened, for rounded positions.
+// One participant. `slack`: by how many keys its boxes are widened, for rounded positions.
 struct Body {
     root: u32,
     slack: u32,
@@ -56,12 +56,12 @@ struct Candidate { a: u32, b: u32 }
 struct PairKey { low: u32, high: u32 }
 struct UnsureKey { low: u32, high: u32 }
 
-// What one dispatch is told.
+// Parameters of one dispatch.
 struct Params {
     // bounds: the nodes or levels to refit. dispatch: the round.
     first: u32,
     count: u32,
-    // prepare: the counter to read, elements a workgroup, the most there are, where arguments go.
+    // prepare: the counter to read, elements per workgroup, the most elements, the slot for the arguments.
     counter: u32,
     per_group: u32,
     capacity: u32,
@@ -70,14 +70,14 @@ struct Params {
     n_ignored: u32,
     // 1 when pairs that share a vertex are resolved, 0 when they are left out.
     resolve: u32,
-    // Cells: primitives a group, cells a primitive (bits of an f32), most cells there is room for.
+    // Cells: primitives per group, cells per primitive (bits of an f32), the most cells there is room for.
     group_size: u32,
     lambda: u32,
     most_cells: u32,
-    // Methods from outside: 1 when a pair is tested by one of its cells alone.
+    // Methods of other crates: 1 when only the cell that owns a pair tests it.
     owner_rule: u32,
-    // Cells: 1 when lists are filled and nothing is listed as work. Of the one cell whose lists are there:
-    // its entries, and the tile of the product of its groups.
+    // Cells: 1 when lists are filled but no work items are made. Then, for one cell at a time: its entries, and
+    // the tile of the product of its groups.
     lists_only: u32,
     n_entries: u32,
     tile_row: u32,
@@ -85,7 +85,7 @@ struct Params {
     tile_side: u32,
 }
 
-// A primitive that reaches another body: its box, its place (bit 31: rounded), its body, and the
+// A primitive within its body's reach: its box, its place (bit 31: rounded), its body, and the
 // fine cells that it touches:
 //
 //   range.x  31       16 15        0
@@ -101,13 +101,13 @@ struct Kept {
     unused: u32,
 }
 
-// Where others may meet a body.
+// The box in which a body may meet others.
 struct Reach {
     low: vec3<u32>,
     high: vec3<u32>,
 }
 
-// The grid. Fine cells are four a coarse cell and axis; `shift` halvings make all of them coarser.
+// The grid. A coarse cell has four fine cells along each axis; `shift` halvings make all of them coarser.
 struct Grid {
     origin: vec3<f32>,
     shift: u32,
@@ -120,7 +120,7 @@ struct Grid {
     unused_too: u32,
 }
 
-// A coarse cell: entries, the highest body with one, and the highest complement (of the lowest).
+// A coarse cell: the number of entries, the highest body with an entry, and the complement of the lowest.
 struct Cell {
     n_entries: atomic<u32>,
     highest: atomic<u32>,
@@ -143,7 +143,7 @@ struct CellItem {
 // Workgroups of an indirect dispatch.
 struct Arguments { x: u32, y: u32, z: u32 }
 
-// Counters: how much was needed, whether it fitted or not.
+// Counters: how much was needed, even if it did not fit.
 const ROUNDS: u32 = 32u;
 const N_ITEMS: u32 = 32u;
 const N_CANDIDATES: u32 = 33u;
@@ -153,13 +153,13 @@ const TOO_MUCH: u32 = 36u;
 const N_KEPT: u32 = 37u;
 const N_ENTRIES: u32 = 38u;
 const N_SUBDIVIDED: u32 = 39u;
-// Low and high word, of methods that count them.
+// Low and high word; only some methods count box tests.
 const N_BOX_TESTS: u32 = 40u;
 const N_BOX_TESTS_HIGH: u32 = 41u;
 const N_COUNTERS: u32 = 42u;
 
-// Tallies: the region (three complements of its low end, three of its high end), then entries of the cell
-// lists for every shift, two words each, and a bit for each shift that is too fine.
+// Tallies: the region (three complements of its low end, then its high end), then the entries of the cell lists
+// for every shift, two words each, then a bit for each shift that is too fine.
 const ENTRIES_BY_SHIFT: u32 = 6u;
 const SHIFTS_TOO_FINE: u32 = 36u;
 const SHIFTS: u32 = 15u;

@@ -1,4 +1,4 @@
-// Whether two bodies meet: their filters agree and nobody asked to leave them out. The list of
+// Whether two bodies meet: their filters agree and the query does not ignore the pair. The list of
 // ignored pairs is sorted, lower body first.
 
 fn is_ignored(a: u32, b: u32) -> bool {

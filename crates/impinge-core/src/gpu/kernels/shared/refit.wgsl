@@ -1,4 +1,4 @@
-// The box of an inner node or gate from those of its children.
+// Computes the box of an inner node or gate from the boxes of its children.
 fn refit(node_ix: u32) {
     let node = nodes[node_ix];
     var first = node.first_child;

@@ -1,4 +1,4 @@
-// Takes room for `n` elements from a counter. A counter that passes 2^32 says so.
+// Takes room for `n` elements from a counter. A counter that wraps around at 2^32 sets `TOO_MUCH`.
 fn reserve(counter: u32, n: u32) -> u32 {
     if n == 0u {
         return 0u;

@@ -1,6 +1,6 @@
-// A tetrahedron against a tetrahedron or a triangle, the same steps as `exact::filter` on the CPU.
+// A tetrahedron against a tetrahedron or a triangle, in the same steps as `exact::filter` on the CPU.
 //
-// A solid is four points; a triangle repeats its last one and has one face and three edges.
+// A solid is four points. A triangle repeats its last point and has one face and three edges.
 //
 // Yes: a vertex certainly inside, or an edge that certainly crosses a face. No: a face with all of
 // the other certainly on its outer side; or all edges certainly miss all faces, so that the
@@ -11,13 +11,14 @@ struct Solid {
     is_triangle: bool,
 }
 
-// Where the points of one solid lie by the faces of the other: 1 inside, -1 outside, 0 unsure. By a
-// triangle: above and below.
+// Where the points of one solid lie relative to each face of the other: 1 inside, -1 outside, 0 unsure.
+// If the other is a triangle: 1 above, -1 below, 0 unsure.
 struct Sides {
     faces: array<vec4<i32>, 4>,
 }
 
-// Vertices of face k of a tetrahedron, counterclockwise as seen from vertex k when it is upright.
+// The vertices of face k of a tetrahedron, counterclockwise as seen from vertex k if the tetrahedron is
+// positively oriented.
 fn face(k: u32) -> vec3<u32> {
     switch k {
         case 0u: { return vec3<u32>(1u, 3u, 2u); }
@@ -39,7 +40,7 @@ fn edge(k: u32) -> vec2<u32> {
     }
 }
 
-// The first face to look at: of a triangle only the last, of vertices 0, 1, 2.
+// The first face to examine: a triangle has only the last, which has vertices 0, 1, 2.
 fn first_face(solid: ptr<function, Solid>) -> u32 {
     return select(0u, 3u, (*solid).is_triangle);
 }

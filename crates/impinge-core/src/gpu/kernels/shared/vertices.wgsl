@@ -1,4 +1,4 @@
-// Vertices as keys. Positions are three words a vertex, the bits of x, y, z.
+// Vertices as keys. Positions are three words per vertex: the bits of x, y, z.
 
 fn vertex_key(vertex: u32) -> vec3<u32> {
     let word = 3u * vertex;
