@@ -10,7 +10,7 @@ struct Counting;
 
 static N_ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
 
-// SAFETY: everything is passed on to the system's allocator.
+// SAFETY: all calls go on to the system's allocator.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         N_ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
@@ -58,7 +58,7 @@ fn steady_frames_allocate_nothing() {
                 let before = N_ALLOCATIONS.load(Ordering::Relaxed);
                 n_pairs = detector.detect(&scene, &query).unwrap().len();
                 let allocated = N_ALLOCATIONS.load(Ordering::Relaxed) - before;
-                // Two poses take turns: after one of each, everything has its size.
+                // Two poses alternate: after one frame in each, all buffers have their final size.
                 assert!(
                     frame < 3 || allocated == 0,
                     "{method:?} frame {frame}: {allocated}"

@@ -1,6 +1,6 @@
-//! Real meshes against answers that were not made by this project: pair lists of CGAL's exact kernel,
-//! published self-intersections, the oracle on frames of a sequence. Without the data folder
-//! (`../shared/data` or `$IMPINGE_DATA`) they fail, unless `IMPINGE_NO_DATA=1` says that it may be absent.
+//! Real meshes against answers from elsewhere: pair lists of CGAL's exact kernel and published
+//! self-intersections; and against the oracle, on frames of a sequence. Without the data folder
+//! (`../shared/data` or `$IMPINGE_DATA`) these tests fail, unless `IMPINGE_NO_DATA=1` is set.
 
 mod common;
 #[path = "common/published.rs"]
@@ -20,7 +20,7 @@ fn file(path: &str) -> Option<PathBuf> {
     impinge_scenes::data::test_file(path)
 }
 
-/// A detector of each method and backend. Without an adapter that of the GPU fails.
+/// One detector per method and backend. Without a GPU adapter this fails.
 fn detectors() -> Vec<Detector> {
     let mut detectors = Vec::new();
     for backend in [Backend::Cpu, Backend::Gpu] {
@@ -235,7 +235,7 @@ fn published_triangle_pairs_are_answered_as_bodies() {
     }
 }
 
-/// A body a triangle. Each meets its partner, and one in 64 of the others as well.
+/// One body per triangle. By the filters, each meets its partner and one in 64 of the other bodies.
 fn side_by_side(cases: &[Published]) -> Case {
     let mut scene = Scene::new();
     for (ix, case) in cases.iter().enumerate() {

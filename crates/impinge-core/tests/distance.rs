@@ -1,4 +1,4 @@
-//! Distances of bodies against every pair, and what must hold of them.
+//! Distances of bodies: compared with every pair of primitives, and their properties.
 
 use impinge_core::proximity::{Distances, Nearest};
 use impinge_core::{Backend, BodyId, Detector, Query, Scene};
@@ -31,7 +31,7 @@ fn alone(model: &Model, primitive: usize) -> Model {
     }
 }
 
-/// The search finds what comparing all pairs one by one finds: the same distance to the last bit, and the
+/// The search finds the same as comparing all pairs one by one: the same distance to the last bit, and the
 /// lowest pair that has it.
 #[test]
 fn the_search_loses_nothing() {
@@ -77,7 +77,7 @@ fn known_distances() {
     assert!((found.distance - 2.0).abs() < 5e-3, "{found:?}");
     let [p, q] = found.points.unwrap();
     assert!((q[0] - p[0] - found.distance).abs() < 1e-3);
-    // A solid holds what is inside it, a surface does not.
+    // A body inside a solid has distance 0 from it, but not from a surface.
     let small = surfaces::ball(100).scaled(0.1);
     assert_eq!(
         nearest(
@@ -89,12 +89,12 @@ fn known_distances() {
     );
     let inside = nearest(&surfaces::cube([0.0; 3], 1.0), &small);
     assert!((inside.distance - 0.45).abs() < 1e-2, "{inside:?}");
-    // Whichever comes first.
+    // With the bodies swapped.
     let back = nearest(&ball.translated([3.0, 0.0, 0.0]), &ball);
     assert!((back.distance - found.distance).abs() < 1e-12);
 }
 
-/// Zero if and only if the detector finds a pair; then it is that pair.
+/// The distance is zero if and only if the detector finds a pair; the pair is then one of the detector's.
 #[test]
 fn zero_means_that_they_touch() {
     let a = surfaces::bumpy_ball(1_500, 0.2);
@@ -124,7 +124,7 @@ fn zero_means_that_they_touch() {
         }
     }
     assert!(n_touching > 5 && n_apart > 5, "{n_touching} {n_apart}");
-    // A hair's breadth.
+    // Apart by the smallest possible gap.
     let cube = surfaces::cube([0.0; 3], 1.0);
     let beside = cube.mapped(|[x, y, z]| [x + 1.0, y, z]);
     assert_eq!(nearest(&cube, &beside).distance, 0.0);

@@ -1,10 +1,10 @@
-//! One answer, pinned: the same hash for every method and for 1 to 16 threads, on every machine. The scene's coordinates
-//! come from integers and sums alone, so they are the same bits everywhere.
+//! Pinned answers: the same hash for every method and for 1 to 16 threads, on every machine. The scene's coordinates
+//! come from integers and sums alone, so they have the same bits everywhere.
 
 use impinge_core::{Backend, Detector, Method, Query, Scene, Settings};
 use impinge_scenes::soup;
 
-/// How many pairs there are, and their hash. A change of these numbers is a change of the answer.
+/// The number of pairs, and their hash. If these numbers change, the answer has changed.
 const GOLDEN: [(&str, usize, u64); 3] = [
     ("triangles", 67_174, 0xbfa1_3f0d_7168_8c03),
     ("lattice", 51_993, 0x088f_ae75_8617_32b1),
@@ -45,7 +45,7 @@ fn the_hash_is_the_same_for_1_to_16_threads() {
                     ..Settings::default()
                 })
                 .unwrap();
-                // A second frame finds caches filled and helpers awake; positions are written again for it.
+                // The second frame finds caches filled and helpers awake; positions are written again before it.
                 for frame in 0..2 {
                     let pairs = detector.detect(&scene, &Query::everything()).unwrap();
                     assert_eq!(

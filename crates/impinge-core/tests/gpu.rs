@@ -17,7 +17,7 @@ use impinge_scenes::deform::{self, Deform};
 use impinge_scenes::{soup, surfaces};
 
 /// Settings for the GPU. The first call opens a device and keeps it open, so that all tests share
-/// it and its compiled kernels.
+/// the device and its compiled kernels.
 fn gpu(method: Method) -> Settings {
     static OPEN: OnceLock<Mutex<Detector>> = OnceLock::new();
     OPEN.get_or_init(|| {
@@ -68,7 +68,7 @@ fn cells_agree_with_the_oracle() {
     }
 }
 
-/// Buffers of one scene are used again for the next, which may need more or less of them, and other
+/// The buffers of one scene are reused for the next, which may need larger or smaller ones, and other
 /// kernels.
 #[test]
 fn one_detector_answers_scene_after_scene() {
@@ -88,7 +88,7 @@ fn one_detector_answers_scene_after_scene() {
     }
 }
 
-/// Settings of `Cells` that put everything into one cell, in groups of a few.
+/// Settings of `Cells` that put everything into one cell, in small groups.
 fn one_cell(group_size: u32) -> Settings {
     Settings {
         lambda: 1e-9,
@@ -99,7 +99,7 @@ fn one_cell(group_size: u32) -> Settings {
 
 #[test]
 fn a_crowded_cell_is_worked_in_tiles() {
-    // Groups of one primitive: more pairs of groups than a pass lists of one cell.
+    // Groups of one primitive: more pairs of groups than one pass lists for one cell.
     let soup = soup::triangles(300, 0.4, 11);
     let web = soup::lattice_web(290, 4, 9);
     let mut scene = Scene::new();
@@ -128,7 +128,7 @@ fn a_crowded_cell_is_worked_in_tiles() {
         assert_eq!(stats.n_work_items, n * (n + 1) / 2);
         assert!(stats.n_slabs > 1, "{stats:?}");
     }
-    // Buffers that grow between tiles leave the list alone.
+    // Buffers that grow between tiles must not change the list.
     let mut tiny = Capacities::default();
     (tiny.items, tiny.candidates, tiny.pairs, tiny.unsure) = (1, 1, 1, 1);
     (tiny.kept, tiny.entries) = (1, 1);
@@ -165,7 +165,7 @@ fn a_crowded_cell_keeps_to_the_budget_or_is_left_to_clusters() {
         assert_eq!(stats.method, method, "{budget:?} {stats:?}");
         assert!(stats.bytes_held <= budget.unwrap_or(u64::MAX), "{stats:?}");
         assert!(stats.n_slabs > 1, "{stats:?}");
-        // A frame with less in it goes back to the method that was asked for.
+        // A smaller frame uses the requested method again.
         let mut small = Scene::new();
         let id = soup::triangles(50, 0.4, 1).add_to(&mut small).unwrap();
         let pairs = detector.detect(&small, &Query::within(id)).unwrap();
@@ -173,7 +173,7 @@ fn a_crowded_cell_keeps_to_the_budget_or_is_left_to_clusters() {
     }
 }
 
-/// 2,000 primitives a body, enough for several rounds and thousands of pairs.
+/// 2,000 primitives per body, enough for several rounds and thousands of pairs.
 fn large() -> Case {
     let mut scene = Scene::new();
     let knot = surfaces::torus_knot(4000, Default::default());
@@ -222,7 +222,7 @@ fn buffers_that_overflow_grow_and_nothing_is_lost() {
                 let pairs = detector.detect(&case.scene, &case.query).unwrap();
                 pairs.stats().n_reruns
             };
-            // Once grown it stays so, and the first frame had to, if the method has this stage.
+            // A grown buffer stays grown. The first frame had to grow it, if the method has this stage.
             assert_eq!(reruns(&mut detector), 0, "{method:?} {stage}");
             let mut again = Detector::with_capacities(settings.clone(), capacities).unwrap();
             let is_there = match stage {
@@ -291,7 +291,7 @@ fn what_is_more_than_the_device_binds_is_answered_in_pieces() {
     for (ix, case) in cases().into_iter().enumerate() {
         let expected = naive(&case);
         let method = [Method::Clusters, Method::Cells][ix % 2];
-        // A cluster takes up to 3 KiB of positions.
+        // The positions of one cluster take up to 3 KiB.
         for most_bound in [1, 8 << 10, 20 << 10] {
             let mut detector = Detector::with_most_bound(gpu(method), most_bound).unwrap();
             assert_agree("in pieces", &expected, &mut detector, &case);
@@ -379,7 +379,7 @@ fn pieces_keep_to_filters_ignored_pairs_and_frames() {
         scene.set_positions(a, &moved.positions).unwrap();
     }
     assert!(sizes.len() > 6, "{sizes:?}");
-    // A scene that fits is answered at once again, and one that does not in pieces again.
+    // A scene that fits is again answered in one piece, and one that does not is again answered in several.
     let small = cases().swap_remove(4);
     let expected = naive(&small);
     for detector in &mut detectors {
@@ -424,7 +424,7 @@ fn few_pairs_are_left_to_exact_arithmetic() {
     assert!(!stats.backend.is_empty() && stats.backend != "cpu");
 }
 
-/// Triangles over a few vertices: nearly all share one with many others, some two or three.
+/// Triangles over a few vertices: nearly all share one vertex with many others, and some share two or three.
 fn web(n: u32, n_vertices: u32, seed: u64) -> impinge_scenes::Model {
     let mut state = seed;
     let mut next = |below: u32| {
@@ -505,7 +505,7 @@ fn adapters_are_listed_and_chosen_by_name() {
     let error = Detector::with_settings(nobody.clone()).err().unwrap();
     assert!(matches!(error, Error::NoAdapter { .. }), "{error}");
     assert!(error.to_string().contains(&all[0].name), "{error}");
-    // Auto is quiet about it and takes the CPU.
+    // `Backend::Auto` falls back to the CPU without an error.
     let mut auto = Detector::with_settings(Settings {
         backend: Backend::Auto,
         ..nobody
@@ -541,7 +541,7 @@ fn frames_follow_positions_bodies_and_precision() {
         .set_positions(b, &ball.translated([0.7, 0.1, 0.0]).positions)
         .unwrap();
     assert_ne!(compare(&scene, Query::all()), first);
-    // Positions that only f64 can hold: touching, and apart by less than f32 can tell.
+    // Positions that only f64 can hold: touching, and apart or overlapping by less than f32 resolves.
     let apart = |gap: f64| {
         let (_, max) = ball.bounds().unwrap();
         let shift = 2.0 * f64::from(max[0]) + gap;
@@ -568,7 +568,7 @@ fn topology_that_changes_within_its_room_is_bound_anew() {
         let mut scene = Scene::new();
         let a = surfaces::ball(100).add_to(&mut scene).unwrap();
         let b = surfaces::ball(100).add_to(&mut scene).unwrap();
-        // Larger, larger within the quarter to spare, smaller and solid.
+        // Larger; much larger; slightly larger, within the spare quarter of the buffers; smaller and solid.
         let solids = soup::tetrahedra(500, 0.3, 1);
         for model in [
             surfaces::ball(1000),
@@ -634,7 +634,7 @@ fn bodies_that_flow_away_are_clustered_again() {
     assert_eq!(by_auto.stats().n_reclustered, 1);
     assert_eq!(by_never.stats().n_reclustered, 0);
     assert!(by_auto.stats().n_work_items < by_never.stats().n_work_items);
-    // The next frame has nothing to repair.
+    // The next frame has nothing left to recluster.
     scene.set_positions(a, &flowed).unwrap();
     let after = auto.detect(&scene, &query).unwrap();
     assert_eq!(after.stats().n_reclustered, 0);
@@ -688,7 +688,7 @@ fn resident_frames_take_positions_and_leave_pairs_on_the_device() {
     let (device, queue) = device.unwrap();
     let ball = surfaces::bumpy_ball(1500, 0.2);
     let moved = ball.translated([0.3, 0.1, 0.0]);
-    // The scene has the rest pose; where the second ball really is, the device alone knows.
+    // The scene has the rest pose; only the device has the second ball's real positions.
     let mut scene = Scene::new();
     let a = ball.add_to(&mut scene).unwrap();
     let b = ball.add_to(&mut scene).unwrap();
@@ -740,11 +740,11 @@ fn resident_frames_take_positions_and_leave_pairs_on_the_device() {
         let mut pairs = keys(&found.pairs, found.n_pairs_offset);
         let unsure = keys(&found.unsure, found.n_unsure_offset);
         assert!(unsure.len() * 20 < pairs.len());
-        // What is left open belongs to the truth or does not; the rest must be right.
+        // Unsure pairs may or may not intersect; all other pairs must be right.
         pairs.extend(unsure.iter().filter(|&pair| expected.contains(pair)));
         pairs.sort_unstable();
         assert!(pairs == expected, "{method:?}");
-        // Asked in the other way, the same detector answers from the scene's own positions.
+        // Called by `detect`, the same detector answers from the scene's own positions.
         let pairs = detector.detect(&truth, &query).unwrap();
         assert_eq!(pairs.len(), expected.len());
         let small = device.create_buffer(&wgpu::BufferDescriptor {

@@ -1,4 +1,4 @@
-//! Proof that the comparison with the oracle can fail: answers of the GPU tampered with, and kernels damaged.
+//! Proof that the comparison with the oracle can fail: the GPU's answers are falsified, and its kernels damaged.
 #![cfg(feature = "gpu")]
 
 mod common;
@@ -37,12 +37,12 @@ fn answers_tampered_with_are_caught() {
         tell(&mut told);
         let hash = hash_rows(told.iter().copied());
         assert!(agree(&truth, &told, hash).is_err(), "{lie}");
-        // Nor does the true hash help.
+        // The true hash does not hide the lie.
         assert!(agree(&truth, &told, pairs.hash()).is_err(), "{lie}");
     }
 }
 
-/// A kernel, a line of it, and what is put in its place.
+/// A kernel, a line of it, and the replacement.
 type Damage = (&'static str, &'static str, &'static str);
 
 const HARMLESS: Damage = (
@@ -178,7 +178,7 @@ fn questions() -> Vec<(Case, Vec<[u32; 4]>)> {
     soup::lattice_web_tetrahedra(300, 3, 10)
         .add_to(&mut scene)
         .unwrap();
-    // More bodies than the host looks at.
+    // So many bodies that the kernels, not the host, walk the tree over bodies.
     let mut cubes = Scene::new();
     let ids: Vec<_> = (0..300u32)
         .map(|ix| {
@@ -208,7 +208,7 @@ fn questions() -> Vec<(Case, Vec<[u32; 4]>)> {
         .collect()
 }
 
-/// Questions that a damaged backend answers as the oracle does not, or not at all.
+/// The number of questions that a damaged backend answers wrongly or not at all.
 fn n_caught(settings: &Settings, damage: Damage, questions: &[(Case, Vec<[u32; 4]>)]) -> usize {
     let (device, queue) = device();
     let mut detector = Detector::with_damage(device, queue, settings.clone(), damage).unwrap();
@@ -246,7 +246,7 @@ fn damaged_kernels_of_cells_are_caught() {
     let (of_tiles, of_cells) = OF_CELLS.split_last().unwrap();
     let questions = questions();
     assert_all_are_caught(&settings, of_cells, &questions);
-    // One cell, worked in tiles.
+    // One cell, processed in tiles.
     let crowded = Settings {
         lambda: 1e-9,
         group_size: 25,

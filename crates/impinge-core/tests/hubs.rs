@@ -1,4 +1,4 @@
-//! Vertices that very many primitives name: the oracle's answers, with work bounded by input plus output.
+//! Hubs, vertices that very many primitives name: the oracle's answers, with work bounded by input plus output.
 
 mod common;
 
@@ -56,7 +56,7 @@ impl Random {
     }
 }
 
-/// A fan around vertex 0 whose rim winds round so many times; not closed.
+/// A fan around vertex 0 whose rim winds around it `turns` times; not closed.
 fn fan(n: u32, turns: f64, height: impl Fn(f64) -> f64) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
     let faces = (0..n).map(|k| [0, k + 1, k + 2]).collect();
     let rim = (0..=n).map(|k| {
@@ -66,7 +66,7 @@ fn fan(n: u32, turns: f64, height: impl Fn(f64) -> f64) -> (Vec<[u32; 3]>, Vec<[
     (faces, std::iter::once([0.0; 3]).chain(rim).collect())
 }
 
-/// Primitives of few vertices on a small lattice; some vertices are named very often.
+/// Primitives over a few vertices on a small lattice; some vertices are named very often.
 fn lattice<const N: usize>(
     n: usize,
     n_hubs: u64,
@@ -94,7 +94,7 @@ fn fans_are_answered_as_by_the_oracle() {
         let (faces, positions) = fan(300, turns, |angle| bend * (3.0 * angle).sin());
         check_both("fan", &faces.into(), &positions);
     }
-    // Triangles that point anywhere, two hubs, some of their vertices at a hub.
+    // Triangles in random directions, two hubs, some vertices at the position of a hub.
     let mut random = Random(7);
     for spread in [0.05, 0.3, 1.0] {
         let mut positions = vec![[0.0; 3], [0.0, 0.0, 0.5]];
@@ -125,7 +125,7 @@ fn books_are_answered_as_by_the_oracle() {
                 false => std::f64::consts::TAU * random.unit(),
             };
             let along = 4.0 * random.unit() - 1.5;
-            // Some on the spine's line, before, on and behind it.
+            // Some vertices lie on the spine's line: before the spine, on it and behind it.
             let out = if k % 5 == 0 { 0.0 } else { random.unit() };
             let (x, z) = (out * angle.cos(), out * angle.sin());
             positions.push([0.25 + x, along, 0.125 + z]);
@@ -134,7 +134,7 @@ fn books_are_answered_as_by_the_oracle() {
         check_both("book", &pages.into(), &positions);
         let pages: Vec<[u32; 4]> = (2..301).map(|page| [page, 1, page + 1, 0]).collect();
         check_both("book of tetrahedra", &pages.into(), &positions);
-        // A spine without length.
+        // A spine of zero length.
         positions[1] = positions[0];
         let pages: Vec<[u32; 3]> = (2..302).map(|page| [page, 0, 1]).collect();
         check_both("book without a spine", &pages.into(), &positions);
@@ -153,7 +153,7 @@ fn lattices_with_hubs_are_answered_as_by_the_oracle() {
             &tets.into(),
             &positions,
         );
-        // The same, not axis-aligned and hardly exact.
+        // The same under a linear map: off the axes, with rounded coordinates.
         let (faces, positions) = lattice::<3>(350, n_hubs, side + 2, seed);
         let turned: Vec<[f64; 3]> = (positions.iter())
             .map(|[x, y, z]| [0.1 * x + 0.7 * y, 0.3 * y - 0.2 * z, 0.9 * z + 0.4 * x])
@@ -197,7 +197,7 @@ fn work_around_a_hub_is_bounded_by_its_primitives() {
     bound("flat fan", faces.into(), &positions, 0);
     let (faces, positions) = fan(n, 0.99, |angle| 0.3 * (5.0 * angle).sin());
     bound("bent fan", faces.into(), &positions, 0);
-    // Two caps, one above the other: their triangles lie mixed in the plane.
+    // Two caps, one above the other, whose projections overlap.
     let (mut faces, mut positions) = fan(n / 2, 0.99, |_| 0.0);
     let above = positions.len() as u32;
     faces.extend_from_within(..);
@@ -206,7 +206,7 @@ fn work_around_a_hub_is_bounded_by_its_primitives() {
         .for_each(|face| *face = face.map(|id| id + above));
     positions.extend(positions.clone().iter().map(|[x, y, _]| [*x, *y, 1.0]));
     bound("two caps", faces.into(), &positions, 0);
-    // The same two hubs in all; half of the pages lie on the line of the spine.
+    // All pages share two hubs; half of the pages lie on the line of the spine.
     let mut positions = vec![[0.0; 3], [0.0, 0.0, 1.0]];
     positions.extend((0..n).map(|k| {
         let angle = std::f64::consts::TAU * f64::from(k) / f64::from(n);
@@ -215,7 +215,7 @@ fn work_around_a_hub_is_bounded_by_its_primitives() {
     }));
     let pages: Vec<[u32; 3]> = (0..n).map(|k| [0, 1, k + 2]).collect();
     bound("book", pages.into(), &positions, 0);
-    // All vertices in one place, under numbers of their own.
+    // All vertices at one position, with different numbers.
     let faces: Vec<[u32; 3]> = (0..n).map(|k| [0, 2 * k + 1, 2 * k + 2]).collect();
     bound(
         "points",
@@ -223,7 +223,7 @@ fn work_around_a_hub_is_bounded_by_its_primitives() {
         &vec![[1.0; 3]; 2 * n as usize + 1],
         0,
     );
-    // A fan of tetrahedra around a segment of a hub and a point beside it.
+    // A fan of tetrahedra around the segment from a hub to a point next to it.
     let (faces, mut positions) = fan(n, 0.99, |_| 0.0);
     let tip = positions.len() as u32;
     positions.push([0.0, 0.0, 1.0]);

@@ -78,7 +78,7 @@ fn bad_bodies_are_refused_by_name() {
             ..
         }
     ));
-    // Nothing of all this was added.
+    // None of these bodies was added.
     assert_eq!(scene.n_bodies(), 1);
     let mut detector = Detector::with_settings(cpu(Method::Clusters)).unwrap();
     assert!(matches!(
@@ -117,14 +117,14 @@ fn bodies_of_other_scenes_are_refused() {
     for query in [Query::within(other), Query::between(a, other)] {
         is_refused(detector.detect(&ours, &query).map(|_| ()));
     }
-    // A clone has the same bodies, but what is added to it later is its own.
+    // A clone has the same bodies, but bodies added to it later are its own.
     let mut clone = ours.clone();
     clone.set_positions(a, &TRIANGLE).unwrap();
     let b = ours.add_triangles(&[[0, 1, 2]], &TRIANGLE).unwrap();
     let c = clone.add_triangles(&[[0, 1, 2]], &TRIANGLE).unwrap();
     assert_eq!(b.index(), c.index());
     assert!(ours.body(c).is_err() && clone.body(b).is_err());
-    // Nor does an old id name the body that took its slot.
+    // An old id does not name the body that took its slot.
     ours.remove(b).unwrap();
     let d = ours.add_triangles(&[[0, 1, 2]], &TRIANGLE).unwrap();
     assert!(d.index() == b.index() && ours.body(b).is_err() && ours.body(d).is_ok());
@@ -171,7 +171,7 @@ fn the_largest_and_smallest_coordinates_are_answered() {
         scene.add_triangles(&[[0, 1, 2]], &a).unwrap();
         scene.add_triangles(&[[0, 1, 2]], &b).unwrap();
     }
-    // Sums of such numbers overflow: the check of in-place positions must not take that for infinity.
+    // Sums of such numbers overflow: the check of positions written in place must not mistake that for infinity.
     let first = scene.bodies().next().unwrap().0;
     scene.positions_mut::<f32>(first).unwrap();
     let case = common::Case {
@@ -226,7 +226,7 @@ fn budgets_are_kept_by_slabs() {
         let pairs = free.detect(&built.scene, &query).unwrap();
         let expected = rows(pairs);
         let held = pairs.stats().bytes_held;
-        // Between what is refused and what is plenty: the least budget that is enough.
+        // Bisect between a budget that is refused and one that is enough, to the least sufficient budget.
         let (mut refused, mut enough) = (1_000, held);
         let mut most_slabs = 0;
         while enough - refused > held / 200 {
@@ -262,7 +262,7 @@ fn budgets_are_kept_by_slabs() {
     }
 }
 
-/// Law 4: memory is bounded by input and output, on scenes made to break that.
+/// Memory is bounded by input and output, even on scenes made to break that.
 #[test]
 fn adversarial_scenes_hold_memory_in_proportion() {
     for built in [
@@ -319,7 +319,7 @@ fn runs_can_be_watched_and_cancelled() {
         let control = Control::new().cancel(&token).progress(&stop);
         let result = detector.detect_with(&built.scene, &built.query, &control);
         assert!(matches!(result, Err(Error::Cancelled)), "{method:?}");
-        // A cancelled detector goes on as if nothing had happened.
+        // After a cancellation, the detector works as before.
         assert_eq!(
             detector.detect(&built.scene, &built.query).unwrap().len(),
             n_pairs

@@ -237,7 +237,7 @@ fn bodies_that_flow_away_are_clustered_again() {
     assert_eq!(by_auto.stats().n_reclustered, 1);
     assert_eq!(by_never.stats().n_reclustered, 0);
     assert!(by_auto.stats().n_work_items < by_never.stats().n_work_items);
-    // The next frame has nothing to repair.
+    // The next frame has nothing left to recluster.
     scene.set_positions(a, &flowed).unwrap();
     assert_eq!(
         auto.detect(&scene, &query).unwrap().stats().n_reclustered,
@@ -250,7 +250,7 @@ fn a_frame_that_failed_leaves_nothing_behind() {
     let ball = surfaces::bumpy_ball(3_000, 0.2);
     for (method, settled) in [
         (Method::Clusters, 1),
-        // Long enough for clusters to be left out.
+        // Enough frames for remote clusters to be left out.
         (Method::Clusters, 6),
         (Method::Cells, 1),
     ] {
@@ -265,7 +265,7 @@ fn a_frame_that_failed_leaves_nothing_behind() {
             scene.set_positions(b, &place).unwrap();
             assert!(!detector.detect(&scene, &query).unwrap().is_empty());
         }
-        // Positions that were good come back with their scene, and nothing tells them from what they were.
+        // Restoring the clone brings back the old positions and their old stamps, so a stale cache would look valid.
         let saved = scene.clone();
         for bad in [a, b] {
             for body in [a, b] {

@@ -15,7 +15,7 @@ fn settings(method: Method) -> Settings {
     }
 }
 
-/// Both precisions: filters of their own.
+/// One case per precision: each has its own filters.
 fn cases(name: &str, model: &Model, rule: SharedVertex) -> [Case; 2] {
     [false, true].map(|double| {
         let mut scene = Scene::new();
@@ -57,7 +57,7 @@ fn regular_meshes_are_settled_by_filters() {
     }
 }
 
-/// Folded onto itself, a sheet overlaps in one plane, touches along edges and at single points.
+/// A sheet folded onto itself overlaps in one plane, and touches along edges and at single points.
 #[test]
 fn folded_sheets_are_answered_as_by_the_oracle() {
     for surface in regular::ALL {

@@ -1,4 +1,4 @@
-//! Clusters that are proven remote are left out of a frame: whatever moves, and whatever is asked, no pair may be.
+//! Clusters that are proven remote are left out of a frame. Whatever moves and whatever the query, no pair may be lost.
 
 use impinge_core::{
     Backend, BodyId, Detector, Error, Filter, InstructionSet, Method, Query, Scene, Settings,
@@ -16,7 +16,7 @@ fn settings(method: Method, threads: usize, instruction_set: InstructionSet) -> 
     }
 }
 
-/// Whether this processor leaves anything out at all: plain loops gain nothing by it.
+/// Whether remote clusters are left out on this processor: without AVX2 this would gain nothing.
 fn leaves_out() -> bool {
     #[cfg(target_arch = "x86_64")]
     {
@@ -28,10 +28,10 @@ fn leaves_out() -> bool {
     }
 }
 
-/// Detectors that remember, and an oracle that does not.
+/// Detectors that keep state between frames, and an oracle that keeps none.
 struct Contest {
     detectors: Vec<Detector>,
-    /// How many clusters each has left out in its last frame.
+    /// How many clusters each detector left out in its last frame.
     n_remote: Vec<u64>,
     oracle: Detector,
     /// Frames in which clusters were left out, in which none were, and in which there were pairs.
@@ -80,12 +80,12 @@ impl Contest {
         self.n_frames_without += usize::from(self.n_remote[0] == 0);
     }
 
-    /// Whether more than so many frames left something out, if this processor does.
+    /// Whether more than `n_frames` frames left clusters out; true if this processor never does.
     fn left_out_in_more_than(&self, n_frames: usize) -> bool {
         self.n_frames_with > n_frames || !leaves_out()
     }
 
-    /// Whether the last frame did.
+    /// Whether the last frame left clusters out; true if this processor never does.
     fn has_left_out(&self) -> bool {
         self.n_remote[0] > 0 || !leaves_out()
     }
@@ -151,7 +151,7 @@ fn no_motion_loses_a_pair() {
     ];
     for (what, motion) in motions {
         let still: Motion = |point, _| point;
-        // Which of the two moves; 2: the first one, but both are written.
+        // Which of the two moves. 2: only the first moves, but the positions of both are written.
         for mover in 0..3 {
             let (ball, mut scene, a, b) = pair();
             let mut contest = Contest::new();
@@ -197,7 +197,7 @@ fn steady_frames_leave_clusters_out_until_they_are_renewed() {
     assert!(contest.n_frames_without >= 4);
     let n_clusters = 2 * ball.n_primitives().div_ceil(64) as u64;
     assert!(contest.n_remote[0] > n_clusters / 3);
-    // Whatever the threads and registers; plain loops gain nothing and leave none out.
+    // The same for every thread count and vector instruction set; the portable set leaves none out.
     assert_eq!(
         contest.n_remote,
         [
@@ -212,7 +212,7 @@ fn steady_frames_leave_clusters_out_until_they_are_renewed() {
 #[test]
 fn whoever_asks_for_all_boxes_gets_them() {
     let (ball, mut scene, a, b) = pair();
-    // Meets the far side of the first body, which the second one does not.
+    // Meets the far side of the first body, which the second body does not reach.
     let c = ball
         .translated([-0.8, 0.0, 0.1])
         .add_to(&mut scene)
@@ -302,7 +302,7 @@ fn a_bad_position_in_a_remote_cluster_is_refused() {
             }
         }
     }
-    // Finite, though sums overflow.
+    // Finite positions whose sums overflow.
     let mut far = ball.positions.clone();
     far.iter_mut()
         .for_each(|[_, y, _]| *y = y.signum() * f32::MAX);
@@ -333,7 +333,7 @@ fn meshes_change_while_clusters_are_left_out() {
             scene.set_positions(a, &model.positions).unwrap();
             contest.frame(&scene, &query, &format!("round {round}, frame {frame}"));
         }
-        // Clusters of a body that has more vertices than its triangles are not sorted.
+        // A body with vertices that no triangle names has no remote clusters.
         assert!(round >= 2 || contest.has_left_out(), "round {round}");
     }
     scene.remove(b).unwrap();
@@ -351,7 +351,7 @@ fn bodies_that_come_to_touch_meet() {
     let a = sheet.add_to(&mut scene).unwrap();
     let b = sheet.add_to(&mut scene).unwrap();
     let (low, high) = sheet.bounds().unwrap();
-    // Along each axis in which it has an extent, from either side: beside it at first, then edge to edge.
+    // Along each axis in which the sheet has an extent, from either side: first beside it, then edge to edge.
     for axis in [0, 1, 2].into_iter().filter(|&axis| low[axis] < high[axis]) {
         for width in [low[axis] - high[axis], high[axis] - low[axis]] {
             let mut contest = Contest::new();
@@ -372,7 +372,7 @@ fn bodies_that_come_to_touch_meet() {
     }
 }
 
-/// A model whose vertices are numbered along x, so that no part of them reaches as far as all.
+/// A model whose vertices are numbered along x, so that each run of vertices covers only part of its extent.
 fn from_low_to_high(model: Model) -> Model {
     let mut order: Vec<u32> = (0..model.positions.len() as u32).collect();
     let x = |vertex: u32| model.positions[vertex as usize][0];
@@ -396,7 +396,7 @@ fn from_low_to_high(model: Model) -> Model {
 
 #[test]
 fn bodies_that_several_tasks_read_lose_no_pair() {
-    // Two threads find boxes from 120,000 primitives on, and a task reads 4,096 vertices.
+    // From 120,000 primitives on, two threads compute boxes; one task reads 4,096 vertices.
     let ball = from_low_to_high(surfaces::bumpy_ball(64_000, 0.2));
     let mut scene = Scene::new();
     let a = ball.add_to(&mut scene).unwrap();
@@ -411,7 +411,7 @@ fn bodies_that_several_tasks_read_lose_no_pair() {
     let mut other_method = detector(Method::Cells, 2, InstructionSet::Avx512);
     let mut n_frames_with = 0;
     for frame in 0..30 {
-        // Trembles, then goes round the first body; towards the end that one moves too.
+        // The second body trembles, then circles the first; towards the end the first moves too.
         let angle = 0.3 * (frame as f32 - 8.0).max(0.0);
         let radius = if frame % 2 == 0 { 0.9 } else { 0.89 };
         place(&mut scene, b, &ball, |point, _| point, 0.0);
@@ -455,7 +455,7 @@ fn detectors_with_a_past_answer_as_new_ones() {
         }
         assert!(contest.has_left_out());
     };
-    // A clone of the scene, whose positions another scene with the same stamps has left behind.
+    // A clone of the scene whose positions have changed since, while the saved clone kept its stamps.
     let mut one = scene.clone();
     settle(&mut contest, &mut one);
     let saved = one.clone();
@@ -465,7 +465,7 @@ fn detectors_with_a_past_answer_as_new_ones() {
     let mut one = saved.clone();
     place(&mut one, b, &ball, |[x, y, z], _| [x, y + 0.8, z], 0.0);
     contest.frame(&one, &query, "above");
-    // More bodies than those whose clusters are sorted, then two again.
+    // More bodies than remote clusters are used with, then two again.
     let mut many = saved.clone();
     settle(&mut contest, &mut many);
     for k in 0..10 {
@@ -474,7 +474,7 @@ fn detectors_with_a_past_answer_as_new_ones() {
     }
     contest.frame(&many, &Query::all(), "many");
     contest.frame(&many, &query, "two of many");
-    // A body that flows so far that it is clustered anew while its clusters are sorted.
+    // A body that flows so far that it is clustered again while it has remote clusters.
     let mut one = saved.clone();
     settle(&mut contest, &mut one);
     let flow = deform::Flow::default();
@@ -484,7 +484,7 @@ fn detectors_with_a_past_answer_as_new_ones() {
         one.set_positions(a, &flowed).unwrap();
         contest.frame(&one, &query, &format!("flows, step {step}"));
     }
-    // A body in double precision in its place.
+    // The body is replaced by one in double precision.
     let mut one = saved;
     settle(&mut contest, &mut one);
     one.remesh(a, ball.elements.clone(), ball.positions_f64())

@@ -43,7 +43,7 @@ fn a_triangle_that_falls_through_another_touches_it_at_a_quarter() {
                 .iter()
                 .all(|impact| impact.toi == 0.25 && !impact.at_start)
         );
-        // One vertex comes down inside; its two edges meet the floor's long edge.
+        // One vertex lands inside the floor; its two edges meet the floor's long edge.
         let rows: Vec<_> = impacts.iter().map(|i| (i.kind, i.a, i.b)).collect();
         let vf = impacts.of(PairKind::VertexFace);
         assert_eq!(vf.len(), 1, "{rows:?}");
@@ -134,11 +134,11 @@ fn a_step_that_is_advanced_is_free_to_its_rounded_end() {
                 .expect("good")
                 .is_empty()
         );
-        // It goes on from there, but never through.
+        // The body goes on from there, but never passes through.
         scene.set_end_positions(other, &lifted(-3.0)).expect("good");
         let next = detector.advance(&scene, &Step::default()).expect("good");
         assert!(next.fraction < 1e-6, "{next:?}");
-        // Upwards it is free as a whole.
+        // Upwards the whole step is free.
         scene.set_end_positions(other, &lifted(2.0)).expect("good");
         let up = detector.advance(&scene, &Step::default()).expect("good");
         assert_eq!((up.fraction, up.first), (1.0, None));
@@ -278,7 +278,7 @@ fn lattices_are_answered_as_pair_by_pair() {
     }
 }
 
-/// Two bodies of random triangles on a lattice of even numbers, and where they go.
+/// Two bodies of random triangles on a lattice of even numbers, at the start and at the end of a step.
 struct Twins {
     faces: [Vec<[u32; 3]>; 2],
     start: [Vec<[f32; 3]>; 2],
@@ -305,7 +305,7 @@ impl Twins {
         }
     }
 
-    /// Sorted rows of impacts: elements by whether they are of the second body.
+    /// Sorted rows of impacts. An element is named by whether it belongs to the second body, and its number.
     fn rows(&self, swapped: bool, detector: &mut Detector) -> Vec<Row> {
         let mut scene = Scene::new();
         let order = if swapped { [1, 0] } else { [0, 1] };
@@ -387,7 +387,7 @@ fn a_step_is_its_two_halves() {
     for seed in 0..6 {
         let mut detector = detectors().remove(0);
         let twins = Twins::new(seed);
-        // Even numbers have whole means.
+        // The mean of two even numbers is an integer.
         let middle: [Vec<[f32; 3]>; 2] = std::array::from_fn(|body| {
             let ends = twins.start[body].iter().zip(&twins.end[body]);
             let mean = |(x, y): (&[f32; 3], &[f32; 3])| {

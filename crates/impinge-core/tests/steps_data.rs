@@ -1,5 +1,5 @@
-//! Steps of real scenes against answers that were not made by this project: every pair that touches, and every time to the
-//! last bit. Fails where the data folder (`../shared/data` or `$IMPINGE_DATA`) is absent.
+//! Steps of real scenes against answers from elsewhere: every pair that touches, and every time to the last bit. Fails
+//! if the data folder (`../shared/data` or `$IMPINGE_DATA`) is absent.
 
 use std::path::PathBuf;
 

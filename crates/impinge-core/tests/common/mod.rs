@@ -7,7 +7,7 @@ use impinge_core::{
 };
 use impinge_scenes::{Model, adversarial, soup, surfaces};
 
-/// A scene and a question.
+/// A scene and a query.
 pub struct Case {
     pub name: String,
     pub scene: Scene,
@@ -19,7 +19,7 @@ pub fn rows(pairs: &Pairs) -> Vec<[u32; 4]> {
     pairs.rows().collect()
 }
 
-/// What the oracle says.
+/// The oracle's answer.
 pub fn naive(case: &Case) -> Vec<[u32; 4]> {
     let mut detector = Detector::with_settings(Settings {
         method: Method::Naive,
@@ -30,7 +30,7 @@ pub fn naive(case: &Case) -> Vec<[u32; 4]> {
     rows(detector.detect(&case.scene, &case.query).unwrap())
 }
 
-/// Whether an answer is the oracle's: the same rows in the same order, and the same hash.
+/// Whether an answer equals the oracle's: the same rows in the same order, and the same hash.
 pub fn agree(expected: &[[u32; 4]], answer: &[[u32; 4]], hash: u64) -> Result<(), String> {
     if hash != hash_rows(expected.iter().copied()) {
         return Err(format!(
@@ -56,7 +56,7 @@ pub fn agree(expected: &[[u32; 4]], answer: &[[u32; 4]], hash: u64) -> Result<()
 /// Runs a case with these settings and compares.
 pub fn check(case: &Case, expected: &[[u32; 4]], settings: Settings) {
     let mut detector = Detector::with_settings(settings.clone()).unwrap();
-    // Twice: the second frame runs on what the first has cached.
+    // Twice: the second frame uses the caches that the first filled.
     for frame in 0..2 {
         let pairs = detector.detect(&case.scene, &case.query).unwrap();
         if let Err(error) = agree(expected, &rows(pairs), pairs.hash()) {
@@ -232,7 +232,7 @@ pub fn cases() -> Vec<Case> {
     cases
 }
 
-/// Triangles that all share one vertex, more than any mesh has: the hub of the adjacency masks.
+/// Triangles that all share one vertex, more than in any mesh: a hub for the adjacency masks.
 fn fan(n: u32) -> Model {
     let mut positions = vec![[0.0f32; 3]];
     let mut faces = Vec::new();

@@ -1,9 +1,9 @@
-//! Triangle pairs that others published, from the shared data. `None` where `IMPINGE_NO_DATA=1` says that it may be absent.
+//! Published triangle pairs, from the shared data. `None` if the data is absent and `IMPINGE_NO_DATA=1` allows that.
 
 /// A triangle as three corners.
 pub type Triangle = [[f64; 3]; 3];
 
-/// Two triangles, whether they intersect, and where that is from.
+/// Two triangles, whether they intersect, and the source of the answer.
 pub struct Published {
     pub triangles: [Triangle; 2],
     pub intersect: bool,

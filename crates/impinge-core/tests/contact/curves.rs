@@ -1,4 +1,4 @@
-//! What must hold of curves, whatever the bodies.
+//! Properties that curves must have for all bodies.
 
 use impinge_core::contact::{Contacts, Curves, Feature, Shape};
 use impinge_core::{Query, Scene, SharedVertex};
@@ -54,7 +54,7 @@ fn closed_surfaces_cross_in_loops() {
         assert!((0..curves.len()).all(|curve| curves.is_directed(curve)));
         assert!(curves.isolated().is_empty());
         check_cover(&contacts, &curves);
-        // The other way round it is the same curves, which run the other way.
+        // With the bodies swapped, the curves are the same but run the other way.
         let (_, swapped) = crossing(&b, &ball);
         assert_eq!(swapped.len(), curves.len());
         assert!((swapped.total_length() - curves.total_length()).abs() < 1e-9);
@@ -75,7 +75,7 @@ fn a_known_circle() {
     );
 }
 
-/// Seen from outside of the first body, what is beneath the second one's surface lies to the left.
+/// Seen from outside the first body, its part beneath the second body's surface lies to the left.
 #[test]
 fn a_curve_runs_around_what_is_inside() {
     // A floor that faces up, and a cube whose lower half is beneath it.
@@ -91,7 +91,7 @@ fn a_curve_runs_around_what_is_inside() {
             .map(|k| 0.5 * (at(k)[0] * at(k + 1)[1] - at(k)[1] * at(k + 1)[0]))
             .sum::<f64>()
     };
-    // Of the floor, the square inside the cube is to the left: counter-clockwise from above.
+    // The floor's square inside the cube is to the left: counter-clockwise from above.
     let (contacts, curves) = crossing(&floor, &cube);
     assert_eq!(
         (curves.len(), curves.is_closed(0), curves.is_directed(0)),
@@ -99,7 +99,7 @@ fn a_curve_runs_around_what_is_inside() {
     );
     assert!((area(&contacts, &curves) - 1.0).abs() < 1e-6);
     assert!((curves.length(0) - 4.0).abs() < 1e-6);
-    // Of the cube, the lower half is to the left: clockwise from above.
+    // The cube's lower half is to the left: clockwise from above.
     let (contacts, curves) = crossing(&cube, &floor);
     assert!((area(&contacts, &curves) + 1.0).abs() < 1e-6);
 }
@@ -180,7 +180,7 @@ fn repeated_vertices_do_not_break_curves() {
     check_cover(&contacts, &again);
 }
 
-/// A figure of two sheets of one body: open curves and loops, found within.
+/// Two sheets of one body: its self-collision has open curves and loops.
 #[test]
 fn a_body_that_runs_into_itself() {
     let ball = surfaces::ball(600);
@@ -258,7 +258,7 @@ fn pairs_of_another_scene_are_refused_by_name() {
         error.starts_with("body 1: a pair names primitive"),
         "{error}"
     );
-    // A scene that moved has pairs that no longer meet.
+    // After the scene has changed, pairs may no longer meet.
     scene
         .remesh(
             b,

@@ -1,4 +1,4 @@
-//! Contact geometry against an oracle in whole numbers, and what must hold of curves.
+//! Contact geometry against an oracle in integers, and properties of curves.
 
 mod curves;
 mod oracle;
@@ -11,7 +11,7 @@ use impinge_scenes::{Model, Random, soup};
 
 use oracle::{Rational, Scale};
 
-/// All pairs of a question, on the CPU.
+/// All pairs of a query, on the CPU.
 pub fn detect(scene: &Scene, query: &Query) -> Pairs {
     let mut detector = Detector::new(Backend::Cpu).unwrap();
     detector.detect(scene, query).unwrap().clone()
@@ -25,7 +25,7 @@ fn corners_of(scene: &Scene, bodies: &[BodyId], body: u32, face: u32) -> [[f64; 
     faces[face as usize].map(|vertex| body.positions().point(vertex as usize))
 }
 
-/// How many contacts of each shape were held against the oracle.
+/// How many contacts of each shape were compared with the oracle.
 #[derive(Debug, Default)]
 struct Seen {
     points: usize,
@@ -34,8 +34,8 @@ struct Seen {
     polygons: [usize; 7],
 }
 
-/// Holds every contact against the oracle: the same corners, each coordinate the nearest number, in the order
-/// and direction that are promised.
+/// Compares every contact with the oracle: the same corners, each coordinate the nearest number, in the
+/// promised order and direction.
 fn check(scene: &Scene, pairs: &Pairs, most: usize, seen: &mut Seen) {
     let bodies: Vec<BodyId> = scene.bodies().map(|(id, _)| id).collect();
     let contacts = Contacts::new(scene, pairs).unwrap();
@@ -143,7 +143,7 @@ fn lattice_triangles_meet_as_the_oracle_says() {
     assert!(seen.polygons[3..=4].iter().all(|&n| n > 5), "{seen:?}");
 }
 
-/// Triangles of one plane in all positions, up to hexagons; the plane is x + y + z = 0 of the lattice.
+/// Coplanar triangles in all positions, up to hexagons; the plane is x + y + z = 0 of the lattice.
 #[test]
 fn triangles_of_one_plane_meet_in_polygons() {
     let mut random = Random::new(5);
@@ -182,8 +182,8 @@ fn random_triangles_meet_as_the_oracle_says() {
     assert!(seen.directed > 500, "{seen:?}");
 }
 
-/// Coordinates of very different sizes: results that cancel nearly to nothing, far from both stages
-/// that round.
+/// Coordinates of very different sizes: results that cancel almost to zero, often beyond both rounding
+/// stages.
 #[test]
 fn coordinates_that_cancel_are_the_nearest_too() {
     let mut random = Random::new(11);

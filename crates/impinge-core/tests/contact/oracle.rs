@@ -1,9 +1,9 @@
-//! The oracle: what two triangles have in common, in whole numbers and by another algorithm.
+//! The oracle: the intersection of two triangles, in integers and by another algorithm.
 //!
 //! A point of both is a blend of either's corners with weights λ, μ ≥ 0 of sum 1. The solutions form a
 //! polytope whose vertices are *basic*: their nonzero weights belong to independent columns. Trying all sets
-//! of columns finds them all. For triangles with a plane each, points and weights determine each other, so these
-//! are the corners; else all lie on one line, and the corners are the first and the last in lexicographic order.
+//! of columns finds them all. If neither triangle is degenerate, points and weights determine each other, so these
+//! are the corners. Else all lie on one line, and the corners are the first and the last in lexicographic order.
 
 use dashu_int::IBig;
 
@@ -14,7 +14,7 @@ pub struct Rational {
     pub denominator: IBig,
 }
 
-/// `f64` as whole multiples of a power of two.
+/// `f64` as integer multiples of a power of two.
 #[derive(Debug, Clone, Copy)]
 pub struct Scale {
     unit: i32,
@@ -66,7 +66,7 @@ fn is_positive(x: &IBig) -> bool {
     *x > IBig::ZERO
 }
 
-/// The corners of what two triangles have in common.
+/// The corners of the intersection of two triangles.
 pub fn corners(a: &[[IBig; 3]; 3], b: &[[IBig; 3]; 3]) -> Vec<Rational> {
     let mut found: Vec<Rational> = Vec::new();
     for set in 1u32..64 {
@@ -120,7 +120,7 @@ pub fn equal(p: &Rational, q: &Rational) -> bool {
     between(p, q).iter().all(|x| *x == IBig::ZERO)
 }
 
-/// The point of the basic solution of a set of columns; none where they depend on each other or a weight
+/// The point of the basic solution of a set of columns; `None` if they are linearly dependent or a weight
 /// is not positive.
 fn basic(a: &[[IBig; 3]; 3], b: &[[IBig; 3]; 3], set: u32) -> Option<Rational> {
     let columns: Vec<usize> = (0..6).filter(|k| set >> k & 1 == 1).collect();
@@ -187,8 +187,8 @@ fn basic(a: &[[IBig; 3]; 3], b: &[[IBig; 3]; 3], set: u32) -> Option<Rational> {
     })
 }
 
-/// Whether `x` is the number nearest to `numerator / denominator`, ties to the even one; in single precision
-/// among the numbers of `f32`.
+/// Whether `x` is the number nearest to `numerator / denominator`, ties to even; in single precision, the nearest
+/// `f32`.
 pub fn is_nearest(
     scale: Scale,
     x: f64,
@@ -219,7 +219,7 @@ pub fn is_nearest(
     if here == IBig::ZERO {
         return true;
     }
-    // Zero is the nearest only where it is the number itself, at the sizes that are tried.
+    // At the sizes tried here, zero is the nearest only to zero itself.
     x != 0.0
         && neighbours.into_iter().all(|other| {
             let there = far(other);

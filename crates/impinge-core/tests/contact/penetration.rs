@@ -15,7 +15,7 @@ fn overlap(a: &Model, b: &Model) -> Overlap {
     let found = penetration
         .between(&scene, &contacts, ids[0], ids[1])
         .unwrap();
-    // Whichever is named first, and knowing the bodies from before.
+    // The same with the bodies in the other order, and with their topologies cached.
     let again = penetration
         .between(&scene, &contacts, ids[1], ids[0])
         .unwrap();
@@ -109,7 +109,7 @@ fn vertices_inside_are_those_of_solid_angles() {
     }
 }
 
-/// The unit direction and what it says.
+/// The region's normal, which must exist.
 fn normal(region: &Region) -> [f64; 3] {
     region.normal.expect("a normal")
 }
@@ -138,7 +138,7 @@ fn cubes_overlap_in_a_box() {
     }
 }
 
-/// The derivative of the volume by the position of the first body is the area.
+/// The derivative of the volume with respect to the first body's position is the area.
 #[test]
 fn the_area_is_how_the_volume_grows() {
     let a = surfaces::bumpy_ball(2_000, 0.2);
@@ -240,7 +240,7 @@ fn a_body_inside_another_is_a_region_without_contacts() {
     assert_eq!(found.inside[1].len(), small.positions.len());
     assert!(found.inside[0].is_empty());
     assert!((found.volume().unwrap() - volume(&small)).abs() < 1e-9);
-    // Inside the hole of a ring is outside.
+    // The hole of a ring is outside.
     let ring = surfaces::torus(40, 20, 1.0, 0.3);
     let found = overlap(&ring, &surfaces::ball(100));
     assert!(found.regions.is_empty() && found.volume() == Some(0.0));
@@ -260,7 +260,7 @@ fn touching_bodies_have_a_normal_and_no_depth() {
     assert!(found.inside.iter().all(Vec::is_empty));
 }
 
-/// Coincident bodies, and bodies that share a plane: degenerate all over, and still an answer.
+/// Coincident bodies and bodies that share a plane: everything is degenerate, and there is still an answer.
 #[test]
 fn degenerate_overlaps_do_not_panic() {
     let cube = surfaces::cube([0.0; 3], 1.0);

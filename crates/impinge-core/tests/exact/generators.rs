@@ -39,7 +39,7 @@ impl Random {
         order
     }
 
-    /// A finite `f32` of any exponent, widened; every bit pattern is as likely as any other.
+    /// A finite `f32` of any exponent, widened; all bit patterns are equally likely.
     pub fn any_f32(&mut self) -> f64 {
         loop {
             let x = f32::from_bits(self.bits() as u32);
@@ -53,17 +53,17 @@ impl Random {
 /// A kind of points.
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {
-    /// Integer points {0..n}^3: coincident, collinear and coplanar all at once.
+    /// Integer points {0..n}^3: many are coincident, collinear or coplanar.
     Lattice(u64),
     /// Lattice points under one linear map with 24-bit entries: degenerate in no axis.
     Skewed(u64),
-    /// Lattice points {0..n}^2 of one plane in no special position: all coplanar, often more.
+    /// Lattice points {0..n}^2 of one plane in general position: all coplanar, often collinear or coincident.
     Planar(u64),
-    /// `f32` numbers of about one size.
+    /// `f32` numbers of similar size.
     Plain,
     /// Any finite `f32`, from the smallest subnormal to the largest number.
     AnyF32,
-    /// Few values of very different size, so that they also coincide.
+    /// A few values of very different size, so that coordinates often coincide.
     Palette,
     /// Blends of common points, rounded to `f32`, then moved by at most one unit in the last place.
     NearlyTouching,

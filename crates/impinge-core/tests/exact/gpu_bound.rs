@@ -1,6 +1,6 @@
 //! The determinant of the GPU's filter, as `docs/exactness.md` specifies it, in a model of WGSL's
 //! arithmetic: results rounded up or down at random, sums in random order, products fused or
-//! distributed at random, subnormal numbers flushed or not. What it calls sure must be right.
+//! distributed at random, subnormal numbers flushed or not. Signs that it calls sure must be right.
 
 use crate::generators::{Kind, Random};
 use impinge_core::exact::{Sign, orient3d};
@@ -10,7 +10,7 @@ const SMALLEST: f32 = 1.0 / 4_294_967_296.0;
 const LARGEST: f32 = 1_099_511_627_776.0;
 const NARROWING: f32 = 1.0 / 4_194_304.0;
 
-/// Arithmetic in `f32` that keeps to WGSL's rules and to nothing more.
+/// Arithmetic in `f32` that guarantees only what WGSL guarantees.
 struct Device<'a>(&'a mut Random);
 
 impl Device<'_> {
@@ -26,7 +26,7 @@ impl Device<'_> {
         }
     }
 
-    /// A neighbour of the exact value `sum + error`, which are a rounded sum and its exact error.
+    /// A neighbour of the exact value `sum + error`: a rounded sum and its exact error.
     fn rounded(&mut self, sum: f64, error: f64) -> f32 {
         let nearest = sum as f32;
         let exact_minus_nearest = (sum - f64::from(nearest)) + error;
@@ -127,7 +127,7 @@ impl Device<'_> {
         }
     }
 
-    /// The bound of the determinant's error, or none where it is unsure whatever its value.
+    /// The bound of the determinant's error; `None` if it is unsure whatever its value.
     /// `narrowing` is the N of the document, zero for `f32` bodies.
     fn bound(&mut self, vectors: [&[f32; 3]; 3], narrowing: f32) -> Option<f32> {
         let sizes = vectors.map(|v| v.iter().fold(0.0, |size: f32, x| size.max(x.abs())));
@@ -147,7 +147,7 @@ impl Device<'_> {
         Some(self.add(own, inherited))
     }
 
-    /// The sign of orient3d(a, b, c, o) where it is sure, and the computed value.
+    /// The sign of orient3d(a, b, c, o) if it is sure, and the computed value.
     fn side(&mut self, [a, b, c, o]: &[[f32; 3]; 4], narrowing: f32) -> (Option<Sign>, f32) {
         let (d, e, f) = (
             self.difference(a, o),
@@ -183,7 +183,7 @@ fn device_determinants_are_right_where_they_are_sure() {
         Kind::NearlyTouching,
         Kind::Skewed(2),
     ] {
-        // Down to where differences are hardly larger than `SMALLEST`, up to `LARGEST`.
+        // From scales where differences are barely above `SMALLEST`, up to `LARGEST`.
         for scale in [
             1.0,
             2.0_f64.powi(-29),
@@ -235,7 +235,7 @@ fn device_determinants_of_narrowed_positions_are_right_where_they_are_sure() {
                 let Some(points) = points(&mut random, kind, scale) else {
                     continue;
                 };
-                // Off the grid of `f32`, and at times far from the origin.
+                // Not representable in `f32`, and sometimes far from the origin.
                 let shift = random.pick(&[0.0, 1.0, 1000.0]) * scale;
                 let points =
                     points.map(|p| p.map(|x| x * 1.1 + shift + 1e-9 * scale * random.unit()));

@@ -14,7 +14,7 @@ use impinge_core::exact::{
     triangles_intersect_beyond_shared,
 };
 
-/// How many cases of each kind a test takes; big integers make the wide kinds slower.
+/// How many cases of a kind a test tries; big integers make the wide kinds slow.
 fn n_cases(kind: Kind, n: usize) -> usize {
     match kind {
         Kind::Lattice(_) => 6 * n,
@@ -258,8 +258,8 @@ fn neighbouring_tetrahedra_agree_with_the_oracle() {
     }
 }
 
-/// Two flat tetrahedra in different planes, or one line, that share the edge where they meet: what
-/// counts then is how far each goes on along the line of the edge.
+/// Two flat tetrahedra in different planes, or on one line, that share the edge where they meet. The
+/// answer depends on how far each extends along the line of the edge.
 #[test]
 fn flat_tetrahedra_that_share_an_edge_agree_with_the_oracle() {
     let mut random = Random::new(11);
@@ -316,7 +316,7 @@ fn neighbours_of_two_kinds_agree_with_the_oracle() {
     }
 }
 
-/// The rules by which most people know the shared cases, on triangles that are not degenerate.
+/// The usual rules for shared vertices, on triangles that are not degenerate.
 #[test]
 fn neighbouring_triangles_follow_the_usual_rules() {
     let mut random = Random::new(8);
@@ -447,7 +447,7 @@ fn every_finite_f32_is_in_range() {
     assert_eq!(MIN_MAGNITUDE, 2.0_f64.powi(-250));
 }
 
-/// Input that callers should have refused gives some answer, not a panic.
+/// Input that callers should refuse gives some answer, not a panic.
 #[test]
 fn numbers_out_of_range_do_not_panic() {
     let mut random = Random::new(10);

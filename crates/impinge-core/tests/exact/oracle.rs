@@ -11,7 +11,7 @@
 
 use dashu_int::IBig;
 
-/// What elimination needs of an integer.
+/// The integer operations that elimination needs.
 trait Integer: Clone {
     fn from_big(big: &IBig) -> Self;
     fn sign(&self) -> i32;
@@ -82,7 +82,7 @@ pub fn intersect(a: &[[f64; 3]], b: &[[f64; 3]]) -> bool {
 }
 
 /// Whether the intersection of the two hulls is larger than the hull of the shared vertices.
-/// Primitives with the same vertices count as such.
+/// Also true for primitives with the same vertices.
 pub fn intersect_beyond_shared(
     a: &[[f64; 3]],
     ids_a: &[u32],
@@ -103,7 +103,7 @@ pub fn intersect_beyond_shared(
         )
 }
 
-/// Brings all coordinates to one power of two and calls `small` where they are small, else `big`.
+/// Makes all coordinates integers over one power of two, and calls `small` if they are small, else `big`.
 fn with_integers(
     a: &[[f64; 3]],
     b: &[[f64; 3]],
@@ -296,7 +296,7 @@ mod tests {
 
     const UNIT: [[f64; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
-    /// The oracle itself, on answers that one sees.
+    /// The oracle itself, on cases with obvious answers.
     #[test]
     fn oracle_knows_the_obvious() {
         let point = |x, y, z| [[x, y, z]; 3];

@@ -1,5 +1,5 @@
-//! Cases that others published. The data is not part of the repository; without it the tests say
-//! that they were skipped.
+//! Published cases. The data is not part of the repository: without it the tests fail, unless
+//! `IMPINGE_NO_DATA=1` is set.
 
 #[path = "../common/published.rs"]
 mod files;

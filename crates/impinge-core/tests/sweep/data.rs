@@ -1,4 +1,4 @@
-//! Pairs whose answers others published, and steps whose contacts and times are known to the last bit. The data is
+//! Pairs with published answers, and steps whose contacts and times are known to the last bit. The data is
 //! not part of the repository: without it the tests fail, unless `IMPINGE_NO_DATA=1` is set.
 
 use std::path::PathBuf;
@@ -54,7 +54,7 @@ fn check_queries(kind: &str, pair: ElementPair, n_expected: usize) {
     assert!(queries.iter().filter(|query| query.1).count() > 10);
     for ([start, end], truth, name) in &queries {
         assert_eq!(first_contact(pair, start, end).is_some(), *truth, "{name}");
-        // Backwards in time the two touch at some time if and only if they do forwards.
+        // The two touch at some time backwards if and only if they touch at some time forwards.
         assert_eq!(
             first_contact(pair, end, start).is_some(),
             *truth,
@@ -178,7 +178,7 @@ impl Recorded {
         }
     }
 
-    /// The pairs that the scene's publisher asked about: those that touch are among the contacts, the others not.
+    /// The pairs with published answers: those that touch are among the contacts, the others are not.
     fn check_published(&self, kind: &str, pair: ElementPair, number: &str) {
         let json = |what: &str| -> Option<serde_json::Value> {
             let path = file(&format!("ccd/{}/{what}.json", self.name))?;

@@ -1,6 +1,6 @@
-//! Distances against an oracle in fractions: of all subsets of the polygon's corners, the point of their plane, line or own
-//! that is nearest to the origin, where its weights are positive. The nearest of these is the nearest point. No normal, no
-//! regions of edges or corners.
+//! Distances against an oracle in fractions. For every subset of the polygon's corners, the oracle finds the point of their
+//! plane, line or point that is nearest to the origin, and keeps it if its weights are positive. The nearest of these is the
+//! nearest point of the polygon. No normals, no regions of edges or corners.
 
 use dashu_int::IBig;
 use impinge_core::exact::{
@@ -13,7 +13,7 @@ use crate::moving::{MOTIONS, PAIRS, Point, corners, integers_over, step_on_latti
 
 type Vector = [IBig; 3];
 
-/// The square of the distance as a fraction, and the corners whose blend the nearest point is.
+/// The square of the distance as a fraction, and the corners whose blend is the nearest point.
 struct Shortest {
     over: IBig,
     under: IBig,
@@ -36,7 +36,7 @@ fn dot(a: &Vector, b: &Vector) -> IBig {
 
 fn shortest(polygon: &[Vector]) -> Shortest {
     let mut best: Option<Shortest> = None;
-    // Small subsets first: the nearest point belongs to the smallest that has it.
+    // Small subsets first: the nearest point belongs to the smallest subset that has it.
     for size in 1..=3_u32.min(polygon.len() as u32) {
         for set in (1_u32..1 << polygon.len()).filter(|set| set.count_ones() == size) {
             let support: Vec<usize> = (0..polygon.len()).filter(|ix| set >> ix & 1 == 1).collect();
@@ -51,8 +51,8 @@ fn shortest(polygon: &[Vector]) -> Shortest {
     best.expect("a corner at least")
 }
 
-/// Weights with sum 1 that make the blend shortest, if the corners are independent and the weights positive: where the
-/// blend has one product with all corners.
+/// The shortest blend of corners with weights of sum 1, if the corners are independent and the weights positive. The dot
+/// product of the shortest blend with every corner is the same.
 fn foot(polygon: &[Vector], support: Vec<usize>) -> Option<Shortest> {
     let n = support.len();
     // Rows: G weights - m = 0 for each corner, and sum of weights = 1; unknowns: weights, then m.
@@ -108,7 +108,7 @@ fn polygon(pair: ElementPair, points: &[Vector]) -> Vec<Vector> {
         .collect()
 }
 
-/// The features that a blend of the oracle's corners belongs to; none for an inside that may be of several.
+/// The features that a blend of the oracle's corners belongs to; `None` where several features are possible.
 fn features(pair: ElementPair, support: &[usize]) -> Option<(Feature, Feature)> {
     use Feature::{Edge, Face, Vertex};
     let numbers = corners(pair);
@@ -159,7 +159,7 @@ fn check(pair: ElementPair, points: &[Point; 4], distance: f64) -> bool {
     assert!(!nearest.name(pair).is_empty());
     let closest = closest_points(pair, points);
     assert_eq!(closest.nearest, nearest);
-    // The rounded distance, to the last digits; the rounded points, as far as coordinates are.
+    // The rounded distance agrees to the last digits, the rounded points as precisely as coordinates are rounded.
     let size = points
         .iter()
         .flatten()
@@ -179,7 +179,7 @@ fn check(pair: ElementPair, points: &[Point; 4], distance: f64) -> bool {
     is_within
 }
 
-/// Both as floats, whatever their size.
+/// The quotient as a float, whatever the size of the integers.
 fn ratio(over: &IBig, under: &IBig) -> f64 {
     if *over == IBig::ZERO {
         return 0.0;
@@ -192,7 +192,7 @@ fn ratio(over: &IBig, under: &IBig) -> f64 {
     digits * 10.0_f64.powf(exponent)
 }
 
-/// What one of the common units is.
+/// The size of one common unit.
 fn scale_of(all: &[IBig], points: &[Point; 4]) -> f64 {
     let (ix, x) = points
         .iter()
@@ -217,7 +217,7 @@ fn distances_agree_with_the_oracle() {
             let mut n_within = 0;
             for _ in 0..n {
                 let points = kind.points::<4>(&mut random);
-                // Distances that occur, and next to them.
+                // Distances that occur, and their neighbours.
                 let apart = closest_points(pair, &points).distance;
                 let distance = match random.below(6) {
                     0 => 0.0,
@@ -260,7 +260,7 @@ fn faces_are_as_near_as_the_hull_of_differences() {
                 .flat_map(|i| (0..3).map(move |j| (i, x.len() + j)))
                 .map(|(i, j)| std::array::from_fn(|k| &all[3 * i + k] - &all[3 * j + k]))
                 .collect();
-            // The origin inside the hull: the two share a point.
+            // If the origin is inside the hull, the two share a point.
             let third = x[x.len() - 1];
             triangles_intersect(&[x[0], x[1], third], y)
                 || shortest(&hull).is_within(&all[numbers.len() - 1])
@@ -307,7 +307,7 @@ fn first_times_within_a_distance_are_right() {
         for pair in PAIRS {
             let found = first_within(pair, &start, &end, distance);
             let case = || format!("{pair:?} {start:?} {end:?} {distance} {found:?}");
-            // No later than without a distance.
+            // No later than the first contact.
             if let Some(contact) = first_contact(pair, &start, &end) {
                 assert!(
                     found.is_some_and(|near| near.time <= contact.time),
@@ -336,7 +336,7 @@ fn first_times_within_a_distance_are_right() {
                     }
                 }
             }
-            // Backwards: at some time or never, alike.
+            // Backwards, they come within the distance if and only if they do forwards.
             let back = first_within(pair, &end, &start, distance);
             assert_eq!(back.is_some(), found.is_some(), "{}", case());
         }

@@ -1,4 +1,4 @@
-//! Exact continuous collision and distances against an oracle of another make, published answers, and itself in other words.
+//! Exact continuous collision and distances: against an independent oracle, against published answers, and asked in other ways.
 
 mod data;
 mod distance;

@@ -15,7 +15,7 @@ pub const PAIRS: [ElementPair; 4] = [
     ElementPair::EdgeEdge,
 ];
 
-/// The difference polygon's corners as the definition of a pair gives them.
+/// The corners of the difference polygon, by the definition of a pair.
 pub fn corners(pair: ElementPair) -> &'static [[usize; 2]] {
     match pair {
         ElementPair::VertexVertex => &[[1, 0]],
@@ -69,7 +69,7 @@ fn expected(pair: ElementPair, start: &[Point; 4], end: &[Point; 4]) -> oracle::
     oracle::contacts(&polygon(0), &polygon(4))
 }
 
-/// Holds an answer against the oracle's; returns whether there is contact after the start.
+/// Compares an answer with the oracle's; returns whether there is contact after the start.
 fn check(pair: ElementPair, start: &[Point; 4], end: &[Point; 4], note: &str) -> bool {
     let expected = expected(pair, start, end);
     let found = first_contact(pair, start, end);
@@ -190,7 +190,7 @@ fn lattices_agree_with_the_oracle() {
 
 const N_CASES: u64 = 150;
 
-/// Kinds with numbers of very different size take the oracle long.
+/// The oracle is slow for kinds with numbers of very different size.
 #[test]
 fn numbers_of_every_kind_agree_with_the_oracle() {
     let mut random = Random::new(13);
@@ -210,7 +210,7 @@ fn numbers_of_every_kind_agree_with_the_oracle() {
     }
 }
 
-/// The same question in other words.
+/// The same question asked in other ways.
 #[test]
 fn twins_agree() {
     let mut random = Random::new(14);
@@ -237,21 +237,21 @@ fn twins_agree() {
                     same("both turned", [1, 0, 3, 2]);
                 }
             }
-            // Moved and scaled as a whole, also by another way at each time: nothing changes.
+            // Moving or scaling everything changes nothing, even with another shift at the end than at the start.
             let moved = |by: f64, scale: f64, points: &[Point; 4]| {
                 points.map(|point| point.map(|x| (x + by) * scale))
             };
             let scale = 2.0_f64.powi(random.below(400) as i32 - 200);
             let answer = first_contact(pair, &moved(4.0, scale, &start), &moved(-9.0, scale, &end));
             assert_eq!(answer, found, "moved {pair:?} {start:?} {end:?}");
-            // Backwards: contact or none alike.
+            // Backwards there is contact if and only if there is forwards.
             let back = first_contact(pair, &end, &start);
             assert_eq!(
                 back.is_some(),
                 found.is_some(),
                 "{pair:?} {start:?} {end:?}"
             );
-            // In two halves: the first has the contact if it is no later than the middle.
+            // In two halves: the first half has the contact if the contact is no later than the middle.
             let middle: [Point; 4] = std::array::from_fn(|ix| {
                 std::array::from_fn(|axis| (start[ix][axis] + end[ix][axis]) / 2.0)
             });
@@ -294,7 +294,7 @@ fn times_are_rounded_down() {
     let half = vertex_face(1.0, -1.0);
     assert!(half.is_exact && half.time == 0.5 && half.is_within(0.5));
     assert!(vertex_face(1.0, 0.0).is_exact && vertex_face(1.0, 0.0).time == 1.0);
-    // Below the smallest number there is nothing but zero, and the two do not touch at the start.
+    // A time below the smallest `f32` rounds down to zero, though the two do not touch at the start.
     let tiny = f64::from(f32::from_bits(1));
     let early = vertex_face(tiny, -f64::from(f32::MAX));
     assert!(early.time > 0.0 && early.time_f32() == 0.0 && !early.at_start);

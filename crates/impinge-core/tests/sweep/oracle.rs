@@ -1,11 +1,11 @@
 //! The oracle: the first contact of two moving elements by another algorithm.
 //!
 //! At one moment two elements share a point if and only if weights λ ≥ 0 with sum 1 exist that blend the differences
-//! of their points to zero. If there are such weights, there are some with at most three of them positive whose
-//! columns (difference, 1) are linearly independent (Carathéodory; the differences lie in a plane). Whether there
-//! are, the signs of the minors of these columns decide. So the answer can change only at a root of a minor. All
-//! roots in [0, 1] of all minors are found (Sturm), and at each the weights are looked for by elimination. Its entries
-//! are polynomials, whose signs at a root are counted (Tarski).
+//! of their points to zero. If such weights exist, some exist with at most three of them positive whose
+//! columns (difference, 1) are linearly independent (Carathéodory; the differences lie in a plane). The signs of the
+//! minors of these columns decide whether they exist. So the answer can change only at a root of a minor. All
+//! roots in [0, 1] of all minors are found (Sturm), and at each root elimination looks for weights. Its entries
+//! are polynomials, whose signs at a root are found by counting (Tarski).
 //!
 //! No normal, no area, no case distinction, no Bernstein form, no floating-point operation.
 
@@ -25,7 +25,7 @@ struct Dyadic(IBig, usize);
 #[derive(Clone, Debug)]
 enum Moment {
     Dyadic(Dyadic),
-    /// The only root of the polynomial between two numbers, both no roots.
+    /// The only root of the polynomial between two numbers that are not roots.
     Root(Polynomial, Dyadic, Dyadic),
 }
 
@@ -76,7 +76,7 @@ impl Moments {
     }
 }
 
-/// A float that is not negative.
+/// A nonnegative float as a dyadic number.
 fn dyadic(x: f64) -> Dyadic {
     let bits = x.to_bits();
     let (biased, fraction) = ((bits >> 52) as usize, bits & ((1 << 52) - 1));
@@ -86,7 +86,7 @@ fn dyadic(x: f64) -> Dyadic {
     }
 }
 
-/// All minors of one to three columns that are not zero everywhere, each once but for constant factors.
+/// All minors of one to three columns that are not zero everywhere, each once up to constant factors.
 fn minors(columns: &[[Polynomial; 4]]) -> HashSet<Polynomial> {
     let subsets = |n: usize| {
         (1_u32..1 << n)
@@ -105,7 +105,7 @@ fn minors(columns: &[[Polynomial; 4]]) -> HashSet<Polynomial> {
     found
 }
 
-/// By expansion along the first column.
+/// A determinant, by expansion along the first column.
 fn determinant(columns: &[[Polynomial; 4]], chosen: &[usize], rows: &[usize]) -> Polynomial {
     let Some((&first, rest)) = chosen.split_first() else {
         return vec![IBig::ONE];
@@ -370,7 +370,7 @@ fn common_divisor(a: &Polynomial, b: &Polynomial) -> Polynomial {
     primitive(a)
 }
 
-/// The oracle itself, on answers that one sees.
+/// The oracle itself, on cases with obvious answers.
 #[test]
 fn oracle_knows_the_obvious() {
     let points = |points: &[[i32; 3]]| -> Vec<[IBig; 3]> {
