@@ -1,6 +1,7 @@
-//! Base64 as mesh files have it: with white space, and with padding in the middle where a writer encoded header and data apart.
+//! Base64 as found in mesh files: with white space, and with padding in the middle if a writer encoded header and data
+//! separately.
 
-/// What is wrong with a text that should be base64: the offset of the first byte that does not belong.
+/// The offset of the first byte that is not valid base64.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Wrong(pub usize);
 
@@ -37,7 +38,7 @@ pub(crate) fn decode(text: &[u8], most: usize) -> Result<Vec<u8>, Wrong> {
             (bits, n_digits, n_padding) = (0, 0, 0);
         }
     }
-    // Some writers leave the padding at the very end out; one digit alone holds no byte.
+    // Some writers omit the padding at the very end; one digit alone holds no byte.
     if out.len() < most && n_digits > 0 {
         let n_bytes = (n_digits - n_padding).saturating_sub(1);
         if n_bytes == 0 {

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Name, Place};
 
-/// Which end of a number comes first.
+/// The byte order of a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Endian {
     Little,
@@ -25,7 +25,7 @@ pub(crate) enum Scalar {
 }
 
 impl Scalar {
-    /// Bytes a number.
+    /// Bytes per number.
     pub(crate) fn size(self) -> usize {
         match self {
             Scalar::I8 | Scalar::U8 => 1,
@@ -48,7 +48,7 @@ impl Scalar {
     }
 
     /// The number at the start of `bytes`, which hold at least [`size`](Self::size), as an integer. A u64 beyond i64
-    /// becomes `i64::MAX`, which no index or count reaches; floats are cut off.
+    /// becomes `i64::MAX`, which no index or count reaches; floats are truncated.
     pub(crate) fn integer(self, bytes: &[u8], endian: Endian) -> i64 {
         match self {
             Scalar::I8 => i64::from(i8::from_ne_bytes([bytes[0]])),
@@ -74,7 +74,7 @@ impl Scalar {
         }
     }
 
-    /// The number at the start of `bytes` in f32: exact where [`fits_f32`](Self::fits_f32), which callers see to.
+    /// The number at the start of `bytes` in f32. Callers make sure that [`fits_f32`](Self::fits_f32) holds, so it is exact.
     pub(crate) fn narrow(self, bytes: &[u8], endian: Endian) -> f32 {
         match self {
             Scalar::F32 => f32::from_le_bytes(array(bytes, endian)),
@@ -99,7 +99,7 @@ pub(crate) struct Cursor<'a> {
     name: Name<'a>,
     bytes: &'a [u8],
     offset: usize,
-    /// What to add to the offset in messages, where the data is a part of a file.
+    /// Added to offsets in messages: where this data starts in its file.
     base: usize,
     pub endian: Endian,
 }

@@ -1,8 +1,8 @@
-//! What data may take that is larger in memory than in its file.
+//! Limits on data that is larger in memory than in its file.
 
 use crate::error::{Error, Name, Place};
 
-/// Makes room for `n` things more, or says that there is no memory for them; the process goes on.
+/// Reserves room for `n` more elements. Returns an error if there is not enough memory, instead of ending the process.
 pub(crate) fn reserve<T>(name: Name, place: Place, to: &mut Vec<T>, n: u64) -> Result<(), Error> {
     usize::try_from(n)
         .ok()
@@ -13,8 +13,8 @@ pub(crate) fn reserve<T>(name: Name, place: Place, to: &mut Vec<T>, n: u64) -> R
         })
 }
 
-/// The most bytes that compressed data of a file of `length` bytes may become. Meshes are seldom compressed to less than a
-/// tenth; constant arrays are, by a factor of a thousand, but they are a small part of a mesh.
+/// The most bytes that the compressed data of a file of `length` bytes may expand to. Meshes rarely compress to less than a
+/// tenth of their size. Constant arrays compress by a factor of a thousand, but they are a small part of a mesh.
 pub(crate) fn most_expanded(length: u64, limit: u64) -> u64 {
     const FACTOR: u64 = 200;
     const FLOOR: u64 = 64 << 20;
@@ -33,7 +33,7 @@ impl Budget {
         Budget { limit, used: 0 }
     }
 
-    /// Takes `n` things of `size` bytes from the budget, before memory is reserved for them.
+    /// Charges `n` elements of `size` bytes to the budget, before memory is reserved for them.
     pub(crate) fn charge(
         &mut self,
         name: Name,

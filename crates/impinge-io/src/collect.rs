@@ -1,4 +1,4 @@
-//! Where every reader puts what it finds: positions, triangles, tetrahedra, and the counts of what was fanned or left out.
+//! The output of every reader: positions, triangles, tetrahedra, and the counts of fanned polygons and skipped cells.
 
 use crate::error::{Error, Name, Place};
 use crate::mesh::{Elements, Mesh, Positions};
@@ -14,7 +14,7 @@ pub(crate) struct Collector<'a> {
     pub n_fanned: u64,
     pub n_lines: u64,
     pub n_points: u64,
-    /// The corners of the polygon or strip at hand; kept to be reused.
+    /// The corners of the current polygon or strip; its memory is reused.
     pub corners: Vec<u32>,
 }
 
@@ -36,7 +36,7 @@ impl<'a> Collector<'a> {
         self.positions.len() as u64
     }
 
-    /// Turns `index` of a file that counts from `first` into a vertex index.
+    /// Converts `index` of a file that counts from `first` to a vertex index.
     pub(crate) fn vertex(&self, index: i64, first: i64, place: Place) -> Result<u32, Error> {
         vertex_ix(self.name, index, first, self.n_vertices(), place)
     }
@@ -62,7 +62,8 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
-    /// Adds the strip in [`corners`](Self::corners): each corner makes a triangle with the two before it, every other one turned.
+    /// Adds the strip in [`corners`](Self::corners): each corner forms a triangle with the two before it; every other
+    /// triangle is flipped.
     pub(crate) fn strip(&mut self) {
         self.triangles
             .extend(self.corners.windows(3).enumerate().map(|(ix, t)| {
@@ -74,7 +75,7 @@ impl<'a> Collector<'a> {
             }));
     }
 
-    /// Chooses the primitives that were asked for, checks that there are some, and welds if that was asked for.
+    /// Chooses the primitives that the options ask for, checks that there are some, and welds if the options say so.
     pub(crate) fn finish(self, options: &ReadOptions) -> Result<(Mesh, Summary), Error> {
         let (n_triangles, n_tetrahedra) =
             (self.triangles.len() as u64, self.tetrahedra.len() as u64);
@@ -120,7 +121,7 @@ impl<'a> Collector<'a> {
     }
 }
 
-/// Turns `index` of a file that counts from `first` into a vertex index below `n_vertices`.
+/// Converts `index` of a file that counts from `first` to a vertex index below `n_vertices`.
 pub(crate) fn vertex_ix(
     name: Name,
     index: i64,

@@ -1,13 +1,13 @@
-//! Which text a reader takes.
+//! Which text encodings readers accept.
 
 use crate::error::{Error, Name, Place};
 use crate::format::Format;
 use crate::formats::stl;
 
-/// Refuses text in UTF-16, which some editors and shells write, by name.
+/// Refuses text in UTF-16, which some editors and shells write, with an error that says so.
 ///
-/// Without a byte order mark UTF-16 shows by a zero in every other byte. No format starts like that but binary STL, whose
-/// title may be anything: it is told by its length.
+/// Without a byte order mark, UTF-16 is recognised by a zero in every other byte. Only binary STL can start like that, because
+/// its title may be anything; binary STL is recognised by its length.
 pub(crate) fn check_encoding(bytes: &[u8], format: Format, name: Name) -> Result<(), Error> {
     let is_utf16 = match bytes {
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => true,
@@ -15,7 +15,7 @@ pub(crate) fn check_encoding(bytes: &[u8], format: Format, name: Name) -> Result
         _ => false,
     };
     if is_utf16 && !(format == Format::Stl && stl::is_binary(bytes)) {
-        return Err(name.unsupported(Place::File, "text in UTF-16 (UTF-8 is: save it as that)"));
+        return Err(name.unsupported(Place::File, "text in UTF-16 (save the file as UTF-8)"));
     }
     Ok(())
 }

@@ -1,9 +1,9 @@
-//! What can go wrong with a file, said in one line.
+//! Errors of reading and writing; each message is one line.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Where in a file something stands.
+/// A place in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// The file as a whole.
@@ -33,45 +33,46 @@ impl fmt::Display for Location {
     }
 }
 
-/// Everything that reading or writing can fail with. Each message is one line and names the file and the place.
+/// An error of reading or writing. Each message is one line and names the file and the place.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The operating system refused. Check that the file exists, that it may be read or written, and that the disk has room.
+    /// The operating system reported an error. Check that the file exists, that it may be read or written, and that the disk has
+    /// room.
     #[error("{}: cannot {action}: {source}", .path.display())]
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What was tried: `open`, `read`, `write`, …
+        /// The failed action: `open`, `read`, `write`, …
         action: &'static str,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// Something that is no regular file: a pipe, a device, a socket or a folder. Check the name, or copy its content to a file.
+    /// The path is not a regular file but a pipe, a device, a socket or a folder. Check the name, or copy its content to a file.
     #[error("{}: is {what}, not a regular file", .path.display())]
     NotAFile {
         /// The path.
         path: PathBuf,
-        /// What it is.
+        /// What the path is instead.
         what: &'static str,
     },
-    /// A mesh file or a pattern names a file elsewhere, perhaps by a link. Check that the mesh is what it seems to be, or put
+    /// A mesh file or a pattern names a file in another folder, perhaps through a link. Check that you trust the mesh, or put
     /// the file beside it.
     #[error("{}: is not in {}; only files in the folder of the mesh or below it are read", .path.display(), .folder.display())]
     Outside {
         /// The file that was named.
         path: PathBuf,
-        /// The folder in which it should be.
+        /// The folder in which the file should be.
         folder: PathBuf,
     },
-    /// The format is chosen by the file's extension, and this one is not known. Check the name.
+    /// The format is chosen by the file's extension, and this extension is not known. Check the name.
     #[error("{}: no mesh format has the extension '{extension}' (known: {known})", .path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
-        /// Its extension, empty where it has none.
+        /// Its extension, empty if it has none.
         extension: String,
-        /// The extensions that are known.
+        /// The known extensions.
         known: &'static str,
     },
     /// The file does not follow its format. Check the place named.
@@ -79,29 +80,29 @@ pub enum Error {
     Syntax {
         /// Where.
         at: Location,
-        /// What should stand there.
+        /// What should be there.
         expected: String,
-        /// What stands there.
+        /// What is there.
         found: String,
     },
-    /// The file ends before what its header announces. Check that it was written and copied whole.
+    /// The file is shorter than its header says. Check that it was written and copied completely.
     #[error("{at}: {what}: {expected} bytes are needed, but {found} are left")]
     Truncated {
-        /// Where the data in question starts.
+        /// Where the incomplete data starts.
         at: Location,
-        /// The data in question.
+        /// The incomplete data.
         what: String,
         /// Bytes needed.
         expected: u64,
         /// Bytes present.
         found: u64,
     },
-    /// A number of things differs from what was announced. Check both numbers.
+    /// A count differs from the number announced in the file. Check both numbers.
     #[error("{at}: expected {expected} {what}, found {found}")]
     Count {
         /// Where.
         at: Location,
-        /// The things counted.
+        /// What was counted.
         what: String,
         /// How many there should be.
         expected: u64,
@@ -132,12 +133,12 @@ pub enum Error {
         /// The coordinate.
         value: f64,
     },
-    /// The file is right, but uses something that is not read. Convert it with another program.
+    /// The file is valid, but uses a feature that is not supported. Convert it with another program.
     #[error("{at}: {what} is not supported")]
     Unsupported {
         /// Where.
         at: Location,
-        /// What is not supported, and what is.
+        /// What is not supported, and the supported alternatives.
         what: String,
     },
     /// The file has no primitive of the wanted kind. Check that it is a surface or a volume, not points or curves.
@@ -160,7 +161,8 @@ pub enum Error {
         /// Point cells in the file.
         n_points: u64,
     },
-    /// More than an index or the byte budget of [`ReadOptions`](crate::ReadOptions) can hold. Split the file, or raise the budget.
+    /// A number is too large for an index, or for a byte limit of [`ReadOptions`](crate::ReadOptions). Split the file, or raise
+    /// the limit.
     #[error("{at}: {what}: {found} is more than the limit of {limit}")]
     TooLarge {
         /// Where.
@@ -172,20 +174,20 @@ pub enum Error {
         /// How much there is.
         found: u64,
     },
-    /// There is no memory for what the file holds. Check that the file is what it seems to be, or give the process more memory.
-    #[error("{at}: {needed} bytes of memory are needed, and cannot be had")]
+    /// There is not enough memory for the content of the file. Check that the file is valid, or give the process more memory.
+    #[error("{at}: {needed} bytes of memory are needed, but there is not enough")]
     NoMemory {
-        /// The file, and what in it.
+        /// The place in the file.
         at: Location,
-        /// Bytes that were asked for.
+        /// Bytes that were requested.
         needed: u64,
     },
-    /// What was given to a writer, or asked of a sequence, does not fit together. Check the call.
+    /// The arguments of a call to a writer or a sequence do not fit together. Check the call.
     #[error("{file}: {what}: expected {expected}, found {found}")]
     Mismatch {
         /// The file written or read.
         file: String,
-        /// What does not fit.
+        /// The argument that does not fit.
         what: String,
         /// The number that would fit.
         expected: u64,
@@ -282,7 +284,7 @@ impl Name<'_> {
     }
 }
 
-/// Bytes of a file as they may be shown in a message: short, printable, in quotes.
+/// Bytes of a file for a message: short, printable, in quotes.
 pub(crate) fn shown(bytes: &[u8]) -> String {
     const MOST: usize = 24;
     let text: String = String::from_utf8_lossy(&bytes[..bytes.len().min(MOST)])

@@ -1,8 +1,8 @@
-//! Opening files: regular ones only, none larger than asked for, and files that another file names only in its folder.
+//! Opening files safely: only regular files, only up to a size limit, and files named by a mesh only in the mesh's folder.
 //!
-//! A pipe never ends if nobody writes to it, and a device may give bytes for ever; neither is a mesh. A path that a mesh file
-//! holds may have been written by somebody who wants to see other files, so such a path is resolved, links and all, and
-//! must lie in the folder of the file that names it or below.
+//! Reading a pipe may never end, and a device may give bytes forever; neither is a mesh. A path inside a mesh file
+//! may have been written by somebody who wants to see other files. So such a path is resolved, including links, and
+//! must lie in the folder of the mesh file or below.
 
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::Read;
@@ -12,12 +12,12 @@ use crate::budget::reserve;
 use crate::error::{Error, Name, Place};
 use crate::options::ReadOptions;
 
-/// A path and who named it.
+/// A path and its origin.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Source<'p> {
-    /// The caller: any link may lead anywhere.
+    /// Named by the caller: links may lead anywhere.
     Named(&'p Path),
-    /// A file or a pattern of names in this folder: must lie in it or below, links resolved.
+    /// Named by a file or a pattern in this folder: must lie in it or below, links resolved.
     Beside(&'p Path, &'p Path),
 }
 
@@ -51,7 +51,7 @@ impl<'p> Source<'p> {
         let shown = path.display().to_string();
         let mut bytes = Vec::new();
         reserve(Name(&shown), Place::File, &mut bytes, length)?;
-        // A file that grows meanwhile is read as long as it was.
+        // If the file grows meanwhile, only the initial length is read.
         file.take(length)
             .read_to_end(&mut bytes)
             .map_err(|source| Error::io(path, "read", source))?;
@@ -66,7 +66,7 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
         .unwrap_or(Path::new("."))
 }
 
-/// Opens `path`, where `shown` stands in messages.
+/// Opens `path`; messages name it `shown`.
 fn open(shown: &Path, path: &Path) -> Result<(File, u64), Error> {
     let failed = |source| Error::io(shown, "read", source);
     let check = |metadata: &Metadata| match metadata.is_file() {
@@ -76,7 +76,8 @@ fn open(shown: &Path, path: &Path) -> Result<(File, u64), Error> {
             what: kind(metadata),
         }),
     };
-    // Opening a device can do something already, so the path is looked at first; and the open file again, which may be another by now.
+    // Opening a device can already have effects, so the path is checked first. The open file is checked again, because the path
+    // may lead to another file by now.
     check(&fs::metadata(path).map_err(failed)?)?;
     let file = patient(OpenOptions::new().read(true))
         .open(path)
@@ -86,7 +87,7 @@ fn open(shown: &Path, path: &Path) -> Result<(File, u64), Error> {
     Ok((file, metadata.len()))
 }
 
-/// Makes opening a pipe return at once, where it would wait for a writer.
+/// Makes opening a pipe return at once instead of waiting for a writer.
 #[cfg(unix)]
 fn patient(options: &mut OpenOptions) -> &mut OpenOptions {
     use std::os::unix::fs::OpenOptionsExt;
@@ -98,7 +99,7 @@ fn patient(options: &mut OpenOptions) -> &mut OpenOptions {
     options
 }
 
-/// What something is that is no regular file.
+/// Describes a file that is not regular.
 fn kind(metadata: &Metadata) -> &'static str {
     #[cfg(unix)]
     {
@@ -121,10 +122,10 @@ fn kind(metadata: &Metadata) -> &'static str {
     }
 }
 
-/// Where `path`, all links resolved, is; an error unless that is in `folder` or below.
+/// `path` with all links resolved; an error unless it lies in `folder` or below.
 fn resolved(path: &Path, folder: &Path) -> Result<PathBuf, Error> {
     let outside = || outside(path, folder);
-    // Names that lead out are refused before anything is looked up: even whether there is such a file is not to be seen.
+    // Names that lead out are refused before any lookup, so that an error does not reveal whether such a file exists.
     if path.strip_prefix(folder).is_ok_and(leads_out) {
         return Err(outside());
     }
@@ -136,7 +137,7 @@ fn resolved(path: &Path, folder: &Path) -> Result<PathBuf, Error> {
     Ok(real)
 }
 
-/// The error for a file that is named in or beside another, and lies outside its folder.
+/// The error for a file named by a mesh or a pattern that lies outside its folder.
 pub(crate) fn outside(path: &Path, folder: &Path) -> Error {
     Error::Outside {
         path: path.to_owned(),
@@ -144,7 +145,7 @@ pub(crate) fn outside(path: &Path, folder: &Path) -> Error {
     }
 }
 
-/// Whether a relative path leaves the folder it starts in, somewhere on its way.
+/// Whether a relative path leaves its starting folder at any point.
 pub(crate) fn leads_out(relative: &Path) -> bool {
     let mut depth = 0usize;
     for component in relative.components() {

@@ -1,4 +1,4 @@
-//! Which formats there are, and which one a file has.
+//! The supported formats, and how to find the format of a file.
 
 use std::path::Path;
 
@@ -35,7 +35,7 @@ pub(crate) const KNOWN: &str =
     "obj, ply, stl, off, coff, noff, gltf, glb, msh, vtk, vtu, mesh, node, ele, face";
 
 impl Format {
-    /// The format that files with this extension have (without the dot; case does not matter).
+    /// The format of files with this extension (without the dot; case does not matter).
     ///
     /// ```
     /// use impinge_io::Format;
@@ -61,7 +61,7 @@ impl Format {
     /// The format of the file at `path`, by its extension.
     ///
     /// # Errors
-    /// [`Error::UnknownFormat`] where the extension is none of those known.
+    /// [`Error::UnknownFormat`] if the extension is not known.
     pub fn from_path(path: &Path) -> Result<Self, Error> {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         Self::from_extension(&extension).ok_or_else(|| Error::UnknownFormat {

@@ -1,5 +1,5 @@
-//! Mesh files for impinge: surfaces, tetrahedra and sequences of positions in, coloured meshes out. Plain arrays on either
-//! side; this crate knows nothing of collision detection.
+//! Mesh files for impinge: reads surfaces, tetrahedra and sequences of positions, writes coloured meshes. Both sides are plain
+//! arrays; this crate knows nothing about collision detection.
 //!
 //! ```no_run
 //! use impinge_io::{ColoredMesh, ReadOptions, read, write_ply};
@@ -17,24 +17,24 @@
 //! # }
 //! ```
 //!
-//! # What readers keep
+//! # What readers preserve
 //! - **Values.** Binary `float` coordinates stay f32. Coordinates in text are read as f64, correctly rounded, whatever
-//!   type a header declares; [`Positions::narrow_if_exact`] goes back to f32 where nothing is lost.
+//!   type a header declares; [`Positions::narrow_if_exact`] converts them to f32 if nothing is lost.
 //! - **Order.** Vertices and primitives keep the order of the file. A polygon of n corners becomes the fan of n - 2
-//!   triangles around its first corner, in its place; a strip, its triangles. (A fan covers a convex polygon exactly;
-//!   of one that is not convex it is only a triangulation of the same corners.)
-//! - **Everything that can collide.** Points and lines are counted and left out, and so are the triangles of a file that
-//!   has tetrahedra as well, unless [`ReadOptions::prefer`] says otherwise; see [`Summary`]. Hexahedra, prisms, pyramids and
-//!   curved (higher-order) cells are refused by name: leaving them out would lose collisions silently.
+//!   triangles around its first corner, in its place; a strip becomes its triangles. (A fan covers a convex polygon exactly;
+//!   for a polygon that is not convex, it only connects the same corners.)
+//! - **Everything that can collide.** Points and lines are counted and skipped. If a file has tetrahedra, its triangles are
+//!   skipped too, unless [`ReadOptions::prefer`] says otherwise; see [`Summary`]. Hexahedra, prisms, pyramids and
+//!   curved (higher-order) cells are refused with an error: skipping them would lose collisions silently.
 //!
 //! # What readers refuse
 //! Indices out of range, coordinates that are not finite, files that end early, and headers that announce more than the
-//! file holds: each is an [`Error`] that names file, line or byte offset, and both numbers. Memory is reserved by what a
-//! file holds, not by what its header says.
+//! file holds: each is an [`Error`] that names the file, the line or byte offset, and both numbers. Memory is reserved by the
+//! content of a file, not by what its header says.
 //!
 //! # Why the parsers are our own
-//! Crates exist for most of these formats, but they cover one version of a format, read coordinates as f32, merge vertices,
-//! or give no line with an error. XML, JSON, zlib and LZ4 are left to crates.
+//! Crates exist for most of these formats, but they cover only one version of a format, read coordinates as f32, merge vertices,
+//! or report errors without a line. For XML, JSON, zlib and LZ4 we use crates.
 
 mod base64;
 mod binary;

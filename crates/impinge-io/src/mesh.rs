@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasher, Hasher, RandomState};
 
-/// Vertex positions in the precision of their file: binary `float` stays f32; text is read as f64, so that nothing is
-/// rounded behind the user's back.
+/// Vertex positions in the precision of their file: binary `float` stays f32; text is read as f64, so that no coordinate is
+/// silently rounded to f32.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Positions {
-    /// One `[x, y, z]` a vertex, in the file's unit of length.
+    /// One `[x, y, z]` per vertex, in the file's unit of length.
     F32(Vec<[f32; 3]>),
-    /// One `[x, y, z]` a vertex, in the file's unit of length.
+    /// One `[x, y, z]` per vertex, in the file's unit of length.
     F64(Vec<[f64; 3]>),
 }
 
@@ -27,7 +27,7 @@ impl Positions {
         self.len() == 0
     }
 
-    /// The position of vertex `ix` in f64, which holds every f32 exactly; `None` where there is no such vertex.
+    /// The position of vertex `ix` in f64, which holds every f32 exactly; `None` if there is no such vertex.
     pub fn get(&self, ix: usize) -> Option<[f64; 3]> {
         match self {
             Positions::F32(p) => p.get(ix).map(|v| v.map(f64::from)),
@@ -43,7 +43,7 @@ impl Positions {
         }
     }
 
-    /// All positions in f32, each coordinate rounded to the nearest; lossless for `F32`, and for `F64` exactly where
+    /// All positions in f32, each coordinate rounded to the nearest. Lossless for `F32`, and for `F64` if and only if
     /// [`narrow_if_exact`](Self::narrow_if_exact) would narrow.
     pub fn to_f32_rounded(&self) -> Vec<[f32; 3]> {
         match self {
@@ -52,9 +52,9 @@ impl Positions {
         }
     }
 
-    /// Turns `F64` into `F32` when every coordinate is exactly representable there; says whether the positions are f32 now.
+    /// Converts `F64` to `F32` if every coordinate is exactly representable in f32. Returns whether the positions are f32 now.
     ///
-    /// No coordinate changes its value, so no answer about the mesh changes; half the memory is saved.
+    /// No coordinate changes its value, so no answer about the mesh changes; this halves the memory.
     pub fn narrow_if_exact(&mut self) -> bool {
         let Positions::F64(wide) = self else {
             return true;
@@ -68,7 +68,7 @@ impl Positions {
     }
 }
 
-/// The f32 nearest to `value`: the one place where this crate rounds a coordinate.
+/// The f32 nearest to `value`. This is the only place where this crate rounds a coordinate.
 fn nearest_f32(value: f64) -> f32 {
     value as f32
 }
@@ -76,9 +76,9 @@ fn nearest_f32(value: f64) -> f32 {
 /// The primitives of a mesh: vertex indices counted from 0, in the order of the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Elements {
-    /// Three vertices a triangle.
+    /// Three vertices per triangle.
     Triangles(Vec<[u32; 3]>),
-    /// Four vertices a tetrahedron.
+    /// Four vertices per tetrahedron.
     Tetrahedra(Vec<[u32; 4]>),
 }
 
@@ -96,7 +96,7 @@ impl Elements {
         self.len() == 0
     }
 
-    /// All vertex indices, a primitive after the other.
+    /// All vertex indices, primitive by primitive.
     pub fn indices(&self) -> &[u32] {
         match self {
             Elements::Triangles(t) => t.as_flattened(),
@@ -112,12 +112,12 @@ impl Elements {
     }
 }
 
-/// One body: vertices and the primitives between them. Readers guarantee that every index is in range and every coordinate finite.
+/// One body: vertices and primitives. Readers guarantee that every index is in range and every coordinate is finite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
-    /// Where the vertices are.
+    /// The positions of the vertices.
     pub positions: Positions,
-    /// Which vertices make a primitive.
+    /// The vertices of each primitive.
     pub elements: Elements,
 }
 
@@ -133,9 +133,9 @@ impl Mesh {
     }
 }
 
-/// Which vertices become one when vertices at the same position are welded.
+/// A map from vertices to welded vertices: vertices at the same position become one.
 ///
-/// Keep it beside a sequence: its frames have the vertices of the file, and [`Weld::positions`] turns them into those of
+/// Keep it for reading a sequence: the frames have the vertices of the file, and [`Weld::positions`] converts them to those of
 /// the welded mesh.
 ///
 /// ```
@@ -154,8 +154,8 @@ pub struct Weld {
 }
 
 impl Weld {
-    /// Welds vertices whose coordinates are all equal as numbers (-0.0 equals 0.0). The first of them stays, in its
-    /// order. NaN equals nothing, so a vertex with NaN is never welded.
+    /// Welds vertices whose coordinates are all equal as numbers (-0.0 equals 0.0). Of equal vertices the first one stays, and
+    /// the order of vertices is kept. NaN equals nothing, so a vertex with NaN is never welded.
     pub fn by_position(positions: &Positions) -> Self {
         match positions {
             Positions::F32(p) => Self::by_key(
@@ -191,17 +191,17 @@ impl Weld {
         Weld { map, firsts }
     }
 
-    /// Welds the vertices that both weldings make one: of the same vertices in two poses, those that are together in both.
+    /// Welds only vertices that both weldings weld: given two poses of the same vertices, those that coincide in both.
     ///
     /// # Panics
-    /// Where the two are of different numbers of vertices.
+    /// If the two weldings have different numbers of vertices.
     pub fn and(&self, other: &Weld) -> Self {
         assert_eq!(self.map.len(), other.map.len(), "of the same vertices");
         let both = self.map.iter().zip(&other.map);
         Self::by_key(both.map(|(&a, &b)| [Some(a), Some(b), Some(0)]))
     }
 
-    /// How many vertices went away.
+    /// How many vertices the welding removed.
     pub fn n_welded(&self) -> usize {
         self.map.len() - self.firsts.len()
     }
@@ -211,7 +211,7 @@ impl Weld {
         &self.map
     }
 
-    /// Welds the mesh that this was made of: its vertices, and the indices of its primitives.
+    /// Welds the mesh that this welding was computed from: its vertices, and the indices of its primitives.
     pub fn apply(&self, mesh: &mut Mesh) {
         if self.n_welded() == 0 {
             return;
@@ -219,7 +219,7 @@ impl Weld {
         if let Some(positions) = self.positions(&mesh.positions) {
             mesh.positions = positions;
             for ix in mesh.elements.indices_mut() {
-                // An index that is out of range stays out of range: fewer vertices are left.
+                // An index out of range stays out of range, because welding only removes vertices.
                 if let Some(&welded) = self.map.get(*ix as usize) {
                     *ix = welded;
                 }
@@ -227,9 +227,9 @@ impl Weld {
         }
     }
 
-    /// Two vertices that are welded, but not at one position in these positions; `None` where there are none.
+    /// Two welded vertices that have different positions in `positions`; `None` if there are none.
     ///
-    /// In a frame of a sequence this says that the mesh comes apart where it was welded.
+    /// In a frame of a sequence this means that the mesh comes apart at a welded vertex.
     pub fn torn(&self, positions: &Positions) -> Option<[u32; 2]> {
         (0u32..).zip(&self.map).find_map(|(ix, &welded)| {
             let first = *self.firsts.get(welded as usize)?;
@@ -238,7 +238,7 @@ impl Weld {
         })
     }
 
-    /// The positions of the welded vertices, taken from those of all vertices (of any frame); `None` where their number differs.
+    /// The positions of the welded vertices, taken from those of all vertices (of any frame); `None` if their number differs.
     pub fn positions(&self, positions: &Positions) -> Option<Positions> {
         if positions.len() != self.map.len() {
             return None;
@@ -254,17 +254,18 @@ impl Weld {
     }
 }
 
-/// Welds the vertices of `mesh` that are at the same position (compared as numbers, exactly) and returns how many went away.
+/// Welds the vertices of `mesh` that are at the same position (compared as numbers, exactly) and returns how many it removed.
 ///
-/// Primitives keep their number and order, so their ids do not shift; those whose corners fall together become
-/// degenerate and stay. To weld the frames of a sequence alike, see [`Weld`].
+/// Primitives keep their number and order, so their ids do not change; primitives whose corners are welded become
+/// degenerate and stay. To weld the frames of a sequence in the same way, see [`Weld`].
 pub fn weld(mesh: &mut Mesh) -> usize {
     let weld = Weld::by_position(&mesh.positions);
     weld.apply(mesh);
     weld.n_welded()
 }
 
-/// The start of a [`Mix`], drawn anew for each weld so that no file can be made to collide. The result does not depend on it.
+/// The seed of a [`Mix`], random for each weld, so that nobody can prepare a file whose vertices collide in the hash table. The
+/// result does not depend on it.
 struct Seed(u64);
 
 impl Seed {
@@ -281,7 +282,7 @@ impl BuildHasher for Seed {
     }
 }
 
-/// A short multiplicative hash of coordinates' bits; std's took most of the time of a weld.
+/// A short multiplicative hash of the bits of coordinates. The standard library's hash took most of the time of a weld.
 struct Mix(u64);
 
 impl Hasher for Mix {
@@ -298,7 +299,7 @@ impl Hasher for Mix {
     }
 
     fn write_u64(&mut self, word: u64) {
-        // A folded 128-bit product: every bit of the input reaches the high and the low bits, from which the table takes its own.
+        // A folded 128-bit product: every bit of the input affects the high and the low bits, which the hash table uses.
         let product = u128::from(self.0 ^ word ^ 0x9E37_79B9_7F4A_7C15)
             * u128::from(0xD6E8_FEB8_6659_FD93_u64);
         self.0 = (product as u64) ^ ((product >> 64) as u64);

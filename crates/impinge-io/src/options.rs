@@ -1,14 +1,14 @@
-//! How a mesh is read, and what a reader tells of it.
+//! Options of reading a mesh, and a summary of what was read.
 
 /// Which primitives to take from a file that has triangles and tetrahedra.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Prefer {
-    /// The tetrahedra if there are any, else the triangles: a volume's file often repeats its surface.
+    /// The tetrahedra if there are any, else the triangles: files of volumes often repeat the surface.
     #[default]
     Volume,
-    /// The triangles; a file without is an error.
+    /// The triangles; a file without triangles is an error.
     Triangles,
-    /// The tetrahedra; a file without is an error.
+    /// The tetrahedra; a file without tetrahedra is an error.
     Tetrahedra,
 }
 
@@ -17,11 +17,11 @@ pub enum Prefer {
 pub struct ReadOptions {
     /// Whether vertices at the same position become one; see [`weld`](crate::weld). Off by default.
     pub weld: bool,
-    /// Which primitives to take where there are both kinds.
+    /// Which primitives to take if the file has both kinds.
     pub prefer: Prefer,
-    /// The most bytes that data may take which is larger in memory than in the file by its nature: compressed arrays,
-    /// and glTF meshes placed many times. 4 GiB by default. Compressed arrays may not take more than 200 times the bytes of
-    /// their file either, or 64 MiB where that is more.
+    /// The most bytes in memory for data that is smaller in the file: compressed arrays, and glTF meshes placed many times.
+    /// 4 GiB by default. In addition, compressed arrays may take at most 200 times the bytes of their file, or 64 MiB if that
+    /// is more.
     pub max_expanded_bytes: u64,
     /// The most bytes that a file may have; a longer one is refused before it is read. 16 GiB by default.
     pub max_file_bytes: u64,
@@ -38,20 +38,20 @@ impl Default for ReadOptions {
     }
 }
 
-/// What a reader did to a file's cells, so that nothing is left out unseen.
+/// What a reader changed or skipped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct Summary {
-    /// Polygons of four corners or more, each of which became several triangles. Where it is 0, primitive ids are the file's.
+    /// Polygons of four corners or more, each of which became several triangles. If it is 0, primitive ids are those of the file.
     pub n_polygons_fanned: u64,
-    /// Lines left out.
+    /// Lines skipped.
     pub n_lines_skipped: u64,
-    /// Point cells left out.
+    /// Point cells skipped.
     pub n_points_skipped: u64,
-    /// Triangles left out beside tetrahedra.
+    /// Triangles skipped because the file has tetrahedra.
     pub n_triangles_skipped: u64,
-    /// Tetrahedra left out because triangles were asked for.
+    /// Tetrahedra skipped because triangles were requested.
     pub n_tetrahedra_skipped: u64,
-    /// Vertices that went away in welding.
+    /// Vertices removed by welding.
     pub n_welded: u64,
 }

@@ -11,19 +11,19 @@ use crate::formats::{gltf, medit, msh, obj, off, ply, stl, tetgen, vtk, vtu};
 use crate::mesh::Mesh;
 use crate::options::{ReadOptions, Summary};
 
-/// Reads the mesh at `path`; the format goes by the extension ([`Format::from_path`]).
+/// Reads the mesh at `path`; the extension decides the format ([`Format::from_path`]).
 ///
-/// All bodies, groups and nodes of a file become one mesh. Of TetGen's files either may be named, the other is found beside it.
-/// Only regular files are read, and of files that the mesh file names or that are found beside it only those in its own
-/// folder or below, links resolved.
+/// All bodies, groups and nodes of a file become one mesh. `path` may be either of TetGen's two files; the other must lie
+/// beside it. Only regular files are read. Files that belong to the mesh file must lie in its folder or below, after
+/// resolving links.
 ///
 /// # Errors
-/// Any [`Error`] but [`Error::Mismatch`].
+/// Any [`Error`] except [`Error::Mismatch`].
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Mesh, Error> {
     Ok(read_with_summary(path, options)?.0)
 }
 
-/// Like [`read`], and tells what was fanned, left out and welded.
+/// Like [`read`], and also returns what was fanned, skipped and welded.
 ///
 /// # Errors
 /// As [`read`].
@@ -31,11 +31,11 @@ pub fn read_with_summary(path: &Path, options: &ReadOptions) -> Result<(Mesh, Su
     collect_file(path, options, |parts| parts.finish(options))
 }
 
-/// Reads a mesh from the bytes of a file. `name` stands for the file in errors.
+/// Reads a mesh from the bytes of a file. Errors use `name` for the file.
 ///
 /// # Errors
-/// As [`read`]. What lies in several files can't be read this way ([`Error::Unsupported`]): TetGen (see
-/// [`read_tetgen_bytes`]) and glTF with buffers beside it.
+/// As [`read`]. A mesh in several files can't be read this way ([`Error::Unsupported`]): TetGen (see
+/// [`read_tetgen_bytes`]) and glTF with buffers in other files.
 pub fn read_bytes(
     bytes: &[u8],
     format: Format,
@@ -45,7 +45,7 @@ pub fn read_bytes(
     Ok(read_bytes_with_summary(bytes, format, name, options)?.0)
 }
 
-/// Like [`read_bytes`], and tells what was fanned, left out and welded.
+/// Like [`read_bytes`], and also returns what was fanned, skipped and welded.
 ///
 /// # Errors
 /// As [`read_bytes`].
@@ -58,8 +58,8 @@ pub fn read_bytes_with_summary(
     collect_bytes(bytes, format, Name(name), None, options)?.finish(options)
 }
 
-/// Reads a TetGen mesh from the bytes of its `.node` file and of its `.ele` or `.face` file, which is told by its extension
-/// in `cells_name`. The names stand for the files in errors.
+/// Reads a TetGen mesh from the bytes of its `.node` file and of its `.ele` or `.face` file; the extension of `cells_name`
+/// says which of these it is. Errors use the given names for the files.
 ///
 /// # Errors
 /// As [`read`].
@@ -77,7 +77,7 @@ pub fn read_tetgen_bytes(
     )
 }
 
-/// Gives the parts of the file at `path` to `then`, before any choice among them. No primitives are no error here.
+/// Gives all parts of the file at `path` to `then`, before any of them is chosen. A file without primitives is not an error here.
 pub(crate) fn collect_file<T>(
     path: &Path,
     options: &ReadOptions,
@@ -86,7 +86,7 @@ pub(crate) fn collect_file<T>(
     collect(Source::Named(path), options, then)
 }
 
-/// As [`collect_file`], for a file that the caller or a pattern named.
+/// Like [`collect_file`], for a file that the caller or a pattern named.
 pub(crate) fn collect<T>(
     source: Source,
     options: &ReadOptions,
@@ -125,7 +125,7 @@ pub(crate) fn collect<T>(
     )?)
 }
 
-/// The parts of a file's bytes. `folder` is where files that it refers to are, if they may be read.
+/// The parts of a file's bytes. `folder` is the folder of the files that it refers to; `None` if these may not be read.
 fn collect_bytes<'a>(
     bytes: &[u8],
     format: Format,

@@ -34,8 +34,8 @@ impl SequenceFormat {
     }
 }
 
-/// The frames of a deforming mesh: positions alone, all of the same number of vertices. Opening reads the header (or, of
-/// numbered files, the first); a frame is read when it is asked for, in any order.
+/// The frames of a deforming mesh: positions only, all with the same number of vertices. Opening reads the header (or the first
+/// of numbered files). Each frame is read on request, in any order.
 #[derive(Debug)]
 pub struct Sequence {
     name: String,
@@ -52,7 +52,7 @@ enum Frames {
         start: u64,
         endian: Endian,
     },
-    /// A mesh file each, in the folder of the path that named them.
+    /// One mesh file per frame, in the folder of the path that named them.
     Files { files: Vec<PathBuf>, named: PathBuf },
 }
 
@@ -62,7 +62,7 @@ enum Source {
     Bytes(Vec<u8>),
 }
 
-/// What the header of a point cache says.
+/// The content of a point cache's header.
 struct Header {
     n_points: u64,
     n_frames: u64,
@@ -73,16 +73,16 @@ struct Header {
 impl Sequence {
     /// Opens a sequence:
     /// - `run.pc2`, `run.mdd`: a point cache;
-    /// - `run_0010.ply`: that file and those whose number in this place (the last one in the name) is greater, in the order
-    ///   of their numbers, gaps allowed;
+    /// - `run_0010.ply`: that file and all files with a greater number in this place (the last number in the name), in the
+    ///   order of their numbers, gaps allowed;
     /// - `run_%04d.ply`, `run_%d.ply`: all files of that pattern, in the order of their numbers;
     /// - `run_*.ply`, `run_??.ply`: all files whose name matches, ordered by name with runs of digits compared as numbers.
     ///
-    /// Patterns stand for a part of the file's name, not of a folder's. Numbered files may have any mesh format; only
-    /// their positions are read, never welded (see [`Weld`](crate::Weld)).
+    /// Patterns may occur in the file's name, but not in the name of a folder. Numbered files may have any mesh format; only
+    /// their positions are read, and they are never welded (see [`Weld`](crate::Weld)).
     ///
     /// # Errors
-    /// As [`read`](crate::read); [`Error::Truncated`] where a cache is shorter than its header says.
+    /// As [`read`](crate::read); [`Error::Truncated`] if a cache is shorter than its header says.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         match SequenceFormat::from_extension(&extension) {
@@ -91,7 +91,7 @@ impl Sequence {
         }
     }
 
-    /// Reads a point cache from bytes. `name` stands for the file in errors.
+    /// Reads a point cache from bytes. Errors use `name` for the file.
     ///
     /// # Errors
     /// [`Error::Syntax`] or [`Error::Truncated`].
@@ -105,7 +105,7 @@ impl Sequence {
         self.n_frames
     }
 
-    /// The files that hold the frames: one for each frame, or one for all of them; none where they are in memory.
+    /// The files that hold the frames: one per frame, or one for all of them; none if the frames are in memory.
     pub fn files(&self) -> &[PathBuf] {
         match &self.frames {
             Frames::Files { files, .. } => files,
@@ -117,8 +117,8 @@ impl Sequence {
         }
     }
 
-    /// Gaps in the numbers of numbered files: the files before and after each, where more numbers lie between two files than
-    /// between those that are closest. A sequence of every tenth number has no gap.
+    /// Gaps in the numbers of numbered files: the files before and after each gap. A gap is a step that is larger than the
+    /// smallest step between two files, so a sequence of every tenth number has no gap.
     pub fn gaps(&self) -> Vec<[&Path; 2]> {
         let Frames::Files { files, .. } = &self.frames else {
             return Vec::new();
@@ -126,7 +126,7 @@ impl Sequence {
         let number = |path: &PathBuf| {
             let name = path.file_name()?.to_str()?;
             let key = natural_key(name);
-            // The last number of the name without its extension, as in the matcher.
+            // The last number of the name without its extension, as in `Matcher`.
             let stem = name.rfind('.').map_or(name, |dot| &name[..dot]);
             let n_numbers = natural_key(stem).len();
             key.get(n_numbers - 1).map(|(number, _)| *number)
@@ -149,10 +149,10 @@ impl Sequence {
         self.n_points
     }
 
-    /// The positions of frame `frame_ix`, counted from 0: f32 from a point cache, else as the file has them.
+    /// The positions of frame `frame_ix`, counted from 0: f32 from a point cache, else in the precision of the file.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] where there is no such frame, or a numbered file has another number of vertices;
+    /// [`Error::Mismatch`] if there is no such frame, or a numbered file has another number of vertices;
     /// [`Error::NotFinite`]; as [`read`](crate::read) for numbered files.
     pub fn frame(&self, frame_ix: usize) -> Result<Positions, Error> {
         let mismatch = |file: &str, what: &str, expected: usize, found: usize| Error::Mismatch {
@@ -212,7 +212,7 @@ impl Sequence {
     fn cache(header: Header, source: Source, name: String) -> Self {
         Sequence {
             name,
-            // Counts of 31 bits.
+            // Counts have 31 bits, so they fit.
             n_frames: header.n_frames as usize,
             n_points: header.n_points as usize,
             frames: Frames::Cache {
@@ -235,7 +235,7 @@ impl Sequence {
         let name = Name(&self.name);
         let mut buffer = Vec::new();
         let bytes = match source {
-            // The header was held against the length of the bytes.
+            // The header was checked against the length of the bytes.
             Source::Bytes(bytes) => &bytes[offset as usize..offset as usize + size],
             Source::File(path, file) => {
                 let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
@@ -293,9 +293,10 @@ impl Header {
                 }
                 let version = cursor.integer(Scalar::I32, "the version")?;
                 if version != 1 {
-                    return Err(
-                        name.unsupported(Place::Byte(12), format!("PC2 version {version} (1 is)"))
-                    );
+                    return Err(name.unsupported(
+                        Place::Byte(12),
+                        format!("PC2 version {version} (supported: 1)"),
+                    ));
                 }
                 let n_points = cursor.count(Scalar::I32, "the number of points")?;
                 cursor.take(2, 4, "start and rate")?;
@@ -332,7 +333,7 @@ impl Header {
     }
 }
 
-/// A file of a sequence: the very one that the caller named, or one that was found by that name.
+/// A file of a sequence: the file that the caller named, or one found by a pattern.
 fn input<'p>(path: &'p Path, named: &'p Path) -> Input<'p> {
     if path == named {
         Input::Named(path)
@@ -341,7 +342,7 @@ fn input<'p>(path: &'p Path, named: &'p Path) -> Input<'p> {
     }
 }
 
-/// The files that `path` names: a first one, a printf pattern, or a glob pattern; at least one, in order.
+/// The files that `path` stands for, in order, at least one. `path` is the first file, a printf pattern, or a glob pattern.
 fn numbered_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let shown_path = path.display().to_string();
     let name = Name(&shown_path);
@@ -376,7 +377,7 @@ fn numbered_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(found.into_iter().map(|(_, path)| path).collect())
 }
 
-/// Which file names belong to a sequence.
+/// Decides which file names belong to a sequence.
 #[derive(Debug)]
 enum Matcher<'p> {
     /// A number from `least` on, of at least `width` digits, between two texts.
@@ -408,7 +409,7 @@ impl<'p> Matcher<'p> {
         if pattern.contains(['*', '?']) {
             return Some(Matcher::Glob(pattern));
         }
-        // Digits of the extension are no frame number.
+        // Digits in the extension are not a frame number.
         let stem = pattern.rfind('.').map_or(pattern, |dot| &pattern[..dot]);
         let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
         let start = stem[..end]
@@ -426,7 +427,7 @@ impl<'p> Matcher<'p> {
         })
     }
 
-    /// What to sort a file name by; `None` where it does not belong.
+    /// The sort key of a file name; `None` if it does not belong to the sequence.
     fn key(&self, candidate: &str) -> Option<Vec<(u128, String)>> {
         match *self {
             Matcher::Number {
@@ -437,7 +438,7 @@ impl<'p> Matcher<'p> {
             } => {
                 let digits = candidate.strip_prefix(prefix)?.strip_suffix(suffix)?;
                 let is_number = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit());
-                // Zeros only fill up to the width: 7 and 07 are not both of one sequence.
+                // Zeros only fill up to the width: 7 and 07 never belong to one sequence.
                 let is_padded =
                     digits.len() == width || (digits.len() > width && !digits.starts_with('0'));
                 let number = digits
@@ -453,12 +454,12 @@ impl<'p> Matcher<'p> {
     }
 }
 
-/// Whether `name` is of the pattern: `*` stands for any text, `?` for one character.
+/// Whether `name` matches the pattern: `*` stands for any text, `?` for one character.
 fn matches_glob(pattern: &str, name: &str) -> bool {
     let (pattern, name): (Vec<char>, Vec<char>) =
         (pattern.chars().collect(), name.chars().collect());
     let (mut p, mut n) = (0, 0);
-    // The last star, and how far into the name it reaches so far.
+    // The position of the last star, and how far into the name its match reaches so far.
     let mut star: Option<(usize, usize)> = None;
     while n < name.len() {
         match pattern.get(p) {

@@ -1,4 +1,4 @@
-//! Text files as lines and as words, with the line number always at hand.
+//! Text files as lines and as words, with line numbers.
 
 use crate::error::{Error, Name, Place, shown};
 
@@ -7,7 +7,7 @@ fn is_space(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | b'\r' | b'\n' | 0x0b | 0x0c)
 }
 
-/// Reads `word` as a number; the nearest f64, as the standard library's correctly rounding parser gives it.
+/// Parses `word` as a number. Floats are rounded to nearest, as by the standard library's correctly rounding parser.
 pub(crate) fn number<T: std::str::FromStr>(
     name: Name,
     place: Place,
@@ -57,7 +57,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// A cursor over a text that gives lines or words, as the format wants; both count lines.
+/// A cursor over a text that returns lines or words, whichever the format needs; both count lines.
 #[derive(Debug, Clone)]
 pub(crate) struct Text<'a> {
     name: Name<'a>,
@@ -68,12 +68,12 @@ pub(crate) struct Text<'a> {
     line: u64,
     /// What starts a comment that [`Text::word`] skips, if anything.
     comment: Option<u8>,
-    /// Where binary data stands among text, lines mean nothing: places are offsets then, from this base.
+    /// If binary data is mixed with text, line numbers mean nothing: places are then offsets in bytes, added to this base.
     base: Option<usize>,
 }
 
 impl<'a> Text<'a> {
-    /// A cursor at the start of `bytes`, behind the byte order mark that some editors put before UTF-8.
+    /// A cursor at the start of `bytes`, after the byte order mark that some editors put before UTF-8.
     pub(crate) fn new(name: Name<'a>, bytes: &'a [u8]) -> Self {
         let offset = if bytes.starts_with(b"\xef\xbb\xbf") {
             3
@@ -117,12 +117,12 @@ impl<'a> Text<'a> {
         &self.bytes[self.offset..]
     }
 
-    /// How many things that take at least `bytes` each can still follow: the cap for what a header may reserve.
+    /// How many items of at least `bytes` each can still follow: the limit for what a header may reserve.
     pub(crate) fn room(&self, bytes: usize) -> u64 {
         (self.rest().len() / bytes + 1) as u64
     }
 
-    /// Passes over `n` bytes, counting the lines in them.
+    /// Skips `n` bytes, counting the lines in them.
     pub(crate) fn skip(&mut self, n: usize) {
         let end = self.bytes.len().min(self.offset.saturating_add(n));
         self.line += self.bytes[self.offset..end]
@@ -151,7 +151,7 @@ impl<'a> Text<'a> {
         })
     }
 
-    /// The next line that is not blank once what follows `comment` is cut off.
+    /// The next line that is not blank after removing its comment, which starts with `comment`.
     pub(crate) fn content_line(&mut self, comment: u8) -> Option<Line<'a>> {
         loop {
             let line = self.line()?.before(comment);
@@ -188,7 +188,7 @@ impl<'a> Text<'a> {
         }
     }
 
-    /// The next word, whatever line it is on; `None` at the end of the file. [`Text::place`] is that of the word then.
+    /// The next word, on whatever line; `None` at the end of the file. Afterwards [`Text::place`] is the place of the word.
     pub(crate) fn word(&mut self) -> Option<&'a [u8]> {
         self.skip_space();
         let start = self.offset;
@@ -202,7 +202,7 @@ impl<'a> Text<'a> {
         (self.offset > start).then(|| &self.bytes[start..self.offset])
     }
 
-    /// The next word without passing it.
+    /// The next word, without advancing.
     pub(crate) fn peek_word(&mut self) -> Option<&'a [u8]> {
         let mut ahead = self.clone();
         ahead.word()

@@ -1,5 +1,5 @@
-//! Broken files: cut off at every byte, changed at every byte, and with headers that lie. Nothing panics, nothing that is
-//! returned is invalid, and memory goes by the length of a file, whatever its header says.
+//! Broken files: cut off at every byte, changed at every byte, and with wrong headers. Nothing panics, every returned mesh is
+//! valid, and memory is bounded by the length of a file, whatever its header says.
 
 mod common;
 
@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use common::{Sample, assert_valid, samples};
 use impinge_io::Format;
 
-/// Counts the bytes that are held, to see what a reader reserves.
+/// Counts allocated bytes, to see what a reader reserves.
 struct Counting;
 
 static HELD: AtomicUsize = AtomicUsize::new(0);
@@ -34,7 +34,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Reads `bytes` and returns the result with the bytes that were held at most while reading.
+/// Reads `bytes` and returns the result with the peak of allocated bytes.
 fn measured(sample: &Sample, bytes: &[u8]) -> (Result<impinge_io::Mesh, impinge_io::Error>, usize) {
     let before = HELD.load(Ordering::Relaxed);
     MOST_HELD.store(before, Ordering::Relaxed);
@@ -42,7 +42,7 @@ fn measured(sample: &Sample, bytes: &[u8]) -> (Result<impinge_io::Mesh, impinge_
     (result, MOST_HELD.load(Ordering::Relaxed) - before)
 }
 
-/// The most that reading a few hundred bytes may hold. (A hash table and an inflater alone take tens of thousands.)
+/// The most bytes that reading a few hundred bytes may allocate. (A hash table and an inflater alone take tens of thousands.)
 const MOST_BYTES: usize = 1 << 19;
 
 /// Reads a broken file: no panic, no invalid mesh, a message of one line, little memory.
@@ -70,7 +70,7 @@ fn check(sample: &Sample, bytes: &[u8], what: &str) -> Option<impinge_io::Mesh> 
     }
 }
 
-// One test, one thread: the memory that is counted is that of the process.
+// One test on one thread, because the counted memory is that of the whole process.
 #[test]
 fn broken_files() {
     cut_off_at_every_byte();
@@ -86,7 +86,7 @@ fn cut_off_at_every_byte() {
                 &sample.bytes[..length],
                 &format!("cut off at {length}"),
             );
-            // OBJ announces nothing, so its beginning is a file of its own. Others may lose an end mark or a line's end.
+            // OBJ announces no counts, so its beginning is a valid file. Other formats may lose an end mark or a line's end.
             if sample.format != Format::Obj {
                 let Some(mesh) = read else { continue };
                 assert_eq!(mesh, sample.mesh, "{} cut off at {length}", sample.name);
@@ -121,7 +121,7 @@ fn changed_at_every_byte() {
 }
 
 fn lying_headers() {
-    // Each count of a text that a reader might believe, made huge.
+    // Each count in a text, made huge.
     let lies: [(&str, &[(&str, &str)]); 13] = [
         (
             "off",

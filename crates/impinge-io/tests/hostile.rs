@@ -1,4 +1,4 @@
-//! Files made to harm: meshes that name files elsewhere, inputs that never end, archives that expand without end, text in
+//! Hostile files: meshes that name files elsewhere, inputs that never end, archives that expand without limit, text in
 //! other encodings.
 
 mod common;
@@ -10,7 +10,7 @@ use std::time::Duration;
 use common::{Order, gltf_buffer, gltf_json, samples, surface};
 use impinge_io::{Error, Format, Mesh, ReadOptions, Sequence, read, read_bytes};
 
-/// A folder with a mesh folder in it; what lies outside the mesh folder must never be read.
+/// A folder with a mesh folder in it; files outside the mesh folder must never be read.
 struct Trap {
     _outer: tempfile::TempDir,
     outer: PathBuf,
@@ -38,7 +38,7 @@ impl Trap {
     }
 }
 
-/// Asserts that a file outside was refused as such, before it was read.
+/// Asserts that a file outside the mesh folder was refused before it was read.
 #[track_caller]
 fn assert_outside(result: Result<impl Sized, Error>, what: &str) {
     let Err(error) = result else {
@@ -96,7 +96,7 @@ fn a_gltf_reads_files_of_its_own_folder_only() {
     ] {
         assert_outside(trap.gltf(uri), uri);
     }
-    // Not a name of that file on this system, or of any: an error, and never its content.
+    // These names do not lead to that file on this system: an error, and never its content.
     for uri in [
         r"..\\secret.bin",
         "%252e%252e/secret.bin",
@@ -178,7 +178,7 @@ fn files_found_beside_the_one_named_are_of_its_folder() {
     std::fs::write(trap.inner.join("a.ele"), &cells).unwrap();
     symlink("../a.node", trap.inner.join("a.node")).unwrap();
     assert_outside(read(&trap.inner.join("a.ele"), &options), "a.node");
-    // The user may name any link; only what is found beside it is held to the folder.
+    // The user may name any link; only files found beside it must lie in the folder.
     std::fs::copy(trap.inner.join("a.ele"), trap.outer.join("b.ele")).unwrap();
     std::fs::write(trap.inner.join("b.node"), &nodes).unwrap();
     symlink("../b.ele", trap.inner.join("b.ele")).unwrap();
@@ -195,13 +195,13 @@ fn files_found_beside_the_one_named_are_of_its_folder() {
         assert!(sequence.frame(0).is_ok(), "{pattern}");
         assert_outside(sequence.frame(1), pattern);
     }
-    // Named itself, the link is what the user wants.
+    // The user named the link itself, so it is followed.
     assert!(read(&trap.inner.join("run_2.off"), &options).is_ok());
     let sequence = Sequence::open(&trap.inner.join("run_2.off")).unwrap();
     assert!(sequence.frame(0).is_ok());
 }
 
-/// Runs `task` on a thread, and fails where it does not come back.
+/// Runs `task` on a thread, and fails if it does not return.
 #[track_caller]
 fn soon<T: Send + 'static>(what: &str, task: impl FnOnce() -> T + Send + 'static) -> T {
     let (done, result) = mpsc::channel();
@@ -306,7 +306,7 @@ fn bomb(n_blocks: usize) -> Vec<u8> {
 fn compressed_data_expands_within_limits() {
     let read =
         |bytes: &[u8], options: &ReadOptions| read_bytes(bytes, Format::Vtu, "b.vtu", options);
-    // 2.8 MB that stand for 2.9 GB: refused without asking for that memory.
+    // 2.8 MB that expand to 2.9 GB: refused without reserving that memory.
     let bytes = bomb(1400);
     assert!(
         (2_500_000..3_500_000).contains(&bytes.len()),
@@ -316,7 +316,7 @@ fn compressed_data_expands_within_limits() {
     let error = read(&bytes, &ReadOptions::default()).unwrap_err();
     assert!(matches!(error, Error::TooLarge { .. }), "{error}");
     assert!(error.to_string().contains("expanded"), "{error}");
-    // A small file may expand to a few megabytes, unless it may not.
+    // A small file may expand to a few megabytes, unless the option forbids it.
     let small = bomb(3);
     let error = read(&small, &ReadOptions::default()).unwrap_err();
     assert!(!matches!(error, Error::TooLarge { .. }), "{error}");
@@ -382,7 +382,7 @@ fn text_with_a_mark_is_read_and_utf_16_refused_by_name() {
     );
 }
 
-/// Binary STL titles are any bytes, so they are never taken for UTF-16.
+/// Titles of binary STL may be any bytes; they are never taken for UTF-16.
 #[test]
 fn a_binary_stl_may_have_any_title() {
     let sample = samples()
@@ -396,7 +396,7 @@ fn a_binary_stl_may_have_any_title() {
     }
 }
 
-/// Reading is linear in the corners of a polygon: where it is not, this takes hours.
+/// Reading is linear in the corners of a polygon; otherwise this test would take hours.
 #[test]
 fn a_polygon_of_many_corners_is_read_at_once() {
     const N: usize = 300_000;

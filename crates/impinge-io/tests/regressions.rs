@@ -1,4 +1,4 @@
-//! What fuzzing has found, each in its few bytes.
+//! Inputs found by fuzzing, reduced to a few bytes.
 
 mod common;
 

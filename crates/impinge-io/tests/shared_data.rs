@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use impinge_io::{Elements, Mesh, Positions, ReadOptions, Sequence, read, weld};
 
-/// The folder of the shared data; `None` where `IMPINGE_NO_DATA=1` says that it may be absent.
+/// The folder of the shared data; `None` if `IMPINGE_NO_DATA=1` is set and it is absent.
 fn data() -> Option<PathBuf> {
     let folder = std::env::var_os("IMPINGE_DATA").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
@@ -17,7 +17,7 @@ fn data() -> Option<PathBuf> {
     let may_be_absent = std::env::var_os("IMPINGE_NO_DATA").is_some_and(|value| value == "1");
     assert!(
         may_be_absent,
-        "no shared data at {}: set IMPINGE_DATA, or IMPINGE_NO_DATA=1 to go without",
+        "no shared data at {}: set IMPINGE_DATA, or IMPINGE_NO_DATA=1 to skip this test",
         folder.display()
     );
     None

@@ -1,4 +1,4 @@
-//! What is written is read back as what it was.
+//! Written files read back as the same meshes.
 
 mod common;
 
@@ -133,7 +133,7 @@ fn glb_splits_vertices_where_colors_meet() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");
     let mesh = surface(false);
-    // Red 0 2 1 and 4 0 3, blue 1 2 3: all of 1, 2, 3 are there in both colours.
+    // Red 0 2 1 and 4 0 3, blue 1 2 3: vertices 1, 2 and 3 occur in both colours.
     write_glb(
         &path,
         &[
@@ -179,7 +179,7 @@ fn glb_splits_vertices_where_colors_meet() {
     );
 }
 
-/// Colours as GLB has them.
+/// Colours as stored in GLB.
 trait MapRgba {
     fn map_rgba(&self) -> Vec<u8>;
 }

@@ -5,7 +5,7 @@
 use crate::collect::Collector;
 use crate::error::{Error, Place};
 
-/// Puts the cell of type `kind` with these point indices where it belongs; polygons are fanned, strips cut up.
+/// Adds the cell of type `kind` with these point indices to `parts`; polygons are fanned, strips are cut into triangles.
 pub(crate) fn put(
     parts: &mut Collector,
     kind: i64,
@@ -52,7 +52,7 @@ pub(crate) fn put(
                 }
                 6 => parts.strip(),
                 8 => {
-                    // A pixel counts its corners row by row, not around.
+                    // A VTK pixel lists its corners row by row, not in cyclic order.
                     parts.corners.swap(2, 3);
                     parts.polygon(place)?;
                 }
@@ -78,14 +78,14 @@ pub(crate) fn put(
             };
             return Err(name.unsupported(
                 place,
-                format!("cell type {kind} ({what}; triangles, polygons and tetrahedra are)"),
+                format!("cell type {kind} ({what}; supported: triangles, polygons and tetrahedra)"),
             ));
         }
         17..=81 => {
             return Err(name.unsupported(
                 place,
                 format!(
-                    "cell type {kind} (of higher order; triangles, polygons and tetrahedra are)"
+                    "cell type {kind} (of higher order; supported: triangles, polygons and tetrahedra)"
                 ),
             ));
         }

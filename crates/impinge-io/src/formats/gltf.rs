@@ -1,8 +1,9 @@
 //! glTF 2.0 and GLB: all triangles of the default scene, placed by their nodes, as one body.
 //!
 //! Source: Khronos, "glTF 2.0 Specification". Triangles, strips and fans are read; points and lines are counted. Within a
-//! node, primitives that use the same positions share their vertices. Positions keep f32 where no node moves them; where one
-//! does, they are computed in f64 (each sum and product rounded to the nearest) and stay f64. Skins and morph targets are not applied: it is the rest pose.
+//! node, primitives that use the same positions share their vertices. Positions stay f32 if no node moves them; otherwise
+//! they are computed in f64 (each sum and product rounded to nearest) and stay f64. Skins and morph targets are not applied: the
+//! mesh is in its rest pose.
 
 mod accessor;
 mod json;
@@ -28,7 +29,7 @@ pub(crate) fn read<'a>(
     let (json, binary) = if bytes.starts_with(b"glTF") {
         chunks(bytes, name)?
     } else {
-        // A byte order mark does not belong here, but some editors write one.
+        // A byte order mark is not allowed here, but some editors write one.
         (
             (bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), None),
             None,
@@ -54,7 +55,7 @@ pub(crate) fn read<'a>(
     scene.read()
 }
 
-/// The JSON of a file, and where it starts if that is in a GLB.
+/// The JSON of a file, and its offset if the file is a GLB.
 type Json<'b> = (&'b [u8], Option<usize>);
 
 /// The JSON and binary chunks of a GLB file.
@@ -62,7 +63,10 @@ fn chunks<'b>(bytes: &'b [u8], name: Name<'b>) -> Result<(Json<'b>, Option<&'b [
     let mut cursor = Cursor::new(name, bytes, 4, Endian::Little);
     let version = cursor.count(Scalar::U32, "the version")?;
     if version != 2 {
-        return Err(name.unsupported(Place::Byte(4), format!("GLB version {version} (2 is)")));
+        return Err(name.unsupported(
+            Place::Byte(4),
+            format!("GLB version {version} (supported: 2)"),
+        ));
     }
     let length = cursor.count(Scalar::U32, "the length")?;
     if length > bytes.len() as u64 {
@@ -116,7 +120,7 @@ fn parse((json, start): Json, name: Name) -> Result<Root, Error> {
         return Err(name.unsupported(
             Place::File,
             format!(
-                "glTF version {} (2.x is)",
+                "glTF version {} (supported: 2.x)",
                 shown(root.asset.version.as_bytes())
             ),
         ));
@@ -145,12 +149,12 @@ fn parse((json, start): Json, name: Name) -> Result<Root, Error> {
 /// A transformation: columns of x, y, z axes and the origin. `None` moves nothing.
 type Transform = Option<[[f64; 3]; 4]>;
 
-/// A scene being put together.
+/// A scene being assembled.
 struct Scene<'a, 'r> {
     name: Name<'a>,
     root: &'r Root,
     data: Data<'a, 'r>,
-    /// Whether positions have become f64; those so far are in the vector of their type.
+    /// Whether positions have become f64.
     is_f64: bool,
     f32s: Vec<[f32; 3]>,
     f64s: Vec<[f64; 3]>,
@@ -170,7 +174,7 @@ impl<'a> Scene<'a, '_> {
                     root.scenes.len(),
                 ));
             }
-            // A file without scenes is a library of nodes: all that are nobody's children.
+            // A file without scenes is a library of nodes: take all nodes that are not children.
             None => {
                 let mut is_child = vec![false; root.nodes.len()];
                 for &child in root.nodes.iter().flat_map(|node| &node.children) {
@@ -270,7 +274,7 @@ impl<'a> Scene<'a, '_> {
         let corners = &mut self.parts.corners;
         corners.clear();
         for index in indices {
-            // The sum of both is a vertex that exists.
+            // The sum is the index of an existing vertex, so it does not overflow.
             corners.push(base as u32 + vertex_ix(name, index, 0, n_vertices, Place::File)?);
         }
         match mode {
@@ -344,7 +348,7 @@ impl<'a> Scene<'a, '_> {
     }
 }
 
-/// What a node does to what it holds.
+/// The transformation of a node.
 fn local(node: &Node) -> Transform {
     if let Some(m) = node.matrix {
         let columns = [
@@ -387,7 +391,7 @@ const IDENTITY: [[f64; 3]; 4] = [
     [0.0, 0.0, 0.0],
 ];
 
-/// The position behind a transformation.
+/// The transformed position.
 fn apply(columns: &[[f64; 3]; 4], [x, y, z]: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|row| {
         columns[0][row] * x + columns[1][row] * y + columns[2][row] * z + columns[3][row]

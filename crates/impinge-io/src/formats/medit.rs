@@ -2,7 +2,7 @@
 //!
 //! Source: P. Frey, "MEDIT: An interactive mesh visualization software", INRIA RT-0253, 2001, section 7.2. Edges and corners
 //! are counted; hexahedra, prisms and pyramids are refused; other sections (normals, tangents, required vertices, …) are
-//! passed over up to the next keyword.
+//! skipped up to the next keyword.
 
 use crate::collect::{Collector, check_n_vertices, finite};
 use crate::error::{Error, Name, shown};
@@ -19,7 +19,7 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
     }
     text.number::<u32>("a version")?;
     loop {
-        // Without the end mark, a file that was cut off between two sections would pass for a whole one.
+        // The end mark is required: without it, a file cut off between two sections would look complete.
         let keyword = text.need_word("a keyword, at last 'End'")?;
         let place = text.place();
         match keyword {
@@ -27,9 +27,10 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
             b"Dimension" => {
                 let dimension: u32 = text.number("the dimension, 3")?;
                 if dimension != 3 {
-                    return Err(
-                        name.unsupported(text.place(), format!("dimension {dimension} (3 is)"))
-                    );
+                    return Err(name.unsupported(
+                        text.place(),
+                        format!("dimension {dimension} (supported: 3)"),
+                    ));
                 }
             }
             b"Vertices" if has_vertices => {
@@ -51,7 +52,7 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
                 let n = skip_section(&mut text)?;
                 if n > 0 {
                     let keyword = String::from_utf8_lossy(keyword);
-                    return Err(name.unsupported(place, format!("the section '{keyword}' of {n} cells (triangles, quadrilaterals and tetrahedra are)")));
+                    return Err(name.unsupported(place, format!("the section '{keyword}' of {n} cells (supported: triangles, quadrilaterals and tetrahedra)")));
                 }
             }
             other if other[0].is_ascii_alphabetic() => {
@@ -113,7 +114,7 @@ fn tetrahedra(text: &mut Text, parts: &mut Collector) -> Result<(), Error> {
     Ok(())
 }
 
-/// Passes over a section up to the next keyword and returns the count that it starts with (0 where it has none).
+/// Skips a section up to the next keyword and returns the count at its start (0 if there is none).
 fn skip_section(text: &mut Text) -> Result<u64, Error> {
     let mut n = None;
     while let Some(word) = text.peek_word() {

@@ -1,4 +1,4 @@
-//! One file a format; each reads bytes into a [`Collector`](crate::collect::Collector).
+//! One file per format; each reads bytes into a [`Collector`](crate::collect::Collector).
 
 use crate::binary::{Endian, Scalar};
 use crate::budget::reserve;
@@ -18,7 +18,7 @@ pub(crate) mod tetgen;
 pub(crate) mod vtk;
 pub(crate) mod vtu;
 
-/// Positions from an array of numbers: f32 where the type fits, else f64. `place` tells where a vertex stands.
+/// Positions from an array of numbers: f32 where the type fits, else f64. `place` gives the place of a vertex in the file.
 fn positions(
     name: Name,
     bytes: &[u8],

@@ -1,4 +1,4 @@
-//! Gmsh MSH 2.x and 4.1, ascii and binary: `$Nodes` and `$Elements`; other sections are passed over.
+//! Gmsh MSH 2.x and 4.1, ascii and binary: `$Nodes` and `$Elements`; other sections are skipped.
 //!
 //! Source: Gmsh reference manual, "MSH file format" (4.1) and "Legacy formats" (2.2). Nodes have tags, perhaps with gaps:
 //! vertices are numbered in the order of the file. Linear triangles, quadrangles (fanned) and tetrahedra are read, lines
@@ -54,13 +54,13 @@ enum Version {
     V4,
 }
 
-/// The file at a place, its version and storage.
+/// A position in the file, the file's version and storage.
 struct File<'a> {
     name: Name<'a>,
     bytes: &'a [u8],
     text: Text<'a>,
     version: Version,
-    /// The byte order where the storage is binary.
+    /// The byte order if the storage is binary.
     binary: Option<Endian>,
     /// The type of the counts and tags of version 4.1 in binary.
     size: Scalar,
@@ -80,7 +80,10 @@ impl<'a> File<'a> {
             other => {
                 return Err(name.unsupported(
                     text.place(),
-                    format!("MSH version {} (2.0 to 2.2 and 4.1 are)", shown(other)),
+                    format!(
+                        "MSH version {} (supported: 2.0 to 2.2 and 4.1)",
+                        shown(other)
+                    ),
                 ));
             }
         };
@@ -156,7 +159,7 @@ impl<'a> File<'a> {
         Ok(())
     }
 
-    /// Passes over a section, whose content may be anything.
+    /// Skips a section, whose content may be anything.
     fn skip_section(&mut self, section: &[u8]) -> Result<(), Error> {
         let end = end_of(section);
         let rest = self.text.rest();
@@ -179,7 +182,7 @@ impl<'a> File<'a> {
         Cursor::new(self.name, self.bytes, self.text.offset(), endian)
     }
 
-    /// Goes on behind what `cursor` has read.
+    /// Advances to the position of `cursor`.
     fn advance(&mut self, cursor: &Cursor) {
         self.text.skip(cursor.offset() - self.text.offset());
     }
@@ -189,7 +192,7 @@ fn end_of(section: &[u8]) -> Vec<u8> {
     [b"$End", section.strip_prefix(b"$").unwrap_or(section)].concat()
 }
 
-/// Tags and positions as they are read, side by side.
+/// Tags and positions in the order of the file.
 struct RawNodes {
     tags: Vec<i64>,
     positions: Vec<[f64; 3]>,
@@ -220,9 +223,9 @@ impl RawNodes {
     }
 }
 
-/// From a node's tag to its vertex.
+/// Maps a node's tag to its vertex.
 enum Nodes {
-    /// Tags follow each other, as most files have them.
+    /// Consecutive tags, as in most files.
     Run { first: i64, n: usize },
     /// Tags with their vertices, sorted by tag.
     Sorted(Vec<(i64, u32)>),
@@ -279,7 +282,7 @@ impl Nodes {
     }
 }
 
-/// What an element type is to us.
+/// How an element type is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Shape {
     Point,
@@ -305,18 +308,18 @@ fn shape(name: Name, place: Place, kind: i64) -> Result<(Shape, usize), Error> {
             return Err(name.unsupported(
                 place,
                 format!(
-                    "element type {kind} ({volume}; triangles, quadrangles and tetrahedra are)"
+                    "element type {kind} ({volume}; supported: triangles, quadrangles and tetrahedra)"
                 ),
             ));
         }
         9..=140 => {
-            return Err(name.unsupported(place, format!("element type {kind} (of higher order; triangles, quadrangles and tetrahedra are)")));
+            return Err(name.unsupported(place, format!("element type {kind} (of higher order; supported: triangles, quadrangles and tetrahedra)")));
         }
         _ => return Err(name.syntax(place, "an element type", kind.to_string())),
     })
 }
 
-/// Puts an element with its node tags where it belongs.
+/// Adds an element with its node tags to `parts`.
 fn put(
     parts: &mut Collector,
     nodes: &Nodes,
@@ -361,7 +364,7 @@ fn text_tags<'t>(
     Ok(&tags[..n])
 }
 
-/// Reads a count line of version 2: the number alone, then the end of the line, behind which binary data starts.
+/// Reads a count line of version 2: only the number, then the end of the line. Binary data starts after it.
 fn count_line(file: &mut File, what: &str) -> Result<u64, Error> {
     let n = file.text.number(what)?;
     if file.binary.is_some() {

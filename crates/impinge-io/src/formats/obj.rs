@@ -1,4 +1,4 @@
-//! Wavefront OBJ: `v` and `f`; groups, materials, normals and texture coordinates are passed over.
+//! Wavefront OBJ: `v` and `f`; groups, materials, normals and texture coordinates are skipped.
 //!
 //! Source: Wavefront, "Advanced Visualizer" manual, appendix B1. A file is read as one body, its groups in their order. A
 //! face may name vertices that come later (positive indices); negative ones count back from the last vertex so far.
@@ -13,7 +13,7 @@ use crate::text::{Line, Text, number};
 pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error> {
     let mut parts = Collector::new(name);
     let mut positions: Vec<[f64; 3]> = Vec::new();
-    // The greatest index of all faces and where it is: checked once all vertices are known.
+    // The greatest index of all faces and its place: checked once all vertices are known.
     let mut greatest = (0, Place::File);
     let mut text = Text::new(name, bytes);
     while let Some(line) = text.line() {
@@ -47,7 +47,8 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
                             } else {
                                 greatest
                             };
-                            // One that does not fit is above the greatest number of vertices, so the check at the end finds it.
+                            // An index that does not fit exceeds the greatest possible number of vertices, so the check at the
+                            // end refuses it.
                             u32::try_from(index - 1).unwrap_or(u32::MAX)
                         }
                         ..0 => vertex_ix(name, index, -(positions.len() as i64), n_so_far, place)?,
@@ -89,7 +90,7 @@ fn corner(name: Name, place: Place, word: &[u8]) -> Result<i64, Error> {
     number(name, place, &word[..end], "a vertex index")
 }
 
-/// A line with the lines that it is continued on by a backslash at its end.
+/// A line joined with its continuation lines; a backslash at the end of a line continues it.
 fn joined<'t>(line: Line<'t>, text: &mut Text<'t>) -> Cow<'t, [u8]> {
     let Some(start) = line.bytes.strip_suffix(b"\\") else {
         return Cow::Borrowed(line.bytes);

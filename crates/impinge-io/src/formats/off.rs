@@ -1,7 +1,7 @@
-//! Geomview OFF, text: `OFF`, `COFF`, `NOFF`, `STOFF` and mixtures; normals, colours and texture coordinates are passed over.
+//! Geomview OFF, text: `OFF`, `COFF`, `NOFF`, `STOFF` and mixtures; normals, colours and texture coordinates are skipped.
 //!
 //! Source: Geomview manual, "OFF Files". The keyword and the number of edges may be missing. Faces of one or two corners,
-//! which OFF uses for points and segments, are counted and left out.
+//! which OFF uses for points and segments, are counted and skipped.
 
 use crate::collect::{Collector, check_n_vertices, finite};
 use crate::error::{Error, Name, shown};
@@ -64,7 +64,7 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
     Ok(parts)
 }
 
-/// Refuses the variants whose vertices are not `x y z` and something after it.
+/// Refuses the variants whose vertex lines do not start with `x y z`.
 fn check_keyword(name: Name, header: Line, keyword: &[u8]) -> Result<(), Error> {
     let prefix = &keyword[..keyword.len() - 3];
     if prefix.iter().any(|b| matches!(b, b'4' | b'n')) {
@@ -87,7 +87,7 @@ fn check_keyword(name: Name, header: Line, keyword: &[u8]) -> Result<(), Error> 
         ));
     }
     if header.words().nth(1) == Some(b"BINARY") {
-        return Err(name.unsupported(header.place(), "binary OFF (text is)"));
+        return Err(name.unsupported(header.place(), "binary OFF (supported: text)"));
     }
     Ok(())
 }

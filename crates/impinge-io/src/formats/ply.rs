@@ -1,8 +1,8 @@
 //! PLY: ascii and binary of either byte order; faces (polygons fanned), triangle strips, tetrahedra.
 //!
-//! Source: G. Turk, "The PLY Polygon File Format", 1994. Read are the elements
-//! `vertex` (x, y, z), `face` and `tristrips` (a list `vertex_indices` or `vertex_index`; -1 starts a strip anew), and `tetra`,
-//! `tetrahedra`, `tet` or `tets` (such a list of four). `edge` is counted; other elements and properties are passed over.
+//! Source: G. Turk, "The PLY Polygon File Format", 1994. The reader takes the elements
+//! `vertex` (x, y, z), `face` and `tristrips` (a list `vertex_indices` or `vertex_index`; -1 starts a new strip), and `tetra`,
+//! `tetrahedra`, `tet` or `tets` (such a list of four). `edge` is counted; other elements and properties are skipped.
 
 mod header;
 
@@ -33,7 +33,7 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
     Ok(parts)
 }
 
-/// What one record's list of vertices becomes, once it is in `corners` as the file has it.
+/// Adds the primitives of one record, whose vertex list `corners` holds as in the file.
 fn put(
     parts: &mut Collector,
     header: &Header,
@@ -78,7 +78,7 @@ fn put(
     Ok(())
 }
 
-/// Makes room for as many primitives as an element announces, but for no more than `room`.
+/// Reserves room for as many primitives as an element announces, but for at most `room`.
 fn reserve(parts: &mut Collector, element: &Element, room: u64) {
     let n = element.count.min(room) as usize;
     match element.kind {
@@ -279,7 +279,7 @@ fn record<'t>(
     n_read: u64,
     text: &mut Text<'t>,
 ) -> Result<Line<'t>, Error> {
-    // A line can't hold '\n', so nothing is cut off as a comment.
+    // A line can't contain '\n', so no part of it is taken for a comment.
     text.content_line(b'\n').ok_or_else(|| {
         name.count(
             text.place(),

@@ -1,7 +1,7 @@
-//! STL, ascii and binary; a triangle brings three vertices of its own, normals and attributes are passed over.
+//! STL, ascii and binary; each triangle has three vertices of its own; normals and attributes are skipped.
 //!
 //! Source: 3D Systems, "StereoLithography Interface Specification", 1989. Several solids of an ascii file become one body.
-//! Neighbours share no vertices here: weld to get the surface that was meant.
+//! Neighbours share no vertices here: weld to get a connected surface.
 
 use crate::binary::{Cursor, Endian, Scalar};
 use crate::collect::{Collector, check_n_vertices, finite};
@@ -13,7 +13,7 @@ use crate::text::Text;
 const TITLE: usize = 80;
 /// Bytes before the first triangle.
 const START: usize = TITLE + 4;
-/// Bytes a triangle: normal, three corners, attributes.
+/// Bytes per triangle: normal, three corners, attributes.
 const RECORD: usize = 12 + 36 + 2;
 
 pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error> {
@@ -82,7 +82,7 @@ fn read_ascii<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error> 
         } else if is_open && is(b"facet") {
             expect(&mut text, name, &[b"normal"])?;
             for _ in 0..3 {
-                // Normals are often nonsense, so they are not even read as numbers.
+                // Normals are often nonsense, so they are not parsed as numbers.
                 text.need_word("a normal")?;
             }
             expect(&mut text, name, &[b"outer", b"loop"])?;

@@ -1,7 +1,7 @@
 //! TetGen: vertices in `.node`, tetrahedra in `.ele`, triangles in `.face`.
 //!
 //! Source: H. Si, "TetGen, A Quality Tetrahedral Mesh Generator", manual, section "File formats". Vertices are numbered from 0 or 1; the
-//! first line of the `.node` file decides. Attributes, markers and the six mid-edge nodes are not wanted; the last are refused.
+//! first line of the `.node` file decides. Attributes and markers are skipped; tetrahedra with mid-edge nodes are refused.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,8 @@ use crate::format::Format;
 use crate::mesh::Positions;
 use crate::text::{Line, Text, number};
 
-/// The `.node` file and the file of cells that belong to `path`, which is one of them: `.ele` where it exists, else `.face`.
+/// The `.node` file and the file of cells that belong to `path`, which is one of them. The cells are in `.ele` if it exists, else
+/// in `.face`.
 pub(crate) fn paths(path: &Path) -> (PathBuf, PathBuf) {
     let is_face = path
         .extension()
@@ -76,7 +77,10 @@ fn read_nodes(bytes: &[u8], parts: &mut Collector) -> Result<i64, Error> {
     )?;
     check_n_vertices(name, header.place(), n)?;
     if dimension != 3 {
-        return Err(name.unsupported(header.place(), format!("dimension {dimension} (3 is)")));
+        return Err(name.unsupported(
+            header.place(),
+            format!("dimension {dimension} (supported: 3)"),
+        ));
     }
     let mut positions = Vec::with_capacity(n.min(text.room(8)) as usize);
     let mut first = 0;
@@ -130,7 +134,7 @@ fn read_cells(
         if n_corners != 4 {
             return Err(name.unsupported(
                 header.place(),
-                format!("a tetrahedron of {n_corners} nodes (4 is)"),
+                format!("a tetrahedron of {n_corners} nodes (supported: 4)"),
             ));
         }
     }

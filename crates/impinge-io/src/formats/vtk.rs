@@ -1,7 +1,7 @@
 //! Legacy VTK, ascii and binary (big endian): unstructured grids and polygonal data, versions 1 to 5.1.
 //!
 //! Source: VTK File Formats (Kitware), "Simple legacy formats"; for the split cell arrays of version 5.1, the VTK 9 release notes.
-//! Point and cell data end the reading; fields and metadata before them are passed over.
+//! Reading stops at point or cell data; fields and metadata before them are skipped.
 
 use super::cells;
 use crate::binary::{Cursor, Endian, Scalar};
@@ -43,7 +43,7 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
                 let section = file.cells()?;
                 for cell in 0..section.n_cells {
                     let (indices, at) = section.cell(&file, cell)?;
-                    // Only where something is wrong, it is worth finding the place.
+                    // Finding the place takes time, so it is done for errors only.
                     cells::put(&mut parts, kind, indices, Place::File).or_else(|_| {
                         cells::put(&mut parts, kind, indices, section.connectivity.place(at))
                     })?;
@@ -61,19 +61,19 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
     Ok(parts)
 }
 
-/// The file at a place behind its header.
+/// A position in the file after its header.
 struct File<'a> {
     name: Name<'a>,
     bytes: &'a [u8],
     text: Text<'a>,
     is_binary: bool,
-    /// Version 5: cells are offsets and connectivity apart.
+    /// Version 5: offsets and connectivity of cells are separate arrays.
     is_split: bool,
     /// Whether the dataset is an unstructured grid, else polygonal data.
     is_grid: bool,
 }
 
-/// Integers as they stand in the file, with the means to tell where one of them stands.
+/// Integers of the file, with enough information to find the place of each.
 struct Integers<'a> {
     values: Vec<i64>,
     start: Start<'a>,
@@ -85,7 +85,7 @@ enum Start<'a> {
 }
 
 impl Integers<'_> {
-    /// The place of value `ix`; reads the text again up to there, so it is for errors only.
+    /// The place of value `ix`. It reads the text again up to there, so use it for errors only.
     fn place(&self, ix: usize) -> Place {
         match &self.start {
             Start::Text(text) => {
@@ -106,7 +106,7 @@ struct Cells<'a> {
     connectivity: Integers<'a>,
     /// Where each cell starts in the connectivity, and the end of the last.
     starts: Vec<usize>,
-    /// Indices that stand before each cell's own: the count, unless it is split.
+    /// Numbers before the point indices of each cell: 1 for the count, 0 if offsets are separate.
     n_before: usize,
 }
 
@@ -166,7 +166,7 @@ impl<'a> File<'a> {
                 return Err(name.unsupported(
                     text.place(),
                     format!(
-                        "the dataset {} (UNSTRUCTURED_GRID and POLYDATA are)",
+                        "the dataset {} (supported: UNSTRUCTURED_GRID and POLYDATA)",
                         shown(other)
                     ),
                 ));
@@ -265,7 +265,7 @@ impl<'a> File<'a> {
         })
     }
 
-    /// A section of cells behind its keyword.
+    /// Reads a section of cells, after its keyword.
     fn cells(&mut self) -> Result<Cells<'a>, Error> {
         let n: u64 = self.text.number("a count")?;
         let size: u64 = self.text.number("a size")?;
@@ -336,7 +336,7 @@ impl<'a> File<'a> {
         })
     }
 
-    /// The types of `cells`, behind the keyword; puts the cells where they belong.
+    /// Reads the types of `cells`, after the keyword, and adds the cells to `parts`.
     fn typed_cells(&mut self, cells: &Cells, parts: &mut Collector) -> Result<(), Error> {
         let n: u64 = self.text.number("the number of types")?;
         let place = self.text.place();
@@ -347,7 +347,7 @@ impl<'a> File<'a> {
         for (cell, &kind) in (0u64..).zip(&types.values) {
             let (indices, at) = cells.cell(self, cell)?;
             cells::put(parts, kind, indices, Place::File).or_else(|error| {
-                // Only where something is wrong, it is worth finding the place.
+                // Finding the place takes time, so it is done for errors only.
                 let place = if matches!(error, Error::Index { .. }) {
                     cells.connectivity.place(at)
                 } else {
@@ -359,7 +359,7 @@ impl<'a> File<'a> {
         Ok(())
     }
 
-    /// Passes over a field behind its keyword.
+    /// Skips a field, after its keyword.
     fn skip_field(&mut self) -> Result<(), Error> {
         self.text.need_word("the name of a field")?;
         let n_arrays: u64 = self.text.number("the number of arrays")?;
@@ -388,7 +388,7 @@ impl<'a> File<'a> {
         Ok(())
     }
 
-    /// Passes over metadata behind its keyword: up to an empty line.
+    /// Skips metadata, after its keyword, up to an empty line.
     fn skip_metadata(&mut self) {
         self.text.line();
         while self.text.line().is_some_and(|line| !line.is_blank()) {}

@@ -38,7 +38,7 @@ pub(crate) fn read<'a>(
         return Err(name.unsupported(
             root.place(),
             format!(
-                "the VTK file type {} (UnstructuredGrid is)",
+                "the VTK file type {} (supported: UnstructuredGrid)",
                 shown(kind.as_bytes())
             ),
         ));
@@ -77,7 +77,7 @@ pub(crate) fn read<'a>(
                 return Err(name.unsupported(
                     root.place(),
                     format!(
-                        "the compressor {} (zlib and LZ4 are)",
+                        "the compressor {} (supported: zlib and LZ4)",
                         shown(other.as_bytes())
                     ),
                 ));
@@ -101,12 +101,12 @@ pub(crate) fn read<'a>(
 /// The tag of the element that holds appended data.
 const APPENDED: &str = "AppendedData";
 
-/// The two parts of a file: XML, and what is appended, which may be any bytes.
+/// The two parts of a file: XML, and the appended data, which may be any bytes.
 struct File<'b> {
     name: Name<'b>,
     /// The file, or its beginning up to the start tag of the appended data.
     xml: &'b str,
-    /// The bytes behind the `_` that starts the appended data, and the offset of the first.
+    /// The bytes after the `_` that starts the appended data, and the offset of the first.
     behind: Option<(&'b [u8], usize)>,
 }
 
@@ -166,7 +166,7 @@ impl<'b> File<'b> {
                 ));
             }
         };
-        // Of base64 only what stands before the end tag can be meant; raw data may hold any bytes.
+        // Base64 ends at the end tag; raw data may contain any bytes, even the end tag.
         let end = if is_base64 {
             bytes.iter().position(|&b| b == b'<').unwrap_or(bytes.len())
         } else {
@@ -228,7 +228,7 @@ fn read_piece(arrays: &mut Arrays, piece: Node, parts: &mut Collector) -> Result
                 values.len() as u64,
             ));
         }
-        // Small integers become f32.
+        // Small integers become f32, which takes 12 bytes per point.
         arrays.budget.charge(name, points.place(), n_points, 12)?;
         append(
             &mut parts.positions,
@@ -264,7 +264,7 @@ fn read_piece(arrays: &mut Arrays, piece: Node, parts: &mut Collector) -> Result
             return Err(name.count(at, what, n_cells, values.len() as u64));
         }
     }
-    // Indices of one byte become corners of four, and a polygon of n corners n - 2 triangles.
+    // Indices of one byte become corners of four bytes, and a polygon of n corners becomes n - 2 triangles.
     arrays.budget.charge(
         name,
         connectivity_at,
@@ -309,7 +309,7 @@ fn read_piece(arrays: &mut Arrays, piece: Node, parts: &mut Collector) -> Result
     Ok(())
 }
 
-/// Adds `more` behind `positions`; they are f32 as long as all pieces are.
+/// Appends `more` to `positions`; the result is f32 as long as all pieces are.
 fn append(positions: &mut Positions, more: Positions) {
     if positions.is_empty() {
         *positions = more;

@@ -1,4 +1,4 @@
-//! Files that appear under their name only when they are complete.
+//! Files that get their name only when they are complete.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
@@ -8,11 +8,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::error::Error;
 
-/// A file that appears under its name only when it is complete.
+/// A file that gets its name only when it is complete.
 ///
-/// Bytes go to a file beside the target, which [`finish`](Self::finish) renames; dropping without it removes that file, and
-/// an older file of that name stays as it was. A link keeps being one: the file that it leads to is replaced.
-/// A target that exists and is no regular file (a device, a pipe) is written directly.
+/// Bytes go to a temporary file beside the target, and [`finish`](Self::finish) renames it. Dropping it without `finish`
+/// removes the temporary file, and an older file of that name stays as it was. A link stays a link: its target is replaced.
+/// A target that exists and is not a regular file (a device, a pipe) is written directly.
 ///
 /// ```
 /// use impinge_io::AtomicFile;
@@ -30,9 +30,9 @@ use crate::error::Error;
 /// ```
 #[derive(Debug)]
 pub struct AtomicFile {
-    /// What the caller named, for messages.
+    /// The path as the caller gave it, for messages.
     path: PathBuf,
-    /// What is written, and what it becomes; the same where the target is no plain file.
+    /// The file being written, and its final path; both are the same if the target is not a regular file.
     written: PathBuf,
     target: PathBuf,
     /// `None` once it is closed.
@@ -47,20 +47,20 @@ fn parts() -> MutexGuard<'static, Vec<PathBuf>> {
     PARTS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes the temporary files of all outputs that are being written: for a program that is about to end at once, as on a
-/// second Ctrl-C, from whatever thread.
+/// Removes the temporary files of all outputs being written. For a program that must end at once, for example after a
+/// second Ctrl-C. Any thread may call it.
 pub fn remove_temporary_files() {
     for part in parts().drain(..) {
-        // There is nobody left to tell of a failure; the file's name says what it is.
+        // A failure can't be reported any more; the name of the file shows that it is temporary.
         let _ = fs::remove_file(part);
     }
 }
 
 impl AtomicFile {
-    /// Starts a file that is to be `path`.
+    /// Starts a file that will become `path`.
     ///
     /// # Errors
-    /// [`Error::Io`] where no file can be made in that folder.
+    /// [`Error::Io`] if no file can be created in that folder.
     pub fn create(path: &Path) -> Result<Self, Error> {
         let error = |source| Error::io(path, "create", source);
         let (written, target, file) = match fs::metadata(path) {
@@ -69,7 +69,7 @@ impl AtomicFile {
                 (path.to_owned(), path.to_owned(), file)
             }
             found => {
-                // A link keeps being one: what it points to is replaced.
+                // A link stays a link: its target is replaced.
                 let target = if found.is_ok() {
                     fs::canonicalize(path).map_err(error)?
                 } else {
@@ -77,7 +77,7 @@ impl AtomicFile {
                 };
                 let (written, file) = create_beside(&target).map_err(error)?;
                 if let Ok(replaced) = found {
-                    // What others may not read stays so. Where that can't be set, the usual permissions are a fair answer.
+                    // Keeps the permissions of the replaced file. If they can't be set, the default ones are acceptable.
                     let _ = file.set_permissions(replaced.permissions());
                 }
                 (written, target, file)
@@ -106,7 +106,7 @@ impl AtomicFile {
         written.map_err(|source| Error::io(&self.path, "write", source))
     }
 
-    /// Overwrites bytes at `offset`; what follows goes to the end again.
+    /// Overwrites bytes at `offset`; later writes append to the end again.
     pub(super) fn patch(&mut self, offset: u64, bytes: &[u8]) -> Result<(), Error> {
         let patched = self.file.as_mut().map_or(Ok(()), |file| {
             file.seek(SeekFrom::Start(offset))?;
@@ -116,10 +116,10 @@ impl AtomicFile {
         patched.map_err(|source| Error::io(&self.path, "write", source))
     }
 
-    /// Waits until all that was written so far is on the disk, for what must outlive a loss of power.
+    /// Waits until all bytes written so far are on the disk, so that they survive a loss of power.
     ///
     /// # Errors
-    /// What the system says.
+    /// The system's error.
     pub fn sync(&mut self) -> io::Result<()> {
         self.file.as_mut().map_or(Ok(()), |file| {
             file.flush()?;
@@ -130,7 +130,7 @@ impl AtomicFile {
     /// Gives the file its name.
     ///
     /// # Errors
-    /// [`Error::Io`]; nothing is left of the new file then, and an older one is as it was.
+    /// [`Error::Io`]; then the new file is removed, and an older one stays as it was.
     pub fn finish(mut self) -> Result<(), Error> {
         // Until the rename has succeeded, dropping removes what was written.
         if let Some(file) = self.file.take() {
@@ -138,7 +138,7 @@ impl AtomicFile {
                 .map_err(|error| Error::io(&self.path, "write", error.into_error()))?;
         }
         if self.written != self.target {
-            // Held while renaming, so that nobody removes the file in between.
+            // Locked while renaming, so that no other thread removes the file in between.
             let mut parts = parts();
             fs::rename(&self.written, &self.target)
                 .map_err(|source| Error::io(&self.path, "rename the complete file to", source))?;
@@ -152,11 +152,11 @@ impl AtomicFile {
 impl Drop for AtomicFile {
     fn drop(&mut self) {
         if let Some(file) = self.file.take() {
-            // What is buffered need not be written any more.
+            // Buffered bytes need not be written any more.
             drop(file.into_parts());
         }
         if !self.is_finished && self.written != self.target {
-            // There is nobody left to tell of a failure; the file's name says what it is.
+            // A failure can't be reported any more; the name of the file shows that it is temporary.
             let _ = fs::remove_file(&self.written);
             parts().retain(|part| *part != self.written);
         }

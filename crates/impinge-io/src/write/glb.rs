@@ -17,15 +17,15 @@ const UNSIGNED_BYTE: u32 = 5121;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
-/// Writes bodies into one GLB file (glTF 2.0), a node each, with colours that every viewer shows.
+/// Writes bodies into one GLB file (glTF 2.0), one node per body, with colours that every viewer shows.
 ///
-/// glTF has colours of vertices only, so a vertex where colours meet is written once for each of them, in the order in which
-/// the triangles use them; vertices that no triangle uses are left out. Positions are f32 in this format: f64 is rounded to
-/// the nearest. Of tetrahedra the surface is written. Bodies without triangles are left out.
+/// glTF colours vertices only, so a vertex between faces of different colours is written once per colour, in the order in which
+/// the triangles use them; vertices that no triangle uses are omitted. Positions are f32 in this format: f64 is rounded to
+/// nearest. For tetrahedra, their surface is written. Bodies without triangles are omitted.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Mismatch`] or [`Error::Index`] where a body does not fit together; [`Error::NotFinite`] where a
-/// coordinate is not finite in f32, which JSON can't say; [`Error::TooLarge`] beyond 4 GiB, the limit of the format.
+/// [`Error::Io`]; [`Error::Mismatch`] or [`Error::Index`] if the parts of a body do not fit together; [`Error::NotFinite`] if a
+/// coordinate is not finite in f32, which JSON can't express; [`Error::TooLarge`] beyond 4 GiB, the limit of the format.
 pub fn write_glb(path: &Path, meshes: &[ColoredMesh]) -> Result<(), Error> {
     check(path, meshes)?;
     let name = path.display().to_string();
@@ -65,7 +65,7 @@ pub fn write_glb(path: &Path, meshes: &[ColoredMesh]) -> Result<(), Error> {
     file.finish()
 }
 
-/// A file being put together.
+/// A file being assembled.
 #[derive(Default)]
 struct Glb {
     binary: Vec<u8>,
@@ -89,7 +89,7 @@ impl Glb {
             for corner in face {
                 let ix = *written.entry((corner, color)).or_insert_with(|| {
                     vertices.push((corner, color));
-                    // Three times as many corners as primitives of u32 numbers may pass 2^32, but not within the 4 GiB checked at the end.
+                    // There may be more than 2^32 corners, but not within the 4 GiB checked at the end.
                     (vertices.len() - 1) as u32
                 });
                 indices.extend_from_slice(&ix.to_le_bytes());
@@ -133,7 +133,7 @@ impl Glb {
         Ok(())
     }
 
-    /// Adds `bytes`, whose length is a multiple of 4, as a view and the accessor on all of it; returns the accessor's index.
+    /// Adds `bytes`, whose length is a multiple of 4, as a view with an accessor for all of it; returns the accessor's index.
     fn accessor(&mut self, bytes: &[u8], target: u32, mut accessor: Value) -> usize {
         self.views.push(json!({"buffer": 0, "byteOffset": self.binary.len(), "byteLength": bytes.len(), "target": target}));
         self.binary.extend_from_slice(bytes);

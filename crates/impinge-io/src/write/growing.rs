@@ -1,4 +1,4 @@
-//! A PC2 point cache that grows, and that a later run can go on with.
+//! A PC2 point cache that grows, and that a later run can continue.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
@@ -13,9 +13,9 @@ const N_FRAMES_AT: usize = 28;
 /// The bytes before the first frame.
 const HEADER: usize = 32;
 
-/// A PC2 point cache in place, for long runs: whole and readable after each [`save`](Self::save), and after an
-/// interruption [`resume`](Self::resume) cuts off what came later and goes on. Where an all-or-nothing file is
-/// wanted, take [`Pc2Writer`](crate::Pc2Writer).
+/// A PC2 point cache written in place, for long runs. It is complete and readable after each [`save`](Self::save). After an
+/// interruption, [`resume`](Self::resume) cuts off later bytes and continues. For an all-or-nothing file, use
+/// [`Pc2Writer`](crate::Pc2Writer).
 #[derive(Debug)]
 pub struct GrowingPc2 {
     path: PathBuf,
@@ -25,8 +25,8 @@ pub struct GrowingPc2 {
 }
 
 impl GrowingPc2 {
-    /// Starts a cache of frames of `n_points` vertices, replacing the file that is there; `start` is the time of the first
-    /// frame, `rate` the time between two, both in frames of the program that plays it (usually 0 and 1).
+    /// Starts a cache of frames of `n_points` vertices, replacing any existing file. `start` is the time of the first frame and
+    /// `rate` the time between two frames, both in frames of the program that plays the cache (usually 0 and 1).
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::TooLarge`] beyond 2^31 - 1 points.
@@ -39,18 +39,18 @@ impl GrowingPc2 {
         header.extend(start.to_le_bytes());
         header.extend(rate.to_le_bytes());
         header.extend(0i32.to_le_bytes());
-        // The file that is there is replaced once its successor has a header on the disk.
+        // An existing file is replaced once the new one has its header on the disk.
         let mut file = AtomicFile::create(path)?;
         file.put(&header)?;
         file.finish()?;
         Self::resume(path, n_points, 0)
     }
 
-    /// Goes on after the first `n_frames` frames of a cache that [`create`](Self::create) started; later ones are cut off.
+    /// Continues after the first `n_frames` frames of a cache that [`create`](Self::create) started; later frames are cut off.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Mismatch`] where the file is no PC2 cache of `n_points` vertices, and [`Error::Truncated`]
-    /// where it holds fewer frames. The file is unchanged then.
+    /// [`Error::Io`]; [`Error::Mismatch`] if the file is not a PC2 cache of `n_points` vertices; [`Error::Truncated`] if it holds
+    /// fewer frames. On an error the file is unchanged.
     pub fn resume(path: &Path, n_points: usize, n_frames: usize) -> Result<Self, Error> {
         let open = OpenOptions::new().read(true).write(true).open(path);
         let mut file = open.map_err(|source| Error::io(path, "open", source))?;
@@ -67,7 +67,7 @@ impl GrowingPc2 {
         if found != n_points as i64 {
             return Err(Error::Mismatch {
                 file: name,
-                what: "points of the PC2 cache to go on with".to_owned(),
+                what: "points of the PC2 cache to continue".to_owned(),
                 expected: n_points as u64,
                 found: found.unsigned_abs(),
             });
@@ -84,7 +84,7 @@ impl GrowingPc2 {
         if length < expected {
             return Err(Error::Truncated {
                 at: Name(&name).at(Place::Byte(HEADER as u64)),
-                what: format!("{n_frames} frames to go on after"),
+                what: format!("{n_frames} frames to continue after"),
                 expected: expected - HEADER as u64,
                 found: length.saturating_sub(HEADER as u64),
             });
@@ -108,10 +108,10 @@ impl GrowingPc2 {
         self.n_frames
     }
 
-    /// Adds a frame. The format holds f32 only: the caller rounds f64, in sight.
+    /// Adds a frame. The format holds f32 only, so the caller must round f64 explicitly.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Mismatch`] where the number of positions is not that of the cache;
+    /// [`Error::Io`]; [`Error::Mismatch`] if the number of positions is not that of the cache;
     /// [`Error::TooLarge`] beyond 2^31 - 1 frames.
     pub fn append<'a>(
         &mut self,
@@ -138,7 +138,7 @@ impl GrowingPc2 {
         Ok(())
     }
 
-    /// Makes the file whole: what is buffered goes to the disk, and the header counts it.
+    /// Makes the file complete: writes buffered bytes to the disk, and the number of frames to the header.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -205,7 +205,7 @@ mod tests {
         cache.append(FRAMES[2].iter()).unwrap();
         cache.save().unwrap();
         assert_eq!(frames(&path).len(), 2);
-        // A run that was killed here left more than it had counted.
+        // A run killed here leaves more frames than the header counts.
         cache.append(FRAMES[2].iter()).unwrap();
         drop(cache);
 
@@ -216,7 +216,7 @@ mod tests {
         cache.save().unwrap();
         assert_eq!(frames(&path), held(3));
         assert!(cache.append(FRAMES[0][..1].iter()).is_err());
-        // What does not fit is refused and left alone.
+        // A file that does not fit is refused and left unchanged.
         let bytes = std::fs::read(&path).unwrap();
         for (n_points, n_frames) in [(3, 1), (2, 4), (2, usize::MAX)] {
             assert!(GrowingPc2::resume(&path, n_points, n_frames).is_err());

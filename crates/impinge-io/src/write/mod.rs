@@ -1,5 +1,4 @@
-//! Writing coloured meshes and point caches. A file appears under its name when it is complete, and not before,
-//! but for [`GrowingPc2`].
+//! Writing coloured meshes and point caches. Except for [`GrowingPc2`], a file gets its name only when it is complete.
 
 mod atomic;
 mod glb;
@@ -26,19 +25,19 @@ use crate::mesh::{Elements, Positions};
 /// A body to be written.
 #[derive(Debug, Clone, Copy)]
 pub struct ColoredMesh<'a> {
-    /// Where the vertices are.
+    /// The positions of the vertices.
     pub positions: &'a Positions,
     /// The primitives.
     pub elements: &'a Elements,
-    /// Red, green and blue (sRGB, 0 to 255) of each primitive; light grey where there are none.
+    /// Red, green and blue (sRGB, 0 to 255) of each primitive; `None` means light grey.
     pub primitive_colors: Option<&'a [[u8; 3]]>,
-    /// Whether each primitive collides; VTU alone has a place for it.
+    /// Whether each primitive collides; only VTU stores this.
     pub colliding: Option<&'a [bool]>,
     /// The name of the body, for formats that have names.
     pub name: &'a str,
 }
 
-/// The colour of a primitive that has none.
+/// The colour of primitives without a given colour.
 const GREY: [u8; 3] = [200, 200, 200];
 
 impl ColoredMesh<'_> {
@@ -47,7 +46,7 @@ impl ColoredMesh<'_> {
             .map_or(GREY, |colors| colors[primitive_ix])
     }
 
-    /// Checks that numbers match and indices are in range, so that no file is written that can't be read.
+    /// Checks that numbers match and indices are in range, so that every written file can be read.
     fn check(&self, name: Name) -> Result<(), Error> {
         let n_primitives = self.elements.len();
         for (what, given) in [
@@ -89,7 +88,7 @@ fn check(path: &Path, meshes: &[ColoredMesh]) -> Result<(), Error> {
     meshes.iter().try_for_each(|mesh| mesh.check(Name(&name)))
 }
 
-/// Whether any body has f64 positions; one file has one type of number, and f64 holds both.
+/// Whether any body has f64 positions. A file has only one type of number, so then all positions are written as f64.
 fn any_f64(meshes: &[ColoredMesh]) -> bool {
     meshes
         .iter()

@@ -5,8 +5,8 @@ use std::path::Path;
 use super::atomic::AtomicFile;
 use crate::error::{Error, Name, Place};
 
-/// Writes a PC2 point cache, a frame after the other. The file appears with [`finish`](Self::finish); dropping the writer
-/// before leaves nothing.
+/// Writes a PC2 point cache frame by frame. [`finish`](Self::finish) gives the file its name; dropping the writer without
+/// `finish` leaves no file.
 #[derive(Debug)]
 pub struct Pc2Writer {
     file: AtomicFile,
@@ -14,12 +14,12 @@ pub struct Pc2Writer {
     n_frames: i32,
 }
 
-/// Where the number of frames stands in the header.
+/// The offset of the number of frames in the header.
 const N_FRAMES_AT: u64 = 28;
 
 impl Pc2Writer {
-    /// Starts a cache of frames of `n_points` vertices; `start` is the time of the first frame, `rate` the time between two,
-    /// both in frames of the program that plays it (usually 0 and 1).
+    /// Starts a cache of frames of `n_points` vertices. `start` is the time of the first frame and `rate` the time between two
+    /// frames, both in frames of the program that plays the cache (usually 0 and 1).
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::TooLarge`] beyond 2^31 - 1 points.
@@ -40,10 +40,10 @@ impl Pc2Writer {
         })
     }
 
-    /// Adds a frame. The format holds f32 only: the caller rounds f64, in sight.
+    /// Adds a frame. The format holds f32 only, so the caller must round f64 explicitly.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Mismatch`] where the number of positions is not that of the cache.
+    /// [`Error::Io`]; [`Error::Mismatch`] if the number of positions is not that of the cache.
     pub fn append(&mut self, positions: &[[f32; 3]]) -> Result<(), Error> {
         if positions.len() != self.n_points {
             return Err(Error::Mismatch {

@@ -9,16 +9,17 @@ use super::{ColoredMesh, any_f64, check};
 use crate::error::{Error, Name, Place};
 use crate::mesh::{Elements, Positions};
 
-/// Writes bodies into one binary PLY file, a colour for each face.
+/// Writes bodies into one binary PLY file, with one colour per face.
 ///
-/// Vertices are those given, in their order, a body after the other, so what is read back has the same vertices and ids;
-/// a viewer must know colours of faces (MeshLab, CloudCompare, ParaView do; for others write GLB). Each face also has the
-/// property `body`, the number of its body. Of tetrahedra the surface goes into the element `face`, and all of them into an
-/// element `tetra` (lists of four indices, colour, body), which viewers pass over and [`read`](crate::read) takes.
-/// Positions are f32 where all bodies have f32, else f64: nothing is rounded.
+/// Vertices are those given, in their order, body by body, so a mesh that is read back has the same vertices and ids.
+/// The viewer must support face colours (MeshLab, CloudCompare and ParaView do; for others write GLB). Each face also has the
+/// property `body`, the number of its body. The surface of tetrahedra goes to the element `face`, and all tetrahedra go to an
+/// element `tetra` (lists of four indices, colour, body), which viewers ignore and [`read`](crate::read) reads.
+/// Positions are f32 if all bodies have f32, else f64: nothing is rounded.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Mismatch`] or [`Error::Index`] where a body does not fit together; [`Error::TooLarge`] beyond 2^31 - 1 vertices.
+/// [`Error::Io`]; [`Error::Mismatch`] or [`Error::Index`] if the parts of a body do not fit together; [`Error::TooLarge`] beyond
+/// 2^31 - 1 vertices.
 pub fn write_ply(path: &Path, meshes: &[ColoredMesh]) -> Result<(), Error> {
     check(path, meshes)?;
     let name = path.display().to_string();

@@ -10,13 +10,13 @@ use crate::error::{Error, Name, Place};
 /// Curves to be written.
 #[derive(Debug, Clone, Copy)]
 pub struct Polylines<'a> {
-    /// Where the points are.
+    /// The positions of the points.
     pub points: &'a [[f64; 3]],
-    /// Each curve as numbers of points in order, and whether it leads back from its last one to its first.
+    /// Each curve as point indices in order, and whether it is closed (leads back from its last point to its first).
     pub curves: &'a [(&'a [u32], bool)],
 }
 
-/// VTK's number of a cell that is a polyline.
+/// VTK's cell type for a polyline.
 const POLY_LINE: u8 = 4;
 
 impl Polylines<'_> {
@@ -48,10 +48,10 @@ impl Polylines<'_> {
 }
 
 /// Writes curves as a Wavefront OBJ file: `v` for each point, `l` for each curve (a closed one ends with its
-/// first point). Coordinates have as many digits as it takes to read the same `f64` back.
+/// first point). Coordinates have as many digits as needed to read the same `f64` back.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Index`] where a curve names a point that is not there.
+/// [`Error::Io`]; [`Error::Index`] if a curve names a point that does not exist.
 pub fn write_polylines_obj(path: &Path, lines: &Polylines) -> Result<(), Error> {
     lines.check(path)?;
     let mut file = AtomicFile::create(path)?;
@@ -105,7 +105,7 @@ pub fn write_polylines_ply(path: &Path, lines: &Polylines) -> Result<(), Error> 
     file.finish()
 }
 
-/// Writes curves as a VTU file: a cell of type polyline for each, with cell data `curve` (i32, its number)
+/// Writes curves as a VTU file: one polyline cell per curve, with cell data `curve` (i32, its number)
 /// and `closed` (u8, 0 or 1).
 ///
 /// # Errors

@@ -8,18 +8,18 @@ use super::{ColoredMesh, any_f64, check};
 use crate::error::Error;
 use crate::mesh::{Elements, Positions};
 
-/// Numbers of VTK's cell types.
+/// VTK's cell types.
 const TRIANGLE: u8 = 5;
 const TETRA: u8 = 10;
 
 /// Writes bodies into one VTU file (VTK XML unstructured grid, raw appended data), for ParaView and the like.
 ///
-/// Cells are the primitives in their order, a body after the other. Cell data: `body`, the number of the body (i32); `color`,
-/// red, green, blue (u8); and, where any body says so, `colliding` (u8, 0 or 1; 0 for bodies that do not say). Positions
-/// are f32 where all bodies have f32, else f64: nothing is rounded.
+/// Cells are the primitives in their order, body by body. Cell data: `body`, the number of the body (i32); `color`,
+/// red, green, blue (u8); and, if any body has [`colliding`](ColoredMesh::colliding), `colliding` (u8, 0 or 1; 0 for bodies
+/// without it). Positions are f32 if all bodies have f32, else f64: nothing is rounded.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Mismatch`] or [`Error::Index`] where a body does not fit together.
+/// [`Error::Io`]; [`Error::Mismatch`] or [`Error::Index`] if the parts of a body do not fit together.
 pub fn write_vtu(path: &Path, meshes: &[ColoredMesh]) -> Result<(), Error> {
     check(path, meshes)?;
     let wide = any_f64(meshes);
@@ -38,7 +38,7 @@ pub fn write_vtu(path: &Path, meshes: &[ColoredMesh]) -> Result<(), Error> {
     )
 }
 
-/// Writes a file of points, cells and cell data, announced by elements, with the appended data.
+/// Writes a file from the XML elements of points, cells and cell data, and the appended data.
 pub(super) fn document(
     path: &Path,
     data: &Appended,
@@ -61,14 +61,14 @@ pub(super) fn document(
     file.finish()
 }
 
-/// The appended data: arrays, each after its length in bytes.
+/// The appended data: arrays, each preceded by its length in bytes.
 #[derive(Default)]
 pub(super) struct Appended {
     bytes: Vec<u8>,
 }
 
 impl Appended {
-    /// Adds an array and returns the element that announces it.
+    /// Adds an array and returns its XML element.
     pub fn array<const N: usize>(
         &mut self,
         kind: &str,

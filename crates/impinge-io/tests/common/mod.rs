@@ -1,6 +1,6 @@
-//! One small mesh in every format and flavour, made here byte by byte.
+//! One small mesh in every format and flavour, built here byte by byte.
 
-// Each test uses some of this.
+// Each test uses a part of this module.
 #![allow(dead_code)]
 
 mod vtu;
@@ -11,7 +11,7 @@ use impinge_io::{
     Elements, Error, Format, Mesh, Positions, ReadOptions, read_bytes, read_tetgen_bytes,
 };
 
-/// Coordinates that f32 holds exactly, so that every flavour can have the same.
+/// Coordinates that f32 represents exactly, so that every flavour has the same values.
 pub const VERTICES: [[f64; 3]; 5] = [
     [0.0, 0.0, 0.0],
     [1.0, 0.0, 0.0],
@@ -33,7 +33,7 @@ pub struct Sample {
 impl Sample {
     pub fn read(&self, bytes: &[u8]) -> Result<Mesh, Error> {
         if self.format == Format::Tetgen {
-            // Both files in one, a zero between.
+            // Both files in one, separated by a zero byte.
             let cut = bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len());
             let cells = bytes.get(cut + 1..).unwrap_or_default();
             let (node, ele) = (format!("{}.node", self.name), format!("{}.ele", self.name));
@@ -69,7 +69,7 @@ fn f32s() -> Vec<[f32; 3]> {
     VERTICES.iter().map(|v| v.map(|c| c as f32)).collect()
 }
 
-/// Triangles of three vertices each, as STL has them.
+/// Triangles with three vertices of their own, as in STL.
 pub fn soup(wide: bool) -> Mesh {
     let corners: Vec<[f64; 3]> = TRIANGLES
         .as_flattened()
@@ -87,7 +87,7 @@ pub fn soup(wide: bool) -> Mesh {
     }
 }
 
-/// Numbers as bytes of either order.
+/// Numbers as bytes in either byte order.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Order {
     Little,
@@ -139,13 +139,13 @@ pub fn coordinates() -> impl Iterator<Item = f64> {
     VERTICES.into_iter().flatten()
 }
 
-/// One line a vertex, with something before and after its coordinates.
+/// One line per vertex, with a prefix and a suffix around its coordinates.
 pub fn vertex_lines(before: impl Fn(usize) -> String, after: &str) -> String {
     let line = |(ix, [x, y, z]): (usize, &[f64; 3])| format!("{}{x} {y} {z}{after}\n", before(ix));
     VERTICES.iter().enumerate().map(line).collect()
 }
 
-/// One line a cell, its vertices counted from `first`.
+/// One line per cell, its vertices counted from `first`.
 pub fn cell_lines<const N: usize>(
     cells: &[[u32; N]],
     first: u32,
@@ -384,7 +384,7 @@ pub fn gltf_buffer() -> Vec<u8> {
     buffer
 }
 
-/// A document; `uri` is that of the buffer with a comma before it, or empty.
+/// A document; `uri` is the URI of the buffer with a comma before it, or empty.
 pub fn gltf_json(uri: &str, node: &str) -> String {
     format!(
         r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0{node}}}],
@@ -512,7 +512,7 @@ pub fn base64(bytes: &[u8]) -> String {
     out
 }
 
-/// What every mesh that a reader returns must keep.
+/// Asserts what must hold for every mesh that a reader returns.
 pub fn assert_valid(mesh: &Mesh) {
     let n = mesh.n_vertices();
     assert!(

@@ -109,7 +109,7 @@ fn words<T: ToString>(values: impl IntoIterator<Item = T>) -> String {
         .join(" ")
 }
 
-/// An array as the storage has it, behind its header of u32 numbers.
+/// An array in the storage's encoding, after its header of u32 numbers.
 fn encode(storage: VtuStorage, bytes: &[u8]) -> Vec<u8> {
     use VtuStorage::*;
     let u32s = |values: &[usize]| {
@@ -132,7 +132,7 @@ fn encode(storage: VtuStorage, bytes: &[u8]) -> Vec<u8> {
         Raw => [u32s(&[bytes.len()]), bytes.to_vec()].concat(),
         Inline | Base64 => base64(&[u32s(&[bytes.len()]), bytes.to_vec()].concat()).into_bytes(),
         InlineZlib | Base64Zlib => {
-            // Header and data are encoded apart, each with its padding.
+            // Header and data are encoded separately, each with its padding.
             let (header, data) = blocks(&zlib);
             (base64(&header) + &base64(&data)).into_bytes()
         }

@@ -165,7 +165,7 @@ fn gltf_errors() {
         (
             r#""2.0""#,
             r#""1.0""#,
-            "file: glTF version '1.0' (2.x is) is not supported",
+            "file: glTF version '1.0' (supported: 2.x) is not supported",
         ),
     ] {
         let broken = json.replace(from, to);

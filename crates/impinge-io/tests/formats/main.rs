@@ -1,4 +1,4 @@
-//! Every format and flavour is read as what it is.
+//! Every format and flavour is read correctly.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -39,7 +39,7 @@ fn all_samples() {
     }
 }
 
-/// Where `$IMPINGE_SEEDS` names a folder (`fuzz/corpus`), the samples go there, for each fuzz target into its own.
+/// If `$IMPINGE_SEEDS` names a folder (`fuzz/corpus`), the samples are written there, into one folder per fuzz target.
 #[test]
 fn samples_are_seeds_for_fuzzing() {
     let Some(folder) = std::env::var_os("IMPINGE_SEEDS").map(std::path::PathBuf::from) else {
@@ -48,7 +48,7 @@ fn samples_are_seeds_for_fuzzing() {
     };
     for sample in samples() {
         let target = format!("{:?}", sample.format).to_ascii_lowercase();
-        // The first byte tells that target which kind of file the second one is.
+        // The first byte tells the fuzz target which kind of file the second one is.
         let kind: &[u8] = if sample.format == Format::Tetgen {
             b"d"
         } else {
@@ -114,7 +114,7 @@ fn unknown_extension_and_missing_file() {
     );
 }
 
-/// Shows the error where there is one.
+/// Panics with the error, if there is one.
 trait OrShow<T> {
     fn or_show(self) -> T;
 }

@@ -113,7 +113,7 @@ fn off_variants() {
         ),
         (
             "OFF BINARY\n",
-            "file:1: binary OFF (text is) is not supported",
+            "file:1: binary OFF (supported: text) is not supported",
         ),
         (
             "OFF\n3 1 0\n0 0 0\n1 0 0\n",

@@ -19,7 +19,7 @@ pub(super) struct Data<'a, 'r> {
     root: &'r Root,
     /// The binary chunk of a GLB.
     binary: Option<&'r [u8]>,
-    /// Where files are that buffers refer to; `None` where none may be read.
+    /// The folder of the files that buffers refer to; `None` if no files may be read.
     folder: Option<&'r Path>,
     buffers: HashMap<usize, Cow<'r, [u8]>>,
     budget: Budget,
@@ -46,12 +46,12 @@ impl<'a, 'r> Data<'a, 'r> {
         }
     }
 
-    /// Takes `n` things of `size` bytes from the budget.
+    /// Charges `n` elements of `size` bytes to the budget.
     pub(super) fn charge(&mut self, n: u64, size: u64) -> Result<(), Error> {
         self.budget.charge(self.name, Place::File, n, size)
     }
 
-    /// The positions of an accessor: f32 where the file has floats, else f64.
+    /// The positions of an accessor: f32 if the file has floats, else f64.
     pub(super) fn positions(&mut self, accessor_ix: usize) -> Result<Positions, Error> {
         let accessor = self.accessor(accessor_ix, "VEC3")?;
         let scalar = component(self.name, accessor.component_type)?;
@@ -113,7 +113,7 @@ impl<'a, 'r> Data<'a, 'r> {
         Ok(accessor)
     }
 
-    /// All values of an accessor; `value` turns the bytes of one, `n_components` numbers, into what is wanted.
+    /// All values of an accessor; `value` converts the bytes of one value (`n_components` numbers).
     fn read<T: Clone>(
         &mut self,
         accessor: &Accessor,
@@ -133,7 +133,7 @@ impl<'a, 'r> Data<'a, 'r> {
                     .map(|ix| value(&bytes[ix * stride..]))
                     .collect()
             }
-            // Without a view all values are zero; the budget has been asked.
+            // Without a view all values are zero; the budget has been charged.
             None => vec![value(&[0; 24]); accessor.count],
         };
         if let Some(sparse) = &accessor.sparse {
@@ -243,7 +243,7 @@ impl<'a, 'r> Data<'a, 'r> {
                 let (_, text) = uri.split_once(";base64,").ok_or_else(|| {
                     name.unsupported(
                         Place::File,
-                        format!("the data URI of buffer {buffer_ix} (base64 is)"),
+                        format!("the data URI of buffer {buffer_ix} (supported: base64)"),
                     )
                 })?;
                 Cow::Owned(base64::decode(text.as_bytes(), usize::MAX).map_err(
@@ -269,7 +269,7 @@ impl<'a, 'r> Data<'a, 'r> {
         Ok(bytes)
     }
 
-    /// Reads a buffer from the file beside this one that `uri` names.
+    /// Reads a buffer from the file that `uri` names, which must lie beside this one.
     fn load_file(&mut self, buffer_ix: usize, uri: &str) -> Result<Vec<u8>, Error> {
         let name = self.name;
         let refused = |why: &str| {

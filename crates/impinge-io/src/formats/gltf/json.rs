@@ -43,7 +43,7 @@ pub(super) struct Node {
     #[serde(default)]
     pub children: Vec<usize>,
     pub mesh: Option<usize>,
-    /// By columns.
+    /// Column by column.
     pub matrix: Option<[f64; 16]>,
     pub translation: Option<[f64; 3]>,
     /// A quaternion x, y, z, w.

@@ -1,4 +1,4 @@
-//! Version 2: a node is a line, an element is a line with tags of its own; binary elements come in blocks of one type.
+//! Version 2: one line per node, one line per element with its own tags; binary elements come in blocks of one type.
 
 use super::{File, MOST_NODES, Nodes, RawNodes, count_line, put, shape, text_tags};
 use crate::binary::Scalar;

@@ -1,11 +1,11 @@
-//! Version 4.1: nodes and elements in blocks, one for each entity of the geometry.
+//! Version 4.1: nodes and elements in blocks, one block per entity of the geometry.
 
 use super::{File, MOST_NODES, Nodes, RawNodes, put, shape, text_tags};
 use crate::binary::{Cursor, Scalar};
 use crate::collect::Collector;
 use crate::error::{Error, Place};
 
-/// Where the numbers of a section come from; both storages have the same numbers in the same order.
+/// The source of a section's numbers; both storages have the same numbers in the same order.
 enum Numbers<'a> {
     Text,
     Binary(Cursor<'a>),
@@ -45,7 +45,8 @@ impl<'a> Numbers<'a> {
         }
     }
 
-    /// The header of a section: the number of blocks and that of things in all; the least and the greatest tag are passed over.
+    /// Reads the header of a section: returns the number of blocks and the total number of nodes or elements, and skips the least
+    /// and the greatest tag.
     fn header(&mut self, file: &mut File) -> Result<(u64, u64), Error> {
         let n_blocks = self.size(file, "the number of blocks")?;
         let n = self.size(file, "the number in all")?;

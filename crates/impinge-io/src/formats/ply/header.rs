@@ -12,7 +12,7 @@ pub(super) enum Storage {
     Binary(Endian),
 }
 
-/// What an element is to us.
+/// How an element is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Vertices,
@@ -40,7 +40,7 @@ pub(super) enum Property {
 pub(super) struct Element {
     pub name: String,
     pub kind: Kind,
-    /// How many records are announced.
+    /// The number of records, as announced.
     pub count: u64,
     pub properties: Vec<Property>,
     /// The line of the header that announces it.
@@ -56,7 +56,7 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// Reads up to and with the line `end_header`.
+    /// Reads up to and including the line `end_header`.
     pub(super) fn read(name: Name, text: &mut Text) -> Result<Self, Error> {
         let magic = text.line().map_or(&[][..], |line| line.bytes);
         if magic.trim_ascii() != b"ply" {
@@ -207,7 +207,7 @@ impl Element {
         })
     }
 
-    /// Bytes a record, where all records have the same.
+    /// Bytes per record, if all records have the same size.
     pub(super) fn stride(&self) -> Option<usize> {
         self.properties
             .iter()
@@ -218,7 +218,7 @@ impl Element {
             .sum()
     }
 
-    /// Bytes of the shortest possible record; at least 1 where there are properties.
+    /// Bytes of the shortest possible record; at least 1 if there are properties.
     pub(super) fn least_size(&self) -> usize {
         let size = |property: &Property| match property {
             Property::Scalar { scalar, .. } => scalar.size(),
@@ -242,7 +242,7 @@ impl Element {
         Ok([find("x")?, find("y")?, find("z")?])
     }
 
-    /// Offsets in a record and types of x, y and z, where no property is a list.
+    /// Offsets in a record and types of x, y and z, if no property is a list.
     pub(super) fn xyz(&self, name: Name) -> Result<[(usize, Scalar); 3], Error> {
         let axes = self.axes(name)?;
         let mut xyz = [(0, Scalar::F32); 3];
@@ -258,7 +258,7 @@ impl Element {
         Ok(xyz)
     }
 
-    /// Which property lists the vertices of a primitive; `None` for elements that are passed over.
+    /// Which property lists the vertices of a primitive; `None` for elements that are skipped.
     pub(super) fn vertex_list(&self, name: Name) -> Result<Option<usize>, Error> {
         if matches!(self.kind, Kind::Vertices | Kind::Edges | Kind::Other) {
             return Ok(None);

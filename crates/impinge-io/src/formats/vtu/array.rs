@@ -91,19 +91,19 @@ pub(super) struct Appended<'b> {
     pub is_base64: bool,
 }
 
-/// What is needed to read an array of the file.
+/// Everything needed to read the arrays of a file.
 pub(super) struct Arrays<'b> {
     pub name: Name<'b>,
     pub xml: &'b str,
     pub appended: Option<Appended<'b>>,
     pub endian: Endian,
-    /// The type of the numbers that stand before binary data.
+    /// The type of the numbers before binary data.
     pub header: Scalar,
     pub compressor: Option<Compressor>,
     pub budget: Budget,
 }
 
-/// Encoded bytes from some place on; how many of them are wanted shows only while reading.
+/// Encoded bytes from some place on; their number is known only while reading.
 struct Encoded<'b> {
     bytes: &'b [u8],
     is_base64: bool,
@@ -207,7 +207,7 @@ impl<'b> Arrays<'b> {
         Ok(Values::Integers(values))
     }
 
-    /// The first `n` bytes that `encoded` stands for, taken from the budget.
+    /// The first `n` decoded bytes of `encoded`, charged to the budget.
     fn fetch(&mut self, encoded: &Encoded<'b>, n: u64, what: &str) -> Result<Cow<'b, [u8]>, Error> {
         let (name, at) = (self.name, encoded.at);
         self.budget
@@ -239,7 +239,7 @@ impl<'b> Arrays<'b> {
         Ok(bytes)
     }
 
-    /// Data behind its length.
+    /// Reads data that follows its length.
     fn plain(&mut self, encoded: &Encoded<'b>) -> Result<Cow<'b, [u8]>, Error> {
         let size = self.header.size();
         let header = self.fetch(encoded, size as u64, "the length of an array")?;
@@ -254,8 +254,8 @@ impl<'b> Arrays<'b> {
         })
     }
 
-    /// Compressed data behind its header: the number of blocks, the size of a block, that of the last one (0: it is whole),
-    /// then the compressed size of each.
+    /// Reads compressed data that follows its header: the number of blocks, the size of a block, the size of the last block (0 if
+    /// it is full), then the compressed size of each block.
     fn compressed(
         &mut self,
         encoded: &Encoded<'b>,
@@ -283,14 +283,14 @@ impl<'b> Arrays<'b> {
             .iter()
             .fold(header_length, |sum, &size| sum.saturating_add(size));
         let all = self.fetch(encoded, length, "compressed data")?;
-        // Whole blocks, and a last one that may be shorter.
+        // All blocks are full, except perhaps the last.
         let expanded = |ix: u64| match last {
             1.. if ix == n_blocks => last,
             _ => block,
         };
         let mut total = 0u64;
         for (ix, &compressed) in (1..).zip(&sizes) {
-            // Neither method makes data longer than this; a header that says so lies, and no memory is reserved for it.
+            // Neither method expands data more than this. A header that claims more is wrong, and no memory is reserved for it.
             let most = compressed.saturating_mul(1100).saturating_add(64);
             if expanded(ix) > most {
                 return Err(name.too_large(
@@ -305,7 +305,7 @@ impl<'b> Arrays<'b> {
         self.budget.charge(name, at, total, 1)?;
         let mut out: Vec<u8> = Vec::new();
         reserve(name, at, &mut out, total)?;
-        // The sizes sum up to no more than was fetched, so they are small.
+        // The sizes add up to at most the fetched length, so they fit.
         let mut rest = &all[header_length as usize..];
         for (ix, &compressed) in (1..).zip(&sizes) {
             let (bytes, behind) = rest.split_at(compressed as usize);
@@ -328,7 +328,7 @@ impl<'b> Arrays<'b> {
     }
 }
 
-/// Decompresses a block into `out`, and says how much of it was filled.
+/// Decompresses a block into `out` and returns how many bytes it filled.
 fn decompress(bytes: &[u8], out: &mut [u8], compressor: Compressor) -> Result<usize, String> {
     use miniz_oxide::inflate::{TINFLStatus, core};
     match compressor {

@@ -1,5 +1,5 @@
-//! The elements of an XML text as a tree, with their places. Time and memory go by the length of the text, whatever it is
-//! (trees of elements with many attributes or namespaces make checking parsers quadratic).
+//! The elements of an XML text as a tree, with their places. Time and memory are linear in the length of the text, whatever its
+//! content (many attributes or namespaces make other validating parsers quadratic).
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -16,9 +16,9 @@ pub(super) struct Document<'x> {
 
 struct Element<'x> {
     start: BytesStart<'x>,
-    /// Where its start tag is.
+    /// The offset of its start tag.
     offset: usize,
-    /// Where its first text that is not blank is.
+    /// The range of its first text that is not blank.
     text: Range<usize>,
     children: Vec<usize>,
 }
@@ -31,9 +31,9 @@ pub(super) struct Node<'d> {
 }
 
 impl<'x> Document<'x> {
-    /// Parses `xml`. Behind the start tag of an element `last`, if there is one, nothing is looked at.
+    /// Parses `xml`, and stops after the start tag of an element `last`, if there is one.
     pub(super) fn parse(xml: &'x str, last: &str, name: Name) -> Result<Self, Error> {
-        // The reader would skip one byte order mark itself, and not count its bytes.
+        // The reader would skip one byte order mark without counting its bytes.
         let bare = xml.trim_start_matches('\u{feff}');
         let base = xml.len() - bare.len();
         let mut reader = Reader::from_str(bare);
@@ -73,7 +73,7 @@ impl<'x> Document<'x> {
                     }
                 }
                 Event::End(_) => {
-                    // The reader has checked that it belongs to the element opened last.
+                    // The reader has checked that the end tag matches the element opened last.
                     open.pop();
                 }
                 Event::Text(_) => {
@@ -128,7 +128,7 @@ impl<'d> Node<'d> {
         self.element().start.name().into_inner()
     }
 
-    /// An attribute's value as it stands there; none of those that matter has a reason to be escaped.
+    /// An attribute's value without unescaping; the attributes used here need no escapes.
     pub(super) fn attribute(self, key: &str) -> Option<&'d str> {
         let mut attributes = self.element().start.attributes();
         let found = attributes
@@ -141,7 +141,7 @@ impl<'d> Node<'d> {
         }
     }
 
-    /// Where its first text that is not blank is, in the text that was parsed.
+    /// The range of its first text that is not blank, in the parsed text.
     pub(super) fn text(self) -> Range<usize> {
         self.element().text.clone()
     }
