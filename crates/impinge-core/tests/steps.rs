@@ -2,8 +2,8 @@
 
 use impinge_core::exact::{ElementPair, first_contact};
 use impinge_core::{
-    Backend, BodyId, CandidateQuery, Detector, Error, Method, PairKind, Part, Query, Scene,
-    Settings, Start, Step, Toi,
+    Backend, BodyId, CancelToken, CandidateQuery, Control, Detector, Error, Method, PairKind, Part,
+    Query, Scene, Settings, Start, Step, Toi,
 };
 
 const FACE: [[u32; 3]; 1] = [[0, 1, 2]];
@@ -199,6 +199,29 @@ fn candidates_are_boxes_that_overlap_within_twice_the_distance() {
             .set_end_positions(far, &[[1.0f32, 0.0, 0.0]])
             .expect("good");
         assert_eq!([0.49, 0.5].map(|d| count(&scene, d)), [0, 1]);
+    }
+}
+
+#[test]
+fn a_cancelled_question_about_a_step_ends_and_the_detector_goes_on() {
+    let token = CancelToken::new();
+    token.cancel();
+    let control = Control::new().cancel(&token);
+    let step = Step::default();
+    for mut detector in detectors() {
+        let (scene, _, _) = falling();
+        let impacts = detector.impacts_with(&scene, &step, &control).err();
+        assert_eq!(impacts, Some(Error::Cancelled));
+        let earliest = detector.earliest_with(&scene, &step, &control).err();
+        assert_eq!(earliest, Some(Error::Cancelled));
+        let is_free = detector.is_free_with(&scene, &step, &control).err();
+        assert_eq!(is_free, Some(Error::Cancelled));
+        let advance = detector.advance_with(&scene, &step, &control).err();
+        assert_eq!(advance, Some(Error::Cancelled));
+        let query = CandidateQuery::new(Query::everything());
+        let candidates = detector.candidates_with(&scene, &query, &control).err();
+        assert_eq!(candidates, Some(Error::Cancelled));
+        assert_eq!(detector.is_free(&scene, &step), Ok(false));
     }
 }
 

@@ -2,15 +2,16 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use impinge::{Control, Query};
-use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
+use impinge::{CandidateQuery, Control, Query, Step, Toi};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use pyo3::types::PyBool;
 
 use crate::errors::raise;
-use crate::result::{Answer, Asked};
+use crate::question::{question, step_question};
+use crate::result::Answer;
 use crate::scene::Scene;
-use crate::settings::{Argument, Told, shared_vertex, unexpected};
+use crate::settings::{self, Argument, Told, unexpected};
+use crate::steps::{self, Advance, Candidates, Impact, Impacts};
 use crate::watch::{CancelToken, Watch};
 
 /// Finds intersecting pairs, frame after frame. Scratch memory lives here and is used again.
@@ -160,33 +161,279 @@ impl Detector {
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<Answer> {
-        let py = slf.py();
-        let scene = scene
-            .cast::<Scene>()
-            .map_err(|_| unexpected(scene, "scene", "a Scene"))?;
-        if let Some(progress) = progress
-            && !progress.is_callable()
-        {
-            return Err(unexpected(progress, "progress", "a callable"));
-        }
-        let cancel = match cancel.map(|token| (token, token.cast::<CancelToken>())) {
-            None => None,
-            Some((_, Ok(token))) => Some(token.get().inner.clone()),
-            Some((token, Err(_))) => return Err(unexpected(token, "cancel", "a CancelToken")),
+        let watched = (scene, progress, cancel);
+        let ask = |scene: &Scene| question(scene, between, within, ignore, shared_vertex);
+        let answer = |detector: &mut impinge::Detector,
+                      scene: &impinge::Scene,
+                      (query, _): &(Query, _),
+                      control: &Control<'_>| {
+            detector.detect_with(scene, query, control).cloned()
         };
-        let mut detector = slf.try_borrow_mut().map_err(|_| {
-            PyRuntimeError::new_err("the detector is busy: give each thread one of its own")
-        })?;
-        let scene = scene
-            .try_borrow()
-            .map_err(|_| PyRuntimeError::new_err("the scene is being changed by another thread"))?;
-        let (query, asked) = question(&scene, between, within, ignore, shared_vertex)?;
-        let watch = Watch::new(progress.map(|progress| progress.clone().unbind()), cancel);
-        let pairs = detector.run(py, &scene, &query, &watch);
-        match (watch.raised(), pairs) {
-            (Some(error), _) => Err(error),
-            (None, pairs) => Ok(Answer::new(pairs?, scene.number, asked)),
-        }
+        let (pairs, (_, asked), number) = Detector::watched(slf, watched, ask, answer)?;
+        Ok(Answer::new(pairs, number, asked))
+    }
+
+    /// Finds all pairs of elements that touch during a step, each with the first time at which it does.
+    ///
+    /// Every vertex moves on a straight line, from its position at time 0 to its end position
+    /// (`Scene.set_end_positions`) at time 1. Pairs are of a vertex and a face (``"vf"``) and of two edges
+    /// (``"ee"``); where a body is made of edges or points alone also of an edge and a vertex (``"ev"``) and of
+    /// two vertices (``"vv"``). Of tetrahedra the surface takes part. Pairs of one body that share a vertex
+    /// are left out. The answer is exact: a pair is reported if and only if the two closed elements share a
+    /// point at some time, and its time is that of the first contact, rounded down.
+    ///
+    /// Parameters
+    /// ----------
+    /// scene : Scene
+    /// between, within, ignore
+    ///     As for `detect`, but for the default, which is all pairs of all bodies, those within a body included.
+    /// start : {"report", "skip"}
+    ///     Pairs that touch at the start: reported with the time 0, or left out whatever they do later.
+    /// toi : {"f32", "f64"}
+    ///     To which precision times are rounded down.
+    /// progress, cancel
+    ///     As for `detect`.
+    ///
+    /// Returns
+    /// -------
+    /// Impacts
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError, MemoryError, Cancelled, RuntimeError
+    ///     As `detect`.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import impinge
+    /// >>> scene = impinge.Scene()
+    /// >>> floor = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+    /// >>> point = scene.add_points([[1, 1, 1]])
+    /// >>> scene.set_end_positions(point, [[1, 1, -3]])
+    /// >>> impacts = impinge.Detector(backend="cpu").impacts(scene)
+    /// >>> impacts[0]
+    /// Impact("vf", 0 of body 1 and 0 of body 0, toi=0.25)
+    /// >>> float(impacts.toi.min())
+    /// 0.25
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+    #[pyo3(
+        signature = (
+            scene, *, between=None, within=None, ignore=None, start=None, toi=None, progress=None,
+            cancel=None,
+        ),
+        text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
+                          start=\"report\", toi=\"f32\", progress=None, cancel=None)"
+    )]
+    fn impacts(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        between: Argument<'_, '_>,
+        within: Argument<'_, '_>,
+        ignore: Argument<'_, '_>,
+        start: Argument<'_, '_>,
+        toi: Argument<'_, '_>,
+        progress: Argument<'_, '_>,
+        cancel: Argument<'_, '_>,
+    ) -> PyResult<Impacts> {
+        let toi = settings::toi(toi)?;
+        let ask = step((between, within, ignore), start, toi)?;
+        let answer = |detector: &mut impinge::Detector,
+                      scene: &impinge::Scene,
+                      step: &Step,
+                      control: &Control<'_>| {
+            detector.impacts_with(scene, step, control).cloned()
+        };
+        let watched = (scene, progress, cancel);
+        let (impacts, _, number) = Detector::watched(slf, watched, ask, answer)?;
+        Ok(Impacts::new(impacts, number, toi == Toi::F64))
+    }
+
+    /// Finds the first contact of a step: the impact with the least time, of several the first row. It is the
+    /// one that ``impacts(...).earliest()`` finds, but found faster.
+    ///
+    /// Parameters
+    /// ----------
+    /// scene, between, within, ignore, start, toi, progress, cancel
+    ///     As for `impacts`.
+    ///
+    /// Returns
+    /// -------
+    /// Impact or None
+    ///     ``None`` where the step is free.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError, MemoryError, Cancelled, RuntimeError
+    ///     As `detect`.
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+    #[pyo3(
+        signature = (
+            scene, *, between=None, within=None, ignore=None, start=None, toi=None, progress=None,
+            cancel=None,
+        ),
+        text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
+                          start=\"report\", toi=\"f32\", progress=None, cancel=None)"
+    )]
+    fn earliest(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        between: Argument<'_, '_>,
+        within: Argument<'_, '_>,
+        ignore: Argument<'_, '_>,
+        start: Argument<'_, '_>,
+        toi: Argument<'_, '_>,
+        progress: Argument<'_, '_>,
+        cancel: Argument<'_, '_>,
+    ) -> PyResult<Option<Impact>> {
+        let ask = step((between, within, ignore), start, settings::toi(toi)?)?;
+        let watched = (scene, progress, cancel);
+        let answer = impinge::Detector::earliest_with;
+        let (first, _, number) = Detector::watched(slf, watched, ask, answer)?;
+        Ok(first.map(|impact| Impact::new(impact, number)))
+    }
+
+    /// Whether nothing touches during a step; with ``start="skip"``, but for pairs that touch at its start.
+    ///
+    /// Parameters
+    /// ----------
+    /// scene, between, within, ignore, start, progress, cancel
+    ///     As for `impacts`.
+    ///
+    /// Returns
+    /// -------
+    /// bool
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError, MemoryError, Cancelled, RuntimeError
+    ///     As `detect`.
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+    #[pyo3(
+        signature = (
+            scene, *, between=None, within=None, ignore=None, start=None, progress=None, cancel=None,
+        ),
+        text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
+                          start=\"report\", progress=None, cancel=None)"
+    )]
+    fn is_free(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        between: Argument<'_, '_>,
+        within: Argument<'_, '_>,
+        ignore: Argument<'_, '_>,
+        start: Argument<'_, '_>,
+        progress: Argument<'_, '_>,
+        cancel: Argument<'_, '_>,
+    ) -> PyResult<bool> {
+        let ask = step((between, within, ignore), start, Toi::F32)?;
+        let watched = (scene, progress, cancel);
+        let answer = impinge::Detector::is_free_with;
+        Ok(Detector::watched(slf, watched, ask, answer)?.0)
+    }
+
+    /// How far a step can be taken: the largest fraction of it, backed off as little as the precision of
+    /// positions allows, for which the straight way from the start to the *rounded* positions is free.
+    ///
+    /// Rounding alone may make elements touch that did not. So for each fraction that is tried positions are
+    /// rounded first, and the way to those is asked about. A chain of such steps is free from the first to the
+    /// last. Pairs that touch at the start allow no step at all, or are not looked at with ``start="skip"``.
+    ///
+    /// Parameters
+    /// ----------
+    /// scene, between, within, ignore, start, progress, cancel
+    ///     As for `impacts`.
+    ///
+    /// Returns
+    /// -------
+    /// Advance
+    ///     ``advance.apply(scene)`` takes the step.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError, MemoryError, Cancelled, RuntimeError
+    ///     As `detect`.
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+    #[pyo3(
+        signature = (
+            scene, *, between=None, within=None, ignore=None, start=None, progress=None, cancel=None,
+        ),
+        text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
+                          start=\"report\", progress=None, cancel=None)"
+    )]
+    fn advance(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        between: Argument<'_, '_>,
+        within: Argument<'_, '_>,
+        ignore: Argument<'_, '_>,
+        start: Argument<'_, '_>,
+        progress: Argument<'_, '_>,
+        cancel: Argument<'_, '_>,
+    ) -> PyResult<Advance> {
+        let ask = step((between, within, ignore), start, Toi::F64)?;
+        let watched = (scene, progress, cancel);
+        let answer = impinge::Detector::advance_with;
+        let (advance, _, number) = Detector::watched(slf, watched, ask, answer)?;
+        Ok(Advance::new(advance, number))
+    }
+
+    /// Finds the pairs of elements whose boxes over the whole step, each inflated by `distance` on all sides,
+    /// overlap: for those who bring a test of their own. Sorted and complete; decided exactly. Pairs of one
+    /// body that share a vertex are left out.
+    ///
+    /// Parameters
+    /// ----------
+    /// scene, between, within, ignore, progress, cancel
+    ///     As for `impacts`.
+    /// kinds : sequence of {"vf", "ee", "ev", "vv", "ef", "ff"}
+    ///     Which kinds of pairs; ``("vf", "ee")`` by default.
+    /// distance : float
+    ///     By how much boxes are inflated, 0 or more.
+    ///
+    /// Returns
+    /// -------
+    /// Candidates
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError, MemoryError, Cancelled, RuntimeError
+    ///     As `detect`; a distance that is negative or not finite.
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+    #[pyo3(
+        signature = (
+            scene, *, between=None, within=None, ignore=None, kinds=None, distance=None,
+            progress=None, cancel=None,
+        ),
+        text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
+                          kinds=(\"vf\", \"ee\"), distance=0.0, progress=None, cancel=None)"
+    )]
+    fn candidates(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        between: Argument<'_, '_>,
+        within: Argument<'_, '_>,
+        ignore: Argument<'_, '_>,
+        kinds: Argument<'_, '_>,
+        distance: Argument<'_, '_>,
+        progress: Argument<'_, '_>,
+        cancel: Argument<'_, '_>,
+    ) -> PyResult<Candidates> {
+        let kinds = steps::kinds(kinds)?;
+        let distance = steps::distance(distance)?;
+        let ask = |scene: &Scene| {
+            let query = step_question(scene, between, within, ignore)?;
+            Ok(CandidateQuery::new(query).kinds(kinds).distance(distance))
+        };
+        let answer = |detector: &mut impinge::Detector,
+                      scene: &impinge::Scene,
+                      query: &CandidateQuery,
+                      control: &Control<'_>| {
+            detector.candidates_with(scene, query, control).cloned()
+        };
+        let watched = (scene, progress, cancel);
+        Ok(Candidates::new(
+            Detector::watched(slf, watched, ask, answer)?.0,
+        ))
     }
 
     fn __repr__(&self) -> String {
@@ -210,23 +457,67 @@ impl Detector {
     }
 }
 
+/// A step question as the keywords ask it: the bodies, what touches at the start, the precision of times.
+fn step<'a, 'py>(
+    (between, within, ignore): (Argument<'a, 'py>, Argument<'a, 'py>, Argument<'a, 'py>),
+    start: Argument<'a, 'py>,
+    toi: Toi,
+) -> PyResult<impl FnOnce(&Scene) -> PyResult<Step>> {
+    let start = settings::start(start)?;
+    Ok(move |scene: &Scene| {
+        let query = step_question(scene, between, within, ignore)?;
+        Ok(Step::new(query).start(start).toi(toi))
+    })
+}
+
 impl Detector {
-    /// Runs with the interpreter released.
-    pub fn run(
-        &mut self,
-        py: Python<'_>,
-        scene: &Scene,
-        query: &Query,
-        watch: &Watch,
-    ) -> PyResult<impinge::Pairs> {
+    /// Asks about a scene and answers with the interpreter released, watched for Ctrl-C, progress and cancellation.
+    /// Returns the answer, the question and the number of the scene.
+    fn watched<Q: Sync + Send, T: Send>(
+        slf: &Bound<'_, Self>,
+        (scene, progress, cancel): (&Bound<'_, PyAny>, Argument<'_, '_>, Argument<'_, '_>),
+        ask: impl FnOnce(&Scene) -> PyResult<Q>,
+        answer: impl FnOnce(
+            &mut impinge::Detector,
+            &impinge::Scene,
+            &Q,
+            &Control<'_>,
+        ) -> Result<T, impinge::Error>
+        + Send,
+    ) -> PyResult<(T, Q, u64)> {
+        let py = slf.py();
+        let scene = scene
+            .cast::<Scene>()
+            .map_err(|_| unexpected(scene, "scene", "a Scene"))?;
+        if let Some(progress) = progress
+            && !progress.is_callable()
+        {
+            return Err(unexpected(progress, "progress", "a callable"));
+        }
+        let cancel = match cancel.map(|token| (token, token.cast::<CancelToken>())) {
+            None => None,
+            Some((_, Ok(token))) => Some(token.get().inner.clone()),
+            Some((token, Err(_))) => return Err(unexpected(token, "cancel", "a CancelToken")),
+        };
+        let mut detector = slf.try_borrow_mut().map_err(|_| {
+            PyRuntimeError::new_err("the detector is busy: give each thread one of its own")
+        })?;
+        let scene = scene
+            .try_borrow()
+            .map_err(|_| PyRuntimeError::new_err("the scene is being changed by another thread"))?;
+        let question = ask(&scene)?;
         check_process()?;
-        let (inner, scene) = (&mut self.inner, &scene.inner);
-        py.detach(|| {
+        let watch = Watch::new(progress.map(|progress| progress.clone().unbind()), cancel);
+        let (inner, bodies) = (&mut detector.inner, &scene.inner);
+        let answer = py.detach(|| {
             let step = |at| watch.step(at);
             let control = Control::new().cancel(&watch.stop).progress(&step);
-            inner.detect_with(scene, query, &control).cloned()
-        })
-        .map_err(raise)
+            answer(inner, bodies, &question, &control)
+        });
+        match (watch.raised(), answer) {
+            (Some(error), _) => Err(error),
+            (None, answer) => Ok((answer.map_err(raise)?, question, scene.number)),
+        }
     }
 }
 
@@ -241,83 +532,5 @@ fn check_process() -> PyResult<()> {
              the first Detector",
         )),
         _ => Ok(()),
-    }
-}
-
-/// What the keywords ask.
-fn question(
-    scene: &Scene,
-    between: Argument<'_, '_>,
-    within: Argument<'_, '_>,
-    ignore: Argument<'_, '_>,
-    rule: Argument<'_, '_>,
-) -> PyResult<(Query, Asked)> {
-    let (query, asked) = match (Scope::new(between), Scope::new(within)) {
-        (Scope::Nothing | Scope::All, Scope::Nothing) => (Query::all(), Asked::Many),
-        (Scope::Nothing, Scope::All) => (Query::all_within(), Asked::Many),
-        (Scope::All, Scope::All) => (Query::everything(), Asked::Many),
-        (Scope::One(pair), Scope::Nothing) => {
-            let (a, b) = two_bodies(scene, pair, "between")?;
-            (Query::between(a, b), Asked::Between(a, b))
-        }
-        (Scope::Nothing, Scope::One(body)) => {
-            let body = scene.id(body, "within")?;
-            (Query::within(body), Asked::Within(body))
-        }
-        _ => {
-            return Err(PyValueError::new_err(
-                "between and within: two questions; ask one of them, or between=True and \
-                 within=True for all pairs of all bodies",
-            ));
-        }
-    };
-    let mut query = query.shared_vertex(shared_vertex(rule)?);
-    if let Some(ignore) = ignore {
-        let pairs = ignore
-            .try_iter()
-            .map_err(|_| unexpected(ignore, "ignore", "a sequence of pairs of bodies"))?;
-        for (ix, pair) in pairs.enumerate() {
-            let (a, b) = two_bodies(scene, &pair?, &format!("ignore[{ix}]"))?;
-            query = query.ignore(a, b);
-        }
-    }
-    Ok((query, asked))
-}
-
-/// One of the keywords `between` and `within`.
-enum Scope<'a, 'py> {
-    Nothing,
-    All,
-    One(&'a Bound<'py, PyAny>),
-}
-
-impl<'a, 'py> Scope<'a, 'py> {
-    fn new(argument: Argument<'a, 'py>) -> Self {
-        match argument.map(|argument| (argument, argument.cast::<PyBool>())) {
-            None => Scope::Nothing,
-            Some((_, Ok(all))) if all.is_true() => Scope::All,
-            Some((_, Ok(_))) => Scope::Nothing,
-            Some((one, Err(_))) => Scope::One(one),
-        }
-    }
-}
-
-fn two_bodies(
-    scene: &Scene,
-    pair: &Bound<'_, PyAny>,
-    name: &str,
-) -> PyResult<(impinge::BodyId, impinge::BodyId)> {
-    let pair: Vec<Bound<'_, PyAny>> =
-        pair.try_iter()
-            .and_then(|items| items.collect())
-            .map_err(|_| {
-                PyTypeError::new_err(format!("{name}: a pair of bodies expected, such as (a, b)"))
-            })?;
-    match &pair[..] {
-        [a, b] => Ok((scene.id(a, name)?, scene.id(b, name)?)),
-        _ => Err(PyValueError::new_err(format!(
-            "{name}: two bodies expected, {} given",
-            pair.len()
-        ))),
     }
 }

@@ -9,10 +9,12 @@ mod detector;
 mod devices;
 mod errors;
 mod functions;
+mod question;
 mod result;
 mod scene;
 mod settings;
 mod statistics;
+mod steps;
 mod watch;
 
 use pyo3::prelude::*;
@@ -36,6 +38,8 @@ mod _impinge {
     use super::scene::Scene;
     #[pymodule_export]
     use super::statistics::Statistics;
+    #[pymodule_export]
+    use super::steps::{Advance, Candidates, Impact, Impacts};
     #[pymodule_export]
     use super::watch::CancelToken;
 

@@ -1,6 +1,6 @@
 //! `impinge.Scene`: bodies, their topology and positions.
 
-use impinge::{BodyId, Elements, Filter, Positions};
+use impinge::{BodyId, Elements, Filter, Kind, Positions};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -72,13 +72,35 @@ impl Scene {
         kind: Argument<'_, '_>,
         names: Names<'_>,
     ) -> PyResult<BodyId> {
+        self.add_kind(vertices, faces, settings::kind(kind)?, names)
+    }
+
+    fn add_kind(
+        &mut self,
+        vertices: &Bound<'_, PyAny>,
+        elements: &Bound<'_, PyAny>,
+        kind: Option<Kind>,
+        names: Names<'_>,
+    ) -> PyResult<BodyId> {
         let positions = PositionArray::new(vertices, names.vertices)?;
-        let kind = settings::kind(kind)?;
-        let elements = arrays::elements(faces, names.elements, kind, positions.len())?;
+        let elements = arrays::elements(elements, names.elements, kind, positions.len())?;
         self.inner
             .add(elements, stored(&positions)?)
             .map_err(|error| refuse(error, names, &positions))
     }
+}
+
+/// An `(n, 3)` array of the precision in which positions are held.
+pub fn positions_array<'py>(py: Python<'py>, positions: &Positions) -> PyResult<Bound<'py, PyAny>> {
+    let shape = [positions.len(), 3];
+    Ok(match positions {
+        Positions::F32(positions) => PyArray1::from_slice(py, positions.as_flattened())
+            .reshape(shape)?
+            .into_any(),
+        Positions::F64(positions) => PyArray1::from_slice(py, positions.as_flattened())
+            .reshape(shape)?
+            .into_any(),
+    })
 }
 
 fn stored(positions: &PositionArray<'_>) -> PyResult<Positions> {
@@ -138,7 +160,65 @@ impl Scene {
         Ok(scene.handle(id))
     }
 
-    /// Moves the vertices of a body. The array is copied; the precision may change.
+    /// Adds a body of edges, such as strands of hair. The arrays are copied.
+    ///
+    /// Parameters
+    /// ----------
+    /// vertices : array_like, shape (v, 3)
+    ///     As for `add`.
+    /// edges : array_like of int, shape (n, 2)
+    ///     Vertex indices.
+    ///
+    /// Returns
+    /// -------
+    /// Body
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     As `add`.
+    fn add_edges(
+        slf: &Bound<'_, Self>,
+        vertices: &Bound<'_, PyAny>,
+        edges: &Bound<'_, PyAny>,
+    ) -> PyResult<Body> {
+        let names = Names {
+            vertices: "vertices",
+            elements: "edges",
+        };
+        let mut scene = change(slf)?;
+        let id = scene.add_kind(vertices, edges, Some(Kind::Edges), names)?;
+        Ok(scene.handle(id))
+    }
+
+    /// Adds a body of points, one per row. The array is copied.
+    ///
+    /// Parameters
+    /// ----------
+    /// vertices : array_like, shape (v, 3)
+    ///     As for `add`.
+    ///
+    /// Returns
+    /// -------
+    /// Body
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     As `add`.
+    fn add_points(slf: &Bound<'_, Self>, vertices: &Bound<'_, PyAny>) -> PyResult<Body> {
+        let mut scene = change(slf)?;
+        let positions = PositionArray::new(vertices, "vertices")?;
+        let id = match &positions {
+            PositionArray::F32(array) => scene.inner.add_points::<f32>(slice_rows(array)?),
+            PositionArray::F64(array) => scene.inner.add_points::<f64>(slice_rows(array)?),
+        }
+        .map_err(|error| refuse(error, ARGUMENTS, &positions))?;
+        Ok(scene.handle(id))
+    }
+
+    /// Moves the vertices of a body. The array is copied; the precision may change. A new step starts: the
+    /// body has no end positions until they are set.
     ///
     /// Parameters
     /// ----------
@@ -163,6 +243,49 @@ impl Scene {
             PositionArray::F64(array) => scene.inner.set_positions::<f64>(id, slice_rows(array)?),
         }
         .map_err(|error| refuse(error, ARGUMENTS, &positions))
+    }
+
+    /// Says where the vertices of a body are at the end of a step: between its positions and these, each moves
+    /// on a straight line at constant speed. They hold until the next `set_positions`, `remesh` or
+    /// `clear_end_positions`. A body without end positions stands still.
+    ///
+    /// Where start and end come in different precisions, the single one is widened, which is exact.
+    ///
+    /// Parameters
+    /// ----------
+    /// body : Body or int
+    /// vertices : array_like, shape (v, 3)
+    ///     As many positions as the body has vertices. The array is copied.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     As `add`; the body keeps its old end positions then.
+    fn set_end_positions(
+        slf: &Bound<'_, Self>,
+        body: &Bound<'_, PyAny>,
+        vertices: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let mut scene = change(slf)?;
+        let id = scene.id(body, "body")?;
+        let positions = PositionArray::new(vertices, "vertices")?;
+        let inner = &mut scene.inner;
+        match &positions {
+            PositionArray::F32(array) => inner.set_end_positions::<f32>(id, slice_rows(array)?),
+            PositionArray::F64(array) => inner.set_end_positions::<f64>(id, slice_rows(array)?),
+        }
+        .map_err(|error| refuse(error, ARGUMENTS, &positions))
+    }
+
+    /// Forgets where a body is at the end of a step: it stands still.
+    ///
+    /// Parameters
+    /// ----------
+    /// body : Body or int
+    fn clear_end_positions(slf: &Bound<'_, Self>, body: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut scene = change(slf)?;
+        let id = scene.id(body, "body")?;
+        scene.inner.clear_end_positions(id).map_err(raise)
     }
 
     /// Gives a body new topology and positions under its old handle.
@@ -248,37 +371,54 @@ impl Scene {
         py: Python<'py>,
         body: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let body = self.body(body)?;
-        let shape = [body.n_vertices(), 3];
-        Ok(match body.positions() {
-            Positions::F32(positions) => PyArray1::from_slice(py, positions.as_flattened())
-                .reshape(shape)?
-                .into_any(),
-            Positions::F64(positions) => PyArray1::from_slice(py, positions.as_flattened())
-                .reshape(shape)?
-                .into_any(),
-        })
+        positions_array(py, self.body(body)?.positions())
     }
 
-    /// The vertex indices of a body.
+    /// The end positions of a body.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray, shape (v, 3), float32 or float64, or None
+    ///     A copy; ``None`` for a body that stands still.
+    fn end_positions<'py>(
+        &self,
+        py: Python<'py>,
+        body: &Bound<'py, PyAny>,
+    ) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let end = self.body(body)?.end_positions();
+        end.map(|end| positions_array(py, end)).transpose()
+    }
+
+    /// The elements of a body as vertex indices.
+    ///
+    /// Parameters
+    /// ----------
+    /// body : Body or int
+    /// part : {"given", "vertices", "edges", "faces"}
+    ///     Those that it was given as, or its vertices, edges or faces, as `Impacts.elements` numbers the last
+    ///     two. Edges are the unique pairs (low, high) of vertices in the order of (high, low), as
+    ///     ``igl.edges`` has them; of tetrahedra the surface counts. ``"vertices"`` are those that some element
+    ///     names; impacts number vertices as positions are.
     ///
     /// Returns
     /// -------
     /// numpy.ndarray of uint32, shape (n, 1), (n, 2), (n, 3) or (n, 4)
     ///     A copy.
+    #[pyo3(signature = (body, part=None), text_signature = "($self, body, part=\"given\")")]
     fn elements<'py>(
         &self,
         py: Python<'py>,
         body: &Bound<'py, PyAny>,
+        part: Argument<'py, 'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let body = self.body(body)?;
-        let (flat, n_columns) = match body.elements() {
+        let elements = self.body(body)?.part(settings::part(part)?);
+        let (flat, n_columns) = match elements {
             Elements::Points(points) => (points.as_flattened(), 1),
             Elements::Edges(edges) => (edges.as_flattened(), 2),
             Elements::Triangles(faces) => (faces.as_flattened(), 3),
             Elements::Tetrahedra(tets) => (tets.as_flattened(), 4),
         };
-        let shape = [body.n_primitives(), n_columns];
+        let shape = [elements.len(), n_columns];
         Ok(PyArray1::from_slice(py, flat).reshape(shape)?.into_any())
     }
 

@@ -1,6 +1,8 @@
 //! Keyword arguments as the library's settings.
 
-use impinge::{Backend, InstructionSet, Kind, Method, Recluster, Settings, SharedVertex};
+use impinge::{
+    Backend, InstructionSet, Kind, Method, Part, Recluster, Settings, SharedVertex, Start, Toi,
+};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
@@ -14,9 +16,18 @@ fn choose<T: Copy + Default>(
     name: &str,
     choices: &[(&str, T)],
 ) -> PyResult<T> {
-    let Some(argument) = argument else {
-        return Ok(T::default());
-    };
+    match argument {
+        Some(argument) => choose_one(argument, name, choices),
+        None => Ok(T::default()),
+    }
+}
+
+/// Picks the value that goes with a name, or lists the names.
+pub fn choose_one<T: Copy>(
+    argument: &Bound<'_, PyAny>,
+    name: &str,
+    choices: &[(&str, T)],
+) -> PyResult<T> {
     let given = text(argument, name)?;
     if let Some(&(_, value)) = choices.iter().find(|(choice, _)| *choice == given) {
         return Ok(value);
@@ -63,6 +74,31 @@ pub fn shared_vertex(argument: Argument<'_, '_>) -> PyResult<SharedVertex> {
             ("resolve", SharedVertex::Resolve),
         ],
     )
+}
+
+/// What becomes of pairs that touch at the start of a step.
+pub fn start(argument: Argument<'_, '_>) -> PyResult<Start> {
+    let choices = [("report", Start::Report), ("skip", Start::Skip)];
+    choose(argument, "start", &choices)
+}
+
+/// To which precision times are rounded down.
+pub fn toi(argument: Argument<'_, '_>) -> PyResult<Toi> {
+    choose(argument, "toi", &[("f32", Toi::F32), ("f64", Toi::F64)])
+}
+
+/// Which elements of a body.
+pub fn part(argument: Argument<'_, '_>) -> PyResult<Part> {
+    let Some(argument) = argument else {
+        return Ok(Part::Given);
+    };
+    let choices = [
+        ("given", Part::Given),
+        ("vertices", Part::Vertices),
+        ("edges", Part::Edges),
+        ("faces", Part::Faces),
+    ];
+    choose_one(argument, "part", &choices)
 }
 
 /// A whole number from 0 to `most`.

@@ -54,14 +54,14 @@ def test_bodies_come_go_and_change(scene):
     assert len(detector.detect(scene)) > 1
     scene.remove(a)
     assert len(scene) == 1 and a not in scene and b in scene
-    with pytest.raises(ValueError, match="no body 0"):
+    with pytest.raises(ValueError, match="there is no such body 0"):
         scene.set_positions(a, TRIANGLE)
     again = scene.add(TRIANGLE, FACE)
     assert again.index == a.index and again != a
     # The old handle does not name the new body.
-    with pytest.raises(ValueError, match="no body 0 in this scene"):
+    with pytest.raises(ValueError, match="there is no such body 0"):
         scene.positions(a)
-    with pytest.raises(ValueError, match="no body 0 in this scene"):
+    with pytest.raises(ValueError, match="there is no such body 0"):
         detector.detect(scene, within=a)
     assert len(detector.detect(scene)) > 1
 

@@ -126,9 +126,21 @@ impl Detector {
     /// # Errors
     /// As [`impacts`](Detector::impacts).
     pub fn earliest(&mut self, scene: &Scene, step: &Step) -> Result<Option<Impact>, Error> {
+        self.earliest_with(scene, step, &Control::new())
+    }
+
+    /// [`earliest`](Detector::earliest) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `earliest`, and [`Error::Cancelled`].
+    pub fn earliest_with(
+        &mut self,
+        scene: &Scene,
+        step: &Step,
+        control: &Control<'_>,
+    ) -> Result<Option<Impact>, Error> {
         let start = Instant::now();
         self.begin(scene, step)?;
-        let control = Control::new();
         let mut until = FIRST_UNTIL;
         let mut first: Option<Impact> = None;
         loop {
@@ -137,7 +149,7 @@ impl Detector {
                 ..Pose::WHOLE
             };
             let latest = first.map_or(f64::INFINITY, |first| beyond(first.toi));
-            self.find(scene, step, Sought::Earliest, (pose, latest), &control)?;
+            self.find(scene, step, Sought::Earliest, (pose, latest), control)?;
             let found = self.steps.named(step.toi);
             first = found.chain(first).reduce(Impact::earlier);
             // Of contacts up to this time none is left out; some later ones may have been found, too.
@@ -223,10 +235,23 @@ impl Detector {
     /// # Errors
     /// As [`impacts`](Detector::impacts).
     pub fn is_free(&mut self, scene: &Scene, step: &Step) -> Result<bool, Error> {
+        self.is_free_with(scene, step, &Control::new())
+    }
+
+    /// [`is_free`](Detector::is_free) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `is_free`, and [`Error::Cancelled`].
+    pub fn is_free_with(
+        &mut self,
+        scene: &Scene,
+        step: &Step,
+        control: &Control<'_>,
+    ) -> Result<bool, Error> {
         let start = Instant::now();
         self.begin(scene, step)?;
         let whole = (Pose::WHOLE, f64::INFINITY);
-        self.find(scene, step, Sought::Any, whole, &Control::new())?;
+        self.find(scene, step, Sought::Any, whole, control)?;
         self.steps.impacts.stats_mut().total_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(self.steps.found.iter().all(Vec::is_empty))
     }
@@ -245,8 +270,21 @@ impl Detector {
     /// # Errors
     /// As [`impacts`](Detector::impacts).
     pub fn advance(&mut self, scene: &Scene, step: &Step) -> Result<Advance, Error> {
+        self.advance_with(scene, step, &Control::new())
+    }
+
+    /// [`advance`](Detector::advance) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `advance`, and [`Error::Cancelled`].
+    pub fn advance_with(
+        &mut self,
+        scene: &Scene,
+        step: &Step,
+        control: &Control<'_>,
+    ) -> Result<Advance, Error> {
         let step = step.clone().toi(Toi::F64);
-        let first = self.earliest(scene, &step)?;
+        let first = self.earliest_with(scene, &step, control)?;
         let moving = || {
             let bodies = scene.bodies();
             bodies.filter_map(|(id, body)| Some((id, body.positions(), body.end_positions()?)))
@@ -283,7 +321,7 @@ impl Detector {
                 return Ok(advance);
             }
             advance.n_tried += 1;
-            if self.is_free(&trial, &step)? {
+            if self.is_free_with(&trial, &step, control)? {
                 return Ok(advance);
             }
             back_off = if back_off == 0.0 {
@@ -304,6 +342,19 @@ impl Detector {
         scene: &Scene,
         query: &CandidateQuery,
     ) -> Result<&Candidates, Error> {
+        self.candidates_with(scene, query, &Control::new())
+    }
+
+    /// [`candidates`](Detector::candidates) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `candidates`, and [`Error::Cancelled`].
+    pub fn candidates_with(
+        &mut self,
+        scene: &Scene,
+        query: &CandidateQuery,
+        control: &Control<'_>,
+    ) -> Result<&Candidates, Error> {
         let start = Instant::now();
         query.check()?;
         let Steps {
@@ -318,12 +369,11 @@ impl Detector {
         frame.check(scene)?;
         let (keys, stats) = candidates.parts_mut();
         begin(stats, &self.settings, self.frames.workers().n());
-        let control = Control::new();
         if self.settings.method == Method::Naive {
             let test = Overlap {
                 distance: query.distance,
             };
-            naive::run(&test, scene, frame, &control, stats, |test, key, ()| {
+            naive::run(&test, scene, frame, control, stats, |test, key, ()| {
                 if let TestId::Elements(kind) = test {
                     keys[kind as usize].push(key);
                 }
@@ -335,7 +385,7 @@ impl Detector {
                 scene,
                 frame,
                 workers: self.frames.workers(),
-                control: &control,
+                control,
             };
             let asked = Asked {
                 sought: Sought::Boxes(query.distance),

@@ -12,15 +12,22 @@ read as real numbers: touching counts, and there is no tolerance anywhere. The a
 and depends on the input alone, not on method, backend, threads or memory.
 
 For deforming meshes keep a `Scene` and a `Detector`, move the vertices with
-`Scene.set_positions`, and ask again with `Detector.detect`.
+`Scene.set_positions`, and ask again with `Detector.detect`. Of a step, from positions to
+`Scene.set_end_positions`, ask `Detector.impacts`, `earliest`, `is_free` and `advance`; `impinge.ipc` has
+those under the names of ipc-toolkit.
 """
 
+from . import ipc
 from ._impinge import (
+    Advance,
     Body,
     Cancelled,
     CancelToken,
+    Candidates,
     Detector,
     Device,
+    Impact,
+    Impacts,
     Result,
     Scene,
     Statistics,
@@ -32,17 +39,22 @@ from ._impinge import (
 )
 
 __all__ = [
+    "Advance",
     "Body",
     "CancelToken",
     "Cancelled",
+    "Candidates",
     "Detector",
     "Device",
+    "Impact",
+    "Impacts",
     "Result",
     "Scene",
     "Statistics",
     "__version__",
     "devices",
     "hash_rows",
+    "ipc",
     "pairs",
     "self_pairs",
 ]

@@ -1,4 +1,4 @@
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Literal, SupportsFloat, SupportsIndex, TypedDict, final
 
 import numpy as np
@@ -6,11 +6,15 @@ import numpy.typing as npt
 from typing_extensions import TypeAlias, Unpack
 
 __all__ = [
+    "Advance",
     "Body",
     "CancelToken",
     "Cancelled",
+    "Candidates",
     "Detector",
     "Device",
+    "Impact",
+    "Impacts",
     "Result",
     "Scene",
     "Statistics",
@@ -32,6 +36,11 @@ _Recluster: TypeAlias = Literal["auto", "never"]
 _InstructionSet: TypeAlias = Literal["portable", "avx2", "avx512"]
 _Kind: TypeAlias = Literal["points", "edges", "triangles", "tetrahedra"]
 _SharedVertex: TypeAlias = Literal["skip", "resolve"]
+_Part: TypeAlias = Literal["given", "vertices", "edges", "faces"]
+_PairKind: TypeAlias = Literal["vf", "ee", "ev", "vv", "ef", "ff"]
+_Start: TypeAlias = Literal["report", "skip"]
+_Toi: TypeAlias = Literal["f32", "f64"]
+_Progress: TypeAlias = Callable[[int, int], object]
 
 class _Settings(TypedDict, total=False):
     method: _Method
@@ -88,7 +97,11 @@ def devices() -> list[Device]: ...
 class Scene:
     def __new__(cls) -> Scene: ...
     def add(self, vertices: _Array, faces: _Array, kind: _Kind | None = None) -> Body: ...
+    def add_edges(self, vertices: _Array, edges: _Array) -> Body: ...
+    def add_points(self, vertices: _Array) -> Body: ...
     def set_positions(self, body: _Body, vertices: _Array) -> None: ...
+    def set_end_positions(self, body: _Body, vertices: _Array) -> None: ...
+    def clear_end_positions(self, body: _Body) -> None: ...
     def remesh(
         self, body: _Body, vertices: _Array, faces: _Array, kind: _Kind | None = None
     ) -> None: ...
@@ -100,7 +113,8 @@ class Scene:
         mask: SupportsIndex | None = None,
     ) -> None: ...
     def positions(self, body: _Body) -> npt.NDArray[np.floating[Any]]: ...
-    def elements(self, body: _Body) -> npt.NDArray[np.uint32]: ...
+    def end_positions(self, body: _Body) -> npt.NDArray[np.floating[Any]] | None: ...
+    def elements(self, body: _Body, part: _Part = "given") -> npt.NDArray[np.uint32]: ...
     def kind(self, body: _Body) -> _Kind: ...
     def n_primitives(self, body: _Body) -> int: ...
     def n_vertices(self, body: _Body) -> int: ...
@@ -137,6 +151,127 @@ class Detector:
         progress: Callable[[int, int], object] | None = None,
         cancel: CancelToken | None = None,
     ) -> Result: ...
+    def impacts(
+        self,
+        scene: Scene,
+        *,
+        between: _Pair | bool | None = None,
+        within: _Body | None = None,
+        ignore: Iterable[_Pair] | None = None,
+        start: _Start = "report",
+        toi: _Toi = "f32",
+        progress: _Progress | None = None,
+        cancel: CancelToken | None = None,
+    ) -> Impacts: ...
+    def earliest(
+        self,
+        scene: Scene,
+        *,
+        between: _Pair | bool | None = None,
+        within: _Body | None = None,
+        ignore: Iterable[_Pair] | None = None,
+        start: _Start = "report",
+        toi: _Toi = "f32",
+        progress: _Progress | None = None,
+        cancel: CancelToken | None = None,
+    ) -> Impact | None: ...
+    def is_free(
+        self,
+        scene: Scene,
+        *,
+        between: _Pair | bool | None = None,
+        within: _Body | None = None,
+        ignore: Iterable[_Pair] | None = None,
+        start: _Start = "report",
+        progress: _Progress | None = None,
+        cancel: CancelToken | None = None,
+    ) -> bool: ...
+    def advance(
+        self,
+        scene: Scene,
+        *,
+        between: _Pair | bool | None = None,
+        within: _Body | None = None,
+        ignore: Iterable[_Pair] | None = None,
+        start: _Start = "report",
+        progress: _Progress | None = None,
+        cancel: CancelToken | None = None,
+    ) -> Advance: ...
+    def candidates(
+        self,
+        scene: Scene,
+        *,
+        between: _Pair | bool | None = None,
+        within: _Body | None = None,
+        ignore: Iterable[_Pair] | None = None,
+        kinds: Iterable[_PairKind] = ("vf", "ee"),
+        distance: SupportsFloat = 0.0,
+        progress: _Progress | None = None,
+        cancel: CancelToken | None = None,
+    ) -> Candidates: ...
+
+@final
+class Impact:
+    def __hash__(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    @property
+    def kind(self) -> _PairKind: ...
+    @property
+    def bodies(self) -> tuple[Body, Body]: ...
+    @property
+    def elements(self) -> tuple[int, int]: ...
+    @property
+    def toi(self) -> float: ...
+    @property
+    def at_start(self) -> bool: ...
+
+@final
+class Impacts:
+    @property
+    def kinds(self) -> npt.NDArray[np.str_]: ...
+    @property
+    def bodies(self) -> npt.NDArray[np.uint32]: ...
+    @property
+    def elements(self) -> npt.NDArray[np.uint32]: ...
+    @property
+    def toi(self) -> npt.NDArray[np.floating[Any]]: ...
+    @property
+    def at_start(self) -> npt.NDArray[np.bool_]: ...
+    def earliest(self) -> Impact | None: ...
+    @property
+    def hash(self) -> int: ...
+    @property
+    def stats(self) -> Statistics: ...
+    def __len__(self) -> int: ...
+    def __getitem__(self, index: SupportsIndex, /) -> Impact: ...
+    def __iter__(self) -> Iterator[Impact]: ...
+
+@final
+class Advance:
+    @property
+    def fraction(self) -> float: ...
+    @property
+    def first(self) -> Impact | None: ...
+    @property
+    def n_tried(self) -> int: ...
+    @property
+    def positions(self) -> list[tuple[Body, npt.NDArray[np.floating[Any]]]]: ...
+    def apply(self, scene: Scene) -> None: ...
+
+@final
+class Candidates:
+    def rows(self, kind: _PairKind) -> npt.NDArray[np.uint32]: ...
+    @property
+    def kinds(self) -> npt.NDArray[np.str_]: ...
+    @property
+    def bodies(self) -> npt.NDArray[np.uint32]: ...
+    @property
+    def elements(self) -> npt.NDArray[np.uint32]: ...
+    @property
+    def hash(self) -> int: ...
+    @property
+    def stats(self) -> Statistics: ...
+    def __len__(self) -> int: ...
 
 @final
 class Result:

@@ -1,0 +1,463 @@
+//! `impinge.Impacts`, `Impact`, `Advance` and `Candidates`: the answers about a step.
+
+use impinge::{PairKind, Primitive};
+use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyTypeError};
+use pyo3::prelude::*;
+use pyo3::types::PyString;
+
+use crate::bodies::Body;
+use crate::errors::raise;
+use crate::result::to_array;
+use crate::scene::{Scene, positions_array};
+use crate::settings::{Argument, choose_one, unexpected};
+use crate::statistics::Statistics;
+
+/// Two elements that touch during a step, and when first.
+#[pyclass(module = "impinge", frozen, from_py_object)]
+#[derive(Clone)]
+pub struct Impact {
+    inner: impinge::Impact,
+    scene: u64,
+}
+
+impl Impact {
+    pub fn new(inner: impinge::Impact, scene: u64) -> Self {
+        Impact { inner, scene }
+    }
+}
+
+#[pymethods]
+impl Impact {
+    /// str : ``"vf"`` (a vertex and a face), ``"ee"`` (two edges), ``"ev"`` (an edge and a vertex) or
+    /// ``"vv"`` (two vertices).
+    #[getter]
+    fn kind(&self) -> &'static str {
+        self.inner.kind.name()
+    }
+
+    /// tuple of two Body : whose elements they are. The first is that of the element which `kind` names first.
+    #[getter]
+    fn bodies(&self) -> (Body, Body) {
+        let scene = self.scene;
+        let body = |of: Primitive| Body { id: of.body, scene };
+        (body(self.inner.a), body(self.inner.b))
+    }
+
+    /// tuple of two int : the numbers of the elements in their bodies; `Scene.elements` has their vertices.
+    #[getter]
+    fn elements(&self) -> (u32, u32) {
+        (self.inner.a.primitive, self.inner.b.primitive)
+    }
+
+    /// float : the first time in [0, 1] at which they touch, rounded down.
+    #[getter]
+    fn toi(&self) -> f64 {
+        self.inner.toi
+    }
+
+    /// bool : whether they touch at the start, at time 0.
+    #[getter]
+    fn at_start(&self) -> bool {
+        self.inner.at_start
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        let other = other.cast::<Impact>();
+        other.is_ok_and(|other| {
+            let other = other.get();
+            self.scene == other.scene && self.inner == other.inner
+        })
+    }
+
+    fn __hash__(&self) -> u64 {
+        let [body_a, a, body_b, b] = self.inner.row().map(u64::from);
+        (a << 32 | b) ^ (body_a << 48 | body_b << 16) ^ self.inner.toi.to_bits()
+    }
+
+    fn __repr__(&self) -> String {
+        let impinge::Impact {
+            kind, a, b, toi, ..
+        } = self.inner;
+        format!(
+            "Impact({:?}, {} of body {} and {} of body {}, toi={toi:?})",
+            kind.name(),
+            a.primitive,
+            a.body,
+            b.primitive,
+            b.body
+        )
+    }
+}
+
+/// All pairs of elements that touch during a step, sorted by kind, then by bodies and elements. The same
+/// bytes on every method and thread count.
+///
+/// ``len(impacts)`` is their number; impacts of a free step are false. They are indexed and iterated as
+/// `Impact`, and taken as arrays by the attributes below, one row per impact. Each access makes new arrays.
+#[pyclass(module = "impinge", frozen)]
+pub struct Impacts {
+    inner: impinge::Impacts,
+    scene: u64,
+    /// Whether times are double precision.
+    is_double: bool,
+}
+
+impl Impacts {
+    pub fn new(inner: impinge::Impacts, scene: u64, is_double: bool) -> Self {
+        Impacts {
+            inner,
+            scene,
+            is_double,
+        }
+    }
+}
+
+#[pymethods]
+impl Impacts {
+    /// numpy.ndarray of str, shape (n,) : ``"vf"``, ``"ee"``, ``"ev"`` or ``"vv"``.
+    #[getter]
+    fn kinds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        kinds_array(py, self.inner.iter().map(|impact| impact.kind))
+    }
+
+    /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two bodies.
+    #[getter]
+    fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let rows = self.inner.iter().map(impinge::Impact::row);
+        to_array(py, rows.map(|[a, _, b, _]| [a, b]).collect())
+    }
+
+    /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two elements in their bodies.
+    ///
+    /// A vertex is numbered as positions are, a face as it was given (of tetrahedra: as
+    /// ``Scene.elements(body, "faces")``), an edge as ``Scene.elements(body, "edges")``. Of ``"vf"`` the
+    /// vertex is in the first column, of ``"ev"`` the edge.
+    #[getter]
+    fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let rows = self.inner.iter().map(impinge::Impact::row);
+        to_array(py, rows.map(|[_, a, _, b]| [a, b]).collect())
+    }
+
+    /// numpy.ndarray of float32, or float64 after ``toi="f64"``, shape (n,) : first times in [0, 1], each
+    /// rounded down.
+    #[getter]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "they were rounded to f32 before"
+    )]
+    fn toi<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        let times = self.inner.iter().map(|impact| impact.toi);
+        match self.is_double {
+            true => PyArray1::from_vec(py, times.collect()).into_any(),
+            false => PyArray1::from_vec(py, times.map(|toi| toi as f32).collect()).into_any(),
+        }
+    }
+
+    /// numpy.ndarray of bool, shape (n,) : which touch at the start, at time 0.
+    #[getter]
+    fn at_start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+        let at_start = self.inner.iter().map(|impact| impact.at_start);
+        PyArray1::from_vec(py, at_start.collect())
+    }
+
+    /// The impact with the least time; of several, the first row.
+    ///
+    /// Returns
+    /// -------
+    /// Impact or None
+    ///     ``None`` where the step is free.
+    fn earliest(&self) -> Option<Impact> {
+        let earliest = self.inner.earliest();
+        earliest.map(|impact| Impact::new(impact, self.scene))
+    }
+
+    /// int : a 64-bit hash of the set of impacts, times included; equal sets have equal hashes everywhere.
+    #[getter]
+    fn hash(&self, py: Python<'_>) -> u64 {
+        py.detach(|| self.inner.hash())
+    }
+
+    /// Statistics : what the answer cost.
+    #[getter]
+    fn stats(&self) -> Statistics {
+        Statistics {
+            inner: self.inner.stats().clone(),
+        }
+    }
+
+    fn __len__(&self) -> usize {
+        self.inner.len()
+    }
+
+    fn __getitem__(&self, index: isize) -> PyResult<Impact> {
+        let ix = from_end(index, self.inner.len(), "impacts")?;
+        Ok(Impact::new(self.inner.as_slice()[ix], self.scene))
+    }
+
+    fn __iter__(slf: PyRef<'_, Self>) -> ImpactIterator {
+        ImpactIterator {
+            impacts: slf.into(),
+            next: 0,
+        }
+    }
+
+    fn __repr__(&self) -> String {
+        match self.inner.earliest() {
+            None => "Impacts(0, the step is free)".into(),
+            Some(first) => format!(
+                "Impacts({}, the first at {:?})",
+                self.inner.len(),
+                first.toi
+            ),
+        }
+    }
+}
+
+/// Impacts one after the other.
+#[pyclass]
+pub struct ImpactIterator {
+    impacts: Py<Impacts>,
+    next: usize,
+}
+
+#[pymethods]
+impl ImpactIterator {
+    fn __iter__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        slf
+    }
+
+    fn __next__(&mut self) -> Option<Impact> {
+        let Impacts { inner, scene, .. } = self.impacts.get();
+        let impact = *inner.as_slice().get(self.next)?;
+        self.next += 1;
+        Some(Impact::new(impact, *scene))
+    }
+}
+
+/// How far a step can be taken, and where vertices are then.
+#[pyclass(module = "impinge", frozen)]
+pub struct Advance {
+    inner: impinge::Advance,
+    scene: u64,
+}
+
+impl Advance {
+    pub fn new(inner: impinge::Advance, scene: u64) -> Self {
+        Advance { inner, scene }
+    }
+}
+
+#[pymethods]
+impl Advance {
+    /// float : the part of the step that can be taken: 1 for all of it, 0 for none.
+    #[getter]
+    fn fraction(&self) -> f64 {
+        self.inner.fraction
+    }
+
+    /// Impact or None : the first contact of the whole step, its time rounded down to float64; ``None`` where
+    /// the whole step is free.
+    #[getter]
+    fn first(&self) -> Option<Impact> {
+        let first = self.inner.first;
+        first.map(|impact| Impact::new(impact, self.scene))
+    }
+
+    /// int : how many fractions were tried.
+    #[getter]
+    fn n_tried(&self) -> u32 {
+        self.inner.n_tried
+    }
+
+    /// list of (Body, numpy.ndarray of shape (v, 3)) : where the vertices of all bodies that move are then,
+    /// rounded to the precision in which they are held. The straight way from the start to these rounded
+    /// positions is free, but for what touches at the start.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Vec<(Body, Bound<'py, PyAny>)>> {
+        let scene = self.scene;
+        let positions = self.inner.positions.iter();
+        positions
+            .map(|(id, positions)| Ok((Body { id: *id, scene }, positions_array(py, positions)?)))
+            .collect()
+    }
+
+    /// Takes the step: these positions become those of the scene, and its bodies stand still until they are
+    /// given end positions again.
+    ///
+    /// Parameters
+    /// ----------
+    /// scene : Scene
+    ///     The scene that was asked about.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A body that is gone, or that has another number of vertices now.
+    fn apply(&self, scene: &Bound<'_, PyAny>) -> PyResult<()> {
+        let scene = scene
+            .cast::<Scene>()
+            .map_err(|_| unexpected(scene, "scene", "a Scene"))?;
+        let mut scene = scene.try_borrow_mut().map_err(|_| {
+            PyRuntimeError::new_err("the scene is being read by a detection: wait for it to end")
+        })?;
+        self.inner.apply(&mut scene.inner).map_err(raise)
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Advance(fraction={:?}, {} bodies)",
+            self.inner.fraction,
+            self.inner.positions.len()
+        )
+    }
+}
+
+/// Pairs of elements whose boxes overlap during a step, sorted by kind, then by bodies and elements.
+#[pyclass(module = "impinge", frozen)]
+pub struct Candidates {
+    inner: impinge::Candidates,
+}
+
+impl Candidates {
+    pub fn new(inner: impinge::Candidates) -> Self {
+        Candidates { inner }
+    }
+
+    fn all(&self) -> impl Iterator<Item = (PairKind, [u32; 4])> + '_ {
+        PairKind::ALL
+            .into_iter()
+            .flat_map(|kind| self.inner.rows(kind).map(move |row| (kind, row)))
+    }
+}
+
+#[pymethods]
+impl Candidates {
+    /// The pairs of one kind.
+    ///
+    /// Parameters
+    /// ----------
+    /// kind : {"vf", "ee", "ev", "vv", "ef", "ff"}
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray of uint32, shape (n, 4)
+    ///     Number of a body, its element, number of the other body, its element; sorted. The element that the
+    ///     kind names first comes first.
+    fn rows<'py>(
+        &self,
+        py: Python<'py>,
+        kind: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let kind = choose_one(kind, "kind", &PairKind::ALL.map(|kind| (kind.name(), kind)))?;
+        to_array(py, py.detach(|| self.inner.rows(kind).collect()))
+    }
+
+    /// numpy.ndarray of str, shape (n,) : the kind of each pair.
+    #[getter]
+    fn kinds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        kinds_array(py, self.all().map(|(kind, _)| kind))
+    }
+
+    /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two bodies.
+    #[getter]
+    fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        to_array(py, self.all().map(|(_, [a, _, b, _])| [a, b]).collect())
+    }
+
+    /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two elements in their bodies, as those of
+    /// `Impacts.elements`.
+    #[getter]
+    fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        to_array(py, self.all().map(|(_, [_, a, _, b])| [a, b]).collect())
+    }
+
+    /// int : a 64-bit hash of the set that does not depend on its order.
+    #[getter]
+    fn hash(&self, py: Python<'_>) -> u64 {
+        py.detach(|| self.inner.hash())
+    }
+
+    /// Statistics : what the answer cost.
+    #[getter]
+    fn stats(&self) -> Statistics {
+        Statistics {
+            inner: self.inner.stats().clone(),
+        }
+    }
+
+    fn __len__(&self) -> usize {
+        self.inner.len()
+    }
+
+    fn __repr__(&self) -> String {
+        let counts = PairKind::ALL.map(|kind| (kind.name(), self.inner.of(kind).len()));
+        let counts: Vec<String> = counts
+            .iter()
+            .filter(|(_, n)| *n > 0)
+            .map(|(name, n)| format!("{name}: {n}"))
+            .collect();
+        format!("Candidates({})", counts.join(", "))
+    }
+}
+
+/// The kinds that `candidates` is asked for; by default vertices and faces, and edges and edges.
+pub fn kinds(argument: Argument<'_, '_>) -> PyResult<Vec<PairKind>> {
+    let choices = PairKind::ALL.map(|kind| (kind.name(), kind));
+    let Some(argument) = argument else {
+        return Ok(vec![PairKind::VertexFace, PairKind::EdgeEdge]);
+    };
+    // A string is a sequence of strings, too, of letters.
+    if argument.is_instance_of::<PyString>() {
+        return Ok(vec![choose_one(argument, "kinds", &choices)?]);
+    }
+    let kinds = argument.try_iter().map_err(|_| {
+        unexpected(
+            argument,
+            "kinds",
+            "a sequence of names such as (\"vf\", \"ee\")",
+        )
+    })?;
+    kinds
+        .enumerate()
+        .map(|(ix, kind)| choose_one(&kind?, &format!("kinds[{ix}]"), &choices))
+        .collect()
+}
+
+/// An index that may count from the end.
+pub fn from_end(index: isize, len: usize, what: &str) -> PyResult<usize> {
+    let ix = match usize::try_from(index) {
+        Ok(ix) => Some(ix),
+        Err(_) => len.checked_sub(index.unsigned_abs()),
+    };
+    ix.filter(|&ix| ix < len).ok_or_else(|| {
+        PyIndexError::new_err(format!("index {index} given, but there are {len} {what}"))
+    })
+}
+
+/// Names of two letters as NumPy holds them: one 32-bit number per letter.
+fn kinds_array(
+    py: Python<'_>,
+    kinds: impl Iterator<Item = PairKind>,
+) -> PyResult<Bound<'_, PyAny>> {
+    let letters: Vec<u32> = kinds
+        .flat_map(|kind| kind.name().bytes().map(u32::from))
+        .collect();
+    if letters.is_empty() {
+        return py.import("numpy")?.call_method1("empty", (0, "U2"));
+    }
+    PyArray1::from_vec(py, letters).call_method1("view", ("U2",))
+}
+
+/// A number that is a distance; `CandidateQuery` refuses what is not finite or below 0.
+pub fn distance(argument: Argument<'_, '_>) -> PyResult<f64> {
+    let Some(argument) = argument else {
+        return Ok(0.0);
+    };
+    argument.extract().map_err(|error: PyErr| {
+        match error.is_instance_of::<PyTypeError>(argument.py()) {
+            true => unexpected(argument, "distance", "a number"),
+            false => error,
+        }
+    })
+}

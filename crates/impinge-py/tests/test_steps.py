@@ -1,0 +1,299 @@
+"""Steps: what touches while bodies move, when first, how far a step can be taken."""
+
+import threading
+
+import numpy as np
+import pytest
+
+import impinge
+from shapes import FACE, ball, lattice_triangles
+
+FLOOR = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0]], np.float32)
+
+
+def lifted(z, dtype=np.float32):
+    return (FLOOR + np.float32([0, 0, z])).astype(dtype)
+
+
+@pytest.fixture(params=["clusters", "naive"])
+def detector(request):
+    return impinge.Detector(request.param, backend="cpu", threads=1)
+
+
+@pytest.fixture
+def falling():
+    scene = impinge.Scene()
+    scene.add(FLOOR, FACE)
+    other = scene.add(lifted(1), FACE)
+    scene.set_end_positions(other, lifted(-3))
+    return scene
+
+
+def lattice_step(n=40, k=6, seed=3, dtype=np.float32):
+    """Lattice triangles of three bodies whose vertices go to other places of the lattice."""
+    scene = impinge.Scene()
+    for body in range(3):
+        vertices, faces = lattice_triangles(n, k, seed + body, shared=True)
+        ends = np.random.default_rng(seed + 10 + body).integers(0, k + 1, vertices.shape)
+        scene.add(vertices.astype(dtype), faces)
+        scene.set_end_positions(body, ends.astype(dtype))
+    return scene
+
+
+def test_a_triangle_falls_through_another(detector, falling):
+    impacts = detector.impacts(falling)
+    assert len(impacts) == 15 and bool(impacts)
+    assert impacts.kinds.shape == (15,) and set(impacts.kinds.tolist()) == {"vf", "ee"}
+    assert impacts.bodies.shape == impacts.elements.shape == (15, 2)
+    assert impacts.bodies.dtype == impacts.elements.dtype == np.uint32
+    assert impacts.toi.dtype == np.float32 and (impacts.toi == 0.25).all()
+    assert impacts.at_start.dtype == bool and not impacts.at_start.any()
+    first = impacts[0]
+    assert (first.kind, first.toi, first.at_start) == ("vf", 0.25, False)
+    assert first == impacts.earliest() == detector.earliest(falling) != impacts[1]
+    assert len({first, impacts[-15], impacts[-1]}) == 2
+    assert [hit.elements for hit in impacts] == [tuple(row) for row in impacts.elements.tolist()]
+    assert [tuple(map(int, hit.bodies)) for hit in impacts] == list(map(tuple, impacts.bodies))
+    assert first.bodies[1] in falling.bodies
+    for index in [15, -16]:
+        with pytest.raises(IndexError, match=f"^index {index} given, but there are 15 impacts"):
+            impacts[index]
+    assert not detector.is_free(falling)
+    assert impacts.stats.method in ("clusters", "naive")
+    falling.clear_end_positions(1)
+    assert falling.end_positions(1) is None
+    assert detector.is_free(falling) and detector.earliest(falling) is None
+    free = detector.impacts(falling)
+    assert len(free) == 0 and free.earliest() is None and free.kinds.shape == (0,)
+    assert free.kinds.dtype == impacts.kinds.dtype and free.elements.shape == (0, 2)
+    assert repr(free) == "Impacts(0, the step is free)"
+
+
+def test_edges_are_numbered_as_the_scene_lists_them(detector, falling):
+    impacts = detector.impacts(falling)
+    edges = falling.elements(0, "edges")
+    assert edges.tolist() == [[0, 1], [0, 2], [1, 2]]
+    of_edges = impacts.elements[impacts.kinds == "ee"]
+    assert of_edges.max() < len(edges)
+    assert falling.elements(0, part="faces").tolist() == [[0, 1, 2]]
+    assert falling.elements(0, "vertices").tolist() == [[0], [1], [2]]
+    with pytest.raises(ValueError, match='^part: "corners" given'):
+        falling.elements(0, "corners")
+
+
+def test_times_are_rounded_down(detector):
+    scene = impinge.Scene()
+    scene.add(FLOOR, FACE)
+    point = scene.add_points([[1, 1, 1]])
+    scene.set_end_positions(point, [[1, 1, -2]])
+    single, double = (detector.impacts(scene, toi=toi).toi for toi in ["f32", "f64"])
+    assert (single.dtype, double.dtype) == (np.float32, np.float64)
+    third = float.fromhex("0x1.5555555555555p-2")
+    assert double.tolist() == [third] and single.tolist() == [float(np.nextafter(np.float32(third), np.float32(0)))]
+    assert detector.earliest(scene, toi="f64").toi == third
+    assert detector.earliest(scene).toi == single[0]
+
+
+def test_what_touches_at_the_start(detector, falling):
+    falling.set_positions(1, lifted(0))
+    falling.set_end_positions(1, lifted(1))
+    impacts = detector.impacts(falling)
+    assert len(impacts) == 15
+    assert (impacts.toi == 0).all() and impacts.at_start.all()
+    assert len(detector.impacts(falling, start="skip")) == 0
+    assert detector.is_free(falling, start="skip") and not detector.is_free(falling)
+    assert detector.advance(falling).fraction == 0.0
+    assert detector.advance(falling, start="skip").fraction == 1.0
+
+
+def test_points_and_edges(detector):
+    scene = impinge.Scene()
+    point = scene.add_points(np.array([[0, 0, 1.0]]))
+    scene.set_end_positions(point, [[0, 0, -1.0]])
+    edge = scene.add_edges([[-1, 0, 0], [1, 0, 0]], [[0, 1]])
+    resting = scene.add_points([[0, 0, -0.5]])
+    assert [scene.kind(body) for body in scene.bodies] == ["points", "edges", "points"]
+    impacts = detector.impacts(scene)
+    assert impacts.kinds.tolist() == ["ev", "vv"]
+    assert impacts.bodies.tolist() == [[int(edge), int(point)], [int(point), int(resting)]]
+    assert impacts.toi.tolist() == [0.5, 0.75]
+    with pytest.raises(ValueError, match=r"^edges: shape \(n, 2\) expected, \(1, 3\) given"):
+        scene.add_edges(FLOOR, FACE)
+    with pytest.raises(ValueError, match=r"^edges\[0, 1\] = 3: there are 3 vertices"):
+        scene.add_edges(FLOOR, [[0, 3]])
+    with pytest.raises(ValueError, match=r"^vertices\[0, 1\] = nan: a position must be finite"):
+        scene.add_points([[0, np.nan, 0]])
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize(
+    "question",
+    [
+        {},
+        {"between": True},
+        {"between": (2, 0)},
+        {"within": 1},
+        {"within": True},
+        {"ignore": [(0, 1), (2, 2)]},
+        {"start": "skip"},
+        {"toi": "f64"},
+    ],
+    ids=str,
+)
+def test_every_question_has_the_answer_of_the_naive_method(question, dtype):
+    scene = lattice_step(dtype=dtype)
+    fast, naive = (impinge.Detector(method, backend="cpu") for method in ["clusters", "naive"])
+    ours, truth = fast.impacts(scene, **question), naive.impacts(scene, **question)
+    assert len(ours) > 0 and ours.hash == truth.hash
+    for name in ["kinds", "bodies", "elements", "toi", "at_start"]:
+        assert getattr(ours, name).tobytes() == getattr(truth, name).tobytes(), name
+    assert fast.earliest(scene, **question) == ours.earliest() == naive.earliest(scene, **question)
+    bodies = {tuple(row) for row in ours.bodies.tolist()}
+    scope = {key: value for key, value in question.items() if key not in ("start", "toi")}
+    if scope.get("between") == (2, 0):
+        assert bodies == {(0, 2), (2, 0)}
+    elif scope.get("within") is True:
+        assert bodies == {(0, 0), (1, 1), (2, 2)}
+    elif scope.get("within") == 1:
+        assert bodies == {(1, 1)}
+    elif scope.get("between") is True:
+        assert all(a != b for a, b in bodies)
+    elif not scope:
+        assert {(0, 0), (0, 1), (2, 2)} <= bodies
+    candidates = fast.candidates(scene, **scope)
+    assert candidates.hash == naive.candidates(scene, **scope).hash and len(candidates) > 0
+
+
+def test_a_step_that_is_advanced_is_free(detector, falling):
+    advance = detector.advance(falling)
+    assert 0.249999 < advance.fraction < 0.25 and advance.first.toi == 0.25
+    [(body, positions)] = advance.positions
+    assert body == falling.bodies[1] and positions.dtype == np.float32 and positions.shape == (3, 3)
+    assert "fraction=0.24999" in repr(advance) and advance.n_tried >= 2
+    advance.apply(falling)
+    assert np.array_equal(falling.positions(1), positions) and falling.end_positions(1) is None
+    assert len(detector.detect(falling)) == 0
+    with pytest.raises(TypeError, match="^scene: a Scene expected, int given"):
+        advance.apply(3)
+    falling.remove(1)
+    with pytest.raises(ValueError, match="no such body"):
+        advance.apply(falling)
+
+
+def test_a_chain_of_steps_never_passes_through(detector):
+    scene = impinge.Scene()
+    vertices, faces = ball(8, 12)
+    scene.add(vertices, faces)
+    other = scene.add(vertices * np.float32(0.5) + np.float32([0, 0.1, 2]), faces)
+    for _ in range(6):
+        scene.set_end_positions(other, scene.positions(other) - np.float32([0, 0, 0.4]))
+        detector.advance(scene).apply(scene)
+        assert len(detector.detect(scene, between=True, within=True)) == 0
+    assert scene.positions(other)[:, 2].min() > 0.9
+
+
+def test_end_positions(detector, falling):
+    assert np.array_equal(falling.end_positions(1), lifted(-3)) and falling.end_positions(0) is None
+    with pytest.raises(ValueError, match="^vertices: 2 positions given, but body 1 has 3 vertices"):
+        falling.set_end_positions(1, FLOOR[:2])
+    with pytest.raises(ValueError, match=r"^vertices\[2, 0\] = inf: a position must be finite"):
+        falling.set_end_positions(1, np.where([[0], [0], [1]], np.inf, FLOOR))
+    with pytest.raises(ValueError, match="no body 7"):
+        falling.clear_end_positions(7)
+    assert np.array_equal(falling.end_positions(1), lifted(-3))
+    # Mixed precision becomes double, exactly.
+    falling.set_end_positions(1, lifted(-3, np.float64))
+    assert falling.positions(1).dtype == falling.end_positions(1).dtype == np.float64
+    assert detector.earliest(falling).toi == 0.25
+
+
+def test_candidates(detector):
+    scene = impinge.Scene()
+    scene.add_points([[0, 0, 0]])
+    far = scene.add_points([[3, 0, 0]])
+
+    def count(distance):
+        return len(detector.candidates(scene, kinds=["vv"], distance=distance))
+
+    assert [count(d) for d in [0, 1.0, np.nextafter(1.5, 0), 1.5]] == [0, 0, 0, 1]
+    scene.set_end_positions(far, [[1, 0, 0]])
+    assert [count(d) for d in [0.49, 0.5]] == [0, 1]
+    candidates = detector.candidates(scene, kinds="vv", distance=0.5)
+    assert candidates.rows("vv").tolist() == [[0, 0, 1, 0]] and candidates.kinds.tolist() == ["vv"]
+    assert candidates.bodies.tolist() == [[0, 1]] and candidates.elements.tolist() == [[0, 0]]
+    assert candidates.rows("ef").shape == (0, 4) and repr(candidates) == "Candidates(vv: 1)"
+    with pytest.raises(ValueError, match='^kind: "fv" given, "vf", "ee", "ev", "vv", "ef", "ff" allowed'):
+        candidates.rows("fv")
+    for bad in [-1, np.nan, np.inf]:
+        with pytest.raises(ValueError, match="^distance: "):
+            detector.candidates(scene, distance=bad)
+    with pytest.raises(TypeError, match="^distance: a number expected, str given"):
+        detector.candidates(scene, distance="far")
+    with pytest.raises(ValueError, match=r'^kinds\[1\]: "xx" given'):
+        detector.candidates(scene, kinds=["vv", "xx"])
+    with pytest.raises(TypeError, match="^kinds: a sequence of names"):
+        detector.candidates(scene, kinds=3)
+
+
+def test_all_six_kinds(detector):
+    scene = lattice_step(12, 3)
+    kinds = ["vf", "ee", "ev", "vv", "ef", "ff"]
+    everything = detector.candidates(scene, kinds=kinds, distance=0.25)
+    assert {kind: len(everything.rows(kind)) for kind in kinds if len(everything.rows(kind))}.keys() == set(kinds)
+    assert sum(len(everything.rows(kind)) for kind in kinds) == len(everything)
+    assert sorted(everything.kinds.tolist(), key=kinds.index) == everything.kinds.tolist()
+
+
+@pytest.mark.parametrize("name", ["impacts", "earliest", "is_free", "advance", "candidates"])
+def test_bad_questions_are_refused_by_name(detector, falling, name):
+    ask = getattr(detector, name)
+    for error, words, question in [
+        (ValueError, "^between and within: two questions", {"between": (0, 1), "within": 0}),
+        (ValueError, "^within: there is no body 5", {"within": 5}),
+        (ValueError, r"^ignore\[0\]: there is no body 9", {"ignore": [(0, 9)]}),
+        (TypeError, "^progress: a callable expected, int given", {"progress": 3}),
+        (TypeError, "^cancel: a CancelToken expected, bool given", {"cancel": True}),
+    ]:
+        with pytest.raises(error, match=words):
+            ask(falling, **question)
+    with pytest.raises(TypeError, match="^scene: a Scene expected, NoneType given"):
+        ask(None)
+    if name != "candidates":
+        with pytest.raises(ValueError, match='^start: "leave" given, "report", "skip" allowed'):
+            ask(falling, start="leave")
+    if name in ("impacts", "earliest"):
+        with pytest.raises(ValueError, match='^toi: "f16" given, "f32", "f64" allowed'):
+            ask(falling, toi="f16")
+
+
+@pytest.mark.parametrize("name", ["impacts", "earliest", "is_free", "advance", "candidates"])
+def test_questions_are_cancelled_and_other_threads_run_on(name):
+    random = np.random.default_rng(1)
+    n = 20_000
+    scene = impinge.Scene()
+    scene.add(random.random((3 * n, 3)), np.arange(3 * n).reshape(n, 3))
+    scene.set_end_positions(0, random.random((3 * n, 3)))
+    # Free but for the last pair is what takes long: touching at the start is left out here.
+    question = {} if name == "candidates" else {"start": "skip"}
+    method = "naive" if name in ("earliest", "is_free", "advance") else "clusters"
+    detector = impinge.Detector(method, backend="cpu", threads=1)
+    token, ticks = impinge.CancelToken(), []
+    stop = threading.Event()
+
+    def watch():
+        while not stop.wait(0.05):
+            ticks.append(None)
+            if len(ticks) == 4:
+                token.cancel()
+
+    thread = threading.Thread(target=watch)
+    thread.start()
+    try:
+        with pytest.raises(impinge.Cancelled):
+            getattr(detector, name)(scene, cancel=token, **question)
+    finally:
+        stop.set()
+        thread.join()
+    assert len(ticks) >= 4
+    scene.remesh(0, FLOOR, FACE)
+    assert detector.is_free(scene)
