@@ -7,7 +7,7 @@ use super::pipeline::{Bound, Groups};
 use super::steps::Steps;
 use super::world::World;
 
-/// Levels up to this wide are refitted by one workgroup, in one launch with those above them.
+/// Levels of up to this many nodes are refitted by one workgroup, in one launch with the levels above them.
 const NARROW_LEVEL: u32 = 2048;
 
 /// The kernels with their buffers.
@@ -18,7 +18,7 @@ pub struct Bounds {
     top: Bound,
 }
 
-/// Which launches are needed.
+/// The launches of the stage.
 #[derive(Debug, Default)]
 pub struct BoundsSteps {
     /// Step and width of each wide level.
@@ -88,7 +88,7 @@ impl Bounds {
         }
     }
 
-    /// Refits everything, if anything has moved.
+    /// Refits all boxes, if anything has moved.
     pub fn run(&self, pass: &mut wgpu::ComputePass<'_>, world: &World, steps: &BoundsSteps) {
         if !world.is_moved {
             return;

@@ -1,8 +1,8 @@
-//! Buffers that know what they hold, and grow.
+//! Typed buffers that grow.
 //!
 //! A [`Storage<T>`] is bound to kernels as [`Read<T>`] or [`Write<T>`], and kernels name the `T` of
-//! each binding: two swapped buffers do not compile. A buffer never passes the device's binding limit;
-//! what does not fit is worked in slabs by the engine.
+//! each binding: two swapped buffers do not compile. A buffer never exceeds the device's binding limit;
+//! the engine splits work that does not fit.
 
 use std::marker::PhantomData;
 
@@ -18,9 +18,9 @@ pub struct Storage<T> {
     label: &'static str,
     usage: wgpu::BufferUsages,
     buffer: Option<wgpu::Buffer>,
-    /// Elements that are bound.
+    /// The number of elements that are bound.
     len: u64,
-    /// Elements that there is room for.
+    /// The number of elements that there is room for.
     capacity: u64,
     holds: PhantomData<T>,
 }
@@ -33,7 +33,7 @@ pub struct Read<T>(wgpu::Buffer, u64, PhantomData<T>);
 #[derive(Debug, Clone)]
 pub struct Write<T>(wgpu::Buffer, u64, PhantomData<T>);
 
-/// A binding of one `T` that stays the same through a dispatch, at an offset given with it.
+/// A binding of one `T` that is constant during a dispatch, at an offset given with the dispatch.
 #[derive(Debug, Clone)]
 pub struct Uniform<T>(wgpu::Buffer, PhantomData<T>);
 
@@ -61,16 +61,16 @@ impl<T: Pod> Storage<T> {
 
     const SIZE: u64 = size_of::<T>() as u64;
 
-    /// Elements that one binding may hold on this device.
+    /// The most elements that one binding may hold on this device.
     pub fn limit(gpu: &Device) -> u64 {
         (gpu.max_binding() / Self::SIZE).min(u64::from(u32::MAX))
     }
 
-    /// Binds exactly `len` elements, growing by a quarter more than needed. Contents are lost when
-    /// it grows. Returns whether what is bound is another buffer now, or another length of it.
+    /// Binds exactly `len` elements; if it must grow, by a quarter more than needed. Growing loses the
+    /// contents. Returns whether the bound buffer or its bound length has changed.
     ///
     /// # Errors
-    /// More than one binding may hold.
+    /// More elements than one binding may hold.
     pub fn resize(&mut self, gpu: &Device, len: u64) -> Result<bool, Error> {
         let limit = Self::limit(gpu);
         if len > limit {
@@ -94,7 +94,7 @@ impl<T: Pod> Storage<T> {
         Ok(is_other)
     }
 
-    /// Binds exactly `len` elements with no room to spare, whatever was there.
+    /// Binds exactly `len` elements with no room to spare, whatever size it had.
     pub fn resize_exactly(&mut self, gpu: &Device, len: u64) {
         self.len = len.clamp(1, Self::limit(gpu));
         if self.capacity != self.len {
@@ -103,7 +103,7 @@ impl<T: Pod> Storage<T> {
     }
 
     fn allocate(&mut self, gpu: &Device, capacity: u64) {
-        // The old one goes first: both may not fit.
+        // Free the old buffer first: both together may not fit.
         self.buffer = None;
         self.capacity = capacity;
         self.buffer = Some(gpu.device.create_buffer(&wgpu::BufferDescriptor {
@@ -133,7 +133,7 @@ impl<T: Pod> Storage<T> {
         }
     }
 
-    /// The buffer behind; it exists from the first `resize` on.
+    /// The underlying buffer; it exists from the first `resize` on.
     pub fn buffer(&self) -> &wgpu::Buffer {
         self.buffer.as_ref().expect("resized before it is used")
     }
@@ -157,7 +157,7 @@ impl<T: Pod> Storage<T> {
 }
 
 impl Storage<Step> {
-    /// The parameters of all steps; a dispatch says which.
+    /// The parameters of all steps; a dispatch chooses one by its offset.
     pub fn params(&self) -> Uniform<Params> {
         Uniform(self.buffer().clone(), PhantomData)
     }
@@ -171,7 +171,7 @@ fn resource(buffer: &wgpu::Buffer, size: u64) -> wgpu::BindingResource<'_> {
     })
 }
 
-/// What a kernel does with a binding.
+/// How a kernel uses a binding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Access {
     /// `var<storage, read>`
@@ -184,7 +184,7 @@ pub enum Access {
 
 /// One of the three kinds of bindings.
 pub trait Binding {
-    /// What the kernel does with it.
+    /// How the kernel uses it.
     const ACCESS: Access;
     /// Bytes of one element.
     const STRIDE: u64;

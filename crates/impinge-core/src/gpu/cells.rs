@@ -8,7 +8,7 @@
 //! narrow     prepare · narrow
 //! ```
 //!
-//! A cell too crowded for one pass is worked in several: one fills its list, then each of the others pairs
+//! A cell too crowded for one pass takes several: one fills its list, then each of the others pairs
 //! one tile of the product of its groups, dispatch · pairing · narrow.
 
 use std::fmt;
@@ -24,10 +24,10 @@ use super::steps::{Stages, Steps};
 use super::world::World;
 use crate::error::Error;
 
-/// The stages on the device, in order: the names of their times.
+/// The stages on the device, in order, by their timing labels.
 const STAGES: &[&str] = &["bounds", "grid", "dispatch", "pairing", "narrow"];
 
-/// What the method is told.
+/// The method's parameters for a pass.
 #[derive(Debug, Clone, Copy)]
 pub struct Told {
     pub lambda: f64,
@@ -36,37 +36,37 @@ pub struct Told {
     pub share: Share,
 }
 
-/// What a pass does in its cells.
+/// The share of the work in its cells that a pass does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Share {
-    /// All there is to do.
+    /// All of it.
     All,
-    /// Fills the lists and leaves them to later passes.
+    /// Fills the lists, for later passes.
     Lists,
-    /// Pairs one tile of the product of the groups of a list that is there.
+    /// Pairs one tile of the product of the groups of a list that an earlier pass has filled.
     Tile(Tile),
 }
 
 /// A square of the product of the groups of one cell with themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tile {
-    /// Entries of the cell's list.
+    /// The number of entries of the cell's list.
     pub n_entries: u32,
-    /// Groups of the cell's list.
+    /// The number of groups of the cell's list.
     pub n_groups: u32,
-    /// The first group along either side.
+    /// The first group of the rows.
     pub row: u32,
-    /// See `row`.
+    /// The first group of the columns.
     pub column: u32,
     /// Groups along a side, a power of two.
     pub side: u32,
 }
 
 impl Tile {
-    /// Groups along a side that one pass does at most: a megabyte of work items.
+    /// The most groups along a side that one pass does: a megabyte of work items.
     pub const MOST: u32 = 256;
 
-    /// All of a list.
+    /// The tile of a whole list.
     pub fn all(n_entries: u32, group_size: u32) -> Self {
         let n_groups = n_entries.div_ceil(group_size);
         Tile {
@@ -74,12 +74,12 @@ impl Tile {
             n_groups,
             row: 0,
             column: 0,
-            // Places are numbered with 31 bits, so there is such a power.
+            // Places have 31 bits, so this power of two fits.
             side: n_groups.next_power_of_two(),
         }
     }
 
-    /// Its quarters, but for those that have nothing on or above the diagonal; none of a single pair of groups.
+    /// Its quarters, except those with nothing on or above the diagonal; `None` for a single pair of groups.
     pub fn split(self) -> Option<Vec<Tile>> {
         if self.side < 2 {
             return None;
@@ -102,18 +102,18 @@ impl Tile {
     }
 }
 
-/// A plan of passes that work in cells: this method's, or one from outside.
+/// A plan of passes that work in cells: this method's, or that of another crate.
 pub trait InCells: fmt::Debug + Send + Sync {
-    /// The stages on the device, in order: the names of their times.
+    /// The stages on the device, in order, by their timing labels.
     fn stages(&self) -> &'static [&'static str];
 
-    /// Another one, that has seen no buffers.
+    /// A new plan of the same kind that is bound to no buffers.
     fn anew(&self) -> Box<dyn InCells>;
 
-    /// Forgets which buffers it was made for.
+    /// Drops its kernel bindings: the buffers have changed.
     fn unbind(&mut self);
 
-    /// Whether a single cell can be worked in several passes: whether it heeds [`Told::share`].
+    /// Whether the work of a single cell can be split over several passes: whether the plan follows [`Told::share`].
     fn splits_cells(&self) -> bool {
         false
     }
@@ -121,7 +121,7 @@ pub trait InCells: fmt::Debug + Send + Sync {
     /// Plans a pass.
     ///
     /// # Errors
-    /// As [`Steps::send`]; buffers of its own that cannot be had.
+    /// As [`Steps::send`]; the plan's own buffers cannot be allocated.
     fn make(
         &mut self,
         gpu: &Gpu,
@@ -135,25 +135,25 @@ pub trait InCells: fmt::Debug + Send + Sync {
     fn encode(&self, stages: &mut Stages<'_>, world: &World, room: &Room);
 }
 
-/// The part of the work that a pass does: some cells. To do a single cell in several passes takes
-/// a [`Share`]: each pass that fills the lists does so in whatever order threads come, so tiles of the product of the
-/// groups would not be the same primitives from pass to pass.
+/// The part of the work that a pass does: a range of cells. To split a single cell over several passes takes
+/// a [`Share`]: every pass that fills lists does so in the order in which threads happen to come, so tiles of the
+/// product of the groups would not hold the same primitives from pass to pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Part {
     /// The first cell.
     pub first: u32,
-    /// How many.
+    /// The number of cells.
     pub count: u32,
 }
 
 impl Part {
-    /// Everything.
+    /// All cells.
     pub const ALL: Part = Part {
         first: 0,
         count: u32::MAX,
     };
 
-    /// Two halves of the cells; none when there is but one. `n_cells` is at least what there is.
+    /// Two halves of the cells; `None` for a single cell. `n_cells`: the number of cells of the grid.
     pub fn split(self, n_cells: u32) -> Option<[Part; 2]> {
         let count = self.count.min(n_cells.saturating_sub(self.first));
         let low = Part {
@@ -168,7 +168,7 @@ impl Part {
     }
 }
 
-/// Kernels with their buffers; made anew when a buffer is.
+/// Kernels with their buffers; bound again when a buffer is replaced.
 #[derive(Debug)]
 struct Launches {
     reaching: Reaching,
@@ -181,14 +181,14 @@ struct Launches {
     settling: Settling,
 }
 
-/// Everything that is launched in a pass.
+/// All launches of a pass.
 #[derive(Debug)]
 pub struct Plan {
     steps: Steps,
     launches: Option<Launches>,
     reaching: ReachingSteps,
     share: Share,
-    /// Dispatch and pairing.
+    /// The step of dispatch and pairing.
     work: u32,
     prepare_pairing: u32,
     narrow: u32,
@@ -263,7 +263,7 @@ impl InCells for Plan {
         self.prepare_pairing = steps.push(Params {
             counter: N_ITEMS,
             per_group: 1,
-            // Capacities are at most what 32 bits can number.
+            // Capacities fit 32 bits.
             capacity: room.capacities().items as u32,
             slot: ROUNDS,
             ..Params::default()
@@ -280,7 +280,7 @@ impl InCells for Plan {
         let arguments = room.arguments.buffer();
         let kept = || Groups::Indirect(arguments, KEPT);
         if let Share::Tile(tile) = self.share {
-            // Boxes, grid and the list are there.
+            // Boxes, grid and the list exist already: their stages are empty.
             stages.stage(|_| ());
             stages.stage(|_| ());
             stages.stage(|pass| {

@@ -1,5 +1,5 @@
-//! The clusters of bodies as the host knows them: found once a topology, and anew for a body that has flowed
-//! away from them.
+//! The clusters of bodies on the host: found once per topology, and again for a body that has flowed far
+//! away from its clusters.
 
 use std::sync::Arc;
 
@@ -14,23 +14,23 @@ use crate::stats::Statistics;
 
 /// How much the clusters' surface may grow against the body's before it is clustered again.
 const STALE: f64 = 1.5;
-/// Clusters that are looked at to judge how well a body's clusters fit its pose.
+/// The number of clusters sampled to judge how well a body's clusters fit its pose.
 const SAMPLES: usize = 64;
 
 /// The clusters of a body, kept while its topology stays and they fit its pose.
 #[derive(Debug)]
 pub struct Cached {
     topology_stamp: u64,
-    /// No two clusterings of a detector have the same.
+    /// Identifies the clustering: no two of a detector have the same number.
     pub number: u64,
-    /// The positions that were judged last.
+    /// The stamp of the positions that were judged last.
     judged_stamp: u64,
-    /// Surface of the sampled clusters over that of all of them together, at its best so far.
+    /// The lowest [`spread`] so far.
     best_spread: f64,
     pub(crate) clustering: Arc<Clustering>,
 }
 
-/// Clusters by slot of the body.
+/// Clusterings by slot of the body.
 #[derive(Debug, Default)]
 pub struct Clusterings {
     known: Vec<Option<Box<Cached>>>,
@@ -38,14 +38,14 @@ pub struct Clusterings {
 }
 
 impl Clusterings {
-    /// Those of a participant, if they are known.
+    /// The clustering of a body, if it is known.
     pub fn of(&self, id: BodyId) -> Option<&Cached> {
         self.known.get(id.index())?.as_deref()
     }
 
-    /// Clusters bodies that are new or were re-meshed, and those that have flowed away from their clusters;
-    /// forgets those that are gone. Of `resident` bodies the host does not know the pose, so they
-    /// are not judged.
+    /// Clusters bodies that are new, were re-meshed, or have flowed away from their clusters;
+    /// forgets removed bodies. The host does not know the pose of `resident` bodies, so it does not
+    /// judge their clusters.
     ///
     /// # Errors
     /// Threads that do not start.
@@ -123,8 +123,8 @@ impl Cached {
     }
 }
 
-/// The surface of evenly spaced clusters over that of the box that holds them: how well the clusters fit
-/// the pose at hand. Both ends of the ratio come from the same clusters, in every frame.
+/// The summed surface of evenly spaced clusters, divided by the surface of the box around them: how well the
+/// clusters fit the current pose. Every frame samples the same clusters for both.
 fn spread(clustering: &Clustering, positions: &Positions) -> f64 {
     let n = clustering.n_clusters();
     let n_samples = n.min(SAMPLES);

@@ -18,10 +18,10 @@ use super::steps::{Stages, Steps};
 use super::world::World;
 use crate::error::Error;
 
-/// The stages on the device, in order: the names of their times.
+/// The stages on the device, in order, by their timing labels.
 pub(crate) const STAGES: &[&str] = &["bounds", "dispatch", "pairing", "narrow"];
 
-/// Kernels with their buffers; made anew when a buffer is.
+/// Kernels with their buffers; bound again when a buffer is replaced.
 #[derive(Debug)]
 struct Launches {
     bounds: Bounds,
@@ -32,16 +32,16 @@ struct Launches {
     settling: Settling,
 }
 
-/// Everything that is launched in a pass.
+/// All launches of a pass.
 #[derive(Debug)]
 pub(crate) struct Plan {
     steps: Steps,
     launches: Option<Launches>,
     bounds: BoundsSteps,
-    /// First step of the rounds.
+    /// The step of the first round.
     rounds: u32,
     n_rounds: u32,
-    /// Steps of the arguments of rounds 1, 2, … , after that of pairing.
+    /// The step that prepares pairing. The steps that prepare rounds 1, 2, … follow it.
     prepare_pairing: u32,
     narrow: u32,
 }
@@ -59,7 +59,7 @@ impl Plan {
         }
     }
 
-    /// Forgets which buffers it was made for.
+    /// Drops its kernel bindings: the buffers have changed.
     pub fn unbind(&mut self) {
         self.launches = None;
     }
@@ -92,7 +92,7 @@ impl Plan {
                 ..Params::default()
             });
         }
-        // Capacities are at most what 32 bits can number.
+        // Capacities fit 32 bits.
         let capacities = room.capacities();
         let prepare = |counter: u32, capacity: u64, slot: u32| Params {
             counter,

@@ -1,4 +1,4 @@
-//! Devices, what they must allow, and what may go wrong with them.
+//! Devices, the limits that they must offer, and their errors.
 
 use std::fmt;
 use std::future::Future;
@@ -7,20 +7,20 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::waiting::drive;
 use crate::error::Error;
 
-/// A GPU, or a driver that imitates one, on this machine.
+/// A GPU on this machine, or a software driver that emulates one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct DeviceInfo {
-    /// Its name as the driver gives it, or the interface's where that is empty. Any part of it chooses it in
+    /// The name that the driver gives, or the interface's name if that is empty. Any part of it selects this device in
     /// [`Settings::device`](crate::Settings::device).
     pub name: String,
     /// The programming interface: `"vulkan"`, `"metal"`, `"dx12"`, or `"webgpu"` in a browser.
     pub interface: String,
     /// The driver and its version.
     pub driver: String,
-    /// Whether it is a program on the CPU, which `Backend::Auto` passes over.
+    /// Whether it runs in software on the CPU. `Backend::Auto` ignores such devices.
     pub is_software: bool,
-    /// Bytes that one buffer binding may have.
+    /// The most bytes of one buffer binding.
     pub max_binding: u64,
 }
 
@@ -30,7 +30,7 @@ impl fmt::Display for DeviceInfo {
     }
 }
 
-/// What every adapter must have: the least that WebGPU promises.
+/// Storage buffers per stage that every adapter must allow: WebGPU's guaranteed minimum.
 pub(super) const STORAGE_BUFFERS: u32 = 8;
 
 pub(super) fn suffices(limits: &wgpu::Limits) -> bool {
@@ -41,7 +41,7 @@ pub(super) fn suffices(limits: &wgpu::Limits) -> bool {
 
 pub(super) fn describe(info: &wgpu::AdapterInfo, limits: &wgpu::Limits) -> DeviceInfo {
     let interface = info.backend.to_str();
-    // Browsers keep the name to themselves.
+    // Browsers do not reveal the name.
     let name = match info.name.as_str() {
         "" => interface,
         name => name,
@@ -63,7 +63,7 @@ fn max_binding(limits: &wgpu::Limits) -> u64 {
         .min(limits.max_buffer_size)
 }
 
-/// A device that is open.
+/// An open device.
 pub struct Device {
     /// The device.
     pub device: wgpu::Device,
@@ -82,7 +82,7 @@ impl fmt::Debug for Device {
 }
 
 impl Device {
-    /// What has been opened. Its limits are the caller's to check, see [`suffices`].
+    /// Wraps an open device. The caller checks its limits, see [`suffices`].
     pub(super) fn new(device: wgpu::Device, queue: wgpu::Queue, info: DeviceInfo) -> Device {
         Device {
             has_timestamps: device.features().contains(wgpu::Features::TIMESTAMP_QUERY),
@@ -93,7 +93,7 @@ impl Device {
         }
     }
 
-    /// Has the driver say when it takes the device away.
+    /// Registers a callback that records the loss of the device.
     pub(super) fn listen(&self) {
         let told = Arc::clone(&self.lost);
         self.device
@@ -108,15 +108,15 @@ impl Device {
         &self.info.name
     }
 
-    /// Bytes that one binding may have.
+    /// The most bytes of one binding.
     pub fn max_binding(&self) -> u64 {
         self.info.max_binding
     }
 
-    /// Drives a future of this device to its end, waiting for the device whenever it must.
+    /// Runs a future of this device to completion, waiting for the device when necessary.
     ///
     /// # Errors
-    /// Those of the future; a device that cannot be waited for. In a browser always.
+    /// The future's errors; a device that cannot be waited for. Always an error in a browser.
     pub fn block_on<T>(&self, future: impl Future<Output = Result<T, Error>>) -> Result<T, Error> {
         drive(&self.device, future, || self.check_lost())
     }
@@ -131,7 +131,7 @@ impl Device {
     }
 }
 
-/// Catches the device's errors of this thread until it is closed.
+/// Catches this thread's device errors until it is closed.
 pub struct Scopes([wgpu::ErrorScopeGuard; 3]);
 
 impl Scopes {
@@ -143,7 +143,7 @@ impl Scopes {
         ])
     }
 
-    /// Closes at once; the future has the first error, memory before consequences.
+    /// Closes immediately. The future returns the first error; out-of-memory comes before the errors that follow from it.
     pub fn close(self) -> impl Future<Output = Result<(), Error>> {
         let [internal, validation, memory] = self.0;
         // Innermost first.

@@ -7,7 +7,7 @@ use super::layout::{Level, NO_ROOT, Node, NodePair};
 
 /// Bodies, empty ones included, that need no tree over bodies if at most two are filled.
 const FEW_BODIES: usize = 1024;
-/// How far bodies may part from their neighbours in the tree over bodies before it is made anew.
+/// How far bodies may move away from their neighbours in the tree over bodies before it is rebuilt.
 const STALE: f64 = 1.5;
 
 /// All trees in one array.
@@ -27,13 +27,13 @@ pub struct Forest {
 }
 
 impl Forest {
-    /// One tree a body, and where there are more than a few a tree over them, by a point of each.
+    /// One tree per body and, if there are more than a few, a tree over the bodies, built from one point of each.
     pub(crate) fn new(shapes: &[&Shape], sample: impl Fn(usize) -> [f32; 3]) -> Self {
         let mut forest = Forest::of_trees(shapes);
         let filled: Vec<u32> = (0..shapes.len() as u32)
             .filter(|&ix| forest.is_filled(ix as usize))
             .collect();
-        // Without a tree kernels walk over all bodies, empty ones too.
+        // Without a tree, kernels loop over all bodies, empty ones too.
         if filled.len() > 2 || (shapes.len() > FEW_BODIES && !filled.is_empty()) {
             forest.has_top = true;
             forest.push_top(&filled);
@@ -42,14 +42,14 @@ impl Forest {
         forest
     }
 
-    /// Trees without one over them.
+    /// The trees of the bodies, without a tree over them.
     pub(crate) fn of_trees(shapes: &[&Shape]) -> Self {
         let mut forest = Forest {
             roots: vec![NO_ROOT; shapes.len()],
             ..Forest::default()
         };
         let n_heights = shapes.iter().map(|shape| shape.n_levels()).max();
-        // First node of the body at the height below, and at this one.
+        // For each body, its first node at the height below.
         let mut below = vec![0u32; shapes.len()];
         for height in 0..n_heights.unwrap_or(0) {
             let first = forest.nodes.len() as u32;
@@ -91,7 +91,7 @@ impl Forest {
         });
     }
 
-    /// Gates and the tree over them.
+    /// Appends gates and the tree over them.
     fn push_top(&mut self, filled: &[u32]) {
         self.first_gate = self.nodes.len() as u32;
         self.n_gates = filled.len() as u32;
@@ -137,7 +137,7 @@ impl Forest {
         &self.nodes[first..first + self.n_gates as usize]
     }
 
-    /// Puts the gates in a new order when bodies have parted from their neighbours. Returns whether.
+    /// Reorders the gates if bodies have moved away from their neighbours. Returns whether it did.
     pub fn reorder(&mut self, sample: impl Fn(usize) -> [f32; 3]) -> bool {
         if !self.has_top {
             return false;
@@ -161,12 +161,12 @@ impl Forest {
         for (gate, entry) in self.entries.iter().enumerate() {
             self.nodes[first + gate].first_child = entry.number;
         }
-        // Never 0, so that it is known to have been found.
+        // Never 0: that stands for "not found yet".
         self.best_spread = self.spread().max(f64::MIN_POSITIVE);
         true
     }
 
-    /// The summed surface of the boxes of neighbouring entries: how well the order fits.
+    /// The summed surface of the boxes around runs of neighbouring entries: how well the order fits.
     fn spread(&self) -> f64 {
         let boxes = self.entries.chunks(FANOUT);
         boxes
@@ -184,7 +184,7 @@ impl Forest {
             .sum()
     }
 
-    /// Rounds that a traversal from these pairs takes.
+    /// The number of rounds that a traversal from these pairs takes.
     pub fn rounds(&self, seeds: &[NodePair]) -> u32 {
         seeds
             .iter()

@@ -1,4 +1,4 @@
-//! All kernels: their sources, their bindings, and the set that a device has.
+//! All kernels: their sources, their bindings, and the set of them per device.
 
 use super::layout::{
     Arguments, Body, Candidate, Cell, CellItem, Cluster, ClusterVertex, Coordinate, Corners,
@@ -218,7 +218,7 @@ macro_rules! kernels {
         $(pub(crate) const $source: Source = source!($file, [$($shared),*]);)*
 
         impl Kernels {
-            /// All of them. `damage` may give another text than the source's own.
+            /// All kernels. `damage` may replace a kernel's text.
             pub fn new(damage: impl Fn(&Source) -> Option<String>) -> Self {
                 Kernels {
                     $($name: Kernel::new($source, &[$($constant),*]).with_text(damage(&$source)),)*
@@ -226,7 +226,7 @@ macro_rules! kernels {
             }
         }
 
-        /// Every kernel's source and what it binds.
+        /// Every kernel's source and its bindings.
         pub(crate) const ALL: &[(Source, &[super::pipeline::Entry])] = &[
             $(($source, <$bindings as super::pipeline::Bindings>::ENTRIES),)*
         ];

@@ -1,4 +1,4 @@
-//! What crosses the line between host and device, once: each struct here has its twin in
+//! The data that host and device exchange. Each struct here has its twin in
 //! `kernels/shared/layout.wgsl`, where the bits are drawn. Tests parse the shaders and compare.
 
 use bytemuck::{Pod, Zeroable};
@@ -39,7 +39,7 @@ words! {
     PairKey { low: u32, high: u32 }
     /// Two global primitive numbers left to exact arithmetic.
     UnsureKey { low: u32, high: u32 }
-    /// What one dispatch is told.
+    /// Parameters of one dispatch.
     Params {
         first: u32, count: u32,
         counter: u32, per_group: u32, capacity: u32, slot: u32,
@@ -47,11 +47,11 @@ words! {
         group_size: u32, lambda: u32, most_cells: u32, owner_rule: u32,
         lists_only: u32, n_entries: u32, tile_row: u32, tile_column: u32, tile_side: u32,
     }
-    /// A primitive that reaches another body.
+    /// A primitive within its body's reach.
     Kept { low: [u32; 3], place: u32, high: [u32; 3], body: u32, range: [u32; 3], unused: u32 }
-    /// Where others may meet a body.
+    /// The box in which a body may meet others.
     Reach { low: [u32; 3], gap: u32, high: [u32; 3], gap_too: u32 }
-    /// The grid; the floats are never looked at here.
+    /// The grid; the host never reads the floats.
     Grid {
         origin: [u32; 3], shift: u32, scale: [u32; 3], n_cells: u32,
         finest: [u32; 3], unused: u32, resolution: [u32; 3], unused_too: u32,
@@ -64,13 +64,13 @@ words! {
     Start { entry: u32 }
     /// One entry of a cell's list.
     ListEntry { kept: u32 }
-    /// A word of the region, or of the entries a shift.
+    /// A word of the region, or of the entries per shift.
     Tally { word: u32 }
     /// Workgroups of an indirect dispatch.
     Arguments { x: u32, y: u32, z: u32 }
     /// One word of a position: the bits of a coordinate.
     Coordinate { bits: u32 }
-    /// The corners of a primitive; a triangle repeats its last one.
+    /// The corners of a primitive; a triangle repeats its last corner.
     Corners { vertices: [u32; 4] }
     /// A vertex of a cluster.
     ClusterVertex { vertex: u32 }
@@ -82,7 +82,7 @@ words! {
 
 /// Children of a node, in `Node::shape`.
 pub const CHILDREN: u32 = 15;
-/// The door to a body, in `Node::shape`.
+/// Marks the entrance to a body, in `Node::shape`.
 pub const GATE: u32 = 0x1000;
 /// Where the height of a node is, in `Node::shape`.
 pub const HEIGHT_SHIFT: u32 = 4;
@@ -96,7 +96,7 @@ pub const N_CANDIDATES: u32 = 33;
 pub const N_PAIRS: u32 = 34;
 /// Counter of unsure pairs.
 pub const N_UNSURE: u32 = 35;
-/// Not 0 when a counter has passed 2^32, or one invocation had too much to do.
+/// Not 0 if a counter has passed 2^32, or one invocation had too much work.
 pub const TOO_MUCH: u32 = 36;
 /// Counter of kept primitives.
 pub const N_KEPT: u32 = 37;
@@ -104,15 +104,15 @@ pub const N_KEPT: u32 = 37;
 pub const N_ENTRIES: u32 = 38;
 /// Counter of cells that went through the second level.
 pub const N_SUBDIVIDED: u32 = 39;
-/// Counter of box tests, of methods that count them: low word.
+/// Counter of box tests, which only some methods count: low word.
 pub const N_BOX_TESTS: u32 = 40;
 /// High word.
 pub const N_BOX_TESTS_HIGH: u32 = 41;
-/// Words of the region and of the entries a shift.
+/// The number of words for the region and the entries per shift.
 pub const N_TALLIES: u32 = 37;
-/// The root of a body without primitives, and the top where there is no tree over bodies.
+/// The root of a body without primitives, and the top if there is no tree over bodies.
 pub const NO_ROOT: u32 = u32::MAX;
-/// Counters in all.
+/// The number of counters.
 pub const N_COUNTERS: u32 = 42;
 /// Flags of candidates.
 #[cfg(test)]
@@ -142,7 +142,7 @@ impl Node {
     }
 }
 
-/// The parameters of one dispatch, as far apart as devices want uniform offsets.
+/// The parameters of one dispatch, padded to the alignment of uniform offsets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Step {

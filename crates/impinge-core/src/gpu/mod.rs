@@ -1,9 +1,9 @@
 //! The GPU backend: the whole pipeline in WGSL, the same bytes as the CPU.
 //!
-//! Stages carry the names that they have on the CPU; each kernel file begins with a card. One
-//! submission a frame: positions go up, counters and results come back, see `clusters` and `cells`. What the filter on
-//! the device leaves open is settled exactly on the CPU from the numbers as given. Nothing here
-//! blocks but what is in `waiting`.
+//! Stages have the same names as on the CPU; each kernel file begins with a card. If all buffers are large enough, a
+//! frame is one submission: positions go up, counters and results come back, see `clusters` and `cells`. Pairs of
+//! which the filter on the device is unsure are settled exactly on the CPU, from the numbers as given. Only
+//! `waiting` blocks.
 
 mod bounds;
 mod clusterings;
@@ -16,7 +16,7 @@ mod passes;
 mod pieces;
 mod resident;
 
-// Types are documented; fields and small methods of the inside speak for themselves.
+// Types are documented; internal fields and small methods are self-explanatory.
 #[allow(missing_docs)]
 pub mod buffers;
 #[allow(missing_docs)]
@@ -48,7 +48,7 @@ pub(crate) use engine::Engine;
 pub use kernels::shaders;
 pub use open::{Gpu, Wanted, devices, devices_async};
 
-/// Text that kernels are put together from: `LAYOUT` first, it has the structs of all.
+/// The texts from which kernels are assembled. `LAYOUT`, with the structs of all kernels, comes first.
 pub mod shared {
     macro_rules! shared {
         ($($name:ident = $file:literal;)*) => {

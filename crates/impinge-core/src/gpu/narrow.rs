@@ -8,9 +8,9 @@ use super::room::Room;
 use super::steps::Steps;
 use super::world::World;
 
-/// Candidates a workgroup settles.
+/// Candidates per workgroup.
 const GROUP: u32 = 64;
-/// Where the arguments of this stage are.
+/// The slot of this stage's arguments.
 const SLOT: u32 = ROUNDS + 1;
 
 /// The kernels with their buffers.
@@ -20,7 +20,7 @@ pub struct Settling {
     narrow: Bound,
 }
 
-/// `prepare`, for any stage.
+/// Binds `prepare`, for any stage.
 pub fn prepare(gpu: &Gpu, room: &Room, steps: &Steps) -> Bound {
     gpu.kernels.prepare.bind(
         gpu,
@@ -34,7 +34,7 @@ pub fn prepare(gpu: &Gpu, room: &Room, steps: &Steps) -> Bound {
 
 impl Settling {
     pub fn new(gpu: &Gpu, world: &World, room: &Room, steps: &Steps) -> Self {
-        // Scenes of triangles alone do without the code for solids, and the registers it wants.
+        // Scenes without tetrahedra use a kernel without the code for solids, and the registers it needs.
         let narrow = match world.has_solids {
             true => &gpu.kernels.narrow_solids,
             false => &gpu.kernels.narrow,
@@ -61,7 +61,7 @@ impl Settling {
         steps.push(Params {
             counter: N_CANDIDATES,
             per_group: GROUP,
-            // Capacities are at most what 32 bits can number.
+            // Capacities fit 32 bits.
             capacity: room.capacities().candidates as u32,
             slot: SLOT,
             ..Params::default()

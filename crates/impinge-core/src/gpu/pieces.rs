@@ -1,8 +1,8 @@
-//! Frames that are more than the device can hold at once: answered piece by piece.
+//! Frames that are too large for the device, answered piece by piece.
 //!
-//! The clusters of all participants, body after body, are cut into chunks of which two fit. Every chunk is
-//! asked for the pairs within it, and every two chunks whose boxes meet for the pairs between them, each as a
-//! query of its own whose topology and positions are sent for it alone.
+//! The clusters of all participants, body after body, are cut into chunks of which two fit on the device. The pieces
+//! are every chunk by itself, and every two chunks whose boxes meet. Each piece is a separate query, for which its
+//! topology and positions are sent.
 //!
 //! ```text
 //! clusters  | body 0 . . . . . | body 1 . | body 2 . . . . . . . . |      chunks    0  1  2
@@ -11,11 +11,11 @@
 //!                                                                            2            x
 //! ```
 //!
-//! Two runs of one body count as one body on the device, with one numbering of their vertices: there
-//! primitives share a vertex if and only if they do in the whole body. Who meets whom is decided here, by
-//! the runs, so the device has no tree over bodies.
+//! Two runs of one body count as one body on the device, with one numbering of their vertices: so
+//! primitives share a vertex there if and only if they do in the whole body. The host decides which runs
+//! meet, so the device has no tree over bodies.
 //!
-//! Cost: the cuts are quadratic in the number of chunks, but chunks are compact and most of their boxes do
+//! Cost: quadratic in the number of chunks, but chunks are compact and most of their boxes do
 //! not meet. Invariant: every two clusters lie in one pair of runs of one piece.
 
 use rayon::prelude::*;
@@ -33,7 +33,7 @@ use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::Scene;
 
-/// Neighbouring clusters of one participant.
+/// Consecutive clusters of one participant.
 #[derive(Debug)]
 pub struct Run {
     participant: usize,
@@ -42,14 +42,14 @@ pub struct Run {
     bounds: Bounds,
 }
 
-/// Neighbouring runs, at most one a participant.
+/// Consecutive runs, at most one per participant.
 #[derive(Debug)]
 pub struct Chunk {
     pub runs: Vec<Run>,
     bounds: Bounds,
 }
 
-/// Cuts the clusters of a frame into chunks of at most `most`, though of at least one cluster.
+/// Cuts the clusters of a frame into chunks that weigh at most `most`, but have at least one cluster.
 ///
 /// # Errors
 /// Threads that do not start.
@@ -110,9 +110,9 @@ pub fn cut<'a>(
 }
 
 /// The pairs of runs of a piece that may hold pairs of primitives, lower number first: runs of the first
-/// chunk come before those of the second. One chunk is asked within itself.
+/// chunk come before those of the second. For a single chunk, the pairs within it.
 ///
-/// Two primitives can only meet where the boxes of their runs do. Cost: a sweep along x.
+/// Two primitives can only meet if the boxes of their runs do. Cost: a sweep along x.
 pub fn meeting(frame: &Frame, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
     let mut pairs = Vec::new();
     if let [a, b] = chunks
@@ -153,15 +153,15 @@ fn meets(frame: &Frame, a: &Run, b: &Run) -> bool {
     }
 }
 
-/// A piece as it is sent.
+/// The data of a piece as it is sent to the device.
 #[derive(Debug, Default)]
 pub struct Loaded {
     pub topology: Topology,
     /// The trees of the runs.
     pub shapes: Vec<Shape>,
-    /// Of each body on the device, whether its positions were rounded.
+    /// For each body on the device, whether its positions were rounded.
     pub is_rounded: Vec<bool>,
-    /// The bits of the coordinates of all vertices that are named.
+    /// The coordinates of all named vertices, as bits.
     pub words: Vec<u32>,
 }
 

@@ -9,14 +9,14 @@ use super::device::Device;
 /// One binding as a kernel declares it.
 #[derive(Debug, Clone, Copy)]
 pub struct Entry {
-    /// What the kernel calls it; tests compare.
+    /// Its name in the kernel; tests compare the two.
     pub name: &'static str,
     pub access: Access,
     /// Bytes of one element.
     pub stride: u64,
 }
 
-/// Everything that a kernel binds, in the order of its binding numbers.
+/// All bindings of a kernel, in the order of their numbers.
 pub trait Bindings {
     const ENTRIES: &'static [Entry];
     fn resources(&self) -> Vec<wgpu::BindingResource<'_>>;
@@ -52,7 +52,7 @@ macro_rules! bindings {
 }
 pub use crate::bindings;
 
-/// A kernel's text: its own file behind the shared ones that it builds on.
+/// A kernel's text: the shared files that it uses, then its own file.
 pub struct Source {
     pub name: &'static str,
     pub parts: &'static [&'static str],
@@ -83,7 +83,7 @@ pub(crate) use source;
 pub struct Kernel<B> {
     source: Source,
     constants: &'static [(&'static str, f64)],
-    /// In place of the text of `source`.
+    /// Replaces the text of `source`, for tests.
     damaged: Option<String>,
     compiled: OnceLock<Compiled>,
     takes: PhantomData<fn(B)>,
@@ -95,7 +95,7 @@ struct Compiled {
 }
 
 impl Compiled {
-    /// Errors go to the error scopes that are open.
+    /// Errors go to the open error scopes.
     fn new(
         device: &wgpu::Device,
         name: &str,
@@ -162,7 +162,7 @@ impl<B: Bindings> Kernel<B> {
         }
     }
 
-    /// The same with another text, or with its own for `None`.
+    /// The same kernel with another text; with its own for `None`.
     pub(crate) fn with_text(self, damaged: Option<String>) -> Self {
         Kernel { damaged, ..self }
     }
@@ -175,8 +175,8 @@ impl<B: Bindings> Kernel<B> {
         })
     }
 
-    /// The kernel with its buffers. The first call of any detector on this device compiles it; errors go to
-    /// the error scopes that are open.
+    /// The kernel with its buffers. The first call on this device, by any detector, compiles it; errors go to
+    /// the open error scopes.
     pub fn bind(&self, gpu: &Device, bindings: &B) -> Bound {
         let compiled = self.compiled(&gpu.device);
         let entries: Vec<wgpu::BindGroupEntry<'_>> = (0u32..)
@@ -197,7 +197,7 @@ impl<B: Bindings> Kernel<B> {
     }
 }
 
-/// Bytes between the parameters of two steps.
+/// Bytes from the parameters of one step to those of the next.
 const STEP: u32 = size_of::<super::layout::Step>() as u32;
 
 /// A kernel with its buffers, ready to be dispatched.
@@ -208,15 +208,15 @@ pub struct Bound {
     has_params: bool,
 }
 
-/// How many workgroups.
+/// The number of workgroups of a dispatch.
 pub enum Groups<'a> {
-    /// As many as this, in rows if need be.
+    /// This many, in rows if necessary.
     Known(u64),
-    /// As the arguments in this slot say.
+    /// As many as the arguments in this slot say.
     Indirect(&'a wgpu::Buffer, u32),
 }
 
-/// The widest row of workgroups; `prepare.wgsl` has the same.
+/// The widest row of workgroups; `shared/arguments.wgsl` has the same.
 const WIDEST: u64 = 32_768;
 
 impl Bound {
@@ -228,7 +228,7 @@ impl Bound {
         pass.set_bind_group(0, &self.group, offsets);
         match groups {
             Groups::Known(n) => {
-                // Counts are below 2^32, so both fit.
+                // Both fit: counts are below 2^32.
                 let x = n.min(WIDEST) as u32;
                 let y = n.div_ceil(WIDEST) as u32;
                 pass.dispatch_workgroups(x, y, 1);

@@ -15,9 +15,9 @@ use super::room::Room;
 use super::steps::Steps;
 use super::world::World;
 
-/// Slot of the arguments for dispatches over kept primitives, 64 a workgroup.
+/// Slot of the arguments for dispatches over kept primitives, 64 per workgroup.
 pub const KEPT: u32 = 0;
-/// Slot of the arguments for dispatches over cells, 64 a workgroup.
+/// Slot of the arguments for dispatches over cells, 64 per workgroup.
 pub const CELLS: u32 = 1;
 
 /// The kernels with their buffers.
@@ -31,7 +31,7 @@ pub struct Reaching {
     shift: Bound,
 }
 
-/// What is launched.
+/// The launches of both stages.
 #[derive(Debug, Default)]
 pub struct ReachingSteps {
     bounds: BoundsSteps,
@@ -44,7 +44,7 @@ impl ReachingSteps {
     /// Plans both stages.
     pub fn plan(&mut self, world: &World, room: &Room, told: Told, steps: &mut Steps) {
         self.bounds.plan(world, steps);
-        // Capacities and counts are at most what 32 bits can number.
+        // Capacities and counts fit 32 bits.
         self.reach = steps.push(Params {
             first: world.forest().top().unwrap_or(NO_ROOT),
             count: world.bodies.len() as u32,
@@ -134,7 +134,7 @@ impl Reaching {
         }
     }
 
-    /// What has to be zero before a pass.
+    /// Clears the tallies, which must be zero before a pass.
     pub fn clear(encoder: &mut wgpu::CommandEncoder, room: &Room) {
         encoder.clear_buffer(room.tallies.buffer(), 0, None);
     }
@@ -153,7 +153,7 @@ impl Reaching {
         self.keep.run(pass, 0, groups);
     }
 
-    /// Stage `grid`, up to the ranges and by how much they are to be shifted.
+    /// Stage `grid`, up to the ranges and their shift.
     pub fn run_grid(&self, pass: &mut wgpu::ComputePass<'_>, room: &Room, steps: &ReachingSteps) {
         self.resolution
             .run(pass, steps.resolution, Groups::Known(1));

@@ -1,4 +1,4 @@
-//! Frames that stay on the device: positions from the caller's buffers, pairs in ours.
+//! Frames that stay on the device: positions come from the caller's buffers, pairs go to ours.
 
 use super::buffers::count;
 use super::collect::map;
@@ -10,21 +10,22 @@ use crate::ids::BodyId;
 use crate::run::Job;
 use crate::stats::Statistics;
 
-/// Where the pairs of an encoded frame are once its commands have run.
+/// The buffers that hold the pairs of an encoded frame once its commands have run.
 ///
-/// Both lists hold two `u32` a pair, the numbers of its primitives, the lower one first. Primitives are
-/// numbered through, body after body in the order of their ids: primitive `i` of a body has the number
-/// `first + i`, where `first` is the number of primitives of the bodies before it that take part. The order of
+/// Both lists hold two `u32` per pair: the numbers of its primitives, the lower one first. Primitives are
+/// numbered consecutively, body after body in the order of their ids: primitive `i` of a body has the number
+/// `first + i`, where `first` is the number of primitives of all participants before it. The order of
 /// pairs is not specified.
 ///
-/// A count may be larger than its list: then the list holds as many pairs as fit, and
+/// A count may be larger than its list: the list then holds as many pairs as fit, and
 /// [`Detector::make_room`](crate::Detector::make_room) makes it larger.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct ResidentPairs {
     /// Pairs that certainly intersect.
     pub pairs: wgpu::Buffer,
-    /// Pairs within the rounding error of intersecting or not. Taken as pairs they are safe.
+    /// Pairs that may or may not intersect, within the rounding error of the device. To be conservative, count them
+    /// as pairs.
     pub unsure: wgpu::Buffer,
     /// Holds the two counts as `u32`.
     pub counts: wgpu::Buffer,
@@ -32,9 +33,9 @@ pub struct ResidentPairs {
     pub n_pairs_offset: u64,
     /// Byte offset of the number of unsure pairs in `counts`.
     pub n_unsure_offset: u64,
-    /// Pairs that the list has room for.
+    /// The number of pairs that the list has room for.
     pub pairs_capacity: u64,
-    /// Unsure pairs that the list has room for.
+    /// The number of unsure pairs that the list has room for.
     pub unsure_capacity: u64,
 }
 
@@ -89,7 +90,7 @@ impl Engine {
         })
     }
 
-    /// Reads the counters and grows what was too small. Returns whether nothing was.
+    /// Reads the counters and grows the buffers that were too small. Returns whether none was.
     ///
     /// # Errors
     /// Those of [`Detector::make_room`](crate::Detector::make_room).

@@ -1,7 +1,7 @@
-//! Room for what a pass finds: queues, work items, candidates, pairs, unsure pairs.
+//! Buffers for the results of a pass: queues, work items, candidates, pairs, unsure pairs.
 //!
-//! How much a frame finds is not known before. Kernels count what they need, whether it fits or not; what
-//! did not fit makes its buffer grow and the pass run again. Where the device or the memory budget
+//! Their sizes are not known in advance. Kernels count what they need, even if it does not fit. Buffers that
+//! were too small grow, and the pass runs again. If the device or the memory budget
 //! allows no more, the engine splits the pass instead.
 
 use super::buffers::Storage;
@@ -15,7 +15,7 @@ use super::open::Gpu;
 use crate::error::Error;
 use crate::settings::Method;
 
-/// Elements that each buffer has room for. The answer never depends on it.
+/// The number of elements that each buffer has room for. The answer never depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Capacities {
@@ -53,7 +53,7 @@ impl Default for Capacities {
 const ONE_ITEM: u64 = 64 * 64;
 
 impl Capacities {
-    /// With these a pass of one pair of clusters always fits.
+    /// Enough for a pass of one pair of clusters.
     pub const LEAST: Capacities = Capacities {
         queue: 512,
         items: 64,
@@ -123,7 +123,7 @@ impl Capacities {
         self.fits(Capacities::limit(gpu))
     }
 
-    /// What one binding of the device may hold.
+    /// The most that one binding of the device may hold.
     fn limit(gpu: &Gpu) -> Self {
         Capacities {
             queue: Storage::<NodePair>::limit(gpu),
@@ -137,7 +137,7 @@ impl Capacities {
     }
 }
 
-/// The buffers. A method leaves those of the other at one element each.
+/// The buffers. Those that only the other method needs have one element each.
 #[derive(Debug)]
 pub struct Room {
     pub queues: [Storage<NodePair>; 2],
@@ -155,14 +155,14 @@ pub struct Room {
     pub reaches: Storage<Reach>,
     pub tallies: Storage<Tally>,
     pub grid: Storage<Grid>,
-    /// What a pass starts from, copied by its encoder: counters and the first queue.
+    /// The initial counters and queue of a pass, copied by its encoder.
     start_counters: Storage<Counter>,
     start_queue: Storage<NodePair>,
     started: Option<Vec<NodePair>>,
     sizes: Option<(Capacities, CellsWanted)>,
 }
 
-/// Room that `Cells` wants besides what grows by itself; none for `Clusters`.
+/// Room that `Cells` needs besides the buffers that grow; zero for `Clusters`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CellsWanted {
     pub n_cells: u64,
@@ -170,7 +170,7 @@ pub struct CellsWanted {
 }
 
 impl CellsWanted {
-    /// Bytes of a cell and of its list's start.
+    /// Bytes per cell, the start of its list included.
     pub const CELL: u64 = (size_of::<Cell>() + size_of::<Start>()) as u64;
 
     pub fn bytes(&self) -> u64 {
@@ -238,7 +238,7 @@ impl Room {
         true
     }
 
-    /// Encodes what a pass starts from: counters at zero but for the seeds, which fit the queue.
+    /// Encodes the start of a pass: the seeds, which must fit the queue, and counters at zero except the number of seeds.
     ///
     /// # Errors
     /// As [`Storage::resize`].
@@ -268,7 +268,7 @@ impl Room {
         Ok(())
     }
 
-    /// Bytes of the room that does not grow by itself.
+    /// Bytes of the buffers that do not grow: those of [`CellsWanted`].
     pub fn bytes_of_cells(&self) -> u64 {
         self.sizes.map_or(0, |(_, cells)| cells.bytes())
     }
@@ -284,26 +284,26 @@ impl Room {
     }
 }
 
-/// What a pass counted.
+/// The counts of a pass.
 #[derive(Debug, Clone, Copy)]
 pub struct Counts {
-    /// What would have held everything; of later stages a lower bound when an earlier one overflowed.
+    /// The capacities that would have been enough; a lower bound for stages after one that overflowed.
     pub needed: Capacities,
     /// Cells that went through the second level.
     pub n_subdivided: u64,
-    /// Box tests, of methods that count them.
+    /// Box tests; only some methods count them.
     pub n_box_tests: u64,
     too_much: bool,
 }
 
-/// What is to be done about the counts of a pass.
+/// What to do after a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// All of it fitted.
+    /// Everything fitted.
     Complete,
     /// Run again with this much room.
     Grow(Capacities),
-    /// There is no more room to be had.
+    /// No more room is available: split the work.
     Split,
 }
 
@@ -326,7 +326,7 @@ impl Counts {
         }
     }
 
-    /// Compares with the room there was. `bytes` may be held in all by these buffers.
+    /// Compares the counts with the room that the pass had. `bytes`: the most that these buffers may take together.
     pub fn judge(&self, gpu: &Gpu, room: Capacities, bytes: Option<u64>) -> Verdict {
         if self.too_much {
             return Verdict::Split;
@@ -335,7 +335,7 @@ impl Counts {
             return Verdict::Complete;
         }
         let limit = Capacities::limit(gpu);
-        // A quarter more than needed, where it is needed; the next frame needs a little more.
+        // Too small buffers get a quarter more than needed: the next frame may need a little more.
         let larger = self.needed.zip(room, |needed, room| {
             if needed > room {
                 needed + needed / 4

@@ -1,4 +1,4 @@
-//! What both methods' plans are made of: the table of parameters, and timed passes.
+//! Shared by the plans of both methods: the table of parameters, and timed passes.
 
 use super::buffers::{Storage, Uniform};
 use super::layout::{Params, Step};
@@ -35,11 +35,11 @@ impl Steps {
     /// Plans a step and returns its number.
     pub fn push(&mut self, params: Params) -> u32 {
         self.planned.push(params.into());
-        // A plan has some dozens of steps.
+        // A plan has a few dozen steps.
         self.planned.len() as u32 - 1
     }
 
-    /// Sends what is planned, if it differs. Returns whether the buffer is a new one.
+    /// Sends the planned steps if they have changed. Returns whether the buffer is a new one.
     ///
     /// # Errors
     /// As [`Storage::resize`].
@@ -47,7 +47,7 @@ impl Steps {
         if self.planned == self.sent && self.buffer.bytes() > 0 {
             return Ok(false);
         }
-        // One step is bound at a time, so only another buffer matters, not another length.
+        // One step is bound at a time, so only a new buffer matters, not a new length.
         let bytes = self.buffer.bytes();
         self.buffer.upload(gpu, &self.planned)?;
         self.sent.clone_from(&self.planned);

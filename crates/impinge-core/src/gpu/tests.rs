@@ -1,4 +1,4 @@
-//! Kernels without a GPU: every one parses, validates, and agrees with the host on what it binds.
+//! Kernels without a GPU: each one parses, validates, and agrees with the host on its bindings.
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{AddressSpace, Module, StorageAccess, TypeInner};
@@ -114,7 +114,7 @@ macro_rules! assert_twins {
 
 #[test]
 fn structs_are_laid_out_as_on_the_host() {
-    // Any kernel has all of the layout in front of it.
+    // Every kernel begins with the whole layout.
     let module = parse(&DISPATCH);
     assert_twins!(&module,
         Node { low, first_child, high, shape }
@@ -137,7 +137,7 @@ fn structs_are_laid_out_as_on_the_host() {
         Arguments { x, y, z }
     );
     assert_eq!(size_of::<Step>(), 256);
-    // The shader leaves a gap after each corner, which has a name on the host alone.
+    // The shader has an unnamed gap after each corner; the host names it.
     let (reach, span) = members(&module, "Reach");
     assert_eq!(reach, [("low".to_owned(), 0), ("high".to_owned(), 16)]);
     assert_eq!(span as usize, size_of::<Reach>());

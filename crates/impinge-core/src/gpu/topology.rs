@@ -1,4 +1,4 @@
-//! What is sent of clusters: their primitives, corners and vertices, once a topology.
+//! The clusters as they are sent to the device once per topology: primitives, corners and vertices.
 
 use std::ops::Range;
 
@@ -19,8 +19,8 @@ pub struct Topology {
 }
 
 impl Topology {
-    /// Appends a run of clusters of a body whose first primitive has the global number `first`. `body` is its
-    /// number on the device, `place` says where each of its vertices is there.
+    /// Appends a run of clusters of a body whose first primitive has the global number `first`. `body`: its
+    /// number on the device; `place`: where each of its vertices is on the device.
     pub fn push(
         &mut self,
         clustering: &Clustering,
@@ -35,7 +35,7 @@ impl Topology {
             let vertices = clustering.vertices(cluster);
             let first_place = self.corners.len() + cluster * GROUP - begin;
             self.clusters.push(Cluster {
-                // Places and vertices fit 32 bits: what is sent was weighed before.
+                // Places and vertices fit 32 bits: the caller has checked the sizes.
                 first_place: first_place as u32,
                 first_vertex: self.cluster_vertices.len() as u32,
                 sizes: clustering.size(cluster) as u32 | (vertices.len() as u32) << 16,
@@ -48,7 +48,7 @@ impl Topology {
         }
         let is_solid = clustering.corners.kind() == Kind::Tetrahedra;
         self.has_solids |= is_solid && !primitives.is_empty();
-        // Edges and points are the degenerate triangles that they look like.
+        // Edges and points become degenerate triangles.
         let corners = primitives.clone().map(|primitive| Corners {
             vertices: clustering.corners.four_corners(primitive).map(&place),
         });
@@ -60,7 +60,7 @@ impl Topology {
     }
 }
 
-/// How much there is to send.
+/// The size of the data to send.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Weight {
     pub n_primitives: u64,
@@ -76,7 +76,7 @@ const fn bytes<T>(n: u64) -> u64 {
 }
 
 impl Weight {
-    /// Adds a cluster of a piece, its nodes and body included as if no other cluster shared them.
+    /// Adds a cluster of a piece, with nodes and a body of its own, as if no other cluster shared them.
     pub fn add_cluster(&mut self, n_primitives: u64, n_vertices: u64) {
         self.n_primitives += n_primitives;
         self.n_vertices += n_vertices;
@@ -109,13 +109,13 @@ impl Weight {
             + bytes::<Body>(self.n_bodies)
     }
 
-    /// Whether no buffer has more than `binding` bytes and all together not more than `total`.
+    /// Whether no buffer has more than `most.binding` bytes and all together have at most `most.bytes`.
     pub fn fits(&self, most: Most) -> bool {
         self.binding() <= most.binding && self.bytes() <= most.bytes
     }
 }
 
-/// The most that may be on the device of a frame, or of a piece of it.
+/// The most of a frame, or of a piece of it, that may be on the device at once.
 #[derive(Debug, Clone, Copy)]
 pub struct Most {
     /// Bytes of one buffer.

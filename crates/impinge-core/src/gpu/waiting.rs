@@ -1,7 +1,7 @@
-//! The only room of the GPU backend that blocks a thread.
+//! The only module of the GPU backend that blocks a thread.
 //!
-//! A browser's thread must never wait: promises are kept between its turns. So on wasm nothing here waits; it
-//! is an error that names the way out.
+//! A thread in a browser must never wait: promises are fulfilled only between its turns. So on wasm these functions
+//! return an error that names the alternative.
 
 use std::future::Future;
 
@@ -16,26 +16,26 @@ fn cannot_wait<T>() -> Result<T, Error> {
     })
 }
 
-/// Waits for a future that no device has to be polled for, such as the opening of one.
+/// Waits for a future that needs no device to be polled, such as the opening of one.
 ///
 /// # Errors
-/// Those of the future. In a browser always.
+/// The future's errors. Always an error in a browser.
 #[cfg(not(target_family = "wasm"))]
 pub fn wait<T>(future: impl Future<Output = Result<T, Error>>) -> Result<T, Error> {
     pollster::block_on(future)
 }
 
-/// As natively, but nothing waits in a browser.
+/// In a browser, where a thread cannot wait: always an error.
 #[cfg(target_family = "wasm")]
 pub fn wait<T>(_: impl Future<Output = Result<T, Error>>) -> Result<T, Error> {
     cannot_wait()
 }
 
-/// Drives a future to its end, waiting for the device whenever it must; in between `check` may give up.
+/// Runs a future to completion, waiting for the device when necessary; after each wait, `check` may give up.
 ///
 /// # Errors
-/// Those of the future and of `check`; a device that cannot be waited for. In a browser always, and before
-/// anything is begun.
+/// The errors of the future and of `check`; a device that cannot be waited for. Always an error in a browser, before
+/// the future is polled.
 #[cfg(not(target_family = "wasm"))]
 pub fn drive<T>(
     device: &wgpu::Device,
@@ -59,7 +59,7 @@ pub fn drive<T>(
     }
 }
 
-/// As natively, but nothing waits in a browser.
+/// In a browser, where a thread cannot wait: always an error.
 #[cfg(target_family = "wasm")]
 pub fn drive<T>(
     _: &wgpu::Device,

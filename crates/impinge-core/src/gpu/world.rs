@@ -1,19 +1,19 @@
 //! The participants on the device: a forest of clusters, and positions.
 //!
-//! All trees lie in one array of nodes, ordered by height over all bodies, so that one launch refits a
-//! height of every tree. Three or more bodies stand below a tree of their own; the doors to them
-//! are gates:
+//! All trees lie in one array of nodes, ordered by height over all bodies, so that one launch refits one
+//! height of every tree. Above three or more bodies there is a tree over bodies, whose leaves are
+//! gates, the entrances to the bodies:
 //!
 //! ```text
 //! height h+2                    top
 //! height h+1          node  …         node          tree over bodies
-//! height h        gate 0 … gate k  gate … gate      one a body: filters are checked here
+//! height h        gate 0 … gate k  gate … gate      one per body: filters are checked here
 //! …                  |       |
 //! height 1         root    root …                   bodies' trees, of unequal heights
 //! height 0        clusters of body 0 | of body 1 | …
 //! ```
 //!
-//! Topology is sent once; each frame sends the positions that have moved.
+//! Topology is sent once; each frame sends the positions that have changed.
 
 use std::sync::Arc;
 
@@ -37,15 +37,15 @@ use super::open::Gpu;
 use super::pieces::{Chunk, Loaded};
 use super::topology::{Topology, Weight};
 
-/// Places carry a flag in bit 31.
+/// Bit 31 of a place is a flag.
 pub const MOST_PRIMITIVES: u64 = 1 << 31;
-/// How many keys the boxes of rounded positions are widened: see `boxes.wgsl`.
+/// By how many keys the boxes of rounded positions are widened: see `boxes.wgsl`.
 const SLACK: u32 = 2;
 /// One participant on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Resident {
     id: BodyId,
-    /// The clustering that was sent.
+    /// The number of the clustering that was sent.
     number: u64,
     positions_stamp: u64,
     /// Index of its first vertex in the positions.
@@ -53,17 +53,17 @@ struct Resident {
     n_vertices: u64,
 }
 
-/// Everything about the participants that the kernels read.
+/// The data on participants that the kernels read.
 #[derive(Debug)]
 pub struct World {
     pub clusterings: Clusterings,
     residents: Vec<Resident>,
-    /// What the device has of the nodes, without the boxes.
+    /// The nodes on the device, without their boxes.
     forest: Forest,
     bodies_sent: Vec<Body>,
     ignored_sent: Vec<NodePair>,
     words: Vec<u32>,
-    /// Boxes have to be refitted.
+    /// Whether boxes have to be refitted.
     pub is_moved: bool,
     pub has_solids: bool,
     pub nodes: Storage<Node>,
@@ -117,8 +117,8 @@ impl World {
         &self.forest
     }
 
-    /// Brings the device up to the frame; positions of `resident` bodies are there already. Returns
-    /// whether kernels have to be bound anew.
+    /// Sends what has changed since the last frame; positions of `resident` bodies are on the device already. Returns
+    /// whether kernels have to be bound again.
     ///
     /// # Errors
     /// More primitives than the device can bind at once.
@@ -141,7 +141,7 @@ impl World {
         self.clusterings.update(job, resident, recluster, stats)?;
         let mut is_other = false;
         if !self.is_resident(frame) {
-            // Half a topology must not pass for a whole one if an upload fails.
+            // If an upload fails, half a topology must not look complete.
             self.residents.clear();
             self.send_topology(gpu, scene, frame)?;
             is_other = true;
@@ -185,7 +185,7 @@ impl World {
                     limit,
                 });
             }
-            // Vertices fit 32 bits, as was just checked.
+            // Vertices fit 32 bits: just checked.
             let first = first_vertex as u32;
             let clusters = 0..clustering.n_clusters();
             topology.push(
@@ -228,10 +228,10 @@ impl World {
         Ok(())
     }
 
-    /// Sends a piece of the frame in place of all of it. Kernels have to be bound anew after it.
+    /// Sends a piece of the frame instead of all of it. Kernels have to be bound again afterwards.
     ///
     /// # Errors
-    /// The piece is more than the device can bind at once.
+    /// The piece is larger than the device can bind at once.
     pub fn send_piece(
         &mut self,
         gpu: &Gpu,
@@ -260,7 +260,7 @@ impl World {
         Ok(())
     }
 
-    /// Gives all buffers back. What is known of clusters stays.
+    /// Frees all buffers. The clusterings stay.
     pub fn forget_buffers(&mut self) {
         *self = World {
             clusterings: std::mem::take(&mut self.clusterings),
@@ -268,14 +268,14 @@ impl World {
         };
     }
 
-    /// The clusters of a participant, which are known.
+    /// The clustering of a participant, which must be known.
     pub(crate) fn clustering(&self, frame: &Frame, participant_ix: usize) -> &Clustering {
         let id = frame.layers[participant_ix].id;
         let cache = self.clusterings.of(id);
         &cache.expect("just clustered").clustering
     }
 
-    /// What all of a frame would take on the device.
+    /// The size of a whole frame on the device.
     pub fn weigh(&self, scene: &Scene, frame: &Frame) -> Weight {
         let mut weight = Weight::default();
         for ix in 0..frame.layers.len() {
@@ -296,7 +296,7 @@ impl World {
         weight
     }
 
-    /// Sends the positions of bodies that have moved, neighbours in one piece.
+    /// Sends the positions of bodies that have moved; runs of consecutive bodies in one write.
     fn send_positions(&mut self, gpu: &Gpu, scene: &Scene, frame: &Frame, resident: &[BodyId]) {
         let mut ix = 0;
         while ix < self.residents.len() {
@@ -343,7 +343,7 @@ impl World {
         }
     }
 
-    /// Sends what is said of each body in this frame, if it differs from what the device has.
+    /// Sends the records of all bodies and the list of ignored pairs, if they differ from those on the device.
     fn send_bodies(
         &mut self,
         gpu: &Gpu,
@@ -359,7 +359,7 @@ impl World {
         let words = |bits: u64| [bits as u32, (bits >> 32) as u32];
         let mut bodies = Vec::with_capacity(frame.layers.len());
         for (ix, participant) in frame.layers.iter().enumerate() {
-            // Bodies without a category meet nobody.
+            // Bodies without a category meet no other body.
             let filter = match frame.between() {
                 true => frame.filter(ix),
                 false => Filter {
@@ -410,7 +410,7 @@ impl World {
         let Some(held) = held.filter(|held| held.n_vertices > 0) else {
             return;
         };
-        // The scene's positions are no longer what the device has.
+        // The device no longer has the scene's positions.
         held.positions_stamp = 0;
         self.is_moved = true;
         let vertex = 3 * size_of::<Coordinate>() as u64;
@@ -418,12 +418,12 @@ impl World {
         encoder.copy_buffer_to_buffer(buffer, 0, self.positions.buffer(), to, size);
     }
 
-    /// Entries of the list of ignored pairs.
+    /// The length of the list of ignored pairs.
     pub fn n_ignored(&self) -> u32 {
         self.ignored_sent.len() as u32
     }
 
-    /// What a traversal starts from: pairs of nodes, whose boxes need not overlap.
+    /// The seeds of a traversal: pairs of nodes, whose boxes need not overlap.
     pub fn seeds(&self, frame: &Frame) -> Vec<NodePair> {
         let forest = &self.forest;
         let root = |ix: usize| forest.roots[ix];
@@ -457,7 +457,7 @@ impl World {
         seeds
     }
 
-    /// Seeds of a piece: the trees of its runs, by their numbers.
+    /// The seeds of a piece, from pairs of its runs by their numbers.
     pub fn seeds_of_runs(&self, pairs: &[[u32; 2]]) -> Vec<NodePair> {
         let root = |run: u32| self.forest.roots[run as usize];
         let seed = |&[a, b]: &[u32; 2]| NodePair {
@@ -467,8 +467,8 @@ impl World {
         pairs.iter().map(seed).collect()
     }
 
-    /// The pairs of children of two nodes, whether their boxes overlap or not; `None` for two
-    /// clusters. The same steps as `dispatch.wgsl`.
+    /// Appends the pairs of children of two nodes, whether their boxes overlap or not. Returns false, and appends
+    /// nothing, for two clusters. The same steps as `dispatch.wgsl`.
     pub fn expand(&self, frame: &Frame, pair: NodePair, into: &mut Vec<NodePair>) -> bool {
         let nodes = &self.forest.nodes;
         let (a, b) = (&nodes[pair.a as usize], &nodes[pair.b as usize]);
@@ -513,7 +513,7 @@ pub fn narrowed(x: &f64) -> u32 {
     (*x as f32).to_bits()
 }
 
-/// A point of a body: its first vertex that a primitive names. The tree over bodies is made of these.
+/// A point of a body: the first corner of its first primitive. The tree over bodies is built from these points.
 fn sample(scene: &Scene, frame: &Frame, ix: usize) -> [f32; 3] {
     let body = frame.body(scene, ix);
     let vertex = body.elements().corners(0)[0];

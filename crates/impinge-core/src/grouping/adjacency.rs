@@ -1,20 +1,20 @@
-//! Who shares vertices with whom, as 64-bit masks fixed by topology.
+//! Which primitives share vertices, as 64-bit masks fixed by topology.
 //!
-//! In self-collision nearly all box overlaps are between neighbours of one surface, which the
-//! adjacency rule keeps out. Since clusters never change, the rule is a mask a primitive, made
+//! In self-collision nearly all box overlaps are between neighbours on one surface, which the
+//! adjacency rule excludes. Since a clustering never changes, the rule is one mask per primitive, made
 //! once: bit `j` of the mask of primitive `i` says that `i` and lane `j` of the other cluster name a common
 //! vertex. A frame then clears neighbours from its candidate masks with one `and`.
 //!
 //! ```text
 //! cluster A, lane 5                 own cluster      0b…0101_0000   lanes that share a vertex
-//!                     neighbour B > A, entry (5, mask)  0b…0000_0011   lanes of B that do
+//!                     neighbour B > A, entry (5, mask)  0b…0000_0011   lanes of B that share a vertex
 //! ```
 //!
 //! A vertex with very many primitives (the hub of a fan) would make these masks quadratic. Hubs are
-//! left out: [`hubs`](super::hubs) has masks of its own.
+//! left out: [`hubs`](super::hubs) has separate masks for them.
 //!
-//! Cost: `O(n · valence)` once a topology; about 8 bytes a primitive for the own masks and about as much
-//! for those of neighbours, at most `HUB` entries a corner.
+//! Cost: `O(n · valence)` once per topology; about 8 bytes per primitive for the own masks and about as much
+//! for those of neighbours, at most `HUB` entries per corner.
 
 use rayon::prelude::*;
 
@@ -24,7 +24,7 @@ use super::hubs::{self, HUB};
 /// The masks of one body's clusters.
 #[derive(Debug)]
 pub(crate) struct Adjacency {
-    /// One mask a place of the order: lanes of the same cluster that share a vertex, itself included.
+    /// One mask per place of the order: lanes of the same cluster that share a vertex, itself included.
     own: Vec<u64>,
     /// Neighbour clusters of each cluster, higher numbers only.
     neighbors: Vec<Neighbor>,
@@ -36,11 +36,11 @@ pub(crate) struct Adjacency {
 #[derive(Debug, Clone, Copy)]
 struct Neighbor {
     cluster: u32,
-    /// First entry in `lanes` and `masks`; the next neighbour's is one past the last.
+    /// First entry in `lanes` and `masks`; the entries end where the next neighbour's begin.
     first: u32,
 }
 
-/// What one cluster contributes.
+/// The masks of one cluster.
 struct Part {
     own: Vec<u64>,
     /// `(neighbour cluster, lane, mask)`, sorted.
@@ -90,7 +90,7 @@ impl Adjacency {
         adjacency
     }
 
-    /// The own masks of a cluster's primitives, one a lane.
+    /// The own masks of a cluster's primitives, one per lane.
     #[inline(always)]
     pub fn own(&self, cluster: usize) -> &[u64] {
         let end = self.own.len().min((cluster + 1) * GROUP);
@@ -153,7 +153,7 @@ impl Incidence {
         Incidence { starts, places }
     }
 
-    /// The places that name the vertex; none for a hub.
+    /// The places that name the vertex; empty for a hub.
     fn of(&self, vertex: u32) -> &[u32] {
         let vertex = vertex as usize;
         &self.places[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]

@@ -1,7 +1,7 @@
 //! Axis-aligned boxes in single precision, rounded outward.
 //!
-//! A box may only grow by rounding, never shrink, so that boxes which do not overlap prove that
-//! what they hold cannot meet. Boxes of f32 positions are not rounded at all.
+//! Rounding may only grow a box, never shrink it. So boxes that do not overlap prove that their
+//! contents do not meet. Boxes of f32 positions are not rounded at all.
 
 /// A closed box. The empty one has `min > max` and overlaps nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,7 +13,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Holds nothing.
+    /// The empty box.
     pub const EMPTY: Bounds = Bounds {
         min: [f32::INFINITY; 3],
         max: [f32::NEG_INFINITY; 3],
@@ -38,7 +38,7 @@ impl Bounds {
         }
     }
 
-    /// What lies in both; empty when they do not overlap.
+    /// The intersection; empty when they do not overlap.
     #[inline(always)]
     pub fn intersection(&self, other: &Bounds) -> Bounds {
         let mut both = *self;
@@ -55,8 +55,8 @@ impl Bounds {
         std::array::from_fn(|axis| 0.5 * self.min[axis] + 0.5 * self.max[axis])
     }
 
-    /// Half the surface: a measure of how often a box is met. In double precision, where the
-    /// squares of f32 extents cannot overflow.
+    /// Half the surface: a measure of how often other boxes meet this one. In double precision, where
+    /// the squares of f32 extents cannot overflow.
     #[inline]
     pub fn half_area(&self) -> f64 {
         let [x, y, z]: [f64; 3] =
@@ -65,7 +65,7 @@ impl Bounds {
     }
 }
 
-/// The minimum as one instruction: no care for NaN, which validation has kept out.
+/// The minimum as one instruction. It need not handle NaN, which validation has excluded.
 #[inline(always)]
 pub(crate) fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
@@ -114,7 +114,7 @@ pub(crate) struct BoundsArray {
     len: usize,
 }
 
-/// Boxes read at once; arrays are padded by as many.
+/// How many boxes are read at once; arrays are padded by as many.
 pub(crate) const READ_AHEAD: usize = 8;
 
 impl BoundsArray {
@@ -168,18 +168,18 @@ pub(crate) struct RawBoundsArray {
     max: [*mut f32; 3],
 }
 
-// SAFETY: a pointer does nothing by itself; `put` says what its callers owe.
+// SAFETY: a pointer does nothing by itself; the contract of `put` covers its use.
 unsafe impl Send for RawBoundsArray {}
 // SAFETY: as above.
 unsafe impl Sync for RawBoundsArray {}
 
 impl RawBoundsArray {
     /// # Safety
-    /// `ix` must lie within the array, which must still live; nobody else may use that box meanwhile.
+    /// `ix` must lie within the array, which must still live; no other thread may use that box at the same time.
     #[inline(always)]
     pub unsafe fn put(self, ix: usize, bounds: &Bounds) {
         for axis in 0..3 {
-            // SAFETY: said above.
+            // SAFETY: by the contract of `put`.
             unsafe {
                 self.min[axis].add(ix).write(bounds.min[axis]);
                 self.max[axis].add(ix).write(bounds.max[axis]);

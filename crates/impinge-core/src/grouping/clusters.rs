@@ -1,11 +1,11 @@
-//! Clusters: groups fixed by topology, found once in the pose at hand.
+//! Clusters: groups fixed by topology, found once in the current pose.
 //!
 //! In: the primitives' corners and one pose. Out: an order of the primitives in which cluster `c`
 //! is the run `64 c .. 64 c + 64` (the last one may be shorter), the tree over clusters, the corners in
-//! that order, and each cluster's unique vertices: a frame finds a cluster's box from those, each
-//! read once (64 triangles of a closed mesh have about 45 of them, not 192).
+//! that order, and each cluster's unique vertices. A frame computes a cluster's box from these, each
+//! read once (64 triangles of a closed mesh have about 45 unique vertices, not 192).
 //!
-//! Cost: `O(n log n)` time once a topology; 8 to 12 bytes a primitive for order and vertices, and a
+//! Cost: `O(n log n)` time once per topology; 8 to 12 bytes per primitive for order and vertices, and a
 //! copy of the corners. Inside a cluster, runs of eight primitives lie close together, so that a
 //! vector of lanes tends to be needed whole or not at all.
 
@@ -22,8 +22,8 @@ use crate::elements::{Elements, with_corners};
 
 /// Runs this short are not split further inside a cluster.
 const FINEST_RUN: usize = 8;
-/// A cluster's vertices come in whole chunks of so many, so that a loop over them ends where the processor
-/// expects it and needs no remainder.
+/// A cluster's vertices are padded to whole chunks of this many: a loop over them needs no remainder, and its end
+/// is easy to predict.
 pub(crate) const CHUNK: usize = 8;
 
 /// The clusters of one body.
@@ -33,13 +33,12 @@ pub(crate) struct Clustering {
     pub order: Vec<u32>,
     /// The corners at each place of the order.
     pub corners: Elements,
-    /// Unique vertices of all clusters, cluster after cluster. Each run ascends and repeats its last one up
+    /// Unique vertices of all clusters, cluster after cluster. Each run ascends and repeats its last vertex up
     /// to a multiple of [`CHUNK`].
     pub vertices: Vec<u32>,
     /// Where each cluster's run starts, and one past the last.
     pub vertex_starts: Vec<u32>,
-    /// Whether every vertex below the body's highest index belongs to some primitive, and how many
-    /// vertices that is.
+    /// The number of vertices, if every vertex up to the highest index belongs to some primitive; else `None`.
     pub n_vertices_covered: Option<usize>,
     /// The tree over the clusters.
     pub shape: Shape,
@@ -51,11 +50,11 @@ pub(crate) struct Clustering {
 /// The corners of a cluster's triangles as numbers of its vertices: `[corner][place]`. Places past its size hold 0.
 pub(crate) type LocalFaces = [[u8; GROUP]; 3];
 
-/// Three vertices a triangle have numbers that fit a byte.
+/// With three vertices per triangle, the numbers fit a byte.
 const _: () = assert!(3 * GROUP <= 256);
 
 impl Clustering {
-    /// Clusters primitives whose boxes in the pose at hand are given by `bounds`.
+    /// Clusters primitives whose boxes in the current pose are given by `bounds`.
     pub fn new(elements: &Elements, bounds: impl Fn(usize) -> Bounds + Sync) -> Self {
         let n = elements.len();
         let shape = Shape::new(n.div_ceil(GROUP));
@@ -113,7 +112,7 @@ impl Clustering {
         self.hubs.as_ref()
     }
 
-    /// Who shares vertices with whom, hubs apart; found at the first self-collision query.
+    /// Which primitives share vertices that are not hubs; found at the first self-collision query.
     pub fn adjacency(&self) -> &Adjacency {
         self.adjacency
             .get_or_init(|| with_corners!(&self.corners, |corners| Adjacency::new(corners)))
@@ -134,7 +133,7 @@ impl Clustering {
         });
     }
 
-    /// Those of a cluster, where they have been found.
+    /// The local faces of a cluster, if they have been found.
     #[inline(always)]
     pub fn local_faces(&self, cluster: usize) -> Option<&LocalFaces> {
         self.local_faces.get()?.get(cluster)
@@ -164,7 +163,7 @@ fn local_faces(faces: &[[u32; 3]], vertices: &[u32]) -> LocalFaces {
     let mut local = [[0; GROUP]; 3];
     for (place, face) in faces.iter().enumerate() {
         for corner in 0..3 {
-            // The first of those that the last one repeats.
+            // The first occurrence: the last vertex is repeated.
             let number = vertices.partition_point(|&vertex| vertex < face[corner]);
             local[corner][place] = number as u8;
         }

@@ -2,8 +2,8 @@
 //!
 //! Source: "Real-time Collision Detection with Two-level Spatial Hashing on GPU", section 3.1.
 //!
-//! A box is stored once as a range of *fine* cells, four a coarse cell and axis; coarse is fine
-//! shifted right by two. `floor((x - origin) * scale)` is monotone under any rounding, and so is
+//! A box is stored once as a range of *fine* cells: a coarse cell has four along each axis, so coarse is
+//! fine shifted right by two. `floor((x - origin) * scale)` is monotone under any rounding, and so is
 //! clamping to the grid: boxes that overlap have ranges that overlap, on any device.
 //!
 //! ```text
@@ -14,16 +14,16 @@
 
 use super::bounds::Bounds;
 
-/// Cells along one axis at most, so that fine coordinates fit 16 bits.
+/// The most cells along one axis, so that fine coordinates fit 16 bits.
 const MOST_ALONG: u32 = 1 << 14;
-/// Cells of the first level at most, whatever lambda says: 4 bytes each.
+/// The most cells of the first level, for any lambda: 4 bytes each.
 const MOST_CELLS: u64 = 1 << 25;
 
 /// A uniform grid over a region.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
     origin: [f32; 3],
-    /// Fine cells a unit of length.
+    /// Fine cells per unit of length.
     scale: [f32; 3],
     extent: [f32; 3],
     /// Coarse cells along each axis.
@@ -33,18 +33,18 @@ pub struct Grid {
 /// Fine cells that a box touches, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FineRange {
-    /// The first along each axis.
+    /// The first cell along each axis.
     pub lo: [u16; 3],
-    /// The last along each axis.
+    /// The last cell along each axis.
     pub hi: [u16; 3],
 }
 
 impl Grid {
-    /// Equation (1): `R_i = d_i (lambda N / V)^(1/3)`, at least one cell an axis.
+    /// Equation (1): `R_i = d_i (lambda N / V)^(1/3)`, at least one cell per axis.
     ///
-    /// Where the region is so thin along an axis that this asks for less than one cell, the axis gets
-    /// one and the cells are shared out over the others (square and first root in place of the cube
-    /// root), so that a flat cloth, with V = 0, is a grid of squares and a needle a row.
+    /// If the region is so thin along an axis that the equation gives less than one cell, the axis gets
+    /// one cell and the other axes share the cells (with the square root, or no root, in place of the cube
+    /// root). So a flat cloth, with V = 0, gets a grid of squares, and a needle gets a row of cells.
     pub fn new(region: &Bounds, n_primitives: u64, lambda: f64) -> Self {
         let extent: [f64; 3] = std::array::from_fn(|axis| {
             (f64::from(region.max[axis]) - f64::from(region.min[axis])).clamp(0.0, 2f64.powi(129))
@@ -99,7 +99,7 @@ impl Grid {
             .then(|| Grid::with_resolution(&region, self.resolution.map(|along| along.div_ceil(2))))
     }
 
-    /// Coarse cells in all.
+    /// The number of coarse cells.
     pub fn n_cells(&self) -> u64 {
         self.resolution
             .iter()
@@ -191,8 +191,8 @@ fn spread(bits: u64, stride: u32) -> u64 {
 }
 
 /// The owner rule: of all cells that two boxes share, the pair belongs to the one that holds the lower
-/// corner of their common range, `max(lo_a, lo_b)`. Exact, without memory; it stands where the paper
-/// has a table hashed by DJB2, which lost 2.7 to 4.3 % of the collisions (table 3).
+/// corner of their common range, `max(lo_a, lo_b)`. It is exact and needs no memory. The paper has a table
+/// hashed by DJB2 instead, which lost 2.7 to 4.3 % of the collisions (table 3).
 #[inline(always)]
 pub fn owns(cell: [u32; 3], a: &FineRange, b: &FineRange) -> bool {
     (0..3).all(|axis| u32::from(a.lo[axis].max(b.lo[axis]) >> 2) == cell[axis])

@@ -1,7 +1,7 @@
-//! The shape of a wide tree over leaves that lie in an order, and the order itself.
+//! The shape of a wide tree over leaves in some order, and that order.
 //!
-//! Level 0 holds the leaves; a node of level `l` has up to eight children, neighbours in level
-//! `l - 1`; the top level holds the root. All leaves are equally deep and children share the leaves
+//! Level 0 holds the leaves. A node of level `l` has up to eight children, which are consecutive in level
+//! `l - 1`. The top level holds the root. All leaves are equally deep and children share the leaves
 //! evenly, so the shape follows from the number of leaves alone:
 //!
 //! ```text
@@ -14,25 +14,25 @@
 //! boundaries that the shape prescribes (a balanced k-d order; median splits made 5 times fewer
 //! cluster pairs than blocks along a Morton curve on the dragon, see `docs/performance.md`).
 //!
-//! Cost: `O(n log n)` once a topology. Invariant: an order is a permutation, whatever the input.
+//! Cost: `O(n log n)` once per topology. Invariant: an order is a permutation, whatever the input.
 
 use std::ops::Range;
 
 use rayon::join;
 
-/// Children a node has at most.
+/// The most children of a node.
 pub(crate) const FANOUT: usize = 8;
 
 /// The tree's shape: for each level above the leaves, where each node's children start.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Shape {
     n_leaves: usize,
-    /// `child_starts[l]` has one entry a node of level `l + 1`, and one past the last.
+    /// `child_starts[l]` has one entry per node of level `l + 1`, and one more for the end of the last.
     child_starts: Vec<Vec<u32>>,
 }
 
 impl Shape {
-    /// The shape over `n_leaves` leaves; without leaves there is no level at all.
+    /// The shape over `n_leaves` leaves; without leaves it has no levels.
     pub fn new(n_leaves: usize) -> Self {
         // How many leaves each node of the level holds, from the root down.
         let mut leaf_starts: Vec<Vec<usize>> = Vec::new();
@@ -65,7 +65,7 @@ impl Shape {
         }
     }
 
-    /// Levels, leaves and root included.
+    /// The number of levels, those of the leaves and the root included.
     pub fn n_levels(&self) -> usize {
         match self.n_leaves {
             0 => 0,
@@ -73,7 +73,7 @@ impl Shape {
         }
     }
 
-    /// Nodes of a level.
+    /// The number of nodes of a level.
     pub fn n_nodes(&self, level: usize) -> usize {
         match level {
             0 => self.n_leaves,
@@ -81,7 +81,7 @@ impl Shape {
         }
     }
 
-    /// Children of a node of a level above 0, as a range of the level below.
+    /// The children of a node of a level above 0, as a range of the level below.
     #[inline(always)]
     pub fn children(&self, level: usize, node: usize) -> Range<usize> {
         let starts = &self.child_starts[level - 1];
@@ -96,7 +96,7 @@ impl Shape {
     }
 }
 
-/// What is put in order: a centre and the number it stands for.
+/// An entry to be ordered: a centre, and the number of what it stands for.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Entry {
     pub center: [f32; 3],
@@ -104,22 +104,23 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
-    /// Orders entries along an axis, and those at one place by number. One integer, so that comparisons are no branches.
+    /// Orders entries along an axis, and entries at the same place by number. One integer, so that comparing needs no
+    /// branch.
     #[inline(always)]
     fn key(&self, axis: usize) -> u64 {
         let bits = self.center[axis].to_bits();
-        // The order of `f32::total_cmp`: negative numbers turned round, and below all others.
+        // The order of `f32::total_cmp`: negative numbers are reversed and placed below all others.
         let ordered = bits ^ (((bits as i32) >> 31) as u32 | 1 << 31);
         u64::from(ordered) << 32 | u64::from(self.number)
     }
 }
 
-/// Entries below which a piece is not worth another thread.
+/// A piece with fewer entries is not worth another thread.
 const PARALLEL_FROM: usize = 8 * 1024;
 
-/// Puts entries in the order of the shape, whose leaves hold `leaf_size` entries each, the last
-/// one what remains. Inside a leaf, entries stay split at medians down to `finest` of them.
-/// Where entries have classes, by number, those of one class follow each other, whatever their centers.
+/// Puts entries in the order of the shape. Its leaves hold `leaf_size` entries each, the last leaf the
+/// rest. Inside a leaf, entries are split at medians further, down to runs of `finest`. If entries have
+/// classes, by number, those of one class follow each other, whatever their centers.
 pub(crate) fn order(
     shape: &Shape,
     leaf_size: usize,
@@ -147,7 +148,7 @@ struct Split<'a> {
 }
 
 impl Split<'_> {
-    /// Splits the entries of a run of neighbouring nodes; `first_leaf` is the run's first leaf.
+    /// Splits the entries of a run of consecutive nodes; `first_leaf` is the run's first leaf.
     fn nodes(&self, level: usize, nodes: Range<usize>, first_leaf: usize, entries: &mut [Entry]) {
         if nodes.len() == 1 {
             match level {
@@ -193,8 +194,8 @@ impl Split<'_> {
     }
 }
 
-/// Moves the `cut` entries that are lowest along the longest axis to the front, those of lower classes before
-/// all others. Ties are broken by number, so the two sets depend on nothing but the input.
+/// Moves the `cut` entries that are lowest along the longest axis to the front; lower classes come before
+/// higher ones. Ties are broken by number, so the two sets depend only on the input.
 fn split_at(entries: &mut [Entry], cut: usize, classes: Option<&[Option<u32>]>) {
     if cut == 0 || cut >= entries.len() {
         return;

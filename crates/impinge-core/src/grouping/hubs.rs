@@ -1,15 +1,15 @@
 //! Hubs: vertices that very many primitives name, such as the middle of a fan.
 //!
 //! All primitives around a hub have boxes that overlap there, so pairs that share a hub would be quadratic in
-//! number. They are never looked at one by one:
+//! number. They are never examined one by one:
 //!
 //! - Primitives of one hub follow each other in the order of the clusters (`classes`).
-//! - A node of the tree whose primitives *all* name a hub knows it. Two such nodes of one hub are left out of
-//!   `dispatch` together: each pair of their primitives shares a vertex.
-//! - For clusters of which some primitives name a hub, masks of their lanes take such pairs out.
+//! - A node of the tree records the hubs that *all* of its primitives name. `dispatch` skips a pair of nodes with
+//!   a common hub: each pair of their primitives shares a vertex.
+//! - In clusters of which only some primitives name a hub, lane masks exclude such pairs.
 //!
-//! Under `SharedVertex::Skip` that is all. Under `SharedVertex::Resolve`, `cpu::hubs` asks the pairs of each
-//! hub by the directions in which primitives lie as seen from it.
+//! Under `SharedVertex::Skip` that is all. Under `SharedVertex::Resolve`, `cpu::hubs` settles the pairs of each
+//! hub by the directions of the primitives as seen from it.
 //!
 //! Two hubs that very many primitives name together are an *axis*, such as the spine of a book.
 //!
@@ -22,7 +22,7 @@ use super::hierarchy::Shape;
 pub(crate) const HUB: u32 = 96;
 /// No vertex has this number.
 const NONE: u32 = u32::MAX;
-/// Most hubs of one primitive: a tetrahedron has four vertices.
+/// The most hubs of one primitive: a tetrahedron has four vertices.
 const MOST: usize = 4;
 
 /// The hubs of one primitive, or those common to all primitives of a node: ascending, then [`NONE`].
@@ -43,7 +43,7 @@ impl HubSet {
         }
     }
 
-    /// Those of both.
+    /// The hubs in both sets.
     pub fn and(&self, other: &Self) -> Self {
         let mut both = Self::EMPTY;
         for (slot, hub) in self.iter().filter(|hub| other.0.contains(hub)).enumerate() {
@@ -76,15 +76,15 @@ struct Hub {
 /// The hubs of one body's clusters.
 #[derive(Debug, Default)]
 pub(crate) struct Hubs {
-    /// By vertex.
+    /// Sorted by vertex.
     hubs: Vec<Hub>,
-    /// By the two vertices.
+    /// Sorted by the two vertices.
     axes: Vec<Axis>,
     /// `common[level][node]`: the hubs that all primitives of the node name.
     common: Vec<Vec<HubSet>>,
     /// For each cluster, where its entries in `lanes` start; and one past the last.
     lane_starts: Vec<u32>,
-    /// A hub and the lanes of the cluster that name it, by hub.
+    /// A hub and the lanes of the cluster that name it, sorted by hub.
     lanes: Vec<(u32, u64)>,
 }
 
@@ -99,7 +99,7 @@ pub(super) fn counts<const N: usize>(corners: &[[u32; N]]) -> Vec<u32> {
     counts
 }
 
-/// For each primitive, its hub that is named most, or none; `None` where the body has no hub.
+/// For each primitive, the one of its hubs that is named most often, if it has any; `None` if the body has no hub.
 pub(super) fn classes<const N: usize>(corners: &[[u32; N]]) -> Option<Vec<Option<u32>>> {
     let counts = counts(corners);
     if counts.iter().all(|&count| count <= HUB) {
@@ -109,7 +109,7 @@ pub(super) fn classes<const N: usize>(corners: &[[u32; N]]) -> Option<Vec<Option
         let hubs = primitive
             .iter()
             .filter(|&&vertex| counts[vertex as usize] > HUB);
-        // Of two that are named as often, the lower one.
+        // Of two named equally often, the lower one.
         hubs.copied()
             .max_by_key(|&vertex| (counts[vertex as usize], std::cmp::Reverse(vertex)))
     };
@@ -117,7 +117,7 @@ pub(super) fn classes<const N: usize>(corners: &[[u32; N]]) -> Option<Vec<Option
 }
 
 impl Hubs {
-    /// From the corners in the order of the clusters.
+    /// Finds the hubs from the corners in the order of the clusters.
     pub fn new<const N: usize>(corners: &[[u32; N]], shape: &Shape) -> Self {
         let counts = counts(corners);
         let sets: Vec<HubSet> = corners
@@ -157,14 +157,14 @@ impl Hubs {
         }
     }
 
-    /// Whether all primitives of one node share a hub with all of another, which may be the same.
+    /// Whether one hub is named by all primitives of both nodes, which may be the same node.
     #[inline(always)]
     pub fn hold_all(&self, (level_a, a): (u32, u32), (level_b, b): (u32, u32)) -> bool {
         let a = &self.common[level_a as usize][a as usize];
         a.meets(&self.common[level_b as usize][b as usize])
     }
 
-    /// Lanes of two clusters, which may be the same, that name one hub: `(lanes of a, lanes of b)` per hub.
+    /// For each hub that two clusters (or one with itself) both name: `(lanes of a, lanes of b)` that name it.
     pub fn between(&self, a: usize, b: usize) -> impl Iterator<Item = (u64, u64)> + '_ {
         let of = |cluster: usize| {
             let starts = &self.lane_starts;
@@ -182,7 +182,7 @@ impl Hubs {
         })
     }
 
-    /// How many hubs and axes there are.
+    /// The number of hubs and axes.
     pub fn n_to_settle(&self) -> usize {
         self.hubs.len() + self.axes.len()
     }
@@ -198,7 +198,7 @@ impl Hubs {
         )
     }
 
-    /// The hubs among a primitive's corners that make an axis with this one.
+    /// The hubs among a primitive's corners that form an axis with `hub`.
     pub fn partners(&self, hub: u32, corners: &[u32]) -> HubSet {
         let mut partners = HubSet::EMPTY;
         for &other in corners {
@@ -209,8 +209,8 @@ impl Hubs {
         partners
     }
 
-    /// Whether two primitives are settled with those that share this hub, or this axis: the first axis that
-    /// both name, or if there is none the first hub.
+    /// Whether two primitives are settled at `shared`, a hub or an axis. Each pair is settled once: at the first axis
+    /// that both name, or if there is none at the first hub.
     pub fn owns(&self, shared: &[u32], a: &[u32], b: &[u32]) -> bool {
         let mut common = HubSet::EMPTY;
         for &vertex in a {
@@ -247,7 +247,7 @@ impl Hubs {
     }
 }
 
-/// The places of each thing that primitives have, by thing.
+/// Inverts a list: `things` gives each place's hubs or axes; returns the places of each, sorted by hub or axis.
 fn runs(things: impl Iterator<Item = impl Iterator<Item = [u32; 2]>>) -> Vec<([u32; 2], Vec<u32>)> {
     let mut all: Vec<([u32; 2], u32)> = (0u32..)
         .zip(things)

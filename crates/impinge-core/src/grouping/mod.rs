@@ -1,5 +1,5 @@
-//! How primitives are gathered into groups of at most 64, and how groups meet: what both
-//! backends share. This floor knows nobody.
+//! Groups of at most 64 primitives, and the structures over them that both backends share: boxes,
+//! clusters, trees, adjacency masks, the grid. Imports only `elements`.
 
 pub(crate) mod adjacency;
 #[allow(missing_docs)]
@@ -10,5 +10,5 @@ pub mod grid;
 pub(crate) mod hierarchy;
 pub(crate) mod hubs;
 
-/// The most primitives a group holds: one bit each in a 64-bit mask.
+/// The most primitives that a group holds: one bit each in a 64-bit mask.
 pub const GROUP: usize = 64;
