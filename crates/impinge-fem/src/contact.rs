@@ -1,25 +1,25 @@
-//! Contact: a penalty on the volume that two tetrahedra have in common.
+//! Contact: a penalty on the volume of the intersection of two tetrahedra.
 //!
-//! For each pair that the detector finds, the common polyhedron is cut out exactly (but for
+//! For each pair that the detector finds, the intersection, a polyhedron, is computed exactly (up to
 //! rounding). With volume V, centroid c and a unit direction n, tetrahedron a is pushed by `k V n`
-//! at c and tetrahedron b by the opposite, spread to corners by the barycentric coordinates of c.
-//! Both forces act at one point, so linear and angular momentum are kept. Summed over a layer of
-//! pairs, where bodies overlap by a depth d over an area A, the force is `k A d`: a pressure `k d`,
-//! whatever the meshes.
+//! at c and tetrahedron b by the opposite force, distributed to corners by the barycentric coordinates
+//! of c. Both forces act at one point, so linear and angular momentum are conserved. Where bodies overlap by
+//! a depth d over an area A, the forces of all pairs sum to `k A d`: a pressure `k d`, independent of the
+//! meshes.
 //!
-//! **Direction.** Each vertex has a direction that leads outwards: on the surface the normal of its
-//! faces, weighted by area; inside, the way in which the depth at rest falls, interpolated in the deformed
-//! mesh (Hirota et al. 2001, Fisher & Lin 2001). n is b's direction at c less a's, which is smooth in c,
-//! defined also between edges, and the same whichever body comes first. Where both cancel, a is pushed
-//! away from the centroid of b.
+//! **Direction.** Each vertex has an outward direction. On the surface it is the area-weighted normal of
+//! its faces; inside, it is the direction in which the depth at rest decreases. It is interpolated in the
+//! deformed mesh (Hirota et al. 2001, Fisher & Lin 2001). n is b's direction at c minus a's, normalised: it
+//! is smooth in c, also defined between edges, and does not depend on which body comes first. If both
+//! directions cancel, a is pushed away from the centroid of b.
 //!
-//! **Stiffness.** V grows by the cross-section as the bodies approach. The cross-section is V over
-//! the larger of the polyhedron's extent along n and the depth d that the two interpolated depths sum
-//! up to at c: for a stack of pairs through the overlap they share one cross-section that way.
-//! It enters the implicit step, so that stiff contacts stay stable.
+//! **Stiffness.** As the bodies approach, V grows in proportion to the cross-section. The cross-section is V
+//! divided by the larger of two lengths: the polyhedron's extent along n, and the sum d of the two
+//! interpolated depths at c. With d, a stack of pairs through the overlap shares one cross-section.
+//! The stiffness enters the implicit step, so that stiff contacts stay stable.
 //!
-//! **Friction** is Coulomb's, with the normal force of the step's beginning and a linear rise at
-//! very small speeds, also implicit.
+//! **Friction** is Coulomb's, with the normal force at the beginning of the step; at very small speeds it
+//! grows linearly. It is implicit too.
 
 use impinge::Pairs;
 use rayon::prelude::*;
@@ -33,13 +33,13 @@ use crate::overlap::Clipper;
 use crate::rotation::cofactors;
 use crate::settings::Settings;
 
-/// Slip of this share of an edge a step is where friction reaches its full strength.
+/// Slip per step, as a share of an edge, at which friction reaches its full strength.
 const FULL_FRICTION: f64 = 1e-3;
 
-/// Directions shorter than this share of a unit vector say nothing.
+/// A sum of unit vectors shorter than this has no reliable direction.
 const CANCELLED: f64 = 1e-6;
 
-/// Two tetrahedra that push each other.
+/// Two tetrahedra in contact.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Contact {
     /// Corners of a, then of b.
@@ -48,11 +48,11 @@ pub(crate) struct Contact {
     pub weights: [f64; 8],
     /// The force on a at the start of the step.
     pub force: Vec3,
-    /// What couples the velocities in the implicit step: h² stiffness + h friction.
+    /// The coupling of velocities in the implicit step: h² stiffness + h friction.
     pub block: Mat3,
 }
 
-/// A penalty along a direction with friction across, as the implicit step takes it:
+/// The term of the implicit step for a penalty along a direction and friction across it:
 /// `h² k n nᵀ + h c (1 − n nᵀ)`.
 fn implicit(normal: &Vec3, stiffness: f64, drag: f64, dt: f64) -> Mat3 {
     normal * (normal * (dt * dt * stiffness - dt * drag)).transpose()
@@ -65,7 +65,7 @@ fn drag(settings: &Settings, normal_force: f64, normal: &Vec3, velocity: &Vec3, 
     settings.friction * normal_force / slip.max(FULL_FRICTION * edge / settings.dt)
 }
 
-/// Fills `outward` with the outward direction of each vertex, of length 1, or 0 where there is none.
+/// Fills `outward` with the outward direction of each vertex, of length 1, or 0 if there is none.
 pub(crate) fn outward_directions(mesh: &Mesh, positions: &[Vec3], outward: &mut Vec<Vec3>) {
     let face_normal = |&face: &u32| {
         let [a, b, c] = mesh.surface[face as usize].map(|corner| positions[corner as usize]);
@@ -76,7 +76,7 @@ pub(crate) fn outward_directions(mesh: &Mesh, positions: &[Vec3], outward: &mut 
         let [a, b, c, d] = element.corners.map(|corner| mesh.depths[corner as usize]);
         let [p, q, r] = &element.gradients;
         let at_rest = p * (b - a) + q * (c - a) + r * (d - a);
-        // The gradient where the element is now, times its volume: finite even when it is flat.
+        // The gradient in the deformed element, times its volume: finite even if the element is flat.
         let f = element.deformation(positions);
         let cofactors = cofactors(&f);
         let det = f.column(0).dot(&cofactors.column(0));
@@ -97,7 +97,7 @@ pub(crate) fn outward_directions(mesh: &Mesh, positions: &[Vec3], outward: &mut 
         .collect_into_vec(outward);
 }
 
-/// The state at the start of a step, as contact sees it.
+/// The state at the start of a step that contact needs.
 pub(crate) struct Now<'a> {
     pub mesh: &'a Mesh,
     pub settings: &'a Settings,
@@ -169,8 +169,8 @@ impl Now<'_> {
         })
     }
 
-    /// Pressure over depth between two elements in Pa/m, and the length of their edges: the harmonic
-    /// mean of the materials' moduli over the mean edge.
+    /// Pressure per depth between two elements in Pa/m (the harmonic mean of the materials' moduli over the mean
+    /// edge), and the mean length of their edges.
     fn hardness(&self, pair: [u32; 2]) -> (f64, f64) {
         let [a, b] = pair.map(|tet| {
             let parts = &self.mesh.parts;
@@ -181,8 +181,8 @@ impl Now<'_> {
         (self.settings.contact_stiffness * young / edge, edge)
     }
 
-    /// The ground's force on each vertex of the surface below it, and what it adds to the implicit
-    /// step, through `add`.
+    /// Calls `add` with the ground's force on each surface vertex below the ground's surface, and its term of the implicit
+    /// step.
     pub fn ground(&self, mut add: impl FnMut(usize, Vec3, Mat3)) {
         let Some(ground) = self.settings.ground else {
             return;
@@ -207,11 +207,11 @@ impl Now<'_> {
 }
 
 /// Barycentric coordinates of a point inside a tetrahedron of any orientation: 0 or more, sum 1.
-/// `None` where it is too flat to have any.
+/// `None` if the tetrahedron is too flat.
 fn barycentric(tet: &[Vec3; 4], at: &Vec3) -> Option<[f64; 4]> {
     let [a, b, c, d] = tet.map(|corner| corner - at);
     let volume = |p: &Vec3, q: &Vec3, r: &Vec3| p.cross(q).dot(r);
-    // Each corner weighs as much as the tetrahedron in which the point takes its place.
+    // The weight of a corner is the volume of the tetrahedron in which the point replaces that corner.
     let weights = [
         volume(&b, &c, &d),
         -volume(&a, &c, &d),
@@ -225,7 +225,7 @@ fn barycentric(tet: &[Vec3; 4], at: &Vec3) -> Option<[f64; 4]> {
     (sum > 0.0).then(|| weights.map(|weight| weight / sum))
 }
 
-/// The pairs of an answer with tetrahedra numbered over all solids.
+/// The pairs of an answer, with tetrahedra numbered consecutively over all solids.
 pub(crate) fn numbered(mesh: &Mesh, pairs: &Pairs, out: &mut Vec<[u32; 2]>) -> Result<(), Error> {
     out.clear();
     for [body_a, a, body_b, b] in pairs.rows() {
@@ -256,19 +256,19 @@ pub(crate) fn numbered(mesh: &Mesh, pairs: &Pairs, out: &mut Vec<[u32; 2]>) -> R
     Ok(())
 }
 
-/// The contacts as part of the system matrix: blocks between any two of a contact's eight vertices,
-/// applied without being written out.
+/// The contacts as a part of the system matrix: blocks between any two of a contact's eight vertices,
+/// applied without storing them.
 #[derive(Debug, Default)]
 pub(crate) struct Couplings {
     pub contacts: Vec<Contact>,
-    /// Each vertex' contacts, as 8 · contact + corner.
+    /// Each vertex's contacts, as 8 · contact + corner.
     at: Lists,
-    /// The weight of each entry of `at`: read once an iteration of the solver, in order.
+    /// The weight of each entry of `at`: read once per iteration of the solver, in order.
     weights: Vec<f64>,
 }
 
 impl Couplings {
-    /// Finds each vertex' contacts.
+    /// Finds each vertex's contacts.
     pub fn index(&mut self, n_vertices: usize) {
         let corners = self.contacts.iter().map(|contact| contact.vertices);
         self.at.rebuild(n_vertices, corners);
@@ -280,7 +280,7 @@ impl Couplings {
             .collect_into_vec(&mut self.weights);
     }
 
-    /// What each contact answers to velocities `x`.
+    /// The reaction of each contact to velocities `x`.
     pub fn react(&self, x: &[Vec3], out: &mut Vec<Vec3>) {
         self.contacts
             .par_iter()

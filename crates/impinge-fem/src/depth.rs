@@ -1,9 +1,9 @@
-//! How deep below the surface each vertex lies at rest.
+//! The depth of each vertex below the surface, at rest.
 //!
-//! Contact takes the depth of a point as the interpolation of its tetrahedron's depths, wherever
-//! that has been deformed to ("deformed distance fields", Fisher & Lin 2001). Here the depth is the
-//! length of the shortest path along edges to the surface (Dijkstra 1959): at least the distance,
-//! cheap on any mesh, and exact enough for what is made of it: directions and a stiffness.
+//! Contact interpolates the depth of a point from the corners of its tetrahedron, wherever the
+//! tetrahedron has moved ("deformed distance fields", Fisher & Lin 2001). Here the depth is the
+//! length of the shortest path along edges to the surface (Dijkstra 1959). It is at least the distance,
+//! cheap on any mesh, and accurate enough for its uses: directions and a stiffness.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -11,7 +11,7 @@ use std::collections::BinaryHeap;
 use crate::element::{Element, Vec3};
 use crate::lists::Lists;
 
-/// A vertex waiting for its turn: nearest first, ties by number.
+/// A vertex in the queue: nearest first, ties by number.
 #[derive(PartialEq)]
 struct Waiting {
     depth: f64,
@@ -35,7 +35,7 @@ impl PartialOrd for Waiting {
     }
 }
 
-/// The depth of each vertex in metres. A solid always has a surface, so every depth is finite.
+/// The depth of each vertex in metres: finite, and 0 for vertices without a path to a surface.
 pub(crate) fn depths(
     rest: &[Vec3],
     elements: &[Element],
@@ -68,7 +68,7 @@ pub(crate) fn depths(
             }
         }
     }
-    // A face that more than two tetrahedra claim is no surface; a mesh of nothing else has none.
+    // Without a surface there is no path to it: a face of more than two tetrahedra does not count as surface.
     depths
         .iter_mut()
         .filter(|depth| depth.is_infinite())

@@ -3,8 +3,8 @@
 //! Müller & Gross 2004 ("Interactive virtual materials"): strain is measured in a frame that turns
 //! with the element, ε = RᵀF − 1 (symmetric, as R is the polar factor), and stress is linear in it:
 //! σ = λ tr(ε) 1 + 2μ ε. A corner with rest gradient g is pulled by −V R σ g, and the stiffness is the
-//! linear one turned by R; the change of R itself is left out, which keeps the matrix positive
-//! semidefinite. [`rotation`] keeps R sensible where the element is inverted.
+//! linear one turned by R; the derivative of R is ignored, which keeps the matrix positive
+//! semidefinite. [`rotation`] returns a useful R even if the element is inverted.
 
 use nalgebra::Matrix3;
 use rayon::prelude::*;
@@ -13,10 +13,10 @@ use crate::element::{Element, Mat3, Vec3};
 use crate::mesh::Mesh;
 use crate::rotation::rotation;
 
-/// Vertices or elements a thread works on at a time. Results do not depend on it.
+/// The least number of vertices or elements per task of a thread, and the size of the pieces of sums.
 pub(crate) const GRAIN: usize = 512;
 
-/// What an element is now.
+/// The current state of an element.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Turned {
     /// Volume times first Piola–Kirchhoff stress, R σ V.
@@ -51,7 +51,7 @@ impl Turned {
         }
     }
 
-    /// The stiffness between two corners: what a move of corner `b` adds to minus the force on `a`.
+    /// The stiffness between two corners: minus the derivative of the force on `a` with respect to the position of `b`.
     #[inline]
     pub fn stiffness(&self, a: usize, b: usize) -> Mat3 {
         let (p, q) = (self.gradient(a), self.gradient(b));
@@ -62,7 +62,7 @@ impl Turned {
     }
 }
 
-/// Turns every element.
+/// Computes the current state of every element.
 pub(crate) fn turn(mesh: &Mesh, positions: &[Vec3], turned: &mut Vec<Turned>) {
     mesh.elements
         .par_iter()
@@ -71,7 +71,7 @@ pub(crate) fn turn(mesh: &Mesh, positions: &[Vec3], turned: &mut Vec<Turned>) {
         .collect_into_vec(turned);
 }
 
-/// The elastic force on each vertex: summed over its tetrahedra in their order, so the same on any
+/// The elastic force on each vertex, summed over its tetrahedra in their order, so it does not depend on the
 /// number of threads.
 pub(crate) fn forces(mesh: &Mesh, turned: &[Turned], forces: &mut Vec<Vec3>) {
     (0..mesh.n_vertices())

@@ -5,10 +5,10 @@ use nalgebra::{Matrix3, Vector3};
 pub(crate) type Vec3 = Vector3<f64>;
 pub(crate) type Mat3 = Matrix3<f64>;
 
-/// What a tetrahedron is at rest.
+/// A tetrahedron at rest.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Element {
-    /// Vertices, numbered over all solids.
+    /// Vertices, numbered consecutively over all solids.
     pub corners: [u32; 4],
     /// Volume, above 0.
     pub volume: f64,

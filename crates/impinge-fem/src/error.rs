@@ -1,18 +1,18 @@
-//! Everything that can go wrong, by name.
+//! Errors of simulations.
 
-/// Why a simulation could not be set up, or a step not be made. A failed step leaves the
-/// simulation as it was before.
+/// Why a simulation could not be set up, or why a step failed. A failed step leaves the
+/// simulation unchanged.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A number lies outside its range. Check the material or the settings.
+    /// A number is outside its range. Check the material or the settings.
     #[error("{what}: {given} given, {allowed} allowed")]
     Setting {
-        /// What it sets.
+        /// The name of the number.
         what: &'static str,
         /// The value as given.
         given: f64,
-        /// What is allowed.
+        /// The allowed range.
         allowed: &'static str,
     },
     /// A tetrahedron names a vertex that does not exist. Check the index buffer's base.
@@ -29,7 +29,7 @@ pub enum Error {
         /// How many vertices the solid has.
         n_vertices: usize,
     },
-    /// A tetrahedron has no volume at rest, so strains in it are not defined. Mesh again.
+    /// A tetrahedron has no volume at rest, so its strain is undefined. Mesh again.
     #[error("solid {solid}: tetrahedron {tetrahedron} is flat at rest (volume {volume:e})")]
     FlatTetrahedron {
         /// Number of the solid, in the order given.
@@ -58,12 +58,12 @@ pub enum Error {
         /// How many vertices the solid has.
         n_vertices: usize,
     },
-    /// There is not one position (or velocity) a vertex.
+    /// The number of positions or velocities is not the number of vertices.
     #[error("solid {solid}: {given} {what} given, but it has {expected} vertices")]
     WrongNumber {
         /// Number of the solid, in the order given.
         solid: usize,
-        /// What was given: positions or velocities.
+        /// The kind of vectors: positions or velocities.
         what: &'static str,
         /// How many were given.
         given: usize,
@@ -78,21 +78,21 @@ pub enum Error {
         solid: usize,
         /// Index of the vertex within the solid.
         vertex: usize,
-        /// What is not finite.
+        /// The kind of vector: position or velocity.
         what: &'static str,
         /// The value.
         value: [f64; 3],
     },
-    /// Pairs that name a tetrahedron which is not there: they come from another scene.
+    /// A pair names a tetrahedron that does not exist: the pairs come from another scene.
     #[error("no such pair of tetrahedra in this simulation: {row:?}")]
     ForeignPair {
         /// The row: body, tetrahedron, body, tetrahedron.
         row: [u32; 4],
     },
-    /// More than 32-bit indices can name.
+    /// More elements than 32-bit indices can number.
     #[error("{what}: {given} given, at most {limit} can be held")]
     TooMany {
-        /// What there are too many of.
+        /// The kind of elements.
         what: &'static str,
         /// How many were given.
         given: usize,
@@ -105,14 +105,14 @@ pub enum Error {
     /// The threads of the pool could not be started.
     #[error("thread pool: {0}")]
     Threads(String),
-    /// The detector refused, or was cancelled.
+    /// The detector returned an error, or was cancelled.
     #[error(transparent)]
     Detection(#[from] impinge::Error),
     /// A mesh file could not be read.
     #[error(transparent)]
     File(#[from] impinge_io::Error),
     /// A mesh file holds no tetrahedra.
-    #[error("{0}: tetrahedra are needed, but it holds triangles")]
+    #[error("{0}: tetrahedra are needed, but the file holds triangles")]
     NoTetrahedra(String),
 }
 

@@ -8,7 +8,7 @@ pub(crate) struct Lists {
 }
 
 impl Lists {
-    /// For each vertex, where it is a corner: N · tuple + corner, ascending.
+    /// For each vertex, its places among the corners of the tuples: N · tuple + corner, ascending.
     pub fn of_corners<const N: usize>(
         n_vertices: usize,
         tuples: impl Iterator<Item = [u32; N]> + Clone,
@@ -18,7 +18,7 @@ impl Lists {
         lists
     }
 
-    /// [`of_corners`](Lists::of_corners) into the memory held: counts, their running sum, scatter.
+    /// Like [`of_corners`](Lists::of_corners), but reuses memory: counts, prefix sum, scatter.
     pub fn rebuild<const N: usize>(
         &mut self,
         n_vertices: usize,
@@ -36,8 +36,8 @@ impl Lists {
         }
         self.entries.clear();
         self.entries.resize(n_entries, 0);
-        // starts[v + 1] is where list v begins; filling moves it to where the list ends, which is
-        // where list v + 1 begins: the shift by one undoes itself.
+        // At first starts[v + 1] is the beginning of list v. Filling the list advances it to the end of the
+        // list, which is the beginning of list v + 1, as it should be.
         let mut entry = 0;
         for tuple in tuples {
             for vertex in tuple {
@@ -72,7 +72,7 @@ impl Lists {
         &self.entries[self.range(list)]
     }
 
-    /// Where the list's entries are.
+    /// The range of the list in the entries.
     #[inline]
     pub fn range(&self, list: usize) -> std::ops::Range<usize> {
         self.starts[list] as usize..self.starts[list + 1] as usize

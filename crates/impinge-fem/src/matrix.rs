@@ -1,4 +1,4 @@
-//! The system matrix: 3×3 blocks where two vertices share a tetrahedron, in compressed rows.
+//! The system matrix: 3×3 blocks for every two vertices that share a tetrahedron, in compressed rows.
 
 use rayon::prelude::*;
 
@@ -7,21 +7,22 @@ use crate::element::{Mat3, Vec3};
 use crate::lists::Lists;
 use crate::mesh::Mesh;
 
-/// Symmetric in values; all blocks are held, so that each row is summed by one thread in one order.
+/// The matrix is symmetric, but all blocks are stored, so that one thread sums each row in a fixed order.
 #[derive(Debug)]
 pub(crate) struct BlockMatrix {
     /// Columns of each row, ascending.
     columns: Lists,
     /// The blocks, row after row.
     blocks: Vec<Mat3>,
-    /// Where the block on the diagonal of each row is.
+    /// The index of the diagonal block of each row.
     diagonal: Vec<u32>,
-    /// For each block, the pairs of corners that make it: 16 · element + 4 · row's + column's, ascending.
+    /// For each block, the pairs of corners that contribute to it: 16 · element + 4 · row's corner + column's corner,
+    /// ascending.
     contributions: Lists,
 }
 
 impl BlockMatrix {
-    /// The pattern, which never changes; blocks are 0.
+    /// The matrix with its pattern, which never changes; blocks are 0.
     pub fn new(mesh: &Mesh) -> Self {
         let mut columns = Lists::default();
         let mut contributions = Lists::default();
@@ -53,7 +54,7 @@ impl BlockMatrix {
         }
     }
 
-    /// `factor` times the stiffness.
+    /// Sets the matrix to `factor` times the stiffness.
     pub fn assemble(&mut self, turned: &[Turned], factor: f64) {
         let contributions = &self.contributions;
         self.blocks
@@ -77,7 +78,7 @@ impl BlockMatrix {
         &self.blocks[self.diagonal[row] as usize]
     }
 
-    /// The same, to be added to.
+    /// The same block, mutable.
     pub fn diagonal_mut(&mut self, row: usize) -> &mut Mat3 {
         &mut self.blocks[self.diagonal[row] as usize]
     }

@@ -1,4 +1,4 @@
-//! All solids as one mesh: rest quantities, the surface, and who is incident on whom. Computed once.
+//! All solids as one mesh: rest quantities, the surface, and incidences. Computed once.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -11,11 +11,11 @@ use crate::error::Error;
 use crate::lists::Lists;
 use crate::solid::Solid;
 
-/// A tetrahedron's volume below this share of its longest edge cubed counts as flat: strains would
+/// A tetrahedron with a volume below this share of its longest edge cubed counts as flat: its strains would
 /// be rounding errors.
 const FLAT: f64 = 1e-9;
 
-/// Where a solid's vertices and tetrahedra are in the arrays over all solids.
+/// The ranges of a solid's vertices and tetrahedra in the arrays over all solids.
 #[derive(Debug, Clone)]
 pub(crate) struct Part {
     pub vertices: Range<usize>,
@@ -30,18 +30,18 @@ pub(crate) struct Part {
 pub(crate) struct Mesh {
     pub parts: Vec<Part>,
     pub elements: Vec<Element>,
-    /// Lumped mass of each vertex: a quarter of each of its tetrahedra.
+    /// Lumped mass of each vertex: a quarter of the mass of each of its tetrahedra.
     pub masses: Vec<f64>,
     pub fixed: Vec<bool>,
     /// Surface triangles, seen from outside counter-clockwise at rest.
     pub surface: Vec<[u32; 3]>,
-    /// A third of the rest area of a vertex' surface triangles; 0 inside.
+    /// A third of the rest area of a vertex's surface triangles; 0 inside.
     pub areas: Vec<f64>,
-    /// How deep below the surface a vertex is at rest; 0 on it.
+    /// The depth of a vertex below the surface at rest; 0 on the surface.
     pub depths: Vec<f64>,
-    /// Each vertex' tetrahedra, as 4 · element + corner, ascending.
+    /// Each vertex's tetrahedra, as 4 · element + corner, ascending.
     pub tets_at: Lists,
-    /// Each vertex' surface triangles, ascending.
+    /// Each vertex's surface triangles, ascending.
     pub faces_at: Lists,
 }
 
@@ -83,7 +83,7 @@ impl Mesh {
         self.masses.len()
     }
 
-    /// The solid that holds a vertex, and the vertex' number in it.
+    /// The solid that holds a vertex, and the vertex's number in it.
     pub fn locate(&self, vertex: usize) -> (usize, usize) {
         let solid = self
             .parts
@@ -147,7 +147,7 @@ impl Mesh {
     }
 }
 
-/// Volume and gradients, or the volume of a flat one.
+/// A rest element; for a flat one, its volume as the error.
 fn element(corners: [u32; 4], rest: &[Vec3], lame: (f64, f64)) -> Result<Element, f64> {
     let [a, b, c, d] = corners.map(|corner| rest[corner as usize]);
     let edges = [b - a, c - a, d - a];
@@ -171,7 +171,7 @@ fn element(corners: [u32; 4], rest: &[Vec3], lame: (f64, f64)) -> Result<Element
     })
 }
 
-/// Faces that belong to one tetrahedron only, turned outwards, in the order of the tetrahedra.
+/// Faces of only one tetrahedron, oriented outwards, in the order of the tetrahedra.
 fn surface(elements: &[Element], rest: &[Vec3]) -> Vec<[u32; 3]> {
     const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
     let key = |face: [u32; 3]| {

@@ -1,4 +1,4 @@
-//! What two tetrahedra have in common: a convex polyhedron, cut out piece by piece.
+//! The intersection of two tetrahedra: a convex polyhedron, cut out piece by piece.
 
 use crate::element::Vec3;
 
@@ -10,8 +10,8 @@ const FACES: [([usize; 3], usize); 4] = [
     ([0, 1, 2], 3),
 ];
 
-/// Cuts a tetrahedron by the faces of another one. Each cut leaves a piece as it is, drops it or
-/// makes at most three tetrahedra of it, so there are never more than 81 and mostly about ten.
+/// Cuts a tetrahedron by the faces of another one. Each cut leaves a piece as it is, drops it or splits
+/// it into at most three tetrahedra, so there are never more than 81 pieces, and mostly about ten.
 #[derive(Debug, Default)]
 pub(crate) struct Clipper {
     pieces: Vec<[Vec3; 4]>,
@@ -19,7 +19,7 @@ pub(crate) struct Clipper {
 }
 
 impl Clipper {
-    /// Cuts `a` by `b`, of any orientation. What is left fills the intersection.
+    /// Cuts `a` by `b`, of any orientation. The remaining pieces fill the intersection.
     pub fn clip(&mut self, a: &[Vec3; 4], b: &[Vec3; 4]) {
         self.pieces.clear();
         self.pieces.push(*a);
@@ -43,7 +43,7 @@ impl Clipper {
         }
     }
 
-    /// Volume and centroid of what is left; `None` where it has no volume.
+    /// Volume and centroid of the intersection; `None` if it has no volume.
     pub fn volume(&self) -> Option<(f64, Vec3)> {
         let (volume, moment) =
             self.pieces
@@ -56,7 +56,7 @@ impl Clipper {
         (volume > 0.0).then(|| (volume, moment / volume))
     }
 
-    /// How far what is left extends along a unit vector.
+    /// The extent of the intersection along a unit vector.
     pub fn extent(&self, along: &Vec3) -> f64 {
         let heights = self.pieces.iter().flatten().map(|x| along.dot(x));
         let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| {
@@ -66,7 +66,7 @@ impl Clipper {
     }
 }
 
-/// The part of a piece on the side of a plane where the heights of its corners are 0 or more.
+/// Adds to `out` the part of a piece with height 0 or more, given the heights of its corners over a plane.
 fn cut(piece: &[Vec3; 4], heights: [f64; 4], out: &mut Vec<[Vec3; 4]>) {
     // Corners above first.
     let mut order = [0, 1, 2, 3];

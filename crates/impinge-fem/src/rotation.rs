@@ -1,17 +1,17 @@
-//! The rotation in a deformation: polar decomposition, kept sensible under inversion.
+//! The rotation in a deformation: polar decomposition that handles inversion.
 //!
-//! Müller & Gross 2004 take the rotation R of F = R S. Where an element is inverted (det F < 0) the
-//! polar decomposition gives a reflection; Irving, Teran & Fedkiw 2004 (section 4) take the singular
+//! Müller & Gross 2004 use the rotation R of F = R S. If an element is inverted (det F < 0), the
+//! polar decomposition gives a reflection. Irving, Teran & Fedkiw 2004 (section 4) use the singular
 //! value decomposition F = U Σ Vᵀ with proper rotations U, V and let the *smallest* singular value be
-//! negative: the element is pushed back along the direction in which it is least inverted. R = U Vᵀ.
+//! negative, so that the element is pushed back along the direction in which it is least inverted. R = U Vᵀ.
 //!
 //! For det F well above 0 both agree, and Newton's iteration for the polar factor, scaled
-//! (Higham 1986, section 3), is several times faster than an SVD; elsewhere the SVD is taken.
+//! (Higham 1986, section 3), is several times faster than an SVD; otherwise the SVD is used.
 
 use nalgebra::{Matrix3, Vector3};
 
 /// Below this share of the determinant of a conformal map of the same size, Newton's iteration would
-/// need many steps or go to the wrong side: the SVD is taken.
+/// need many steps or converge to a reflection, so the SVD is used.
 const WELL_CONDITIONED: f64 = 1e-2;
 
 /// The rotation nearest to `f` (in the Frobenius norm): orthogonal, determinant 1. It does not depend
@@ -36,7 +36,7 @@ pub(crate) fn cofactors(f: &Matrix3<f64>) -> Matrix3<f64> {
 }
 
 fn newton(mut r: Matrix3<f64>) -> Matrix3<f64> {
-    // Quadratic convergence: 3 to 5 rounds for what comes up, 10 at the threshold.
+    // Quadratic convergence: 3 to 5 rounds in practice, 10 at the threshold.
     for _ in 0..20 {
         let cofactors = cofactors(&r);
         let det = r.column(0).dot(&cofactors.column(0));
@@ -61,12 +61,12 @@ fn signed_svd(f: &Matrix3<f64>) -> Matrix3<f64> {
         return Matrix3::identity();
     };
     if u.determinant() * v_t.determinant() < 0.0 {
-        // U or V reflects; turning the axis of the smallest singular value round makes it a rotation.
+        // U or V is a reflection; reversing the axis of the smallest singular value makes it a rotation.
         let smallest = svd.singular_values.imin();
         u.column_mut(smallest).neg_mut();
     }
     let r = u * v_t;
-    // A decomposition of a matrix of rank 1 or less may come back without full bases.
+    // The decomposition of a matrix of rank 1 or less may lack full bases.
     let defect = (r.transpose() * r - Matrix3::identity()).norm();
     if defect < 1e-6 {
         r
@@ -75,8 +75,8 @@ fn signed_svd(f: &Matrix3<f64>) -> Matrix3<f64> {
     }
 }
 
-/// A rotation that maps the directions in which `f` is largest as `f` does, for matrices of (nearly)
-/// rank 1: all rotations that do are equally near, so any will do.
+/// For matrices of (nearly) rank 1: a rotation that maps the direction in which `f` is largest as `f` does.
+/// All such rotations are equally near to `f`, so any will do.
 fn from_dominant_axes(f: &Matrix3<f64>) -> Matrix3<f64> {
     let eigen = (f.transpose() * f).symmetric_eigen();
     let from: Vector3<f64> = eigen
@@ -86,7 +86,7 @@ fn from_dominant_axes(f: &Matrix3<f64>) -> Matrix3<f64> {
     let to = f * from;
     nalgebra::Rotation3::rotation_between(&from, &to)
         .unwrap_or_else(|| {
-            // Opposite directions: half a turn about any axis across.
+            // Opposite directions: half a turn about any perpendicular axis.
             let across = from.cross(&Vector3::ith(from.iamin(), 1.0));
             nalgebra::Rotation3::from_axis_angle(
                 &nalgebra::Unit::new_normalize(across),

@@ -1,8 +1,8 @@
 //! Scenes with large deformation: one body dropped on another one like it.
 //!
-//! The bodies are those of the paper's table 2 as far as their meshes are at hand. They come from files that are
-//! not part of the repository (`tets/*.msh` in the folder of shared data, see [`impinge_scenes::data`]);
-//! where they are absent, balls of about the same number of tetrahedra stand in, and say so.
+//! The bodies are those of the paper's table 2, with other meshes of about the same size. The files are
+//! not part of the repository (`tets/*.msh` in the folder of shared data, see [`impinge_scenes::data`]).
+//! If a file is absent, a ball of about the same number of tetrahedra stands in, and the scene's label says so.
 
 use std::path::Path;
 
@@ -30,7 +30,7 @@ pub enum SceneName {
 }
 
 impl SceneName {
-    /// All of them.
+    /// All scenes.
     pub const ALL: [SceneName; 5] = [
         SceneName::Bunny7k,
         SceneName::Bunny19k,
@@ -39,7 +39,7 @@ impl SceneName {
         SceneName::Blocks,
     ];
 
-    /// As on the command line: `"bunny-7k"` and so on.
+    /// The name on the command line: `"bunny-7k"` and so on.
     pub fn name(self) -> &'static str {
         match self {
             SceneName::Bunny7k => "bunny-7k",
@@ -65,19 +65,19 @@ impl SceneName {
 /// A scene ready to be simulated.
 #[derive(Debug, Clone)]
 pub struct DropScene {
-    /// What it is, with the number of tetrahedra; a stand-in says that it is one.
+    /// A description with the number of tetrahedra; it says if the body is a stand-in.
     pub label: String,
     /// Whether a generated body stands in for a mesh that is absent.
     pub is_stand_in: bool,
     /// The lower body, and the one that is dropped on it.
     pub solids: Vec<Solid>,
-    /// How to simulate it.
+    /// The settings of its simulation.
     pub settings: Settings,
-    /// Enough steps to fall, to be crushed and to come to rest again.
+    /// Enough steps for the upper body to fall, to be crushed and to come to rest again.
     pub n_steps: u64,
 }
 
-/// What the bodies are made of: soft enough to be crushed to a fraction of their height.
+/// The material of the bodies: soft enough to be crushed to a fraction of their height.
 pub const SOFT: Material = Material {
     young: 3e4,
     poisson: 0.4,
@@ -88,13 +88,13 @@ pub const SOFT: Material = Material {
 /// on the lower one.
 ///
 /// # Errors
-/// A mesh file that is there but can't be read, or holds no tetrahedra.
+/// A mesh file that exists but can't be read, or holds no tetrahedra.
 pub fn drop_scene(name: SceneName) -> Result<DropScene, Error> {
     let mesh = name.file().and_then(|(path, _)| data::data_file(path));
     build(name, mesh.as_deref())
 }
 
-/// The same scene with a mesh of the caller's: a file of tetrahedra.
+/// The same scene with the caller's mesh: a file of tetrahedra.
 ///
 /// # Errors
 /// A file that can't be read, or holds no tetrahedra.
@@ -103,11 +103,11 @@ pub fn drop_scene_of(path: &Path) -> Result<DropScene, Error> {
     Ok(dropped(load(path, SOFT)?, label, false))
 }
 
-/// The scene with a mesh from a file, or without one.
+/// The scene with a mesh from a file, or with a generated one.
 fn build(name: SceneName, mesh: Option<&Path>) -> Result<DropScene, Error> {
     let (solid, label, is_stand_in) = match name.file() {
         None => {
-            // A block weighs far more than a bunny in the same box.
+            // A block is far heavier than a bunny in the same box, so its material is stiffer.
             let material = Material { young: 1e5, ..SOFT };
             let solid = block(6, 6, 6, 1.0 / 6.0, material);
             (solid, "block".to_owned(), false)
@@ -143,7 +143,7 @@ fn dropped(solid: Solid, label: String, is_stand_in: bool) -> DropScene {
                 normal: [0.0, 1.0, 0.0],
                 height: 0.0,
             }),
-            // An error in the velocities far below what gravity adds in a step.
+            // The error in the velocities is far below the velocity that gravity adds in a step.
             tolerance: 1e-4,
             // Enough for the bodies to stay together after the first impact.
             damping: Damping {
@@ -170,8 +170,8 @@ pub fn load(path: &Path, material: Material) -> Result<Solid, Error> {
     }
 }
 
-/// A block of `n_x` by `n_y` by `n_z` cubes with edge `spacing` in metres, from the origin on, six
-/// tetrahedra each.
+/// A block of `n_x` by `n_y` by `n_z` cubes of six tetrahedra with edge `spacing` in metres; one corner is at
+/// the origin.
 pub fn block(n_x: usize, n_y: usize, n_z: usize, spacing: f64, material: Material) -> Solid {
     let model = solids::block(n_x, n_y, n_z, 1.0);
     let rest = model.positions_f64();
@@ -244,6 +244,9 @@ mod tests {
             return;
         };
         let error = build(SceneName::Bunny7k, Some(&path)).unwrap_err();
-        assert!(error.to_string().contains("it holds triangles"), "{error}");
+        assert!(
+            error.to_string().contains("the file holds triangles"),
+            "{error}"
+        );
     }
 }

@@ -1,18 +1,18 @@
-//! What a simulation may be told.
+//! Settings of a simulation.
 
 use crate::error::{Error, check};
 
 /// Solid ground: the half-space where `normal · x < height`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ground {
-    /// The way up; its length does not matter, but it is not 0.
+    /// The upward direction, of any length except 0.
     pub normal: [f64; 3],
-    /// Where the ground begins along the unit normal, in metres.
+    /// The height of the ground's surface along the unit normal, in metres.
     pub height: f64,
 }
 
-/// Rayleigh damping: the damping matrix is `mass` · M + `stiffness` · K. Backward Euler damps by
-/// itself, the more, the longer the step.
+/// Rayleigh damping: the damping matrix is `mass` · M + `stiffness` · K. Backward Euler also damps by
+/// itself, and more for longer steps.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Damping {
     /// Share of the mass matrix, in 1/s, 0 or more.
@@ -32,7 +32,7 @@ pub struct Settings {
     pub ground: Option<Ground>,
     /// Rayleigh damping.
     pub damping: Damping,
-    /// Hardness of contact, above 0: how many times Young's modulus the pressure is where bodies
+    /// Hardness of contact, above 0: the pressure, in multiples of Young's modulus, where bodies
     /// overlap by the length of an edge.
     pub contact_stiffness: f64,
     /// Coefficient of friction between bodies and with the ground, 0 or more.
@@ -41,14 +41,14 @@ pub struct Settings {
     pub self_contact: bool,
     /// Residual at which the solver stops, relative to the right side, above 0.
     pub tolerance: f64,
-    /// The most iterations of the solver a step, at least 1.
+    /// The most iterations of the solver per step, at least 1.
     pub max_iterations: usize,
-    /// Threads; 0 means one a core. The result does not depend on it.
+    /// Threads; 0 means one per core. The result does not depend on it.
     pub threads: usize,
 }
 
 impl Default for Settings {
-    /// 5 ms a step, gravity along -y, no ground, no damping, contact of 4 moduli, friction 0.3, a
+    /// 5 ms per step, gravity along -y, no ground, no damping, contact of 4 moduli, friction 0.3, a
     /// residual of 1e-5.
     fn default() -> Self {
         Settings {

@@ -1,4 +1,4 @@
-//! The loop: detect, then a step of backward Euler.
+//! The simulation loop: detection, then a step of backward Euler.
 
 use impinge::{BodyId, Control, Detector, Pairs, Query, Scene, Statistics};
 use rayon::prelude::*;
@@ -18,10 +18,10 @@ use crate::state::{State, fingerprint};
 /// Elastic solids in contact, moved by backward Euler.
 ///
 /// A step solves `(M + h D + h² K) v' = M v + h f` for the new velocities, with the stiffness K and all
-/// forces f of the step's beginning: one round of Newton's method, as Müller & Gross 2004 do. D is
-/// Rayleigh's damping. Then `x' = x + h v'`. Contacts add to K as [`contact`](crate#contact) says.
+/// forces f at the beginning of the step: one round of Newton's method, as in Müller & Gross 2004. D is
+/// Rayleigh damping. Then `x' = x + h v'`. Contacts add to K as described in [`contact`](crate#contact).
 ///
-/// Positions are f64 inside; the [`scene`](Simulation::scene) that is detected in and written to files holds
+/// Positions are f64 inside. The [`scene`](Simulation::scene), which detection uses and files contain, holds
 /// them rounded to f32.
 ///
 /// ```
@@ -57,7 +57,7 @@ pub struct Simulation {
     scratch: StepScratch,
 }
 
-/// Memory of a step, kept for the next.
+/// Scratch memory, reused from step to step.
 #[derive(Default)]
 struct StepScratch {
     turned: Vec<Turned>,
@@ -71,32 +71,32 @@ struct StepScratch {
     next_positions: Vec<Vec3>,
 }
 
-/// What a step found, and what it cost.
+/// Counts and times of a step.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct StepReport {
     /// Number of the step, from 0; it leads from state `step` to `step + 1`.
     pub step: u64,
-    /// Pairs of tetrahedra that the detector found at the step's beginning.
+    /// Pairs of tetrahedra that the detector found at the beginning of the step.
     pub n_pairs: usize,
-    /// Those of them that have a volume in common, and so push.
+    /// Those of them whose intersection has a volume, so that they push each other.
     pub n_contacts: usize,
     /// Colliding tetrahedra of each solid.
     pub n_colliding: Vec<usize>,
-    /// The detection in milliseconds, as the detector measures it.
+    /// Time of detection in milliseconds, as measured by the detector.
     pub detect_ms: f64,
-    /// Cutting out what pairs have in common, in milliseconds.
+    /// Time of computing intersections of pairs, in milliseconds.
     pub contact_ms: f64,
-    /// Rotations, forces and matrix, in milliseconds.
+    /// Time of rotations, forces and matrix, in milliseconds.
     pub assemble_ms: f64,
-    /// The solver, in milliseconds.
+    /// Time of the solver, in milliseconds.
     pub solve_ms: f64,
-    /// All of the step but the detection, in milliseconds.
+    /// Time of the whole step except detection, in milliseconds.
     pub advance_ms: f64,
     /// Iterations of the solver.
     pub n_iterations: usize,
-    /// The residual that the solver reached, relative to the right side. Above the tolerance where the
-    /// iterations did not suffice.
+    /// The residual that the solver reached, relative to the right side. It is above the tolerance if the
+    /// solver ran out of iterations.
     pub residual: f64,
     /// Counts and times of the detection.
     pub detection: Statistics,
@@ -105,23 +105,23 @@ pub struct StepReport {
 /// Energies in joule.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Energy {
-    /// Of the motion.
+    /// Kinetic energy.
     pub kinetic: f64,
-    /// Of the strain.
+    /// Elastic energy.
     pub elastic: f64,
-    /// Of the height, 0 at the origin.
+    /// Potential energy of gravity, 0 at the origin.
     pub potential: f64,
 }
 
 impl Energy {
-    /// All of it; contacts are not counted.
+    /// The sum of all three, without contacts.
     pub fn total(self) -> f64 {
         self.kinetic + self.elastic + self.potential
     }
 }
 
 impl Simulation {
-    /// Sets up solids at their start.
+    /// Sets up solids in their initial state.
     ///
     /// # Errors
     /// A setting or material out of its range; a solid that is refused (index out of range, flat
@@ -166,12 +166,12 @@ impl Simulation {
         })
     }
 
-    /// How many steps have been made.
+    /// The number of steps made so far.
     pub fn n_steps(&self) -> u64 {
         self.step
     }
 
-    /// What it was told.
+    /// The settings.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
@@ -186,27 +186,27 @@ impl Simulation {
         &self.bodies
     }
 
-    /// What is asked of the detector: pairs of different solids, with self-contact also of one.
+    /// The query for the detector: pairs of different solids, and with self-contact also pairs within one solid.
     pub fn query(&self) -> &Query {
         &self.query
     }
 
-    /// Positions of all vertices, a solid after the other, in metres.
+    /// Positions of all vertices, solid by solid, in metres.
     pub fn positions(&self) -> Vec<[f64; 3]> {
         self.positions.iter().map(|&v| v.into()).collect()
     }
 
-    /// Velocities of all vertices, a solid after the other, in m/s.
+    /// Velocities of all vertices, solid by solid, in m/s.
     pub fn velocities(&self) -> Vec<[f64; 3]> {
         self.velocities.iter().map(|&v| v.into()).collect()
     }
 
-    /// Lumped masses of all vertices, a solid after the other, in kg.
+    /// Lumped masses of all vertices, solid by solid, in kg.
     pub fn masses(&self) -> &[f64] {
         &self.mesh.masses
     }
 
-    /// Elastic forces on all vertices as they are now, in newton.
+    /// Current elastic forces on all vertices, in newton.
     pub fn elastic_forces(&self) -> Vec<[f64; 3]> {
         let (mut turned, mut found) = (Vec::new(), Vec::new());
         self.pool.install(|| {
@@ -216,7 +216,7 @@ impl Simulation {
         found.into_iter().map(Into::into).collect()
     }
 
-    /// Forces that contacts of these pairs put on all vertices, in newton. The ground is not among them.
+    /// Forces of the contacts of these pairs on all vertices, in newton, without the forces of the ground.
     ///
     /// # Errors
     /// [`Error::ForeignPair`] for pairs of another scene.
@@ -233,7 +233,7 @@ impl Simulation {
             .collect())
     }
 
-    /// The energies now.
+    /// The current energies.
     pub fn energy(&self) -> Energy {
         let gravity = Vec3::from(self.settings.gravity);
         let (mut kinetic, mut potential) = (0.0, 0.0);
@@ -261,7 +261,7 @@ impl Simulation {
         sum.into()
     }
 
-    /// Detects, then advances: one step.
+    /// Makes one step: detects, then advances.
     ///
     /// # Errors
     /// As [`detect`](Simulation::detect) and [`advance`](Simulation::advance).
@@ -270,8 +270,8 @@ impl Simulation {
         self.advance(pairs)
     }
 
-    /// Finds the pairs of tetrahedra that meet now: the first half of a step, for who wants to see
-    /// them together with the positions at which they were found.
+    /// Finds the pairs of tetrahedra that intersect now: the first half of a step. Use it to see the
+    /// pairs together with the positions at which they were found.
     ///
     /// # Errors
     /// As [`Detector::detect_with`].
@@ -283,11 +283,11 @@ impl Simulation {
         Ok(detector.detect_with(&self.scene, &self.query, control)?)
     }
 
-    /// Moves on by one time step, with contacts from the pairs of this simulation's
+    /// Advances by one time step, with contacts from the pairs found by this simulation's
     /// [`detect`](Simulation::detect): the second half of a step.
     ///
     /// # Errors
-    /// [`Error::ForeignPair`]; [`Error::NotFinite`] where the solids flew apart. The simulation is then as it was.
+    /// [`Error::ForeignPair`]; [`Error::NotFinite`] if the motion diverges. The simulation is then unchanged.
     pub fn advance(&mut self, pairs: &Pairs) -> Result<StepReport, Error> {
         let start = Instant::now();
         let mut scratch = std::mem::take(&mut self.scratch);
@@ -324,7 +324,7 @@ impl Simulation {
         })
     }
 
-    /// Takes over positions and velocities, unless one is not finite.
+    /// Accepts the new positions and velocities if all of them are finite.
     fn accept(&mut self, scratch: &StepScratch) -> Result<(), Error> {
         let StepScratch {
             next_positions,
@@ -348,7 +348,7 @@ impl Simulation {
         self.show()
     }
 
-    /// Puts the positions into the scene.
+    /// Copies the positions to the scene.
     fn show(&mut self) -> Result<(), Error> {
         for (&body, part) in self.bodies.iter().zip(&self.mesh.parts) {
             let shown = self.scene.positions_mut::<f32>(body)?;
@@ -359,7 +359,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// The state now, to go on from later.
+    /// The current state, from which a simulation can continue later.
     pub fn state(&self) -> State {
         State {
             fingerprint: self.fingerprint,
@@ -369,8 +369,8 @@ impl Simulation {
         }
     }
 
-    /// Goes on from a state of a simulation of the same solids with the same settings; the number of
-    /// threads may differ. What follows is what would have followed there, bit by bit.
+    /// Continues from a state of a simulation of the same solids with the same settings; the number of
+    /// threads may differ. The following steps give the same bits as they would have given there.
     ///
     /// # Errors
     /// [`Error::State`] for a state of another simulation; [`Error::NotFinite`].
@@ -504,7 +504,7 @@ fn ms_since(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }
 
-/// The f32 nearest to a coordinate: the one place where the simulation leaves double precision.
+/// The f32 nearest to a coordinate. The simulation leaves double precision only here.
 fn to_f32(x: f64) -> f32 {
     x as f32
 }

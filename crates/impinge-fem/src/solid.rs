@@ -1,4 +1,4 @@
-//! What is simulated: a mesh at rest, its material, where it starts.
+//! A body to simulate: a mesh at rest, its material, its initial state.
 
 use crate::error::{Error, check};
 
@@ -9,7 +9,7 @@ pub struct Material {
     pub young: f64,
     /// Poisson's ratio, from 0 up to, but not including, 0.5. Linear tetrahedra lock near 0.5.
     pub poisson: f64,
-    /// Mass a volume at rest in kg/m³, above 0.
+    /// Mass per volume at rest in kg/m³, above 0.
     pub density: f64,
 }
 
@@ -70,7 +70,7 @@ pub struct Solid {
     pub velocities: Vec<[f64; 3]>,
     /// Vertices that stay where they start.
     pub fixed: Vec<u32>,
-    /// What it is made of.
+    /// The material.
     pub material: Material,
 }
 
@@ -87,19 +87,19 @@ impl Solid {
         }
     }
 
-    /// The same solid, started with every position mapped: moved, turned, stretched.
+    /// The same solid with every initial position mapped: moved, turned, stretched.
     pub fn posed(mut self, map: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
         self.positions.iter_mut().for_each(|p| *p = map(*p));
         self
     }
 
-    /// The same solid, started with the velocity in m/s at every vertex.
+    /// The same solid with this initial velocity in m/s at every vertex.
     pub fn moving(mut self, velocity: [f64; 3]) -> Self {
         self.velocities.fill(velocity);
         self
     }
 
-    /// The same solid with the vertices fixed whose rest position the predicate picks.
+    /// The same solid, with those vertices fixed whose rest position satisfies the predicate.
     pub fn fixed_where(mut self, pick: impl Fn([f64; 3]) -> bool) -> Self {
         self.fixed = (0u32..)
             .zip(&self.rest)
@@ -147,7 +147,7 @@ impl Solid {
         self
     }
 
-    /// Checks everything but volumes, which need the tetrahedra's geometry.
+    /// Checks everything except volumes, which need the tetrahedra's geometry.
     pub(crate) fn check(&self, solid: usize) -> Result<(), Error> {
         self.material.check()?;
         let n_vertices = self.rest.len();

@@ -1,8 +1,8 @@
 //! Conjugate gradients with a block-Jacobi preconditioner.
 //!
 //! Hestenes & Stiefel 1952; fixed vertices are filtered as by Baraff & Witkin 1998 (section 5.3):
-//! their unknowns stay what they are and their residuals count as 0. Sums run over fixed pieces of
-//! the vertices, each in order, and then over the pieces in order: the same bits on any number of threads.
+//! their unknowns do not change and their residuals count as 0. Sums run over fixed pieces of
+//! the vertices, each in order, and then over the pieces in order, so they do not depend on the number of threads.
 
 use rayon::prelude::*;
 
@@ -18,7 +18,7 @@ pub(crate) struct System<'a> {
     pub fixed: &'a [bool],
 }
 
-/// How far the solver came.
+/// The result of the solver.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Solved {
     pub n_iterations: usize,
@@ -26,7 +26,7 @@ pub(crate) struct Solved {
     pub residual: f64,
 }
 
-/// Vectors that the solver needs, kept from step to step.
+/// Scratch vectors of the solver, reused from step to step.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     residual: Vec<Vec3>,
@@ -39,7 +39,7 @@ pub(crate) struct Scratch {
 }
 
 impl System<'_> {
-    /// `out = A x`, 0 at fixed vertices; gives `x · out`.
+    /// Computes `out = A x`, 0 at fixed vertices; returns `x · out`.
     fn multiply(
         &self,
         x: &[Vec3],
@@ -127,13 +127,13 @@ impl System<'_> {
         while norm > goal && n_iterations < max_iterations {
             n_iterations += 1;
             let curvature = self.multiply(direction, coupled, product, sums);
-            // A matrix that rounding makes indefinite, or a vector that is not finite, ends the search.
+            // Stops if rounding made the matrix indefinite, or if a vector is not finite.
             if curvature.is_nan() || curvature <= 0.0 {
                 break;
             }
             let step = norm / curvature;
-            // One pass over all vectors: the solution moves, the residual follows, and so do its
-            // preconditioned self and their product.
+            // One pass over all vectors updates the solution, the residual, the preconditioned residual and
+            // the product of these two.
             x.par_chunks_mut(GRAIN)
                 .zip(residual.par_chunks_mut(GRAIN))
                 .zip(preconditioned.par_chunks_mut(GRAIN))

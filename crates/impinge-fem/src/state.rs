@@ -1,10 +1,10 @@
-//! A simulation's state as bytes, to stop and go on later.
+//! A simulation's state as bytes, to stop and continue later.
 //!
 //! ```text
 //! "impinge state 1\n" | fingerprint u64 | step u64 | n vertices u64 | positions 3n f64 | velocities 3n f64 | checksum u64
 //! ```
-//! All numbers are little-endian. The fingerprint names the solids and the settings that decide the
-//! result; the checksum covers all bytes before it. Both are FNV-1a, 64 bits (Fowler, Noll, Vo).
+//! All numbers are little-endian. The fingerprint identifies the solids and the settings that affect the
+//! result; the checksum covers all bytes before it. Both are 64-bit FNV-1a (Fowler, Noll, Vo).
 
 use crate::error::Error;
 use crate::settings::Settings;
@@ -12,7 +12,7 @@ use crate::solid::{Material, Solid};
 
 const MAGIC: &[u8; 16] = b"impinge state 1\n";
 
-/// Where everything is, and how fast it moves, after a number of steps.
+/// Positions and velocities of all vertices after a number of steps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct State {
     pub(crate) fingerprint: u64,
@@ -22,7 +22,7 @@ pub struct State {
 }
 
 impl State {
-    /// How many steps led here.
+    /// The number of steps made so far.
     pub fn step(&self) -> u64 {
         self.step
     }
@@ -41,15 +41,15 @@ impl State {
         bytes
     }
 
-    /// The state that was made into these bytes.
+    /// Reads the state from bytes written by [`to_bytes`](State::to_bytes).
     ///
     /// # Errors
-    /// [`Error::State`] for bytes that are not such a state, whole and undamaged.
+    /// [`Error::State`] if the bytes are not a complete, undamaged state.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
         let damaged = |what: &str| Error::State(what.to_owned());
         let rest = bytes
             .strip_prefix(MAGIC)
-            .ok_or_else(|| damaged("this is no saved state"))?;
+            .ok_or_else(|| damaged("this is not a saved state"))?;
         let (words, odd) = rest.as_chunks::<8>();
         let words: Vec<u64> = words.iter().map(|word| u64::from_le_bytes(*word)).collect();
         let [fingerprint, step, n_vertices, numbers @ .., checksum] = &words[..] else {
@@ -78,7 +78,7 @@ impl State {
     }
 }
 
-/// FNV-1a over bytes: short and the same everywhere; it guards against mistakes, not against malice.
+/// FNV-1a over bytes: short and the same everywhere. It detects mistakes, not malicious changes.
 struct Fingerprint(u64);
 
 impl Fingerprint {
@@ -115,7 +115,7 @@ impl Fingerprint {
     }
 }
 
-/// A number that differs where solids or settings do, but for what does not change the result.
+/// A hash of the solids and of all settings that affect the result.
 pub(crate) fn fingerprint(solids: &[Solid], settings: &Settings) -> u64 {
     let mut hash = Fingerprint::new();
     for solid in solids {

@@ -1,4 +1,4 @@
-//! Contact: forces that balance, bodies that do not pass, the ground, and the same bits every time.
+//! Contact: forces balance, bodies do not pass through each other, the ground holds, every run gives the same bits.
 
 mod common;
 
@@ -43,8 +43,8 @@ fn contact_forces_are_opposite_and_twist_nothing() {
     let positions = simulation.positions();
     let n = forces.len() / 2;
     let (below, above) = (sum(forces[..n].to_vec()), sum(forces[n..].to_vec()));
-    // The overlap is 0.07 m deep over the common area of two squares turned and moved; it pushes straight up but
-    // for the rim, where normals lean outwards.
+    // The overlap is 0.07 m deep over the common area of two squares, turned and moved. It pushes straight up except
+    // at the rim, where normals lean outwards.
     let pressure = settings.contact_stiffness * 1e5 * 0.07 / mean_edge();
     let area = above[1] / pressure;
     assert!((0.7..0.95).contains(&area), "{area}");
@@ -52,7 +52,7 @@ fn contact_forces_are_opposite_and_twist_nothing() {
     assert!(distance(below, above.map(|x| -x)) < 1e-9 * above[1]);
     let torque = sum(positions.iter().zip(&forces).map(|(x, f)| cross(*x, *f)));
     assert!(distance(torque, [0.0; 3]) < 1e-9 * above[1], "{torque:?}");
-    // Whoever comes first, the forces are the same.
+    // The forces do not depend on the order of the bodies.
     let swapped = Simulation::new(
         &[
             turned_block(0.4, [0.1, 0.93, -0.05]),
@@ -97,7 +97,7 @@ fn a_collision_keeps_momentum_and_gains_no_energy() {
     }
     assert!(n_contacts > 100);
     assert!(most <= start * (1.0 + 1e-9), "{start} {most}");
-    // They met and parted: the left one is slower than the right one now.
+    // They met and separated: now the left one is slower than the right one.
     let (masses, velocities) = (simulation.masses(), simulation.velocities());
     let mean = |range: std::ops::Range<usize>| {
         let mass: f64 = masses[range.clone()].iter().sum();
@@ -143,7 +143,7 @@ fn blocks_that_are_dropped_do_not_pass_through_each_other() {
         deepest = deepest.min(upper - lower);
         last = Some(report);
     }
-    // One at rest on the other: about a metre apart, in contact, nothing through the floor.
+    // One rests on the other: centroids about a metre apart, in contact, nothing below the floor.
     assert!(deepest > 0.6, "{deepest}");
     let [lower, upper] = heights(&simulation);
     assert!(
@@ -160,13 +160,13 @@ fn blocks_that_are_dropped_do_not_pass_through_each_other() {
         .fold(f64::INFINITY, |m, p| m.min(p[1]));
     assert!((-0.05..0.0).contains(&lowest), "{lowest}");
     let speed = simulation.energy().kinetic;
-    // Of some 9 kJ with which it came down, next to nothing is left.
+    // It came down with about 9 kJ; almost nothing of that is left.
     assert!(speed < 20.0, "{speed} J");
 }
 
 #[test]
 fn without_contact_they_would_pass() {
-    // The same fall with pairs that say nothing: shows that the test above can fail.
+    // The same fall with empty answers of the detector: shows that the test above can fail.
     let mut simulation = two_blocks(still());
     let mut detector = cpu();
     let mut apart = Simulation::new(
@@ -192,7 +192,7 @@ fn without_contact_they_would_pass() {
 #[test]
 fn friction_holds_on_a_slope_and_without_it_slides() {
     let slide = |friction: f64| {
-        // Gravity leans by 0.2 rad: a slope of tan 0.2 = 0.2027.
+        // Gravity is tilted by 0.2 rad: a slope of tan 0.2 = 0.2027.
         let settings = Settings {
             gravity: [9.81 * 0.2f64.sin(), -9.81 * 0.2f64.cos(), 0.0],
             ground: Some(FLOOR),
@@ -206,7 +206,7 @@ fn friction_holds_on_a_slope_and_without_it_slides() {
         let n = simulation.masses().len() as f64;
         simulation.positions().iter().map(|p| p[0]).sum::<f64>() / n
     };
-    // A second of free sliding: g sin 0.2 / 2; with friction of 0.1, g (sin 0.2 - 0.1 cos 0.2) / 2.
+    // The path in one second of free sliding: g sin 0.2 / 2; with friction of 0.1, g (sin 0.2 - 0.1 cos 0.2) / 2.
     assert!((slide(0.0) - 0.974).abs() < 0.08, "{}", slide(0.0));
     assert!((slide(0.1) - 0.494).abs() < 0.08, "{}", slide(0.1));
     assert!(slide(0.5) < 0.1, "{}", slide(0.5));
@@ -295,7 +295,7 @@ fn going_on_from_a_saved_state_is_going_on() {
         resumed.step(&mut detector).unwrap();
     }
     assert!(resumed.state() == whole.state());
-    // Another scene's state is refused, and so is one of other settings.
+    // The state of another scene is refused, and so is a state with other settings.
     let other = Settings {
         friction: 0.31,
         ..settings

@@ -12,7 +12,7 @@ const MATERIAL: Material = Material {
     density: 1e3,
 };
 
-/// A block of 4 by 3 by 3 cubes of 0.25 m whose inner vertices are shaken: no two elements alike.
+/// A block of 4 by 3 by 3 cubes of 0.25 m with randomly moved inner vertices, so that no two elements are alike.
 fn shaken_block() -> Solid {
     let mut solid = scenes::block(4, 3, 3, 0.25, MATERIAL);
     let mut random = Random::new(5);
@@ -57,8 +57,8 @@ fn patch_test_a_uniform_stretch_leaves_inner_vertices_without_force() {
         }
     }
     assert_eq!(n_inside, 3 * 2 * 2);
-    // The face x = 1 is pulled back by stress times area. Its border vertices carry parts of the sides'
-    // tractions too, which cancel between opposite sides, as these are meshed alike.
+    // The face x = 1 is pulled back by stress times area. Its border vertices also carry parts of the sides'
+    // tractions, which cancel between opposite sides, because these have the same mesh.
     let (lambda, mu) = MATERIAL.lame();
     let [xx, yy, zz, xy, xz] = [0.02, -0.03, 0.01, 0.01, -0.005];
     let normal_stress = lambda * (xx + yy + zz) + 2.0 * mu * xx;
@@ -76,7 +76,7 @@ fn patch_test_a_uniform_stretch_leaves_inner_vertices_without_force() {
 fn patch_test_inner_vertices_find_their_place() {
     let solid = shaken_block();
     let goal: Vec<[f64; 3]> = solid.rest.iter().map(|&p| stretched(p)).collect();
-    // The surface is held in the stretched pose; inside starts anywhere near.
+    // The surface is fixed in the stretched pose; inner vertices start near their places.
     let mut random = Random::new(6);
     let mut solid = solid.posed(stretched).fixed_where(|p| !is_inside(p));
     for (p, rest) in solid.positions.iter_mut().zip(&solid.rest) {
@@ -145,7 +145,7 @@ fn free_vibration_never_gains_energy_and_keeps_momentum() {
         last = now;
         assert!(distance(simulation.momentum(), momentum) < 1e-8);
     }
-    // It swings, so something is lost to the scheme, but the flight goes on.
+    // It vibrates, so the scheme loses some energy, but the motion of the centre continues.
     let flight =
         0.5 * (0.4f64.powi(2) + 0.2f64.powi(2) + 1.0) * simulation.masses().iter().sum::<f64>();
     assert!(
@@ -198,7 +198,7 @@ fn cantilever(n_across: usize) -> f64 {
     let tip: Vec<usize> = (0..solid.rest.len())
         .filter(|&v| solid.rest[v][0] > 1.0 - 1e-9)
         .collect();
-    // Steps far longer than the beam's period go straight to rest.
+    // Steps far longer than the beam's period lead directly to rest.
     let settings = Settings {
         dt: 10.0,
         tolerance: 1e-8,
@@ -219,7 +219,7 @@ fn cantilever(n_across: usize) -> f64 {
 
 #[test]
 fn a_cantilever_bends_as_the_beam_formula_says() {
-    // Timoshenko: w L⁴ / 8 E I + w L² / 2 k G A with k = 5/6; w weight a length.
+    // Timoshenko: w L⁴ / 8 E I + w L² / 2 k G A with k = 5/6; w is the weight per length.
     let (length, side, young) = (1.0f64, 0.2f64, 1e7);
     let weight = 1e3 * 9.81 * side * side;
     let inertia = side.powi(4) / 12.0;
@@ -228,8 +228,8 @@ fn a_cantilever_bends_as_the_beam_formula_says() {
         weight * length.powi(4) / (8.0 * young * inertia) + weight * length.powi(2) / (2.0 * shear);
     let coarse = cantilever(3) / expected;
     let fine = cantilever(6) / expected;
-    // Linear tetrahedra are too stiff in bending, less so when finer: the error falls with the
-    // square of the size. Extrapolated, it is the formula within 3 %.
+    // Linear tetrahedra are too stiff in bending, less so on finer meshes: the error falls with the
+    // square of the size. The extrapolated value agrees with the formula within 3 %.
     assert!(coarse < fine && fine < 1.0, "{coarse} {fine}");
     assert!(fine > 0.88, "{fine}");
     let extrapolated = fine + (fine - coarse) / 3.0;
@@ -270,7 +270,7 @@ fn inverted_elements_recover() {
         }
         let end = simulation.energy().elastic;
         if what == "point" {
-            // Nothing says which way a point should unfold; it must not stay one, nor fly apart.
+            // The direction in which a point unfolds is not defined, but it must not stay a point, nor fly apart.
             assert!(end < 0.5 * start, "{what}: {start} -> {end}");
             continue;
         }
@@ -339,7 +339,7 @@ fn bad_input_is_refused_by_name() {
     assert!(settings(&|s| s.dt = 0.0).contains("time step: 0 given"));
     assert!(settings(&|s| s.friction = -1.0).contains("friction: -1 given"));
     assert!(settings(&|s| s.max_iterations = 0).contains("solver iterations: 0 given"));
-    // Nothing to simulate is no error.
+    // A simulation without solids is not an error.
     let mut empty = Simulation::new(&[], still()).unwrap();
     assert_eq!(empty.step(&mut cpu()).unwrap().n_pairs, 0);
 }

@@ -1,4 +1,4 @@
-//! The scenes with the meshes of the shared data, where it is at hand.
+//! The scenes with the meshes of the shared data.
 
 mod common;
 
@@ -21,14 +21,14 @@ fn the_meshes_are_those_of_the_tables() {
                 std::env::var_os("IMPINGE_NO_DATA").is_some_and(|value| value == "1");
             assert!(
                 may_be_absent,
-                "the mesh of {} is absent: set IMPINGE_DATA, or IMPINGE_NO_DATA=1 to go without",
+                "the mesh of {} is absent: set IMPINGE_DATA, or IMPINGE_NO_DATA=1 to skip this test",
                 name.name()
             );
             continue;
         }
         assert!(scene.solids.iter().all(|solid| solid.tets.len() == n_tets));
         assert!(scene.n_steps >= 200);
-        // Every mesh is fit to be simulated, and the bodies start apart.
+        // Every mesh can be simulated, and the bodies start apart.
         let mut simulation = Simulation::new(&scene.solids, scene.settings).unwrap();
         assert_eq!(simulation.step(&mut cpu()).unwrap().n_pairs, 0);
     }

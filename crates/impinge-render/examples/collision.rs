@@ -1,4 +1,4 @@
-//! The picture of the README: a knot and a wavy ring, what collides in red and blue.
+//! The picture of the README: a knot and a wavy ring, with colliding triangles in red and blue.
 //!
 //! `cargo run --release -p impinge-render --example collision -- docs/images/collision.png`
 

@@ -8,20 +8,20 @@ use crate::picture::{Face, Normals, Surface};
 /// The two colours of a body, sRGB.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Colors {
-    /// Of primitives that collide.
+    /// The colour of primitives that collide.
     pub colliding: [u8; 3],
-    /// Of all the others.
+    /// The colour of all other primitives.
     pub other: [u8; 3],
 }
 
 impl Surface {
-    /// A body where it is now, its `colliding` primitives coloured and showing through.
+    /// A body in its current pose; its `colliding` primitives are coloured and show through.
     ///
-    /// Triangles are drawn as they are, smooth. Tetrahedra are drawn flat: the faces that belong to one
-    /// tetrahedron only, and all faces of those that collide.
+    /// Triangles are drawn with smooth normals. Tetrahedra are drawn with flat faces: the faces of only one
+    /// tetrahedron, and all faces of colliding tetrahedra.
     ///
     /// # Errors
-    /// A colliding primitive that the body does not have.
+    /// A number in `colliding` that the body does not have.
     pub fn of_body(body: &Body, colliding: &[u32], colors: Colors) -> Result<Self, Error> {
         let n_primitives = body.n_primitives();
         let mut collides = vec![false; n_primitives];
@@ -79,7 +79,7 @@ struct Side {
     collides: bool,
 }
 
-/// The faces that belong to one tetrahedron only, and those of which one collides, each once.
+/// The faces of only one tetrahedron, and the faces of colliding tetrahedra, each once.
 fn shown_sides(tets: &[[u32; 4]], collides: &[bool]) -> impl Iterator<Item = Side> {
     let mut sides: Vec<Side> = tets
         .iter()
@@ -96,7 +96,7 @@ fn shown_sides(tets: &[[u32; 4]], collides: &[bool]) -> impl Iterator<Item = Sid
             })
         })
         .collect();
-    // Stable: of two tetrahedra, the first one's side is drawn.
+    // The sort is stable: of two tetrahedra that share a face, the first one's side is drawn.
     sides.sort_by_key(|side| side.key);
     let shown: Vec<Side> = sides
         .chunk_by(|a, b| a.key == b.key)

@@ -1,4 +1,4 @@
-//! Where a picture is seen from.
+//! The viewpoint of a picture.
 
 use crate::error::Error;
 
@@ -8,14 +8,14 @@ pub enum UpAxis {
     /// As in glTF, and in most scanned meshes.
     #[default]
     Y,
-    /// As in engineering, and in Blender.
+    /// As in engineering and in Blender.
     Z,
 }
 
-/// How depth becomes picture.
+/// How a picture shows depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Projection {
-    /// What is farther away looks smaller.
+    /// Distant objects look smaller.
     Perspective {
         /// The angle between the picture's upper and lower edge, above 0, at most 120 degrees.
         degrees: f64,
@@ -24,17 +24,17 @@ pub enum Projection {
     Orthographic,
 }
 
-/// From where a picture is seen. The distance is chosen so that everything is in it.
+/// The viewpoint of a picture. The distance is chosen so that the picture contains everything.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
     /// Degrees counter-clockwise around the up axis, seen from above. At 0 the viewer is on the side of
-    /// +z where y is up, and of -y where z is up; in both +x is to the right.
+    /// +z if y is up, and of -y if z is up; in both cases +x is to the right.
     pub azimuth: f64,
     /// Degrees above the ground, -90 to 90.
     pub elevation: f64,
     /// The axis that points up.
     pub up: UpAxis,
-    /// How depth becomes picture.
+    /// How the picture shows depth.
     pub projection: Projection,
 }
 
@@ -76,7 +76,7 @@ impl Camera {
     pub(crate) fn axes(&self) -> Axes {
         let (sin_a, cos_a) = self.azimuth.to_radians().sin_cos();
         let (sin_e, cos_e) = self.elevation.to_radians().sin_cos();
-        // As with y up; then, for z up, (x, y, z) becomes (x, -z, y).
+        // Axes for y up; for z up, (x, y, z) then becomes (x, -z, y).
         let axes = Axes {
             right: [cos_a, 0.0, -sin_a],
             up: [-sin_a * sin_e, cos_e, -cos_a * sin_e],

@@ -1,4 +1,4 @@
-//! Faces as what the GPU draws: three corners each, with normals.
+//! Faces in the form that the GPU draws: three corners each, with normals.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -7,7 +7,7 @@ use impinge::wgpu;
 use crate::picture::{Face, Normals, Picture, Surface};
 use crate::view::Frame;
 
-/// A corner of a face as the vertex shader takes it.
+/// A corner of a face, the input of the vertex shader.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Corner {
@@ -23,13 +23,13 @@ pub(crate) struct Corner {
 pub(crate) const CORNER: [wgpu::VertexAttribute; 3] =
     wgpu::vertex_attr_array![0 => Float32x3, 1 => Snorm16x4, 2 => Unorm8x4];
 
-/// Bytes of a face.
+/// Bytes per face.
 pub(crate) const FACE_BYTES: u64 = 3 * size_of::<Corner>() as u64;
 
 /// Cosine of the sharpest edge that still looks smooth: 50 degrees.
 const SMOOTHEST: f64 = 0.642_787_609_686_539_3;
 
-/// Hands over the corners of all faces for which `wanted` holds, at most `n_faces` faces at a time.
+/// Passes on the corners of all faces for which `wanted` holds, at most `n_faces` faces at a time.
 pub(crate) fn chunks(
     picture: &Picture,
     frame: &Frame,
@@ -72,7 +72,7 @@ pub(crate) fn chunks(
     }
 }
 
-/// Unit normals: those of the faces around a vertex, weighted by their angles there.
+/// Unit normals of vertices: the mean normal of the faces around a vertex, weighted by their angles there.
 fn vertex_normals(surface: &Surface, frame: &Frame) -> Vec<[f64; 3]> {
     let mut sums = vec![[0.0; 3]; surface.positions.len()];
     for face in &surface.faces {
@@ -91,7 +91,7 @@ fn vertex_normals(surface: &Surface, frame: &Frame) -> Vec<[f64; 3]> {
     sums.into_iter().map(unit).collect()
 }
 
-/// The unit normal, or 0 of a face without area.
+/// The unit normal, or 0 for a face without area.
 fn normal([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
     let (u, v) = (sub(b, a), sub(c, a));
     unit([

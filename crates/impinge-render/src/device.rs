@@ -1,4 +1,4 @@
-//! Adapters, the device, and what may go wrong with them.
+//! Adapters, the device, and their errors.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -14,10 +14,10 @@ pub(crate) struct Gpu {
 }
 
 impl Gpu {
-    /// The first adapter whose name contains `name`, whatever the case; hardware before software.
+    /// Opens the first adapter whose name contains `name`, ignoring case; hardware before software.
     ///
     /// # Errors
-    /// No adapter fits; the driver refuses.
+    /// No adapter has such a name; the driver returns an error.
     pub fn open(name: Option<&str>) -> Result<Gpu, Error> {
         let mut adapters = adapters();
         adapters.sort_by_key(|adapter| adapter.get_info().device_type == wgpu::DeviceType::Cpu);
@@ -44,7 +44,7 @@ impl Gpu {
             return Err(Error::NoAdapter { found });
         };
         let offered = adapter.limits();
-        // The least that WebGPU promises, but pictures and buffers as large as the adapter has them.
+        // wgpu's downlevel limits, but textures and buffers as large as the adapter allows.
         let required_limits = wgpu::Limits {
             max_buffer_size: offered.max_buffer_size,
             max_texture_dimension_2d: offered.max_texture_dimension_2d,
@@ -61,7 +61,7 @@ impl Gpu {
         Ok(Gpu { device, queue })
     }
 
-    /// Runs `work` and catches what the device has against it.
+    /// Runs `work` and catches the device's errors.
     ///
     /// # Errors
     /// Those of `work`, else the device's.
@@ -73,7 +73,7 @@ impl Gpu {
         ]
         .map(|filter| self.device.push_error_scope(filter));
         let done = work();
-        // Innermost first; an error of memory has others as its consequence.
+        // Innermost scope first. Memory errors come first in the list, because they cause other errors.
         let (memory, validation, internal) = (memory.pop(), validation.pop(), internal.pop());
         let errors = [memory, validation, internal].map(pollster::block_on);
         match errors.into_iter().flatten().next() {
@@ -121,7 +121,7 @@ impl Gpu {
     }
 }
 
-/// What to do where there is no adapter.
+/// Advice for a machine without an adapter.
 fn advice() -> &'static str {
     if cfg!(target_os = "linux") {
         "; install a Vulkan driver (a software one suffices: mesa-vulkan-drivers on Debian, Ubuntu and Fedora)"

@@ -1,7 +1,7 @@
 use std::io;
 use std::path::PathBuf;
 
-/// Everything that can go wrong, by name: which surface, which index, and both numbers.
+/// An error of drawing. It names the surface, the index, and both numbers.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -29,7 +29,7 @@ pub enum Error {
         /// How many vertices the surface has.
         n_vertices: usize,
     },
-    /// A primitive is said to collide that the body does not have: the pairs are of another body.
+    /// A colliding primitive that the body does not have: the pairs belong to another body.
     #[error("primitive {primitive} collides, but the body has {n_primitives} primitives")]
     PrimitiveOutOfRange {
         /// The primitive as given.
@@ -37,12 +37,12 @@ pub enum Error {
         /// How many primitives the body has.
         n_primitives: usize,
     },
-    /// A picture of no pixels, or larger than the device draws.
-    #[error("a picture of {} x {} pixels was asked for, {allowed} is possible", given[0], given[1])]
+    /// A picture without pixels, or larger than the device can draw.
+    #[error("a picture of {} x {} pixels was requested, {allowed} is possible", given[0], given[1])]
     Size {
-        /// Width and height as asked for.
+        /// Width and height as requested.
         given: [u32; 2],
-        /// What is possible.
+        /// The possible sizes.
         allowed: String,
     },
     /// A setting lies outside its range.
@@ -52,19 +52,19 @@ pub enum Error {
         setting: &'static str,
         /// The value as given.
         given: f64,
-        /// What is allowed.
+        /// The allowed range.
         allowed: &'static str,
     },
-    /// No adapter fits what was asked for; the text lists those found.
+    /// No adapter matches the request; the text lists those found.
     #[error("no GPU adapter to draw with: {found}")]
     NoAdapter {
-        /// What was looked for and what is there.
+        /// The requested name and the adapters found.
         found: String,
     },
-    /// The GPU refused: out of memory, a lost device, a shader that does not compile.
+    /// An error of the GPU: out of memory, a lost device, a shader that does not compile.
     #[error("GPU: {what}")]
     Gpu {
-        /// The driver's own words.
+        /// The driver's message.
         what: String,
     },
     /// An image file could not be written.
@@ -72,7 +72,7 @@ pub enum Error {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
 }

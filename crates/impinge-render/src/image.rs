@@ -21,7 +21,7 @@ impl std::fmt::Debug for Image {
 }
 
 impl Image {
-    /// All black.
+    /// A black image.
     pub(crate) fn new([width, height]: [u32; 2]) -> Self {
         Image {
             width,
@@ -30,12 +30,12 @@ impl Image {
         }
     }
 
-    /// Pixels in a row.
+    /// The number of pixels in a row.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Rows.
+    /// The number of rows.
     pub fn height(&self) -> u32 {
         self.height
     }
@@ -51,10 +51,10 @@ impl Image {
         &mut self.pixels[y * width..][x..width]
     }
 
-    /// The bytes of a PNG file of it: 8 bits a channel, no alpha.
+    /// The image as the bytes of a PNG file: 8 bits per channel, no alpha.
     ///
     /// # Errors
-    /// An image that the format cannot hold.
+    /// The PNG format cannot hold the image.
     pub fn to_png(&self) -> io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
@@ -73,7 +73,7 @@ impl Image {
         Ok(bytes)
     }
 
-    /// Writes it as a PNG file.
+    /// Writes the image as a PNG file.
     ///
     /// # Errors
     /// The file cannot be written.

@@ -1,8 +1,8 @@
-//! Pictures of meshes and of what collides in them, drawn off screen with `wgpu`: on any GPU, and on a
-//! software driver where there is none.
+//! Pictures of meshes and their colliding primitives, drawn off screen with `wgpu` on any GPU, or on a
+//! software driver if there is none.
 //!
-//! A [`Picture`] is plain data: [`Surface`]s with a colour a face, a [`Camera`] and a size. A
-//! [`Renderer`] turns it into an [`Image`]. The camera fits itself to what there is to see.
+//! A [`Picture`] is plain data: [`Surface`]s with one colour per face, a [`Camera`] and a size. A
+//! [`Renderer`] turns it into an [`Image`]. The camera distance is chosen so that everything is visible.
 //!
 //! ```no_run
 //! use impinge::{Backend, Detector, Query, Scene};
@@ -26,15 +26,15 @@
 //! ```
 //!
 //! # What is drawn
-//! Both sides of every face, with soft light and darkened hollows, four samples a pixel. Faces that
-//! [show through](Face::shows_through) are seen faintly where other faces hide them, so that a band of
-//! contact can be followed around a body. Of tetrahedra the boundary is drawn, and all faces of those that
-//! collide.
+//! Both sides of every face, with soft light and darkened hollows, four samples per pixel. Faces that
+//! [show through](Face::shows_through) are faintly visible where other faces hide them, so that a band of
+//! contact can be followed around a body. For tetrahedra, the boundary is drawn, and all faces of colliding
+//! tetrahedra.
 //!
 //! # What it costs
-//! A picture is drawn in tiles and faces in chunks, so device memory beyond the faces themselves (72 bytes
-//! each) is bounded whatever the size. The same picture on the same device gives the same bytes; devices
-//! differ in the last bits.
+//! A picture is drawn in tiles, and faces are uploaded in chunks. So device memory beyond the faces themselves
+//! (72 bytes each) is bounded, whatever the size of the picture. The same picture on the same device gives the
+//! same bytes; different devices may differ in the last bits.
 
 mod body;
 mod camera;
@@ -52,7 +52,7 @@ pub use body::Colors;
 pub use camera::{Camera, Projection, UpAxis};
 pub use error::Error;
 pub use image::Image;
-/// The GPU interface that [`Renderer::with_device`] speaks.
+/// The GPU interface that [`Renderer::with_device`] takes.
 pub use impinge::wgpu;
 pub use picture::{Face, Normals, Picture, Surface};
 #[doc(hidden)]

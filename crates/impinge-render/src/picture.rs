@@ -1,4 +1,4 @@
-//! What a picture shows, as plain data.
+//! The content of a picture, as plain data.
 
 use crate::camera::Camera;
 use crate::error::Error;
@@ -10,44 +10,44 @@ pub struct Face {
     pub corners: [u32; 3],
     /// sRGB.
     pub color: [u8; 3],
-    /// Whether it is seen, faintly, where other faces hide it: see [`Picture::see_through`].
+    /// Whether it is faintly visible where other faces hide it: see [`Picture::see_through`].
     pub shows_through: bool,
 }
 
-/// How a surface meets the light.
+/// How a surface is shaded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Normals {
     /// Every face is flat.
     #[default]
     Flat,
-    /// Faces that share vertices look like one curved surface, but for edges sharper than 50 degrees.
+    /// Faces that share vertices look like one curved surface, except at edges sharper than 50 degrees.
     Smooth,
 }
 
-/// Triangles with a colour each.
+/// Triangles with one colour each.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Surface {
-    /// One a vertex, all finite, in any unit.
+    /// One position per vertex, all finite, in any unit.
     pub positions: Vec<[f64; 3]>,
-    /// The triangles. Degenerate ones are not seen.
+    /// The triangles. Degenerate ones are invisible.
     pub faces: Vec<Face>,
-    /// How it meets the light.
+    /// How it is shaded.
     pub normals: Normals,
 }
 
-/// What is drawn, from where, and how large.
+/// A picture: its content, viewpoint and size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
-    /// What there is to see.
+    /// The content.
     pub surfaces: Vec<Surface>,
-    /// From where it is seen.
+    /// The viewpoint.
     pub camera: Camera,
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// How strongly hidden faces that [show through](Face::shows_through) are seen, 0 (not at all) to 1
+    /// How visible hidden faces that [show through](Face::shows_through) are, from 0 (not at all) to 1
     /// (as if nothing hid them).
     pub see_through: f32,
-    /// How dark hollows are, 0 (as bright as the rest) to 1.
+    /// How dark hollows are, from 0 (as bright as the rest) to 1.
     pub occlusion: f32,
     /// sRGB colours of the background's upper and lower edge.
     pub background: [[u8; 3]; 2],
@@ -67,7 +67,7 @@ impl Default for Picture {
 }
 
 impl Picture {
-    /// The first thing wrong with it.
+    /// Returns the first error in the picture, if any.
     pub(crate) fn check(&self) -> Result<(), Error> {
         for (setting, given) in [
             ("see_through", self.see_through),

@@ -1,11 +1,11 @@
-//! The shaders, compiled, and what they bind.
+//! The compiled shaders and their bindings.
 
 use bytemuck::{Pod, Zeroable};
 use impinge::wgpu;
 
 use crate::corners::{CORNER, FACE_BYTES};
 
-/// What all shaders know: `frame.wgsl` has the same.
+/// Uniform data of all shaders: `frame.wgsl` has the same struct.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct FrameUniform {
@@ -17,13 +17,13 @@ pub(crate) struct FrameUniform {
     pub sky: [f32; 4],
     pub background_top: [f32; 4],
     pub background_bottom: [f32; 4],
-    /// Width and height of the picture; column and row at which the tile begins.
+    /// Width and height of the picture; first column and row of the tile.
     pub picture: [f32; 4],
-    /// Radius in the scene; largest radius in pixels; strength of occlusion; how far hidden faces are seen.
+    /// Occlusion's radius in the scene; its largest radius in pixels; its strength; the visibility of hidden faces.
     pub amounts: [f32; 4],
 }
 
-/// The text of every shader.
+/// Names and texts of all shaders.
 pub(crate) const SHADERS: [(&str, &str); 3] = [
     (
         "surface",
@@ -67,7 +67,7 @@ pub(crate) const PIXELS: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSr
 pub(crate) struct Pipelines {
     /// All faces.
     pub surface: wgpu::RenderPipeline,
-    /// Faces that show through, a little nearer, so that they win against faces in the same place.
+    /// Faces that show through. They are drawn slightly nearer, so that they win against faces in the same place.
     pub raised: wgpu::RenderPipeline,
     pub occlusion: wgpu::RenderPipeline,
     pub composite: wgpu::RenderPipeline,
@@ -77,7 +77,7 @@ pub(crate) struct Pipelines {
 }
 
 impl Pipelines {
-    /// Compiles; errors go to the error scopes that are open.
+    /// Compiles the shaders; errors go to the open error scopes.
     pub fn new(device: &wgpu::Device) -> Self {
         let depth = wgpu::BindingType::Texture {
             sample_type: wgpu::TextureSampleType::Depth,
@@ -103,7 +103,7 @@ impl Pipelines {
             surface: faces(wgpu::DepthBiasState::default()),
             raised: faces(wgpu::DepthBiasState {
                 constant: -8,
-                // By slope, sides of tetrahedra that stand on end would rise out of the body.
+                // No bias by slope: it would raise steep sides of tetrahedra out of the body.
                 ..Default::default()
             }),
             occlusion: pipeline(device, &occlusion, &occlusion_layout, OCCLUSION, None),
@@ -115,7 +115,7 @@ impl Pipelines {
     }
 }
 
-/// The frame's uniform, then textures for the fragment shader.
+/// The layout of the frame's uniform, followed by textures for the fragment shader.
 fn layout(device: &wgpu::Device, textures: &[wgpu::BindingType]) -> wgpu::BindGroupLayout {
     let uniform = wgpu::BindingType::Buffer {
         ty: wgpu::BufferBindingType::Uniform,
@@ -137,7 +137,7 @@ fn layout(device: &wgpu::Device, textures: &[wgpu::BindingType]) -> wgpu::BindGr
     })
 }
 
-/// Draws faces with depth and samples where there is a bias, else one triangle over all pixels.
+/// With a bias, a pipeline that draws faces with depth and multisampling; without, one triangle over all pixels.
 fn pipeline(
     device: &wgpu::Device,
     module: &wgpu::ShaderModule,

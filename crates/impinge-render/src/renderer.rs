@@ -11,49 +11,50 @@ use crate::pipelines::{FrameUniform, Pipelines};
 use crate::targets::{Chunks, Targets};
 use crate::view::{Frame, View};
 
-/// Draws pictures on one device. Textures are kept from picture to picture.
+/// Draws pictures on one device. Textures are reused from picture to picture.
 #[derive(Debug)]
 pub struct Renderer {
     gpu: Gpu,
     pipelines: Pipelines,
     targets: Option<Targets>,
-    /// Width and height of a tile, margins not counted.
+    /// Width and height of a tile without its margins.
     tile: u32,
-    /// Faces of a chunk.
+    /// Faces per chunk.
     n_faces: usize,
 }
 
-/// Bytes of a chunk of faces at most.
+/// The most bytes in a chunk of faces.
 const CHUNK: u64 = 64 << 20;
-/// Width and height of a tile, which with its margins takes up to 300 MB of textures.
+/// Width and height of a tile. With its margins it takes up to 300 MB of textures.
 const TILE: u32 = 1536;
-/// How far from a hollow what darkens it may lie, in the scene's longest half extent and in pixels.
+/// The largest distance between a hollow and a face that darkens it: as a share of the scene's longest half extent, and in
+/// pixels.
 const REACH: f32 = 0.16;
 const REACH_PIXELS: u32 = 254;
-/// How far occlusion is blurred, in pixels.
+/// The radius of the blur of occlusion, in pixels.
 const BLUR: u32 = 2;
 
 impl Renderer {
-    /// A renderer on the first GPU, or on a software driver where there is none.
+    /// A renderer on the first GPU, or on a software driver if there is none.
     ///
     /// # Errors
-    /// No adapter; a driver that refuses.
+    /// No adapter; an error of the driver.
     pub fn new() -> Result<Self, Error> {
         Renderer::on(Gpu::open(None)?)
     }
 
-    /// A renderer on the adapter whose name contains `name`, whatever the case.
+    /// A renderer on the first adapter whose name contains `name`, ignoring case.
     ///
     /// # Errors
-    /// There is none; the driver refuses.
+    /// No adapter has such a name; an error of the driver.
     pub fn on_device_named(name: &str) -> Result<Self, Error> {
         Renderer::on(Gpu::open(Some(name))?)
     }
 
-    /// A renderer on a device of the caller's. The least limits of WebGPU suffice.
+    /// A renderer on the caller's device. `wgpu::Limits::downlevel_defaults` suffice.
     ///
     /// # Errors
-    /// A shader that does not compile there.
+    /// A shader does not compile on the device.
     pub fn with_device(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, Error> {
         Renderer::on(Gpu { device, queue })
     }
@@ -64,7 +65,7 @@ impl Renderer {
         Ok(Renderer {
             pipelines,
             targets: None,
-            // Both are far from 0 wherever WebGPU's least limits are kept: textures of 2,048.
+            // Both are far from 0 for every device with at least the downlevel limits, which allow textures of 2,048 pixels.
             tile: limits
                 .max_texture_dimension_2d
                 .saturating_sub(2 * (REACH_PIXELS + BLUR))
@@ -74,7 +75,7 @@ impl Renderer {
         })
     }
 
-    /// The same with smaller tiles and chunks, at least 1 pixel and 1 face. For tests.
+    /// The same renderer with smaller tiles and chunks, at least 1 pixel and 1 face. For tests.
     #[doc(hidden)]
     pub fn with_room(self, tile: u32, n_faces: usize) -> Self {
         Renderer {
@@ -88,8 +89,8 @@ impl Renderer {
     /// Draws a picture.
     ///
     /// # Errors
-    /// A position that is not finite or an index out of range, by name; a size of 0 or beyond the device's
-    /// textures; a setting out of its range; the device's own.
+    /// A position that is not finite or an index out of range; a size of 0 or beyond the device's
+    /// textures; a setting out of its range; errors of the device.
     pub fn render(&mut self, picture: &Picture) -> Result<Image, Error> {
         let [width, height] = picture.size;
         let most = self.gpu.device.limits().max_texture_dimension_2d;
@@ -112,7 +113,7 @@ impl Renderer {
         Ok(image)
     }
 
-    /// All faces, on the device.
+    /// Uploads all faces to the device.
     fn upload(&self, picture: &Picture, frame: &Frame) -> Result<Chunks, Error> {
         let Gpu { device, queue } = &self.gpu;
         let upload = |shows_through| {
@@ -127,7 +128,7 @@ impl Renderer {
                     mapped_at_creation: false,
                 });
                 queue.write_buffer(&buffer, 0, bytes);
-                // Now, or all chunks would be held twice until the first tile is drawn.
+                // Submit now; otherwise all chunks would be held twice until the first tile is drawn.
                 queue.submit([]);
                 buffers.push(buffer);
             });
@@ -141,8 +142,8 @@ impl Renderer {
         })
     }
 
-    /// Draws the tile that begins at a column and row into the image. Around it a margin is drawn too, as
-    /// far as occlusion reaches.
+    /// Draws the tile that begins at column and row `begin` into the image. A margin around the tile is drawn too, as wide as
+    /// the reach of occlusion.
     fn tile(
         &mut self,
         picture: &Picture,
@@ -159,7 +160,7 @@ impl Renderer {
         let uniform = uniform(picture, view, drawn, margin - BLUR);
         let (gpu, pipelines) = (&self.gpu, &self.pipelines);
         if self.targets.as_ref().is_none_or(|old| old.size() != size) {
-            // The old ones first: both may not fit.
+            // Drop the old textures first: both may not fit in memory.
             self.targets = None;
             let targets = gpu.scoped(|| Ok(Targets::new(&gpu.device, pipelines, size)))?;
             self.targets = Some(targets);
@@ -183,7 +184,7 @@ impl Renderer {
     }
 }
 
-/// What the shaders are told of a tile that begins at `drawn`.
+/// The uniform data of a tile that begins at `drawn`.
 fn uniform(picture: &Picture, view: &View, drawn: [u32; 2], reach: u32) -> FrameUniform {
     let narrow = |v: [f64; 4]| v.map(|x| x as f32);
     let [right, up, back] = view.axes.map(narrow);

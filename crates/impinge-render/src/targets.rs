@@ -1,19 +1,19 @@
-//! The textures of a tile, and how it is drawn: faces; occlusion from their depths; the faces that show through,
-//! alone; all of it together.
+//! The textures of a tile, and the passes that draw it: all faces; occlusion from their depths; only the faces that show
+//! through; the composition of these.
 
 use impinge::wgpu;
 
 use crate::corners::FACE_BYTES;
 use crate::pipelines::{DEPTH, FrameUniform, LIGHT, OCCLUSION, PIXELS, Pipelines, SAMPLES};
 
-/// Faces on the device: the plain ones, and those that show through.
+/// Faces on the device: plain faces, and faces that show through.
 #[derive(Debug, Default)]
 pub(crate) struct Chunks {
     pub plain: Vec<wgpu::Buffer>,
     pub raised: Vec<wgpu::Buffer>,
 }
 
-/// The textures of a tile, and what binds them.
+/// The textures of a tile and their bind groups.
 #[derive(Debug)]
 pub(crate) struct Targets {
     size: [u32; 2],
@@ -31,7 +31,7 @@ pub(crate) struct Targets {
 }
 
 impl Targets {
-    /// Of a tile of this width and height.
+    /// The textures of a tile of this width and height.
     pub fn new(device: &wgpu::Device, pipelines: &Pipelines, size: [u32; 2]) -> Self {
         let texture = |format, sample_count, usage| {
             device.create_texture(&wgpu::TextureDescriptor {
@@ -103,7 +103,7 @@ impl Targets {
         self.size
     }
 
-    /// Where the picture's pixels are read from: rows of [`row_bytes`](Self::row_bytes).
+    /// The buffer from which pixels are read back: rows of [`row_bytes`](Self::row_bytes).
     pub fn staging(&self) -> &wgpu::Buffer {
         &self.staging
     }
@@ -141,7 +141,7 @@ impl Targets {
             pass.set_bind_group(0, group, &[]);
             pass.draw(0..3, 0..1);
         };
-        // Before the depths are overwritten.
+        // Occlusion reads the depths before the next pass overwrites them.
         over_all(
             &mut encoder,
             &pipelines.occlusion,
@@ -200,7 +200,7 @@ impl Targets {
             }),
             ..Default::default()
         });
-        // The whole picture, of which the tile is a part: so tiles fit together.
+        // The viewport is the whole picture, of which the tile is a part, so that tiles fit together.
         let [width, height, x, y] = frame.picture;
         pass.set_viewport(-x, -y, width, height, 0.0, 1.0);
         pass.set_bind_group(0, &self.frame_group, &[]);

@@ -1,4 +1,4 @@
-//! How a camera fits itself to what there is to see.
+//! Fits a camera to the content of a picture.
 
 use crate::camera::{Axes, Projection};
 use crate::picture::Picture;
@@ -7,7 +7,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The coordinates that are drawn: the middle of everything at 0, the longest half extent 1. Computed in
+/// The coordinate system for drawing: the middle of the scene is at 0 and its longest half extent is 1. Converted in
 /// f64, so that a scene far from the origin keeps its shape in f32.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Frame {
@@ -35,7 +35,7 @@ impl Frame {
                 half: 1.0,
             };
         }
-        // Halves first: the sum of two coordinates may not be finite.
+        // Halve before adding: the sum of two coordinates may overflow.
         let middle = std::array::from_fn(|k| 0.5 * min[k] + 0.5 * max[k]);
         let half = (0..3)
             .map(|k| 0.5 * max[k] - 0.5 * min[k])
@@ -46,13 +46,13 @@ impl Frame {
         }
     }
 
-    /// A point in it.
+    /// A point in these coordinates.
     pub fn place(&self, point: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|k| (point[k] - self.middle[k]) / self.half)
     }
 }
 
-/// A camera that has been fitted: what shaders need to know of it, in the coordinates of a [`Frame`].
+/// A fitted camera, in the coordinates of a [`Frame`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct View {
     /// Axes to the right, up and towards the viewer; `w` moves the eye to 0.
@@ -64,16 +64,16 @@ pub(crate) struct View {
     pub is_perspective: bool,
 }
 
-/// The part of the picture's half width and half height that is used.
+/// The share of the picture's half width and half height that the content fills.
 const FILLED: f64 = 0.93;
 
 impl View {
-    /// Fits a camera to the picture's faces, each side of the picture to what lies outermost there.
+    /// Fits a camera to the picture's faces, so that the outermost points touch the filled part on each side.
     pub fn fit(picture: &Picture, frame: &Frame) -> View {
         let camera = &picture.camera;
         let axes = camera.axes();
         let aspect = f64::from(picture.size[0]) / f64::from(picture.size[1]);
-        // Half width and half height of what is seen: of everything, or at distance 1.
+        // Half width and half height of the visible region: of the scene, or at distance 1.
         let (wide, high) = match camera.projection {
             Projection::Perspective { degrees } => {
                 let high = (0.5 * degrees.to_radians()).tan();
@@ -85,9 +85,9 @@ impl View {
             Projection::Perspective { .. } => [FILLED * wide, FILLED * high],
             Projection::Orthographic => [f64::INFINITY; 2],
         };
-        // In perspective, x stays within the right edge where x / slope + z is at most the eye's distance
-        // (for an eye at x = 0): the outermost point of each edge is the one with the largest sum. In
-        // orthographic projection, the one with the largest x.
+        // In perspective, x stays within the right edge if x / slope + z is at most the eye's distance
+        // (for an eye at x = 0). So the outermost point of each edge is the point with the largest sum; in
+        // orthographic projection, the point with the largest x.
         let mut outermost = [[f64::NEG_INFINITY; 2]; 2];
         let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
         for surface in &picture.surfaces {
@@ -151,7 +151,7 @@ impl View {
         }
     }
 
-    /// `eye` is along the axes.
+    /// `eye` is given in the coordinates of `axes`.
     fn new(axes: &Axes, eye: [f64; 3], projection: [f64; 4], is_perspective: bool) -> View {
         let all = [axes.right, axes.up, axes.back];
         View {

@@ -1,4 +1,4 @@
-//! Pictures on whatever adapter there is. They fail where there is none: a software driver suffices.
+//! Pictures on the first adapter. The tests fail if there is none; a software driver suffices.
 
 use impinge::{Backend, Detector, Query, Scene};
 use impinge_render::{
@@ -24,7 +24,7 @@ fn front() -> Camera {
     }
 }
 
-/// On a black ground, without anything but faces and light.
+/// Only faces and light on a black background.
 fn plain(surfaces: Vec<Surface>, size: [u32; 2]) -> Picture {
     Picture {
         surfaces,
@@ -83,7 +83,7 @@ fn a_triangle_covers_its_pixels_and_no_others() {
     for flipped in [false, true] {
         let mut surface = surface.clone();
         if flipped {
-            // Both sides are seen alike.
+            // Both sides look the same.
             surface.faces[0].corners = [0, 2, 1];
         }
         let image = renderer()
@@ -119,7 +119,7 @@ fn the_nearer_face_hides_the_other_whatever_their_order() {
 
 #[test]
 fn a_face_that_shows_through_wins_against_one_in_the_same_place() {
-    // The same plane by other corners: depths are rounded otherwise.
+    // The same plane with other corners: depths are rounded differently.
     let grey = triangle(
         [[-1.0, -1.5, 0.1], [5.0, -1.0, 3.7], [-1.2, 6.0, 1.5]],
         GREY,
@@ -352,7 +352,7 @@ fn runs_and_chunks_change_no_byte_and_tiles_no_picture() {
             .with_room(tile, n_faces)
             .render(&picture)
             .unwrap();
-        // Pixels beside a seam may be rounded otherwise: drivers place faces relative to the tile.
+        // Pixels beside a seam may be rounded differently: drivers place faces relative to the tile.
         let is_one_tile = tile >= picture.size[0];
         let allowed = if is_one_tile { 0 } else { 1 };
         assert!(
@@ -364,7 +364,7 @@ fn runs_and_chunks_change_no_byte_and_tiles_no_picture() {
             "{tile} {n_faces}"
         );
     }
-    // Where it could fail: another picture has other bytes.
+    // Shows that the comparison can fail: another picture has other bytes.
     picture.camera.azimuth += 1.0;
     let other = one.render(&picture).unwrap();
     assert!(n_differing(&image, &other, 1) > 500);
@@ -410,7 +410,7 @@ fn an_empty_picture_is_its_background() {
     };
     let image = renderer().render(&picture).unwrap();
     assert_eq!(image.pixels(), [[10, 20, 30, 255]; 35]);
-    // A point and a needle are seen by nobody, and harm nobody.
+    // A point and a needle are invisible and do no harm.
     let point = triangle([[1.0; 3]; 3], RED);
     let needle = triangle([[0.0; 3], [1e-300, 0.0, 0.0], [1e300, 0.0, 0.0]], RED);
     for surface in [point, needle] {
@@ -446,7 +446,7 @@ fn bad_input_is_refused_by_name() {
     for size in [[0, 16], [16, 0], [u32::MAX, 16], [16, u32::MAX]] {
         let text = refused(&|picture| picture.size = size);
         let begin = format!(
-            "a picture of {} x {} pixels was asked for",
+            "a picture of {} x {} pixels was requested",
             size[0], size[1]
         );
         assert!(text.starts_with(&begin), "{text}");
@@ -461,7 +461,7 @@ fn bad_input_is_refused_by_name() {
         picture.camera.projection = Projection::Perspective { degrees: 0.0 };
     });
     assert_eq!(text, "angle of view: 0 given, above 0 to 120 allowed");
-    // And it draws on.
+    // The renderer still works after the errors.
     renderer.render(&plain(vec![good], [16, 16])).unwrap();
 
     let error = Renderer::on_device_named("no such device").unwrap_err();
@@ -508,7 +508,7 @@ fn a_device_of_the_caller_draws_as_large_as_its_textures() {
     let text = renderer.render(&picture).unwrap_err().to_string();
     assert_eq!(
         text,
-        "a picture of 2049 x 10 pixels was asked for, 1 x 1 to 2048 x 2048 is possible"
+        "a picture of 2049 x 10 pixels was requested, 1 x 1 to 2048 x 2048 is possible"
     );
 }
 

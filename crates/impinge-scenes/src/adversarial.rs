@@ -1,9 +1,9 @@
 //! Scenes that break methods which are only fast on average.
 //!
-//! Work should be bounded by input plus output. Each scene here takes away one assumption that a
-//! method may have made without saying so: that primitives are of about the same size, that they
-//! are spread out, that the scene has a volume, that bodies are few. [`SCENES`] lists them all, to be
-//! run against [`plain`] of the same size.
+//! Work should be bounded by input plus output. Each scene here violates one hidden assumption of
+//! a method: that primitives have about the same size, that they are spread out, that the scene has a
+//! volume, that there are few bodies. [`SCENES`] lists them all, to be compared with [`plain`] of the
+//! same size.
 
 use impinge::Error;
 
@@ -19,10 +19,10 @@ pub struct Adversarial {
     pub name: &'static str,
     /// The bound that it probes.
     pub probes: &'static str,
-    /// The largest number of primitives worth asking for: beyond it the answer itself, or the
-    /// number of overlapping boxes, grows out of hand, or coordinates stop being exact.
+    /// The largest useful number of primitives: beyond it the answer, or the number of overlapping
+    /// boxes, gets too large, or coordinates are no longer exact.
     pub max_n: usize,
-    /// Builds it with about this many primitives.
+    /// Builds the scene with about this many primitives.
     pub build: fn(usize) -> Result<BuiltScene, Error>,
 }
 
@@ -48,7 +48,7 @@ pub const SCENES: &[Adversarial] = &[
     },
     Adversarial {
         name: "one-point",
-        probes: "time and memory follow the answer, here all pairs, and nothing besides",
+        probes: "time and memory are proportional to the answer, here all pairs",
         max_n: 1 << 12,
         build: one_point,
     },
@@ -66,13 +66,13 @@ pub const SCENES: &[Adversarial] = &[
     },
     Adversarial {
         name: "coincident",
-        probes: "a body on top of itself costs its answer, about a dozen pairs a triangle",
+        probes: "a body and its copy in the same place cost their answer, about a dozen pairs per triangle",
         max_n: 1 << 23,
         build: coincident,
     },
     Adversarial {
         name: "outliers",
-        probes: "a few primitives far away do not blow up the region for all the others",
+        probes: "a few primitives far away do not enlarge the region for all others",
         max_n: 1 << 24,
         build: outliers,
     },
@@ -90,7 +90,7 @@ pub const SCENES: &[Adversarial] = &[
     },
     Adversarial {
         name: "slivers",
-        probes: "boxes that say little: memory stays bounded although nearly all boxes overlap",
+        probes: "nearly empty boxes: memory stays bounded although nearly all boxes overlap",
         max_n: 1 << 13,
         build: slivers,
     },
@@ -108,11 +108,11 @@ pub const SCENES: &[Adversarial] = &[
     },
 ];
 
-/// What the others are measured against: two well-shaped bodies of `n / 2` triangles each, moved
-/// into each other by less than half their length.
+/// The reference scene: two well-shaped bodies of `n / 2` triangles each that overlap by less than
+/// half their length.
 ///
 /// # Errors
-/// As [`impinge::Scene::add`]; so for all scenes here.
+/// As [`impinge::Scene::add`]; the same holds for all scenes here.
 pub fn plain(n: usize) -> Result<BuiltScene, Error> {
     BuiltScene::two_body("plain", &stand_in(n / 2), [0.4, 0.01, 0.01])
 }
@@ -152,9 +152,9 @@ fn cloth_about_origin(n_along: usize, spacing: f32) -> Model {
     cloth(n_along, n_along, spacing).translated([-half, -half, 0.0])
 }
 
-/// Two bodies whose triangles lie flat in one stack, turn and turn about, 2^-24 apart, and one triangle
-/// of each 2^20 away. A uniform grid over the region puts the whole stack in one cell. No two boxes
-/// touch: there are no pairs. Probes that work in one cell is not quadratic.
+/// Two bodies whose triangles lie flat in one stack, alternately from each body, 2^-24 apart, plus one
+/// triangle of each body 2^20 away. A uniform grid over the region puts the whole stack in one cell. No
+/// two boxes touch, so there are no pairs. Probes that work in one cell is not quadratic.
 ///
 /// # Errors
 /// As [`plain`].
@@ -174,8 +174,8 @@ pub fn one_cell(n: usize) -> Result<BuiltScene, Error> {
 }
 
 /// Two bodies of `n / 2` triangles, all hinged on one segment like the pages of a book: every
-/// triangle of one meets every one of the other, `(n / 2)^2` pairs. Probes that memory and time follow
-/// the answer.
+/// triangle of one body meets every triangle of the other, `(n / 2)^2` pairs. Probes that memory and
+/// time are proportional to the answer.
 ///
 /// # Errors
 /// As [`plain`].
@@ -226,8 +226,8 @@ pub fn coincident(n: usize) -> Result<BuiltScene, Error> {
     BuiltScene::two_body("coincident", &stand_in(n / 2), [0.0; 3])
 }
 
-/// The [`plain`] scene with eight more triangles a body, a million units away towards all corners.
-/// Probes that the region in which bodies overlap does not set the resolution alone.
+/// The [`plain`] scene with eight more triangles per body, a million units away towards all corners.
+/// Probes that the resolution does not depend only on the region in which bodies overlap.
 ///
 /// # Errors
 /// As [`plain`].
@@ -302,8 +302,8 @@ fn tumbled_cube(random: &mut Random, centre: [f32; 3], size: f32) -> Model {
 }
 
 /// `n_bodies` cubes of 12 triangles each, placed and turned at random, with edges of 0.4 to 0.8 in a
-/// space of one unit volume a body: each meets about one other. All pairs of bodies are
-/// asked for. Probes that no step looks at all pairs of bodies.
+/// space of one unit volume per body: each cube meets about one other. The query asks for pairs of all
+/// bodies. Probes that no step visits all pairs of bodies.
 ///
 /// # Errors
 /// As [`plain`].
@@ -319,9 +319,9 @@ pub fn boxes(n_bodies: usize, seed: u64) -> Result<BuiltScene, Error> {
     BuiltScene::all("boxes", cubes)
 }
 
-/// Two bodies of `n / 4` triangles and `n / 24` cubes of 12 about and within them, with edges from
-/// 1/2 down to 1/1024, each size half as likely as the next smaller. Probes that neither bodies nor
-/// the largest primitive set the unit of work.
+/// Two bodies of `n / 4` triangles and `n / 24` cubes of 12 triangles around and inside them, with edges
+/// from 1/2 down to 1/1024, each size half as likely as the next smaller one. Probes that the unit of
+/// work is neither a body nor the largest primitive.
 ///
 /// # Errors
 /// As [`plain`].
@@ -344,10 +344,10 @@ pub fn mixed_sizes(n: usize) -> Result<BuiltScene, Error> {
     BuiltScene::all("mixed-sizes", [large, neighbour].into_iter().chain(cubes))
 }
 
-/// Long, thin triangles along diagonals, `n / 2` a body: those of one along `(1, 1, 1)`, those of the
-/// other along `(1, 1, -1)`, crossing the first ones at their middles. Their boxes are
-/// nearly empty and four in ten pairs of them overlap: no method that looks at boxes can tell them
-/// apart. Probes that memory stays bounded and that the pair test is fast.
+/// Long, thin triangles along diagonals, `n / 2` per body: those of one body along `(1, 1, 1)`, those of
+/// the other along `(1, 1, -1)`, crossing the first ones at their middles. Their boxes are
+/// nearly empty and four in ten pairs of boxes overlap, so boxes tell little about them.
+/// Probes that memory stays bounded and that the pair test is fast.
 ///
 /// # Errors
 /// As [`plain`].
@@ -355,8 +355,8 @@ pub fn slivers(n: usize) -> Result<BuiltScene, Error> {
     let mut random = Random::new(3);
     let mut bodies = [Mesh::default(), Mesh::default()];
     for _ in 0..(n / 2).min(MAX_PRIMITIVES) {
-        // Middles are multiples of 2^-12 and half lengths 2^-2: ends are exact, so each pair of
-        // slivers about one middle does share that point.
+        // Middles are multiples of 2^-12 and half lengths are 2^-2, so ends are exact, and the two
+        // slivers with a common middle really share that point.
         let middle: [f32; 3] = std::array::from_fn(|_| (random.unit() * 4096.0).floor() / 4096.0);
         for (body, z) in bodies.iter_mut().zip([0.25, -0.25]) {
             let end = add(middle, [0.25, 0.25, z]);
@@ -385,8 +385,8 @@ fn unit_cube([x, y, z]: [usize; 3]) -> Model {
     crate::surfaces::cuboid(min, add(min, [1.0; 3]))
 }
 
-/// Unit cubes on integer coordinates, stacked without gaps, each a body of 12 triangles; all pairs of
-/// bodies are asked for. Faces, edges and corners touch and boxes end exactly on cell borders:
+/// Unit cubes on integer coordinates, stacked without gaps, each a body of 12 triangles; the query asks
+/// for pairs of all bodies. Faces, edges and corners touch and boxes end exactly on cell borders:
 /// probes that each touching pair is found, and found once.
 ///
 /// # Errors

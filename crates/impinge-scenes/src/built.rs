@@ -1,4 +1,4 @@
-//! Bodies and the question asked of them.
+//! A scene and a query about it.
 
 use impinge::{BodyId, Error, Query, Scene};
 
@@ -7,18 +7,18 @@ use crate::model::Model;
 /// A scene ready to be detected.
 #[derive(Debug, Clone)]
 pub struct BuiltScene {
-    /// What it is called in tables.
+    /// Its name in tables.
     pub name: String,
     /// The bodies.
     pub scene: Scene,
     /// Their ids in the order in which they were added.
     pub bodies: Vec<BodyId>,
-    /// What is asked.
+    /// The query.
     pub query: Query,
 }
 
 impl BuiltScene {
-    /// A scene of models, and all pairs of different bodies asked for.
+    /// A scene of models, with a query for the pairs of all different bodies.
     ///
     /// # Errors
     /// As [`Scene::add`].
@@ -39,7 +39,7 @@ impl BuiltScene {
         })
     }
 
-    /// Two bodies, and the pairs between them.
+    /// Two bodies, with a query for the pairs between them.
     ///
     /// # Errors
     /// As [`Scene::add`].
@@ -49,7 +49,7 @@ impl BuiltScene {
         Ok(built)
     }
 
-    /// A model and its copy moved by `offset` (added in f32), and the pairs between them.
+    /// A model and its copy moved by `offset` (added in f32), with a query for the pairs between them.
     ///
     /// # Errors
     /// As [`Scene::add`].
@@ -61,7 +61,7 @@ impl BuiltScene {
         BuiltScene::between(name, model.clone(), model.translated(offset))
     }
 
-    /// One body, and its self-collision.
+    /// One body, with a query for its self-collision.
     ///
     /// # Errors
     /// As [`Scene::add`].
@@ -71,7 +71,7 @@ impl BuiltScene {
         Ok(built)
     }
 
-    /// Primitives of all bodies together.
+    /// The number of primitives of all bodies together.
     pub fn n_primitives(&self) -> usize {
         self.scene
             .bodies()

@@ -1,8 +1,8 @@
-//! Deformations: where a vertex is at a time, given where it rests.
+//! Deformations: the position of a vertex at a time, given its rest position.
 //!
-//! A frame is always computed from the rest pose, never from the frame before, so any frame can
-//! be asked for first and rounding does not pile up. Two deformations one after the other are
-//! a tuple.
+//! A frame is always computed from the rest pose, never from the frame before, so frames can be
+//! computed in any order and rounding errors do not accumulate. A tuple of two deformations applies
+//! the first, then the second.
 //!
 //! ```
 //! use impinge_scenes::deform::{Deform, Drift, Wave};
@@ -17,11 +17,11 @@ use crate::model::add;
 
 /// Moves vertices as a function of their rest position and of time.
 pub trait Deform {
-    /// Where the vertex that rests at `p` is at time `t`.
+    /// The position at time `t` of the vertex with rest position `p`.
     fn at(&self, p: [f32; 3], t: f32) -> [f32; 3];
 
-    /// Writes the positions at time `t` over `now`, without allocating. Of arrays of different
-    /// lengths the common part is written.
+    /// Overwrites `now` with the positions at time `t`, without allocating. If the arrays have different
+    /// lengths, it writes the common part.
     fn apply(&self, rest: &[[f32; 3]], t: f32, now: &mut [[f32; 3]]) {
         for (now, &rest) in now.iter_mut().zip(rest) {
             *now = self.at(rest, t);
@@ -43,11 +43,11 @@ pub struct Wave {
     pub amplitude: f32,
     /// Distance from crest to crest along `travel`, above 0.
     pub wave_length: f32,
-    /// How far crests move in a unit of time.
+    /// How far crests move per unit of time.
     pub speed: f32,
-    /// Where the crests move to, of length 1.
+    /// The direction in which crests move, of length 1.
     pub travel: [f32; 3],
-    /// Along what vertices move, of length 1.
+    /// The direction along which vertices move, of length 1.
     pub displacement: [f32; 3],
 }
 
@@ -74,12 +74,12 @@ impl Deform for Wave {
 }
 
 /// Turns every slice perpendicular to `axis` about the axis through the origin, by
-/// `rate * t` radians a unit length along it.
+/// `rate * t` radians per unit length along it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Twist {
     /// 0, 1 or 2 for x, y or z; other numbers are taken modulo 3.
     pub axis: usize,
-    /// Radians a unit length and a unit of time.
+    /// Radians per unit length and unit of time.
     pub rate: f32,
 }
 
@@ -94,10 +94,10 @@ impl Deform for Twist {
     }
 }
 
-/// Moves everything alike: `p + velocity * t`.
+/// Moves all vertices by the same vector: `p + velocity * t`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drift {
-    /// Length a unit of time.
+    /// Length per unit of time.
     pub velocity: [f32; 3],
 }
 
@@ -107,17 +107,17 @@ impl Deform for Drift {
     }
 }
 
-/// Stirs: three sine shears one after the other, each along one axis by
-/// `strength * t * sin(frequency * next axis)`, volume-preserving as every shear is. Neighbours part
+/// A stirring motion: three sine shears one after the other, each along one axis by
+/// `strength * t * sin(frequency * next axis)`, which preserve volume. Distances of neighbours grow
 /// by a factor of about `(strength * frequency * t)^3`, so groups of vertices that
-/// were near each other at rest are soon spread over the whole body, which grows by no more than
-/// `strength * t` along each axis. It is a motion to make anything stale that was built for
-/// the rest pose.
+/// are close at rest soon spread over the whole body, while the body grows by at most
+/// `strength * t` along each axis. It makes any structure that was built for the rest pose
+/// stale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flow {
-    /// Length a unit of time.
+    /// Length per unit of time.
     pub strength: f32,
-    /// Radians a unit length.
+    /// Radians per unit length.
     pub frequency: f32,
 }
 

@@ -4,11 +4,11 @@
 //!   [`soup`] (random primitives, on an integer lattice too, where everything is degenerate).
 //! * [`regular`]: flat and regular surfaces, hard for filters.
 //! * [`deform`]: positions as functions of the rest pose and of time, written into a buffer.
-//! * [`BuiltScene`]: bodies and the question asked of them, ready to be detected.
+//! * [`BuiltScene`]: bodies and a query about them, ready for a detector.
 //! * [`adversarial`]: scenes that break methods which are only fast on average.
-//! * [`data`]: where real meshes and published answers are looked for.
+//! * [`data`]: locations of real meshes and published answers.
 //!
-//! Everything is deterministic: random generators take a seed, and nothing looks at the clock.
+//! Everything is deterministic: random generators take a seed, and nothing reads the clock.
 //! Generators that use trigonometry may differ in the last bit between operating systems.
 //!
 //! ```

@@ -2,8 +2,8 @@
 
 use impinge::{BodyId, Elements, Error, Scene};
 
-/// The most primitives that a generator makes; a larger request is taken as this one. Vertex
-/// indices stay well inside 32 bits.
+/// The most primitives that a generator makes; larger requests are reduced to it, so that vertex
+/// indices fit in 32 bits.
 pub const MAX_PRIMITIVES: usize = 1 << 30;
 
 /// A mesh: positions and elements.
@@ -26,7 +26,7 @@ impl Model {
         self.positions.len()
     }
 
-    /// Smallest and largest coordinates, `None` without vertices.
+    /// Smallest and largest coordinates; `None` if there are no vertices.
     pub fn bounds(&self) -> Option<([f32; 3], [f32; 3])> {
         let &first = self.positions.first()?;
         Some(self.positions.iter().fold((first, first), |(min, max), p| {
@@ -37,12 +37,12 @@ impl Model {
         }))
     }
 
-    /// The same mesh, moved: one f32 addition a coordinate.
+    /// The same mesh, moved: one f32 addition per coordinate.
     pub fn translated(&self, offset: [f32; 3]) -> Model {
         self.mapped(|p| add(p, offset))
     }
 
-    /// The same mesh, scaled about the origin: one f32 product a coordinate, exact for powers of two.
+    /// The same mesh, scaled about the origin: one f32 product per coordinate, exact for powers of two.
     pub fn scaled(&self, factor: f32) -> Model {
         self.mapped(|p| p.map(|x| x * factor))
     }
@@ -95,9 +95,9 @@ impl Mesh {
         );
     }
 
-    /// Splits faces, spread evenly, at a new vertex each until there are `n_faces` (or one less:
-    /// a split adds two faces, and a closed surface stays closed). The new vertex is the
-    /// centroid, moved by `place`.
+    /// Splits evenly spread faces, each at a new vertex, until there are `n_faces` faces (or one less:
+    /// a split adds two faces, and a closed surface stays closed). The new vertex is the face's
+    /// centroid, mapped by `place`.
     pub fn split_to(&mut self, n_faces: usize, place: impl Fn([f32; 3]) -> [f32; 3]) {
         while self.faces.len() + 2 <= n_faces {
             let n_old = self.faces.len();
@@ -130,7 +130,7 @@ pub(crate) fn index(vertex: usize) -> u32 {
     u32::try_from(vertex).expect("generators are limited to MAX_PRIMITIVES")
 }
 
-/// Rounds a position to nearest in f32: the one place where generators leave double precision.
+/// Rounds a position to nearest in f32. Generators leave double precision only here.
 pub(crate) fn to_f32(p: [f64; 3]) -> [f32; 3] {
     p.map(|x| x as f32)
 }

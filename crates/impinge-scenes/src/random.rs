@@ -1,7 +1,7 @@
 //! A small random number generator: the same numbers on every machine.
 
 /// SplitMix64 (Steele, Lea, Flood 2014, "Fast splittable pseudorandom number generators"): a
-/// counter in steps of the golden ratio, mixed. Good enough for scenes, useless for secrets.
+/// counter in steps of the golden ratio, mixed. Good enough for scenes, not for cryptography.
 #[derive(Debug, Clone)]
 pub struct Random(u64);
 

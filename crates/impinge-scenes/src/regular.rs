@@ -1,7 +1,7 @@
-//! Flat and regular surfaces, as sheets at rest and machine parts are: neighbours in one plane, edges in one line.
+//! Flat and regular surfaces, like sheets at rest and machine parts: neighbours in one plane, edges in one line.
 //!
-//! None of them meets itself anywhere but at shared vertices. They are hard for filters, because the plane of a
-//! triangle holds its neighbours' vertices exactly, or nearly. [`rough`] is the easy one of the same
+//! None of them meets itself except at shared vertices. They are hard for filters, because the plane of a
+//! triangle contains its neighbours' vertices exactly, or nearly. [`rough`] is an easy surface of the same
 //! size, for comparison.
 
 use std::f64::consts::TAU;
@@ -10,18 +10,18 @@ use crate::model::{Mesh, Model, index, real, to_f32};
 use crate::random::Random;
 use crate::surfaces::cloth;
 
-/// A regular surface by its name: what it is, and how to make it of about so many triangles.
+/// A regular surface: its name, a description, and a function that builds it.
 #[derive(Debug, Clone, Copy)]
 pub struct Regular {
     /// One word.
     pub name: &'static str,
-    /// What it looks like.
+    /// A description.
     pub what: &'static str,
-    /// Makes it of about so many triangles.
+    /// Builds it with about this many triangles.
     pub build: fn(usize) -> Model,
 }
 
-/// All of them, [`rough`] first.
+/// All regular surfaces, [`rough`] first.
 pub const ALL: [Regular; 7] = [
     Regular {
         name: "rough",
@@ -64,7 +64,7 @@ fn side(n_triangles: usize) -> usize {
     (n_triangles / 2).isqrt().max(1)
 }
 
-/// A square sheet of spacing 1 whose points are moved, before they are rounded.
+/// A square sheet of spacing 1 whose points are mapped by `moved` and then rounded.
 fn sheet(n_triangles: usize, mut moved: impl FnMut([f64; 3]) -> [f64; 3]) -> Model {
     let side = side(n_triangles);
     let mut model = cloth(side, side, 1.0);
@@ -74,7 +74,7 @@ fn sheet(n_triangles: usize, mut moved: impl FnMut([f64; 3]) -> [f64; 3]) -> Mod
     model
 }
 
-/// A square sheet with heights between 0 and half of its grid's spacing, at random.
+/// A square sheet with random heights between 0 and half of its grid's spacing.
 pub fn rough(n_triangles: usize) -> Model {
     let mut random = Random::new(1);
     sheet(n_triangles, |[x, y, _]| {

@@ -1,12 +1,12 @@
-//! Primitives without any order: random ones, and ones on an integer lattice, where vertices
-//! coincide and points are collinear and coplanar at every turn.
+//! Unconnected primitives: random ones, and ones on an integer lattice, where many vertices
+//! coincide and many points are collinear or coplanar.
 
 use impinge::Elements;
 
 use crate::model::{MAX_PRIMITIVES, Model, add, index};
 use crate::random::Random;
 
-/// `n` primitives of `K` vertices each, all their own.
+/// `n` primitives of `K` vertices each, none of them shared.
 fn separate<const K: usize>(
     n: usize,
     mut corners: impl FnMut() -> [[f32; 3]; K],
@@ -57,7 +57,7 @@ pub fn tetrahedra(n: usize, size: f32, seed: u64) -> Model {
 }
 
 /// `n` triangles whose corners are random points of the lattice 0, 1, …, `k` (at most 65,535) cubed:
-/// with a small `k` many are segments or points, and nearly all meetings are touching ones.
+/// with a small `k` many are segments or points, and nearly all pairs only touch.
 pub fn lattice_triangles(n: usize, k: u32, seed: u64) -> Model {
     let mut random = Random::new(seed);
     let (positions, faces) = separate(n, || on_lattice(&mut random, k.min(65_535)));
@@ -93,8 +93,8 @@ fn web<const K: usize>(n: usize, n_vertices: usize, seed: u64) -> Vec<[u32; K]> 
         .collect()
 }
 
-/// `n` triangles over shared vertices, the points of the lattice 0, 1, …, `k` (at most 255) cubed:
-/// trouble for adjacency rules. Triangles share one, two or three vertices, and one may name
+/// `n` triangles over shared vertices, the points of the lattice 0, 1, …, `k` (at most 255) cubed: a
+/// hard case for adjacency rules. Triangles share one, two or three vertices, and a triangle may name
 /// the same vertex twice.
 pub fn lattice_web(n: usize, k: u32, seed: u64) -> Model {
     let positions = lattice_points(k);

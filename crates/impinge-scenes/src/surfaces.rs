@@ -47,8 +47,8 @@ pub fn uv_sphere(n_segments: usize, n_rings: usize) -> Model {
 }
 
 /// A sphere of radius 0.5 about the origin with `n_triangles` triangles of about the same size:
-/// exactly as many for an even number from 20 on, one less for an odd one (a closed surface of
-/// triangles has an even number of them).
+/// exactly this many for an even number from 20 on, one less for an odd number (a closed surface has
+/// an even number of triangles).
 pub fn ball(n_triangles: usize) -> Model {
     ball_mesh(n_triangles).model()
 }
@@ -100,7 +100,7 @@ fn geodesic(frequency: usize) -> Mesh {
     ];
     let mut mesh = Mesh::default();
     mesh.positions.extend(corners.map(on_sphere));
-    // Points inside an edge are made once, from its lower to its higher corner.
+    // Points inside an edge are created once, from its lower to its higher corner.
     let mut edges: HashMap<(u32, u32), u32> = HashMap::new();
     for face in FACES {
         for (&from, &to) in face.iter().zip(face.iter().cycle().skip(1)) {
@@ -221,7 +221,7 @@ pub struct Knot {
 }
 
 impl Default for Knot {
-    /// A trefoil whose strands keep clear of each other.
+    /// A trefoil whose strands do not touch.
     fn default() -> Self {
         Knot {
             p: 2,
@@ -234,11 +234,11 @@ impl Default for Knot {
 }
 
 /// A tube along a torus knot, scaled to a box diagonal of 1 about the origin, with
-/// `n_triangles` triangles: exactly as many for an even number from 96 on, one less for an odd one.
+/// `n_triangles` triangles: exactly this many for an even number from 96 on, one less for an odd number.
 pub fn torus_knot(n_triangles: usize, knot: Knot) -> Model {
     let n_triangles = n_triangles.clamp(96, MAX_PRIMITIVES);
     let (p, q) = (f64::from(knot.p), f64::from(knot.q));
-    // Quads come out about square when their numbers are as length to girth.
+    // Quads are about square if their numbers have the ratio of length to girth.
     let slenderness = p.hypot(q * knot.winding_radius) / knot.tube_radius;
     let n_quads = n_triangles / 2;
     let n_tube = count((real(n_quads) / slenderness).sqrt()).clamp(3, n_quads / 16);
@@ -246,8 +246,8 @@ pub fn torus_knot(n_triangles: usize, knot: Knot) -> Model {
         let ((sin_p, cos_p), (sin_q, cos_q)) = ((p * u).sin_cos(), (q * u).sin_cos());
         let radius = 1.0 + knot.winding_radius * cos_q;
         let centre = [radius * cos_p, radius * sin_p, knot.winding_radius * sin_q];
-        // The strand lies on a torus: the torus's normal stays perpendicular to the strand and
-        // comes back to itself after a round, which a Frenet frame need not.
+        // The strand lies on a torus. The torus's normal stays perpendicular to the strand and
+        // returns to itself after one round, unlike a Frenet frame.
         let normal = [cos_q * cos_p, cos_q * sin_p, sin_q];
         let radius_change = -knot.winding_radius * q * sin_q;
         let tangent = normalised([
@@ -264,9 +264,9 @@ pub fn torus_knot(n_triangles: usize, knot: Knot) -> Model {
     unit_diagonal(mesh.model())
 }
 
-/// A mesh to stand in for a scanned one of `n_triangles` triangles where no file is at hand: a
-/// swelling [`torus_knot`] with a box diagonal of 1, as the scans have. It is a stand-in: pair
-/// counts and times differ from those of any scan.
+/// A stand-in for a scanned mesh of `n_triangles` triangles if its file is absent: a
+/// swelling [`torus_knot`] with a box diagonal of 1, like the scans. Pair counts and times differ
+/// from those of any scan.
 pub fn stand_in(n_triangles: usize) -> Model {
     torus_knot(n_triangles, Knot::default())
 }
@@ -318,7 +318,7 @@ pub fn cloth(n_x: usize, n_y: usize, spacing: f32) -> Model {
 /// The surface of a box from `min` to `max`: 12 triangles, 8 vertices.
 pub fn cuboid(min: [f32; 3], max: [f32; 3]) -> Model {
     let mut mesh = Mesh::default();
-    // Vertex number bit k says whether axis k is at its maximum.
+    // Bit k of a vertex number says whether axis k is at its maximum.
     mesh.positions.extend(
         (0..8).map(|v| std::array::from_fn(|k| if v >> k & 1 == 1 { max[k] } else { min[k] })),
     );

@@ -1,4 +1,4 @@
-//! Generators make what they say: counts, closed surfaces, positive volumes, equal runs.
+//! Generators keep their promises: counts, closed surfaces, positive volumes, repeatable results.
 
 use std::collections::HashMap;
 
@@ -248,7 +248,7 @@ fn soups_repeat_and_lattice_points_are_integers() {
         );
         assert!(coordinates.contains(&0.0) && coordinates.contains(&k));
     }
-    // Degenerate primitives are what a lattice is for: some must be there.
+    // A lattice exists to produce degenerate primitives: there must be some.
     let web = soup::lattice_web(500, 1, 3);
     assert!(
         faces(&web)

@@ -1,4 +1,4 @@
-//! Scenes have the structure that they promise, held against the oracle.
+//! Scenes have the structure that they promise, checked with the oracle.
 
 use impinge::{Detector, Method, Settings};
 use impinge_scenes::{BuiltScene, adversarial, data, solids, surfaces};
@@ -69,7 +69,7 @@ fn scenes_that_should_meet_do() {
         let built = build(2_000).expect("valid");
         let n = n_pairs(&built);
         assert!(n >= least, "{}: {n}", built.name);
-        // The answer is of the order of the input: none of these grows quadratically.
+        // The answer is proportional to the input: none of these grows quadratically.
         assert!(n <= 40 * built.n_primitives(), "{}: {n}", built.name);
     }
 }

@@ -1,6 +1,6 @@
-//! What the tests share.
+//! Helpers shared by the tests.
 
-// Each test binary uses a part of this.
+// Each test binary uses a part of this module.
 #![allow(dead_code)]
 
 use impinge::{Backend, Detector};
@@ -10,7 +10,7 @@ pub fn cpu() -> Detector {
     Detector::new(Backend::Cpu).unwrap()
 }
 
-/// Default settings on one thread: tests run many at a time.
+/// Default settings on one thread, because many tests run at the same time.
 pub fn still() -> Settings {
     Settings {
         threads: 1,

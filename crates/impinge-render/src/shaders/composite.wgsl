@@ -1,6 +1,6 @@
 
-// The picture: what is seen, darkened by occlusion; over it, faintly, the faces that show through; behind it, the
-// background. Colours carry their alpha.
+// Composes the picture: the visible faces, darkened by occlusion; faintly over them the faces that show through; behind
+// them the background. Colours are premultiplied by alpha.
 
 @group(0) @binding(1) var scene: texture_2d<f32>;
 @group(0) @binding(2) var through: texture_2d<f32>;
@@ -11,7 +11,7 @@ fn vertex(@builtin(vertex_index) ix: u32) -> @builtin(position) vec4<f32> {
     return over_all(ix);
 }
 
-// The mean of a block of 4 x 4 pixels, as far as they lie about as deep.
+// The mean over those pixels of a 4 x 4 block that have about the same depth.
 fn brightness(pixel: vec2<i32>) -> f32 {
     let size = vec2<i32>(textureDimensions(occlusion));
     let here = textureLoad(occlusion, pixel, 0).xy;

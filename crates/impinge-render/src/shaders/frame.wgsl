@@ -1,4 +1,4 @@
-// What all shaders know: `FrameUniform` of pipelines.rs.
+// Uniform data of all shaders: `FrameUniform` of pipelines.rs.
 struct Frame {
     // Axes of the viewer; `w` moves the eye to 0.
     right: vec4<f32>,
@@ -11,9 +11,9 @@ struct Frame {
     // sRGB.
     background_top: vec4<f32>,
     background_bottom: vec4<f32>,
-    // Width and height of the picture; column and row at which the tile begins.
+    // Width and height of the picture; first column and row of the tile.
     picture: vec4<f32>,
-    // Reach of occlusion in the scene and in pixels; its strength; how far hidden faces are seen.
+    // Reach of occlusion in the scene and in pixels; its strength; the visibility of hidden faces.
     amounts: vec4<f32>,
 }
 

@@ -1,8 +1,8 @@
 
-// How much of the sky around it each pixel loses to what rises nearby: samples on a spiral in the depth
-// buffer, weighted by how steeply they rise over the pixel's own plane and how near they are. The idea is that
-// of McGuire, Osman, Bukowski and Hennessy, "The Alchemy Screen-Space Ambient Obscurance Algorithm" (2011); the
-// falloff is ours. The spiral turns from pixel to pixel in blocks of 4 x 4, over which `composite` takes the mean.
+// How much of the sky nearby faces hide from each pixel: samples on a spiral in the depth buffer, weighted by
+// how steeply they rise over the pixel's own plane and how near they are. After McGuire, Osman, Bukowski and
+// Hennessy, "The Alchemy Screen-Space Ambient Obscurance Algorithm" (2011), with another falloff. The spiral is
+// rotated differently for each pixel of a 4 x 4 block, over which `composite` takes the mean.
 
 @group(0) @binding(1) var depths: texture_depth_multisampled_2d;
 
@@ -13,7 +13,7 @@ fn vertex(@builtin(vertex_index) ix: u32) -> @builtin(position) vec4<f32> {
     return over_all(ix);
 }
 
-// Where the face in this pixel is, the eye at 0; `w` is 0 where there is none.
+// The position of the face in this pixel, relative to the eye; `w` is 0 if there is no face.
 fn seen_at(pixel: vec2<i32>) -> vec4<f32> {
     let size = vec2<i32>(textureDimensions(depths));
     if any(pixel < vec2<i32>(0)) || any(pixel >= size) {
@@ -32,7 +32,7 @@ fn seen_at(pixel: vec2<i32>) -> vec4<f32> {
     return vec4<f32>(across, (depth - frame.projection.w) / frame.projection.z, 1.0);
 }
 
-// The direction along the surface to the neighbour that lies nearer in depth.
+// The direction along the surface, taken from the neighbour whose position is closer in depth.
 fn slope(here: vec3<f32>, one: vec4<f32>, other: vec4<f32>) -> vec3<f32> {
     let forward = one.xyz - here;
     let backward = here - other.xyz;
@@ -56,7 +56,7 @@ fn fragment(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
     let distance = select(1.0, -here.z, frame.sky.w > 0.5);
     let reach_pixels = min(0.5 * frame.picture.y * frame.projection.y * reach / distance, frame.amounts.y);
     let turned = vec2<i32>(pixel + vec2<i32>(frame.picture.zw)) & vec2<i32>(3);
-    // 0 to 15, neighbours far apart.
+    // Rotations 0 to 15; neighbouring pixels get very different ones.
     let turn = f32((turned.x * 5 + turned.y * 11) & 15) * (6.2831853 / 16.0);
     var sum = 0.0;
     for (var k = 0; k < N_SAMPLES; k++) {

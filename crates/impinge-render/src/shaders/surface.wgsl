@@ -1,6 +1,6 @@
 
 // Faces, lit from both sides: light from the sky and from the ground, a key light from the upper left of the
-// viewer, a fill light from the right. A face that looks at the viewer comes out about as bright as its colour.
+// viewer, a fill light from the right. A face turned to the viewer is drawn about as bright as its colour.
 
 struct Corner {
     @location(0) position: vec3<f32>,
@@ -31,7 +31,7 @@ fn vertex(corner: Corner) -> Shaded {
 
 @fragment
 fn fragment(in: Shaded, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
-    // Opposite normals may have cancelled out between corners.
+    // Opposite normals of corners may cancel when interpolated.
     let long_enough = dot(in.normal, in.normal) > 1e-8;
     let outward = select(vec3<f32>(0.0, 0.0, 1.0), normalize(in.normal), long_enough);
     let n = select(-outward, outward, is_front);
