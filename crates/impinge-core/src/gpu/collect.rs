@@ -1,10 +1,10 @@
 //! Stage `collect`: counters and results come back in one copy.
 //!
 //! ```text
-//! counters | grid | times of the stages | pairs, as many as last time and some | unsure pairs, likewise
+//! counters | grid | times of the stages | pairs, a quarter more than last time | unsure pairs, likewise
 //! ```
 //!
-//! When there are more than were copied, the rest follows in a second copy; no kernel runs again.
+//! If there are more than were copied, the rest follows in a second copy; no kernel runs again.
 
 use std::future::Future;
 use std::pin::Pin;
@@ -18,20 +18,20 @@ use crate::error::Error;
 
 const COUNTERS: u64 = N_COUNTERS as u64 * size_of::<Counter>() as u64;
 const GRID: u64 = size_of::<Grid>() as u64;
-/// Stages that a method has at most.
+/// The most stages of a method.
 const MOST_STAGES: usize = 8;
 const TIMES: u64 = 2 * MOST_STAGES as u64 * size_of::<u64>() as u64;
 const HEADER: u64 = COUNTERS + GRID + TIMES;
 const KEY: u64 = size_of::<PairKey>() as u64;
-/// Keys copied at least.
+/// At least this many keys are copied.
 const LEAST: u64 = 1024;
 
-/// The memory that results are read from.
+/// The buffers through which results are read back.
 #[derive(Debug, Default)]
 pub struct Collector {
     staging: Option<wgpu::Buffer>,
     times: Option<Times>,
-    /// What the last pass had.
+    /// The number of pairs of the last pass.
     n_pairs: u64,
     n_unsure: u64,
 }
@@ -42,27 +42,27 @@ struct Times {
     resolved: wgpu::Buffer,
 }
 
-/// How many keys are copied along.
+/// How many keys the first copy includes.
 #[derive(Debug, Clone, Copy)]
 pub struct Guess {
     pairs: u64,
     unsure: u64,
 }
 
-/// What came back.
+/// The results of a pass.
 #[derive(Debug)]
 pub struct Collected {
     pub counts: Counts,
     /// The grid of `Cells`.
     pub grid: Grid,
-    /// Milliseconds a stage, where the device has a clock.
+    /// Milliseconds per stage, if the device has a clock.
     pub stage_ms: Option<Vec<f64>>,
     pub pairs: Vec<PairKey>,
     pub unsure: Vec<UnsureKey>,
 }
 
 impl Collector {
-    /// Where the stages' times are written, if the device has a clock.
+    /// The queries that record the stages' times, if the device has a clock.
     pub fn times(&mut self, gpu: &Gpu) -> Option<&wgpu::QuerySet> {
         if gpu.has_timestamps && self.times.is_none() {
             self.times = Some(Times {
@@ -98,7 +98,7 @@ impl Collector {
         }
     }
 
-    /// Encodes the copy of everything that is wanted.
+    /// Encodes the copy of counters, times and keys.
     pub fn encode(
         &mut self,
         gpu: &Gpu,
@@ -131,10 +131,10 @@ impl Collector {
         guess
     }
 
-    /// Waits for the copy and takes what it brought.
+    /// Waits for the copy and reads it.
     ///
     /// # Errors
-    /// The device's own.
+    /// Device errors.
     pub async fn take(
         &mut self,
         gpu: &Gpu,

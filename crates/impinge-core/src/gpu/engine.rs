@@ -1,6 +1,6 @@
-//! The GPU backend of one detector: which method, which share of the memory, which buffers.
+//! The GPU backend of one detector: its method, its share of the memory, its buffers.
 //!
-//! What is done with them, pass after pass, is in [`passes`](super::passes).
+//! [`passes`](super::passes) runs the passes of a frame.
 
 use crate::clock::Instant;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ use crate::scene::Scene;
 use crate::settings::{Backend, Method, Recluster, Settings};
 use crate::stats::Statistics;
 
-/// Cells at most, whatever lambda says.
+/// The most cells, for any lambda.
 const MOST_CELLS: u64 = 1 << 25;
 /// The share of a memory budget that cells may have.
 const SHARE_OF_CELLS: u64 = 8;
@@ -39,21 +39,21 @@ pub struct Engine {
     pub(super) gpu: Arc<Gpu>,
     pub(super) settings: Settings,
     first: Capacities,
-    /// The method at work: `Clusters` for frames that are too much for `Cells`.
+    /// The method in use: `Clusters` for frames that are too large for `Cells`.
     pub(super) method: Method,
-    /// Primitives of the frame that was too much for `Cells`.
+    /// The number of primitives of the frame that was too large for `Cells`.
     too_much: Option<u64>,
-    /// Bytes of one buffer of topology or positions, where that is less than the device allows.
+    /// The most bytes of one buffer of topology or positions, if less than the device allows.
     pub most_bound: u64,
-    /// Whether the device has pieces of a frame.
+    /// Whether the device holds a piece of a frame, not a whole one.
     has_pieces: bool,
     pub(super) world: World,
     pub(super) room: Room,
     pub(super) plan: Plan,
-    /// What each complete pass of the last frame counted.
+    /// The counts of each complete pass of the last frame.
     pub complete: Vec<Counts>,
     pub(super) collector: Collector,
-    /// Keys that each worker has settled, until they are taken over.
+    /// Keys that each worker has settled, until they are appended to the answer.
     pub(super) settled: Vec<Vec<u64>>,
 }
 
@@ -78,7 +78,7 @@ impl Engine {
         Engine::with_plan(gpu, settings.clone(), first, plan)
     }
 
-    /// With a plan of another crate.
+    /// Creates an engine with a plan of another crate.
     pub fn with_plan_of_guest(
         gpu: Arc<Gpu>,
         settings: Settings,
@@ -110,7 +110,7 @@ impl Engine {
         &self.gpu
     }
 
-    /// After an error of the device: whatever state the buffers are in, the next frame must not build on it.
+    /// Starts with new buffers after a device error: the old ones may be in any state.
     fn begin_anew(&mut self) {
         let plan = match &self.plan {
             Plan::Cells(plan) => Plan::Cells(plan.anew()),
@@ -154,7 +154,7 @@ impl Engine {
         updated?;
         closed.await?;
         if self.first_room(self.cells_wanted(frame)).is_err() {
-            // What buffers have to spare is too much for the budget.
+            // The buffers' spare room exceeds the budget.
             self.world.forget_buffers();
             self.update(job, &[], stats)?;
         }
@@ -185,7 +185,7 @@ impl Engine {
         Ok(())
     }
 
-    /// The same piece by piece, see [`pieces`].
+    /// Answers the frame piece by piece, see [`pieces`].
     async fn in_pieces(
         &mut self,
         job: Job<'_>,
@@ -194,13 +194,13 @@ impl Engine {
     ) -> Result<(), Error> {
         let Job { scene, frame, .. } = job;
         if !self.has_pieces {
-            // They are sized for all of a frame.
+            // The buffers are sized for a whole frame.
             self.world.forget_buffers();
             self.unbind();
             self.has_pieces = true;
         }
         let most = self.most();
-        // Two chunks a piece, and a quarter to spare in each buffer.
+        // Two chunks per piece, and a quarter to spare in each buffer.
         let most = Most {
             binding: most.binding / 2,
             bytes: most.bytes / 4,
@@ -248,12 +248,12 @@ impl Engine {
         stats.bytes_held = self.world.bytes() + self.room.bytes();
     }
 
-    /// In `Cells` clusters only tell what is out of reach, however well they fit.
+    /// Whether bodies are clustered again. Not in `Cells`, where clusters only show which primitives are out of reach.
     fn reclusters(&self) -> bool {
         self.settings.recluster == Recluster::Auto && self.method == Method::Clusters
     }
 
-    /// The most that may be on the device of topology and positions.
+    /// The most topology and positions that may be on the device.
     fn most(&self) -> Most {
         let least = Capacities::LEAST.of(self.method).bytes();
         let budget = self.settings.memory_budget;
@@ -263,7 +263,7 @@ impl Engine {
         }
     }
 
-    /// Whether topology and positions of all of a frame fit the device and the budget.
+    /// Whether topology and positions of a whole frame fit the device and the budget.
     fn is_held(&self, scene: &Scene, frame: &Frame) -> bool {
         let cells = self.cells_wanted(frame).map_or(0, |cells| cells.bytes());
         let most = self.most();
@@ -273,10 +273,10 @@ impl Engine {
         })
     }
 
-    /// Whether a frame that is not held may be answered in pieces.
+    /// Whether a frame that does not fit may be answered in pieces.
     ///
     /// # Errors
-    /// The device binds less, and somebody else is to answer then.
+    /// The device binds less than the frame needs, and with `Backend::Auto` the CPU is to answer it.
     fn may_cut(&self, scene: &Scene, frame: &Frame) -> Result<(), Error> {
         let (needed, most) = (self.world.weigh(scene, frame).binding(), self.most());
         if self.settings.backend == Backend::Gpu || needed <= most.binding {
@@ -295,25 +295,25 @@ impl Engine {
         matches!(&self.plan, Plan::Cells(plan) if !plan.splits_cells())
     }
 
-    /// Whether a frame that is too much for the method may be answered by `Clusters`.
+    /// Whether `Clusters` may answer a frame that is too large for the method.
     fn falls_back(&self) -> bool {
         matches!(&self.plan, Plan::Cells(plan) if plan.splits_cells())
     }
 
-    /// Answers this frame, and those with as many primitives, by `Clusters`.
+    /// Answers this frame, and later ones with at least as many primitives, by `Clusters`.
     fn take_clusters(&mut self, frame: &Frame) {
         self.too_much = Some(frame.n_primitives());
         self.take(Method::Clusters);
     }
 
-    /// Goes over to a method of the library's own.
+    /// Switches to a built-in method.
     fn take(&mut self, method: Method) {
         self.method = method;
         self.plan = Plan::of(method);
         self.room = Room::new();
     }
 
-    /// Brings the device up to the frame, but for positions that are on the device already.
+    /// Sends what has changed since the last frame, except the positions of `resident` bodies.
     pub(super) fn update(
         &mut self,
         job: Job<'_>,
@@ -331,14 +331,14 @@ impl Engine {
         Ok(())
     }
 
-    /// What the budget leaves for buffers that grow by themselves.
+    /// The part of the budget that is left for buffers that grow.
     pub(super) fn budget_for_room(&self) -> Option<u64> {
         let fixed = self.world.bytes() + self.room.bytes_of_cells();
         let budget = self.settings.memory_budget;
         budget.map(|budget| budget.saturating_sub(fixed))
     }
 
-    /// Room from the next frame on.
+    /// Sets the room from the next frame on.
     pub(super) fn grow_to(&mut self, capacities: Capacities) {
         self.first = capacities;
     }
@@ -350,7 +350,7 @@ impl Engine {
         }
     }
 
-    /// Room for the grid: as many cells as equation (1) can ask for.
+    /// Room for the grid: as many cells as equation (1) can give.
     pub(super) fn cells_wanted(&self, frame: &Frame) -> Option<CellsWanted> {
         if self.method != Method::Cells {
             return None;
@@ -367,7 +367,7 @@ impl Engine {
         })
     }
 
-    /// Room for the first pass: what there is, unless the budget says less.
+    /// Room for the first pass: the present room, unless the budget allows less.
     pub(super) fn first_room(&self, cells: Option<CellsWanted>) -> Result<Capacities, Error> {
         let wanted = self.first.of(self.method).max(self.room.capacities());
         let Some(budget) = self.settings.memory_budget else {
@@ -416,7 +416,7 @@ impl Finder for Engine {
     }
 
     /// # Errors
-    /// The device's own, a budget too small for the smallest pass, cancellation.
+    /// Device errors, a budget too small for the smallest pass, cancellation.
     async fn find(
         &mut self,
         job: Job<'_>,

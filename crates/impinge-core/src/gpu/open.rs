@@ -1,4 +1,4 @@
-//! Finding adapters, and opening one for all detectors that want it.
+//! Finds adapters, and opens one device per adapter for all detectors that use it.
 
 use std::fmt;
 use std::ops::Deref;
@@ -10,8 +10,8 @@ use super::pipeline::Source;
 use super::waiting::wait;
 use crate::error::Error;
 
-/// The adapters on this machine that can run the kernels, hardware first. In a browser, which does not let
-/// a program wait for the answer, none: ask [`devices_async`].
+/// The adapters on this machine that can run the kernels, hardware first. Empty in a browser, where a program cannot
+/// wait for the answer: use [`devices_async`].
 pub fn devices() -> Vec<DeviceInfo> {
     wait(async { Ok(devices_async().await) }).unwrap_or_default()
 }
@@ -30,7 +30,7 @@ async fn adapters() -> Vec<(wgpu::Adapter, DeviceInfo)> {
     let instance = INSTANCE.get_or_init(|| {
         wgpu::Instance::new(wgpu::InstanceDescriptor {
             backends: wgpu::Backends::PRIMARY,
-            // Indirect arguments come from our own kernel, which keeps to the limits.
+            // Indirect arguments need no validation: they come from our own kernel, which keeps to the limits.
             flags: wgpu::InstanceFlags::empty(),
             ..wgpu::InstanceDescriptor::new_without_display_handle()
         })
@@ -68,14 +68,14 @@ impl Deref for Gpu {
     }
 }
 
-/// Which adapters come into question.
+/// Which adapters are acceptable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wanted<'a> {
     /// Any, hardware before software.
     Any,
     /// Hardware only.
     Hardware,
-    /// Those whose name contains this, whatever the case.
+    /// Those whose name contains this; upper and lower case are the same.
     Named(&'a str),
 }
 
@@ -86,7 +86,7 @@ impl Gpu {
     /// Opens an adapter, or shares the device of another detector.
     ///
     /// # Errors
-    /// No adapter fits; the driver refuses. In a browser always.
+    /// No adapter fits; the driver refuses. Always an error in a browser.
     pub fn open(wanted: Wanted<'_>) -> Result<Arc<Gpu>, Error> {
         wait(Gpu::open_async(wanted))
     }
@@ -118,7 +118,7 @@ impl Gpu {
         if let Some(gpu) = Gpu::shared(info) {
             return Ok(gpu);
         }
-        // The lock is not held while the device is awaited, so another one may have come first.
+        // The lock is not held while the device is awaited, so another detector may have opened it first.
         let gpu = Arc::new(Gpu::request(adapter, info.clone()).await?);
         if let Some(gpu) = Gpu::shared(info) {
             return Ok(gpu);
@@ -128,7 +128,7 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// The device that another detector has open on this adapter.
+    /// The device that another detector has opened on this adapter.
     fn shared(info: &DeviceInfo) -> Option<Arc<Gpu>> {
         let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
         shared.retain(|(_, gpu)| gpu.strong_count() > 0);
@@ -140,7 +140,7 @@ impl Gpu {
 
     async fn request(adapter: &wgpu::Adapter, info: DeviceInfo) -> Result<Gpu, Error> {
         let offered = adapter.limits();
-        // The least that WebGPU promises, but buffers as large as the adapter has them.
+        // WebGPU's guaranteed minimum, but buffers as large as the adapter allows.
         let required_limits = wgpu::Limits {
             max_buffer_size: offered.max_buffer_size,
             max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
@@ -164,7 +164,7 @@ impl Gpu {
         })
     }
 
-    /// A device that is the caller's. Its callbacks are left alone.
+    /// Wraps a device of the caller's. Its callbacks are not changed.
     ///
     /// # Errors
     /// It allows too little.
@@ -172,7 +172,7 @@ impl Gpu {
         Gpu::of_caller_with(device, queue, |_| None)
     }
 
-    /// The same, where `damage` may give another text than a kernel's own.
+    /// The same, where `damage` may replace a kernel's text.
     pub(crate) fn of_caller_with(
         device: wgpu::Device,
         queue: wgpu::Queue,

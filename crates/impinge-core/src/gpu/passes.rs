@@ -1,13 +1,13 @@
 //! The frame on the device: passes, growing, splitting.
 //!
 //! A pass takes its share of the work through all stages in one submission. If a buffer was too small,
-//! the counters say how large it must be: it grows and the pass runs again. If it may not grow, by the
-//! device's limit or the memory budget, the work is split and each part is a pass. What is split:
+//! the counters say how large it must be: it grows and the pass runs again. If the device's limit or the
+//! memory budget forbids that, the work is split and each part becomes a pass:
 //!
-//! * `Clusters`: pairs of tree nodes, the seeds of the traversal, down to one pair of clusters;
-//! * `Cells`: cells; of a single cell the product of its groups, in tiles, over a list that stays as it is.
+//! * `Clusters`: the seeds of the traversal, which are pairs of tree nodes, down to one pair of clusters;
+//! * `Cells`: ranges of cells, then the product of one cell's groups, in tiles, over a list that does not change.
 //!
-//! In the end a pass has one work item, for which [`Capacities::LEAST`] is enough.
+//! The smallest pass has one work item, for which [`Capacities::LEAST`] is enough.
 
 use super::buffers::count;
 use super::cells::{Part, Share, Tile, Told};
@@ -26,14 +26,14 @@ use crate::run::Job;
 use crate::settings::Method;
 use crate::stats::Statistics;
 
-/// Seeds up to which the host descends before the first launch: each step down saves two launches.
+/// The host descends before the first launch while there are at most this many seeds: each step saves two launches.
 const SEEDS: usize = 512;
-/// Unsure pairs from which on threads share them.
+/// From this many unsure pairs on, several threads settle them.
 const PARALLEL_FROM: usize = 512;
-/// Unsure pairs that a worker takes at a time.
+/// Unsure pairs per task.
 const SETTLED_BY_A_TASK: usize = 64;
 
-/// What a pass does.
+/// The work of a pass.
 #[derive(Debug, Clone)]
 pub(super) enum Work {
     Seeds(Vec<NodePair>),
@@ -44,7 +44,7 @@ pub(super) enum Work {
 #[derive(Debug)]
 pub(super) enum Answer {
     Complete,
-    /// There is not room enough for what cannot be split.
+    /// There is not enough room for work that cannot be split.
     Crowded(Error),
 }
 
@@ -78,7 +78,7 @@ impl Engine {
                     let settled = &mut self.settled;
                     stats.time("settle", |_| settle_all(job, &collected, settled, keys));
                     if let Work::Cells(part, Share::Lists) = work {
-                        // Nothing touches the list before the last of its tiles is done.
+                        // No other pass changes the list before the last of its tiles is done.
                         let n_entries = collected.counts.needed.entries as u32;
                         let tile = Tile::all(n_entries, self.settings.group_size);
                         waiting.extend(
@@ -108,7 +108,7 @@ impl Engine {
         Ok(Answer::Complete)
     }
 
-    /// All of the work, if there is any.
+    /// The whole work of a frame, if there is any.
     pub(super) fn whole(&self, frame: &Frame) -> Option<Work> {
         let seeds = self.world.seeds(frame);
         if seeds.is_empty() {
@@ -120,7 +120,7 @@ impl Engine {
         })
     }
 
-    /// The work of a piece: pairs of its runs, not more at a time than a queue holds.
+    /// The work of a piece: pairs of its runs, in batches that a queue can hold.
     pub(super) fn seeds_in_batches(&self, frame: &Frame, pairs: &[[u32; 2]]) -> Vec<Work> {
         let most = (self.room.capacities().queue as usize).max(SEEDS);
         let batches = pairs.chunks(most);
@@ -129,7 +129,7 @@ impl Engine {
             .collect()
     }
 
-    /// Seeds, as far down as the host goes.
+    /// Replaces seeds by their children's pairs, for as long as there are at most [`SEEDS`].
     fn descend(&self, frame: &Frame, mut seeds: Vec<NodePair>) -> Vec<NodePair> {
         let mut below = Vec::new();
         loop {
@@ -146,7 +146,7 @@ impl Engine {
         }
     }
 
-    /// Smaller parts, or the children of a single pair of nodes; none when that is no help.
+    /// Smaller parts, or the children of a single pair of nodes; `None` if splitting does not help.
     fn split(
         &self,
         frame: &Frame,
@@ -178,7 +178,7 @@ impl Engine {
     fn split_cells(&self, part: Part, share: Share, collected: &Collected) -> Option<Vec<Work>> {
         match share {
             Share::All => {
-                // What is kept does not depend on the part.
+                // The kept primitives do not depend on the part.
                 let needed = &collected.counts.needed;
                 if needed.kept > self.room.capacities().kept {
                     return None;
@@ -194,7 +194,7 @@ impl Engine {
         }
     }
 
-    /// Room for what cannot be split, at the cost of all that can.
+    /// Room for work that cannot be split: the buffers that it needs grow, and all others shrink.
     fn lean(
         &self,
         work: &Work,
@@ -205,7 +205,7 @@ impl Engine {
         let needed = &collected.counts.needed;
         let least = Capacities::LEAST.of(self.method);
         let lean = match work {
-            // The list that is there must stay.
+            // The filled list must stay.
             Work::Cells(_, Share::Tile(_)) => Capacities {
                 kept: now.kept,
                 entries: now.entries,
@@ -284,7 +284,7 @@ impl Engine {
         Ok(guess)
     }
 
-    /// Encodes all stages; without work, counters that say so.
+    /// Encodes all stages; without work, only counters of zero.
     pub(super) fn encode_pass(
         &mut self,
         frame: &Frame,
@@ -335,7 +335,7 @@ impl Engine {
     }
 }
 
-/// The quarters of a tile that have anything to do.
+/// The quarters of a tile that have any work.
 fn quarters(part: Part, tile: Tile) -> Vec<Work> {
     let quarters = tile.split().unwrap_or_default().into_iter();
     quarters
@@ -343,7 +343,7 @@ fn quarters(part: Part, tile: Tile) -> Vec<Work> {
         .collect()
 }
 
-/// Counts of a pass that is complete.
+/// Adds the counts of a complete pass to the statistics.
 fn book(collected: &Collected, method: Method, stats: &mut Statistics) {
     let needed = &collected.counts.needed;
     stats.n_slabs += 1;
