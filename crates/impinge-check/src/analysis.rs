@@ -1,7 +1,7 @@
 //! The check of one mesh in memory.
 //!
-//! What comes in: a mesh with indices in range. What goes out: [`Counts`], and the [`Marks`] of each primitive.
-//! Welding, facets, union of neighbours, zero areas and self-intersections follow each other; each is exact.
+//! In: a mesh with indices in range. Out: [`Counts`], and the [`Marks`] of each primitive.
+//! The steps are welding, self-intersections, facets, union of neighbours and zero areas; each is exact.
 
 use impinge::exact::{Point, orient2d, orient3d};
 use impinge::{Backend, Detector, Error, Query, Scene, Settings, SharedVertex};
@@ -15,8 +15,8 @@ use crate::union_find::UnionFind;
 /// How a mesh is checked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Options {
-    /// Whether vertices at exactly the same position become one first. On by default: most formats repeat vertices
-    /// per face, and every edge would be a border otherwise.
+    /// Whether vertices at exactly the same position are welded first. On by default: many formats repeat vertices
+    /// per face, and without welding every edge would be a border.
     pub weld: bool,
     /// CPU threads of the self-intersection search; 0 means one per core. No count depends on it.
     pub threads: usize,
@@ -31,14 +31,14 @@ impl Default for Options {
     }
 }
 
-/// What was found, and where.
+/// The result of a check.
 #[derive(Debug, Clone)]
 pub struct Checked {
-    /// How many of each.
+    /// The counts of problems.
     pub counts: Counts,
     /// The problems of each primitive, in the order of the mesh.
     pub marks: Vec<Marks>,
-    /// The mesh that was looked at: welded, if that was asked for.
+    /// The checked mesh: welded, if the options say so.
     pub mesh: Mesh,
 }
 
@@ -57,7 +57,8 @@ pub fn check_mesh(mut mesh: Mesh, options: &Options) -> Result<Checked, Error> {
         ..Counts::default()
     };
     let mut marks = vec![Marks::default(); mesh.n_primitives()];
-    // First, for it refuses what the steps below rely on: indices in range, finite coordinates.
+    // This comes first because it refuses indices out of range and coordinates that are not finite, on which the steps below
+    // rely.
     intersections(&mesh, options, &mut counts, &mut marks)?;
     match &mesh.elements {
         Elements::Triangles(triangles) => {
@@ -90,7 +91,7 @@ pub fn check_mesh(mut mesh: Mesh, options: &Options) -> Result<Checked, Error> {
     })
 }
 
-/// Pairs that meet in more than what they share.
+/// Counts and marks pairs that share more points than their common vertices, edge or face.
 fn intersections(
     mesh: &Mesh,
     options: &Options,
@@ -125,7 +126,7 @@ fn intersections(
     Ok(())
 }
 
-/// Everything that vertex indices alone say.
+/// Counts and marks everything that depends on vertex indices alone.
 fn topology<const K: usize>(
     elements: &[[u32; K]],
     n_vertices: usize,
@@ -179,7 +180,7 @@ fn topology<const K: usize>(
     Ok(())
 }
 
-/// Two primitives that have a facet in common are of one piece, and around each vertex of the facet of one fan.
+/// Two primitives with a common facet belong to one piece, and to one fan around each vertex of the facet.
 fn join_neighbours<const K: usize>(
     elements: &[[u32; K]],
     a: &Facet,
@@ -199,13 +200,13 @@ fn join_neighbours<const K: usize>(
     }
 }
 
-/// How many sets have their smallest number among those that count.
+/// The number of sets whose smallest number satisfies `counts`.
 fn n_roots(sets: &mut UnionFind, counts: impl Fn(u32) -> bool) -> u64 {
     let n = sets.len();
     (0..n).filter(|&x| counts(x) && sets.root(x) == x).count() as u64
 }
 
-/// Vertices of no primitive, and vertices around which primitives form several fans.
+/// Counts vertices of no primitive, and vertices around which primitives form several fans.
 fn count_vertices<const K: usize>(
     elements: &[[u32; K]],
     n_vertices: usize,
@@ -238,7 +239,7 @@ fn count_vertices<const K: usize>(
     counts.non_manifold_vertices = count(SEVERAL_FANS);
 }
 
-/// Primitives with the vertices of an earlier one, in whatever order.
+/// Counts and marks primitives with the vertices of an earlier one, in any order.
 fn duplicates<const K: usize>(
     elements: &[[u32; K]],
     n_vertices: usize,
@@ -298,7 +299,7 @@ fn degenerate<const K: usize>(
     }
 }
 
-/// A triangle has zero area if and only if its projections onto three coordinate planes all have.
+/// A triangle has zero area if and only if all its projections onto the three coordinate planes have zero area.
 fn is_flat_triangle([a, b, c]: &[Point; 3]) -> bool {
     [[0, 1], [1, 2], [2, 0]].iter().all(|&[u, v]| {
         let drop = |p: &Point| [p[u], p[v]];

@@ -1,7 +1,7 @@
 //! Facets: the edges of triangles, the faces of tetrahedra, and which primitives meet at each.
 //!
 //! All facets of all primitives are listed with their vertices in ascending order, and sorted, so that equal facets
-//! are neighbours. Sorting goes by the smallest vertex first, in one counting pass; what is left are short runs.
+//! are neighbours. One counting pass sorts by the smallest vertex; only short runs remain to be sorted.
 //! Cost: linear in primitives for meshes whose vertices have few neighbours. Scratch: 20 bytes per facet, twice.
 
 /// One facet of one primitive.
@@ -15,7 +15,7 @@ pub struct Facet {
     pub is_even: bool,
 }
 
-/// Whether no vertex is named twice. Primitives that name one twice have no facets of their own.
+/// Whether no vertex is named twice. Primitives that name a vertex twice have no facets here.
 pub fn is_simplex<const K: usize>(corners: &[u32; K]) -> bool {
     (1..K).all(|ix| !corners[..ix].contains(&corners[ix]))
 }

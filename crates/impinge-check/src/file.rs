@@ -7,12 +7,12 @@ use impinge_io::{Error as FileError, ReadOptions, read};
 use crate::analysis::{Checked, Options, check_mesh};
 use crate::row::{ErrorKind, Failure, Row};
 
-/// Checks the mesh of one file. What goes wrong is in the row.
+/// Checks the mesh of one file. Errors are in the row.
 pub fn check_file(path: &Path, options: &Options) -> Row {
     check_file_marked(path, options).0
 }
 
-/// As [`check_file`], and gives the mesh with the marks of its primitives, where it could be checked.
+/// Like [`check_file`], and also returns the mesh with the marks of its primitives if it could be checked.
 pub fn check_file_marked(path: &Path, options: &Options) -> (Row, Option<Checked>) {
     let (result, checked) = match checked(path, options) {
         Ok(checked) => (Ok(checked.counts), Some(checked)),
@@ -43,7 +43,7 @@ fn checked(path: &Path, options: &Options) -> Result<Checked, Failure> {
     check_mesh(mesh, options).map_err(|error| Failure {
         kind: match error {
             impinge::Error::NonFinitePosition { .. } => ErrorKind::NotFinite,
-            // Threads do not start where their stacks do not fit.
+            // Threads fail to start if there is no memory for their stacks.
             impinge::Error::MemoryBudget { .. } | impinge::Error::Threads(_) => ErrorKind::Memory,
             _ => ErrorKind::Refused,
         },

@@ -1,9 +1,9 @@
-//! What is wrong with a mesh: self-intersections, degenerate and duplicate primitives, non-manifold places, open
-//! borders, inconsistent orientation, pieces. Every count is exact: there is no tolerance anywhere.
+//! Checks meshes for self-intersections, degenerate and duplicate primitives, non-manifold places, open
+//! borders and inconsistent orientation, and counts their pieces. Every count is exact: there is no tolerance anywhere.
 //!
-//! [`check_mesh`] looks at one mesh in memory, [`check_file`] at one file. A dataset of many files goes through
+//! [`check_mesh`] checks one mesh in memory, [`check_file`] one file. For a dataset of many files use
 //! [`Pool`]: each mesh is checked in a child process that may be killed, so that one bad file costs one row and
-//! not the run. [`RowStore`] keeps rows on disk, and a run that was interrupted goes on where it stopped.
+//! not the run. [`RowStore`] keeps rows on disk, so that an interrupted run can continue where it stopped.
 //!
 //! ```
 //! use impinge_check::{Options, check_mesh};

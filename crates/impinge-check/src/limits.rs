@@ -1,18 +1,18 @@
-//! What a child process may use.
+//! Limits of a child process.
 
 /// Limits of the process that checks a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Limits {
-    /// The most bytes of address space (`RLIMIT_AS`); `None` for as many as the system gives. Where it is reached, the
-    /// process ends and its mesh gets a row of kind `memory`. Unix alone; macOS accepts it and does not enforce it.
+    /// The most bytes of address space (`RLIMIT_AS`); `None` for no limit. If the limit is reached, the
+    /// process ends and its mesh gets a row of kind `memory`. Unix only; macOS accepts the limit and does not enforce it.
     pub memory: Option<u64>,
 }
 
-/// Limits this process: called by a child at its start. It also ends with its parent on Linux, so that a mesh that
-/// takes for ever does not outlive the run.
+/// Limits this process; a child calls it at its start. On Linux the process then also ends with its parent, so that a mesh that
+/// takes forever does not outlive the run.
 ///
 /// # Errors
-/// The system refuses the limit, or has none.
+/// The system refuses the limit, or does not support it.
 #[cfg(unix)]
 pub fn apply_limits(limits: &Limits) -> std::io::Result<()> {
     use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
@@ -30,10 +30,10 @@ pub fn apply_limits(limits: &Limits) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Limits this process: called by a child at its start.
+/// Limits this process; a child calls it at its start.
 ///
 /// # Errors
-/// A memory limit was asked for: this system has none.
+/// There is a memory limit: this system does not support it.
 #[cfg(not(unix))]
 pub fn apply_limits(limits: &Limits) -> std::io::Result<()> {
     match limits.memory {

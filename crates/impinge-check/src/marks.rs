@@ -1,15 +1,15 @@
-//! Which primitive has which problem, for pictures.
+//! The problems of each primitive, for pictures.
 
 /// One kind of problem of a primitive, in the order in which pictures show them: the first that applies gives the colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Problem {
-    /// Meets another primitive in more than what the two share.
+    /// Shares more points with another primitive than their common vertices, edge or face.
     SelfIntersection,
     /// Has the same vertices as an earlier primitive.
     Duplicate,
     /// Has an edge (a tetrahedron: a face) of more than two primitives.
     NonManifold,
-    /// Has an edge (a tetrahedron: a face) where its neighbour is oriented the other way.
+    /// Has an edge (a tetrahedron: a face) whose other primitive has the opposite orientation.
     Inconsistent,
     /// Has zero area (a tetrahedron: zero volume).
     Degenerate,
@@ -32,7 +32,7 @@ impl Problem {
         1 << self as u8
     }
 
-    /// Its colour in pictures, sRGB.
+    /// The problem's colour in pictures, sRGB.
     pub fn color(self) -> [u8; 3] {
         match self {
             Problem::SelfIntersection => [214, 39, 40],
@@ -44,7 +44,7 @@ impl Problem {
         }
     }
 
-    /// The name of its colour, for a legend.
+    /// The name of the problem's colour, for a legend.
     pub fn color_name(self) -> &'static str {
         match self {
             Problem::SelfIntersection => "red",
@@ -56,7 +56,7 @@ impl Problem {
         }
     }
 
-    /// Its name in a legend.
+    /// The problem's name in a legend.
     pub fn name(self) -> &'static str {
         match self {
             Problem::SelfIntersection => "self-intersection",

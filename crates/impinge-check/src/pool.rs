@@ -1,8 +1,8 @@
 //! Many meshes, each checked in a child process.
 //!
-//! A child answers one mesh after the other ([`serve`](crate::serve)). Where it takes too long it is killed; where it
-//! ends by itself, the mesh at hand is tried once more in a child of its own, so that its row does not depend on
-//! what the first child did before. A row of kind `timeout`, `memory` or `crash` is what is left of such a mesh.
+//! A child answers one mesh after the other ([`serve`](crate::serve)). A child that takes too long is killed. If a child
+//! ends by itself, its current mesh is tried once more in a child of its own, so that the row does not depend on
+//! the meshes that the first child checked before. A mesh that fails gets a row of kind `timeout`, `memory` or `crash`.
 
 mod child;
 
@@ -22,11 +22,11 @@ use crate::row::{ErrorKind, Row};
 pub struct Pool<'a> {
     /// The command of a child, which must call [`apply_limits`](crate::apply_limits) and [`serve`](crate::serve).
     pub command: &'a (dyn Fn() -> Command + Sync),
-    /// How many children there are at a time; at least 1.
+    /// How many children run at a time; at least 1.
     pub jobs: usize,
-    /// How long one mesh may take; `None` for as long as it does.
+    /// How long one mesh may take; `None` for no limit.
     pub timeout: Option<Duration>,
-    /// Whether the children weld: what rows say that no child wrote.
+    /// Whether the children weld; needed for rows that no child wrote.
     pub weld: bool,
 }
 
@@ -37,16 +37,16 @@ pub enum PoolError {
     /// No child process could be started. Check the limits on processes and memory.
     #[error("cannot start a child process: {0}")]
     Start(#[source] io::Error),
-    /// The caller asked to stop.
+    /// The caller cancelled the run.
     #[error("cancelled")]
     Cancelled,
 }
 
 impl Pool<'_> {
-    /// Checks `paths` and gives each row, with the number of its path, to `done`, in the order in which they are finished.
+    /// Checks `paths` and passes each row, with the number of its path, to `done`, in the order in which they are finished.
     ///
     /// # Errors
-    /// A child that can't be started; cancellation. Rows given before stay good.
+    /// A child that can't be started; cancellation. Rows passed before that are valid.
     pub fn run(
         &self,
         paths: &[PathBuf],
@@ -77,7 +77,7 @@ impl Pool<'_> {
         })
     }
 
-    /// One thread: takes the next mesh until there is none.
+    /// The work of one thread: takes the next mesh until there is none left.
     fn work(
         &self,
         paths: &[PathBuf],

@@ -1,19 +1,19 @@
-//! One row per mesh: what is printed, stored and sent between processes, as a line of JSON.
+//! One row per mesh. It is printed, stored and sent between processes as a line of JSON.
 
 use serde_json::{Map, Value, json};
 
-/// What was counted in one mesh. Facets are edges of triangles and faces of tetrahedra.
+/// The counts of one mesh. Facets are edges of triangles and faces of tetrahedra.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     /// Vertices, as in the file.
     pub n_vertices: u64,
-    /// Vertices that became one with another at exactly the same position.
+    /// Vertices removed by welding: they had exactly the position of another vertex.
     pub n_welded: u64,
     /// Triangles; 0 for a mesh of tetrahedra.
     pub n_triangles: u64,
     /// Tetrahedra; 0 for a mesh of triangles.
     pub n_tetrahedra: u64,
-    /// Pairs of primitives that meet in more than the vertices that they share
+    /// Pairs of primitives that share more points than their common vertices, edge or face
     /// ([`SharedVertex::Resolve`](impinge::SharedVertex::Resolve)).
     pub self_intersections: u64,
     /// Primitives in any such pair.
@@ -28,11 +28,11 @@ pub struct Counts {
     pub non_manifold_facets: u64,
     /// Vertices around which the primitives form more than one fan.
     pub non_manifold_vertices: u64,
-    /// Facets of one primitive only.
+    /// Facets of only one primitive.
     pub boundary_facets: u64,
     /// Connected pieces of the border: holes, for most surfaces.
     pub boundaries: u64,
-    /// Facets of two primitives that are oriented against each other.
+    /// Facets of two primitives with opposite orientations.
     pub inconsistent_facets: u64,
     /// Pieces connected through facets. Primitives that name a vertex twice belong to none.
     pub components: u64,
@@ -67,7 +67,7 @@ impl ErrorKind {
         ErrorKind::Crash,
     ];
 
-    /// Its name in a row: `file`, `not_finite`, `refused`, `timeout`, `memory` or `crash`.
+    /// The name in a row: `file`, `not_finite`, `refused`, `timeout`, `memory` or `crash`.
     pub fn name(self) -> &'static str {
         match self {
             ErrorKind::File => "file",
@@ -91,13 +91,13 @@ impl ErrorKind {
 /// A mesh that could not be checked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Failure {
-    /// What kind of failure it is.
+    /// The kind of failure.
     pub kind: ErrorKind,
-    /// One line for people.
+    /// A message of one line.
     pub message: String,
 }
 
-/// What is known of one mesh.
+/// The result for one mesh.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Row {
     /// The file, as it was named.
@@ -125,8 +125,8 @@ impl Row {
         }
     }
 
-    /// The row as an object. The keys are the same for every mesh; what does not apply is `null`: all counts of a
-    /// mesh with an `error`, and the counts of edges of a mesh of tetrahedra, which has those of faces instead.
+    /// The row as an object. The keys are the same for every mesh. Counts that do not apply are `null`: all counts of a
+    /// mesh with an `error`, and the counts of edges of a mesh of tetrahedra, which has counts of faces instead.
     pub fn to_json(&self) -> Value {
         let counts = self.result.as_ref().ok();
         let number = |get: fn(&Counts) -> u64| counts.map(get);
@@ -198,7 +198,7 @@ impl Row {
         Value::Object(object)
     }
 
-    /// A row from the object that [`to_json`](Self::to_json) made; `None` where it is none.
+    /// The row of an object made by [`to_json`](Self::to_json); `None` if the object is not a row.
     pub fn from_json(value: &Value) -> Option<Self> {
         let result = match value.get("error")? {
             Value::Null => Ok(counts(value)?),

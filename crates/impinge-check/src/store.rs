@@ -1,9 +1,9 @@
-//! Rows on disk: a run that was interrupted goes on where it stopped.
+//! Rows on disk, so that an interrupted run can continue where it stopped.
 //!
-//! The list of meshes is cut into batches of equal length. The rows of batch 12 are in `rows-00000012.jsonl`, a line per
+//! The list of meshes is cut into batches of equal length. The rows of batch 12 are in `rows-00000012.jsonl`, one line per
 //! mesh, in the order of the list. A file is replaced as a whole by a rename, at most once per second while
-//! its batch is under way, so at every moment it holds complete lines only. Batch b belongs to the process whose rank is
-//! b modulo the number of processes; no two processes write one file. The rows of all are `cat rows-*.jsonl`.
+//! its batch is in progress, so it always holds complete lines only. Batch b belongs to the process whose rank is
+//! b modulo the number of processes, so no two processes write one file. `cat rows-*.jsonl` gives all rows.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -12,24 +12,24 @@ use std::time::{Duration, Instant};
 
 use crate::row::Row;
 
-/// How long rows may wait for the disk.
+/// How long rows may wait before they are written to disk.
 const WAIT: Duration = Duration::from_secs(1);
 
 /// Why rows can't be kept.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StoreError {
-    /// The operating system refused. Check the folder and the room on its disk.
+    /// The operating system reported an error. Check the folder and the free space on its disk.
     #[error("{}: cannot {action}: {source}", .path.display())]
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What was tried.
+        /// The failed action.
         action: &'static str,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// A line is no row of this program. Remove the file, and its meshes are checked again.
+    /// A line is not a row of this program. Remove the file, and its meshes are checked again.
     #[error("{}:{line}: not a row; remove the file to check its meshes again", .path.display())]
     Damaged {
         /// The file.
@@ -37,7 +37,7 @@ pub enum StoreError {
         /// The line, counted from 1.
         line: usize,
     },
-    /// The folder holds rows of another list, batch length or welding. Take a new folder.
+    /// The folder holds rows of another list, batch length or welding. Use a new folder.
     #[error("{}:{line}: the row of '{found}' is not of this run: {why}", .path.display())]
     OtherRun {
         /// The file.
@@ -46,7 +46,7 @@ pub enum StoreError {
         line: usize,
         /// The mesh of the row.
         found: String,
-        /// What does not fit.
+        /// The mismatch.
         why: &'static str,
     },
 }
@@ -62,19 +62,19 @@ pub struct RowStore {
 
 #[derive(Debug)]
 struct Batch {
-    /// Its number in the whole list.
+    /// The number of the batch in the whole list.
     number: usize,
     rows: Vec<Option<Row>>,
-    /// When the oldest row came that is not on disk.
+    /// When the oldest row arrived that is not on disk.
     waiting: Option<Instant>,
 }
 
 impl RowStore {
-    /// Opens or creates a folder for the rows of the meshes `paths`, the whole list. Takes the batches of process `rank` of
-    /// `world_size` and reads the rows that are there. With `retry`, rows of kind `timeout`, `memory` and `crash` count as missing.
+    /// Opens or creates a folder for the rows of `paths`, the whole list of meshes. Takes the batches of process `rank` of
+    /// `world_size` and reads their existing rows. With `retry`, rows of kind `timeout`, `memory` and `crash` count as missing.
     ///
     /// # Errors
-    /// A folder that can't be made or read; a file with a line that is no row, or of another run.
+    /// A folder that can't be created or read; a file with a line that is not a row, or belongs to another run.
     pub fn open(
         folder: &Path,
         paths: &[PathBuf],
@@ -118,14 +118,14 @@ impl RowStore {
         })
     }
 
-    /// The number in the list of each mesh of this process that has no row yet, ascending.
+    /// The numbers in the list of this process's meshes that have no row yet, ascending.
     pub fn missing(&self) -> Vec<usize> {
         self.numbered()
             .filter_map(|(ix, row)| row.is_none().then_some(ix))
             .collect()
     }
 
-    /// All rows of this process that are there, in the order of the list.
+    /// All existing rows of this process, in the order of the list.
     pub fn rows(&self) -> impl Iterator<Item = (usize, &Row)> {
         self.numbered().filter_map(|(ix, row)| Some((ix, row?)))
     }
@@ -137,7 +137,7 @@ impl RowStore {
         })
     }
 
-    /// Keeps the row of mesh `ix` of the list, and writes it soon.
+    /// Stores the row of mesh `ix` of the list, and writes it soon.
     ///
     /// # Errors
     /// A file that can't be written.
@@ -173,7 +173,7 @@ fn file(folder: &Path, batch: usize) -> PathBuf {
     folder.join(format!("rows-{batch:08}.jsonl"))
 }
 
-/// Reads the rows of a batch, of which some may be missing, into their places.
+/// Reads the rows of a batch into their places; some may be missing.
 fn read_batch(
     path: &Path,
     meshes: &[PathBuf],
@@ -219,7 +219,7 @@ fn read_batch(
     Ok(())
 }
 
-/// Writes the rows of a batch beside their file and renames them to it.
+/// Writes the rows of a batch to a temporary file and renames it.
 fn write_batch(folder: &Path, batch: &mut Batch) -> Result<(), StoreError> {
     let path = file(folder, batch.number);
     let part = folder.join(format!(

@@ -1,6 +1,6 @@
-//! Disjoint sets of numbers: union by index, paths halved (Tarjan and van Leeuwen 1984).
+//! Disjoint sets of numbers: union by index, path halving (Tarjan and van Leeuwen 1984).
 
-/// Sets of the numbers 0 to n - 1, each alone at first.
+/// Sets of the numbers 0 to n - 1; at first each number is a set of its own.
 pub struct UnionFind {
     parents: Vec<u32>,
 }
@@ -31,7 +31,7 @@ impl UnionFind {
         }
     }
 
-    /// Makes one set of two. The smaller root stays, so the outcome does not depend on the order of unions.
+    /// Joins two sets. The smaller root stays, so the result does not depend on the order of unions.
     pub fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         self.parents[a.max(b) as usize] = a.min(b);

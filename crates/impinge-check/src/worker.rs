@@ -1,4 +1,4 @@
-//! The child's side: paths in, rows out, a line of JSON each.
+//! The child's side: paths in, rows out, one line of JSON each.
 
 use std::io::{self, BufRead, Write};
 use std::path::Path;
@@ -8,10 +8,10 @@ use serde_json::Value;
 use crate::analysis::Options;
 use crate::file::check_file;
 
-/// Answers each line of `input`, a path as a JSON string, by the row of its mesh on a line of `output`, until the input ends.
+/// Answers each line of `input`, a path as a JSON string, with the row of its mesh on a line of `output`, until the input ends.
 ///
 /// # Errors
-/// Input that is no JSON string; input or output that fails.
+/// A line that is not a JSON string; an error of input or output.
 pub fn serve(input: impl BufRead, mut output: impl Write, options: &Options) -> io::Result<()> {
     for line in input.lines() {
         let Value::String(path) = serde_json::from_str(&line?)? else {

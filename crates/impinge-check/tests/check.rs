@@ -1,4 +1,4 @@
-//! Counts against closed forms, against definitions written out plainly, and against published numbers.
+//! Counts compared with closed forms, with plain definitions, and with published numbers.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -72,7 +72,7 @@ fn unwelded_files_are_welded_first() {
         (apart.n_welded, apart.boundary_facets, apart.components),
         (0, 12, 4)
     );
-    // All four touch each other.
+    // All four triangles touch each other.
     assert_eq!(apart.self_intersections, 6);
 }
 
@@ -93,7 +93,7 @@ fn each_fault_is_counted_as_what_it_is() {
         ),
         (1, 3)
     );
-    // Equal triangles meet in more than their vertices.
+    // Equal triangles share more than their vertices.
     assert_eq!(doubled.counts.self_intersections, 1);
     assert!(doubled.marks[4].has(Problem::Duplicate) && !doubled.marks[0].has(Problem::Duplicate));
     assert_eq!(doubled.marks[4].first(), Some(Problem::SelfIntersection));
@@ -120,7 +120,7 @@ fn each_fault_is_counted_as_what_it_is() {
 
 #[test]
 fn degenerate_is_exactly_zero_area() {
-    // 0.1, 0.2, 0.3 lie on a line in x = y = z; 0.1 + 0.2 is one bit more than 0.3.
+    // The points 0.1, 0.2, 0.3 lie on the line x = y = z; 0.1 + 0.2 is one bit more than 0.3.
     let line = vec![[0.1; 3], [0.2; 3], [0.3; 3]];
     assert_eq!(counts(triangles(line, vec![[0, 1, 2]])).degenerate, 1);
     let thin = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 1e-60, 0.0]];
@@ -170,7 +170,7 @@ fn tetrahedra_are_checked_by_their_faces() {
     assert_eq!(check(vec![[0, 1, 2, 2]]).degenerate, 1);
 }
 
-/// The same counts, written out from their definitions over maps and repeated searches.
+/// The same counts, computed from their definitions with maps and repeated searches.
 fn plainly(n_vertices: u32, faces: &[[u32; 3]]) -> [u64; 8] {
     let is_simplex = |f: &[u32; 3]| f[0] != f[1] && f[1] != f[2] && f[2] != f[0];
     let mut edges: BTreeMap<(u32, u32), Vec<(usize, bool)>> = BTreeMap::new();
@@ -187,13 +187,13 @@ fn plainly(n_vertices: u32, faces: &[[u32; 3]]) -> [u64; 8] {
                 .push((ix, a < b));
         }
     }
-    /// Whether the faces that use an edge, each with the direction in which it does, are to be counted.
+    /// Whether to count an edge, given the faces that use it, each with its direction along the edge.
     type Pick = fn(&[(usize, bool)]) -> bool;
     let n = |pick: Pick| edges.values().filter(|users| pick(users)).count() as u64;
     let boundary = n(|users| users.len() == 1);
     let non_manifold = n(|users| users.len() > 2);
     let inconsistent = n(|users| users.len() == 2 && users[0].1 == users[1].1);
-    // Pieces of things that are linked: labels sink to the smallest until nothing changes.
+    // Connected pieces: each label becomes the smallest label linked to it, until nothing changes.
     let pieces = |members: &BTreeSet<usize>, linked: &dyn Fn(usize, usize) -> bool| -> u64 {
         let mut labels: BTreeMap<usize, usize> = members.iter().map(|&x| (x, x)).collect();
         loop {
@@ -283,7 +283,7 @@ fn random_meshes_agree_with_the_definitions() {
         let faces: Vec<[u32; 3]> = (0..n_faces)
             .map(|_| [below(n_vertices), below(n_vertices), below(n_vertices)])
             .collect();
-        // All apart, so that nothing is welded.
+        // All positions differ, so that nothing is welded.
         let positions = (0..n_vertices)
             .map(|v| [f64::from(v), f64::from(v * v), f64::from(v % 3)])
             .collect();
@@ -303,7 +303,7 @@ fn random_meshes_agree_with_the_definitions() {
             *total += n;
         }
     }
-    // Every count was something else than zero in some mesh.
+    // Every count was above zero in some mesh.
     assert!(seen.iter().all(|&n| n > 0), "{seen:?}");
 }
 

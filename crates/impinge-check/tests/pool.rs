@@ -1,6 +1,6 @@
-//! Children that hang, die, run out of memory or talk nonsense: each costs its mesh a row, and nothing else.
+//! Children that hang, die, run out of memory or print nonsense: each affects only the row of its mesh.
 //!
-//! The children here are shell scripts that speak the protocol of `serve`.
+//! The children here are shell scripts that use the protocol of `serve`.
 #![cfg(unix)]
 
 use std::path::PathBuf;
@@ -14,7 +14,7 @@ use impinge_check::{ErrorKind, Pool, PoolError, Row};
 const ANSWER: &str =
     r#"printf '{"path":%s,"welded":true,"error":"seen","error_kind":"file"}\n' "$p""#;
 
-/// Runs a pool of scripts over meshes and gives the rows in their order.
+/// Runs a pool of scripts over meshes and returns the rows in the order of the meshes.
 fn run(script: &str, names: &[&str], jobs: usize, seconds: f64) -> Result<Vec<Row>, PoolError> {
     let script = script.replace("ANSWER", ANSWER);
     let command = || {
@@ -66,7 +66,7 @@ fn one_that_hangs_is_killed_at_its_time() {
 
 #[test]
 fn one_that_dies_is_tried_once_more_in_a_child_of_its_own() {
-    // Each child answers one mesh and dies of the second: no row shows it.
+    // Each child answers one mesh and dies at the second one; no row shows it.
     let rows = run(
         "read -r p; ANSWER; read -r p; kill -9 $$",
         &["a", "b", "c", "d"],
@@ -75,7 +75,7 @@ fn one_that_dies_is_tried_once_more_in_a_child_of_its_own() {
     )
     .unwrap();
     assert_eq!(kinds(&rows), [ErrorKind::File; 4]);
-    // One that dies of a certain mesh does so again.
+    // A child that dies at a certain mesh does so again.
     let script = r#"while read -r p; do case $p in *bad*) echo panicked >&2; kill -9 $$;; *) ANSWER;; esac; done"#;
     let rows = run(script, &["a", "bad", "b"], 1, LONG).unwrap();
     assert_eq!(

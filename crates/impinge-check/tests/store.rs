@@ -1,4 +1,4 @@
-//! Rows on disk: what is there is kept, what is missing is named, what is of another run is refused.
+//! Rows on disk: existing rows are kept, missing ones are listed, rows of another run are refused.
 
 use std::path::{Path, PathBuf};
 

@@ -297,7 +297,7 @@ impl Couplings {
             .collect_into_vec(out);
     }
 
-    /// Adds a row of the product, from what the contacts answered.
+    /// Adds a row of the product to `sum`, from the reactions of the contacts.
     #[inline]
     pub fn add_row(&self, row: usize, reactions: &[Vec3], sum: Vec3) -> Vec3 {
         let weights = &self.weights[self.at.range(row)];

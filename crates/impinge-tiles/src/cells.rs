@@ -1,16 +1,16 @@
-//! Half-open cells that fill space, and who goes where.
+//! Half-open cells that fill space, and which box goes to which cell.
 //!
-//! A cut at `c` along an axis parts a cell into a low side, `x < c`, and a high side, `x >= c`. A box goes to the low
-//! side if `lo < c` and to the high side if `hi >= c`; its corners are given numbers, so these comparisons are exact.
+//! A cut at `c` along an axis divides a cell into a low side, `x < c`, and a high side, `x >= c`. A box goes to the low
+//! side if `lo < c` and to the high side if `hi >= c`. Its corners are given numbers, so these comparisons are exact.
 //!
-//! Why every pair is found once: let two boxes meet, and let p be the larger of their lower corners, axis by axis. Then
-//! p lies in both boxes. At each cut on the way to the cell that holds p: if `p < c`, the lower corner of either box is
-//! at most p, so it is below c and the box went low; if `p >= c`, the upper corner of either box is at least p, so the box went
-//! high. That cell has got both boxes. Cells are disjoint and fill space, so exactly one cell holds p.
+//! Why every pair is found exactly once: let two boxes meet, and let p be the larger of their lower corners, axis by axis.
+//! Then p lies in both boxes. Consider each cut on the way to the cell that holds p. If `p < c`, the lower corner of each box
+//! is at most p, so it is below c and the box goes low. If `p >= c`, the upper corner of each box is at least p, so the box
+//! goes high. So that cell gets both boxes. Cells are disjoint and fill space, so exactly one cell holds p.
 
 use serde_json::{Value, json};
 
-/// The comparisons, as a type: tests replace them by wrong ones and must notice.
+/// The comparisons as a type, so that tests can replace them by wrong ones and check that this is noticed.
 pub(crate) trait Rule {
     /// Whether a box with this lower coordinate goes to the low side.
     fn goes_low(lo: f64, cut: f64) -> bool;
@@ -20,7 +20,7 @@ pub(crate) trait Rule {
     fn lies_low(x: f64, cut: f64) -> bool;
 }
 
-/// The right comparisons.
+/// The correct comparisons.
 pub(crate) struct HalfOpen;
 
 impl Rule for HalfOpen {
@@ -68,7 +68,7 @@ pub struct Cells {
 }
 
 impl Cells {
-    /// All of space as tile 0.
+    /// The whole space as tile 0.
     pub fn whole() -> Self {
         Cells {
             nodes: vec![Node::Tile(0)],
@@ -160,7 +160,7 @@ impl Cells {
         }
     }
 
-    /// Nodes as JSON. Cuts are written as the 64 bits of their number, so that none is rounded.
+    /// Nodes as JSON. A cut is also written as the 64 bits of its number, so that it is not rounded.
     pub(crate) fn to_json(&self) -> Value {
         let node = |node: &Node| match node {
             Node::Tile(tile) => json!({ "tile": tile }),
@@ -176,7 +176,7 @@ impl Cells {
         Value::Array(self.nodes.iter().map(node).collect())
     }
 
-    /// The cells of [`to_json`](Self::to_json); `None` where they are no tree of tiles.
+    /// The cells written by [`to_json`](Self::to_json); `None` if the value is not a tree of tiles.
     pub(crate) fn from_json(value: &Value) -> Option<Self> {
         let node = |value: &Value| {
             let index = |key: &str| u32::try_from(value.get(key)?.as_u64()?).ok();
@@ -196,7 +196,7 @@ impl Cells {
         for (ix, node) in nodes.iter().enumerate() {
             match *node {
                 Node::Tile(tile) => tiles.push(tile),
-                // Children come after their parent, so there is no way round in circles.
+                // Children come after their parent, so there are no cycles.
                 Node::Cut { low, high, .. } => {
                     let is_later =
                         |child: u32| child as usize > ix && (child as usize) < nodes.len();
@@ -213,7 +213,7 @@ impl Cells {
     }
 }
 
-/// The point that says to whom a pair belongs: the larger of two lower corners, axis by axis.
+/// The point that decides to which tile a pair belongs: the larger of the two lower corners, axis by axis.
 pub(crate) fn owner_point(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| a[axis].max(b[axis]))
 }

@@ -1,4 +1,4 @@
-//! Primitives with everything that a tile needs of them.
+//! Primitives with all the data that a tile needs.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use impinge::exact::in_range;
 use crate::cells::Bounds;
 use crate::error::Error;
 
-/// What the primitives of a file are, and how wide their coordinates.
+/// The kind of a file's primitives, and the width of their coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shape {
     /// Corners per primitive: 3 or 4.
@@ -30,7 +30,7 @@ pub struct Chunk {
     pub first: u64,
     /// Vertex numbers, `corners` per primitive.
     pub vertices: Vec<u32>,
-    /// Positions of these, `corners` per primitive.
+    /// Positions of these vertices, `corners` per primitive.
     pub positions: Vec<[f64; 3]>,
 }
 
@@ -40,7 +40,7 @@ impl Chunk {
         self.positions.chunks_exact(shape.corners).map(bounds)
     }
 
-    /// Refuses coordinates that no tile would hold, or that no exact test can take.
+    /// Refuses coordinates that are not finite, which no tile holds, or outside the range of the exact tests.
     pub fn check(&self, path: &Path, shape: Shape) -> Result<(), Error> {
         let bad = |x: &f64| !in_range(*x);
         match self.positions.iter().position(|p| p.iter().any(bad)) {
@@ -80,7 +80,7 @@ impl Chunk {
     }
 }
 
-/// An f32 that was widened, as it was.
+/// Converts an f32 that was widened to f64 back, exactly.
 fn back_to_f32(x: f64) -> f32 {
     x as f32
 }
@@ -97,7 +97,7 @@ pub fn bounds(points: &[[f64; 3]]) -> Bounds {
         })
 }
 
-/// A record as it lies on disk and in memory.
+/// A record in the form in which it is stored on disk and in memory.
 #[derive(Clone, Copy)]
 pub struct Record<'a> {
     shape: Shape,
@@ -105,7 +105,7 @@ pub struct Record<'a> {
 }
 
 impl<'a> Record<'a> {
-    /// `bytes` has the stride of the shape.
+    /// A record of `bytes`, whose length is the stride of the shape.
     pub fn new(shape: Shape, bytes: &'a [u8]) -> Self {
         Record { shape, bytes }
     }
@@ -138,7 +138,7 @@ impl<'a> Record<'a> {
         })
     }
 
-    /// The box of the primitive: the same comparisons of the same numbers as when it was scattered.
+    /// The box of the primitive, by the same comparisons of the same numbers as in scattering.
     pub fn bounds(&self) -> Bounds {
         let points: [[f64; 3]; 4] =
             std::array::from_fn(|corner| self.position(corner.min(self.shape.corners - 1)));

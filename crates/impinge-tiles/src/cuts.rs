@@ -1,17 +1,17 @@
-//! Where to cut: at medians of a sample of boxes, until a cell holds few enough primitives.
+//! The choice of cuts: at medians of a sample of boxes, until a cell holds few enough primitives.
 
 use crate::cells::{Bounds, Cells};
 
-/// A cell stays as it is where cutting would copy more than this part of its primitives to both sides.
+/// A cell is not cut if the two sides together would hold more than this multiple of its primitives.
 const MAX_GROWTH: f64 = 1.5;
 
-/// A cell stays as it is where the larger side keeps more than this part of it.
+/// A cell is not cut if the larger side would keep more than this share of its primitives.
 const MAX_KEPT: f64 = 0.9;
 
 /// The most cuts on the way to a cell.
 const MAX_DEPTH: usize = 64;
 
-/// Cells of about `cap` primitives each, by a sample in which each box stands for `weight` primitives. The outcome depends
+/// Cells of about `cap` primitives each, from a sample in which each box stands for `weight` primitives. The result depends
 /// on the sample alone.
 pub fn cells(sample: &[Bounds], weight: f64, cap: u64) -> Cells {
     let mut cells = Cells::whole();
@@ -43,7 +43,7 @@ pub fn cells(sample: &[Bounds], weight: f64, cap: u64) -> Cells {
     cells
 }
 
-/// The median cut that copies the fewest boxes; none that is worth its copies where all lie on one another.
+/// The median cut that copies the fewest boxes; `None` if no cut is worth its copies, as for boxes on one spot.
 fn best_cut(sample: &[Bounds], members: &[u32]) -> Option<(usize, f64)> {
     let n = members.len() as f64;
     let mut best: Option<(usize, usize, f64)> = None;

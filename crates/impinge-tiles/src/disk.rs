@@ -1,4 +1,4 @@
-//! Files that are there whole or not at all.
+//! Files that exist whole or not at all.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -6,8 +6,8 @@ use std::path::Path;
 
 use crate::error::Error;
 
-/// Writes a file beside its place and renames it: whoever looks finds the old file or the new one. A process that is
-/// killed leaves a `.part` file behind, which nobody reads and the next attempt of a process of that number replaces.
+/// Writes a temporary file and renames it, so that readers see either the old file or the new one. A process that is
+/// killed leaves a `.part` file behind. No step reads it, and the next process with the same process id replaces it.
 pub fn replace(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -28,18 +28,18 @@ pub fn replace(
     step().map_err(|source| Error::io(path, "write", source))
 }
 
-/// Creates a folder, unless it is there.
+/// Creates a folder, unless it exists.
 pub fn folder(path: &Path) -> Result<(), Error> {
     fs::create_dir_all(path).map_err(|source| Error::io(path, "create the folder", source))
 }
 
-/// A file each of whose writes is a step at which a test may stop.
+/// A file in which every write is a step at which a test may stop.
 struct Stepped(File);
 
 impl Write for Stepped {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if step().is_err() {
-            // As a process that is killed in the middle of a write: half of it is on the disk.
+            // Like a process that is killed in the middle of a write: half of the bytes are on the disk.
             self.0.write_all(&bytes[..bytes.len() / 2])?;
             return Err(io::Error::other("stopped by a test"));
         }
@@ -58,7 +58,7 @@ fn step() -> io::Result<()> {
 
 #[cfg(test)]
 thread_local! {
-    /// Steps until everything on this thread fails, as if the process had been killed there.
+    /// Steps until every write on this thread fails, as if the process had been killed there.
     pub static STEPS_LEFT: std::cell::Cell<Option<u32>> = const { std::cell::Cell::new(None) };
 }
 

@@ -1,19 +1,19 @@
-//! Everything that can go wrong, by name.
+//! Errors of plans, their files and their meshes.
 
 use std::path::{Path, PathBuf};
 
-/// What went wrong with a plan, its files or its meshes.
+/// An error of a plan, its files or its meshes.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The operating system refused. Check the path, and the room on its disk.
+    /// The operating system reported an error. Check the path, and the free space on its disk.
     #[error("{}: cannot {action}: {source}", .path.display())]
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What was tried.
+        /// The failed action.
         action: &'static str,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A mesh file that can't be read.
@@ -24,10 +24,10 @@ pub enum Error {
     Detection {
         /// The tile.
         tile: u32,
-        /// What the library said.
+        /// The library's error.
         source: impinge::Error,
     },
-    /// The caller asked to stop. What is done stays done.
+    /// The caller cancelled the step. Finished work is kept.
     #[error("cancelled")]
     Cancelled,
     /// A coordinate that is not finite, or outside the range of exact answers. Its box would lie in no tile.
@@ -51,28 +51,28 @@ pub enum Error {
         primitive: u64,
         /// The vertex it names.
         index: i64,
-        /// How many there are.
+        /// How many vertices there are.
         n_vertices: u64,
     },
-    /// More of something than 32-bit numbers can name. Split the file.
+    /// More elements than 32-bit numbers can name. Split the file.
     #[error("{}: {given} {what}, at most {limit} can be numbered", .path.display())]
     TooMany {
         /// The mesh file.
         path: PathBuf,
-        /// What there is too much of.
+        /// The kind of elements.
         what: &'static str,
         /// How many there are.
         given: u64,
         /// The most there may be.
         limit: u64,
     },
-    /// A mesh file is not what it was when the plan was made. Make a new plan.
+    /// A mesh file has changed since the plan was made. Make a new plan.
     #[error("{}: changed since the plan was made", .path.display())]
     Changed {
         /// The mesh file.
         path: PathBuf,
     },
-    /// The folder holds another plan. Take a new folder, or replace it.
+    /// The folder holds another plan. Use a new folder, or replace the plan.
     #[error("{}: there is another plan in this folder", .path.display())]
     OtherPlan {
         /// The plan's file.
@@ -96,7 +96,7 @@ pub enum Error {
         /// The step that writes it.
         step: &'static str,
     },
-    /// A step has not been run to its end.
+    /// A step is not complete.
     #[error("{}: missing; run `{step}` first ({n_missing} of {n} are missing)", .path.display())]
     Missing {
         /// The first file that is missing.
@@ -108,14 +108,16 @@ pub enum Error {
         /// How many there should be.
         n: u64,
     },
-    /// Tiles were asked different questions. Run them all with the same options.
-    #[error("tile {tile} was asked for {found}, tile 0 for {expected}; run all tiles alike")]
+    /// Tiles have answered different queries. Run all of them with the same options.
+    #[error(
+        "tile {tile} has the answer for {found}, tile 0 for {expected}; run all tiles with the same options"
+    )]
     MixedQuestions {
         /// The tile.
         tile: u32,
-        /// Its question.
+        /// Its query.
         found: String,
-        /// The question of the first tile.
+        /// The query of the first tile.
         expected: String,
     },
     /// An argument outside its range.
@@ -125,7 +127,7 @@ pub enum Error {
         what: &'static str,
         /// Its value.
         given: String,
-        /// What is allowed.
+        /// The allowed range.
         allowed: String,
     },
 }

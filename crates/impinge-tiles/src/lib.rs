@@ -1,11 +1,11 @@
 //! Scenes larger than memory, or than one machine: exact collision detection tile by tile.
 //!
 //! Space is cut by a kd-tree into half-open cells that fill it. A primitive goes to each cell that its box touches; a
-//! pair belongs to the cell that holds the larger of the two lower corners. So every pair is found, and no pair twice
-//! (the proof is in [`Cells`]). The hash of the whole answer is the sum of the tiles' hashes.
+//! pair belongs to the cell that holds the larger of the two lower corners, axis by axis. So every pair is found, and no pair
+//! twice (the proof is in `cells.rs`). The hash of the whole answer is the sum of the tiles' hashes.
 //!
-//! Four steps work on one folder, and its files are all that they share. Any of them may run on any machine that sees
-//! the folder, in any number of processes; a step that was killed is run again and ends with the same bytes.
+//! Four steps work on one folder and share nothing but its files. Each step may run on any machine that sees
+//! the folder, in any number of processes. Run a killed step again: it ends with the same bytes.
 //!
 //! | step | reads | writes |
 //! |---|---|---|

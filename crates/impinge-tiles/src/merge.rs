@@ -1,4 +1,4 @@
-//! All results as one answer: sorted rows, their number, their hash.
+//! Merges all results into one answer: sorted rows, their number, their hash.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -22,13 +22,14 @@ const STEP: &str = "tiles run";
 pub struct Merged {
     /// All pairs.
     pub n_pairs: u64,
-    /// As [`Pairs::hash`](impinge::Pairs::hash) of the whole scene in one process, with bodies in the order of files.
+    /// The hash of all pairs: equal to [`Pairs::hash`](impinge::Pairs::hash) of the whole scene in one process, with bodies in
+    /// the order of files.
     pub hash: u64,
     /// Records of all tiles together: primitives, counted once per tile that they touch.
     pub n_records: u64,
-    /// Tiles that had to be cut into pieces.
+    /// Tiles that had to be split into pieces.
     pub n_uncut: u64,
-    /// The question that all tiles answered, in words.
+    /// The query that all tiles answered, in words.
     pub asked: String,
     /// The rows `file_a, primitive_a, file_b, primitive_b` (u32, sorted).
     pub rows: PathBuf,
@@ -38,12 +39,12 @@ impl Plan {
     /// Merges the results of all tiles into `rows.npy` and `answer.json`.
     ///
     /// # Errors
-    /// A tile whose result is missing, stale, damaged, or for another question than that of tile 0.
+    /// A tile whose result is missing, stale, damaged, or for another query than that of tile 0.
     pub fn merge(&self) -> Result<Merged, Error> {
         let results = self.results()?;
         let n_pairs = results.iter().map(|result| result.n_pairs).sum();
         let path = self.folder().join("rows.npy");
-        // Rows of all tiles are held in blocks, of 64 MiB together.
+        // The blocks of rows of all tiles together take 64 MiB.
         let block = ((64 << 20) / 16 / results.len().max(1)).clamp(256, 1 << 16);
         let mut tiles = results
             .iter()
@@ -113,7 +114,8 @@ impl Plan {
     }
 }
 
-/// The rows of one tile, block by block. The file is closed in between: there may be more tiles than files may be open.
+/// The rows of one tile, block by block. The file is closed in between, because there may be more tiles than a process may have
+/// open files.
 struct Rows {
     path: PathBuf,
     start: u64,
@@ -138,7 +140,7 @@ impl Rows {
         file.take(256)
             .read_to_end(&mut head)
             .map_err(|source| Error::io(&path, "read", source))?;
-        let header = npy::parse(&head).ok_or_else(|| damaged("its header is none"))?;
+        let header = npy::parse(&head).ok_or_else(|| damaged("its header is invalid"))?;
         if header.descr != "<u4"
             || header.shape != [result.n_pairs, 4]
             || length != header.start + 16 * result.n_pairs
@@ -162,7 +164,7 @@ impl Rows {
             return Ok(Some(row));
         }
         if self.n_read == self.n {
-            // The hash of all rows is what the result has promised.
+            // The hash of all rows must be that of the result.
             return if self.hash == self.expected_hash {
                 Ok(None)
             } else {
@@ -193,7 +195,7 @@ impl Rows {
     }
 }
 
-/// Writes the rows of all tiles, ascending. A row that comes twice, or out of order, is a damaged file.
+/// Writes the rows of all tiles, ascending. A repeated row, or one out of order, means a damaged file.
 fn sort_into(tiles: &mut [Rows], to: &mut dyn Write) -> Result<(), Error> {
     let mut heap = BinaryHeap::new();
     for (ix, tile) in tiles.iter_mut().enumerate() {

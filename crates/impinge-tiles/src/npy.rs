@@ -1,8 +1,8 @@
-//! NumPy's array format (NEP 1), as far as it is needed: headers read, arrays of rows written.
+//! The needed parts of NumPy's array format (NEP 1): reads headers, writes arrays of rows.
 
 use std::io::{self, Write};
 
-/// What a header says.
+/// The content of a header.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Header {
     /// The type, such as `<f4`.
@@ -13,7 +13,7 @@ pub struct Header {
     pub start: u64,
 }
 
-/// Reads the header at the beginning of a file; `None` where it is none, or the data is in Fortran order.
+/// Reads the header at the beginning of a file; `None` if it is not valid, or if the data is in Fortran order.
 pub fn parse(head: &[u8]) -> Option<Header> {
     let rest = head.strip_prefix(b"\x93NUMPY")?;
     let (length, preamble) = match *rest {
@@ -50,7 +50,7 @@ pub fn parse(head: &[u8]) -> Option<Header> {
     })
 }
 
-/// The header of `n` rows of four u32.
+/// The header for `n` rows of four u32.
 pub fn rows_header(n: u64) -> Vec<u8> {
     const PREAMBLE: usize = 10;
     let mut header = format!("{{'descr': '<u4', 'fortran_order': False, 'shape': ({n}, 4), }}");
@@ -64,7 +64,7 @@ pub fn rows_header(n: u64) -> Vec<u8> {
     bytes
 }
 
-/// One row.
+/// Writes one row.
 pub fn write_row(to: &mut dyn Write, row: [u32; 4]) -> io::Result<()> {
     to.write_all(row.map(u32::to_le_bytes).as_flattened())
 }

@@ -10,8 +10,8 @@
 //!     records: u32 primitive, u32 vertex per corner, 3 coordinates per corner
 //! ```
 //!
-//! All numbers are little-endian. A checksum covers the place of the records and the records. A tile
-//! reads one entry of the table and its records; the rest of the file is not touched.
+//! All numbers are little-endian. A checksum covers the tile's number, the place and number of its records, and the records.
+//! A tile reads one entry of the table and its records; it does not touch the rest of the file.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -29,7 +29,7 @@ const HEADER: usize = 40;
 const ENTRY: usize = 24;
 const STEP: &str = "tiles scatter";
 
-/// Records of one tile from one part.
+/// The records of one tile in one part.
 pub struct Segment {
     pub file: usize,
     pub shape: Shape,
@@ -60,7 +60,7 @@ impl Plan {
         header
     }
 
-    /// Whether the part of a unit is there, and of this plan.
+    /// Whether the part of a unit exists and belongs to this plan.
     pub(crate) fn has_part(&self, unit_ix: usize, file: usize) -> bool {
         let mut held = [0; HEADER];
         let read =
@@ -68,7 +68,7 @@ impl Plan {
         read.is_ok() && held[..] == self.part_header(unit_ix, file)
     }
 
-    /// Writes the part of a unit. Returns how many records it has: copies included.
+    /// Writes the part of a unit. Returns the number of its records, including copies.
     pub(crate) fn write_part(
         &self,
         unit_ix: usize,
@@ -82,7 +82,7 @@ impl Plan {
             self.cells
                 .route::<HalfOpen>(&bounds, |tile| places.push((tile, ix)));
         }
-        // Tiles in order, primitives of a tile in theirs.
+        // Sorted by tile, then by primitive.
         places.sort_unstable();
         let mut table = Vec::with_capacity(n_tiles * ENTRY);
         let mut records = Vec::with_capacity(places.len() * shape.stride());

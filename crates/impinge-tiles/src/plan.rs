@@ -1,4 +1,4 @@
-//! The plan: which files, which cells, which units of work. Everything else in the folder names the plan it belongs to.
+//! The plan: files, cells and units of work. Every other file in the folder names the plan that it belongs to.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use crate::source::{self, Source};
 /// The version of all files of a folder.
 const VERSION: u64 = 1;
 
-/// About how many boxes the cuts are made from.
+/// The approximate number of boxes in the sample for cuts.
 const SAMPLE: u64 = 500_000;
 
 /// How a plan is made.
@@ -25,13 +25,13 @@ const SAMPLE: u64 = 500_000;
 pub struct PlanOptions {
     /// About how many primitives a tile may hold; one tile is in memory at a time. 2 million by default: about 600 MB.
     pub cap: u64,
-    /// Primitives per unit of scattering: what a process reads, sorts and writes at a time. 500,000 by default.
+    /// Primitives per unit of scattering; a thread reads, sorts and writes one unit at a time. 500,000 by default.
     pub chunk: u64,
-    /// Whether vertices of one file at exactly the same position become one, as formats without shared vertices (STL) need.
+    /// Whether vertices of one file at exactly the same position are welded; formats without shared vertices (STL) need it.
     pub weld: bool,
-    /// Cells to take instead of those that the plan would choose.
+    /// Cells to use instead of those that the plan would choose.
     pub cells: Option<Cells>,
-    /// Whether a plan that is in the folder already, and all that was made by it, is removed.
+    /// Whether to remove an existing plan in the folder, and all files made by it.
     pub replace: bool,
 }
 
@@ -74,7 +74,7 @@ pub struct Plan {
     pub(crate) cells: Cells,
 }
 
-/// A run of primitives of one file: what one part file holds.
+/// A run of primitives of one file: the content of one part file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Unit {
     pub file: usize,
@@ -83,11 +83,11 @@ pub(crate) struct Unit {
 }
 
 impl Plan {
-    /// Looks at every primitive of `files` once (they must be finite), takes a sample, cuts space and writes `plan.json`.
-    /// A folder with the very same plan is left as it is. `progress` hears of primitives done and in all.
+    /// Reads every primitive of `files` once (coordinates must be finite), takes a sample, cuts space and writes `plan.json`.
+    /// A folder with exactly the same plan is left as it is. `progress` gets the number of primitives done and the total.
     ///
     /// # Errors
-    /// Files that can't be read, coordinates that are refused, another plan in the folder, cancellation.
+    /// Files that can't be read, refused coordinates, another plan in the folder, cancellation.
     pub fn make(
         folder: &Path,
         files: &[PathBuf],
@@ -142,7 +142,7 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The plan of a folder.
+    /// Opens the plan of a folder.
     ///
     /// # Errors
     /// No plan, or a damaged one.
@@ -183,7 +183,7 @@ impl Plan {
             .map_err(|error| Error::io(&path, "write", error.into()))?;
         disk::replace(&path, |to| writeln!(to, "{text}"))?;
         if replace {
-            // Files of another plan would be found stale one by one; this frees the disk.
+            // Files of another plan would be found stale one by one; removing them frees disk space.
             for name in ["parts", "results"] {
                 let old = self.folder.join(name);
                 if old.exists() {
@@ -199,12 +199,12 @@ impl Plan {
         &self.folder
     }
 
-    /// What names this plan in all its files: a checksum of files, cells and options.
+    /// The number that identifies this plan in all its files: a checksum of files, cells and options.
     pub fn id(&self) -> u64 {
         self.id
     }
 
-    /// The mesh files, a body each.
+    /// The mesh files, one per body.
     pub fn files(&self) -> &[File] {
         &self.files
     }
@@ -235,12 +235,12 @@ impl Plan {
         })
     }
 
-    /// What the id is a checksum of.
+    /// The text whose checksum is the id.
     fn text(&self) -> String {
         Value::Object(self.to_json()).to_string()
     }
 
-    /// Without the id.
+    /// The plan as JSON, without the id.
     fn to_json(&self) -> Map<String, Value> {
         let file = |file: &File| {
             json!({
@@ -300,7 +300,7 @@ impl Plan {
                 .collect::<Option<_>>()?,
             cells: Cells::from_json(value.get("cells")?)?,
         };
-        // Whatever was changed by hand is not what the other files belong to.
+        // The other files do not belong to a plan that was changed by hand.
         (checksum(plan.text().as_bytes()) == plan.id).then_some(plan)
     }
 }
@@ -310,7 +310,7 @@ impl File {
         self.n_primitives.div_ceil(chunk) as usize
     }
 
-    /// Opens the file, if it is what it was.
+    /// Opens the file, if it has not changed since the plan was made.
     pub(crate) fn open(&self) -> Result<Box<dyn Source>, Error> {
         let changed = || Error::Changed {
             path: self.path.clone(),
@@ -346,8 +346,8 @@ fn file(path: &Path, source: &dyn Source) -> Result<File, Error> {
     })
 }
 
-/// Checks all primitives of a file and takes every `step`th of them. A file that turns out to hold other polygons than
-/// triangles is replaced by one that is read whole.
+/// Checks all primitives of a file and samples every `step`th of them. If the file turns out to hold polygons other than
+/// triangles, its source is replaced by one that reads the whole file.
 fn look_at(
     path: &Path,
     source: &mut Box<dyn Source>,

@@ -1,4 +1,4 @@
-//! One tile: its primitives from all parts, the pairs among them, and those that the tile owns.
+//! Runs one tile: reads its primitives from all parts, finds the pairs among them, and keeps those that the tile owns.
 
 mod records;
 
@@ -14,7 +14,7 @@ use crate::error::Error;
 use crate::npy;
 use crate::plan::Plan;
 
-/// What is asked of the whole scene. All tiles must be asked the same.
+/// The query for the whole scene. It must be the same for all tiles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ask {
     /// Pairs of different files.
@@ -36,7 +36,7 @@ impl Default for Ask {
 }
 
 impl Ask {
-    /// In words, as results carry it.
+    /// The query in words, as in results.
     pub fn name(self) -> &'static str {
         let resolve = self.shared_vertex == SharedVertex::Resolve;
         match (self.between, self.within, resolve) {
@@ -61,15 +61,15 @@ impl Ask {
 /// How a tile is run.
 #[derive(Debug, Clone, Default)]
 pub struct RunOptions {
-    /// What is asked.
+    /// The query.
     pub ask: Ask,
     /// Settings of the detector. The backend is the CPU unless they name a GPU.
     pub settings: Settings,
-    /// Whether tiles that have a result for the same question are run again.
+    /// Whether to run tiles again that have a result for the same query.
     pub again: bool,
 }
 
-/// What one tile found.
+/// The result of one tile.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TileResult {
     /// The tile.
@@ -80,12 +80,12 @@ pub struct TileResult {
     pub n_pairs: u64,
     /// The sum of the hashes of these pairs; see [`hash_rows`].
     pub hash: u64,
-    /// Pairs that were found here and belong to another tile.
+    /// Pairs that were found here but belong to another tile.
     pub n_elsewhere: u64,
-    /// Into how many pieces the tile was cut, each asked with each other: more than 1 where its primitives lie on one
-    /// another so that no cut of space parts them.
+    /// The number of pieces into which the tile was split, every piece tested against every other. It is above 1 if its
+    /// primitives overlap so much that no cut of space separates them.
     pub n_pieces: u64,
-    /// Whether the result was there already.
+    /// Whether the result already existed.
     pub was_kept: bool,
     pub(crate) ask: String,
 }
@@ -103,11 +103,11 @@ impl Plan {
             .join(format!("tile-{tile:08}.json"))
     }
 
-    /// Finds the pairs of each of `tiles` and writes them, one tile in memory at a time. Tiles that have a result for the same question
-    /// are kept. `done` hears of each.
+    /// Finds the pairs of each of `tiles` and writes them, with one tile in memory at a time. Existing results for the same query
+    /// are kept. `done` gets the result of each tile.
     ///
     /// # Errors
-    /// No such tile; parts that are missing, stale or damaged; what [`Detector::detect_with`] refuses; cancellation.
+    /// No such tile; parts that are missing, stale or damaged; errors of [`Detector::detect_with`]; cancellation.
     pub fn run(
         &self,
         tiles: impl IntoIterator<Item = u32>,
@@ -146,7 +146,7 @@ impl Plan {
         Ok(())
     }
 
-    /// Every part must be there before any tile can be whole.
+    /// Checks that every part exists: otherwise no tile is complete.
     fn check_parts(&self) -> Result<(), Error> {
         let missing: Vec<usize> = (0..self.n_units())
             .filter(|&unit| !self.part_path(unit).exists())
@@ -174,7 +174,7 @@ impl Plan {
             records.add(self.read_segment(unit_ix, unit, tile)?);
         }
         let n = records.len();
-        // The plan aims at `cap`; twice that is left only where no cut was worth its copies.
+        // The plan aims at `cap` primitives per tile; a tile has more than twice that only if no cut was worth its copies.
         let piece = if n as u64 > 2 * self.cap {
             self.cap as usize
         } else {
@@ -202,7 +202,7 @@ impl Plan {
                 for row in pairs.rows() {
                     let (first, second) =
                         (part.record(row[0], row[1]), part.record(row[2], row[3]));
-                    // Two pieces are asked for the pairs between them; each was asked by itself before.
+                    // For two pieces, only pairs between them count: each piece was tested by itself before.
                     if a != b && (first / piece == second / piece) {
                         continue;
                     }
@@ -231,7 +231,7 @@ impl Plan {
         Ok(result)
     }
 
-    /// The rows first, then the result that vouches for them; an older one must not.
+    /// Removes an older result, then writes the rows, then the result that names them.
     fn write_result(&self, result: &TileResult, rows: &[[u32; 4]]) -> Result<(), Error> {
         let path = self.result_path(result.tile);
         if path.exists() {
@@ -254,7 +254,7 @@ impl Plan {
         disk::replace(&path, |to| writeln!(to, "{object}"))
     }
 
-    /// The result of a tile, if it is there and of this plan.
+    /// The result of a tile, if it exists and belongs to this plan.
     pub(crate) fn result(&self, tile: u32) -> Result<TileResult, Error> {
         const STEP: &str = "tiles run";
         let path = self.result_path(tile);

@@ -1,4 +1,4 @@
-//! Scattering: every unit becomes a part file, by any number of threads and processes.
+//! Scattering: writes one part file per unit, with any number of threads and processes.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -10,14 +10,14 @@ use crate::error::Error;
 use crate::plan::{Plan, Unit};
 use crate::source::Source;
 
-/// How to scatter.
+/// Options of scattering.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ScatterOptions {
-    /// The share of this process, from 0.
+    /// The rank of this process, from 0.
     pub rank: usize,
     /// How many processes share the units.
     pub world_size: usize,
-    /// Threads, a unit each at a time; 0 means one per core.
+    /// Threads, each with one unit at a time; 0 means one per core.
     pub threads: usize,
 }
 
@@ -31,12 +31,12 @@ impl Default for ScatterOptions {
     }
 }
 
-/// What was done.
+/// The result of scattering.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Scattered {
     /// Parts written.
     pub n_written: u64,
-    /// Parts that were there already.
+    /// Parts that already existed.
     pub n_kept: u64,
     /// Primitives in the parts written.
     pub n_primitives: u64,
@@ -45,10 +45,10 @@ pub struct Scattered {
 }
 
 impl Plan {
-    /// Writes the parts of this process's units that are not there yet. `progress` hears of units done and in all.
+    /// Writes the missing parts of this process's units. `progress` gets the number of units done and the total.
     ///
     /// # Errors
-    /// Files that have changed or can't be read, coordinates that are refused, a full disk, cancellation.
+    /// Files that have changed or can't be read, refused coordinates, a full disk, cancellation.
     pub fn scatter(
         &self,
         options: &ScatterOptions,
@@ -71,7 +71,7 @@ impl Plan {
         };
         let done = AtomicU64::new(0);
         let mut scattered = Scattered::default();
-        // One file at a time, so that the vertices of one file are in memory.
+        // One file at a time, so that the vertices of only one file are in memory.
         for units in mine.chunk_by(|a, b| a.1.file == b.1.file) {
             let todo: Vec<(usize, Unit)> = units
                 .iter()
@@ -152,15 +152,15 @@ impl Plan {
     ) -> Result<u64, Error> {
         let path = &self.files[unit.file].path;
         let chunk = source.read(unit.first, unit.n)?;
-        // When the plan was made, all of these were triangles.
+        // When the plan was made, all faces were triangles.
         let chunk = chunk.ok_or_else(|| Error::Changed { path: path.clone() })?;
-        // The plan has looked, but what is read now is what counts: a NaN box would lie in no tile.
+        // The plan has checked the coordinates, but the file may have changed: a box with NaN would lie in no tile.
         chunk.check(path, source.shape())?;
         self.write_part(unit_ix, unit.file, &chunk)
     }
 }
 
-/// Refuses a rank that is none.
+/// Refuses a rank that is not below the world size.
 pub(crate) fn check_share(rank: usize, world_size: usize) -> Result<(), Error> {
     if rank < world_size {
         return Ok(());

@@ -1,7 +1,7 @@
 //! Mesh files as chunks of primitives.
 //!
-//! Binary PLY of triangles, binary STL and `.npy` arrays have primitives of equal length on disk, so any run of them is read by
-//! itself. Whatever else `impinge-io` reads is held in memory as a whole.
+//! Binary PLY of triangles, binary STL and `.npy` arrays have primitives of equal length on disk, so any run of them can be read
+//! separately. All other formats of `impinge-io` are held in memory as a whole.
 
 mod npy;
 mod ply;
@@ -16,21 +16,22 @@ use crate::chunk::{Chunk, Shape};
 use crate::error::Error;
 use crate::hash::checksum;
 
-/// A mesh file that is read run by run, by several threads at a time.
+/// A mesh file that several threads can read at a time, in runs of primitives.
 pub trait Source: Send + Sync {
     /// `ply`, `stl`, `npy` or `whole`.
     fn reader(&self) -> &'static str;
-    /// What its primitives are.
+    /// The kind of its primitives.
     fn shape(&self) -> Shape;
-    /// How many there are.
+    /// How many primitives there are.
     fn n_primitives(&self) -> u64;
     /// How many vertices there are.
     fn n_vertices(&self) -> u64;
-    /// Primitives `first..first + n`, in range; `None` where they are no triangles and the file must be read whole.
+    /// Primitives `first..first + n`, which must be in range; `None` if they are not triangles, so that the file must be read
+    /// whole.
     fn read(&self, first: u64, n: usize) -> Result<Option<Chunk>, Error>;
 }
 
-/// Opens a mesh file in the way that suits it.
+/// Opens a mesh file with the reader for its format.
 pub fn open(path: &Path) -> Result<Box<dyn Source>, Error> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     match extension.to_ascii_lowercase().as_str() {
@@ -50,12 +51,12 @@ pub fn open(path: &Path) -> Result<Box<dyn Source>, Error> {
     open_whole(path)
 }
 
-/// Opens a mesh file by reading all of it.
+/// Opens a mesh file and reads all of it.
 pub fn open_whole(path: &Path) -> Result<Box<dyn Source>, Error> {
     Ok(Box::new(whole::Whole::open(path)?))
 }
 
-/// Opens a file in the way that a plan says.
+/// Opens a file with the reader that a plan names.
 pub fn open_as(path: &Path, reader: &str) -> Result<Box<dyn Source>, Error> {
     let source = if reader == "whole" {
         open_whole(path)?
@@ -70,7 +71,7 @@ pub fn open_as(path: &Path, reader: &str) -> Result<Box<dyn Source>, Error> {
     Ok(source)
 }
 
-/// The length of a file, and a checksum of up to 16 blocks spread evenly over it: enough to notice another file.
+/// The length of a file, and a checksum of up to 16 blocks spread evenly over it: enough to recognise another file.
 pub fn fingerprint(path: &Path) -> Result<(u64, u64), Error> {
     const BLOCK: u64 = 4096;
     const N: u64 = 16;
@@ -93,7 +94,7 @@ fn length(path: &Path) -> Result<u64, Error> {
     Ok(metadata.len())
 }
 
-/// Exactly `n` bytes of a file from `start` on.
+/// Reads exactly `n` bytes of a file from `start` on.
 fn read_at(path: &Path, start: u64, n: usize) -> Result<Vec<u8>, Error> {
     let read = || {
         let mut file = File::open(path)?;
@@ -119,7 +120,7 @@ fn f64_at(bytes: &[u8], at: usize) -> f64 {
     f64::from_le_bytes(std::array::from_fn(|ix| bytes[at + ix]))
 }
 
-/// Refuses more than 32-bit numbers can name.
+/// Refuses more elements than 32-bit numbers can name.
 fn check_count(path: &Path, what: &'static str, given: u64) -> Result<(), Error> {
     let limit = u64::from(u32::MAX);
     if given > limit {

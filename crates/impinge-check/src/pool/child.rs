@@ -1,4 +1,4 @@
-//! One child process and what it says.
+//! One child process and its answers.
 
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::process::{ChildStdin, Command, ExitStatus, Stdio};
@@ -11,31 +11,31 @@ use serde_json::Value;
 
 use crate::row::{ErrorKind, Row};
 
-/// How often somebody who waits looks whether to stop.
+/// How often a waiting thread checks for cancellation.
 const GLANCE: Duration = Duration::from_millis(50);
 
-/// The most bytes of a child's standard error that are kept: the last ones.
+/// How many bytes of a child's standard error are kept: the last ones.
 const KEPT: usize = 4096;
 
 /// A running child. Dropping it kills it.
 pub struct Child {
     process: std::process::Child,
-    /// `None` once the child is to end.
+    /// `None` once the child should end.
     input: Option<ChildStdin>,
     answers: Receiver<String>,
-    /// Gives the end of standard error when that is closed.
+    /// Returns the last bytes of standard error once that is closed.
     complaints: Option<JoinHandle<String>>,
 }
 
-/// What came of a question.
+/// The result of asking a child.
 pub enum Answer {
     /// The row of the mesh.
     Row(Row),
-    /// Nothing within the time.
+    /// No answer within the time limit.
     TooLate,
-    /// Somebody asked to stop.
+    /// The caller cancelled the run.
     Cancelled,
-    /// The child ended, or said what is no row.
+    /// The child ended, or printed a line that is not a row.
     Ended { kind: ErrorKind, message: String },
 }
 
@@ -53,7 +53,7 @@ impl Child {
         let (sender, answers) = mpsc::channel();
         std::thread::Builder::new().spawn(move || {
             for line in BufReader::new(output).lines() {
-                // Whoever listens is gone, or the child speaks no UTF-8: it ends either way.
+                // Stop if the receiver is gone, or if the child does not print UTF-8.
                 if !line.is_ok_and(|line| sender.send(line).is_ok()) {
                     return;
                 }
@@ -68,7 +68,7 @@ impl Child {
         })
     }
 
-    /// Asks for the row of one mesh. After any answer but a row, drop the child.
+    /// Asks for the row of one mesh. After any other answer than a row, drop the child.
     pub fn ask(&mut self, path: &str, timeout: Option<Duration>, cancel: &CancelToken) -> Answer {
         let started = Instant::now();
         let question = format!("{}\n", Value::from(path));
@@ -94,7 +94,9 @@ impl Child {
                         Some(row) if row.path == path => Answer::Row(row),
                         _ => Answer::Ended {
                             kind: ErrorKind::Crash,
-                            message: format!("the child process answered what is no row: {line}"),
+                            message: format!(
+                                "the child process printed a line that is not a row: {line}"
+                            ),
                         },
                     };
                 }
@@ -107,10 +109,10 @@ impl Child {
         }
     }
 
-    /// Why the child has ended.
+    /// The reason why the child has ended.
     fn ended(&mut self) -> Answer {
         self.input = None;
-        // It has closed its output: it ends, or must be ended.
+        // The child has closed its output: it ends by itself, or is killed.
         let status = self.wait_or_kill();
         let complaints = self.complaints.take().and_then(|reader| reader.join().ok());
         let complaints = complaints.unwrap_or_default();
@@ -149,13 +151,13 @@ impl Child {
 
 impl Drop for Child {
     fn drop(&mut self) {
-        // Either may fail only because the child has ended already.
+        // These fail only if the child has already ended.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
 }
 
-/// Reads to the end and gives the last bytes as text.
+/// Reads to the end and returns the last bytes as text.
 fn last_of(mut from: impl Read) -> String {
     let mut kept = Vec::new();
     let mut chunk = [0u8; 1024];

@@ -1,4 +1,4 @@
-//! The primitives of a tile, as they were read, and scenes made of some of them.
+//! The primitives of a tile as records, and scenes made of some of them.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use crate::cells::owner_point;
 use crate::chunk::{Record, Shape};
 use crate::parts::Segment;
 
-/// All records of a tile, file by file, primitives ascending. Numbered through from 0.
+/// All records of a tile, file by file, primitives ascending. They are numbered from 0.
 #[derive(Default)]
 pub struct Records {
     files: Vec<OfFile>,
@@ -17,7 +17,7 @@ pub struct Records {
 struct OfFile {
     file: usize,
     shape: Shape,
-    /// The number of its first record.
+    /// The number of the file's first record.
     first: usize,
     bytes: Vec<u8>,
 }
@@ -33,15 +33,15 @@ impl OfFile {
     }
 }
 
-/// A scene of some records, and which they are.
+/// A scene of some records, and the numbers of these records.
 pub struct Part {
     pub scene: Scene,
-    /// Per body: the numbers of its records, in runs that follow each other.
+    /// Per body: the numbers of its records, in consecutive runs.
     bodies: Vec<Vec<Range<usize>>>,
 }
 
 impl Part {
-    /// The number of the record that is a primitive of the scene.
+    /// The number of the record of a primitive of the scene.
     pub fn record(&self, body: u32, primitive: u32) -> usize {
         let mut left = primitive as usize;
         for run in &self.bodies[body as usize] {
@@ -55,7 +55,7 @@ impl Part {
 }
 
 impl Records {
-    /// Appends what comes next: units come in the order of files and primitives.
+    /// Appends the next segment; segments come in the order of files and primitives.
     pub fn add(&mut self, segment: Segment) {
         if segment.bytes.is_empty() {
             return;
@@ -81,7 +81,7 @@ impl Records {
         (&self.files[ix], record - self.files[ix].first)
     }
 
-    /// Says to whom a pair belongs.
+    /// The point that decides to which tile a pair belongs.
     pub fn owner_point(&self, a: usize, b: usize) -> [f64; 3] {
         let lower = |record: usize| {
             let (held, ix) = self.find(record);
@@ -90,7 +90,7 @@ impl Records {
         owner_point(&lower(a), &lower(b))
     }
 
-    /// The pair by files and primitives of files.
+    /// The pair as a row: file, primitive, file, primitive.
     pub fn row(&self, a: usize, b: usize) -> [u32; 4] {
         let named = |record: usize| {
             let (held, ix) = self.find(record);
@@ -100,7 +100,7 @@ impl Records {
         [a.0, a.1, b.0, b.1]
     }
 
-    /// A scene of the records in `ranges` (ascending), a body per file that has any. Vertices are numbered densely.
+    /// A scene of the records in `ranges` (ascending), with one body per file that has any. Vertices are numbered densely.
     pub fn scene(&self, ranges: &[Range<usize>], weld: bool) -> Result<Part, impinge::Error> {
         let mut part = Part {
             scene: Scene::new(),
@@ -152,7 +152,7 @@ impl Records {
     }
 }
 
-/// Numbers equal keys alike, from 0 on: the number of each key, and where each number is found first.
+/// Gives equal keys equal numbers, from 0 on. Returns the number of each key, and the first place of each number.
 fn dense<K: Ord>(keys: impl Iterator<Item = K>) -> (Vec<u32>, Vec<u32>) {
     let mut sorted: Vec<(K, u32)> = keys.zip(0u32..).collect();
     sorted.sort_unstable();

@@ -1,4 +1,5 @@
-//! NumPy arrays of corners: `(n, 3, 3)` triangles or `(n, 4, 3)` tetrahedra, `<f4` or `<f8`, each primitive with vertices of its own.
+//! NumPy arrays of corners: `(n, 3, 3)` triangles or `(n, 4, 3)` tetrahedra, `<f4` or `<f8`; each primitive has vertices of its
+//! own.
 
 use std::path::{Path, PathBuf};
 
@@ -21,7 +22,7 @@ impl Npy {
             given: format!("{}: {found}", path.display()),
             allowed: "'<f4' or '<f8' of shape (n, 3, 3) or (n, 4, 3), in C order,".to_owned(),
         };
-        let header = npy::parse(&head(path, 4096)?).ok_or_else(|| refuse("no such header"))?;
+        let header = npy::parse(&head(path, 4096)?).ok_or_else(|| refuse("no valid header"))?;
         let width = match header.descr.as_str() {
             "<f4" => 4,
             "<f8" => 8,

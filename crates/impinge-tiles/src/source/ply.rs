@@ -1,4 +1,4 @@
-//! Binary PLY, little-endian, whose faces are triangles: each then takes the same number of bytes.
+//! Binary PLY, little-endian, with triangles only, so that all faces take the same number of bytes.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use super::{Source, check_count, head, length, read_at};
 use crate::chunk::{Chunk, Shape};
 use crate::error::Error;
 
-/// The longest header that is looked at.
+/// The longest header that is read.
 const HEADER: u64 = 1 << 16;
 
 pub struct Ply {
@@ -19,23 +19,23 @@ pub struct Ply {
     face: FaceLayout,
 }
 
-/// Where things are in a face.
+/// The layout of a face.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct FaceLayout {
     stride: usize,
-    /// The byte that holds the number of corners.
+    /// The offset of the byte that holds the number of corners.
     count: usize,
-    /// The first of three vertex numbers of 4 bytes.
+    /// The offset of the first of three vertex numbers of 4 bytes.
     vertices: usize,
 }
 
-/// What a header says, if it says what is read here.
+/// The content of a header that this reader supports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Layout {
     start: u64,
     n_vertices: u64,
     vertex_stride: usize,
-    /// Of x, y and z.
+    /// The offsets of x, y and z in a vertex.
     offsets: [usize; 3],
     is_f64: bool,
     n_faces: u64,
@@ -43,7 +43,7 @@ struct Layout {
 }
 
 impl Ply {
-    /// None where the file is of another flavour, which is read whole.
+    /// `None` if the file has another flavour, which is read whole.
     pub fn open(path: &Path) -> Result<Option<Self>, Error> {
         let Some(layout) = layout(&head(path, HEADER)?) else {
             return Ok(None);
@@ -53,7 +53,7 @@ impl Ply {
         let vertex_bytes = layout.n_vertices * layout.vertex_stride as u64;
         let faces_start = layout.start + vertex_bytes;
         if length(path)? != faces_start + layout.n_faces * layout.face.stride as u64 {
-            // Faces of other lengths, or cut short: the reader of whole files says which.
+            // Faces of other lengths, or a file that is too short: the reader of whole files decides.
             return Ok(None);
         }
         Ok(Some(Ply {
@@ -66,7 +66,7 @@ impl Ply {
     }
 }
 
-/// The positions alone, block by block.
+/// Reads only the positions, block by block.
 fn positions(path: &Path, layout: &Layout) -> Result<Positions, Error> {
     const BLOCK: u64 = 1 << 18;
     let mut narrow: Vec<[f32; 3]> = Vec::new();

@@ -15,7 +15,7 @@ pub struct Stl {
 }
 
 impl Stl {
-    /// None where the file is text: its length then does not fit the count.
+    /// `None` if the file is text: then its length does not match the count.
     pub fn open(path: &Path) -> Result<Option<Self>, Error> {
         let head = head(path, START)?;
         let &[.., a, b, c, d] = head.as_slice() else {

@@ -1,5 +1,5 @@
-//! Tiles against the oracle, where everything touches: any cuts, both precisions, both rules, triangles and tetrahedra.
-//! And that wrong comparisons would be noticed.
+//! Tiles compared with the oracle on lattices, where everything touches: any cuts, both precisions, both adjacency rules,
+//! triangles and tetrahedra. One test shows that wrong comparisons would be noticed.
 
 use std::collections::BTreeMap;
 
@@ -38,7 +38,7 @@ fn tiles_have_the_rows_of_the_whole() {
         };
         let cuts = cells(&mut random, if is_f64 { 1.0 / 3.0 } else { 0.25 });
         let options = PlanOptions {
-            // Sometimes so small that tiles fall apart into pieces.
+            // Sometimes so small that tiles are split into pieces.
             cap: if random.chance(3) { 7 } else { 1000 },
             chunk: 1 + u64::from(random.below(20)),
             cells: random.chance(8).then(Cells::whole).or(Some(cuts)),
@@ -56,7 +56,7 @@ fn tiles_have_the_rows_of_the_whole() {
         n_copies += merged.n_records as usize
             - meshes.iter().map(|mesh| mesh.n_primitives()).sum::<usize>();
     }
-    // Not for want of pairs, nor of primitives in several tiles.
+    // The test had pairs, and primitives in several tiles.
     assert!(
         n_pairs > 5_000 && n_copies > 1_000,
         "{n_pairs} pairs, {n_copies} copies"
@@ -123,7 +123,7 @@ fn a_pile_that_no_cut_parts_falls_apart_into_pieces() {
     assert_eq!((rows(&merged), merged.hash), (expected, hash));
 }
 
-/// Boxes on a lattice, all pairs that meet, and how often each is found by the tiles of a rule.
+/// For boxes on a lattice: how many pairs that meet the tiles of a rule miss, and how many pairs they find more than once.
 fn found<R: Rule>(seed: u64) -> (usize, usize) {
     let mut random = Random(seed);
     let (mut n_lost, mut n_twice) = (0, 0);

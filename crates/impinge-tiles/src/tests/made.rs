@@ -1,4 +1,4 @@
-//! Scenes for tests, as files and as the oracle sees them.
+//! Scenes for tests, as files and as input of the oracle.
 
 use std::path::{Path, PathBuf};
 
@@ -24,16 +24,16 @@ impl Random {
     }
 }
 
-/// Primitives between few vertices of a lattice: everything touches, lies on cuts, or is degenerate. One in eight is a giant.
+/// Primitives over few vertices of a lattice: many touch, lie on cuts, or are degenerate. One in eight is very large.
 pub fn lattice(random: &mut Random, n: usize, is_solid: bool, is_f64: bool) -> Mesh {
     let width = 4 + random.below(8);
     let n_vertices = 4 + n as u32 / 2;
-    // A third of a lattice step is no f32: then the numbers need f64.
+    // Multiples of 1/3 are not representable in f32, so these coordinates need f64.
     let unit = if is_f64 { 1.0 / 3.0 } else { 0.25 };
     let positions: Vec<[f64; 3]> = (0..n_vertices)
         .map(|_| std::array::from_fn(|_| f64::from(random.below(width)) * unit))
         .collect();
-    // Near vertices mostly, so that primitives are small against the whole.
+    // Mostly near vertices, so that most primitives are small.
     let near = |random: &mut Random, start: u32| {
         if random.chance(8) {
             return random.below(n_vertices);
@@ -78,7 +78,7 @@ pub fn lattice(random: &mut Random, n: usize, is_solid: bool, is_f64: bool) -> M
     }
 }
 
-/// Writes a mesh in a format that keeps it: PLY for triangles, Medit for tetrahedra.
+/// Writes a mesh in a format that preserves it: PLY for triangles, Medit for tetrahedra.
 pub fn write(folder: &Path, name: &str, mesh: &Mesh) -> PathBuf {
     match &mesh.elements {
         Elements::Triangles(_) => {
@@ -112,7 +112,7 @@ pub fn write(folder: &Path, name: &str, mesh: &Mesh) -> PathBuf {
     }
 }
 
-/// Rows and hash by every box against every box.
+/// Rows and hash of the oracle: every box against every box.
 pub fn oracle(meshes: &[Mesh], ask: Ask) -> (Vec<[u32; 4]>, u64) {
     let mut scene = Scene::new();
     for mesh in meshes {
@@ -194,7 +194,7 @@ pub fn rows(merged: &Merged) -> Vec<[u32; 4]> {
     words.as_chunks::<4>().0.to_vec()
 }
 
-/// Random cuts, at coordinates of the lattice as often as beside them.
+/// Random cuts, half of them at coordinates of the lattice.
 pub fn cells(random: &mut Random, unit: f64) -> Cells {
     let mut cells = Cells::whole();
     for _ in 0..random.below(12) {

@@ -1,4 +1,4 @@
-//! What is missing, stale, damaged, changed or not finite is named.
+//! Errors name files that are missing, stale, damaged or changed, and coordinates that are not finite.
 
 use std::path::{Path, PathBuf};
 
@@ -169,7 +169,7 @@ fn files_of_another_plan_are_stale() {
     std::fs::copy(old.join("parts/unit-00000000.bin"), second.part_path(0)).unwrap();
     let error = run(&second, Ask::default()).unwrap_err();
     assert!(matches!(error, Error::Stale { .. }), "{error}");
-    // The step that writes such a file takes it for missing.
+    // The step that writes such a file treats it as missing.
     assert_eq!(scatter(&second).unwrap().n_written, 1);
     run(&second, Ask::default()).unwrap();
     assert_eq!(second.merge().unwrap(), merged);
@@ -208,7 +208,7 @@ fn a_mesh_that_changes_is_noticed() {
     assert!(matches!(scatter(&plan), Err(Error::Changed { .. })));
 }
 
-/// Says NaN where the plan saw numbers.
+/// Returns NaN although the plan saw numbers.
 struct Liar;
 
 impl Source for Liar {
@@ -355,7 +355,7 @@ fn soups_are_welded_tile_by_tile_as_the_whole_would_be() {
 
 #[test]
 fn faces_of_many_corners_are_read_whole() {
-    // The same number of bytes as triangles with a byte more would have; only the count says what they are.
+    // These faces have as many bytes as triangles with one more byte; only the count of corners distinguishes them.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("quads.ply");
     let mut bytes = b"ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\

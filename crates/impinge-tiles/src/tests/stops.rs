@@ -1,4 +1,4 @@
-//! A run that is stopped at any write and run again ends with the same bytes.
+//! A run that is stopped at any write ends with the same bytes when run again.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,7 +7,7 @@ use super::made::{Random, answer, lattice, oracle, write};
 use crate::disk::STEPS_LEFT;
 use crate::{Ask, PlanOptions};
 
-/// All files of a folder but those that a process left unfinished.
+/// All files of a folder except unfinished ones.
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     for sub in ["", "parts", "results"] {
@@ -57,7 +57,7 @@ fn stopped_at_each_write_and_run_again_the_bytes_are_the_same() {
         }
         let error = stopped.unwrap_err().to_string();
         assert!(error.contains("stopped by a test"), "{error}");
-        // Twice, the second time at a later step: what was left behind is no trouble either.
+        // Stop a second time, at a later step: leftover files do no harm.
         STEPS_LEFT.set(Some(n_stops / 2 + 3));
         let _ = attempt(&name);
         STEPS_LEFT.set(None);
