@@ -1,4 +1,4 @@
-//! How far a step can be taken, and where vertices are then.
+//! How far a step can be taken, and where the vertices are afterwards.
 
 use crate::error::Error;
 use crate::ids::BodyId;
@@ -11,20 +11,20 @@ use crate::scene::Scene;
 pub struct Advance {
     /// The part of the step that can be taken: 1 for all of it, 0 for none.
     pub fraction: f64,
-    /// The first contact of the whole step, its time rounded down to `f64`. `None` where the whole step is free.
+    /// The first contact of the whole step, its time rounded down to `f64`. `None` if the whole step is free.
     pub first: Option<Impact>,
-    /// Where the vertices of all bodies that move are then, rounded to the precision in which they are stored. The straight
-    /// way from the start to these rounded positions is free, but for what touches at the start.
+    /// The vertex positions of all moving bodies at that fraction, rounded to the precision in which they are stored. The
+    /// straight path from the start to these rounded positions is free, except for pairs that touch at the start.
     pub positions: Vec<(BodyId, Positions)>,
     /// How many fractions were tried.
     pub n_tried: u32,
 }
 
 impl Advance {
-    /// Takes the step: these positions become those of the scene.
+    /// Takes the step: sets these positions in the scene.
     ///
     /// # Errors
-    /// A body that is gone, or that has another number of vertices now.
+    /// A body that was removed, or that now has another number of vertices.
     pub fn apply(&self, scene: &mut Scene) -> Result<(), Error> {
         self.positions
             .iter()
@@ -42,7 +42,7 @@ pub(crate) fn blend(start: &Positions, end: &Positions, fraction: f64) -> Positi
         return end.clone();
     }
     let at = |x: f64, y: f64| {
-        // Never beyond the ends, whatever the rounding.
+        // Rounding must not move it beyond the ends.
         (x + fraction * (y - x)).clamp(x.min(y), x.max(y))
     };
     match (start, end) {

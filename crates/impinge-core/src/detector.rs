@@ -1,4 +1,4 @@
-//! What users hold: it picks the backend, and the frame loop does the rest.
+//! The detector that users hold. It picks the backend; the frame loop does the rest.
 
 #[cfg(feature = "gpu")]
 mod gpu;
@@ -13,7 +13,7 @@ use crate::run::{FrameLoop, ready};
 use crate::scene::Scene;
 use crate::settings::{Backend, Settings};
 
-/// Finds intersecting pairs, frame after frame. Scratch memory lives here and is reused.
+/// Finds intersecting pairs, frame after frame. Owns the scratch memory and reuses it.
 ///
 /// ```
 /// use impinge::{Backend, Detector, Query, Scene};
@@ -63,8 +63,7 @@ impl Detector {
         ))
     }
 
-    /// [`with_settings`](Detector::with_settings) without blocking, for pages in a browser: there a GPU
-    /// is opened in no other way.
+    /// [`with_settings`](Detector::with_settings) without blocking. In a browser this is the only way to open a GPU.
     ///
     /// # Errors
     /// As `with_settings`.
@@ -98,7 +97,7 @@ impl Detector {
         &self.settings
     }
 
-    /// All pairs that the query asks for, as things are in the scene now.
+    /// All pairs that the query asks for, in the current state of the scene.
     ///
     /// # Errors
     /// A stale id, refused positions, a memory budget too small for even one slab, a GPU failure.
@@ -125,8 +124,8 @@ impl Detector {
         Ok(self.frames.pairs())
     }
 
-    /// [`detect`](Detector::detect) without blocking: on a GPU the future waits for the device, which
-    /// somebody must poll (a browser does; natively `wgpu::Device::poll`). On the CPU it is ready at once.
+    /// [`detect`](Detector::detect) without blocking. On a GPU the future waits for the device, which must be
+    /// polled meanwhile (a browser does that; natively call `wgpu::Device::poll`). On the CPU it is ready at once.
     ///
     /// # Errors
     /// As `detect`.
@@ -135,7 +134,7 @@ impl Detector {
         Ok(self.frames.pairs())
     }
 
-    /// One frame. With `Backend::Auto` a GPU that fails, or cannot hold the scene, is given up for the CPU.
+    /// One frame. With `Backend::Auto`, the CPU takes over for good if the GPU fails or cannot hold the scene.
     async fn answer(
         &mut self,
         scene: &Scene,

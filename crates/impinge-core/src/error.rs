@@ -1,6 +1,6 @@
 use crate::ids::BodyId;
 
-/// Everything that can go wrong, by name: which body, which index, and both numbers.
+/// All errors. Each names the body, the index, and both numbers where it has them.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -43,7 +43,7 @@ pub enum Error {
         /// How many vertices the body has.
         n_vertices: usize,
     },
-    /// New positions do not match the body's vertex count. Topology is fixed between re-meshings.
+    /// The number of new positions is not the body's number of vertices. Only re-meshing changes topology.
     #[error("body {body}: {given} positions given, but it has {expected} vertices")]
     WrongNumberOfPositions {
         /// The body.
@@ -53,14 +53,14 @@ pub enum Error {
         /// How many vertices the body has.
         expected: usize,
     },
-    /// Positions were asked for in a precision in which the body does not hold them.
+    /// Positions were requested in a precision in which the body does not store them.
     #[error("body {body}: positions are stored as {stored}, not as {asked}")]
     WrongPrecision {
         /// The body.
         body: BodyId,
-        /// How they are stored: `"f32"` or `"f64"`.
+        /// The stored precision: `"f32"` or `"f64"`.
         stored: &'static str,
-        /// What was asked for.
+        /// The requested precision.
         asked: &'static str,
     },
     /// The id names no body of this scene: the body was removed, or belongs to another scene.
@@ -73,7 +73,7 @@ pub enum Error {
         /// How many bodies the scene has.
         n_bodies: usize,
     },
-    /// A query between two bodies names one body twice. Ask for `within` instead.
+    /// A query between two bodies names one body twice. Use `within` instead.
     #[error("a query between body {body} and itself: ask for collisions within it instead")]
     SameBody {
         /// The body named twice.
@@ -90,7 +90,7 @@ pub enum Error {
         primitive: u32,
         /// How many primitives the body has.
         n_primitives: usize,
-        /// What the body is made of: `"triangles"` or `"tetrahedra"`.
+        /// The kind of the body's primitives, such as `"triangles"`.
         kind: &'static str,
     },
     /// A surface with a border, or with faces whose orientations disagree. Weld vertices, fill holes, orient faces.
@@ -113,9 +113,9 @@ pub enum Error {
     WrongKind {
         /// The body.
         body: BodyId,
-        /// What it is made of.
+        /// The kind of its primitives.
         kind: &'static str,
-        /// What is needed.
+        /// The kind that is needed.
         expected: &'static str,
     },
     /// More primitives or vertices than 32-bit indices can name.
@@ -151,16 +151,16 @@ pub enum Error {
     /// The caller cancelled the run; the detector stays usable.
     #[error("cancelled")]
     Cancelled,
-    /// No GPU adapter fits what was asked for; the text lists those found.
+    /// No GPU adapter fits the request; the text lists the adapters found.
     #[error("no GPU adapter: {found}")]
     NoAdapter {
-        /// What was looked for and what is there.
+        /// What was requested and what is available.
         found: String,
     },
     /// The GPU refused: out of memory, a lost device, a shader that does not compile.
     #[error("GPU: {what}")]
     Gpu {
-        /// The driver's own words.
+        /// The driver's message.
         what: String,
     },
     /// The threads of the pool could not be started.

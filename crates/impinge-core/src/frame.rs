@@ -1,9 +1,9 @@
-//! One question about one scene, resolved: which layers take part, in what order, which meet and under which test.
+//! A query resolved for one scene: which layers take part, in what order, which of them meet and under which test.
 //!
-//! A *layer* is a part of a body whose elements are of one kind. Intersections are asked of one layer per body: the
-//! elements that it was given as. Steps are asked of up to three: its edges, its vertices and its faces.
+//! A *layer* is a part of a body whose elements are of one kind. For intersections each body has one layer: the
+//! elements that it was given as. For steps it has up to three: its edges, its vertices and its faces.
 //!
-//! The elements of all layers are numbered through, part after part and body after body in slot order: element `i` of
+//! The elements of all layers are numbered consecutively, part after part and body after body in slot order: element `i` of
 //! layer `l` has the global number `first(l) + i`. A pair is then one 64-bit key, `lower << 32 | higher`, and sorting
 //! the keys of one test sorts rows `(body_a, element_a, body_b, element_b)`.
 //!
@@ -33,11 +33,11 @@ pub struct Layer {
     pub part: Part,
     /// Global number of its first element.
     pub first: u32,
-    /// How many numbers its elements have. Vertices are numbered as positions are, whether they take part or not.
+    /// How many numbers its elements take up. Vertices are numbered as positions are, whether they take part or not.
     pub n_primitives: u32,
-    /// What they are.
+    /// The kind of its elements.
     pub kind: Kind,
-    /// Whether its self-collision is asked for.
+    /// Whether its self-collision is queried.
     pub within: bool,
     /// Whether the body has no faces.
     is_bare: bool,
@@ -46,10 +46,10 @@ pub struct Layer {
     filter: Filter,
 }
 
-/// What is asked of pairs of elements.
+/// The question about pairs of elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Ask {
-    /// Whether those that the bodies were given as share a point.
+    /// Whether elements that bodies were given as share a point.
     #[default]
     Intersections,
     /// Whether and when vertices, edges and faces touch during a step.
@@ -59,8 +59,8 @@ pub enum Ask {
 }
 
 impl Ask {
-    /// The parts of bodies that are looked at, in the order of their layers. A pair's lower number is then that of the
-    /// element which its kind names first, but for a vertex and a face: there it is the vertex, which lies before faces.
+    /// The parts of bodies that take part, in the order of their layers. In this order, the lower number of a pair belongs to
+    /// the element that its kind names first: edges come before vertices, and vertices before faces.
     fn parts(self) -> &'static [Part] {
         match self {
             Ask::Intersections => &[Part::Given],
@@ -74,7 +74,7 @@ impl Ask {
 pub enum TestId {
     /// Whether the elements that bodies were given as share a point.
     Intersection,
-    /// What is asked of vertices, edges and faces.
+    /// The question about vertices, edges and faces.
     Elements(PairKind),
 }
 
@@ -83,7 +83,7 @@ pub enum TestId {
 pub struct Frame {
     /// Part after part, in slot order.
     pub layers: Vec<Layer>,
-    /// What is asked of pairs.
+    /// The question about pairs.
     pub ask: Ask,
     /// The adjacency rule of self-collision.
     pub shared_vertex: SharedVertex,
@@ -97,7 +97,7 @@ impl Frame {
         self.resolve_for(scene, query, Ask::Intersections)
     }
 
-    /// Resolves a query for anything.
+    /// Resolves a query for any question.
     pub fn resolve_for(&mut self, scene: &Scene, query: &Query, ask: Ask) -> Result<(), Error> {
         self.layers.clear();
         self.ask = ask;
@@ -198,19 +198,19 @@ impl Frame {
         Ok(())
     }
 
-    /// Elements of all layers together.
+    /// The number of elements of all layers together.
     pub fn n_primitives(&self) -> u64 {
         self.layers.last().map_or(0, |last| {
             u64::from(last.first) + u64::from(last.n_primitives)
         })
     }
 
-    /// Whether pairs of two different layers are asked for at all.
+    /// Whether any pairs of two different layers are wanted.
     pub fn between(&self) -> bool {
         self.layers.len() > 1 && (self.between || self.ask != Ask::Intersections)
     }
 
-    /// The test for pairs of elements of two layers, or of one with itself; none where no pair is asked for.
+    /// The test for pairs of elements of two layers, or of one with itself; `None` if no pair of them is wanted.
     #[inline]
     pub fn test(&self, a_ix: usize, b_ix: usize) -> Option<TestId> {
         let (a, b) = (&self.layers[a_ix], &self.layers[b_ix]);
@@ -228,8 +228,8 @@ impl Frame {
         let kind = PairKind::of(a.part, b.part)?;
         let is_asked = match self.ask {
             Ask::Candidates(kinds) => kinds.contains(kind),
-            // What has faces is met by its faces and edges. Of edges without faces a vertex may meet one that its own
-            // edges are neighbours of.
+            // Vertices against faces and edges against edges cover every body with faces. Only bodies without faces need
+            // edges against vertices, and only bodies of points need vertices against vertices.
             _ => match kind {
                 PairKind::VertexFace | PairKind::EdgeEdge => true,
                 PairKind::EdgeVertex => a.is_bare && b.is_bare,
@@ -248,7 +248,7 @@ impl Frame {
                 || !self.ignored.contains(&(a.id.min(b.id), a.id.max(b.id))))
     }
 
-    /// Who a participant meets.
+    /// The filter of a participant.
     #[cfg(feature = "gpu")]
     pub fn filter(&self, participant_ix: usize) -> Filter {
         self.layers[participant_ix].filter
@@ -286,7 +286,7 @@ impl Frame {
         })
     }
 
-    /// The body behind a layer.
+    /// The body of a layer.
     #[inline]
     pub fn body<'a>(&self, scene: &'a Scene, participant_ix: usize) -> &'a Body {
         scene.body_in(self.layers[participant_ix].id.slot())

@@ -17,7 +17,7 @@ pub struct Host {
 }
 
 impl Host {
-    /// With `threads` workers; 0 for one per core.
+    /// Creates a host with `threads` workers; 0 for one per core.
     pub fn new(threads: usize) -> Self {
         let frames = FrameLoop::new(threads);
         Host { frames }
@@ -27,7 +27,7 @@ impl Host {
     /// order, sorts them and drops repetitions.
     ///
     /// # Errors
-    /// A stale id, refused positions, those of the method.
+    /// A stale id, refused positions, errors of the method.
     pub fn detect(
         &mut self,
         scene: &Scene,

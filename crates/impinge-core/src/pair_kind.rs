@@ -2,8 +2,8 @@
 
 use crate::elements::Part;
 
-/// Which elements a pair is of. A pair's `a` is the element that the kind names first, so a vertex and a face are always in
-/// this order, whatever their bodies.
+/// The kinds of a pair's elements. A pair's `a` is the element that the kind names first. So a vertex and a face are always
+/// in this order, whatever their bodies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum PairKind {
     /// A vertex and a face.
@@ -58,15 +58,15 @@ impl PairKind {
     }
 }
 
-/// Some kinds of pairs.
+/// A set of kinds of pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PairKinds(u8);
 
 impl PairKinds {
-    /// All six.
+    /// All six kinds.
     pub const ALL: PairKinds = PairKinds(0b11_1111);
 
-    /// Whether it is one of them.
+    /// Whether the set contains a kind.
     pub fn contains(self, kind: PairKind) -> bool {
         self.0 >> kind as u8 & 1 == 1
     }

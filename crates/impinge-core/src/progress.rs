@@ -10,32 +10,32 @@ use crate::error::Error;
 pub struct CancelToken(Arc<AtomicBool>);
 
 impl CancelToken {
-    /// A token that nobody has cancelled.
+    /// Creates a token that is not cancelled.
     pub fn new() -> Self {
         CancelToken::default()
     }
 
-    /// Asks every detection that holds this token to stop soon with [`Error::Cancelled`].
+    /// Makes every detection with this token stop soon with [`Error::Cancelled`].
     pub fn cancel(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether somebody asked.
+    /// Whether the token was cancelled.
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// How far a detection has come: `done` of `total` units of work. Units differ by stage.
+/// The progress of a detection: `done` of `total` units of work. Units differ by stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
     /// Units done.
     pub done: u64,
-    /// Units in all.
+    /// All units.
     pub total: u64,
 }
 
-/// What a caller may hang onto a detection: a token to stop it, a callback to watch it.
+/// Controls that a caller may attach to a detection: a token to stop it, a callback to watch it.
 #[derive(Clone, Copy, Default)]
 pub struct Control<'a> {
     cancel: Option<&'a CancelToken>,
@@ -43,7 +43,7 @@ pub struct Control<'a> {
 }
 
 impl<'a> Control<'a> {
-    /// Nothing: run to the end in silence.
+    /// No controls: the detection runs to its end without callbacks.
     pub fn new() -> Self {
         Control::default()
     }
@@ -54,7 +54,7 @@ impl<'a> Control<'a> {
         self
     }
 
-    /// Calls back now and then, from any of the working threads.
+    /// Calls `callback` from time to time, from any of the threads used.
     pub fn progress(mut self, callback: &'a (dyn Fn(Progress) + Sync)) -> Self {
         self.progress = Some(callback);
         self

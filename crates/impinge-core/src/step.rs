@@ -1,31 +1,31 @@
-//! What is asked of a step: bodies that move on straight lines from their positions to their end positions.
+//! Questions about a step, in which bodies move on straight lines from their positions to their end positions.
 
 use crate::error::Error;
 use crate::pair_kind::{PairKind, PairKinds};
 use crate::query::Query;
 
-/// What becomes of pairs that touch at the start of a step.
+/// What happens to pairs that touch at the start of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Start {
     /// They are reported with the time 0.
     #[default]
     Report,
-    /// They are left out, whatever they do later in the step.
+    /// They are not reported, whatever they do later in the step.
     Skip,
 }
 
-/// To which precision times are rounded down.
+/// The precision to which times are rounded down.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Toi {
     /// The largest `f32` that is not above the first time.
     #[default]
     F32,
-    /// The largest `f64` that is not above it.
+    /// The largest `f64` that is not above the first time.
     F64,
 }
 
 impl Toi {
-    /// A time that was rounded down to `f64`, rounded down further.
+    /// The time of a contact in this precision, as an `f64`.
     pub(crate) fn round(self, contact: &crate::exact::Contact) -> f64 {
         match self {
             Toi::F32 => f64::from(contact.time_f32()),
@@ -34,9 +34,9 @@ impl Toi {
     }
 }
 
-/// What is asked of a step: of which bodies, and what is reported.
+/// The question about a step: which bodies, and what is reported.
 ///
-/// Pairs of one body that share a vertex are left out, whatever the query says of them.
+/// Pairs of one body that share a vertex are never reported, whatever the query's adjacency rule.
 ///
 /// ```
 /// use impinge::{Query, Start, Step, Toi};
@@ -52,7 +52,7 @@ pub struct Step {
 }
 
 impl Step {
-    /// Of the bodies of a query.
+    /// A step of the bodies of a query.
     pub fn new(query: Query) -> Self {
         Step {
             query,
@@ -61,13 +61,13 @@ impl Step {
         }
     }
 
-    /// What becomes of pairs that touch at the start.
+    /// Sets what happens to pairs that touch at the start.
     pub fn start(mut self, start: Start) -> Self {
         self.start = start;
         self
     }
 
-    /// To which precision times are rounded down.
+    /// Sets the precision to which times are rounded down.
     pub fn toi(mut self, toi: Toi) -> Self {
         self.toi = toi;
         self
@@ -87,11 +87,11 @@ impl From<Query> for Step {
     }
 }
 
-/// Which pairs of elements are candidates for a test of the caller's own.
+/// The question which pairs of elements are candidates for a test of the caller's own.
 ///
-/// Two elements are when their boxes over the whole step, each inflated by `distance` on all sides, overlap (closed): when
-/// no axis leaves a gap of more than twice the distance. This is decided exactly. Pairs of one body that share a vertex are
-/// left out.
+/// Two elements are candidates when their boxes over the whole step, each inflated by `distance` on all sides, overlap
+/// (closed): no axis has a gap of more than twice the distance. This is decided exactly. Pairs of one body that share a
+/// vertex are never candidates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CandidateQuery {
     pub(crate) query: Query,
@@ -100,7 +100,7 @@ pub struct CandidateQuery {
 }
 
 impl CandidateQuery {
-    /// Of the bodies of a query: vertices and faces, edges and edges, with a distance of 0.
+    /// Candidates of the bodies of a query: vertices with faces and edges with edges, at distance 0.
     pub fn new(query: Query) -> Self {
         CandidateQuery {
             query,
@@ -111,13 +111,13 @@ impl CandidateQuery {
         }
     }
 
-    /// Which kinds of pairs.
+    /// Sets the kinds of pairs.
     pub fn kinds(mut self, kinds: impl IntoIterator<Item = PairKind>) -> Self {
         self.kinds = kinds.into_iter().collect();
         self
     }
 
-    /// By how much boxes are inflated on all sides: 0 or more.
+    /// Sets by how much boxes are inflated on all sides: 0 or more.
     pub fn distance(mut self, distance: f64) -> Self {
         self.distance = distance;
         self

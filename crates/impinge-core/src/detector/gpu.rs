@@ -1,4 +1,4 @@
-//! What a detector does on a GPU: its own device, or the caller's.
+//! Detectors on a GPU: on a device of their own, or on the caller's.
 
 use std::cell::Cell;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::run::Job;
 use crate::scene::Scene;
 use crate::settings::Method;
 
-/// The GPU that the settings ask for, if they ask for one.
+/// Opens the GPU that the settings ask for, if they ask for one.
 pub(super) fn open(settings: &Settings) -> Result<Option<Engine>, Error> {
     let gpu = wanted(settings).map(Gpu::open).transpose();
     engine_of(gpu, settings)
@@ -33,7 +33,7 @@ fn wanted(settings: &Settings) -> Option<Wanted<'_>> {
     match settings.backend {
         Backend::Cpu => None,
         Backend::Auto if settings.method == Method::Naive => None,
-        // A driver that runs on the CPU is slower than the CPU backend.
+        // A software driver is slower than the CPU backend.
         Backend::Auto => Some(named.unwrap_or(Wanted::Hardware)),
         Backend::Gpu => Some(named.unwrap_or(Wanted::Any)),
     }
@@ -51,7 +51,7 @@ fn engine_of(
 }
 
 impl Detector {
-    /// [`with_settings`](Detector::with_settings), and how much room GPU buffers begin with. For
+    /// [`with_settings`](Detector::with_settings), with the initial room of GPU buffers. For
     /// tests: buffers grow by themselves.
     ///
     /// # Errors
@@ -65,8 +65,8 @@ impl Detector {
         Ok(detector)
     }
 
-    /// [`with_settings`](Detector::with_settings), and the most bytes of topology or positions that a GPU may
-    /// bind at once. For tests: devices say so themselves.
+    /// [`with_settings`](Detector::with_settings), with the most bytes of topology or positions that a GPU may
+    /// bind at once. For tests: devices report their own limit.
     ///
     /// # Errors
     /// As `with_settings`.
@@ -79,11 +79,11 @@ impl Detector {
         Ok(detector)
     }
 
-    /// A detector on a device of the caller's, which must allow 8 storage buffers a stage and
-    /// workgroups of 256 (WebGPU's defaults do). `settings.backend` and `settings.device` are passed over.
+    /// A detector on the caller's device, which must allow 8 storage buffers per stage and
+    /// workgroups of 256 (WebGPU's defaults do). `settings.backend` and `settings.device` are ignored.
     ///
-    /// Such a detector answers [`detect`](Detector::detect) as any other, and besides
-    /// [`encode`](Detector::encode), where positions and pairs stay on the device. Nothing is waited for, so
+    /// Such a detector answers [`detect`](Detector::detect) like any other, and also
+    /// [`encode`](Detector::encode), where positions and pairs stay on the device. This constructor waits for nothing, so
     /// it works in a browser too. Kernels are compiled when the first frame needs them.
     ///
     /// # Errors
@@ -96,7 +96,7 @@ impl Detector {
         Detector::on(Gpu::of_caller(device, queue)?, settings)
     }
 
-    /// [`with_device`](Detector::with_device), with one line of one kernel replaced by another. For tests: answers
+    /// [`with_device`](Detector::with_device), with one line of one kernel replaced. For tests: answers
     /// may be wrong.
     ///
     /// # Errors
@@ -142,17 +142,17 @@ impl Detector {
     ///
     /// `positions` names bodies whose positions are taken from a buffer: `(v, 3)` f32 tightly packed,
     /// with the usage `COPY_SRC`, copied when the encoder's commands run; other bodies' positions
-    /// come from the scene. The scene's own positions of named bodies are a pose that clusters are
-    /// found in, once. Positions on the device are not checked: with one that is not finite the pairs of
+    /// come from the scene. For the named bodies, the scene's positions only serve to find clusters,
+    /// once. Positions on the device are not checked: if one is not finite, the pairs of
     /// its primitives are unspecified.
     ///
-    /// At most one frame of a detector may be encoded a submission. What the filter on the device
-    /// leaves open comes in a list of its own. If there is not enough room the lists are incomplete and
+    /// At most one frame of a detector may be encoded per submission. Pairs of which the filter on the device is
+    /// unsure come in a separate list. If there is not enough room, the lists are incomplete and
     /// their counts say so, see [`ResidentPairs`]; [`make_room`](Detector::make_room) then grows them.
     ///
     /// # Errors
-    /// A stale id, a buffer too small or without its usage, a detector without a GPU. The device's own
-    /// errors go where its owner sends them, and so do those of kernels, which the first frame compiles.
+    /// A stale id, a buffer that is too small or lacks its usage, a detector without a GPU. Device errors
+    /// go to the device's owner, and so do those of kernels, which the first frame compiles.
     pub fn encode(
         &mut self,
         scene: &Scene,
@@ -175,8 +175,8 @@ impl Detector {
         engine.encode(job, positions, encoder)
     }
 
-    /// Reads the counts of the frame that was last encoded, and whose commands have been submitted, and
-    /// grows what was too small. Returns whether that frame was complete; if not, encode it again.
+    /// Reads the counts of the last encoded frame, whose commands must have been submitted, and
+    /// grows the lists that were too small. Returns whether that frame was complete; if not, encode it again.
     ///
     /// # Errors
     /// A lost device; lists larger than it can bind; a memory budget that does not allow them.

@@ -1,4 +1,4 @@
-//! The same for the GPU: a method of another crate is a plan of passes that work in cells.
+//! Runs a method of another crate on the GPU: such a method is a plan of passes that work in cells.
 
 use std::sync::Arc;
 
@@ -21,9 +21,9 @@ pub struct Host {
 }
 
 impl Host {
-    /// On the adapter whose name contains `device`, or the best there is, with cells as dense as `lambda`.
-    /// `first` is the room to begin with, and `memory_budget` bytes are what the engine's own buffers may
-    /// have: beyond it, the work is done in parts.
+    /// Opens the adapter whose name contains `device`, or the best one. `lambda` is the density of cells, and
+    /// `first` the initial room. The engine's own buffers take at most `memory_budget` bytes; if that is not
+    /// enough, the work is done in parts.
     ///
     /// # Errors
     /// No adapter fits; the driver refuses.
@@ -49,10 +49,10 @@ impl Host {
         })
     }
 
-    /// One frame, repetitions dropped; and what each pass counted.
+    /// One frame, with repetitions dropped; and the counts of each pass.
     ///
     /// # Errors
-    /// A stale id, refused positions, the device's own.
+    /// A stale id, refused positions, device errors.
     pub fn detect(
         &mut self,
         scene: &Scene,

@@ -21,7 +21,7 @@ impl Test for FirstContact {
         if a.shares_vertex(&b) {
             return None;
         }
-        // An edge and a vertex are named in this order, and tested in the other.
+        // The pair is named "edge and vertex", but tested as vertex and edge.
         let (a, b) = match pair {
             ElementPair::VertexEdge => (b, a),
             _ => (a, b),
@@ -36,7 +36,7 @@ impl Test for FirstContact {
     }
 }
 
-/// The pair as the exact predicate names it; none of what no contact is sought for.
+/// The pair as the exact predicate names it; `None` for tests that look for no contact.
 pub(crate) fn exact_kind(test: TestId) -> Option<ElementPair> {
     match test {
         TestId::Elements(PairKind::VertexFace) => Some(ElementPair::VertexFace),

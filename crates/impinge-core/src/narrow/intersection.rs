@@ -61,7 +61,7 @@ pub(crate) fn settle(scene: &Scene, frame: &Frame, a: u32, b: u32) -> bool {
 }
 
 impl Element<'_> {
-    /// The corners in double precision; an element of fewer than four repeats its last one.
+    /// The corners in double precision; an element with fewer than four repeats its last.
     fn points(&self) -> [Point; 4] {
         let positions = self.frame.body(self.scene, self.layer).positions();
         let last = self.corners.len() - 1;
@@ -84,7 +84,7 @@ pub(crate) fn intersect(kind_a: Kind, a: &[Point; 4], kind_b: Kind, b: &[Point; 
     }
 }
 
-/// Whether a pair of one body that shares a vertex index is reported under the rule. Of points and edges none is.
+/// Whether a pair of one body that shares a vertex index is reported under the rule. Pairs of points and of edges never are.
 pub(crate) fn intersect_shared(
     rule: SharedVertex,
     kind: Kind,

@@ -1,4 +1,4 @@
-//! The test of one pair, as a plug: what every method and backend ends in.
+//! The test of one pair, as a trait. Every method and backend ends with it.
 
 mod impact;
 mod intersection;
@@ -25,12 +25,12 @@ pub(crate) struct Element<'a> {
     pub corners: &'a [u32],
 }
 
-/// What is asked of a pair of elements, and what is answered.
+/// A test of a pair of elements, and its answer.
 pub(crate) trait Test {
-    /// What comes with a pair that is reported: nothing, a time, a distance.
+    /// The value of a reported pair: nothing, a time, a distance.
     type Value: Copy;
 
-    /// The extent of an element, exactly: pairs whose extents have no point in common are not reported.
+    /// A box around an element: pairs whose boxes have no point in common are not reported.
     fn extent(&self, element: Element<'_>) -> Extent;
 
     /// Whether the adjacency rule lets a pair whose extents meet be a candidate.
@@ -38,7 +38,7 @@ pub(crate) trait Test {
         true
     }
 
-    /// Whether a pair is reported, decided exactly; adjacency rule included.
+    /// The value of a pair, decided exactly and by the adjacency rule; `None` if the pair is not reported.
     fn settle(&self, test: TestId, a: Element<'_>, b: Element<'_>) -> Option<Self::Value>;
 }
 
@@ -50,7 +50,7 @@ pub(crate) struct Extent {
 }
 
 impl Extent {
-    /// Of some points.
+    /// The extent of some points.
     pub fn of(points: impl Iterator<Item = [f64; 3]>) -> Self {
         let nothing = Extent {
             min: [f64::INFINITY; 3],
@@ -62,7 +62,7 @@ impl Extent {
         })
     }
 
-    /// Whether two have a point in common.
+    /// Whether two extents have a point in common.
     pub fn overlaps(&self, other: &Extent) -> bool {
         (0..3).all(|axis| self.min[axis] <= other.max[axis] && other.min[axis] <= self.max[axis])
     }
@@ -75,7 +75,7 @@ impl Element<'_> {
         same_body && share_vertex(self.corners, other.corners)
     }
 
-    /// Where the corners are at the start of a step and at its end.
+    /// The corners at the start of a step and at its end.
     fn ends(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
         let body = self.frame.body(self.scene, self.layer);
         let start = body.positions();

@@ -4,8 +4,8 @@ use crate::frame::TestId;
 
 use super::{Element, Extent, Test};
 
-/// The test of [`Detector::candidates`](crate::Detector::candidates): boxes over the whole step, of which no axis leaves a
-/// gap of more than twice `distance`, as if each was inflated by that much.
+/// The test of [`Detector::candidates`](crate::Detector::candidates): whether the boxes over the whole step overlap once each
+/// is inflated by `distance`, so that no axis has a gap of more than twice that.
 pub(crate) struct Overlap {
     pub distance: f64,
 }
@@ -15,7 +15,7 @@ impl Test for Overlap {
 
     fn extent(&self, element: Element<'_>) -> Extent {
         let extent = Extent::of(element.ends().flatten());
-        // Outward: what is rounded is tested again.
+        // Rounded outward: `settle` tests again without rounding.
         Extent {
             min: extent.min.map(|x| (x - self.distance).next_down()),
             max: extent.max.map(|x| (x + self.distance).next_up()),

@@ -1,13 +1,13 @@
-//! Where helpers run: not on the caller's core, while there is another.
+//! Where helpers run: not on the caller's core, if there is another.
 //!
-//! A helper that is woken on the core of the busy thread that wakes it runs when that thread is through, which is too
-//! late; and two that both run on a core are not soon moved apart. (Linux wakes threads there when it thinks that the other
-//! cores are busy, and one of two cores is enough for that: on the machine of the records every second
-//! burst of frames began so, with 1.0 ms a frame in place of 0.55.) So helpers are told to keep off the core that the caller
-//! is on: one look at its number a region, and a request a helper when it has changed.
+//! A helper that wakes on the core of the busy caller runs only when the caller is done, which is too late, and the
+//! system does not soon move one of two busy threads to another core. (Linux wakes threads on the caller's core when it
+//! thinks that the other cores are busy, and one busy core of two is enough for that: on the machine of the records every
+//! second burst of frames began so, with 1.0 ms per frame instead of 0.55.) So helpers are kept off the caller's core: the
+//! core's number is read once per region, and if it has changed there is one system call per helper.
 //!
-//! Where there is no such request, or it fails, or helpers are many (then a core is free for them), they run where the
-//! system lets them.
+//! Helpers run where the system puts them if it has no such call, if the call fails, or if there are many helpers, for
+//! whom a core is free then.
 
 #[cfg(target_os = "linux")]
 pub(super) use linux::Places;
@@ -21,22 +21,22 @@ mod linux {
 
     use rustix::thread::{CpuSet, Pid, gettid, sched_getaffinity, sched_getcpu, sched_setaffinity};
 
-    /// The core of the caller, and who its helpers are.
+    /// The caller's core, and the helpers' threads.
     pub(crate) struct Places {
         caller: AtomicUsize,
         helpers: Box<[OnceLock<Helper>]>,
-        /// Whose threads they are: a process that was forked has none of them.
+        /// The process of the threads: a forked process has none of them.
         process: u32,
     }
 
     struct Helper {
         thread: Pid,
-        /// Where it may run by itself.
+        /// The cores on which it may run.
         cores: CpuSet,
     }
 
     const UNKNOWN: usize = usize::MAX;
-    /// Helpers from which on they are left alone.
+    /// From this many helpers on, they are left alone.
     const MANY: usize = 8;
 
     impl Places {
@@ -77,7 +77,7 @@ mod linux {
                 thread: gettid(),
                 cores,
             });
-            // The caller sees the helper from here on; what it said before is looked up, until it has not changed.
+            // From here on the caller sees the helper. Apply the caller's core until it has not changed meanwhile.
             let mut core = UNKNOWN;
             loop {
                 let now = self.caller.load(Ordering::SeqCst);
@@ -91,14 +91,14 @@ mod linux {
     }
 
     impl Helper {
-        /// Lets it run where it may but for one core, unless that is the only one.
+        /// Excludes one core from those on which the helper may run, unless it is the only one.
         fn keep_off(&self, core: usize) {
             let mut cores = self.cores;
             if core < CpuSet::MAX_CPU {
                 cores.unset(core);
             }
             if cores.count() > 0 {
-                // A system that refuses has its reasons; the answer is the same.
+                // If the system refuses, only speed suffers.
                 let _ = sched_setaffinity(Some(self.thread), &cores);
             }
         }
@@ -131,7 +131,7 @@ mod linux {
                     assert_eq!(cores.is_set(core), allowed.count() == 1);
                     let mut others = (0..CpuSet::MAX_CPU).filter(|&other| other != core);
                     assert!(others.all(|other| cores.is_set(other) == allowed.is_set(other)));
-                    // As if the caller had come from elsewhere.
+                    // As if the caller had moved from another core.
                     places.caller.store(UNKNOWN - 1, Ordering::SeqCst);
                     places.caller_is_here();
                 }
@@ -143,7 +143,7 @@ mod linux {
 
 #[cfg(not(target_os = "linux"))]
 mod other {
-    /// Nothing is known of cores.
+    /// Does nothing: cores are not known.
     pub(crate) struct Places;
 
     impl Places {
