@@ -1,4 +1,4 @@
-//! The command line: what may be said, and its help.
+//! The command line and its help.
 
 mod choices;
 #[cfg(feature = "gpu")]
@@ -35,12 +35,12 @@ pub struct Cli {
 const EXAMPLES: &str = "\
 Examples:
   impinge demo                                  a built-in scene: no files needed
-  impinge pairs a.obj b.obj                     which primitives of two meshes meet
-  impinge self cloth.ply                        where a mesh runs into itself
-  impinge self part.stl --fail-on-hit           the same as a check: exit code 3 where it does
+  impinge pairs a.obj b.obj                     which primitives of two meshes intersect
+  impinge self cloth.ply                        where a mesh intersects itself
+  impinge self part.stl --fail-on-hit           the same as a check: exit code 3 if it does
   impinge pairs a.obj b.obj --pairs -           the pairs themselves, as CSV
   impinge check parts/*.stl                     what is wrong with each mesh
-  impinge sequence body.ply run.pc2 --self      the same, frame after frame
+  impinge sequence body.ply run.pc2 --self      the pairs of every frame of an animation
   impinge step cloth_0.ply cloth_1.ply          does anything touch on the way, and when first
   impinge simulate blocks --out out/blocks      bodies that fall, deform and collide
 
@@ -50,37 +50,37 @@ Exit codes: 0 done, 2 bad usage, 3 pairs were found and --fail-on-hit was given,
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Run a built-in scene of deforming bodies and show what is found, and how fast
+    /// Run a built-in scene of deforming bodies and show its pairs and times
     #[command(after_help = DEMO_EXAMPLES)]
     Demo(DemoArgs),
-    /// Find the pairs of primitives that meet, between all meshes given
+    /// Find the pairs of primitives that intersect, between different meshes
     #[command(after_help = PAIRS_EXAMPLES)]
     Pairs(PairsArgs),
-    /// Find the pairs of primitives that meet within each mesh given
+    /// Find the pairs of primitives that intersect, within each mesh
     #[command(name = "self", after_help = SELF_EXAMPLES)]
     Within(WithinArgs),
-    /// Find the smallest distance of two meshes, and where it is
+    /// Find the smallest distance between two meshes, and where it is
     #[command(after_help = DISTANCE_EXAMPLES)]
     Distance(DistanceArgs),
-    /// Follow a deforming mesh through the frames of a sequence
+    /// Find the pairs in every frame of a deforming mesh
     #[command(after_help = SEQUENCE_EXAMPLES)]
     Sequence(SequenceArgs),
     /// Find what touches while meshes move from one pose to another, and when first
     #[command(after_help = step::STEP_EXAMPLES)]
     Step(StepArgs),
-    /// Drop an elastic body on another one and write what happens, step by step
+    /// Simulate an elastic body that drops on another one, and write every step
     #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(SimulateArgs),
-    /// Say what is wrong with meshes: self-intersections, degenerate faces, borders, …
+    /// Check meshes for self-intersections, degenerate faces, borders, …
     #[command(after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),
     /// Find the pairs of a scene that is larger than memory, tile by tile
     #[command(after_help = TILES_EXAMPLES)]
     Tiles(TilesArgs),
-    /// Answer paths on standard input by rows: a child of `check`
+    /// Print one row for each path on standard input: a child process of `check`
     #[command(hide = true)]
     CheckWorker(CheckWorkerArgs),
-    /// Draw meshes, the primitives that meet in red and blue
+    /// Draw meshes with colliding primitives in red and blue
     #[cfg(feature = "gpu")]
     #[command(after_help = RENDER_EXAMPLES)]
     Render(RenderArgs),
@@ -89,7 +89,7 @@ pub enum Command {
     Devices(DevicesArgs),
 }
 
-/// What is said of GPUs.
+/// Arguments of `impinge devices`.
 #[cfg(feature = "gpu")]
 #[derive(Debug, Clone, Args)]
 pub struct DevicesArgs {
@@ -104,10 +104,10 @@ Examples:
   impinge render a.obj b.obj --png out.png
   impinge render a.ply b.msh --png out.png --size 1920x1080 --azimuth -60 --up z
   impinge render cow.off --self --png cow.png --see-through 1
-  impinge pairs a.ply b.ply --png out.png           the answer, and its picture
+  impinge pairs a.ply b.ply --png out.png           the answer and a picture
 
-A software driver suffices where there is no GPU. The colliding primitives of body 0 are red, of body 1
-blue, then green, orange, …; where they are hidden, they are seen faintly.";
+Without a GPU, a software driver suffices. Colliding primitives of body 0 are red, those of body 1 blue,
+then green, orange, …; hidden ones show through faintly.";
 
 const DEMO_EXAMPLES: &str = "\
 Examples:
@@ -115,7 +115,7 @@ Examples:
   impinge demo --triangles 1000000 --frames 100
   impinge demo --threads 1 --out frame.ply
 
-The mesh written shows the frame with the most pairs; colliding triangles have a colour a body.";
+The written mesh shows the frame with the most pairs. Colliding triangles have one colour per body.";
 
 const PAIRS_EXAMPLES: &str = "\
 Examples:
@@ -128,17 +128,19 @@ Examples:
   impinge pairs a.ply b.ply --curves curves.obj --contacts contacts.csv
 
 Rows of --pairs are body_a, primitive_a, body_b, primitive_b (u32, sorted): bodies numbered
-from 0 as given, primitives as in the file. With `--pairs -` the summary goes to standard error. --contacts has a row for each corner of what two triangles have in
-common: a point, a segment's two ends, or the corners of a polygon where they lie in one plane. feature_a and
-feature_b say where it lies: on vertex 7 (v7), edge 7-9 (e7-9) or face 3 (f3).";
+from 0 as given, primitives as in the file. With `--pairs -` the summary goes to standard error.
+
+--contacts has one row per corner of the intersection of two triangles: a point, the two ends of a segment,
+or the corners of a polygon if both triangles lie in one plane. feature_a and feature_b say where the corner
+lies in each triangle: on vertex 7 (v7), edge 7-9 (e7-9) or face 3 (f3).";
 
 const DISTANCE_EXAMPLES: &str = "\
 Examples:
   impinge distance a.obj b.ply
   impinge distance a.obj b.ply --json
 
-The distance is 0 if and only if the meshes touch, which is decided exactly; else it is rounded. Meshes of
-triangles are surfaces: one that lies wholly inside another has a distance from it.";
+The distance is 0 if and only if the meshes touch, which is decided exactly; otherwise it is rounded. Meshes
+of triangles are surfaces: a mesh that lies completely inside another one has a distance from it.";
 
 const SELF_EXAMPLES: &str = "\
 Examples:
@@ -148,9 +150,9 @@ Examples:
   cat cow.off | impinge self - --format off --pairs - --pairs-format jsonl
   impinge self cow.off --no-weld --shared-vertex skip
 
-Many files repeat a vertex for each face that uses it, so vertices at one position count as one. Pairs of
-neighbours are reported where they share more points than the vertices they have in common, as folded
-faces do. --no-weld and --shared-vertex skip turn either off.";
+Many files repeat a vertex for each face that uses it, so vertices at the same position are welded into one.
+Neighbours (primitives that share vertices) are reported only if they also meet elsewhere, as folded faces
+do. --no-weld turns welding off; with --shared-vertex skip neighbours are never reported.";
 
 const SEQUENCE_EXAMPLES: &str = "\
 Examples:
@@ -159,10 +161,10 @@ Examples:
   impinge sequence body.obj frames_0001.obj --frames 10..20 --json
   impinge sequence body.obj 'frames_%04d.obj' --json | head
   impinge sequence body.ply run.pc2 --pairs pairs.csv --out seen_%04d.ply
-  impinge sequence body.ply run.pc2 --ccd       a line per step from one frame to the next
+  impinge sequence body.ply run.pc2 --ccd       one line per step from a frame to the next
 
 FRAMES is a .pc2 or .mdd file, the first of numbered mesh files, or a pattern of their names.
-Without --other, self-collision is what is asked for.";
+Without --other, the pairs within the body are found.";
 
 const SIMULATE_EXAMPLES: &str = "\
 Examples:
@@ -171,17 +173,17 @@ Examples:
   impinge simulate bunny-7k --out out/bunny --format vtu --resume
 
 Corotated finite elements on tetrahedra; contact forces come from the pairs found. Ctrl-C saves
-the state and stops; --resume goes on to the very bits of a run that was never stopped.
-Where the mesh of a scene is not at hand, a generated ball stands in, and the first line says so.";
+the state and stops; --resume continues and gives the same bits as a run that was never stopped.
+If the mesh of a scene is absent, a generated ball stands in, and the first line says so.";
 
-/// Who works, and how.
+/// Options of the detector.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "How it is found")]
+#[command(next_help_heading = "Detection")]
 pub struct DetectorArgs {
-    /// How candidates are found; all methods give the same pairs
+    /// The method that finds candidates; all methods give the same pairs
     #[arg(long, value_enum, default_value_t = MethodArg::Clusters)]
     pub method: MethodArg,
-    /// Where the work is done
+    /// Where detection runs
     #[arg(long, value_enum, default_value_t = BackendArg::Auto)]
     pub backend: BackendArg,
     /// A part of the GPU's name, to choose among several (`impinge devices` lists them)
@@ -193,10 +195,10 @@ pub struct DetectorArgs {
     /// Density coefficient of the grid of `--method cells`
     #[arg(long, value_name = "X", value_parser = lambda, default_value = "1")]
     pub lambda: f64,
-    /// The most primitives of a group of `--method cells`, 1 to 64
+    /// The most primitives in a group of `--method cells`, 1 to 64
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64), default_value = "64")]
     pub group_size: u32,
-    /// Memory for the detector besides the answer, such as 512M or 2GiB [default: what it takes]
+    /// Memory for the detector without the answer, such as 512M or 2GiB [default: no limit]
     #[arg(long, value_name = "BYTES", value_parser = bytes)]
     pub memory_budget: Option<u64>,
     /// Show no progress bar
@@ -204,28 +206,28 @@ pub struct DetectorArgs {
     pub no_progress: bool,
 }
 
-/// What is asked of meshes from files.
+/// Options of reading meshes and of the query.
 #[derive(Debug, Clone, Args)]
 pub struct AskArgs {
     /// Which neighbours are reported: pairs of primitives of one body that share a vertex
     #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Resolve)]
     pub shared_vertex: SharedVertexArg,
-    /// Make vertices at the same position one, in each file by itself [default wherever a body may meet itself]
+    /// Weld vertices at the same position, within each file [default if a body is checked against itself]
     #[arg(long, overrides_with = "no_weld")]
     pub weld: bool,
-    /// Keep vertices at the same position apart, but for STL files, whose triangles share nothing else
+    /// Do not weld vertices at the same position, except in STL files, where triangles share nothing else
     #[arg(long, overrides_with = "weld")]
     pub no_weld: bool,
-    /// The format of the mesh that is read from standard input, named "-": ply, off, stl, …
+    /// The format of a mesh on standard input, which is named "-": ply, off, stl, …
     #[arg(long, value_name = "EXT", value_parser = mesh_format)]
     pub format: Option<impinge_io::Format>,
-    /// Leave out the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
+    /// Ignore the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
     #[arg(long, value_name = "A,B", value_parser = body_numbers)]
     pub ignore: Vec<(usize, usize)>,
-    /// End with exit code 3 where there is any pair
+    /// End with exit code 3 if there is any pair
     #[arg(long)]
     pub fail_on_hit: bool,
-    /// Print the bodies, the time of each stage, counters and the hash of the answer as well
+    /// Also print the bodies, the time of each stage, counters and the hash of the answer
     #[arg(short, long)]
     pub verbose: bool,
     /// Print JSON and nothing else (see docs/cli.md)
@@ -233,28 +235,28 @@ pub struct AskArgs {
     pub json: bool,
 }
 
-/// What becomes of the answer for one set of meshes.
+/// Outputs of the answer for one set of meshes.
 #[derive(Debug, Clone, Args)]
 pub struct AnswerArgs {
-    /// Run N frames, positions rewritten before each, and show median times
+    /// Run N frames, rewriting positions before each, and show median times
     #[arg(long, value_name = "N", default_value = "1", value_parser = at_least_one)]
     pub repeat: NonZeroUsize,
     /// Write the pairs (.csv, .jsonl or .npy; "-" is standard output, as CSV unless --pairs-format says otherwise)
     #[arg(long, value_name = "FILE")]
     pub pairs: Option<RowsFile>,
-    /// How pairs are written, whatever the file is called
+    /// The format of the pairs, whatever the name of the file
     #[arg(long, value_enum, value_name = "FORMAT", requires = "pairs")]
     pub pairs_format: Option<RowsFormat>,
-    /// Write where the triangles of each pair meet, a row for each corner (.npy or .csv)
+    /// Write where the triangles of each pair meet, one row per corner (.npy or .csv)
     #[arg(long, value_name = "FILE")]
     pub contacts: Option<RowsFile>,
     /// Write the curves in which surfaces cross (.ply, .obj or .vtu)
     #[arg(long, value_name = "FILE")]
     pub curves: Option<CurvesFile>,
-    /// Write the meshes, colliding primitives coloured (.ply, .glb or .vtu)
+    /// Write the meshes with colliding primitives coloured (.ply, .glb or .vtu)
     #[arg(long, value_name = "FILE")]
     pub out: Option<MeshFile>,
-    /// Draw the meshes, colliding primitives coloured (.png)
+    /// Draw the meshes with colliding primitives coloured (.png)
     #[cfg(feature = "gpu")]
     #[arg(long, value_name = "FILE")]
     pub png: Option<PngFile>,
@@ -264,7 +266,7 @@ pub struct AnswerArgs {
 }
 
 impl AnswerArgs {
-    /// The files to be written, each with its option.
+    /// The output files, each with its option.
     pub fn outputs(&self) -> Vec<(&'static str, &Path)> {
         let rows = self.pairs.as_ref().filter(|file| !file.is_stdout());
         let pairs = rows.map(|file| ("--pairs", file.path.as_path()));
@@ -283,7 +285,7 @@ impl AnswerArgs {
             .collect()
     }
 
-    /// Where the pairs go, in the format that was asked for.
+    /// The file of the pairs, with the requested format.
     pub fn rows(&self) -> Option<RowsFile> {
         let file = self.pairs.clone()?;
         let format = self.pairs_format.unwrap_or(file.format);
@@ -291,17 +293,17 @@ impl AnswerArgs {
     }
 }
 
-/// What is drawn.
+/// Arguments of `impinge render`.
 #[cfg(feature = "gpu")]
 #[derive(Debug, Args)]
 pub struct RenderArgs {
-    /// Mesh files, a body each
+    /// Mesh files, one per body
     #[arg(value_name = "MESH", required = true)]
     pub meshes: Vec<PathBuf>,
     /// The picture (.png)
     #[arg(long, value_name = "FILE", required = true)]
     pub png: PngFile,
-    /// Find the pairs within each body as well
+    /// Also find the pairs within each body
     #[arg(long = "self")]
     pub within: bool,
     #[command(flatten)]
@@ -314,10 +316,10 @@ pub struct RenderArgs {
 
 #[derive(Debug, Args)]
 pub struct PairsArgs {
-    /// Mesh files, a body each
+    /// Mesh files, one per body
     #[arg(value_name = "MESH", required = true, num_args = 2..)]
     pub meshes: Vec<PathBuf>,
-    /// Find the pairs within each body as well
+    /// Also find the pairs within each body
     #[arg(long = "self")]
     pub within: bool,
     #[command(flatten)]
@@ -333,7 +335,7 @@ pub struct DistanceArgs {
     /// A mesh file
     #[arg(value_name = "A")]
     pub a: PathBuf,
-    /// Another one
+    /// Another mesh file
     #[arg(value_name = "B")]
     pub b: PathBuf,
     /// Print JSON and nothing else
@@ -343,7 +345,7 @@ pub struct DistanceArgs {
 
 #[derive(Debug, Args)]
 pub struct WithinArgs {
-    /// Mesh files, a body each
+    /// Mesh files, one per body
     #[arg(value_name = "MESH", required = true)]
     pub meshes: Vec<PathBuf>,
     #[command(flatten)]
@@ -359,22 +361,22 @@ pub struct SequenceArgs {
     /// The mesh that deforms: body 0
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
-    /// Its positions, a frame after the other
+    /// Its positions, frame by frame
     #[arg(value_name = "FRAMES")]
     pub sequence: PathBuf,
-    /// A mesh that stays where it is: body 1, 2, …
+    /// A mesh that does not move: body 1, 2, …
     #[arg(long = "other", value_name = "MESH")]
     pub others: Vec<PathBuf>,
-    /// Find the pairs within each body as well; implied where there is no --other
+    /// Also find the pairs within each body; implied without --other
     #[arg(long = "self")]
     pub within: bool,
-    /// Frames from A up to, but not including, B, counted from 0; either may be left out
+    /// Frames from A up to, but not including, B, counted from 0; either may be omitted
     #[arg(long, value_name = "A..B", default_value = "..")]
     pub frames: FrameRange,
-    /// Write the pairs of all frames, the number of the frame first (.csv or .jsonl; "-" is standard output, as CSV)
+    /// Write the pairs of all frames, with the frame's number first (.csv or .jsonl; "-" is standard output, as CSV)
     #[arg(long, value_name = "FILE")]
     pub pairs: Option<RowsFile>,
-    /// Write the meshes of each frame, colliding primitives coloured (seen_%04d.ply, .glb or .vtu)
+    /// Write the meshes of each frame with colliding primitives coloured (seen_%04d.ply, .glb or .vtu)
     #[arg(long, value_name = "FILE")]
     pub out: Option<FramesFile<MeshFile>>,
     /// Draw each frame (seen_%04d.png)
@@ -384,7 +386,7 @@ pub struct SequenceArgs {
     #[cfg(feature = "gpu")]
     #[command(flatten)]
     pub picture: PictureArgs,
-    /// What touches on the way from each frame to the next, vertices moving on straight lines, and when first
+    /// Find what touches on the way from each frame to the next, and when first; vertices move on straight lines
     #[arg(long)]
     pub ccd: bool,
     #[command(flatten)]
@@ -397,7 +399,7 @@ pub struct SequenceArgs {
 
 #[derive(Debug, Args)]
 pub struct SimulateArgs {
-    /// What to simulate: two bodies, one dropped on the other
+    /// The scene: two bodies, one dropped on the other
     #[arg(value_enum, value_name = "SCENE")]
     pub scene: SceneArg,
     /// The folder for all files
@@ -406,10 +408,10 @@ pub struct SimulateArgs {
     /// Time steps [default: 240]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub steps: Option<u32>,
-    /// How the sequence is written
+    /// The format of the sequence
     #[arg(long, value_enum, default_value_t = SequenceFormatArg::Pc2)]
     pub format: SequenceFormatArg,
-    /// Go on from the state saved in the folder; start where there is none
+    /// Continue from the state saved in the folder; start a new run if there is none
     #[arg(long)]
     pub resume: bool,
     #[command(flatten)]
@@ -447,20 +449,20 @@ impl From<SceneArg> for SceneName {
     }
 }
 
-/// How a simulated sequence is written.
+/// The format of a simulated sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SequenceFormatArg {
-    /// One mesh (.ply), its positions (.pc2), and a table of what collides
+    /// One mesh (.ply), its positions (.pc2), and a table of colliding primitives
     Pc2,
-    /// A VTU file a step, with a field `colliding`
+    /// One VTU file per step, with a field `colliding`
     Vtu,
-    /// A PLY file a step, colliding tetrahedra coloured
+    /// One PLY file per step with colliding tetrahedra coloured
     Ply,
 }
 
 #[derive(Debug, Args)]
 pub struct DemoArgs {
-    /// Triangles of all bodies together
+    /// The number of triangles in all bodies together
     #[arg(long, value_name = "N", default_value = "60000", value_parser = clap::value_parser!(u32).range(1_000..=100_000_000))]
     pub triangles: u32,
     /// Frames to run

@@ -5,11 +5,11 @@ use clap::ValueEnum;
 /// [`impinge::Method`] as an option.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MethodArg {
-    /// Groups fixed by topology; the fast one
+    /// Groups fixed by topology; the fastest method
     Clusters,
     /// The two-level grid
     Cells,
-    /// Every box against every box; slow, and what the others are held against
+    /// Every box against every box; slow, the reference for the other methods
     Naive,
 }
 
@@ -30,7 +30,7 @@ pub enum BackendArg {
     Auto,
     /// The CPU
     Cpu,
-    /// A GPU, or an error where there is none
+    /// A GPU, or an error if there is none
     Gpu,
 }
 
@@ -49,7 +49,7 @@ impl From<BackendArg> for impinge::Backend {
 pub enum SharedVertexArg {
     /// None
     Skip,
-    /// Those that share more points than the vertices they have in common
+    /// Those that also meet outside their common vertices, edge or face
     Resolve,
 }
 

@@ -1,12 +1,12 @@
-//! How a picture looks, as options.
+//! Options of pictures.
 
 use clap::{Args, ValueEnum};
 
 use crate::values::{azimuth, elevation, part, size};
 
-/// How a picture looks.
+/// Options of pictures.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "How it is drawn")]
+#[command(next_help_heading = "Picture")]
 pub struct PictureArgs {
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x960", requires = "png")]
@@ -34,10 +34,10 @@ pub struct PictureArgs {
     /// The axis that points up; at azimuth 0 the viewer is on the side of +z or of -y
     #[arg(long, value_enum, value_name = "AXIS", default_value_t = UpArg::Y, requires = "png")]
     pub up: UpArg,
-    /// How strongly hidden colliding primitives are seen, 0 (not at all) to 1 (as if nothing hid them)
+    /// How visible hidden colliding primitives are, from 0 (not at all) to 1 (as if nothing hid them)
     #[arg(long, value_name = "X", value_parser = part, default_value = "0.5", requires = "png")]
     pub see_through: f32,
-    /// Without perspective
+    /// Draw without perspective
     #[arg(long, requires = "png")]
     pub orthographic: bool,
 }

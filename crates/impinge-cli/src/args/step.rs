@@ -1,4 +1,4 @@
-//! `impinge step` and `impinge sequence --ccd`: what may be said.
+//! The command line of `impinge step` and of `impinge sequence --ccd`.
 
 use std::path::{Path, PathBuf};
 
@@ -13,36 +13,36 @@ use crate::values::{MeshFile, RowsFile, body_numbers};
 
 pub const STEP_EXAMPLES: &str = "\
 Examples:
-  impinge step cloth_0.ply cloth_1.ply             may the cloth move from one to the other?
+  impinge step cloth_0.ply cloth_1.ply             may the cloth move from one pose to the other?
   impinge step a_0.obj a_1.obj b_0.obj b_1.obj     two bodies, each at the start and at the end
-  impinge step cloth_0.ply cloth_1.ply --earliest  the first contact alone, which is faster
+  impinge step cloth_0.ply cloth_1.ply --earliest  only the first contact, which is faster
   impinge step cloth_0.ply cloth_1.ply --impacts impacts.csv --out impacts.glb
 
-Every vertex moves on a straight line from time 0 to time 1. The two files of a body have the same elements.
-Times are exact and rounded down: nothing touches before them. They are 0 only where elements touch at the start.
+Every vertex moves on a straight line from time 0 to time 1. The two files of a body must have the same elements.
+Times are exact first times, rounded down: nothing touches earlier.
 
 Rows of --impacts are kind, body_a, element_a, body_b, element_b, toi, sorted. In a row of kind vf, a is the vertex
 and b the face. Vertices and faces are numbered as in the file; edges are the unique pairs (low, high) of vertices in
-the order of (high, low). Kinds ev and vv occur where a body has edges or points without faces.";
+the order of (high, low). Kinds ev and vv occur if a body has edges or points without faces.";
 
 #[derive(Debug, Args)]
 pub struct StepArgs {
     /// Mesh files in pairs: a body at the start of the step, and the same body at its end
     #[arg(value_name = "START END", required = true, num_args = 2..)]
     pub meshes: Vec<PathBuf>,
-    /// Find the first contact alone
+    /// Find only the first contact
     #[arg(long, conflicts_with_all = ["impacts", "out"])]
     #[cfg_attr(feature = "gpu", arg(conflicts_with = "png"))]
     pub earliest: bool,
-    /// Leave out the pairs within each body
+    /// Ignore the pairs within each body
     #[arg(long)]
     pub no_self: bool,
     #[command(flatten)]
     pub how: StepHow,
-    /// Make vertices that are at the same position at the start and at the end one, in each body by itself
+    /// Weld vertices that are at the same position both at the start and at the end, within each body
     #[arg(long)]
     pub weld: bool,
-    /// Leave out the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
+    /// Ignore the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
     #[arg(long, value_name = "A,B", value_parser = body_numbers)]
     pub ignore: Vec<(usize, usize)>,
     /// Print JSON and nothing else
@@ -51,10 +51,10 @@ pub struct StepArgs {
     /// Write all impacts (.csv, .jsonl or .npy; "-" is standard output, as CSV)
     #[arg(long, value_name = "FILE")]
     pub impacts: Option<RowsFile>,
-    /// Write the meshes at the start of the step, what collides coloured by its time (.ply, .glb or .vtu)
+    /// Write the meshes at the start of the step, coloured by the time of contact (.ply, .glb or .vtu)
     #[arg(long, value_name = "FILE")]
     pub out: Option<MeshFile>,
-    /// Draw the meshes at the start of the step, what collides coloured by its time (.png)
+    /// Draw the meshes at the start of the step, coloured by the time of contact (.png)
     #[cfg(feature = "gpu")]
     #[arg(long, value_name = "FILE")]
     pub png: Option<PngFile>,
@@ -66,7 +66,7 @@ pub struct StepArgs {
 }
 
 impl StepArgs {
-    /// The files to be written, each with its option.
+    /// The output files, each with its option.
     pub fn outputs(&self) -> Vec<(&'static str, &Path)> {
         let impacts = self.impacts.as_ref();
         let impacts = impacts.map(|file| ("--impacts", file.path.as_path()));
@@ -79,13 +79,13 @@ impl StepArgs {
     }
 }
 
-/// What is reported of a step.
+/// Options of reporting impacts.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct StepHow {
-    /// To which precision times are rounded down
+    /// The precision to which times are rounded down
     #[arg(long, value_enum, value_name = "PRECISION", default_value_t = ToiArg::F32)]
     pub toi: ToiArg,
-    /// Pairs that touch at the start: reported with the time 0, or left out
+    /// Pairs that touch at the start: reported with the time 0, or ignored
     #[arg(long, value_enum, value_name = "RULE", default_value_t = StartArg::Report)]
     pub start: StartArg,
 }
@@ -113,7 +113,7 @@ impl From<ToiArg> for impinge::Toi {
 pub enum StartArg {
     /// Reported with the time 0
     Report,
-    /// Left out, whatever they do later in the step
+    /// Ignored, whatever they do later in the step
     Skip,
 }
 
