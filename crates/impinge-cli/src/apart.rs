@@ -1,10 +1,10 @@
-//! Outputs that are inputs too.
+//! Refuses outputs that are also inputs.
 
 use std::path::{Path, PathBuf};
 
 use crate::error::Error;
 
-/// The files that are read.
+/// The input files.
 pub struct Inputs(Vec<(PathBuf, Id)>);
 
 impl Inputs {
@@ -13,8 +13,8 @@ impl Inputs {
         Inputs(paths.into_iter().filter_map(known).collect())
     }
 
-    /// Fails where an output is one of them, by whatever name or link: what is written has less in it than a mesh file may
-    /// have (normals, colours, attributes, groups), and the input would be gone.
+    /// Fails if an output is one of the inputs, under any name or link. Outputs contain less than a mesh file may contain
+    /// (normals, colours, attributes, groups), and the input would be lost.
     pub fn check(&self, option: &str, output: &Path) -> Result<(), Error> {
         let Some(output_id) = Id::of(output) else {
             return Ok(());
@@ -30,7 +30,7 @@ impl Inputs {
     }
 }
 
-/// What tells a regular file from all others, however it is named.
+/// Identifies a regular file, whatever its name.
 #[derive(PartialEq, Eq)]
 struct Id {
     #[cfg(unix)]
@@ -40,7 +40,7 @@ struct Id {
 }
 
 impl Id {
-    /// `None` where there is no such file, or it is a device or a pipe.
+    /// `None` if there is no such file, or if it is a device or a pipe.
     fn of(path: &Path) -> Option<Id> {
         let metadata = std::fs::metadata(path).ok()?;
         if !metadata.is_file() {

@@ -40,7 +40,7 @@ fn rows(contacts: &Contacts) -> impl Iterator<Item = Row> + '_ {
     (0u32..).zip(0..contacts.len()).flat_map(of_contact)
 }
 
-/// How many corners tell the shape: 1 a point, 2 a segment, 3 a polygon.
+/// The number of a shape in files: 1 for a point, 2 for a segment, 3 for a polygon.
 fn shape_number(shape: Shape) -> u8 {
     match shape {
         Shape::Solid | Shape::Apart => 0,
@@ -50,12 +50,12 @@ fn shape_number(shape: Shape) -> u8 {
     }
 }
 
-/// Writes a row for each corner of each contact.
+/// Writes one row per corner of each contact.
 pub fn write(file: &RowsFile, contacts: &Contacts) -> Result<(), Error> {
     let mut to = AtomicFile::create(&file.path)?;
     let written = match file.format {
         RowsFormat::Npy => npy(&mut to, contacts),
-        // Lines of JSON are refused when the options are looked at.
+        // Lines of JSON are refused when the options are checked.
         RowsFormat::Csv | RowsFormat::Jsonl => csv(&mut to, contacts),
     };
     written.map_err(|source| Error::Write {
@@ -97,7 +97,7 @@ fn feature_text(feature: Feature) -> String {
     }
 }
 
-/// The kind (0 a vertex, 1 an edge, 2 a face), and one or two numbers.
+/// The kind (0 for a vertex, 1 for an edge, 2 for a face), and one or two numbers.
 fn feature_numbers(feature: Feature) -> (u8, [u32; 2]) {
     match feature {
         Feature::Vertex(vertex) => (0, [vertex; 2]),
@@ -152,7 +152,7 @@ pub fn write_curves(file: &CurvesFile, contacts: &Contacts, curves: &Curves) -> 
     Ok(())
 }
 
-/// What is said of contacts on the terminal.
+/// A summary of contacts for the terminal.
 pub fn summary(contacts: &Contacts, curves: &Curves) -> String {
     let isolated = match curves.isolated().len() as u64 {
         0 => String::new(),
@@ -167,7 +167,7 @@ pub fn summary(contacts: &Contacts, curves: &Curves) -> String {
     )
 }
 
-/// The same as a JSON object.
+/// The summary as a JSON object.
 pub fn object(contacts: &Contacts, curves: &Curves) -> Value {
     let n = |shape: Shape| {
         contacts

@@ -1,4 +1,4 @@
-//! Running a detector as the command line says, and its times over many frames.
+//! Runs a detector with the options of the command line, and collects its times over many frames.
 
 use impinge::{
     Backend, BodyId, CancelToken, Control, Detector, Pairs, Positions, Query, Scene, Settings,
@@ -8,12 +8,12 @@ use crate::args::{AskArgs, BackendArg, DetectorArgs};
 use crate::error::Error;
 use crate::watch::Watch;
 
-/// A detector as told.
+/// A detector with the options of the command line.
 pub fn detector(args: &DetectorArgs) -> Result<Detector, Error> {
     Ok(Detector::with_settings(settings(args))?)
 }
 
-/// What a detector is told.
+/// The settings of a detector.
 pub fn settings(args: &DetectorArgs) -> Settings {
     Settings {
         method: args.method.into(),
@@ -27,19 +27,19 @@ pub fn settings(args: &DetectorArgs) -> Settings {
     }
 }
 
-/// Where the work is done.
+/// The backend to use.
 fn backend(args: &DetectorArgs) -> Backend {
     match (args.backend, &args.device) {
-        // A device that is named is wanted: one that is not there is an error.
+        // A named device must exist, so its absence is an error.
         (BackendArg::Auto, Some(_)) => Backend::Gpu,
         (BackendArg::Auto, None) if !may_have_gpu() => Backend::Cpu,
         (backend, _) => backend.into(),
     }
 }
 
-/// Whether this machine may have a GPU in hardware. Looking for one loads every driver, and software drivers write to
-/// standard error then. On Linux a GPU has a file in `/dev`: of the kernel's graphics drivers, of NVIDIA's, of Windows
-/// below it, or of a phone.
+/// Whether this machine may have a hardware GPU. Searching for one loads every driver, and some software drivers then write to
+/// standard error. On Linux a GPU has a file in `/dev`, made by the kernel's graphics drivers, by NVIDIA's driver, by WSL
+/// or by a phone's driver.
 fn may_have_gpu() -> bool {
     if !cfg!(target_os = "linux") {
         return true;
@@ -57,7 +57,7 @@ fn may_have_gpu() -> bool {
             .any(|start| has("/dev", start))
 }
 
-/// The question with its adjacency rule and the pairs of bodies to leave out.
+/// The query with its adjacency rule and the pairs of bodies to ignore.
 pub fn query(query: Query, args: &AskArgs, bodies: &[BodyId]) -> Result<Query, Error> {
     let body = |number: usize| {
         bodies.get(number).copied().ok_or_else(|| {
@@ -73,7 +73,7 @@ pub fn query(query: Query, args: &AskArgs, bodies: &[BodyId]) -> Result<Query, E
     )
 }
 
-/// One detection, watched and stopped on request.
+/// One detection, with progress and cancellation.
 pub fn detect<'d>(
     detector: &'d mut Detector,
     scene: &Scene,
@@ -89,8 +89,8 @@ pub fn detect<'d>(
     Ok(detector.detect_with(scene, query, &control)?)
 }
 
-/// The same frame `n_frames` times over, all positions rewritten before each one, so that nothing
-/// can be remembered from the frame before.
+/// Runs the same frame `n_frames` times. All positions are rewritten before each run, so that no result
+/// of the frame before can be reused.
 pub fn repeat<'d>(
     detector: &'d mut Detector,
     scene: &mut Scene,
@@ -118,7 +118,7 @@ pub fn repeat<'d>(
     Ok((pairs, times))
 }
 
-/// Moves a body's vertices, in whatever precision.
+/// Sets a body's positions, in either precision.
 pub fn set_positions(
     scene: &mut Scene,
     body: BodyId,
@@ -130,7 +130,7 @@ pub fn set_positions(
     }
 }
 
-/// Wall times of frames in milliseconds, whole and by stage.
+/// Wall times of frames in milliseconds, in total and by stage.
 #[derive(Debug, Clone, Default)]
 pub struct Times {
     total: Vec<f64>,
@@ -158,7 +158,7 @@ impl Times {
         self.total.len()
     }
 
-    /// The whole frame: the time that `percent` % of the frames did not exceed.
+    /// A percentile of the total time: `percent` % of the frames took at most this long.
     pub fn total_ms(&self, percent: u32) -> f64 {
         percentile(&self.total, percent)
     }
@@ -171,7 +171,7 @@ impl Times {
     }
 }
 
-/// The percentile with linear interpolation between the two nearest ranks; 0 of no values.
+/// The percentile, by linear interpolation between the two nearest ranks; 0 if there are no values.
 pub fn percentile(values: &[f64], percent: u32) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);

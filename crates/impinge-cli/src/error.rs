@@ -1,14 +1,14 @@
-//! The one error type of the program, and its exit codes.
+//! The error type of the program, and its exit codes.
 
 use std::io;
 use std::path::PathBuf;
 
 use crate::stop;
 
-/// Everything that ends the program early.
+/// An error that ends the program.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// Options that do not fit together, or not what they are applied to.
+    /// Options that do not fit together or do not fit the input.
     #[error("{0}")]
     Usage(String),
     /// A picture could not be drawn or written.
@@ -33,14 +33,14 @@ pub enum Error {
     /// The simulation could not be set up or go on, or was cancelled.
     #[error(transparent)]
     Simulation(#[from] impinge_fem::Error),
-    /// A saved state that is damaged or of another simulation.
+    /// A saved state that is damaged or belongs to another simulation.
     #[error("{}: {source}", .path.display())]
     SavedState {
         path: PathBuf,
         source: impinge_fem::Error,
     },
-    /// A simulation was asked to stop, and has saved its state.
-    #[error("stopped after step {step} of {n_steps}; --resume goes on in {}", .folder.display())]
+    /// A simulation was stopped, and has saved its state.
+    #[error("stopped after step {step} of {n_steps}; --resume continues in {}", .folder.display())]
     Stopped {
         step: u64,
         n_steps: u64,
@@ -52,13 +52,13 @@ pub enum Error {
     /// Rows of pairs, or the folder of an output file, could not be written.
     #[error("{}: cannot write: {source}", .path.display())]
     Write { path: PathBuf, source: io::Error },
-    /// Pairs were found, and that was to be told.
+    /// Pairs were found, and `--fail-on-hit` was given.
     #[error("pairs were found")]
     Hit,
-    /// What is printed could not be.
+    /// Standard output could not be written.
     #[error("standard output: {0}")]
     Output(#[from] io::Error),
-    /// Ctrl-C can't be listened to.
+    /// The handler for Ctrl-C could not be installed.
     #[error("cannot listen to Ctrl-C: {0}")]
     Signal(io::Error),
     /// Rows of checked meshes can't be kept on disk.
@@ -75,7 +75,7 @@ pub enum Error {
     CheckFailed(String),
     /// Two methods gave different answers: a defect of the library.
     #[error(
-        "frame {frame}: {n_found} pairs by {method}, but {n_expected} by {reference}, or others: please report this"
+        "frame {frame}: {n_found} pairs by {method}, {n_expected} by {reference}, and the sets differ: please report this"
     )]
     Disagreement {
         frame: u32,
@@ -87,7 +87,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// Whether somebody has asked to stop, and nothing else is wrong.
+    /// Whether the error is only a cancellation.
     fn is_cancelled(&self) -> bool {
         matches!(
             self,
@@ -98,7 +98,8 @@ impl Error {
         )
     }
 
-    /// 128 and the signal's number where one has ended the program, 2 for bad usage, 0 where the reader of our output went away (it has what it wanted), else 1.
+    /// 128 plus the signal's number if a signal ended the program, 2 for bad usage, 3 for `--fail-on-hit`, 0 if the reader of
+    /// standard output has closed it (it has what it wanted), else 1.
     pub fn exit_code(&self) -> u8 {
         match self {
             error if error.is_cancelled() => stop::exit_code().unwrap_or(1),
@@ -111,7 +112,7 @@ impl Error {
         }
     }
 
-    /// Whether nothing need be said on standard error.
+    /// Whether nothing is printed on standard error.
     pub fn is_silent(&self) -> bool {
         matches!(self, Error::Hit) || self.exit_code() == 0
     }

@@ -1,4 +1,4 @@
-//! The answer in the first line, and below it where.
+//! The answer in the first line, and its places below.
 
 use std::io::{self, Write};
 
@@ -8,11 +8,11 @@ use crate::error::Error;
 use crate::regions::Region;
 use crate::text::{counted, grouped};
 
-/// Lines of places, and of bodies, before the rest is only counted.
+/// The most lines of places, and of bodies; the rest is only counted.
 const MOST_LINES: usize = 8;
 
-/// Writes what was found: `cow.off: 83 pairs of 5,804 triangles in 3 places, near (0.1, 0.2, 0.3)`; of several bodies
-/// all together first, then who meets whom.
+/// Writes the answer: `cow.off: 83 pairs of 5,804 triangles in 3 places, near (0.1, 0.2, 0.3)`. For several bodies, the
+/// first line is the total, and one line per two bodies that meet follows.
 pub fn write(
     to: &mut impl Write,
     scene: &Scene,
@@ -68,7 +68,7 @@ pub fn write(
     Ok(())
 }
 
-/// A line for each two bodies that meet, and for each that meets itself.
+/// Writes one line per two bodies that meet, and per body that meets itself.
 fn meetings(to: &mut impl Write, bodies: &[(BodyId, &str)], regions: &[Region]) -> io::Result<()> {
     let mut meetings: Vec<([usize; 2], usize, u64)> = Vec::new();
     for region in regions {
@@ -128,13 +128,13 @@ fn point(position: [f64; 3]) -> String {
     format!("({})", position.map(short).join(", "))
 }
 
-/// A number with four digits that count.
+/// A number with four significant digits.
 fn short(x: f64) -> String {
     let magnitude = x.abs().log10().floor();
     if x == 0.0 {
         "0".to_owned()
     } else if (-4.0..7.0).contains(&magnitude) {
-        // From 0 to 7 digits after the point.
+        // 0 to 7 digits after the decimal point.
         let digits = (3.0 - magnitude).max(0.0) as usize;
         let text = format!("{x:.digits$}");
         match text.contains('.') {

@@ -8,7 +8,7 @@ use crate::load::Vertices;
 use crate::regions::Region;
 use crate::text::hash;
 
-/// The most regions that are described; all of them are counted.
+/// The most regions in the object; all regions are counted.
 const MOST_REGIONS: usize = 100;
 
 /// The object that `docs/answer.schema.json` describes, times as medians.
@@ -68,7 +68,7 @@ pub fn answer(
     Ok(object)
 }
 
-/// Milliseconds in whole nanoseconds: the clock has no more, sums and medians only look so.
+/// Milliseconds, rounded to whole nanoseconds, which is the resolution of the clock.
 pub fn rounded(ms: f64) -> f64 {
     (ms * 1e6).round() / 1e6
 }

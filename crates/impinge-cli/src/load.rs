@@ -1,4 +1,4 @@
-//! Mesh files to bodies of a scene.
+//! Reads mesh files into bodies of a scene.
 
 use std::io::{Read, Write, stderr, stdin};
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::watch::go_on;
 /// The path that stands for standard input.
 const STDIN: &str = "-";
 
-/// A scene and what its bodies are called.
+/// A scene and the names of its bodies.
 #[derive(Debug, Default)]
 pub struct Bodies {
     pub scene: Scene,
@@ -25,25 +25,25 @@ pub struct Bodies {
     pub vertices: Vec<Vertices>,
 }
 
-/// What became of a file's vertices that share their position.
+/// Counts of a file's vertices that share their position.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Vertices {
-    /// How many were made one with another.
+    /// How many were welded to another one.
     pub n_welded: usize,
-    /// How many lie where another one does, and are apart; `None` where nobody looked.
+    /// How many are at the position of another one, but not welded to it; `None` if this was not counted.
     pub n_coincident: Option<usize>,
 }
 
-/// How files are read.
+/// Options of reading files.
 #[derive(Debug, Clone, Copy)]
 pub struct Loading<'a> {
-    /// Whether vertices at one position become one, told by the user.
+    /// The user's choice whether to weld vertices at one position.
     weld: Option<bool>,
-    /// Whether it is asked where a body meets itself: then it matters which vertices are one.
+    /// Whether the query includes self-collision: then it matters which vertices are welded.
     is_self: bool,
     /// The format of standard input.
     format: Option<Format>,
-    /// Whether to say on standard error what was fanned, left out and welded.
+    /// Whether to print on standard error what was fanned, skipped and welded.
     notes: bool,
     cancel: &'a CancelToken,
 }
@@ -63,7 +63,7 @@ impl<'a> Loading<'a> {
         }
     }
 
-    /// Files as they are, for questions between bodies.
+    /// Files without welding, for queries between bodies.
     pub fn as_they_are(notes: bool, cancel: &'a CancelToken) -> Self {
         Loading {
             weld: None,
@@ -74,7 +74,7 @@ impl<'a> Loading<'a> {
         }
     }
 
-    /// Whether vertices at one position become one. Those of an STL file share nothing but that.
+    /// Whether to weld vertices at one position. Triangles of an STL file share only positions.
     fn welds(&self, format: Format) -> bool {
         match self.weld {
             Some(true) => true,
@@ -85,7 +85,7 @@ impl<'a> Loading<'a> {
 }
 
 impl Bodies {
-    /// Reads files, a body each.
+    /// Reads files, one per body.
     pub fn read(paths: &[PathBuf], loading: Loading<'_>) -> Result<Self, Error> {
         let mut bodies = Bodies::default();
         for path in paths {
@@ -94,7 +94,7 @@ impl Bodies {
         Ok(bodies)
     }
 
-    /// Reads a file as one more body; where it is welded, tells how.
+    /// Reads a file as one more body; returns the welding, if any.
     pub fn add(
         &mut self,
         path: &Path,
@@ -119,7 +119,7 @@ impl Bodies {
         if loading.notes {
             note(&name, &summary, vertices);
         }
-        // No coordinate changes its value here; half the memory is saved where all of them allow it.
+        // No coordinate changes its value; this halves the memory if all coordinates fit in f32.
         mesh.positions.narrow_if_exact();
         let Mesh {
             positions,
@@ -138,7 +138,7 @@ impl Bodies {
         Ok((id, welding))
     }
 
-    /// A file, or standard input, as it is.
+    /// Reads a file, or standard input, without changes.
     fn read_one(
         &self,
         path: &Path,
@@ -177,16 +177,16 @@ impl Bodies {
     }
 }
 
-/// What a user should know about a file who looks at primitive numbers, or wonders about pairs.
+/// Notes on a file for users who look at primitive numbers, or wonder about pairs.
 pub fn note(name: &str, summary: &Summary, vertices: Vertices) {
     for (n, what) in [
         (
             summary.n_polygons_fanned,
-            "polygons fanned (primitives are numbered after that)",
+            "polygons split into triangles (primitive numbers count the triangles)",
         ),
         (
             summary.n_triangles_skipped,
-            "triangles beside tetrahedra left out",
+            "triangles skipped, because the file has tetrahedra",
         ),
         (vertices.n_welded as u64, "vertices welded to others"),
         (
@@ -201,7 +201,7 @@ pub fn note(name: &str, summary: &Summary, vertices: Vertices) {
     }
 }
 
-/// The arrays of a file as the library takes them.
+/// Converts the positions of a file to those of the library.
 pub fn to_positions(positions: impinge_io::Positions) -> impinge::Positions {
     match positions {
         impinge_io::Positions::F32(positions) => positions.into(),

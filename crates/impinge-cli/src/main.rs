@@ -61,12 +61,12 @@ fn main() -> ExitCode {
     }
 }
 
-/// Where there is no session, a Vulkan layer of Mesa's says on standard error that it finds no display
-/// to choose a GPU by. We choose ourselves.
+/// Without a desktop session, a Vulkan layer of Mesa complains on standard error that it finds no display
+/// by which to choose a GPU. The program chooses the GPU itself, so the layer is switched off.
 #[cfg(all(feature = "gpu", target_os = "linux"))]
 fn keep_mesa_quiet() {
     if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
-        // SAFETY: the program has just begun, no other thread runs that could read the environment.
+        // SAFETY: the program has just started, so no other thread can read the environment.
         unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
     }
 }

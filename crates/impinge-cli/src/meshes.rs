@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::palette::{self, BodyColors};
 use crate::values::{MeshFile, MeshFormat};
 
-/// Writes bodies as they are in the scene now; primitives that take part in a pair are coloured.
+/// Writes bodies in their current pose; primitives that take part in a pair are coloured.
 pub fn write(
     file: &MeshFile,
     scene: &Scene,
@@ -25,7 +25,7 @@ pub fn write(
     write_colored(file, &meshes)
 }
 
-/// Writes meshes in the format of the file's name.
+/// Writes meshes in the format given by the file's name.
 pub fn write_colored(file: &MeshFile, meshes: &[ColoredMesh<'_>]) -> Result<(), Error> {
     match file.format {
         MeshFormat::Ply => write_ply(&file.path, meshes)?,
@@ -41,7 +41,7 @@ fn file_name(path: &str) -> &str {
     name.unwrap_or(path)
 }
 
-/// The library's arrays as mesh files take them.
+/// Converts positions of the library to those of mesh files.
 pub fn from_positions(positions: &Positions) -> impinge_io::Positions {
     match positions {
         Positions::F32(positions) => impinge_io::Positions::F32(positions.clone()),
@@ -49,8 +49,8 @@ pub fn from_positions(positions: &Positions) -> impinge_io::Positions {
     }
 }
 
-/// The library's elements as mesh files take them. Those hold surfaces and solids: an edge is written as the flat triangle
-/// that it is, and so is a point.
+/// Converts elements of the library to those of mesh files. Mesh files hold only triangles and tetrahedra, so an edge or a point
+/// becomes a degenerate triangle.
 pub fn from_elements(elements: &Elements) -> impinge_io::Elements {
     match elements {
         Elements::Triangles(faces) => impinge_io::Elements::Triangles(faces.clone()),
@@ -92,7 +92,7 @@ impl<'a> Part<'a> {
             elements: from_elements(body.elements()),
             colors: primitive_colors,
             colliding,
-            // Where the file is on this machine is no business of the mesh that is written.
+            // The written mesh should not reveal folders of this machine.
             name: file_name(name),
         })
     }

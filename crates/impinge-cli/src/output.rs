@@ -1,4 +1,4 @@
-//! What is printed for people.
+//! Text output.
 
 use std::io::{self, StdoutLock, Write, stdout};
 
@@ -9,12 +9,12 @@ use crate::detection::Times;
 use crate::error::Error;
 use crate::text::{counted, grouped, hash, shown_bytes};
 
-/// Standard output. A reader that goes away is an error here, not a panic.
+/// Standard output. If the reader closes it, writing is an error, not a panic.
 pub fn out() -> StdoutLock<'static> {
     stdout().lock()
 }
 
-/// A table without rules; the columns named in `text` are flush left, all others right.
+/// A table without lines; the columns in `text` are aligned left, all others right.
 pub fn table(
     header: &[&str],
     text: &[usize],
@@ -33,7 +33,7 @@ pub fn table(
     table.trim_fmt()
 }
 
-/// Bodies, stages, counters and the hash.
+/// Prints bodies, stages, counters and the hash.
 pub fn print_details(
     to: &mut impl Write,
     scene: &Scene,
@@ -47,7 +47,7 @@ pub fn print_details(
     Ok(())
 }
 
-/// A row a body.
+/// One row per body.
 pub fn body_table(
     scene: &Scene,
     bodies: &[(BodyId, &str)],
@@ -76,7 +76,7 @@ pub fn body_table(
     Ok(table(&header, &[1, 2], rows))
 }
 
-/// A row a stage, with the median of many frames.
+/// One row per stage, with the median over the frames.
 pub fn stage_table(times: &Times) -> String {
     let shown = |ms: f64| format!("{ms:.3}");
     let rows = times

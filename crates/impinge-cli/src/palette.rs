@@ -3,9 +3,9 @@
 /// sRGB.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BodyColors {
-    /// Of primitives that take part in a pair.
+    /// The colour of primitives that take part in a pair.
     pub colliding: [u8; 3],
-    /// Of all the others.
+    /// The colour of all other primitives.
     pub other: [u8; 3],
 }
 
@@ -21,17 +21,17 @@ const COLLIDING: [[u8; 3]; 8] = [
     [188, 189, 34],
 ];
 
-/// Greys that can just be told apart.
+/// Two greys that are just distinguishable.
 const OTHER: [[u8; 3]; 2] = [[200, 200, 200], [172, 178, 188]];
 
-/// The colour of what collides at a time of a step: red at its start, yellow at its end.
+/// The colour for a time of contact: red at the start of the step, yellow at its end.
 pub fn time(toi: f64) -> [u8; 3] {
     const EARLY: [f64; 3] = [214.0, 39.0, 40.0];
     const LATE: [f64; 3] = [255.0, 221.0, 87.0];
     std::array::from_fn(|k| (EARLY[k] + toi * (LATE[k] - EARLY[k])).round() as u8)
 }
 
-/// The colours of a body by its number; after the last ones, they begin again.
+/// The colours of a body by its number; they repeat after the last one.
 pub fn body(ix: usize) -> BodyColors {
     BodyColors {
         colliding: COLLIDING[ix % COLLIDING.len()],

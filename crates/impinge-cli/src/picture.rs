@@ -1,4 +1,4 @@
-//! Bodies as a picture.
+//! Draws bodies as a picture.
 
 use std::io::Write;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::args::PictureArgs;
 use crate::error::Error;
 use crate::palette;
 
-/// Draws pictures, all of one kind.
+/// Draws pictures, all with the same options.
 pub struct Drawer<'a> {
     args: &'a PictureArgs,
     renderer: Renderer,
@@ -28,7 +28,7 @@ impl<'a> Drawer<'a> {
         Ok(Drawer { args, renderer })
     }
 
-    /// Draws bodies as they are in the scene now, colliding primitives coloured.
+    /// Draws bodies in their current pose, with colliding primitives coloured.
     pub fn write(
         &mut self,
         path: &Path,
@@ -129,7 +129,7 @@ fn tubes(contacts: &Contacts, curves: &Curves, diagonal: f64) -> Surface {
     tubes
 }
 
-/// Two unit vectors across a direction and each other; none for no direction.
+/// Two unit vectors perpendicular to a direction and to each other; `None` for a zero vector.
 fn across(d: [f64; 3]) -> Option<[[f64; 3]; 2]> {
     let unit = |v: [f64; 3]| {
         let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
@@ -143,7 +143,7 @@ fn across(d: [f64; 3]) -> Option<[[f64; 3]; 2]> {
         ]
     };
     let d = unit(d)?;
-    // The axis that is farthest from the direction.
+    // The axis that deviates most from the direction.
     let axis = (1..3).fold(
         0,
         |best, k| if d[k].abs() < d[best].abs() { k } else { best },
@@ -154,7 +154,7 @@ fn across(d: [f64; 3]) -> Option<[[f64; 3]; 2]> {
     Some([u, cross(d, u)])
 }
 
-/// A surface a body, in the colours of the palette.
+/// One surface per body, in the colours of the palette.
 pub fn surfaces(
     scene: &Scene,
     bodies: &[(BodyId, &str)],

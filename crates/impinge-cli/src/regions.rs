@@ -1,4 +1,4 @@
-//! Where bodies meet: pairs that hang together, with a place and a size.
+//! The places where bodies meet: connected pairs, with a position and a size.
 
 use std::collections::HashMap;
 
@@ -6,30 +6,30 @@ use impinge::{Body, BodyId, Pairs, Scene};
 
 use crate::error::Error;
 
-/// Beyond this many pairs nobody looks at places any more, and finding them takes seconds.
+/// The most pairs for which regions are computed: beyond, they take seconds and are hardly useful.
 const MOST_PAIRS: usize = 2_000_000;
 
-/// Pairs of two bodies, or of one with itself, that hang together: by a primitive or a vertex that they share.
+/// Pairs of two bodies, or of one body with itself, that are connected by shared primitives or vertices.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Region {
-    /// The bodies by their number, the lower one first; twice the same where a body meets itself.
+    /// The numbers of the bodies, the lower one first; the same number twice for self-collision.
     pub bodies: [usize; 2],
-    /// How many pairs it has.
+    /// How many pairs the region has.
     pub n_pairs: usize,
-    /// The first of its pairs: a primitive of each body.
+    /// The first pair of the region: one primitive of each body.
     pub first: [u32; 2],
-    /// The box around what the boxes of the two primitives of each pair share.
+    /// The box around the overlaps of the two primitives' boxes, over all pairs.
     low: [f64; 3],
     high: [f64; 3],
 }
 
 impl Region {
-    /// The middle.
+    /// The middle of the box.
     pub fn center(&self) -> [f64; 3] {
         std::array::from_fn(|axis| self.low[axis] / 2.0 + self.high[axis] / 2.0)
     }
 
-    /// The longest side of its box.
+    /// The longest side of the box.
     pub fn size(&self) -> f64 {
         (0..3)
             .map(|axis| self.high[axis] - self.low[axis])
@@ -37,7 +37,7 @@ impl Region {
     }
 }
 
-/// The regions of an answer, those with most pairs first; `None` where there are too many pairs to look.
+/// The regions of an answer, those with the most pairs first; `None` if there are too many pairs.
 pub fn regions(
     scene: &Scene,
     bodies: &[(BodyId, &str)],
@@ -55,7 +55,7 @@ pub fn regions(
         .iter()
         .map(|&(id, _)| scene.body(id))
         .collect::<Result<_, _>>()?;
-    // One node per vertex of a colliding primitive, for each pair of bodies apart: (body, other body, vertex).
+    // One node per vertex of a colliding primitive, separately for each pair of bodies: (body, other body, vertex).
     let mut sets = Sets::default();
     let mut nodes: HashMap<[u32; 3], u32> = HashMap::new();
     let mut of_pairs = Vec::with_capacity(pairs.len());
@@ -99,7 +99,7 @@ pub fn regions(
             region.high[axis] = region.high[axis].max(a_box.1[axis].min(b_box.1[axis]));
         }
     }
-    // Stable: regions of as many pairs stay in the order of their first pair.
+    // The sort is stable: regions with equally many pairs stay in the order of their first pair.
     regions.sort_by_key(|region| std::cmp::Reverse(region.n_pairs));
     Ok(Some(regions))
 }
@@ -117,14 +117,14 @@ fn extent(body: &Body, primitive: u32) -> ([f64; 3], [f64; 3]) {
     (low, high)
 }
 
-/// Disjoint sets, joined along (Tarjan 1975, with path halving).
+/// Disjoint sets (Tarjan 1975, with path halving).
 #[derive(Default)]
 struct Sets {
     parents: Vec<u32>,
 }
 
 impl Sets {
-    /// A set of one, by its node.
+    /// Adds a set of one node and returns the node.
     fn add(&mut self) -> u32 {
         // At most eight nodes per pair, of which there are two million.
         let node = self.parents.len() as u32;
@@ -153,7 +153,8 @@ mod tests {
 
     use super::*;
 
-    /// A horizontal sheet of two triangles, no vertex shared, that two upright triangles pierce, far apart, and a third one of another body.
+    /// A horizontal sheet of two triangles without shared vertices. Two upright triangles pierce it far apart; so does
+    /// a third triangle of another body.
     #[test]
     fn pairs_that_hang_together_are_one_region() {
         let sheet = [[0u32, 1, 2], [3, 4, 5]];

@@ -32,10 +32,10 @@ fn put(to: &mut impl Write, format: RowsFormat, pairs: &Pairs) -> io::Result<()>
     }
 }
 
-/// The rows of the frames of a sequence, each behind the number of its frame.
+/// The rows of the frames of a sequence, each preceded by the number of its frame.
 pub struct FrameRows {
     file: RowsFile,
-    /// `None` where they go to standard output.
+    /// `None` for standard output.
     to: Option<AtomicFile>,
 }
 
@@ -107,7 +107,7 @@ fn npy(to: &mut impl Write, rows: impl ExactSizeIterator<Item = [u32; 4]>) -> io
 }
 
 /// The header of NumPy's array format, version 1.0 (NEP 1): magic, version, length of the description, description
-/// padded with spaces so that data starts at a multiple of 64. Data are little endian, in C order.
+/// padded with spaces so that the data starts at a multiple of 64. The data is little-endian, in C order.
 pub fn npy_header(kind: &str, shape: &str) -> Vec<u8> {
     const PREAMBLE: usize = 10;
     let mut text = format!("{{'descr': {kind}, 'fortran_order': False, 'shape': {shape}, }}");
@@ -115,7 +115,7 @@ pub fn npy_header(kind: &str, shape: &str) -> Vec<u8> {
     text.extend(std::iter::repeat_n(' ', length - 1 - text.len()));
     text.push('\n');
     let mut header = b"\x93NUMPY\x01\x00".to_vec();
-    // Some hundred bytes at most, whatever the number of rows.
+    // At most a few hundred bytes, whatever the number of rows.
     header.extend(u16::try_from(length).unwrap_or(u16::MAX).to_le_bytes());
     header.extend(text.as_bytes());
     header

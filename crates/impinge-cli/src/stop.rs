@@ -1,8 +1,8 @@
 //! Ctrl-C and requests to terminate.
 //!
-//! The first one cancels a token that every detection watches. Not all that takes long can watch it (reading a file, a
-//! driver's compiler, a pipe that nobody reads), so a thread ends the program itself where it has not ended within
-//! [`GRACE`]. A second request ends it at once.
+//! The first request cancels a token that every detection watches. Some long operations can't watch it (reading a file, a
+//! driver's compiler, a pipe that nobody reads). So if the program has not ended within [`GRACE`], a thread ends it.
+//! A second request ends it at once.
 
 use std::io::{Write, stderr};
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicUsize, Ordering};
@@ -14,25 +14,25 @@ use impinge::CancelToken;
 /// How long the program may take to end by itself.
 const GRACE: Duration = Duration::from_millis(600);
 
-/// The exit code that the first request asks for: 128 and the number of the signal, as shells have it; 0 while there is none.
+/// The exit code for the first request: 128 plus the number of the signal, as in shells; 0 while there is no request.
 static CODE: AtomicU8 = AtomicU8::new(0);
 
-/// Parts of the program that must not be ended before they are done.
+/// The number of running parts that must finish before the program may be ended.
 static N_PATIENT: AtomicUsize = AtomicUsize::new(0);
 
-/// A token that the first Ctrl-C, or a request to terminate, cancels.
+/// A token that the first Ctrl-C or request to terminate cancels.
 pub fn cancel_on_signal() -> std::io::Result<CancelToken> {
     let token = CancelToken::new();
     listen(token.clone())?;
     Ok(token)
 }
 
-/// The exit code of a program that was asked to stop, if it was.
+/// The exit code after a request to stop, if there was one.
 pub fn exit_code() -> Option<u8> {
     Some(CODE.load(Ordering::Acquire)).filter(|&code| code > 0)
 }
 
-/// While this is held, the first request waits: for what must be saved. The second one does not.
+/// While this is held, the first request waits, so that results can be saved. The second request does not wait.
 pub struct Patience;
 
 impl Patience {
@@ -48,11 +48,11 @@ impl Drop for Patience {
     }
 }
 
-/// Says on standard error why the program ends, once.
+/// Prints the reason for the end of the program on standard error, once.
 pub fn say(line: &str) {
     static IS_SAID: AtomicBool = AtomicBool::new(false);
     if !IS_SAID.swap(true, Ordering::AcqRel) {
-        // Where standard error is closed there is nobody left to tell.
+        // If standard error is closed, the reason can't be reported.
         let _ = writeln!(stderr(), "impinge: {line}");
     }
 }
@@ -61,7 +61,7 @@ pub fn say(line: &str) {
 fn listen(token: CancelToken) -> std::io::Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     use signal_hook::iterator::Signals;
-    // Whoever started the program with a signal ignored (`nohup`) does not want to be stopped by it.
+    // A signal that was ignored when the program was started (`nohup`) stays ignored.
     let wanted = [SIGINT, SIGTERM, SIGHUP]
         .into_iter()
         .filter(|&signal| !is_ignored(signal));
@@ -95,7 +95,7 @@ fn listen(token: CancelToken) -> std::io::Result<()> {
         .map_err(|error| std::io::Error::other(error.to_string()))
 }
 
-/// Takes a request to stop.
+/// Handles a request to stop.
 fn asked(token: &CancelToken, code: u8) {
     let first = CODE.compare_exchange(0, code, Ordering::AcqRel, Ordering::Acquire);
     token.cancel();
@@ -111,18 +111,18 @@ fn asked(token: &CancelToken, code: u8) {
         }
     };
     if thread::Builder::new().spawn(watch).is_err() {
-        // Without a thread to wait on, there is no reason to.
+        // Without a thread that can wait, end at once.
         end(code);
     }
 }
 
-/// Ends the program, whatever it is at.
+/// Ends the program, whatever it is doing.
 fn end(code: u8) -> ! {
     impinge_io::remove_temporary_files();
     say("cancelled");
-    // What a driver or a library wants to do at exit may wait for threads that are still at work.
+    // Exit handlers of drivers or libraries might wait for threads that are still working, so they are not run.
     #[cfg(unix)]
-    // SAFETY: ends the process at once; nothing of it runs any more.
+    // SAFETY: ends the process at once; no more of its code runs.
     unsafe {
         libc::_exit(i32::from(code))
     }

@@ -15,7 +15,7 @@ pub fn grouped(n: u64) -> String {
     text
 }
 
-/// `n` of something, in the plural where there is not one.
+/// `n` with a noun, in the plural unless `n` is 1.
 pub fn counted(n: u64, one: &str) -> String {
     format!("{} {one}{}", grouped(n), if n == 1 { "" } else { "s" })
 }
@@ -35,7 +35,7 @@ pub fn shown_bytes(n: u64) -> String {
     format!("{:.1} TB", n as f64 / unit as f64)
 }
 
-/// The hash as it is shown: 16 hexadecimal digits.
+/// The hash of an answer as 16 hexadecimal digits.
 pub fn hash(pairs: &Pairs) -> String {
     hex(pairs.hash())
 }

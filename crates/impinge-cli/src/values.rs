@@ -15,14 +15,14 @@ pub struct RowsFile {
     pub format: RowsFormat,
 }
 
-/// How rows of pairs are written.
+/// The format of rows of pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum RowsFormat {
-    /// A line for each pair, numbers with commas between them
+    /// One line per pair, numbers separated by commas
     Csv,
-    /// A JSON object for each pair, on a line
+    /// One JSON object per pair, each on its own line
     Jsonl,
-    /// An array of NumPy's
+    /// A NumPy array
     Npy,
 }
 
@@ -58,7 +58,7 @@ pub struct CurvesFile {
     pub format: CurvesFormat,
 }
 
-/// How curves are written.
+/// The format of curves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CurvesFormat {
     Ply,
@@ -90,7 +90,7 @@ pub struct MeshFile {
     pub format: MeshFormat,
 }
 
-/// How coloured meshes are written.
+/// The format of coloured meshes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MeshFormat {
     Ply,
@@ -99,7 +99,7 @@ pub enum MeshFormat {
 }
 
 impl MeshFormat {
-    /// The extension of its files.
+    /// The extension of files of this format.
     pub fn extension(self) -> &'static str {
         match self {
             MeshFormat::Ply => "ply",
@@ -197,7 +197,7 @@ pub struct FrameRange {
 }
 
 impl FrameRange {
-    /// The frames that are there; `None` where the range reaches beyond them.
+    /// The frames of the range; `None` if the range reaches beyond the last frame.
     pub fn within(self, n_frames: usize) -> Option<Range<usize>> {
         let end = self.end.unwrap_or(n_frames);
         (self.start <= end && end <= n_frames).then_some(self.start..end)
@@ -287,7 +287,7 @@ pub fn body_numbers(text: &str) -> Result<(usize, usize), String> {
         .ok_or_else(|| "expected two body numbers, such as 0,1".to_owned())
 }
 
-/// A number of things above 0, with an optional suffix: `k`, `M`, `G` are powers of 1000.
+/// A count above 0, with an optional suffix: `k`, `M`, `G` are powers of 1000.
 pub fn count(text: &str) -> Result<u64, String> {
     let expected = || "expected a number such as 250000, 250k or 2M".to_owned();
     let split = text
@@ -309,7 +309,7 @@ pub fn count(text: &str) -> Result<u64, String> {
 }
 
 /// A number of bytes with an optional suffix: `k`, `M`, `G`, `T` (or `KiB`, `MiB`, …) are powers of
-/// 1024, `kB`, `MB`, … powers of 1000, as GNU tools have it.
+/// 1024, `kB`, `MB`, … powers of 1000, as in GNU tools.
 pub fn bytes(text: &str) -> Result<u64, String> {
     let expected =
         || "expected a number of bytes, such as 500000000, 512M, 2GiB or 1.5G".to_owned();

@@ -1,4 +1,4 @@
-//! Progress bars, and whether to go on.
+//! Progress bars, and cancellation between detections.
 
 use std::io::{IsTerminal, stderr, stdout};
 use std::time::{Duration, Instant};
@@ -8,10 +8,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::error::Error;
 
-/// A detection that is done sooner than this shows no bar.
+/// A detection that takes less time than this shows no bar.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Fails where somebody has asked to stop: for the time between detections.
+/// Fails if a stop was requested; for use between detections.
 pub fn go_on(cancel: &CancelToken) -> Result<(), Error> {
     if cancel.is_cancelled() {
         return Err(impinge::Error::Cancelled.into());
@@ -19,7 +19,7 @@ pub fn go_on(cancel: &CancelToken) -> Result<(), Error> {
     Ok(())
 }
 
-/// A progress bar on standard error, if that is a terminal and a bar is wanted.
+/// A progress bar on standard error, if that is a terminal and a bar is requested.
 pub struct Watch {
     bar: Option<ProgressBar>,
     started: Instant,
@@ -31,8 +31,8 @@ impl Watch {
         Watch::new(wanted, 0, "{msg} {wide_bar} {percent:>3} % {eta:>4}", what)
     }
 
-    /// Watches `n_frames` frames through [`frame_done`](Watch::frame_done). No bar is shown where the
-    /// frames themselves are printed on the terminal, `prints_frames`.
+    /// Watches `n_frames` frames through [`frame_done`](Watch::frame_done). No bar is shown if the frames
+    /// themselves are printed on the terminal (`prints_frames`).
     pub fn frames(wanted: bool, n_frames: usize, prints_frames: bool) -> Self {
         let wanted = wanted && !(prints_frames && stdout().is_terminal());
         Watch::new(
@@ -43,8 +43,8 @@ impl Watch {
         )
     }
 
-    /// Watches `n` things of a kind through [`frame_done`](Watch::frame_done). No bar is shown where rows are printed on
-    /// the terminal, `prints_rows`.
+    /// Watches `n` items through [`frame_done`](Watch::frame_done). No bar is shown if rows are printed on
+    /// the terminal (`prints_rows`).
     pub fn things(wanted: bool, n: usize, what: &'static str, prints_rows: bool) -> Self {
         let wanted = wanted && !(prints_rows && stdout().is_terminal());
         let template = "{msg} {wide_bar} {pos}/{len} {eta:>4}";
@@ -65,12 +65,12 @@ impl Watch {
         }
     }
 
-    /// Whether anything is shown; where not, nobody need report.
+    /// Whether a bar is shown; if not, progress need not be reported.
     pub fn is_shown(&self) -> bool {
         self.bar.is_some()
     }
 
-    /// Shows how far a detection has come, once it has taken a while.
+    /// Shows the progress of a detection, once it has taken a while.
     pub fn report(&self, progress: Progress) {
         if let Some(bar) = &self.bar
             && self.started.elapsed() >= PATIENCE
@@ -80,7 +80,7 @@ impl Watch {
         }
     }
 
-    /// One frame more is done.
+    /// Counts one more frame as done.
     pub fn frame_done(&self) {
         if let Some(bar) = &self.bar {
             bar.inc(1);

@@ -1,4 +1,4 @@
-//! `impinge pairs` and `impinge self`: one answer about one set of meshes.
+//! `impinge pairs` and `impinge self`: one answer for one set of meshes.
 
 use std::io::{Write, stderr};
 use std::path::PathBuf;
@@ -78,7 +78,7 @@ fn answer(
         vertices,
     } = Bodies::read(paths, Loading::new(ask, is_self, cancel))?;
     let query = query(asked, ask, &ids)?;
-    // Only now: opening a GPU takes time, and some drivers talk.
+    // The detector comes last, because opening a GPU takes time and some drivers print messages.
     let mut detector = detector(how)?;
 
     let watch = Watch::detection(!how.no_progress, "detecting");
@@ -90,7 +90,7 @@ fn answer(
         .into_iter()
         .zip(names.iter().map(String::as_str))
         .collect();
-    // Files come first: where one can't be written, no answer is printed that looks like success.
+    // Files are written first: if one can't be written, no answer is printed that looks like success.
     if let Some(file) = &rows_file {
         rows::write(file, pairs)?;
     }
@@ -130,13 +130,13 @@ fn answer(
             output::print_details(&mut text, &scene, &bodies, pairs, &times)?;
         }
         if is_stdout_taken {
-            // Where standard error is closed nobody wants a summary.
+            // If standard error is closed, nobody reads the summary.
             let _ = stderr().write_all(&text);
         } else {
             output::out().write_all(&text)?;
         }
     }
-    // Last: whoever has no adapter has the answer.
+    // The picture comes last, so that the answer is printed even without an adapter.
     #[cfg(feature = "gpu")]
     if let Some(png) = &answer.png {
         let mut drawer = Drawer::new(&answer.picture, how.device.as_deref())?;
@@ -145,7 +145,7 @@ fn answer(
     hit(ask, pairs.len())
 }
 
-/// What `--fail-on-hit` makes of a number of pairs.
+/// Fails if there are pairs and `--fail-on-hit` was given.
 pub fn hit(ask: &AskArgs, n_pairs: usize) -> Result<(), Error> {
     match ask.fail_on_hit && n_pairs > 0 {
         true => Err(Error::Hit),

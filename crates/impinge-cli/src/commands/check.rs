@@ -1,4 +1,4 @@
-//! `impinge check`: what is wrong with one mesh, or with a million.
+//! `impinge check`: checks one mesh, or a million.
 
 mod args;
 mod shown;
@@ -44,7 +44,7 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
             shown::print_legend()?;
         }
     }
-    // Last: whoever has no adapter has the answer.
+    // The picture comes last, so that the answer is printed even without an adapter.
     #[cfg(feature = "gpu")]
     if let Some(png) = &args.png {
         shown::draw(&png.0, &rows, args)?;
@@ -65,7 +65,7 @@ pub fn check_worker(args: &CheckWorkerArgs) -> Result<(), Error> {
     Ok(serve(stdin().lock(), stdout().lock(), &options)?)
 }
 
-/// The meshes named, and those of the list.
+/// The meshes of the command line and of the list.
 fn paths(args: &CheckArgs) -> Result<Vec<PathBuf>, Error> {
     let mut paths = args.meshes.clone();
     if let Some(list) = &args.list {
@@ -89,14 +89,14 @@ fn paths(args: &CheckArgs) -> Result<Vec<PathBuf>, Error> {
     }
     if args.rank >= args.world_size.get() {
         return Err(Error::Usage(format!(
-            "--rank {} of --world-size {}: ranks begin at 0",
+            "--rank {} of --world-size {}: ranks start at 0",
             args.rank, args.world_size
         )));
     }
     Ok(paths)
 }
 
-/// The numbers of the meshes of this process: whole batches in turn.
+/// The numbers of this process's meshes: whole batches, dealt to processes in turn.
 fn share(args: &CheckArgs, n: usize) -> impl Iterator<Item = usize> {
     let (batch, rank, world_size) = (args.batch.get(), args.rank, args.world_size.get());
     (0..n).filter(move |ix| ix / batch % world_size == rank)
@@ -139,7 +139,7 @@ fn run(
         weld: !args.no_weld,
     };
     let chosen: Vec<PathBuf> = wanted.iter().map(|&ix| paths[ix].clone()).collect();
-    // A row that can't be printed or kept stops the run.
+    // A row that can't be printed or stored stops the run.
     let stop = CancelToken::new();
     let mut result = Ok(());
     let ran = std::thread::scope(|scope| {
@@ -173,7 +173,7 @@ fn run(
     }
 }
 
-/// Checks what has no row in the folder yet; gives all rows of this process.
+/// Checks the meshes without a row in the folder; returns all rows of this process.
 fn kept(
     args: &CheckArgs,
     folder: &Path,
@@ -190,7 +190,7 @@ fn kept(
         watch.frame_done();
         printed.put(ix, row.clone())?;
     }
-    // Whoever asks to stop waits for what is known to be written.
+    // A request to stop waits until all finished rows are written.
     let _patience = Patience::new();
     let ran = run(args, paths, &missing, watch, cancel, |ix, row| {
         printed.put(ix, row.clone())?;
@@ -208,7 +208,7 @@ fn share_of(args: &CheckArgs, n: usize) -> Vec<usize> {
 /// Rows in the order of the list, printed as soon as all before them are there.
 struct Ordered {
     prints: bool,
-    /// Place in this process's share of each mesh.
+    /// The place of each mesh in this process's share.
     places: BTreeMap<usize, usize>,
     rows: Vec<Option<Row>>,
     n_printed: usize,

@@ -1,4 +1,4 @@
-//! `impinge demo`: a built-in scene, what is found in it, and how fast.
+//! `impinge demo`: a built-in scene, its pairs and times.
 
 use std::fs::create_dir_all;
 use std::io::Write;
@@ -16,7 +16,7 @@ use crate::output::{body_table, out, stage_table, table};
 use crate::text::{counted, grouped};
 use crate::watch::{Watch, go_on};
 
-/// About how many triangles the oracle, quadratic in them, is asked about: it takes a second at most.
+/// The approximate number of triangles for the oracle, which is quadratic in them: it takes a second at most.
 const SAMPLE: usize = 16_000;
 
 /// `impinge demo`.
@@ -122,7 +122,7 @@ fn check(
     Ok(())
 }
 
-/// Some of the triangles as a scene of its own, and which of the pairs found are among them.
+/// Some of the triangles as a scene of its own, and the pairs found among these triangles.
 struct Sample {
     scene: Scene,
     n_triangles: usize,
@@ -134,14 +134,14 @@ impl Sample {
         let n_all = demo.n_triangles();
         let mut scene = Scene::new();
         let mut n_triangles = 0;
-        // For each body, the number of each triangle in the sample, if it is there.
+        // For each triangle of each body, its number in the sample, if it is in the sample.
         let mut numbers: Vec<Vec<Option<u32>>> = Vec::new();
         for (id, _) in demo.bodies() {
             let body = demo.scene().body(id)?;
             let n = body.n_primitives();
             let mut is_in = vec![n_all <= SAMPLE; n];
             if n_all > SAMPLE {
-                // Half of what this body may have are triangles that collide, half any, both spread evenly.
+                // Half of this body's share are colliding triangles, half are any triangles, both spread evenly.
                 let most = (SAMPLE as u128 * n as u128 / n_all as u128) as usize / 2;
                 let colliding = pairs.colliding(id);
                 for (most, candidates) in [(most, colliding), (most, (0..).take(n).collect())] {
@@ -182,7 +182,7 @@ fn make_folder(folder: &Path) -> Result<(), Error> {
     })
 }
 
-/// What the frames held.
+/// Statistics over the frames.
 #[derive(Default)]
 struct Found {
     times: Times,
@@ -191,13 +191,13 @@ struct Found {
     n_pairs: Vec<usize>,
 }
 
-/// Pairs of two bodies, or of one with itself, over all frames.
+/// Pairs of two bodies, or of one body with itself, over all frames.
 struct Meeting {
     a_ix: usize,
     b_ix: usize,
-    /// Pairs of the frame that has the most.
+    /// Pairs in the frame with the most pairs.
     most: usize,
-    /// Frames with any.
+    /// Frames with any pairs.
     n_frames: usize,
 }
 
@@ -257,13 +257,13 @@ impl Found {
             ]
         });
         let mut to = out();
-        let header = ["who meets whom", "in frames", "most pairs"];
+        let header = ["bodies", "in frames", "most pairs"];
         writeln!(to, "\n{}\n", table(&header, &[0], rows))?;
         writeln!(to, "{}\n", stage_table(&self.times))?;
         let n_pairs = |n: Option<&usize>| grouped(n.map_or(0, |&n| n as u64));
         writeln!(
             to,
-            "{} to {} pairs a frame, {} in all",
+            "{} to {} pairs per frame, {} in all",
             n_pairs(self.n_pairs.iter().min()),
             n_pairs(self.n_pairs.iter().max()),
             grouped(self.n_pairs.iter().map(|&n| n as u64).sum())
@@ -271,14 +271,14 @@ impl Found {
         let median = self.times.total_ms(50);
         writeln!(
             to,
-            "{:.0} frames a second: median {median:.3} ms, 95 % within {:.3} ms, longest {:.3} ms",
+            "{:.0} frames per second: median {median:.3} ms, 95 % within {:.3} ms, longest {:.3} ms",
             1e3 / median.max(f64::MIN_POSITIVE),
             self.times.total_ms(95),
             self.times.total_ms(100)
         )?;
         writeln!(
             to,
-            "(moving the vertices is not counted: {:.3} ms a frame)",
+            "(moving the vertices takes another {:.3} ms per frame)",
             moving.as_secs_f64() * 1e3 / self.n_pairs.len().max(1) as f64
         )?;
         Ok(())

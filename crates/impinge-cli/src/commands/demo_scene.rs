@@ -1,8 +1,8 @@
 //! The scene of `impinge demo`: three bodies that deform and drift into each other.
 //!
-//! A worm bends into a ring until its head runs into its tail, a knot that ripples sinks through the
-//! ring, and a bumpy ball that twists comes in from the side. All are functions of the rest
-//! pose and of the time, 0 at the first frame and 1 at the last.
+//! A worm bends into a ring until its head runs into its tail, a rippling knot sinks through the
+//! ring, and a bumpy, twisting ball comes in from the side. All positions are functions of the rest
+//! pose and of the time, which is 0 at the first frame and 1 at the last.
 
 use std::f32::consts::TAU;
 
@@ -11,7 +11,7 @@ use impinge_scenes::Model;
 use impinge_scenes::deform::{Deform, Drift, Twist, Wave};
 use impinge_scenes::surfaces::{ball, bumpy_ball, stand_in};
 
-/// Length of the worm, straight.
+/// Length of the straight worm.
 const WORM_LENGTH: f32 = 3.0;
 
 /// A body, its rest pose and its motion.
@@ -22,7 +22,7 @@ struct Actor {
     motion: Box<dyn Motion>,
 }
 
-/// A [`Deform`] behind a pointer, called once a frame and not once a vertex.
+/// A [`Deform`] behind a pointer, called once per frame, not once per vertex.
 trait Motion {
     fn pose(&self, rest: &[[f32; 3]], t: f32, now: &mut [[f32; 3]]);
 }
@@ -33,7 +33,7 @@ impl<D: Deform> Motion for D {
     }
 }
 
-/// The bodies and how they move.
+/// The bodies and their motions.
 pub struct DemoScene {
     scene: Scene,
     actors: Vec<Actor>,
@@ -88,7 +88,7 @@ impl DemoScene {
         Ok(())
     }
 
-    /// Rewrites all positions as they are at a frame.
+    /// Sets all positions to those of a frame.
     pub fn pose(&mut self, frame: u32, n_frames: u32) -> Result<(), Error> {
         let t = frame as f32 / n_frames.saturating_sub(1).max(1) as f32;
         for actor in &self.actors {
@@ -98,12 +98,12 @@ impl DemoScene {
         Ok(())
     }
 
-    /// The bodies as they were last posed.
+    /// The bodies in their last pose.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// The bodies and what they are called.
+    /// The bodies and their names.
     pub fn bodies(&self) -> Vec<(BodyId, &str)> {
         self.actors
             .iter()
@@ -111,7 +111,7 @@ impl DemoScene {
             .collect()
     }
 
-    /// Triangles of all bodies.
+    /// The number of triangles in all bodies.
     pub fn n_triangles(&self) -> usize {
         self.scene
             .bodies()
@@ -120,7 +120,7 @@ impl DemoScene {
     }
 }
 
-/// Moves everything by a vector, whatever the time.
+/// Moves all vertices by a vector, whatever the time.
 struct Place([f32; 3]);
 
 impl Deform for Place {
@@ -130,7 +130,7 @@ impl Deform for Place {
 }
 
 /// Bends the x axis into an arc of the same length in the plane of x and y, from almost straight at
-/// time 0 to more than a full turn at time 1: what lies near the ends runs into each other.
+/// time 0 to more than a full turn at time 1, so that both ends run into each other.
 struct Bend;
 
 impl Deform for Bend {

@@ -1,4 +1,4 @@
-//! `impinge devices`: the GPUs that there are.
+//! `impinge devices`: lists GPUs.
 
 use std::io::Write;
 

@@ -1,4 +1,4 @@
-//! `impinge distance`: how near two meshes are.
+//! `impinge distance`: the smallest distance between two meshes.
 
 use std::io::Write;
 use std::time::Instant;

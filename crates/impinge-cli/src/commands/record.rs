@@ -1,14 +1,14 @@
-//! What `impinge simulate` writes, in such a way that a later run can go on with it.
+//! The outputs of `impinge simulate`, which a later run can continue.
 //!
 //! ```text
-//! FOLDER/bunny-7k.ply + bunny-7k.pc2   the bodies' mesh and its positions, a frame a step
-//!        colliding.csv                 and which primitives collide in each (step, body, primitive)
-//! FOLDER/bunny-7k_00000.vtu, …         or a coloured mesh a step (or .ply)
-//! FOLDER/steps.csv                     a row a step: counts, hash, times
+//! FOLDER/bunny-7k.ply + bunny-7k.pc2   the bodies' mesh and its positions, one frame per step
+//!        colliding.csv                 and the colliding primitives of each step (step, body, primitive)
+//! FOLDER/bunny-7k_00000.vtu, …         or one coloured mesh per step (or .ply)
+//! FOLDER/steps.csv                     one row per step: counts, hash, times
 //! FOLDER/state.bin                     the last saved state
 //! ```
-//! A saved state after n steps comes after the first n frames and rows are on the disk. Going on from it
-//! cuts off what is later and writes that again.
+//! The state after n steps is saved only after the first n frames and rows are on the disk. A run that continues from it
+//! cuts off later frames and rows and writes them again.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, ErrorKind, Write};
@@ -35,13 +35,13 @@ pub struct Record {
 }
 
 enum Frames {
-    /// One mesh, a cache of positions, and which primitives collide.
+    /// One mesh, a cache of positions, and a table of colliding primitives.
     Cache { cache: GrowingPc2, colliding: Log },
-    /// A mesh a frame.
+    /// One mesh per frame.
     Numbered(MeshFormat),
 }
 
-/// What was found in a frame.
+/// The pairs of a frame in numbers.
 pub struct Found {
     step: u64,
     n_pairs: usize,
@@ -74,7 +74,7 @@ impl Record {
         }
     }
 
-    /// Starts afresh; files of these names are replaced.
+    /// Starts a new run; existing files of these names are replaced.
     pub fn create(args: &SimulateArgs, simulation: &Simulation) -> Result<Self, Error> {
         let stem = impinge_fem::scenes::SceneName::from(args.scene).name();
         let folder = args.out.clone();
@@ -98,7 +98,7 @@ impl Record {
         })
     }
 
-    /// Goes on after the steps that the simulation has made.
+    /// Continues after the steps that the simulation has made.
     pub fn resume(args: &SimulateArgs, simulation: &Simulation) -> Result<Self, Error> {
         let stem = impinge_fem::scenes::SceneName::from(args.scene).name();
         let folder = args.out.clone();
@@ -131,7 +131,7 @@ impl Record {
             let path = record.numbered_path(*format, last);
             if !path.is_file() {
                 return Err(Error::Usage(format!(
-                    "{} is not there: go on in the --format in which the run was begun",
+                    "{} does not exist: continue with the --format of the first run",
                     path.display()
                 )));
             }
@@ -172,7 +172,7 @@ impl Record {
         }
     }
 
-    /// Writes a step's row, without the step itself where it is the last frame.
+    /// Writes the row of a step; for the last frame, which has no step, `report` is `None`.
     pub fn row(&mut self, found: &Found, report: Option<&StepReport>) -> Result<(), Error> {
         let colliding: String = found
             .n_colliding
@@ -198,7 +198,7 @@ impl Record {
             colliding.save()?;
         }
         self.steps.save()?;
-        // A state that is being written never takes the place of one that is whole.
+        // A partly written state never replaces a complete one.
         let path = self.folder.join(STATE);
         let mut file = AtomicFile::create(&path)?;
         file.write_all(&state.to_bytes())
@@ -207,19 +207,19 @@ impl Record {
         Ok(file.finish()?)
     }
 
-    /// What there is to look at.
+    /// Describes the outputs for the user.
     pub fn describe(&self) -> String {
         let path = self.folder.join(self.stem);
         match self.frames {
             Frames::Cache { .. } => format!(
-                "{}, its positions in {} and what collides in {}",
+                "{}, its positions in {} and colliding primitives in {}",
                 path.with_extension("ply").display(),
                 path.with_extension("pc2").display(),
                 self.folder.join("colliding.csv").display()
             ),
             Frames::Numbered(format) => {
                 format!(
-                    "{} and those after it",
+                    "{} and the following files",
                     self.numbered_path(format, 0).display()
                 )
             }
@@ -250,7 +250,7 @@ fn n_vertices(simulation: &Simulation) -> usize {
     simulation.masses().len()
 }
 
-/// The positions that were detected in, a body after the other.
+/// The positions that the detector used, body by body.
 fn positions(scene: &Scene, bodies: &[(BodyId, &str)]) -> Result<Vec<[f32; 3]>, Error> {
     let mut all = Vec::new();
     for &(id, _) in bodies {
@@ -270,7 +270,7 @@ struct Log {
 
 impl Log {
     fn create(path: PathBuf, header: &str) -> Result<Self, Error> {
-        // The file that is there is replaced once its successor has a header on the disk.
+        // An existing file is replaced once the new one has its header on the disk.
         let mut file = AtomicFile::create(&path)?;
         if let Err(source) = file.write_all(header.as_bytes()) {
             return Err(Error::Write { path, source });
@@ -279,7 +279,7 @@ impl Log {
         Log::open(path, |path| OpenOptions::new().append(true).open(path))
     }
 
-    /// Keeps the rows of steps before `step`, and says how many there are.
+    /// Keeps the rows of steps before `step`, and returns their number.
     fn resume(path: PathBuf, step: u64) -> Result<(Self, u64), Error> {
         let text = fs::read_to_string(&path).map_err(|source| Error::Read {
             path: path.clone(),
@@ -290,7 +290,7 @@ impl Log {
         let mut n_rows = 0;
         for line in lines {
             let of = line.split(',').next().and_then(|field| field.parse().ok());
-            // A row that was cut short by an interruption belongs to a later step.
+            // A row cut off by an interruption belongs to a later step.
             if !line.ends_with('\n') || of.is_none_or(|of: u64| of >= step) {
                 break;
             }

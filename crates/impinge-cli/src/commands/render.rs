@@ -16,7 +16,7 @@ use crate::picture::Drawer;
 use crate::watch::Watch;
 use crate::{headline, json, regions};
 
-/// Draws meshes, and says what collides in them.
+/// Draws meshes, and prints what collides.
 pub fn render(args: &RenderArgs, cancel: &CancelToken) -> Result<(), Error> {
     let how = &args.detector;
     let path = &args.png.0;
@@ -33,7 +33,7 @@ pub fn render(args: &RenderArgs, cancel: &CancelToken) -> Result<(), Error> {
         Query::all()
     };
     let query = query(asked, &args.ask, &ids)?;
-    // Before anything is searched for: without an adapter there will be no picture.
+    // The drawer comes before detection: without an adapter there is no picture.
     let mut drawer = Drawer::new(&args.picture, how.device.as_deref())?;
     let mut detector = detector(how)?;
     let watch = Watch::detection(!how.no_progress, "detecting");

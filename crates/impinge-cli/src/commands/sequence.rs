@@ -1,4 +1,4 @@
-//! `impinge sequence`: a frame after the other.
+//! `impinge sequence`: every frame of a sequence.
 
 use std::io::{Write, stderr};
 
@@ -121,7 +121,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     hit(&args.ask, n_pairs)
 }
 
-/// What is written of each frame, besides what is printed.
+/// The output files of each frame.
 struct Outputs<'a> {
     args: &'a SequenceArgs,
     inputs: Inputs,
@@ -181,7 +181,7 @@ impl<'a> Outputs<'a> {
     }
 }
 
-/// The frames of the sequence, welded as the mesh is.
+/// The frames of the sequence, welded like the mesh.
 struct Frames {
     sequence: Sequence,
     weld: Option<Weld>,
@@ -224,7 +224,7 @@ impl step::Frames for Frames {
                 weld.positions(&positions)
                     .ok_or_else(|| impinge_io::Error::Mismatch {
                         file: self.name.clone(),
-                        what: "positions a frame (the mesh, before welding, has as many vertices)"
+                        what: "positions per frame (the mesh has as many vertices before welding)"
                             .to_owned(),
                         expected: weld.map().len() as u64,
                         found: positions.len() as u64,
@@ -242,11 +242,11 @@ impl step::Frames for Frames {
     }
 }
 
-/// A line a frame for people, and one about all of them.
+/// The text output: one line per frame, and one summary line.
 #[derive(Default)]
 struct Lines {
     times: Times,
-    /// Fewest and most pairs of a frame.
+    /// The smallest and the largest number of pairs in a frame.
     extremes: Option<(usize, usize)>,
 }
 

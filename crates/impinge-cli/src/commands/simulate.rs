@@ -16,10 +16,10 @@ use crate::stop::Patience;
 use crate::text::{counted, grouped};
 use crate::watch::Watch;
 
-/// Steps between two saved states.
+/// The number of steps between two saved states.
 const SAVE_EVERY: u64 = 25;
 
-/// What the solids are called.
+/// The names of the solids.
 const NAMES: [&str; 2] = ["lower", "upper"];
 
 /// `impinge simulate`.
@@ -53,7 +53,7 @@ pub fn simulate(args: &SimulateArgs, cancel: &CancelToken) -> Result<(), Error> 
         }
         (false, Some((path, _))) => {
             return Err(Error::Usage(format!(
-                "{} is there: go on from it with --resume, or choose another folder",
+                "{} exists: continue from it with --resume, or choose another folder",
                 path.display()
             )));
         }
@@ -67,7 +67,7 @@ pub fn simulate(args: &SimulateArgs, cancel: &CancelToken) -> Result<(), Error> 
         usize::try_from(n_left).unwrap_or(usize::MAX),
         false,
     );
-    // A step is short; what it found is saved before the program ends.
+    // A step is short, so a request to stop waits for it, and its state is saved.
     let _patience = Patience::new();
     let mut summary = Summary::default();
     let result = run(
@@ -110,13 +110,13 @@ fn introduce(scene: &DropScene, simulation: &Simulation, n_steps: u64) -> Result
         simulation.settings().dt * 1e3,
         match simulation.n_steps() {
             0 => String::new(),
-            done => format!(", going on after step {}", grouped(done)),
+            done => format!(", continuing after step {}", grouped(done)),
         }
     )?;
     Ok(to.flush()?)
 }
 
-/// What a run writes to.
+/// The outputs of a run.
 struct Running<'a> {
     bodies: &'a [(BodyId, &'a str)],
     record: &'a mut Record,
@@ -124,7 +124,7 @@ struct Running<'a> {
     watch: &'a Watch,
 }
 
-/// Frame k shows the state after k steps and what is found there; it is written before step k is made.
+/// Runs the simulation. Frame k shows the state after k steps and its pairs; it is written before step k is made.
 fn run(
     simulation: &mut Simulation,
     detector: &mut Detector,
@@ -156,13 +156,13 @@ fn run(
     }
 }
 
-/// What this run found and what it took.
+/// Counts and times of this run.
 #[derive(Default)]
 struct Summary {
     times: Times,
     advance_ms: Vec<f64>,
     n_iterations: usize,
-    /// Of each frame: pairs, and colliding tetrahedra of each body.
+    /// The number of pairs of each frame; below, the colliding tetrahedra of each body.
     n_pairs: Vec<usize>,
     n_colliding: Vec<Vec<usize>>,
 }
@@ -199,7 +199,7 @@ impl Summary {
         if !self.advance_ms.is_empty() {
             writeln!(
                 to,
-                "finite elements: median {:.3} ms a step, 95 % within {:.3} ms; {:.1} iterations of the solver",
+                "finite elements: median {:.3} ms per step, 95 % within {:.3} ms; {:.1} iterations of the solver",
                 percentile(&self.advance_ms, 50),
                 percentile(&self.advance_ms, 95),
                 self.n_iterations as f64 / self.advance_ms.len() as f64

@@ -1,4 +1,4 @@
-//! `impinge step`: what touches while bodies move from one pose to another, and when.
+//! `impinge step`: finds what touches while bodies move from one pose to another, and when.
 
 mod answer;
 mod colors;
@@ -56,7 +56,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     }
     let impacts = detector.impacts_with(&bodies.scene, &step, &control)?;
     drop(watch);
-    // Files come first: where one can't be written, no answer is printed that looks like success.
+    // Files are written first: if one can't be written, no answer is printed that looks like success.
     if let Some(file) = &args.impacts {
         rows::write(file, args.how.toi, impacts)?;
     }
@@ -78,7 +78,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
 fn query(args: &StepArgs, bodies: &Moving) -> Result<Query, Error> {
     if args.no_self && bodies.ids.len() < 2 {
         return Err(Error::Usage(
-            "--no-self leaves nothing to test where one body is given".to_owned(),
+            "--no-self leaves nothing to test if there is only one body".to_owned(),
         ));
     }
     let asked = match args.no_self {

@@ -46,7 +46,7 @@ fn plan(args: &PlanArgs, cancel: &CancelToken) -> Result<(), Error> {
         cells: None,
         replace: args.replace,
     };
-    let watch = Watch::detection(!args.no_progress, "looking at primitives");
+    let watch = Watch::detection(!args.no_progress, "reading primitives");
     let plan = Plan::make(
         &args.folder,
         &args.meshes,
@@ -111,7 +111,7 @@ fn run(args: &RunArgs, cancel: &CancelToken) -> Result<(), Error> {
             let (rank, world_size) = (args.share.rank, args.share.world_size.get());
             if rank >= world_size {
                 return Err(Error::Usage(format!(
-                    "--rank {rank} of --world-size {world_size}: ranks begin at 0"
+                    "--rank {rank} of --world-size {world_size}: ranks start at 0"
                 )));
             }
             (0..plan.n_tiles())
@@ -170,7 +170,7 @@ fn summarise(results: &[TileResult]) -> Result<(), Error> {
     for result in results.iter().filter(|result| result.n_pieces > 1) {
         writeln!(
             to,
-            "tile {}: {} that no cut of space parts; asked in {} pieces, each with each",
+            "tile {}: {} that no cut of space separates; run in {} pieces, every piece against every other",
             result.tile,
             counted(result.n_primitives, "primitive"),
             grouped(result.n_pieces),

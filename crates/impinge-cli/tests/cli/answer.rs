@@ -136,7 +136,7 @@ fn written_rows_are_the_library_s() {
             seen.push(rows);
         }
     }
-    // Each option changes something, or this test could not fail.
+    // Each option must change something; otherwise this test could not fail.
     seen.sort();
     let n_cases = seen.len();
     seen.dedup();
@@ -259,7 +259,7 @@ fn coloured_meshes_hold_every_body() {
     }
     let bytes = std::fs::read(folder.path("seen.vtu")).unwrap();
     assert!(bytes.windows(9).any(|window| window == b"colliding"));
-    // Tetrahedra go where tetrahedra can.
+    // Tetrahedra are written to formats that support them.
     folder.medit("t.mesh", &solid_ball(40));
     folder
         .run(["pairs", "a.ply", "t.mesh", "--out", "mixed.vtu"])
@@ -275,7 +275,7 @@ fn polygons_are_fanned_with_a_note() {
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n",
     );
     let run = folder.run(["self", "quad.obj"]);
-    let expected = "note: quad.obj: polygons fanned (primitives are numbered after that): 1\n";
+    let expected = "note: quad.obj: polygons split into triangles (primitive numbers count the triangles): 1\n";
     assert_eq!(run.stderr, expected);
     let object = folder.run(["self", "quad.obj", "--json"]).json();
     assert_eq!(object["bodies"][0]["primitives"], json!(2));

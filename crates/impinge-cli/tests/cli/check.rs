@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::harness::{Folder, Run, keys};
 
-/// A closed tetrahedron as OBJ, and what may be added to it.
+/// A closed tetrahedron as OBJ, to which tests append.
 const CLOSED: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
 fn meshes() -> Folder {
@@ -177,7 +177,7 @@ fn ranks_make_the_rows_of_one_process_and_a_run_goes_on() {
         all += &read(&folder, &format!("two/rows-{batch:08}.jsonl"));
     }
     assert_eq!(all, one);
-    // Rows that are there are not made again: this one would be another now.
+    // Existing rows are not made again: this mesh would have another row now.
     folder.text("open.obj", CLOSED);
     let args = ["check", "--json", "--list", "list.txt", "--out", "one"];
     assert_eq!(folder.run(args).printed(), one);
@@ -188,7 +188,7 @@ fn ranks_make_the_rows_of_one_process_and_a_run_goes_on() {
         .collect();
     folder.text("one/rows-00000000.jsonl", &first_two);
     assert_ne!(folder.run(args).printed(), one);
-    // Another list is not mixed with it.
+    // Rows of another list are refused.
     let error = folder.run(["check", "pierced.obj", "--out", "one"]).error();
     assert!(
         error.contains("rows-00000000.jsonl:1") && error.contains("not of this run"),
@@ -238,7 +238,7 @@ fn a_mesh_that_takes_too_long_is_a_row() {
 #[test]
 fn a_mesh_that_is_too_large_is_a_row() {
     let folder = meshes();
-    // Three gigabytes of nothing, in no room on the disk.
+    // A sparse file of three gigabytes takes no room on the disk.
     let sparse = std::fs::File::create(folder.path("large.stl")).unwrap();
     sparse.set_len(3 << 30).unwrap();
     let args = [

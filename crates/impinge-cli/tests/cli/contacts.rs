@@ -49,7 +49,7 @@ fn contacts_and_curves_are_written() {
         .unwrap()
         + 11;
     assert_eq!(ply.len() - end, n_vertices * (24 + 12));
-    // People are told as well, and the array has a row for each corner.
+    // The text has the counts as well, and the array has one row per corner.
     let printed = folder
         .run([
             "pairs",

@@ -13,7 +13,7 @@ fn a_small_demo_finds_checks_and_writes() {
     for word in [
         "3 deforming bodies, 3,000 triangles, 12 frames",
         "worm with itself",
-        "frames a second",
+        "frames per second",
         "checked: naive finds the same",
         "wrote out/demo.glb",
     ] {
@@ -21,7 +21,7 @@ fn a_small_demo_finds_checks_and_writes() {
     }
     let mesh = read(&folder.path("out/demo.glb"), &ReadOptions::default()).unwrap();
     assert_eq!(mesh.n_primitives(), 3_000);
-    // Everybody meets, and the worm itself: a demo of nothing would show nothing.
+    // All bodies meet, and the worm meets itself: otherwise the demo would show nothing.
     for what in [
         "worm with itself",
         "worm and knot",

@@ -1,4 +1,4 @@
-//! GPUs: listed, chosen, and refused by name.
+//! GPUs: listed and chosen by name; unknown names are refused.
 
 use crate::harness::Folder;
 use impinge_scenes::surfaces::ball;

@@ -1,4 +1,4 @@
-//! What somebody sees first: the answer in the first line, and the answer that is meant.
+//! A user's first impression: the answer in the first line, and the answer that the user means.
 
 use std::io::Write;
 use std::process::Stdio;
@@ -39,7 +39,7 @@ fn a_clean_mesh_is_clean_in_every_format() {
         format!("note: sphere.stl: vertices welded to others: {n_welded}\n")
     );
     assert_eq!(run.printed(), "sphere.stl: no pairs of 1,280 triangles\n");
-    // An STL file's triangles share nothing but positions, so it makes no sense to keep them apart.
+    // Triangles of an STL file share only positions, so they are always welded.
     for options in [&["--no-weld"][..], &[]] {
         let args = ["self", "sphere.stl", "--json"];
         let object = folder.run(args.iter().chain(options)).json();
@@ -84,7 +84,7 @@ fn what_is_not_welded_is_counted() {
             [&json!(vertices), &json!(welded), &json!(coincident)]
         );
     }
-    // Between bodies it does not matter, and nobody looks.
+    // Between bodies it does not matter, so nothing is counted.
     let object = folder
         .run(["pairs", "split.obj", "split.obj", "--json"])
         .json();
@@ -156,7 +156,7 @@ fn the_first_line_is_the_answer_and_the_next_ones_say_where() {
         .map(|region| region["center"][0].as_f64().unwrap())
         .collect();
     xs.sort_by(f64::total_cmp);
-    // The cubes share the space from 0.4 to 0.5 of each axis, or that lies on the sides of it.
+    // Each place lies near one of the two corners where the cubes overlap.
     assert!(xs[0].abs() < 2.0 && (xs[1] - 50.5).abs() < 2.0, "{xs:?}");
     for region in regions {
         assert!(region["size"].as_f64().unwrap() < 2.5);
@@ -251,7 +251,7 @@ fn pairs_and_meshes_go_through_pipes() {
             .spawn()
             .unwrap();
         let bytes = std::fs::read(folder.path("boxes.ply")).unwrap();
-        // A run that refuses does not read.
+        // A run that ends with an error does not read its input.
         let _ = child.stdin.take().unwrap().write_all(&bytes);
         child.wait_with_output().unwrap().into()
     };
@@ -308,7 +308,7 @@ fn a_device_that_is_named_is_wanted() {
         run.stdout.is_empty() && run.stderr.lines().count() == 1,
         "{run:?}"
     );
-    // Nobody has asked for a GPU: nothing is said of drivers.
+    // Without a request for a GPU, no driver prints a message.
     let run = folder.run(["self", "a.ply"]);
     assert_eq!(run.stderr, "");
 }

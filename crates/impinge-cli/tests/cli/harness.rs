@@ -1,4 +1,4 @@
-//! Running the binary, and files for it.
+//! Runs the binary, and makes files for it.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ pub fn program() -> Command {
     command
 }
 
-/// What a run left behind.
+/// The result of a run.
 #[derive(Debug)]
 pub struct Run {
     pub code: Option<i32>,
@@ -36,7 +36,7 @@ impl From<Output> for Run {
 }
 
 impl Run {
-    /// Asserts exit code 0 and gives what was printed.
+    /// Asserts exit code 0 and returns what was printed.
     #[track_caller]
     pub fn printed(self) -> String {
         assert_eq!(self.code, Some(0), "{}", self.stderr);
@@ -55,7 +55,7 @@ impl Run {
         serde_json::from_str(&text).unwrap()
     }
 
-    /// Asserts exit code 1, nothing printed, and one line on standard error, which it gives.
+    /// Asserts exit code 1, nothing printed, and one line on standard error, which it returns.
     #[track_caller]
     pub fn error(self) -> String {
         assert_eq!(
@@ -69,7 +69,7 @@ impl Run {
         line.strip_prefix("impinge: ").expect(line).to_owned()
     }
 
-    /// Asserts exit code 2 and nothing printed, and gives what was said.
+    /// Asserts exit code 2 and nothing printed, and returns the message.
     #[track_caller]
     pub fn misuse(self) -> String {
         assert_eq!(
@@ -110,7 +110,7 @@ impl Folder {
         std::fs::write(self.path(name), text).unwrap();
     }
 
-    /// Writes triangles as a binary PLY file: the very f32 coordinates.
+    /// Writes triangles as a binary PLY file with exactly these f32 coordinates.
     pub fn ply(&self, name: &str, model: &Model) {
         let Elements::Triangles(faces) = &model.elements else {
             panic!("PLY is for triangles");

@@ -1,5 +1,5 @@
-//! Nothing is lost and nothing hangs: full disks, outputs that are inputs, inputs that never end, meshes that name files
-//! elsewhere.
+//! Nothing is lost and nothing hangs with full disks, outputs that are also inputs, inputs that never end, and meshes that
+//! name files elsewhere.
 #![cfg(unix)]
 
 use std::fs;
@@ -58,7 +58,7 @@ fn a_full_disk_leaves_older_files_as_they_were() {
         );
         fs::remove_file(folder.path(file)).unwrap();
         assert_eq!(names(&folder), ["a.ply", "b.ply"]);
-        // Without the limit it is written, and has more than that.
+        // Without the limit the file is written, and is longer than that.
         folder
             .run(["pairs", "a.ply", "b.ply", option, file])
             .printed();

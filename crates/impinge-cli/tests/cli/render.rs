@@ -57,7 +57,7 @@ fn what_meets_is_red_and_blue() {
         assert_eq!(size, [320, 200]);
         let counts = red_and_blue(&seen);
         assert!(counts.iter().all(|&n| n > 50), "{other}: {counts:?}");
-        // Twice the same bytes; another viewer, other bytes.
+        // The same command gives the same bytes; another viewpoint gives other bytes.
         let once = std::fs::read(folder.path("out.png")).unwrap();
         let again = |options: &[&str]| {
             folder
@@ -76,7 +76,7 @@ fn what_meets_is_red_and_blue() {
             assert!(once != again(options), "{options:?}");
         }
     }
-    // A body alone meets nobody.
+    // A single body meets no other.
     folder
         .run(["render", "a.ply", "--png", "out.png", "--size", "64x64"])
         .printed();
@@ -130,7 +130,7 @@ fn without_an_adapter_the_answer_is_printed_and_the_error_is_one_line() {
             "cpu",
         ];
         let mut command = folder.command(args.iter().chain(options));
-        // The loader of Vulkan takes drivers from here alone.
+        // The Vulkan loader takes drivers only from here.
         command.env("VK_DRIVER_FILES", "/no/driver.json");
         command.env("VK_ICD_FILENAMES", "/no/driver.json");
         command.output().unwrap().into()

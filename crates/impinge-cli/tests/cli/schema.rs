@@ -12,7 +12,7 @@ fn schema() -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// What is wrong with `value`, by the part of JSON Schema that the file uses; a keyword that is not known here is an error.
+/// The errors in `value`, by the part of JSON Schema that the file uses; an unknown keyword is an error too.
 fn wrong(schema: &Value, value: &Value, at: &str) -> Vec<String> {
     let mut found = Vec::new();
     let mut say = |is_right: bool, what: String| {

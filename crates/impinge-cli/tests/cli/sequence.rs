@@ -149,7 +149,7 @@ fn text_for_people() {
 fn frames_are_welded_as_the_mesh_is() {
     let folder = Folder::new();
     let (rest, frames) = falling(4);
-    // Every triangle with vertices of its own, as in a file that repeats them.
+    // Every triangle has vertices of its own, as in a file that repeats them.
     let soup = |model: &Model| -> Model {
         let impinge::Elements::Triangles(faces) = &model.elements else {
             unreachable!("a ball is made of triangles");
@@ -239,7 +239,7 @@ fn pairs_and_meshes_of_every_frame_are_written() {
         keys(&first),
         ["frame", "body_a", "primitive_a", "body_b", "primitive_b"]
     );
-    // Frames that are read are not written over, and one file cannot hold them all.
+    // Input frames are not overwritten, and one file cannot hold all frames.
     for out in ["run_%03d.ply", "seen.ply"] {
         let args = ["sequence", "ball.ply", "run_000.ply", "--out", out];
         folder.run(args).code.filter(|code| *code == 2).expect(out);

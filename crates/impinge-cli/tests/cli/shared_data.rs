@@ -1,4 +1,4 @@
-//! Real meshes and published answers, where they are at hand.
+//! Real meshes and published answers.
 
 use std::path::PathBuf;
 

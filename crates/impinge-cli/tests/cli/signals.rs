@@ -1,4 +1,4 @@
-//! Ctrl-C, and readers that go away, in the middle of a long run.
+//! Ctrl-C, and readers that close the pipe, in the middle of a long run.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Read, Write};
@@ -54,14 +54,14 @@ fn send(child: &Child, signal: &str) {
     assert!(sent.success());
 }
 
-/// Waits until the child has ended, and says how long that took.
+/// Waits until the child has ended, and returns how long that took.
 fn ended(child: &mut Child) -> (Option<i32>, Duration) {
     let started = Instant::now();
     let code = child.wait().unwrap().code();
     (code, started.elapsed())
 }
 
-/// The second that a user waits at most, and what a loaded machine takes to notice.
+/// The second that a user waits at most, plus a margin for a loaded machine.
 const SOON: Duration = Duration::from_secs(4);
 
 #[test]
@@ -122,7 +122,7 @@ fn reading_and_writing_are_stopped_too() {
     assert!(took < SOON, "{took:?}");
 }
 
-/// As `nohup` starts programs: what it asks to be ignored is.
+/// Like a program started by `nohup`: ignored signals stay ignored.
 #[test]
 fn an_ignored_signal_stays_ignored() {
     let folder = Folder::new();

@@ -54,7 +54,7 @@ fn a_cache_and_what_collides_in_it() {
     assert_eq!(sequence.n_frames(), 41);
     let rows = steps(&folder, "run/steps.csv");
     assert_eq!(rows.len(), 41);
-    // The mesh fits the cache, and the command for sequences takes both: the bodies are one there.
+    // The mesh fits the cache, and `impinge sequence` reads both: there, the two bodies are one.
     let mesh = read(&folder.path("run/blocks.ply"), &ReadOptions::default()).unwrap();
     assert!(matches!(&mesh.elements, Elements::Tetrahedra(tets) if tets.len() == 2 * 1296));
     assert_eq!(mesh.positions, sequence.frame(0).unwrap());
@@ -70,7 +70,7 @@ fn a_cache_and_what_collides_in_it() {
         ])
         .json();
     assert_eq!(found["pairs"].to_string(), rows[40][1], "{found}");
-    // Bodies meet, and the table of what collides counts as the table of steps does.
+    // Bodies meet, and the table of colliding primitives agrees with the table of steps.
     assert!(rows[40][1].parse::<u32>().unwrap() > 100);
     let colliding = fs::read_to_string(folder.path("run/colliding.csv")).unwrap();
     let lower = colliding
@@ -97,7 +97,7 @@ fn numbered_meshes_mark_what_collides() {
     }
     let vtu = fs::read(folder.path("vtu/blocks_00012.vtu")).unwrap();
     assert!(vtu.windows(16).any(|bytes| bytes == b"Name=\"colliding\""));
-    // Going on in numbered files, also where the last ones were lost.
+    // A run continues in numbered files, even if the last ones were lost.
     fs::remove_file(folder.path("vtu/blocks_00012.vtu")).unwrap();
     let more = [
         "simulate", "blocks", "--out", "vtu", "--format", "vtu", "--resume",
@@ -107,14 +107,14 @@ fn numbered_meshes_mark_what_collides() {
         .printed();
     assert!(fs::read(folder.path("vtu/blocks_00012.vtu")).unwrap() == vtu);
     assert!(folder.path("vtu/blocks_00014.vtu").is_file());
-    // In another format there is nothing to go on with.
+    // In another format there is nothing to continue.
     let other = [
         "simulate", "blocks", "--out", "vtu", "--format", "ply", "--resume",
     ];
     let said = folder
         .run(other.into_iter().chain(["--steps", "15"]))
         .misuse();
-    assert!(said.contains("blocks_00013.ply is not there"), "{said}");
+    assert!(said.contains("blocks_00013.ply does not exist"), "{said}");
 }
 
 #[cfg(unix)]
@@ -129,7 +129,7 @@ fn ctrl_c_saves_and_resume_goes_on_as_if_nothing_had_been() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // The first saved state says that the run is under way.
+    // The first saved state shows that the run has started.
     let state = folder.path("stopped/state.bin");
     let started = Instant::now();
     while !state.is_file() {
@@ -154,10 +154,10 @@ fn ctrl_c_saves_and_resume_goes_on_as_if_nothing_had_been() {
         .and_then(|step| step.parse().ok())
         .unwrap_or_else(|| panic!("{said}"));
     assert!(
-        step >= 25 && said.ends_with("--resume goes on in stopped"),
+        step >= 25 && said.ends_with("--resume continues in stopped"),
         "{said}"
     );
-    // What a killed run leaves behind its last state, too, is cut off.
+    // Rows after the last saved state, which a killed run leaves, are cut off.
     let table = folder.path("stopped/steps.csv");
     let mut text = fs::read_to_string(&table).unwrap();
     text += &format!("{step},1,2,3\n{},half a r", step + 1);
@@ -169,7 +169,7 @@ fn ctrl_c_saves_and_resume_goes_on_as_if_nothing_had_been() {
     ];
     let text = folder.run(rest).printed();
     assert!(
-        text.contains(&format!("going on after step {step}")),
+        text.contains(&format!("continuing after step {step}")),
         "{text}"
     );
     folder
@@ -191,11 +191,11 @@ fn ctrl_c_saves_and_resume_goes_on_as_if_nothing_had_been() {
 fn runs_are_not_overwritten_and_damage_is_seen() {
     let folder = Folder::new();
     let args = ["simulate", "blocks", "--out", "run", "--steps", "3"];
-    // Nothing to go on from: it starts.
+    // Without a saved state, --resume starts a new run.
     folder.run(args.into_iter().chain(["--resume"])).printed();
     let said = folder.run(args).misuse();
     assert!(
-        said.contains("run/state.bin is there: go on from it with --resume"),
+        said.contains("run/state.bin exists: continue from it with --resume"),
         "{said}"
     );
     let fewer = [

@@ -126,7 +126,7 @@ fn the_json_holds_what_the_library_says() {
     assert_eq!(answer["bodies"][1]["name"], "b0.ply");
     assert_eq!(answer["bodies"][1]["end"], "b1.ply");
 
-    // The first alone is the same.
+    // `--earliest` gives the same first impact.
     let alone = folder.run(
         ["step"]
             .iter()
@@ -140,7 +140,7 @@ fn the_json_holds_what_the_library_says() {
         (&Value::Bool(false), &Value::Null)
     );
 
-    // And in words.
+    // The same as text.
     let printed = folder.run(["step"].iter().chain(&FILES)).printed();
     assert!(printed.starts_with("not free: "), "{printed}");
     assert!(
@@ -236,7 +236,7 @@ fn ends_of_another_body_are_refused() {
     assert!(misuse.contains("nothing to test"), "{misuse}");
 }
 
-/// Two triangles with a vertex each at one position at the start; at the end it has parted.
+/// Two triangles, each with a vertex at the same position at the start; at the end these vertices have separated.
 #[test]
 fn welding_keeps_what_parts() {
     let folder = Folder::new();

@@ -1,4 +1,4 @@
-//! `impinge tiles`: the answer of the whole scene, in steps that may be killed.
+//! `impinge tiles`: gives the answer of the whole scene, in steps that may be killed.
 
 use impinge_scenes::{Model, soup};
 use serde_json::Value;
@@ -121,7 +121,7 @@ fn what_is_missing_is_said() {
     folder.run(again.into_iter().chain(["--replace"])).printed();
 }
 
-/// The kernel ends a process that writes more than it may: in the middle of whatever file that is.
+/// The kernel ends a process that exceeds its file size limit, in the middle of whatever file it writes.
 #[cfg(target_os = "linux")]
 #[test]
 fn killed_while_writing_and_run_again_the_answer_is_the_same() {

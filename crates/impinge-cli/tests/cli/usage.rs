@@ -190,7 +190,7 @@ fn closed_pipes_are_no_panic() {
         assert_eq!(String::from_utf8(output.stderr).unwrap(), "", "{args:?}");
         assert_eq!(output.status.code(), Some(0), "{args:?}");
     }
-    // Standard error may be closed as well: the code still tells.
+    // Standard error may be closed as well: the exit code is still right.
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
     let status = program()

@@ -22,13 +22,14 @@ Examples:
   impinge check --list meshes.txt --out rows --timeout 60 --memory 4G
   impinge check --list meshes.txt --out rows --rank $SLURM_ARRAY_TASK_ID --world-size 64
 
-Every count is exact. Vertices at one position are welded first, unless --no-weld says otherwise.
-Self-intersections are pairs that meet in more than the vertices that they share; degenerate
-faces have exactly zero area. Of a mesh of tetrahedra, faces take the place of edges.
+Every count is exact. Vertices at the same position are welded first, unless --no-weld is given.
+Self-intersections are pairs that also meet outside their common vertices, edge or face;
+degenerate faces have exactly zero area. For tetrahedra, faces are counted instead of edges.
 
 Each mesh is checked in a child process. A mesh that can't be read, takes too long or runs out
-of memory gets a row with its `error`, and the run goes on. The exit code is 0 unless --fail-on
-names what was found. Run the same command again to go on with an interrupted run in --out.";
+of memory gets a row with its `error`, and the run continues. The exit code is 0 unless a mesh
+has a problem that --fail-on names. Run the same command again to continue an interrupted run
+in --out.";
 
 #[derive(Debug, Args)]
 pub struct CheckArgs {
@@ -41,19 +42,19 @@ pub struct CheckArgs {
     /// Print one line of JSON per mesh and nothing else
     #[arg(long)]
     pub json: bool,
-    /// A folder for rows, in which an interrupted run goes on; or a mesh file that shows what is wrong (.glb, .ply, .vtu)
+    /// A folder for rows, in which an interrupted run can continue; or a mesh file that shows the problems (.glb, .ply, .vtu)
     #[arg(long, value_name = "DIR|MESH")]
     pub out: Option<Out>,
-    /// Exit with code 1 where any mesh has one of these (comma-separated)
+    /// Exit with code 1 if any mesh has one of these problems (comma-separated)
     #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',')]
     pub fail_on: Vec<FailOn>,
-    /// Leave vertices at one position apart
+    /// Do not weld vertices at the same position
     #[arg(long)]
     pub no_weld: bool,
     /// Show no progress bar
     #[arg(long)]
     pub no_progress: bool,
-    /// Seconds that one mesh may take [default: as long as it takes]
+    /// Seconds that one mesh may take [default: no limit]
     #[arg(long, value_name = "S", value_parser = seconds, help_heading = "Many meshes")]
     pub timeout: Option<f64>,
     /// Address space of each child process, such as 4G (Unix) [default: no limit]
@@ -62,7 +63,7 @@ pub struct CheckArgs {
     /// Child processes at a time [default: one per core]
     #[arg(long, value_name = "N", help_heading = "Many meshes")]
     pub jobs: Option<NonZeroUsize>,
-    /// The share of this process, from 0
+    /// The rank of this process, from 0
     #[arg(
         long,
         value_name = "R",
@@ -86,10 +87,10 @@ pub struct CheckArgs {
         help_heading = "Many meshes"
     )]
     pub batch: NonZeroUsize,
-    /// Check again what ended by a limit or a crash in an earlier run in --out
+    /// Check meshes again that ended by a limit or a crash in an earlier run in --out
     #[arg(long, help_heading = "Many meshes")]
     pub retry: bool,
-    /// Draw what is wrong as a picture (.png)
+    /// Draw the problems as a picture (.png)
     #[cfg(feature = "gpu")]
     #[arg(long, value_name = "FILE")]
     pub png: Option<PngFile>,
@@ -103,7 +104,7 @@ pub struct CheckWorkerArgs {
     /// CPU threads
     #[arg(long, value_name = "N", default_value = "1")]
     pub threads: usize,
-    /// Leave vertices at one position apart
+    /// Do not weld vertices at the same position
     #[arg(long)]
     pub no_weld: bool,
     /// Address space
@@ -111,12 +112,12 @@ pub struct CheckWorkerArgs {
     pub memory: Option<u64>,
 }
 
-/// Where results go besides standard output.
+/// An output besides standard output.
 #[derive(Debug, Clone)]
 pub enum Out {
-    /// Rows.
+    /// A folder for rows.
     Folder(PathBuf),
-    /// The meshes in colours.
+    /// A file for the coloured meshes.
     Mesh(MeshFile),
 }
 
@@ -135,10 +136,10 @@ impl FromStr for Out {
     }
 }
 
-/// What makes a run fail.
+/// A problem that makes a run fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum FailOn {
-    /// Pairs that meet in more than what they share
+    /// Pairs that also meet outside their common vertices, edge or face
     SelfIntersections,
     /// Primitives of zero area or volume
     Degenerate,
@@ -146,9 +147,9 @@ pub enum FailOn {
     Duplicates,
     /// Edges of more than two triangles, vertices of several fans
     NonManifold,
-    /// Edges of one triangle only
+    /// Edges of only one triangle
     Boundary,
-    /// Neighbours oriented against each other
+    /// Neighbours with opposite orientations
     Orientation,
     /// Coordinates that are NaN or infinite
     Nan,

@@ -1,6 +1,6 @@
-//! What is wrong with meshes, in colours: mesh files and pictures.
+//! The problems of meshes in colours: mesh files and pictures.
 //!
-//! Marks of primitives do not travel between processes: meshes that have a finding are checked once more, in this one.
+//! Child processes do not send marks of primitives, so meshes are checked once more in this process.
 
 use std::io::Write;
 use std::path::Path;
@@ -31,7 +31,7 @@ fn marked(rows: &[Row], args: &CheckArgs) -> Result<Vec<(String, Checked)>, Erro
         .collect();
     if checked.is_empty() {
         return Err(Error::Usage(
-            "no mesh could be checked, so there is nothing to show".to_owned(),
+            "no mesh could be checked, so there is nothing to draw".to_owned(),
         ));
     }
     Ok(checked)
@@ -43,7 +43,7 @@ fn color(checked: &Checked, primitive: usize) -> [u8; 3] {
         .map_or(FINE, Problem::color)
 }
 
-/// Writes the meshes, welded as they were checked; each primitive has the colour of its most serious problem.
+/// Writes the meshes, welded as in the check; each primitive has the colour of its most serious problem.
 pub fn write_mesh(file: &MeshFile, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
     let checked = marked(rows, args)?;
     let colors: Vec<Vec<[u8; 3]>> = checked
@@ -84,7 +84,7 @@ pub fn write_mesh(file: &MeshFile, rows: &[Row], args: &CheckArgs) -> Result<(),
     Ok(())
 }
 
-/// What the colours mean.
+/// Prints the meaning of the colours.
 pub fn print_legend() -> Result<(), Error> {
     let entries =
         Problem::ALL.map(|problem| format!("{} {}", problem.color_name(), problem.name()));
@@ -92,7 +92,7 @@ pub fn print_legend() -> Result<(), Error> {
     Ok(())
 }
 
-/// Draws the meshes in the same colours. Primitives with a problem show through what hides them.
+/// Draws the meshes in the same colours. Primitives with a problem show through faces that hide them.
 #[cfg(feature = "gpu")]
 pub fn draw(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
     use impinge_io::Elements;

@@ -1,4 +1,4 @@
-//! What `impinge check` prints for people, and what makes it fail.
+//! The table of `impinge check`, and its failures.
 
 use std::io::Write;
 
@@ -13,7 +13,7 @@ use crate::text::grouped;
 const LISTED: usize = 50;
 
 impl FailOn {
-    /// All but `any`, in the order of the summary.
+    /// All problems except `any`, in the order of the summary.
     const EACH: [FailOn; 8] = [
         FailOn::SelfIntersections,
         FailOn::Degenerate,
@@ -25,7 +25,7 @@ impl FailOn {
         FailOn::Error,
     ];
 
-    /// Its words in a sentence: "3 with …".
+    /// The words for it in a sentence: "3 with …".
     fn words(self) -> &'static str {
         match self {
             FailOn::SelfIntersections => "self-intersections",
@@ -40,7 +40,7 @@ impl FailOn {
         }
     }
 
-    /// Whether a mesh has it.
+    /// Whether a mesh has the problem.
     fn is_in(self, row: &Row) -> bool {
         let counted =
             |get: fn(&Counts) -> u64| row.result.as_ref().is_ok_and(|counts| get(counts) > 0);
@@ -49,7 +49,7 @@ impl FailOn {
             FailOn::Degenerate => counted(|c| c.degenerate),
             FailOn::Duplicates => counted(|c| c.duplicates),
             FailOn::NonManifold => counted(|c| c.non_manifold_facets + c.non_manifold_vertices),
-            // A body of tetrahedra has a border by its nature.
+            // Meshes of tetrahedra always have a border.
             FailOn::Boundary => counted(|c| {
                 if c.n_tetrahedra > 0 {
                     0
@@ -67,7 +67,7 @@ impl FailOn {
     }
 }
 
-/// A row per mesh, or per mesh that has something where they are many; then a summary.
+/// Prints one row per mesh (if there are many, only meshes with a problem), then a summary.
 pub fn print(rows: &[Row]) -> Result<(), Error> {
     let mut to = out();
     let few = rows.len() <= LISTED;
@@ -96,7 +96,7 @@ pub fn print(rows: &[Row]) -> Result<(), Error> {
     }
     for row in listed.iter().take(LISTED) {
         if let Err(failure) = &row.result {
-            // Most messages of files name the file themselves.
+            // Most messages about files already name the file.
             if failure.message.starts_with(&row.path) {
                 writeln!(to, "{}", failure.message)?;
             } else {
@@ -140,7 +140,7 @@ fn line(row: &Row, counts: &Counts) -> Vec<String> {
     line
 }
 
-/// An error where any mesh has what is named.
+/// Fails if any mesh has one of the named problems.
 pub fn fail_on(rows: &[Row], named: &[FailOn]) -> Result<(), Error> {
     let n_failed = rows
         .iter()

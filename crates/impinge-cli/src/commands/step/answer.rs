@@ -1,4 +1,4 @@
-//! The answer about a step, as JSON and for people.
+//! The answer about a step, as JSON and as text.
 
 use std::io::Write;
 
@@ -19,7 +19,7 @@ const KINDS: [PairKind; 4] = [
     PairKind::VertexVertex,
 ];
 
-/// What was found: all impacts, or the first alone.
+/// The answer: all impacts, or only the first one.
 pub struct Found<'a> {
     earliest: Option<Impact>,
     all: Option<&'a Impacts>,
@@ -44,7 +44,7 @@ impl<'a> Found<'a> {
     }
 
     /// `free`, `earliest`, `impacts`, `kinds`, `touching_at_start`, `hash`, `backend`, `bodies`, `ms`, `stats`; counts and
-    /// the hash are null where only the first was asked for.
+    /// the hash are null with `--earliest`.
     pub fn json(&self, bodies: &Moving) -> Result<Map<String, Value>, Error> {
         let described: Vec<Value> = bodies
             .ids
@@ -68,7 +68,7 @@ impl<'a> Found<'a> {
         Ok(object)
     }
 
-    /// The part of it that a line per step has, too.
+    /// The keys that the lines of a sequence also have.
     pub fn numbers(&self) -> Map<String, Value> {
         let kinds = |impacts: &Impacts| {
             let counted = KINDS.map(|kind| (kind.name().to_owned(), impacts.of(kind).len().into()));
@@ -89,7 +89,7 @@ impl<'a> Found<'a> {
         object
     }
 
-    /// Times of stages and of the whole.
+    /// Times of the stages, and the total time.
     pub fn ms(&self) -> Value {
         let stages = self.stats.stages.iter();
         let stages: Map<String, Value> = stages
@@ -98,7 +98,7 @@ impl<'a> Found<'a> {
         json!({ "total": rounded(self.stats.total_ms), "stages": stages })
     }
 
-    /// The answer in the first line, then counts.
+    /// Prints the answer in the first line, then counts.
     pub fn print(&self, bodies: &Moving) -> Result<(), crate::error::Error> {
         let mut to = out();
         let name = |body: impinge::BodyId| bodies.names[body.index()][0].as_str();

@@ -1,4 +1,4 @@
-//! What collides, coloured by the time at which it does: red at once, yellow at the end of the step.
+//! Colliding primitives, coloured by their time of contact: red at the start of the step, yellow at its end.
 
 use std::collections::HashMap;
 
@@ -68,7 +68,7 @@ impl Times {
     }
 }
 
-/// What the first and the second element of a kind are.
+/// The parts of the first and of the second element of a kind.
 fn parts(kind: PairKind) -> [Part; 2] {
     match kind {
         PairKind::VertexFace => [Part::Vertices, Part::Faces],

@@ -1,4 +1,4 @@
-//! `impinge sequence --ccd`: a line per step from one frame to the next.
+//! `impinge sequence --ccd`: one line per step from a frame to the next.
 
 use std::io::Write;
 use std::ops::Range;
@@ -14,11 +14,11 @@ use crate::text::grouped;
 use super::answer::Found;
 use super::load::set_end_positions;
 
-/// Where frames come from, and the error where a frame is refused.
+/// A source of frames.
 pub trait Frames {
     /// The positions of a frame.
     fn read(&self, frame_ix: usize) -> Result<Positions, Error>;
-    /// The library's word about a frame.
+    /// The error for a frame that the library refuses.
     fn refused(&self, frame_ix: usize, source: impinge::Error) -> Error;
 }
 

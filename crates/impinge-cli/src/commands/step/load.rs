@@ -1,4 +1,4 @@
-//! Bodies of a step: each from a file for its start and a file for its end.
+//! Reads the bodies of a step: one file for the start of each body and one for its end.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::load::{Vertices, note, to_elements, to_positions};
 use crate::watch::go_on;
 
-/// A scene whose bodies have end positions, and the files that they came from.
+/// A scene whose bodies have end positions, and the files of the bodies.
 #[derive(Debug, Default)]
 pub struct Moving {
     pub scene: Scene,
@@ -58,7 +58,7 @@ impl Moving {
             };
             note(&names[0], &summary, vertices);
         }
-        // No coordinate changes its value; half the memory is saved where all of them allow it.
+        // No coordinate changes its value; this halves the memory if all coordinates fit in f32.
         at_start.positions.narrow_if_exact();
         at_end.positions.narrow_if_exact();
         let refused = |name: &str| {
@@ -81,7 +81,7 @@ impl Moving {
     }
 }
 
-/// Says where a body's vertices are at the end of the step, in whatever precision.
+/// Sets the positions of a body at the end of the step, in either precision.
 pub fn set_end_positions(
     scene: &mut Scene,
     body: BodyId,
@@ -93,7 +93,7 @@ pub fn set_end_positions(
     }
 }
 
-/// Fails where the two files of a body differ in anything but positions.
+/// Fails if the two files of a body differ in anything except positions.
 fn same_elements(names: &[String; 2], start: &Mesh, end: &Mesh) -> Result<(), Error> {
     let [name, other] = names;
     let differ = |what: String| {

@@ -34,7 +34,7 @@ fn put(to: &mut impl Write, format: RowsFormat, toi: ToiArg, impacts: &[Impact])
     }
 }
 
-/// A structured array, packed: `kind` is two characters of four bytes each, as NumPy has them.
+/// A packed structured array: `kind` is two characters of four bytes each, as in NumPy.
 fn npy(to: &mut impl Write, toi: ToiArg, impacts: &[Impact]) -> io::Result<()> {
     let time = match toi {
         ToiArg::F32 => "<f4",
@@ -58,7 +58,7 @@ fn npy(to: &mut impl Write, toi: ToiArg, impacts: &[Impact]) -> io::Result<()> {
     Ok(())
 }
 
-/// Times are written so that they read back to the same bits, in single and in double precision.
+/// Times are written with enough digits to read back the same bits, in single and in double precision.
 fn csv(to: &mut impl Write, impacts: &[Impact]) -> io::Result<()> {
     writeln!(to, "kind,body_a,element_a,body_b,element_b,toi")?;
     for impact in impacts {

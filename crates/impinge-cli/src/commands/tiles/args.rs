@@ -17,12 +17,12 @@ Examples:
   impinge tiles merge big --json                                     pairs and hash of the whole
   impinge tiles run big --rank $SLURM_ARRAY_TASK_ID --world-size 64  one of 64 processes
 
-Space is cut into tiles of about --cap primitives each. Every step reads and writes the folder
-alone, may be run by many processes on any machine that sees it, and may be killed and run again:
-the bytes are the same. Answers are those of the whole scene in one process.
+Space is cut into tiles of about --cap primitives each. Steps communicate only through the folder.
+Many processes, on any machine that sees the folder, may run a step. A killed step can be run again
+and gives the same bytes. The answer is the same as for the whole scene in one process.
 
 Binary PLY of triangles, binary STL and .npy arrays (n, 3, 3) or (n, 4, 3) are read in chunks.
-Other formats are read whole, a file at a time.";
+Other formats are read whole, one file at a time.";
 
 #[derive(Debug, Args)]
 pub struct TilesArgs {
@@ -32,7 +32,7 @@ pub struct TilesArgs {
 
 #[derive(Debug, Subcommand)]
 pub enum TilesCommand {
-    /// Look at the meshes once and decide where to cut
+    /// Read the meshes once and decide where to cut
     Plan(PlanArgs),
     /// Write the primitives of each tile
     Scatter(ScatterArgs),
@@ -42,10 +42,10 @@ pub enum TilesCommand {
     Merge(MergeArgs),
 }
 
-/// Which share of the work is this process's.
+/// The share of the work of this process.
 #[derive(Debug, Clone, Args)]
 pub struct ShareArgs {
-    /// The share of this process, from 0
+    /// The rank of this process, from 0
     #[arg(long, value_name = "R", default_value = "0")]
     pub rank: usize,
     /// How many processes share the work
@@ -55,22 +55,22 @@ pub struct ShareArgs {
 
 #[derive(Debug, Args)]
 pub struct PlanArgs {
-    /// A folder for the plan and all that follows
+    /// A folder for the plan and all later files
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// Mesh files, a body each
+    /// Mesh files, one per body
     #[arg(value_name = "MESH", required = true)]
     pub meshes: Vec<PathBuf>,
     /// About how many primitives a tile may hold, such as 500k or 2M: about 300 bytes each
     #[arg(long, value_name = "N", value_parser = count, default_value = "2M")]
     pub cap: u64,
-    /// Primitives that are scattered at a time: about 200 bytes each, per thread
+    /// The number of primitives that a thread scatters at a time: about 200 bytes each
     #[arg(long, value_name = "N", value_parser = count, default_value = "500k")]
     pub chunk: u64,
-    /// Make vertices at the same position one, in each file by itself
+    /// Weld vertices at the same position, within each file
     #[arg(long)]
     pub weld: bool,
-    /// Replace another plan in this folder, and all that was made by it
+    /// Replace another plan in this folder, and all files made by it
     #[arg(long)]
     pub replace: bool,
     /// Print JSON and nothing else
@@ -104,30 +104,30 @@ pub struct RunArgs {
     /// The folder of the plan
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// One tile instead of this process's share
+    /// Run one tile instead of this process's share
     #[arg(long, value_name = "I")]
     pub tile: Option<u32>,
     #[command(flatten)]
     pub share: ShareArgs,
-    /// Pairs within each file alone [default: within and between]
+    /// Find only pairs within each file [default: within and between]
     #[arg(long = "self", conflicts_with = "between")]
     pub within: bool,
-    /// Pairs between files alone
+    /// Find only pairs between files
     #[arg(long)]
     pub between: bool,
-    /// Pairs of one body that share a vertex: not reported, or where they meet in more than that
+    /// Which neighbours are reported: pairs of primitives of one body that share a vertex
     #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Skip)]
     pub shared_vertex: SharedVertexArg,
-    /// How candidates are found; all methods give the same pairs
+    /// The method that finds candidates; all methods give the same pairs
     #[arg(long, value_enum, default_value_t = MethodArg::Clusters)]
     pub method: MethodArg,
     /// CPU threads [default: one per core]
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
-    /// Memory for the detector besides the answer, such as 512M [default: what it takes]
+    /// Memory for the detector without the answer, such as 512M [default: no limit]
     #[arg(long, value_name = "BYTES", value_parser = bytes)]
     pub memory_budget: Option<u64>,
-    /// Run tiles again that have a result for this question
+    /// Run tiles again that already have a result for this query
     #[arg(long)]
     pub again: bool,
     /// Print one line of JSON per tile and nothing else
