@@ -1,16 +1,16 @@
-//! The method `Clusters` on the CPU: groups fixed by topology, only their boxes move.
+//! The method `Clusters` on the CPU: groups are fixed by topology, only their boxes move.
 //!
 //! ```text
 //! bounds      boxes of the clusters of bodies that moved, and of the trees above them
 //! dispatch    bodies whose boxes meet (more than two: a tree over bodies), then tree against tree
-//! pairing     boxes of the primitives of clusters that take part; candidates a work item
+//! pairing     boxes of the primitives of clusters that take part; candidates per work item
 //! narrow      filters, then exact arithmetic
 //! ```
 //!
 //! This file keeps the caches; `slabs` runs the stages from `dispatch` on.
 //!
-//! Memory: what is cached a body, and a slab of work items. When that is full it is paired and settled,
-//! and dispatch goes on.
+//! Memory: a cache per body, and a slab of work items. A full slab is paired and settled, then dispatch
+//! goes on.
 
 use crate::error::Error;
 use crate::grouping::bounds::Bounds;
@@ -31,7 +31,7 @@ use super::world::{BodyCache, Caches, World};
 use crate::run::Job;
 use crate::workers::Workers;
 
-/// Primitives of all bodies together from which on helpers are woken at a frame's begin.
+/// From this many primitives of all bodies on, helpers are woken at the beginning of a frame.
 const CALL_FROM: u64 = 30_000;
 
 /// Caches and scratch of the method; kept from frame to frame.
@@ -130,7 +130,7 @@ impl Clusters {
         caches + scratches + self.top.bytes()
     }
 
-    /// Clusters bodies that are new or were re-meshed; forgets those that are gone.
+    /// Clusters bodies that are new or were re-meshed; forgets removed bodies.
     fn cluster(&mut self, job: Job<'_>, stats: &mut Statistics) -> Result<(), Error> {
         let Job {
             scene,
@@ -174,7 +174,7 @@ impl Clusters {
 }
 
 impl BodyCache {
-    /// Clusters a body in the pose at hand.
+    /// Clusters a body in its current pose.
     pub fn new(body: &Body, isa: Isa) -> Self {
         let (elements, positions) = (body.elements(), body.positions());
         let clustering = Clustering::new(elements, |primitive| {
@@ -197,8 +197,8 @@ impl BodyCache {
         }
     }
 
-    /// Who shares vertices with whom, found before workers ask for it. Going to the pool costs 0.1 ms, so not
-    /// when it is known.
+    /// Finds which primitives share vertices, before workers need it. Going to the pool costs 0.1 ms, so it is avoided
+    /// when the adjacency is known.
     pub(super) fn find_adjacency(&self, workers: &Workers) -> Result<(), Error> {
         if !self.clustering.knows_adjacency() {
             let n_primitives = self.clustering.order.len();
@@ -210,7 +210,7 @@ impl BodyCache {
         Ok(())
     }
 
-    /// All boxes, on this thread: those of clusters made anew are the best so far.
+    /// Computes all boxes on this thread, for new clusters: their spread is the best so far.
     pub(super) fn refit_all(&mut self, body: &Body) {
         self.surface = 0.0;
         for cluster in 0..self.clustering.n_clusters() {
@@ -224,13 +224,13 @@ impl BodyCache {
         self.best_spread = self.spread();
     }
 
-    /// What is sorted, if anything is.
+    /// The remote clusters, if the clusters are sorted.
     #[inline(always)]
     pub(super) fn sorted(&self) -> Option<&Remote> {
         self.remote.as_deref().filter(|remote| remote.is_sorted())
     }
 
-    /// As `unsort`, because a frame asks for what was left out.
+    /// [`unsort`](Self::unsort), because a frame needs boxes that were left out.
     pub(super) fn interrupt(&mut self) {
         if let Some(remote) = &mut self.remote {
             remote.interrupt();
@@ -238,14 +238,14 @@ impl BodyCache {
         self.unsort();
     }
 
-    /// Forgets what was sorted; all boxes must be found again.
+    /// Ends the sorting; all boxes must be found again.
     pub(super) fn unsort(&mut self) {
         if self.remote.as_mut().is_some_and(|remote| remote.end()) {
             self.positions_stamp = 0;
         }
     }
 
-    /// The clusters' summed surface over the body's: how well the clusters fit the pose at hand.
+    /// The clusters' summed surface divided by the body's: how well the clusters fit the current pose.
     pub(super) fn spread(&self) -> f64 {
         let whole = self.bounds.root().half_area();
         if whole > 0.0 && self.surface.is_finite() {

@@ -12,7 +12,7 @@ use crate::grouping::hubs::Hubs;
 use super::bounds::TreeBounds;
 use super::simd::Simd;
 
-/// A tree: its shape and where its boxes are now.
+/// A tree: its shape and its current boxes.
 #[derive(Clone, Copy)]
 pub(crate) struct Tree<'a> {
     pub shape: &'a Shape,
@@ -33,7 +33,7 @@ impl Tree<'_> {
         self.bounds.levels[level as usize].at(node as usize)
     }
 
-    /// Children of a node that overlap a box: the first child, and a bit each.
+    /// The children of a node that overlap a box: the first child, and one bit per child.
     #[inline(always)]
     fn children_meeting<S: Simd>(&self, simd: S, level: u32, node: u32, query: &Bounds) -> Met {
         let children = self.shape.children(level as usize, node as usize);
@@ -65,7 +65,7 @@ impl Iterator for Met {
     }
 }
 
-/// Two nodes whose boxes overlap; in a tree against itself also a node with itself.
+/// Two nodes whose boxes overlap; when a tree meets itself, also a node with itself.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct NodePair {
     level_a: u32,
@@ -103,7 +103,7 @@ pub(crate) fn between<S: Simd, E>(
 }
 
 /// Calls `emit(leaf, other)`, `leaf <= other`, for every leaf with itself and every pair of different
-/// leaves of one tree whose boxes overlap, but for nodes whose primitives all name a common hub.
+/// leaves of one tree whose boxes overlap, except below pairs of nodes whose primitives all name a common hub.
 #[inline(always)]
 pub(crate) fn within<S: Simd, E>(
     simd: S,
@@ -144,7 +144,7 @@ pub(crate) fn within<S: Simd, E>(
             let child = child as u32;
             let query = tree.at(level - 1, child);
             let mut met = tree.children_meeting(simd, level, node, &query);
-            // Every pair once, the child with itself whatever its box.
+            // Every pair once; a child with itself whatever its box.
             met.mask &= u32::MAX << (child - met.first) << 1;
             for other in std::iter::once(child).chain(met) {
                 if level == 1 {

@@ -1,8 +1,8 @@
-//! What `pairing` and `narrow` look at of the clusters seen last: a worker's own copy, a primitive a lane.
+//! A worker's own copy of the clusters it saw last, for `pairing` and `narrow`: one primitive per lane.
 //!
 //! In: positions and corners of a cluster. Out: the boxes of its primitives and, for triangles in f32, their
-//! corners as tables, so that the filter takes them from the first-level cache and not from all over the
-//! body. Cost: each corner of a cluster once, when it is first needed; 3.8 KB a cluster.
+//! corners as tables, so that the filter reads them from the first-level cache and not from all over the
+//! body. Cost: each corner of a cluster once, when it is first needed; 3.8 KB per cluster.
 
 use crate::elements::Elements;
 use crate::exact::filter::{LARGEST_F32, Triangles64};
@@ -18,11 +18,11 @@ use super::world::World;
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub(super) struct Group {
-    /// Their boxes.
+    /// The primitives' boxes.
     pub boxes: LaneBounds,
-    /// Their corners, where they are `in_tables`.
+    /// The primitives' corners, if `in_tables`.
     pub corners: Triangles64,
-    /// Whether they are triangles in f32 that the filter in f32 may be asked about.
+    /// Whether the primitives are triangles in f32 that are small enough for the filter in f32.
     pub in_tables: bool,
 }
 
@@ -71,18 +71,18 @@ fn is_small(bounds: &Bounds) -> bool {
     largest(&bounds.min) && largest(&bounds.max)
 }
 
-/// What is kept of one cluster.
+/// The data kept per cluster.
 pub(super) trait Kept<W>: Clone {
-    /// Of no cluster.
+    /// The data of no cluster.
     const EMPTY: Self;
 
-    /// Finds it for a cluster of a layer.
+    /// Computes the data of a cluster of a layer.
     fn fill<S: Simd>(&mut self, simd: S, world: W, layer: u32, cluster: usize);
 }
 
 /// The clusters that a worker has seen last.
 ///
-/// A cluster has two places, `h` and `h ^ 1`; the one that is not in use makes room.
+/// A cluster has two possible places, `h` and `h ^ 1`; a new one replaces the cluster that is not in use.
 #[derive(Debug)]
 pub(super) struct GroupCache<G> {
     /// Layer and cluster of each place.
@@ -99,15 +99,15 @@ impl<G> Default for GroupCache<G> {
     }
 }
 
-/// No participant has this number: there are fewer than 2^32 of them.
+/// The key of an empty place: there are fewer than 2^32 participants.
 const NOBODY: u64 = u64::MAX;
-/// Clusters kept: 500 KB, which a second-level cache holds.
+/// Clusters kept: 500 KB, which fits in a second-level cache.
 const MOST: u64 = 128;
-/// Clusters kept under a memory budget, 31 KB: hardly slower, for neighbours come after each other.
+/// Clusters kept under a memory budget, 31 KB: hardly slower, for neighbouring clusters come in a row.
 const MOST_IN_BUDGET: u64 = 8;
 
 impl<G> GroupCache<G> {
-    /// Makes ready for a frame of so many clusters.
+    /// Prepares for a frame of `n_clusters` clusters.
     pub fn begin<W>(&mut self, n_clusters: u64, in_budget: bool)
     where
         G: Kept<W>,
@@ -134,14 +134,14 @@ impl<G> GroupCache<G> {
         hash & (self.keys.len() - 1)
     }
 
-    /// Whether a cluster of a participant is here.
+    /// Whether a cluster of a participant is cached.
     #[inline(always)]
     pub fn holds(&self, whose: (u32, u32)) -> bool {
         let (key, first) = (Self::key(whose), self.first_place(whose));
         self.keys[first] == key || self.keys[first ^ 1] == key
     }
 
-    /// The place of a cluster of a participant, which is found now if it is not here; what is at the place `pinned`
+    /// The place of a cluster of a participant; computes its data if it is not cached. The cluster at the place `pinned`
     /// stays.
     #[inline(always)]
     pub fn place<S: Simd, W>(
@@ -166,7 +166,7 @@ impl<G> GroupCache<G> {
         place
     }
 
-    /// What is at a place.
+    /// The cluster at a place.
     #[inline(always)]
     pub fn at(&self, place: usize) -> &G {
         &self.groups[place]

@@ -1,8 +1,8 @@
-//! Pairs that share a hub, under `SharedVertex::Resolve`: asked by the directions in which they lie.
+//! Pairs that share a hub, under `SharedVertex::Resolve`: found by the directions of their primitives.
 //!
 //! In: the hubs and axes of a body, and its positions. Out: pairs for the exact test.
 //!
-//! The boxes of all primitives around a hub v overlap there, so boxes in space tell nothing. Seen from v, each
+//! The boxes of all primitives around a hub v overlap there, so boxes in space separate nothing. Seen from v, each
 //! primitive is a cone of directions, and two primitives that meet in a point other than v share the direction
 //! of that point. So each cone gets a box on the surface of the cube of all directions, and a tree over these
 //! boxes finds those that overlap:
@@ -16,8 +16,8 @@
 //!    +--------------+
 //! ```
 //!
-//! All that share an axis uv share the direction of the other vertex, too. They are asked by half-planes around
-//! the axis: that of a point p is told by the direction of (v - u) x (p - u).
+//! Primitives that share an axis uv also share the direction of its other vertex. They are found by half-planes
+//! around the axis: the half-plane of a point p is given by the direction of (v - u) x (p - u).
 //!
 //! Cost: `O(n log n)` per hub for n primitives, and one exact test per pair whose cones' boxes overlap.
 //! Reason for each discard: cones without a common direction. `docs/exactness.md`, "Hubs", has the proof and the bound.
@@ -29,11 +29,11 @@ use crate::grouping::hubs::{HubSet, Hubs};
 use super::narrow::Settler;
 use super::world::BodyRef;
 
-/// Entries of a leaf.
+/// Entries per leaf.
 const LEAF: usize = 4;
-/// What rounding may do to a direction's coordinate: 2^-24.
+/// The rounding error of a direction's coordinate: 2^-24.
 const ERROR: f64 = f64::from_bits((1023 - 24) << 52);
-/// A normal shorter than this part of its factors' sizes has no certain direction: 2^-23.
+/// A normal shorter than this share of the product of its factors' sizes has no certain direction: 2^-23.
 const SHORTEST: f64 = f64::from_bits((1023 - 23) << 52);
 
 /// All directions.
@@ -48,9 +48,9 @@ pub(super) struct Around {
     entries: Vec<Entry>,
     nodes: Vec<Node>,
     stack: Vec<NodePair>,
-    /// Places of primitives that lie in what is shared.
+    /// Places of primitives that lie entirely in the shared hub or axis.
     nowhere: Vec<u32>,
-    /// Places of triangles on the axis' line that go on beyond its first and beyond its second hub.
+    /// Places of triangles on the axis' line that extend beyond its first hub, and beyond its second.
     beyond: [Vec<u32>; 2],
 }
 
@@ -58,7 +58,7 @@ pub(super) struct Around {
 struct Entry {
     cone: Bounds,
     place: u32,
-    /// The hubs with which the hub at hand makes an axis.
+    /// The hubs of the primitive with which the current hub forms an axis.
     partners: HubSet,
 }
 
@@ -76,7 +76,7 @@ struct NodePair {
     b: usize,
 }
 
-/// Where a primitive lies as seen from what is shared.
+/// Where a primitive lies as seen from the shared hub or axis.
 enum Seen {
     Cone(Bounds),
     Nowhere,
@@ -92,7 +92,7 @@ impl Around {
                 * (self.nowhere.capacity() + self.beyond[0].capacity() + self.beyond[1].capacity())
     }
 
-    /// Settles the pairs that share one hub, or an axis.
+    /// Settles the pairs that share a hub, or an axis.
     pub fn settle(
         &mut self,
         body: &BodyRef<'_>,
@@ -123,11 +123,11 @@ impl Around {
                 settler.settle_shared(body, a.min(b), a.max(b));
             }
         };
-        // All these meet beyond what is shared.
+        // All of these meet beyond the shared axis.
         for on_line in &self.beyond {
             each_pair(on_line, &mut settle);
         }
-        // What lies in the shared vertices meets only primitives of the same vertices by the rule.
+        // By the rule, a primitive that lies in the shared vertices meets only primitives with the same vertices.
         let ids = |place: u32| sorted_ids(body.corners(place));
         self.nowhere.sort_unstable_by_key(|&place| ids(place));
         for same in self.nowhere.chunk_by(|&a, &b| ids(a) == ids(b)) {
@@ -136,7 +136,7 @@ impl Around {
         self.meet(&mut settle);
     }
 
-    /// Calls `emit` for all entries whose cones' boxes overlap and that have no common partner.
+    /// Calls `emit` for all pairs of entries whose cones' boxes overlap and that have no common partner.
     fn meet(&mut self, emit: &mut impl FnMut(u32, u32)) {
         let n = self.entries.len();
         if n < 2 {
@@ -212,7 +212,7 @@ fn range(n: usize, depth: u32, node: usize) -> std::ops::Range<usize> {
     start(node)..start(node + 1)
 }
 
-/// The entries of a body's hub as a tree whose nodes are numbered as those of a heap.
+/// The entries of a hub as a binary tree whose nodes are numbered like those of a heap.
 struct Tree<'a> {
     entries: &'a mut [Entry],
     nodes: &'a mut [Node],
@@ -220,7 +220,7 @@ struct Tree<'a> {
 }
 
 impl Tree<'_> {
-    /// Puts the entries of a node in order, by partners and then by cones, and fills the nodes.
+    /// Sorts the entries of a node, by partners and then by cones, and fills the nodes below.
     fn build(&mut self, at: u32, node: usize) -> Node {
         let n = self.entries.len();
         let entries = &mut self.entries[range(n, at, node)];
@@ -250,7 +250,7 @@ impl Tree<'_> {
     }
 }
 
-/// A primitive's vertices, each once, ascending, then the largest number.
+/// A primitive's vertices, each once, ascending, filled up with the largest number.
 fn sorted_ids(corners: &[u32]) -> [u32; 4] {
     let mut ids = [u32::MAX; 4];
     for (ix, &id) in corners.iter().enumerate() {
@@ -293,7 +293,7 @@ fn seen(body: &BodyRef<'_>, shared: &[u32], place: u32) -> Seen {
     cone.bounds().map_or(Seen::Nowhere, Seen::Cone)
 }
 
-/// The directions of some points: a box of them on the surface of the cube.
+/// The directions of some points: their box on the surface of the cube.
 #[derive(Default)]
 struct Cone {
     min: [f64; 3],
@@ -302,7 +302,7 @@ struct Cone {
 }
 
 impl Cone {
-    /// Adds a direction; zero is none.
+    /// Adds a direction; the zero vector is ignored.
     fn add(&mut self, direction: Point) {
         let size = size(&direction);
         if size == 0.0 {
@@ -326,8 +326,8 @@ impl Cone {
         }
         let min = self.min.map(|x| x - ERROR);
         let max = self.max.map(|x| x + ERROR);
-        // A point between directions on the cube lies within the box of them, at least this far from the
-        // middle by its largest coordinate. Moved out to the cube, it gets so many times larger at most.
+        // A point between directions on the cube lies within their box, so its largest coordinate is at least `least`.
+        // Projected outward onto the cube, it grows at most by the factor `most`.
         let least = (0..3).fold(0.0, |least: f64, k| least.max(min[k]).max(-max[k]));
         let most = 1.0 / least;
         let out = |x: f64| {

@@ -1,4 +1,4 @@
-//! The CPU backend: one file a stage, SIMD chosen at run time.
+//! The CPU backend. Most stages have a file of their name; SIMD is chosen at run time.
 
 pub(crate) mod bounds;
 pub mod cells;
@@ -30,7 +30,7 @@ use crate::stats::Statistics;
 use cells::Cells;
 use clusters::Clusters;
 
-/// The CPU backend of one detector: every method, and the memory that they keep from frame to frame.
+/// The CPU backend of one detector: every method, and the memory kept from frame to frame.
 pub(crate) struct Cpu {
     settings: Settings,
     clusters: Clusters,

@@ -1,9 +1,9 @@
-//! Clusters that no other body comes near, proven so without their boxes.
+//! Remote clusters: proven, without their boxes, to be beside all other bodies.
 //!
-//! A cluster's box takes a look at its vertices wherever they lie in memory; read in the order of memory, vertices
-//! cost a fraction of that. Bodies that meet mostly do so with a part of them, and what lies beside the
-//! other body mostly stays there for many frames. So clusters are *sorted*: those that lie beside all
-//! that their body could meet go into one of six groups, below or above it along x, y or z.
+//! Computing a cluster's box reads vertices from all over memory; reading vertices in memory order costs a fraction of
+//! that. Bodies that meet mostly do so with only a part of them, and clusters that lie beside the
+//! other body mostly stay there for many frames. So clusters are *sorted*: those that lie beside all
+//! bodies that their body could meet go into one of six groups, below or above them along x, y or z.
 //!
 //! ```text
 //!            below, x |  near   | above, x
@@ -12,10 +12,10 @@
 //! ```
 //!
 //! Each frame reads all positions in order and finds the interval that each group spans along its axis, and the box of
-//! the whole. A group whose interval touches none of the other boxes is proven *remote*, whatever has moved and
-//! however: none of its primitives can be in a pair, and its clusters keep empty boxes. A group that touches one has come
-//! back: its clusters are near in this frame, and are sorted again at its end, with more room between them and the others if
-//! the group has come back soon.
+//! the whole body. A group whose interval touches no other body's box is proven *remote*, however bodies have
+//! moved: none of its primitives can be in a pair, and its clusters keep empty boxes. A group that touches another box
+//! has come back: its clusters are near in this frame and are sorted again at its end, with more slack between them and
+//! the others if the group came back soon.
 //!
 //! In: boxes of clusters, then positions frame by frame. Out: which clusters' boxes a frame needs.
 
@@ -28,7 +28,7 @@ use super::bounds::TreeBounds;
 use super::extents::{self, Extents, Groups, Intervals, Members, RUN, Side};
 use super::simd::{Lanes, Simd};
 
-/// Some clusters of a node of level 1: bit `k` for its child `k`.
+/// Some clusters of a node of level 1: bit `k` for child `k`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SomeClusters {
     pub node: u32,
@@ -39,18 +39,18 @@ pub(crate) struct SomeClusters {
 #[derive(Debug, Default)]
 pub(crate) struct Remote {
     is_sorted: bool,
-    /// The group of each cluster, none for those that are near. Those in a group have empty boxes.
+    /// The group of each cluster; `None` for clusters that are near. Clusters in a group have empty boxes.
     sides: Vec<Option<Side>>,
-    /// What is near.
+    /// The clusters that are near.
     near: Vec<SomeClusters>,
-    /// The groups by vertices, run by run.
+    /// The groups of each vertex, run by run.
     members: Vec<Members>,
     n_vertices: usize,
-    /// What the groups span in the pose at hand.
+    /// The intervals of the groups in the current pose.
     groups: Intervals,
-    /// Groups whose clusters are to be sorted at the frame's end.
+    /// Groups whose clusters are to be sorted again at the frame's end.
     unsorted: Groups,
-    /// Clusters that have just been found to lie beside the others, and where.
+    /// Clusters just found to lie beside the others, and their sides.
     fresh: Vec<(u32, Side)>,
     outlook: Outlook,
 }
@@ -61,39 +61,39 @@ impl Remote {
         self.is_sorted
     }
 
-    /// Whether clusters are to be sorted at the frame's end, once boxes of all that is near have been found.
+    /// Whether clusters are to be sorted at the frame's end, once the boxes of all near clusters are known.
     pub fn is_due(&self) -> bool {
         !self.unsorted.is_empty() || (!self.is_sorted && self.outlook.wait == 0)
     }
 
-    /// What is near.
+    /// The clusters that are near.
     pub fn near(&self) -> &[SomeClusters] {
         &self.near
     }
 
-    /// How many clusters are near.
+    /// The number of clusters that are near.
     pub fn n_near(&self) -> usize {
         let near = self.near.iter().map(|near| near.children.count_ones());
         near.sum::<u32>() as usize
     }
 
-    /// How many runs of vertices there are.
+    /// The number of runs of vertices.
     pub fn n_runs(&self) -> usize {
         self.members.len()
     }
 
-    /// Whether it can be read with so many positions, and need not be renewed.
+    /// Whether the sorting fits a body of `n_vertices` vertices and is not due for renewal.
     pub fn is_fit_for(&self, n_vertices: usize) -> bool {
         self.n_vertices == n_vertices && self.outlook.age < RENEWED_AFTER
     }
 
-    /// A frame of a body that moved begins: nothing is known of its positions.
+    /// Begins a frame of a body that moved: its positions are not known yet.
     pub fn begin(&mut self) {
         self.outlook.grow_older(self.is_sorted);
         self.groups = Intervals::EMPTY;
     }
 
-    /// Adds what has been read of the positions.
+    /// Adds the extents of positions that were read.
     pub fn add(&mut self, extents: &Extents) {
         self.groups.join(&extents.groups);
     }
@@ -103,22 +103,23 @@ impl Remote {
         self.groups.back_at(other)
     }
 
-    /// Ends it. All boxes must be found again if this says so.
+    /// Ends the sorting. Returns whether all boxes must be found again.
     #[must_use]
     pub fn end(&mut self) -> bool {
         self.unsorted = Groups::default();
         std::mem::take(&mut self.is_sorted)
     }
 
-    /// A frame asks for more than what is near: it should be ended, and not begun again at once, for the next frames may ask so too.
+    /// A frame needs all boxes: the caller ends the sorting. It does not begin again at once, for the next frames may need
+    /// all boxes too.
     pub fn interrupt(&mut self) {
         if self.is_sorted {
             self.outlook.pause();
         }
     }
 
-    /// Some groups have come back: their clusters are near from now on. False if too many have come back of late: then
-    /// it should be ended.
+    /// Some groups have come back: their clusters are near from now on. False if groups have come back too often lately:
+    /// then the caller ends the sorting.
     pub fn come_back(&mut self, groups: Groups, clustering: &Clustering) -> bool {
         if !self.outlook.affords(groups) {
             return false;
@@ -140,8 +141,8 @@ impl Remote {
         extents::of(simd, &positions[vertices], &self.members[runs])
     }
 
-    /// Sorts what is near, by its boxes, against the joint box of `others`, and empties the boxes of clusters that lie beside
-    /// it. False if there are few of them: then it should be ended.
+    /// Sorts near clusters by their boxes against the joint box of `others`, and empties the boxes of clusters that lie beside
+    /// it. False if there are too few of these: then the caller ends the sorting.
     #[must_use]
     pub fn sort(
         &mut self,
@@ -224,8 +225,8 @@ impl Remote {
     }
 }
 
-/// The side on which a box is farthest beside others, measured by the slack that is asked for there, if it is beside them by more
-/// than that.
+/// The side on which a box is farthest beside others, measured in units of that side's slack; `None` if no gap is larger
+/// than its slack.
 fn side(cluster: &Bounds, others: &Bounds, slack: &[f32; 6]) -> Option<Side> {
     let mut best = None;
     let mut farthest = 1.0;
@@ -244,14 +245,14 @@ fn side(cluster: &Bounds, others: &Bounds, slack: &[f32; 6]) -> Option<Side> {
     best
 }
 
-/// The clusters among a node's children.
+/// Iterates over some of a node's clusters.
 pub(crate) struct Children {
     first: usize,
     lanes: Lanes,
 }
 
 impl Children {
-    /// Those of a node's children that `only` has bits of.
+    /// The children whose bits are set in `only`.
     #[inline(always)]
     pub fn new(children: Range<usize>, only: u8) -> Self {
         Children {
@@ -273,24 +274,25 @@ impl Iterator for Children {
 /// When a body's clusters should be sorted, and how cautiously.
 #[derive(Debug, Clone, Copy)]
 struct Outlook {
-    /// Frames to wait.
+    /// Frames to wait before sorting.
     wait: u32,
-    /// The same, when the groups come back too often.
+    /// Frames to wait the next time that groups come back too often.
     next_wait: u32,
-    /// Frames since all were sorted.
+    /// Frames since all clusters were sorted.
     age: u32,
-    /// Frames since each group was.
+    /// Frames since each group was sorted.
     ages: [u32; 6],
-    /// Frames that sorting has paid for.
+    /// Grows by one per frame; sorting groups again costs [`COST`].
     credit: u32,
     /// How far beside the others a cluster must be to be in a group, as a share of the body's longest side.
     slack: [f32; 6],
 }
 
-/// Frames after which all boxes are found again, to see what else is remote by now and how well clusters fit.
+/// Frames after which all boxes are found again, to see which clusters are remote by now and how well clusters fit.
 const RENEWED_AFTER: u32 = 64;
-/// Frames that a group should last. To sort it again costs what it saves in some of them.
+/// Frames that a group should last.
 const LASTS: u32 = 24;
+/// Sorting groups again costs as much as they save in this many frames.
 const COST: u32 = 6;
 const MOST_CREDIT: u32 = 4 * COST;
 const SLACK: RangeInclusive<f32> = 1.0 / 128.0..=0.25;
@@ -324,7 +326,7 @@ impl Outlook {
         self.credit = (self.credit + 1).min(MOST_CREDIT);
     }
 
-    /// All are sorted.
+    /// All clusters are sorted now.
     fn begin(&mut self) {
         if self.age >= RENEWED_AFTER {
             self.next_wait = 1;
@@ -335,7 +337,7 @@ impl Outlook {
         self.credit = COST;
     }
 
-    /// Groups have come back: whether it pays to sort them again.
+    /// Groups have come back: returns whether it pays to sort them again.
     fn affords(&mut self, groups: Groups) -> bool {
         for side in groups.sides() {
             let group = side.number();
@@ -350,19 +352,19 @@ impl Outlook {
         false
     }
 
-    /// Waits, longer each time.
+    /// Makes the sorting wait, longer each time.
     fn pause(&mut self) {
         self.wait = self.next_wait;
         self.next_wait = (2 * self.next_wait).min(RENEWED_AFTER);
     }
 
-    /// Hardly any cluster lies beside the others.
+    /// Too few clusters lie beside the others: waits.
     fn too_few(&mut self) {
         self.wait = RENEWED_AFTER / 4;
     }
 }
 
-/// The slack with which a group would have lasted, by how long it lasted with this one.
+/// The slack with which a group would have lasted [`LASTS`] frames, given that it lasted `age` frames with this one.
 fn slack_for(slack: f32, age: u32) -> f32 {
     (slack * LASTS as f32 / (age as f32 + 1.0)).clamp(*SLACK.start(), *SLACK.end())
 }

@@ -1,8 +1,8 @@
 //! The second level: which primitives of two groups of one cell touch a common sub-cell.
 //!
-//! A box touches a product of ranges of the 4 x 4 x 4 sub-cells. Two products share a sub-cell exactly
-//! if their ranges overlap along x, along y and along z, so that the 64 x 64 occupancy bits of the
-//! paper, with their transposition, come down to 8 masks of lanes an axis:
+//! A box touches a product of ranges of the 4 x 4 x 4 sub-cells. Two products share a sub-cell if and only
+//! if their ranges overlap along x, along y and along z. So the 64 x 64 occupancy bits of the
+//! paper, with their transposition, reduce to 8 masks of lanes per axis:
 //!
 //! ```text
 //! begins[s]    lanes j whose range begins at sub-cell s or before      s = 0 … 3
@@ -10,8 +10,8 @@
 //! partners     of i: for all axes, begins[last of i] and ends[first of i]
 //! ```
 //!
-//! The owner rule is a mask as well: of all cells that two boxes share, the pair belongs to the one where
-//! along each axis one of the two begins.
+//! The owner rule is a mask, too: of all cells that two boxes share, the pair belongs to the one in which
+//! one of the two boxes begins along each axis.
 
 use crate::grouping::GROUP;
 
@@ -20,14 +20,14 @@ use super::pairing::full;
 use super::simd::{Isa, LaneBounds, Lanes32, Simd, dispatch};
 use super::world::BodyRef;
 
-/// Which pairs of primitives that share a sub-cell are asked for.
+/// Which pairs of primitives that share a sub-cell are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Asked {
-    /// Only those whose boxes overlap.
+    /// Only pairs whose boxes overlap.
     pub boxes: bool,
-    /// Only those that the cell owns.
+    /// Only pairs that the cell owns.
     pub owned: bool,
-    /// Also those of one body that share a vertex.
+    /// Also pairs of one body that share a vertex.
     pub adjacent: bool,
 }
 
@@ -38,9 +38,9 @@ pub(crate) struct Groups<'a> {
     pub a: &'a [u32],
     pub b: &'a [u32],
     pub cell: [u32; 3],
-    /// Whether they are one and the same: each pair is then found once.
+    /// Whether both are the same group: each pair is then found once.
     pub same: bool,
-    /// The body, where both groups are of one.
+    /// The body, if both groups are of the same body.
     pub body: Option<BodyRef<'a>>,
 }
 
@@ -48,9 +48,9 @@ pub(crate) struct Groups<'a> {
 pub(crate) struct Lanes64 {
     boxes: LaneBounds,
     corners: [Lanes32; 4],
-    /// For each primitive of the other group the lanes that it meets.
+    /// For each primitive of the other group, the lanes that it meets.
     pub partners: [u64; GROUP],
-    /// Those among them that share a vertex with it.
+    /// For each primitive of the other group, those of its partners that share a vertex with it.
     pub adjacent: [u64; GROUP],
 }
 
@@ -76,8 +76,8 @@ impl Lanes64 {
     }
 }
 
-/// The first and the last sub-cell along an axis: 1 to 4, and the first is 0 for a range that begins in
-/// a cell before.
+/// The first and the last sub-cell along an axis, from 1 to 4. The first is 0 if the range begins in an
+/// earlier cell.
 #[inline(always)]
 fn along(kept: &Kept, cell: [u32; 3], axis: usize) -> (usize, usize) {
     let before = 4 * cell[axis];

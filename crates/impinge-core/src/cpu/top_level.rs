@@ -9,7 +9,7 @@ use super::simd::Simd;
 use super::world::STALE;
 
 /// A tree over the participants' boxes, for frames of more than two bodies. Its order is kept from
-/// frame to frame and made anew when bodies have moved apart from their neighbours in it.
+/// frame to frame and made again when bodies have moved away from their neighbours in it.
 #[derive(Default)]
 pub(crate) struct TopLevel {
     shape: Shape,
@@ -48,7 +48,7 @@ impl TopLevel {
             + self.bounds.bytes()
     }
 
-    /// Boxes of `n` participants as they are now.
+    /// Updates the tree to the current boxes of `n` participants.
     pub fn refit(&mut self, n: usize, root: impl Fn(u32) -> Bounds) {
         if self.order.len() != n {
             self.shape = Shape::new(n);
@@ -80,7 +80,7 @@ impl TopLevel {
         self.bounds.refit_above(0, &self.shape);
     }
 
-    /// The summed surface of the nodes above the leaves over that of the whole.
+    /// The summed surface of the nodes above the leaves, divided by that of the whole.
     fn spread(&self) -> f64 {
         let Some(parents) = self.bounds.levels.get(1) else {
             return 0.0;

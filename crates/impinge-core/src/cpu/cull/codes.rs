@@ -1,16 +1,16 @@
-//! The cells of a coarse map that vertices lie in, a byte an axis: x + 2^8 y + 2^16 z.
+//! The cells of a coarse map that vertices lie in, one byte per axis: x + 2^8 y + 2^16 z.
 
 use crate::grouping::bounds::{greater, lesser};
 use crate::positions::Positions;
 
 use crate::cpu::simd::{Isa, Simd, dispatch};
 
-/// From coordinates to cells of the map.
+/// The function from coordinates to cells of the map.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Function {
     /// The region's low corner.
     pub origin: [f32; 3],
-    /// Cells a unit of length, above zero.
+    /// Cells per unit of length, above zero.
     pub scale: [f32; 3],
     /// The last cell along each axis, past the region: at most 254.
     pub limit: [f32; 3],
@@ -28,26 +28,26 @@ impl Function {
     }
 }
 
-/// A pointer to the cells of the vertices, and the function that gives them.
+/// A pointer to the cells of the vertices, and the function that computes them.
 #[derive(Clone, Copy)]
 pub(crate) struct Codes {
     pub(super) first: *mut u32,
     pub(super) function: Function,
 }
 
-// SAFETY: a pointer does nothing by itself; `put` says what its callers owe.
+// SAFETY: a pointer does nothing by itself; the contract of `put` covers its use.
 unsafe impl Send for Codes {}
 // SAFETY: as above.
 unsafe impl Sync for Codes {}
 
-/// Vertices whose coordinates are taken at once, as one row of floats.
+/// Vertices whose coordinates are processed at once, as one row of floats.
 const CHUNK: usize = 16;
 
 impl Codes {
     /// Writes the cells of vertices `range` of a body whose codes start at `first`.
     ///
     /// # Safety
-    /// The codes must still live and hold the body's; nobody else may use those of `range` meanwhile.
+    /// The codes must still live and include the body's; no other thread may use those of `range` at the same time.
     pub unsafe fn put(
         self,
         isa: Isa,
@@ -55,7 +55,7 @@ impl Codes {
         range: std::ops::Range<usize>,
         first: usize,
     ) {
-        // SAFETY: said above.
+        // SAFETY: by the contract of this function.
         let into = unsafe {
             std::slice::from_raw_parts_mut(self.first.add(first + range.start), range.len())
         };
@@ -110,7 +110,7 @@ fn quantised(x: f32, origin: f32, scale: f32, limit: f32) -> u8 {
     (unsafe { cell.to_int_unchecked::<i32>() }) as u8
 }
 
-/// The lesser of each byte of two numbers.
+/// The lesser of two numbers, byte by byte.
 #[inline(always)]
 pub(super) fn lesser_bytes(a: u32, b: u32) -> u32 {
     #[cfg(target_arch = "x86_64")]
@@ -127,7 +127,7 @@ pub(super) fn lesser_bytes(a: u32, b: u32) -> u32 {
     }
 }
 
-/// The greater of each byte of two numbers.
+/// The greater of two numbers, byte by byte.
 #[inline(always)]
 pub(super) fn greater_bytes(a: u32, b: u32) -> u32 {
     #[cfg(target_arch = "x86_64")]

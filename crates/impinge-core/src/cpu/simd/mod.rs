@@ -1,10 +1,10 @@
 //! Box tests, many at a time: AVX-512, AVX2, or plain loops that any compiler vectorises (NEON).
 //!
-//! A binary built for plain x86-64 finds out at run time what the processor has. Kernels are
+//! A binary built for plain x86-64 detects at run time which instruction sets the processor has. Kernels are
 //! generic over `Simd` and wrapped once per instruction set by `dispatch!`; everything between wrapper
-//! and intrinsic is `inline(always)`, so a kernel is compiled whole for its set. Kernels pass no closures
-//! to library functions: those would be compiled on their own, without the set.
-//! The answers are bit masks of exact comparisons: no set can differ from another.
+//! and intrinsic is `inline(always)`, so a whole kernel is compiled for its set. Kernels pass no closures
+//! to library functions: those would be compiled separately, without the set.
+//! The answers are bit masks of exact comparisons, so they are the same for every set.
 
 use crate::exact::filter::number::{self, Lookup, Vector};
 use crate::exact::filter::{LANES, Triangles64};
@@ -18,18 +18,18 @@ use crate::settings::InstructionSet;
 use super::bounds::of_vertices_f32;
 use super::extents::{self, Members, RUN, RunExtents};
 
-/// The boxes of one group, a lane each; lanes past the group's size hold empty boxes.
+/// The boxes of one group, one per lane; lanes past the group's size hold empty boxes.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub struct LaneBounds {
-    /// Low ends, an axis a row.
+    /// Low ends, one row per axis.
     pub min: [[f32; GROUP]; 3],
     /// High ends.
     pub max: [[f32; GROUP]; 3],
 }
 
 impl LaneBounds {
-    /// Nothing in any lane.
+    /// Empty boxes in all lanes.
     pub const EMPTY: LaneBounds = LaneBounds {
         min: [[f32::INFINITY; GROUP]; 3],
         max: [[f32::NEG_INFINITY; GROUP]; 3],
@@ -53,7 +53,7 @@ impl LaneBounds {
         }
     }
 
-    /// Empties the lanes from this one on.
+    /// Empties the lanes from `lane` on.
     pub fn clear_from(&mut self, lane: usize) {
         for axis in 0..3 {
             self.min[axis][lane..].fill(f32::INFINITY);
@@ -78,7 +78,8 @@ impl Iterator for Lanes {
     }
 }
 
-/// The triangles of a cluster, twice: for those who load each corner, and for those who load each vertex once.
+/// The triangles of a cluster in two forms: for kernels that load each corner, and for kernels that load each vertex
+/// once.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ClusterFaces<'a> {
     /// At most 64.
@@ -86,12 +87,12 @@ pub(crate) struct ClusterFaces<'a> {
     /// Unique vertices, in whole chunks of [`CHUNK`](crate::grouping::clusters::CHUNK).
     #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
     pub vertices: &'a [u32],
-    /// The corners as numbers of `vertices`, where the instruction set looks them up.
+    /// The corners as numbers of `vertices`, if the instruction set looks them up.
     #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
     pub local: Option<&'a LocalFaces>,
 }
 
-/// A mask for each primitive of a group.
+/// One mask per primitive of a group.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub struct Masks(pub [u64; GROUP]);
@@ -102,33 +103,33 @@ impl Default for Masks {
     }
 }
 
-/// The lanes from the first to a lane.
+/// The lanes up to and including `lane`.
 #[inline(always)]
 pub(crate) fn up_to(lane: usize) -> u64 {
     u64::MAX >> (GROUP - 1 - lane)
 }
 
-/// A number for each primitive of a group.
+/// One number per primitive of a group.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub(crate) struct Lanes32(pub [u32; GROUP]);
 
 /// An instruction set: the box tests that kernels are made of.
 pub(crate) trait Simd: Copy {
-    /// The f64 of the narrow stage's filters.
+    /// The f64 register of the narrow stage's filters.
     type F64: Vector;
 
-    /// The f32 of the filter that settles most pairs of triangles.
+    /// The f32 register of the filter that settles most pairs of triangles.
     type F32: Lookup;
 
     /// Bit `k`: box `first + k` overlaps `query`, for `k` below 8.
     fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32;
 
-    /// Bit `k`: lane `k` overlaps `query`; only lanes of `among` are looked at.
+    /// Bit `k`: lane `k` overlaps `query`; only lanes of `among` are tested.
     fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64;
 
     /// Bit `k`: lane `k`, whose box moves from `start` to `end`, is not beside `query` on the same side of one axis at both
-    /// ends; only lanes of `among` are looked at. What is beside it at both ends is so all the time.
+    /// ends; only lanes of `among` are tested. A box that is beside it at both ends is so all the time.
     #[inline(always)]
     fn meets_64(
         self,
@@ -159,8 +160,8 @@ pub(crate) trait Simd: Copy {
         mask & among
     }
 
-    /// For each lane of `rows`, the mask of the lanes of `boxes` that its box among `queries` overlaps; only
-    /// lanes of `among` are looked at. Masks of other rows are zero.
+    /// For each lane of `rows`, the mask of the lanes of `boxes` that its box in `queries` overlaps; only
+    /// lanes of `among` are tested. Masks of other rows are zero.
     #[inline(always)]
     fn overlaps_rows(
         self,
@@ -176,7 +177,7 @@ pub(crate) trait Simd: Copy {
         }
     }
 
-    /// For each lane of `among`, the mask of the lanes of `among` beyond it that it overlaps. Other masks are
+    /// For each lane of `among`, the mask of the higher lanes of `among` that it overlaps. Other masks are
     /// zero.
     #[inline(always)]
     fn overlaps_within(self, boxes: &LaneBounds, among: u64, masks: &mut Masks) {
@@ -186,7 +187,7 @@ pub(crate) trait Simd: Copy {
         }
     }
 
-    /// Writes the lanes of a mask, lowest first, and anything after them; returns how many there are.
+    /// Writes the lanes of a mask, lowest first; the rest of the list is arbitrary. Returns the number of lanes.
     #[inline(always)]
     fn list_lanes(self, mask: u64, list: &mut [u8; GROUP]) -> usize {
         let mut n = 0;
@@ -197,7 +198,7 @@ pub(crate) trait Simd: Copy {
         n
     }
 
-    /// Bit `k`: lane `k` equals `query`; only lanes of `among` are looked at.
+    /// Bit `k`: lane `k` equals `query`; only lanes of `among` are tested.
     fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64;
 
     /// The box of some vertices, and whether all are certainly finite, as [`of_vertices_f32`] finds them.
@@ -209,13 +210,13 @@ pub(crate) trait Simd: Copy {
     /// `vertices` must not descend.
     unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool);
 
-    /// Adds runs of vertices, with as many members, to what is found of others.
+    /// Adds runs of vertices, each with its members, to the extents in `into`.
     #[inline(always)]
     fn add_runs(self, runs: &[[[f32; 3]; RUN]], members: &[Members], into: &mut RunExtents) {
         extents::add_runs(runs, members, into);
     }
 
-    /// The corners of a cluster's triangles as tables; places past its size hold anything.
+    /// The corners of a cluster's triangles as tables; places past its size are arbitrary.
     ///
     /// # Panics
     /// If there is no such vertex.
@@ -363,7 +364,7 @@ pub enum Isa {
 }
 
 impl Isa {
-    /// Whether `put_corners` looks corners up among a cluster's own vertices.
+    /// Whether `put_corners` looks up corners among a cluster's own vertices.
     pub(crate) fn looks_corners_up(self) -> bool {
         #[cfg(target_arch = "x86_64")]
         {
@@ -375,12 +376,12 @@ impl Isa {
         }
     }
 
-    /// Whether `add_runs` is faster than finding boxes: plain loops are not.
+    /// Whether `add_runs` is faster than computing boxes: with plain loops it is not.
     pub(crate) fn reads_runs(self) -> bool {
         self != Isa::Portable
     }
 
-    /// The best one that this processor has, and that is allowed.
+    /// The best instruction set that this processor has and that is allowed.
     pub fn detect(allowed: InstructionSet) -> Self {
         #[cfg(target_arch = "x86_64")]
         {
@@ -415,7 +416,7 @@ impl Isa {
 /// Calls a kernel `fn kernel(simd: impl Simd, …)`, marked `inline(always)`, compiled for `$isa`.
 macro_rules! dispatch {
     ($isa:expr, $kernel:path, $(<$generic:ident: $bound:ident>)? ($($name:ident: $type:ty = $value:expr),* $(,)?) $(-> $result:ty)?) => {{
-        // A function of its own, as the others are: not optimised, a kernel's frame is half a megabyte.
+        // A separate function, like the others: without optimisation, a kernel's stack frame is half a megabyte.
         fn portable$(<$generic: $bound>)?($($name: $type),*) $(-> $result)? {
             $kernel($crate::cpu::simd::Portable, $($name),*)
         }
@@ -445,7 +446,7 @@ macro_rules! dispatch {
 pub(crate) use dispatch;
 
 /// For each query, which of the lanes of `among` it overlaps: `overlaps_64` for callers that are not
-/// themselves compiled once an instruction set. As many queries are answered as there are masks.
+/// themselves compiled once per instruction set. Answers as many queries as there are masks.
 pub fn masks(isa: Isa, boxes: &LaneBounds, among: u64, queries: &[Bounds], masks: &mut [u64]) {
     dispatch!(isa, all_masks, (
         boxes: &LaneBounds = boxes,

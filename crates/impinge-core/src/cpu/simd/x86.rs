@@ -13,11 +13,11 @@ use super::{
     put_vertices, up_to,
 };
 
-/// 256-bit registers. Only made where `avx2` was detected.
+/// 256-bit registers. Only created if `avx2` was detected.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Avx2(());
 
-/// 512-bit registers and mask registers. Only made where `avx512f` and its extensions `vl`, `dq`, `bw` and
+/// 512-bit registers and mask registers. Only created if `avx512f` and its extensions `vl`, `dq`, `bw` and
 /// `vbmi2` were detected.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Avx512(());
@@ -38,8 +38,8 @@ impl Avx512 {
     }
 }
 
-/// Eight vertices as rows of x, y and z: two columns of four, transposed side by side. None where one
-/// of them is the last one or past it: a vertex is read as 16 bytes, of which its successor has four.
+/// Eight vertices as rows of x, y and z: two columns of four, transposed side by side. `None` if one
+/// of them is the last vertex or past it: a vertex is read as 16 bytes, four of which belong to its successor.
 ///
 /// # Safety
 /// The caller must be compiled for AVX2.
@@ -54,7 +54,7 @@ unsafe fn rows(positions: &[[f32; 3]], vertices: [u32; LANES]) -> Option<[__m256
         return None;
     }
     let first = positions.as_ptr();
-    // SAFETY: all vertices have a successor, as was just seen, so 16 bytes lie in the slice.
+    // SAFETY: all vertices have a successor, as just checked, so 16 bytes lie in the slice.
     unsafe {
         let load = [
             _mm_loadu_ps(first.add(vertices[0] as usize).cast()),
@@ -168,7 +168,8 @@ unsafe fn put_corners_by_vertices(
 #[repr(C, align(64))]
 struct Table([[f32; TABLE]; 3]);
 
-/// For each byte of members, all ones in the place of what is none: as f32 a NaN, which minimum and maximum pass over.
+/// Expands eight membership bits into lane masks. Non-members become all ones, an f32 NaN, for which `minps` and `maxps`
+/// return their second operand.
 static NO_MEMBERS: [[u32; 8]; 256] = {
     let mut table = [[0; 8]; 256];
     let mut k = 0;
@@ -181,17 +182,17 @@ static NO_MEMBERS: [[u32; 8]; 256] = {
     table
 };
 
-/// Those of one eight of a run's coordinates that are not in a group.
+/// The lane masks of those among eight of a run's coordinates that are not in a group.
 #[inline(always)]
 fn no_members(members: &Members, end: usize, eight: usize) -> &'static [u32; 8] {
     let byte = members[end][eight / 2] >> (8 * (eight % 2)) & 0xff;
     &NO_MEMBERS[usize::from(byte)]
 }
 
-/// Runs looked at again and again, eight coordinates of each at a time, while they are in the first-level cache.
+/// Runs that are read repeatedly, eight coordinates of each at a time, while they are in the first-level cache.
 const BLOCK: usize = 32;
 
-/// As `Simd::add_runs`, for one eight of the runs' coordinates: so few that all that is found of them stays in registers.
+/// As `Simd::add_runs`, for eight of the runs' coordinates: so few that all their results stay in registers.
 ///
 /// # Safety
 /// The caller must be compiled for AVX2.
@@ -220,7 +221,7 @@ unsafe fn add_eight(
             for end in 0..2 {
                 let none = no_members(members, end, eight);
                 let x = _mm256_or_ps(x, _mm256_loadu_ps(none.as_ptr().cast()));
-                // Of a NaN and a number, the second one.
+                // If the first operand is NaN, the result is the second.
                 group_min[end] = _mm256_min_ps(x, group_min[end]);
                 group_max[end] = _mm256_max_ps(x, group_max[end]);
             }
@@ -235,10 +236,10 @@ unsafe fn add_eight(
     }
 }
 
-/// Coordinates in 4 KiB: what the processor fetches ahead by itself ends with the page.
+/// Coordinates in 4 KiB: the processor's own prefetching ends with the page.
 const PAGE: usize = 1024;
 
-/// As `Simd::of_ascending`: two vertices a register and four chains, which hide the latency of minimum
+/// As `Simd::of_ascending`: two vertices per register and four chains, which hide the latency of minimum
 /// and maximum.
 ///
 /// # Safety
@@ -251,8 +252,8 @@ unsafe fn of_ascending(positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, boo
         return of_vertices_f32(positions, vertices);
     }
     let first = positions.as_ptr();
-    // SAFETY: no vertex is higher than the last one, which has a successor: the 16 bytes of which a vertex
-    // is the first 12 lie within the slice.
+    // SAFETY: no vertex is higher than the last one, which has a successor. So the 16 bytes that start with a
+    // vertex's 12 lie within the slice.
     unsafe {
         let mut min = [_mm256_set1_ps(f32::INFINITY); CHUNK / 2];
         let mut max = [_mm256_set1_ps(f32::NEG_INFINITY); CHUNK / 2];
@@ -395,7 +396,7 @@ impl Simd for Avx2 {
 
     #[inline(always)]
     unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
-        // SAFETY: `Avx2` exists only where the processor has AVX2; the caller keeps the order.
+        // SAFETY: `Avx2` exists only where the processor has AVX2; the caller guarantees the order.
         unsafe { of_ascending(positions, vertices) }
     }
 
@@ -442,7 +443,7 @@ impl Simd for Avx2 {
     }
 }
 
-/// What sixteen lanes add to the masks of some rows. The lanes' boxes stay in registers.
+/// Adds sixteen lanes' bits to the masks of some rows. The lanes' boxes stay in registers.
 ///
 /// # Safety
 /// The caller must be compiled for AVX-512.
@@ -600,7 +601,7 @@ impl Simd for Avx512 {
     fn overlaps_within(self, boxes: &LaneBounds, among: u64, masks: &mut Masks) {
         masks.0 = [0; GROUP];
         for chunk in 0..4 {
-            // A lane of this chunk is beyond no row that is past the chunk.
+            // Rows past this chunk have no higher lanes in it.
             let rows = among & up_to(16 * chunk + 15);
             // SAFETY: `Avx512` exists only where the processor has it.
             unsafe { chunk_overlaps(boxes, chunk, among, boxes, rows, masks) };
@@ -641,14 +642,14 @@ impl Simd for Avx512 {
 
     #[inline(always)]
     unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
-        // SAFETY: `Avx512` exists only where the processor has AVX2 too; the caller keeps the order.
+        // SAFETY: `Avx512` exists only where the processor has AVX2 too; the caller guarantees the order.
         unsafe { of_ascending(positions, vertices) }
     }
 
     #[inline(always)]
     fn add_runs(self, runs: &[[[f32; 3]; RUN]], members: &[Members], into: &mut RunExtents) {
         // SAFETY: `Avx512` exists only where the processor has it; a run is three registers of coordinates,
-        // as is each row of `into`. What is fetched ahead may lie past the end: that is a hint and never a fault.
+        // as is each row of `into`. A prefetch may go past the end: it is a hint and never faults.
         unsafe {
             let load = |row: &[f32; 3 * RUN]| {
                 let first = row.as_ptr();
