@@ -1,4 +1,4 @@
-//! What a detector says of a step: which elements touch while bodies move from their positions to their end positions,
+//! A detector's answers about a step: which elements touch while bodies move from their positions to their end positions,
 //! when first, and how far the step can be taken.
 
 use crate::clock::Instant;
@@ -20,7 +20,7 @@ use crate::settings::{Method, Settings};
 use crate::stats::Statistics;
 use crate::step::{CandidateQuery, Start, Step, Toi};
 
-/// What is kept from step to step.
+/// The memory kept from step to step.
 pub(super) struct Steps {
     frame: Frame,
     impacts: Impacts,
@@ -40,7 +40,7 @@ impl Steps {
         }
     }
 
-    /// All that was found, unless it is sorted out, as impacts.
+    /// All contacts found, as impacts.
     fn named(&self, toi: Toi) -> impl Iterator<Item = Impact> + '_ {
         let kinds = PairKind::ALL.into_iter().zip(&self.found);
         kinds.flat_map(move |(kind, found)| {
@@ -50,18 +50,19 @@ impl Steps {
     }
 }
 
-/// How far into a step the earliest contact is sought first: what is near the start is a small part of all.
+/// The part of a step in which the earliest contact is sought first: few pairs are close that early.
 const FIRST_UNTIL: f64 = 1.0 / 1024.0;
-/// How much further it is sought when there is none.
+/// The factor by which that part grows when it has no contact.
 const FURTHER: f64 = 32.0;
 
 impl Detector {
-    /// All pairs of elements that touch during a step, each with the first time at which it does.
+    /// All pairs of elements that touch during a step, each with the first time at which they do.
     ///
     /// In: a scene whose bodies have positions, and end positions if they move
     /// ([`Scene::set_end_positions`]). Every vertex moves on a straight line at constant speed, from time 0 to time 1. Pairs
-    /// are of a vertex and a face and of two edges; where a body is made of edges or points alone also of an edge and a
-    /// vertex and of two vertices. Of tetrahedra the surface takes part. Pairs of one body that share a vertex are left out.
+    /// are a vertex and a face, or two edges. Between bodies of edges or points alone, they are also an edge and a vertex, and
+    /// between bodies of points two vertices. Tetrahedra take part with their surface. Pairs of one body that share a vertex
+    /// are not reported.
     ///
     /// The answer is exact: a pair is reported if and only if the two closed elements share a point at some time, and its
     /// time is that of the first contact, rounded down: `toi <= first < toi.next_up()`.
@@ -120,8 +121,8 @@ impl Detector {
         Ok(&self.steps.impacts)
     }
 
-    /// The impact with the least time, of several the one whose row comes first; `None` where the step is free.
-    /// The one that [`Impacts::earliest`] finds among all, but found faster.
+    /// The earliest impact; of several at the same time, the one whose row comes first. `None` if the step is free.
+    /// The same as [`Impacts::earliest`] of all impacts, but found faster.
     ///
     /// # Errors
     /// As [`impacts`](Detector::impacts).
@@ -152,7 +153,7 @@ impl Detector {
             self.find(scene, step, Sought::Earliest, (pose, latest), control)?;
             let found = self.steps.named(step.toi);
             first = found.chain(first).reduce(Impact::earlier);
-            // Of contacts up to this time none is left out; some later ones may have been found, too.
+            // All contacts up to this time have been found, and maybe some later ones.
             let bound = first.map_or(f64::INFINITY, |first| beyond(first.toi));
             if bound <= until || until == 1.0 {
                 break;
@@ -177,7 +178,7 @@ impl Detector {
         Ok(())
     }
 
-    /// Finds what is sought, in no order.
+    /// Finds what is sought, in any order.
     fn find(
         &mut self,
         scene: &Scene,
@@ -230,7 +231,7 @@ impl Detector {
         clusters.run(job, &self.settings, asked, found, stats)
     }
 
-    /// Whether nothing touches during the step; with [`Start::Skip`], but for pairs that touch at its start.
+    /// Whether nothing touches during the step. With [`Start::Skip`], pairs that touch at its start do not count.
     ///
     /// # Errors
     /// As [`impacts`](Detector::impacts).
@@ -332,8 +333,8 @@ impl Detector {
         }
     }
 
-    /// Pairs of elements whose boxes overlap during a step, each box inflated by a distance: for those who bring a test of
-    /// their own. Sorted and complete.
+    /// Pairs of elements whose boxes overlap during a step, each box inflated by a distance: for callers with their own test.
+    /// Sorted and complete.
     ///
     /// # Errors
     /// As [`impacts`](Detector::impacts), and a distance that is negative or not finite.
@@ -408,14 +409,14 @@ impl Detector {
         Ok(&self.steps.candidates)
     }
 
-    /// How the last answer about a step was found: that of [`impacts`](Detector::impacts),
+    /// Statistics of the last answer about a step: by [`impacts`](Detector::impacts),
     /// [`earliest`](Detector::earliest), [`is_free`](Detector::is_free) or [`advance`](Detector::advance).
     pub fn step_stats(&self) -> &Statistics {
         self.steps.impacts.stats()
     }
 }
 
-/// A time above all that are rounded down to this one, even to `f32`.
+/// A time above all times that round down to this one, even in `f32`.
 fn beyond(toi: f64) -> f64 {
     (toi * (1.0 + 2f64.powi(-20))).max(f64::from(f32::MIN_POSITIVE))
 }

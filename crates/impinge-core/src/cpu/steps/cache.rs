@@ -1,4 +1,4 @@
-//! What is kept of a layer: its clusters, and their boxes at the start and at the end of a step.
+//! The cache of a layer: its clusters, and their boxes at the start and at the end of a step.
 
 use crate::clock::Instant;
 use crate::cpu::bounds::{self, TreeBounds};
@@ -17,9 +17,9 @@ use crate::stats::Statistics;
 
 use super::hull::Pose;
 
-/// Clusters whose boxes a task finds.
+/// Clusters per task.
 const CLUSTERS: usize = 128;
-/// Elements of all layers together below which one thread finds the boxes.
+/// With fewer elements of all layers together, one thread computes the boxes.
 const PARALLEL_FROM: u64 = 60_000;
 
 /// By slot of the body, then by part.
@@ -36,31 +36,31 @@ pub(super) fn part_ix(part: Part) -> usize {
     }
 }
 
-/// What is kept of a layer from step to step.
+/// The data kept per layer from step to step.
 #[derive(Debug)]
 pub(super) struct LayerCache {
-    /// The topology that was clustered.
+    /// The stamp of the topology that was clustered.
     pub topology_stamp: u64,
-    /// The step that the boxes belong to, and how they were made.
+    /// The stamp of the step that the boxes belong to, and their pose.
     of: Option<(u64, Pose)>,
     pub clustering: Clustering,
     /// Boxes that hold the start and the end.
     bounds: TreeBounds,
-    /// Those of the clusters at the start, and at the end.
+    /// The clusters' boxes at the start, and at the end.
     ends: [BoundsArray; 2],
     /// The clusters' summed surface over the layer's, at its best so far.
     best_spread: f64,
 }
 
 impl LayerCache {
-    /// Clusters a part of a body in the pose at its start.
+    /// Clusters a part of a body in its pose at the start of the step.
     pub fn new(body: &Body, part: Part) -> Self {
         let (elements, positions) = (body.part(part), body.positions());
         let mut clustering = Clustering::new(elements, |element| {
             bounds::of_vertices(positions, elements.corners(element))
         });
         if let (Part::Vertices, Elements::Points(vertices)) = (part, &clustering.corners) {
-            // They are numbered as positions are.
+            // Vertices are numbered as positions are.
             clustering.order = vertices.iter().map(|&[vertex]| vertex).collect();
         }
         let mut bounds = TreeBounds::default();
@@ -98,7 +98,7 @@ impl LayerCache {
         size_of::<LayerCache>() + self.clustering.bytes() + self.bounds.bytes() + ends
     }
 
-    /// How well the clusters fit the pose at hand: the clusters' summed surface over the layer's.
+    /// How well the clusters fit the current pose: the clusters' summed surface divided by the layer's.
     fn spread(&self) -> f64 {
         let whole = self.bounds.root().half_area();
         let clusters = 0..self.clustering.n_clusters();
@@ -117,13 +117,13 @@ struct Task {
     layer: usize,
     first: usize,
     end: usize,
-    /// Where boxes go.
+    /// Where boxes are written.
     leaves: RawBoundsArray,
     ends: [RawBoundsArray; 2],
 }
 
-/// The boxes of all layers that moved, or that were looked at otherwise; layers that have flowed away from their clusters
-/// are clustered anew.
+/// Computes the boxes of all layers that have moved, or whose boxes were made for another [`Pose`]; layers that have flowed
+/// away from their clusters are clustered again.
 pub(super) fn refit<S: Send>(
     isa: Isa,
     job: Job<'_>,
@@ -165,7 +165,7 @@ pub(super) fn refit<S: Send>(
         }
     }
     if is_stale {
-        // Those made anew have the best spread so far, so this ends here.
+        // New clusters have the best spread so far, so this recursion ends.
         refit(isa, job, settings, pose, caches, scratches, stats)?;
     }
     Ok(())
@@ -248,7 +248,7 @@ fn find<S: Simd>(simd: S, clustering: &Clustering, body: &Body, pose: Pose, task
         let ends = pose.close([at_start, at_end]);
         let mut both = ends[0];
         both.join(&ends[1]);
-        // SAFETY: no two tasks have the same cluster, and nobody reads boxes before all tasks are done.
+        // SAFETY: no two tasks have the same cluster, and no thread reads boxes before all tasks are done.
         unsafe {
             task.leaves.put(cluster, &both);
             task.ends[0].put(cluster, &ends[0]);

@@ -12,10 +12,10 @@ use super::World;
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub(super) struct Group {
-    /// Their boxes at the start and at the end.
+    /// The elements' boxes at the start and at the end.
     pub start: LaneBounds,
     pub end: LaneBounds,
-    /// The vertices of each corner; an element of fewer than three has none beyond.
+    /// The vertices of each corner; lists past an element's number of corners mean nothing.
     pub corners: [Lanes32; 3],
     pub n_corners: usize,
     pub size: usize,

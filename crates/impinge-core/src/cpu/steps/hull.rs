@@ -1,18 +1,18 @@
-//! How moving boxes become the boxes that are tested.
+//! The boxes that are tested, made from moving boxes.
 
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, greater, lesser, round_down, round_up};
 
 use crate::cpu::simd::LaneBounds;
 
-/// Which part of a step is looked at, and by how much boxes are inflated.
+/// Which part of a step is examined, and by how much boxes are inflated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pose {
     /// The time up to which elements move, above 0 and at most 1.
     pub until: f64,
-    /// How far boxes reach beyond what they hold, on all sides.
+    /// How far boxes reach beyond their contents, on all sides.
     pub margin: f64,
-    /// Whether boxes hold the way from the start to the end, so that both are the same.
+    /// Whether boxes hold the whole path from the start to the end, so that both are the same.
     pub is_swept: bool,
 }
 
@@ -24,14 +24,14 @@ impl Pose {
         is_swept: false,
     };
 
-    /// Whether boxes at both ends are taken as they are.
+    /// Whether the boxes at both ends are used unchanged.
     fn is_plain(self) -> bool {
         self == Pose::WHOLE
     }
 
     /// The boxes to be tested, from those at the start and at the end of the step.
     ///
-    /// The box at a time between is no larger than the boxes at the ends, interpolated: each coordinate is at least the
+    /// The box at a time between lies within the interpolation of the boxes at both ends: each coordinate is at least the
     /// interpolated minimum. Everything is rounded outward.
     #[inline(always)]
     pub fn close(self, [start, end]: [Bounds; 2]) -> [Bounds; 2] {
@@ -42,7 +42,7 @@ impl Pose {
             let (x, y) = (f64::from(x), f64::from(y));
             x + self.until * (y - x)
         };
-        // Two roundings of numbers no larger than twice the larger end: 2^-51 of it is more than enough.
+        // Two roundings of numbers up to twice the larger end: 2^-51 of it is more than enough.
         let slack = |x: f32, y: f32| f64::from(greater(x.abs(), y.abs())) * 2f64.powi(-50);
         let mut end = Bounds {
             min: std::array::from_fn(|axis| {
@@ -110,7 +110,7 @@ mod tests {
             state = state
                 .wrapping_mul(6_364_136_223_846_793_005)
                 .wrapping_add(1);
-            // Between -1 and 1, with many sizes.
+            // Between -1 and 1, then of many sizes.
             let x = (state >> 40) as f32 / (1u64 << 23) as f32 - 1.0;
             x * 2f32.powi((state >> 33 & 15) as i32 - 8)
         };

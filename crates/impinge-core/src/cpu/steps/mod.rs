@@ -8,8 +8,8 @@
 //! narrow      filters, then exact arithmetic
 //! ```
 //!
-//! Reason for each discard: what moves linearly is, at any time, in the hull of its boxes at both ends. Two elements of which
-//! one is beside the other on the same side of an axis at both ends never touch.
+//! Reason for each discard: an element that moves linearly is, at any time, in the interpolation of its boxes at both ends.
+//! If one element is beside the other on the same side of an axis at both ends, they never touch.
 
 mod cache;
 mod group;
@@ -143,7 +143,7 @@ impl StepClusters {
         caches + scratches + self.top.bytes()
     }
 
-    /// Clusters layers that are new or were re-meshed; forgets those of bodies that are gone.
+    /// Clusters layers that are new or were re-meshed; forgets layers of removed bodies.
     fn cluster(&mut self, job: Job<'_>, stats: &mut Statistics) -> Result<(), Error> {
         let Job {
             scene,
@@ -180,7 +180,7 @@ impl StepClusters {
         Ok(())
     }
 
-    /// The boxes of layers that moved.
+    /// Computes the boxes of layers that have moved.
     fn refit(
         &mut self,
         job: Job<'_>,

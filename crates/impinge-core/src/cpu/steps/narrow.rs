@@ -18,7 +18,7 @@ use crate::step::{Start, Toi};
 
 use super::world::{FoundByKind, Sought, World};
 
-/// Pairs that the filter's first step leaves are searched once this many have gathered.
+/// Pairs that the filter's first step leaves open are searched once there are this many.
 const FULL: usize = 1024;
 
 /// Two layers, and the kind of their pairs.
@@ -56,7 +56,7 @@ impl Settler {
         size_of::<Places>() * self.open.capacity()
     }
 
-    /// The candidates of a work item.
+    /// Takes the candidates of a work item.
     #[inline(always)]
     pub fn settle_item<S: Simd>(
         &mut self,
@@ -115,7 +115,7 @@ impl Settler {
         }
     }
 
-    /// Searches what is open for first contacts.
+    /// Searches the open pairs for first contacts.
     #[inline(never)]
     pub fn search(&mut self, isa: Isa, world: World<'_>) {
         if self.open.is_empty() {
@@ -149,7 +149,7 @@ impl Settler {
         self.n_unsure += 1;
         let mut sides = [(between.a, places[0]), (between.b, places[1])];
         if pair == ElementPair::VertexEdge {
-            // Named edge first, tested vertex first.
+            // Such pairs are named edge first, but tested vertex first.
             sides.reverse();
         }
         let mut points: [[Point; 4]; 2] = Default::default();
@@ -167,7 +167,7 @@ impl Settler {
         }
     }
 
-    /// Notes a contact, unless nobody wants it.
+    /// Records a contact, unless it is not wanted.
     #[inline(always)]
     fn report(&mut self, world: World<'_>, between: Between, places: Places, contact: Contact) {
         if world.asked.start == Start::Skip && contact.at_start {
@@ -245,11 +245,11 @@ fn search<S: Simd>(simd: S, settler: &mut Settler, world: World<'_>) {
     settler.open = open;
 }
 
-/// Where the elements of two layers are.
+/// The corners and positions of two layers' elements.
 struct Sides<'a> {
     /// The corners at each place: of vertices and faces, or of edges.
     corners: Corners<'a>,
-    /// Of each layer, at the start and at the end.
+    /// The positions of each layer, at the start and at the end.
     positions: [[&'a Positions; 2]; 2],
 }
 
@@ -295,7 +295,7 @@ impl<'a> Sides<'a> {
     }
 }
 
-/// The points of one side, from a point of the pair on.
+/// Loads the points of one side, from a given point of the pair on.
 #[inline(always)]
 fn fill<S: Simd, const N: usize>(
     simd: S,
@@ -334,7 +334,7 @@ fn exact_pair(kind: PairKind) -> Option<ElementPair> {
     crate::narrow::exact_kind(crate::frame::TestId::Elements(kind))
 }
 
-/// The corners of an element, and where its body is at both ends.
+/// The corners of an element, and its body's positions at both ends.
 fn element<'a>(world: World<'a>, layer: u32, place: u32) -> (&'a [u32], [&'a Positions; 2]) {
     let body = world.frame.body(world.scene, layer as usize);
     let corners = world

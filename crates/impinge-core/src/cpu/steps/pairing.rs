@@ -15,7 +15,7 @@ use super::group::Group;
 use super::narrow::{Between, Settler};
 use super::world::{FoundByKind, World};
 
-/// One work item in so many has its narrow stage timed.
+/// The narrow stage is timed for one work item in this many.
 const SAMPLED: u32 = 16;
 
 /// What one worker has of its own.
@@ -29,7 +29,7 @@ pub(crate) struct Worker {
 }
 
 impl Worker {
-    /// Makes ready for a step of so many clusters.
+    /// Prepares for a step of `n_clusters` clusters.
     pub fn begin(&mut self, n_clusters: u64, in_budget: bool) {
         self.groups.begin::<World<'_>>(n_clusters, in_budget);
         self.settler.clear();
@@ -117,7 +117,7 @@ fn pair<S: Simd>(simd: S, world: World<'_>, item: &WorkItem, worker: &mut Worker
     }
     let layers = &world.frame.layers;
     let same_body = layers[item.a as usize].id == layers[item.b as usize].id;
-    // The side with fewer lanes has the rows.
+    // The lanes of the side with fewer of them are the rows.
     let (side, rows, lanes, [own, other]) = if lanes_a.count_ones() <= lanes_b.count_ones() {
         (Side::A, lanes_a, lanes_b, [a, b])
     } else {
@@ -142,7 +142,7 @@ fn pair<S: Simd>(simd: S, world: World<'_>, item: &WorkItem, worker: &mut Worker
     met.len() > 0
 }
 
-/// Whether two boxes that move are not beside each other on the same side of an axis at both ends.
+/// Whether two moving boxes are not beside each other on the same side of an axis at both ends.
 #[inline(always)]
 fn meet(a: &[Bounds; 2], b: &[Bounds; 2]) -> bool {
     let beside = |a: &[Bounds; 2], b: &[Bounds; 2], axis: usize| {

@@ -1,4 +1,4 @@
-//! What the stages of a step look at: what is asked, the layers, and what is known of the answer so far.
+//! Read-only view shared by all stages of a step: the question, the layers, and what is known of the answer so far.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -15,12 +15,12 @@ use super::hull::Pose;
 /// What was found, by kind of pair.
 pub(crate) type FoundByKind = [Vec<Found<Contact>>; PairKind::ALL.len()];
 
-/// What is sought in a step.
+/// What to look for in a step.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Sought {
     /// Every contact.
     All,
-    /// The earliest contact, and all that may be at the same time when rounded.
+    /// The earliest contact, and all whose times may round to the same time.
     Earliest,
     /// Any contact.
     Any,
@@ -28,21 +28,21 @@ pub(crate) enum Sought {
     Boxes(f64),
 }
 
-/// What is asked of a step.
+/// The question about a step.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Asked {
     pub sought: Sought,
     pub start: Start,
     pub toi: Toi,
     pub pose: Pose,
-    /// No contact is wanted that is later than this.
+    /// Contacts later than this are not wanted.
     pub latest: f64,
 }
 
 /// What is known of the answer while workers look for it.
 #[derive(Debug)]
 pub(crate) struct Known {
-    /// The earliest time found, as the bits of a number that is not negative.
+    /// The earliest time found, as the bits of a nonnegative number.
     earliest: AtomicU64,
     is_over: AtomicBool,
 }
@@ -55,7 +55,7 @@ impl Known {
         }
     }
 
-    /// Whether what is sought is known.
+    /// Whether the answer is complete, so that the search can stop.
     pub fn is_over(&self) -> bool {
         self.is_over.load(Ordering::Relaxed)
     }
@@ -67,7 +67,7 @@ impl Known {
 
     pub fn found(&self, sought: Sought, time: f64) {
         match sought {
-            // Bits of numbers that are not negative are in their order.
+            // The bits of nonnegative numbers are ordered as the numbers are.
             Sought::Earliest => {
                 self.earliest.fetch_min(time.to_bits(), Ordering::Relaxed);
             }
@@ -77,7 +77,7 @@ impl Known {
     }
 }
 
-/// What the stages look at.
+/// Read-only view shared by all stages of a step.
 #[derive(Clone, Copy)]
 pub(crate) struct World<'a> {
     pub scene: &'a Scene,
@@ -88,11 +88,11 @@ pub(crate) struct World<'a> {
 }
 
 impl<'a> World<'a> {
-    /// No contact is wanted that is later than this.
+    /// Contacts later than this are not wanted.
     #[inline(always)]
     pub(super) fn until(&self) -> f64 {
         match self.asked.sought {
-            // Those that are later by less than rounding are wanted, for their keys may be lower.
+            // Contacts that are later by less than rounding are wanted, for their keys may be lower.
             Sought::Earliest => {
                 let time = self.known.earliest();
                 let later = (time * (1.0 + 2f64.powi(-22))).max(f64::from(f32::MIN_POSITIVE));
@@ -102,7 +102,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// What is kept of a layer.
+    /// The cache of a layer.
     #[inline(always)]
     pub(super) fn cache(&self, layer: u32) -> &'a LayerCache {
         let layer = &self.frame.layers[layer as usize];

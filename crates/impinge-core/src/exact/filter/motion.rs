@@ -28,7 +28,7 @@ pub struct Motion<T: Number, const K: usize> {
     /// The largest coordinate of a corner, at either end.
     corner_sizes: [T; K],
     edge_sizes: [T; 3],
-    /// Where all of this is small enough for what underflow may do.
+    /// The lanes in which all of this is within the range of the error bounds.
     is_small: T::Mask,
 }
 
@@ -77,15 +77,15 @@ impl<T: Number> Cubic<T> {
         (a & b & c & d) | (e & f & g & h)
     }
 
-    /// The outer coefficients are opposite, and not each inner one has the sign of the outer one further away: then the
-    /// signs change once.
+    /// Whether the signs certainly change once: the outer coefficients have opposite signs, and some inner one does not have
+    /// the sign of the outer one farther away.
     #[inline(always)]
     fn has_one_root(&self) -> T::Mask {
         let ([a, b, c, d], [e, f, g, h]) = (self.positive, self.negative);
         (a & h & (b | g)) | (e & d & (f | c))
     }
 
-    /// If no coefficient is certain, none will be over shorter intervals.
+    /// Whether the sign of any coefficient is certain. If not, none will be over shorter intervals.
     #[inline(always)]
     fn is_sure_anywhere(&self) -> T::Mask {
         let ([a, b, c, d], [e, f, g, h]) = (self.positive, self.negative);
@@ -172,8 +172,8 @@ impl<T: Number, const K: usize> Motion<T, K> {
         }
     }
 
-    /// Where the elements are certainly apart from t = 0 to `until`: because they are on an axis, or along a direction,
-    /// at both ends of that time, or because f has one sign. The cheap first step.
+    /// The lanes whose elements are certainly apart from t = 0 to `until`: either they are apart on an axis or along a direction
+    /// at both ends of that time, or f has one sign. The cheap first step.
     #[inline(always)]
     #[must_use]
     pub fn are_apart(&self, until: f64) -> T::Mask {
@@ -201,7 +201,7 @@ impl<T: Number, const K: usize> Motion<T, K> {
             | are_before(&normal[0], start, &end, size)
             | are_before(&normal[2], start, &end, size);
         let cubic = self.signs(&cubic(&normal, &[start[0], end[0]]));
-        // At t = 1 nothing is rounded but differences, whose signs are right.
+        // At t = 1 only differences are rounded, and their signs are right.
         let bound = if until == 1.0 {
             T::splat(0.0)
         } else {
@@ -269,7 +269,7 @@ impl<T: Number, const K: usize> Motion<T, K> {
         self.signs(&self.f_over(a, b))
     }
 
-    /// The signs that coefficients of f certainly have.
+    /// The certain signs of f's coefficients.
     #[inline(always)]
     fn signs(&self, f: &[T; 4]) -> Cubic<T> {
         let tiny = T::splat(T::TINY[1]);
@@ -344,19 +344,19 @@ impl<T: Number, const K: usize> Motion<T, K> {
         if ix < Self::N_EDGES {
             (positive, negative)
         } else {
-            // The edge from this corner is the opposite of the one that is kept.
+            // The edge from this corner is the opposite of the stored one.
             (negative, positive)
         }
     }
 
-    /// Where [low, high] has one root of f: an interval inside it, as short as rounding allows, that certainly has the root.
+    /// If [low, high] has one root of f: an interval inside it, as short as rounding allows, that certainly has the root.
     #[inline(always)]
     #[must_use]
     pub fn narrowed(&self, low: T, high: T) -> [T; 2] {
         let (zero, one, two, three) = (T::splat(0.0), T::splat(1.0), T::splat(2.0), T::splat(3.0));
         let f = self.f_over(low, high);
         let is_rising = f[3].gt(f[0]);
-        // f in powers of the part s of the interval, and Newton's method from the chord's root, kept inside.
+        // f in powers of s, a share of the interval. Newton's method starts at the root of the chord and is kept inside.
         let powers = [
             f[0],
             f[1] - three * f[0],
@@ -379,7 +379,7 @@ impl<T: Number, const K: usize> Motion<T, K> {
         let length = high - low;
         let root = low + s * length;
         let bound = self.f_at(root).1;
-        // So far from the root f is certain, if it goes on as steep as it is there; else sixteen times as far.
+        // At this distance from the root f is certain, if its slope stays the same; else sixteen times as far.
         let reach = bound * T::splat(1.5) * length / slope.abs() + root * T::splat(T::BOUND / 16.0);
         let (mut first, mut last) = (low, high);
         for widening in WIDENINGS {
@@ -428,10 +428,10 @@ impl<T: Number, const K: usize> Motion<T, K> {
 /// The shortest interval that is looked at, in parts of the whole: 2^-12. Then comes exact arithmetic.
 const SHORTEST: f64 = 1.0 / 4096.0;
 
-/// Steps of Newton's method: from the root of a chord to the last bits of an `f64`, nearly always.
+/// Steps of Newton's method: nearly always enough from the root of a chord to the last bits of an `f64`.
 const N_NEWTON: usize = 8;
 
-/// How wide the interval around a root is made, in parts of the likely width; the narrowest that is certain counts.
+/// The widths that are tried for the interval around a root, relative to the likely width; the narrowest certain one counts.
 const WIDENINGS: [f64; 2] = [16.0, 1.0];
 
 /// f = N . V over an interval: f_0, 3 f_1, 3 f_2, f_3.
@@ -445,7 +445,7 @@ fn cubic<T: Number>(normal: &[Vector<T>; 3], corner: &[Vector<T>; 2]) -> [T; 4] 
     ]
 }
 
-/// Whether on an axis all corners at both ends are further from the origin than a bound, on one side.
+/// Whether on some axis all corners at both ends are farther from the origin than a bound, on the same side.
 #[inline(always)]
 fn are_apart_on_an_axis<T: Number, const K: usize>(
     start: &[Vector<T>; K],
@@ -485,7 +485,7 @@ fn are_before<T: Number, const K: usize>(
     least.gt(bound) | (T::splat(0.0) - bound).gt(most)
 }
 
-/// Whether a value is certainly of the sign that f has before (or after) its root.
+/// Whether a value certainly has the sign that f has before (or after) its root.
 #[inline(always)]
 fn certainly<T: Number>(is_rising: T::Mask, value: T, bound: T, before: bool) -> T::Mask {
     let is_positive = value.gt(bound);
@@ -512,7 +512,7 @@ fn between<T: Number>(p: &Vector<T>, q: &Vector<T>, t: T) -> Vector<T> {
     ]
 }
 
-/// Bernstein coefficients of a product of two vectors that move: the first, twice the middle one, the last.
+/// Bernstein coefficients of the cross product of two moving vectors: the first, twice the middle one, the last.
 #[inline(always)]
 fn cross_over<T: Number>(d: &[Vector<T>; 2], e: &[Vector<T>; 2]) -> [Vector<T>; 3] {
     let (one, two) = (cross(&d[0], &e[1]), cross(&d[1], &e[0]));

@@ -6,7 +6,7 @@ use super::{BATCH, LANES, TABLE};
 use crate::exact::rounding::round_down;
 use crate::exact::{ElementPair, Point};
 
-/// The points of eight pairs of moving elements, one pair a lane: `[start or end][point][axis][lane]`, points in the
+/// The points of eight pairs of moving elements, one pair per lane: `[start or end][point][axis][lane]`, points in the
 /// order of the [`ElementPair`].
 #[derive(Clone, Debug, Default, PartialEq)]
 #[repr(align(64))]
@@ -233,7 +233,7 @@ pub(in super::super) fn contact_search(
     }
 }
 
-/// Whether they touch, if that is certain.
+/// Whether the elements touch; `None` when unsure.
 #[inline]
 pub(in super::super) fn contact_answer(
     pair: ElementPair,

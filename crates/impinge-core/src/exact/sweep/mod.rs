@@ -5,12 +5,12 @@
 //! such time is an algebraic number; it is returned rounded down to a float.
 //!
 //! How: at each time two elements share a point if and only if the origin lies in their *difference polygon*: a
-//! point, a segment, a triangle or a parallelogram, whose corners move linearly. Where its plane passes the origin,
-//! a cubic f in t is zero; whether the origin is inside then, the signs of three or four quartics tell. Where f is
-//! zero at all times, the first contact is on an edge of the polygon, and a root of a quadratic.
+//! point, a segment, a triangle or a parallelogram, whose corners move linearly. When its plane passes through the
+//! origin, a cubic f in t is zero. The signs of three or four quartics then say whether the origin is inside. If f is
+//! zero at all times, the first contact is on an edge of the polygon, at a root of a quadratic.
 //!
-//! In: the positions of the points at the start and at the end. Out: none, or a [`Contact`]. Cost: nearly always a
-//! few microseconds; most pairs that do not touch much less.
+//! In: the positions of the points at the start and at the end. Out: `None`, or a [`Contact`]. Cost: nearly always a
+//! few microseconds, and much less for most pairs that do not touch.
 //!
 //! Invariant: `contact.time <= t < contact.time.next_up()` for the exact first time t. Degenerate elements are the
 //! segments and points that they are; touching counts, at t = 1 as well, and so does contact over a whole interval.
@@ -43,7 +43,7 @@ pub enum ElementPair {
 }
 
 impl ElementPair {
-    /// How many points the two elements have together. Further points are not looked at.
+    /// How many points the two elements have together. Further points are ignored.
     #[inline]
     #[must_use]
     pub fn n_points(self) -> usize {
@@ -111,7 +111,7 @@ impl Contact {
 
 /// The first time at which two elements share a point while their points move from `start` to `end` on straight lines.
 ///
-/// None if they share none at any time in [0, 1]. The points and their order are those of the [`ElementPair`]. Exact
+/// `None` if they share no point at any time in [0, 1]. The points and their order are those of the [`ElementPair`]. Exact
 /// for coordinates [`in_range`](super::in_range); unspecified for others, but never a panic.
 ///
 /// ```
@@ -183,8 +183,8 @@ pub fn touch(pair: ElementPair, points: &[Point; 4]) -> bool {
     }
 }
 
-/// Whether on some axis one element is strictly before the other at the start and at the end. It is then so at all
-/// times between. By comparisons alone, so exact for all numbers.
+/// Whether on some axis one element is strictly before the other at the start and at the end. Then it is so at all
+/// times between. Uses only comparisons, so it is exact for all numbers.
 fn is_apart_on_an_axis(pair: ElementPair, start: &[Point; 4], end: &[Point; 4]) -> bool {
     let corners = pair.corners();
     (0..3).any(|axis| {

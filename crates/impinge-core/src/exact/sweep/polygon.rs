@@ -30,7 +30,7 @@ impl Polygon {
                 12..24 => end[ix % 12 / 3][ix % 3],
                 _ => distance,
             };
-            // Points that do not belong to the pair.
+            // Points that do not belong to the pair may hold anything.
             if x.is_finite() { x } else { 0.0 }
         });
         let (integers, _) = common_integers(numbers);
@@ -48,7 +48,7 @@ impl Polygon {
         (Self { corners }, distance)
     }
 
-    /// The only root of f between two times, which are no roots, rounded down. For triangles and parallelograms.
+    /// The only root of f between two times that are not roots, rounded down. For triangles and parallelograms.
     pub(super) fn time_between(&self, low: f64, high: f64) -> Time {
         floor_between(&plane_and_height(&self.corners).1, low, high)
     }
@@ -57,7 +57,7 @@ impl Polygon {
         &self.corners
     }
 
-    /// The first time in (0, 1] at which the origin is in the polygon, if it is not at the start.
+    /// The first time in (0, 1] at which the origin is in the polygon, provided that it is not in it at the start.
     pub(super) fn first_time(&self) -> Option<Time> {
         match &self.corners[..] {
             [corner] => first_at_corner(corner),
@@ -67,10 +67,10 @@ impl Polygon {
     }
 }
 
-/// For a triangle or a parallelogram.
+/// [`Polygon::first_time`] of a triangle or a parallelogram.
 ///
-/// With f = N . V_0 and w_i = N . (V_i x V_(i+1)): the origin is inside at t if and only if f(t) = 0 and all
-/// w_i(t) > 0, or it is on an edge. If all w_i(t) are at least 0 and one is greater, f(t) = 0 suffices.
+/// Let f = N . V_0 and w_i = N . (V_i x V_(i+1)). The origin is inside at t if and only if f(t) = 0 and all
+/// w_i(t) > 0, or it is on an edge. If all w_i(t) are at least 0 and one is greater, f(t) = 0 is sufficient.
 fn first_in_face(corners: &[Vector]) -> Option<Time> {
     let (normal, f) = plane_and_height(corners);
     if f.is_zero() {
@@ -128,21 +128,21 @@ impl Edge {
         }
     }
 
-    /// Whether the origin is on the edge at a root of something.
+    /// Whether the origin is on the edge at a root.
     fn has_origin(&self, root: &mut Root) -> bool {
         self.cross.iter().all(|x| root.sign_of(x).is_zero())
             && root.sign_of(&self.dot) != Sign::Positive
     }
 
-    /// The first time in (0, 1] at which the origin is on the edge, if it is not at the start.
+    /// The first time in (0, 1] at which the origin is on the edge, provided that it is not on it at the start.
     fn first_time(&self) -> Option<Time> {
         let moving: Vec<&Polynomial> = self.cross.iter().filter(|x| !x.is_zero()).collect();
         if moving.iter().any(|x| x.has_no_root()) {
             return None;
         }
         let Some(&first) = moving.first() else {
-            // The edge's line passes the origin at all times: A . B is positive at the start, and the origin comes
-            // onto the edge when it becomes zero.
+            // The edge's line passes through the origin at all times. A . B is positive at the start, and the origin
+            // comes onto the edge when A . B becomes zero.
             return (!self.dot.is_zero())
                 .then(|| Roots::of(self.dot.clone()).next())
                 .flatten()
@@ -153,7 +153,7 @@ impl Edge {
     }
 }
 
-/// The first time in (0, 1] at which a corner is the origin, if it is not at the start.
+/// The first time in (0, 1] at which a corner is at the origin, provided that it is not there at the start.
 fn first_at_corner(corner: &Vector) -> Option<Time> {
     let first = corner.iter().find(|x| !x.is_zero())?;
     Roots::of(first.clone()).find_map(|mut root| {

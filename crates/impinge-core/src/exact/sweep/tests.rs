@@ -1,5 +1,5 @@
-//! What the filter for moving elements says against what exact roots say. The roots themselves are held against an
-//! independent oracle in `tests/sweep`.
+//! The answers of the filter for moving elements compared with those of exact roots. The roots themselves are compared
+//! with an independent oracle in `tests/sweep`.
 
 use super::{Contact, ElementPair, first_contact, first_contact_by_roots};
 use crate::exact::Point;
@@ -38,7 +38,7 @@ enum Kind {
     Plain,
     /// On a small lattice: ties.
     Lattice,
-    /// One of the lattice, turned, and moved by a last bit.
+    /// As `Lattice`, rotated and moved by about a last bit.
     NearlyTied,
     /// Elements next to each other, moving little.
     Close,
@@ -133,7 +133,7 @@ fn ask_avx512(pair: ElementPair, steps: &Steps8, until: f64) -> Answer {
     ask::<number::Avx512>(pair, steps, until)
 }
 
-/// What every instruction set of this processor says, after it was found to be the same.
+/// The answer of all instruction sets of this processor, which must be the same.
 fn ask_all(pair: ElementPair, steps: &Steps8, until: f64) -> Answer {
     let answer = ask::<number::Portable>(pair, steps, until);
     #[cfg(target_arch = "x86_64")]
@@ -271,7 +271,7 @@ fn filter_never_contradicts_exact_roots() {
                         let [start, end] = &steps[lane];
                         if let Some(answer) = contact_answer(pair, start, end) {
                             assert_eq!(answer, contact.is_some(), "{}", case());
-                            // The quick way to the time is the same time.
+                            // The fast path finds the same time.
                             assert_eq!(first_contact(pair, start, end), contact, "{}", case());
                         }
                     }
