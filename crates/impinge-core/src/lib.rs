@@ -1,7 +1,7 @@
-//! The engine of `impinge`: everything inside, public and without a promise of stability.
+//! The engine of `impinge`: all its internals, public but without a promise of stability.
 //!
-//! Users of the library take the crate `impinge`, which hands on what is stable. Methods that live in
-//! other crates, such as the baselines that impinge is measured against, stand on this one: on the same
+//! Users of the library depend on the crate `impinge`, which re-exports the stable part. Methods in
+//! other crates, such as the baselines that impinge is compared with, are built on this crate. They share its
 //! frame, boxes, grid, threads, exact test and GPU engine, so that only the method differs.
 
 pub mod clock;

@@ -1,14 +1,14 @@
-//! What a detector may be told.
+//! The settings of a detector.
 
 use crate::error::Error;
 
 /// How candidates are found. All methods give the same pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Method {
-    /// Groups fixed by topology; each frame only their boxes move. The fast one.
+    /// Groups are fixed by topology; in each frame only their boxes move. The fast method.
     #[default]
     Clusters,
-    /// The two-level grid of the paper: groups are what a cell holds, made anew each frame.
+    /// The two-level grid of the paper: the primitives of a cell form groups, made anew each frame.
     Cells,
     /// Every box against every box: the oracle, quadratic in primitives.
     Naive,
@@ -28,28 +28,28 @@ impl Method {
 /// Where the work is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Backend {
-    /// A GPU where there is one in hardware, else the CPU; also when the GPU fails or the scene is
-    /// more than it can hold.
+    /// A hardware GPU if there is one, else the CPU. The CPU also takes over if the GPU fails or cannot
+    /// hold the scene.
     #[default]
     Auto,
-    /// All cores, or as many threads as told.
+    /// The CPU, with one thread per core or as many as [`Settings::threads`] says.
     Cpu,
-    /// A GPU; an error where there is none.
+    /// A GPU; an error if there is none.
     Gpu,
 }
 
-/// Whether a body that has flowed far from the pose in which it was clustered is clustered anew.
+/// Whether a body is clustered again after it has flowed far from the pose in which it was clustered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Recluster {
-    /// When the summed surface of its cluster boxes has grown enough for it to pay. A GPU judges by a sample of
-    /// them, and only bodies whose positions are in the scene, not in a buffer of the caller's.
+    /// Yes, when the summed surface of its cluster boxes has grown so much that it pays. A GPU judges by a sample of
+    /// the boxes, and only bodies whose positions are in the scene, not in a buffer of the caller's.
     #[default]
     Auto,
-    /// Never: no frame ever pays for it. Boxes may grow and frames get slower.
+    /// Never: no frame pays for clustering again, but boxes may grow and frames get slower.
     Never,
 }
 
-/// The widest vector instructions that the CPU backend may use, where the processor has them.
+/// The widest vector instructions that the CPU backend may use, if the processor has them.
 /// The pairs do not depend on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum InstructionSet {
@@ -63,14 +63,14 @@ pub enum InstructionSet {
     Avx512,
 }
 
-/// What a detector may be told.
+/// The settings of a detector.
 #[derive(Debug, Clone)]
 pub struct Settings {
     /// How candidates are found.
     pub method: Method,
-    /// Where.
+    /// Where the work is done.
     pub backend: Backend,
-    /// CPU threads; 0 means one a core.
+    /// CPU threads; 0 means one per core.
     pub threads: usize,
     /// The widest vector instructions that the CPU backend may use.
     pub instruction_set: InstructionSet,

@@ -1,4 +1,4 @@
-//! What a frame cost and what it went through.
+//! Counts and times of a frame.
 
 use crate::clock::Instant;
 
@@ -19,7 +19,7 @@ pub struct Statistics {
     pub backend: String,
     /// `"clusters"`, `"cells"` or `"naive"`.
     pub method: &'static str,
-    /// Threads that worked.
+    /// Threads used.
     pub n_threads: usize,
     /// The stages in the order in which they ran.
     pub stages: Vec<Stage>,
@@ -29,28 +29,28 @@ pub struct Statistics {
     pub grid: Option<[u32; 3]>,
     /// `Cells`: cells that went through the second level.
     pub n_subdivided: u64,
-    /// `Cells`: entries of the cell lists, a primitive counted once a cell. Primitives that no other body
+    /// `Cells`: entries of the cell lists, where a primitive counts once per cell. Primitives that no other body
     /// comes near may have none.
     pub n_entries: u64,
     /// `Clusters`: clusters of all participants.
     pub n_clusters: u64,
-    /// `Clusters` on the CPU: those that were proven to lie beside all other bodies, so that their boxes were not
+    /// `Clusters` on the CPU: clusters that were proven to lie beside all other bodies, so that their boxes were not
     /// needed.
     pub n_remote: u64,
-    /// Pairs of groups that were paired.
+    /// Work items: pairs of groups whose primitives were paired.
     pub n_work_items: u64,
-    /// Pairs whose boxes overlap and that the adjacency rule lets through.
+    /// Pairs whose boxes overlap and that the adjacency rule admits.
     pub n_candidates: u64,
     /// Candidates that the floating-point filter left to exact arithmetic.
     pub n_unsure: u64,
-    /// Bodies that were clustered in this frame, the first time included.
+    /// Bodies that were clustered in this frame, for the first time or again.
     pub n_clustered: u64,
-    /// Of those, bodies clustered again because they had flowed away from their rest pose.
+    /// Of those, bodies clustered again because they had flowed away from the pose in which they were clustered.
     pub n_reclustered: u64,
-    /// Runs over parts of the work, 1 when the memory budget allowed for all at once.
+    /// Parts in which the work was done; 1 if the memory budget allowed all of it at once.
     pub n_slabs: u64,
-    /// GPU: pieces that the scene was answered in because the device or the memory budget cannot hold all of
-    /// it; 0 when it can.
+    /// GPU: pieces in which the scene was answered because the device or the memory budget cannot hold all of
+    /// it; 0 if it can.
     pub n_pieces: u64,
     /// Stages that were run again because a buffer had to grow.
     pub n_reruns: u64,
@@ -59,7 +59,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Forgets everything but the memory of the stage list.
+    /// Clears everything, but keeps the allocated memory.
     pub(crate) fn clear(&mut self) {
         let mut stages = std::mem::take(&mut self.stages);
         let mut backend = std::mem::take(&mut self.backend);
@@ -72,7 +72,7 @@ impl Statistics {
         };
     }
 
-    /// Adds time to a stage, which is appended at its first mention.
+    /// Adds time to a stage; appends the stage if it is new.
     #[doc(hidden)]
     pub fn add_ms(&mut self, name: &'static str, ms: f64) {
         match self.stages.iter_mut().find(|stage| stage.name == name) {
@@ -81,7 +81,7 @@ impl Statistics {
         }
     }
 
-    /// Runs one stage and books its wall time.
+    /// Runs one stage and adds its wall time.
     #[doc(hidden)]
     pub fn time<T>(&mut self, name: &'static str, stage: impl FnOnce(&mut Self) -> T) -> T {
         let start = Instant::now();
@@ -90,7 +90,7 @@ impl Statistics {
         result
     }
 
-    /// Milliseconds of a stage; 0 when it did not run.
+    /// Milliseconds of a stage; 0 if it did not run.
     pub fn stage_ms(&self, name: &str) -> f64 {
         self.stages
             .iter()

@@ -1,8 +1,8 @@
 //! The method `Cells` on the CPU: the paper's two levels.
 //!
 //! ```text
-//! bounds      box of each body; where bodies overlap; primitives that reach there and have another body's
-//!             near them, and their boxes
+//! bounds      box of each body; where bodies overlap; primitives that reach there and have primitives of
+//!             another body near them, and their boxes
 //! grid        eq. (1) resolution, eq. (3) ranges; count, prefix sum, scatter into cell lists
 //! dispatch    cells with primitives of bodies that meet; lists cut into groups of at most 64;
 //!             Cartesian product of groups, eq. (4): work items
@@ -11,10 +11,10 @@
 //! ```
 //!
 //! Source: "Real-time Collision Detection with Two-level Spatial Hashing on GPU", section 3.
-//! Where we deviate: the owner rule in place of a hash table (nothing is lost or tested twice), and
-//! cell lists bounded by the number of primitives: a huge primitive would touch every cell, so the grid is made
-//! coarser until the lists hold at most [`MOST_ENTRIES_EACH`] entries a primitive. That keeps memory
-//! bounded; the price is more pairs a cell, and `n_reruns` and `grid` in the statistics tell it.
+//! Where we deviate: the owner rule replaces the hash table (nothing is lost or tested twice), and
+//! cell lists are bounded by the number of primitives: a huge primitive would touch every cell, so the grid is made
+//! coarser until the lists hold at most [`MOST_ENTRIES_EACH`] entries per primitive. That keeps memory
+//! bounded; the price is more pairs per cell, which `n_reruns` and `grid` in the statistics show.
 
 use crate::clock::Instant;
 
@@ -41,12 +41,12 @@ pub const MOST_ENTRIES_EACH: u64 = 16;
 const SLAB_ITEMS: usize = 1 << 18;
 const PAIRING_TASK: usize = 32;
 
-/// What becomes of two primitives of one cell that touch a common sub-cell.
+/// Decides about two primitives of one cell that touch a common sub-cell.
 ///
-/// The method is compiled once for each rule; [`Owner`] is that of every detector. Others are for studies
-/// of what it replaces.
+/// The method is compiled once per rule. Every detector uses [`Owner`]; other rules are for studies
+/// of what the owner rule replaces.
 pub trait Rule: Sync {
-    /// Which pairs the rule is asked about.
+    /// The pairs that the rule is asked about.
     fn asked(&self) -> Asked;
 
     /// Whether such a pair is a candidate here. What the rule appends to `keys` ends up in the answer's.
@@ -89,14 +89,14 @@ pub struct Cells {
     reaching: KeptList,
     /// Where each cell's list starts, and one past the last.
     starts: Vec<u32>,
-    /// The cell lists: places in `kept`, rising within a cell, so that a body's are together.
+    /// The cell lists: places in `kept`, ascending within a cell, so that those of one body are together.
     entries: Vec<u32>,
     items: Vec<WorkItem>,
     scratches: Vec<Settler>,
 }
 
 impl Cells {
-    /// With the best instructions that are allowed and there.
+    /// Uses the best instruction set that is allowed and available.
     pub fn new(allowed: InstructionSet) -> Self {
         Cells {
             isa: Isa::detect(allowed),
@@ -187,7 +187,7 @@ impl Cells {
         let mut most_entries = n.saturating_mul(MOST_ENTRIES_EACH).min(u64::from(u32::MAX));
         let mut most_cells = u64::MAX;
         if let Some(budget) = settings.memory_budget {
-            // What is held by now, primitives' boxes above all, but for what is still to be sized.
+            // Bytes held by now, mainly the boxes of primitives, without the lists that are sized below.
             let sized_later = size_of::<u32>() * (self.starts.capacity() + self.entries.capacity())
                 + size_of::<WorkItem>() * self.items.capacity();
             let fixed = self.bytes() - sized_later as u64 + slab_bytes(settings) + 8;
@@ -217,7 +217,7 @@ impl Cells {
             grid = coarser;
             stats.n_reruns += 1;
         }
-        // Two places further on than the cell's own: the sum moves them by one, and so does the scatter.
+        // Counts go two places past the cell's own: the prefix sum moves them back by one, and so does the scatter.
         let n_starts = grid.n_cells() as usize + 2;
         self.starts.clear();
         self.starts.reserve_exact(n_starts);
@@ -243,7 +243,7 @@ impl Cells {
         Ok(grid)
     }
 
-    /// Work items of all cells, a slab at a time.
+    /// Makes the work items of all cells, one slab at a time.
     fn dispatch_items<R: Rule>(
         &mut self,
         task: Task<'_, R>,
@@ -316,7 +316,7 @@ impl Cells {
 fn slab_items(settings: &Settings) -> usize {
     match settings.memory_budget {
         None => SLAB_ITEMS,
-        // A small share of the budget; what is left over is for boxes and lists.
+        // A small share of the budget; the rest is for boxes and lists.
         Some(budget) => {
             (budget as usize / 16 / size_of::<WorkItem>()).clamp(PAIRING_TASK, SLAB_ITEMS)
         }
@@ -327,7 +327,7 @@ fn slab_bytes(settings: &Settings) -> u64 {
     (slab_items(settings) * size_of::<WorkItem>()) as u64
 }
 
-/// A frame, with what the rule says of its pairs.
+/// A frame and the rule for its pairs.
 struct Task<'a, R> {
     world: World<'a>,
     workers: &'a Workers,
@@ -370,7 +370,7 @@ fn for_places(grid: &Grid, range: &FineRange, mut call: impl FnMut(usize)) {
     }
 }
 
-/// The cell lists and what they name.
+/// The cell lists and the primitives that they name.
 #[derive(Clone, Copy)]
 struct Lists<'a> {
     world: World<'a>,

@@ -1,7 +1,7 @@
 //! Stage `bounds` of methods that work in a grid: the primitives that reach another body.
 //!
-//! In: positions. Out: where bodies may meet, the primitives that reach there, and their boxes; in the
-//! order of bodies and, within one, of primitives. Cost: every vertex once for the boxes of bodies, every
+//! In: positions. Out: where bodies may meet, and the primitives that reach there with their boxes, ordered by
+//! body and primitive. Cost: every vertex once for the boxes of bodies, every
 //! primitive's corners once. Invariant: no pair that intersects has a primitive that is not kept.
 
 use std::sync::Mutex;
@@ -19,11 +19,11 @@ use super::top_level::TopLevel;
 use super::world::{BodyRef, World};
 use crate::workers::Workers;
 
-/// Primitives whose boxes a task finds.
+/// Primitives per task.
 const PRIMITIVES: u32 = 4096;
-/// Vertices that a task looks at.
+/// Vertices per task.
 const VERTICES: u32 = 1 << 15;
-/// Primitives below which waking a thread costs more than it saves.
+/// With fewer primitives, waking a thread costs more than it saves.
 const PARALLEL_FROM: u64 = 100_000;
 
 /// A primitive that reaches the region.
@@ -33,7 +33,7 @@ pub struct Kept {
     pub bounds: Bounds,
     /// The fine cells that it touches; the grid fills them in.
     pub range: FineRange,
-    /// Whose it is.
+    /// Its participant.
     pub participant: u32,
     /// Its index within the body.
     pub primitive: u32,
@@ -61,7 +61,7 @@ impl Kept {
     }
 }
 
-/// As many of the workers as are worth waking.
+/// The scratches of as many workers as are worth waking.
 fn few<'a, S>(world: World<'_>, scratches: &'a mut [S]) -> &'a mut [S] {
     let n = match world.frame.n_primitives() < PARALLEL_FROM {
         true => 1,
@@ -99,17 +99,17 @@ pub struct KeptList {
     stack: Vec<NodePair>,
     /// Runs of primitives.
     runs: Vec<Run>,
-    /// What each of them adds.
+    /// The kept primitives of each run.
     parts: Vec<Mutex<Vec<Kept>>>,
     /// Runs of vertices, with their boxes.
     vertices: Vec<(Run, Mutex<Bounds>)>,
     cull: Cull,
-    /// The primitives.
+    /// The kept primitives.
     pub kept: Vec<Kept>,
 }
 
 impl KeptList {
-    /// An empty one.
+    /// An empty list.
     pub fn new(isa: Isa) -> Self {
         KeptList {
             isa,
@@ -139,8 +139,8 @@ impl KeptList {
             + self.cull.bytes()
     }
 
-    /// Boxes of bodies, where they reach each other, and the primitives that do. `scratches` are one
-    /// a worker and only counted.
+    /// Finds the boxes of bodies, where bodies reach each other, and the primitives that reach there. `scratches` has
+    /// one entry per worker; only their number matters.
     pub fn find<S: Send>(&mut self, world: World<'_>, workers: &Workers, scratches: &mut [S]) {
         let scratches = few(world, scratches);
         self.begin(world, workers, scratches);
@@ -158,8 +158,8 @@ impl KeptList {
         self.gather();
     }
 
-    /// As [`find`](KeptList::find), but for primitives that no other body comes near: they are left
-    /// out. Returns how many were near where bodies meet.
+    /// [`find`](KeptList::find), without the primitives that no other body comes near.
+    /// Returns how many primitives were near where bodies meet.
     pub fn find_sharing<S: Send>(
         &mut self,
         world: World<'_>,
@@ -167,7 +167,8 @@ impl KeptList {
         scratches: &mut [S],
     ) -> usize {
         let scratches = few(world, scratches);
-        // One that is asked for itself keeps all it has, and among many hardly anything is alone.
+        // Bodies queried for self-collision keep every primitive, and with many bodies the map rejects almost
+        // nothing; skip it in both cases.
         let participants = &world.frame.layers;
         if !world.frame.between()
             || participants.len() > MOST_MAPS
@@ -189,7 +190,7 @@ impl KeptList {
             let run = vertices[ix].0;
             let range = run.first as usize..run.end as usize;
             let positions = world.body(run.participant).positions;
-            // SAFETY: runs do not overlap, and codes are read only when all are written.
+            // SAFETY: runs do not overlap, and codes are read only after all are written.
             unsafe { codes.put(isa, positions, range, cull.first_code(run.participant)) };
         });
         let (runs, parts, reach) = (&self.runs, &self.parts, &self.reach);
@@ -215,7 +216,7 @@ impl KeptList {
         n_near.into_inner()
     }
 
-    /// Tasks, the boxes of bodies and where they reach each other.
+    /// Makes the tasks, and finds the boxes of bodies and where they reach each other.
     fn begin<S: Send>(&mut self, world: World<'_>, workers: &Workers, scratches: &mut [S]) {
         self.runs.clear();
         self.vertices.clear();
@@ -248,7 +249,7 @@ impl KeptList {
         self.find_reach(world);
     }
 
-    /// Puts the parts behind each other.
+    /// Concatenates the kept primitives of all runs.
     fn gather(&mut self) {
         let parts = &mut self.parts[..self.runs.len()];
         self.kept.clear();
@@ -263,8 +264,8 @@ impl KeptList {
         }
     }
 
-    /// Reason for the discard that follows: a pair's boxes share a point, which lies in both bodies'
-    /// boxes, so each primitive meets the intersection of the two.
+    /// Finds the box in which each participant may meet others. Reason for the discard that follows: the boxes of a
+    /// pair share a point. It lies in both bodies' boxes, so each primitive meets the intersection of the two.
     fn find_reach(&mut self, world: World<'_>) {
         let frame = world.frame;
         let KeptList {
@@ -299,7 +300,7 @@ impl KeptList {
         }
     }
 
-    /// The box of all reaches; none when nothing reaches anything.
+    /// The box of all reaches; `None` if no primitives were kept.
     pub fn region(&self) -> Option<Bounds> {
         self.joined_reach().filter(|_| !self.kept.is_empty())
     }

@@ -2,9 +2,9 @@
 //!
 //! In: candidates. Out: keys of pairs that intersect. Triangle pairs go through two floating-point
 //! filters, eight pairs at a time (`exact::filter`, bounds derived in `docs/exactness.md`): most are
-//! thrown out because one triangle lies on one side of the other's plane; the rest is classified.
-//! Tetrahedron pairs are classified by their faces, what is left by faces and edges. What the filters leave
-//! open goes to exact arithmetic, and so do pairs of a triangle and a tetrahedron; that code filters too.
+//! rejected because one triangle lies on one side of the other's plane; the rest is classified.
+//! Tetrahedron pairs are classified by their faces, then the open ones by faces and edges. Pairs of which the filters
+//! are unsure go to exact arithmetic, and so do pairs of a triangle and a tetrahedron; that code filters too.
 
 use crate::clock::Instant;
 use std::time::Duration;
@@ -26,9 +26,9 @@ use super::world::{BodyRef, World};
 /// Two primitives whose boxes overlap: participants, and places in their clusters' orders.
 #[derive(Debug, Clone, Copy)]
 pub struct Candidate {
-    /// Layer.
+    /// The first participant.
     pub a: u32,
-    /// The other participant.
+    /// The second participant.
     pub b: u32,
     /// Place of the primitive of `a`.
     pub place_a: u32,
@@ -36,9 +36,9 @@ pub struct Candidate {
     pub place_b: u32,
 }
 
-/// Candidates are settled once this many have gathered.
+/// Candidates are settled once there are this many.
 const FULL: usize = 1024;
-/// The last work item before that may add this many.
+/// The most candidates: the last work item may add this many more than [`FULL`].
 const MOST: usize = FULL + GROUP * GROUP;
 
 /// One worker's candidates, pairs and counts.
@@ -48,14 +48,14 @@ pub struct Settler {
     pub keys: Vec<u64>,
     /// Candidates that were settled.
     pub n_candidates: u64,
-    /// Those left to exact arithmetic.
+    /// Candidates left to exact arithmetic.
     pub n_unsure: u64,
     /// Time spent here, for the statistics.
     pub busy: Duration,
     candidates: Vec<Candidate>,
-    /// Triangle pairs that no plane parts.
+    /// Triangle pairs that no plane separates.
     survivors: Vec<Candidate>,
-    /// Tetrahedron pairs that faces leave open.
+    /// Tetrahedron pairs that are open after the test of faces.
     open: Vec<Candidate>,
 }
 
@@ -85,8 +85,8 @@ impl Settler {
         self.candidates.push(candidate);
     }
 
-    /// The candidates of a work item. Triangles in f32 are settled by the filter in f32, but for a few that
-    /// it leaves open; these and all others go the way of [`push`](Self::push).
+    /// Takes the candidates of a work item. The filter in f32 settles triangles in f32, except for a few of which it is
+    /// unsure; these and all other candidates are [pushed](Self::push).
     #[inline(always)]
     pub(super) fn settle_item<S: Simd>(
         &mut self,
@@ -131,7 +131,7 @@ impl Settler {
         }
     }
 
-    /// Settles what has gathered once it is worth it.
+    /// Settles the candidates once there are enough.
     #[inline(always)]
     pub fn settle_when_full(&mut self, isa: Isa, world: World<'_>) {
         if self.candidates.len() >= FULL {
@@ -139,7 +139,7 @@ impl Settler {
         }
     }
 
-    /// A pair of one body that shares a vertex, under the rule that resolves it.
+    /// Settles a pair of one body that shares a vertex, under `SharedVertex::Resolve`.
     pub fn settle_shared(&mut self, body: &BodyRef<'_>, place_a: u32, place_b: u32) {
         self.n_candidates += 1;
         let (a, b) = (body.points(place_a), body.points(place_b));
@@ -151,7 +151,7 @@ impl Settler {
         }
     }
 
-    /// Settles what has gathered. Compiled once an instruction set, not once a caller.
+    /// Settles all candidates. Compiled once per instruction set, not once per caller.
     pub fn settle(&mut self, isa: Isa, world: World<'_>) {
         if self.candidates.is_empty() {
             return;
@@ -165,8 +165,8 @@ impl Settler {
         self.busy += start.elapsed();
     }
 
-    /// Triangle pairs that the planes do not part, and tetrahedron pairs that faces leave open, go on;
-    /// batches of several kinds are settled on the way.
+    /// Passes on triangle pairs that planes do not separate, and tetrahedron pairs that are open after the test of
+    /// faces. Settles batches of mixed kinds right away.
     #[inline(always)]
     fn reject<S: Simd>(&mut self, simd: S, world: World<'_>) {
         let mut lookup = Lookup::new(world);
@@ -214,7 +214,7 @@ impl Settler {
         self.open = open;
     }
 
-    /// Books the verdict over a batch; settles what it leaves open.
+    /// Records the verdict on a batch; settles its unsure pairs exactly.
     #[inline(always)]
     fn take(&mut self, lookup: &mut Lookup<'_>, chunk: &[Candidate], verdict: Verdict) {
         self.take_pairs(lookup, chunk, verdict.yes);
@@ -225,7 +225,7 @@ impl Settler {
         }
     }
 
-    /// Books pairs that certainly intersect.
+    /// Records pairs that certainly intersect.
     #[inline(always)]
     fn take_pairs(&mut self, lookup: &mut Lookup<'_>, chunk: &[Candidate], yes: u8) {
         for lane in lanes(chunk, yes) {
@@ -250,7 +250,7 @@ impl Settler {
     }
 }
 
-/// The lanes of a mask that a batch has.
+/// The lanes of a mask, up to the size of the batch.
 #[inline(always)]
 fn lanes(chunk: &[Candidate], mask: u8) -> Lanes {
     Lanes(u64::from(mask & (u8::MAX >> (LANES - chunk.len()))))
@@ -269,7 +269,7 @@ fn settle<S: Simd>(simd: S, settler: &mut Settler, world: World<'_>) {
     settler.classify(simd, world);
 }
 
-/// The two bodies of the candidate at hand; candidates of the same bodies come in runs.
+/// The two bodies of the current candidate; candidates of the same bodies come in runs.
 struct Lookup<'a> {
     world: World<'a>,
     a_ix: u32,
@@ -302,7 +302,7 @@ impl<'a> Lookup<'a> {
         }
     }
 
-    /// Gathers a batch of triangle pairs; whether all of them are.
+    /// Gathers a batch of triangle pairs; false if any pair is of another kind.
     #[inline(always)]
     fn fill_triangles<S: Simd>(
         &mut self,
@@ -317,7 +317,7 @@ impl<'a> Lookup<'a> {
         })
     }
 
-    /// Gathers a batch of tetrahedron pairs; whether all of them are.
+    /// Gathers a batch of tetrahedron pairs; false if any pair is of another kind.
     #[inline(always)]
     fn fill_tetrahedra<S: Simd>(
         &mut self,
@@ -332,7 +332,7 @@ impl<'a> Lookup<'a> {
         })
     }
 
-    /// Gathers a batch; whether all primitives have the corners that are asked for.
+    /// Gathers a batch; false if any primitive does not have N corners.
     #[inline(always)]
     fn fill<S: Simd, const N: usize>(
         &mut self,
@@ -363,7 +363,7 @@ impl<'a> Lookup<'a> {
     }
 }
 
-/// The places of candidates of the same two bodies; lanes left over repeat the first.
+/// The places of candidates of the same two bodies; unused lanes repeat the first.
 #[inline(always)]
 fn places_in_common(chunk: &[Candidate]) -> Option<([u32; LANES], [u32; LANES])> {
     let first = chunk[0];
@@ -418,7 +418,7 @@ fn put<const N: usize>(
     positions: &Positions,
     corners: &[u32; N],
 ) {
-    // The match is outside: one predictable branch a primitive, not one a vertex.
+    // The match is outside the loop: one predictable branch per primitive, not one per vertex.
     match positions {
         Positions::F32(positions) => {
             for k in 0..N {

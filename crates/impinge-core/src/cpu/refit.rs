@@ -1,11 +1,11 @@
 //! Stage `bounds` of `Clusters`: boxes of the clusters of bodies that moved, and of the trees above them.
 //!
 //! ```text
-//! read    all boxes of a body whose clusters are not sorted; else its positions in the order of memory, and the boxes of
-//!         what is in no group
+//! read    all boxes of a body whose clusters are not sorted; else its positions in memory order, and the boxes of
+//!         clusters in no group
 //! prove   whether its groups are beside all bodies that it could meet (see `remote`)
-//! back    if not, boxes of what has come back too
-//! above   nodes; bodies that have flowed away from their clusters are clustered anew; clusters are sorted
+//! back    if not, also the boxes of clusters that have come back
+//! above   nodes; bodies that have flowed away from their clusters are clustered again; clusters are sorted
 //! ```
 
 use crate::clock::Instant;
@@ -27,34 +27,34 @@ use super::simd::{Isa, Simd, dispatch};
 use super::world::{BodyCache, Caches, STALE, World};
 use crate::run::Job;
 
-/// Nodes a task refits, of up to eight clusters each.
+/// Nodes per task, of up to eight clusters each.
 const NODES: usize = 32;
-/// Runs of vertices a task reads: 48 KiB of positions.
+/// Runs of vertices per task: 48 KiB of positions.
 const RUNS: usize = 256;
-/// Primitives of all bodies together below which one thread finds the boxes. Positions have just been written,
-/// mostly by one thread, and what fits in its cache another fetches from there more slowly than it reads it.
+/// With fewer primitives of all bodies together, one thread computes the boxes. Positions have just been written,
+/// mostly by one thread. If they fit in its cache, this thread reads them faster than another could fetch them.
 const PARALLEL_FROM: u64 = 120_000;
-/// Primitives of a body from which on its clusters are sorted.
+/// The clusters of a body are sorted if it has at least this many primitives.
 pub(super) const SORTED_FROM: usize = 2_048;
-/// Bodies of a frame up to which clusters are sorted: more are everywhere.
+/// Clusters are sorted in frames of at most this many bodies: more bodies are everywhere.
 const SORTED_TO: usize = 8;
 
-/// What the stage is done with; kept from frame to frame.
+/// Tasks and results of the stage; kept from frame to frame.
 #[derive(Default)]
 pub(super) struct Refit {
     tasks: Vec<Task>,
-    /// What each task has found.
+    /// The result of each task.
     found: Vec<Mutex<Found>>,
 }
 
-/// What a task does with the run `first..end` of something.
+/// What a task does with its range `first..end`.
 #[derive(Debug, Clone, Copy)]
 enum What {
     /// Reads runs of vertices.
     Read,
-    /// Finds the boxes of nodes of level 1 and of all their clusters; of clusters where there is one only.
+    /// Computes the boxes of nodes of level 1 and of all their clusters; only the cluster's box if there is just one.
     All,
-    /// The same of what is near, node by node.
+    /// The same for the clusters that are near, node by node.
     Near,
 }
 
@@ -64,7 +64,7 @@ struct Task {
     what: What,
     first: u32,
     end: u32,
-    /// Where the body's boxes go; valid within the frame that made the task.
+    /// Where the body's boxes are written; valid within the frame that made the task.
     leaves: RawBoundsArray,
     parents: Option<RawBoundsArray>,
 }
@@ -77,7 +77,7 @@ struct Found {
 }
 
 impl Refit {
-    /// All boxes that the frame needs.
+    /// Computes all boxes that the frame needs.
     pub fn run(
         &mut self,
         isa: Isa,
@@ -108,7 +108,7 @@ impl Refit {
             if cache.positions_stamp == body.positions_stamp() {
                 continue;
             }
-            // Whatever ends this frame before its end, the boxes are of no pose until then.
+            // If this frame ends early, for whatever reason, the boxes belong to no pose.
             cache.positions_stamp = 0;
             if !can_be_read(cache, body) {
                 frame.check_one(scene, ix)?;
@@ -121,8 +121,8 @@ impl Refit {
                 self.push_all(ix, cache);
                 continue;
             };
-            // A body is read and its boxes are found by the same thread, as far as that goes: helpers take tasks from
-            // the first on, the caller from the last.
+            // Order tasks so that one thread tends to read a body and compute its boxes: `work` reverses this list, so
+            // the caller starts at its end and helpers at its front.
             let (n_runs, n_near) = (sorted.n_runs(), sorted.near().len());
             if 2 * ix < frame.layers.len() {
                 self.push(ix, cache, What::Read, n_runs);
@@ -146,7 +146,8 @@ impl Refit {
         Ok(())
     }
 
-    /// Tasks for what is near with what has come back, or for all where too much has.
+    /// Makes tasks for bodies of which groups have come back: for the boxes of all clusters that are near now, or for all
+    /// boxes if groups come back too often.
     fn prove(&mut self, job: Job<'_>, caches: &mut Caches, stats: &mut Statistics) {
         let Job { scene, frame, .. } = job;
         self.tasks.clear();
@@ -179,13 +180,13 @@ impl Refit {
         }
     }
 
-    /// Tasks to find all boxes.
+    /// Makes tasks for all boxes of a body.
     fn push_all(&mut self, participant_ix: usize, cache: &mut BodyCache) {
         let n_nodes = cache.bounds.levels.get(1).map_or(1, BoundsArray::len);
         self.push(participant_ix, cache, What::All, n_nodes);
     }
 
-    /// Tasks for `n` of something.
+    /// Makes tasks for `n` runs or nodes of a body.
     fn push(&mut self, participant_ix: usize, cache: &mut BodyCache, what: What, n: usize) {
         let (leaves, parents) = match &mut cache.bounds.levels[..] {
             [] => return,
@@ -210,7 +211,7 @@ impl Refit {
         self.tasks.extend(tasks);
     }
 
-    /// Does the tasks; whether all positions that they read are certainly finite.
+    /// Does the tasks. Returns whether all positions that they read are certainly finite.
     fn work(
         &mut self,
         isa: Isa,
@@ -224,7 +225,7 @@ impl Refit {
             workers,
             ..
         } = job;
-        // Positions are mostly written in order: the last ones are in the nearest cache.
+        // Positions are mostly written in order: the last ones are in the caller's cache.
         self.tasks.reverse();
         let n_tasks = self.tasks.len();
         if self.found.len() < n_tasks {
@@ -260,7 +261,7 @@ impl Refit {
         all_finite
     }
 
-    /// Boxes of nodes above those of level 1; clusters anew what has flowed away from its clusters.
+    /// Computes the boxes of nodes above level 1; clusters bodies again that have flowed away from their clusters.
     fn above(
         &mut self,
         isa: Isa,
@@ -306,40 +307,39 @@ impl Refit {
     }
 }
 
-/// The workers that find boxes.
+/// The scratches of the workers that compute boxes.
 fn for_boxes<'a>(job: Job<'_>, scratches: &'a mut [Worker]) -> &'a mut [Worker] {
     let parallel = job.frame.n_primitives() >= PARALLEL_FROM;
     let n_workers = if parallel { job.workers.n() } else { 1 };
     &mut scratches[..n_workers]
 }
 
-/// Whether a body's clusters may be sorted: reading all its positions sees them in single precision, and none that its
-/// primitives do not have.
+/// Whether a body's clusters may be sorted: its positions are in single precision, and its primitives name every vertex.
 fn can_be_read(cache: &BodyCache, body: &Body) -> bool {
     let is_single = matches!(body.positions(), Positions::F32(_));
     is_single && cache.clustering.n_vertices_covered == Some(body.n_vertices())
 }
 
-/// Whom a participant could meet.
+/// The participants that a participant could meet.
 fn met(frame: &Frame, ix: usize) -> impl Iterator<Item = usize> {
     (0..frame.layers.len()).filter(move |&other| other != ix && frame.test(ix, other).is_some())
 }
 
-/// The groups of a participant that are not beside all that it could meet, if its clusters are sorted.
+/// The groups of a participant that are not beside all bodies that it could meet; `None` if its clusters are not sorted.
 fn back(world: World<'_>, ix: usize) -> Option<Groups> {
     let sorted = world.cache(ix as u32).sorted()?;
     let groups = met(world.frame, ix).map(|other| sorted.back_at(&world.cache(other as u32).whole));
     Some(groups.fold(Groups::default(), Groups::union))
 }
 
-/// A body whose clusters are to be sorted, and the joint box of all that it could meet.
+/// A body whose clusters are to be sorted, and the joint box of all bodies that it could meet.
 struct Due<'a> {
     n_vertices: usize,
     cache: &'a mut BodyCache,
     others: Bounds,
 }
 
-/// Sorts the clusters of participants for which it is time.
+/// Sorts the clusters of participants for which that is due.
 fn sort(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker]) {
     let Job {
         scene,
@@ -413,7 +413,7 @@ impl Found {
     };
 }
 
-/// One task.
+/// Does one task.
 #[inline(always)]
 fn work<S: Simd>(simd: S, world: World<'_>, task: Task) -> Found {
     let positions = world.body(task.participant).positions;
@@ -439,7 +439,7 @@ fn work<S: Simd>(simd: S, world: World<'_>, task: Task) -> Found {
             Some(_) => Children::new(clustering.shape.children(1, node), only),
             None => Children::new(node..node + 1, only),
         };
-        // SAFETY: no two tasks name the same node of the same body, and nobody reads boxes before all
+        // SAFETY: no two tasks name the same node of the same body, and no thread reads boxes before all
         // tasks are done.
         unsafe {
             let of_node = bounds::of_clusters(simd, positions, clustering, clusters, task.leaves);
