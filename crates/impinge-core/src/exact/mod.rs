@@ -10,8 +10,8 @@
 //! arithmetic after Shewchuk, *Adaptive Precision Floating-Point Arithmetic and Fast Robust
 //! Geometric Predicates*, 1997), so the answers are.
 //!
-//! Invariant: for coordinates that are [`in_range`] no intermediate value overflows or loses a
-//! bit to underflow. Every finite `f32` is in range. Coordinates outside it never cause a panic,
+//! Invariant: for coordinates that are [`in_range`], no intermediate value overflows or loses a
+//! bit to underflow. Every finite `f32` is in range. Coordinates out of range never cause a panic,
 //! but the answer is then unspecified; callers check their input once.
 //!
 //! `docs/exactness.md` derives every bound and draws every case.

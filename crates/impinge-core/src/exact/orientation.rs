@@ -35,7 +35,7 @@ impl Sign {
         self == Self::Zero
     }
 
-    /// Whether both numbers are nonzero and of the same sign: two points strictly on one side.
+    /// Whether both numbers are nonzero and of the same sign: two points strictly on the same side.
     #[inline]
     pub(crate) fn strictly_same(self, other: Self) -> bool {
         self as i8 * other as i8 > 0
@@ -132,8 +132,8 @@ pub fn orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
     if -det > bound {
         return Sign::Negative;
     }
-    // A difference is zero only when it is zero exactly and nothing underflows in range, so a
-    // zero permanent means that all six products are zero. Axis-aligned input ends here often.
+    // A computed difference is zero only if the exact one is, and nothing underflows in range. So a
+    // zero permanent means that all six products are zero. Axis-aligned input often ends here.
     if permanent == 0.0 {
         return Sign::Zero;
     }
@@ -142,8 +142,8 @@ pub fn orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
 
 /// The stages of growing precision behind [`orient3d`], out of line because they are rare.
 ///
-/// Two points that coincide are the usual reason to come here (meshes whose vertices are not
-/// welded), and would need the last stage.
+/// The usual reason to get here is that two points coincide (meshes whose vertices are not
+/// welded), which would need the last stage.
 #[cold]
 #[inline(never)]
 fn orient3d_adaptive(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
@@ -184,8 +184,8 @@ impl Projection {
         orient2d(self.apply(a), self.apply(b), self.apply(c))
     }
 
-    /// A projection that keeps a, b, c apart from a line, and so is one-to-one on their plane;
-    /// none when the three lie on one line.
+    /// A projection in which a, b, c do not lie on one line, so that it is one-to-one on their plane;
+    /// `None` if the three lie on one line.
     #[inline]
     pub(crate) fn injective(a: &Point, b: &Point, c: &Point) -> Option<Self> {
         Self::ALL

@@ -1,6 +1,6 @@
 //! The boxes of a body's clusters, and of the tree nodes above them.
 //!
-//! Clusters are found once per topology, in the pose at hand; boxes once per pose. Cost: `O(n log n)` and `O(n)`.
+//! Clusters are found once per topology, in the current pose; boxes once per pose. Cost: `O(n log n)` and `O(n)`.
 
 use crate::exact::Point;
 use crate::grouping::GROUP;

@@ -17,7 +17,7 @@ impl Polygon {
         Self::with_distance(corners, start, end, 0.0).0
     }
 
-    /// [`Polygon::new`], and a distance as an integer over the same power of two.
+    /// [`Polygon::new`], and a distance as an integer times the same power of two.
     pub(in crate::exact) fn with_distance(
         corners: &[[usize; 2]],
         start: &[Point; 4],
