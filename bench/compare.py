@@ -1,21 +1,21 @@
-"""The same deforming frames through impinge and its peers, in one run, with the answers checked.
+"""Runs impinge and its peers on the same deforming frames, and checks the answers.
 
-    python bench/compare.py                         # every scene whose mesh is there
+    python bench/compare.py                         # every scene whose mesh exists
     python bench/compare.py bunny --frames 3
     python bench/compare.py --record --machine my-machine
 
-It installs nothing: peers that are missing are named, with what to install. Meshes are looked for
-in $IMPINGE_DATA or ../shared/data; the scene "ball" is generated and always there.
+It installs nothing: it names missing peers and what to install. It looks for meshes
+in $IMPINGE_DATA or ../shared/data; the scene "ball" is generated.
 
-What is timed. Two overlapping copies of a mesh are twisted a little further in each frame. A
-contender gets the positions of both as the arrays that it takes without a conversion, and must
-answer which triangles of one meet which of the other. "Build" is whatever it has to do because the
-vertices have moved; "query" is the question. Each contender runs all frames on its own, several
-rounds, so that its caches are its own; the table shows medians over frames and rounds.
+Timing: two overlapping copies of a mesh are twisted a little further in each frame. A
+contender gets the positions of both as arrays that it takes without a conversion, and must
+find which triangles of one copy meet which of the other. "Build" is the work that it does because
+the vertices have moved; "query" finds the pairs. Each contender runs all frames on its own, in
+several rounds, so that it has the caches to itself; the table shows medians over frames and rounds.
 
-What is checked. Every contender's pairs in every frame, as a set, against the exact ones: those of
-CGAL's exact kernel (through libigl), and for the first frame also the published ones where some
-are. Without libigl they come from impinge's other method, and the table says so.
+Checks: every contender's pairs in every frame are compared, as a set, with the exact pairs. These
+come from CGAL's exact kernel (through libigl), and for the first frame also from published data, if
+there is any. Without libigl they come from impinge's other method, and the table says so.
 """
 
 import argparse
@@ -37,12 +37,12 @@ except ModuleNotFoundError as missing:
     sys.exit(f"{missing}: pip install . (in the root of the checkout) installs impinge and NumPy")
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-#: Radians a unit length by which the last frame is twisted.
+#: The twist of the last frame, in radians per unit length.
 TWIST = 1.5
 
 
 def read_ply(path):
-    """Vertices (v, 3) float32 and faces (n, 3) of a binary PLY that holds just these."""
+    """Vertices (v, 3) float32 and faces (n, 3) of a binary PLY that holds nothing else."""
     data = path.read_bytes()
     header, _, body = data.partition(b"end_header\n")
     counts = {name: int(n) for name, n in re.findall(r"element (\w+) (\d+)", header.decode())}
@@ -75,7 +75,7 @@ def ball(n_rings=124, n_segments=124):
 
 
 class Scene:
-    """Two copies of a mesh, their frames, and the exact pairs where they are known."""
+    """Two copies of a mesh, their frames, and the published pairs if there are any."""
 
     def __init__(self, name, data, n_frames):
         self.name = name
@@ -92,7 +92,7 @@ class Scene:
         self.frames = [(self.twisted(twist, 0), self.twisted(-twist, offset)) for twist in twists]
 
     def twisted(self, twist, offset):
-        """The mesh turned about the x axis, the more the further along it; float32."""
+        """The mesh turned about the x axis by an angle proportional to x; float32."""
         vertices = self.vertices + np.float32(offset)
         x, y, z = vertices.T.astype(np.float64)
         angle = twist * (x - x.mean())
@@ -116,9 +116,9 @@ class Scene:
 
 
 def run(contender, scene, truth, seconds):
-    """Medians in milliseconds and what was wrong, over all frames and rounds.
+    """Medians in milliseconds and wrong pairs, over all frames and rounds.
 
-    Every frame is run at least once, then further rounds until these seconds are up.
+    Every frame is run at least once, then further rounds until `seconds` have passed.
     """
     contender.start(scene.faces, scene.faces, *scene.frames[0])
     frames = [contender.arrays(*frame) for frame in scene.frames]
@@ -158,7 +158,7 @@ def run(contender, scene, truth, seconds):
 
 
 def milliseconds(time):
-    """Three digits that mean something; empty for what does not apply."""
+    """A time with about three significant digits; empty for None."""
     if time is None:
         return ""
     return f"{time:,.0f}" if time >= 100 else f"{time:.{1 if time >= 10 else 3}f}"
@@ -171,7 +171,7 @@ def table(scene, reference, truth, rows):
         f"### {scene.name}: {n:,} triangles against {n:,}, {len(truth)} frames",
         "",
         f"{sum(map(len, truth)):,} true pairs in all frames (by {reference}); times in "
-        "milliseconds a frame.",
+        "milliseconds per frame.",
         "",
         "| | once | build | query | frame | pairs | wrong | times impinge |",
         "|---|---:|---:|---:|---:|---:|---:|---:|",
@@ -186,9 +186,9 @@ def table(scene, reference, truth, rows):
 
 
 def abilities(classes):
-    """What each contender does and does not do, as Markdown."""
+    """The abilities of each contender, as Markdown."""
     lines = [
-        "### What each one answers",
+        "### What each contender can do",
         "",
         "| | two meshes | one mesh with itself | tetrahedra | answers | when vertices move |",
         "|---|---|---|---|---|---|",
@@ -200,7 +200,7 @@ def abilities(classes):
 
 
 def machine():
-    """The processor in words, and how many of it."""
+    """The processor's name and its number of threads."""
     model = platform.processor() or platform.machine()
     try:
         cpuinfo = pathlib.Path("/proc/cpuinfo").read_text()
@@ -243,7 +243,7 @@ def main():
         rows = []
         for contender in present:
             row = run(contender, scene, truth, arguments.seconds)
-            print(f"{name}: {row['contender']} {row['frame_ms']:.3g} ms a frame", file=sys.stderr)
+            print(f"{name}: {row['contender']} {row['frame_ms']:.3g} ms per frame", file=sys.stderr)
             rows.append(row)
             if contender.exact and row["extra"] + row["missing"]:
                 print(f"{name}: {row['contender']} claims to be exact and is not", file=sys.stderr)

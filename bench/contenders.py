@@ -1,4 +1,4 @@
-"""impinge and its peers behind one interface, each used the way that favours it most.
+"""impinge and its peers behind one interface, each used in its fastest way.
 
 A contender gets the topology once (`start`), is handed arrays in the type and layout that it takes
 without a conversion (`arrays`, not timed), does what moved vertices demand (`build`), answers
@@ -22,7 +22,7 @@ def as_keys(pairs):
 
 
 class Contender:
-    """What they have in common."""
+    """The interface of all contenders."""
 
     #: Its name in tables, and what to install.
     label, package = "", ""
@@ -41,16 +41,16 @@ class Contender:
         return importlib.metadata.version(self.package)
 
     def build_within_query_ms(self):
-        """Time within `query` that was spent because the vertices had moved."""
+        """Time within `query` that belongs to the build, because the vertices had moved."""
         return 0.0
 
     def once_ms(self):
-        """Time spent once a topology, or None where there is no such thing."""
+        """Time spent once per topology, or None if there is none."""
         return None
 
 
 class Impinge(Contender):
-    """This library; positions are float32, as the frames are."""
+    """This library, with float32 positions like the frames."""
 
     label, package, exact = "impinge", "impinge", True
     abilities = (
@@ -100,7 +100,7 @@ class Impinge(Contender):
 
 
 class Libigl(Contender):
-    """CGAL's exact kernel through libigl: boxes are sorted anew at every call."""
+    """CGAL's exact kernel through libigl: boxes are sorted again at every call."""
 
     label, package, exact = "libigl (CGAL, exact kernel)", "libigl", True
     settings = "intersect_other, detect_only"
@@ -132,7 +132,7 @@ class Libigl(Contender):
 
 
 class Coal(Contender):
-    """Trees of boxes; the tree is built anew in each frame."""
+    """Trees of boxes; the tree is rebuilt in each frame."""
 
     label, package = "Coal", "coal"
     abilities = (
@@ -300,7 +300,7 @@ def available():
     """The contenders that can be run here, impinge first, and the peers that are missing."""
     present = [Impinge("", backend="cpu"), Impinge(", one thread", backend="cpu", threads=1)]
     missing = []
-    # By itself a detector takes a GPU only where there is a real one.
+    # By default a detector uses a GPU only if it is real hardware.
     gpu = Impinge("", backend="auto")
     gpu.start(*[np.array([[0, 1, 2]])] * 2, *[np.eye(3, dtype=np.float32)] * 2)
     if gpu.result.stats.backend != "cpu":
@@ -316,6 +316,6 @@ def available():
 
 
 def reference(present):
-    """Who says what is true: CGAL where it is installed, else impinge's other method."""
+    """The contender for the exact pairs: CGAL if it is installed, else impinge's other method."""
     exact = [contender for contender in present if isinstance(contender, Libigl)]
     return exact[0] if exact else Impinge("'s other method", method="cells")

@@ -1,4 +1,4 @@
-//! The commands: which problems, which contestants, which tables.
+//! The commands: their problems, contestants and tables.
 
 use impinge::{Backend, Method, Settings};
 use impinge_scenes::deform::Wave;
@@ -36,7 +36,7 @@ pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
     report.write(options.json.as_deref(), options.record.as_deref())
 }
 
-/// The peers' settings once found, to be used again on the same kind of problem.
+/// The best settings of the peers, reused for problems of the same kind.
 #[derive(Default)]
 struct Peers {
     #[cfg(feature = "embree")]
@@ -46,7 +46,7 @@ struct Peers {
 }
 
 impl Peers {
-    /// All peers there are, at their best, or as they were at their best last time.
+    /// All available peers, with their best settings; settings found before are reused.
     #[cfg_attr(not(any(feature = "embree", feature = "parry")), allow(unused))]
     fn runners(&mut self, problem: &Problem) -> Result<Vec<Box<dyn Runner>>, Failure> {
         let mut runners = Vec::new();
@@ -76,8 +76,8 @@ fn settings(options: &Options, method: Method) -> Settings {
     }
 }
 
-/// The library's contestants; the first is what others are compared with. `variants` are positions
-/// copied while the clock runs, and a single thread.
+/// The library's contestants; the others are compared with the first one. `variants` adds positions
+/// copied on the clock, and a single thread.
 fn ours(
     problem: &Problem,
     options: &Options,
@@ -146,7 +146,7 @@ fn two_body(options: &Options, report: &mut Report) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Relative speeds, in widths of a body a frame.
+/// Relative speeds, in widths of a body per frame.
 const SPEEDS: [f32; 4] = [0.001, 0.003, 0.01, 0.03];
 
 fn motion(options: &Options, report: &mut Report) -> Result<(), Failure> {
@@ -183,7 +183,7 @@ fn tets(options: &Options, report: &mut Report) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The models of a built scene, to be posed anew.
+/// The models of a built scene, to be posed again.
 pub fn models(built: BuiltScene) -> Result<Vec<Model>, Failure> {
     built
         .bodies
@@ -249,9 +249,9 @@ fn sizes(options: &Options, report: &mut Report) -> Result<(), Failure> {
     };
     text += "| triangles | pairs |";
     for row in &first.rows {
-        text += &format!(" {} ms | ns a triangle |", row.name);
+        text += &format!(" {} ms | ns per triangle |", row.name);
     }
-    text += " bytes a triangle, positions and topology | bytes a triangle, detector |\n|---:|---:|";
+    text += " bytes per triangle, positions and topology | bytes per triangle, detector |\n|---:|---:|";
     text += &"---:|---:|".repeat(first.rows.len() + 1);
     text.push('\n');
     for table in &tables {
@@ -344,7 +344,7 @@ fn adversarial_scenes(options: &Options, report: &mut Report) -> Result<(), Fail
     Ok(())
 }
 
-/// A built scene as a problem: between for two bodies, all for more.
+/// A built scene as a problem: pairs between the bodies for two bodies, all pairs for more.
 fn posed(built: BuiltScene, about: &str) -> Result<Problem, Failure> {
     let name = built.name.clone();
     let models = models(built)?;

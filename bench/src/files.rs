@@ -1,4 +1,4 @@
-//! The benchmark meshes: files where they are, labelled stand-ins where they are not.
+//! The benchmark meshes: files if they exist, otherwise labelled stand-ins.
 
 use std::path::Path;
 
@@ -9,13 +9,13 @@ use impinge_scenes::{Model, data, solids, surfaces};
 use crate::Failure;
 use crate::problem::{Ask, Problem};
 
-/// How far apart the two balls are. They have a diameter of 1.
+/// The offset of the second ball. The balls have a diameter of 1.
 const BALL_OFFSET: [f32; 3] = [0.9, 0.01, 0.02];
 /// Pairs of the two balls, counted by the oracle.
 const N_PAIRS_BALL_15K: u64 = 277;
 const N_PAIRS_BALL: u64 = 390;
 
-/// A mesh file in single precision. Coordinates that need more are rounded: a bench is about time.
+/// Reads a mesh file in single precision. Coordinates that need more precision are rounded, because a bench measures time.
 fn load(path: &Path, weld: bool) -> Result<Model, Failure> {
     let options = ReadOptions {
         weld,
@@ -31,7 +31,7 @@ fn load(path: &Path, weld: bool) -> Result<Model, Failure> {
     })
 }
 
-/// A mesh from the shared data, or a stand-in, and what it is.
+/// A mesh from the shared data, or a stand-in, and a description of it.
 fn mesh(file: &str, stand_in: impl FnOnce() -> Model) -> Result<(Model, String), Failure> {
     match data::data_file(file) {
         Some(path) => Ok((load(&path, false)?, format!("`{file}`"))),
@@ -48,7 +48,8 @@ fn mesh(file: &str, stand_in: impl FnOnce() -> Model) -> Result<(Model, String),
 
 const MIRRORED: &str = "frames alternate with the mirror image, whose pairs are the same because changing signs is exact";
 
-/// Two copies of a body, how many pairs they have, and what they are: `ball15k`, `ball` (30,000), `bunny`, `buddha`, `dragon`.
+/// Two copies of a body, their number of pairs, and a description. Scenes: `ball15k`, `ball` (30,000), `bunny`, `buddha`,
+/// `dragon`.
 fn twice(scene: &str) -> Result<(Vec<Model>, Option<u64>, String), Failure> {
     let (model, offset, expected, about) = match scene {
         "ball15k" => (
@@ -105,14 +106,14 @@ pub fn two_body(scene: &str) -> Result<Problem, Failure> {
         .expecting(expected))
 }
 
-/// Steps of a passing body from one end of its way to the other.
+/// The number of steps of a passing body from one end of its path to the other.
 const N_STEPS: usize = 15;
 
-/// Two copies of a body, one of which passes by: `step` is the part of its width that it moves in a frame.
+/// Two copies of a body, one of which passes by: `step` is the share of its width that it moves per frame.
 pub fn passing(scene: &str, step: f32) -> Result<Problem, Failure> {
     let (models, ..) = twice(scene)?;
     let width = models[0].bounds().map_or(0.0, |(min, max)| max[0] - min[0]);
-    let name = format!("{scene}, {} % a frame", 100.0 * step);
+    let name = format!("{scene}, {} % per frame", 100.0 * step);
     Ok(
         Problem::passing(&name, models, Ask::Between, step * width, N_STEPS).about(format!(
             "the second body goes to and fro along x around its place of `two-body`, {N_STEPS} steps of {} % of its width \
@@ -136,7 +137,7 @@ fn published(scene: &str) -> Result<Option<([f32; 3], u64)>, Failure> {
             .collect()
     });
     match (offset.as_deref(), answer["pairs"].as_u64()) {
-        // The file holds f32 numbers written out in full: narrowing gives them back.
+        // The file holds f32 numbers with all digits, so narrowing is exact.
         (Some(&[x, y, z]), Some(n_pairs)) => Ok(Some(([x as f32, y as f32, z as f32], n_pairs))),
         _ => Err(format!("two_body.json: no offset and pairs for `{scene}`").into()),
     }

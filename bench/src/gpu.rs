@@ -1,7 +1,7 @@
-//! A GPU by itself: what each stage takes on the device, beside the least that it could take.
+//! Measures a GPU: the time of each stage on the device, beside a lower bound.
 //!
-//! The floor is bytes over bandwidth plus launches. Both rates are measured on the device at hand: the
-//! bandwidth by copying a large buffer, the cost of a launch by a row of launches that wait for each other.
+//! The lower bound (floor) is bytes over bandwidth plus launches. Both rates are measured on the same device: the
+//! bandwidth by copying a large buffer, the cost of a launch by a sequence of dependent launches.
 
 use std::time::Instant;
 
@@ -13,9 +13,9 @@ use crate::problem::{Ask, Problem};
 use crate::report::{Report, figures, grouped};
 use crate::{Failure, Options, files};
 
-/// Frames before the clock counts.
+/// Untimed frames before the timed ones.
 const N_WARM: usize = 4;
-/// Stages of the host; all others are stages on the device, timed by it where it can.
+/// Stages of the host; all others run on the device, which times them if it can.
 const ON_HOST: [&str; 4] = ["upload", "clustering", "settle", "collect"];
 
 /// The adapter that the options choose.
@@ -23,10 +23,10 @@ pub fn device(options: &Options) -> Result<DeviceInfo, Failure> {
     let wanted = options.device.as_deref().unwrap_or("").to_lowercase();
     let mut all = devices().into_iter();
     let found = all.find(|device| device.name.to_lowercase().contains(&wanted));
-    found.ok_or_else(|| "no such GPU; `impinge devices` lists those there are".into())
+    found.ok_or_else(|| "no such GPU; `impinge devices` lists the available ones".into())
 }
 
-/// Its name in lower case, words joined by hyphens.
+/// The adapter's name in lower case, words joined by hyphens.
 pub fn slug(device: &DeviceInfo) -> String {
     let name = device.name.split('(').next().unwrap_or("").to_lowercase();
     let words = name.split(|letter: char| !letter.is_ascii_alphanumeric());
@@ -39,14 +39,14 @@ pub fn scenes(options: &Options, report: &mut Report) -> Result<(), Failure> {
     let info = device(options)?;
     let rates = Rates::measure(&info)?;
     let kind = if info.is_software {
-        " (software: these times say nothing of a GPU)"
+        " (software: these times say nothing about a GPU)"
     } else {
         ""
     };
     report.say(&format!(
-        "{info}{kind}, {}.\n\nMeasured here: {:.0} GB/s copying, {:.2} µs a dependent launch. `device` is the sum of the stages on \
-         the device by its own clock, positions there to pairs there; `host` is what the caller waits, upload, read-back, \
-         exact settling and sorting included. Medians. Pairs are those of the CPU backend, compared by hash in every scene.\n",
+        "{info}{kind}, {}.\n\nMeasured here: {:.0} GB/s copying, {:.2} µs per dependent launch. `device` is the sum of the stages on \
+         the device by its own clock, from positions to pairs on the device; `host` is the time that the caller waits, including \
+         upload, read-back, exact settling and sorting. Medians. Pairs equal those of the CPU backend, compared by hash in every scene.\n",
         info.driver, rates.bytes_per_ms / 1e6, rates.launch_ms * 1e3
     ));
     report.say(
@@ -103,7 +103,7 @@ fn row(
         let answer = gpu.detect(&scene, &query)?;
         let n_pairs = answer.len() as u64;
         if let Some(expected) = problem.expected.filter(|&expected| expected != n_pairs) {
-            return Err(format!("{}: {n_pairs} pairs, {expected} are right", problem.name).into());
+            return Err(format!("{}: {n_pairs} pairs, {expected} expected", problem.name).into());
         }
         if frame >= N_WARM {
             frames.push(answer.stats().clone());
@@ -172,14 +172,14 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// What the device does in a millisecond.
+/// The rates of the device, per millisecond.
 struct Rates {
     bytes_per_ms: f64,
     launch_ms: f64,
 }
 
 impl Rates {
-    /// Of a device opened for this alone.
+    /// Measures the rates on a device opened only for this.
     fn measure(info: &DeviceInfo) -> Result<Rates, Failure> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
@@ -194,7 +194,7 @@ impl Rates {
         })
     }
 
-    /// Bytes that must move, at full bandwidth, and the launches of one pass, as docs/gpu.md counts them.
+    /// The time of the bytes that must move, at full bandwidth, plus the launches of one pass, as counted in docs/gpu.md.
     fn floor_ms(&self, problem: &Problem, stats: &Statistics) -> f64 {
         const CLUSTER: u64 = 45 * (4 + 12);
         const BOX: u64 = 2 * 24;
@@ -221,7 +221,7 @@ impl Rates {
     }
 }
 
-/// The fastest of several runs, in milliseconds, from submission to idle.
+/// The time of the fastest of several runs, in milliseconds, from submission to idle.
 fn fastest(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
@@ -239,7 +239,7 @@ fn fastest(
     Ok(best)
 }
 
-/// Bytes read and written in a millisecond by copies, the submission taken out.
+/// Bytes read and written per millisecond by copies, without the time of the submission.
 fn bandwidth(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<f64, Failure> {
     const BYTES: u64 = 128 << 20;
     const MORE: u32 = 16;
@@ -263,7 +263,7 @@ fn bandwidth(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<f64, Failure>
     Ok((2 * BYTES * u64::from(MORE)) as f64 / ms.max(1e-6))
 }
 
-/// Milliseconds of a launch that waits for the one before it.
+/// Milliseconds per dependent launch.
 fn launch(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<f64, Failure> {
     const N: u32 = 256;
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {

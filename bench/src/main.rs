@@ -1,13 +1,13 @@
-//! Benchmarks of impinge. Peers run in the same process, on the same frames, turn by turn.
+//! Benchmarks of impinge. Peers run in the same process, on the same frames, and take turns.
 //!
 //! ```text
 //! cargo run --release -p impinge-bench --features embree,parry -- two-body --scene dragon
 //! ```
 //!
-//! Before each frame all positions are rewritten, into the memory that each contestant reads, while no
-//! clock runs. A frame is timed from there to pairs in memory. Exact contestants must find the
-//! expected number of pairs and, among themselves, the same pairs; peers' counts are printed with their
-//! difference. Peers run with the setting that is fastest on the problem at hand, found before the
+//! Before each frame all positions are rewritten, off the clock, in the memory that each contestant
+//! reads. A frame is timed from there to pairs in memory. Exact contestants must find the
+//! expected number of pairs and the same pairs as each other; peers' counts are printed with their
+//! difference. Peers run with the setting that is fastest on the problem, found before the
 //! contest, and need not sort their answer.
 
 mod commands;
@@ -42,15 +42,15 @@ usage: impinge-bench COMMAND [options]
 
 commands:
   two-body      two copies of a mesh: --scene ball15k|ball|bunny|buddha|dragon, or all but ball15k
-  motion        the same, the second copy passing by at four speeds: --scene; the dragon if not said
-  self          self-collision of one mesh: --scene ball|bunny|buddha|dragon|cow|camelhead;
-                the dragon if not said
+  motion        the same, the second copy passing by at four speeds: --scene (default dragon)
+  self          self-collision of one mesh: --scene ball|bunny|buddha|dragon|cow|camelhead
+                (default dragon)
   tets          two solids of tetrahedra
   bodies        1,000, 10,000 and 100,000 bodies of 12 triangles
   sizes         10^4 to 10^7 triangles in two waving bodies
   adversarial   scenes that break methods which are only fast on average, as ratios to a plain one
-  gpu           the scenes of two-body and self on a GPU: stages on the device beside their floor
-  device        prints the name of the GPU in a form that fits --record
+  gpu           the scenes of two-body and self on a GPU: stages on the device beside a lower bound
+  device        prints the name of the GPU in a form for --record
 
 options:
   --scene NAME       one scene only (two-body, motion, self, adversarial)
@@ -60,15 +60,15 @@ options:
   --threads N        threads of impinge (default: all)
   --backend NAME     cpu (default), gpu or auto
   --device NAME      part of a GPU's name, to choose among several
-  --no-cells         leaves out impinge's other method, Cells
-  --no-peers         leaves out Embree and parry
+  --no-cells         without impinge's other method, Cells
+  --no-peers         without Embree and parry
   --json FILE        figures for machines
   --record NAME      also writes bench/record/NAME/COMMAND.md and .json; NAME is <machine>-<date>
   --help             this text
 
 Embree needs --features embree, parry needs --features parry.";
 
-/// What the command line asks for.
+/// The options of the command line.
 #[derive(Debug, Clone)]
 pub struct Options {
     scene: Option<String>,

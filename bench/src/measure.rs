@@ -1,7 +1,8 @@
-//! Frames of all contestants, turn by turn, so that each meets the same weather.
+//! Runs frames of all contestants in turns, so that all meet the same conditions.
 //!
-//! A turn is a few frames of one contestant. With one frame a turn, each finds its data gone from the
-//! caches and its threads asleep; with ten, nine find what a program that uses one of them would.
+//! A turn is a few frames of one contestant. With one frame per turn, each contestant starts with cold
+//! caches and sleeping threads. With ten, nine frames run under the conditions of a program that uses only this
+//! contestant.
 
 use std::time::Duration;
 
@@ -11,10 +12,10 @@ use crate::Failure;
 use crate::problem::Problem;
 use crate::runner::{Answer, Runner};
 
-/// Frames that are run before the clock counts; more if there are more poses, for answers are verified in these.
+/// Untimed frames before the timed ones; more if there are more poses, because answers are verified in these frames.
 const N_WARM: usize = 4;
 
-/// Between one contestant's turn and the next one's.
+/// The pause between two turns.
 const PAUSE: Duration = Duration::from_millis(2);
 
 /// One contestant's figures on one problem.
@@ -38,27 +39,27 @@ pub struct Row {
     pub details: serde_json::Value,
 }
 
-/// All figures on one problem. The first row is the one that others are compared with.
+/// All figures on one problem. The other rows are compared with the first one.
 #[derive(Debug, Clone)]
 pub struct Table {
     /// The problem's name.
     pub name: String,
-    /// What it is.
+    /// A description.
     pub about: String,
-    /// Primitives of all bodies.
+    /// The number of primitives in all bodies.
     pub n_primitives: usize,
-    /// Bodies.
+    /// The number of bodies.
     pub n_bodies: usize,
-    /// Timed frames.
+    /// The number of timed frames.
     pub n_frames: usize,
-    /// How many of them in a row.
+    /// The number of frames per turn.
     pub turn: usize,
-    /// One row a contestant.
+    /// One row per contestant.
     pub rows: Vec<Row>,
 }
 
 impl Table {
-    /// For machines.
+    /// The table as JSON.
     pub fn json(&self) -> serde_json::Value {
         let rows: Vec<_> = self
             .rows
@@ -92,8 +93,8 @@ impl Table {
 /// Runs `n_frames` timed frames of every contestant, `turn` of them in a row.
 ///
 /// # Errors
-/// A contestant fails; an exact one does not find the expected number of pairs, another number in another
-/// frame of the same pose, or other pairs than another exact one.
+/// A contestant fails; an exact contestant does not find the expected number of pairs, finds another number in another
+/// frame of the same pose, or finds other pairs than another exact contestant.
 pub fn run(
     problem: &Problem,
     mut runners: Vec<Box<dyn Runner>>,
@@ -111,7 +112,7 @@ pub fn run(
     });
     for frames in std::iter::once(0..n_warm).chain(timed) {
         for (runner, record) in runners.iter_mut().zip(&mut records) {
-            // Idle workers of the contestant before spin for a while: let them fall asleep.
+            // Idle workers of the previous contestant spin for a while: let them fall asleep.
             std::thread::sleep(PAUSE);
             for frame in frames.clone() {
                 let (pose, is_warm) = (frame % n_poses, frame < n_warm);
@@ -158,12 +159,12 @@ pub fn run(
     })
 }
 
-/// What one contestant has done so far.
+/// The results of one contestant so far.
 #[derive(Debug)]
 struct Record {
     times: Vec<f64>,
     first_ms: f64,
-    /// Pairs in each pose, where it has been seen.
+    /// The number of pairs in each pose; `None` for a pose that has not been run.
     n_pairs: Vec<Option<u64>>,
 }
 
@@ -187,8 +188,8 @@ impl Record {
     }
 }
 
-/// Holds an answer against what is known of this pose: how many pairs the contestant has found before, and the hash that is
-/// agreed on with who gave it first.
+/// Checks an answer against what is known about its pose: the number of pairs that the contestant has found before, and the
+/// agreed hash with the contestant that gave it first.
 fn check(
     problem: &Problem,
     name: &str,
@@ -207,10 +208,10 @@ fn check(
     let Some(hash) = answer.hash else {
         return Ok(());
     };
-    // Later frames are held against these by their number.
+    // Later frames are compared with these by the number of pairs.
     if let Some(expected) = problem.expected.filter(|&n| n != answer.n_pairs) {
         return Err(format!(
-            "{}: {name} found {} pairs, {expected} are right",
+            "{}: {name} found {} pairs, {expected} expected",
             problem.name, answer.n_pairs
         )
         .into());
@@ -281,7 +282,7 @@ mod tests {
             runners.push(crate::embree::tuned(&problem, None).expect("Embree runs").0);
             #[cfg(feature = "parry")]
             runners.push(crate::parry::tuned(&problem, None).expect("parry runs").0);
-            // The library holds its own methods against each other; peers are compared here.
+            // `run` compares the library's own methods with each other; peers are compared here.
             let table = run(&problem, std::mem::take(&mut runners), 2, 1).expect("they agree");
             let oracle = &table.rows[0];
             assert!(oracle.n_pairs > 50, "{}: {}", problem.name, oracle.n_pairs);
@@ -339,7 +340,7 @@ mod tests {
         };
         assert!(contest(|_| {}).is_ok());
         let drops = contest(|answer| answer.n_pairs -= 1).map_err(|error| error.to_string());
-        assert!(drops.is_err_and(|error| error.contains("are right")));
+        assert!(drops.is_err_and(|error| error.contains(" expected")));
         let swaps = contest(|answer| answer.hash = answer.hash.map(|hash| hash ^ 1));
         assert!(swaps.is_err_and(|error| error.to_string().contains("differ in their pairs")));
     }
@@ -347,7 +348,7 @@ mod tests {
     #[test]
     fn a_wrong_number_is_caught_in_timed_frames_too() {
         let problem = problems().swap_remove(0);
-        // In warm frames the hash is there and the lie is held back.
+        // The liar answers correctly in untimed frames, where the hash is checked.
         let liar = Liar {
             honest: ours(&problem, Method::Clusters, Feed::InPlace),
             change: |answer| answer.n_pairs += u64::from(answer.hash.is_none()),

@@ -10,11 +10,11 @@ use crate::Failure;
 use crate::problem::{Body, Problem};
 use crate::runner::{Answer, Runner};
 
-/// How positions get into the library.
+/// How the library gets its positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Feed {
-    /// Written in place through `positions_mut` before the clock starts, as for the peers. Checking
-    /// them is part of the detection and is timed.
+    /// Written in place through `positions_mut` before the clock starts, as for the peers. Detection
+    /// checks them, and this is timed.
     InPlace,
     /// Copied and checked by `set_positions` while the clock runs.
     Copied,
@@ -27,9 +27,9 @@ pub struct Ours {
     query: Query,
     detector: Detector,
     feed: Feed,
-    /// What `Feed::Copied` copies in the next frame.
+    /// The positions that `Feed::Copied` copies in the next frame.
     next: Vec<Arc<[[f32; 3]]>>,
-    /// What it copies, pose by pose.
+    /// The positions that it copies, pose by pose.
     poses: Vec<Vec<Arc<[[f32; 3]]>>>,
     stats: Statistics,
 }

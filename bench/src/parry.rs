@@ -1,6 +1,6 @@
 //! parry3d as a peer: its `Bvh` over primitives, refitted each frame, its traversals, and the plain
-//! pair test. parry has no self-collision and no triangle-pair query for meshes of its own; these are
-//! the parts it offers for the purpose, put together in the ways that [`tuned`] tries.
+//! pair test. parry has no self-collision and no triangle-pair query for meshes, but it offers these
+//! parts; [`tuned`] tries several ways to combine them.
 
 use std::fmt;
 use std::time::Instant;
@@ -24,7 +24,8 @@ pub struct Setting {
     refit: Refit,
     /// Whether candidates are collected and tested in parallel, or tested one by one as they come.
     parallel_test: bool,
-    /// Many bodies: a tree over bodies and all box pairs of two that meet, or a tree over primitives.
+    /// For many bodies: whether to use a tree over bodies, with all box pairs of two bodies that meet, or a tree over
+    /// primitives.
     over_bodies: bool,
 }
 
@@ -99,14 +100,14 @@ pub fn tuned(
 /// The primitives of one tree: a body, or all bodies.
 struct Side {
     positions: Vec<[f32; 3]>,
-    /// Corner indices, `P::N` a primitive.
+    /// Corner indices, `P::N` per primitive.
     corners: Vec<u32>,
     owners: Vec<u32>,
-    /// Where the primitives of each body start, and one past the last.
+    /// The first primitive of each body, and one past the last.
     starts: Vec<usize>,
-    /// The same for vertices.
+    /// The first vertex of each body, and one past the last.
     vertex_starts: Vec<usize>,
-    /// The boxes of the leaves in this frame, where leaves are bodies.
+    /// The boxes of the leaves in this frame, if leaves are bodies.
     body_boxes: Vec<Aabb>,
     bvh: Bvh,
     workspace: BvhWorkspace,

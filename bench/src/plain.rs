@@ -1,14 +1,14 @@
-//! The pair tests that peers run: plain double precision, without error bounds, written to be
-//! fast. They may err where primitives touch or nearly do, which shows as a difference in counts.
+//! The pair tests of the peers: plain double precision, without error bounds, written to be
+//! fast. They may be wrong for primitives that touch or nearly touch, which shows as a difference in counts.
 
 /// A point in double precision.
 pub type Point = [f64; 3];
 
 /// The corners of a primitive: three or four points.
 pub trait Corners: Copy + Send + Sync + 'static {
-    /// How many.
+    /// The number of corners.
     const N: usize;
-    /// The corners given one by one.
+    /// Builds the corners one by one.
     fn from_fn(corner: impl FnMut(usize) -> Point) -> Self;
     /// Whether two primitives meet, by the plain test.
     fn meet(&self, other: &Self) -> bool;
@@ -57,7 +57,7 @@ fn dot(a: Point, b: Point) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Positive when `d` lies on the side of the plane `abc` from which `abc` turns counterclockwise.
+/// Positive if `d` lies on the side of the plane `abc` from which `abc` appears counterclockwise.
 #[inline(always)]
 fn orient(a: Point, b: Point, c: Point, d: Point) -> f64 {
     dot(sub(d, a), cross(sub(b, a), sub(c, a)))
@@ -75,9 +75,9 @@ fn one_sided(d: [f64; 3]) -> bool {
     (d[0] > 0.0 && d[1] > 0.0 && d[2] > 0.0) || (d[0] < 0.0 && d[1] < 0.0 && d[2] < 0.0)
 }
 
-/// The corner that has a side of the other triangle's plane for itself, and whether that is the
-/// upper side. A corner in the plane counts for the side on which it leaves one corner alone.
-/// `None` when all three lie in the plane.
+/// The corner that is alone on its side of the other triangle's plane, and whether that is the
+/// upper side. A corner in the plane is assigned to a side so that one corner is alone.
+/// `None` if all three lie in the plane.
 #[inline(always)]
 fn apex(d: [f64; 3]) -> Option<(usize, bool)> {
     let bits = |keep: fn(f64) -> bool| {
@@ -95,7 +95,7 @@ fn apex(d: [f64; 3]) -> Option<(usize, bool)> {
     } else if in_plane == 7 {
         None
     } else {
-        // One corner in the plane, the others together on one side: it stands for the other side.
+        // One corner in the plane, the others together on one side: it counts as being on the other side.
         Some((corner(in_plane), below != 0))
     }
 }
@@ -154,7 +154,7 @@ fn coplanar(a: &[Point; 3], b: &[Point; 3]) -> bool {
 }
 
 /// Whether two tetrahedra meet: separating axes, the faces of both first, then the cross
-/// products of edges; a corner of one inside the other is seen on the way and ends the test.
+/// products of edges. If the face tests show a corner of one inside the other, the test ends.
 #[inline]
 pub fn tetrahedra(a: &[Point; 4], b: &[Point; 4]) -> bool {
     match (faces(a, b), faces(b, a)) {

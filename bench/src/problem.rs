@@ -1,4 +1,4 @@
-//! What is measured: bodies, the question, and the poses that frames go through.
+//! The problem that is measured: bodies, a query, and the poses of the frames.
 
 use std::sync::Arc;
 
@@ -8,12 +8,12 @@ use impinge_scenes::deform::Deform;
 
 use crate::Failure;
 
-/// What is asked of the bodies.
+/// The query about the bodies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ask {
     /// Pairs between the first and the second body.
     Between,
-    /// Self-collision of the only body; pairs that share a vertex are left out.
+    /// Self-collision of the only body, without pairs that share a vertex.
     Within,
     /// Pairs of different bodies.
     All,
@@ -24,7 +24,7 @@ pub enum Ask {
 pub struct Body {
     /// Its primitives.
     pub elements: Arc<Elements>,
-    /// Its positions in each pose; all bodies have as many.
+    /// Its positions in each pose; all bodies have equally many poses.
     pub poses: Vec<Vec<[f32; 3]>>,
 }
 
@@ -33,13 +33,13 @@ pub struct Body {
 pub struct Problem {
     /// Its name in tables.
     pub name: String,
-    /// Where the meshes came from, and what the poses are.
+    /// The origin of the meshes, and a description of the poses.
     pub about: String,
     /// The bodies.
     pub bodies: Vec<Body>,
-    /// The question.
+    /// The query.
     pub ask: Ask,
-    /// The number of pairs in every pose, where it is the same and known from elsewhere.
+    /// The number of pairs in every pose, if it is the same in all poses and known.
     pub expected: Option<u64>,
 }
 
@@ -54,8 +54,8 @@ impl Problem {
         })
     }
 
-    /// A problem whose last body goes to and fro along x while the others stay, though their positions are written all the same:
-    /// `n_steps` steps there and as many back, each of `step`, from its place to both sides. Pairs differ.
+    /// A problem whose last body moves to and fro along x: `n_steps` steps of length `step` each way, around its place. The other
+    /// bodies stay, but their positions are rewritten too. The pairs of the poses differ.
     pub fn passing(name: &str, models: Vec<Model>, ask: Ask, step: f32, n_steps: usize) -> Problem {
         let last = models.len().saturating_sub(1);
         let middle = n_steps as f32 / 2.0;
@@ -111,19 +111,19 @@ impl Problem {
         }
     }
 
-    /// Says where it comes from.
+    /// Sets the description.
     pub fn about(mut self, about: impl Into<String>) -> Problem {
         self.about = about.into();
         self
     }
 
-    /// Says how many pairs there must be.
+    /// Sets the expected number of pairs.
     pub fn expecting(mut self, n_pairs: Option<u64>) -> Problem {
         self.expected = n_pairs;
         self
     }
 
-    /// With the number of pairs by the oracle, where that is not known and the problem small enough for it.
+    /// Counts the pairs by the oracle, if their number is not known and the problem is small enough.
     pub fn by_oracle(self) -> Result<Problem, Failure> {
         const MAX_PRIMITIVES: usize = 60_000;
         if self.expected.is_some() || self.n_primitives() > MAX_PRIMITIVES {
@@ -145,12 +145,12 @@ impl Problem {
         self.bodies.first().map_or(1, |body| body.poses.len())
     }
 
-    /// Primitives of all bodies.
+    /// The number of primitives in all bodies.
     pub fn n_primitives(&self) -> usize {
         self.bodies.iter().map(|body| body.elements.len()).sum()
     }
 
-    /// The library's scene and query for it.
+    /// The library's scene and query for the problem.
     pub fn scene(&self) -> Result<(Scene, Vec<impinge::BodyId>, Query), Failure> {
         let mut scene = Scene::new();
         let ids = self

@@ -1,4 +1,4 @@
-//! Tables for people and records for later.
+//! Tables and records.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use serde_json::json;
 use crate::Failure;
 use crate::measure::Table;
 
-/// What a run says: Markdown as it goes, JSON at its end.
+/// The output of a run: Markdown while it runs, JSON at the end.
 #[derive(Debug)]
 pub struct Report {
     command: String,
@@ -17,7 +17,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// A report of one command, headed by the machine.
+    /// A report of one command; its header names the machine.
     pub fn new(command: &str) -> Self {
         let mut report = Report {
             command: command.to_owned(),
@@ -35,7 +35,7 @@ impl Report {
         self.markdown.push('\n');
     }
 
-    /// One problem, all contestants.
+    /// Prints the table of one problem.
     pub fn contest(&mut self, table: &Table) {
         let mut text = format!(
             "### {}: {} primitives in {}, {} pairs\n\n{}. {} frames each, {} in a row.\n\n",
@@ -94,7 +94,7 @@ impl Report {
         })
     }
 
-    /// Writes the JSON to a file and both forms into a record folder, where asked to.
+    /// Writes the JSON to a file and both forms to a record folder, if requested.
     pub fn write(&self, file: Option<&Path>, record: Option<&str>) -> Result<(), Failure> {
         let text = format!("{:#}\n", self.json());
         if let Some(path) = file {

@@ -1,14 +1,14 @@
-//! Whoever answers a problem: the library with some settings, or a peer.
+//! Contestants: the library with some settings, or a peer.
 
 use crate::Failure;
 use crate::problem::Problem;
 
-/// What came out of a frame.
+/// The result of a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Answer {
     /// How many pairs were found.
     pub n_pairs: u64,
-    /// A hash of them, from contestants whose answer is exact.
+    /// A hash of the pairs, from exact contestants.
     pub hash: Option<u64>,
     /// Wall time in milliseconds, from positions in memory to pairs in memory.
     pub ms: f64,
@@ -19,14 +19,14 @@ pub trait Runner {
     /// Its name in tables.
     fn name(&self) -> String;
 
-    /// The settings it runs with, for the record.
+    /// Its settings, for the record.
     fn setting(&self) -> String;
 
     /// Rewrites all positions. Not timed.
     fn load(&mut self, problem: &Problem, pose: usize) -> Result<(), Failure>;
 
-    /// Answers as things are now and says how long that took. With `verify`, what comes after the clock
-    /// has stopped may include a hash of the answer.
+    /// Answers for the current positions and measures the time. With `verify`, it may compute a hash of the answer
+    /// after the clock has stopped.
     fn frame(&mut self, verify: bool) -> Result<Answer, Failure>;
 
     /// Counts, bytes and stages of the last frame, for the record.

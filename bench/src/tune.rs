@@ -1,16 +1,16 @@
-//! Peers at their best: every setting is tried on the problem itself, the fastest is kept.
+//! Finds the best setting of a peer: tries every setting on the problem itself and keeps the fastest.
 
 use crate::Failure;
 use crate::problem::Problem;
 use crate::runner::Runner;
 
-/// Frames before the clock counts, and frames that count.
+/// Untimed and timed frames.
 const N_WARM: usize = 3;
 const N_TIMED: usize = 8;
 
-/// Builds a contestant for each setting, runs a few frames, and returns the one with the fastest
-/// frame: of several runs on a machine that others use too, the fastest says most about a setting. A
-/// setting whose first frames take twice as long as the best so far is not tried to the end. With a
+/// Builds a contestant for each setting, runs a few frames, and returns the contestant with the fastest
+/// frame: on a shared machine, the fastest of several frames says most about a setting. A
+/// setting whose first frames take twice as long as the best so far is abandoned. With a
 /// single setting nothing is measured.
 pub fn fastest<S: Copy>(
     problem: &Problem,

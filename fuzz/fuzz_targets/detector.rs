@@ -1,8 +1,8 @@
-//! The whole detector on scenes made of bytes: every method must say what the oracle says, and nothing
+//! The whole detector on scenes made from bytes: every method must agree with the oracle, and nothing
 //! may panic, whatever the numbers.
 //!
-//! The first byte chooses how coordinates are read (small integers, where everything is degenerate, or
-//! raw bits of f32 or f64, NaN included), then come bodies: a byte for kind and size, vertices, corners.
+//! The first byte chooses how coordinates are read: as small integers, where everything is degenerate, or
+//! as raw bits of f32 or f64, including NaN. Then bodies follow: a byte for kind and size, vertices, corners.
 
 #![no_main]
 

@@ -1,12 +1,12 @@
-//! What every fuzz target of a file format asserts: no panic, no endless loop, little memory (libFuzzer sees to these), and
-//! of what is returned that it is valid.
+//! The assertions of all fuzz targets of file formats. libFuzzer checks for panics, endless loops and memory; the
+//! functions here check that returned meshes and errors are valid.
 
 use impinge_io::{
     Error, Format, Mesh, Positions, Prefer, ReadOptions, Sequence, SequenceFormat, read_bytes,
     read_tetgen_bytes,
 };
 
-/// Little room for what may grow beyond its file, so that the fuzzer need not hold gigabytes.
+/// A small limit for data that may expand, so that the fuzzer does not need gigabytes.
 fn options(prefer: Prefer) -> ReadOptions {
     ReadOptions {
         weld: true,
@@ -54,7 +54,7 @@ pub fn mesh(bytes: &[u8], format: Format) {
     ));
 }
 
-/// Reads a TetGen mesh: its two files are parted by a zero; the first byte tells which kind of cells the second has.
+/// Reads a TetGen mesh. A zero byte separates its two files; the first byte chooses the kind of cells of the second file.
 pub fn tetgen(bytes: &[u8]) {
     let Some((kind, bytes)) = bytes.split_first() else {
         return;

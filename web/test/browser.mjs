@@ -1,4 +1,4 @@
-// A headless Chromium with WebGPU on its software driver, and a server for what it reads.
+// A headless Chromium with WebGPU on its software driver, and a server for its files.
 
 import { createServer } from "node:http";
 import { readFile } from "node:fs/promises";
@@ -13,7 +13,7 @@ const TYPES = {
   ".json": "application/json",
 };
 
-// Serves a folder on a free port of this machine. WebGPU and modules need http: file:// has neither.
+// Serves a folder on a free port of this machine. WebGPU and modules work only over http, not with file:// URLs.
 export async function serve(folder, port = 0) {
   const server = createServer(async (request, response) => {
     const path = normalize(decodeURIComponent(new URL(request.url, "http://here").pathname));

@@ -1,13 +1,13 @@
 // Gives every shader text in a folder to Chrome's compiler: node shaders.mjs FOLDER
 //
-// Chrome keeps to the WGSL grammar where naga does not, so a text that wgpu takes on every desktop may
-// still be refused by every browser. `scripts/web-shaders` writes the folder and calls this.
+// Chrome follows the WGSL grammar more strictly than naga, so a text that wgpu accepts on every desktop may
+// still be refused by browsers. `scripts/web-shaders` writes the folder and calls this.
 
 import { readdir, readFile } from "node:fs/promises";
 import { join } from "node:path";
 import { launch, serve } from "./browser.mjs";
 
-// naga takes this; the grammar asks for parentheses. It shows that a refusal is seen here.
+// naga accepts this text, but the grammar requires parentheses. It shows that this script notices a refusal.
 const REFUSED = `
   @group(0) @binding(0) var<storage, read_write> out: array<u32>;
   @compute @workgroup_size(1) fn main() { out[0] = out[1] | out[2] << 1u; }`;

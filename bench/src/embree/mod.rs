@@ -1,10 +1,10 @@
-//! Embree 3 as a peer: a bounding volume hierarchy over user-defined primitives, refitted or built
-//! anew each frame, `rtcCollide`, and the plain pair test in its callback.
+//! Embree 3 as a peer: a bounding volume hierarchy over user-defined primitives, refitted or rebuilt
+//! each frame, `rtcCollide`, and the plain pair test in its callback.
 //!
-//! `rtcCollide` takes user geometries only and hands over candidate pairs from several threads. What
-//! the callback does is written tight: no lock, no allocation, one atomic addition a batch of hits.
+//! `rtcCollide` takes only user geometries and calls back with candidate pairs from several threads. The
+//! callback is fast: no lock, no allocation, one atomic addition per batch of hits.
 //! The setting (build quality, scene flags, threads, whether candidates' boxes are compared first) is
-//! not fixed here: [`tuned`] measures all sensible ones on the problem and keeps the fastest.
+//! not fixed: [`tuned`] measures all sensible settings on the problem and keeps the fastest.
 
 mod ffi;
 
@@ -27,7 +27,7 @@ pub struct Setting {
     scene_quality: c_int,
     geometry_quality: c_int,
     flags: c_int,
-    /// 0 for all.
+    /// 0 means all.
     threads: usize,
     /// Whether boxes of candidates are compared before the pair test: a leaf may hold several
     /// primitives, and Embree does not compare their boxes.
@@ -66,8 +66,8 @@ impl fmt::Display for Setting {
     }
 }
 
-/// All settings that are tried. A refit needs the two-level tree of a scene of low quality: with
-/// any other, Embree builds anew whatever the geometry says.
+/// All settings to try. A refit needs the two-level tree of a scene of low quality: with
+/// any other quality, Embree rebuilds, whatever the geometry says.
 fn settings() -> Vec<Setting> {
     use ffi::*;
     let mut settings = Vec::new();
@@ -121,9 +121,9 @@ pub fn tuned(
 struct Side {
     /// Padded to 16 bytes, so that a position is one load.
     positions: Vec<[f32; 4]>,
-    /// Corner indices, `K` a primitive.
+    /// Corner indices, `K` per primitive.
     corners: Vec<u32>,
-    /// The body of each primitive, where it matters.
+    /// The body of each primitive, if it matters.
     owners: Vec<u32>,
 }
 
@@ -174,7 +174,7 @@ impl Side {
         let (mut min, mut max) = (first, first);
         for &index in &indices[1..] {
             let p = self.positions[index as usize];
-            // Written so that each line is one vector instruction: no NaN gets this far.
+            // Written so that each line is one vector instruction; there are no NaNs here.
             min = std::array::from_fn(|k| if p[k] < min[k] { p[k] } else { min[k] });
             max = std::array::from_fn(|k| if p[k] > max[k] { p[k] } else { max[k] });
         }
@@ -190,7 +190,7 @@ impl Side {
     }
 }
 
-/// What the collision callback sees.
+/// The data of the collision callback.
 struct Shared {
     sides: Vec<Side>,
     n_hits: AtomicUsize,
@@ -237,7 +237,7 @@ unsafe extern "C" fn collide<P: Corners, const RULE: u8, const BOXES: bool>(
         let mut n_found = 0;
         for collision in batch {
             let (i, j) = (collision.primitive0 as usize, collision.primitive1 as usize);
-            // A scene against itself hands over both orders.
+            // For a scene against itself, Embree reports both orders.
             if RULE != BETWEEN && i >= j {
                 continue;
             }
@@ -260,7 +260,7 @@ unsafe extern "C" fn collide<P: Corners, const RULE: u8, const BOXES: bool>(
         }
         if n_found > 0 {
             let start = shared.n_hits.fetch_add(n_found, Relaxed);
-            // Past the end only the count goes on; `frame` makes room and runs again.
+            // After the end only the count grows; `frame` then grows the buffer and runs again.
             if let Some(room) = shared.hits.get(start..start + n_found) {
                 for (slot, pair) in room.iter().zip(found) {
                     slot.store(pair, Relaxed);
@@ -270,7 +270,7 @@ unsafe extern "C" fn collide<P: Corners, const RULE: u8, const BOXES: bool>(
     }
 }
 
-/// A device and what hangs on it; released in the reverse order.
+/// A device and the objects that depend on it; released in reverse order.
 struct Handles {
     device: ffi::Device,
     scenes: Vec<ffi::Scene>,
@@ -309,7 +309,7 @@ impl Drop for Handles {
 struct Embree<P> {
     handles: Handles,
     shared: Box<Shared>,
-    /// Bodies of each side, and where their vertices start.
+    /// The bodies of each side, and the first vertex of each.
     layout: Vec<Vec<(usize, usize)>>,
     callback: ffi::CollideFunction,
     setting: Setting,
@@ -388,7 +388,7 @@ impl<P: Corners> Embree<P> {
         })
     }
 
-    /// Refits or builds, collides, and says how many pairs there were.
+    /// Refits or builds, collides, and returns the number of pairs.
     fn run(&self) -> usize {
         self.shared.n_hits.store(0, Relaxed);
         let handles = &self.handles;
@@ -442,7 +442,7 @@ impl<P: Corners> Runner for Embree<P> {
         let start = Instant::now();
         let mut n_hits = self.run();
         if n_hits > self.shared.hits.len() {
-            // Only the first frame of a scene comes here: room for half as many again.
+            // Only the first frame of a scene gets here: make room for 50 % more.
             let room = n_hits + n_hits / 2;
             self.shared.hits.resize_with(room, AtomicU64::default);
             n_hits = self.run();

@@ -1,5 +1,5 @@
-//! A simulation that never leaves the GPU: a compute shader deforms a mesh, the detector finds what
-//! collides, another shader uses the pairs. The host only submits; it looks once, after the last frame.
+//! A simulation that never leaves the GPU: a compute shader deforms a mesh, the detector finds the
+//! pairs, another shader uses them. The host only submits; it reads back once, after the last frame.
 //!
 //! `cargo run --release --example gpu_resident --features gpu`
 
@@ -28,7 +28,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
 }
 ";
 
-/// Marks the primitives that take part in a pair, unsure ones too: that is safe.
+/// Marks the primitives that take part in a pair. Unsure pairs count as pairs, which is safe.
 const MARK: &str = "
 struct Pair { low: u32, high: u32 }
 @group(0) @binding(0) var<storage, read> pairs: array<Pair>;
@@ -63,7 +63,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (device, queue) = pollster::block_on(adapter.request_device(&Default::default()))?;
     println!("on {}", adapter.get_info().name);
 
-    // Two balls: one deforms on the device and sinks into the other, which rests.
+    // Two balls: one deforms on the device and sinks into the other, which does not move.
     let ball = surfaces::ball(20_000);
     let mut scene = Scene::new();
     let moving = ball.add_to(&mut scene)?;
@@ -128,7 +128,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         queue.submit([encoder.finish()]);
     }
 
-    // The one look: did everything fit, and how many primitives were hit in the last frame?
+    // The only read-back: did everything fit, and how many primitives were hit in the last frame?
     let is_complete = detector.make_room()?;
     let staging = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("staging"),
@@ -148,7 +148,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .count();
     let ms = start.elapsed().as_secs_f64() * 1e3 / f64::from(FRAMES);
     println!(
-        "{n_hit} of {n_primitives} triangles hit, complete: {is_complete}, {ms:.2} ms a frame"
+        "{n_hit} of {n_primitives} triangles hit, complete: {is_complete}, {ms:.2} ms per frame"
     );
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Exact, real-time collision detection for deforming meshes.
 //!
-//! Bodies have fixed topology and positions that change every frame. A [`Detector`] answers
-//! which of their primitives intersect: between bodies and within one.
+//! Bodies have fixed topology and positions that change every frame. A [`Detector`] finds
+//! which of their primitives intersect, between bodies and within one body.
 //!
 //! * **Closed sets.** Touching counts, coplanar overlap counts, a degenerate triangle is the
 //!   segment or the point that it is.
@@ -9,13 +9,14 @@
 //!   coordinates are read as real numbers. There is no tolerance anywhere.
 //! * **The same bytes everywhere.** The answer is sorted and depends on the input alone: not on
 //!   method, backend, threads or memory.
-//! * **Continuous, too.** [`Detector::impacts`] finds which vertices, edges and faces touch while bodies move from their
-//!   positions to their [end positions](Scene::set_end_positions), and the first time of each pair, exactly and rounded down;
-//!   [`Detector::earliest`], [`Detector::is_free`] and [`Detector::advance`] answer what solvers ask of a step.
+//! * **Continuous detection.** [`Detector::impacts`] finds which vertices, edges and faces touch while bodies move from their
+//!   positions to their [end positions](Scene::set_end_positions), and the first time of each pair, exact and rounded down.
+//!   For solvers, [`Detector::earliest`] finds the first contact of a step, [`Detector::is_free`] decides whether there is any,
+//!   and [`Detector::advance`] finds how far a step can be taken.
 //!
-//! This crate is the stable face of the engine in `impinge-core`.
+//! This crate is the stable interface of the engine in `impinge-core`.
 
-/// The GPU interface that [`Detector::with_device`] and [`Detector::encode`] speak.
+/// The GPU interface of [`Detector::with_device`] and [`Detector::encode`].
 #[cfg(feature = "gpu")]
 pub use impinge_core::wgpu;
 pub use impinge_core::{
@@ -28,7 +29,7 @@ pub use impinge_core::{
 pub use impinge_core::{DeviceInfo, ResidentPairs, devices, devices_async};
 pub use impinge_core::{contact, exact, proximity};
 
-// What users hold may be moved to, and lent to, other threads.
+// The types that users hold are `Send` and `Sync`.
 const _: () = {
     const fn threads_may_share<T: Send + Sync>() {}
     threads_may_share::<Detector>();

@@ -1,4 +1,4 @@
-//! The baselines beside impinge on a mesh and its copy moved by an offset:
+//! Compares the baselines with impinge, on a mesh and its copy moved by an offset:
 //!
 //! ```text
 //! cargo run --release -p impinge-baseline --example compare -- bunny.ply 0.373 0.008 0.01
@@ -69,7 +69,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         })?;
         let checks = two_levels.count(&scene, a, b)?;
         let (share, average) = (checks.repeated_share(), checks.average());
-        println!("    {checks:?}, {share:.2} repeated, {average:.2} on average");
+        println!("    {checks:?}, {share:.2} repeated, {average:.2} tests on average");
         show("  DJB2", || {
             Ok(two_levels.detect_djb2(&scene, a, b, n)?.clone())
         })?;

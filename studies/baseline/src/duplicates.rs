@@ -1,10 +1,10 @@
-//! What impinge's owner rule replaces: the paper's two levels without it.
+//! The paper's two levels without impinge's owner rule.
 //!
-//! Two primitives often share several cells, and are then found in each of them. The paper counts how
+//! Two primitives often share several cells, and the pair is then found in each of them. The paper counts how
 //! often (section 4.2, table 3: 62 to 83 % of the pairs are checked more than once, 2.11 to 3.72 times on
-//! average) and tries a hash table against it, which loses 2.7 to 4.3 % of the colliding primitives.
-//! impinge has each pair tested by one cell alone, the one that holds the lower corner of the pair's
-//! common range: nothing is lost, and there is no table.
+//! average). It tries a hash table to avoid this, which loses 2.7 to 4.3 % of the colliding primitives.
+//! In impinge only one cell tests each pair, the cell that holds the lower corner of the pair's
+//! common range: nothing is lost, and no table is needed.
 //!
 //! ```
 //! use impinge_core::{Method, Query};
@@ -37,23 +37,23 @@ use rules::{Every, Recorded};
 /// Which pairs of a cell go on to the intersection test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Possible {
-    /// All that touch a common sub-cell, as the paper has it (section 3.2).
+    /// All pairs that touch a common sub-cell, as in the paper (section 3.2).
     #[default]
     Masks,
-    /// Of those, the ones whose boxes overlap, as impinge has it.
+    /// Of those, only the pairs whose boxes overlap, as in impinge.
     Boxes,
 }
 
-/// What [`TwoLevels`] may be told.
+/// Settings of [`TwoLevels`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// The density coefficient λ of the paper's equation (1), above 0.
     pub lambda: f64,
-    /// Primitives a group, 1 to 64.
+    /// Primitives per group, 1 to 64.
     pub group_size: u32,
     /// Which pairs are tested.
     pub possible: Possible,
-    /// CPU threads; 0 means one a core.
+    /// CPU threads; 0 means one per core.
     pub threads: usize,
     /// The widest vector instructions that may be used.
     pub instruction_set: InstructionSet,
@@ -71,12 +71,12 @@ impl Default for Settings {
     }
 }
 
-/// How often pairs are tested when every cell tests what it finds.
+/// How often pairs are tested if every cell tests the pairs that it finds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Checks {
-    /// Tests, repetitions counted.
+    /// Tests, including repetitions.
     pub n_tests: u64,
-    /// Pairs that are tested at all.
+    /// Different pairs that are tested.
     pub n_pairs: u64,
     /// Pairs that are tested more than once.
     pub n_repeated: u64,
@@ -88,27 +88,27 @@ impl Checks {
         self.n_repeated as f64 / self.n_pairs.max(1) as f64
     }
 
-    /// Tests a pair that is tested, 1 at least (`#Checking times` of table 3); 1 when there is none.
+    /// Tests per tested pair, at least 1 (`#Checking times` of table 3); 1 if there is none.
     pub fn average(&self) -> f64 {
         self.n_tests.max(1) as f64 / self.n_pairs.max(1) as f64
     }
 }
 
-/// What an incomplete answer lacks.
+/// The losses of an incomplete answer.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Missing {
     /// Primitives of both bodies that take part in any pair.
     pub n_colliding: u64,
-    /// Of those, the ones that the incomplete answer does not name.
+    /// Of those, the primitives that the incomplete answer does not name.
     pub n_missing: u64,
-    /// Pairs.
+    /// Pairs of the complete answer.
     pub n_pairs: u64,
-    /// Of those, the ones that the incomplete answer does not have.
+    /// Of those, the pairs that the incomplete answer does not have.
     pub n_missing_pairs: u64,
 }
 
 impl Missing {
-    /// Compares an answer with the whole of it.
+    /// Compares an answer with the complete one.
     pub fn of(all: &Pairs, found: &Pairs, a: BodyId, b: BodyId) -> Self {
         let n_colliding = |pairs: &Pairs| {
             let of_both = [a, b].map(|body| pairs.colliding(body).len() as u64);
@@ -123,12 +123,12 @@ impl Missing {
         }
     }
 
-    /// Missing primitives to colliding primitives, 0 to 1: the paper's missing rate.
+    /// Missing primitives divided by colliding primitives, 0 to 1: the paper's missing rate.
     pub fn rate(&self) -> f64 {
         self.n_missing as f64 / self.n_colliding.max(1) as f64
     }
 
-    /// Missing pairs to pairs, 0 to 1.
+    /// Missing pairs divided by pairs, 0 to 1.
     pub fn pair_rate(&self) -> f64 {
         self.n_missing_pairs as f64 / self.n_pairs.max(1) as f64
     }
@@ -143,7 +143,7 @@ pub struct TwoLevels {
 }
 
 impl TwoLevels {
-    /// With everything said.
+    /// Creates the method with explicit settings.
     ///
     /// # Errors
     /// A setting out of its range.
@@ -165,13 +165,13 @@ impl TwoLevels {
         })
     }
 
-    /// What it was told.
+    /// The settings.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// Every pair tested in every cell where it is found (table 3, "without hash"). Nothing is missing;
-    /// `n_candidates` of the statistics counts the tests, repetitions included.
+    /// Tests every pair in every cell where it is found (table 3, "without hash"). Nothing is missing;
+    /// `n_candidates` of the statistics counts the tests, including repetitions.
     ///
     /// # Errors
     /// A stale id, one body named twice, refused positions.
@@ -186,10 +186,10 @@ impl TwoLevels {
             })
     }
 
-    /// As [`detect`](TwoLevels::detect), but a table of `table_size` slots stands before the tests (table 3,
-    /// "with hash"; the paper has as many slots as there are primitives). Each pair goes to the slot that
-    /// DJB2 gives it; of all pairs in a slot only one is tested, and the others are lost. Which one: the
-    /// lowest, so that the answer does not depend on threads.
+    /// Like [`detect`](TwoLevels::detect), but pairs go through a table of `table_size` slots before the tests (table 3,
+    /// "with hash"; the paper has as many slots as there are primitives). DJB2 maps each pair to a slot. Of all
+    /// pairs in a slot only the lowest is tested, so that the answer does not depend on threads; the others are
+    /// lost.
     ///
     /// # Errors
     /// As `detect`; a table without slots or with more than 2^32.
@@ -213,8 +213,8 @@ impl TwoLevels {
             })
     }
 
-    /// How often pairs are tested by [`detect`](TwoLevels::detect). Every test is written down, so this
-    /// takes 16 bytes a test and is not for timing.
+    /// Counts how often [`detect`](TwoLevels::detect) tests pairs. It records every test, which
+    /// takes 16 bytes per test, so do not time it.
     ///
     /// # Errors
     /// As `detect`.
@@ -243,7 +243,7 @@ impl TwoLevels {
     }
 }
 
-/// What impinge's own stages are told.
+/// The settings for impinge's own stages.
 fn of_cells(settings: &Settings) -> impinge_core::Settings {
     impinge_core::Settings {
         lambda: settings.lambda,

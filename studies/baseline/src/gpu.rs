@@ -1,7 +1,7 @@
 //! The uniform grid on a GPU: the same stages in WGSL, on any adapter.
 //!
-//! What the filter on the device leaves open is settled exactly on the CPU, as in impinge; so the pairs
-//! are those of [`crate::UniformGrid`], whatever the device.
+//! Pairs that the filter on the device leaves unsure are settled exactly on the CPU, as in impinge. So the pairs
+//! are those of [`crate::UniformGrid`] on every device.
 //!
 //! ```no_run
 //! use impinge_baseline::gpu::{Settings, UniformGrid};
@@ -27,13 +27,13 @@ use kernels::Kernels;
 pub use kernels::shaders;
 use plan::Plan;
 
-/// What a [`UniformGrid`] on a GPU may be told.
+/// Settings of a [`UniformGrid`] on a GPU.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// The density coefficient λ of the paper's equation (1), above 0. The paper found 5 to be best for
     /// this method.
     pub lambda: f64,
-    /// Whether a pair is tested in one of the cells that it shares only, as impinge does it.
+    /// Whether a pair is tested in only one of its common cells, as in impinge.
     pub owner_rule: bool,
     /// Part of an adapter's name, to choose among several; hardware comes before software.
     pub device: Option<String>,
@@ -56,16 +56,16 @@ pub struct UniformGrid {
 }
 
 impl UniformGrid {
-    /// Opens the adapter, or shares the device that impinge has open on it. Kernels are compiled by the first frame.
+    /// Opens the adapter, or shares the device that impinge has open on it. The first frame compiles the kernels.
     ///
     /// # Errors
-    /// A setting out of its range; no adapter fits; the driver refuses.
+    /// A setting out of its range; no adapter matches; the driver returns an error.
     pub fn new(settings: Settings) -> Result<Self, Error> {
         UniformGrid::with_room(settings, None, None)
     }
 
-    /// [`new`](UniformGrid::new), and how much room impinge's buffers begin with and may have. For tests:
-    /// they grow by themselves, as far as the device goes.
+    /// Like [`new`](UniformGrid::new), with the initial and the largest capacities of impinge's buffers. For tests:
+    /// normally buffers grow by themselves, up to the limits of the device.
     ///
     /// # Errors
     /// As `new`.
@@ -96,14 +96,14 @@ impl UniformGrid {
         Ok(UniformGrid { settings, host })
     }
 
-    /// What it was told.
+    /// The settings.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// All pairs of primitives of two different bodies that intersect, as things are in the scene now.
+    /// Finds all intersecting pairs of primitives of two different bodies, in the current state of the scene.
     ///
-    /// Stages are timed by the device where it has a clock; `upload`, `settle` and `collect` are the host's.
+    /// The device times its stages if it has a clock; `upload`, `settle` and `collect` are stages of the host.
     ///
     /// # Errors
     /// A stale id, one body named twice, refused positions; more than the device can hold.
@@ -112,7 +112,7 @@ impl UniformGrid {
         let (pairs, passes) = self.host.detect(scene, &query, "uniform grid")?;
         let mut counts = Counts::default();
         for pass in passes {
-            // Each pass makes all entries, and pairs those of its cells.
+            // Each pass makes all entries, but pairs only those of its cells.
             counts.n_reaching = pass.needed.kept;
             counts.n_entries = pass.needed.entries;
             counts.n_mixed_cells += pass.n_subdivided;

@@ -1,15 +1,15 @@
-//! What impinge is measured against, written to be as good as it can be.
+//! The methods that impinge is compared with, written to be as fast as possible.
 //!
 //! * [`UniformGrid`]: the parallel spatial hashing of `FWZS11`, as section 2 and section 4.1 of the paper
 //!   ("Real-time Collision Detection with Two-level Spatial Hashing on GPU") describe it: one uniform
 //!   grid with λ = 5, cell-primitive pairs sorted by a radix sort, compaction, all pairs of a cell tested.
-//! * [`duplicates`]: the paper's own two levels without the owner rule that impinge has in its place:
-//!   pairs tested once in every cell where they meet (table 3), or handed through a table hashed by DJB2
-//!   that loses some of them (table 3, figure 7).
+//! * [`duplicates`]: the paper's two levels without impinge's owner rule: pairs are tested in every cell
+//!   where they meet (table 3), or go through a table hashed by DJB2 that loses some of them (table 3,
+//!   figure 7).
 //!
-//! Both stand on impinge's boxes, grid, threads and exact test, so that a comparison compares methods.
+//! Both use impinge's boxes, grid, threads and exact test, so that a comparison compares only methods.
 //!
-//! `FWZS11` is cited by the paper; what is built here follows the paper's description of it, not the
+//! The paper cites `FWZS11`. The code here follows the paper's description of it, not the
 //! original text.
 //!
 //! ```
@@ -37,7 +37,7 @@ mod uniform_grid;
 pub use impinge_core::Error;
 pub use uniform_grid::{Counts, Outcome, Settings, UniformGrid};
 
-/// Refuses a λ that is no density.
+/// Refuses a λ that is not a number above 0.
 fn check_lambda(lambda: f64) -> Result<(), Error> {
     if lambda.is_finite() && lambda > 0.0 {
         return Ok(());
@@ -49,7 +49,7 @@ fn check_lambda(lambda: f64) -> Result<(), Error> {
     })
 }
 
-/// Refuses more threads than make sense.
+/// Refuses an unreasonable number of threads.
 fn check_threads(threads: usize) -> Result<(), Error> {
     if threads <= 1024 {
         return Ok(());

@@ -1,12 +1,12 @@
 //! Parallel spatial hashing on the CPU: one uniform grid, sorted.
 //!
 //! ```text
-//! bounds    boxes of the bodies, where they overlap, primitives that reach there, and their boxes
+//! bounds    boxes of the bodies, the region where they overlap, primitives that reach it, and their boxes
 //! grid      resolution by eq. (1) with λ = 5, ranges of cells by eq. (3), entries counted
 //! fill      exclusive sum of the counts; one entry (cell, primitive) for every cell that a box touches
 //! sort      radix sort by cell
-//! compact   cells that have primitives of both bodies, and where their entries are
-//! pairing   all pairs of a cell: boxes
+//! compact   cells that have primitives of both bodies, and the places of their entries
+//! pairing   box tests of all pairs of a cell
 //! narrow    the exact test
 //! collect   sorted, repetitions dropped
 //! ```
@@ -27,7 +27,7 @@ use crate::pairing::{Lists, Run, Scratch};
 use crate::radix::Radix;
 use crate::{Counts, Error, Settings};
 
-/// Primitives, entries and runs of one task.
+/// Primitives, entries and runs per task.
 const PRIMITIVES: usize = 4096;
 const ENTRIES: usize = 1 << 14;
 const RUNS: usize = 64;
@@ -38,7 +38,7 @@ const GROUP: u32 = impinge_core::grouping::GROUP as u32;
 pub(crate) struct Method {
     isa: Isa,
     reaching: KeptList,
-    /// Entries of each task over primitives, then where they begin.
+    /// The number of entries of each task; after the prefix sum, their beginnings.
     firsts: Vec<Mutex<u64>>,
     /// `cell << 32 | place in kept`.
     entries: Vec<u64>,
@@ -46,11 +46,11 @@ pub(crate) struct Method {
     parts: Vec<Mutex<Part>>,
     runs: Vec<Run>,
     scratches: Vec<Scratch>,
-    /// What the last frame had.
+    /// The counts of the last frame.
     pub counts: Counts,
 }
 
-/// What one task of `compact` finds.
+/// The result of one task of `compact`.
 #[derive(Debug, Default)]
 struct Part {
     runs: Vec<Run>,
@@ -137,7 +137,7 @@ impl Method {
         let n_tasks = kept.len().div_ceil(PRIMITIVES);
         self.firsts
             .resize_with(n_tasks.max(self.firsts.len()), Mutex::default);
-        // As in `Cells`: a huge primitive would touch every cell of a fine grid.
+        // As in `Cells`, the number of entries is bounded: a huge primitive would touch every cell of a fine grid.
         let most = (kept.len() as u64)
             .saturating_mul(MOST_ENTRIES_EACH)
             .min(u64::from(u32::MAX));
@@ -164,7 +164,7 @@ impl Method {
                 return Ok(grid);
             }
             let Some(coarser) = grid.coarser() else {
-                // One cell, so that every primitive has one entry.
+                // Even one cell, where every primitive has one entry, has too many entries.
                 return Err(Error::TooMany {
                     what: "cell-primitive pairs",
                     given: n_entries,
@@ -180,7 +180,7 @@ impl Method {
     fn fill(&mut self, job: Job<'_>, grid: &Grid) {
         let kept = &self.reaching.kept;
         let n_tasks = kept.len().div_ceil(PRIMITIVES);
-        // Counts were held against what 32 bits can number.
+        // The count was checked to fit in 32 bits.
         self.entries.clear();
         self.entries.resize(self.counts.n_entries as usize, 0);
         let mut places = Vec::with_capacity(n_tasks);
@@ -192,7 +192,7 @@ impl Method {
             (rest, first) = (others, next);
             places.push(Mutex::new(task));
         }
-        // What was split off belongs to the task before.
+        // The part that was split off belongs to the task before.
         places.push(Mutex::new(rest));
         job.workers.for_each(&mut self.scratches, n_tasks, |_, ix| {
             let mut places = places[ix + 1].lock().expect("no task panics");
@@ -309,7 +309,7 @@ impl Method {
 }
 
 impl Part {
-    /// The entries of one cell, cut so that a task never has many more than it can share out.
+    /// Adds the entries of one cell, cut into runs so that large cells can be shared among tasks.
     fn put(&mut self, cell: u32, first: u32, middle: u32, end: u32) {
         let mut first_a = first;
         while first_a < middle {

@@ -2,9 +2,9 @@
 //!
 //! In: runs of the sorted entries. Out: candidates, which the exact test settles in runs of about a
 //! thousand, while they are in the cache.
-//! A small cell is two loops of box tests. In a larger one the boxes of 64 primitives of `b` are laid out a
-//! lane each, and a primitive of `a` is tested against 8 or 16 of them at a time.
-//! Cost: `n_a n_b` box tests a cell; nothing is culled before them, that is the method.
+//! A small cell is two loops of box tests. In a larger one the boxes of 64 primitives of `b` are laid out in
+//! lanes, and a primitive of `a` is tested against 8 or 16 of them at a time.
+//! Cost: `n_a n_b` box tests per cell. The method culls nothing before them.
 
 use impinge_core::cpu::kept::Kept;
 use impinge_core::cpu::narrow::{Candidate, Settler};
@@ -14,22 +14,22 @@ use impinge_core::grouping::GROUP;
 use impinge_core::grouping::bounds::Bounds;
 use impinge_core::grouping::grid::Grid;
 
-/// Box tests up to which laying out lanes is not worth it.
+/// Up to this many box tests, laying out lanes does not pay.
 const FEW: usize = 24;
 
-/// The entries of one cell that has primitives of both bodies, or as many of `a` as make a group.
+/// The entries of one cell with primitives of both bodies, with at most one group of `a`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Run {
     pub cell: u32,
-    /// Entries `first_a .. end_a` are of body `a`, at most a group of them.
+    /// Entries `first_a .. end_a` belong to body `a`; at most a group of them.
     pub first_a: u32,
     pub end_a: u32,
-    /// Entries `first_b .. end_b` are of body `b`.
+    /// Entries `first_b .. end_b` belong to body `b`.
     pub first_b: u32,
     pub end_b: u32,
 }
 
-/// What the pairs of a cell are looked up in.
+/// The data from which the pairs of a cell are read.
 #[derive(Clone, Copy)]
 pub(crate) struct Lists<'a> {
     pub world: World<'a>,
@@ -37,11 +37,11 @@ pub(crate) struct Lists<'a> {
     pub kept: &'a [Kept],
     /// `cell << 32 | place in kept`, sorted.
     pub entries: &'a [u64],
-    /// Whether a pair is tested by one of its cells only.
+    /// Whether a pair is tested in only one of its cells.
     pub owner_rule: bool,
 }
 
-/// What one worker has of its own.
+/// Scratch memory of one worker.
 #[derive(Debug)]
 pub(crate) struct Scratch {
     pub settler: Settler,
@@ -73,7 +73,7 @@ impl Scratch {
         size_of::<Scratch>() + self.settler.bytes() + size_of::<Bounds>() * self.boxes.capacity()
     }
 
-    /// Tests all pairs of these cells, and settles what their boxes leave.
+    /// Tests the boxes of all pairs of these cells, and settles the candidates.
     pub fn pair(&mut self, isa: Isa, lists: Lists<'_>, runs: &[Run]) {
         for run in runs {
             let a = &lists.entries[run.first_a as usize..run.end_a as usize];
@@ -109,7 +109,7 @@ impl Scratch {
             for (lane, &entry) in b.iter().enumerate() {
                 self.lanes.put(lane, &lists.kept(entry).bounds);
             }
-            // Lanes past the last hold what was there before, and are not looked at.
+            // Lanes after the last one hold old data and are masked out.
             let among = u64::MAX >> (GROUP - b.len());
             masks(isa, &self.lanes, among, &self.boxes, &mut self.masks);
             for (row, &entry_a) in a.iter().enumerate() {
@@ -144,7 +144,7 @@ impl<'a> Lists<'a> {
         &self.kept[entry as u32 as usize]
     }
 
-    /// The one of all common cells to which a pair belongs, as in `impinge`'s owner rule.
+    /// The common cell to which a pair belongs, as in impinge's owner rule.
     #[inline(always)]
     fn owner(&self, a: &Kept, b: &Kept) -> usize {
         self.grid.index(std::array::from_fn(|axis| {

@@ -1,7 +1,7 @@
 //! A radix sort of cell-primitive pairs: least significant digit first, stable, on all threads.
 //!
-//! In: entries `cell << 32 | primitive`. Out: the same, cells rising, and within a cell in the order in
-//! which they came. Only the bits that cells have are sorted by, in as few digits as there can be:
+//! In: entries `cell << 32 | primitive`. Out: the same entries, sorted by cell, and within a cell in the original
+//! order. The sort uses only as many bits as cells have, in as few digits as possible:
 //!
 //! ```text
 //!  63        48 47    41 40    32 31                0
@@ -10,50 +10,50 @@
 //! +------------+--------+--------+-------------------+
 //! ```
 //!
-//! A round counts the digits of each task's run of entries, sums the counts up, digit by digit and within
-//! one task by task, and scatters: every task then knows where its entries go, and no two write to the
-//! same place. Cost: each entry read twice and written once a round.
+//! A round counts the digits of each task's run of entries, sums up the counts (digit by digit, and within
+//! a digit task by task), and scatters. After the sums every task knows where its entries go, and no two
+//! tasks write to the same place. Cost: per round each entry is read twice and written once.
 
 use std::sync::Mutex;
 
 use impinge_core::workers::Workers;
 
-/// Bits of a digit, at most: 2,048 places that are written to at a time.
+/// The most bits of a digit: a round writes to up to 2,048 places.
 const MOST_BITS: u32 = 11;
-/// Entries of a task, at least.
+/// The fewest entries of a task.
 const TASK: usize = 1 << 14;
-/// Where an entry's cell begins.
+/// The lowest bit of an entry's cell.
 const CELL: u32 = 32;
 
-/// The memory of a sort, kept from frame to frame.
+/// The memory of a sort, reused from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Radix {
     sorted: Vec<u64>,
-    /// For each task its counts, then its places.
+    /// For each task its counts; after the sums, its places.
     counts: Vec<Mutex<Vec<u32>>>,
 }
 
-/// Where tasks put entries, each in places of its own.
+/// The destination of entries; each task writes to places of its own.
 #[derive(Clone, Copy)]
 struct Places(*mut u64);
 
-// SAFETY: a pointer does nothing by itself; `put` says what its callers owe.
+// SAFETY: a pointer does nothing by itself; `put` states the duties of its callers.
 unsafe impl Send for Places {}
 // SAFETY: as above.
 unsafe impl Sync for Places {}
 
 impl Places {
     /// # Safety
-    /// `at` must lie within the memory pointed to, and be given to nobody else in the same round.
+    /// `at` must lie within the memory pointed to, and no other task may write to it in the same round.
     #[inline(always)]
     unsafe fn put(self, at: usize, entry: u64) {
-        // SAFETY: said above.
+        // SAFETY: the caller guarantees it.
         unsafe { self.0.add(at).write(entry) }
     }
 }
 
 impl Radix {
-    /// Sorts by cells, of which there are `n_cells`. `scratches` are one a worker and only counted.
+    /// Sorts by cells, of which there are `n_cells`. `scratches` has one element per worker; only its length is used.
     pub fn sort<S: Send>(
         &mut self,
         entries: &mut Vec<u64>,
@@ -88,7 +88,7 @@ impl Radix {
         workers: &Workers,
         scratches: &mut [S],
     ) {
-        // Some tasks a worker, so that none waits long for the last one.
+        // Several tasks per worker, so that no worker waits long for the last one.
         let task = entries.len().div_ceil(4 * workers.n()).max(TASK);
         let n_tasks = entries.len().div_ceil(task);
         let n_digits = 1usize << bits;
@@ -124,7 +124,7 @@ impl Radix {
                 let place = &mut places[digit(entry)];
                 debug_assert!((*place as usize) < n);
                 // SAFETY: the counts of all tasks and digits add up to `n`, and each task takes as many
-                // places of a digit as it has counted, from where the one before it has ended.
+                // places of a digit as it has counted, starting where the task before it ends.
                 unsafe { sorted.put(*place as usize, entry) };
                 *place += 1;
             }

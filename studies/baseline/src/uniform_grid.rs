@@ -1,4 +1,4 @@
-//! Parallel spatial hashing on the CPU: what it is told, and what it tells.
+//! Parallel spatial hashing on the CPU: settings, counts and results.
 
 use impinge_core::host::Host;
 use impinge_core::{BodyId, InstructionSet, Pairs, Query, Scene};
@@ -6,19 +6,19 @@ use impinge_core::{BodyId, InstructionSet, Pairs, Query, Scene};
 use crate::method::Method;
 use crate::{Error, check_lambda, check_threads};
 
-/// What a [`UniformGrid`] may be told.
+/// Settings of a [`UniformGrid`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// The density coefficient λ of the paper's equation (1), above 0. The paper found 5 to be best for
     /// this method.
     pub lambda: f64,
-    /// Whether a pair is tested in one of the cells that it shares only, as impinge does it. The method as
-    /// described has no such rule: a pair is tested in every cell.
+    /// Whether a pair is tested in only one of its common cells, as in impinge. The method as
+    /// described has no such rule: a pair is tested in every common cell.
     pub owner_rule: bool,
-    /// Whether primitives that the other body comes nowhere near are left out by impinge's coarse map, before
+    /// Whether impinge's coarse map drops primitives that the other body comes nowhere near, before
     /// the grid. The method as described has no such map.
     pub coarse_map: bool,
-    /// CPU threads; 0 means one a core.
+    /// CPU threads; 0 means one per core.
     pub threads: usize,
     /// The widest vector instructions that may be used.
     pub instruction_set: InstructionSet,
@@ -36,28 +36,28 @@ impl Default for Settings {
     }
 }
 
-/// How much there was of everything.
+/// Counts of one frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Counts {
-    /// Cells along x, y, z; 0 when the bodies' boxes do not overlap.
+    /// Cells along x, y, z; 0 if the bodies' boxes do not overlap.
     pub resolution: [u32; 3],
     /// Primitives that reach the region where the bodies' boxes overlap.
     pub n_reaching: u64,
-    /// Cell-primitive pairs: a primitive counted once a cell.
+    /// Cell-primitive pairs: a primitive is counted once per cell.
     pub n_entries: u64,
     /// Cells with primitives of both bodies.
     pub n_mixed_cells: u64,
     /// Pairs of boxes tested: `n_a n_b` summed over cells.
     pub n_box_tests: u64,
-    /// Pairs of primitives tested exactly, repetitions counted.
+    /// Pairs of primitives tested exactly, including repetitions.
     pub n_tests: u64,
-    /// Of those, the ones that floating-point filters left to exact arithmetic.
+    /// Of those, the pairs that floating-point filters left to exact arithmetic.
     pub n_unsure: u64,
 }
 
 impl Counts {
-    /// Cells of the grid.
+    /// The number of cells of the grid.
     pub fn n_cells(&self) -> u64 {
         self.resolution
             .iter()
@@ -66,7 +66,7 @@ impl Counts {
     }
 }
 
-/// What was found, and how much work it was.
+/// The pairs, and the counts of the work.
 #[derive(Debug, Clone, Copy)]
 pub struct Outcome<'a> {
     /// The pairs, sorted, each once; stages in milliseconds are in its statistics, and
@@ -84,7 +84,7 @@ pub struct UniformGrid {
 }
 
 impl UniformGrid {
-    /// With everything said.
+    /// Creates the method with explicit settings.
     ///
     /// # Errors
     /// A setting out of its range.
@@ -98,12 +98,12 @@ impl UniformGrid {
         })
     }
 
-    /// What it was told.
+    /// The settings.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// All pairs of primitives of two different bodies that intersect, as things are in the scene now.
+    /// Finds all intersecting pairs of primitives of two different bodies, in the current state of the scene.
     ///
     /// # Errors
     /// A stale id, one body named twice, refused positions; 2^32 cell-primitive pairs or more.

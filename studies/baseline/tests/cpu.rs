@@ -1,4 +1,4 @@
-//! The CPU baselines against the oracle and against impinge's own methods.
+//! The CPU baselines compared with the oracle and with impinge's own methods.
 
 mod common;
 
@@ -23,7 +23,7 @@ fn uniform_grid_finds_what_the_oracle_finds() {
                     instruction_set: sets[(case_ix + ix / 2) % 2],
                 };
                 let mut grid = UniformGrid::new(settings).unwrap();
-                // Twice: the second frame runs in the memory of the first.
+                // Run twice: the second frame reuses the memory of the first.
                 for _ in 0..2 {
                     let outcome = grid.detect(&case.scene, case.a, case.b).unwrap();
                     let found: Vec<_> = outcome.pairs.rows().collect();
@@ -72,7 +72,7 @@ fn owner_rule_tests_each_pair_once() {
     assert_eq!(with, without);
     assert_eq!(repeated.n_box_tests, once.n_box_tests);
     assert!(once.n_tests < repeated.n_tests);
-    // Candidates are pairs of boxes that overlap, whatever finds them.
+    // Candidates are pairs of boxes that overlap, for every method.
     let mut cells = Detector::with_settings(impinge_core::Settings {
         method: Method::Cells,
         backend: Backend::Cpu,
@@ -85,7 +85,7 @@ fn owner_rule_tests_each_pair_once() {
 
 #[test]
 fn counts_are_those_of_the_grid() {
-    // Two unit cubes' worth of boxes in a grid that can be counted by hand: everything is in one cell.
+    // The boxes of two unit cubes in a grid that can be counted by hand: everything is in one cell.
     let cube = surfaces::cube([0.0; 3], 1.0);
     let case = Case::new("cubes", &cube, &cube, false);
     let settings = Settings {

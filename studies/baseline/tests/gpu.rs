@@ -1,4 +1,4 @@
-//! The GPU baseline against the oracle and its twin on the CPU. Without an adapter these tests fail.
+//! The GPU baseline compared with the oracle and with its CPU version. Without an adapter these tests fail.
 
 mod common;
 
@@ -24,7 +24,7 @@ fn finds_what_the_oracle_finds() {
         };
         let mut grid = UniformGrid::new(settings.clone()).unwrap();
         for (case, expected) in cases.iter().zip(&expected) {
-            // Twice: the second frame runs in the memory of the first.
+            // Run twice: the second frame reuses the memory of the first.
             for _ in 0..2 {
                 let found = rows(&mut grid, case);
                 assert_eq!(&found, expected, "{} with {settings:?}", case.name);
@@ -33,7 +33,7 @@ fn finds_what_the_oracle_finds() {
     }
 }
 
-/// Next to no room.
+/// The smallest capacities.
 fn least() -> Capacities {
     let mut least = Capacities::default();
     (least.items, least.kept, least.entries) = (1, 1, 1);
@@ -79,7 +79,7 @@ fn a_cell_too_crowded_is_refused() {
     let mut grid = UniformGrid::new(settings).unwrap();
     let refused = grid.detect(&case.scene, case.a, case.b).err();
     assert!(matches!(refused, Some(impinge_core::Error::Gpu { .. })));
-    // It stays usable.
+    // The grid stays usable.
     let ball = surfaces::ball(500);
     let case = Case::new("balls", &ball, &ball, false);
     assert_eq!(rows(&mut grid, &case), oracle(&case));
@@ -117,10 +117,10 @@ fn sorts_many_blocks_and_counts_as_the_cpu_does() {
     let gpu = on_gpu.detect(&balls.scene, a, b).unwrap();
     assert!(gpu.pairs.same_as(cpu.pairs));
     assert!(gpu.counts.n_entries > 200_000);
-    // With the owner rule a test is a pair of boxes that overlap, on either.
+    // With the owner rule a test is a pair of boxes that overlap, on both backends.
     assert_eq!(gpu.counts.n_tests, cpu.counts.n_tests);
     assert_eq!(gpu.counts.n_reaching, cpu.counts.n_reaching);
-    // Ranges on a GPU are a little wider, and so are the counts that follow from them.
+    // Ranges on a GPU are slightly wider, so counts are slightly larger.
     let near = |gpu: u64, cpu: u64| gpu >= cpu && gpu < 2 * cpu;
     assert!(near(gpu.counts.n_entries, cpu.counts.n_entries));
     assert!(near(gpu.counts.n_box_tests, cpu.counts.n_box_tests));

@@ -1,10 +1,10 @@
 //! Every shader text of the project, for compilers other than naga to check.
 //!
-//! The texts come from the functions that the crates themselves compile from, so the list cannot differ
-//! from what runs. A test writes them to a folder, which `web/test/shaders.mjs` gives to a browser's
-//! compiler: it keeps to the WGSL grammar where naga does not.
+//! The texts come from the same functions from which the crates compile their shaders, so the list is always
+//! complete. A test writes them to a folder, which `web/test/shaders.mjs` gives to a browser's
+//! compiler: it follows the WGSL grammar more strictly than naga.
 
-/// `crate-kernel` and the text of each shader of the library, of its baselines and of its pictures.
+/// The name (`crate-kernel`) and the text of each shader of the library, the baselines and the renderer.
 pub fn shaders() -> Vec<(String, String)> {
     let library = impinge_core::gpu::shaders().map(|shader| ("core", shader));
     let baseline = impinge_baseline::gpu::shaders().map(|shader| ("baseline", shader));

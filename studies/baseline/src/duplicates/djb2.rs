@@ -1,9 +1,9 @@
-//! A table of pairs that forgets some of them.
+//! A table of pairs that loses some of them.
 //!
 //! Section 4.2 of the paper says that possible pairs are handled "by a hashing function", that DJB2 was
-//! tested, and that pairs are lost to its conflicts; no more. Here a slot holds one pair. While cells are
-//! paired every possible pair goes to its slot; one that is there already is a repetition and does no harm, and of
-//! different ones only the lowest stays. Afterwards each slot that is taken is tested once.
+//! tested, and that pairs are lost to its conflicts, but nothing more. Here a slot holds one pair. While cells are
+//! paired, every possible pair goes to its slot. A repetition of the same pair changes nothing; of
+//! different pairs only the lowest stays. Afterwards the pair in each occupied slot is tested once.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -18,12 +18,12 @@ use impinge_core::{Error, Statistics};
 
 use super::Possible;
 
-/// A slot that nobody has taken. No pair: there are fewer than 2^32 primitives.
+/// A free slot. No pair has this value, because there are fewer than 2^32 primitives.
 const FREE: u64 = u64::MAX;
-/// Slots of one task.
+/// Slots per task.
 const TASK: usize = 4096;
 
-/// The table and the memory of its tests.
+/// The table, and scratch memory for its tests.
 pub(super) struct Table {
     isa: Isa,
     /// `primitive of a << 32 | primitive of b`.
@@ -40,7 +40,7 @@ impl Table {
         }
     }
 
-    /// Makes it empty, with so many slots.
+    /// Empties the table and sets the number of slots.
     pub fn clear(&mut self, n_slots: usize) -> Result<(), Error> {
         if n_slots == 0 || n_slots as u64 > 1 << 32 {
             return Err(Error::Setting {
@@ -102,7 +102,7 @@ impl Table {
     }
 }
 
-/// Nothing is tested yet; every possible pair goes to its slot.
+/// The rule that puts every possible pair into its slot, without testing it.
 pub(super) struct Insert<'a> {
     possible: Possible,
     slots: &'a [AtomicU64],
@@ -117,7 +117,7 @@ impl Rule for Insert<'_> {
     fn admits(&self, a: &Kept, b: &Kept, _: &mut Vec<u64>) -> bool {
         let pair = u64::from(a.primitive) << 32 | u64::from(b.primitive);
         let slot = &self.slots[djb2(a.primitive, b.primitive) as usize % self.slots.len()];
-        // Repetitions are many: most find what they would write.
+        // Repetitions are frequent: most of them find their pair in the slot and write nothing.
         if slot.load(Ordering::Relaxed) > pair {
             slot.fetch_min(pair, Ordering::Relaxed);
         }

@@ -1,4 +1,4 @@
-//! What becomes of a pair found in a cell, where impinge asks who owns it.
+//! Rules for a pair found in a cell, in place of impinge's owner rule.
 
 use impinge_core::cpu::cells::Rule;
 use impinge_core::cpu::kept::Kept;
@@ -8,7 +8,7 @@ use impinge_core::frame::{Frame, pair_key};
 use super::Possible;
 
 impl Possible {
-    /// Which pairs that touch a common sub-cell go on, whichever cell they are found in.
+    /// Which pairs that touch a common sub-cell are possible, in any cell.
     pub(super) fn asked(self) -> Asked {
         Asked {
             boxes: self != Possible::Masks,
@@ -18,7 +18,7 @@ impl Possible {
     }
 }
 
-/// Every cell tests what it finds.
+/// Every cell tests the pairs that it finds.
 pub(super) struct Every(pub Possible);
 
 impl Rule for Every {
@@ -32,7 +32,7 @@ impl Rule for Every {
     }
 }
 
-/// Nothing is tested; the key of every pair that would be is written down.
+/// Tests nothing; records the key of every pair that would be tested.
 pub(super) struct Recorded<'a> {
     pub possible: Possible,
     pub frame: &'a Frame,

@@ -14,7 +14,7 @@ pub(crate) struct Entry {
     pub kept: u32,
 }
 
-/// Declares buffers of one word an element, each a type of its own.
+/// Declares buffers of one word per element, each with its own type.
 macro_rules! words {
     ($($(#[$doc:meta])* $name:ident)*) => {
         $(
@@ -31,11 +31,11 @@ macro_rules! words {
 words! {
     /// Entries of the primitives before this one in its workgroup.
     First
-    /// Entries of a workgroup of primitives, then of those before it.
+    /// The number of entries of each workgroup of primitives; after the scan, of all workgroups before it.
     Sum
-    /// How often a digit comes in a block, then in those before it.
+    /// How often a digit occurs in each block; after the scan, in all blocks before it.
     DigitCount
-    /// How often a digit comes in all.
+    /// How often a digit occurs in total.
     DigitTotal
 }
 
@@ -126,14 +126,14 @@ bindings! {
     }
 }
 
-/// Text that kernels build on: the library's, and what those of the uniform grid share.
+/// Shader text shared by kernels: the library's, and that of the uniform grid.
 mod shared {
     pub use impinge_core::gpu::shared::*;
 
     pub const SUMS: &str = include_str!("kernels/sums.wgsl");
 }
 
-/// Declares the set: for each kernel its bindings and the shared text that it builds on.
+/// Declares the set of kernels: the bindings of each kernel, and the shared text that it uses.
 macro_rules! kernels {
     ($($name:ident: $bindings:ident from $file:literal ($($shared:ident),*);)*) => {
         /// Every kernel, compiled when it is first bound.
@@ -142,7 +142,7 @@ macro_rules! kernels {
         }
 
         impl Kernels {
-            /// All of them.
+            /// Declares all kernels.
             pub fn new() -> Self {
                 Kernels {
                     $($name: Kernel::new(source::$name(), &[]),)*
@@ -169,7 +169,7 @@ macro_rules! kernels {
             )*
         }
 
-        /// Every kernel's source and what it binds.
+        /// The source and the bindings of every kernel.
         fn all() -> Vec<(Source, &'static [impinge_core::gpu::pipeline::Entry])> {
             use impinge_core::gpu::pipeline::Bindings;
             vec![$((source::$name(), $bindings::ENTRIES),)*]

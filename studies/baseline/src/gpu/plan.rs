@@ -10,7 +10,7 @@
 //! narrow     the filter                                                    impinge's own
 //! ```
 //!
-//! A pass does the cells that it is told. What does not fit is counted, and the engine grows its room and
+//! A pass processes a given range of cells. It counts the items that do not fit; then the engine grows its buffers and
 //! runs the pass again, as for impinge's own methods.
 
 use std::fmt;
@@ -37,20 +37,20 @@ const STAGES: &[&str] = &[
     "bounds", "grid", "fill", "sort", "compact", "pairing", "narrow",
 ];
 
-/// Slots of arguments: blocks of a sort, workgroups over entries. Those of pairing and narrow are impinge's.
+/// Slots of indirect arguments: blocks of a sort, workgroups over entries. The slots of pairing and narrow are impinge's.
 const BLOCKS: u32 = 2;
 const ENTRIES: u32 = 3;
 
 /// Entries that a workgroup sorts; `entries.wgsl` has the same.
 const BLOCK: u32 = 4096;
-/// Values and bits of a digit.
+/// The number of values, and of bits, of a digit.
 const DIGITS: u64 = 256;
 const DIGIT_BITS: u32 = 8;
-/// Primitives that share a sum, entries that share a workgroup of `compact`.
+/// Primitives per sum, and entries per workgroup of `compact`.
 const SUM: u64 = 64;
 const COMPACT: u32 = 256;
 
-/// Kernels with their buffers; made anew when a buffer is.
+/// Kernels bound to their buffers; made again when a buffer changes.
 struct Launches {
     reaching: Reaching,
     prepare: Bound,
@@ -66,7 +66,7 @@ struct Launches {
     settling: Settling,
 }
 
-/// Buffers that impinge's own methods have no use for.
+/// Buffers that impinge's own methods do not have.
 struct Buffers {
     firsts: Storage<First>,
     sums: Storage<Sum>,
@@ -75,7 +75,7 @@ struct Buffers {
     totals: Storage<DigitTotal>,
 }
 
-/// Everything that is launched in a pass.
+/// The launches of a pass.
 pub(crate) struct Plan {
     kernels: Arc<Kernels>,
     owner_rule: bool,
@@ -85,10 +85,10 @@ pub(crate) struct Plan {
     reaching: ReachingSteps,
     fill_scan: u32,
     prepare_blocks: u32,
-    /// One a digit, the lowest first.
+    /// One per digit, the lowest first.
     digits: Vec<u32>,
     prepare_compact: u32,
-    /// Compact and pairing.
+    /// Parameters of compact and pairing.
     work: u32,
     prepare_pairing: u32,
     narrow: u32,
@@ -130,7 +130,7 @@ impl Plan {
 }
 
 impl Buffers {
-    /// Makes room for as much as the engine has room for. Returns whether any buffer is a new one.
+    /// Resizes the buffers to the engine's capacities. Returns whether any buffer is new.
     fn resize(&mut self, gpu: &Gpu, room: &Room) -> Result<bool, Error> {
         let capacities = room.capacities();
         let n_blocks = capacities.entries.div_ceil(u64::from(BLOCK));
@@ -168,7 +168,7 @@ impl InCells for Plan {
         if self.buffers.resize(gpu, room)? {
             self.launches = None;
         }
-        // Capacities are at most what 32 bits can number.
+        // Capacities fit in 32 bits.
         let capacities = room.capacities();
         let n_entries = capacities.entries as u32;
         let steps = &mut self.steps;
@@ -187,7 +187,7 @@ impl InCells for Plan {
         };
         self.prepare_blocks = steps.push(over_entries(BLOCK, BLOCKS));
         self.prepare_compact = steps.push(over_entries(COMPACT, ENTRIES));
-        // A key is a cell and a bit for the body.
+        // A key consists of a cell and one bit for the body.
         let key_bits = u64::BITS - (2 * room.cells.len() - 1).leading_zeros();
         self.digits.clear();
         self.digits

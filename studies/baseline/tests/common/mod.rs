@@ -1,4 +1,4 @@
-//! Two bodies, and what is true of them.
+//! Cases of two bodies, and their correct answers.
 
 #![allow(dead_code)]
 
@@ -41,7 +41,7 @@ impl Case {
     }
 }
 
-/// What the oracle says.
+/// The answer of the oracle.
 pub fn oracle(case: &Case) -> Vec<[u32; 4]> {
     let mut detector = Detector::with_settings(Settings {
         method: Method::Naive,
@@ -53,7 +53,7 @@ pub fn oracle(case: &Case) -> Vec<[u32; 4]> {
     pairs.rows().collect()
 }
 
-/// Every kind, both precisions, lattice troublemakers, and the adversarial scenes in small.
+/// Every kind of primitive, both precisions, lattices, and small adversarial scenes.
 pub fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     let ball = surfaces::bumpy_ball(1200, 0.2);
@@ -112,8 +112,8 @@ pub fn cases() -> Vec<Case> {
     cases
 }
 
-/// How often each pair of f32 bodies is tested, found the slow way: for all pairs, how many coarse cells
-/// (of the paper's equations 1 to 3) hold a common sub-cell.
+/// How often each pair of f32 bodies is tested, by brute force: for each pair, the number of coarse cells
+/// (by the paper's equations 1 to 3) that hold a common sub-cell.
 pub fn brute_checks(case: &Case, lambda: f64, boxes: bool) -> Checks {
     type Box = [[f32; 3]; 2];
     let primitives = |id: BodyId| -> Vec<Box> {
@@ -172,7 +172,7 @@ pub fn brute_checks(case: &Case, lambda: f64, boxes: bool) -> Checks {
     let mut times = BTreeMap::new();
     for (i, a) in a.iter().enumerate() {
         for (j, b) in b.iter().enumerate() {
-            // The common sub-cells are a block, and so are the cells that hold any.
+            // The common sub-cells form a block, and so do the cells that hold any of them.
             let mut n_cells = 1u64;
             for axis in 0..3 {
                 let low = fine(&a[0], axis).max(fine(&b[0], axis));

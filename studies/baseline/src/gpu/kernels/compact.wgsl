@@ -1,7 +1,7 @@
-// Stage `compact`: the cells that have primitives of both bodies, and where their entries are.
+// Stage `compact`: finds the cells with primitives of both bodies, and the places of their entries.
 //
-// In: sorted entries. Out: work items, at most 64 primitives of either body each: the pairs of a large cell are
-// those of all pairs of such groups. One thread an entry; the first of the first body in its cell does
+// In: sorted entries. Out: work items of at most 64 primitives of each body: a large cell becomes all pairs of
+// such groups. One thread per entry; the thread of the first entry of the first body in a cell does
 // the work. Cost: a doubling search for the ends of its two runs.
 
 @group(0) @binding(0) var<storage, read> entries: array<Entry>;
@@ -10,14 +10,14 @@
 @group(0) @binding(3) var<uniform> params: Params;
 
 const GROUP: u32 = 64u;
-// Work items that one invocation writes at most; a cell with more is refused.
+// The most work items that one invocation writes; a cell with more is refused.
 const MOST_ITEMS: u32 = 32768u;
 
 var<workgroup> n_items: atomic<u32>;
 var<workgroup> n_cells: atomic<u32>;
 var<workgroup> first_item: u32;
 
-// One past the last entry with the key that the entry at `start` has.
+// One past the last entry with the same key as the entry at `start`.
 fn end_of_run(start: u32, n: u32) -> u32 {
     let key = entries[start].key;
     var step = 1u;
@@ -43,7 +43,7 @@ fn n_groups_of(n: u32) -> u32 {
     return n / GROUP + select(0u, 1u, n % GROUP != 0u);
 }
 
-// `params.first`, `params.count`: the cells that are looked at.
+// `params.first`, `params.count`: the range of cells.
 @compute @workgroup_size(256)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,

@@ -1,7 +1,7 @@
-// What the kernels of the uniform grid share. The Rust twin of `Entry` is in `gpu/kernels.rs`.
+// Declarations shared by the kernels of the uniform grid. The Rust version of `Entry` is in `gpu/kernels.rs`.
 
-// A cell-primitive pair: which cell, and which kept primitive. Sorted by key, the primitives of a cell are
-// together, those of the first body before those of the second:
+// A cell-primitive pair: a cell and a kept primitive. Sorted by key, the primitives of a cell are
+// adjacent, those of the first body before those of the second:
 //
 //   key   31                    1   0
 //        +-----------------------+------+

@@ -1,7 +1,7 @@
 // Stage `fill`, third kernel: one entry for every cell that a primitive's box touches.
 //
-// In: kept primitives with their ranges, where their entries begin. Out: entries; those that do not fit are
-// counted already. One thread a kept primitive.
+// In: kept primitives with their ranges, and the places of their first entries. Out: entries; those that do not
+// fit have already been counted. One thread per kept primitive.
 
 @group(0) @binding(0) var<storage, read> grid: array<Grid>;
 @group(0) @binding(1) var<storage, read> kept: array<Kept>;

@@ -1,7 +1,8 @@
 // Stage `fill`, second kernel: exclusive sum over the workgroups of the first.
 //
-// In: entries of each workgroup. Out: entries of those before it; in the counters, entries in all. One
-// workgroup, a lane a run of sums. Cost: the sums, one for 64 primitives, read twice and written once.
+// In: the number of entries of each workgroup. Out: the number of entries of all workgroups before it; in the
+// counters, the total. One workgroup; each lane takes a run of sums. Cost: the sums, one per 64 primitives, are
+// read twice and written once.
 
 @group(0) @binding(0) var<storage, read_write> sums: array<u32>;
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;

@@ -1,13 +1,13 @@
-// Stage `pairing`: all pairs of a cell, by their boxes.
+// Stage `pairing`: box tests of all pairs of a cell.
 //
-// In: work items. Out: candidates; what does not fit is counted. One workgroup of 64 a work item: boxes go
-// to workgroup memory, then lanes take pairs in turn, 64 at a time.
+// In: work items. Out: candidates; those that do not fit are counted. One workgroup of 64 lanes per work item:
+// boxes go to workgroup memory, then the lanes test 64 pairs at a time.
 //
 //   test p       primitive p / n_b of the first body, p % n_b of the second
 //   hits         bit k: the lane's k-th test, p = 64 k + lane, found a candidate
 //
-// Cost: n_a n_b box tests. With the owner rule (`params.owner_rule`) a pair is a candidate in the cell alone
-// that holds the lower corner of its common range; without it, in every cell that it shares.
+// Cost: n_a n_b box tests. With the owner rule (`params.owner_rule`) a pair is a candidate only in the cell
+// that holds the lower corner of its common range; without it, in every common cell.
 
 @group(0) @binding(0) var<storage, read> grid: array<Grid>;
 @group(0) @binding(1) var<storage, read> kept: array<Kept>;
@@ -93,7 +93,7 @@ fn main(
             let a = places[test / n_b];
             let b = places[64u + test % n_b];
             if place < arrayLength(&candidates) {
-                // Bit 31 of either says that positions were rounded; it is kept with the first.
+                // Bit 31 of either number says that positions were rounded; it is stored with the first.
                 candidates[place] = Candidate(a | (b & FLAG), b & ~FLAG);
             }
             place++;

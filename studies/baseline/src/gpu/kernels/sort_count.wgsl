@@ -1,6 +1,6 @@
-// Stage `sort`, first kernel of a round: how often each digit comes in each block of entries.
+// Stage `sort`, first kernel of a round: counts how often each digit occurs in each block of entries.
 //
-// In: entries. Out: the counts, digit by digit, and within a digit block by block. One workgroup a block.
+// In: entries. Out: the counts, digit by digit, and within a digit block by block. One workgroup per block.
 
 @group(0) @binding(0) var<storage, read> entries: array<Entry>;
 @group(0) @binding(1) var<storage, read_write> counts: array<u32>;

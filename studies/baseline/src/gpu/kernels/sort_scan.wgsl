@@ -1,14 +1,14 @@
 // Stage `sort`, second kernel of a round: exclusive sums of each digit's counts over the blocks.
 //
-// In: counts. Out: sums in their place, and the whole of each digit. One workgroup a digit, a lane a run of
-// blocks.
+// In: counts. Out: sums in the same places, and the total of each digit. One workgroup per digit; each lane takes
+// a run of blocks.
 
 @group(0) @binding(0) var<storage, read_write> counts: array<u32>;
 @group(0) @binding(1) var<storage, read_write> totals: array<u32>;
 @group(0) @binding(2) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(3) var<uniform> params: Params;
 
-// `params.capacity`: entries that there is room for.
+// `params.capacity`: the capacity for entries.
 @compute @workgroup_size(256)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,

@@ -1,11 +1,11 @@
-// Stage `sort`, third kernel of a round: puts entries where their digit says, in the order they came in.
+// Stage `sort`, third kernel of a round: moves entries to the places of their digits, in their original order.
 //
-// In: entries, sums of the counts, totals of the digits. Out: entries. One workgroup a block, 256 entries a time.
-// Each lane sets its bit in the row of its digit; the bits before its own are its rank among equals:
+// In: entries, sums of the counts, totals of the digits. Out: entries. One workgroup per block, 256 entries at a
+// time. Each lane sets its bit in the row of its digit; the bits before its own give its rank among equal digits:
 //
 //   row of digit d    word 0: lanes 31 … 0 | word 1: lanes 63 … 32 | … | word 7: lanes 255 … 224
 //
-// Invariant: stable, which a sort by digits, the lowest first, lives on.
+// Invariant: the order of equal digits is kept. A sort by digits, the lowest first, depends on it.
 
 @group(0) @binding(0) var<storage, read> entries: array<Entry>;
 @group(0) @binding(1) var<storage, read> counts: array<u32>;
@@ -66,7 +66,7 @@ fn main(
             sorted[places[digit] + rank] = entry;
         }
         workgroupBarrier();
-        // The last of equals makes the row ready for the next round.
+        // The last of the lanes with equal digits clears the row for the next round.
         if is_there && rank + 1u == n_equal {
             places[digit] += n_equal;
             for (var word = 0u; word < 8u; word++) {
