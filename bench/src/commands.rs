@@ -251,7 +251,8 @@ fn sizes(options: &Options, report: &mut Report) -> Result<(), Failure> {
     for row in &first.rows {
         text += &format!(" {} ms | ns per triangle |", row.name);
     }
-    text += " bytes per triangle, positions and topology | bytes per triangle, detector |\n|---:|---:|";
+    text +=
+        " bytes per triangle, positions and topology | bytes per triangle, detector |\n|---:|---:|";
     text += &"---:|---:|".repeat(first.rows.len() + 1);
     text.push('\n');
     for table in &tables {
