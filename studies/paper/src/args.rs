@@ -15,11 +15,11 @@ Examples:
   impinge-paper --scene dragon --mesh my_dragon.ply
   impinge-paper --mesh bunny=my_bunny.ply --mesh bunny-7k=my_bunny.msh
 
-Scans are looked for in ../shared/data beside the repository, or $IMPINGE_DATA. Where there is neither
-a scan nor --mesh, generated meshes of the same size stand in, and the report says so.
+Scans are read from ../shared/data beside the repository, or from $IMPINGE_DATA. Without a scan or --mesh,
+a generated mesh of the same size stands in, and the report says so.
 The full run takes about a quarter of an hour on two cores.";
 
-/// Everything that the paper on two-level spatial hashing shows, its numbers beside ours.
+/// Repeat the measurements of the paper on two-level spatial hashing; the report has its numbers beside ours.
 #[derive(Debug, Parser)]
 #[command(name = "impinge-paper", after_help = EXAMPLES)]
 pub struct Args {
@@ -29,22 +29,22 @@ pub struct Args {
     /// A benchmark to run: ball, bunny, buddha, dragon (surfaces), bunny-7k, bunny-19k, dragon-8k, dragon-15k (solids) [default: all]
     #[arg(long = "scene", value_name = "NAME", value_parser = benchmark)]
     scenes: Vec<SceneName>,
-    /// A mesh for a benchmark, in place of what is at hand; with one --scene its name may be left out
+    /// A mesh for a benchmark, instead of the scan; with one --scene the name may be omitted
     #[arg(long = "mesh", value_name = "[NAME=]FILE")]
     meshes: Vec<BenchmarkMesh>,
-    /// A few frames of everything in less than two minutes: to see that all agree, not how fast
+    /// A few frames of everything in less than two minutes: checks that all agree; times are not meaningful
     #[arg(long)]
     quick: bool,
     /// Frames of each surface benchmark and steps of each solid one [default: 100 and 240]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: Option<u32>,
-    /// λ of the grid to report beside the paper's 1 [default: what measures best]
+    /// λ of the grid to report beside the paper's 1 [default: the fastest]
     #[arg(long, value_name = "X", value_parser = lambda)]
     lambda: Option<f64>,
     /// CPU threads [default: one per core]
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
-    /// Where to measure [default: cpu, and gpu where an adapter is found]
+    /// Where to measure [default: cpu, and gpu if an adapter is found]
     #[arg(long, value_enum)]
     backend: Option<BackendArg>,
     /// A part of the GPU's name, to choose among several (`impinge devices` lists them)
@@ -53,7 +53,7 @@ pub struct Args {
     /// How far waves move a vertex to either side, in box diagonals of a body
     #[arg(long, value_name = "X", default_value_t = Waving::default().amplitude)]
     amplitude: f32,
-    /// From crest to crest, in box diagonals
+    /// Distance from crest to crest, in box diagonals
     #[arg(long, value_name = "X", default_value_t = Waving::default().wave_length)]
     wave_length: f32,
     /// How far crests travel in the whole run, in box diagonals
@@ -71,7 +71,7 @@ impl TryFrom<&Args> for Options {
         let named = |mesh: &BenchmarkMesh| match (mesh.scene, &args.scenes[..]) {
             (Some(scene), _) | (None, &[scene]) => Ok((scene, mesh.path.clone())),
             _ => Err(Error::Options(format!(
-                "--mesh {}: for which benchmark? Say --mesh NAME=FILE, or name one --scene",
+                "--mesh {}: for which benchmark? Use --mesh NAME=FILE, or name one --scene",
                 mesh.path.display()
             ))),
         };
@@ -98,7 +98,7 @@ impl TryFrom<&Args> for Options {
 enum BackendArg {
     /// The CPU
     Cpu,
-    /// A GPU, or an error where there is none
+    /// A GPU, or an error if there is none
     Gpu,
     /// Both
     Both,
@@ -130,7 +130,7 @@ fn benchmark(text: &str) -> Result<SceneName, String> {
     })
 }
 
-/// A mesh file, and the benchmark that it is for.
+/// A mesh file and its benchmark.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct BenchmarkMesh {
     scene: Option<SceneName>,
@@ -140,7 +140,7 @@ struct BenchmarkMesh {
 impl FromStr for BenchmarkMesh {
     type Err = String;
 
-    /// What stands before the first `=` is a name only if it is a benchmark's.
+    /// The text before the first `=` is a name only if it is the name of a benchmark.
     fn from_str(text: &str) -> Result<Self, String> {
         let named = text
             .split_once('=')

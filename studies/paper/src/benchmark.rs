@@ -1,4 +1,4 @@
-//! One benchmark, whatever moves its bodies: λ, contestants, oracle, picture.
+//! Runs one benchmark, whatever moves its bodies: λ, contestants, oracle, picture.
 
 use impinge::{Backend, Detector, Method, Settings};
 
@@ -13,10 +13,10 @@ use crate::report::{Moment, Scene};
 use crate::samples::Samples;
 use crate::sweep::{contestants, sweep};
 
-/// The oracle is asked where its quadratic cost is a second or so.
+/// The most primitives for which the oracle runs: its quadratic cost is then about a second.
 const MOST_FOR_ORACLE: usize = 40_000;
 
-/// Runs all frames of a course by everybody.
+/// Runs all frames of a course with all contestants.
 pub(crate) fn run(
     course: &mut dyn Course,
     options: &Options,
@@ -53,7 +53,7 @@ pub(crate) fn run(
     let is_small = n_primitives.iter().sum::<usize>() <= MOST_FOR_ORACLE;
     let mut runs = contest.runs();
     if is_small && find(course, Method::Naive, control)? != rows {
-        // The first contestant is wrong, and all that agree with it.
+        // The first contestant is wrong, and so are all that agree with it.
         runs.iter_mut().for_each(|run| run.n_frames_differing += 1);
     }
     let counts = |count: fn(&Moment) -> usize| {
@@ -84,7 +84,7 @@ pub(crate) fn run(
     })
 }
 
-/// The pairs as things are now.
+/// Finds the pairs in the current state of the scene.
 fn find(
     course: &dyn Course,
     method: Method,

@@ -1,5 +1,5 @@
-//! What the report says, chapter by chapter: from data to headings, tables and sentences. All numbers come from the
-//! data; sentences that draw a conclusion are chosen by it.
+//! The text of the report, chapter by chapter: turns data into headings, tables and sentences. All numbers come from the
+//! data, and the data chooses the sentences that draw a conclusion.
 
 mod absolute;
 mod checks;
@@ -40,7 +40,7 @@ fn paragraph(words: impl Into<String>) -> Block {
     Block::Paragraph(words.into())
 }
 
-/// A method as tables name it.
+/// The name of a method in tables.
 fn method(method: Method) -> &'static str {
     match method {
         Method::Cells => "`Cells` (two levels)",
@@ -49,7 +49,7 @@ fn method(method: Method) -> &'static str {
     }
 }
 
-/// Where a contestant ran.
+/// The place where a contestant ran.
 fn place(run: &Run) -> &'static str {
     match (run.is_gpu, run.is_software) {
         (false, _) => "CPU",
@@ -96,7 +96,7 @@ fn contestants(caption: &str, scenes: &[Scene]) -> Table {
         ],
     );
     for scene in scenes {
-        // Of solids, half of the steps have little contact or none.
+        // For solids, half of the steps have little contact or none, so the mean is used.
         let typical = |run: &Run| match scene.simulation_ms {
             Some(_) => run.ms.mean,
             None => run.ms.median,
@@ -139,7 +139,7 @@ fn contestants(caption: &str, scenes: &[Scene]) -> Table {
     table
 }
 
-/// A part of a whole, 0 of nothing.
+/// The share of a part in a whole; 0 if the whole is 0.
 fn share(part: f64, whole: f64) -> f64 {
     if whole > 0.0 { part / whole } else { 0.0 }
 }
@@ -154,18 +154,18 @@ fn ratios<'a>(
     scenes.iter().filter_map(of).collect()
 }
 
-/// How a GPU is named in sentences: a software driver as what it is.
+/// The name of the GPU in sentences; a software driver is marked as such.
 fn gpu_name(report: &Report) -> String {
     match &report.adapter {
         None => NONE.to_owned(),
         Some(adapter) if adapter.is_software => {
-            format!("{} (**software**: a program on the CPU)", adapter.name)
+            format!("{} (**software**: it runs on the CPU)", adapter.name)
         }
         Some(adapter) => adapter.name.clone(),
     }
 }
 
-/// Where contestants ran: the CPU, the GPU.
+/// Where contestants ran: on the CPU, on a GPU.
 fn places(scenes: &[Scene]) -> Vec<bool> {
     let ran = |is_gpu| {
         scenes

@@ -1,4 +1,4 @@
-//! Frames of all contestants, turn by turn, so that each meets the same weather; and their pairs compared.
+//! Runs frames of all contestants in turns, so that all meet the same conditions, and compares their pairs.
 
 use std::time::Duration;
 
@@ -11,10 +11,10 @@ use crate::published;
 use crate::report::{Method, Moment, Run, StageTimes};
 use crate::samples::Samples;
 
-/// Between one contestant's frame and the next one's: idle workers of the one before fall asleep.
+/// The pause between two contestants' frames, in which idle workers of the first one fall asleep.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// Frames of a contestant on a driver that imitates a GPU, at most: such times say little.
+/// The most frames of a contestant on a software driver, whose times say little.
 const FRAMES_IN_SOFTWARE: usize = 10;
 const FRAMES_IN_SOFTWARE_QUICK: usize = 2;
 
@@ -22,23 +22,23 @@ struct Contestant {
     setup: Setup,
     is_chosen_lambda: bool,
     finder: Box<dyn Finder>,
-    /// It takes every so many frames.
+    /// It runs one of so many frames.
     every: usize,
     found: Vec<Found>,
-    /// Its pairs of the last frame that it took.
+    /// Its pairs in the last frame that it ran.
     rows: Vec<[u32; 4]>,
     hash: u64,
     n_frames_differing: usize,
 }
 
-/// All contestants on one scene. The first one is that which others are compared with.
+/// All contestants on one scene. The others are compared with the first one.
 pub(crate) struct Contest {
     contestants: Vec<Contestant>,
     course: Vec<Moment>,
 }
 
 impl Contest {
-    /// A contest of `n_frames` frames. With each setup: whether its λ measured best, or was asked for.
+    /// A contest of `n_frames` frames. The flag of each setup says whether its λ was the fastest or was given.
     pub fn new(setups: Vec<(Setup, bool)>, n_frames: usize, is_quick: bool) -> Result<Self, Error> {
         let n_in_software = match is_quick {
             true => FRAMES_IN_SOFTWARE_QUICK,
@@ -65,8 +65,8 @@ impl Contest {
         })
     }
 
-    /// One frame of everybody who takes it, starting with another one each time. Returns the pairs of the
-    /// first contestant, if that one takes it.
+    /// Runs one frame with all contestants that run this frame, starting with a different one each time. Returns the
+    /// pairs of the first contestant, if it runs this frame.
     pub fn frame(
         &mut self,
         frame: usize,
@@ -83,7 +83,7 @@ impl Contest {
             control.go_on()?;
             let Contestant { finder, rows, .. } = contestant;
             if contestant.found.is_empty() {
-                // Nobody's memory is grown, and nothing is clustered, while the clock runs.
+                // An untimed run first, so that the timed one neither grows memory nor clusters.
                 finder.find(scene, bodies, control.cancel, rows)?;
             }
             std::thread::sleep(PAUSE);
@@ -109,19 +109,19 @@ impl Contest {
         Ok(Some(&first.rows))
     }
 
-    /// What the first contestant found, frame by frame.
+    /// The counts of the first contestant, frame by frame.
     pub fn course(&self) -> &[Moment] {
         &self.course
     }
 
-    /// Everybody's figures.
+    /// The figures of all contestants.
     pub fn runs(&self) -> Vec<Run> {
         self.contestants.iter().map(Contestant::run).collect()
     }
 }
 
 impl Contestant {
-    /// Every so many frames, in the middle of so many.
+    /// Whether it runs a frame: the middle one of each `every` frames.
     fn takes(&self, frame: usize) -> bool {
         frame % self.every == self.every / 2
     }
@@ -138,7 +138,7 @@ impl Contestant {
             lambda,
         } = &self.setup;
         let counts = |count: fn(&Found) -> u64| Samples::of_counts(self.found.iter().map(count));
-        // In the order of the frame with the most stages: one without contact leaves some out.
+        // Stages are in the order of the frame with the most stages: a frame without contact skips some.
         let mut by_length: Vec<&Found> = self.found.iter().collect();
         by_length.sort_by_key(|found| std::cmp::Reverse(found.stages.len()));
         let mut names: Vec<&str> = Vec::new();
@@ -185,7 +185,7 @@ impl Contestant {
     }
 }
 
-/// λ of the paper for a method that has one.
+/// The paper's λ for a method; `None` for a method without λ.
 pub(crate) fn papers_lambda(method: Method) -> Option<f64> {
     match method {
         Method::Cells => Some(published::LAMBDA),
@@ -194,7 +194,7 @@ pub(crate) fn papers_lambda(method: Method) -> Option<f64> {
     }
 }
 
-/// Primitives that take part in a pair, those of all bodies together.
+/// The number of primitives in all bodies together that take part in a pair.
 pub(crate) fn n_colliding(rows: &[[u32; 4]]) -> usize {
     let ends = rows
         .iter()
@@ -230,7 +230,8 @@ mod tests {
         }
     }
 
-    /// Frames that differ, and hashes, of an honest contestant and one with changed rows.
+    /// Compares an honest contestant with one that changes rows: the number of frames that differ, and whether the hashes are
+    /// equal.
     fn against(lie: fn(&mut Vec<[u32; 4]>)) -> (usize, bool) {
         let balls = BuiltScene::two_body("balls", &surfaces::ball(500), [0.9, 0.0, 0.0]).unwrap();
         let setup = Setup {
@@ -270,7 +271,7 @@ mod tests {
         for lie in lies {
             assert_eq!(against(lie), (3, false));
         }
-        // In another order the hash is the same, but the answer is not: it has to be sorted.
+        // In another order the hash is the same, but the answer is wrong, because it must be sorted.
         assert_eq!(against(|rows| rows.swap(0, 1)), (3, true));
     }
 

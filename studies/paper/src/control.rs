@@ -1,21 +1,21 @@
-//! Stopping a run, and watching it.
+//! Cancellation and progress of a run.
 
 use impinge::CancelToken;
 
 use crate::error::Error;
 
-/// How far a run has come.
+/// The progress of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress<'a> {
     /// The benchmark that is running.
     pub what: &'a str,
-    /// Frames of it that are done.
+    /// How many of its frames are done.
     pub done: usize,
-    /// Its frames in all.
+    /// The total number of its frames.
     pub total: usize,
 }
 
-/// Who may stop a run, and who watches it.
+/// Cancellation and progress of a run.
 pub struct Control<'a> {
     /// Stops the run soon after it is cancelled.
     pub cancel: &'a CancelToken,
@@ -24,7 +24,7 @@ pub struct Control<'a> {
 }
 
 impl Control<'_> {
-    /// Fails where somebody has asked to stop.
+    /// Fails if a stop was requested.
     pub(crate) fn go_on(&self) -> Result<(), Error> {
         match self.cancel.is_cancelled() {
             true => Err(impinge::Error::Cancelled.into()),

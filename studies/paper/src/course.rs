@@ -1,4 +1,4 @@
-//! A scene that moves, frame by frame, whatever moves it.
+//! A scene that moves frame by frame.
 
 use impinge::{BodyId, Query, Scene};
 
@@ -6,27 +6,27 @@ use crate::error::Error;
 use crate::options::SceneName;
 use crate::report::Moment;
 
-/// Two bodies and where they are in each frame.
+/// Two bodies and their positions in each frame.
 pub(crate) trait Course {
     /// The benchmark.
     fn name(&self) -> SceneName;
-    /// What the bodies are made of, for the report.
+    /// A description of the meshes, for the report.
     fn mesh(&self) -> &str;
-    /// How they move, for the report.
+    /// A description of the motion, for the report.
     fn motion(&self) -> String;
     /// Whether generated bodies stand in for scans.
     fn is_stand_in(&self) -> bool;
-    /// The bodies as they are now.
+    /// The bodies in their current pose.
     fn scene(&self) -> &Scene;
     /// Their ids.
     fn bodies(&self) -> [BodyId; 2];
     /// How many frames there are.
     fn n_frames(&self) -> usize;
-    /// Moves the bodies to where they are in a frame. Any frame may be asked for at any time.
+    /// Moves the bodies to their positions in a frame. Frames may be requested in any order.
     fn pose(&mut self, frame: usize) -> Result<(), Error>;
 
-    /// The frame to be shown, given what each frame found: that with the most pairs, unless a course
-    /// knows better.
+    /// The frame for the picture, given the counts of each frame: the frame with the most pairs, unless a course
+    /// overrides this.
     fn picture_frame(&self, moments: &[Moment]) -> usize {
         let fullest = moments.iter().max_by_key(|moment| moment.n_pairs);
         fullest.map_or(0, |moment| moment.frame)
@@ -45,8 +45,8 @@ pub(crate) trait Course {
     }
 }
 
-/// `n` frames spread over a course of `n_frames`, or all where there are fewer. Ends are left out: contact
-/// grows as a course goes on, and its middle is what most frames are like.
+/// `n` frames spread over a course of `n_frames`, or all frames if there are fewer. The ends are avoided: contact
+/// grows during a course, and frames in its middle are typical.
 pub(crate) fn spread(n: usize, n_frames: usize) -> impl Iterator<Item = usize> {
     let n = n.min(n_frames);
     (0..n).map(move |k| (2 * k + 1) * n_frames / (2 * n))

@@ -1,6 +1,6 @@
-//! A report as headings, paragraphs, tables and figures: what both writers write.
+//! A report as headings, paragraphs, tables and figures: the input of both writers.
 //!
-//! Text may hold `` `code` `` and `**strong**` words, and nothing else that is marked.
+//! Text may contain `` `code` `` and `**strong**` words, but no other markup.
 
 /// One piece of a document.
 #[derive(Debug, Clone, PartialEq)]
@@ -9,7 +9,7 @@ pub(crate) enum Block {
     Heading(u8, String),
     /// A paragraph.
     Paragraph(String),
-    /// Points, one a line.
+    /// Points, one per line.
     List(Vec<String>),
     /// A table.
     Table(Table),
@@ -46,11 +46,11 @@ pub(crate) struct Figure {
 /// A picture, drawn or plotted.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Image {
-    /// Its name without ending; there is always a PNG.
+    /// The file's name without its extension; there is always a PNG.
     pub name: String,
     /// Whether there is an SVG too.
     pub has_svg: bool,
-    /// What it is called below it, where a figure has several.
+    /// The label below the picture, if a figure has several.
     pub label: String,
 }
 
@@ -93,7 +93,7 @@ impl Figure {
     }
 }
 
-/// Where there is no number.
+/// The text for a missing number.
 pub(crate) const NONE: &str = "–";
 
 /// 1234567.0 as 1,234,567.
@@ -119,7 +119,7 @@ pub(crate) fn ms(ms: f64) -> String {
     }
 }
 
-/// A share as per cent, fine where it is small.
+/// A share in per cent, with more digits if it is small.
 pub(crate) fn percent(share: f64) -> String {
     match 100.0 * share {
         0.0 => "0".to_owned(),
@@ -138,7 +138,7 @@ pub(crate) fn density(lambda: f64) -> String {
     }
 }
 
-/// How many times as much.
+/// A ratio.
 pub(crate) fn ratio(ratio: f64) -> String {
     match ratio {
         ratio if ratio >= 99.5 => format!("{ratio:.0}"),
@@ -147,7 +147,7 @@ pub(crate) fn ratio(ratio: f64) -> String {
     }
 }
 
-/// "0.6" where both ends are alike, else "0.6 to 2.1".
+/// "0.6" if both ends are equal, else "0.6 to 2.1".
 pub(crate) fn range(values: &[f64]) -> String {
     let (low, high) = values
         .iter()

@@ -1,7 +1,7 @@
-//! Table 3 and figure 7: pairs that meet in several cells, and what becomes of them.
+//! Table 3 and figure 7: pairs that meet in several cells.
 //!
-//! Three ways on the same frames: every cell tests what it finds; a table hashed by DJB2 stands before the
-//! tests, as in the paper; and our owner rule, by which one cell alone tests a pair.
+//! Compares three ways on the same frames: every cell tests the pairs that it finds; pairs go through a table hashed by
+//! DJB2 before the tests, as in the paper; and our owner rule, by which only one cell tests a pair.
 
 use std::time::{Duration, Instant};
 
@@ -17,7 +17,7 @@ use crate::published;
 use crate::report::{Duplicates, TableSize, TableSizes};
 use crate::samples::Samples;
 
-/// Frames of a course that are looked at.
+/// The number of frames of a course that are measured.
 const N_FRAMES: usize = 40;
 const N_FRAMES_OF_SIZES: usize = 8;
 const N_FRAMES_QUICK: usize = 2;
@@ -25,10 +25,10 @@ const N_FRAMES_QUICK: usize = 2;
 /// Sizes of the table in figure 7, as powers of two times the number of primitives.
 const SIZES: std::ops::RangeInclusive<i32> = -3..=5;
 
-/// Both ways in which the paper can be read: which pairs of a cell go on to the test.
+/// The two ways to read the paper: which pairs of a cell are tested.
 const WAYS: [Possible; 2] = [Possible::Masks, Possible::Boxes];
 
-/// One way of dealing with repetitions, over frames.
+/// The results of one way to handle repetitions, over all frames.
 #[derive(Default)]
 struct Column {
     ms: Vec<f64>,
@@ -43,7 +43,7 @@ impl Column {
     }
 }
 
-/// Table 3 for one benchmark: a row for each of the two ways to read the paper.
+/// Table 3 for one benchmark: one row per way to read the paper.
 pub(crate) fn table(
     course: &mut dyn Course,
     options: &Options,
@@ -64,12 +64,12 @@ pub(crate) fn table(
             course.pose(frame)?;
             let (scene, query) = (course.scene(), course.query());
             if ix == 0 {
-                // Nobody's memory is grown while the clock runs.
+                // An untimed run first, so that the timed ones do not grow memory.
                 two_levels.detect(scene, a, b)?;
                 two_levels.detect_djb2(scene, a, b, n_primitives)?;
                 owner.detect(scene, &query)?;
             }
-            // Somebody else begins each time: the first one finds the fewest data in the caches.
+            // Another way starts each time, because the first one finds the least data in the caches.
             let mut answers: [Pairs; 3] = std::array::from_fn(|_| Pairs::default());
             for turn in 0..3 {
                 let way = (ix + turn) % 3;
@@ -182,7 +182,7 @@ fn two_levels(options: &Options, possible: Possible) -> Result<TwoLevels, Error>
     })?)
 }
 
-/// The library's own two levels.
+/// The library's own two levels, with the owner rule.
 fn owner(options: &Options) -> Result<Detector, Error> {
     let place = Place::Cpu {
         n_threads: options.n_threads,
@@ -194,7 +194,7 @@ fn owner(options: &Options) -> Result<Detector, Error> {
     })?)
 }
 
-/// A detection after a pause, in which idle workers fall asleep.
+/// Times a detection after a pause, in which idle workers fall asleep.
 fn timed<'p>(
     detect: impl FnOnce() -> Result<&'p Pairs, impinge::Error>,
 ) -> Result<(f64, &'p Pairs), Error> {

@@ -1,4 +1,4 @@
-//! Everything that can go wrong.
+//! Errors of a run.
 
 use std::path::PathBuf;
 
@@ -13,15 +13,15 @@ pub enum Error {
     #[error(transparent)]
     File(#[from] impinge_io::Error),
     /// A mesh of the wrong kind for its scene.
-    #[error("{}: {scene} needs {needed}, but it holds {found}", path.display())]
+    #[error("{}: {scene} needs {needed}, but the file holds {found}", path.display())]
     WrongKind {
         /// The file.
         path: PathBuf,
-        /// The scene that it was given for.
+        /// The scene for which it was given.
         scene: &'static str,
-        /// What is needed.
+        /// The needed kind of primitives.
         needed: &'static str,
-        /// What is there.
+        /// The kind of primitives in the file.
         found: &'static str,
     },
     /// A detection failed, or was cancelled.
@@ -42,13 +42,13 @@ pub enum Error {
     Write {
         /// The file or folder.
         path: PathBuf,
-        /// Why.
+        /// The system's error.
         source: std::io::Error,
     },
 }
 
 impl Error {
-    /// Whether somebody asked to stop.
+    /// Whether the run was cancelled.
     pub fn is_cancelled(&self) -> bool {
         matches!(
             self,

@@ -20,7 +20,7 @@ pub(crate) const LAMBDA: [(&str, Method, bool); 4] = [
 ];
 pub(crate) const STEPS: &str = "steps";
 
-/// All plots that there is data for.
+/// All plots for which there is data.
 pub(crate) fn plots(report: &Report) -> Result<Vec<File>, Error> {
     let mut all = Vec::new();
     for (name, is_gpu) in COMPARISON.into_iter().zip([false, true]) {
@@ -42,7 +42,7 @@ pub(crate) fn plots(report: &Report) -> Result<Vec<File>, Error> {
     Ok(all)
 }
 
-/// The bars of figure 5, and whose they are.
+/// A kind of bar in figure 5, and its contestant.
 struct Bar {
     name: &'static str,
     color: RGBColor,
@@ -93,12 +93,12 @@ fn comparison(report: &Report, is_gpu: bool) -> Option<Bars> {
         (true, Some(adapter)) => &adapter.name,
         _ => &report.machine.cpu,
     };
-    // A kind that no scene has, such as the best λ where only the paper's was run, gets no room.
+    // A kind that no scene has gets no space, such as the best λ if only the paper's λ was run.
     let is_there = |kind: &usize| groups.iter().any(|(_, bars)| bars[*kind].is_some());
     let kinds: Vec<usize> = (0..BARS.len()).filter(is_there).collect();
     let chosen = |mut bars: Vec<Height>| kinds.iter().map(|&kind| bars[kind].take()).collect();
     (!groups.is_empty()).then(|| Bars {
-        title: format!("Time a frame on {place}"),
+        title: format!("Time per frame on {place}"),
         y: "[FWZS11] with λ = 5 is 1; numbers: ms".to_owned(),
         kinds: kinds
             .iter()
@@ -135,7 +135,7 @@ fn lambda(report: &Report, method: Method, is_gpu: bool) -> Option<Curves> {
     };
     (lambdas.len() > 1).then(|| Curves {
         title: format!(
-            "{title} on the {}: time a frame against λ",
+            "{title} on the {}: time per frame against λ",
             if is_gpu { "GPU" } else { "CPU" }
         ),
         x: Axis {
@@ -182,7 +182,7 @@ fn table_sizes(report: &Report) -> Option<Curves> {
         (2f64.powi(power), label)
     };
     Some(Curves {
-        title: format!("Hash table, {}: what is lost against its size", sizes.scene),
+        title: format!("Hash table, {}: losses against its size", sizes.scene),
         x: Axis {
             name: "slots of the table / primitives of both bodies".to_owned(),
             is_log: true,
@@ -193,10 +193,10 @@ fn table_sizes(report: &Report) -> Option<Curves> {
             most.fold(0.0, f64::max),
         ),
         curves: vec![
-            curve("hash table, as the paper has it", COLORS[3], &|p| {
+            curve("hash table, as in the paper", COLORS[3], &|p| {
                 p.missing_rate
             }),
-            curve("hash table after a test of boxes", COLORS[1], &|p| {
+            curve("hash table after box tests", COLORS[1], &|p| {
                 p.missing_rate_with_box_test
             }),
             curve("owner rule, no table", COLORS[4], &|_| 0.0),

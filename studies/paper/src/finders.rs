@@ -1,4 +1,4 @@
-//! Whoever finds pairs: the library by each of its methods, and the peer of the paper.
+//! Contestants: the library with each of its methods, and the peer of the paper.
 
 use std::time::Instant;
 
@@ -33,7 +33,7 @@ impl Place {
         matches!(self, Place::Gpu(adapter) if adapter.is_software)
     }
 
-    /// Settings of the library's detector here.
+    /// The settings of the library's detector for this place.
     pub fn settings(&self) -> Settings {
         match self {
             Place::Cpu { n_threads } => Settings {
@@ -50,7 +50,7 @@ impl Place {
     }
 }
 
-/// What is known of a frame besides its pairs.
+/// Times and counts of a frame.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Found {
     pub ms: f64,
@@ -65,8 +65,8 @@ pub(crate) struct Found {
 
 /// Finds all pairs of a frame.
 pub(crate) trait Finder {
-    /// Finds the pairs between two bodies as things are in the scene now; `rows` takes their place, sorted, after the clock has
-    /// stopped.
+    /// Finds the pairs between two bodies in the current state of the scene. After the clock has stopped, it writes them to
+    /// `rows`, sorted.
     fn find(
         &mut self,
         scene: &Scene,
@@ -81,7 +81,7 @@ pub(crate) trait Finder {
 pub(crate) struct Setup {
     pub method: Method,
     pub place: Place,
-    /// Of grids only.
+    /// λ; only grids use it.
     pub lambda: f64,
 }
 
@@ -106,13 +106,13 @@ impl Setup {
 }
 
 impl Place {
-    /// The method of [FWZS11] here.
+    /// The method of [FWZS11] for this place.
     fn uniform_grid(&self, lambda: f64) -> Result<Box<dyn Finder>, Error> {
         match self {
             Place::Cpu { n_threads } => {
                 Ok(Box::new(UniformGrid::new(impinge_baseline::Settings {
                     lambda,
-                    // As the paper has it; at its best, with all that helps `Cells`.
+                    // With the paper's λ as described there; with its best λ, with everything that helps `Cells`.
                     coarse_map: lambda != LAMBDA_FWZS11,
                     threads: *n_threads,
                     ..impinge_baseline::Settings::default()
@@ -182,7 +182,7 @@ impl Finder for UniformGrid {
 }
 
 impl Found {
-    /// What the statistics of an answer say that was asked for at `start`. Stops the clock first.
+    /// The times and counts of an answer whose search began at `start`. Stops the clock first.
     fn of(start: Instant, pairs: &Pairs, rows: &mut Vec<[u32; 4]>) -> Self {
         let ms = start.elapsed().as_secs_f64() * 1e3;
         rows.clear();

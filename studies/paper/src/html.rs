@@ -122,7 +122,7 @@ fn escaped(text: &str) -> String {
         .replace('"', "&quot;")
 }
 
-/// Escaped, with code and strong words marked. A mark without its other half stays as it is.
+/// Escapes text and converts code and strong words to tags. A mark without its other half stays as it is.
 fn marked(text: &str) -> String {
     let mut text = escaped(text);
     for (mark, tag) in [("`", "code"), ("**", "strong")] {

@@ -1,7 +1,7 @@
-//! Everything that the paper "Real-time Collision Detection with Two-level Spatial Hashing on GPU" shows,
-//! measured again: its tables and figures, with the paper's own numbers beside ours.
+//! Repeats the measurements of the paper "Real-time Collision Detection with Two-level Spatial Hashing on GPU":
+//! its tables and figures, with the paper's own numbers beside ours.
 //!
-//! [`run`] measures and gives an [`Outcome`]: a [`Report`] of plain data, and figures. [`Outcome::write`]
+//! [`run`] measures and returns an [`Outcome`]: a [`Report`] of plain data, and figures. [`Outcome::write`]
 //! writes both as Markdown, HTML and JSON.
 
 mod benchmark;

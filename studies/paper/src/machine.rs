@@ -1,15 +1,15 @@
-//! What the numbers were measured on.
+//! The machine of a measurement.
 
 use serde::Serialize;
 
-/// The processor, as the system names it.
+/// The processor and the operating system.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Machine {
     /// The CPU's model.
     pub cpu: String,
     /// Threads that the system offers.
     pub n_threads_offered: usize,
-    /// Threads that worked.
+    /// Threads used.
     pub n_threads: usize,
     /// Vector instructions that the library uses here.
     pub vectors: String,
@@ -17,19 +17,19 @@ pub struct Machine {
     pub os: String,
 }
 
-/// A GPU, or a driver that imitates one.
+/// A GPU, or a software driver.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Adapter {
-    /// As the driver names it.
+    /// The name given by the driver.
     pub name: String,
     /// The driver and its version.
     pub driver: String,
-    /// Whether it is a program on the CPU.
+    /// Whether it is a software driver on the CPU.
     pub is_software: bool,
 }
 
 impl Machine {
-    /// This machine; `n_threads` workers were asked for, 0 for one a core.
+    /// This machine; `n_threads` is the requested number of threads, 0 for one per core.
     pub fn of_this(n_threads: usize) -> Self {
         let n_threads_offered = std::thread::available_parallelism().map_or(1, usize::from);
         Machine {
@@ -46,7 +46,7 @@ impl Machine {
     }
 }
 
-/// The processor's name as Linux tells it.
+/// The processor's name on Linux.
 #[cfg(target_os = "linux")]
 fn cpu() -> Option<String> {
     let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
@@ -57,7 +57,7 @@ fn cpu() -> Option<String> {
     Some(line.split_once(':')?.1.trim().to_owned())
 }
 
-/// The processor's name as macOS tells it.
+/// The processor's name on macOS.
 #[cfg(target_os = "macos")]
 fn cpu() -> Option<String> {
     let output = std::process::Command::new("sysctl")
@@ -68,7 +68,7 @@ fn cpu() -> Option<String> {
     (!name.trim().is_empty()).then(|| name.trim().to_owned())
 }
 
-/// The processor's name as Windows, or anybody, has it in the environment.
+/// The processor's name from the environment, as on Windows.
 #[cfg(not(any(target_os = "linux", target_os = "macos")))]
 fn cpu() -> Option<String> {
     std::env::var("PROCESSOR_IDENTIFIER").ok()

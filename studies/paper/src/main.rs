@@ -24,12 +24,12 @@ fn main() -> ExitCode {
     }
 }
 
-/// What ends the program without success.
+/// An error that ends the program.
 #[derive(Debug, thiserror::Error)]
 enum Failure {
     #[error(transparent)]
     Run(#[from] Error),
-    #[error("{n} answers in {} differ from those beside them: please report this", .report.display())]
+    #[error("{n} answers in {} differ from the reference: please report this", .report.display())]
     Disagreements { n: usize, report: PathBuf },
     #[error("cannot listen to Ctrl-C: {0}")]
     Signal(#[from] ctrlc::Error),
@@ -80,7 +80,7 @@ fn run(args: &Args) -> Result<(), Failure> {
     }
 }
 
-/// A progress bar on standard error, if that is a terminal and a bar is wanted.
+/// A progress bar on standard error, if that is a terminal and a bar is requested.
 fn bar(is_wanted: bool) -> ProgressBar {
     if !(is_wanted && stderr().is_terminal()) {
         return ProgressBar::hidden();

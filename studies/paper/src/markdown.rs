@@ -1,4 +1,4 @@
-//! A document as Markdown, with tables as GitHub reads them.
+//! A document as Markdown, with tables in GitHub's syntax.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,4 @@
-//! What a run may be told.
+//! Options of a run.
 
 use std::path::PathBuf;
 
@@ -28,7 +28,7 @@ pub enum SceneName {
 }
 
 impl SceneName {
-    /// All of them, in the order of the paper.
+    /// All benchmarks, in the order of the paper.
     pub const ALL: [SceneName; 8] = [
         SceneName::Ball,
         SceneName::Bunny,
@@ -40,7 +40,7 @@ impl SceneName {
         SceneName::Dragon15k,
     ];
 
-    /// As on the command line: `"ball"`, `"bunny-7k"` and so on.
+    /// The name on the command line: `"ball"`, `"bunny-7k"` and so on.
     pub fn name(self) -> &'static str {
         match self {
             SceneName::Ball => "ball",
@@ -82,14 +82,14 @@ impl SceneName {
 /// Where detection runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Backends {
-    /// The CPU, and a GPU where there is one; a driver that imitates one will do.
+    /// The CPU, and a GPU if there is one; a software driver suffices.
     #[default]
     Found,
-    /// The CPU alone.
+    /// Only the CPU.
     Cpu,
-    /// A GPU alone; an error where there is none.
+    /// Only a GPU; an error if there is none.
     Gpu,
-    /// Both; an error where there is no GPU.
+    /// Both; an error if there is no GPU.
     Both,
 }
 
@@ -98,7 +98,7 @@ pub enum Backends {
 pub struct Waving {
     /// How far a vertex moves to either side.
     pub amplitude: f32,
-    /// From crest to crest, above 0.
+    /// The distance from crest to crest, above 0.
     pub wave_length: f32,
     /// How far crests travel in the whole run.
     pub speed: f32,
@@ -114,20 +114,20 @@ impl Default for Waving {
     }
 }
 
-/// What a run is told.
+/// Options of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// The benchmarks to run; none means all.
+    /// The benchmarks to run; an empty list means all.
     pub scenes: Vec<SceneName>,
-    /// Meshes to take for a benchmark, whatever else is at hand.
+    /// Meshes for benchmarks, used instead of scans.
     pub meshes: Vec<(SceneName, PathBuf)>,
-    /// Few frames of each benchmark, to see that everything agrees. Times are not worth keeping.
+    /// Few frames of each benchmark, to check that all agree. Times are not meaningful.
     pub is_quick: bool,
     /// Frames of each surface benchmark and steps of each volume benchmark.
     pub n_frames: Option<usize>,
-    /// λ to report beside the paper's, in place of that which measures best.
+    /// The λ to report beside the paper's, instead of the fastest one.
     pub lambda: Option<f64>,
-    /// CPU threads; 0 means one a core.
+    /// CPU threads; 0 means one per core.
     pub n_threads: usize,
     /// Where detection runs.
     pub backends: Backends,
@@ -138,7 +138,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// Whether a benchmark is to be run.
+    /// Whether to run a benchmark.
     pub(crate) fn wants(&self, scene: SceneName) -> bool {
         self.scenes.is_empty() || self.scenes.contains(&scene)
     }
@@ -171,13 +171,13 @@ impl Options {
             speed,
         } = self.waving;
         if !(amplitude >= 0.0 && amplitude.is_finite()) {
-            return refuse("the amplitude of the wave is a number, 0 or more");
+            return refuse("the amplitude of the wave must be a number, 0 or more");
         }
         if !(wave_length > 0.0 && wave_length.is_finite()) {
-            return refuse("the wave length is a number above 0");
+            return refuse("the wave length must be a number above 0");
         }
         if !speed.is_finite() {
-            return refuse("the speed of the wave is a number");
+            return refuse("the speed of the wave must be a finite number");
         }
         if let Some((scene, _)) = self.meshes.iter().find(|(scene, _)| !self.wants(*scene)) {
             return Err(Error::Options(format!(

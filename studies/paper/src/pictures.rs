@@ -1,4 +1,4 @@
-//! Figures 4 and 6: a frame of each benchmark, its colliding primitives red and blue.
+//! Figures 4 and 6: one frame of each benchmark with colliding primitives in red and blue.
 
 use crate::course::Course;
 use crate::error::Error;
@@ -6,23 +6,23 @@ use crate::error::Error;
 /// A file of the report.
 #[derive(Debug, Clone, PartialEq)]
 pub struct File {
-    /// Its name in the report's folder.
+    /// The file's name in the report's folder.
     pub name: String,
-    /// What it holds.
+    /// The file's content.
     pub bytes: Vec<u8>,
 }
 
-/// Draws pictures, where there is a GPU, or a driver that imitates one, to draw them with.
+/// Draws pictures, if there is a GPU or a software driver.
 #[derive(Default)]
 pub(crate) struct Painter {
-    /// What has been drawn.
+    /// The pictures drawn so far.
     pub files: Vec<File>,
     #[cfg(feature = "gpu")]
     renderer: Option<impinge_render::Renderer>,
 }
 
 impl Painter {
-    /// A painter, or one that draws nothing and the reason for that.
+    /// A painter; without an adapter, one that draws nothing, and the reason.
     #[cfg(feature = "gpu")]
     pub fn new(device: Option<&str>) -> (Self, Option<String>) {
         use impinge_render::Renderer;
@@ -38,14 +38,14 @@ impl Painter {
         (Painter { files, renderer }, reason)
     }
 
-    /// A painter that draws nothing, and the reason for that.
+    /// A painter that draws nothing, and the reason.
     #[cfg(not(feature = "gpu"))]
     pub fn new(_: Option<&str>) -> (Self, Option<String>) {
         let reason = "There are no pictures: the program was built without its feature `gpu`.";
         (Painter::default(), Some(reason.to_owned()))
     }
 
-    /// Whether anything will be drawn.
+    /// Whether the painter draws pictures.
     pub fn is_there(&self) -> bool {
         #[cfg(feature = "gpu")]
         return self.renderer.is_some();
@@ -53,13 +53,13 @@ impl Painter {
         false
     }
 
-    /// Draws the bodies as they are now, with the primitives of these pairs coloured. Returns the file's name.
+    /// Draws the bodies in their current pose, with the primitives of these pairs coloured. Returns the file's name.
     #[cfg(not(feature = "gpu"))]
     pub fn paint(&mut self, _: &dyn Course, _: &[[u32; 4]]) -> Result<Option<String>, Error> {
         Ok(None)
     }
 
-    /// Draws the bodies as they are now, with the primitives of these pairs coloured. Returns the file's name.
+    /// Draws the bodies in their current pose, with the primitives of these pairs coloured. Returns the file's name.
     #[cfg(feature = "gpu")]
     pub fn paint(
         &mut self,
@@ -67,7 +67,7 @@ impl Painter {
         rows: &[[u32; 4]],
     ) -> Result<Option<String>, Error> {
         use impinge_render::{Camera, Colors, Picture, Surface};
-        /// Of the first and of the second body: what collides, and the rest.
+        /// The colours of the first and of the second body.
         const COLORS: [Colors; 2] = [
             Colors {
                 colliding: [214, 32, 39],
@@ -97,7 +97,7 @@ impl Painter {
             ..Picture::default()
         };
         for (ix, (body, colors)) in course.bodies().into_iter().zip(COLORS).enumerate() {
-            // Rows hold the body with the lower id first, which is the first one.
+            // Rows name the body with the lower id first, which is the first body.
             let mut colliding: Vec<u32> = rows.iter().map(|row| row[2 * ix + 1]).collect();
             colliding.sort_unstable();
             colliding.dedup();

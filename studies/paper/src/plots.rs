@@ -1,4 +1,4 @@
-//! The plots, each as SVG and as PNG. The font comes with the program: a machine without fonts will do.
+//! The plots, each as SVG and as PNG. The font is embedded, so the machine needs no fonts.
 
 mod bars;
 mod curves;
@@ -16,16 +16,16 @@ pub(crate) use curves::{Axis, Curve, Curves, Mark};
 use crate::error::Error;
 use crate::pictures::File;
 
-/// Pixels of a plot in SVG; the PNG has twice as many along each side.
+/// Width and height of a plot in SVG pixels; the PNG has twice as many along each side.
 const SIZE: (u32, u32) = (760, 420);
 
-/// How many pixels of the PNG along one of the SVG.
+/// PNG pixels per SVG pixel, along each side.
 const SCALE: u32 = 2;
 
-/// The family that is registered for measuring and for the PNG. Viewers of the SVG take their own.
+/// The font family that is registered for measuring and for the PNG. SVG viewers use their own font.
 const FONT: &str = "sans-serif";
 
-/// Colours that differ in lightness too: readable in grey and by the colour-blind (Okabe & Ito 2008).
+/// Colours that also differ in lightness, so that they are readable in grey and by the colour-blind (Okabe & Ito 2008).
 pub(crate) const COLORS: [RGBColor; 6] = [
     RGBColor(0x8a, 0x8a, 0x8a),
     RGBColor(0x00, 0x72, 0xb2),
@@ -59,7 +59,7 @@ pub(crate) fn files(name: &str, plot: &impl Plot) -> Result<[File; 2], Error> {
             (FontStyle::Normal, dejavu::sans::regular()),
             (FontStyle::Bold, dejavu::sans::bold()),
         ] {
-            // A font that cannot be read is an error at the first text.
+            // If the font cannot be read, drawing the first text returns an error.
             let _ = register_font(FONT, style, bytes);
         }
     });

@@ -1,11 +1,11 @@
-//! The paper's own numbers, each with the table that it is from.
+//! The paper's own numbers, each with its table.
 //!
 //! Source: "Real-time Collision Detection with Two-level Spatial Hashing on GPU", section 4. Figures 5 and 7
-//! print no numbers; of figure 7 one point is known from table 3.
+//! contain no numbers; one point of figure 7 is known from table 3.
 
 use serde::Serialize;
 
-/// What the paper ran on (section 4.1).
+/// The paper's machine (section 4.1).
 pub const MACHINE: &str = "Intel i7 CPU at 3.2 GHz, 16 GB RAM, NVIDIA GeForce GTX 680, CUDA 5.0";
 
 /// The paper's graphics card, in short.
@@ -61,7 +61,7 @@ pub struct Duplicates {
     pub n_colliding_without: u64,
     /// "#CT (with hash)".
     pub n_colliding_with: u64,
-    /// "#Missing rate": missing collisions to colliding primitives.
+    /// "#Missing rate": missing collisions divided by colliding primitives.
     pub missing_rate: f64,
     /// "#MCT": share of pairs that are checked more than once.
     pub share_repeated: f64,
@@ -129,14 +129,14 @@ pub fn duplicates(scene: &str) -> Option<Duplicates> {
 mod tests {
     use super::*;
 
-    /// The tables are consistent among themselves, which a slip of the pen would not be.
+    /// The tables are consistent with each other, which finds typing errors.
     #[test]
     fn tables_agree_with_each_other() {
         for scene in ["ball", "bunny", "buddha", "dragon"] {
             let (table_1, table_3) = (surface(scene).unwrap(), duplicates(scene).unwrap());
             assert_eq!(table_1.ms, table_3.ms_without);
             assert_eq!(table_1.n_colliding, table_3.n_colliding_without);
-            // The missing rate is that of the two counts, but for its rounding.
+            // The missing rate follows from the two counts, up to rounding.
             let missing =
                 1.0 - table_3.n_colliding_with as f64 / table_3.n_colliding_without as f64;
             assert!((missing - table_3.missing_rate).abs() < 0.0015, "{scene}");

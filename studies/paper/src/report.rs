@@ -1,4 +1,4 @@
-//! What was measured, as one tree of plain data: `report.json` is this and nothing else.
+//! All measurements as one tree of plain data: the content of `report.json`.
 
 use serde::Serialize;
 
@@ -6,28 +6,28 @@ use crate::machine::{Adapter, Machine};
 use crate::options::Waving;
 use crate::samples::Samples;
 
-/// Everything that a run found.
+/// The results of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// The library's version.
     pub version: String,
-    /// Whether it was the quick run, whose times are not worth keeping.
+    /// Whether it was the quick run, whose times are not meaningful.
     pub is_quick: bool,
-    /// Whether the program was built without optimisation of its own crates.
+    /// Whether the program was built with debug assertions.
     pub has_debug_assertions: bool,
-    /// The CPU and what is on it.
+    /// The machine.
     pub machine: Machine,
     /// The GPU that took part.
     pub adapter: Option<Adapter>,
-    /// Why there is no GPU in the report, or no picture.
+    /// Reasons why the report has no GPU or no pictures.
     pub remarks: Vec<String>,
     /// How bodies wave.
     pub waving: Waving,
-    /// Table 1, figures 4 and 5: a scene each.
+    /// Table 1, figures 4 and 5: one entry per scene.
     pub surfaces: Vec<Scene>,
-    /// Table 2, figure 6: a scene each.
+    /// Table 2, figure 6: one entry per scene.
     pub volumes: Vec<Scene>,
-    /// Table 3: two rows a scene, for two ways to read the paper.
+    /// Table 3: two rows per scene, for two ways to read the paper.
     pub duplicates: Vec<Duplicates>,
     /// Figure 7: missing rates of one scene.
     pub table_sizes: Option<TableSizes>,
@@ -36,9 +36,9 @@ pub struct Report {
 /// One scene, all contestants.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scene {
-    /// As on the command line.
+    /// The name on the command line.
     pub name: String,
-    /// Where the mesh comes from; a stand-in says that it is one.
+    /// The origin of the mesh; it says if the mesh is a stand-in.
     pub mesh: String,
     /// Whether a generated mesh stands in for a scan.
     pub is_stand_in: bool,
@@ -50,30 +50,30 @@ pub struct Scene {
     pub n_primitives: Vec<usize>,
     /// Frames, or steps, that were run.
     pub n_frames: usize,
-    /// Pairs found a frame.
+    /// Pairs per frame.
     pub n_pairs: Samples,
-    /// Primitives of either body that take part in a pair, a frame.
+    /// Primitives of both bodies that take part in a pair, per frame.
     pub n_colliding: Samples,
     /// The sum of the frames' hashes: 16 hexadecimal digits.
     pub hash: String,
-    /// Frames in which the oracle (every box against every box) was asked too.
+    /// Frames in which the oracle (every box against every box) ran too.
     pub n_frames_of_oracle: usize,
-    /// The contestants; the first one is that which others are compared with.
+    /// The contestants; the others are compared with the first one.
     pub runs: Vec<Run>,
-    /// Time against λ on a few frames, of the methods that have one.
+    /// Time against λ on a few frames, for methods with a λ.
     pub sweep: Vec<Sweep>,
     /// A picture of the frame with the most pairs: a file in the report's folder.
     pub picture: Option<String>,
-    /// The finite elements' share, in milliseconds a step, besides detection.
+    /// The time of the simulation in milliseconds per step, without detection.
     pub simulation_ms: Option<Samples>,
-    /// What each frame found, in order.
+    /// The counts of each frame, in order.
     pub course: Vec<Moment>,
 }
 
-/// What a frame found.
+/// The counts of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Moment {
-    /// Its number, from 0. A driver that imitates a GPU takes only some frames.
+    /// Its number, from 0. A software driver runs only some frames.
     pub frame: usize,
     /// Pairs.
     pub n_pairs: usize,
@@ -81,15 +81,15 @@ pub struct Moment {
     pub n_colliding: usize,
 }
 
-/// A method, for who reads the report by program.
+/// A method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// The paper's two levels, with our owner rule.
+    /// The paper's two levels with our owner rule.
     Cells,
-    /// Ours.
+    /// Our method.
     Clusters,
-    /// The peer of the paper.
+    /// The method that the paper compares itself with.
     Fwzs11,
 }
 
@@ -100,33 +100,33 @@ pub struct Run {
     pub method: Method,
     /// `"cpu"` or the adapter's name.
     pub backend: String,
-    /// Whether it ran on a GPU, imitated ones included.
+    /// Whether it ran on a GPU or a software driver.
     pub is_gpu: bool,
-    /// Whether the GPU is a program on the CPU.
+    /// Whether the GPU is a software driver on the CPU.
     pub is_software: bool,
-    /// Density coefficient of the grid.
+    /// The density coefficient of the grid.
     pub lambda: Option<f64>,
     /// Whether λ is the one that the paper used.
     pub is_papers_lambda: bool,
-    /// Whether λ measured best in the sweep, or was asked for.
+    /// Whether λ was the fastest in the sweep, or was given.
     pub is_chosen_lambda: bool,
-    /// Wall time a frame, from positions in memory to sorted pairs in memory.
+    /// Wall time per frame, from positions in memory to sorted pairs in memory.
     pub ms: Samples,
-    /// Wall time a frame of each stage, in the order in which they run.
+    /// Wall time per frame of each stage, in the order in which they run.
     pub stages: Vec<StageTimes>,
     /// Cells of the first level.
     pub n_cells: Samples,
     /// Cells that went through the second level.
     pub n_subdivided: Samples,
-    /// Entries of the cell lists, a primitive counted once a cell.
+    /// Entries of the cell lists; a primitive is counted once per cell.
     pub n_entries: Samples,
-    /// Pairs of primitives that are tested exactly, repetitions counted.
+    /// Pairs of primitives that are tested exactly, including repetitions.
     pub n_candidates: Samples,
     /// Candidates that the floating-point filter left to exact arithmetic.
     pub n_unsure: Samples,
-    /// Bytes held besides the answer, the most of any frame.
+    /// Bytes held without the answer, the maximum over frames.
     pub bytes_held: u64,
-    /// The sum of the frames' hashes, 16 hexadecimal digits; as the scene's where all frames were run.
+    /// The sum of the frames' hashes, 16 hexadecimal digits; equal to the scene's if all frames were run.
     pub hash: String,
     /// Frames whose pairs differ from the first contestant's: a defect.
     pub n_frames_differing: usize,
@@ -137,7 +137,7 @@ pub struct Run {
 pub struct StageTimes {
     /// Its name.
     pub name: String,
-    /// Milliseconds a frame.
+    /// Milliseconds per frame.
     pub ms: Samples,
 }
 
@@ -148,7 +148,7 @@ pub struct Sweep {
     pub method: Method,
     /// `"cpu"` or the adapter's name.
     pub backend: String,
-    /// λ and the milliseconds with it.
+    /// Pairs of λ and milliseconds.
     pub points: Vec<(f64, f64)>,
 }
 
@@ -157,30 +157,30 @@ pub struct Sweep {
 pub struct Duplicates {
     /// The scene.
     pub scene: String,
-    /// Which pairs of a cell are tested: of those that touch a common sub-cell all, as the paper has it, or
-    /// the ones whose boxes overlap.
+    /// Which pairs of a cell are tested: all that touch a common sub-cell, as in the paper (false), or only those of them
+    /// whose boxes overlap (true).
     pub has_box_test: bool,
-    /// Frames looked at.
+    /// The number of measured frames.
     pub n_frames: usize,
     /// Slots of the hash table.
     pub table_size: u64,
-    /// Pairs that are tested at all, a frame.
+    /// Different pairs that are tested, per frame.
     pub n_candidates: f64,
     /// Of those, the share tested more than once without a hash table.
     pub share_repeated: f64,
     /// How often a candidate is tested, on average.
     pub times_checked: f64,
-    /// Milliseconds a frame where every test is made.
+    /// Milliseconds per frame if every cell tests its pairs.
     pub ms_without: Samples,
-    /// Milliseconds a frame with the DJB2 table.
+    /// Milliseconds per frame with the DJB2 table.
     pub ms_with: Samples,
-    /// Milliseconds a frame with the owner rule.
+    /// Milliseconds per frame with the owner rule.
     pub ms_owner: Samples,
-    /// Colliding primitives a frame, all tests made.
+    /// Colliding primitives per frame if every cell tests its pairs.
     pub n_colliding_without: f64,
-    /// Colliding primitives a frame with the table.
+    /// Colliding primitives per frame with the table.
     pub n_colliding_with: f64,
-    /// Colliding primitives a frame with the owner rule.
+    /// Colliding primitives per frame with the owner rule.
     pub n_colliding_owner: f64,
     /// Share of the colliding primitives that the table loses.
     pub missing_rate: f64,
@@ -197,11 +197,11 @@ pub struct Duplicates {
 pub struct TableSizes {
     /// The scene.
     pub scene: String,
-    /// Frames looked at.
+    /// The number of measured frames.
     pub n_frames: usize,
-    /// Primitives of both bodies: the paper's size.
+    /// Primitives of both bodies: the paper's size of the table.
     pub n_primitives: u64,
-    /// A size and what is lost with it.
+    /// Sizes with their losses.
     pub points: Vec<TableSize>,
 }
 
@@ -214,12 +214,13 @@ pub struct TableSize {
     pub missing_rate: f64,
     /// Share of the pairs that is lost.
     pub missing_rate_of_pairs: f64,
-    /// Share of the colliding primitives that is lost where boxes are tested before the table.
+    /// Share of the colliding primitives that is lost if boxes are tested before the table.
     pub missing_rate_with_box_test: f64,
 }
 
 impl Report {
-    /// Frames in which a contestant gave other pairs than the first one, and subsets that are none.
+    /// The number of answers that differ: frames in which a contestant found other pairs than the first one, and failed checks of
+    /// table 3.
     pub fn n_disagreements(&self) -> usize {
         let differing =
             |scene: &Scene| -> usize { scene.runs.iter().map(|run| run.n_frames_differing).sum() };
@@ -233,7 +234,7 @@ impl Report {
 }
 
 impl Scene {
-    /// The run of a method on the CPU or a GPU; of two that differ in λ, the paper's.
+    /// The run of a method on the CPU or a GPU; of two runs with different λ, the one with the paper's.
     pub fn run(&self, method: Method, is_gpu: bool) -> Option<&Run> {
         let mut runs = self.runs_of(method, is_gpu);
         let first = runs.next()?;
@@ -243,7 +244,7 @@ impl Scene {
         })
     }
 
-    /// The fastest run of a method whose λ was looked for; `None` where only the paper's was run.
+    /// The fastest run of a method, if it also ran with a chosen λ; `None` if only the paper's λ was run.
     pub fn best(&self, method: Method, is_gpu: bool) -> Option<&Run> {
         self.runs_of(method, is_gpu)
             .find(|run| run.is_chosen_lambda)?;
@@ -251,13 +252,13 @@ impl Scene {
             .min_by(|a, b| a.ms.median.total_cmp(&b.ms.median))
     }
 
-    /// λ was looked for or not: the fastest run of a method.
+    /// The fastest run of a method, with any λ.
     pub fn fastest(&self, method: Method, is_gpu: bool) -> Option<&Run> {
         self.runs_of(method, is_gpu)
             .min_by(|a, b| a.ms.median.total_cmp(&b.ms.median))
     }
 
-    /// Time against λ of a method on the CPU or a GPU.
+    /// Time against λ for a method on the CPU or a GPU.
     pub fn sweep(&self, method: Method, is_gpu: bool) -> Option<&Sweep> {
         self.sweep
             .iter()

@@ -1,4 +1,4 @@
-//! All benchmarks, one after the other.
+//! Runs all benchmarks.
 
 use crate::benchmark;
 use crate::control::Control;
@@ -13,20 +13,20 @@ use crate::report::Report;
 use crate::scenes::Moving;
 use crate::volumes::Recorded;
 
-/// What a run found, and its figures.
+/// The report of a run, and its figures.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// The figures' data and the tables.
+    /// The data of the figures and tables.
     pub report: Report,
     /// Plots and pictures.
     pub figures: Vec<File>,
 }
 
-/// Runs what is asked for. Nothing is written.
+/// Runs the benchmarks of the options. It writes no files.
 ///
 /// # Errors
-/// Options that do not fit together; a mesh that cannot be read; no GPU where one is asked for; a detection
-/// that fails or is cancelled. Answers that differ are no error here: they are in the report, see
+/// Options that do not fit together; a mesh that cannot be read; no GPU although one is requested; a detection
+/// that fails or is cancelled. Different answers are not an error here: the report counts them, see
 /// [`Report::n_disagreements`].
 pub fn run(options: &Options, control: &Control<'_>) -> Result<Outcome, Error> {
     options.check()?;
@@ -78,10 +78,10 @@ pub fn run(options: &Options, control: &Control<'_>) -> Result<Outcome, Error> {
     Ok(Outcome { report, figures })
 }
 
-/// Where contestants run, the GPU among them, and what there is to say about that.
+/// The places where contestants run, the GPU among them, and remarks about missing ones.
 type Places = (Vec<Place>, Option<Adapter>, Vec<String>);
 
-/// The places that are asked for and are there.
+/// The requested places that exist.
 fn places(options: &Options) -> Result<Places, Error> {
     let mut places = Vec::new();
     let mut remarks = Vec::new();
@@ -92,7 +92,7 @@ fn places(options: &Options) -> Result<Places, Error> {
     }
     let adapter = match options.backends {
         Backends::Cpu => {
-            remarks.push("There are no runs on a GPU: only the CPU was asked for.".to_owned());
+            remarks.push("There are no runs on a GPU: only the CPU was requested.".to_owned());
             None
         }
         backends => match (adapter(options.device.as_deref()), backends) {
@@ -108,7 +108,7 @@ fn places(options: &Options) -> Result<Places, Error> {
     Ok((places, adapter, remarks))
 }
 
-/// The GPU of this name, or the first one, hardware before software; or why there is none.
+/// The GPU of this name, or the first one, hardware before software; or the reason why there is none.
 #[cfg(feature = "gpu")]
 fn adapter(device: Option<&str>) -> Result<Adapter, String> {
     let wanted = device.unwrap_or_default().to_lowercase();

@@ -1,15 +1,15 @@
-//! A number a frame, in short.
+//! Statistics of a number per frame.
 
 use serde::Serialize;
 
-/// Mean, median and extremes of a number that every frame has; all 0 of no frames.
+/// Mean, median and extremes of a number that every frame has; all are 0 if there are no frames.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Samples {
-    /// How many frames.
+    /// The number of frames.
     pub n: usize,
     /// The average, which the paper prints.
     pub mean: f64,
-    /// The middle one.
+    /// The median.
     pub median: f64,
     /// The smallest.
     pub min: f64,
@@ -18,7 +18,7 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// Of these values, none of them NaN.
+    /// The statistics of these values; none may be NaN.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let mut sorted: Vec<f64> = values.into_iter().collect();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -35,7 +35,7 @@ impl Samples {
         }
     }
 
-    /// Of counts.
+    /// The statistics of counts.
     pub fn of_counts(counts: impl IntoIterator<Item = u64>) -> Self {
         // Counts here are far below 2^53.
         Samples::of(counts.into_iter().map(|count| count as f64))

@@ -1,4 +1,4 @@
-//! The surface benchmarks: which mesh, and how the two copies move.
+//! The surface benchmarks: their meshes, and the motion of the two copies.
 
 use std::path::Path;
 
@@ -11,20 +11,19 @@ use crate::course::Course;
 use crate::error::Error;
 use crate::options::{Options, SceneName, Waving};
 
-/// How the second body drifts: shares of the first one's box. It starts at `from` widths along x and
-/// ends at `to`. Chosen so that the average of colliding triangles comes near the paper's, which does not
-/// say how its bodies meet.
+/// The drift of the second body, in widths of the first one's box: it starts at `from` along x and ends at
+/// `to`. Chosen so that the average number of colliding triangles is close to the paper's, because the paper does
+/// not say how its bodies meet.
 #[derive(Debug, Clone, Copy)]
 struct Approach {
     from: f32,
     to: f32,
 }
 
-/// A little aside, as a share of the width along y and z: no two copies of a face are parallel planes
-/// in line.
+/// A small offset along y and z, as a share of the width, so that the two copies are not exactly aligned.
 const ASIDE: [f32; 2] = [0.011, 0.007];
 
-/// What is known of a benchmark beforehand.
+/// The fixed data of a benchmark.
 struct Plan {
     file: Option<&'static str>,
     n_triangles: usize,
@@ -62,7 +61,7 @@ pub(crate) struct Moving {
 }
 
 impl Moving {
-    /// A surface benchmark with the mesh that is at hand: the one given, the shared one, a stand-in.
+    /// A surface benchmark with its mesh: the given one, else the shared one, else a stand-in.
     pub fn new(name: SceneName, options: &Options) -> Result<Self, Error> {
         let Plan {
             file,
@@ -163,7 +162,7 @@ impl Course for Moving {
     }
 }
 
-/// Moves everything alike, at any time.
+/// Moves all vertices by the same vector, at any time.
 #[derive(Clone, Copy)]
 struct Fixed([f32; 3]);
 
@@ -173,7 +172,7 @@ impl Deform for Fixed {
     }
 }
 
-/// Crests travel along x in the first body and back in the second one; vertices move along z.
+/// Crests travel along x in the first body and against x in the second one; vertices move along z.
 fn waves(waving: &Waving, diagonal: f32) -> [Wave; 2] {
     let wave = |speed: f32| Wave {
         amplitude: waving.amplitude * diagonal,

@@ -1,4 +1,4 @@
-//! Which λ is best, measured on a few frames.
+//! Finds the fastest λ on a few frames.
 
 use std::time::Duration;
 
@@ -11,18 +11,18 @@ use crate::finders::{Place, Setup};
 use crate::report::{Method, Sweep};
 use crate::samples::Samples;
 
-/// λ that are tried: powers of two around the paper's 1, and 5 with its like.
+/// The values of λ to try: powers of two around the paper's 1, and 5 and values near it.
 const CELLS: [f64; 10] = [
     0.015625, 0.03125, 0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0,
 ];
 const FWZS11: [f64; 10] = [0.03125, 0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0];
 
-/// Frames of a course that are looked at, and how often each.
+/// The number of measured frames of a course, and of repetitions per frame.
 const N_FRAMES: usize = 3;
 const N_REPEATS: usize = 3;
 
-/// Times against λ of every method that has one, at every place in hardware: of each frame the fastest of a few
-/// repetitions, on average.
+/// Times against λ for every method with a λ, at every hardware place: the average over frames of the fastest of a few
+/// repetitions.
 pub(crate) fn sweep(
     course: &mut dyn Course,
     places: &[Place],
@@ -70,8 +70,8 @@ pub(crate) fn sweep(
     Ok(sweeps)
 }
 
-/// Who takes part: at each place the library's methods and the peer, each grid with the paper's λ and with
-/// the one that was asked for or measured best. The flag says which λ is that one.
+/// The contestants: at each place the library's methods and the peer, each grid with the paper's λ and with
+/// the λ that was given or was the fastest. The flag marks this second λ.
 pub(crate) fn contestants(
     places: &[Place],
     sweeps: &[Sweep],

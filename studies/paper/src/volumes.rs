@@ -1,6 +1,6 @@
 //! The volume benchmarks of table 2 and figure 6: solids of finite elements, one dropped on the other.
 //!
-//! The simulation runs first, and where its vertices are is kept for every step; then everybody finds the
+//! The simulation runs first, and its positions are recorded for every step. Then all contestants find the
 //! pairs of the same steps.
 
 use impinge::{BodyId, Detector, Scene};
@@ -22,9 +22,9 @@ pub(crate) struct Recorded {
     is_stand_in: bool,
     scene: Scene,
     bodies: [BodyId; 2],
-    /// Of each step, the positions of each body, in f32 as the detector saw them.
+    /// For each step, the positions of each body, in f32 as the detector got them.
     frames: Vec<[Vec<[f32; 3]>; 2]>,
-    /// What a step took besides detection, in milliseconds.
+    /// The time of a step without detection, in milliseconds.
     pub simulation_ms: Samples,
 }
 
@@ -84,7 +84,7 @@ impl Recorded {
     }
 }
 
-/// Where a body's vertices are. The simulation keeps them in f32.
+/// The positions of a body's vertices. The simulation's scene holds them in f32.
 fn positions(scene: &Scene, body: BodyId) -> Result<Vec<[f32; 3]>, Error> {
     match scene.body(body)?.positions() {
         impinge::Positions::F32(positions) => Ok(positions.clone()),
@@ -126,7 +126,7 @@ impl Course for Recorded {
         self.frames.len()
     }
 
-    /// The first step with a third of the most pairs: at the most, bodies are crushed beyond recognition.
+    /// The first step with a third of the largest number of pairs: at the maximum, bodies are crushed beyond recognition.
     fn picture_frame(&self, moments: &[Moment]) -> usize {
         let most = moments.iter().map(|moment| moment.n_pairs).max();
         let enough = |moment: &Moment| 3 * moment.n_pairs >= most.unwrap_or(0);

@@ -1,4 +1,4 @@
-//! The files of a report.
+//! Writes the files of a report.
 
 use std::path::Path;
 
@@ -7,11 +7,11 @@ use crate::run::Outcome;
 use crate::{chapters, html, markdown};
 
 impl Outcome {
-    /// Writes `report.md`, `report.html`, `report.json` and all figures into a folder, which is made where
-    /// it is not there. Files of the same names are replaced.
+    /// Writes `report.md`, `report.html`, `report.json` and all figures to a folder, which is created if it does
+    /// not exist. Files of the same names are replaced.
     ///
     /// # Errors
-    /// The folder cannot be made, or a file not be written.
+    /// The folder cannot be created, or a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), Error> {
         let failed = |path: &Path, source| Error::Write {
             path: path.to_owned(),

@@ -1,4 +1,4 @@
-//! The program: a quick report, and what is asserted of its data.
+//! The program: a quick report, and assertions on its data.
 
 use serde_json::Value;
 
@@ -47,7 +47,7 @@ impl Folder {
     }
 }
 
-/// What was said on standard error, after the exit code was looked at.
+/// The text on standard error, after checking the exit code.
 #[track_caller]
 fn said(output: &Output, code: i32) -> String {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -59,7 +59,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap()
 }
 
-/// One number of each object of a list; 0 where it is null.
+/// One number of each object of a list; 0 if it is null.
 fn numbers(list: &Value, name: &str) -> Vec<f64> {
     let list = list.as_array().unwrap();
     list.iter()
@@ -82,7 +82,7 @@ fn differing(run: &Value) -> (u64, u64) {
     (count(&run["ms"]["n"]), count(&run["n_frames_differing"]))
 }
 
-/// All that the quick report must hold, whatever meshes and adapters are at hand.
+/// What the quick report must contain, whatever meshes and adapters there are.
 #[test]
 fn the_quick_report_agrees_with_itself() {
     let folder = Folder::new();
@@ -122,12 +122,12 @@ fn the_quick_report_agrees_with_itself() {
                 "{}: {run:#}",
                 scene["name"]
             );
-            // Who ran all frames found the same pairs in all of them.
+            // A contestant that ran all frames found the same pairs in all of them.
             if n_frames == scene["n_frames"].as_u64().unwrap() {
                 assert_eq!(run["hash"], scene["hash"], "{}", scene["name"]);
             }
         }
-        // Two densities of the grid, unless the paper's measured best.
+        // Two densities of the grid, unless the paper's was the fastest.
         let lambdas: Vec<&Value> = runs
             .iter()
             .filter(|run| run["method"] == "cells" && run["is_gpu"] == false)
@@ -156,7 +156,7 @@ fn the_quick_report_agrees_with_itself() {
             "{row:#}"
         );
     }
-    // A table as large as the paper's loses something somewhere; a larger one less.
+    // A table as large as the paper's loses pairs in some scene; a larger one loses fewer.
     assert!(rows.iter().any(|row| number(&row["missing_rate"]) > 0.0));
     let lost = numbers(&report["table_sizes"]["points"], "missing_rate");
     assert!(lost[0] > lost[lost.len() - 1] && lost[0] > 0.01, "{lost:?}");
@@ -164,7 +164,7 @@ fn the_quick_report_agrees_with_itself() {
     check_documents(&folder, has_adapter);
 }
 
-/// Every figure that a document names is there, and every table has the paper's rows.
+/// Every figure that a document names exists, and every table has the paper's rows.
 fn check_documents(folder: &Folder, has_adapter: bool) {
     let read = |name: &str| std::fs::read_to_string(folder.path("report").join(name)).unwrap();
     let (markdown, page) = (read("report.md"), read("report.html"));
@@ -177,7 +177,7 @@ fn check_documents(folder: &Folder, has_adapter: bool) {
     let in_markdown = links(&markdown, "](", ')');
     let in_page = links(&page, "<img src=\"", '"');
     assert_eq!(in_markdown.len(), in_page.len());
-    // Figure 7, λ twice, steps and figure 5 at least once; eight pictures where there is an adapter.
+    // Figure 7, λ twice, steps and figure 5 at least once; eight pictures if there is an adapter.
     assert!(
         in_markdown.len() >= if has_adapter { 14 } else { 5 },
         "{in_markdown:?}"
@@ -228,7 +228,7 @@ fn a_stand_in_says_so_and_a_mesh_given_is_taken() {
     assert_eq!(stand_in["n_primitives"][0], 69_450);
     let text = std::fs::read_to_string(folder.path("stand-in/report.md")).unwrap();
     assert!(text.contains("**a generated stand-in**") && text.contains("**Stand-ins.**"));
-    assert!(text.contains("only the CPU was asked for"));
+    assert!(text.contains("only the CPU was requested"));
 
     folder.ply("mine.ply", &impinge_scenes::surfaces::ball(3_000));
     for given in ["mine.ply", "bunny=mine.ply"] {
@@ -273,7 +273,7 @@ fn a_report_that_is_stopped_leaves_no_files() {
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();
-    // Long enough to have begun; where it has not, the signal ends it in another way.
+    // Long enough for the run to start; otherwise the signal ends it in another way.
     std::thread::sleep(std::time::Duration::from_secs(2));
     let sent = Command::new("kill")
         .args(["-INT", &child.id().to_string()])

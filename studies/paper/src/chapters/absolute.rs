@@ -1,4 +1,4 @@
-//! The paper's times beside ours, machines named.
+//! The paper's times beside ours, with the machines.
 
 use super::{gpu_name, heading, paragraph, places};
 use crate::document::{Block, NONE, Table, ms, ratio};
@@ -32,7 +32,7 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
         });
         columns.push((Method::Clusters, is_gpu));
     }
-    let mut table = Table::new("Average milliseconds a frame.", 1, &header);
+    let mut table = Table::new("Average milliseconds per frame.", 1, &header);
     for scene in scenes {
         let papers = published::surface(&scene.name)
             .map(|papers| papers.ms)
@@ -54,9 +54,9 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
         table.ours(cells);
     }
     vec![
-        heading("Ours beside the paper's times"),
+        heading("Our times beside the paper's"),
         paragraph(format!(
-            "Two machines more than a decade apart, and other meshes and motions: these are absolute numbers, no comparison of methods. \
+            "The machines are more than a decade apart, and meshes and motions differ: these are absolute numbers, not a comparison of methods. \
              The paper: {}. Here: {}, {} threads; GPU: {}.",
             published::MACHINE,
             report.machine.cpu,

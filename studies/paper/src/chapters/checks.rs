@@ -1,4 +1,4 @@
-//! Whether everybody found the same.
+//! Whether all contestants found the same pairs.
 
 use super::{heading, lambda, method, paragraph, place};
 use crate::document::{Block, NONE, Table, count};
@@ -6,7 +6,7 @@ use crate::report::{Report, Scene};
 
 pub(super) fn blocks(report: &Report) -> Vec<Block> {
     let mut table = Table::new(
-        "Pairs of all frames together. The hash is the sum of the frames' hashes, and is the same for all contestants that ran all frames.",
+        "Pairs of all frames together. The hash is the sum of the frames' hashes; it is the same for all contestants that ran all frames.",
         1,
         &[
             "scene",
@@ -48,7 +48,7 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
     for row in &report.duplicates {
         if !row.is_subset {
             differing.push(format!(
-                "**{}: the table gave a pair that is none**",
+                "**{}: the table gave a pair that does not intersect**",
                 row.scene
             ));
         }
@@ -60,11 +60,11 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
         }
     }
     let mut blocks = vec![
-        heading("Whether all agree"),
+        heading("Agreement"),
         paragraph(
-            "The set of pairs depends on positions alone: not on the method, λ, backend, threads, nor on whether pairs are tested once or often. \
-             In every frame the whole sets were compared, not only their numbers. The oracle compares every box with every \
-             box; it is asked for the frame with the most pairs of the smaller scenes.",
+            "The set of pairs depends on positions alone: not on the method, λ, backend or threads, nor on how often pairs are tested. \
+             In every frame whole sets were compared, not only their sizes. The oracle compares every box with every \
+             box; it checks the frame with the most pairs of the smaller scenes.",
         ),
         Block::Table(table),
     ];

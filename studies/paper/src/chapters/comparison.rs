@@ -1,4 +1,4 @@
-//! Figure 5: what the second level is worth, and why.
+//! Figure 5: the gain of the second level, and its reasons.
 
 use super::{gpu_name, heading, lambda, paragraph, places, ratios, short_place};
 use crate::document::{Block, Figure, NONE, Table, count, ms, range, ratio};
@@ -23,7 +23,7 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
         blocks.push(Block::Figure(Figure::plot(
             name,
             format!(
-                "Figure 5 on the {}, {place}: median time a frame as a share of that of [FWZS11] with λ = 5; milliseconds \
+                "Figure 5 on the {}, {place}: median time per frame as a share of that of [FWZS11] with λ = 5; milliseconds \
                  on top. The paper's figure has the first and the third bar of each group.",
                 short_place(is_gpu)
             ),
@@ -51,7 +51,7 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
 fn speed_ups(scenes: &[Scene], is_gpu: bool) -> Table {
     let mut table = Table::new(
         format!(
-            "[FWZS11] over each method on the {}: how many times as fast the method is.",
+            "The speed of each method relative to [FWZS11] on the {}.",
             short_place(is_gpu)
         ),
         1,
@@ -100,7 +100,7 @@ fn verdict(scenes: &[Scene], is_gpu: bool) -> String {
         (held, all) => format!("on {held} of {all} scenes"),
     };
     let mut words = format!(
-        "The paper's claim is that two levels are \"more than twice as fast\" on average. On the {} here they are {} \
+        "The paper claims that two levels are \"more than twice as fast\" on average. On the {} here they are {} \
          times as fast with the paper's λ: more than twice {}.",
         short_place(is_gpu),
         range(&at_papers),
@@ -119,17 +119,16 @@ fn verdict(scenes: &[Scene], is_gpu: bool) -> String {
             .flat_map(|scene| &scene.runs)
             .any(|run| run.is_software)
     {
-        words +=
-            " The adapter is a program on the CPU, so this says nothing about a graphics card.";
+        words += " The adapter is a software driver on the CPU, so this says nothing about a graphics card.";
         return words;
     }
-    words += " Where the time goes is in the next table. With λ = 5, [FWZS11] makes more \
-              entries than `Cells` with λ = 1 and has to sort them in several passes; two levels count and scatter \
-              instead, and the second level does what the finer grid did. That is what the paper's method saves.";
+    words += " The next table shows where the time goes. With λ = 5, [FWZS11] makes more \
+              entries than `Cells` with λ = 1 and has to sort them in several passes. Two levels count and scatter \
+              instead, and the second level replaces the finer grid. That is the saving of the paper's method.";
     if !is_gpu {
-        words += " Not all of it is the two levels' doing: on the CPU `Cells` first drops primitives that the other body comes nowhere \
-                  near, by a coarse map that the paper does not have, and so has far fewer entries. Where each method runs at its best λ, \
-                  both have the map.";
+        words += " Not all of the gain comes from the two levels: on the CPU `Cells` first drops primitives that the other body comes nowhere \
+                  near, by a coarse map that the paper does not have, and so has far fewer entries. When each method runs with its best λ, \
+                  both use the map.";
     }
     let bests = scenes
         .iter()
@@ -137,14 +136,14 @@ fn verdict(scenes: &[Scene], is_gpu: bool) -> String {
     let has_other_best =
         bests.clone().count() > 0 && bests.clone().all(|run| !run.is_papers_lambda);
     if !is_gpu && has_other_best && n_held(&at_best) < at_best.len() {
-        words += " But λ = 5 is not the best setting of [FWZS11] here: all boxes of a cell are compared in registers, many at a time, \
-                  and the exact test filters before it computes, so that a coarser grid with more pairs a cell costs little, \
-                  and what two levels save against it is less than the claim. On the paper's card each of these pairs was \
-                  a thread's work of its own.";
+        words += " But λ = 5 is not the best setting of [FWZS11] here: boxes of a cell are compared in registers, many at a time, \
+                  and the exact test filters before it computes. So a coarser grid with more pairs per cell costs little, \
+                  and two levels gain less than claimed. On the paper's card each of these pairs was \
+                  the work of one thread.";
     }
     words
-        + " `Clusters` does not fill a grid at all: groups are fixed by topology and only their boxes are found anew, so it \
-             reads each position once and touches triangles only where boxes of 64 meet."
+        + " `Clusters` does not fill a grid at all: groups are fixed by topology and only their boxes are recomputed, so it \
+             reads each position once and reads triangles only where boxes of groups of 64 meet."
 }
 
 /// Stages of both methods with the paper's λ, side by side.

@@ -8,32 +8,32 @@ use crate::report::{Duplicates, Report};
 
 pub(super) fn blocks(report: &Report) -> Vec<Block> {
     let mut blocks = vec![
-        heading("Table 3: pairs that are found more than once"),
+        heading("Table 3: pairs found more than once"),
         paragraph(
-            "Two triangles that share several cells are found in each of them. Three ways to deal with that, on the CPU with \
-             λ = 1: every cell tests what it finds (without hash); a table hashed by DJB2, with as many slots as \
-             there are triangles, lets one pair of each slot through (with hash); and the owner rule of `Cells`, by which \
+            "Two triangles that share several cells are found in each of them. The table compares three ways to handle this, on the CPU with \
+             λ = 1. Without hash: every cell tests the pairs that it finds. With hash: a table hashed by DJB2, with as many slots as \
+             there are triangles, keeps one pair per slot. Owner rule of `Cells`: \
              only the cell that holds the lower corner of the pair's common range tests it.",
         ),
         Block::Table(table_3(
             report,
             false,
-            "Table 3, as the paper has it: all pairs of a cell that touch a common sub-cell are tested.",
+            "Table 3, as in the paper: all pairs of a cell that touch a common sub-cell are tested.",
         )),
         Block::Table(table_3(
             report,
             true,
-            "Table 3 once more with boxes compared before the table, as `Cells` does it: fewer pairs, so fewer of them meet in a slot.",
+            "Table 3 with boxes compared before the table, as in `Cells`: fewer pairs, so fewer collisions in a slot.",
         )),
         Block::List(vec![
-            "#CT: colliding triangles of both bodies, average of frames. #Missing rate: the share of them that the table loses; lost \
-             pairs are more, because a triangle is missing only when all its pairs are."
+            "#CT: colliding triangles of both bodies, average over frames. #Missing rate: the share of them that the table loses. The share of \
+             lost pairs is higher, because a triangle is missing only if all its pairs are."
                 .to_owned(),
-            "#MCT: share of the tested pairs that are tested more than once. #Checking times: tests a tested pair, on average. A pair \
-             that shares several sub-cells of one cell counts once here; the paper does not say whether it does there."
+            "#MCT: share of the tested pairs that are tested more than once. #Checking times: average number of tests per tested pair. A pair \
+             that shares several sub-cells of one cell counts once here; the paper does not say how it counts."
                 .to_owned(),
-            "All pairs that come through the table are pairs of the exact answer, and testing everything gives the exact answer: held \
-             against the owner rule in every frame."
+            "All pairs that pass the table are pairs of the exact answer, and testing everything gives the exact answer. Both were \
+             checked against the owner rule in every frame."
                 .to_owned(),
         ]),
     ];
@@ -51,7 +51,7 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
                 "slots / primitives",
                 "missing rate",
                 "missing pairs",
-                "missing rate after a test of boxes",
+                "missing rate after box tests",
                 "owner rule",
             ],
         );
@@ -72,7 +72,7 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
             heading("Figure 7: missing rate against the table's size"),
             Block::Figure(Figure::plot(
                 figures::TABLE_SIZES,
-                "Figure 7: what a table hashed by DJB2 loses, against its size. The paper's figure has no numbers; the \
+                "Figure 7: the losses of a table hashed by DJB2, against its size. The paper's figure has no numbers; the \
                  point is from its table 3. The owner rule needs no table.",
             )),
             Block::Table(table),
@@ -87,7 +87,7 @@ fn table_3(report: &Report, has_box_test: bool, caption: &str) -> Table {
         2,
         &[
             "scene",
-            "whose",
+            "source",
             "ms without hash",
             "ms with hash",
             "ms, owner rule",

@@ -1,4 +1,4 @@
-//! Title, machines, how it was measured, and what came out in short.
+//! Title, summary, machines, and how it was measured.
 
 use super::{gpu_name, heading, paragraph, places, ratios, short_place};
 use crate::document::{Block, Table, percent, range};
@@ -9,24 +9,24 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
     let mut blocks = vec![
         Block::Heading(1, "The paper's benchmarks, measured again".to_owned()),
         paragraph(
-            "What \"Real-time Collision Detection with Two-level Spatial Hashing on GPU\" shows in its section 4, \
-             measured by one run of `impinge-paper`. Rows in italics are the paper's own numbers. `Cells` is \
-             the paper's method as the library has it, `Clusters` is the library's default, and [FWZS11] is the \
-             uniform grid with a radix sort that the paper is compared with.",
+            "The measurements of section 4 of \"Real-time Collision Detection with Two-level Spatial Hashing on GPU\", \
+             repeated by one run of `impinge-paper`. Rows in italics are the paper's own numbers. `Cells` is \
+             the library's version of the paper's method, `Clusters` is the library's default, and [FWZS11] is the \
+             uniform grid with a radix sort that the paper compares itself with.",
         ),
     ];
     if report.is_quick {
         blocks.push(paragraph(
-            "**A quick run**: few frames, to see that all contestants agree. Its times are not worth keeping.",
+            "**A quick run**: few frames, to check that all contestants agree. Its times are not meaningful.",
         ));
     }
     if report.has_debug_assertions {
         blocks.push(paragraph(
-            "**Built with debug assertions**: times are far from those of a release build.",
+            "**Built with debug assertions**: times are much longer than in a release build.",
         ));
     }
     blocks.extend([
-        heading("In short"),
+        heading("Summary"),
         Block::List(in_short(report)),
         heading("Machines"),
         Block::Table(machines(report)),
@@ -40,7 +40,7 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
 
 fn machines(report: &Report) -> Table {
     let machine = &report.machine;
-    let mut table = Table::new("What the numbers were measured on.", 2, &["", "CPU", "GPU"]);
+    let mut table = Table::new("The machines of the measurements.", 2, &["", "CPU", "GPU"]);
     table.n_text = 3;
     table.papers(vec![
         "the paper".to_owned(),
@@ -64,15 +64,15 @@ fn machines(report: &Report) -> Table {
 
 fn how() -> Vec<String> {
     [
-        "All contestants run in one process on the same frames, turn by turn, with a pause of 1 ms before each, so \
-         that nobody finds its data in the caches or its threads awake. All positions are rewritten before each frame.",
+        "All contestants run in one process on the same frames and take turns, with a pause of 1 ms before each frame, so \
+         that all start with cold caches and sleeping threads. All positions are rewritten before each frame.",
         "The clock runs from positions in memory to sorted pairs in memory. On a GPU that includes sending \
-         positions, reading pairs back and settling what the device left unsure.",
-        "The paper prints averages: so do tables here, with medians beside them. Ratios are of medians for surfaces and of averages for solids.",
-        "λ is 1 for `Cells` and 5 for [FWZS11] as in the paper, and beside that what measured best on a few frames \
-         of the scene, for each method and machine. On the CPU, `Cells` first leaves out primitives that the other body comes nowhere near, \
-         by a coarse map; [FWZS11] has that too where it runs with its best λ, and is as the paper describes it with λ = 5.",
-        "A driver that imitates a GPU runs on the CPU: it takes at most ten frames of each scene, with the paper's λ, and \
+         positions, reading pairs back and settling unsure pairs.",
+        "Like the paper, the tables print averages, with medians beside them. Ratios are of medians for surfaces and of averages for solids.",
+        "λ is 1 for `Cells` and 5 for [FWZS11] as in the paper. Both also run with the λ that was fastest on a few frames \
+         of the scene, for each method and machine. On the CPU, `Cells` first drops primitives that the other body comes nowhere near, \
+         by a coarse map; [FWZS11] has the map too when it runs with its best λ, but follows the paper's description with λ = 5.",
+        "A software driver imitates a GPU on the CPU: it runs at most ten frames of each scene, with the paper's λ, and \
          its times say nothing about GPUs.",
     ]
     .map(str::to_owned)
@@ -96,7 +96,7 @@ fn in_short(report: &Report) -> Vec<String> {
             .filter_map(|scene| Some(published::surface(&scene.name)?.ms))
             .collect();
         points.push(format!(
-            "Surfaces on the {place}, average a frame: `Cells` (λ = 1) {} ms, `Clusters` {} ms; the paper on its \
+            "Surfaces on the {place}, average per frame: `Cells` (λ = 1) {} ms, `Clusters` {} ms; the paper on its \
              {}: {} ms.",
             range(&mean(Method::Cells)),
             range(&mean(Method::Clusters)),
@@ -109,7 +109,7 @@ fn in_short(report: &Report) -> Vec<String> {
         if !claims.is_empty() {
             let at_best = match at_best.is_empty() {
                 true => String::new(),
-                false => format!(" and {} times with each one's best λ", range(&at_best)),
+                false => format!(" and {} times with the best λ of each", range(&at_best)),
             };
             points.push(format!(
                 "Against [FWZS11] on the {place} in the same run: `Cells` is {} times as fast with the paper's λ{at_best} \
@@ -132,12 +132,12 @@ fn in_short(report: &Report) -> Vec<String> {
         };
         points.push(format!(
             "The table hashed by DJB2 loses {loss} of the colliding triangles (the paper: 2.7 % to 4.3 %); the owner rule, \
-             which has taken its place, loses none."
+             which replaces it, loses none."
         ));
     }
     points.push(match report.n_disagreements() {
         0 => "Every contestant found the same set of pairs in every frame.".to_owned(),
-        n => format!("**{n} answers differ from those beside them**: see the last chapter."),
+        n => format!("**{n} answers differ from the reference**: see the chapter on agreement."),
     });
     points
 }

@@ -10,8 +10,8 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
     let mut blocks = vec![
         heading("Table 1: surfaces"),
         paragraph(
-            "Two copies of a mesh wave and drift into each other. The paper's columns; cells, cells of the second \
-             level and times are those of `Cells` with λ = 1, candidates are pairs whose boxes overlap, and unsure is \
+            "Two copies of a mesh wave and drift into each other. The columns are those of the paper: cells, cells of the second \
+             level and times are those of `Cells` with λ = 1. Candidates are pairs whose boxes overlap; unsure is \
              the share of them that the floating-point filter left to exact arithmetic.",
         ),
         Block::Table(table_1(scenes)),
@@ -33,8 +33,8 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
          second one; those behind other faces show through.",
     ));
     blocks.push(Block::Table(contestants(
-        "Table 1, all contestants. Counts are averages a frame; the column before them says how many times as fast as \
-         [FWZS11] with λ = 5 a contestant is.",
+        "Table 1, all contestants. Counts are averages per frame; the column before them gives the speed of a contestant relative to \
+         [FWZS11] with λ = 5.",
         scenes,
     )));
     blocks
@@ -66,7 +66,7 @@ fn table_1(scenes: &[Scene]) -> Table {
         2,
         &[
             "scene",
-            "whose",
+            "source",
             "#Tri",
             "#Cells",
             "#Sub",

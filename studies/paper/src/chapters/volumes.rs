@@ -12,8 +12,8 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
     let mut blocks = vec![
         heading("Table 2: solids of corotated finite elements"),
         paragraph(
-            "An elastic body is dropped on another one like it. The simulation's positions are kept for every step, and all \
-             contestants find the pairs of tetrahedra of the same steps. The paper's columns; cells, cells of the second \
+            "An elastic body is dropped on another one like it. The positions of every simulation step are recorded, and all \
+             contestants find the pairs of tetrahedra of the same steps. The columns are those of the paper: cells, cells of the second \
              level and times are those of `Cells` with λ = 1.",
         ),
         Block::Table(table_2(scenes)),
@@ -23,7 +23,7 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
                 .map(|scene| {
                     let advance = scene.simulation_ms.map_or(0.0, |samples| samples.mean);
                     format!(
-                        "**{}**: {}; {}; {} steps, {} ms each besides detection.",
+                        "**{}**: {}; {}; {} steps, {} ms each without detection.",
                         scene.name,
                         scene.mesh,
                         scene.motion,
@@ -36,15 +36,15 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
     ];
     blocks.extend(pictures(
         scenes,
-        "Figure 6: of each scene the first step with a third of the most pairs (at the most, bodies are crushed beyond recognition). Colliding tetrahedra are red in the lower body and blue in \
-         the upper one; those inside show through.",
+        "Figure 6: for each scene the first step with a third of the largest number of pairs (at the maximum, bodies are crushed beyond \
+         recognition). Colliding tetrahedra are red in the lower body and blue in the upper one; those inside show through.",
     ));
     blocks.push(Block::Figure(Figure::plot(
         figures::STEPS,
-        "Colliding tetrahedra of both bodies, step by step: the bodies fall, meet, are crushed and come apart again.",
+        "Colliding tetrahedra of both bodies, step by step: the bodies fall, meet, are crushed and separate again.",
     )));
     blocks.push(Block::Table(contestants(
-        "Table 2, all contestants. Counts are averages a step, and ratios are of averages: the median step has little contact.",
+        "Table 2, all contestants. Counts are averages per step, and ratios are of averages: the median step has little contact.",
         scenes,
     )));
     blocks
@@ -52,12 +52,12 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
 
 fn table_2(scenes: &[Scene]) -> Table {
     let mut table = Table::new(
-        "Table 2. The most colliding tetrahedra of any step stand beside the average: the paper's bodies stay pressed together, \
-         these fall, meet and partly come apart.",
+        "Table 2. The largest number of colliding tetrahedra in any step is given beside the average: the paper's bodies stay pressed \
+         together, ours fall, meet and partly separate.",
         2,
         &[
             "scene",
-            "whose",
+            "source",
             "#Tetra",
             "#Cells",
             "#Sub",

@@ -1,4 +1,4 @@
-//! Groups of bars, each with its number on top.
+//! Groups of bars, each bar with its number on top.
 
 use plotters::chart::{ChartBuilder, LabelAreaPosition};
 use plotters::coord::Shift;
@@ -10,7 +10,7 @@ use plotters::style::{Color, IntoFont, RGBColor, ShapeStyle, TextStyle, WHITE};
 use super::{AXIS, FONT, GRID, Plot, failed};
 use crate::error::Error;
 
-/// The height of a bar and what is written on top of it; `None` where it was not run.
+/// The height of a bar and the text on top of it; `None` if it was not run.
 pub(crate) type Height = Option<(f64, String)>;
 
 /// A group's name, and the height of each kind of bar.
@@ -19,13 +19,13 @@ pub(crate) type Group = (String, Vec<Height>);
 /// Groups of bars beside each other.
 pub(crate) struct Bars {
     pub title: String,
-    /// What the height means.
+    /// The meaning of the height.
     pub y: String,
     /// Names of the bars of a group, and their colours.
     pub kinds: Vec<(String, RGBColor)>,
     /// The groups.
     pub groups: Vec<Group>,
-    /// A height to mark, and what it is.
+    /// A height to mark, and its label.
     pub mark: Option<(f64, String)>,
 }
 
@@ -96,7 +96,7 @@ impl Plot for Bars {
                     .map_err(failed)?;
             }
         }
-        // Numbers come last, on white: a line may pass behind them.
+        // Numbers are drawn last, on white, because a line may pass behind them.
         let style = text(11).pos(Pos::new(HPos::Center, VPos::Bottom));
         for (label, at) in labels {
             let (wide, high) = area.estimate_text_size(label, &style).map_err(failed)?;

@@ -12,12 +12,12 @@ use super::bars::legend;
 use super::{AXIS, FONT, GRID, Plot, failed};
 use crate::error::Error;
 
-/// An axis and where its labels are.
+/// An axis and its labels.
 pub(crate) struct Axis {
     pub name: String,
-    /// Equal steps are equal factors.
+    /// Whether the axis is logarithmic.
     pub is_log: bool,
-    /// Values with a label, from the least to the most; these are also the axis' ends.
+    /// Labelled values in ascending order; the first and the last one are the ends of the axis.
     pub ticks: Vec<(f64, String)>,
 }
 
@@ -30,7 +30,7 @@ pub(crate) struct Curve {
     pub has_dots: bool,
 }
 
-/// A point to mark, and what it is.
+/// A point to mark, and its label.
 pub(crate) struct Mark {
     pub at: (f64, f64),
     pub name: String,
@@ -46,7 +46,7 @@ pub(crate) struct Curves {
 }
 
 impl Axis {
-    /// Equal steps from 0 to at least `most`, about six of them, at 1, 2 or 5 times a power of ten.
+    /// A linear axis from 0 to at least `most`, in about six steps of 1, 2 or 5 times a power of ten.
     pub fn linear(name: &str, most: f64) -> Self {
         let most = if most > 0.0 { most } else { 1.0 };
         let power = 10f64.powf((most / 6.0).log10().floor());
@@ -68,7 +68,7 @@ impl Axis {
         }
     }
 
-    /// 1, 2 and 5 times powers of ten that hold all values above 0.
+    /// A logarithmic axis that contains all values above 0, with labels at 1, 2 and 5 times powers of ten.
     pub fn log(name: &str, values: impl IntoIterator<Item = f64>) -> Self {
         let (low, high) = values
             .into_iter()
@@ -103,7 +103,7 @@ impl Axis {
         }
     }
 
-    /// Where a value is on the drawn axis.
+    /// The position of a value on the drawn axis.
     fn place(&self, value: f64) -> f64 {
         match self.is_log {
             true => value.log10(),
