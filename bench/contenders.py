@@ -104,7 +104,7 @@ class Libigl(Contender):
 
     label, package, exact = "libigl (CGAL, exact kernel)", "libigl", True
     settings = "intersect_other, detect_only"
-    abilities = ("yes", "yes", "no", "exact, float64", "starts anew")
+    abilities = ("yes", "yes", "no", "exact, float64", "starts again")
 
     def __init__(self):
         from igl.copyleft import cgal

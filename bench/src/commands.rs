@@ -289,7 +289,7 @@ fn adversarial_scenes(options: &Options, report: &mut Report) -> Result<(), Fail
     };
     let mut text = "Each scene beside a plain one (two bodies that meet) of as many primitives. `per item` is time over \
                     primitives plus pairs.\n\n\
-                    | scene | method | primitives | pairs | candidates | ms | plain ms | ratio | ns per item | plain | bytes a primitive |\n\
+                    | scene | method | primitives | pairs | candidates | ms | plain ms | ratio | ns per item | plain | bytes per primitive |\n\
                     |---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n"
         .to_owned();
     for entry in adversarial::SCENES {

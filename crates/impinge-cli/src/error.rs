@@ -30,7 +30,7 @@ pub enum Error {
     /// The detection failed, or was cancelled.
     #[error(transparent)]
     Detection(#[from] impinge::Error),
-    /// The simulation could not be set up or go on, or was cancelled.
+    /// The simulation could not be set up or continue, or was cancelled.
     #[error(transparent)]
     Simulation(#[from] impinge_fem::Error),
     /// A saved state that is damaged or belongs to another simulation.

@@ -232,7 +232,7 @@ fn vtu_keeps_vertices_ids_and_precision() {
             assert_eq!(load(&path), mesh);
         }
     }
-    // Bodies of both kinds: the tetrahedra win unless triangles are asked for.
+    // Bodies of both kinds: the tetrahedra win unless triangles are requested.
     let (first, second) = (surface(false), volume(true));
     write_vtu(
         &path,

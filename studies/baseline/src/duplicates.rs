@@ -34,7 +34,7 @@ use crate::{Error, check_lambda, check_threads};
 use djb2::Table;
 use rules::{Every, Recorded};
 
-/// Which pairs of a cell go on to the intersection test.
+/// Which pairs of a cell reach the intersection test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Possible {
     /// All pairs that touch a common sub-cell, as in the paper (section 3.2).
