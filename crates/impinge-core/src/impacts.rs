@@ -1,4 +1,4 @@
-//! The answers about a step: what touches and when, and what might.
+//! The answers about a step: impacts, with their times, and candidates.
 
 use crate::exact::Contact;
 use crate::frame::{Frame, owner_by_first};
@@ -8,7 +8,7 @@ use crate::pairs::{Primitive, mix};
 use crate::stats::Statistics;
 use crate::step::Toi;
 
-/// A key and what comes with it.
+/// A key and its value.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Found<V> {
     pub key: u64,
@@ -56,15 +56,16 @@ impl Numbering {
 /// Two elements that touch during a step, and when first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impact {
-    /// What they are.
+    /// The kinds of the two elements.
     pub kind: PairKind,
     /// The element that the kind names first: the vertex of a vertex and a face, the edge of an edge and a vertex.
     ///
-    /// Vertices are numbered as positions are, faces as they were given (those of tetrahedra: by tetrahedron, then by the
-    /// corner opposite), edges that were given as they were given, and others as unique pairs `(low, high)` in the order of
-    /// `(high, low)`: [`Body::part`](crate::Body::part) has them.
+    /// Vertices are numbered as positions are. Faces are numbered as they were given; those of tetrahedra by tetrahedron,
+    /// then by the opposite corner. Edges are numbered as they were given; those of faces as unique pairs `(low, high)` in
+    /// the order of `(high, low)`. [`Body::part`](crate::Body::part) lists them.
     pub a: Primitive,
-    /// The other element. Where both are of the same kind, it is of a body with a higher id, or the higher element.
+    /// The other element. If both are of the same kind, it belongs to the body with the higher id, or is the higher element
+    /// of the same body.
     pub b: Primitive,
     /// The first time in [0, 1] at which they touch, rounded down to `f32` or `f64`, as [`Step::toi`](crate::Step::toi) says.
     pub toi: f64,
@@ -78,12 +79,12 @@ impl Impact {
         row(self.a, self.b)
     }
 
-    /// What rows are sorted by.
+    /// The order of rows.
     fn order(&self) -> (PairKind, [u32; 4]) {
         (self.kind, self.row())
     }
 
-    /// The earlier one, or of two at the same time the one whose row comes first.
+    /// The earlier impact; of two at the same time, the one whose row comes first.
     pub(crate) fn earlier(self, other: Impact) -> Impact {
         let is_later = self.toi.total_cmp(&other.toi);
         match is_later.then_with(|| self.order().cmp(&other.order())) {
@@ -132,7 +133,7 @@ impl Impacts {
         self.numbering.impact(kind, toi, found)
     }
 
-    /// How many pairs touch.
+    /// The number of pairs that touch.
     pub fn len(&self) -> usize {
         self.impacts.len()
     }
@@ -152,19 +153,19 @@ impl Impacts {
         self.impacts.iter()
     }
 
-    /// Those of one kind.
+    /// The impacts of one kind.
     pub fn of(&self, kind: PairKind) -> &[Impact] {
         let start = self.impacts.partition_point(|impact| impact.kind < kind);
         let end = self.impacts.partition_point(|impact| impact.kind <= kind);
         &self.impacts[start..end]
     }
 
-    /// The one with the least time; of several, the one whose row comes first.
+    /// The earliest impact; of several at the same time, the one whose row comes first.
     pub fn earliest(&self) -> Option<Impact> {
         self.impacts.iter().copied().reduce(Impact::earlier)
     }
 
-    /// How many pairs touch at the start.
+    /// The number of pairs that touch at the start.
     pub fn touching_at_start(&self) -> usize {
         let at_start = self.impacts.iter().filter(|impact| impact.at_start);
         at_start.count()
@@ -219,12 +220,12 @@ impl Candidates {
         self.keys.iter().map(Vec::len).sum()
     }
 
-    /// Whether there is none.
+    /// Whether there are no candidates.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Those of one kind: `(a, b)`, where `a` is what the kind names first.
+    /// The candidates of one kind: `(a, b)`, where `a` is the element that the kind names first.
     pub fn of(&self, kind: PairKind) -> impl ExactSizeIterator<Item = (Primitive, Primitive)> + '_ {
         let keys = self.keys[kind as usize].iter();
         keys.map(|&key| self.numbering.pair(key))
@@ -235,7 +236,7 @@ impl Candidates {
         self.of(kind).map(|(a, b)| row(a, b))
     }
 
-    /// All of them.
+    /// All candidates.
     pub fn iter(&self) -> impl Iterator<Item = (PairKind, Primitive, Primitive)> + '_ {
         let kinds = PairKind::ALL.into_iter();
         kinds.flat_map(|kind| self.of(kind).map(move |(a, b)| (kind, a, b)))

@@ -50,12 +50,12 @@ impl Pairs {
         (&mut self.keys, &mut self.stats)
     }
 
-    /// How many pairs there are.
+    /// The number of pairs.
     pub fn len(&self) -> usize {
         self.keys.len()
     }
 
-    /// Whether nothing intersects.
+    /// Whether there are no pairs.
     pub fn is_empty(&self) -> bool {
         self.keys.is_empty()
     }
@@ -166,7 +166,7 @@ impl Pairs {
     }
 
     /// A hash of the set of pairs that does not depend on their order: the wrapping sum of a
-    /// mixed 64-bit word a pair (finaliser of SplitMix64, Steele et al. 2014).
+    /// mixed 64-bit word per pair (finaliser of SplitMix64, Steele et al. 2014).
     pub fn hash(&self) -> u64 {
         hash_rows(self.rows())
     }
@@ -176,7 +176,7 @@ impl Pairs {
         &self.stats
     }
 
-    /// Two answers are the same when their rows are, whatever the scenes.
+    /// Whether two answers have the same rows, whatever their scenes.
     pub fn same_as(&self, other: &Pairs) -> bool {
         self.keys.len() == other.keys.len() && self.rows().eq(other.rows())
     }

@@ -1,6 +1,6 @@
 //! The frame loop: resolves a query, has a [`Finder`] append the keys of all pairs, sorts them.
 //!
-//! There is one loop for every backend and for methods of other crates. It is async because a GPU is waited for. A
+//! There is one loop for every backend and for methods of other crates. It is async because a GPU must be waited for. A
 //! finder that works on the CPU never waits: its frame is complete at the first poll, see [`ready`].
 
 use std::pin::pin;
@@ -21,7 +21,7 @@ use crate::workers::Workers;
 pub struct Job<'a> {
     /// The bodies.
     pub scene: &'a Scene,
-    /// Who takes part.
+    /// The layers that take part, and their tests.
     pub frame: &'a Frame,
     /// The threads.
     pub workers: &'a Workers,
@@ -60,7 +60,7 @@ pub trait Finder {
     ) -> impl Future<Output = Result<(), Error>>;
 }
 
-/// What a frame needs whichever finder answers it. The memory is kept from frame to frame.
+/// The frame, answer and threads that every finder needs. The memory is kept from frame to frame.
 pub struct FrameLoop {
     frame: Frame,
     pairs: Pairs,
@@ -80,7 +80,7 @@ impl FrameLoop {
     /// One frame. Its answer is in [`pairs`](FrameLoop::pairs).
     ///
     /// # Errors
-    /// A stale id, refused positions, those of the finder.
+    /// A stale id, refused positions, errors of the finder.
     pub async fn run(
         &mut self,
         scene: &Scene,
@@ -116,7 +116,7 @@ impl FrameLoop {
         Ok(())
     }
 
-    /// The answer of the last frame, if it had no error.
+    /// The answer of the last frame, unless it failed.
     pub fn pairs(&self) -> &Pairs {
         &self.pairs
     }

@@ -1,15 +1,15 @@
-//! Threads: the caller works too, the others are helpers of its own.
+//! Threads: the caller, which works too, and its helpers.
 //!
-//! Waking a sleeping thread takes as long as a small frame (15 µs of the caller's time and 45 until it runs, on the
-//! machine of the records; through a rayon pool 35 of the caller's), so helpers are called once a frame,
-//! nobody waits for one that has not come yet, and none goes to sleep at once:
+//! Waking a sleeping thread takes as long as a small frame (on the machine of the records, 15 µs of the caller's time
+//! and 45 µs until the thread runs; through a rayon pool 35 µs of the caller's). So helpers are called once per frame, the
+//! caller never waits for a helper that has not come yet, and helpers do not go to sleep at once:
 //!
 //! ```text
 //! caller    | call | region 1 ......... | alone | region 2 .... | end of the shift
 //! helper    : (waking) ..........|      | spins | ............. | lingers, as long as the shift took | sleeps
 //! ```
 //!
-//! A helper that lingers yields to every other thread. What rayon spreads (clustering) runs in its pool.
+//! A helper that lingers yields to every other thread. Clustering, which rayon parallelises, runs in a rayon pool.
 
 mod places;
 
@@ -26,20 +26,20 @@ use crate::error::Error;
 
 use places::Places;
 
-/// How long a helper spins for the next region before it yields between looks.
+/// How long a helper spins while it waits for the next region; after that it yields between checks.
 const SPIN: Duration = Duration::from_micros(50);
-/// How long a helper lingers within a shift, and at most after one.
+/// How long a helper lingers within a shift, and at most after a shift.
 const LINGER: Duration = Duration::from_millis(1);
-/// How long a frame must take to be worth waking a helper for, if it will sleep again before the next one.
+/// How long a frame must take to be worth waking a helper that will sleep again before the next frame.
 const WORTH: Duration = Duration::from_micros(800);
-/// Primitives from which on a frame is thought to take that long, whatever the last one took.
+/// From this many primitives on, a frame is expected to take that long, whatever the last one took.
 const LARGE: u64 = 300_000;
-/// Primitives from which on clustering is spread over threads.
+/// From this many primitives on, clustering runs on several threads.
 const SPREAD_FROM: usize = 4096;
-/// Looks at the gate between two at the clock.
+/// How often a helper checks the gate between two looks at the clock.
 const LOOKS: u32 = 64;
 
-/// How many workers there are and where they come from.
+/// The workers of a detector: the caller, its helpers and the rayon pool.
 pub struct Workers {
     n: usize,
     crew: Arc<Crew>,
@@ -49,18 +49,18 @@ pub struct Workers {
     last: Mutex<Option<(Instant, Duration)>>,
     /// Whether helpers that sleep are woken in this shift.
     wakes: AtomicBool,
-    /// For [`install`](Workers::install), started when first needed.
+    /// The pool of [`install`](Workers::install), started when first needed.
     pool: OnceLock<Pool>,
 }
 
-/// Where rayon spreads work.
+/// The rayon pool in use.
 enum Pool {
-    /// As many threads as the process has cores: rayon's own pool, which all detectors share.
+    /// Rayon's global pool, with one thread per core of the process, which all detectors share.
     OfProcess,
     OfDetector(rayon::ThreadPool),
 }
 
-/// While it lives, helpers expect more to do.
+/// While it lives, helpers expect more work.
 pub struct Shift<'a> {
     workers: &'a Workers,
     start: Instant,
@@ -80,7 +80,7 @@ impl Drop for Workers {
         self.crew.quit.store(true, Ordering::Relaxed);
         for helper in self.helpers.take().into_iter().flatten() {
             helper.thread().unpark();
-            // It catches panics of the work; there is nothing else to report.
+            // Helpers catch panics of the work; there is nothing else to report.
             let _ = helper.join();
         }
     }
@@ -103,15 +103,16 @@ impl Workers {
         }
     }
 
-    /// How many there are.
+    /// The number of workers, the caller included.
     pub fn n(&self) -> usize {
         self.n
     }
 
-    /// Keeps helpers awake between regions until what it returns is dropped.
+    /// Keeps helpers awake between regions until the returned shift is dropped.
     ///
-    /// Those that sleep are woken unless the frame, of so many primitives, will be over before they come: if it follows
-    /// the last one closely, they stay awake for the next; if the last one was long, this one will be.
+    /// Sleeping helpers are woken unless the frame will probably be over before they come. They are woken if it has very
+    /// many primitives; if the last frame took long, for so will this one; and if it follows the last one closely, for
+    /// then they stay awake for the next one.
     pub fn shift(&self, n_primitives: u64) -> Shift<'_> {
         let start = Instant::now();
         let wakes = n_primitives >= LARGE
@@ -130,15 +131,15 @@ impl Workers {
         self.last.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Runs something that rayon spreads, on as many threads as there are workers. What is about few primitives is not
-    /// spread: it runs here, for going to a pool takes 70 µs.
+    /// Runs work that rayon parallelises, on as many threads as there are workers. Work on few primitives runs on this
+    /// thread, for going to a pool takes 70 µs.
     ///
-    /// This is a second pool beside the helpers, with a reason: clustering divides a body in two again and again, which
-    /// takes a scheduler that steals, and helpers only know a list of equal tasks. It works when a body is new or has
-    /// flowed away from its clusters; in all other frames its threads sleep.
+    /// Why a second pool beside the helpers: clustering splits a body recursively, which takes a work-stealing scheduler,
+    /// while helpers only take equal tasks from a list. The pool works when a body is new or has flowed away from its
+    /// clusters; in all other frames its threads sleep.
     ///
     /// # Errors
-    /// Threads that do not start.
+    /// The pool's threads do not start.
     pub fn install<T: Send>(
         &self,
         n_primitives: usize,
@@ -163,9 +164,9 @@ impl Workers {
         })
     }
 
-    /// Calls `task(scratch, ix)` once for each `ix` below `n_tasks`, each worker with a scratch of its own. The
-    /// caller takes tasks from the first on, helpers from the last: tasks next to each other tend to use the same
-    /// memory. With a single task or worker nobody is woken.
+    /// Calls `task(scratch, ix)` once for each `ix` below `n_tasks`, each worker with its own scratch. The
+    /// caller takes tasks from the first on, helpers from the last: neighbouring tasks tend to use the same
+    /// memory. With a single task or worker, no helper is woken.
     pub fn for_each<S: Send>(
         &self,
         scratches: &mut [S],
@@ -185,7 +186,7 @@ impl Workers {
             if worker >= n_workers {
                 return;
             }
-            // SAFETY: there are at least `n_workers`, and every worker has a number of its own.
+            // SAFETY: there are at least `n_workers` scratches, and every worker has a different number.
             let scratch = unsafe { &mut *scratches.at(worker) };
             while let Some(ix) = claims.next(n_tasks, worker == 0) {
                 task(scratch, ix);
@@ -195,12 +196,12 @@ impl Workers {
         self.crew.region(&work);
     }
 
-    /// Wakes all helpers, so that they are there when they are needed.
+    /// Wakes all helpers, so that they are awake when they are needed.
     pub fn call_all(&self) {
         self.call(self.n - 1);
     }
 
-    /// Wakes so many helpers, those that sleep, where it is worth it.
+    /// Wakes those of the first `n` helpers that sleep, if the shift is worth it.
     fn call(&self, n: usize) {
         if !self.wakes.load(Ordering::Relaxed) {
             return;
@@ -216,7 +217,7 @@ impl Workers {
                     .name(format!("impinge-{seat}"))
                     .spawn(move || crew.serve(seat))
             };
-            // Where a thread cannot be had, there is one helper less.
+            // If a thread does not start, there are fewer helpers.
             (1..self.n).map_while(|seat| start(seat).ok()).collect()
         });
         for (helper, asleep) in helpers.iter().zip(&self.crew.asleep).take(n) {
@@ -252,14 +253,14 @@ impl Claims {
 /// The first of some scratches, one a worker.
 struct Scratches<S>(*mut S);
 
-// SAFETY: each worker takes another one, and `S` may be sent to it.
+// SAFETY: each worker takes a different scratch, and `S` may be sent to it.
 unsafe impl<S: Send> Sync for Scratches<S> {}
 
 impl<S> Scratches<S> {
     /// # Safety
-    /// There must be so many.
+    /// There must be more than `worker` scratches.
     unsafe fn at(&self, worker: usize) -> *mut S {
-        // SAFETY: said above.
+        // SAFETY: by the contract of `at`.
         unsafe { self.0.add(worker) }
     }
 }
@@ -437,7 +438,7 @@ fn build_pool(n_threads: usize) -> Result<rayon::ThreadPool, Error> {
         .map_err(|error| Error::Threads(error.to_string()))
 }
 
-/// One thread shared by every detector that was told to use one, so that what rayon would spread
+/// One thread shared by every detector with a single thread, so that work that rayon would parallelise
 /// (clustering) stays on one core.
 fn single() -> Result<&'static rayon::ThreadPool, Error> {
     static POOL: OnceLock<rayon::ThreadPool> = OnceLock::new();

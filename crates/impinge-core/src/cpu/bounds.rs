@@ -1,8 +1,8 @@
 //! Stage `bounds`: the box of each cluster, of the tree above it, and of single primitives.
 //!
-//! In: positions and the unique vertices of each cluster. Out: a box a cluster and a tree node, as
+//! In: positions and the unique vertices of each cluster. Out: one box per cluster and per tree node, as
 //! structures of arrays. A vertex is one 4-lane load and two instructions.
-//! Cost: every vertex of a body once for each cluster that has it (about 1.35 times a closed mesh).
+//! Cost: every vertex of a body once per cluster that has it (1.35 times on average in a closed mesh).
 //! Invariant: a box holds all its vertices; f64 positions are rounded outward.
 
 use crate::elements::with_corners;
@@ -226,19 +226,19 @@ pub(crate) fn of_run(positions: &Positions, run: std::ops::Range<usize>) -> Boun
     bounds
 }
 
-/// What is found of some clusters besides their boxes.
+/// A summary of some clusters.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Summary {
-    /// The box of them all.
+    /// The box of all of them.
     pub bounds: Bounds,
-    /// Half their summed surface; infinite where squares of extents overflow.
+    /// Half their summed surface; infinite if squares of extents overflow.
     pub surface: f32,
-    /// Whether all positions that were looked at are certainly finite. (f64 ones are checked before.)
+    /// Whether all positions that were read are certainly finite. (f64 positions are checked before.)
     pub all_finite: bool,
 }
 
 impl Summary {
-    /// Of no clusters.
+    /// The summary of no clusters.
     pub const EMPTY: Summary = Summary {
         bounds: Bounds::EMPTY,
         surface: 0.0,
@@ -257,7 +257,7 @@ impl Summary {
 /// The boxes of some clusters.
 ///
 /// # Safety
-/// `into` must be as long as the clustering, and nobody else may look at these clusters' boxes meanwhile.
+/// `into` must be as long as the clustering, and no other thread may access these clusters' boxes at the same time.
 #[inline(always)]
 pub(crate) unsafe fn of_clusters<S: Simd>(
     simd: S,
@@ -280,13 +280,13 @@ pub(crate) unsafe fn of_clusters<S: Simd>(
             surface: x * y + y * z + z * x,
             all_finite,
         });
-        // SAFETY: the caller's.
+        // SAFETY: by the contract of this function.
         unsafe { into.put(cluster, &bounds) };
     }
     summary
 }
 
-/// The boxes of a cluster's primitives, a lane each; lanes past its size are emptied.
+/// The boxes of a cluster's primitives, one per lane; lanes past its size become empty.
 pub(crate) fn of_cluster_primitives(
     positions: &Positions,
     clustering: &Clustering,
@@ -360,7 +360,7 @@ pub(crate) struct TreeBounds {
 }
 
 impl TreeBounds {
-    /// Room for the boxes of a shape.
+    /// Makes room for the boxes of a shape.
     pub fn resize(&mut self, shape: &Shape) {
         self.levels
             .resize_with(shape.n_levels(), BoundsArray::default);
@@ -369,7 +369,7 @@ impl TreeBounds {
         }
     }
 
-    /// Boxes of the nodes above a level from those of the level.
+    /// Computes the boxes of the nodes above a level from those of the level.
     pub fn refit_above(&mut self, below: usize, shape: &Shape) {
         for level in below + 1..self.levels.len() {
             let (below, above) = self.levels.split_at_mut(level);
@@ -384,7 +384,7 @@ impl TreeBounds {
         }
     }
 
-    /// The box of everything.
+    /// The box of the whole tree.
     pub fn root(&self) -> Bounds {
         self.levels.last().map_or(Bounds::EMPTY, |root| root.at(0))
     }

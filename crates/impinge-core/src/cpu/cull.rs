@@ -1,16 +1,16 @@
-//! A coarse map of where bodies are, which drops primitives that no other body comes near.
+//! A coarse map of where bodies are, used to drop primitives that no other body comes near.
 //!
 //! ```text
-//! quantise   each vertex once: the cell of the map that it lies in, a byte an axis
+//! quantise   each vertex once: the cell of the map that it lies in, one byte per axis
 //! mark       each primitive: the range of its vertices' cells, in the map of its body; a row of
 //!            cells along x is a number of 64 bits
 //! compare    cells that two bodies mark
 //! look up    each primitive again: whether its range has such a cell
 //! ```
 //!
-//! In: positions and where each body may be met. Out: whether a primitive may have a partner. Cost: four
-//! bytes a vertex, twelve a primitive near other bodies. Invariant: the function from coordinates to
-//! cells is monotone under any rounding, so that a point of two primitives lies in a cell that both mark.
+//! In: positions and where each body may meet others. Out: whether a primitive may have a partner. Cost: four
+//! bytes per vertex, twelve per primitive near other bodies. Invariant: the function from coordinates to
+//! cells is monotone under any rounding, so a point of two primitives lies in a cell that both mark.
 
 mod codes;
 
@@ -25,19 +25,19 @@ use super::kept::Run;
 use super::world::World;
 use codes::{Codes, Function, greater_bytes, lesser_bytes};
 
-/// Cells along each axis at most: two more hold what lies outside. A row along x has 64, and a byte
-/// numbers the others.
+/// The most cells along each axis. Two more hold vertices outside the region. A row along x then has 64 cells;
+/// along y and z a byte numbers the cells.
 const MOST_ALONG: [u32; 3] = [62, 253, 253];
-/// Primitives of all bodies a cell of the map.
+/// Primitives of all bodies per cell of the map.
 const PRIMITIVES_A_CELL: u64 = 8;
-/// Rows of the map that one primitive marks at most; a larger one counts as being everywhere.
+/// The most rows of the map that one primitive marks; a larger primitive counts as being everywhere.
 const MOST_MARKED: u32 = 256;
-/// Maps, and so participants, at most.
+/// The most maps, and so the most participants.
 pub(crate) const MOST_MAPS: usize = 8;
-/// Primitives looked at before those among them that are near are marked.
+/// Primitives that are examined together; then those among them that are near are marked.
 const TOGETHER: usize = 512;
 
-/// A primitive near where its body is met, and the cells of its vertices along x, y, z, a byte each.
+/// A primitive within its body's reach, and the first and last cell of its vertices along x, y, z, one byte per axis.
 #[derive(Debug, Clone, Copy)]
 struct Near {
     primitive: u32,
@@ -60,26 +60,26 @@ impl Near {
 pub(crate) struct Cull {
     /// From coordinates to cells.
     function: Function,
-    /// Cells along each axis, those outside included.
+    /// The number of cells along each axis, including those outside the region.
     along: [u32; 3],
-    /// The cell of each vertex, a byte an axis, body after body.
+    /// The cell of each vertex, one byte per axis, body after body.
     codes: Vec<u32>,
     /// Where each participant's codes start.
     firsts: Vec<usize>,
-    /// Each body's map, one after the other: its rows along x, bit k for the cell k.
+    /// The maps of all bodies, one after the other: rows along x, bit k for cell k.
     maps: Vec<AtomicU64>,
-    /// Cells where primitives of different bodies, or of one that is asked for itself, are.
+    /// Cells marked by two bodies, or by one body whose self-collision is queried.
     live: Vec<u64>,
     /// Maps of bodies with primitives too large to be marked.
     everywhere: AtomicU32,
-    /// Maps whose bodies pair with themselves.
+    /// Maps of bodies whose self-collision is queried.
     alone: u32,
     near: Vec<Mutex<Vec<Near>>>,
 }
 
 impl Cull {
-    /// Makes ready for a frame of [`MOST_MAPS`] participants at most, which meet within the region; their
-    /// primitives come in `n_runs`.
+    /// Prepares for a frame of at most [`MOST_MAPS`] participants, which meet within the region; their
+    /// primitives come in `n_runs` runs.
     pub fn begin(&mut self, world: World<'_>, region: &Bounds, n_runs: usize) {
         let frame = world.frame;
         let wanted = frame.n_primitives() / PRIMITIVES_A_CELL;
@@ -89,7 +89,7 @@ impl Cull {
         self.function = Function {
             origin: region.min,
             scale: std::array::from_fn(|axis| {
-                // A little less than all cells, so that the region's end is still within the last one.
+                // Slightly less than all cells, so that the region's end still lies in the last cell.
                 let extent = region.max[axis] - region.min[axis];
                 let scale = (along[axis] as f32 - 0.01) / extent;
                 if scale.is_finite() && scale > 0.0 {
@@ -143,7 +143,7 @@ impl Cull {
         self.firsts[participant as usize]
     }
 
-    /// Notes the primitives of a run that are near `reach`, and marks their cells.
+    /// Lists the primitives of a run that are near `reach`, and marks their cells.
     pub fn mark(&self, world: World<'_>, run: Run, run_ix: usize, reach: &Bounds) {
         let mut near = self.near[run_ix].lock().expect("no task panics");
         near.clear();
@@ -178,7 +178,7 @@ impl Cull {
             .step_by(TOGETHER)
             .zip(corners.chunks(TOGETHER))
         {
-            // No branch: whether a primitive is near cannot be foreseen.
+            // No branch: whether a primitive is near is unpredictable.
             let mut n = 0;
             for (primitive, corners) in (first..).zip(corners) {
                 let vertex = codes[corners[0] as usize];
@@ -188,7 +188,7 @@ impl Cull {
                     low = lesser_bytes(low, vertex);
                     high = greater_bytes(high, vertex);
                 }
-                // Partners are met within reach only.
+                // Partners can only meet it within reach.
                 low = greater_bytes(low, reach.0);
                 high = lesser_bytes(high, reach.1);
                 together[n] = Near {
@@ -214,7 +214,7 @@ impl Cull {
         }
     }
 
-    /// Finds the cells in which primitives may have partners, when all are marked.
+    /// Finds the cells in which primitives may have partners, once all are marked.
     pub fn compare(&mut self) {
         let n_rows = self.n_rows();
         self.live.clear();
@@ -236,7 +236,7 @@ impl Cull {
         }
     }
 
-    /// Calls back for the primitives of a run that may have partners, in their order; how many were near.
+    /// Calls back for the primitives of a run that may have partners, in order. Returns how many were near.
     pub fn for_live(&self, run_ix: usize, mut call: impl FnMut(u32)) -> usize {
         let near = self.near[run_ix].lock().expect("no task panics");
         for near in &*near {

@@ -1,9 +1,9 @@
-//! How far a body's vertices reach, and groups of them, read in the order of memory.
+//! The extent of a body's vertices, and of groups of them, read in memory order.
 //!
-//! In: positions and, for each coordinate, whether it belongs to a group. Out: the box of the whole, and an interval along
-//! one axis for each of six groups (see `remote`). A run of sixteen vertices is three registers of sixteen coordinates,
-//! whose axes take turns; nothing is taken apart before the end.
-//! Cost: 12 bytes of positions and 0.75 of membership a vertex, read once.
+//! In: positions and, for each coordinate, whether it belongs to a group. Out: the box of the whole body, and an interval
+//! along one axis for each of six groups (see `remote`). Sixteen vertices fill three 512-bit registers of interleaved x, y,
+//! z. Axes are separated once, after the last run.
+//! Cost: 12 bytes of positions and 0.75 bytes of membership per vertex, read once.
 
 use crate::grouping::bounds::{Bounds, greater, lesser};
 
@@ -28,7 +28,7 @@ pub(super) fn insert(members: &mut [Members], vertex: u32, side: Side) {
     members[run][side.end()][coordinate / ROW] |= 1 << (coordinate % ROW);
 }
 
-/// Leaves groups without members.
+/// Removes all members from some groups.
 pub(super) fn clear(members: &mut [Members], groups: Groups) {
     let mut kept: Members = [[!0; 3]; 2];
     for side in groups.sides() {
@@ -90,15 +90,15 @@ pub(crate) fn add_runs(runs: &[[[f32; 3]; RUN]], members: &[Members], into: &mut
 /// How far some vertices reach, and those of each group.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Extents {
-    /// The box of all of them.
+    /// The box of all of these vertices.
     pub whole: Bounds,
     pub groups: Intervals,
-    /// Whether all positions are certainly finite; the rest is of use only if they are.
+    /// Whether all positions are certainly finite. If not, the other fields mean nothing.
     pub all_finite: bool,
 }
 
 impl Extents {
-    /// Of no vertices.
+    /// The extents of no vertices.
     pub const EMPTY: Extents = Extents {
         whole: Bounds::EMPTY,
         groups: Intervals::EMPTY,
@@ -106,8 +106,8 @@ impl Extents {
     };
 }
 
-/// What the groups span: those below along x, y and z, then those above. Each axis by itself, so these are no
-/// boxes. Groups without members span nothing.
+/// The intervals that the groups span: those below along x, y and z, then those above. Each axis stands for itself, so
+/// these are not boxes. Groups without members have empty intervals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Intervals([Bounds; 2]);
 
@@ -120,21 +120,21 @@ impl Default for Intervals {
 impl Intervals {
     pub const EMPTY: Intervals = Intervals([Bounds::EMPTY; 2]);
 
-    /// Adds those of other vertices.
+    /// Adds the intervals of other vertices.
     pub fn join(&mut self, other: &Intervals) {
         for (groups, other) in self.0.iter_mut().zip(&other.0) {
             groups.join(other);
         }
     }
 
-    /// Lets a group reach as far as a box.
+    /// Extends a group's interval to that of a box.
     pub fn extend(&mut self, side: Side, bounds: &Bounds) {
         let (groups, axis) = (&mut self.0[side.end()], side.axis());
         groups.min[axis] = lesser(groups.min[axis], bounds.min[axis]);
         groups.max[axis] = greater(groups.max[axis], bounds.max[axis]);
     }
 
-    /// Lets groups span nothing.
+    /// Empties the intervals of some groups.
     pub fn clear(&mut self, which: Groups) {
         for side in which.sides() {
             let (groups, axis) = (&mut self.0[side.end()], side.axis());
@@ -143,7 +143,7 @@ impl Intervals {
         }
     }
 
-    /// The groups that are not beside a box, that is, closed intervals that share a number.
+    /// The groups that are not beside a box: the closed intervals share a number.
     pub fn back_at(&self, other: &Bounds) -> Groups {
         let mut back = Groups::default();
         for side in Groups::ALL.sides() {
@@ -156,7 +156,7 @@ impl Intervals {
     }
 }
 
-/// Those of a run of runs; the last one may be shorter. Positions and members begin at the same vertex.
+/// The extents of consecutive runs, the last of which may be shorter. Positions and members begin at the same vertex.
 #[inline(always)]
 pub(super) fn of<S: Simd>(simd: S, positions: &[[f32; 3]], members: &[Members]) -> Extents {
     let mut found = RunExtents::EMPTY;
@@ -164,7 +164,7 @@ pub(super) fn of<S: Simd>(simd: S, positions: &[[f32; 3]], members: &[Members]) 
     let (members, last_members) = members.split_at(runs.len());
     simd.add_runs(runs, members, &mut found);
     if let [first, ..] = rest {
-        // Its first vertex again and again: no member in those places.
+        // Filled up with its first vertex; these places have no members.
         let mut run = [*first; RUN];
         run[..rest.len()].copy_from_slice(rest);
         simd.add_runs(&[run], &last_members[..1], &mut found);
@@ -180,14 +180,14 @@ pub(super) fn of<S: Simd>(simd: S, positions: &[[f32; 3]], members: &[Members]) 
             groups.min[axis] = lesser(groups.min[axis], found.group_min[end][k]);
             groups.max[axis] = greater(groups.max[axis], found.group_max[end][k]);
         }
-        // Finite only if all terms are. It may overflow on finite ones: then they are looked at.
+        // Finite only if all terms are. If it overflows on finite terms, the positions are checked one by one.
         sum += found.sum[k];
     }
     extents.all_finite = sum.is_finite();
     extents
 }
 
-/// Where a cluster lies beside others, which is its group: below (0 to 2) or above (3 to 5) them along an axis.
+/// The side on which a cluster lies beside others, which is its group: below (0 to 2) or above (3 to 5) along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Side(u8);
 
@@ -247,7 +247,7 @@ mod tests {
     use super::*;
     use crate::settings::InstructionSet;
 
-    /// Numbers without a pattern.
+    /// Pseudo-random numbers.
     fn hash(x: usize) -> u32 {
         let mut x = (x as u32).wrapping_add(1).wrapping_mul(0x9e37_79b9);
         x ^= x >> 15;
@@ -292,7 +292,7 @@ mod tests {
                 .collect();
             let n_runs = n.div_ceil(RUN);
             let bits = |run: usize, ix: usize| {
-                // A few members; none past the last vertex.
+                // A few members, and none past the last vertex.
                 let bits = hash(6 * run + ix + 77) & hash(6 * run + ix + 99) & 0xffff;
                 let end = (3 * (n - RUN * run)).saturating_sub(RUN * (ix % 3));
                 (bits as u16) & (((1u32 << end.min(RUN)) - 1) as u16)

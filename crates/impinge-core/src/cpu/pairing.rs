@@ -3,14 +3,14 @@
 //! In: work items (two clusters). Out: candidates, which `narrow` settles item by item, while both groups are in
 //! the cache.
 //!
-//! 0. The boxes of a cluster's primitives, and their corners, are found when it is first needed; a worker keeps
-//!    those of the clusters it saw last. Work items come in the order of the tree, so most are found again.
+//! 0. The boxes of a cluster's primitives, and their corners, are computed when first needed; a worker caches
+//!    those of the clusters it saw last. Work items come in the order of the tree, so most clusters are cached.
 //! 1. The two clusters' boxes intersect in a box; primitives of either side that do not meet it
 //!    drop out, for a partner's box lies in its cluster's box.
 //! 2. Each survivor of the smaller side is tested against the survivors of the other, 16 (or 8)
-//!    lanes at a time: one 64-bit mask a primitive.
+//!    lanes at a time: one 64-bit mask per primitive.
 //! 3. Within one body the adjacency masks clear, or set apart, the lanes that share a vertex. Pairs that share a
-//!    hub are cleared whatever the rule: `hubs` answers for them.
+//!    hub are cleared under any rule: `hubs` settles them.
 //!
 //! Invariant: a pair of primitives lies in one work item only, so no candidate comes twice.
 //! On a CPU these box tests beat the 4x4x4 sub-cell masks of the paper, see `docs/performance.md`.
@@ -28,7 +28,7 @@ use super::narrow::Settler;
 use super::simd::{Isa, Lanes, Masks, Simd};
 use super::world::{BodyRef, World};
 
-/// One work item in so many has its narrow stage timed: looking at the clock takes longer than some take.
+/// The narrow stage is timed for one work item in this many: reading the clock takes longer than some items.
 const SAMPLED: u32 = 16;
 
 /// Two clusters that may meet: participants and their clusters.
@@ -44,12 +44,12 @@ pub(crate) struct WorkItem {
 #[derive(Debug, Default)]
 pub(crate) struct Worker {
     pub settler: Settler,
-    /// For pairs that share a hub.
+    /// Scratch for pairs that share a hub.
     pub(super) around: Around,
     groups: GroupCache<Group>,
     met: Met,
     masks: Masks,
-    /// Work items whose candidates were settled.
+    /// The number of work items whose candidates were settled.
     n_settled: u32,
 }
 
@@ -185,13 +185,13 @@ pub(crate) fn run<S: Simd>(
     settler.settle(isa, world);
 }
 
-/// Where the groups of a work item are, and the lanes of each that meet the box in which their clusters meet.
+/// The places of a work item's groups, and the lanes of each that meet the intersection of the two clusters' boxes.
 struct Culled {
     places: [usize; 2],
     lanes: [u64; 2],
 }
 
-/// None if one side has no lane that meets the box.
+/// `None` if one side has no lane that meets the intersection of the two clusters' boxes.
 #[inline(always)]
 fn cull<S: Simd>(
     simd: S,
@@ -207,7 +207,7 @@ fn cull<S: Simd>(
     let both = leaf(0).intersection(&leaf(1));
     let mut places = [NOWHERE; 2];
     let mut lanes = [0; 2];
-    // Where it leaves no lane of the one that is there, the other need not be found.
+    // Test a cached group first: if no lane of it is left, the other group need not be computed.
     let first = usize::from(!groups.holds(sides[0]) && groups.holds(sides[1]));
     for side in [first, 1 - first] {
         places[side] = groups.place(simd, world, sides[side], places[1 - side]);
@@ -277,7 +277,7 @@ fn within_body<S: Simd>(
         return;
     }
     let mut shared = [0u64; GROUP];
-    // Adjacency is kept by lanes of a: turning it round costs more than some rows.
+    // Adjacency is stored by lanes of a: transposing it costs more than a few more rows.
     let (side, rows) = if lanes_a.count_ones() <= 2 * lanes_b.count_ones() {
         for (lane, mask) in adjacency.between(cluster_a, cluster_b) {
             shared[lane] = mask;
@@ -315,7 +315,7 @@ fn clear_hubs(hubs: &Hubs, item: &WorkItem, rows: Side, masks: &mut Masks) {
     }
 }
 
-/// What becomes of primitives of one body that share a vertex.
+/// Treats the primitives of one body that share a vertex.
 struct Rule<'a> {
     body: BodyRef<'a>,
     first_a: u32,
@@ -324,7 +324,7 @@ struct Rule<'a> {
 }
 
 impl Rule<'_> {
-    /// The lanes that a row has met become candidates, those of `shared` as the rule says.
+    /// Makes candidates of the lanes that a row has met; treats those in `shared` by the rule.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "one call for each way to meet")]
     fn put_row<S: Simd>(

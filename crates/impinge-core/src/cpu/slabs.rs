@@ -16,16 +16,16 @@ use super::simd::{Isa, Simd, dispatch};
 use super::top_level::TopLevel;
 use super::world::World;
 
-/// Work items of one slab, unless the budget says less.
+/// Work items per slab, unless the budget allows fewer.
 const MOST_ITEMS: usize = 1 << 20;
-/// The least with which a slab makes sense.
+/// The fewest work items with which a slab makes sense.
 const FEWEST_ITEMS: usize = 256;
-/// Work items a task pairs, at most and at least. Neighbours in the slab are neighbours in space, and a
-/// worker keeps the boxes of the clusters it has just seen: long tasks find more of them.
+/// The fewest and the most work items per task. Neighbours in the slab are neighbours in space, and a
+/// worker caches the boxes of the clusters it has just seen: long tasks find more of them cached.
 const TASK: std::ops::RangeInclusive<usize> = 16..=512;
-/// Tasks a worker should get, so that none waits long for the last one.
+/// Tasks per worker, so that no worker waits long for the last task.
 const TASKS_EACH: usize = 12;
-/// Work items below which one worker takes them all.
+/// With fewer work items, one worker takes them all.
 const PARALLEL_FROM: usize = 64;
 
 /// How many work items a slab may hold within the budget, when `held` bytes are held besides.
@@ -45,9 +45,9 @@ pub(crate) fn most_items(budget: Option<u64>, held: u64) -> Result<usize, Error>
     Ok(((budget - held) / each).min(MOST_ITEMS as u64) as usize)
 }
 
-/// What becomes of work items, and where the trees are that they come from.
+/// Provides the trees from which work items come, and settles the work items.
 pub(crate) trait Stage: Copy + Sync {
-    /// What one worker has of its own.
+    /// The state of one worker.
     type Worker: Send;
 
     /// The tree over the clusters of a layer.
@@ -59,7 +59,7 @@ pub(crate) trait Stage: Copy + Sync {
     /// What a worker has counted.
     fn counts(worker: &Self::Worker) -> Counts;
 
-    /// Vertices of a layer that very many elements name.
+    /// The hubs of a layer: vertices that very many elements name.
     fn hubs(&self, layer: u32) -> Option<&Hubs>;
 
     /// What is left to do when all work items are settled.
@@ -67,13 +67,13 @@ pub(crate) trait Stage: Copy + Sync {
         Ok(())
     }
 
-    /// Whether the answer is known, so that what is left need not be looked at.
+    /// Whether the answer is known, so that the remaining work items can be skipped.
     fn is_over(&self) -> bool {
         false
     }
 }
 
-/// What one worker has counted in a frame.
+/// The counts of one worker in a frame.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Counts {
     /// Time spent on candidates.
@@ -100,7 +100,7 @@ impl Stage for World<'_> {
         self.cache(layer).clustering.hubs()
     }
 
-    /// Pairs that share a hub, which `dispatch` and `pairing` have left out.
+    /// Settles the pairs that share a hub, which `dispatch` and `pairing` have skipped.
     fn finish(
         &self,
         job: Job<'_>,
@@ -191,7 +191,7 @@ impl<W: Stage> Slabs<'_, W> {
             self.flush()?;
         }
         if self.items.len() == self.items.capacity() {
-            // Doubling must not pass the limit.
+            // Doubling must not exceed the limit.
             let (held, left) = (self.items.len(), self.most_items - self.items.len());
             let more = held.max(FEWEST_ITEMS).min(left);
             self.items.reserve_exact(more);
@@ -246,7 +246,7 @@ fn pair<S: Simd, W: Stage>(
     world.pair(simd, isa, items, worker);
 }
 
-/// Dispatch for every pair of layers and every layer that the frame asks for.
+/// Runs dispatch for every pair of layers and every single layer that the frame asks for.
 #[inline(always)]
 fn all<S: Simd, W: Stage>(
     simd: S,
@@ -266,7 +266,7 @@ fn all<S: Simd, W: Stage>(
             if frame.test(a as usize, b as usize).is_none() {
                 return Ok(());
             }
-            // Compiled on its own: inside this closure the instruction set would be lost.
+            // Compiled separately: inside this closure the instruction set would be lost.
             dispatch!(slabs.isa, between, <W: Stage> (
                 a: u32 = a,
                 b: u32 = b,
@@ -279,7 +279,7 @@ fn all<S: Simd, W: Stage>(
         if frame.test(ix as usize, ix as usize).is_some() {
             let (tree, hubs) = (world.tree(ix), world.hubs(ix));
             dispatch::within(simd, tree, hubs, stack, |cluster_a, cluster_b| {
-                // Adjacency masks are kept with the lower cluster.
+                // Adjacency masks are stored with the lower cluster.
                 slabs.put(WorkItem {
                     a: ix,
                     b: ix,

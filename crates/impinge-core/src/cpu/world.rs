@@ -1,4 +1,4 @@
-//! What the stages look at: a scene, who takes part, and what is cached a body.
+//! Read-only view shared by all stages: the scene, its participants, and the cache kept per body.
 
 use crate::elements::Elements;
 use crate::exact::Point;
@@ -18,15 +18,15 @@ pub(super) const STALE: f64 = 1.5;
 /// What is kept of a body from frame to frame.
 #[derive(Debug)]
 pub(crate) struct BodyCache {
-    /// The topology that was clustered.
+    /// The stamp of the topology that was clustered.
     pub topology_stamp: u64,
-    /// The positions that the boxes belong to; 0 for none.
+    /// The stamp of the positions that the boxes belong to; 0 for none.
     pub positions_stamp: u64,
     pub clustering: Clustering,
     pub bounds: TreeBounds,
     /// The box of all primitives.
     pub whole: Bounds,
-    /// Which clusters lie beside all that the body could meet; for bodies large enough.
+    /// The clusters that lie beside all bodies that this one could meet; only for bodies that are large enough.
     pub remote: Option<Box<Remote>>,
     /// Half the summed surface of the clusters.
     pub surface: f64,
@@ -37,24 +37,24 @@ pub(crate) struct BodyCache {
 /// Caches by slot of the body.
 pub(crate) type Caches = Vec<Option<Box<BodyCache>>>;
 
-/// What the narrow stage reads, whatever the method.
+/// The data that the narrow stage reads, for every method.
 #[derive(Clone, Copy)]
 pub struct World<'a> {
     /// The bodies.
     pub scene: &'a Scene,
-    /// Who takes part.
+    /// The participants.
     pub frame: &'a Frame,
-    /// `Clusters` only: places of primitives are those of the clusters' orders.
+    /// `Clusters` only: places of primitives are places in the clusters' orders.
     pub(crate) caches: Option<&'a Caches>,
 }
 
-/// One participant, looked up. A *place* names a primitive: in the order of the clusters where there
+/// One participant's data. A *place* names a primitive: in the order of the clusters if there
 /// are any, else as the body numbers it.
 #[derive(Clone, Copy)]
 pub struct BodyRef<'a> {
-    /// Who it is.
+    /// The participant.
     pub participant: &'a Layer,
-    /// Where its vertices are.
+    /// The positions of its vertices.
     pub positions: &'a Positions,
     /// The corners at each place.
     pub elements: &'a Elements,
@@ -62,7 +62,7 @@ pub struct BodyRef<'a> {
 }
 
 impl<'a> World<'a> {
-    /// Places of primitives as the bodies number them.
+    /// A view in which places are the bodies' own numbers of primitives.
     pub fn new(scene: &'a Scene, frame: &'a Frame) -> Self {
         World {
             scene,
@@ -71,7 +71,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// A participant, looked up.
+    /// Looks up a participant.
     #[inline(always)]
     pub fn body(&self, participant_ix: u32) -> BodyRef<'a> {
         let participant = &self.frame.layers[participant_ix as usize];
@@ -85,7 +85,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// `Clusters` only: what is kept of a participant.
+    /// `Clusters` only: the cache of a participant.
     #[inline(always)]
     pub(crate) fn cache(&self, participant_ix: u32) -> &'a BodyCache {
         let slot = self.frame.layers[participant_ix as usize].id.index();
@@ -118,7 +118,7 @@ impl<'a> BodyRef<'a> {
         self.elements.corners(place as usize)
     }
 
-    /// The corners at a place in double precision; an element of fewer than four repeats its last one.
+    /// The corners at a place in double precision; an element with fewer than four repeats its last.
     #[inline(always)]
     pub fn points(&self, place: u32) -> [Point; 4] {
         let corners = self.elements.four_corners(place as usize);

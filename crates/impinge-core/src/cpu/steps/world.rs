@@ -12,7 +12,7 @@ use crate::step::{Start, Toi};
 use super::cache::{Caches, LayerCache, part_ix};
 use super::hull::Pose;
 
-/// What was found, by kind of pair.
+/// Contacts found, by kind of pair.
 pub(crate) type FoundByKind = [Vec<Found<Contact>>; PairKind::ALL.len()];
 
 /// What to look for in a step.
