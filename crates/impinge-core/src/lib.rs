@@ -36,6 +36,7 @@ mod scene;
 mod settings;
 mod stats;
 mod step;
+mod transform;
 #[allow(missing_docs)]
 pub mod workers;
 

@@ -70,6 +70,15 @@ impl Pairs {
         })
     }
 
+    /// One pair by its place in that order.
+    pub fn get(&self, ix: usize) -> Option<(Primitive, Primitive)> {
+        let key = *self.keys.get(ix)?;
+        Some((
+            self.primitive((key >> 32) as u32),
+            self.primitive(key as u32),
+        ))
+    }
+
     fn primitive(&self, global: u32) -> Primitive {
         let body = self.bodies[owner_by_first(&self.bodies, global, |body| body.first)];
         Primitive {
@@ -158,6 +167,51 @@ impl Pairs {
         colliding.sort_unstable();
         colliding.dedup();
         colliding
+    }
+
+    /// The primitives of each body that take part in any pair, found in one pass: sorted, each once. Bodies come in order,
+    /// those without such a primitive are left out.
+    pub fn all_colliding(&self) -> Vec<(BodyId, Vec<u32>)> {
+        let both = |&key: &u64| [(key >> 32) as u32, key as u32];
+        let mut colliding: Vec<u32> = self.keys.iter().flat_map(both).collect();
+        colliding.sort_unstable();
+        colliding.dedup();
+        let owner = |number: u32| owner_by_first(&self.bodies, number, |body| body.first);
+        colliding
+            .chunk_by(|&a, &b| owner(a) == owner(b))
+            .map(|numbers| {
+                let body = self.bodies[owner(numbers[0])];
+                let local = numbers.iter().map(|number| number - body.first);
+                (body.id, local.collect())
+            })
+            .collect()
+    }
+
+    /// Keeps the pairs for which `keep` says so: a filter of the caller's own, by body, by face or by vertex. It is asked
+    /// once per pair of primitives, in the order in which pairs are held, after all of them were found: so the answer is
+    /// the same on every method, backend and thread count as long as `keep` itself depends on the pair alone. Statistics
+    /// stay those of the detection.
+    ///
+    /// ```
+    /// use impinge_core::{Backend, Detector, Query, Scene};
+    /// # fn main() -> Result<(), impinge_core::Error> {
+    /// let mut scene = Scene::new();
+    /// let triangle = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// for _ in 0..3 {
+    ///     scene.add_triangles(&[[0, 1, 2]], &triangle)?;
+    /// }
+    /// let mut pairs = Detector::new(Backend::Cpu)?.detect(&scene, &Query::all())?.clone();
+    /// pairs.retain(|a, b| a.body.index() + b.body.index() != 1);
+    /// assert_eq!(pairs.rows().collect::<Vec<_>>(), [[0, 0, 2, 0], [1, 0, 2, 0]]);
+    /// # Ok(()) }
+    /// ```
+    pub fn retain(&mut self, mut keep: impl FnMut(Primitive, Primitive) -> bool) {
+        let mut keys = std::mem::take(&mut self.keys);
+        keys.retain(|&key| {
+            let a = self.primitive((key >> 32) as u32);
+            keep(a, self.primitive(key as u32))
+        });
+        self.keys = keys;
     }
 
     /// The bodies that took part, in order, and what they are made of.

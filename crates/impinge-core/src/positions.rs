@@ -47,6 +47,14 @@ impl Positions {
         }
     }
 
+    /// Refuses the first that is not finite or outside the exact range.
+    pub(crate) fn check(&self, body: BodyId) -> Result<(), Error> {
+        match self {
+            Positions::F32(positions) => check_positions(body, positions),
+            Positions::F64(positions) => check_positions(body, positions),
+        }
+    }
+
     pub(crate) fn precision(&self) -> &'static str {
         match self {
             Positions::F32(_) => "f32",
@@ -87,6 +95,8 @@ pub trait Real: sealed::Sealed + Copy + Send + Sync + 'static {
     #[doc(hidden)]
     fn widen(self) -> f64;
     #[doc(hidden)]
+    fn round(x: f64) -> Self;
+    #[doc(hidden)]
     fn stored(positions: &mut Positions) -> Option<&mut Vec<[Self; 3]>>;
     #[doc(hidden)]
     fn store(positions: &[[Self; 3]]) -> Positions;
@@ -108,6 +118,11 @@ impl Real for f32 {
     fn widen(self) -> f64 {
         f64::from(self)
     }
+    #[inline(always)]
+    #[allow(clippy::cast_possible_truncation, reason = "rounded to the nearest")]
+    fn round(x: f64) -> f32 {
+        x as f32
+    }
     fn stored(positions: &mut Positions) -> Option<&mut Vec<[f32; 3]>> {
         match positions {
             Positions::F32(positions) => Some(positions),
@@ -121,6 +136,10 @@ impl Real for f32 {
 
 impl Real for f64 {
     #[inline]
+    #[allow(
+        clippy::manual_range_contains,
+        reason = "a loop without branches becomes vectors"
+    )]
     fn all_in_range(numbers: &[f64]) -> bool {
         let bad = numbers.iter().fold(0, |bad, x| {
             let size = x.abs();
@@ -132,6 +151,10 @@ impl Real for f64 {
     #[inline(always)]
     fn widen(self) -> f64 {
         self
+    }
+    #[inline(always)]
+    fn round(x: f64) -> f64 {
+        x
     }
     fn stored(positions: &mut Positions) -> Option<&mut Vec<[f64; 3]>> {
         match positions {

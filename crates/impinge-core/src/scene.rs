@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::elements::with_corners;
 pub(crate) use crate::elements::{Elements, Kind};
 use crate::elements::{Part, Topology};
 use crate::error::Error;
@@ -9,6 +10,7 @@ pub(crate) use crate::ids::BodyId;
 use crate::ids::new_stamp;
 use crate::positions::Real;
 pub(crate) use crate::positions::{Positions, check_positions};
+use crate::transform::{Affine, Motion};
 
 /// Which bodies meet in [`Query::all`](crate::Query::all): two bodies meet when the `category` of
 /// each shares a bit with the `mask` of the other. By default all bodies meet.
@@ -46,6 +48,8 @@ pub struct Body {
     end: Option<Positions>,
     /// Whether `end` counts. If not, only its memory is kept.
     moves: bool,
+    /// How the body was moved, if it was by a transform.
+    motion: Option<Box<Motion>>,
     filter: Filter,
     topology_stamp: u64,
     positions_stamp: u64,
@@ -75,6 +79,20 @@ impl Body {
     /// stands still.
     pub fn end_positions(&self) -> Option<&Positions> {
         self.end.as_ref().filter(|_| self.moves)
+    }
+
+    /// How the vertices were moved from the [rest positions](Body::rest_positions); `None` for a body that was not
+    /// ([`Scene::set_transform`]).
+    pub fn transform(&self) -> Option<[[f64; 4]; 4]> {
+        self.motion.as_ref().map(|motion| motion.matrix.matrix())
+    }
+
+    /// The positions that were given last, before any [transform](Scene::set_transform).
+    pub fn rest_positions(&self) -> &Positions {
+        match &self.motion {
+            Some(motion) => &motion.rest,
+            None => &self.positions,
+        }
     }
 
     /// Points, edges, triangles or tetrahedra.
@@ -120,6 +138,7 @@ impl Body {
         self.positions_stamp = new_stamp();
         self.step_stamp = self.positions_stamp;
         self.moves = false;
+        self.motion = None;
         self.checked = checked;
     }
 }
@@ -221,6 +240,61 @@ impl Scene {
             None => self.slots.push(held),
         }
         Ok(id)
+    }
+
+    /// Adds many bodies in one call: all of them, or none.
+    ///
+    /// Body `i` has the elements `element_offsets[i]..element_offsets[i + 1]` and the positions
+    /// `vertex_offsets[i]..vertex_offsets[i + 1]`; its elements name its own vertices, from 0. Both offsets have one number
+    /// more than there are bodies: they begin with 0, never fall, and end with the number of elements and of positions.
+    ///
+    /// ```
+    /// use impinge_core::{Elements, Scene};
+    /// # fn main() -> Result<(), impinge_core::Error> {
+    /// let mut scene = Scene::new();
+    /// let faces = Elements::Triangles(vec![[0, 1, 2]; 2]);
+    /// let triangle = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// let bodies = scene.add_many(&faces, &[0, 1, 2], &[triangle; 2].concat(), &[0, 3, 6])?;
+    /// assert_eq!(bodies.len(), 2);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`add`](Scene::add); offsets that are not as described.
+    pub fn add_many<R: Real>(
+        &mut self,
+        elements: &Elements,
+        element_offsets: &[usize],
+        positions: &[[R; 3]],
+        vertex_offsets: &[usize],
+    ) -> Result<Vec<BodyId>, Error> {
+        check_offsets("element_offsets", element_offsets, elements.len())?;
+        check_offsets("vertex_offsets", vertex_offsets, positions.len())?;
+        if element_offsets.len() != vertex_offsets.len() {
+            return Err(Error::Setting {
+                setting: "vertex_offsets",
+                given: format!("{} numbers", vertex_offsets.len()),
+                allowed: "as many as element_offsets has",
+            });
+        }
+        let mut ids = Vec::with_capacity(element_offsets.len() - 1);
+        self.slots.reserve(element_offsets.len() - 1);
+        for (part, vertices) in element_offsets.windows(2).zip(vertex_offsets.windows(2)) {
+            let part: Elements =
+                with_corners!(elements, |all| all[part[0]..part[1]].to_vec().into());
+            let added = self.add(part, R::store(&positions[vertices[0]..vertices[1]]));
+            match added {
+                Ok(id) => ids.push(id),
+                Err(error) => {
+                    // In reverse, so that slots are free in the order in which they were before.
+                    for &id in ids.iter().rev() {
+                        self.remove(id)?;
+                    }
+                    return Err(error);
+                }
+            }
+        }
+        Ok(ids)
     }
 
     /// Removes a body; a later body may reuse its slot.
@@ -345,6 +419,58 @@ impl Scene {
         }
     }
 
+    /// Moves a body by an affine matrix, such as a rigid motion, without its vertices being given again: from its rest
+    /// positions, which are those that were given last ([`add`](Scene::add), [`set_positions`](Scene::set_positions),
+    /// [`remesh`](Scene::remesh)). A second transform replaces the first, and does not add to it.
+    ///
+    /// Answers are exact as if the moved vertices had been given, and these are rounded in one way only, so they have the
+    /// same bits on every backend: row `[a, b, c, d]` of the matrix takes `(x, y, z)` to `((a x + b y) + c z) + d`. Each
+    /// product and each sum is rounded to `f64` in this order, none is fused with another, and the last sum is rounded
+    /// once more to the precision of the rest positions. So a rotation bends a body by as much as rounding does.
+    ///
+    /// End positions are forgotten, as by [`set_positions`](Scene::set_positions).
+    ///
+    /// ```
+    /// use impinge_core::{Positions, Scene};
+    /// # fn main() -> Result<(), impinge_core::Error> {
+    /// let mut scene = Scene::new();
+    /// let body = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])?;
+    /// let up = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.5], [0.0, 0.0, 0.0, 1.0]];
+    /// scene.set_transform(body, &up)?;
+    /// assert_eq!(scene.body(body)?.positions().point(1), [1.0, 0.0, 0.5]);
+    /// assert_eq!(scene.body(body)?.rest_positions().point(1), [1.0, 0.0, 0.0]);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// The id names no body; a matrix that is not finite, or whose last row is not `[0, 0, 0, 1]`; rest positions that
+    /// were written in place and are refused; a moved position that is refused. The body is unchanged then.
+    pub fn set_transform(&mut self, body: BodyId, matrix: &[[f64; 4]; 4]) -> Result<(), Error> {
+        let matrix = Affine::new(matrix)?;
+        let target = self.body_mut(body)?;
+        if !target.checked {
+            target.positions.check(body)?;
+        }
+        let previous = target.motion.take();
+        let (rest, before) = match previous {
+            Some(motion) => (motion.rest, Some(motion.matrix)),
+            None => (Arc::new(target.positions.clone()), None),
+        };
+        matrix.write(&rest, &mut target.positions);
+        if let Err(error) = target.positions.check(body) {
+            // What stood there before is computed again, to the same bits.
+            match before {
+                Some(matrix) => matrix.write(&rest, &mut target.positions),
+                None => target.positions.clone_from(&rest),
+            }
+            target.motion = before.map(|matrix| Box::new(Motion { rest, matrix }));
+            return Err(error);
+        }
+        target.has_moved(true);
+        target.motion = Some(Box::new(Motion { rest, matrix }));
+        Ok(())
+    }
+
     /// Sets which bodies a body meets in [`Query::all`](crate::Query::all).
     ///
     /// # Errors
@@ -398,6 +524,7 @@ impl Scene {
                 body.topology.bytes()
                     + body.positions.bytes()
                     + body.end.as_ref().map_or(0, Positions::bytes)
+                    + body.motion.as_ref().map_or(0, |motion| motion.rest.bytes())
             })
             .sum()
     }
@@ -412,6 +539,35 @@ impl Scene {
     pub(crate) fn body_in(&self, slot: u32) -> &Body {
         let held = self.slots[slot as usize].0.as_ref();
         &held.expect("a participant's slot is in use").1
+    }
+}
+
+/// Refuses offsets that do not divide `n` things.
+fn check_offsets(setting: &'static str, offsets: &[usize], n: usize) -> Result<(), Error> {
+    let refused = |given, allowed| {
+        Err(Error::Setting {
+            setting,
+            given,
+            allowed,
+        })
+    };
+    match (offsets.first(), offsets.last()) {
+        (Some(0), Some(&last)) if last == n => {}
+        (Some(0), Some(last)) => {
+            return refused(
+                format!("{last} as the last of {n}"),
+                "their number as the last",
+            );
+        }
+        (Some(first), _) => return refused(format!("{first} as the first"), "0 as the first"),
+        _ => return refused("none".to_owned(), "one more than there are bodies"),
+    }
+    match offsets.windows(2).position(|pair| pair[0] > pair[1]) {
+        None => Ok(()),
+        Some(ix) => refused(
+            format!("{} after {} at {}", offsets[ix + 1], offsets[ix], ix + 1),
+            "numbers that never fall",
+        ),
     }
 }
 
@@ -430,10 +586,7 @@ fn checked_body(
             return Err(Error::TooMany { what, given, limit });
         }
     }
-    match &positions {
-        Positions::F32(positions) => check_positions(id, positions)?,
-        Positions::F64(positions) => check_positions(id, positions)?,
-    }
+    positions.check(id)?;
     let n_vertices = positions.len();
     let bad_index = elements.first_bad_index(n_vertices);
     if let Some((primitive, index)) = bad_index {
@@ -450,6 +603,7 @@ fn checked_body(
         positions,
         end: None,
         moves: false,
+        motion: None,
         filter,
         topology_stamp: new_stamp(),
         positions_stamp: stamp,
