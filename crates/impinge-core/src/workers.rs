@@ -17,7 +17,7 @@ use crate::clock::Instant;
 use std::any::Any;
 use std::cell::UnsafeCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering, fence};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering, fence};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -51,6 +51,8 @@ pub struct Workers {
     wakes: AtomicBool,
     /// The pool of [`install`](Workers::install), started when first needed.
     pool: OnceLock<Pool>,
+    /// The process that made it: a fork of that process has none of its threads.
+    process: u32,
 }
 
 /// The rayon pool in use.
@@ -77,6 +79,11 @@ impl Drop for Shift<'_> {
 
 impl Drop for Workers {
     fn drop(&mut self) {
+        if self.process != process() {
+            // These threads do not exist here: waiting for them would never end.
+            std::mem::forget(self.helpers.take());
+            return;
+        }
         self.crew.quit.store(true, Ordering::Relaxed);
         for helper in self.helpers.take().into_iter().flatten() {
             helper.thread().unpark();
@@ -90,6 +97,7 @@ impl Workers {
     /// `threads` workers, the caller among them; 0 for one per core. Threads are started when first needed.
     pub fn new(threads: usize) -> Self {
         let (pool, n) = match threads {
+            0 if is_forked() => (OnceLock::new(), rayon::current_num_threads()),
             0 => (Pool::OfProcess.into(), rayon::current_num_threads()),
             n => (OnceLock::new(), n),
         };
@@ -100,6 +108,7 @@ impl Workers {
             last: Mutex::new(None),
             wakes: AtomicBool::new(true),
             pool,
+            process: process(),
         }
     }
 
@@ -145,11 +154,14 @@ impl Workers {
         n_primitives: usize,
         work: impl FnOnce() -> T + Send,
     ) -> Result<T, Error> {
-        if n_primitives < SPREAD_FROM {
-            return Ok(work());
-        }
-        if self.n == 1 {
-            return Ok(single()?.install(work));
+        // Pools that are shared by the whole process are of no use in a fork of it: there, a detector has its own.
+        if !is_forked() {
+            if n_primitives < SPREAD_FROM {
+                return Ok(work());
+            }
+            if self.n == 1 {
+                return Ok(single()?.install(work));
+            }
         }
         let pool = match self.pool.get() {
             Some(pool) => pool,
@@ -428,6 +440,22 @@ impl Drop for Closing<'_> {
         }
         crew.busy.store(false, Ordering::Release);
     }
+}
+
+/// The number of this process.
+fn process() -> u32 {
+    #[cfg(not(target_family = "wasm"))]
+    return std::process::id();
+    #[cfg(target_family = "wasm")]
+    return 1;
+}
+
+/// Whether this process was forked from one that had workers, whose threads do not exist here.
+pub fn is_forked() -> bool {
+    static FIRST: AtomicU32 = AtomicU32::new(0);
+    let this = process();
+    let first = FIRST.compare_exchange(0, this, Ordering::Relaxed, Ordering::Relaxed);
+    first.is_err_and(|first| first != this)
 }
 
 fn build_pool(n_threads: usize) -> Result<rayon::ThreadPool, Error> {

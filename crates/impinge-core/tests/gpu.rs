@@ -505,14 +505,13 @@ fn adapters_are_listed_and_chosen_by_name() {
     let error = Detector::with_settings(nobody.clone()).err().unwrap();
     assert!(matches!(error, Error::NoAdapter { .. }), "{error}");
     assert!(error.to_string().contains(&all[0].name), "{error}");
-    // `Backend::Auto` falls back to the CPU without an error.
-    let mut auto = Detector::with_settings(Settings {
+    // A name that fits nothing is a mistake for Auto, too.
+    let auto = Settings {
         backend: Backend::Auto,
         ..nobody
-    })
-    .unwrap();
-    let pairs = auto.detect(&Scene::new(), &Query::all()).unwrap();
-    assert_eq!(pairs.stats().backend, "cpu");
+    };
+    let error = Detector::with_settings(auto).err().unwrap();
+    assert!(matches!(error, Error::NoAdapter { .. }), "{error}");
 }
 
 #[test]

@@ -12,6 +12,7 @@ use crate::query::Query;
 use crate::run::Job;
 use crate::scene::Scene;
 use crate::settings::Method;
+use crate::workers::is_forked;
 
 /// Opens the GPU that the settings ask for, if they ask for one.
 pub(super) fn open(settings: &Settings) -> Result<Option<Engine>, Error> {
@@ -33,6 +34,8 @@ fn wanted(settings: &Settings) -> Option<Wanted<'_>> {
     match settings.backend {
         Backend::Cpu => None,
         Backend::Auto if settings.method == Method::Naive => None,
+        // Drivers of GPUs do not survive a fork.
+        Backend::Auto if is_forked() => None,
         // A software driver is slower than the CPU backend.
         Backend::Auto => Some(named.unwrap_or(Wanted::Hardware)),
         Backend::Gpu => Some(named.unwrap_or(Wanted::Any)),
@@ -45,6 +48,8 @@ fn engine_of(
 ) -> Result<Option<Engine>, Error> {
     match gpu {
         Ok(gpu) => Ok(gpu.map(|gpu| Engine::new(gpu, settings, Capacities::default()))),
+        // A name that fits no adapter is a mistake, whoever is to choose.
+        Err(error @ Error::NoAdapter { .. }) if settings.device.is_some() => Err(error),
         Err(_) if settings.backend == Backend::Auto => Ok(None),
         Err(error) => Err(error),
     }

@@ -48,6 +48,27 @@ async fn adapters() -> Vec<(wgpu::Adapter, DeviceInfo)> {
     adapters
 }
 
+/// Whether the system may have a GPU. On Linux a driver of one has made a file; where there is none, drivers are not even
+/// loaded, for those that imitate a GPU write to standard error as they are.
+fn may_have_hardware() -> bool {
+    if !cfg!(target_os = "linux") {
+        return true;
+    }
+    // Direct rendering (most drivers), NVIDIA, AMD compute, Windows' subsystem for Linux, Mali, Adreno, PowerVR.
+    let of_drivers = [
+        "dri",
+        "nvidiactl",
+        "nvidia0",
+        "kfd",
+        "dxg",
+        "mali0",
+        "kgsl-3d0",
+        "pvr_sync",
+    ];
+    let dev = std::path::Path::new("/dev");
+    of_drivers.iter().any(|name| dev.join(name).exists())
+}
+
 /// A device and its kernels, compiled when first needed. Detectors on the same adapter share one.
 pub struct Gpu {
     opened: Device,
@@ -96,6 +117,10 @@ impl Gpu {
     /// # Errors
     /// No adapter fits; the driver refuses.
     pub async fn open_async(wanted: Wanted<'_>) -> Result<Arc<Gpu>, Error> {
+        if wanted == Wanted::Hardware && !may_have_hardware() {
+            let found = "none in hardware: the system has no device of a GPU".to_owned();
+            return Err(Error::NoAdapter { found });
+        }
         let adapters = adapters().await;
         let fits = |info: &DeviceInfo| match wanted {
             Wanted::Any => true,
