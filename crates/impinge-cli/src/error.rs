@@ -98,7 +98,7 @@ impl Error {
         )
     }
 
-    /// 128 plus the signal's number if a signal ended the program, 2 for bad usage, 3 for `--fail-on-hit`, 0 if the reader of
+    /// 128 plus the signal's number if a signal ended the program, 2 for bad usage, 3 for `--fail-on-hit` and `--fail-on`, 0 if the reader of
     /// standard output has closed it (it has what it wanted), else 1.
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -106,7 +106,7 @@ impl Error {
             Error::Usage(_)
             | Error::Tiles(impinge_tiles::Error::Argument { .. })
             | Error::Detection(impinge::Error::Setting { .. }) => 2,
-            Error::Hit => 3,
+            Error::Hit | Error::CheckFailed(_) => 3,
             Error::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
             _ => 1,
         }

@@ -108,11 +108,11 @@ fn exit_codes_are_chosen() {
     );
     assert_eq!(
         code(&["open.obj", "--fail-on", "degenerate,boundary"]),
-        Some(1)
+        Some(3)
     );
-    assert_eq!(code(&["nan.obj", "--fail-on", "nan"]), Some(1));
+    assert_eq!(code(&["nan.obj", "--fail-on", "nan"]), Some(3));
     assert_eq!(code(&["missing.ply", "--fail-on", "nan"]), Some(0));
-    assert_eq!(code(&["missing.ply", "--fail-on", "error"]), Some(1));
+    assert_eq!(code(&["missing.ply", "--fail-on", "error"]), Some(3));
     assert_eq!(
         code(&["closed.obj", "--rank", "2", "--world-size", "2"]),
         Some(2)

@@ -17,7 +17,7 @@ pub const CHECK_EXAMPLES: &str = "\
 Examples:
   impinge check part.stl
   impinge check *.obj --json | jq 'select(.self_intersections > 0) | .path'
-  impinge check part.ply --fail-on self-intersections,boundary       exit code 1 in CI
+  impinge check part.ply --fail-on self-intersections,boundary       exit code 3 in CI
   impinge check part.ply --out wrong.glb                             what is wrong, in colours
   impinge check --list meshes.txt --out rows --timeout 60 --memory 4G
   impinge check --list meshes.txt --out rows --rank $SLURM_ARRAY_TASK_ID --world-size 64
@@ -27,8 +27,8 @@ Self-intersections are pairs that also meet outside their common vertices, edge 
 degenerate faces have exactly zero area. For tetrahedra, faces are counted instead of edges.
 
 Each mesh is checked in a child process. A mesh that can't be read, takes too long or runs out
-of memory gets a row with its `error`, and the run continues. The exit code is 0 unless a mesh
-has a problem that --fail-on names. Run the same command again to continue an interrupted run
+of memory gets a row with its `error`, and the run continues. The exit code is 0, or 3 if
+a mesh has a problem that --fail-on names. Run the same command again to continue an interrupted run
 in --out.";
 
 #[derive(Debug, Args)]
@@ -45,7 +45,7 @@ pub struct CheckArgs {
     /// A folder for rows, in which an interrupted run can continue; or a mesh file that shows the problems (.glb, .ply, .vtu)
     #[arg(long, value_name = "DIR|MESH")]
     pub out: Option<Out>,
-    /// Exit with code 1 if any mesh has one of these problems (comma-separated)
+    /// Exit with code 3 if any mesh has one of these problems (comma-separated)
     #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',')]
     pub fail_on: Vec<FailOn>,
     /// Do not weld vertices at the same position
