@@ -14,6 +14,69 @@
 //!   For solvers, [`Detector::earliest`] finds the first contact of a step, [`Detector::is_free`] decides whether there is any,
 //!   and [`Detector::advance`] finds how far a step can be taken.
 //!
+//! ```toml
+//! [dependencies]
+//! impinge = "0.1"                                            # with the GPU backend
+//! # impinge = { version = "0.1", default-features = false }  # the CPU alone: without wgpu, a quarter of the packages
+//! impinge-io = "0.1"                                         # reads OBJ, PLY, STL, OFF, glTF, MSH, VTK and others
+//! ```
+//!
+//! A whole program: which triangles of two meshes intersect.
+//!
+//! ```
+//! use impinge::{Backend, BodyId, Detector, Query, Scene};
+//! use impinge_io::{Elements, Positions, ReadOptions, read};
+//! use std::error::Error;
+//!
+//! fn add(scene: &mut Scene, path: &str) -> Result<BodyId, Box<dyn Error>> {
+//!     let mesh = read(path.as_ref(), &ReadOptions::default())?;
+//!     Ok(match (&mesh.elements, &mesh.positions) {
+//!         (Elements::Triangles(faces), Positions::F32(at)) => scene.add_triangles(faces, at)?,
+//!         (Elements::Triangles(faces), Positions::F64(at)) => scene.add_triangles(faces, at)?,
+//!         (Elements::Tetrahedra(tets), Positions::F32(at)) => scene.add_tetrahedra(tets, at)?,
+//!         (Elements::Tetrahedra(tets), Positions::F64(at)) => scene.add_tetrahedra(tets, at)?,
+//!     })
+//! }
+//!
+//! fn main() -> Result<(), Box<dyn Error>> {
+//!     let mut scene = Scene::new();
+//!     let a = add(&mut scene, "examples/data/tetrahedron.obj")?;
+//!     let b = add(&mut scene, "examples/data/square.obj")?;
+//!     let mut detector = Detector::new(Backend::Auto)?; // a GPU where there is one, else the CPU
+//!     let pairs = detector.detect(&scene, &Query::between(a, b))?;
+//!     for (i, j) in pairs.between(a, b) {
+//!         println!("triangle {i} of a meets triangle {j} of b");
+//!     }
+//! #   assert_eq!(pairs.between(a, b).collect::<Vec<_>>(), [(1, 0), (1, 1), (2, 0), (2, 1), (3, 0), (3, 1)]);
+//!     Ok(())
+//! }
+//! ```
+//!
+//! # Positions of other libraries
+//!
+//! Positions are `&[[f32; 3]]` or `&[[f64; 3]]`. The vectors of glam and nalgebra have this layout, and with their feature
+//! `bytemuck` a slice of them is cast without a copy; one vector at a time goes by `to_array` and `into`.
+//!
+//! ```
+//! # #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+//! # #[repr(C)]
+//! # struct Vec3 { x: f32, y: f32, z: f32 }
+//! # fn main() -> Result<(), impinge::Error> {
+//! # let corner = |x, y, z| Vec3 { x, y, z };
+//! # let mut scene = impinge::Scene::new();
+//! // glam::Vec3, glam::DVec3, nalgebra::Point3<f32>, nalgebra::Vector3<f64> …: Cargo.toml has glam = { features = ["bytemuck"] },
+//! // or nalgebra = { features = ["bytemuck"] }.
+//! let vertices: Vec<Vec3> = vec![corner(0.0, 0.0, 0.0), corner(1.0, 0.0, 0.0), corner(0.0, 1.0, 0.0)];
+//! let positions: &[[f32; 3]] = bytemuck::cast_slice(&vertices);
+//! let body = scene.add_triangles(&[[0, 1, 2]], positions)?;
+//! # assert_eq!(scene.body(body)?.n_vertices(), 3);
+//! # Ok(()) }
+//! ```
+//!
+//! `glam::Vec3A` is padded to 16 bytes: `vertices.iter().map(|v| v.to_array()).collect::<Vec<_>>()`. A rigid body needs no new
+//! vertices at all: [`Scene::set_transform`] takes rows of `f64`, which are `matrix.transpose().to_cols_array_2d()` of a
+//! `glam::DMat4`, and `matrix.transpose().into()` of a `nalgebra::Matrix4<f64>`.
+//!
 //! This crate is the stable interface of the engine in `impinge-core`.
 
 /// The GPU interface of [`Detector::with_device`] and [`Detector::encode`].
