@@ -4,12 +4,14 @@
 //! An argument is taken, in this order, as a NumPy array, through DLPack, or through
 //! `numpy.asarray` (buffer protocol, `__array__`, nested sequences).
 
+use std::collections::HashMap;
+
 use impinge::{Elements, Kind};
 use numpy::{
-    Element, PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray2, PyUntypedArray,
-    PyUntypedArrayMethods,
+    Element, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray2,
+    PyUntypedArray, PyUntypedArrayMethods,
 };
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 /// Positions in the precision in which they are answered, in C order.
@@ -70,21 +72,29 @@ impl<'py> PositionArray<'py> {
     }
 }
 
-/// Vertex indices: three or four per row, or as many as an element of the kind has corners.
+/// What the rows of an index array are.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum RowKind {
+    Of(Kind),
+    /// Faces of four corners, each cut into two triangles.
+    Quads,
+}
+
+/// Vertex indices: three or four per row, or as many as an element of the kind has corners. Quads become triangles.
 pub fn elements(
     argument: &Bound<'_, PyAny>,
     name: &str,
-    kind: Option<Kind>,
+    kind: Option<RowKind>,
     n_vertices: usize,
 ) -> PyResult<Elements> {
     let array = as_array(argument, name)?;
     let numbers = NumberKind::of(&array, name)?;
     let allowed: &[usize] = match kind {
         None => &[3, 4],
-        Some(Kind::Points) => &[1],
-        Some(Kind::Edges) => &[2],
-        Some(Kind::Triangles) => &[3],
-        Some(Kind::Tetrahedra) => &[4],
+        Some(RowKind::Of(Kind::Points)) => &[1],
+        Some(RowKind::Of(Kind::Edges)) => &[2],
+        Some(RowKind::Of(Kind::Triangles)) => &[3],
+        Some(RowKind::Of(Kind::Tetrahedra) | RowKind::Quads) => &[4],
     };
     check_columns(&array, name, allowed)?;
     let indices = indices(&array, numbers, name)?;
@@ -96,12 +106,115 @@ pub fn elements(
             indices[at]
         )));
     }
-    Ok(match n_columns {
-        1 => Elements::Points(indices.as_chunks().0.to_vec()),
-        2 => Elements::Edges(indices.as_chunks().0.to_vec()),
-        3 => Elements::Triangles(indices.as_chunks().0.to_vec()),
+    Ok(match (n_columns, kind) {
+        (1, _) => Elements::Points(indices.as_chunks().0.to_vec()),
+        (2, _) => Elements::Edges(indices.as_chunks().0.to_vec()),
+        (3, _) => Elements::Triangles(indices.as_chunks().0.to_vec()),
+        (_, Some(RowKind::Quads)) => Elements::Triangles(cut_quads(indices.as_chunks().0)),
+        (_, None) if !are_tetrahedra(indices.as_chunks().0) => {
+            return Err(PyValueError::new_err(format!(
+                "{name}: rows of four are tetrahedra or quads, and no two of them share three vertices, which would \
+                 tell: say kind=\"tetrahedra\", or kind=\"quads\" to cut each into two triangles"
+            )));
+        }
         _ => Elements::Tetrahedra(indices.as_chunks().0.to_vec()),
     })
+}
+
+/// Quad `i` as the triangles `2 i` and `2 i + 1`, along the diagonal from its first corner.
+fn cut_quads(quads: &[[u32; 4]]) -> Vec<[u32; 3]> {
+    let cut = |&[a, b, c, d]: &[u32; 4]| [[a, b, c], [a, c, d]];
+    quads.iter().flat_map(cut).collect()
+}
+
+/// Whether rows of four are tetrahedra beyond doubt: neighbours in a mesh of tetrahedra share three vertices and differ in
+/// the fourth, which no two quads of a surface do. In meshes one of the first rows tells. No row at all may be either.
+fn are_tetrahedra(rows: &[[u32; 4]]) -> bool {
+    let mut fourth = HashMap::new();
+    rows.is_empty()
+        || rows.iter().any(|row| {
+            (0..4).any(|left_out| {
+                let mut face = [0, 1, 2].map(|ix| row[(left_out + 1 + ix) % 4]);
+                face.sort_unstable();
+                let is_face = face[0] != face[1] && face[1] != face[2];
+                let apex = row[left_out];
+                is_face && *fourth.entry(face).or_insert(apex) != apex
+            })
+        })
+}
+
+/// A row of numbers, `(4, 4)`, as they are in double precision.
+pub fn matrix(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<[[f64; 4]; 4]> {
+    let array = as_array(argument, name)?;
+    let kind = NumberKind::of(&array, name)?;
+    if array.shape() != [4, 4] {
+        let given = array.getattr("shape")?.str()?;
+        return Err(PyValueError::new_err(format!(
+            "{name}: shape (4, 4) expected, {given} given"
+        )));
+    }
+    let doubles = match kind {
+        NumberKind::Float(size) if size > 8 => extended_to_double(&array, name)?,
+        _ => in_c_order::<f64>(&array, "=f8")?,
+    };
+    Ok(slice_rows(&doubles)?.try_into()?)
+}
+
+/// An index that may count from the end.
+pub fn from_end(index: isize, len: usize, what: &str) -> PyResult<usize> {
+    let ix = match usize::try_from(index) {
+        Ok(ix) => Some(ix),
+        Err(_) => len.checked_sub(index.unsigned_abs()),
+    };
+    ix.filter(|&ix| ix < len).ok_or_else(|| {
+        PyIndexError::new_err(format!("index {index} given, but there are {len} {what}"))
+    })
+}
+
+/// What a filter answered: `(n,)` bool.
+pub fn mask(answer: &Bound<'_, PyAny>, name: &str, n: usize) -> PyResult<Vec<bool>> {
+    let array = as_array(answer, name)?;
+    let refused = || {
+        let given = array.getattr("shape").and_then(|shape| shape.str());
+        let dtype = array.dtype().str();
+        match (given, dtype) {
+            (Ok(shape), Ok(dtype)) => PyValueError::new_err(format!(
+                "{name}: shape ({n},) of bool expected as the answer, {shape} of {dtype} given"
+            )),
+            (Err(error), _) | (_, Err(error)) => error,
+        }
+    };
+    if array.shape() != [n] {
+        return Err(refused());
+    }
+    let flags = array.cast::<PyArray1<bool>>().map_err(|_| refused())?;
+    Ok(flags.to_vec()?)
+}
+
+/// Offsets, `(n,)`: whole numbers from 0.
+pub fn offsets(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<usize>> {
+    let array = as_array(argument, name)?;
+    let kind = NumberKind::of(&array, name)?;
+    let shape = array.shape();
+    if shape.len() != 1 || matches!(kind, NumberKind::Float(_)) {
+        return Err(PyValueError::new_err(format!(
+            "{name}: a row of whole numbers expected, {} of {} given",
+            array.getattr("shape")?.str()?,
+            array.dtype().str()?
+        )));
+    }
+    let column = array.call_method1("reshape", ((shape[0], 1),))?;
+    let column = column.cast_into::<PyUntypedArray>()?;
+    let numbers = in_c_order::<i64>(&column, "=i8")?;
+    let convert = |&x: &i64| usize::try_from(x).ok();
+    let numbers = numbers.as_slice()?;
+    match numbers.iter().position(|x| convert(x).is_none()) {
+        Some(at) => Err(PyValueError::new_err(format!(
+            "{name}[{at}] = {}: an offset is 0 or more",
+            numbers[at]
+        ))),
+        None => Ok(numbers.iter().filter_map(convert).collect()),
+    }
 }
 
 /// Rows `(n, n_columns)` of unsigned 32-bit numbers, row after row.

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use impinge::BodyId;
 use pyo3::basic::CompareOp;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
 
@@ -56,6 +56,12 @@ impl Body {
         };
         let answer = op.matches(ordering);
         Ok(PyBool::new(py, answer).to_owned().into_any().unbind())
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(PyTypeError::new_err(
+            "a Body is a handle of a live scene: pickle its number, int(body)",
+        ))
     }
 
     fn __repr__(&self) -> String {

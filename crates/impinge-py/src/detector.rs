@@ -1,11 +1,11 @@
 //! `impinge.Detector`: settings, questions, the run.
 
-use std::sync::atomic::{AtomicU32, Ordering};
-
 use impinge::{CandidateQuery, Control, Query, Step, Toi};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
 
+use crate::arrays;
 use crate::errors::raise;
 use crate::question::{question, step_question};
 use crate::result::Answer;
@@ -57,6 +57,8 @@ use crate::watch::{CancelToken, Watch};
 #[pyclass(module = "impinge")]
 pub struct Detector {
     inner: impinge::Detector,
+    /// The process that made it, whose threads a fork does not have.
+    process: u32,
 }
 
 #[pymethods]
@@ -84,7 +86,6 @@ impl Detector {
         recluster: Argument<'_, '_>,
         instruction_set: Argument<'_, '_>,
     ) -> PyResult<Self> {
-        check_process()?;
         let told = Told {
             method,
             backend,
@@ -101,6 +102,7 @@ impl Detector {
         let inner = py.detach(|| impinge::Detector::with_settings(settings));
         Ok(Detector {
             inner: inner.map_err(raise)?,
+            process: std::process::id(),
         })
     }
 
@@ -127,6 +129,10 @@ impl Detector {
     ///     of each stage. Units differ by stage. An exception stops the run and is raised.
     /// cancel : CancelToken, optional
     ///     Stops the run from another thread.
+    /// filter : callable, optional
+    ///     Which pairs are kept: called once, after all pairs were found, as ``filter(rows)`` with the sorted rows
+    ///     ``(n, 4)`` of all of them, as in `Result.rows`; returns ``(n,)`` bool. So the answer stays the same on
+    ///     every method, backend and thread count. Filters by face or vertex are masks of it.
     ///
     /// Returns
     /// -------
@@ -146,10 +152,10 @@ impl Detector {
     #[pyo3(
         signature = (
             scene, *, between=None, within=None, ignore=None, shared_vertex=None, progress=None,
-            cancel=None,
+            cancel=None, filter=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          shared_vertex=\"skip\", progress=None, cancel=None)"
+                          shared_vertex=\"skip\", progress=None, cancel=None, filter=None)"
     )]
     fn detect(
         slf: &Bound<'_, Self>,
@@ -160,7 +166,13 @@ impl Detector {
         shared_vertex: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
+        filter: Argument<'_, '_>,
     ) -> PyResult<Answer> {
+        if let Some(filter) = filter
+            && !filter.is_callable()
+        {
+            return Err(unexpected(filter, "filter", "a callable"));
+        }
         let watched = (scene, progress, cancel);
         let ask = |scene: &Scene| question(scene, between, within, ignore, shared_vertex);
         let answer = |detector: &mut impinge::Detector,
@@ -170,7 +182,12 @@ impl Detector {
             detector.detect_with(scene, query, control).cloned()
         };
         let (pairs, (_, asked), number) = Detector::watched(slf, watched, ask, answer)?;
-        Ok(Answer::new(pairs, number, asked))
+        let mut answer = Answer::new(pairs, number, asked);
+        if let Some(filter) = filter {
+            let keep = filter.call1((answer.rows(slf.py())?,))?;
+            answer.retain(&arrays::mask(&keep, "filter", answer.len())?);
+        }
+        Ok(answer)
     }
 
     /// Finds all pairs of elements that touch during a step, each with the first time at which it does.
@@ -436,13 +453,33 @@ impl Detector {
         ))
     }
 
+    /// Pickles and copies are new detectors with the same settings.
+    fn __getnewargs_ex__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
+        let given = self.inner.settings();
+        let all = PyDict::new(py);
+        all.set_item("method", given.method.name())?;
+        all.set_item("backend", settings::backend_name(given.backend))?;
+        all.set_item("device", &given.device)?;
+        if given.threads > 0 {
+            all.set_item("threads", given.threads)?;
+        }
+        all.set_item("memory_budget", given.memory_budget)?;
+        all.set_item("lambda_", given.lambda)?;
+        all.set_item("group_size", given.group_size)?;
+        all.set_item("recluster", settings::recluster_name(given.recluster))?;
+        all.set_item(
+            "instruction_set",
+            settings::instruction_set_name(given.instruction_set),
+        )?;
+        Ok((PyTuple::empty(py), all))
+    }
+
     fn __repr__(&self) -> String {
         let settings = self.inner.settings();
-        let backend = match settings.backend {
-            impinge::Backend::Cpu => "cpu",
-            impinge::Backend::Gpu => "gpu",
-            _ => "auto",
-        };
+        let backend = settings::backend_name(settings.backend).unwrap_or("auto");
         let mut words = vec![
             format!("method={:?}", settings.method.name()),
             format!("backend={backend:?}"),
@@ -506,7 +543,12 @@ impl Detector {
             .try_borrow()
             .map_err(|_| PyRuntimeError::new_err("the scene is being changed by another thread"))?;
         let question = ask(&scene)?;
-        check_process()?;
+        if detector.process != std::process::id() {
+            return Err(PyRuntimeError::new_err(
+                "this detector was made before this process was forked, and its threads do not survive a fork: make \
+                 one here",
+            ));
+        }
         let watch = Watch::new(progress.map(|progress| progress.clone().unbind()), cancel);
         let (inner, bodies) = (&mut detector.inner, &scene.inner);
         let answer = py.detach(|| {
@@ -518,19 +560,5 @@ impl Detector {
             (Some(error), _) => Err(error),
             (None, answer) => Ok((answer.map_err(raise)?, question, scene.number)),
         }
-    }
-}
-
-/// A forked child inherits none of the threads, and would wait for them for ever.
-fn check_process() -> PyResult<()> {
-    static FIRST_USED_BY: AtomicU32 = AtomicU32::new(0);
-    let this = std::process::id();
-    match FIRST_USED_BY.compare_exchange(0, this, Ordering::Relaxed, Ordering::Relaxed) {
-        Err(first) if first != this => Err(PyRuntimeError::new_err(
-            "this process was forked from one that had started impinge's threads, and they do not \
-             survive a fork: start workers with multiprocessing.get_context(\"spawn\"), or before \
-             the first Detector",
-        )),
-        _ => Ok(()),
     }
 }

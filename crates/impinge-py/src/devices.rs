@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 
-/// A GPU, or a driver that imitates one.
+/// A GPU adapter: hardware, or a driver that does the work of a GPU on the CPU.
 #[pyclass(module = "impinge", frozen, eq)]
 #[derive(PartialEq)]
 pub struct Device {

@@ -9,7 +9,7 @@ use crate::detector::Detector;
 use crate::errors::Names;
 use crate::result::Answer;
 use crate::scene::Scene;
-use crate::settings::Argument;
+use crate::settings::{self, Argument, kind};
 
 /// Which primitives of two meshes intersect.
 ///
@@ -19,6 +19,8 @@ use crate::settings::Argument;
 ///     Positions, float32 or float64.
 /// faces_a, faces_b : array_like of int, shape (n, 3) or (n, 4)
 ///     Triangles or tetrahedra as vertex indices.
+/// kind_a, kind_b : {"points", "edges", "triangles", "tetrahedra", "quads"}, optional
+///     What the rows of `faces_a` and `faces_b` are, as for `Scene.add`.
 /// **settings
 ///     As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given: waking a GPU
 ///     does not pay for one question.
@@ -41,13 +43,18 @@ use crate::settings::Argument;
 /// >>> impinge.pairs(corners, [[0, 1, 2]], corners + [0, 0, 1], [[0, 1, 2]])
 /// array([], shape=(0, 2), dtype=uint32)
 #[pyfunction]
-#[pyo3(signature = (vertices_a, faces_a, vertices_b, faces_b, **settings))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+#[pyo3(
+    signature = (vertices_a, faces_a, vertices_b, faces_b, *, kind_a=None, kind_b=None, **settings)
+)]
 pub fn pairs<'py>(
     py: Python<'py>,
     vertices_a: &Bound<'py, PyAny>,
     faces_a: &Bound<'py, PyAny>,
     vertices_b: &Bound<'py, PyAny>,
     faces_b: &Bound<'py, PyAny>,
+    kind_a: Argument<'py, 'py>,
+    kind_b: Argument<'py, 'py>,
     settings: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<u32>>> {
     let mut scene = Scene::empty();
@@ -59,8 +66,8 @@ pub fn pairs<'py>(
         vertices: "vertices_b",
         elements: "faces_b",
     };
-    scene.add_named(vertices_a, faces_a, None, a)?;
-    scene.add_named(vertices_b, faces_b, None, b)?;
+    scene.add_named(vertices_a, faces_a, kind(kind_a)?, a)?;
+    scene.add_named(vertices_b, faces_b, kind(kind_b)?, b)?;
     let question = PyDict::new(py);
     question.set_item("between", (0, 1))?;
     ask(py, scene, &question, settings)
@@ -74,6 +81,8 @@ pub fn pairs<'py>(
 ///     Positions, float32 or float64.
 /// faces : array_like of int, shape (n, 3) or (n, 4)
 ///     Triangles or tetrahedra as vertex indices.
+/// kind : {"points", "edges", "triangles", "tetrahedra", "quads"}, optional
+///     What the rows of `faces` are, as for `Scene.add`.
 /// shared_vertex : {"skip", "resolve"}
 ///     Primitives that share a vertex index are not reported, or reported when they share more points
 ///     than the vertices they have in common. Vertices at one position with different indices are not
@@ -94,14 +103,15 @@ pub fn pairs<'py>(
 ///     As `Scene.add` and `Detector`.
 #[pyfunction]
 #[pyo3(
-    signature = (vertices, faces, shared_vertex=None, **settings),
-    text_signature = "(vertices, faces, shared_vertex=\"skip\", **settings)"
+    signature = (vertices, faces, shared_vertex=None, *, kind=None, **settings),
+    text_signature = "(vertices, faces, shared_vertex=\"skip\", *, kind=None, **settings)"
 )]
 pub fn self_pairs<'py>(
     py: Python<'py>,
     vertices: &Bound<'py, PyAny>,
     faces: &Bound<'py, PyAny>,
     shared_vertex: Argument<'py, 'py>,
+    kind: Argument<'py, 'py>,
     settings: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<u32>>> {
     let mut scene = Scene::empty();
@@ -109,7 +119,7 @@ pub fn self_pairs<'py>(
         vertices: "vertices",
         elements: "faces",
     };
-    scene.add_named(vertices, faces, None, names)?;
+    scene.add_named(vertices, faces, settings::kind(kind)?, names)?;
     let question = PyDict::new(py);
     question.set_item("within", 0)?;
     question.set_item("shared_vertex", shared_vertex)?;

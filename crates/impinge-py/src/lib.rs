@@ -5,10 +5,13 @@
 
 mod arrays;
 mod bodies;
+mod datasets;
 mod detector;
 mod devices;
 mod errors;
 mod functions;
+mod meshes;
+mod proximity;
 mod question;
 mod result;
 mod scene;
@@ -25,6 +28,11 @@ mod _impinge {
     #[pymodule_export]
     use super::bodies::Body;
     #[pymodule_export]
+    use super::datasets::{
+        _check, _serve_check, _tiles_describe, _tiles_merge, _tiles_plan, _tiles_run,
+        _tiles_scatter,
+    };
+    #[pymodule_export]
     use super::detector::Detector;
     #[pymodule_export]
     use super::devices::{Device, devices};
@@ -32,6 +40,8 @@ mod _impinge {
     use super::errors::Cancelled;
     #[pymodule_export]
     use super::functions::{hash_rows, pairs, self_pairs};
+    #[pymodule_export]
+    use super::proximity::{Distances, Nearest};
     #[pymodule_export]
     use super::result::Answer;
     #[pymodule_export]

@@ -4,10 +4,13 @@ use std::sync::OnceLock;
 
 use impinge::{BodyId, Pairs};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::{PyDict, PySlice};
 
+use crate::arrays::from_end;
 use crate::bodies::{Body, body_id};
+use crate::settings::{Argument, unexpected};
 use crate::statistics::Statistics;
 
 /// Which columns `pairs()` has.
@@ -21,7 +24,9 @@ pub enum Asked {
 /// The pairs that a detection found: sorted, the same bytes on every method, backend and thread
 /// count.
 ///
-/// ``len(result)`` is the number of pairs; a result without pairs is false.
+/// ``len(result)`` is the number of pairs; a result without pairs is false. A result is a sequence of rows, each a tuple
+/// of four int: number of a body, its primitive, number of the other body, its primitive. A slice of it is an array, and
+/// so is ``numpy.asarray(result)``, which has shape (n, 4).
 #[pyclass(module = "impinge", name = "Result", frozen)]
 pub struct Answer {
     pairs: Pairs,
@@ -50,6 +55,28 @@ impl Answer {
                 "{name}: body {id} took no part in this detection"
             )))
         }
+    }
+
+    pub fn len(&self) -> usize {
+        self.pairs.len()
+    }
+
+    /// A pair that there is.
+    fn row(&self, ix: usize) -> (u32, u32, u32, u32) {
+        let (a, b) = self.pairs.get(ix).expect("the index was checked");
+        // Numbers of bodies fit 32 bits.
+        (
+            a.body.index() as u32,
+            a.primitive,
+            b.body.index() as u32,
+            b.primitive,
+        )
+    }
+
+    /// Keeps the pairs whose places in `keep` are true.
+    pub fn retain(&mut self, keep: &[bool]) {
+        let mut keep = keep.iter();
+        self.pairs.retain(|_, _| keep.next() == Some(&true));
     }
 
     fn pairs_between(&self, a: BodyId, b: BodyId) -> Vec<[u32; 2]> {
@@ -154,30 +181,38 @@ impl Answer {
     /// numpy.ndarray of uint32, shape (n, 4) : all pairs, sorted, one a row: number of a body,
     /// its primitive, number of the other body, its primitive. A new array at each access.
     #[getter]
-    fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+    pub fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         to_array(py, py.detach(|| self.pairs.rows().collect()))
     }
 
-    /// The primitives of a body that take part in any pair, for colouring.
+    /// The primitives that take part in any pair, for colouring: of a body, or of all bodies in one pass.
     ///
     /// Parameters
     /// ----------
-    /// body : Body or int
+    /// body : Body or int, optional
     ///
     /// Returns
     /// -------
     /// numpy.ndarray of uint32, shape (n,)
-    ///     Sorted, each once.
+    ///     Sorted, each once. Without a body, a dict with such an array for each Body that has any, in order; it is
+    ///     indexed by the numbers of bodies, too.
+    #[pyo3(signature = (body=None))]
     fn colliding<'py>(
         &self,
         py: Python<'py>,
-        body: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        body: Argument<'py, 'py>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let Some(body) = body else {
+            let all = PyDict::new(py);
+            for (id, colliding) in py.detach(|| self.pairs.all_colliding()) {
+                let scene = self.scene;
+                all.set_item(Body { id, scene }, PyArray1::from_vec(py, colliding))?;
+            }
+            return Ok(all.into_any());
+        };
         let body = self.id(body, "body")?;
-        Ok(PyArray1::from_vec(
-            py,
-            py.detach(|| self.pairs.colliding(body)),
-        ))
+        let colliding = py.detach(|| self.pairs.colliding(body));
+        Ok(PyArray1::from_vec(py, colliding).into_any())
     }
 
     /// list of Body : the bodies that took part, in order.
@@ -205,7 +240,54 @@ impl Answer {
     }
 
     fn __len__(&self) -> usize {
-        self.pairs.len()
+        self.len()
+    }
+
+    fn __getitem__<'py>(
+        &self,
+        py: Python<'py>,
+        index: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if index.is_instance_of::<PySlice>() {
+            return self.rows(py)?.get_item(index);
+        }
+        let index = index
+            .extract()
+            .map_err(|_| unexpected(index, "index", "a whole number or a slice"))?;
+        let ix = from_end(index, self.pairs.len(), "pairs")?;
+        Ok(self.row(ix).into_pyobject(py)?.into_any())
+    }
+
+    fn __iter__(slf: PyRef<'_, Self>) -> RowIterator {
+        RowIterator {
+            answer: slf.into(),
+            next: 0,
+        }
+    }
+
+    #[pyo3(signature = (dtype=None, copy=None))]
+    fn __array__<'py>(
+        &self,
+        py: Python<'py>,
+        dtype: Argument<'py, 'py>,
+        copy: Option<bool>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if copy == Some(false) {
+            return Err(PyValueError::new_err(
+                "copy=False: the rows are made when they are asked for",
+            ));
+        }
+        let rows = self.rows(py)?.into_any();
+        match dtype {
+            Some(dtype) => rows.call_method1("astype", (dtype,)),
+            None => Ok(rows),
+        }
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(PyTypeError::new_err(
+            "a Result names the bodies of a live scene: pickle result.rows",
+        ))
     }
 
     fn __repr__(&self, py: Python<'_>) -> String {
@@ -215,5 +297,26 @@ impl Answer {
             self.pairs.bodies().len(),
             self.hash(py)
         )
+    }
+}
+
+/// Rows one after the other.
+#[pyclass]
+pub struct RowIterator {
+    answer: Py<Answer>,
+    next: usize,
+}
+
+#[pymethods]
+impl RowIterator {
+    fn __iter__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        slf
+    }
+
+    fn __next__(&mut self) -> Option<(u32, u32, u32, u32)> {
+        let answer = self.answer.get();
+        let row = (self.next < answer.pairs.len()).then(|| answer.row(self.next));
+        self.next += 1;
+        row
     }
 }

@@ -2,12 +2,14 @@
 
 use impinge::{BodyId, Elements, Filter, Kind, Positions};
 use numpy::{PyArray1, PyArrayMethods};
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::{PyList, PyTuple};
 
-use crate::arrays::{self, PositionArray, slice_rows};
+use crate::arrays::{self, PositionArray, RowKind, slice_rows};
 use crate::bodies::{Body, body_id, new_scene_number};
 use crate::errors::{Names, raise, refuse};
+use crate::meshes;
 use crate::settings::{self, Argument, unsigned};
 
 const ARGUMENTS: Names<'static> = Names {
@@ -68,18 +70,8 @@ impl Scene {
     pub fn add_named(
         &mut self,
         vertices: &Bound<'_, PyAny>,
-        faces: &Bound<'_, PyAny>,
-        kind: Argument<'_, '_>,
-        names: Names<'_>,
-    ) -> PyResult<BodyId> {
-        self.add_kind(vertices, faces, settings::kind(kind)?, names)
-    }
-
-    fn add_kind(
-        &mut self,
-        vertices: &Bound<'_, PyAny>,
         elements: &Bound<'_, PyAny>,
-        kind: Option<Kind>,
+        kind: Option<RowKind>,
         names: Names<'_>,
     ) -> PyResult<BodyId> {
         let positions = PositionArray::new(vertices, names.vertices)?;
@@ -128,13 +120,18 @@ impl Scene {
     ///
     /// Parameters
     /// ----------
-    /// vertices : array_like, shape (v, 3)
+    /// vertices : array_like, shape (v, 3), or a mesh
     ///     Positions. float32 and float64 are taken as they are and answered exactly; other
-    ///     dtypes are converted where that loses nothing.
-    /// faces : array_like of int, shape (n, 3) or (n, 4)
-    ///     Vertex indices: three a triangle, four a tetrahedron. Orientation does not matter.
-    /// kind : {"triangles", "tetrahedra"}, optional
-    ///     What the rows of `faces` are; by default their length tells.
+    ///     dtypes are converted where that loses nothing. Or, without `faces`, an object with ``vertices`` and
+    ///     ``faces`` (trimesh and many others) or ``triangles`` (Open3D), or with ``points`` and ``cells_dict``
+    ///     (meshio).
+    /// faces : array_like of int, shape (n, 3) or (n, 4), optional
+    ///     Vertex indices: three per triangle, four per tetrahedron. Orientation does not matter.
+    /// kind : {"points", "edges", "triangles", "tetrahedra", "quads"}, optional
+    ///     What the rows of `faces` are. ``"quads"`` cuts row ``i`` into the triangles ``2 * i`` and ``2 * i + 1``,
+    ///     along the diagonal from its first corner. By default three columns are triangles, and four are
+    ///     tetrahedra if two rows share exactly three vertices, as neighbours in a mesh of tetrahedra do and quads do
+    ///     not; else four columns are refused.
     ///
     /// Returns
     /// -------
@@ -145,19 +142,100 @@ impl Scene {
     /// ------
     /// ValueError
     ///     A wrong shape, an index out of range, a position that is not finite or outside the
-    ///     range in which answers are exact, a number that a conversion would change.
+    ///     range in which answers are exact, a number that a conversion would change, rows of four that may be quads,
+    ///     a mesh with cells of several kinds.
     /// TypeError
-    ///     An array that holds no real numbers.
-    #[pyo3(signature = (vertices, faces, kind=None))]
+    ///     An array that holds no real numbers, an object that is no mesh.
+    #[pyo3(signature = (vertices, faces=None, kind=None))]
     fn add(
         slf: &Bound<'_, Self>,
         vertices: &Bound<'_, PyAny>,
-        faces: &Bound<'_, PyAny>,
+        faces: Argument<'_, '_>,
         kind: Argument<'_, '_>,
     ) -> PyResult<Body> {
+        let kind = settings::kind(kind)?;
+        let id = match faces {
+            Some(faces) => change(slf)?.add_named(vertices, faces, kind, ARGUMENTS)?,
+            None => {
+                let mesh = meshes::parts(vertices, kind)?;
+                change(slf)?.add_named(&mesh.vertices, &mesh.elements, mesh.kind, mesh.names)?
+            }
+        };
+        Ok(slf.try_borrow()?.handle(id))
+    }
+
+    /// Adds many bodies in one call: all of them, or none. The arrays are copied.
+    ///
+    /// Parameters
+    /// ----------
+    /// vertices : array_like, shape (v, 3)
+    ///     The positions of all bodies, one after the other.
+    /// faces : array_like of int, shape (n, 3) or (n, 4)
+    ///     The elements of all bodies, one after the other. Each names the vertices of its own body, from 0.
+    /// vertex_offsets, face_offsets : array_like of int, shape (m + 1,)
+    ///     Body ``i`` of ``m`` has the rows ``offsets[i]`` to ``offsets[i + 1]``: they begin with 0, never fall, and end
+    ///     with the number of rows.
+    /// kind : str, optional
+    ///     As for `add`, but for ``"quads"``, which is refused.
+    ///
+    /// Returns
+    /// -------
+    /// list of Body
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     As `add`; the scene is unchanged then. Bodies are named by the number that they would have had.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np, impinge
+    /// >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    /// >>> scene = impinge.Scene()
+    /// >>> parts = scene.add_many(np.tile(corners, (1000, 1)), [[0, 1, 2]] * 1000,
+    /// ...                        np.arange(1001) * 3, np.arange(1001))
+    /// >>> len(parts), parts[999]
+    /// (1000, Body(999))
+    #[pyo3(signature = (vertices, faces, vertex_offsets, face_offsets, kind=None))]
+    fn add_many(
+        slf: &Bound<'_, Self>,
+        vertices: &Bound<'_, PyAny>,
+        faces: &Bound<'_, PyAny>,
+        vertex_offsets: &Bound<'_, PyAny>,
+        face_offsets: &Bound<'_, PyAny>,
+        kind: Argument<'_, '_>,
+    ) -> PyResult<Vec<Body>> {
+        let kind = settings::kind(kind)?;
+        if kind == Some(RowKind::Quads) {
+            return Err(PyValueError::new_err(
+                "kind: \"quads\" given, which would move the offsets; cut them into triangles first",
+            ));
+        }
+        let positions = PositionArray::new(vertices, "vertices")?;
+        let elements = arrays::elements(faces, "faces", kind, positions.len())?;
+        let of_vertices = arrays::offsets(vertex_offsets, "vertex_offsets")?;
+        let of_faces = arrays::offsets(face_offsets, "face_offsets")?;
         let mut scene = change(slf)?;
-        let id = scene.add_named(vertices, faces, kind, ARGUMENTS)?;
-        Ok(scene.handle(id))
+        let inner = &mut scene.inner;
+        let ids = match &positions {
+            PositionArray::F32(array) => {
+                let rows = slice_rows::<f32, 3>(array)?;
+                inner.add_many(&elements, &of_faces, rows, &of_vertices)
+            }
+            PositionArray::F64(array) => {
+                let rows = slice_rows::<f64, 3>(array)?;
+                inner.add_many(&elements, &of_faces, rows, &of_vertices)
+            }
+        };
+        let ids = ids.map_err(|error| match error {
+            impinge::Error::Setting {
+                setting: "element_offsets",
+                given,
+                allowed,
+            } => PyValueError::new_err(format!("face_offsets: {given} given, {allowed} allowed")),
+            error => raise(error),
+        })?;
+        Ok(ids.into_iter().map(|id| scene.handle(id)).collect())
     }
 
     /// Adds a body of edges, such as strands of hair. The arrays are copied.
@@ -187,7 +265,7 @@ impl Scene {
             elements: "edges",
         };
         let mut scene = change(slf)?;
-        let id = scene.add_kind(vertices, edges, Some(Kind::Edges), names)?;
+        let id = scene.add_named(vertices, edges, Some(RowKind::Of(Kind::Edges)), names)?;
         Ok(scene.handle(id))
     }
 
@@ -317,6 +395,86 @@ impl Scene {
             .inner
             .remesh(id, elements, stored(&positions)?)
             .map_err(|error| refuse(error, ARGUMENTS, &positions))
+    }
+
+    /// Moves a body by an affine matrix, such as a rigid motion, without its vertices being given again.
+    ///
+    /// The body moves from its rest positions, which are those that were given last (`add`, `set_positions`, `remesh`);
+    /// a second transform replaces the first. Answers are exact as if the moved vertices had been given, and these are
+    /// rounded in one way: row ``a, b, c, d`` of the matrix takes ``(x, y, z)`` to ``((a*x + b*y) + c*z) + d``, each
+    /// product and each sum rounded to float64 in this order, the last sum rounded once more to the dtype of the
+    /// rest positions. End positions are forgotten.
+    ///
+    /// Parameters
+    /// ----------
+    /// body : Body or int
+    /// matrix : array_like, shape (4, 4)
+    ///     In float64. The last row is ``0, 0, 0, 1``.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     A matrix of another shape, not finite, or not affine; a moved position that is refused. The body is
+    ///     unchanged then.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np, impinge
+    /// >>> scene = impinge.Scene()
+    /// >>> body = scene.add(np.eye(3, dtype=np.float32), [[0, 1, 2]])
+    /// >>> up = np.eye(4)
+    /// >>> up[2, 3] = 0.5
+    /// >>> scene.set_transform(body, up)
+    /// >>> scene.positions(body)[2].tolist(), scene.rest_positions(body)[2].tolist()
+    /// ([0.0, 0.0, 1.5], [0.0, 0.0, 1.0])
+    fn set_transform(
+        slf: &Bound<'_, Self>,
+        body: &Bound<'_, PyAny>,
+        matrix: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let mut scene = change(slf)?;
+        let id = scene.id(body, "body")?;
+        let matrix = arrays::matrix(matrix, "matrix")?;
+        scene
+            .inner
+            .set_transform(id, &matrix)
+            .map_err(|error| match error {
+                impinge::Error::Setting { given, allowed, .. } => {
+                    PyValueError::new_err(format!("matrix: {given} given, {allowed} allowed"))
+                }
+                error => raise(error),
+            })
+    }
+
+    /// How a body was moved by `set_transform`.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray of float64, shape (4, 4), or None
+    ///     ``None`` for a body that was not, or whose positions were given since.
+    fn transform<'py>(
+        &self,
+        py: Python<'py>,
+        body: &Bound<'py, PyAny>,
+    ) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let matrix = self.body(body)?.transform();
+        let flat = matrix.map(|rows| PyArray1::from_slice(py, rows.as_flattened()));
+        flat.map(|flat| Ok(flat.reshape([4, 4])?.into_any()))
+            .transpose()
+    }
+
+    /// The positions that were given last, before any transform.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray, shape (v, 3), float32 or float64
+    ///     A copy.
+    fn rest_positions<'py>(
+        &self,
+        py: Python<'py>,
+        body: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        positions_array(py, self.body(body)?.rest_positions())
     }
 
     /// Removes a body. Its handle is refused from now on; its number may be used again.
@@ -458,11 +616,90 @@ impl Scene {
     }
 
     fn __repr__(&self) -> String {
-        let bodies: Vec<String> = self
-            .inner
-            .bodies()
-            .map(|(id, body)| format!("{id}: {} {}", body.n_primitives(), body.kind().name()))
-            .collect();
-        format!("Scene({})", bodies.join(", "))
+        const SHOWN: usize = 6;
+        let bodies = self.inner.bodies();
+        let counts = bodies.map(|(id, body)| (id, body.n_primitives(), body.kind().name()));
+        if self.inner.n_bodies() <= SHOWN {
+            let each = counts.map(|(id, n, kind)| format!("{id}: {n} {kind}"));
+            return format!("Scene({})", each.collect::<Vec<_>>().join(", "));
+        }
+        let mut totals = Kind::ALL.map(|kind| (kind.name(), 0));
+        for (_, n, kind) in counts {
+            for total in totals.iter_mut().filter(|total| total.0 == kind) {
+                total.1 += n;
+            }
+        }
+        let totals = totals.iter().filter(|(_, n)| *n > 0);
+        let totals: Vec<String> = totals.map(|(kind, n)| format!("{n} {kind}")).collect();
+        format!(
+            "Scene({} bodies: {})",
+            self.inner.n_bodies(),
+            totals.join(", ")
+        )
+    }
+
+    /// Pickles, and copies, hold all bodies under their numbers. Handles of the bodies are those of the scene that they
+    /// came from.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let py = slf.py();
+        let scene = slf.try_borrow()?;
+        let bodies = PyList::empty(py);
+        for (id, body) in scene.inner.bodies() {
+            let number = id.index().into_pyobject(py)?;
+            let filter = body.filter();
+            bodies.append((
+                id.index(),
+                body.kind().name(),
+                positions_array(py, body.rest_positions())?,
+                scene.elements(py, &number, None)?,
+                scene.transform(py, &number)?,
+                scene.end_positions(py, &number)?,
+                filter.category,
+                filter.mask,
+            ))?;
+        }
+        (slf.get_type(), (), bodies).into_pyobject(py)
+    }
+
+    fn __setstate__(slf: &Bound<'_, Self>, bodies: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut scene = change(slf)?;
+        let mut gaps = Vec::new();
+        for state in bodies.try_iter()? {
+            let state = state?;
+            let item = |ix: usize| state.get_item(ix);
+            // Numbers of bodies that were removed are left free.
+            let number: usize = item(0)?.extract()?;
+            while scene.inner.n_bodies() < number {
+                gaps.push(scene.inner.add_points::<f32>(&[]).map_err(raise)?);
+            }
+            let (kind, vertices, elements) = (item(1)?, item(2)?, item(3)?);
+            let kind = settings::kind(Some(&kind))?;
+            let id = scene.add_named(&vertices, &elements, kind, ARGUMENTS)?;
+            let (matrix, end) = (item(4)?, item(5)?);
+            if !matrix.is_none() {
+                let matrix = arrays::matrix(&matrix, "matrix")?;
+                scene.inner.set_transform(id, &matrix).map_err(raise)?;
+            }
+            if !end.is_none() {
+                match PositionArray::new(&end, "vertices")? {
+                    PositionArray::F32(end) => {
+                        scene.inner.set_end_positions::<f32>(id, slice_rows(&end)?)
+                    }
+                    PositionArray::F64(end) => {
+                        scene.inner.set_end_positions::<f64>(id, slice_rows(&end)?)
+                    }
+                }
+                .map_err(raise)?;
+            }
+            let filter = Filter {
+                category: item(6)?.extract()?,
+                mask: item(7)?.extract()?,
+            };
+            scene.inner.set_filter(id, filter).map_err(raise)?;
+        }
+        for id in gaps.into_iter().rev() {
+            scene.inner.remove(id).map_err(raise)?;
+        }
+        Ok(())
     }
 }

@@ -7,6 +7,8 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
 
+use crate::arrays::RowKind;
+
 /// An argument of Python's side that may be left out.
 pub type Argument<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
 
@@ -59,9 +61,15 @@ pub fn unexpected(argument: &Bound<'_, PyAny>, name: &str, expected: &str) -> Py
 }
 
 /// What the rows of an index array are; `None` leaves it to their length.
-pub fn kind(argument: Argument<'_, '_>) -> PyResult<Option<Kind>> {
-    let kinds = Kind::ALL.map(|kind| (kind.name(), Some(kind)));
-    choose(argument, "kind", &kinds)
+pub fn kind(argument: Argument<'_, '_>) -> PyResult<Option<RowKind>> {
+    let mut kinds = Kind::ALL
+        .map(|kind| (kind.name(), Some(RowKind::Of(kind))))
+        .to_vec();
+    kinds.push(("quads", Some(RowKind::Quads)));
+    match argument {
+        Some(argument) => choose_one(argument, "kind", &kinds),
+        None => Ok(None),
+    }
 }
 
 /// What becomes of primitives that share a vertex.
@@ -120,6 +128,39 @@ pub fn unsigned(argument: &Bound<'_, PyAny>, name: &str, most: u64) -> PyResult<
     }
 }
 
+const BACKENDS: [(&str, Backend); 3] = [
+    ("auto", Backend::Auto),
+    ("cpu", Backend::Cpu),
+    ("gpu", Backend::Gpu),
+];
+const RECLUSTER: [(&str, Recluster); 2] = [("auto", Recluster::Auto), ("never", Recluster::Never)];
+const INSTRUCTION_SETS: [(&str, InstructionSet); 3] = [
+    ("portable", InstructionSet::Portable),
+    ("avx2", InstructionSet::Avx2),
+    ("avx512", InstructionSet::Avx512),
+];
+
+/// The name by which a value is chosen.
+fn name_of<T: PartialEq>(value: T, choices: &[(&'static str, T)]) -> Option<&'static str> {
+    let found = choices.iter().find(|(_, choice)| *choice == value);
+    found.map(|(name, _)| *name)
+}
+
+/// The name of a backend.
+pub fn backend_name(backend: Backend) -> Option<&'static str> {
+    name_of(backend, &BACKENDS)
+}
+
+/// The name of a rule of clustering again.
+pub fn recluster_name(recluster: Recluster) -> Option<&'static str> {
+    name_of(recluster, &RECLUSTER)
+}
+
+/// The name of an instruction set.
+pub fn instruction_set_name(instruction_set: InstructionSet) -> Option<&'static str> {
+    name_of(instruction_set, &INSTRUCTION_SETS)
+}
+
 /// What the detector's constructor was told, in its order.
 pub struct Told<'a, 'py> {
     pub method: Argument<'a, 'py>,
@@ -143,29 +184,9 @@ impl Told<'_, '_> {
                 &[Method::Clusters, Method::Cells, Method::Naive]
                     .map(|method| (method.name(), method)),
             )?,
-            backend: choose(
-                self.backend,
-                "backend",
-                &[
-                    ("auto", Backend::Auto),
-                    ("cpu", Backend::Cpu),
-                    ("gpu", Backend::Gpu),
-                ],
-            )?,
-            recluster: choose(
-                self.recluster,
-                "recluster",
-                &[("auto", Recluster::Auto), ("never", Recluster::Never)],
-            )?,
-            instruction_set: choose(
-                self.instruction_set,
-                "instruction_set",
-                &[
-                    ("portable", InstructionSet::Portable),
-                    ("avx2", InstructionSet::Avx2),
-                    ("avx512", InstructionSet::Avx512),
-                ],
-            )?,
+            backend: choose(self.backend, "backend", &BACKENDS)?,
+            recluster: choose(self.recluster, "recluster", &RECLUSTER)?,
+            instruction_set: choose(self.instruction_set, "instruction_set", &INSTRUCTION_SETS)?,
             ..Settings::default()
         };
         if let Some(device) = self.device {

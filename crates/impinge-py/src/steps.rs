@@ -2,10 +2,11 @@
 
 use impinge::{PairKind, Primitive};
 use numpy::{PyArray1, PyArray2};
-use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyTypeError};
+use pyo3::exceptions::{PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 
+use crate::arrays::from_end;
 use crate::bodies::Body;
 use crate::errors::raise;
 use crate::result::to_array;
@@ -202,6 +203,12 @@ impl Impacts {
         }
     }
 
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(PyTypeError::new_err(
+            "Impacts name bodies of a live scene: pickle their arrays",
+        ))
+    }
+
     fn __repr__(&self) -> String {
         match self.inner.earliest() {
             None => "Impacts(0, the step is free)".into(),
@@ -304,6 +311,12 @@ impl Advance {
         self.inner.apply(&mut scene.inner).map_err(raise)
     }
 
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(PyTypeError::new_err(
+            "an Advance names bodies of a live scene: pickle its arrays",
+        ))
+    }
+
     fn __repr__(&self) -> String {
         format!(
             "Advance(fraction={:?}, {} bodies)",
@@ -390,6 +403,12 @@ impl Candidates {
         self.inner.len()
     }
 
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(PyTypeError::new_err(
+            "Candidates name bodies of a live scene: pickle their arrays",
+        ))
+    }
+
     fn __repr__(&self) -> String {
         let counts = PairKind::ALL.map(|kind| (kind.name(), self.inner.of(kind).len()));
         let counts: Vec<String> = counts
@@ -422,17 +441,6 @@ pub fn kinds(argument: Argument<'_, '_>) -> PyResult<Vec<PairKind>> {
         .enumerate()
         .map(|(ix, kind)| choose_one(&kind?, &format!("kinds[{ix}]"), &choices))
         .collect()
-}
-
-/// An index that may count from the end.
-pub fn from_end(index: isize, len: usize, what: &str) -> PyResult<usize> {
-    let ix = match usize::try_from(index) {
-        Ok(ix) => Some(ix),
-        Err(_) => len.checked_sub(index.unsigned_abs()),
-    };
-    ix.filter(|&ix| ix < len).ok_or_else(|| {
-        PyIndexError::new_err(format!("index {index} given, but there are {len} {what}"))
-    })
 }
 
 /// Names of two letters as NumPy holds them: one 32-bit number per letter.

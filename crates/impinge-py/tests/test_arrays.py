@@ -161,7 +161,7 @@ def test_trimesh_and_meshio():
     assert np.array_equal(impinge.pairs(mesh.vertices, mesh.faces, OTHER, FACES), TRUTH)
     mesh = meshio.Mesh(CORNERS.astype(float), [("triangle", FACES), ("tetra", [[0, 1, 2, 3]])])
     tets = mesh.cells_dict["tetra"]
-    assert impinge.pairs(mesh.points, tets, OTHER, FACES).shape == (4, 2)
+    assert impinge.pairs(mesh.points, tets, OTHER, FACES, kind_a="tetrahedra").shape == (4, 2)
 
 
 def test_rows_in_place_are_read_without_a_copy():

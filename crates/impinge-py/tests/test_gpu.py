@@ -32,7 +32,7 @@ def test_the_same_bytes_as_the_cpu(device, method, dtype):
     scene.add(vertices.astype(dtype), faces)
     moving = scene.add(vertices.astype(dtype) + dtype(0.3), faces)
     scene.add(*soup(300, 0.2, 5, dtype))
-    scene.add(*lattice_tetrahedra(100, 3, 4))
+    scene.add(*lattice_tetrahedra(100, 3, 4), kind="tetrahedra")
     gpu = impinge.Detector(method, backend="gpu", device=device.name)
     cpu = impinge.Detector(backend="cpu")
     for shift in [0.3, 0.1]:

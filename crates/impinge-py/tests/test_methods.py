@@ -21,6 +21,18 @@ SETTINGS = [
 ]
 
 
+def kind(mesh):
+    return {3: "triangles", 4: "tetrahedra"}[mesh[1].shape[1]]
+
+
+def pairs(a, b, **settings):
+    return impinge.pairs(*a, *b, kind_a=kind(a), kind_b=kind(b), **settings)
+
+
+def self_pairs(mesh, **settings):
+    return impinge.self_pairs(*mesh, kind=kind(mesh), **settings)
+
+
 def two_body_cases():
     for n, k in [(1, 1), (7, 1), (65, 2), (130, 3), (400, 6)]:
         a, b = lattice_triangles(n, k, 1), lattice_triangles(n + 3, k, 2)
@@ -53,20 +65,20 @@ def named(cases):
 
 @pytest.mark.parametrize("a, b", named(two_body_cases()))
 def test_between_agrees_with_the_oracle(a, b):
-    truth = impinge.pairs(*a, *b, method="naive")
+    truth = pairs(a, b, method="naive")
     swapped = truth[np.lexsort((truth[:, 0], truth[:, 1]))][:, ::-1]
     for settings in SETTINGS:
-        assert np.array_equal(impinge.pairs(*a, *b, **settings), truth), settings
-    assert np.array_equal(impinge.pairs(*b, *a), swapped)
+        assert np.array_equal(pairs(a, b, **settings), truth), settings
+    assert np.array_equal(pairs(b, a), swapped)
 
 
 @pytest.mark.parametrize("mesh", named(one_body_cases()))
 @pytest.mark.parametrize("rule", ["skip", "resolve"])
 def test_within_agrees_with_the_oracle(mesh, rule):
-    truth = impinge.self_pairs(*mesh, rule, method="naive")
+    truth = self_pairs(mesh, shared_vertex=rule, method="naive")
     assert (truth[:, 0] < truth[:, 1]).all()
     for settings in SETTINGS:
-        answer = impinge.self_pairs(*mesh, shared_vertex=rule, **settings)
+        answer = self_pairs(mesh, shared_vertex=rule, **settings)
         assert np.array_equal(answer, truth), settings
 
 
@@ -74,7 +86,7 @@ def test_cases_are_worth_their_time():
     """The cases hold both answers in number, or the tests above would prove nothing."""
     shares = []
     for _, a, b in two_body_cases():
-        shares.append(len(impinge.pairs(*a, *b)) / (len(a[1]) * len(b[1])))
+        shares.append(len(pairs(a, b)) / (len(a[1]) * len(b[1])))
     assert sum(share == 0 for share in shares) >= 1
     assert sum(0 < share < 1 for share in shares) > 20
 

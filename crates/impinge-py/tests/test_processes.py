@@ -101,14 +101,12 @@ os.waitpid(child, 0)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
-@pytest.mark.parametrize(
-    "when, answer", [("early", "1\n"), ("late", "this process was forked from one that had")]
-)
-def test_forks(when, answer):
+@pytest.mark.parametrize("when", ["early", "late"])
+def test_forks(when):
     out = subprocess.run(
         [sys.executable, "-c", FORK, when], capture_output=True, text=True, timeout=60
     )
-    assert out.stdout.startswith(answer), out
+    assert out.stdout == "1\n", out
 
 
 def count(shift):

@@ -30,15 +30,15 @@ def test_handles_are_numbers(scene):
 
 def test_kinds(scene):
     vertices, tets = lattice_tetrahedra(5, 3, 1)
-    body = scene.add(vertices, tets)
+    body = scene.add(vertices, tets, "tetrahedra")
     assert scene.kind(body) == "tetrahedra" and scene.kind(0) == "triangles"
     assert np.array_equal(scene.elements(body), tets) and scene.elements(body).dtype == np.uint32
     assert (scene.n_primitives(body), scene.n_vertices(body)) == (5, 20)
     scene.add(vertices, tets, kind="tetrahedra")
     with pytest.raises(ValueError, match=r"^faces: shape \(n, 3\) expected, \(5, 4\) given"):
         scene.add(vertices, tets, kind="triangles")
-    with pytest.raises(ValueError, match='^kind: "quads" given'):
-        scene.add(vertices, tets, "quads")
+    with pytest.raises(ValueError, match='^kind: "hexahedra" given'):
+        scene.add(vertices, tets, "hexahedra")
     assert len(scene) == 4
 
 

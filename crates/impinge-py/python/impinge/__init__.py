@@ -17,7 +17,8 @@ For deforming meshes keep a `Scene` and a `Detector`, move the vertices with
 those under the names of ipc-toolkit.
 """
 
-from . import ipc
+from . import ipc, ray, tiles
+from ._check import check
 from ._impinge import (
     Advance,
     Body,
@@ -26,8 +27,10 @@ from ._impinge import (
     Candidates,
     Detector,
     Device,
+    Distances,
     Impact,
     Impacts,
+    Nearest,
     Result,
     Scene,
     Statistics,
@@ -37,6 +40,7 @@ from ._impinge import (
     pairs,
     self_pairs,
 )
+from ._manager import CollisionManager
 
 __all__ = [
     "Advance",
@@ -44,17 +48,23 @@ __all__ = [
     "CancelToken",
     "Cancelled",
     "Candidates",
+    "CollisionManager",
     "Detector",
     "Device",
+    "Distances",
     "Impact",
     "Impacts",
+    "Nearest",
     "Result",
     "Scene",
     "Statistics",
     "__version__",
+    "check",
     "devices",
     "hash_rows",
     "ipc",
     "pairs",
+    "ray",
     "self_pairs",
+    "tiles",
 ]

@@ -1,5 +1,14 @@
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any, Literal, SupportsFloat, SupportsIndex, TypedDict, final
+from typing import (
+    Any,
+    Literal,
+    NoReturn,
+    SupportsFloat,
+    SupportsIndex,
+    TypedDict,
+    final,
+    overload,
+)
 
 import numpy as np
 import numpy.typing as npt
@@ -13,12 +22,21 @@ __all__ = [
     "Candidates",
     "Detector",
     "Device",
+    "Distances",
     "Impact",
     "Impacts",
+    "Nearest",
     "Result",
     "Scene",
     "Statistics",
     "__version__",
+    "_check",
+    "_serve_check",
+    "_tiles_describe",
+    "_tiles_merge",
+    "_tiles_plan",
+    "_tiles_run",
+    "_tiles_scatter",
     "devices",
     "hash_rows",
     "pairs",
@@ -35,6 +53,7 @@ _Backend: TypeAlias = Literal["auto", "cpu", "gpu"]
 _Recluster: TypeAlias = Literal["auto", "never"]
 _InstructionSet: TypeAlias = Literal["portable", "avx2", "avx512"]
 _Kind: TypeAlias = Literal["points", "edges", "triangles", "tetrahedra"]
+_RowKind: TypeAlias = Literal["points", "edges", "triangles", "tetrahedra", "quads"]
 _SharedVertex: TypeAlias = Literal["skip", "resolve"]
 _Part: TypeAlias = Literal["given", "vertices", "edges", "faces"]
 _PairKind: TypeAlias = Literal["vf", "ee", "ev", "vv", "ef", "ff"]
@@ -75,6 +94,7 @@ class Body:
     def __le__(self, other: Body | int, /) -> bool: ...
     def __gt__(self, other: Body | int, /) -> bool: ...
     def __ge__(self, other: Body | int, /) -> bool: ...
+    def __reduce__(self) -> NoReturn: ...
 
 @final
 class Device:
@@ -96,15 +116,28 @@ def devices() -> list[Device]: ...
 @final
 class Scene:
     def __new__(cls) -> Scene: ...
-    def add(self, vertices: _Array, faces: _Array, kind: _Kind | None = None) -> Body: ...
+    def add(
+        self, vertices: _Array, faces: _Array | None = None, kind: _RowKind | None = None
+    ) -> Body: ...
+    def add_many(
+        self,
+        vertices: _Array,
+        faces: _Array,
+        vertex_offsets: _Array,
+        face_offsets: _Array,
+        kind: _RowKind | None = None,
+    ) -> list[Body]: ...
     def add_edges(self, vertices: _Array, edges: _Array) -> Body: ...
     def add_points(self, vertices: _Array) -> Body: ...
     def set_positions(self, body: _Body, vertices: _Array) -> None: ...
     def set_end_positions(self, body: _Body, vertices: _Array) -> None: ...
     def clear_end_positions(self, body: _Body) -> None: ...
     def remesh(
-        self, body: _Body, vertices: _Array, faces: _Array, kind: _Kind | None = None
+        self, body: _Body, vertices: _Array, faces: _Array, kind: _RowKind | None = None
     ) -> None: ...
+    def set_transform(self, body: _Body, matrix: _Array) -> None: ...
+    def transform(self, body: _Body) -> npt.NDArray[np.float64] | None: ...
+    def rest_positions(self, body: _Body) -> npt.NDArray[np.floating[Any]]: ...
     def remove(self, body: _Body) -> None: ...
     def set_filter(
         self,
@@ -124,6 +157,8 @@ class Scene:
     def nbytes(self) -> int: ...
     def __len__(self) -> int: ...
     def __contains__(self, body: object, /) -> bool: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
+    def __setstate__(self, bodies: Any, /) -> None: ...
 
 @final
 class Detector:
@@ -140,6 +175,7 @@ class Detector:
         recluster: _Recluster = "auto",
         instruction_set: _InstructionSet = "avx512",
     ) -> Detector: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]: ...
     def detect(
         self,
         scene: Scene,
@@ -150,6 +186,7 @@ class Detector:
         shared_vertex: _SharedVertex = "skip",
         progress: Callable[[int, int], object] | None = None,
         cancel: CancelToken | None = None,
+        filter: Callable[[npt.NDArray[np.uint32]], _Array] | None = None,
     ) -> Result: ...
     def impacts(
         self,
@@ -211,6 +248,20 @@ class Detector:
     ) -> Candidates: ...
 
 @final
+class Nearest:
+    @property
+    def distance(self) -> float: ...
+    @property
+    def primitives(self) -> tuple[int, int]: ...
+    @property
+    def points(self) -> npt.NDArray[np.float64] | None: ...
+
+@final
+class Distances:
+    def __new__(cls) -> Distances: ...
+    def between(self, scene: Scene, a: _Body, b: _Body) -> Nearest | None: ...
+
+@final
 class Impact:
     def __hash__(self) -> int: ...
     def __eq__(self, other: object, /) -> bool: ...
@@ -245,6 +296,7 @@ class Impacts:
     def __len__(self) -> int: ...
     def __getitem__(self, index: SupportsIndex, /) -> Impact: ...
     def __iter__(self) -> Iterator[Impact]: ...
+    def __reduce__(self) -> NoReturn: ...
 
 @final
 class Advance:
@@ -257,6 +309,7 @@ class Advance:
     @property
     def positions(self) -> list[tuple[Body, npt.NDArray[np.floating[Any]]]]: ...
     def apply(self, scene: Scene) -> None: ...
+    def __reduce__(self) -> NoReturn: ...
 
 @final
 class Candidates:
@@ -272,6 +325,7 @@ class Candidates:
     @property
     def stats(self) -> Statistics: ...
     def __len__(self) -> int: ...
+    def __reduce__(self) -> NoReturn: ...
 
 @final
 class Result:
@@ -280,6 +334,9 @@ class Result:
     def within(self, body: _Body) -> npt.NDArray[np.uint32]: ...
     @property
     def rows(self) -> npt.NDArray[np.uint32]: ...
+    @overload
+    def colliding(self, body: None = None) -> dict[Body, npt.NDArray[np.uint32]]: ...
+    @overload
     def colliding(self, body: _Body) -> npt.NDArray[np.uint32]: ...
     @property
     def bodies(self) -> list[Body]: ...
@@ -288,6 +345,15 @@ class Result:
     @property
     def stats(self) -> Statistics: ...
     def __len__(self) -> int: ...
+    @overload
+    def __getitem__(self, index: SupportsIndex, /) -> tuple[int, int, int, int]: ...
+    @overload
+    def __getitem__(self, index: slice, /) -> npt.NDArray[np.uint32]: ...
+    def __iter__(self) -> Iterator[tuple[int, int, int, int]]: ...
+    def __array__(
+        self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
+    ) -> npt.NDArray[Any]: ...
+    def __reduce__(self) -> NoReturn: ...
 
 @final
 class Statistics:
@@ -338,12 +404,51 @@ def pairs(
     faces_a: _Array,
     vertices_b: _Array,
     faces_b: _Array,
+    *,
+    kind_a: _RowKind | None = None,
+    kind_b: _RowKind | None = None,
     **settings: Unpack[_Settings],
 ) -> npt.NDArray[np.uint32]: ...
 def self_pairs(
     vertices: _Array,
     faces: _Array,
     shared_vertex: _SharedVertex = "skip",
+    *,
+    kind: _RowKind | None = None,
     **settings: Unpack[_Settings],
 ) -> npt.NDArray[np.uint32]: ...
 def hash_rows(rows: _Array) -> int: ...
+def _check(
+    paths: list[str],
+    command: list[str],
+    jobs: int,
+    weld: bool,
+    timeout: float | None,
+    row: Callable[[int, str], object],
+) -> None: ...
+def _serve_check(weld: bool, threads: int, memory: int | None) -> None: ...
+def _tiles_plan(
+    folder: str,
+    files: list[str],
+    cap: int,
+    chunk: int,
+    weld: bool,
+    replace: bool,
+    progress: _Progress | None,
+) -> dict[str, Any]: ...
+def _tiles_describe(folder: str) -> dict[str, Any]: ...
+def _tiles_scatter(
+    folder: str, rank: int, world_size: int, threads: int, progress: _Progress | None
+) -> dict[str, int]: ...
+def _tiles_run(
+    folder: str,
+    tiles: list[int],
+    between: bool,
+    within: bool,
+    shared_vertex: str,
+    threads: int,
+    memory_budget: int | None,
+    again: bool,
+    done: Callable[[], object] | None,
+) -> list[dict[str, Any]]: ...
+def _tiles_merge(folder: str) -> dict[str, Any]: ...

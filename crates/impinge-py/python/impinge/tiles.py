@@ -1,0 +1,199 @@
+"""Scenes larger than memory, or than one machine: exact collision detection tile by tile.
+
+Four steps work on one folder, and its files are all that they share: `plan`, `scatter`, `run`, `merge`. Any of them may run
+on any machine that sees the folder, in any number of processes. A step that was stopped is run again and ends with the same
+bytes. The answer is that of one `Detector` with all files in one scene, and has the same hash. `impinge.ray.tiles` runs the
+steps on a Ray cluster.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from typing import Any, Literal, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _impinge
+
+__all__ = ["describe", "merge", "plan", "rows", "run", "scatter"]
+
+_Path = Union[str, "os.PathLike[str]"]
+_Progress = Callable[[int, int], object]
+
+
+def plan(
+    folder: _Path,
+    files: Iterable[_Path],
+    *,
+    cap: int = 2_000_000,
+    chunk: int = 500_000,
+    weld: bool = False,
+    replace: bool = False,
+    progress: _Progress | None = None,
+) -> dict[str, Any]:
+    """Looks at every primitive of the files once, cuts space into tiles and writes ``plan.json``.
+
+    Parameters
+    ----------
+    folder : path
+        Made if it is not there. One with the very same plan is left as it is.
+    files : iterable of paths
+        Mesh files, a body each, numbered in this order.
+    cap : int
+        About how many primitives a tile may hold; one tile is in memory at a time.
+    chunk : int
+        Primitives per unit of scattering.
+    weld : bool
+        Whether vertices of one file at exactly the same position become one.
+    replace : bool
+        Whether another plan in the folder, and all that was made by it, is removed.
+    progress : callable, optional
+        Called as ``progress(done, total)`` with primitives.
+
+    Returns
+    -------
+    dict
+        As `describe`.
+
+    Raises
+    ------
+    OSError, ValueError
+        Files that cannot be read, coordinates that are refused, another plan in the folder.
+    """
+    names = [os.fspath(file) for file in files]
+    return _impinge._tiles_plan(os.fspath(folder), names, cap, chunk, weld, replace, progress)
+
+
+def describe(folder: _Path) -> dict[str, Any]:
+    """What the plan of a folder says.
+
+    Returns
+    -------
+    dict
+        ``plan`` (its name), ``files``, ``primitives``, ``tiles``, ``units``.
+    """
+    return _impinge._tiles_describe(os.fspath(folder))
+
+
+def scatter(
+    folder: _Path,
+    *,
+    rank: int = 0,
+    world_size: int = 1,
+    threads: int = 0,
+    progress: _Progress | None = None,
+) -> dict[str, int]:
+    """Writes the parts that are not there yet: primitives by tile, one part per unit of work.
+
+    Parameters
+    ----------
+    folder : path
+        With a plan.
+    rank, world_size : int
+        The share of this process: units whose number leaves the remainder `rank`.
+    threads : int
+        Threads; 0 for one per core.
+    progress : callable, optional
+        Called as ``progress(done, total)`` with units.
+
+    Returns
+    -------
+    dict
+        ``written`` and ``kept`` (parts), ``primitives`` and ``records`` of the parts that were written.
+
+    Raises
+    ------
+    OSError, ValueError
+        Files that have changed or cannot be read, a full disk, a rank out of its range.
+    """
+    return _impinge._tiles_scatter(os.fspath(folder), rank, world_size, threads, progress)
+
+
+def run(
+    folder: _Path,
+    tiles: Iterable[int] | None = None,
+    *,
+    between: bool = True,
+    within: bool = True,
+    shared_vertex: Literal["skip", "resolve"] = "skip",
+    threads: int = 0,
+    memory_budget: int | None = None,
+    again: bool = False,
+    progress: _Progress | None = None,
+) -> list[dict[str, Any]]:
+    """Finds the pairs of tiles, one tile in memory at a time. Tiles that have a result for the same question are kept.
+
+    Parameters
+    ----------
+    folder : path
+        With all parts.
+    tiles : iterable of int, optional
+        Which; by default all of them.
+    between, within : bool
+        Pairs of different files, pairs within each file. All tiles must be asked the same.
+    shared_vertex : {"skip", "resolve"}
+        As for `Detector.detect`.
+    threads : int
+        Threads; 0 for one per core.
+    memory_budget : int, optional
+        As for `Detector`.
+    again : bool
+        Whether tiles that have a result are run again.
+    progress : callable, optional
+        Called as ``progress(done, total)`` after each tile.
+
+    Returns
+    -------
+    list of dict
+        One per tile: ``tile``, ``primitives``, ``pairs``, ``hash``, ``elsewhere``, ``pieces``, ``kept``.
+
+    Raises
+    ------
+    OSError, ValueError, RuntimeError
+        No such tile; parts that are missing, stale or damaged; a detection that fails.
+    """
+    if not (between or within):
+        raise ValueError("between and within: at least one of them must be asked")
+    chosen = range(describe(folder)["tiles"]) if tiles is None else tiles
+    numbers = list(chosen)
+    n_done = 0
+
+    def done() -> None:
+        nonlocal n_done
+        n_done += 1
+        if progress is not None:
+            progress(n_done, len(numbers))
+
+    arguments = (between, within, shared_vertex, threads, memory_budget, again, done)
+    return _impinge._tiles_run(os.fspath(folder), numbers, *arguments)
+
+
+def merge(folder: _Path) -> dict[str, Any]:
+    """Merges the results of all tiles into ``rows.npy`` and ``answer.json``.
+
+    Returns
+    -------
+    dict
+        ``pairs``, ``hash`` (as `Result.hash` in 16 hexadecimal digits), ``asked``, ``tiles``, ``records``, ``uncut_tiles``,
+        ``rows`` (the path of the rows).
+
+    Raises
+    ------
+    OSError, ValueError
+        A tile whose result is missing, stale, damaged, or for another question.
+    """
+    return _impinge._tiles_merge(os.fspath(folder))
+
+
+def rows(folder: _Path) -> npt.NDArray[np.uint32]:
+    """The merged answer, mapped from its file: it may be larger than memory.
+
+    Returns
+    -------
+    numpy.ndarray of uint32, shape (n, 4)
+        As `Result.rows`, with bodies numbered by the order of files.
+    """
+    mapped: npt.NDArray[np.uint32] = np.load(os.path.join(folder, "rows.npy"), mmap_mode="r")
+    return mapped

@@ -1,0 +1,303 @@
+//! Checks of many meshes, and tiles: what the modules `impinge._check` and `impinge.tiles` are made of.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::process::Command;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+use impinge::{Backend, CancelToken, Control, Settings, SharedVertex};
+use impinge_check::{Limits, Options, Pool, PoolError, apply_limits, serve};
+use impinge_tiles::{Ask, Error, Plan, PlanOptions, RunOptions, ScatterOptions};
+use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::errors::{Cancelled, raise};
+
+/// How often Python gets a look while work goes on in another thread.
+const INTERVAL: Duration = Duration::from_millis(50);
+
+/// Runs `work` in a thread of its own, with the interpreter released, and hands what it sends to `each` here. Ctrl-C and
+/// exceptions of `each` cancel the work, which is waited for.
+fn watched<M: Send, T: Send>(
+    py: Python<'_>,
+    mut each: impl FnMut(Python<'_>, M) -> PyResult<()> + Send,
+    work: impl FnOnce(&CancelToken, &(dyn Fn(M) + Sync)) -> T + Send,
+) -> PyResult<T> {
+    let cancel = CancelToken::new();
+    py.detach(|| {
+        std::thread::scope(|scope| {
+            let (sender, messages) = channel();
+            let sender = std::sync::Mutex::new(sender);
+            let token = &cancel;
+            let worker = scope.spawn(move || {
+                let send = |message| {
+                    let sender = sender
+                        .lock()
+                        .unwrap_or_else(std::sync::PoisonError::into_inner);
+                    // Nobody listens any more once an exception was raised.
+                    let _ = sender.send(message);
+                };
+                work(token, &send)
+            });
+            let mut raised = None;
+            loop {
+                let looked = match messages.recv_timeout(INTERVAL) {
+                    Ok(message) => Python::attach(|py| {
+                        py.check_signals()?;
+                        each(py, message)
+                    }),
+                    Err(RecvTimeoutError::Timeout) => Python::attach(|py| py.check_signals()),
+                    Err(RecvTimeoutError::Disconnected) => break,
+                };
+                if let Err(error) = looked {
+                    raised = Some(error);
+                    cancel.cancel();
+                    break;
+                }
+            }
+            let done = worker
+                .join()
+                .unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            match raised {
+                Some(error) => Err(error),
+                None => Ok(done),
+            }
+        })
+    })
+}
+
+/// Checks meshes in child processes and hands each row, as JSON, to ``row(number, json)``.
+#[pyfunction]
+pub fn _check(
+    py: Python<'_>,
+    paths: Vec<PathBuf>,
+    command: Vec<OsString>,
+    jobs: usize,
+    weld: bool,
+    timeout: Option<f64>,
+    row: Py<PyAny>,
+) -> PyResult<()> {
+    let timeout = timeout.map(Duration::try_from_secs_f64).transpose();
+    let timeout = timeout.map_err(|error| PyValueError::new_err(format!("timeout: {error}")))?;
+    let start = || {
+        let mut child = Command::new(&command[0]);
+        child.args(&command[1..]);
+        child
+    };
+    let pool = Pool {
+        command: &start,
+        jobs,
+        timeout,
+        weld,
+    };
+    let each = |py: Python<'_>, (ix, json): (usize, String)| row.call1(py, (ix, json)).map(drop);
+    let ran = watched(py, each, |cancel, send| {
+        pool.run(&paths, cancel, |ix, row| {
+            send((ix, row.to_json().to_string()))
+        })
+    })?;
+    ran.map_err(|error| match error {
+        PoolError::Cancelled => Cancelled::new_err("the check was cancelled"),
+        error => PyRuntimeError::new_err(error.to_string()),
+    })
+}
+
+/// The child's side of `_check`: answers paths on standard input by rows on standard output.
+#[pyfunction]
+pub fn _serve_check(
+    py: Python<'_>,
+    weld: bool,
+    threads: usize,
+    memory: Option<u64>,
+) -> PyResult<()> {
+    let options = Options { weld, threads };
+    py.detach(|| {
+        apply_limits(&Limits { memory })?;
+        serve(std::io::stdin().lock(), std::io::stdout().lock(), &options)
+    })
+    .map_err(PyErr::from)
+}
+
+fn refuse(error: Error) -> PyErr {
+    match error {
+        Error::Cancelled => Cancelled::new_err("the step was cancelled; what is done stays done"),
+        Error::Io { .. } => PyOSError::new_err(error.to_string()),
+        Error::Detection { tile, source } => match source {
+            impinge::Error::Cancelled => raise(impinge::Error::Cancelled),
+            source => PyRuntimeError::new_err(format!("tile {tile}: {source}")),
+        },
+        error => PyValueError::new_err(error.to_string()),
+    }
+}
+
+fn rule(shared_vertex: &str) -> PyResult<SharedVertex> {
+    match shared_vertex {
+        "skip" => Ok(SharedVertex::Skip),
+        "resolve" => Ok(SharedVertex::Resolve),
+        other => Err(PyValueError::new_err(format!(
+            "shared_vertex: {other:?} given, \"skip\", \"resolve\" allowed"
+        ))),
+    }
+}
+
+fn call_progress(py: Python<'_>, progress: Option<&Py<PyAny>>, at: (u64, u64)) -> PyResult<()> {
+    match progress {
+        Some(progress) => progress.call1(py, at).map(drop),
+        None => Ok(()),
+    }
+}
+
+/// `impinge.tiles.plan`.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+pub fn _tiles_plan<'py>(
+    py: Python<'py>,
+    folder: PathBuf,
+    files: Vec<PathBuf>,
+    cap: u64,
+    chunk: u64,
+    weld: bool,
+    replace: bool,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let options = PlanOptions {
+        cap,
+        chunk,
+        weld,
+        cells: None,
+        replace,
+    };
+    let each = |py: Python<'_>, at| call_progress(py, progress.as_ref(), at);
+    let plan = watched(py, each, |cancel, send| {
+        Plan::make(&folder, &files, &options, cancel, &mut |done, total| {
+            send((done, total));
+        })
+    })?
+    .map_err(refuse)?;
+    describe(py, &plan)
+}
+
+/// `impinge.tiles.describe`.
+#[pyfunction]
+pub fn _tiles_describe(py: Python<'_>, folder: PathBuf) -> PyResult<Bound<'_, PyDict>> {
+    describe(py, &Plan::open(&folder).map_err(refuse)?)
+}
+
+fn describe<'py>(py: Python<'py>, plan: &Plan) -> PyResult<Bound<'py, PyDict>> {
+    let files = plan.files().iter().map(|file| file.path.clone());
+    let n: u64 = plan.files().iter().map(|file| file.n_primitives).sum();
+    let all = PyDict::new(py);
+    all.set_item("plan", format!("{:016x}", plan.id()))?;
+    all.set_item("files", PyList::new(py, files)?)?;
+    all.set_item("primitives", n)?;
+    all.set_item("tiles", plan.n_tiles())?;
+    all.set_item("units", plan.n_units())?;
+    Ok(all)
+}
+
+/// `impinge.tiles.scatter`.
+#[pyfunction]
+pub fn _tiles_scatter(
+    py: Python<'_>,
+    folder: PathBuf,
+    rank: usize,
+    world_size: usize,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'_, PyDict>> {
+    let options = ScatterOptions {
+        rank,
+        world_size,
+        threads,
+    };
+    let plan = Plan::open(&folder).map_err(refuse)?;
+    let each = |py: Python<'_>, at| call_progress(py, progress.as_ref(), at);
+    let scattered = watched(py, each, |cancel, send| {
+        plan.scatter(&options, cancel, &|done, total| send((done, total)))
+    })?
+    .map_err(refuse)?;
+    let all = PyDict::new(py);
+    all.set_item("written", scattered.n_written)?;
+    all.set_item("kept", scattered.n_kept)?;
+    all.set_item("primitives", scattered.n_primitives)?;
+    all.set_item("records", scattered.n_records)?;
+    Ok(all)
+}
+
+/// `impinge.tiles.run`.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+pub fn _tiles_run<'py>(
+    py: Python<'py>,
+    folder: PathBuf,
+    tiles: Vec<u32>,
+    between: bool,
+    within: bool,
+    shared_vertex: &str,
+    threads: usize,
+    memory_budget: Option<u64>,
+    again: bool,
+    done: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyList>> {
+    let options = RunOptions {
+        ask: Ask {
+            between,
+            within,
+            shared_vertex: rule(shared_vertex)?,
+        },
+        settings: Settings {
+            backend: Backend::Cpu,
+            threads,
+            memory_budget,
+            ..Settings::default()
+        },
+        again,
+    };
+    let plan = Plan::open(&folder).map_err(refuse)?;
+    let mut results = Vec::new();
+    let each = |py: Python<'_>, result| {
+        results.push(result);
+        match &done {
+            Some(done) => done.call0(py).map(drop),
+            None => Ok(()),
+        }
+    };
+    watched(py, each, |cancel, send| {
+        let control = Control::new().cancel(cancel);
+        plan.run(tiles, &options, &control, &mut |result| {
+            send(result.clone())
+        })
+    })?
+    .map_err(refuse)?;
+    let rows = results.iter().map(|result: &impinge_tiles::TileResult| {
+        let row = PyDict::new(py);
+        row.set_item("tile", result.tile)?;
+        row.set_item("primitives", result.n_primitives)?;
+        row.set_item("pairs", result.n_pairs)?;
+        row.set_item("hash", format!("{:016x}", result.hash))?;
+        row.set_item("elsewhere", result.n_elsewhere)?;
+        row.set_item("pieces", result.n_pieces)?;
+        row.set_item("kept", result.was_kept)?;
+        Ok(row)
+    });
+    PyList::new(py, rows.collect::<PyResult<Vec<_>>>()?)
+}
+
+/// `impinge.tiles.merge`.
+#[pyfunction]
+pub fn _tiles_merge(py: Python<'_>, folder: PathBuf) -> PyResult<Bound<'_, PyDict>> {
+    let plan = Plan::open(&folder).map_err(refuse)?;
+    let nothing = |_: Python<'_>, ()| Ok(());
+    let merged = watched(py, nothing, |_, _| plan.merge())?.map_err(refuse)?;
+    let all = PyDict::new(py);
+    all.set_item("pairs", merged.n_pairs)?;
+    all.set_item("hash", format!("{:016x}", merged.hash))?;
+    all.set_item("asked", merged.asked)?;
+    all.set_item("tiles", plan.n_tiles())?;
+    all.set_item("records", merged.n_records)?;
+    all.set_item("uncut_tiles", merged.n_uncut)?;
+    all.set_item("rows", merged.rows)?;
+    Ok(all)
+}

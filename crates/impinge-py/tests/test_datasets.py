@@ -1,0 +1,195 @@
+"""Many meshes, tiles, and both on Ray."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import impinge
+from shapes import ball, soup
+
+
+def write_obj(path, vertices, faces):
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.astype(float).tolist()]
+    lines += ["f " + " ".join(str(ix + 1) for ix in face) for face in faces.tolist()]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def meshes(tmp_path_factory):
+    """A ball, a soup that meets itself, a file that is none, one that is not there."""
+    folder = tmp_path_factory.mktemp("meshes")
+    write_obj(folder / "ball.obj", *ball(8, 12))
+    write_obj(folder / "soup.obj", *soup(60, 0.4, 1))
+    (folder / "text.ply").write_text("not a mesh")
+    return [folder / name for name in ["ball.obj", "soup.obj", "text.ply", "missing.stl"]]
+
+
+def test_check(meshes):
+    calls = []
+    rows = impinge.check(meshes, jobs=2, progress=lambda *at: calls.append(at))
+    assert [row["path"] for row in rows] == list(map(str, meshes))
+    clean, crossing, text, missing = rows
+    assert clean["self_intersections"] == clean["boundary_edges"] == 0 and clean["components"] == 1
+    vertices, faces = soup(60, 0.4, 1)
+    expected = impinge.self_pairs(vertices, faces, "resolve")
+    assert crossing["self_intersections"] == len(expected) > 0 and crossing["error"] is None
+    assert text["error"] is not None and missing["error"] is not None
+    assert {"vertices", "triangles", "degenerate", "duplicate_faces", "non_manifold_edges"} <= clean.keys()
+    assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert impinge.check(str(meshes[0])) == [clean] and impinge.check([]) == []
+
+
+def test_check_refuses_by_name(meshes):
+    for words, options in [
+        ("^jobs: 0 given, 1 or more", {"jobs": 0}),
+        ("^timeout: -1 given, more than 0", {"timeout": -1}),
+        ("^memory: 0 given, 1 or more", {"memory": 0}),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            impinge.check(meshes, **options)
+    with pytest.raises(ZeroDivisionError):
+        impinge.check(meshes, jobs=1, progress=lambda *_: 1 // 0)
+    [row] = impinge.check(meshes[:1], timeout=1e-9)
+    assert row["error"] is not None and "self_intersections" in row
+
+
+INTERRUPTED = """
+import sys, impinge
+def report(done, total):
+    print(done, flush=True)
+try:
+    impinge.check([sys.argv[1]] * 100_000, jobs=1, progress=report)
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of this kind are POSIX")
+def test_ctrl_c_ends_a_check(meshes):
+    command = [sys.executable, "-c", INTERRUPTED, str(meshes[0])]
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert child.stdout.readline() == "1\n"
+        child.send_signal(signal.SIGINT)
+        start = time.monotonic()
+        out, err = child.communicate(timeout=60)
+    finally:
+        child.kill()
+        child.communicate()
+    assert out.endswith("interrupted\n") and err == "" and child.returncode == 0
+    assert time.monotonic() - start < 20
+
+
+@pytest.fixture(scope="module")
+def bodies(tmp_path_factory):
+    """Three mesh files, and the answer of one detector for all of them."""
+    folder = tmp_path_factory.mktemp("bodies")
+    scene = impinge.Scene()
+    paths = []
+    for ix in range(3):
+        vertices, faces = soup(700, 0.1, ix)
+        scene.add(vertices, faces)
+        paths.append(write_obj(folder / f"{ix}.obj", vertices, faces))
+    truth = impinge.Detector(backend="cpu").detect(scene, between=True, within=True)
+    assert len(truth) > 300
+    return paths, truth
+
+
+def test_tiles_have_the_answer_of_the_whole(bodies, tmp_path):
+    paths, truth = bodies
+    folder = tmp_path / "tiles"
+    seen = []
+    plan = impinge.tiles.plan(folder, paths, cap=400, chunk=256, progress=lambda *at: seen.append(at))
+    assert plan["primitives"] == 2100 and plan["tiles"] > 3 and plan == impinge.tiles.describe(folder)
+    assert plan["files"] == list(map(str, paths)) or [str(path) for path in plan["files"]] == list(map(str, paths))
+    assert seen and seen[-1] == (2100, 2100)
+    halves = [impinge.tiles.scatter(folder, rank=rank, world_size=2, threads=1) for rank in range(2)]
+    assert sum(half["written"] for half in halves) == plan["units"]
+    assert impinge.tiles.scatter(folder)["kept"] == plan["units"]
+    done = []
+    rows = impinge.tiles.run(folder, threads=1, progress=lambda *at: done.append(at))
+    assert sum(row["pairs"] for row in rows) == len(truth) and done[-1] == (plan["tiles"],) * 2
+    assert all(row["kept"] for row in impinge.tiles.run(folder, [0, 1]))
+    merged = impinge.tiles.merge(folder)
+    assert merged["pairs"] == len(truth) and merged["hash"] == f"{truth.hash:016x}"
+    assert np.array_equal(impinge.tiles.rows(folder), truth.rows)
+
+
+def test_tiles_refuse_by_name(bodies, tmp_path):
+    paths, _ = bodies
+    with pytest.raises((OSError, ValueError), match="missing"):
+        impinge.tiles.plan(tmp_path / "a", [tmp_path / "missing.ply"])
+    with pytest.raises(ValueError, match="cap"):
+        impinge.tiles.plan(tmp_path / "a", paths, cap=0)
+    impinge.tiles.plan(tmp_path / "b", paths, cap=500)
+    with pytest.raises((OSError, ValueError)):
+        impinge.tiles.run(tmp_path / "b")
+    with pytest.raises(ValueError, match="^between and within"):
+        impinge.tiles.run(tmp_path / "b", between=False, within=False)
+    with pytest.raises(ValueError, match="^shared_vertex: \"leave\" given"):
+        impinge.tiles.run(tmp_path / "b", shared_vertex="leave")
+    with pytest.raises((OSError, ValueError)):
+        impinge.tiles.merge(tmp_path / "b")
+    with pytest.raises((OSError, ValueError)):
+        impinge.tiles.describe(tmp_path / "nowhere")
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    ray = pytest.importorskip("ray", reason="Ray is not installed")
+    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="error")
+    yield ray
+    ray.shutdown()
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_ray_checks_the_same_rows(cluster, meshes):
+    paths = meshes * 5
+    calls = []
+    rows = impinge.ray.check(paths, max_in_flight=3, progress=lambda *at: calls.append(at))
+    assert rows == impinge.check(paths)
+    assert calls[-1] == (20, 20) and calls == sorted(calls)
+    with pytest.raises(ValueError, match="^max_in_flight: 0 given"):
+        impinge.ray.check(paths, max_in_flight=0)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_ray_runs_tiles(cluster, bodies, tmp_path):
+    paths, truth = bodies
+    plan = impinge.tiles.plan(tmp_path / "tiles", paths, cap=400, chunk=256)
+    calls = []
+    merged = impinge.ray.tiles(tmp_path / "tiles", progress=lambda *at: calls.append(at))
+    assert merged["hash"] == f"{truth.hash:016x}" and merged["pairs"] == len(truth)
+    n = plan["units"] + plan["tiles"]
+    assert calls == [(done, n) for done in range(1, n + 1)]
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_ray_survives_a_worker_that_dies(cluster, meshes, tmp_path, monkeypatch):
+    """A mesh path whose first reader kills its own worker: the batch is tried again."""
+    from impinge import ray as on_ray
+
+    mark = tmp_path / "died"
+    real = on_ray._check
+
+    def deadly(names, **options):
+        if not os.path.exists(mark):
+            open(mark, "w").close()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return real(names, **options)
+
+    monkeypatch.setattr(on_ray, "_check", deadly)
+    rows = impinge.ray.check(meshes, max_in_flight=1)
+    assert mark.exists() and rows == impinge.check(meshes)
+
+
+def test_ray_is_asked_for_by_name(monkeypatch, meshes):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'impinge\[ray\]'"):
+        impinge.ray.check(meshes)

@@ -1,0 +1,374 @@
+"""What Python users expect of objects: sequences, pickles, meshes of other libraries, forks."""
+
+import copy
+import multiprocessing
+import os
+import pickle
+import subprocess
+import sys
+import types
+
+import numpy as np
+import pytest
+
+import impinge
+from shapes import ACROSS, FACE, TRIANGLE, ball, lattice_tetrahedra, soup
+
+TETS = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], np.float32)
+QUADS = np.array([[0, 1, 3, 2], [1, 4, 5, 3]])
+GRID = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [2, 0, 0], [2, 1, 0]], np.float32)
+
+
+@pytest.fixture(scope="module")
+def result():
+    scene = impinge.Scene()
+    for shift in range(3):
+        vertices, faces = soup(400, 0.3, shift)
+        scene.add(vertices, faces)
+    scene.add(TRIANGLE + np.float32(50), FACE)
+    return impinge.Detector(backend="cpu").detect(scene, between=True, within=True)
+
+
+def test_a_result_is_a_sequence_of_rows(result):
+    rows = result.rows
+    assert len(rows) == len(result) > 100
+    assert [tuple(row) for row in rows.tolist()] == list(result)
+    assert result[0] == tuple(rows[0]) and result[-1] == tuple(rows[-1])
+    assert result[np.int64(7)] == tuple(rows[7]) and isinstance(result[7], tuple)
+    assert np.array_equal(result[5:90:7], rows[5:90:7]) and result[:0].shape == (0, 4)
+    assert result[3] in result and (9, 9, 9, 9) not in result
+    for index in [len(rows), -len(rows) - 1]:
+        with pytest.raises(IndexError, match=f"^index {index} given, but there are {len(rows)} pairs"):
+            result[index]
+    with pytest.raises(TypeError, match="^index: a whole number or a slice expected, str given"):
+        result["a"]
+
+
+def test_a_result_is_an_array(result):
+    array = np.asarray(result)
+    assert array.dtype == np.uint32 and np.array_equal(array, result.rows)
+    assert np.asarray(result, np.int64).dtype == np.int64
+    assert np.array_equal(np.unique(result, axis=0), result.rows)
+    if np.lib.NumpyVersion(np.__version__) >= "2.0.0":
+        with pytest.raises(ValueError, match="^copy=False"):
+            np.array(result, copy=False)
+
+
+def test_all_colliding_primitives_in_one_pass(result):
+    everything = result.colliding()
+    assert [int(body) for body in everything] == [0, 1, 2]
+    for body, primitives in everything.items():
+        assert primitives.dtype == np.uint32
+        assert np.array_equal(primitives, result.colliding(body))
+    assert np.array_equal(everything[1], result.colliding(1)) and 3 not in everything
+    assert result.colliding(3).shape == (0,)
+
+
+def test_filters_of_the_users_own():
+    scene = impinge.Scene()
+    for seed in range(3):
+        scene.add(*soup(300, 0.3, seed))
+    detector = impinge.Detector(backend="cpu")
+    everything = detector.detect(scene).rows
+    layer = [np.arange(300) % 2, np.arange(300) % 3, np.zeros(300, int)]
+    asked = []
+
+    def keep(rows):
+        asked.append(rows)
+        of = [[layer[body][face] for body, face in rows[:, pair]] for pair in ([0, 1], [2, 3])]
+        return np.equal(*map(np.array, of))
+
+    kept = detector.detect(scene, filter=keep)
+    [rows] = asked
+    assert np.array_equal(rows, everything)
+    expected = everything[[layer[a][i] == layer[b][j] for a, i, b, j in everything]]
+    assert 0 < len(expected) < len(everything) and np.array_equal(kept.rows, expected)
+    assert kept.hash == impinge.hash_rows(expected)
+    assert len(detector.detect(scene, between=(0, 1), filter=lambda rows: rows[:, 1] > 900)) == 0
+    with pytest.raises(TypeError, match="^filter: a callable expected, int given"):
+        detector.detect(scene, filter=1)
+    for answer in [lambda rows: rows, lambda rows: np.ones(len(rows)), lambda rows: [True]]:
+        with pytest.raises(ValueError, match=r"^filter: shape \(\d+,\) of bool expected"):
+            detector.detect(scene, filter=answer)
+    with pytest.raises(ZeroDivisionError):
+        detector.detect(scene, filter=lambda rows: 1 // 0)
+
+
+def a_scene():
+    """With bodies of all kinds, a gap, a filter, a transform and a body that moves."""
+    scene = impinge.Scene()
+    scene.add(TRIANGLE, FACE)
+    gone = scene.add(TRIANGLE, FACE)
+    scene.add(ACROSS.astype(np.float64), FACE)
+    scene.add(CORNERS, TETS)
+    scene.add_edges(TRIANGLE, [[0, 1], [1, 2]])
+    scene.add_points(TRIANGLE + np.float32([0, 0, 1]))
+    scene.remove(gone)
+    scene.set_filter(2, category=6, mask=2**64 - 1)
+    scene.set_transform(3, [[0, -1, 0, 0.1], [1, 0, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]])
+    scene.set_end_positions(5, TRIANGLE - np.float32([0, 0, 1]))
+    return scene
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
+def test_scenes_pickle(duplicate):
+    scene = a_scene()
+    other = duplicate(scene)
+    assert list(map(int, other.bodies)) == [0, 2, 3, 4, 5] and repr(other) == repr(scene)
+    for body in map(int, scene.bodies):
+        assert other.kind(body) == scene.kind(body)
+        for of in ["positions", "rest_positions", "elements", "end_positions", "transform"]:
+            ours, theirs = getattr(other, of)(body), getattr(scene, of)(body)
+            assert (ours is None) == (theirs is None)
+            if ours is not None:
+                assert ours.dtype == theirs.dtype and np.array_equal(ours, theirs), (body, of)
+    detector = impinge.Detector(backend="cpu")
+    for question in [{}, {"within": True}]:
+        assert detector.detect(other, **question).hash == detector.detect(scene, **question).hash
+    assert detector.impacts(other).hash == detector.impacts(scene).hash
+    # They are two scenes from now on.
+    other.set_positions(0, TRIANGLE + np.float32(9))
+    assert np.array_equal(scene.positions(0), TRIANGLE)
+    assert int(other.add(TRIANGLE, FACE)) == 1
+    assert len(duplicate(impinge.Scene())) == 0
+
+
+def test_settings_pickle():
+    settings = dict(method="cells", backend="cpu", threads=2, memory_budget=1 << 30, lambda_=2.0)
+    detector = impinge.Detector(**settings, group_size=32, recluster="never", instruction_set="avx2")
+    other = pickle.loads(pickle.dumps(detector))
+    assert repr(other) == repr(detector) == 'Detector(method="cells", backend="cpu", threads=2, memory_budget=1073741824)'
+    arguments, keywords = other.__getnewargs_ex__()
+    assert arguments == () and {**settings, "group_size": 32, "recluster": "never"}.items() <= keywords.items()
+    assert keywords["instruction_set"] == "avx2"
+    scene = a_scene()
+    assert copy.deepcopy(detector).detect(scene).hash == detector.detect(scene).hash
+
+
+def test_what_does_not_pickle_says_why(result):
+    scene = a_scene()
+    detector = impinge.Detector(backend="cpu")
+    for thing, words in [
+        (result, r"pickle result\.rows"),
+        (scene.bodies[0], r"int\(body\)"),
+        (detector.impacts(scene), "pickle their arrays"),
+        (detector.candidates(scene), "pickle their arrays"),
+        (detector.advance(scene), "pickle its arrays"),
+    ]:
+        with pytest.raises(TypeError, match=words):
+            pickle.dumps(thing)
+
+
+def test_repr_is_short():
+    n = 100_000
+    scene = impinge.Scene()
+    scene.add_many(np.tile(TRIANGLE, (n, 1)), np.tile(FACE, (n, 1)), np.arange(n + 1) * 3, np.arange(n + 1))
+    scene.add(CORNERS, TETS)
+    assert repr(scene) == "Scene(100001 bodies: 100000 triangles, 2 tetrahedra)"
+    small = impinge.Scene()
+    small.add(TRIANGLE, FACE)
+    assert repr(small) == "Scene(0: 1 triangles)"
+
+
+def test_many_bodies_at_once():
+    n = 5000
+    random = np.random.default_rng(1)
+    sizes = random.integers(0, 5, n)
+    of_faces = np.concatenate([[0], np.cumsum(sizes)])
+    vertices = random.random((3 * sizes.sum(), 3)).astype(np.float32)
+    faces = np.concatenate([np.arange(3 * size).reshape(-1, 3) for size in sizes])
+    scene, one_by_one = impinge.Scene(), impinge.Scene()
+    bodies = scene.add_many(vertices, faces, 3 * of_faces, of_faces)
+    assert list(map(int, bodies)) == list(range(n)) and bodies == scene.bodies
+    for body in range(n):
+        rows = slice(of_faces[body], of_faces[body + 1])
+        one_by_one.add(vertices[3 * rows.start : 3 * rows.stop], faces[rows], kind="triangles")
+    assert [scene.n_primitives(body) for body in bodies[:50]] == sizes[:50].tolist()
+    assert all(np.array_equal(scene.positions(b), one_by_one.positions(int(b))) for b in bodies[::97])
+    small = impinge.Scene()
+    for words, change in [
+        (r"^vertex_offsets: 2 as the last of 3 given", {"vertex_offsets": [0, 2]}),
+        (r"^face_offsets: 1 as the first given, 0 as the first allowed", {"face_offsets": [1, 1]}),
+        (r"^face_offsets\[1\] = -1: an offset is 0 or more", {"face_offsets": [0, -1]}),
+        (r"^vertex_offsets: a row of whole numbers expected, \(1, 2\)", {"vertex_offsets": [[0, 3]]}),
+        (r"^vertex_offsets: a row of whole numbers expected", {"vertex_offsets": [0.0, 3.0]}),
+        (r"^faces\[0, 2\] = 3: there are 3 vertices", {"faces": [[0, 1, 3]]}),
+        (r'^kind: "quads" given', {"kind": "quads"}),
+        (r"^body 0: vertex 2 has a non-finite", {"vertices": [[0, 0, 0], [0, 0, 1], [0, 0, np.inf]]}),
+    ]:
+        arguments = dict(vertices=TRIANGLE, faces=FACE, vertex_offsets=[0, 3], face_offsets=[0, 1])
+        with pytest.raises(ValueError, match=words):
+            small.add_many(**{**arguments, **change})
+    assert len(small) == 0
+
+
+def test_transforms():
+    scene = impinge.Scene()
+    body = scene.add(*ball(8, 12))
+    rest = scene.positions(body)
+    angle = 0.7
+    matrix = np.eye(4)
+    matrix[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    matrix[:3, 3] = [0.5, -1, 2]
+    scene.set_transform(body, matrix)
+    x, y, z = rest.T.astype(np.float64)
+    by_hand = np.stack([((a * x + b * y) + c * z) + d for a, b, c, d in matrix[:3]], 1)
+    assert np.array_equal(scene.positions(body), by_hand.astype(np.float32))
+    assert np.array_equal(scene.transform(body), matrix) and np.array_equal(scene.rest_positions(body), rest)
+    scene.set_positions(body, rest)
+    assert scene.transform(body) is None
+    for words, bad in [
+        (r"^matrix: shape \(4, 4\) expected, \(3, 4\) given", matrix[:3]),
+        (r"^matrix: NaN in row 0, column 3 given, finite numbers allowed", matrix + np.diag([np.nan] * 4, 0)[:, [3, 1, 2, 0]]),
+        (r"^matrix: a last row of .* given, \[0, 0, 0, 1\] allowed", np.ones((4, 4))),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            scene.set_transform(body, bad)
+    with pytest.raises(TypeError, match="^matrix: an array of real numbers expected"):
+        scene.set_transform(body, [["a"] * 4] * 4)
+    with pytest.raises(ValueError, match="vertex 0 has"):
+        scene.set_transform(body, np.diag([1e300, 1, 1, 1]))
+    assert np.array_equal(scene.positions(body), rest)
+
+
+def test_rows_of_four():
+    scene = impinge.Scene()
+    assert scene.kind(scene.add(CORNERS, TETS)) == "tetrahedra"
+    for rows in [QUADS, QUADS[:1], TETS[:1], np.array([[0, 1, 3, 2], [0, 1, 3, 2]])]:
+        with pytest.raises(ValueError, match='^faces: rows of four are tetrahedra or quads.*kind="quads"'):
+            scene.add(GRID, rows)
+        assert scene.kind(scene.add(GRID, rows, "tetrahedra")) == "tetrahedra"
+    quads = scene.add(GRID, QUADS, kind="quads")
+    assert scene.elements(quads).tolist() == [[0, 1, 3], [0, 3, 2], [1, 4, 5], [1, 5, 3]]
+    with pytest.raises(ValueError, match="rows of four"):
+        impinge.pairs(GRID, QUADS, TRIANGLE, FACE)
+    across = ACROSS + np.float32([0, 0.25, 0])
+    pairs = impinge.pairs(GRID, QUADS, across, FACE, kind_a="quads", kind_b="triangles")
+    assert pairs.tolist() == [[0, 0], [1, 0]]
+    assert len(impinge.self_pairs(GRID, QUADS, kind="quads", shared_vertex="resolve")) == 0
+    empty = scene.add(GRID, np.empty((0, 4), np.uint32))
+    assert scene.n_primitives(empty) == 0
+    # A mesh of tetrahedra of any size tells by its first rows.
+    vertices, tets = lattice_tetrahedra(40, 3, 2, shared=True)
+    assert scene.kind(scene.add(vertices, tets, kind="tetrahedra")) == "tetrahedra"
+
+
+def test_meshes_of_trimesh():
+    trimesh = pytest.importorskip("trimesh", reason="trimesh is not installed")
+    box = trimesh.creation.box()
+    scene = impinge.Scene()
+    body = scene.add(box)
+    assert scene.n_primitives(body) == 12 and np.array_equal(scene.elements(body), box.faces)
+    with pytest.raises(ValueError, match=r"^mesh\.faces: shape \(n, 4\) expected, \(12, 3\) given"):
+        scene.add(box, kind="tetrahedra")
+
+
+def test_meshes_of_meshio():
+    meshio = pytest.importorskip("meshio", reason="meshio is not installed")
+    scene = impinge.Scene()
+
+    def mesh(*cells):
+        return meshio.Mesh(CORNERS if "tetra" in dict(cells) else GRID, list(cells))
+
+    tets, triangles = ("tetra", TETS), ("triangle", [[0, 1, 2]])
+    assert scene.kind(scene.add(mesh(tets))) == "tetrahedra"
+    assert scene.kind(scene.add(mesh(triangles, ("line", [[0, 1]]), ("vertex", [[0]])))) == "triangles"
+    assert scene.kind(scene.add(mesh(("line", [[0, 1]])))) == "edges"
+    assert scene.kind(scene.add(mesh(("vertex", [[0], [1]])))) == "points"
+    both = mesh(tets, triangles)
+    with pytest.raises(ValueError, match="^mesh.cells: tetra, triangle given, one of triangle and tetra"):
+        scene.add(both)
+    assert scene.kind(scene.add(both, kind="triangles")) == "triangles"
+    assert scene.kind(scene.add(both, kind="tetrahedra")) == "tetrahedra"
+    quads = mesh(("quad", QUADS))
+    with pytest.raises(ValueError, match="^mesh.cells: quads, which are no triangles"):
+        scene.add(quads)
+    assert scene.n_primitives(scene.add(quads, kind="quads")) == 4
+    with pytest.raises(ValueError, match="^mesh.cells: tetra expected, quad given"):
+        scene.add(quads, kind="tetrahedra")
+    with pytest.raises(ValueError, match="^mesh.cells: hexahedron given"):
+        scene.add(meshio.Mesh(np.zeros((8, 3)), [("hexahedron", [list(range(8))])]))
+    with pytest.raises(ValueError, match="^mesh.cells: none given"):
+        scene.add(meshio.Mesh(GRID, []))
+
+
+def test_anything_with_vertices_and_faces():
+    scene = impinge.Scene()
+    mesh = types.SimpleNamespace(vertices=TRIANGLE.tolist(), faces=[[0, 1, 2]])
+    assert scene.n_primitives(scene.add(mesh)) == 1
+    mesh = types.SimpleNamespace(vertices=TRIANGLE, triangles=FACE)
+    assert scene.n_primitives(scene.add(mesh)) == 1
+    with pytest.raises(ValueError, match=r"^mesh\.vertices\[0, 0\] = nan"):
+        scene.add(types.SimpleNamespace(vertices=[[np.nan, 0, 0]] * 3, faces=FACE))
+    with pytest.raises(TypeError, match="^faces: none given with a ndarray, which is no mesh"):
+        scene.add(TRIANGLE)
+
+
+def test_tensors_of_pytorch():
+    torch = pytest.importorskip("torch", reason="PyTorch is not installed")
+    vertices, faces = ball(6, 8)
+    positions, indices = torch.from_numpy(vertices), torch.from_numpy(faces.astype(np.int64))
+    scene = impinge.Scene()
+    body = scene.add(positions, indices)
+    assert np.array_equal(scene.positions(body), vertices) and np.array_equal(scene.elements(body), faces)
+    scene.set_positions(body, positions.double() * 2)
+    assert scene.positions(body).dtype == np.float64
+    scene.set_positions(body, positions.t().contiguous().t())
+    expected = impinge.pairs(vertices, faces, vertices + np.float32(0.25), faces)
+    assert np.array_equal(impinge.pairs(positions, indices, positions + 0.25, indices), expected)
+    with pytest.raises(TypeError, match="^vertices: "):
+        scene.set_positions(body, positions.clone().requires_grad_())
+    assert torch.from_numpy(expected.astype(np.int64)).shape == (len(expected), 2)
+
+
+def answers(shift):
+    """What a forked worker is asked: large enough for a pool, with one thread and with two."""
+    vertices, faces = ball(60, 80)
+    moved = vertices + np.float32([shift, 0, 0])
+    pairs = [impinge.pairs(vertices, faces, moved, faces, threads=threads) for threads in [1, 2]]
+    default = impinge.pairs(vertices, faces, moved, faces)
+    own = impinge.self_pairs(np.vstack([vertices, moved]), np.vstack([faces, faces + len(vertices)]))
+    assert np.array_equal(pairs[0], pairs[1]) and np.array_equal(pairs[0], default)
+    scene = impinge.Scene()
+    scene.add(vertices, faces)
+    auto = len(impinge.Detector().detect(scene, within=True, shared_vertex="resolve"))
+    return len(default), len(own), auto
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_forked_workers_after_use_in_the_parent():
+    shifts = [0.5, 1.0, 1.5, 9.0]
+    expected = [answers(shift) for shift in shifts]
+    assert expected[0][0] > 50 and expected[3][0] == 0
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        assert pool.map_async(answers, shifts).get(timeout=120) == expected
+
+
+FORKED_DETECTOR = """
+import os, sys, impinge
+corners, face = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]
+scene = impinge.Scene()
+scene.add(corners, face)
+detector = impinge.Detector(backend="cpu", threads=2)
+detector.detect(scene, within=True)
+if os.fork() == 0:
+    try:
+        detector.detect(scene, within=True)
+    except RuntimeError as error:
+        print(error, flush=True)
+    del detector
+    print(len(impinge.Detector(backend="cpu").detect(scene, within=True)), flush=True)
+    sys.exit(0)
+sys.exit(os.waitstatus_to_exitcode(os.wait()[1]))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_detector_of_the_parent_is_refused_in_a_fork():
+    command = [sys.executable, "-W", "ignore", "-c", FORKED_DETECTOR]
+    out = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert out.returncode == 0, out.stderr
+    first, last = out.stdout.splitlines()
+    assert first.startswith("this detector was made before this process was forked") and last == "0"
