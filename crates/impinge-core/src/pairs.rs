@@ -214,7 +214,7 @@ impl Pairs {
         self.keys = keys;
     }
 
-    /// The bodies that took part, in order, and what they are made of.
+    /// The bodies that took part, in order, and the kind of their primitives.
     pub fn bodies(&self) -> impl ExactSizeIterator<Item = (BodyId, Kind)> + '_ {
         self.bodies.iter().map(|body| (body.id, body.kind))
     }
