@@ -9,14 +9,13 @@ use crate::ours::{Feed, Ours};
 use crate::problem::{Ask, Problem};
 use crate::report::{Report, figures, grouped};
 use crate::runner::Runner;
-use crate::{Failure, Options, files, gpu};
+use crate::{Failure, Options, files, gpu, steps};
 
 /// Runs a command by its name.
 pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
     let mut report = match command {
-        "two-body" | "motion" | "self" | "tets" | "bodies" | "sizes" | "adversarial" | "gpu" => {
-            Report::new(command)
-        }
+        "two-body" | "motion" | "self" | "tets" | "bodies" | "sizes" | "adversarial" | "gpu"
+        | "steps" => Report::new(command),
         "device" => {
             println!("{}", gpu::slug(&gpu::device(options)?));
             return Ok(());
@@ -31,6 +30,7 @@ pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
         "bodies" => bodies(options, &mut report)?,
         "sizes" => sizes(options, &mut report)?,
         "gpu" => gpu::scenes(options, &mut report)?,
+        "steps" => steps::run(options, &mut report)?,
         _ => adversarial_scenes(options, &mut report)?,
     }
     report.write(options.json.as_deref(), options.record.as_deref())

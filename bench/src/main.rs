@@ -24,6 +24,7 @@ mod plain;
 mod problem;
 mod report;
 mod runner;
+mod steps;
 #[cfg_attr(not(any(feature = "embree", feature = "parry")), allow(dead_code))]
 mod tune;
 
@@ -49,6 +50,8 @@ commands:
   bodies        1,000, 10,000 and 100,000 bodies of 12 triangles
   sizes         10^4 to 10^7 triangles in two waving bodies
   adversarial   scenes that break methods which are only fast on average, as ratios to a plain one
+  steps         contacts of moving cloth: all, the earliest, any, how far a step can be taken, pairs of boxes;
+                --scene cloth-ball|cloth-funnel
   gpu           the scenes of two-body and self on a GPU: stages on the device beside a lower bound
   device        prints the name of the GPU in a form for --record
 

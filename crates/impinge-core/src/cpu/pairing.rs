@@ -25,7 +25,7 @@ use crate::query::SharedVertex;
 use super::group_cache::{Group, GroupCache};
 use super::hubs::Around;
 use super::narrow::Settler;
-use super::simd::{Isa, Lanes, Masks, Simd};
+use super::simd::{Isa, Lanes, Lanes32, Masks, Simd};
 use super::world::{BodyRef, World};
 
 /// The narrow stage is timed for one work item in this many: reading the clock takes longer than some items.
@@ -110,6 +110,47 @@ impl Met {
         own[self.n..][..GROUP].fill(row as u8);
         let list = other[self.n..].first_chunk_mut().expect("padded");
         self.n += simd.list_lanes(mask, list);
+    }
+
+    /// As `push_row`, where bit k of the mask stands for the lane `map[k]`.
+    #[inline(always)]
+    pub(super) fn push_mapped_row<S: Simd>(
+        &mut self,
+        simd: S,
+        (side, row): (Side, usize),
+        mask: u64,
+        map: &[u8; GROUP],
+    ) {
+        let MetLanes { a, b } = &mut *self.lanes;
+        let (own, other) = match side {
+            Side::A => (a, b),
+            Side::B => (b, a),
+        };
+        own[self.n..][..GROUP].fill(row as u8);
+        let list = other[self.n..].first_chunk_mut().expect("padded");
+        self.n += simd.list_mapped(mask, map, list);
+    }
+
+    /// Drops candidates that share a vertex, given the vertices of each corner of both groups.
+    #[inline(always)]
+    pub(super) fn drop_sharing<S: Simd>(&mut self, simd: S, corners: [&[Lanes32]; 2]) {
+        let mut n_kept = 0;
+        for first in (0..self.n).step_by(BATCH) {
+            let [a, b] = self.batch(first);
+            let (a, b) = (*a, *b);
+            let n = (self.n - first).min(BATCH);
+            let kept = !simd.share_16(corners, [&a, &b]) & u16::MAX >> (BATCH - n);
+            // What is written past those that are kept was read before.
+            let MetLanes {
+                a: into_a,
+                b: into_b,
+            } = &mut *self.lanes;
+            let padded = "padded";
+            simd.keep_16(kept, &a, into_a[n_kept..].first_chunk_mut().expect(padded));
+            simd.keep_16(kept, &b, into_b[n_kept..].first_chunk_mut().expect(padded));
+            n_kept += kept.count_ones() as usize;
+        }
+        self.n = n_kept;
     }
 
     /// Bytes held.

@@ -6,11 +6,12 @@ use crate::clock::Instant;
 use super::Detector;
 use crate::advance::{Advance, blend};
 use crate::cpu::steps::{Asked, FoundByKind, Pose, Sought, StepClusters};
+use crate::elements::Part;
 use crate::error::Error;
-use crate::frame::{Ask, Frame, TestId};
+use crate::frame::{Ask, Frame, TestId, owner_by_first};
 use crate::impacts::{Candidates, Found, Impact, Impacts};
 use crate::naive;
-use crate::narrow::{FirstContact, Overlap};
+use crate::narrow::{Element, FirstContact, Overlap, Test};
 use crate::pair_kind::PairKind;
 use crate::positions::Positions;
 use crate::progress::Control;
@@ -261,9 +262,9 @@ impl Detector {
     /// allows, for which the straight way from the start to the *rounded* positions is free.
     ///
     /// Positions that are stored are rounded, and rounding alone may make elements touch that did not. So each fraction is
-    /// tried: positions are rounded first, and [`is_free`](Detector::is_free) is asked of the way to those. A chain of such
+    /// tried: positions are rounded first, and the way to those is tested as by [`is_free`](Detector::is_free). A chain of such
     /// steps is free from the first to the last, whatever the rounding. The first fraction tried is that of the first
-    /// contact; then the back-off doubles, from the last bit on.
+    /// contact; then the back-off doubles, from the last bit on. Pairs that touched at a fraction tried before are tested first.
     ///
     /// Pairs that touch at the start allow no step at all under [`Start::Report`], and are not looked at under
     /// [`Start::Skip`].
@@ -304,6 +305,8 @@ impl Detector {
         let last_bit = f64::from(if single { f32::EPSILON } else { 0.0 }).max(f64::EPSILON);
         let mut trial = scene.clone();
         let mut back_off = 0.0;
+        // Pairs that touched on the way to positions tried before: most likely they do again.
+        let mut known: Vec<(PairKind, u64)> = Vec::new();
         loop {
             advance.fraction = first.toi * (1.0 - back_off);
             advance.positions.clear();
@@ -322,8 +325,18 @@ impl Detector {
                 return Ok(advance);
             }
             advance.n_tried += 1;
-            if self.is_free_with(&trial, &step, control)? {
-                return Ok(advance);
+            let still_touch = known.iter().any(|&pair| self.touch(&trial, &step, pair));
+            if !still_touch {
+                self.begin(&trial, &step)?;
+                let whole = (Pose::WHOLE, f64::INFINITY);
+                self.find(&trial, &step, Sought::All, whole, control)?;
+                let found = PairKind::ALL.into_iter().zip(&self.steps.found);
+                known.extend(
+                    found.flat_map(|(kind, found)| found.iter().map(move |of| (kind, of.key))),
+                );
+                if self.steps.found.iter().all(Vec::is_empty) {
+                    return Ok(advance);
+                }
             }
             back_off = if back_off == 0.0 {
                 last_bit
@@ -331,6 +344,31 @@ impl Detector {
                 f64::min(2.0 * back_off, 1.0)
             };
         }
+    }
+
+    /// Whether two elements touch during a step of a scene with the bodies of the last one; with [`Start::Skip`], not at
+    /// its start.
+    fn touch(&self, scene: &Scene, step: &Step, (kind, key): (PairKind, u64)) -> bool {
+        let frame = &self.steps.frame;
+        let numbers = [key >> 32, key & u64::from(u32::MAX)].map(|number| number as u32);
+        let layers = numbers.map(|number| owner_by_first(&frame.layers, number, |of| of.first));
+        let places = [0, 1].map(|side| numbers[side] - frame.layers[layers[side]].first);
+        let [a, b] = [0, 1].map(|side| {
+            let (layer, place) = (layers[side], &places[side]);
+            let part = frame.layers[layer].part;
+            Element {
+                scene,
+                frame,
+                layer,
+                corners: match part {
+                    // They are numbered as positions are.
+                    Part::Vertices => std::slice::from_ref(place),
+                    _ => frame.body(scene, layer).part(part).corners(*place as usize),
+                },
+            }
+        });
+        let contact = FirstContact.settle(TestId::Elements(kind), a, b);
+        contact.is_some_and(|contact| !(step.start == Start::Skip && contact.at_start))
     }
 
     /// Pairs of elements whose boxes overlap during a step, each box inflated by a distance: for callers with their own test.

@@ -7,7 +7,7 @@
 //! The answers are bit masks of exact comparisons, so they are the same for every set.
 
 use crate::exact::filter::number::{self, Lookup, Vector};
-use crate::exact::filter::{LANES, Triangles64};
+use crate::exact::filter::{BATCH, LANES, Triangles64};
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, BoundsArray};
 #[cfg(target_arch = "x86_64")]
@@ -201,6 +201,57 @@ pub(crate) trait Simd: Copy {
     /// Bit `k`: lane `k` equals `query`; only lanes of `among` are tested.
     fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64;
 
+    /// Writes `map[k]` for each lane k of a mask, lowest first, and anything after them; returns how many there are.
+    #[inline(always)]
+    fn list_mapped(self, mask: u64, map: &[u8; GROUP], list: &mut [u8; GROUP]) -> usize {
+        let mut n = 0;
+        for lane in Lanes(mask) {
+            list[n] = map[lane];
+            n += 1;
+        }
+        n
+    }
+
+    /// Writes the lanes of a mask, lowest first, and anything after them.
+    #[inline(always)]
+    fn keep_16(self, mask: u16, lanes: &[u8; BATCH], list: &mut [u8; BATCH]) {
+        let mut n = 0;
+        for lane in Lanes(mask.into()) {
+            list[n] = lanes[lane];
+            n += 1;
+        }
+    }
+
+    /// The boxes in the lanes of a mask, side by side, and anything after them.
+    #[inline(always)]
+    fn put_survivors(self, boxes: &LaneBounds, mask: u64, into: &mut LaneBounds) {
+        for axis in 0..3 {
+            for (n, lane) in Lanes(mask).enumerate() {
+                into.min[axis][n] = boxes.min[axis][lane];
+                into.max[axis][n] = boxes.max[axis][lane];
+            }
+        }
+    }
+
+    /// Bit `k`: some corner of the element `places_a[k]` is one of `places_b[k]`. Places are below [`GROUP`], or anything
+    /// where nobody looks at the bit.
+    #[inline(always)]
+    fn share_16(self, [a, b]: [&[Lanes32]; 2], [places_a, places_b]: [&[u8; BATCH]; 2]) -> u16 {
+        let mut mask = 0;
+        for lane in 0..BATCH {
+            let place = |places: &[u8; BATCH]| usize::from(places[lane]) % GROUP;
+            let (place_a, place_b) = (place(places_a), place(places_b));
+            let mut is = false;
+            for a in a {
+                for b in b {
+                    is |= a.0[place_a] == b.0[place_b];
+                }
+            }
+            mask |= u16::from(is) << lane;
+        }
+        mask
+    }
+
     /// The box of some vertices, and whether all are certainly finite, as [`of_vertices_f32`] finds them.
     ///
     /// # Panics
@@ -226,6 +277,26 @@ pub(crate) trait Simd: Copy {
         cluster: &ClusterFaces<'_>,
         into: &mut Triangles64,
     );
+
+    /// The first `n` of some vertices as rows of x, y and z, and any vertices after them.
+    ///
+    /// # Panics
+    /// If there is no such vertex.
+    #[inline(always)]
+    fn put_points(
+        self,
+        positions: &[[f32; 3]],
+        vertices: &[u32; GROUP],
+        n: usize,
+        into: &mut [[f32; GROUP]; 3],
+    ) {
+        for lane in 0..n {
+            let point = &positions[vertices[lane] as usize];
+            for axis in 0..3 {
+                into[axis][lane] = point[axis];
+            }
+        }
+    }
 
     /// Eight vertices as rows of x, y and z in double precision.
     ///

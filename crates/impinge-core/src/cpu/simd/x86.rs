@@ -123,6 +123,38 @@ unsafe fn put_corners_by_eights(
     put_corners(positions, rest, 8 * eights.len(), into);
 }
 
+/// As `Simd::put_points`.
+///
+/// # Safety
+/// The caller must be compiled for AVX2.
+#[inline(always)]
+unsafe fn put_points(
+    positions: &[[f32; 3]],
+    vertices: &[u32; GROUP],
+    n: usize,
+    into: &mut [[f32; GROUP]; 3],
+) {
+    let (eights, _) = vertices.as_chunks::<LANES>();
+    for (eight_ix, &eight) in eights.iter().enumerate().take(n.div_ceil(LANES)) {
+        let first = LANES * eight_ix;
+        // SAFETY: the caller's.
+        if let Some(rows) = unsafe { rows(positions, eight) } {
+            for axis in 0..3 {
+                let row = into[axis][first..].first_chunk_mut::<LANES>();
+                let row = row.expect("eights of 64");
+                // SAFETY: a row of eight.
+                unsafe { _mm256_storeu_ps(row.as_mut_ptr(), rows[axis]) };
+            }
+        } else {
+            for (place, vertex) in (first..).zip(eight) {
+                for (row, x) in into.iter_mut().zip(positions[vertex as usize]) {
+                    row[place] = x;
+                }
+            }
+        }
+    }
+}
+
 /// As `Simd::put_corners`, for at most 64 vertices: each is loaded once, and corners are looked up.
 ///
 /// # Safety
@@ -281,6 +313,35 @@ unsafe fn of_ascending(positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, boo
     }
 }
 
+/// A number per axis, in all lanes.
+///
+/// # Safety
+/// The caller must be compiled for AVX-512.
+#[inline(always)]
+unsafe fn splat_512(point: &[f32; 3]) -> [__m512; 3] {
+    let [x, y, z] = *point;
+    // SAFETY: the caller's.
+    unsafe { [_mm512_set1_ps(x), _mm512_set1_ps(y), _mm512_set1_ps(z)] }
+}
+
+/// The numbers at some places; a place is taken modulo 64.
+///
+/// # Safety
+/// The caller must be compiled for AVX-512.
+#[inline(always)]
+unsafe fn look_up_512(lanes: &Lanes32, places: __m512i) -> __m512i {
+    let first = lanes.0.as_ptr();
+    // SAFETY: the caller's; four loads of sixteen from 64. A permutation looks at the five lowest bits of a place, the
+    // choice at the sixth.
+    unsafe {
+        let load = |chunk: usize| _mm512_load_si512(first.add(16 * chunk).cast());
+        let low = _mm512_permutex2var_epi32(load(0), places, load(1));
+        let high = _mm512_permutex2var_epi32(load(2), places, load(3));
+        let is_high = _mm512_test_epi32_mask(places, _mm512_set1_epi32(32));
+        _mm512_mask_blend_epi32(is_high, low, high)
+    }
+}
+
 impl Simd for Avx2 {
     type F64 = number::Avx2;
     type F32 = number::Avx2F32;
@@ -422,6 +483,18 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn put_points(
+        self,
+        positions: &[[f32; 3]],
+        vertices: &[u32; GROUP],
+        n: usize,
+        into: &mut [[f32; GROUP]; 3],
+    ) {
+        // SAFETY: this set exists only where the processor has AVX2.
+        unsafe { put_points(positions, vertices, n, into) }
+    }
+
+    #[inline(always)]
     fn put_vertices(
         self,
         positions: &[[f32; 3]],
@@ -554,31 +627,95 @@ impl Simd for Avx512 {
         [query_start, query_end]: &[Bounds; 2],
         among: u64,
     ) -> u64 {
-        let mut mask = 0u64;
-        for chunk in 0..4 {
-            let mut all = (among >> (16 * chunk)) as __mmask16;
-            for axis in 0..3 {
-                if all == 0 {
-                    break;
+        // SAFETY: as above.
+        unsafe {
+            let low_start = splat_512(&query_start.min);
+            let low_end = splat_512(&query_end.min);
+            let high_start = splat_512(&query_start.max);
+            let high_end = splat_512(&query_end.max);
+            let mut mask = 0u64;
+            for chunk in 0..4 {
+                let among = (among >> (16 * chunk)) as __mmask16;
+                if among == 0 {
+                    continue;
                 }
-                // SAFETY: as above.
-                unsafe {
+                let mut beside = 0;
+                for axis in 0..3 {
                     let load = |row: &[f32; GROUP]| _mm512_load_ps(row.as_ptr().add(16 * chunk));
-                    let low_start = _mm512_set1_ps(query_start.min[axis]);
-                    let low_end = _mm512_set1_ps(query_end.min[axis]);
-                    let high_start = _mm512_set1_ps(query_start.max[axis]);
-                    let high_end = _mm512_set1_ps(query_end.max[axis]);
                     let (min_start, min_end) = (load(&start.min[axis]), load(&end.min[axis]));
                     let (max_start, max_end) = (load(&start.max[axis]), load(&end.max[axis]));
-                    all &= _mm512_cmp_ps_mask::<_CMP_LE_OQ>(min_start, high_start)
-                        | _mm512_cmp_ps_mask::<_CMP_LE_OQ>(min_end, high_end);
-                    all &= _mm512_cmp_ps_mask::<_CMP_LE_OQ>(low_start, max_start)
-                        | _mm512_cmp_ps_mask::<_CMP_LE_OQ>(low_end, max_end);
+                    let above = _mm512_cmp_ps_mask::<_CMP_NLE_UQ>(min_start, high_start[axis]);
+                    let below = _mm512_cmp_ps_mask::<_CMP_NLE_UQ>(low_start[axis], max_start);
+                    beside |=
+                        _mm512_mask_cmp_ps_mask::<_CMP_NLE_UQ>(above, min_end, high_end[axis]);
+                    beside |= _mm512_mask_cmp_ps_mask::<_CMP_NLE_UQ>(below, low_end[axis], max_end);
+                }
+                mask |= u64::from(among & !beside) << (16 * chunk);
+            }
+            mask
+        }
+    }
+
+    #[inline(always)]
+    fn list_mapped(self, mask: u64, map: &[u8; GROUP], list: &mut [u8; GROUP]) -> usize {
+        // SAFETY: `Avx512` exists only where the processor has it; one load and one store of 64 bytes.
+        unsafe {
+            let lanes = _mm512_maskz_compress_epi8(mask, _mm512_loadu_si512(map.as_ptr().cast()));
+            _mm512_storeu_si512(list.as_mut_ptr().cast(), lanes);
+        }
+        mask.count_ones() as usize
+    }
+
+    #[inline(always)]
+    fn keep_16(self, mask: u16, lanes: &[u8; BATCH], list: &mut [u8; BATCH]) {
+        // SAFETY: `Avx512` exists only where the processor has it; one load and one store of 16 bytes.
+        unsafe {
+            let lanes = _mm_maskz_compress_epi8(mask, _mm_loadu_si128(lanes.as_ptr().cast()));
+            _mm_storeu_si128(list.as_mut_ptr().cast(), lanes);
+        }
+    }
+
+    #[inline(always)]
+    fn put_survivors(self, boxes: &LaneBounds, mask: u64, into: &mut LaneBounds) {
+        for axis in 0..3 {
+            let rows = [
+                (&boxes.min[axis], &mut into.min[axis]),
+                (&boxes.max[axis], &mut into.max[axis]),
+            ];
+            for (row, into) in rows {
+                let mut n = 0;
+                for chunk in 0..4 {
+                    let mask = (mask >> (16 * chunk)) as __mmask16;
+                    // SAFETY: `Avx512` exists only where the processor has it. At most 16 numbers of each chunk before
+                    // were put, so sixteen more lie within the row.
+                    unsafe {
+                        let lanes = _mm512_load_ps(row.as_ptr().add(16 * chunk));
+                        let lanes = _mm512_maskz_compress_ps(mask, lanes);
+                        _mm512_storeu_ps(into.as_mut_ptr().add(n), lanes);
+                    }
+                    n += mask.count_ones() as usize;
                 }
             }
-            mask |= u64::from(all) << (16 * chunk);
         }
-        mask
+    }
+
+    #[inline(always)]
+    fn share_16(self, [a, b]: [&[Lanes32]; 2], [places_a, places_b]: [&[u8; BATCH]; 2]) -> u16 {
+        // SAFETY: `Avx512` exists only where the processor has it; loads of sixteen bytes, and of sixteen numbers of 64.
+        unsafe {
+            let places = |places: &[u8; BATCH]| {
+                _mm512_cvtepu8_epi32(_mm_loadu_si128(places.as_ptr().cast()))
+            };
+            let (places_a, places_b) = (places(places_a), places(places_b));
+            let mut mask = 0;
+            for a in a {
+                let a = look_up_512(a, places_a);
+                for b in b {
+                    mask |= _mm512_cmpeq_epi32_mask(a, look_up_512(b, places_b));
+                }
+            }
+            mask
+        }
     }
 
     #[inline(always)]
@@ -710,6 +847,18 @@ impl Simd for Avx512 {
                 _ => put_corners_by_eights(positions, cluster.faces, into),
             }
         }
+    }
+
+    #[inline(always)]
+    fn put_points(
+        self,
+        positions: &[[f32; 3]],
+        vertices: &[u32; GROUP],
+        n: usize,
+        into: &mut [[f32; GROUP]; 3],
+    ) {
+        // SAFETY: this set exists only where the processor has AVX2.
+        unsafe { put_points(positions, vertices, n, into) }
     }
 
     #[inline(always)]

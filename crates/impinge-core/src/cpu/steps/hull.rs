@@ -84,19 +84,79 @@ impl Pose {
         }
     }
 
-    /// [`close`](Self::close) for the boxes of a group, of so many elements.
+    /// [`close`](Self::close) for the boxes of a group, of so many elements: in `f32`, rounded outward by more.
     #[inline(always)]
     pub fn close_all(self, [start, end]: [&mut LaneBounds; 2], size: usize) {
         if self.is_plain() {
             return;
         }
         debug_assert!(size <= GROUP);
-        for lane in 0..size {
-            let [at_start, at_end] = self.close([start.at(lane), end.at(lane)]);
-            start.put(lane, &at_start);
-            end.put(lane, &at_end);
+        for axis in 0..3 {
+            if self.until < 1.0 {
+                self.close_lanes::<true>(&start.min[axis], &mut end.min[axis]);
+                self.close_lanes::<false>(&start.max[axis], &mut end.max[axis]);
+            }
+            if self.is_swept {
+                for lane in 0..GROUP {
+                    let (low, high) = (&mut start.min[axis][lane], &mut start.max[axis][lane]);
+                    *low = lesser(*low, end.min[axis][lane]);
+                    *high = greater(*high, end.max[axis][lane]);
+                }
+                end.min[axis] = start.min[axis];
+                end.max[axis] = start.max[axis];
+            }
+            for bounds in [&mut *start, &mut *end] {
+                self.inflate_lanes(&mut bounds.min[axis], -1.0);
+                self.inflate_lanes(&mut bounds.max[axis], 1.0);
+            }
+        }
+        if size < GROUP {
+            start.clear_from(size);
+            end.clear_from(size);
         }
     }
+
+    /// Low or high ends at `until`, from those at the start and at the end.
+    #[inline(always)]
+    fn close_lanes<const ARE_LOW: bool>(self, start: &[f32; GROUP], end: &mut [f32; GROUP]) {
+        let until = nearest(self.until);
+        for lane in 0..GROUP {
+            let (x, y) = (start[lane], end[lane]);
+            let between = x + until * (y - x);
+            // Four roundings, of numbers no larger than the sum of both sizes. No further out than both ends; those count
+            // where what is between overflows.
+            let slack = SLACK * (x.abs() + y.abs()) + f32::MIN_POSITIVE;
+            end[lane] = if ARE_LOW {
+                greater(between - slack, lesser(x, y))
+            } else {
+                lesser(between + slack, greater(x, y))
+            };
+        }
+    }
+
+    /// Ends moved outward by the margin; `outward` is 1 or -1.
+    #[inline(always)]
+    fn inflate_lanes(self, ends: &mut [f32; GROUP], outward: f32) {
+        if self.margin == 0.0 {
+            return;
+        }
+        let margin = round_up(self.margin);
+        for x in ends {
+            let slack = SLACK * (x.abs() + margin) + f32::MIN_POSITIVE;
+            *x += outward * (margin + slack);
+        }
+    }
+}
+
+/// By how much boxes of elements are rounded outward, in parts of their coordinates: 2^-20, sixteen unit roundoffs.
+const SLACK: f32 = 1.0 / 1_048_576.0;
+
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "rounding is covered by slack"
+)]
+fn nearest(x: f64) -> f32 {
+    x as f32
 }
 
 #[cfg(test)]
@@ -121,7 +181,7 @@ mod tests {
                     margin,
                     is_swept,
                 };
-                for _ in 0..1000 {
+                for round in 0..1000 {
                     let (points, mut boxes) =
                         ([[next(), next()], [next(), next()]], [Bounds::EMPTY; 2]);
                     for point in points {
@@ -130,8 +190,25 @@ mod tests {
                             boxes[end].join(&Bounds { min: at, max: at });
                         }
                     }
-                    let [start, end] = pose.close(boxes);
-                    for point in points {
+                    let closed = pose.close(boxes);
+                    let mut lanes = [LaneBounds::EMPTY, LaneBounds::EMPTY];
+                    let lane = round % GROUP;
+                    for end in 0..2 {
+                        lanes[end].put(lane, &boxes[end]);
+                    }
+                    let [at_start, at_end] = &mut lanes;
+                    pose.close_all([at_start, at_end], lane + 1);
+                    let of_group = [lanes[0].at(lane), lanes[1].at(lane)];
+                    // Boxes of groups are not much larger: coordinates are at most 2^7.
+                    let more = 4.0 * SLACK * 256.0;
+                    for (wide, tight) in of_group.iter().zip(&closed) {
+                        assert!(wide.min[0] >= tight.min[0] - more);
+                        assert!(wide.max[0] <= tight.max[0] + more);
+                    }
+                    for (point, [start, end]) in points
+                        .into_iter()
+                        .flat_map(|point| [(point, closed), (point, of_group)])
+                    {
                         let [x, y] = point.map(f64::from);
                         let z = x + until * (y - x);
                         assert!(

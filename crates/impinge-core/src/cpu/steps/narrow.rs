@@ -1,12 +1,21 @@
 //! Stage `narrow` of steps: which candidates touch, and when first.
 //!
-//! In: candidates. Out: keys and times. Vertices with faces and edges with edges go through a filter, eight pairs at a time
-//! (`exact::filter`): most are certainly apart; for most others the filter knows the time to all bits of an `f32`. What it
-//! leaves open goes to exact arithmetic, and so do pairs of bare edges and points, and all times in double precision.
+//! In: candidates. Out: keys and times. Vertices with faces and edges with edges go through filters (`exact::filter`):
+//!
+//! ```text
+//! apart    sixteen pairs at a time in f32, from the tables of the two groups (or eight in f64): three of four go
+//! look     eight intervals of time in f64: no contact in it, one candidate, or unclear
+//! enclose  eight candidates: contact or none, and when, nearly always to all bits of an f32
+//! ```
+//!
+//! The last two take turns, on lists of a thousand pairs, so that no lane waits for another pair's search. What they
+//! leave open goes to exact arithmetic, and so do pairs of bare edges and points, and all times in double precision.
 
 use crate::cpu::pairing::{Met, WorkItem};
 use crate::cpu::simd::{Isa, Lanes, Simd, dispatch};
-use crate::exact::filter::{self, LANES, Steps8};
+use crate::exact::filter::{
+    self, BATCH, Enclosed8, LANES, Look8, Next, Search, Spans8, Steps8, time_between,
+};
 use crate::exact::{Contact, ElementPair, Point, first_contact};
 use crate::frame::pair_key;
 use crate::grouping::GROUP;
@@ -16,6 +25,7 @@ use crate::pair_kind::PairKind;
 use crate::positions::Positions;
 use crate::step::{Start, Toi};
 
+use super::group::Group;
 use super::world::{FoundByKind, Sought, World};
 
 /// Pairs that the filter's first step leaves open are searched once there are this many.
@@ -32,38 +42,54 @@ pub(super) struct Between {
 /// Places of two elements in their clusters' orders.
 type Places = [u32; 2];
 
+/// A pair whose first contact is searched.
+#[derive(Debug, Clone, Copy)]
+struct Open {
+    places: Places,
+    search: Search,
+}
+
 /// One worker's pairs and counts.
 #[derive(Debug, Default)]
 pub(super) struct Settler {
     pub found: FoundByKind,
     pub n_candidates: u64,
     pub n_unsure: u64,
-    /// What the filter's first step has left of the layers at hand.
-    open: Vec<Places>,
+    /// What the filter's first step has left of the layers at hand: pairs to be looked at.
+    open: Vec<Open>,
+    /// Pairs to be looked at in the next round, and pairs with one candidate for a contact.
+    later: Vec<Open>,
+    single: Vec<Open>,
     between: Option<Between>,
+    /// Whether the filter's first step is still to be taken, in `f64`.
+    is_first: bool,
 }
 
 impl Settler {
     pub fn clear(&mut self) {
         self.found.iter_mut().for_each(Vec::clear);
         (self.n_candidates, self.n_unsure) = (0, 0);
-        self.open.clear();
-        self.open.reserve_exact(FULL + GROUP * GROUP);
+        for list in [&mut self.open, &mut self.later, &mut self.single] {
+            list.clear();
+            list.reserve_exact(FULL + GROUP * GROUP);
+        }
         self.between = None;
     }
 
     pub fn bytes(&self) -> usize {
-        size_of::<Places>() * self.open.capacity()
+        let lists = [&self.open, &self.later, &self.single];
+        size_of::<Open>() * lists.iter().map(|list| list.capacity()).sum::<usize>()
     }
 
     /// Takes the candidates of a work item.
     #[inline(always)]
     pub fn settle_item<S: Simd>(
         &mut self,
-        simd: S,
+        _: S,
         isa: Isa,
         world: World<'_>,
         (item, between): (&WorkItem, Between),
+        groups: [&Group; 2],
         met: &Met,
     ) {
         self.n_candidates += met.len() as u64;
@@ -83,22 +109,40 @@ impl Settler {
                 }
             }
             (_, PairKind::VertexFace | PairKind::EdgeEdge) => {
-                let sides = Sides::new(world, between);
-                let mut steps = Steps8::default();
-                for first in (0..met.len()).step_by(LANES) {
-                    let n = (met.len() - first).min(LANES);
-                    let mut batch = [places(first); LANES];
-                    for (lane, batch) in batch.iter_mut().enumerate().take(n) {
-                        *batch = places(first + lane);
+                let until = world.until();
+                let new = |places: Places| Open {
+                    places,
+                    search: Search::new(until),
+                };
+                let [group_a, group_b] = groups;
+                self.is_first = !(group_a.in_tables && group_b.in_tables);
+                if !self.is_first {
+                    let tables = [&group_a.points, &group_b.points];
+                    let until = greater_f32(until);
+                    for first in (0..met.len()).step_by(BATCH) {
+                        let lanes = met.batch(first);
+                        let no = match between.kind {
+                            PairKind::VertexFace => filter::are_apart_in_tables::<S::F32>(
+                                ElementPair::VertexFace,
+                                tables,
+                                lanes,
+                                until,
+                            ),
+                            _ => filter::are_apart_in_tables::<S::F32>(
+                                ElementPair::EdgeEdge,
+                                tables,
+                                lanes,
+                                until,
+                            ),
+                        };
+                        let n = (met.len() - first).min(BATCH);
+                        for lane in Lanes(u64::from(!no & u16::MAX >> (BATCH - n))) {
+                            self.open.push(new(places(first + lane)));
+                        }
                     }
-                    sides.fill(simd, &batch, &mut steps);
-                    let until = world.until();
-                    let no = match between.kind {
-                        PairKind::VertexFace => filter::vertex_face_apart::<S::F64>(&steps, until),
-                        _ => filter::edge_edge_apart::<S::F64>(&steps, until),
-                    };
-                    for lane in Lanes(u64::from(!no & u8::MAX >> (LANES - n))) {
-                        self.open.push(batch[lane]);
+                } else {
+                    for ix in 0..met.len() {
+                        self.open.push(new(places(ix)));
                     }
                 }
                 if self.open.len() >= FULL {
@@ -193,56 +237,152 @@ impl Settler {
     }
 }
 
+/// An `f32` that is not below a time.
+#[allow(clippy::cast_possible_truncation, reason = "rounded here")]
+#[inline(always)]
+fn greater_f32(time: f64) -> f32 {
+    let nearest = time as f32;
+    if f64::from(nearest) < time {
+        nearest.next_up()
+    } else {
+        nearest
+    }
+}
+
 #[inline(always)]
 fn search<S: Simd>(simd: S, settler: &mut Settler, world: World<'_>) {
     let Some(between) = settler.between else {
         return;
     };
+    let Some(pair) = exact_pair(between.kind) else {
+        return;
+    };
     let sides = Sides::new(world, between);
     let mut steps = Steps8::default();
-    let open = std::mem::take(&mut settler.open);
-    for chunk in open.chunks(LANES) {
-        let mut batch = [chunk[0]; LANES];
-        batch[..chunk.len()].copy_from_slice(chunk);
-        sides.fill(simd, &batch, &mut steps);
-        let among = u8::MAX >> (LANES - chunk.len());
+    let mut spans = Spans8::default();
+    let mut open = std::mem::take(&mut settler.open);
+    let mut later = std::mem::take(&mut settler.later);
+    let mut single = std::mem::take(&mut settler.single);
+    if settler.is_first {
         let until = world.until();
-        let (pair, contacts) = match between.kind {
-            PairKind::VertexFace => (
-                ElementPair::VertexFace,
-                filter::vertex_face_contacts::<S::F64>(&steps, among, until),
-            ),
-            _ => (
-                ElementPair::EdgeEdge,
-                filter::edge_edge_contacts::<S::F64>(&steps, among, until),
-            ),
-        };
-        for lane in Lanes(u64::from(!contacts.no & among)) {
-            let is_certain = contacts.yes >> lane & 1 == 1;
-            if is_certain {
-                // Others need not be looked at beyond this.
-                world.known.found(world.asked.sought, contacts.high[lane]);
+        for chunk in open.chunks(LANES) {
+            sides.fill(simd, chunk, &mut steps, &mut spans);
+            let no = filter::are_apart::<S::F64>(pair, &steps, until);
+            let among = u8::MAX >> (LANES - chunk.len());
+            for lane in Lanes(u64::from(!no & among)) {
+                later.push(chunk[lane]);
             }
-            let time = match (world.asked.sought, world.asked.toi) {
-                _ if !is_certain => None,
-                (Sought::Any, _) => Some(contacts.low[lane]),
-                (_, Toi::F32) => contacts.time_f32(lane).map(f64::from),
-                (_, Toi::F64) => None,
-            };
-            match time {
-                Some(time) => {
-                    let contact = Contact {
-                        time,
-                        is_exact: false,
-                        at_start: false,
-                    };
-                    settler.report(world, between, batch[lane], contact);
+        }
+        open.clear();
+        std::mem::swap(&mut open, &mut later);
+    }
+    while !open.is_empty() {
+        for chunk in open.chunks(LANES) {
+            sides.fill(simd, chunk, &mut steps, &mut spans);
+            let seen = filter::look::<S::F64>(pair, &steps, &spans);
+            let among = u8::MAX >> (LANES - chunk.len());
+            settler.after_look(
+                world,
+                (between, pair),
+                chunk,
+                among,
+                &seen,
+                (&mut later, &mut single),
+            );
+        }
+        open.clear();
+        for chunk in single.chunks(LANES) {
+            sides.fill(simd, chunk, &mut steps, &mut spans);
+            let found = filter::enclose::<S::F64>(pair, &steps, &spans);
+            settler.after_enclosing(world, (between, pair), chunk, &found, &mut later);
+        }
+        single.clear();
+        std::mem::swap(&mut open, &mut later);
+    }
+    (settler.open, settler.later, settler.single) = (open, later, single);
+}
+
+impl Settler {
+    /// Sorts pairs by what was seen in their intervals.
+    #[inline(always)]
+    fn after_look(
+        &mut self,
+        world: World<'_>,
+        (between, pair): (Between, ElementPair),
+        chunk: &[Open],
+        among: u8,
+        seen: &Look8,
+        (later, single): (&mut Vec<Open>, &mut Vec<Open>),
+    ) {
+        let until = world.until();
+        for lane in Lanes(u64::from(among)) {
+            let mut open = chunk[lane];
+            match open.search.after_look(seen, lane, until) {
+                Next::Apart => {}
+                Next::Look => later.push(open),
+                Next::Enclose => single.push(open),
+                Next::Contact | Next::Unsure => {
+                    self.settle_exactly(world, between, pair, open.places);
                 }
-                None => settler.settle_exactly(world, between, pair, batch[lane]),
             }
         }
     }
-    settler.open = open;
+
+    /// Reports contacts, and sorts other pairs.
+    #[inline(always)]
+    fn after_enclosing(
+        &mut self,
+        world: World<'_>,
+        (between, pair): (Between, ElementPair),
+        chunk: &[Open],
+        found: &Enclosed8,
+        later: &mut Vec<Open>,
+    ) {
+        let until = world.until();
+        for (lane, &open) in chunk.iter().enumerate() {
+            let mut open = open;
+            match open.search.after_enclosing(found, lane, until) {
+                Next::Apart => {}
+                Next::Look => later.push(open),
+                Next::Contact => {
+                    let span = [found.span.low[lane], found.span.high[lane]];
+                    self.report_within(world, (between, pair), open.places, span);
+                }
+                Next::Enclose | Next::Unsure => {
+                    self.settle_exactly(world, between, pair, open.places);
+                }
+            }
+        }
+    }
+
+    /// Notes a contact that certainly is in an interval of time.
+    #[inline(always)]
+    fn report_within(
+        &mut self,
+        world: World<'_>,
+        (between, pair): (Between, ElementPair),
+        places: Places,
+        span: [f64; 2],
+    ) {
+        // Others need not be looked at beyond this.
+        world.known.found(world.asked.sought, span[1]);
+        let time = match (world.asked.sought, world.asked.toi) {
+            (Sought::Any, _) => Some(span[0]),
+            // Nobody wants it.
+            (Sought::Earliest, _) if span[0] > world.until() => return,
+            (_, Toi::F32) => time_between(span).map(f64::from),
+            (_, Toi::F64) => None,
+        };
+        let Some(time) = time else {
+            return self.settle_exactly(world, between, pair, places);
+        };
+        let contact = Contact {
+            time,
+            is_exact: false,
+            at_start: false,
+        };
+        self.report(world, between, places, contact);
+    }
 }
 
 /// The corners and positions of two layers' elements.
@@ -278,9 +418,16 @@ impl<'a> Sides<'a> {
         }
     }
 
-    /// The points of eight pairs.
+    /// The points and the intervals of up to eight pairs; further lanes get those of the first one.
     #[inline(always)]
-    fn fill<S: Simd>(&self, simd: S, batch: &[Places; LANES], steps: &mut Steps8) {
+    fn fill<S: Simd>(&self, simd: S, chunk: &[Open], steps: &mut Steps8, spans: &mut Spans8) {
+        let mut batch = [chunk[0].places; LANES];
+        for lane in 0..LANES {
+            let open = chunk[if lane < chunk.len() { lane } else { 0 }];
+            batch[lane] = open.places;
+            [spans.low[lane], spans.high[lane]] = open.search.span();
+        }
+        let batch = &batch;
         match self.corners {
             Corners::VertexFace(vertices, faces) => {
                 fill(simd, (vertices, 0, 0), self.positions[0], batch, steps);

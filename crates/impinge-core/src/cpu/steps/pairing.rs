@@ -1,14 +1,21 @@
 //! Stages `pairing` and `narrow` of steps: which elements of two clusters have boxes that meet at both ends, and what
 //! becomes of those that do.
+//!
+//! 1. Elements of either cluster that do not meet the other cluster's box drop out.
+//! 2. The boxes of one side's survivors are put side by side, and each survivor of the other side, the smaller one, is
+//!    tested against them, 16 (or 8) lanes at a time.
+//! 3. Within one body, candidates that share a vertex are dropped, again 16 at a time: by the vertices of their corners,
+//!    which are looked up in the tables of both groups.
 
 use std::time::Duration;
 
 use crate::clock::Instant;
 use crate::cpu::group_cache::GroupCache;
 use crate::cpu::pairing::{Met, Side, WorkItem, full};
-use crate::cpu::simd::{Isa, Lanes, Simd, up_to};
+use crate::cpu::simd::{Isa, LaneBounds, Lanes, Simd, up_to};
 use crate::cpu::slabs::{Counts, Stage};
 use crate::frame::TestId;
+use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
 
 use super::group::Group;
@@ -19,13 +26,28 @@ use super::world::{FoundByKind, World};
 const SAMPLED: u32 = 16;
 
 /// What one worker has of its own.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Worker {
     groups: GroupCache<Group>,
     met: Met,
+    /// The boxes of one side's survivors at the start and at the end.
+    survivors: Box<[LaneBounds; 2]>,
     settler: Settler,
     busy: Duration,
     n_settled: u32,
+}
+
+impl Default for Worker {
+    fn default() -> Self {
+        Worker {
+            groups: GroupCache::default(),
+            met: Met::default(),
+            survivors: Box::new([LaneBounds::EMPTY, LaneBounds::EMPTY]),
+            settler: Settler::default(),
+            busy: Duration::ZERO,
+            n_settled: 0,
+        }
+    }
 }
 
 impl Worker {
@@ -50,7 +72,8 @@ impl Worker {
     }
 
     pub fn bytes(&self) -> usize {
-        self.groups.bytes() + self.settler.bytes() + Met::BYTES
+        let survivors = size_of::<[LaneBounds; 2]>();
+        self.groups.bytes() + self.settler.bytes() + Met::BYTES + survivors
     }
 }
 
@@ -71,9 +94,9 @@ pub(super) fn run<S: Simd>(
         let Some(TestId::Elements(kind)) = test else {
             continue;
         };
-        if !pair(simd, world, item, worker) {
+        let Some(places) = pair(simd, world, item, worker) else {
             continue;
-        }
+        };
         worker.n_settled += 1;
         let is_sample = worker.n_settled.is_multiple_of(SAMPLED);
         let start = is_sample.then(Instant::now);
@@ -82,8 +105,14 @@ pub(super) fn run<S: Simd>(
             b: item.b,
             kind,
         };
-        let Worker { settler, met, .. } = worker;
-        settler.settle_item(simd, isa, world, (item, between), met);
+        let Worker {
+            settler,
+            met,
+            groups,
+            ..
+        } = worker;
+        let groups = places.map(|place| groups.at(place));
+        settler.settle_item(simd, isa, world, (item, between), groups, met);
         if let Some(start) = start {
             worker.busy += start.elapsed() * SAMPLED;
         }
@@ -93,16 +122,26 @@ pub(super) fn run<S: Simd>(
     worker.busy += start.elapsed();
 }
 
-/// Lists the candidates of a work item; whether there is any.
+/// Lists the candidates of a work item; if there is any, the places of its groups.
 #[inline(always)]
-fn pair<S: Simd>(simd: S, world: World<'_>, item: &WorkItem, worker: &mut Worker) -> bool {
-    let Worker { groups, met, .. } = worker;
+fn pair<S: Simd>(
+    simd: S,
+    world: World<'_>,
+    item: &WorkItem,
+    worker: &mut Worker,
+) -> Option<[usize; 2]> {
+    let Worker {
+        groups,
+        met,
+        survivors,
+        ..
+    } = worker;
     met.clear();
     let sides = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
     let is_own = sides[0] == sides[1];
     let ends = sides.map(|(layer, cluster)| world.cache(layer).ends(cluster as usize));
     if !is_own && !meet(&ends[0], &ends[1]) {
-        return false;
+        return None;
     }
     let place_a = groups.place(simd, world, sides[0], usize::MAX);
     let place_b = groups.place(simd, world, sides[1], place_a);
@@ -111,7 +150,7 @@ fn pair<S: Simd>(simd: S, world: World<'_>, item: &WorkItem, worker: &mut Worker
     if !is_own {
         lanes_a = simd.meets_64([&a.start, &a.end], &ends[1], lanes_a);
         if lanes_a == 0 {
-            return false;
+            return None;
         }
         lanes_b = simd.meets_64([&b.start, &b.end], &ends[0], lanes_b);
     }
@@ -123,23 +162,31 @@ fn pair<S: Simd>(simd: S, world: World<'_>, item: &WorkItem, worker: &mut Worker
     } else {
         (Side::B, lanes_b, lanes_a, [b, a])
     };
+    let mut map = [0; GROUP];
+    let (boxes, lanes) = if lanes == u64::MAX {
+        simd.list_lanes(lanes, &mut map);
+        ([&other.start, &other.end], lanes)
+    } else {
+        let [start, end] = &mut **survivors;
+        simd.put_survivors(&other.start, lanes, start);
+        simd.put_survivors(&other.end, lanes, end);
+        let n = simd.list_lanes(lanes, &mut map);
+        ([&*start, &*end], full(n))
+    };
     for row in Lanes(rows) {
         let query = [own.start.at(row), own.end.at(row)];
+        // Within a cluster all lanes survive, each in its place.
         let lanes = if is_own { lanes & !up_to(row) } else { lanes };
-        let mut mask = simd.meets_64([&other.start, &other.end], &query, lanes);
-        if mask != 0 && same_body {
-            // What shares a vertex is left out.
-            for corner in own.corners(row) {
-                for of_other in &other.corners[..other.n_corners.min(3)] {
-                    mask &= !simd.equals_64(of_other, corner, mask);
-                }
-            }
-        }
+        let mask = simd.meets_64(boxes, &query, lanes);
         if mask != 0 {
-            met.push_row(simd, side, row, mask);
+            met.push_mapped_row(simd, (side, row), mask, &map);
         }
     }
-    met.len() > 0
+    if same_body {
+        let corners = [&a.corners[..a.n_corners], &b.corners[..b.n_corners]];
+        met.drop_sharing(simd, corners);
+    }
+    (met.len() > 0).then_some([place_a, place_b])
 }
 
 /// Whether two moving boxes are not beside each other on the same side of an axis at both ends.

@@ -23,9 +23,7 @@
 //! filter"). NaN and overflow make comparisons fail, and so end as unsure.
 
 mod determinant;
-#[allow(dead_code, reason = "see `moving`")]
-pub mod motion;
-#[allow(dead_code, reason = "the pipeline for moving elements takes these up")]
+mod motion;
 mod moving;
 mod neighbours;
 pub mod number;
@@ -35,16 +33,11 @@ mod triangles;
 
 use super::Point;
 
-pub(super) use motion::Search;
-#[allow(
-    unused_imports,
-    reason = "the pipeline for moving elements takes these up"
-)]
 pub use moving::{
-    Contacts8, Moving64, Steps8, edge_edge_apart, edge_edge_apart_in_tables, edge_edge_contacts,
-    vertex_face_apart, vertex_face_apart_in_tables, vertex_face_contacts,
+    Enclosed8, Look8, Moving64, Next, Search, Spans8, Steps8, are_apart, are_apart_in_tables,
+    enclose, look, time_between,
 };
-pub(super) use moving::{contact_answer, contact_search};
+pub(super) use moving::{contact_answer, search_contact};
 pub(super) use neighbours::{shared_edge, shared_vertex};
 pub(super) use projections::{angles_apart, apart_in_a_plane, sides_apart};
 pub(super) use tetrahedra::tetrahedra_answer;

@@ -1,15 +1,17 @@
 //! Moving elements: certainly apart, certainly in contact within known times, or unsure.
 //!
 //! What it does: asks the difference polygon of two moving elements (see `exact::sweep`) about an interval of time, in
-//! plain `f64` or `f32`, and searches [0, 1] for the first contact by halving intervals. One pair a lane.
+//! plain `f64` or `f32`. One pair per lane. The search of [0, 1] for the first contact is a sequence of two questions
+//! about an interval, [`Motion::look`] and [`Motion::enclose`], neither of which has a branch: whoever searches keeps
+//! the intervals ([`Search`]), and so can keep all lanes busy.
 //!
-//! In: the points at the start and at the end ([`Motion`]). Out: masks and times ([`Search`]). Cost in operations for
-//! all lanes: [`Motion::are_apart`] about 300, each step of [`Motion::search`] 200 to 1,200.
+//! In: the points at the start and at the end ([`Motion`]). Out: masks and times. Cost in operations for all lanes:
+//! [`Motion::are_apart`] about 300, [`Motion::look`] 500, [`Motion::enclose`] 900.
 //!
 //! Method: over [a, b] the corners V and edges E of the polygon are computed at a and at b, and from them the Bernstein
 //! coefficients over [a, b] of the cubic f = N . V_0 and of the quartics w = N . (V x E), one per edge. All
-//! coefficients of f of one sign, or all of some w negative: no contact. f of different signs at a and b, and all
-//! coefficients of all w positive: contact. Else the interval is halved.
+//! coefficients of f of one sign, or all of some w negative: no contact. f with one root, and all coefficients of all w
+//! positive around this root: contact. Else the interval is halved.
 //!
 //! Invariant: with |.| the largest coordinate at either end of the step and u the unit roundoff, computed
 //! coefficients are wrong by less than 128 u |E_0| |E_1| |V_0| (f; three times that for the inner ones, which are kept
@@ -18,31 +20,48 @@
 
 use super::number::Number;
 
-/// The difference polygon of pairs of moving elements: a triangle (K = 3) or a parallelogram (K = 4).
+/// The difference polygon of pairs of moving elements: a triangle or a parallelogram.
+///
+/// How many corners it has is a value, not a parameter of the type: the functions below are long, and are compiled once
+/// per instruction set for both.
 #[derive(Clone, Copy)]
-pub struct Motion<T: Number, const K: usize> {
+pub struct Motion<T: Number> {
+    /// 3 or 4.
+    n_corners: usize,
     /// At the start and at the end.
-    corners: [[[T; 3]; K]; 2],
+    corners: [[[T; 3]; 4]; 2],
     /// From each corner to the next. Of a parallelogram two: the others are their opposites.
     edges: [[[T; 3]; 3]; 2],
     /// The largest coordinate of a corner, at either end.
-    corner_sizes: [T; K],
+    corner_sizes: [T; 4],
     edge_sizes: [T; 3],
     /// The lanes in which all of this is within the range of the error bounds.
     is_small: T::Mask,
 }
 
-/// What a [search](Motion::search) found.
+/// What [`Motion::look`] sees in an interval.
 #[derive(Clone, Copy)]
-pub struct Search<T: Number> {
-    /// Certainly no contact in the whole interval.
+pub struct Look<T: Number> {
+    /// Certainly no contact.
     pub no: T::Mask,
-    /// Certainly contact. The first one is inside [`low`, `high`], and there f has one root.
-    pub yes: T::Mask,
-    /// Not before this time is there contact, whatever the masks say.
-    pub low: T,
-    /// Where `yes`: no later than this time there is contact.
-    pub high: T,
+    /// Else: f certainly has one root inside.
+    pub single: T::Mask,
+    /// Nothing is certain, and nothing will be in shorter intervals.
+    pub hopeless: T::Mask,
+}
+
+/// What [`Motion::enclose`] finds in an interval in which f has one root.
+#[derive(Clone, Copy)]
+pub struct Enclosed<T: Number> {
+    /// Certainly contact at the root.
+    pub inside: T::Mask,
+    /// Certainly no contact at the root.
+    pub outside: T::Mask,
+    /// The root is inside [`first`, `last`].
+    pub first: T,
+    pub last: T,
+    /// These two are so near each other that halving the interval does not help.
+    pub is_short: T::Mask,
 }
 
 /// Which Bernstein coefficients of f over an interval are certainly positive, and which certainly negative.
@@ -98,31 +117,35 @@ type Vector<T> = [T; 3];
 // Here and below no closures are passed to library functions: those would be compiled on their
 // own, without the instruction set, and every operation would become a call.
 
-impl<T: Number> Motion<T, 3> {
-    /// A vertex, point 0, and a face, points 1 to 3.
+impl<T: Number> Motion<T> {
+    /// A vertex, point 0, and a face, points 1 to 3; or two edges, points 0 and 1, and points 2 and 3.
     #[inline(always)]
-    pub fn vertex_face(start: &[Vector<T>; 4], end: &[Vector<T>; 4]) -> Self {
-        Self::new(
-            [face_corners(start), face_corners(end)],
-            [face_edges(start), face_edges(end)],
-        )
-    }
-}
-
-impl<T: Number> Motion<T, 4> {
-    /// Two edges, points 0 and 1, and points 2 and 3.
-    #[inline(always)]
-    pub fn edge_edge(start: &[Vector<T>; 4], end: &[Vector<T>; 4]) -> Self {
-        Self::new(
-            [edge_corners(start), edge_corners(end)],
-            [edge_edges(start), edge_edges(end)],
-        )
+    pub fn new(are_edges: bool, start: &[Vector<T>; 4], end: &[Vector<T>; 4]) -> Self {
+        if are_edges {
+            Self::of(
+                4,
+                [edge_corners(start), edge_corners(end)],
+                [edge_edges(start), edge_edges(end)],
+            )
+        } else {
+            Self::of(
+                3,
+                [face_corners(start), face_corners(end)],
+                [face_edges(start), face_edges(end)],
+            )
+        }
     }
 }
 
 #[inline(always)]
-fn face_corners<T: Number>([p, a, b, c]: &[Vector<T>; 4]) -> [Vector<T>; 3] {
-    [difference(a, p), difference(b, p), difference(c, p)]
+fn face_corners<T: Number>([p, a, b, c]: &[Vector<T>; 4]) -> [Vector<T>; 4] {
+    let zero = T::splat(0.0);
+    [
+        difference(a, p),
+        difference(b, p),
+        difference(c, p),
+        [zero, zero, zero],
+    ]
 }
 
 #[inline(always)]
@@ -146,30 +169,35 @@ fn edge_edges<T: Number>([p, q, r, s]: &[Vector<T>; 4]) -> [Vector<T>; 3] {
     [difference(q, p), difference(r, s), [zero, zero, zero]]
 }
 
-impl<T: Number, const K: usize> Motion<T, K> {
-    /// How many edges are kept.
-    const N_EDGES: usize = if K == 3 { 3 } else { 2 };
-
+impl<T: Number> Motion<T> {
     #[inline(always)]
-    fn new(corners: [[Vector<T>; K]; 2], edges: [[Vector<T>; 3]; 2]) -> Self {
+    fn of(n_corners: usize, corners: [[Vector<T>; 4]; 2], edges: [[Vector<T>; 3]; 2]) -> Self {
         let zero = T::splat(0.0);
-        let (mut corner_sizes, mut edge_sizes) = ([zero; K], [zero; 3]);
-        let mut largest = zero;
-        for ix in 0..K {
-            corner_sizes[ix] = size(&corners[0][ix]).larger(size(&corners[1][ix]));
-            largest = largest.larger(corner_sizes[ix]);
-        }
-        for ix in 0..Self::N_EDGES {
-            edge_sizes[ix] = size(&edges[0][ix]).larger(size(&edges[1][ix]));
-            largest = largest.larger(edge_sizes[ix]);
-        }
-        Self {
+        let mut motion = Self {
+            n_corners,
             corners,
             edges,
-            corner_sizes,
-            edge_sizes,
-            is_small: T::splat(T::LARGEST).gt(largest),
+            corner_sizes: [zero; 4],
+            edge_sizes: [zero; 3],
+            is_small: zero.gt(zero),
+        };
+        let mut largest = zero;
+        for ix in 0..n_corners {
+            motion.corner_sizes[ix] = size(&corners[0][ix]).larger(size(&corners[1][ix]));
+            largest = largest.larger(motion.corner_sizes[ix]);
         }
+        for ix in 0..motion.n_edges() {
+            motion.edge_sizes[ix] = size(&edges[0][ix]).larger(size(&edges[1][ix]));
+            largest = largest.larger(motion.edge_sizes[ix]);
+        }
+        motion.is_small = T::splat(T::LARGEST).gt(largest);
+        motion
+    }
+
+    /// How many edges are kept.
+    #[inline(always)]
+    fn n_edges(&self) -> usize {
+        if self.n_corners == 3 { 3 } else { 2 }
     }
 
     /// The lanes whose elements are certainly apart from t = 0 to `until`: either they are apart on an axis or along a direction
@@ -182,7 +210,7 @@ impl<T: Number, const K: usize> Motion<T, K> {
         let mut end = *start;
         let mut sum = start[0];
         let mut size = self.corner_sizes[0];
-        for ix in 0..K {
+        for ix in 0..self.n_corners {
             end[ix] = self.corner_at(ix, t);
             size = size.larger(self.corner_sizes[ix]);
             for axis in 0..3 {
@@ -192,14 +220,15 @@ impl<T: Number, const K: usize> Motion<T, K> {
                 }
             }
         }
+        let (start, end) = (&start[..self.n_corners], &end[..self.n_corners]);
         let edges = [
             [self.edges[0][0], self.edge_at(0, t)],
             [self.edges[0][1], self.edge_at(1, t)],
         ];
         let normal = cross_over(&edges[0], &edges[1]);
-        let along = are_before(&sum, start, &end, size)
-            | are_before(&normal[0], start, &end, size)
-            | are_before(&normal[2], start, &end, size);
+        let along = are_before(&sum, start, end, size)
+            | are_before(&normal[0], start, end, size)
+            | are_before(&normal[2], start, end, size);
         let cubic = self.signs(&cubic(&normal, &[start[0], end[0]]));
         // At t = 1 only differences are rounded, and their signs are right.
         let bound = if until == 1.0 {
@@ -207,66 +236,46 @@ impl<T: Number, const K: usize> Motion<T, K> {
         } else {
             T::splat(T::BOUND / 4.0) * size + T::splat(T::TINY[0])
         };
-        ((along | cubic.has_no_root()) & self.is_small) | are_apart_on_an_axis(start, &end, bound)
+        ((along | cubic.has_no_root()) & self.is_small) | are_apart_on_an_axis(start, end, bound)
     }
 
-    /// Searches [0, `until`] for the first contact, at most in `n_steps` steps. Only lanes of `among` are needed.
+    /// What is certain of an interval [a, b].
     #[inline(always)]
     #[must_use]
-    pub fn search(&self, among: T::Mask, until: f64, n_steps: usize) -> Search<T> {
-        let (zero, last_end) = (T::splat(0.0), T::splat(until));
-        let shortest = T::splat(until * SHORTEST);
-        let never = zero.gt(zero);
-        let mut found = Search {
-            no: never,
-            yes: never,
-            low: zero,
-            high: last_end,
-        };
-        let mut active = among & self.is_small;
-        let mut length = last_end;
-        for _ in 0..n_steps {
-            if !T::any(active) {
-                break;
-            }
-            let end = smaller(found.low + length, last_end);
-            let cubic = self.cubic_over(found.low, end);
-            let mut no = active & cubic.has_no_root();
-            let single = active & cubic.has_one_root();
-            // One root: here is the first contact, or none in this interval.
-            let mut hopeless = active & !cubic.is_sure_anywhere();
-            if T::any(single) {
-                let [first, last] = self.narrowed(found.low, end);
-                let (inside, outside) = self.sides_over(first, last);
-                let yes = single & inside;
-                no = no | (single & outside);
-                // As short as rounding allows, and still unsure: a tie.
-                let is_short = (length * T::splat(0.25)).gt(last - first);
-                hopeless = hopeless | (single & is_short & !inside & !outside);
-                found.yes = found.yes | yes;
-                found.low = T::select(yes, first, found.low);
-                found.high = T::select(yes, last, found.high);
-                active = active & !yes;
-            }
-            if T::any(active & !no & !single) {
-                let (_, outside) = self.sides_over(found.low, end);
-                no = no | (active & outside);
-            }
-            // On: twice as far as this interval, at most to the end.
-            found.low = T::select(no, end, found.low);
-            let at_end = no & !last_end.gt(end);
-            found.no = found.no | at_end;
-            let twice = smaller(length + length, last_end - found.low);
-            length = T::select(no, twice, length * T::splat(0.5));
-            active = active & !at_end & (no | (!hopeless & length.gt(shortest)));
+    pub fn look(&self, a: T, b: T) -> Look<T> {
+        let mut edges = [[[a; 3]; 2]; 3];
+        for (ix, edge) in edges.iter_mut().enumerate().take(self.n_edges()) {
+            *edge = self.edge_over(ix, a, b);
         }
-        found
+        let normal = cross_over(&edges[0], &edges[1]);
+        let cubic = self.signs(&cubic(&normal, &self.corner_over(0, a, b)));
+        let (_, outside) = self.sides_over(&normal, &edges, a, b);
+        let no = self.is_small & (cubic.has_no_root() | outside);
+        Look {
+            no,
+            single: self.is_small & !no & cubic.has_one_root(),
+            hopeless: !self.is_small | !cubic.is_sure_anywhere(),
+        }
     }
 
-    /// What is known of f over [a, b].
+    /// Where f has one root in [low, high]: a short interval that has it, and whether there is contact.
     #[inline(always)]
-    fn cubic_over(&self, a: T, b: T) -> Cubic<T> {
-        self.signs(&self.f_over(a, b))
+    #[must_use]
+    pub fn enclose(&self, low: T, high: T) -> Enclosed<T> {
+        let [first, last] = self.narrowed(low, high);
+        let mut edges = [[[low; 3]; 2]; 3];
+        for (ix, edge) in edges.iter_mut().enumerate().take(self.n_edges()) {
+            *edge = self.edge_over(ix, first, last);
+        }
+        let normal = cross_over(&edges[0], &edges[1]);
+        let (inside, outside) = self.sides_over(&normal, &edges, first, last);
+        Enclosed {
+            inside,
+            outside,
+            first,
+            last,
+            is_short: ((high - low) * T::splat(0.25)).gt(last - first),
+        }
     }
 
     /// The certain signs of f's coefficients.
@@ -281,19 +290,19 @@ impl<T: Number, const K: usize> Motion<T, K> {
 
     /// Whether over [a, b] all w are certainly positive, and whether some w is certainly negative.
     #[inline(always)]
-    fn sides_over(&self, a: T, b: T) -> (T::Mask, T::Mask) {
+    fn sides_over(
+        &self,
+        normal: &[Vector<T>; 3],
+        edges: &[[Vector<T>; 2]; 3],
+        a: T,
+        b: T,
+    ) -> (T::Mask, T::Mask) {
         let zero = T::splat(0.0);
-        let mut edges = [[[zero; 3]; 2]; 3];
-        for (ix, edge) in edges.iter_mut().enumerate().take(Self::N_EDGES) {
-            *edge = self.edge_over(ix, a, b);
-        }
-        let normal = cross_over(&edges[0], &edges[1]);
         let edges_size = self.edge_sizes[0] * self.edge_sizes[1];
         let (mut inside, mut outside) = (!zero.gt(zero), zero.gt(zero));
-        for ix in 0..K {
+        for ix in 0..self.n_corners {
             let corner = self.corner_over(ix, a, b);
-            let edge = &edges[ix % Self::N_EDGES];
-            let (positive, negative) = self.sides(&normal, &corner, edge, ix, edges_size);
+            let (positive, negative) = self.sides(normal, &corner, edges, ix, edges_size);
             inside = inside & positive;
             outside = outside | negative;
         }
@@ -313,12 +322,13 @@ impl<T: Number, const K: usize> Motion<T, K> {
         &self,
         normal: &[Vector<T>; 3],
         corner: &[Vector<T>; 2],
-        edge: &[Vector<T>; 2],
+        edges: &[[Vector<T>; 2]; 3],
         ix: usize,
         edges_size: T,
     ) -> (T::Mask, T::Mask) {
-        let kept = ix % Self::N_EDGES;
-        let moment = cross_over(corner, edge);
+        let is_kept = ix < self.n_edges();
+        let kept = if is_kept { ix } else { ix - self.n_edges() };
+        let moment = cross_over(corner, &edges[kept]);
         // w_0, 4 w_1, 6 w_2, 4 w_3, w_4.
         let w = [
             dot(&normal[0], &moment[0]),
@@ -341,7 +351,7 @@ impl<T: Number, const K: usize> Motion<T, K> {
             & (zero - middle).gt(w[2])
             & (zero - next).gt(w[3])
             & (zero - outer).gt(w[4]);
-        if ix < Self::N_EDGES {
+        if is_kept {
             (positive, negative)
         } else {
             // The edge from this corner is the opposite of the stored one.
@@ -351,8 +361,7 @@ impl<T: Number, const K: usize> Motion<T, K> {
 
     /// If [low, high] has one root of f: an interval inside it, as short as rounding allows, that certainly has the root.
     #[inline(always)]
-    #[must_use]
-    pub fn narrowed(&self, low: T, high: T) -> [T; 2] {
+    fn narrowed(&self, low: T, high: T) -> [T; 2] {
         let (zero, one, two, three) = (T::splat(0.0), T::splat(1.0), T::splat(2.0), T::splat(3.0));
         let f = self.f_over(low, high);
         let is_rising = f[3].gt(f[0]);
@@ -425,9 +434,6 @@ impl<T: Number, const K: usize> Motion<T, K> {
     }
 }
 
-/// The shortest interval that is looked at, in parts of the whole: 2^-12. Then comes exact arithmetic.
-const SHORTEST: f64 = 1.0 / 4096.0;
-
 /// Steps of Newton's method: nearly always enough from the root of a chord to the last bits of an `f64`.
 const N_NEWTON: usize = 8;
 
@@ -447,15 +453,11 @@ fn cubic<T: Number>(normal: &[Vector<T>; 3], corner: &[Vector<T>; 2]) -> [T; 4] 
 
 /// Whether on some axis all corners at both ends are farther from the origin than a bound, on the same side.
 #[inline(always)]
-fn are_apart_on_an_axis<T: Number, const K: usize>(
-    start: &[Vector<T>; K],
-    end: &[Vector<T>; K],
-    bound: T,
-) -> T::Mask {
+fn are_apart_on_an_axis<T: Number>(start: &[Vector<T>], end: &[Vector<T>], bound: T) -> T::Mask {
     let (mut least, mut most) = (start[0], start[0]);
-    for ix in 0..K {
+    for (start, end) in start.iter().zip(end) {
         for axis in 0..3 {
-            let (x, y) = (start[ix][axis], end[ix][axis]);
+            let (x, y) = (start[axis], end[axis]);
             most[axis] = most[axis].larger(x).larger(y);
             least[axis] = smaller(smaller(least[axis], x), y);
         }
@@ -468,17 +470,17 @@ fn are_apart_on_an_axis<T: Number, const K: usize>(
 /// Whether all corners at both ends are certainly on one side of the plane through the origin with this normal,
 /// which is taken as exact. `corner_size` is the largest one.
 #[inline(always)]
-fn are_before<T: Number, const K: usize>(
+fn are_before<T: Number>(
     normal: &Vector<T>,
-    start: &[Vector<T>; K],
-    end: &[Vector<T>; K],
+    start: &[Vector<T>],
+    end: &[Vector<T>],
     corner_size: T,
 ) -> T::Mask {
     let bound = T::splat(T::BOUND) * (size(normal) * corner_size) + T::splat(T::TINY[0]);
     let first = dot(normal, &start[0]);
     let (mut least, mut most) = (first, first);
-    for ix in 0..K {
-        let (x, y) = (dot(normal, &start[ix]), dot(normal, &end[ix]));
+    for (start, end) in start.iter().zip(end) {
+        let (x, y) = (dot(normal, start), dot(normal, end));
         most = most.larger(x).larger(y);
         least = smaller(smaller(least, x), y);
     }

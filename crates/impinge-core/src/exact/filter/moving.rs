@@ -1,6 +1,6 @@
 //! Batches of moving elements: eight pairs in `f64`, or sixteen in `f32` from tables of two groups.
 
-use super::motion::{Motion, Search};
+use super::motion::Motion;
 use super::number::{Lookup, Vector, load_vertex};
 use super::{BATCH, LANES, TABLE};
 use crate::exact::rounding::round_down;
@@ -12,179 +12,266 @@ use crate::exact::{ElementPair, Point};
 #[repr(align(64))]
 pub struct Steps8(pub [[[[f64; LANES]; 3]; 4]; 2]);
 
-/// Elements of a group that move, N points each: `[start or end][point][axis][place]`.
-pub type Moving64<const N: usize> = [[[[f32; TABLE]; 3]; N]; 2];
+/// Elements of a group that move: `[start or end][corner][axis][place]`.
+pub type Moving64 = [[[[f32; TABLE]; 3]; 3]; 2];
 
-/// What the filter found out about eight pairs: bit k stands for lane k. Lanes with neither bit are unsure.
+/// An interval of time for each of eight pairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Contacts8 {
-    /// The pairs that certainly do not touch from t = 0 to the last time asked for.
-    pub no: u8,
-    /// The pairs that certainly touch, and not at the start.
-    pub yes: u8,
-    /// Before this time a pair does certainly not touch.
+#[repr(align(64))]
+pub struct Spans8 {
+    /// Where it starts.
     pub low: [f64; LANES],
-    /// Where `yes`: the first contact is at this time at the latest.
+    /// Where it ends.
     pub high: [f64; LANES],
 }
 
-impl Contacts8 {
-    /// The first contact of a pair that certainly touches, rounded down to `f32`; none where the bounds leave it open.
+/// What [`look`] sees in the intervals of eight pairs: bit k stands for lane k.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Look8 {
+    /// Certainly no contact in the interval.
+    pub no: u8,
+    /// Else: there is one candidate for a contact in it, for [`enclose`].
+    pub single: u8,
+    /// Nothing is certain, and nothing will be in shorter intervals.
+    pub hopeless: u8,
+}
+
+/// What [`enclose`] finds: bit k stands for lane k.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Enclosed8 {
+    /// Certainly one contact in the interval.
+    pub inside: u8,
+    /// Certainly none.
+    pub outside: u8,
+    /// Halving the interval does not help.
+    pub is_short: u8,
+    /// Where the contact is.
+    pub span: Spans8,
+}
+
+/// The search for the first contact of a pair: which interval is next.
+///
+/// ```text
+/// look at [low, high] ── none in it ──> go on behind it, with twice the length, to the end: apart
+///        │      └──────── unclear ──────> half the length, down to 2^-12 of the whole: unsure
+///  one candidate
+///        v
+///     enclose ──────────────────────────> contact, or none in it, or unclear
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Search {
+    /// Certainly no contact before this time.
+    low: f64,
+    high: f64,
+    n_steps: u32,
+}
+
+/// What a search does next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Next {
+    /// [`look`] at the interval.
+    Look,
+    /// [`enclose`] the candidate in it.
+    Enclose,
+    /// There is certainly no contact.
+    Apart,
+    /// There is certainly contact.
+    Contact,
+    /// Exact arithmetic is needed.
+    Unsure,
+}
+
+/// The shortest interval that is looked at, in parts of the whole.
+const SHORTEST: f64 = 1.0 / 4096.0;
+/// Steps of a search before a pair is unsure.
+const N_STEPS: u32 = 48;
+
+impl Search {
+    /// From t = 0 to `until`.
     #[inline]
     #[must_use]
-    pub fn time_f32(&self, lane: usize) -> Option<f32> {
-        let [low, high] = [self.low[lane], self.high[lane]].map(round_down);
-        (low == high).then_some(low)
+    pub fn new(until: f64) -> Self {
+        Search {
+            low: 0.0,
+            high: until,
+            n_steps: 0,
+        }
+    }
+
+    /// The interval at hand.
+    #[inline]
+    #[must_use]
+    pub fn span(&self) -> [f64; 2] {
+        [self.low, self.high]
+    }
+
+    /// After a look at the interval: a lane of what was seen. `until` may be less than before: what is later is no
+    /// longer of interest.
+    #[inline]
+    pub fn after_look(&mut self, seen: &Look8, lane: usize, until: f64) -> Next {
+        let is = |mask: u8| mask >> lane & 1 == 1;
+        if is(seen.no) {
+            self.go_on(until)
+        } else if is(seen.single) {
+            Next::Enclose
+        } else {
+            self.halve(is(seen.hopeless), until)
+        }
+    }
+
+    /// After the candidate was enclosed.
+    #[inline]
+    pub fn after_enclosing(&mut self, found: &Enclosed8, lane: usize, until: f64) -> Next {
+        let is = |mask: u8| mask >> lane & 1 == 1;
+        if is(found.inside) {
+            Next::Contact
+        } else if is(found.outside) {
+            self.go_on(until)
+        } else {
+            // As short as rounding allows, and still unsure: a tie.
+            self.halve(is(found.is_short), until)
+        }
+    }
+
+    #[inline]
+    fn go_on(&mut self, until: f64) -> Next {
+        if self.high >= until {
+            return Next::Apart;
+        }
+        let end = self.high + 2.0 * (self.high - self.low);
+        self.low = self.high;
+        self.high = if end < until { end } else { until };
+        self.count()
+    }
+
+    #[inline]
+    fn halve(&mut self, is_hopeless: bool, until: f64) -> Next {
+        let length = self.high - self.low;
+        if is_hopeless || length <= SHORTEST * until {
+            return Next::Unsure;
+        }
+        self.high = self.low + 0.5 * length;
+        self.count()
+    }
+
+    #[inline]
+    fn count(&mut self) -> Next {
+        self.n_steps += 1;
+        if self.n_steps < N_STEPS {
+            Next::Look
+        } else {
+            Next::Unsure
+        }
     }
 }
 
-/// Steps of a search before a pair is unsure.
-const N_STEPS: usize = 48;
+/// A time that is certainly in an interval, rounded down to `f32`; none where the interval leaves it open.
+#[inline]
+#[must_use]
+pub fn time_between([low, high]: [f64; 2]) -> Option<f32> {
+    let [low, high] = [low, high].map(round_down);
+    (low == high).then_some(low)
+}
 
-/// Which pairs of a vertex and a face are certainly apart from t = 0 to `until`: the cheap first step.
+/// Which of eight pairs are certainly apart from t = 0 to `until`: the cheap first step. For pairs of a vertex and a
+/// face, or of two edges.
 #[inline(always)]
 #[must_use]
-pub fn vertex_face_apart<V: Vector>(steps: &Steps8, until: f64) -> u8 {
+pub fn are_apart<V: Vector>(pair: ElementPair, steps: &Steps8, until: f64) -> u8 {
     let mut no = 0;
     for first in (0..LANES).step_by(V::N) {
-        let [start, end] = load::<V>(steps, first);
-        no |= V::bits(Motion::vertex_face(&start, &end).are_apart(until)) << first;
+        no |= V::bits(load::<V>(pair, steps, first).are_apart(until)) << first;
     }
     no
 }
 
-/// Which pairs of edges are certainly apart from t = 0 to `until`: the cheap first step.
+/// What is certain of an interval of each of eight pairs.
 #[inline(always)]
 #[must_use]
-pub fn edge_edge_apart<V: Vector>(steps: &Steps8, until: f64) -> u8 {
-    let mut no = 0;
+pub fn look<V: Vector>(pair: ElementPair, steps: &Steps8, spans: &Spans8) -> Look8 {
+    let mut seen = Look8::default();
     for first in (0..LANES).step_by(V::N) {
-        let [start, end] = load::<V>(steps, first);
-        no |= V::bits(Motion::edge_edge(&start, &end).are_apart(until)) << first;
+        let (low, high) = (V::load(&spans.low, first), V::load(&spans.high, first));
+        let look = load::<V>(pair, steps, first).look(low, high);
+        seen.no |= V::bits(look.no) << first;
+        seen.single |= V::bits(look.single) << first;
+        seen.hopeless |= V::bits(look.hopeless) << first;
     }
-    no
+    seen
 }
 
-/// Which pairs of a vertex and a face certainly touch or do not from t = 0 to `until`, and when. Only lanes of `among`
-/// are needed; put only pairs in that [`vertex_face_apart`] leaves.
+/// Where [`look`] has seen one candidate for a contact: when it is, and whether it is one.
 #[inline(always)]
 #[must_use]
-pub fn vertex_face_contacts<V: Vector>(steps: &Steps8, among: u8, until: f64) -> Contacts8 {
-    let mut contacts = Contacts8 {
-        high: [until; LANES],
-        ..Contacts8::default()
-    };
+pub fn enclose<V: Vector>(pair: ElementPair, steps: &Steps8, spans: &Spans8) -> Enclosed8 {
+    let mut found = Enclosed8::default();
     for first in (0..LANES).step_by(V::N) {
-        let [start, end] = load::<V>(steps, first);
-        find(
-            &Motion::vertex_face(&start, &end),
-            &mut contacts,
-            among,
-            until,
-            first,
-        );
+        let (low, high) = (V::load(&spans.low, first), V::load(&spans.high, first));
+        let enclosed = load::<V>(pair, steps, first).enclose(low, high);
+        found.inside |= V::bits(enclosed.inside) << first;
+        found.outside |= V::bits(enclosed.outside) << first;
+        found.is_short |= V::bits(enclosed.is_short) << first;
+        enclosed.first.store(&mut found.span.low, first);
+        enclosed.last.store(&mut found.span.high, first);
     }
-    contacts
-}
-
-/// Which pairs of edges certainly touch or do not from t = 0 to `until`, and when. See [`vertex_face_contacts`].
-#[inline(always)]
-#[must_use]
-pub fn edge_edge_contacts<V: Vector>(steps: &Steps8, among: u8, until: f64) -> Contacts8 {
-    let mut contacts = Contacts8 {
-        high: [until; LANES],
-        ..Contacts8::default()
-    };
-    for first in (0..LANES).step_by(V::N) {
-        let [start, end] = load::<V>(steps, first);
-        find(
-            &Motion::edge_edge(&start, &end),
-            &mut contacts,
-            among,
-            until,
-            first,
-        );
-    }
-    contacts
+    found
 }
 
 #[inline(always)]
-fn find<V: Vector, const K: usize>(
-    motion: &Motion<V, K>,
-    contacts: &mut Contacts8,
-    among: u8,
-    until: f64,
-    first: usize,
-) {
-    let apart = motion.are_apart(until);
-    let no = V::bits(apart) << first;
-    contacts.no |= no;
-    let lanes = (u8::MAX >> (LANES - V::N)) << first;
-    if among & !no & lanes == 0 {
-        return;
-    }
-    let found = motion.search(!apart, until, N_STEPS);
-    contacts.no |= V::bits(found.no) << first;
-    contacts.yes |= V::bits(found.yes) << first;
-    found.low.store(&mut contacts.low, first);
-    found.high.store(&mut contacts.high, first);
+fn load<V: Vector>(pair: ElementPair, Steps8(steps): &Steps8, first: usize) -> Motion<V> {
+    let [start, end] = steps;
+    Motion::new(
+        are_edges(pair),
+        &load_end(start, first),
+        &load_end(end, first),
+    )
 }
 
 #[inline(always)]
-fn load<V: Vector>(Steps8([start, end]): &Steps8, first: usize) -> [[[V; 3]; 4]; 2] {
-    let ([p, q, r, s], [t, u, v, w]) = (start, end);
+fn load_end<V: Vector>([p, q, r, s]: &[[[f64; LANES]; 3]; 4], first: usize) -> [[V; 3]; 4] {
     [
-        [
-            load_vertex(p, first),
-            load_vertex(q, first),
-            load_vertex(r, first),
-            load_vertex(s, first),
-        ],
-        [
-            load_vertex(t, first),
-            load_vertex(u, first),
-            load_vertex(v, first),
-            load_vertex(w, first),
-        ],
+        load_vertex(p, first),
+        load_vertex(q, first),
+        load_vertex(r, first),
+        load_vertex(s, first),
     ]
 }
 
-/// Which of sixteen pairs of a vertex and a face are certainly apart from t = 0 to `until`. The elements are those of two groups,
-/// named by their places. In `f32`: for coordinates of any size, but differences above 2^16 are never certain.
 #[inline(always)]
-#[must_use]
-pub fn vertex_face_apart_in_tables<V: Lookup>(
-    (vertices, faces): (&Moving64<1>, &Moving64<3>),
-    [places_a, places_b]: [&[u8; BATCH]; 2],
-    until: f32,
-) -> u16 {
-    let mut no = 0;
-    for first in (0..BATCH).step_by(V::N) {
-        let (a, b) = (V::places(places_a, first), V::places(places_b, first));
-        let motion = Motion::vertex_face(
-            &vertex_and_face::<V>(&vertices[0], a, &faces[0], b),
-            &vertex_and_face::<V>(&vertices[1], a, &faces[1], b),
-        );
-        no |= V::bits(motion.are_apart(f64::from(until))) << first;
-    }
-    no
+fn are_edges(pair: ElementPair) -> bool {
+    debug_assert!(matches!(
+        pair,
+        ElementPair::VertexFace | ElementPair::EdgeEdge
+    ));
+    matches!(pair, ElementPair::EdgeEdge)
 }
 
-/// Which of sixteen pairs of edges are certainly apart from t = 0 to `until`. See [`vertex_face_apart_in_tables`].
+/// Which of sixteen pairs are certainly apart from t = 0 to `until`. The elements are those of two groups, named by
+/// their places. In `f32`: for coordinates of any size, but differences above 2^16 are never certain.
 #[inline(always)]
 #[must_use]
-pub fn edge_edge_apart_in_tables<V: Lookup>(
-    [edges_a, edges_b]: [&Moving64<2>; 2],
+pub fn are_apart_in_tables<V: Lookup>(
+    pair: ElementPair,
+    [group_a, group_b]: [&Moving64; 2],
     [places_a, places_b]: [&[u8; BATCH]; 2],
     until: f32,
 ) -> u16 {
     let mut no = 0;
     for first in (0..BATCH).step_by(V::N) {
         let (a, b) = (V::places(places_a, first), V::places(places_b, first));
-        let motion = Motion::edge_edge(
-            &two_edges::<V>(&edges_a[0], a, &edges_b[0], b),
-            &two_edges::<V>(&edges_a[1], a, &edges_b[1], b),
-        );
+        let motion = if are_edges(pair) {
+            Motion::new(
+                true,
+                &two_edges::<V>(&group_a[0], a, &group_b[0], b),
+                &two_edges::<V>(&group_a[1], a, &group_b[1], b),
+            )
+        } else {
+            Motion::new(
+                false,
+                &vertex_and_face::<V>(&group_a[0], a, &group_b[0], b),
+                &vertex_and_face::<V>(&group_a[1], a, &group_b[1], b),
+            )
+        };
         no |= V::bits(motion.are_apart(f64::from(until))) << first;
     }
     no
@@ -192,7 +279,7 @@ pub fn edge_edge_apart_in_tables<V: Lookup>(
 
 #[inline(always)]
 fn vertex_and_face<V: Lookup>(
-    [p]: &[[[f32; TABLE]; 3]; 1],
+    [p, ..]: &[[[f32; TABLE]; 3]; 3],
     a: V::Places,
     [q, r, s]: &[[[f32; TABLE]; 3]; 3],
     b: V::Places,
@@ -202,9 +289,9 @@ fn vertex_and_face<V: Lookup>(
 
 #[inline(always)]
 fn two_edges<V: Lookup>(
-    [p, q]: &[[[f32; TABLE]; 3]; 2],
+    [p, q, _]: &[[[f32; TABLE]; 3]; 3],
     a: V::Places,
-    [r, s]: &[[[f32; TABLE]; 3]; 2],
+    [r, s, _]: &[[[f32; TABLE]; 3]; 3],
     b: V::Places,
 ) -> [[V; 3]; 4] {
     [look_up(p, a), look_up(q, a), look_up(r, b), look_up(s, b)]
@@ -219,17 +306,55 @@ fn look_up<V: Lookup>([x, y, z]: &[[f32; TABLE]; 3], places: V::Places) -> [V; 3
     ]
 }
 
-/// The same for one pair, in `f64`; none for pairs without a face of their difference polygon.
+/// Searches the whole step of one pair; the interval of the first contact where there certainly is one.
 #[inline]
-pub(in super::super) fn contact_search(
+pub(in super::super) fn search_contact(
     pair: ElementPair,
     start: &[Point; 4],
     end: &[Point; 4],
-) -> Option<Search<f64>> {
+) -> (Next, [f64; 2]) {
     match pair {
-        ElementPair::VertexFace => Some(search_one(&Motion::vertex_face(start, end))),
-        ElementPair::EdgeEdge => Some(search_one(&Motion::edge_edge(start, end))),
-        ElementPair::VertexVertex | ElementPair::VertexEdge => None,
+        ElementPair::VertexFace | ElementPair::EdgeEdge => search_one(are_edges(pair), start, end),
+        // Their difference polygon has no face.
+        ElementPair::VertexVertex | ElementPair::VertexEdge => (Next::Unsure, [0.0, 1.0]),
+    }
+}
+
+#[inline(never)]
+fn search_one(are_edges: bool, start: &[Point; 4], end: &[Point; 4]) -> (Next, [f64; 2]) {
+    let motion = Motion::new(are_edges, start, end);
+    let mut search = Search::new(1.0);
+    if motion.are_apart(1.0) {
+        return (Next::Apart, search.span());
+    }
+    let mut next = Next::Look;
+    loop {
+        let [low, high] = search.span();
+        match next {
+            Next::Look => {
+                let look = motion.look(low, high);
+                let seen = Look8 {
+                    no: u8::from(look.no),
+                    single: u8::from(look.single),
+                    hopeless: u8::from(look.hopeless),
+                };
+                next = search.after_look(&seen, 0, 1.0);
+            }
+            Next::Enclose => {
+                let enclosed = motion.enclose(low, high);
+                let found = Enclosed8 {
+                    inside: u8::from(enclosed.inside),
+                    outside: u8::from(enclosed.outside),
+                    is_short: u8::from(enclosed.is_short),
+                    ..Enclosed8::default()
+                };
+                next = search.after_enclosing(&found, 0, 1.0);
+                if next == Next::Contact {
+                    return (next, [enclosed.first, enclosed.last]);
+                }
+            }
+            Next::Apart | Next::Contact | Next::Unsure => return (next, [low, high]),
+        }
     }
 }
 
@@ -240,16 +365,9 @@ pub(in super::super) fn contact_answer(
     start: &[Point; 4],
     end: &[Point; 4],
 ) -> Option<bool> {
-    match contact_search(pair, start, end)? {
-        Search { yes: true, .. } => Some(true),
-        Search { no: true, .. } => Some(false),
+    match search_contact(pair, start, end).0 {
+        Next::Contact => Some(true),
+        Next::Apart => Some(false),
         _ => None,
     }
-}
-
-fn search_one<const K: usize>(motion: &Motion<f64, K>) -> Search<f64> {
-    let apart = motion.are_apart(1.0);
-    let mut found = motion.search(!apart, 1.0, N_STEPS);
-    found.no |= apart;
-    found
 }

@@ -52,8 +52,6 @@ pub trait Number:
     fn abs(self) -> Self;
     /// The larger of two; if one is NaN, either.
     fn larger(self, other: Self) -> Self;
-    /// Whether the condition holds in any lane.
-    fn any(mask: Self::Mask) -> bool;
     /// The smaller of two; if one is NaN, either.
     #[inline(always)]
     fn smaller(self, other: Self) -> Self {
@@ -151,10 +149,6 @@ impl Number for f64 {
         if self > other { self } else { other }
     }
     #[inline(always)]
-    fn any(mask: bool) -> bool {
-        mask
-    }
-    #[inline(always)]
     fn gt(self, other: Self) -> bool {
         self > other
     }
@@ -178,9 +172,10 @@ macro_rules! operator {
 }
 
 /// Numbers as a plain array, for processors without a known vector instruction set; the compiler may vectorise it.
+/// Every operation names its lanes: loops over them, thousands in one function, took the compiler minutes.
 macro_rules! portable {
     (
-        $type:ident, $mask:ident, $number:ty, $bits:ty, $n:expr, $bound:expr, $underflow:expr,
+        $type:ident, $mask:ident, $number:ty, $bits:ty, $n:expr, [$($k:literal),*], $bound:expr, $underflow:expr,
         $largest:expr, $tiny:expr
     ) => {
         #[doc = concat!("Some `", stringify!($number), "` in 128 bits, which SSE2 and NEON have.")]
@@ -194,14 +189,14 @@ macro_rules! portable {
         impl $type {
             #[inline(always)]
             fn zip(self, other: Self, op: impl Fn($number, $number) -> $number) -> Self {
-                $type(std::array::from_fn(|k| op(self.0[k], other.0[k])))
+                $type([$(op(self.0[$k], other.0[$k])),*])
             }
         }
 
         impl $mask {
             #[inline(always)]
             fn zip(self, other: Self, op: impl Fn($bits, $bits) -> $bits) -> Self {
-                $mask(std::array::from_fn(|k| op(self.0[k], other.0[k])))
+                $mask([$(op(self.0[$k], other.0[$k])),*])
             }
         }
 
@@ -217,7 +212,7 @@ macro_rules! portable {
             type Output = Self;
             #[inline(always)]
             fn not(self) -> Self {
-                $mask(self.0.map(|x| !x))
+                $mask([$(!self.0[$k]),*])
             }
         }
 
@@ -229,16 +224,12 @@ macro_rules! portable {
             const TINY: [f64; 3] = $tiny;
 
             #[inline(always)]
-            fn any(mask: $mask) -> bool {
-                mask.0.iter().fold(0, |bits, more| bits | more) != 0
-            }
-            #[inline(always)]
             fn splat(x: f64) -> Self {
                 $type([x as $number; $n])
             }
             #[inline(always)]
             fn abs(self) -> Self {
-                $type(self.0.map(<$number>::abs))
+                $type([$(self.0[$k].abs()),*])
             }
             #[inline(always)]
             fn larger(self, other: Self) -> Self {
@@ -246,20 +237,15 @@ macro_rules! portable {
             }
             #[inline(always)]
             fn gt(self, other: Self) -> $mask {
-                $mask(std::array::from_fn(|k| {
-                    if self.0[k] > other.0[k] {
-                        <$bits>::MAX
-                    } else {
-                        0
-                    }
-                }))
+                let is = |is: bool| if is { <$bits>::MAX } else { 0 };
+                $mask([$(is(self.0[$k] > other.0[$k])),*])
             }
             #[inline(always)]
             fn select(mask: $mask, yes: Self, no: Self) -> Self {
-                $type(std::array::from_fn(|k| {
-                    let (yes, no) = (yes.0[k].to_bits(), no.0[k].to_bits());
-                    <$number>::from_bits((yes & mask.0[k]) | (no & !mask.0[k]))
-                }))
+                let bits = |mask: $bits, yes: $number, no: $number| {
+                    <$number>::from_bits((yes.to_bits() & mask) | (no.to_bits() & !mask))
+                };
+                $type([$(bits(mask.0[$k], yes.0[$k], no.0[$k])),*])
             }
         }
     };
@@ -274,6 +260,7 @@ portable!(
     f64,
     u64,
     PORTABLE,
+    [0, 1],
     BOUND_F64,
     0.0,
     LARGEST_DIFFERENCE_F64,
@@ -285,6 +272,7 @@ portable!(
     f32,
     u32,
     PORTABLE_F32,
+    [0, 1, 2, 3],
     BOUND_F32,
     UNDERFLOW_F32,
     LARGEST_DIFFERENCE_F32,
@@ -314,15 +302,19 @@ impl Lookup for Portable32 {
 
     #[inline(always)]
     fn places(places: &[u8; BATCH], first: usize) -> Self::Places {
-        std::array::from_fn(|k| places[first + k])
+        let four: &[u8; PORTABLE_F32] = places[first..].first_chunk().expect("four lanes");
+        *four
     }
     #[inline(always)]
     fn look_up(table: &[f32; TABLE], places: Self::Places) -> Self {
-        Portable32(places.map(|place| table[place as usize % TABLE]))
+        let [a, b, c, d] = places;
+        let at = |place: u8| table[place as usize % TABLE];
+        Portable32([at(a), at(b), at(c), at(d)])
     }
     #[inline(always)]
     fn bits(mask: Portable32Mask) -> u16 {
-        (0..PORTABLE_F32).fold(0, |bits, k| bits | ((mask.0[k] & 1) as u16) << k)
+        let [a, b, c, d] = mask.0;
+        (a & 1 | (b & 1) << 1 | (c & 1) << 2 | (d & 1) << 3) as u16
     }
 }
 
@@ -347,8 +339,7 @@ mod x86 {
             abs |$y:ident| $abs:expr, gt |$a:ident, $b:ident| $gt:expr,
             select |$m:ident, $yes:ident, $no:ident| $select:expr,
             and |$p:ident, $q:ident| $and:expr, or |$r:ident, $s:ident| $or:expr,
-            xor |$t:ident, $u:ident| $xor:expr, not |$v:ident| $not:expr,
-            any |$z:ident| $any:expr $(,)?
+            xor |$t:ident, $u:ident| $xor:expr, not |$v:ident| $not:expr $(,)?
         ) => {
             $(#[$doc])*
             #[derive(Debug, Clone, Copy)]
@@ -416,16 +407,6 @@ mod x86 {
                 const TINY: [f64; 3] = $tiny;
 
                 #[inline(always)]
-                fn any(mask: $mask) -> bool {
-                    let $z = mask.0;
-                    #[allow(unused_unsafe, reason = "masks of 512 bits are integers")]
-                    // SAFETY: see above.
-                    unsafe {
-                        $any
-                    }
-                }
-
-                #[inline(always)]
                 fn splat($x: f64) -> Self {
                     // SAFETY: see above.
                     $type(unsafe { $splat })
@@ -469,7 +450,6 @@ mod x86 {
         or |a, b| _mm256_or_pd(a, b),
         xor |a, b| _mm256_xor_pd(a, b),
         not |a| _mm256_xor_pd(a, _mm256_castsi256_pd(_mm256_set1_epi32(-1))),
-        any |x| _mm256_movemask_pd(x) != 0,
     }
 
     register! {
@@ -484,7 +464,6 @@ mod x86 {
         or |a, b| _mm256_or_ps(a, b),
         xor |a, b| _mm256_xor_ps(a, b),
         not |a| _mm256_xor_ps(a, _mm256_castsi256_ps(_mm256_set1_epi32(-1))),
-        any |x| _mm256_movemask_ps(x) != 0,
     }
 
     register! {
@@ -496,7 +475,6 @@ mod x86 {
         gt |a, b| _mm512_cmp_pd_mask::<_CMP_GT_OQ>(a, b),
         select |mask, yes, no| _mm512_mask_blend_pd(mask, no, yes),
         and |a, b| a & b, or |a, b| a | b, xor |a, b| a ^ b, not |a| !a,
-        any |x| x != 0,
     }
 
     register! {
@@ -508,7 +486,6 @@ mod x86 {
         gt |a, b| _mm512_cmp_ps_mask::<_CMP_GT_OQ>(a, b),
         select |mask, yes, no| _mm512_mask_blend_ps(mask, no, yes),
         and |a, b| a & b, or |a, b| a | b, xor |a, b| a ^ b, not |a| !a,
-        any |x| x != 0,
     }
 
     impl Vector for Avx2 {

@@ -23,7 +23,7 @@ mod tests;
 
 use super::Point;
 use super::algebra::Time;
-use super::filter::{Search, contact_answer, contact_search};
+use super::filter::{Next, contact_answer, search_contact};
 use super::rounding::round_down;
 use super::segment::segments_intersect;
 use super::triangle::segment_meets_triangle;
@@ -128,15 +128,10 @@ pub fn first_contact(pair: ElementPair, start: &[Point; 4], end: &[Point; 4]) ->
     if is_apart_on_an_axis(pair, start, end) || !are_finite(pair, start, end) {
         return None;
     }
-    match contact_search(pair, start, end) {
-        Some(Search { no: true, .. }) => None,
+    match search_contact(pair, start, end) {
+        (Next::Apart, _) => None,
         // One root of f is between these times, and they are none: it is the first contact.
-        Some(Search {
-            yes: true,
-            low,
-            high,
-            ..
-        }) => {
+        (Next::Contact, [low, high]) => {
             let polygon = Polygon::new(pair.corners(), start, end);
             Some(Contact::later(polygon.time_between(low, high)))
         }

@@ -4,7 +4,8 @@
 use super::{Contact, ElementPair, first_contact, first_contact_by_roots};
 use crate::exact::Point;
 use crate::exact::filter::{
-    self, BATCH, Contacts8, LANES, Moving64, Steps8, TABLE, contact_answer, number,
+    self, BATCH, LANES, Moving64, Next, Search, Spans8, Steps8, TABLE, contact_answer, number,
+    time_between,
 };
 
 const PAIRS: [ElementPair; 2] = [ElementPair::VertexFace, ElementPair::EdgeEdge];
@@ -104,21 +105,46 @@ impl Steps8 {
     }
 }
 
-/// What a set of instructions says: apart, and contacts.
-type Answer = (u8, Contacts8);
+/// How the search of one lane ended, and with which interval: that of the contact, or what was not searched any more.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Outcome {
+    next: Next,
+    span: [f64; 2],
+}
+
+/// What a set of instructions says: apart, and how searches end.
+type Answer = (u8, [Outcome; LANES]);
 
 #[inline(always)]
 fn ask<V: number::Vector>(pair: ElementPair, steps: &Steps8, until: f64) -> Answer {
-    match pair {
-        ElementPair::VertexFace => (
-            filter::vertex_face_apart::<V>(steps, until),
-            filter::vertex_face_contacts::<V>(steps, u8::MAX, until),
-        ),
-        _ => (
-            filter::edge_edge_apart::<V>(steps, until),
-            filter::edge_edge_contacts::<V>(steps, u8::MAX, until),
-        ),
+    let apart = filter::are_apart::<V>(pair, steps, until);
+    let mut searches = [Search::new(until); LANES];
+    let mut outcomes = [Outcome {
+        next: Next::Look,
+        span: [0.0, until],
+    }; LANES];
+    let is_open = |outcome: &Outcome| matches!(outcome.next, Next::Look | Next::Enclose);
+    while outcomes.iter().any(is_open) {
+        let mut spans = Spans8::default();
+        for (lane, search) in searches.iter().enumerate() {
+            [spans.low[lane], spans.high[lane]] = search.span();
+        }
+        let seen = filter::look::<V>(pair, steps, &spans);
+        let found = filter::enclose::<V>(pair, steps, &spans);
+        for lane in 0..LANES {
+            let (search, outcome) = (&mut searches[lane], &mut outcomes[lane]);
+            outcome.next = match outcome.next {
+                Next::Look => search.after_look(&seen, lane, until),
+                Next::Enclose => search.after_enclosing(&found, lane, until),
+                _ => continue,
+            };
+            outcome.span = match outcome.next {
+                Next::Contact => [found.span.low[lane], found.span.high[lane]],
+                _ => search.span(),
+            };
+        }
     }
+    (apart, outcomes)
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -156,35 +182,24 @@ fn ask_tables<V: number::Lookup>(pair: ElementPair, steps: &[[[Point; 4]; 2]], u
     // Elements at odd places, in reverse.
     let place = |lane: usize| (2 * (BATCH - lane) - 1) as u8;
     let places: [u8; BATCH] = std::array::from_fn(place);
-    fn table<const N: usize>(
-        steps: &[[[Point; 4]; 2]],
-        first: usize,
-        places: &[u8; BATCH],
-    ) -> Moving64<N> {
-        let mut table = [[[[0.0; TABLE]; 3]; N]; 2];
+    let table = |points: std::ops::Range<usize>| {
+        let mut table: Moving64 = [[[[0.0; TABLE]; 3]; 3]; 2];
         for (lane, step) in steps.iter().enumerate() {
-            for (end, ends) in table.iter_mut().enumerate() {
-                for (ix, point) in ends.iter_mut().enumerate() {
-                    for (axis, row) in point.iter_mut().enumerate() {
-                        row[places[lane] as usize] = step[end][first + ix][axis] as f32;
+            for (end, corners) in table.iter_mut().enumerate() {
+                for (point, corner) in points.clone().zip(corners) {
+                    for (axis, row) in corner.iter_mut().enumerate() {
+                        row[places[lane] as usize] = step[end][point][axis] as f32;
                     }
                 }
             }
         }
         table
-    }
-    match pair {
-        ElementPair::VertexFace => filter::vertex_face_apart_in_tables::<V>(
-            (&table(steps, 0, &places), &table(steps, 1, &places)),
-            [&places, &places],
-            until,
-        ),
-        _ => filter::edge_edge_apart_in_tables::<V>(
-            [&table(steps, 0, &places), &table(steps, 2, &places)],
-            [&places, &places],
-            until,
-        ),
-    }
+    };
+    let [a, b] = match pair {
+        ElementPair::VertexFace => [table(0..1), table(1..4)],
+        _ => [table(0..2), table(2..4)],
+    };
+    filter::are_apart_in_tables::<V>(pair, [&a, &b], [&places, &places], until)
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -242,30 +257,32 @@ fn filter_never_contradicts_exact_roots() {
                         batch.set(lane, step);
                     }
                     let (apart, found) = ask_all(pair, &batch, until);
-                    assert_eq!(found.yes & found.no, 0);
-                    assert_eq!(apart & !found.no, 0);
                     for lane in 0..LANES {
+                        let Outcome { next, span } = found[lane];
                         let case = || format!("{kind:?} {pair:?} {until} {:?}", steps[lane]);
                         let contact = exact[lane];
-                        let is_early = contact.is_some_and(|c| c.time < found.low[lane])
-                            && found.no >> lane & 1 == 0;
-                        // A time below `low` only by its own rounding is none.
-                        let is_early = is_early && !is_floor_of(contact, found.low[lane]);
+                        let is_right = apart >> lane & 1 == 0 || !is_in_time(contact, until);
+                        assert!(is_right, "{}", case());
+                        let is_early =
+                            contact.is_some_and(|c| c.time < span[0]) && next != Next::Apart;
+                        // A time below the interval only by its own rounding is none.
+                        let is_early = is_early && !is_floor_of(contact, span[0]);
                         assert!(!is_early, "{} {contact:?} {found:?}", case());
-                        if found.no >> lane & 1 == 1 {
+                        if next == Next::Apart {
                             n_no += 1;
                             assert!(!is_in_time(contact, until), "{}", case());
-                        } else if found.yes >> lane & 1 == 1 {
+                        } else if next == Next::Contact {
                             n_yes += 1;
                             let contact = contact.unwrap_or_else(|| panic!("{}", case()));
                             assert!(!contact.at_start, "{}", case());
-                            assert!(contact.is_within(found.high[lane]), "{}", case());
-                            assert!(found.high[lane] <= until, "{}", case());
-                            if let Some(time) = found.time_f32(lane) {
+                            assert!(contact.is_within(span[1]), "{}", case());
+                            assert!(span[1] <= until, "{}", case());
+                            if let Some(time) = time_between(span) {
                                 n_rounded += 1;
                                 assert_eq!(time, contact.time_f32(), "{}", case());
                             }
                         } else {
+                            assert_eq!(next, Next::Unsure);
                             n_unsure += 1;
                         }
                         let [start, end] = &steps[lane];
@@ -307,14 +324,11 @@ fn numbers_that_are_none_are_unsure() {
             steps.set(lane, &points);
         }
         for pair in PAIRS {
-            let (_, found) = ask_all_bits(pair, &steps);
-            assert_eq!(found, 0, "{x} {pair:?}");
+            let (apart, found) = ask::<number::Portable>(pair, &steps, 1.0);
+            assert_eq!(apart, 0, "{x} {pair:?}");
+            for outcome in found {
+                assert_eq!(outcome.next, Next::Unsure, "{x} {pair:?}");
+            }
         }
     }
-}
-
-/// Yes or no of any instruction set, where contacts need not be equal bit for bit: NaN has many.
-fn ask_all_bits(pair: ElementPair, steps: &Steps8) -> (u8, u8) {
-    let answer = ask::<number::Portable>(pair, steps, 1.0);
-    (answer.0, answer.1.yes)
 }
