@@ -215,10 +215,8 @@ pub(crate) trait Simd: Copy {
     /// Writes the lanes of a mask, lowest first, and anything after them.
     #[inline(always)]
     fn keep_16(self, mask: u16, lanes: &[u8; BATCH], list: &mut [u8; BATCH]) {
-        let mut n = 0;
-        for lane in Lanes(mask.into()) {
-            list[n] = lanes[lane];
-            n += 1;
+        for (place, lane) in Lanes(mask.into()).enumerate() {
+            list[place] = lanes[lane];
         }
     }
 

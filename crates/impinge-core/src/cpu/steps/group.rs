@@ -95,10 +95,9 @@ impl Group {
             boxes.min = points[0];
             boxes.max = points[0];
             for point in points.iter().take(self.n_corners).skip(1) {
-                for axis in 0..3 {
-                    let (min, max) = (&mut boxes.min[axis], &mut boxes.max[axis]);
-                    for lane in 0..GROUP {
-                        let x = point[axis][lane];
+                let axes = boxes.min.iter_mut().zip(&mut boxes.max).zip(point);
+                for ((min, max), row) in axes {
+                    for (lane, &x) in row.iter().enumerate() {
                         min[lane] = lesser(min[lane], x);
                         max[lane] = greater(max[lane], x);
                     }

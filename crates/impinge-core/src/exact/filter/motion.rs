@@ -183,11 +183,13 @@ impl<T: Number> Motion<T> {
         };
         let mut largest = zero;
         for ix in 0..n_corners {
-            motion.corner_sizes[ix] = size(&corners[0][ix]).larger(size(&corners[1][ix]));
+            let [start, end] = &motion.corners;
+            motion.corner_sizes[ix] = size(&start[ix]).larger(size(&end[ix]));
             largest = largest.larger(motion.corner_sizes[ix]);
         }
         for ix in 0..motion.n_edges() {
-            motion.edge_sizes[ix] = size(&edges[0][ix]).larger(size(&edges[1][ix]));
+            let [start, end] = &motion.edges;
+            motion.edge_sizes[ix] = size(&start[ix]).larger(size(&end[ix]));
             largest = largest.larger(motion.edge_sizes[ix]);
         }
         motion.is_small = T::splat(T::LARGEST).gt(largest);
