@@ -307,6 +307,8 @@ impl Detector {
         let mut back_off = 0.0;
         // Pairs that touched on the way to positions tried before: most likely they do again.
         let mut known: Vec<(PairKind, u64)> = Vec::new();
+        // Of their times nothing is needed.
+        let step = step.toi(Toi::F32);
         loop {
             advance.fraction = first.toi * (1.0 - back_off);
             advance.positions.clear();
