@@ -11,7 +11,7 @@ use crate::grouping::GROUP;
 use crate::grouping::bounds::{greater, lesser};
 use crate::positions::Positions;
 
-use super::World;
+use super::world::World;
 
 /// One cluster's elements, one per lane.
 #[derive(Debug, Clone)]
