@@ -1,6 +1,6 @@
 //! A worker's own copy of a cluster: its elements at both ends, their boxes, and their corners.
 //!
-//! Cost: each corner of a cluster once, when it is first needed; 8.5 KB a cluster.
+//! Cost: each corner of a cluster once, when it is first needed; 8.5 KB per cluster.
 
 use crate::cpu::bounds::of_cluster_primitives;
 use crate::cpu::group_cache::Kept;
