@@ -169,8 +169,8 @@ impl Pairs {
         colliding
     }
 
-    /// The primitives of each body that take part in any pair, found in one pass: sorted, each once. Bodies come in order,
-    /// those without such a primitive are left out.
+    /// The primitives of each body that take part in any pair, found in one pass: sorted, each once. Bodies come in order;
+    /// bodies without such a primitive are left out.
     pub fn all_colliding(&self) -> Vec<(BodyId, Vec<u32>)> {
         let both = |&key: &u64| [(key >> 32) as u32, key as u32];
         let mut colliding: Vec<u32> = self.keys.iter().flat_map(both).collect();
@@ -187,10 +187,10 @@ impl Pairs {
             .collect()
     }
 
-    /// Keeps the pairs for which `keep` says so: a filter of the caller's own, by body, by face or by vertex. It is asked
-    /// once per pair of primitives, in the order in which pairs are held, after all of them were found: so the answer is
-    /// the same on every method, backend and thread count as long as `keep` itself depends on the pair alone. Statistics
-    /// stay those of the detection.
+    /// Keeps only the pairs for which `keep` returns true: a filter of the caller's own, by body, by face or by vertex.
+    /// `keep` is called once per pair, in order, after all pairs were found. So the answer is
+    /// the same for every method, backend and thread count, provided that `keep` depends on the pair alone. The statistics
+    /// do not change.
     ///
     /// ```
     /// use impinge_core::{Backend, Detector, Query, Scene};

@@ -48,7 +48,7 @@ pub struct Body {
     end: Option<Positions>,
     /// Whether `end` counts. If not, only its memory is kept.
     moves: bool,
-    /// How the body was moved, if it was by a transform.
+    /// How the body was moved by a transform, if it was.
     motion: Option<Box<Motion>>,
     filter: Filter,
     topology_stamp: u64,
@@ -81,7 +81,7 @@ impl Body {
         self.end.as_ref().filter(|_| self.moves)
     }
 
-    /// How the vertices were moved from the [rest positions](Body::rest_positions); `None` for a body that was not
+    /// The matrix that moved the vertices from the [rest positions](Body::rest_positions); `None` without one
     /// ([`Scene::set_transform`]).
     pub fn transform(&self) -> Option<[[f64; 4]; 4]> {
         self.motion.as_ref().map(|motion| motion.matrix.matrix())
@@ -286,7 +286,7 @@ impl Scene {
             match added {
                 Ok(id) => ids.push(id),
                 Err(error) => {
-                    // In reverse, so that slots are free in the order in which they were before.
+                    // In reverse, so that slots become free in the same order as before.
                     for &id in ids.iter().rev() {
                         self.remove(id)?;
                     }
@@ -419,16 +419,16 @@ impl Scene {
         }
     }
 
-    /// Moves a body by an affine matrix, such as a rigid motion, without its vertices being given again: from its rest
-    /// positions, which are those that were given last ([`add`](Scene::add), [`set_positions`](Scene::set_positions),
-    /// [`remesh`](Scene::remesh)). A second transform replaces the first, and does not add to it.
+    /// Moves a body by an affine matrix, such as a rigid motion, without passing its vertices again. It moves the rest
+    /// positions, which are those given last ([`add`](Scene::add), [`set_positions`](Scene::set_positions),
+    /// [`remesh`](Scene::remesh)). A second transform replaces the first; they do not accumulate.
     ///
-    /// Answers are exact as if the moved vertices had been given, and these are rounded in one way only, so they have the
+    /// Answers are exact for the moved vertices. These are rounded in a fixed way, so they have the
     /// same bits on every backend: row `[a, b, c, d]` of the matrix takes `(x, y, z)` to `((a x + b y) + c z) + d`. Each
     /// product and each sum is rounded to `f64` in this order, none is fused with another, and the last sum is rounded
-    /// once more to the precision of the rest positions. So a rotation bends a body by as much as rounding does.
+    /// once more to the precision of the rest positions. So a rotation deforms a body by the rounding error.
     ///
-    /// End positions are forgotten, as by [`set_positions`](Scene::set_positions).
+    /// End positions are cleared, as by [`set_positions`](Scene::set_positions).
     ///
     /// ```
     /// use impinge_core::{Positions, Scene};
@@ -458,7 +458,7 @@ impl Scene {
         };
         matrix.write(&rest, &mut target.positions);
         if let Err(error) = target.positions.check(body) {
-            // What stood there before is computed again, to the same bits.
+            // Restore the previous positions: computing them again gives the same bits.
             match before {
                 Some(matrix) => matrix.write(&rest, &mut target.positions),
                 None => target.positions.clone_from(&rest),
@@ -542,7 +542,7 @@ impl Scene {
     }
 }
 
-/// Refuses offsets that do not divide `n` things.
+/// Refuses offsets that do not partition `n` elements or positions.
 fn check_offsets(setting: &'static str, offsets: &[usize], n: usize) -> Result<(), Error> {
     let refused = |given, allowed| {
         Err(Error::Setting {

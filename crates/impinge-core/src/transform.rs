@@ -1,11 +1,11 @@
-//! Affine motion of a body: where its rest positions come to lie, rounded in one way only.
+//! Affine motion of a body: its rest positions moved by a matrix, rounded in a fixed way.
 
 use std::sync::Arc;
 
 use crate::error::Error;
 use crate::positions::{Positions, Real};
 
-/// Where a body's vertices are at rest, and how they were moved from there.
+/// The rest positions of a body, and the matrix that moved them.
 #[derive(Debug, Clone)]
 pub(crate) struct Motion {
     pub rest: Arc<Positions>,
@@ -17,7 +17,7 @@ pub(crate) struct Motion {
 pub(crate) struct Affine([[f64; 4]; 3]);
 
 impl Affine {
-    /// Refuses what is not finite, and what is not affine.
+    /// Refuses a matrix that is not finite or not affine.
     pub fn new(matrix: &[[f64; 4]; 4]) -> Result<Self, Error> {
         let [x, y, z, last] = *matrix;
         for (row, numbers) in matrix.iter().enumerate() {
@@ -66,7 +66,7 @@ impl Affine {
         }
     }
 
-    /// Writes where `rest` comes to lie.
+    /// Writes the moved positions of `rest`.
     pub fn write(&self, rest: &Positions, to: &mut Positions) {
         match rest {
             Positions::F32(rest) => self.map(rest, to),

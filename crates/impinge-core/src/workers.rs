@@ -51,7 +51,7 @@ pub struct Workers {
     wakes: AtomicBool,
     /// The pool of [`install`](Workers::install), started when first needed.
     pool: OnceLock<Pool>,
-    /// The process that made it: a fork of that process has none of its threads.
+    /// The process that created the workers: a fork of that process has none of its threads.
     process: u32,
 }
 
@@ -80,7 +80,7 @@ impl Drop for Shift<'_> {
 impl Drop for Workers {
     fn drop(&mut self) {
         if self.process != process() {
-            // These threads do not exist here: waiting for them would never end.
+            // The threads do not exist in this process: waiting for them would never end.
             std::mem::forget(self.helpers.take());
             return;
         }
@@ -154,7 +154,7 @@ impl Workers {
         n_primitives: usize,
         work: impl FnOnce() -> T + Send,
     ) -> Result<T, Error> {
-        // Pools that are shared by the whole process are of no use in a fork of it: there, a detector has its own.
+        // Pools shared by the whole process do not work in a fork of it: there, a detector uses its own pool.
         if !is_forked() {
             if n_primitives < SPREAD_FROM {
                 return Ok(work());

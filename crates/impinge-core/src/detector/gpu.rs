@@ -34,7 +34,7 @@ fn wanted(settings: &Settings) -> Option<Wanted<'_>> {
     match settings.backend {
         Backend::Cpu => None,
         Backend::Auto if settings.method == Method::Naive => None,
-        // Drivers of GPUs do not survive a fork.
+        // GPU drivers do not survive a fork.
         Backend::Auto if is_forked() => None,
         // A software driver is slower than the CPU backend.
         Backend::Auto => Some(named.unwrap_or(Wanted::Hardware)),
@@ -48,7 +48,7 @@ fn engine_of(
 ) -> Result<Option<Engine>, Error> {
     match gpu {
         Ok(gpu) => Ok(gpu.map(|gpu| Engine::new(gpu, settings, Capacities::default()))),
-        // A name that fits no adapter is a mistake, whoever is to choose.
+        // A name that fits no adapter is a mistake, even with `Backend::Auto`.
         Err(error @ Error::NoAdapter { .. }) if settings.device.is_some() => Err(error),
         Err(_) if settings.backend == Backend::Auto => Ok(None),
         Err(error) => Err(error),

@@ -48,8 +48,8 @@ async fn adapters() -> Vec<(wgpu::Adapter, DeviceInfo)> {
     adapters
 }
 
-/// Whether the system may have a GPU. On Linux a driver of one has made a file; where there is none, drivers are not even
-/// loaded, for those that imitate a GPU write to standard error as they are.
+/// Whether the system may have a GPU. On Linux every GPU driver makes a device file. If there is none, no driver is
+/// loaded at all, because software drivers write to standard error when loaded.
 fn may_have_hardware() -> bool {
     if !cfg!(target_os = "linux") {
         return true;
