@@ -12,6 +12,8 @@ use crate::query::Query;
 use crate::run::{FrameLoop, ready};
 use crate::scene::Scene;
 use crate::settings::{Backend, Settings};
+use crate::sink::Wanted;
+use crate::stats::Statistics;
 
 /// Finds intersecting pairs, frame after frame. Owns the scratch memory and reuses it.
 ///
@@ -85,7 +87,7 @@ impl Detector {
         Detector {
             #[cfg(feature = "gpu")]
             gpu,
-            frames: FrameLoop::new(settings.threads),
+            frames: FrameLoop::new(settings.threads, settings.limits()),
             cpu: Cpu::new(&settings),
             steps: steps::Steps::new(&settings),
             settings,
@@ -100,7 +102,8 @@ impl Detector {
     /// All pairs that the query asks for, in the current state of the scene.
     ///
     /// # Errors
-    /// A stale id, refused positions, a memory budget too small for even one slab, a GPU failure.
+    /// A stale id, refused positions, more pairs than allowed, no memory for the answer, a memory budget too small for
+    /// one slab and the answer, a GPU failure.
     pub fn detect(&mut self, scene: &Scene, query: &Query) -> Result<&Pairs, Error> {
         self.detect_with(scene, query, &Control::new())
     }
@@ -115,13 +118,82 @@ impl Detector {
         query: &Query,
         control: &Control<'_>,
     ) -> Result<&Pairs, Error> {
+        self.wait_for(scene, query, control, Wanted::Pairs)?;
+        Ok(self.frames.pairs())
+    }
+
+    /// How many pairs [`detect`](Detector::detect) would find. None of them is held, so there may be more than memory
+    /// has room for.
+    ///
+    /// # Errors
+    /// As `detect`.
+    pub fn count(&mut self, scene: &Scene, query: &Query) -> Result<u64, Error> {
+        self.count_with(scene, query, &Control::new())
+    }
+
+    /// [`count`](Detector::count) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `count`, and [`Error::Cancelled`].
+    pub fn count_with(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        control: &Control<'_>,
+    ) -> Result<u64, Error> {
+        self.wait_for(scene, query, control, Wanted::Count)?;
+        Ok(self.frames.n_pairs())
+    }
+
+    /// Whether [`detect`](Detector::detect) would find any pair. The search ends with the first one that is certain.
+    ///
+    /// That pair is not given: which one comes first depends on the threads. For one that is the same on every run take
+    /// the first of all pairs.
+    ///
+    /// # Errors
+    /// As `detect`; but any number of pairs is allowed.
+    pub fn any(&mut self, scene: &Scene, query: &Query) -> Result<bool, Error> {
+        self.any_with(scene, query, &Control::new())
+    }
+
+    /// [`any`](Detector::any) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `any`, and [`Error::Cancelled`].
+    pub fn any_with(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        control: &Control<'_>,
+    ) -> Result<bool, Error> {
+        self.wait_for(scene, query, control, Wanted::Any)?;
+        Ok(self.frames.n_pairs() > 0)
+    }
+
+    /// The pairs that [`detect`](Detector::detect) found last, out of the detector without a copy. Until the next
+    /// frame it then holds none.
+    pub fn take_pairs(&mut self) -> Pairs {
+        self.frames.take_pairs()
+    }
+
+    /// How the last frame was answered: stages, counts, bytes. The same as [`Pairs::stats`], and there after
+    /// [`count`](Detector::count) and [`any`](Detector::any) too.
+    pub fn stats(&self) -> &Statistics {
+        self.frames.pairs().stats()
+    }
+
+    fn wait_for(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        control: &Control<'_>,
+        wanted: Wanted,
+    ) -> Result<(), Error> {
         #[cfg(feature = "gpu")]
         if let Some(gpu) = self.gpu_in_use() {
-            gpu.block_on(self.answer(scene, query, control))?;
-            return Ok(self.frames.pairs());
+            return gpu.block_on(self.answer(scene, query, control, wanted));
         }
-        ready(self.answer(scene, query, control))?;
-        Ok(self.frames.pairs())
+        ready(self.answer(scene, query, control, wanted))
     }
 
     /// [`detect`](Detector::detect) without blocking. On a GPU the future waits for the device, which must be
@@ -130,7 +202,8 @@ impl Detector {
     /// # Errors
     /// As `detect`.
     pub async fn detect_async(&mut self, scene: &Scene, query: &Query) -> Result<&Pairs, Error> {
-        self.answer(scene, query, &Control::new()).await?;
+        self.answer(scene, query, &Control::new(), Wanted::Pairs)
+            .await?;
         Ok(self.frames.pairs())
     }
 
@@ -140,14 +213,17 @@ impl Detector {
         scene: &Scene,
         query: &Query,
         control: &Control<'_>,
+        wanted: Wanted,
     ) -> Result<(), Error> {
         #[cfg(feature = "gpu")]
         if let Some(engine) = &mut self.gpu {
-            match self.frames.run(scene, query, control, engine).await {
+            match self.frames.run(scene, query, control, wanted, engine).await {
                 Err(Error::Gpu { .. }) if self.settings.backend == Backend::Auto => self.gpu = None,
                 result => return result,
             }
         }
-        self.frames.run(scene, query, control, &mut self.cpu).await
+        self.frames
+            .run(scene, query, control, wanted, &mut self.cpu)
+            .await
     }
 }

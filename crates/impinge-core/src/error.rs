@@ -148,6 +148,24 @@ pub enum Error {
         /// Bytes allowed.
         budget: u64,
     },
+    /// More pairs than [`Settings::max_pairs`](crate::Settings::max_pairs) allows.
+    #[error("{found} pairs and more were found, and at most {limit} are allowed")]
+    TooManyPairs {
+        /// How many were certain by then; this number may differ from run to run.
+        found: u64,
+        /// The most that are allowed.
+        limit: u64,
+    },
+    /// There is no memory for the answer. Ask for parts of the scene, limit the pairs or count them.
+    #[error("out of memory: {needed} bytes more are needed with {n} {what} found")]
+    OutOfMemory {
+        /// What the memory was for.
+        what: &'static str,
+        /// How many were found by then.
+        n: u64,
+        /// Bytes that could not be had.
+        needed: u64,
+    },
     /// The caller cancelled the run; the detector stays usable.
     #[error("cancelled")]
     Cancelled,

@@ -3,12 +3,15 @@
 #[cfg(feature = "gpu")]
 pub mod gpu;
 
+use std::sync::Arc;
+
 use crate::error::Error;
 use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
 use crate::run::{Finder, FrameLoop, Job, ready};
 use crate::scene::Scene;
+use crate::sink::{Answer, Limits, Wanted};
 use crate::stats::Statistics;
 
 /// The frame loop around a method of another crate, on the CPU.
@@ -19,11 +22,11 @@ pub struct Host {
 impl Host {
     /// Creates a host with `threads` workers; 0 for one per core.
     pub fn new(threads: usize) -> Self {
-        let frames = FrameLoop::new(threads);
+        let frames = FrameLoop::new(threads, Limits::default());
         Host { frames }
     }
 
-    /// One frame: resolves and checks the query, has `method` append the keys of all pairs, in any
+    /// One frame: resolves and checks the query, has `method` hand over the keys of all pairs, in any
     /// order, sorts them and drops repetitions.
     ///
     /// # Errors
@@ -33,10 +36,13 @@ impl Host {
         scene: &Scene,
         query: &Query,
         name: &'static str,
-        method: impl FnMut(Job<'_>, &mut Vec<u64>, &mut Statistics) -> Result<(), Error>,
+        method: impl FnMut(Job<'_>, &Arc<Answer>, &mut Statistics) -> Result<(), Error>,
     ) -> Result<&Pairs, Error> {
         let mut guest = Guest { name, method };
-        ready(self.frames.run(scene, query, &Control::new(), &mut guest))?;
+        ready(
+            self.frames
+                .run(scene, query, &Control::new(), Wanted::Pairs, &mut guest),
+        )?;
         Ok(self.frames.pairs())
     }
 }
@@ -48,7 +54,7 @@ struct Guest<F> {
 
 impl<F> Finder for Guest<F>
 where
-    F: FnMut(Job<'_>, &mut Vec<u64>, &mut Statistics) -> Result<(), Error>,
+    F: FnMut(Job<'_>, &Arc<Answer>, &mut Statistics) -> Result<(), Error>,
 {
     fn method(&self) -> &'static str {
         self.name
@@ -65,9 +71,9 @@ where
     async fn find(
         &mut self,
         job: Job<'_>,
-        keys: &mut Vec<u64>,
+        answer: &Arc<Answer>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        (self.method)(job, keys, stats)
+        (self.method)(job, answer, stats)
     }
 }

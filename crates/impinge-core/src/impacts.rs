@@ -1,10 +1,12 @@
 //! The answers about a step: impacts, with their times, and candidates.
 
+use crate::error::Error;
 use crate::exact::Contact;
 use crate::frame::{Frame, owner_by_first};
 use crate::ids::BodyId;
 use crate::pair_kind::PairKind;
 use crate::pairs::{Primitive, mix};
+use crate::sink::{Answer, Ending, reserve};
 use crate::stats::Statistics;
 use crate::step::Toi;
 
@@ -13,6 +15,57 @@ use crate::step::Toi;
 pub(crate) struct Found<V> {
     pub key: u64,
     pub value: V,
+}
+
+/// What was found, by kind of pair.
+pub(crate) type FoundByKind<V = Contact> = [Vec<Found<V>>; PairKind::ALL.len()];
+
+/// Where contacts go while a step is being answered, by kind of pair.
+pub(crate) type ContactAnswer = Answer<Found<Contact>, { PairKind::ALL.len() }>;
+/// The same for keys alone.
+pub(crate) type KeyAnswer = Answer<u64, { PairKind::ALL.len() }>;
+
+/// Where what is found in a step goes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum StepAnswer<'a> {
+    Contacts(&'a ContactAnswer),
+    Keys(&'a KeyAnswer),
+}
+
+impl StepAnswer<'_> {
+    /// Takes what was found of one kind; the block is empty afterwards and keeps its memory.
+    pub fn take(&self, kind: PairKind, block: &mut Vec<Found<Contact>>) {
+        match self {
+            StepAnswer::Contacts(answer) => answer.extend(kind as usize, block.drain(..)),
+            StepAnswer::Keys(answer) => {
+                answer.extend(kind as usize, block.drain(..).map(|found| found.key));
+            }
+        }
+    }
+
+    /// Says how much of the memory budget the finder itself holds.
+    pub fn share(&self, held_by_finder: u64) {
+        match self {
+            StepAnswer::Contacts(answer) => answer.share(held_by_finder),
+            StepAnswer::Keys(answer) => answer.share(held_by_finder),
+        }
+    }
+}
+
+impl Ending for StepAnswer<'_> {
+    fn is_over(&self) -> bool {
+        match self {
+            StepAnswer::Contacts(answer) => answer.is_over(),
+            StepAnswer::Keys(answer) => answer.is_over(),
+        }
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        match self {
+            StepAnswer::Contacts(answer) => answer.check(),
+            StepAnswer::Keys(answer) => answer.check(),
+        }
+    }
 }
 
 /// What global numbers stand for.
@@ -121,11 +174,25 @@ impl Impacts {
         &mut self.stats
     }
 
-    /// What was found of one kind, in the order of the keys. Kinds come in their order.
-    pub(crate) fn extend(&mut self, kind: PairKind, toi: Toi, found: &[Found<Contact>]) {
-        let numbering = &self.numbering;
-        let named = found.iter().map(|found| numbering.impact(kind, toi, found));
-        self.impacts.extend(named);
+    /// All that was found, each kind in the order of the keys.
+    ///
+    /// # Errors
+    /// There is no memory for them.
+    pub(crate) fn fill(&mut self, toi: Toi, found: &FoundByKind) -> Result<(), Error> {
+        let n: usize = found.iter().map(Vec::len).sum();
+        let Impacts {
+            numbering, impacts, ..
+        } = self;
+        reserve(impacts, n, "impacts")?;
+        for (kind, found) in PairKind::ALL.into_iter().zip(found) {
+            impacts.extend(found.iter().map(|found| numbering.impact(kind, toi, found)));
+        }
+        Ok(())
+    }
+
+    /// Bytes of the answer.
+    pub(crate) fn bytes(&self) -> u64 {
+        (size_of::<Impact>() * self.impacts.capacity()) as u64
     }
 
     /// What was found, by its names.
@@ -211,8 +278,15 @@ impl Candidates {
         self.stats.clear();
     }
 
-    pub(crate) fn parts_mut(&mut self) -> (&mut [Vec<u64>; 6], &mut Statistics) {
+    /// Its keys, sorted in the end, and its statistics.
+    pub(crate) fn parts_mut(&mut self) -> (&mut [Vec<u64>; PairKind::ALL.len()], &mut Statistics) {
         (&mut self.keys, &mut self.stats)
+    }
+
+    /// Bytes of the answer.
+    pub(crate) fn bytes(&self) -> u64 {
+        let n: usize = self.keys.iter().map(Vec::capacity).sum();
+        (size_of::<u64>() * n) as u64
     }
 
     /// How many there are of all kinds.

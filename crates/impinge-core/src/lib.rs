@@ -34,6 +34,8 @@ mod query;
 pub mod run;
 mod scene;
 mod settings;
+#[allow(missing_docs)]
+pub mod sink;
 mod stats;
 mod step;
 mod transform;

@@ -11,14 +11,14 @@ use crate::scene::Scene;
 use crate::stats::Statistics;
 
 /// Calls `emit` with the test, the key and the value of every pair that the frame asks for and that passes its test, in the
-/// order of the keys.
+/// order of the keys. An error of `emit` ends the search.
 pub(crate) fn run<T: Test>(
     test: &T,
     scene: &Scene,
     frame: &Frame,
     control: &Control<'_>,
     stats: &mut Statistics,
-    mut emit: impl FnMut(TestId, u64, T::Value),
+    mut emit: impl FnMut(TestId, u64, T::Value) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let elements = elements(test, scene, frame);
     let n = elements.len();
@@ -31,7 +31,7 @@ pub(crate) fn run<T: Test>(
             if box_a.overlaps(box_b) {
                 stats.n_candidates += u64::from(test.admits(id, *a, *b));
                 if let Some(value) = test.settle(id, *a, *b) {
-                    emit(id, pair_key(*number_a, *number_b), value);
+                    emit(id, pair_key(*number_a, *number_b), value)?;
                 }
             }
         }

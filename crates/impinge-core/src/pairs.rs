@@ -33,7 +33,7 @@ pub struct Pairs {
 }
 
 impl Pairs {
-    /// Takes over the frame's numbering; the caller fills in keys through `parts_mut`.
+    /// Takes over the frame's numbering, without keys.
     pub(crate) fn begin(&mut self, frame: &Frame) {
         self.keys.clear();
         self.bodies.clear();
@@ -46,8 +46,18 @@ impl Pairs {
         self.stats.clear();
     }
 
-    pub(crate) fn parts_mut(&mut self) -> (&mut Vec<u64>, &mut Statistics) {
-        (&mut self.keys, &mut self.stats)
+    pub(crate) fn stats_mut(&mut self) -> &mut Statistics {
+        &mut self.stats
+    }
+
+    /// The memory of the keys, to be used for the next answer.
+    pub(crate) fn take_keys(&mut self) -> Vec<u64> {
+        std::mem::take(&mut self.keys)
+    }
+
+    /// The answer: sorted keys, each once.
+    pub(crate) fn put_keys(&mut self, keys: Vec<u64>) {
+        self.keys = keys;
     }
 
     /// The number of pairs.
@@ -157,15 +167,30 @@ impl Pairs {
         let Some(numbers) = self.numbers(body) else {
             return Vec::new();
         };
-        let mut colliding: Vec<u32> = self
+        // One bit per primitive: pairs may be many more than primitives.
+        let mut words: Vec<u64> = Vec::new();
+        for global in self
             .keys
             .iter()
             .flat_map(|&key| [key >> 32, key & u64::from(u32::MAX)])
-            .filter(|global| numbers.contains(global))
-            .map(|global| (global - numbers.start) as u32)
-            .collect();
-        colliding.sort_unstable();
-        colliding.dedup();
+        {
+            if numbers.contains(&global) {
+                let primitive = global - numbers.start;
+                let word = (primitive / 64) as usize;
+                if word >= words.len() {
+                    words.resize(word + 1, 0);
+                }
+                words[word] |= 1 << (primitive % 64);
+            }
+        }
+        let n: u32 = words.iter().map(|word| word.count_ones()).sum();
+        let mut colliding = Vec::with_capacity(n as usize);
+        for (first, mut word) in (0u32..).step_by(64).zip(words) {
+            while word != 0 {
+                colliding.push(first + word.trailing_zeros());
+                word &= word - 1;
+            }
+        }
         colliding
     }
 

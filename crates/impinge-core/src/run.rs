@@ -1,9 +1,10 @@
-//! The frame loop: resolves a query, has a [`Finder`] append the keys of all pairs, sorts them.
+//! The frame loop: resolves a query, has a [`Finder`] find the keys of all pairs, sorts them.
 //!
 //! There is one loop for every backend and for methods of other crates. It is async because a GPU must be waited for. A
 //! finder that works on the CPU never waits: its frame is complete at the first poll, see [`ready`].
 
 use std::pin::pin;
+use std::sync::Arc;
 use std::task::{Context, Poll, Waker};
 
 use crate::clock::Instant;
@@ -13,6 +14,7 @@ use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
 use crate::scene::Scene;
+use crate::sink::{Answer, Limits, Wanted};
 use crate::stats::Statistics;
 use crate::workers::Workers;
 
@@ -48,14 +50,15 @@ pub trait Finder {
         false
     }
 
-    /// Appends the keys of all pairs that the frame asks for, in any order.
+    /// Hands over the keys of all pairs that the frame asks for, in any order, and tells the answer how many bytes the
+    /// finder holds itself.
     ///
     /// # Errors
-    /// Refused positions, cancellation, a memory budget that is too small, a GPU failure.
+    /// Refused positions, cancellation, a memory budget that is too small, a GPU failure, those of the answer.
     fn find(
         &mut self,
         job: Job<'_>,
-        keys: &mut Vec<u64>,
+        answer: &Arc<Answer>,
         stats: &mut Statistics,
     ) -> impl Future<Output = Result<(), Error>>;
 }
@@ -64,20 +67,26 @@ pub trait Finder {
 pub struct FrameLoop {
     frame: Frame,
     pairs: Pairs,
+    n_pairs: u64,
+    answer: Arc<Answer>,
+    limits: Limits,
     workers: Workers,
 }
 
 impl FrameLoop {
     /// With `threads` workers; 0 for one per core.
-    pub fn new(threads: usize) -> Self {
+    pub fn new(threads: usize, limits: Limits) -> Self {
         FrameLoop {
             frame: Frame::default(),
             pairs: Pairs::default(),
+            n_pairs: 0,
+            answer: Arc::default(),
+            limits,
             workers: Workers::new(threads),
         }
     }
 
-    /// One frame. Its answer is in [`pairs`](FrameLoop::pairs).
+    /// One frame. Its answer is in [`pairs`](FrameLoop::pairs) or [`n_pairs`](FrameLoop::n_pairs).
     ///
     /// # Errors
     /// A stale id, refused positions, errors of the finder.
@@ -86,6 +95,7 @@ impl FrameLoop {
         scene: &Scene,
         query: &Query,
         control: &Control<'_>,
+        wanted: Wanted,
         finder: &mut impl Finder,
     ) -> Result<(), Error> {
         let start = Instant::now();
@@ -95,7 +105,9 @@ impl FrameLoop {
         if !finder.checks_positions() {
             self.frame.check(scene)?;
         }
-        let (keys, stats) = self.pairs.parts_mut();
+        let keys = self.pairs.take_keys();
+        self.answer.begin(self.limits, wanted, [keys]);
+        let stats = self.pairs.stats_mut();
         stats.method = finder.method();
         stats.n_threads = self.workers.n();
         stats.backend.push_str(finder.backend());
@@ -105,14 +117,23 @@ impl FrameLoop {
             workers: &self.workers,
             control,
         };
-        finder.find(job, keys, stats).await?;
+        let found = finder.find(job, &self.answer, stats).await;
+        let is_enough = self.answer.is_enough();
+        let joined = self.answer.finish();
+        if !is_enough {
+            found?;
+        }
+        let ([mut keys], n_pairs) = joined?;
+        self.n_pairs = n_pairs;
         stats.time("collect", |_| {
             keys.sort_unstable();
             if finder.repeats() {
                 keys.dedup();
             }
         });
+        stats.bytes_held += size_of::<u64>() as u64 * keys.capacity() as u64;
         stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
+        self.pairs.put_keys(keys);
         Ok(())
     }
 
@@ -121,12 +142,22 @@ impl FrameLoop {
         &self.pairs
     }
 
+    /// The same, out of the loop.
+    pub fn take_pairs(&mut self) -> Pairs {
+        std::mem::take(&mut self.pairs)
+    }
+
+    /// How many pairs the last frame had, if it had no error.
+    pub fn n_pairs(&self) -> u64 {
+        self.n_pairs
+    }
+
     /// The threads, for answers that are found otherwise.
     pub fn workers(&self) -> &Workers {
         &self.workers
     }
 
-    /// A query resolved and its positions checked, and the threads: for frames that are answered elsewhere.
+    /// A query resolved and its positions checked, and the threads: for frames whose answer stays elsewhere.
     ///
     /// # Errors
     /// A stale id, refused positions.

@@ -1,6 +1,7 @@
 //! The settings of a detector.
 
 use crate::error::Error;
+use crate::sink::Limits;
 
 /// How candidates are found. All methods give the same pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -78,8 +79,13 @@ pub struct Settings {
     pub lambda: f64,
     /// `Cells`: the most primitives a group may hold, 1 to 64.
     pub group_size: u32,
-    /// Bytes the detector may hold besides the answer; `None` for as many as it takes.
+    /// Bytes the detector may hold, the answer included; `None` for as many as it takes. While an answer is found that
+    /// is larger than the one before, it takes up to twice its size. On a GPU: bytes of buffers on the device, and as
+    /// many again for the answer on the host.
     pub memory_budget: Option<u64>,
+    /// The most pairs that an answer may have: with more, detection ends with
+    /// [`Error::TooManyPairs`](crate::Error::TooManyPairs) as soon as that is certain. `None` for any number.
+    pub max_pairs: Option<u64>,
     /// `Clusters`: whether bodies are clustered again.
     pub recluster: Recluster,
     /// GPU: part of an adapter's name, to choose among several.
@@ -96,6 +102,7 @@ impl Default for Settings {
             lambda: 1.0,
             group_size: 64,
             memory_budget: None,
+            max_pairs: None,
             recluster: Recluster::default(),
             device: None,
         }
@@ -103,6 +110,15 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// What an answer may be.
+    pub(crate) fn limits(&self) -> Limits {
+        Limits {
+            max_pairs: self.max_pairs,
+            memory_budget: self.memory_budget,
+            besides: 0,
+        }
+    }
+
     /// Whether everything is in its range.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let refuse = |setting, given: String, allowed| {

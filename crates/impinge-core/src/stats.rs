@@ -54,7 +54,7 @@ pub struct Statistics {
     pub n_pieces: u64,
     /// Stages that were run again because a buffer had to grow.
     pub n_reruns: u64,
-    /// Bytes that the detector holds, the answer not counted.
+    /// Bytes that the detector holds, the answer included.
     pub bytes_held: u64,
 }
 

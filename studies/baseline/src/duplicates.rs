@@ -25,9 +25,12 @@
 mod djb2;
 mod rules;
 
+use std::sync::Arc;
+
 use impinge_core::cpu::cells::Cells;
 use impinge_core::cpu::simd::Isa;
 use impinge_core::host::Host;
+use impinge_core::sink::Answer;
 use impinge_core::{BodyId, InstructionSet, Pairs, Query, Scene};
 
 use crate::{Error, check_lambda, check_threads};
@@ -180,10 +183,12 @@ impl TwoLevels {
         let rule = Every(self.settings.possible);
         let cells = &mut self.cells;
         let query = Query::between(a, b);
-        self.host
-            .detect(scene, &query, "two levels, repeated", |job, keys, stats| {
-                cells.run(job, &settings, &rule, keys, stats)
-            })
+        self.host.detect(
+            scene,
+            &query,
+            "two levels, repeated",
+            |job, answer, stats| cells.run(job, answer, &settings, &rule, stats),
+        )
     }
 
     /// Like [`detect`](TwoLevels::detect), but pairs go through a table of `table_size` slots before the tests (table 3,
@@ -205,11 +210,10 @@ impl TwoLevels {
         let (cells, table) = (&mut self.cells, &mut self.table);
         let query = Query::between(a, b);
         self.host
-            .detect(scene, &query, "two levels, DJB2", |job, keys, stats| {
+            .detect(scene, &query, "two levels, DJB2", |job, answer, stats| {
                 stats.time("table", |_| table.clear(table_size))?;
-                cells.run(job, &settings, &table.rule(possible), keys, stats)?;
-                table.settle(job, keys, stats);
-                Ok(())
+                cells.run(job, answer, &settings, &table.rule(possible), stats)?;
+                table.settle(job, answer, stats)
             })
     }
 
@@ -222,7 +226,7 @@ impl TwoLevels {
         let settings = of_cells(&self.settings);
         let possible = self.settings.possible;
         let cells = &mut self.cells;
-        let mut tested = Vec::new();
+        let tests = Arc::new(Answer::default());
         let query = Query::between(a, b);
         self.host
             .detect(scene, &query, "two levels, counted", |job, _, stats| {
@@ -230,8 +234,9 @@ impl TwoLevels {
                     possible,
                     frame: job.frame,
                 };
-                cells.run(job, &settings, &rule, &mut tested, stats)
+                cells.run(job, &tests, &settings, &rule, stats)
             })?;
+        let ([mut tested], _) = tests.finish()?;
         tested.sort_unstable();
         let mut checks = Checks::default();
         for same in tested.chunk_by(u64::eq) {

@@ -11,7 +11,7 @@
 //! collect   sorted, repetitions dropped
 //! ```
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use impinge_core::cpu::cells::{MOST_ENTRIES_EACH, for_cells};
@@ -21,6 +21,7 @@ use impinge_core::cpu::world::World;
 use impinge_core::grouping::bounds::Bounds;
 use impinge_core::grouping::grid::Grid;
 use impinge_core::run::Job;
+use impinge_core::sink::Answer;
 use impinge_core::{InstructionSet, Statistics};
 
 use crate::pairing::{Lists, Run, Scratch};
@@ -73,19 +74,21 @@ impl Method {
         }
     }
 
-    /// Appends the keys of all pairs, unsorted, with repetitions.
+    /// Hands over the keys of all pairs, with repetitions.
     pub fn run(
         &mut self,
         job: Job<'_>,
+        answer: &Arc<Answer>,
         settings: &Settings,
-        keys: &mut Vec<u64>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         let world = World::new(job.scene, job.frame);
         self.counts = Counts::default();
         self.scratches
             .resize_with(job.workers.n(), Scratch::default);
-        self.scratches.iter_mut().for_each(Scratch::clear);
+        for scratch in &mut self.scratches {
+            scratch.begin(answer);
+        }
         stats.n_slabs = 1;
         let Method {
             reaching,
@@ -117,9 +120,10 @@ impl Method {
         });
         stats.time("compact", |_| self.compact(job));
         self.pair(job, world, &grid, settings, stats);
-        for scratch in &self.scratches {
-            keys.extend_from_slice(&scratch.settler.keys);
+        for scratch in &mut self.scratches {
+            scratch.settler.end();
         }
+        answer.check()?;
         self.book(&grid, stats);
         Ok(())
     }

@@ -6,6 +6,8 @@
 //! lanes, and a primitive of `a` is tested against 8 or 16 of them at a time.
 //! Cost: `n_a n_b` box tests per cell. The method culls nothing before them.
 
+use std::sync::Arc;
+
 use impinge_core::cpu::kept::Kept;
 use impinge_core::cpu::narrow::{Candidate, Settler};
 use impinge_core::cpu::simd::{Isa, LaneBounds, masks};
@@ -13,6 +15,7 @@ use impinge_core::cpu::world::World;
 use impinge_core::grouping::GROUP;
 use impinge_core::grouping::bounds::Bounds;
 use impinge_core::grouping::grid::Grid;
+use impinge_core::sink::Answer;
 
 /// Up to this many box tests, laying out lanes does not pay.
 const FEW: usize = 24;
@@ -64,8 +67,8 @@ impl Default for Scratch {
 }
 
 impl Scratch {
-    pub fn clear(&mut self) {
-        self.settler.clear();
+    pub fn begin(&mut self, answer: &Arc<Answer>) {
+        self.settler.begin(answer);
         self.n_box_tests = 0;
     }
 

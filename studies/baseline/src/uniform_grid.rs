@@ -115,8 +115,8 @@ impl UniformGrid {
         } = self;
         let mut counts = Counts::default();
         let query = Query::between(a, b);
-        let pairs = host.detect(scene, &query, "uniform grid", |job, keys, stats| {
-            method.run(job, settings, keys, stats)?;
+        let pairs = host.detect(scene, &query, "uniform grid", |job, answer, stats| {
+            method.run(job, answer, settings, stats)?;
             counts = method.counts;
             Ok(())
         })?;

@@ -16,25 +16,38 @@ use crate::ids::BodyId;
 use crate::pairs::Pairs;
 use crate::positions::{Positions, check_positions};
 use crate::scene::{Body, Scene};
+use crate::sink::reserve;
 
 /// Pairs per task.
 const CHUNK: usize = 256;
+/// What memory is for.
+const WHAT: &str = "contacts";
+
+/// A list with room for so many.
+fn room<T>(n: usize) -> Result<Vec<T>, Error> {
+    let mut list = Vec::new();
+    reserve(&mut list, n, WHAT)?;
+    Ok(list)
+}
 
 pub(super) fn contacts(scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> {
     let bodies = Bodies::new(scene, pairs)?;
-    let rows: Vec<[u32; 4]> = pairs.rows().collect();
-    let met: Vec<Met> = rows
-        .par_chunks(CHUNK)
-        .map(|rows| {
-            let mut met = Met::default();
-            for row in rows {
-                met.add(&bodies, row);
-            }
-            met
-        })
-        .collect();
+    let n = pairs.len();
+    let mut rows: Vec<[u32; 4]> = room(n)?;
+    rows.extend(pairs.rows());
+    let n_chunks = n.div_ceil(CHUNK);
+    let mut met: Vec<Met> = room(n_chunks)?;
+    met.resize_with(n_chunks, Met::default);
+    rows.par_chunks(CHUNK)
+        .zip(&mut met)
+        .try_for_each(|(rows, met)| {
+            reserve(&mut met.contacts, rows.len(), WHAT)?;
+            rows.iter().try_for_each(|row| met.add(&bodies, row))
+        })?;
 
-    let mut names: Vec<PointName> = met.iter().flat_map(|met| &met.names).copied().collect();
+    let n_corners = met.iter().map(|met| met.names.len()).sum();
+    let mut names: Vec<PointName> = room(n_corners)?;
+    names.extend(met.iter().flat_map(|met| &met.names));
     names.par_sort_unstable();
     names.dedup();
     if u32::try_from(names.len()).is_err() {
@@ -45,22 +58,32 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> 
         });
     }
     let number = |name: &PointName| names.partition_point(|held| held < name) as u32;
-    let corners: Vec<u32> = met
-        .par_iter()
-        .flat_map_iter(|met| met.names.iter().map(number))
-        .collect();
-    let points = names
-        .par_iter()
-        .with_min_len(CHUNK)
-        .map(|name| bodies.place(name).rounded(bodies.precision(name.bodies)))
-        .collect();
+    let mut corners: Vec<u32> = room(n_corners)?;
+    corners.resize(n_corners, 0);
+    let mut rest = &mut corners[..];
+    let mut of_chunks: Vec<(&Met, &mut [u32])> = room(n_chunks)?;
+    for met in &met {
+        let (of_chunk, others) = rest.split_at_mut(met.names.len());
+        of_chunks.push((met, of_chunk));
+        rest = others;
+    }
+    of_chunks.into_par_iter().for_each(|(met, corners)| {
+        for (corner, name) in corners.iter_mut().zip(&met.names) {
+            *corner = number(name);
+        }
+    });
+    let mut points: Vec<[f64; 3]> = room(names.len())?;
+    points.resize(names.len(), [0.0; 3]);
+    let places = names.par_iter().zip(&mut points).with_min_len(CHUNK);
+    places.for_each(|(name, point)| {
+        *point = bodies.place(name).rounded(bodies.precision(name.bodies));
+    });
 
-    let n = rows.len();
     let mut contacts = Contacts {
         rows,
-        shapes: Vec::with_capacity(n),
-        directed: Vec::with_capacity(n),
-        starts: Vec::with_capacity(n + 1),
+        shapes: room(n)?,
+        directed: room(n)?,
+        starts: room(n + 1)?,
         corners,
         names,
         points,
@@ -91,7 +114,11 @@ struct Found {
 }
 
 impl Met {
-    fn add(&mut self, bodies: &Bodies<'_>, &[body_a, a, body_b, b]: &[u32; 4]) {
+    fn add(
+        &mut self,
+        bodies: &Bodies<'_>,
+        &[body_a, a, body_b, b]: &[u32; 4],
+    ) -> Result<(), Error> {
         let sides = [(body_a, a), (body_b, b)].map(|(body, face)| bodies.triangle(body, face));
         let [Some(a), Some(b)] = sides else {
             self.contacts.push(Found {
@@ -99,10 +126,14 @@ impl Met {
                 n_corners: 0,
                 directed: false,
             });
-            return;
+            return Ok(());
         };
         let meeting = meet(&a.points, &b.points);
         let corners = meeting.corners();
+        if self.names.capacity() - self.names.len() < corners.len() {
+            let more = self.names.len().max(CHUNK);
+            reserve(&mut self.names, more, WHAT)?;
+        }
         self.names.extend(corners.iter().map(|&[in_a, in_b]| {
             let mut features = [a.feature(in_a), b.feature(in_b)];
             if body_a == body_b {
@@ -123,6 +154,7 @@ impl Met {
             n_corners: corners.len(),
             directed: meeting.directed,
         });
+        Ok(())
     }
 }
 

@@ -16,6 +16,8 @@
 //! coarser until the lists hold at most [`MOST_ENTRIES_EACH`] entries per primitive. That keeps memory
 //! bounded; the price is more pairs per cell, which `n_reruns` and `grid` in the statistics show.
 
+use std::sync::Arc;
+
 use crate::clock::Instant;
 
 use crate::error::Error;
@@ -33,7 +35,7 @@ use super::simd::Lanes;
 use super::subcells::{Asked, Groups, Lanes64};
 use super::world::World;
 use crate::run::Job;
-use crate::workers::Workers;
+use crate::sink::Answer;
 
 /// Entries of the cell lists a primitive, at most, on average.
 pub const MOST_ENTRIES_EACH: u64 = 16;
@@ -49,7 +51,7 @@ pub trait Rule: Sync {
     /// The pairs that the rule is asked about.
     fn asked(&self) -> Asked;
 
-    /// Whether such a pair is a candidate here. What the rule appends to `keys` ends up in the answer's.
+    /// Whether such a pair is a candidate here. What the rule appends to `keys` ends up in the answer.
     fn admits(&self, a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool;
 }
 
@@ -108,16 +110,16 @@ impl Cells {
         }
     }
 
-    /// Appends the keys of all pairs that the frame asks for, unsorted, as the rule has it.
+    /// Hands over the keys of all pairs that the frame asks for, as the rule has it.
     ///
     /// # Errors
     /// A memory budget too small for a slab; cancellation.
     pub fn run<R: Rule>(
         &mut self,
         job: Job<'_>,
+        answer: &Arc<Answer>,
         settings: &Settings,
         rule: &R,
-        keys: &mut Vec<u64>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         let Job {
@@ -128,7 +130,7 @@ impl Cells {
         } = job;
         self.scratches.resize_with(workers.n(), Settler::default);
         for scratch in &mut self.scratches {
-            scratch.clear();
+            scratch.begin(answer);
         }
         self.items.clear();
         let world = World::new(scene, frame);
@@ -148,18 +150,22 @@ impl Cells {
             self.scatter(&region, n_near as u64, settings, control, stats)
         })?;
         stats.grid = Some(grid.resolution);
+        let items = size_of::<WorkItem>() * self.items.capacity();
+        answer.share(self.bytes() - items as u64 + slab_bytes(settings));
+        answer.check()?;
         let task = Task {
+            job,
+            answer,
             world,
-            workers,
-            control,
             rule,
         };
         self.dispatch_items(task, grid, settings, stats)?;
-        for scratch in &self.scratches {
-            keys.extend_from_slice(&scratch.keys);
+        for scratch in &mut self.scratches {
+            scratch.end();
             stats.n_candidates += scratch.n_candidates;
             stats.n_unsure += scratch.n_unsure;
         }
+        answer.check()?;
         stats.n_entries = self.entries.len() as u64;
         stats.bytes_held = self.bytes();
         Ok(())
@@ -199,9 +205,10 @@ impl Cells {
                     budget,
                 });
             }
-            let room = (budget - fixed) / 4;
+            // Half of what is to spare is left for the answer.
+            let room = n + 3 + (budget - needed) / 2 / 4;
             most_entries = most_entries.min((room / 2).max(n));
-            most_cells = room / 2;
+            most_cells = room - (room / 2).max(n);
         }
         loop {
             control.step(0, 1)?;
@@ -253,7 +260,7 @@ impl Cells {
     ) -> Result<(), Error> {
         let start = Instant::now();
         let mut paired_ms = 0.0;
-        let most_items = slab_items(settings);
+        let most_items = task.answer.most_items(slab_items(settings));
         if settings.memory_budget.is_some() {
             self.items.reserve_exact(most_items);
         }
@@ -305,7 +312,7 @@ impl Cells {
         stats.n_slabs += 1;
         items.clear();
         let busy: f64 = scratches.iter().map(|s| s.busy.as_secs_f64() * 1e3).sum();
-        let narrow_ms = (busy / task.workers.n() as f64).min(paired_ms);
+        let narrow_ms = (busy / task.job.workers.n() as f64).min(paired_ms);
         stats.add_ms("dispatch", start.elapsed().as_secs_f64() * 1e3 - paired_ms);
         stats.add_ms("pairing", paired_ms - narrow_ms);
         stats.add_ms("narrow", narrow_ms);
@@ -329,9 +336,9 @@ fn slab_bytes(settings: &Settings) -> u64 {
 
 /// A frame and the rule for its pairs.
 struct Task<'a, R> {
+    job: Job<'a>,
+    answer: &'a Answer,
     world: World<'a>,
-    workers: &'a Workers,
-    control: &'a Control<'a>,
     rule: &'a R,
 }
 
@@ -447,13 +454,13 @@ fn pair<R: Rule>(
     let start = Instant::now();
     let n_tasks = items.len().div_ceil(PAIRING_TASK);
     let Task {
-        workers,
-        control,
-        rule,
-        ..
+        job, answer, rule, ..
     } = task;
+    let Job {
+        workers, control, ..
+    } = job;
     workers.for_each(scratches, n_tasks, |settler, ix| {
-        if control.step(done, total).is_err() {
+        if answer.is_over() || control.step(done, total).is_err() {
             return;
         }
         let first = ix * PAIRING_TASK;
@@ -461,6 +468,7 @@ fn pair<R: Rule>(
         pair_items(isa, lists, items, rule, settler);
     });
     control.step(done, total)?;
+    answer.check()?;
     Ok(start.elapsed().as_secs_f64() * 1e3)
 }
 
@@ -473,6 +481,9 @@ fn pair_items<R: Rule>(
 ) {
     let mut lanes = Lanes64::default();
     for item in items {
+        if settler.is_over() {
+            break;
+        }
         pair_item(isa, lists, item, rule, &mut lanes, settler);
         settler.settle_when_full(isa, lists.world);
     }

@@ -12,6 +12,8 @@
 //! Memory: a cache per body, and a slab of work items. A full slab is paired and settled, then dispatch
 //! goes on.
 
+use std::sync::Arc;
+
 use crate::error::Error;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
@@ -29,6 +31,7 @@ use super::slabs::{self, Slabs};
 use super::top_level::TopLevel;
 use super::world::{BodyCache, Caches, World};
 use crate::run::Job;
+use crate::sink::Answer;
 use crate::workers::Workers;
 
 /// From this many primitives of all bodies on, helpers are woken at the beginning of a frame.
@@ -60,12 +63,12 @@ impl Clusters {
         }
     }
 
-    /// Appends the keys of all pairs that the frame asks for, unsorted.
+    /// Hands over the keys of all pairs that the frame asks for.
     pub fn run(
         &mut self,
         job: Job<'_>,
+        answer: &Arc<Answer>,
         settings: &Settings,
-        keys: &mut Vec<u64>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         self.scratches.resize_with(job.workers.n(), Worker::default);
@@ -79,11 +82,14 @@ impl Clusters {
                 .run(self.isa, job, settings, caches, scratches, stats)
         })?;
         for worker in &mut self.scratches {
-            worker.begin(stats.n_clusters, settings.memory_budget.is_some());
+            worker.begin(stats.n_clusters, settings.memory_budget.is_some(), answer);
         }
-        let most_items = slabs::most_items(settings.memory_budget, self.bytes() as u64)?;
+        let held = self.bytes() as u64;
+        let most_items = answer.most_items(slabs::most_items(settings.memory_budget, held)?);
         self.items.clear();
         self.items.shrink_to(most_items);
+        answer.share(held + slabs::bytes(most_items));
+        answer.check()?;
         let Clusters {
             isa,
             caches,
@@ -97,6 +103,7 @@ impl Clusters {
         let mut slabs = Slabs {
             isa: *isa,
             job,
+            answer,
             world: World {
                 scene: job.scene,
                 frame: job.frame,
@@ -109,9 +116,10 @@ impl Clusters {
             ms: 0.0,
         };
         slabs.run(top, stack, body_stack)?;
-        for worker in scratches.iter() {
-            keys.extend_from_slice(&worker.settler.keys);
+        for worker in scratches.iter_mut() {
+            worker.settler.end();
         }
+        answer.check()?;
         stats.bytes_held = (self.bytes() + size_of::<WorkItem>() * self.items.capacity()) as u64;
         Ok(())
     }

@@ -20,11 +20,14 @@ pub mod subcells;
 pub(crate) mod top_level;
 pub mod world;
 
+use std::sync::Arc;
+
 use crate::error::Error;
 use crate::naive;
 use crate::narrow::Intersection;
 use crate::run::{Finder, Job};
 use crate::settings::{Method, Settings};
+use crate::sink::{Answer, BLOCK};
 use crate::stats::Statistics;
 
 use cells::Cells;
@@ -64,17 +67,35 @@ impl Finder for Cpu {
     async fn find(
         &mut self,
         job: Job<'_>,
-        keys: &mut Vec<u64>,
+        answer: &Arc<Answer>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         let settings = &self.settings;
         match settings.method {
-            Method::Naive => stats.time("naive", |stats| {
-                let put = |_, key, ()| keys.push(key);
-                naive::run(&Intersection, job.scene, job.frame, job.control, stats, put)
-            }),
-            Method::Cells => self.cells.run(job, settings, &cells::Owner, keys, stats),
-            Method::Clusters => self.clusters.run(job, settings, keys, stats),
+            Method::Naive => stats.time("naive", |stats| run_naive(job, answer, stats)),
+            Method::Cells => self.cells.run(job, answer, settings, &cells::Owner, stats),
+            Method::Clusters => self.clusters.run(job, answer, settings, stats),
         }
     }
+}
+
+/// The oracle's pairs, handed over as those of the other methods are.
+fn run_naive(job: Job<'_>, answer: &Answer, stats: &mut Statistics) -> Result<(), Error> {
+    let Job {
+        scene,
+        frame,
+        control,
+        ..
+    } = job;
+    let mut keys = Vec::with_capacity(BLOCK);
+    naive::run(&Intersection, scene, frame, control, stats, |_, key, ()| {
+        keys.push(key);
+        if keys.len() < BLOCK {
+            return Ok(());
+        }
+        answer.take(&mut keys);
+        answer.check()
+    })?;
+    answer.take(&mut keys);
+    answer.check()
 }

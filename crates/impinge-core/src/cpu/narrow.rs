@@ -7,6 +7,7 @@
 //! are unsure go to exact arithmetic, and so do pairs of a triangle and a tetrahedron; that code filters too.
 
 use crate::clock::Instant;
+use std::sync::Arc;
 use std::time::Duration;
 
 use crate::elements::Elements;
@@ -17,6 +18,7 @@ use crate::frame::pair_key;
 use crate::grouping::GROUP;
 use crate::narrow::{intersect, intersect_shared};
 use crate::positions::Positions;
+use crate::sink::{Answer, BLOCK};
 
 use super::group_cache::Group;
 use super::pairing::{Met, WorkItem};
@@ -40,12 +42,17 @@ pub struct Candidate {
 const FULL: usize = 1024;
 /// The most candidates: the last work item may add this many more than [`FULL`].
 const MOST: usize = FULL + GROUP * GROUP;
+/// Keys that may gather: a block but for one, those of a work item, those of its candidates.
+const MOST_KEYS: usize = BLOCK + GROUP * GROUP + MOST;
 
 /// One worker's candidates, pairs and counts.
 #[derive(Debug, Default)]
 pub struct Settler {
-    /// Keys of the pairs that intersect.
+    /// Keys of pairs that intersect, handed over in blocks.
     pub keys: Vec<u64>,
+    answer: Option<Arc<Answer>>,
+    /// Keys that make a block.
+    block: usize,
     /// Candidates that were settled.
     pub n_candidates: u64,
     /// Candidates left to exact arithmetic.
@@ -60,9 +67,12 @@ pub struct Settler {
 }
 
 impl Settler {
-    /// Makes ready for a frame. Candidates get all the room that they may ever need.
-    pub fn clear(&mut self) {
+    /// Makes ready for a frame. Candidates and keys get all the room that they may ever need.
+    pub fn begin(&mut self, answer: &Arc<Answer>) {
+        self.answer = Some(Arc::clone(answer));
+        self.block = answer.block();
         self.keys.clear();
+        self.keys.reserve_exact(MOST_KEYS);
         self.candidates.clear();
         self.candidates.reserve_exact(MOST);
         self.survivors.reserve_exact(MOST);
@@ -72,11 +82,39 @@ impl Settler {
         self.busy = Duration::ZERO;
     }
 
-    /// Bytes held, the keys not counted: they are the answer.
+    /// Ends a frame: hands over the keys that are left.
+    pub fn end(&mut self) {
+        if let Some(answer) = self.answer.take() {
+            answer.take(&mut self.keys);
+        }
+    }
+
+    /// Hands over the keys once there is a block of them.
+    #[inline(always)]
+    fn hand_over(&mut self) {
+        if self.keys.len() >= self.block {
+            self.hand_over_block();
+        }
+    }
+
+    #[inline(never)]
+    fn hand_over_block(&mut self) {
+        if let Some(answer) = &self.answer {
+            answer.take(&mut self.keys);
+        }
+    }
+
+    /// Whether the answer takes no more.
+    #[inline(always)]
+    pub fn is_over(&self) -> bool {
+        self.answer.as_ref().is_some_and(|answer| answer.is_over())
+    }
+
+    /// Bytes held.
     pub fn bytes(&self) -> usize {
         let lists = [&self.candidates, &self.survivors, &self.open];
         let room: usize = lists.iter().map(|list| list.capacity()).sum();
-        size_of::<Candidate>() * room
+        size_of::<Candidate>() * room + size_of::<u64>() * self.keys.capacity()
     }
 
     /// Adds a candidate.
@@ -137,10 +175,14 @@ impl Settler {
         if self.candidates.len() >= FULL {
             self.settle(isa, world);
         }
+        self.hand_over();
     }
 
     /// Settles a pair of one body that shares a vertex, under `SharedVertex::Resolve`.
     pub fn settle_shared(&mut self, body: &BodyRef<'_>, place_a: u32, place_b: u32) {
+        if self.is_over() {
+            return;
+        }
         self.n_candidates += 1;
         let (a, b) = (body.points(place_a), body.points(place_b));
         let (ids_a, ids_b) = (body.corners(place_a), body.corners(place_b));
@@ -148,6 +190,7 @@ impl Settler {
         if intersect_shared(rule, body.participant.kind, (&a, ids_a), (&b, ids_b)) {
             self.keys
                 .push(pair_key(body.global(place_a), body.global(place_b)));
+            self.hand_over();
         }
     }
 
@@ -162,6 +205,7 @@ impl Settler {
         self.candidates.clear();
         self.survivors.clear();
         self.open.clear();
+        self.hand_over();
         self.busy += start.elapsed();
     }
 

@@ -16,11 +16,13 @@
 //! On a CPU these box tests beat the 4x4x4 sub-cell masks of the paper, see `docs/performance.md`.
 
 use crate::clock::Instant;
+use std::sync::Arc;
 
 use crate::exact::filter::BATCH;
 use crate::grouping::GROUP;
 use crate::grouping::hubs::Hubs;
 use crate::query::SharedVertex;
+use crate::sink::Answer;
 
 use super::group_cache::{Group, GroupCache};
 use super::hubs::Around;
@@ -55,8 +57,8 @@ pub(crate) struct Worker {
 
 impl Worker {
     /// Makes ready for a frame of so many clusters.
-    pub fn begin(&mut self, n_clusters: u64, in_budget: bool) {
-        self.settler.clear();
+    pub fn begin(&mut self, n_clusters: u64, in_budget: bool, answer: &Arc<Answer>) {
+        self.settler.begin(answer);
         self.n_settled = 0;
         self.groups.begin::<World<'_>>(n_clusters, in_budget);
     }
@@ -202,6 +204,9 @@ pub(crate) fn run<S: Simd>(
         ..
     } = worker;
     for item in items {
+        if settler.is_over() {
+            break;
+        }
         let Some(Culled { places, lanes }) = cull(simd, world, item, groups) else {
             continue;
         };

@@ -1,6 +1,7 @@
 //! The stages of `Clusters` from `dispatch` on: work items come in slabs, and a full slab is paired and
 //! settled before dispatch goes on.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use crate::clock::Instant;
@@ -8,6 +9,7 @@ use crate::error::Error;
 use crate::grouping::hubs::Hubs;
 use crate::query::SharedVertex;
 use crate::run::Job;
+use crate::sink::{Answer, Ending};
 use crate::stats::Statistics;
 
 use super::dispatch::{self, NodePair, Tree};
@@ -28,7 +30,13 @@ const TASKS_EACH: usize = 12;
 /// With fewer work items, one worker takes them all.
 const PARALLEL_FROM: usize = 64;
 
-/// How many work items a slab may hold within the budget, when `held` bytes are held besides.
+/// Bytes of so many work items.
+pub(crate) fn bytes(n_items: usize) -> u64 {
+    (size_of::<WorkItem>() * n_items) as u64
+}
+
+/// How many work items a slab may hold within the budget, when `held` bytes are held besides. An eighth of what is to
+/// spare is for work items, the rest for the answer.
 pub(crate) fn most_items(budget: Option<u64>, held: u64) -> Result<usize, Error> {
     let Some(budget) = budget else {
         return Ok(MOST_ITEMS);
@@ -42,13 +50,16 @@ pub(crate) fn most_items(budget: Option<u64>, held: u64) -> Result<usize, Error>
             budget,
         });
     }
-    Ok(((budget - held) / each).min(MOST_ITEMS as u64) as usize)
+    let more = (budget - needed) / 8 / each;
+    Ok((FEWEST_ITEMS as u64 + more).min(MOST_ITEMS as u64) as usize)
 }
 
 /// Provides the trees from which work items come, and settles the work items.
 pub(crate) trait Stage: Copy + Sync {
     /// The state of one worker.
     type Worker: Send;
+    /// Where workers hand over what they find.
+    type Answer: Ending;
 
     /// The tree over the clusters of a layer.
     fn tree(&self, layer: u32) -> Tree<'_>;
@@ -63,7 +74,13 @@ pub(crate) trait Stage: Copy + Sync {
     fn hubs(&self, layer: u32) -> Option<&Hubs>;
 
     /// What is left to do when all work items are settled.
-    fn finish(&self, _: Job<'_>, _: &mut [Self::Worker], _: &mut Statistics) -> Result<(), Error> {
+    fn finish(
+        &self,
+        _: Job<'_>,
+        _: Self::Answer,
+        _: &mut [Self::Worker],
+        _: &mut Statistics,
+    ) -> Result<(), Error> {
         Ok(())
     }
 
@@ -82,8 +99,9 @@ pub(crate) struct Counts {
     pub n_unsure: u64,
 }
 
-impl Stage for World<'_> {
+impl<'a> Stage for World<'a> {
     type Worker = Worker;
+    type Answer = &'a Arc<Answer>;
 
     #[inline(always)]
     fn tree(&self, layer: u32) -> Tree<'_> {
@@ -104,6 +122,7 @@ impl Stage for World<'_> {
     fn finish(
         &self,
         job: Job<'_>,
+        answer: Self::Answer,
         scratches: &mut [Worker],
         stats: &mut Statistics,
     ) -> Result<(), Error> {
@@ -122,6 +141,7 @@ impl Stage for World<'_> {
             let n = hubs.n_to_settle();
             for (done, (shared, places)) in hubs.to_settle().enumerate() {
                 job.control.step(done as u64, n as u64)?;
+                answer.check()?;
                 around.settle(&body, hubs, shared, places, settler);
             }
             stats.add_ms("hubs", start.elapsed().as_secs_f64() * 1e3);
@@ -142,6 +162,7 @@ impl Stage for World<'_> {
 pub(crate) struct Slabs<'a, W: Stage> {
     pub isa: Isa,
     pub job: Job<'a>,
+    pub answer: W::Answer,
     pub world: W,
     pub items: &'a mut Vec<WorkItem>,
     pub most_items: usize,
@@ -170,7 +191,8 @@ impl<W: Stage> Slabs<'_, W> {
         let stats = &mut *self.stats;
         let total_ms = start.elapsed().as_secs_f64() * 1e3;
         stats.add_ms("dispatch", total_ms - self.ms);
-        self.world.finish(self.job, self.scratches, self.stats)?;
+        self.world
+            .finish(self.job, self.answer, self.scratches, self.stats)?;
         let stats = &mut *self.stats;
         let mut busy_ms = 0.0;
         for worker in &*self.scratches {
@@ -204,7 +226,7 @@ impl<W: Stage> Slabs<'_, W> {
     fn flush(&mut self) -> Result<(), Error> {
         let start = Instant::now();
         let (isa, world, control) = (self.isa, self.world, self.job.control);
-        let workers = self.job.workers;
+        let (workers, answer) = (self.job.workers, self.answer);
         let items = &self.items[..];
         let n_workers = if items.len() < PARALLEL_FROM {
             1
@@ -215,7 +237,8 @@ impl<W: Stage> Slabs<'_, W> {
         let n_tasks = items.len().div_ceil(task);
         let scratches = &mut self.scratches[..n_workers];
         workers.for_each(scratches, n_tasks, |worker, ix| {
-            if control.step(ix as u64, n_tasks as u64).is_err() || world.is_over() {
+            let is_over = answer.is_over() || world.is_over();
+            if is_over || control.step(ix as u64, n_tasks as u64).is_err() {
                 return;
             }
             let items = &items[ix * task..items.len().min((ix + 1) * task)];
@@ -227,6 +250,7 @@ impl<W: Stage> Slabs<'_, W> {
             ));
         });
         control.step(n_tasks as u64, n_tasks as u64)?;
+        answer.check()?;
         self.stats.n_work_items += items.len() as u64;
         self.stats.n_slabs += 1;
         self.items.clear();

@@ -5,11 +5,14 @@ use crate::clock::Instant;
 
 use super::Detector;
 use crate::advance::{Advance, blend};
-use crate::cpu::steps::{Asked, FoundByKind, Pose, Sought, StepClusters};
+use crate::cpu::steps::{Asked, Pose, Sought, StepClusters};
 use crate::elements::Part;
 use crate::error::Error;
+use crate::exact::Contact;
 use crate::frame::{Ask, Frame, TestId, owner_by_first};
-use crate::impacts::{Candidates, Found, Impact, Impacts};
+use crate::impacts::{
+    Candidates, ContactAnswer, Found, FoundByKind, Impact, Impacts, KeyAnswer, StepAnswer,
+};
 use crate::naive;
 use crate::narrow::{Element, FirstContact, Overlap, Test};
 use crate::pair_kind::PairKind;
@@ -18,6 +21,7 @@ use crate::progress::Control;
 use crate::run::Job;
 use crate::scene::Scene;
 use crate::settings::{Method, Settings};
+use crate::sink::{Limits, Wanted};
 use crate::stats::Statistics;
 use crate::step::{CandidateQuery, Start, Step, Toi};
 
@@ -27,6 +31,8 @@ pub(super) struct Steps {
     impacts: Impacts,
     candidates: Candidates,
     clusters: StepClusters,
+    contacts: ContactAnswer,
+    keys: KeyAnswer,
     found: FoundByKind,
 }
 
@@ -37,6 +43,8 @@ impl Steps {
             impacts: Impacts::default(),
             candidates: Candidates::default(),
             clusters: StepClusters::new(settings.instruction_set),
+            contacts: ContactAnswer::default(),
+            keys: KeyAnswer::default(),
             found: FoundByKind::default(),
         }
     }
@@ -85,7 +93,8 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// A stale id, refused positions, a memory budget too small for even one slab.
+    /// A stale id, refused positions, more pairs than allowed, no memory for the answer, a memory budget too small for
+    /// one slab and the answer.
     pub fn impacts(&mut self, scene: &Scene, step: &Step) -> Result<&Impacts, Error> {
         self.impacts_with(scene, step, &Control::new())
     }
@@ -115,10 +124,11 @@ impl Detector {
                 .iter_mut()
                 .for_each(|found| found.sort_unstable_by_key(|found| found.key));
         });
-        for (kind, found) in PairKind::ALL.into_iter().zip(found) {
-            impacts.extend(kind, step.toi, found);
-        }
-        impacts.stats_mut().total_ms = start.elapsed().as_secs_f64() * 1e3;
+        impacts.fill(step.toi, found)?;
+        let bytes = impacts.bytes();
+        let stats = impacts.stats_mut();
+        stats.bytes_held += bytes;
+        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(&self.steps.impacts)
     }
 
@@ -192,28 +202,36 @@ impl Detector {
             frame,
             impacts,
             clusters,
+            contacts,
             found,
             ..
         } = &mut self.steps;
         let stats = impacts.stats_mut();
-        found.iter_mut().for_each(Vec::clear);
+        let limits = match sought {
+            Sought::All => Limits {
+                besides: size_of::<Impact>() as u64,
+                ..self.settings.limits()
+            },
+            // However many touch, one is wanted.
+            _ => Limits {
+                max_pairs: None,
+                ..self.settings.limits()
+            },
+        };
+        contacts.begin(limits, Wanted::Pairs, std::mem::take(found));
         if self.settings.method == Method::Naive {
-            return stats.time("naive", |stats| {
-                naive::run(
-                    &FirstContact,
-                    scene,
-                    frame,
-                    control,
-                    stats,
-                    |test, key, value| {
-                        if let TestId::Elements(kind) = test
-                            && !(step.start == Start::Skip && value.at_start)
-                        {
-                            found[kind as usize].push(Found { key, value });
-                        }
-                    },
-                )
-            });
+            stats.time("naive", |stats| {
+                let emit = |test, key, value: Contact| match test {
+                    TestId::Elements(kind) if !(step.start == Start::Skip && value.at_start) => {
+                        contacts.extend(kind as usize, [Found { key, value }].into_iter());
+                        contacts.check()
+                    }
+                    _ => Ok(()),
+                };
+                naive::run(&FirstContact, scene, frame, control, stats, emit)
+            })?;
+            (*found, _) = contacts.finish()?;
+            return Ok(());
         }
         let _shift = self.frames.workers().shift(frame.n_primitives());
         let job = Job {
@@ -229,7 +247,14 @@ impl Detector {
             pose,
             latest,
         };
-        clusters.run(job, &self.settings, asked, found, stats)
+        let answer = StepAnswer::Contacts(contacts);
+        let result = clusters.run(job, &self.settings, asked, answer, stats);
+        let finished = contacts.finish();
+        result?;
+        (*found, _) = finished?;
+        let n: usize = found.iter().map(Vec::capacity).sum();
+        stats.bytes_held += (size_of::<Found<Contact>>() * n) as u64;
+        Ok(())
     }
 
     /// Whether nothing touches during the step. With [`Start::Skip`], pairs that touch at its start do not count.
@@ -402,7 +427,7 @@ impl Detector {
             frame,
             candidates,
             clusters,
-            found,
+            keys: answer,
             ..
         } = &mut self.steps;
         frame.resolve_for(scene, &query.query, Ask::Candidates(query.kinds))?;
@@ -410,18 +435,19 @@ impl Detector {
         frame.check(scene)?;
         let (keys, stats) = candidates.parts_mut();
         begin(stats, &self.settings, self.frames.workers().n());
+        answer.begin(self.settings.limits(), Wanted::Pairs, std::mem::take(keys));
         if self.settings.method == Method::Naive {
             let test = Overlap {
                 distance: query.distance,
             };
             naive::run(&test, scene, frame, control, stats, |test, key, ()| {
                 if let TestId::Elements(kind) = test {
-                    keys[kind as usize].push(key);
+                    answer.extend(kind as usize, [key].into_iter());
                 }
+                answer.check()
             })?;
         } else {
             let _shift = self.frames.workers().shift(frame.n_primitives());
-            found.iter_mut().for_each(Vec::clear);
             let job = Job {
                 scene,
                 frame,
@@ -439,12 +465,14 @@ impl Detector {
                 },
                 latest: f64::INFINITY,
             };
-            clusters.run(job, &self.settings, asked, found, stats)?;
-            for (keys, found) in keys.iter_mut().zip(found) {
-                keys.extend(found.iter().map(|found| found.key));
-            }
+            let handed_over = StepAnswer::Keys(answer);
+            clusters.run(job, &self.settings, asked, handed_over, stats)?;
         }
+        (*keys, _) = answer.finish()?;
         keys.iter_mut().for_each(|keys| keys.sort_unstable());
+        let bytes = candidates.bytes();
+        let (_, stats) = candidates.parts_mut();
+        stats.bytes_held += bytes;
         stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(&self.steps.candidates)
     }

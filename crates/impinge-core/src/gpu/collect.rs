@@ -142,9 +142,11 @@ impl Collector {
         n_stages: usize,
         guess: Guess,
     ) -> Result<Collected, Error> {
-        let staging = self.staging.clone().expect("encoded before");
+        // Given back when all went well: a buffer that stays mapped is of no more use.
+        let staging = self.staging.take().expect("encoded before");
         let bytes = HEADER + KEY * (guess.pairs + guess.unsure);
-        let (counts, grid, ticks, n_pairs, n_unsure, mut pairs, mut unsure) = {
+        let (mut pairs, mut unsure) = (Vec::new(), Vec::new());
+        let (counts, grid, ticks, n_pairs, n_unsure) = {
             let view = map(&staging, bytes).await?;
             let at = |from: u64, size: u64| &view[from as usize..(from + size) as usize];
             let counters: Vec<Counter> = bytemuck::pod_collect_to_vec(at(0, COUNTERS));
@@ -155,14 +157,15 @@ impl Collector {
             let n_pairs = counts.needed.pairs.min(capacities.pairs);
             let n_unsure = counts.needed.unsure.min(capacities.unsure);
             let first = HEADER;
-            let pairs: Vec<PairKey> =
-                bytemuck::pod_collect_to_vec(at(first, KEY * n_pairs.min(guess.pairs)));
+            reserve_all(&mut pairs, n_pairs)?;
+            reserve_all(&mut unsure, n_unsure)?;
+            append(&mut pairs, at(first, KEY * n_pairs.min(guess.pairs)));
             let first = first + KEY * guess.pairs;
-            let unsure: Vec<UnsureKey> =
-                bytemuck::pod_collect_to_vec(at(first, KEY * n_unsure.min(guess.unsure)));
-            (counts, grid, ticks, n_pairs, n_unsure, pairs, unsure)
+            append(&mut unsure, at(first, KEY * n_unsure.min(guess.unsure)));
+            (counts, grid, ticks, n_pairs, n_unsure)
         };
         staging.unmap();
+        self.staging = Some(staging);
         (self.n_pairs, self.n_unsure) = (n_pairs, n_unsure);
         let more_pairs = n_pairs.saturating_sub(guess.pairs);
         let more_unsure = n_unsure.saturating_sub(guess.unsure);
@@ -183,8 +186,8 @@ impl Collector {
                 let view = map(&staging, bytes).await?;
                 let (of_pairs, of_unsure) =
                     view[..bytes as usize].split_at((KEY * more_pairs) as usize);
-                pairs.extend(bytemuck::pod_collect_to_vec::<u8, PairKey>(of_pairs));
-                unsure.extend(bytemuck::pod_collect_to_vec::<u8, UnsureKey>(of_unsure));
+                append(&mut pairs, of_pairs);
+                append(&mut unsure, of_unsure);
             }
             staging.unmap();
         }
@@ -201,6 +204,23 @@ impl Collector {
             unsure,
         })
     }
+}
+
+/// Makes room for all keys of a list.
+///
+/// # Errors
+/// There is no memory for them.
+fn reserve_all<K>(keys: &mut Vec<K>, n: u64) -> Result<(), Error> {
+    let reserved = keys.try_reserve_exact(usize::try_from(n).unwrap_or(usize::MAX));
+    let what = "pairs of one pass";
+    let needed = n * KEY;
+    reserved.map_err(|_| Error::OutOfMemory { what, n, needed })
+}
+
+/// Appends keys as the device wrote them, within the room that was made.
+fn append<K: bytemuck::Pod>(keys: &mut Vec<K>, bytes: &[u8]) {
+    let each = bytes.chunks_exact(size_of::<K>());
+    keys.extend(each.map(bytemuck::pod_read_unaligned::<K>));
 }
 
 /// Maps the front of a buffer for reading.

@@ -12,7 +12,7 @@ use super::collect::Collector;
 use super::device::Scopes;
 use super::layout::Cell;
 use super::open::Gpu;
-use super::passes::Answer;
+use super::passes::Outcome;
 use super::pieces;
 use super::room::{Capacities, CellsWanted, Counts, Room};
 use super::topology::Most;
@@ -23,6 +23,7 @@ use crate::ids::BodyId;
 use crate::run::{Finder, Job};
 use crate::scene::Scene;
 use crate::settings::{Backend, Method, Recluster, Settings};
+use crate::sink::Answer;
 use crate::stats::Statistics;
 
 /// The most cells, for any lambda.
@@ -126,11 +127,13 @@ impl Engine {
     async fn answer(
         &mut self,
         job: Job<'_>,
-        keys: &mut Vec<u64>,
+        answer: &Answer,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         let Job { scene, frame, .. } = job;
         self.gpu.check_lost()?;
+        // The engine's own bytes are on the device.
+        answer.share(0);
         self.complete.clear();
         if self.too_much.is_some_and(|n| frame.n_primitives() < n) {
             self.too_much = None;
@@ -146,7 +149,7 @@ impl Engine {
         if !self.is_held(scene, frame) && !self.is_guest() {
             stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
             self.may_cut(scene, frame)?;
-            return self.in_pieces(job, keys, stats).await;
+            return self.in_pieces(job, answer, stats).await;
         }
         let scopes = Scopes::open(&self.gpu.device);
         let updated = self.update(job, &[], stats);
@@ -159,25 +162,25 @@ impl Engine {
             self.update(job, &[], stats)?;
         }
         stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
-        let before = (keys.len(), self.falls_back().then(|| stats.clone()));
+        let before = self.falls_back().then(|| stats.clone());
         let work = Vec::from_iter(self.whole(frame));
-        let answer = self.work_off(job, work, keys, stats);
-        if let (Answer::Crowded(error), (n_keys, before)) = (answer.await?, before) {
+        let outcome = self.work_off(job, answer, work, stats);
+        if let Outcome::Crowded(error) = outcome.await? {
             let Some(before) = before else {
                 return Err(error);
             };
             // What its passes have given so far is given again.
-            keys.truncate(n_keys);
+            answer.forget();
             let n_reruns = stats.n_slabs + stats.n_reruns;
             *stats = before;
             stats.n_reruns = n_reruns;
             self.take_clusters(frame);
             if !self.is_held(scene, frame) {
-                return self.in_pieces(job, keys, stats).await;
+                return self.in_pieces(job, answer, stats).await;
             }
             let work = Vec::from_iter(self.whole(frame));
-            let answer = self.work_off(job, work, keys, stats);
-            if let Answer::Crowded(error) = answer.await? {
+            let outcome = self.work_off(job, answer, work, stats);
+            if let Outcome::Crowded(error) = outcome.await? {
                 return Err(error);
             }
         }
@@ -189,7 +192,7 @@ impl Engine {
     async fn in_pieces(
         &mut self,
         job: Job<'_>,
-        keys: &mut Vec<u64>,
+        answer: &Answer,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         let Job { scene, frame, .. } = job;
@@ -231,8 +234,8 @@ impl Engine {
                 stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
                 stats.n_pieces += 1;
                 let work = self.seeds_in_batches(frame, &pairs);
-                let answer = self.work_off(job, work, keys, stats);
-                if let Answer::Crowded(error) = answer.await? {
+                let outcome = self.work_off(job, answer, work, stats);
+                if let Outcome::Crowded(error) = outcome.await? {
                     return Err(error);
                 }
             }
@@ -420,10 +423,10 @@ impl Finder for Engine {
     async fn find(
         &mut self,
         job: Job<'_>,
-        keys: &mut Vec<u64>,
+        answer: &Arc<Answer>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let result = self.answer(job, keys, stats).await;
+        let result = self.answer(job, answer, stats).await;
         if let Err(Error::Gpu { .. }) = result {
             self.begin_anew();
         }

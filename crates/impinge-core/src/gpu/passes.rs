@@ -24,6 +24,7 @@ use crate::narrow::settle;
 use crate::query::SharedVertex;
 use crate::run::Job;
 use crate::settings::Method;
+use crate::sink::{Answer, BLOCK};
 use crate::stats::Statistics;
 
 /// The host descends before the first launch while there are at most this many seeds: each step saves two launches.
@@ -42,21 +43,21 @@ pub(super) enum Work {
 
 /// How a list of work ended.
 #[derive(Debug)]
-pub(super) enum Answer {
+pub(super) enum Outcome {
     Complete,
     /// There is not enough room for work that cannot be split.
     Crowded(Error),
 }
 
 impl Engine {
-    /// Does all of the work. When it is too much, some of the keys are there already.
+    /// Does all of the work. When it is too much, some of the keys have been handed over already.
     pub(super) async fn work_off(
         &mut self,
         job: Job<'_>,
+        answer: &Answer,
         mut waiting: Vec<Work>,
-        keys: &mut Vec<u64>,
         stats: &mut Statistics,
-    ) -> Result<Answer, Error> {
+    ) -> Result<Outcome, Error> {
         let Job { frame, control, .. } = job;
         let cells = self.cells_wanted(frame);
         let mut capacities = self.first_room(cells)?;
@@ -70,13 +71,15 @@ impl Engine {
             let done = stats.n_slabs;
             control.step(done, done + count(waiting.len()) + 1)?;
             let collected = self.pass(frame, &work, capacities, cells, stats).await?;
+            // These are certain, even where a buffer was too small for them.
+            answer.foresee(collected.counts.needed.pairs)?;
             let room = self.budget_for_room();
             match collected.counts.judge(&self.gpu, capacities, room) {
                 Verdict::Complete => {
                     book(&collected, self.method, stats);
                     self.complete.push(collected.counts);
                     let settled = &mut self.settled;
-                    stats.time("settle", |_| settle_all(job, &collected, settled, keys));
+                    stats.time("settle", |_| settle_all(job, answer, &collected, settled))?;
                     if let Work::Cells(part, Share::Lists) = work {
                         // No other pass changes the list before the last of its tiles is done.
                         let n_entries = collected.counts.needed.entries as u32;
@@ -99,13 +102,13 @@ impl Engine {
                     }
                     match self.lean(&work, &collected, capacities, room) {
                         Ok(lean) => capacities = lean,
-                        Err(error) => return Ok(Answer::Crowded(error)),
+                        Err(error) => return Ok(Outcome::Crowded(error)),
                     }
                     waiting.push(work);
                 }
             }
         }
-        Ok(Answer::Complete)
+        Ok(Outcome::Complete)
     }
 
     /// The whole work of a frame, if there is any.
@@ -357,32 +360,44 @@ fn book(collected: &Collected, method: Method, stats: &mut Statistics) {
     }
 }
 
-/// Takes the certain pairs and settles the others exactly.
+/// Hands over the certain pairs, and those of the others that exact arithmetic says to intersect.
 fn settle_all(
     job: Job<'_>,
+    answer: &Answer,
     collected: &Collected,
     settled: &mut Vec<Vec<u64>>,
-    keys: &mut Vec<u64>,
-) {
-    let certain = collected.pairs.iter();
-    keys.extend(certain.map(|pair| pair_key(pair.low, pair.high)));
-    settled.resize_with(job.workers.n(), Vec::new);
+) -> Result<(), Error> {
+    let Job {
+        scene,
+        frame,
+        workers,
+        ..
+    } = job;
+    settled.resize_with(workers.n(), Vec::new);
+    for certain in collected.pairs.chunks(BLOCK) {
+        let keys = &mut settled[0];
+        keys.extend(certain.iter().map(|pair| pair_key(pair.low, pair.high)));
+        answer.take(keys);
+    }
     let unsure = &collected.unsure[..];
     let n_workers = match unsure.len() < PARALLEL_FROM {
         true => 1,
         false => settled.len(),
     };
     let n_tasks = unsure.len().div_ceil(SETTLED_BY_A_TASK);
-    job.workers
-        .for_each(&mut settled[..n_workers], n_tasks, |settled, ix| {
-            let first = ix * SETTLED_BY_A_TASK;
-            for pair in &unsure[first..unsure.len().min(first + SETTLED_BY_A_TASK)] {
-                if settle(job.scene, job.frame, pair.low, pair.high) {
-                    settled.push(pair_key(pair.low, pair.high));
-                }
+    workers.for_each(&mut settled[..n_workers], n_tasks, |keys, ix| {
+        let first = ix * SETTLED_BY_A_TASK;
+        for pair in &unsure[first..unsure.len().min(first + SETTLED_BY_A_TASK)] {
+            if settle(scene, frame, pair.low, pair.high) {
+                keys.push(pair_key(pair.low, pair.high));
             }
-        });
-    for settled in settled {
-        keys.append(settled);
+        }
+        if keys.len() >= BLOCK {
+            answer.take(keys);
+        }
+    });
+    for keys in settled {
+        answer.take(keys);
     }
+    answer.check()
 }

@@ -12,6 +12,7 @@ use crate::query::Query;
 use crate::run::{Finder, FrameLoop, Job};
 use crate::scene::Scene;
 use crate::settings::{Backend, Method, Settings};
+use crate::sink::{self, Answer, Limits};
 use crate::stats::Statistics;
 
 /// The frame loop around a plan of another crate.
@@ -44,7 +45,7 @@ impl Host {
         };
         let first = first.unwrap_or_default();
         Ok(Host {
-            frames: FrameLoop::new(settings.threads),
+            frames: FrameLoop::new(settings.threads, Limits::default()),
             engine: Engine::with_plan_of_guest(gpu, settings, first, plan),
         })
     }
@@ -62,7 +63,13 @@ impl Host {
         let gpu = Arc::clone(self.engine.gpu());
         let engine = &mut self.engine;
         let mut guest = Guest { name, engine };
-        gpu.block_on(self.frames.run(scene, query, &Control::new(), &mut guest))?;
+        gpu.block_on(self.frames.run(
+            scene,
+            query,
+            &Control::new(),
+            sink::Wanted::Pairs,
+            &mut guest,
+        ))?;
         Ok((self.frames.pairs(), &self.engine.complete))
     }
 }
@@ -88,9 +95,9 @@ impl Finder for Guest<'_> {
     async fn find(
         &mut self,
         job: Job<'_>,
-        keys: &mut Vec<u64>,
+        answer: &Arc<Answer>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        self.engine.find(job, keys, stats).await
+        self.engine.find(job, answer, stats).await
     }
 }

@@ -5,6 +5,7 @@
 //! paired, every possible pair goes to its slot. A repetition of the same pair changes nothing; of
 //! different pairs only the lowest stays. Afterwards the pair in each occupied slot is tested once.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use impinge_core::cpu::cells::Rule;
@@ -14,6 +15,7 @@ use impinge_core::cpu::simd::Isa;
 use impinge_core::cpu::subcells::Asked;
 use impinge_core::cpu::world::World;
 use impinge_core::run::Job;
+use impinge_core::sink::Answer;
 use impinge_core::{Error, Statistics};
 
 use super::Possible;
@@ -65,14 +67,21 @@ impl Table {
     }
 
     /// Tests the pairs in the table.
-    pub fn settle(&mut self, job: Job<'_>, keys: &mut Vec<u64>, stats: &mut Statistics) {
+    pub fn settle(
+        &mut self,
+        job: Job<'_>,
+        answer: &Arc<Answer>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
         let Table {
             isa,
             slots,
             settlers,
         } = self;
         settlers.resize_with(job.workers.n(), Settler::default);
-        settlers.iter_mut().for_each(Settler::clear);
+        for settler in settlers.iter_mut() {
+            settler.begin(answer);
+        }
         let world = World::new(job.scene, job.frame);
         let (isa, slots) = (*isa, &slots[..]);
         stats.time("narrow", |_| {
@@ -94,11 +103,12 @@ impl Table {
             });
         });
         for settler in settlers {
-            keys.extend_from_slice(&settler.keys);
+            settler.end();
             stats.n_candidates += settler.n_candidates;
             stats.n_unsure += settler.n_unsure;
         }
         stats.bytes_held += size_of_val(slots) as u64;
+        answer.check()
     }
 }
 

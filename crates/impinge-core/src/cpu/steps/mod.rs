@@ -20,7 +20,9 @@ mod world;
 
 use crate::error::Error;
 use crate::grouping::hubs::Hubs;
+use crate::impacts::StepAnswer;
 use crate::settings::InstructionSet;
+use crate::sink::Ending;
 use crate::stats::Statistics;
 
 use super::dispatch::{NodePair, Tree};
@@ -34,11 +36,12 @@ use crate::settings::Settings;
 use cache::{Caches, LayerCache, part_ix};
 pub(crate) use hull::Pose;
 use pairing::Worker;
-pub(crate) use world::{Asked, FoundByKind, Sought};
+pub(crate) use world::{Asked, Sought};
 use world::{Known, World};
 
-impl Stage for World<'_> {
+impl<'a> Stage for World<'a> {
     type Worker = Worker;
+    type Answer = StepAnswer<'a>;
 
     #[inline(always)]
     fn tree(&self, layer: u32) -> Tree<'_> {
@@ -88,13 +91,13 @@ impl StepClusters {
         }
     }
 
-    /// Appends what is sought, unsorted.
+    /// Hands over what is sought.
     pub fn run(
         &mut self,
         job: Job<'_>,
         settings: &Settings,
         asked: Asked,
-        found: &mut FoundByKind,
+        answer: StepAnswer<'_>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         self.scratches.resize_with(job.workers.n(), Worker::default);
@@ -106,17 +109,22 @@ impl StepClusters {
         for worker in &mut self.scratches {
             worker.begin(stats.n_clusters, settings.memory_budget.is_some());
         }
-        let most_items = slabs::most_items(settings.memory_budget, self.bytes() as u64)?;
+        let held = self.bytes() as u64;
+        let most_items = slabs::most_items(settings.memory_budget, held)?;
         self.items.clear();
         self.items.shrink_to(most_items);
+        answer.share(held + slabs::bytes(most_items));
+        answer.check()?;
         let known = Known::new(asked.latest);
         let mut slabs = Slabs {
             isa: self.isa,
             job,
+            answer,
             world: World {
                 scene: job.scene,
                 frame: job.frame,
                 asked,
+                answer,
                 known: &known,
                 caches: &self.caches,
             },
@@ -127,11 +135,10 @@ impl StepClusters {
             ms: 0.0,
         };
         slabs.run(&mut self.top, &mut self.stack, &mut self.layer_stack)?;
-        for worker in &self.scratches {
-            for (found, of_worker) in found.iter_mut().zip(worker.found()) {
-                found.extend_from_slice(of_worker);
-            }
+        for worker in &mut self.scratches {
+            worker.end(answer);
         }
+        answer.check()?;
         stats.bytes_held = (self.bytes() + size_of::<WorkItem>() * self.items.capacity()) as u64;
         Ok(())
     }

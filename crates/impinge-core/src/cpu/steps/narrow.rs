@@ -19,14 +19,15 @@ use crate::exact::filter::{
 use crate::exact::{Contact, ElementPair, Point, first_contact};
 use crate::frame::pair_key;
 use crate::grouping::GROUP;
-use crate::impacts::Found;
+use crate::impacts::{Found, FoundByKind, StepAnswer};
 use crate::narrow::{Extent, are_near};
 use crate::pair_kind::PairKind;
 use crate::positions::Positions;
+use crate::sink::BLOCK;
 use crate::step::{Start, Toi};
 
 use super::group::Group;
-use super::world::{FoundByKind, Sought, World};
+use super::world::{Sought, World};
 
 /// Pairs that the filter's first step leaves open are searched once there are this many.
 const FULL: usize = 1024;
@@ -52,7 +53,8 @@ struct Open {
 /// One worker's pairs and counts.
 #[derive(Debug, Default)]
 pub(super) struct Settler {
-    pub found: FoundByKind,
+    /// What was found, handed over in blocks.
+    found: FoundByKind,
     pub n_candidates: u64,
     pub n_unsure: u64,
     /// What the filter's first step has left of the layers at hand: pairs to be looked at.
@@ -77,8 +79,17 @@ impl Settler {
     }
 
     pub fn bytes(&self) -> usize {
+        let found: usize = self.found.iter().map(Vec::capacity).sum();
         let lists = [&self.open, &self.later, &self.single];
         size_of::<Open>() * lists.iter().map(|list| list.capacity()).sum::<usize>()
+            + size_of::<Found<Contact>>() * found
+    }
+
+    /// Ends a step: hands over what is left.
+    pub fn end(&mut self, answer: StepAnswer<'_>) {
+        for (kind, found) in PairKind::ALL.into_iter().zip(&mut self.found) {
+            answer.take(kind, found);
+        }
     }
 
     /// Takes the candidates of a work item.
@@ -230,10 +241,14 @@ impl Settler {
             let first = world.frame.layers[layer as usize].first;
             first + world.cache(layer).clustering.order[place as usize]
         });
-        self.found[between.kind as usize].push(Found {
+        let found = &mut self.found[between.kind as usize];
+        found.push(Found {
             key: pair_key(a, b),
             value: contact,
         });
+        if found.len() >= BLOCK {
+            world.answer.take(between.kind, found);
+        }
     }
 }
 

@@ -17,10 +17,11 @@ use crate::cpu::slabs::{Counts, Stage};
 use crate::frame::TestId;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
+use crate::impacts::StepAnswer;
 
 use super::group::Group;
 use super::narrow::{Between, Settler};
-use super::world::{FoundByKind, World};
+use super::world::World;
 
 /// The narrow stage is timed for one work item in this many.
 const SAMPLED: u32 = 16;
@@ -59,8 +60,9 @@ impl Worker {
         self.busy = Duration::ZERO;
     }
 
-    pub fn found(&self) -> &FoundByKind {
-        &self.settler.found
+    /// Ends a step: hands over what is left.
+    pub fn end(&mut self, answer: StepAnswer<'_>) {
+        self.settler.end(answer);
     }
 
     pub fn counts(&self) -> Counts {

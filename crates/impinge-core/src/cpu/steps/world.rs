@@ -2,18 +2,13 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use crate::exact::Contact;
 use crate::frame::Frame;
-use crate::impacts::Found;
-use crate::pair_kind::PairKind;
+use crate::impacts::StepAnswer;
 use crate::scene::Scene;
 use crate::step::{Start, Toi};
 
 use super::cache::{Caches, LayerCache, part_ix};
 use super::hull::Pose;
-
-/// Contacts found, by kind of pair.
-pub(crate) type FoundByKind = [Vec<Found<Contact>>; PairKind::ALL.len()];
 
 /// What to look for in a step.
 #[derive(Debug, Clone, Copy)]
@@ -83,6 +78,7 @@ pub(crate) struct World<'a> {
     pub scene: &'a Scene,
     pub frame: &'a Frame,
     pub asked: Asked,
+    pub(super) answer: StepAnswer<'a>,
     pub(super) known: &'a Known,
     pub(super) caches: &'a Caches,
 }

@@ -1,0 +1,388 @@
+//! Where pairs go while a frame is being answered: from many threads, within the limits.
+//!
+//! ```text
+//! workers   block  block  block       about a thousand pairs each, kept from frame to frame
+//!               \    |    /
+//! held      | ............... |       the room that the last answer took
+//! overflow  | chunk | chunk | …       what is more; joined to `held` in the end
+//! ```
+//!
+//! Memory: the answer, and once more the answer while chunks are joined. Every allocation here may fail: what does not
+//! fit is an error by name, and all pairs are dropped before it is reported.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crate::error::Error;
+
+/// Pairs that a worker gathers before it hands them over.
+pub const BLOCK: usize = 1024;
+
+/// Bytes of the first chunk; each further one is twice as large, up to the most.
+const FIRST_CHUNK: usize = 1 << 15;
+const LARGEST_CHUNK: usize = 1 << 20;
+
+/// What is wanted of the pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Wanted {
+    /// All of them.
+    #[default]
+    Pairs,
+    /// How many there are.
+    Count,
+    /// Whether there is any.
+    Any,
+}
+
+/// What an answer may be.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Limits {
+    /// Pairs at most.
+    pub max_pairs: Option<u64>,
+    /// Bytes that the detector may hold, the answer included.
+    pub memory_budget: Option<u64>,
+    /// Bytes per pair that the answer takes besides, once all pairs are found.
+    pub besides: u64,
+}
+
+/// Makes room for so many more, where as many are there already as the list has.
+///
+/// # Errors
+/// There is no memory for them.
+pub(crate) fn reserve<T>(
+    list: &mut Vec<T>,
+    n_more: usize,
+    what: &'static str,
+) -> Result<(), Error> {
+    list.try_reserve_exact(n_more)
+        .map_err(|_| Error::OutOfMemory {
+            what,
+            n: list.len() as u64,
+            needed: (size_of::<T>() as u64).saturating_mul(n_more as u64),
+        })
+}
+
+/// Takes the pairs that a finder finds: keys, unless they come with a value. Each goes to one of several lists.
+#[derive(Debug)]
+pub struct Answer<T = u64, const LISTS: usize = 1> {
+    is_over: AtomicBool,
+    state: Mutex<State<T, LISTS>>,
+}
+
+#[derive(Debug)]
+struct State<T, const LISTS: usize> {
+    limits: Limits,
+    wanted: Wanted,
+    n: u64,
+    lists: [List<T>; LISTS],
+    held_by_finder: u64,
+    error: Option<Error>,
+}
+
+#[derive(Debug)]
+struct List<T> {
+    held: Vec<T>,
+    chunks: Vec<Vec<T>>,
+}
+
+impl<T> List<T> {
+    /// With memory to use.
+    fn in_room(mut held: Vec<T>) -> Self {
+        held.clear();
+        List {
+            held,
+            chunks: Vec::new(),
+        }
+    }
+}
+
+impl<T, const LISTS: usize> Default for Answer<T, LISTS> {
+    fn default() -> Self {
+        Answer {
+            is_over: AtomicBool::new(false),
+            state: Mutex::new(State::new(Limits::default(), Wanted::Pairs)),
+        }
+    }
+}
+
+impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
+    /// Makes ready for a frame. `rooms` is memory to use, see [`finish`](Answer::finish).
+    pub fn begin(&self, limits: Limits, wanted: Wanted, rooms: [Vec<T>; LISTS]) {
+        self.is_over.store(false, Ordering::Relaxed);
+        let state = &mut *self.state();
+        *state = State::new(limits, wanted);
+        state.lists = rooms.map(List::in_room);
+    }
+
+    /// How many pairs make a block: one where one is enough.
+    pub fn block(&self) -> usize {
+        match self.state().wanted {
+            Wanted::Any => 1,
+            Wanted::Pairs | Wanted::Count => BLOCK,
+        }
+    }
+
+    /// How many work items are gathered before they are paired, when there is room for so many: few where the first
+    /// pair ends the search.
+    pub fn most_items(&self, room: usize) -> usize {
+        match self.state().wanted {
+            Wanted::Any => room.min(BLOCK),
+            Wanted::Pairs | Wanted::Count => room,
+        }
+    }
+
+    /// Takes a block of pairs for one of the lists. Once the answer is over, pairs are dropped.
+    pub fn extend(&self, list: usize, block: impl ExactSizeIterator<Item = T>) {
+        if block.len() == 0 || self.is_over() {
+            return;
+        }
+        let state = &mut *self.state();
+        let result = state.count(block.len() as u64);
+        let result = result.and_then(|()| match state.wanted {
+            Wanted::Pairs => state.put(list, block),
+            Wanted::Count | Wanted::Any => Ok(()),
+        });
+        self.note(result, state);
+    }
+
+    /// Whether nothing more is wanted, so that workers can stop.
+    pub fn is_over(&self) -> bool {
+        self.is_over.load(Ordering::Relaxed)
+    }
+
+    /// Whether a pair was asked for and found.
+    pub fn is_enough(&self) -> bool {
+        let state = &*self.state();
+        state.wanted == Wanted::Any && state.n > 0
+    }
+
+    /// What ends the frame early, if anything does.
+    ///
+    /// # Errors
+    /// More pairs than allowed, no memory, a memory budget that is too small; a cancellation where the answer
+    /// [is enough](Answer::is_enough).
+    pub fn check(&self) -> Result<(), Error> {
+        match self.is_over() {
+            true => Err(self.state().error.clone().unwrap_or(Error::Cancelled)),
+            false => Ok(()),
+        }
+    }
+
+    /// As [`check`](Answer::check) when so many more pairs are certain, though they have not been handed over.
+    ///
+    /// # Errors
+    /// Those of `check`.
+    pub fn foresee(&self, n_more: u64) -> Result<(), Error> {
+        if n_more > 0 && !self.is_over() {
+            let state = &mut *self.state();
+            let n = state.n;
+            let result = state.count(n_more);
+            if state.wanted != Wanted::Any {
+                // They are handed over later.
+                state.n = n;
+            }
+            self.note(result, state);
+        }
+        self.check()
+    }
+
+    /// Forgets all pairs, for they will be found again in another way.
+    pub fn forget(&self) {
+        let state = &mut *self.state();
+        for list in &mut state.lists {
+            list.held.clear();
+            list.chunks.clear();
+        }
+        state.n = 0;
+    }
+
+    /// Says how much of the memory budget the finder itself holds. The rest is for the answer.
+    pub fn share(&self, held_by_finder: u64) {
+        let state = &mut *self.state();
+        state.held_by_finder = held_by_finder;
+        if state.n == 0 && state.keep_budget().is_err() {
+            // The room of an earlier answer.
+            state.drop_pairs();
+        }
+        let result = state.keep_budget();
+        self.note(result, state);
+    }
+
+    /// All pairs, each list in one piece and unsorted, and how many pairs there are.
+    ///
+    /// # Errors
+    /// Those of [`check`](Answer::check), but none where the answer [is enough](Answer::is_enough).
+    pub fn finish(&self) -> Result<([Vec<T>; LISTS], u64), Error> {
+        let state = &mut *self.state();
+        let joined = match state.error.take() {
+            Some(error) => Err(error),
+            None => state.join(),
+        };
+        let n = state.n;
+        let State { lists, .. } = std::mem::replace(state, State::new(state.limits, state.wanted));
+        joined.map(|()| (lists.map(|list| list.held), n))
+    }
+
+    fn state(&self) -> MutexGuard<'_, State<T, LISTS>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn note(&self, result: Result<(), Error>, state: &mut State<T, LISTS>) {
+        if let Err(error) = result {
+            // Room for whoever reports it.
+            state.drop_pairs();
+            state.error = Some(error);
+            self.is_over.store(true, Ordering::Relaxed);
+        } else if state.wanted == Wanted::Any && state.n > 0 {
+            self.is_over.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Tells workers when to stop.
+pub trait Ending: Copy + Sync {
+    /// Whether nothing more is wanted, so that workers can stop.
+    fn is_over(&self) -> bool;
+
+    /// What ends the frame early, if anything does.
+    ///
+    /// # Errors
+    /// Those of [`Answer::check`].
+    fn check(&self) -> Result<(), Error>;
+}
+
+impl Ending for &Arc<Answer> {
+    fn is_over(&self) -> bool {
+        Answer::is_over(self)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        Answer::check(self)
+    }
+}
+
+impl Answer {
+    /// Takes all keys of a block; it is empty afterwards and keeps its memory.
+    pub fn take(&self, block: &mut Vec<u64>) {
+        self.extend(0, block.drain(..));
+    }
+}
+
+impl<T, const LISTS: usize> State<T, LISTS> {
+    fn new(limits: Limits, wanted: Wanted) -> Self {
+        State {
+            limits,
+            wanted,
+            n: 0,
+            lists: std::array::from_fn(|_| List::in_room(Vec::new())),
+            held_by_finder: 0,
+            error: None,
+        }
+    }
+
+    fn drop_pairs(&mut self) {
+        self.lists = std::array::from_fn(|_| List::in_room(Vec::new()));
+    }
+}
+
+impl<T: Copy, const LISTS: usize> State<T, LISTS> {
+    fn count(&mut self, n_more: u64) -> Result<(), Error> {
+        self.n += n_more;
+        match self.limits.max_pairs {
+            Some(limit) if self.n > limit && self.wanted != Wanted::Any => {
+                Err(Error::TooManyPairs {
+                    found: self.n,
+                    limit,
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn put(
+        &mut self,
+        list: usize,
+        mut block: impl ExactSizeIterator<Item = T>,
+    ) -> Result<(), Error> {
+        let held = &mut self.lists[list].held;
+        let room = held.capacity() - held.len();
+        held.extend(block.by_ref().take(room));
+        while block.len() > 0 {
+            let chunks = &self.lists[list].chunks;
+            let full = |chunk: &Vec<T>| chunk.len() == chunk.capacity();
+            if chunks.last().is_none_or(full) {
+                self.add_chunk(list)?;
+            }
+            let chunks = &mut self.lists[list].chunks;
+            let chunk = chunks.last_mut().expect("there is one with room");
+            let room = chunk.capacity() - chunk.len();
+            chunk.extend(block.by_ref().take(room));
+        }
+        Ok(())
+    }
+
+    fn add_chunk(&mut self, list: usize) -> Result<(), Error> {
+        let List { chunks, .. } = &mut self.lists[list];
+        let [first, largest] = [FIRST_CHUNK, LARGEST_CHUNK].map(|bytes| bytes / size_of::<T>());
+        let last = chunks.last().map_or(0, Vec::capacity);
+        let size = (2 * last).clamp(first, largest);
+        let mut chunk = Vec::new();
+        if chunk.try_reserve_exact(size).is_err() || chunks.try_reserve(1).is_err() {
+            return Err(self.no_memory(size));
+        }
+        chunks.push(chunk);
+        self.keep_budget()
+    }
+
+    /// Appends the chunks to what is held.
+    fn join(&mut self) -> Result<(), Error> {
+        for ix in 0..LISTS {
+            let List { held, chunks } = &mut self.lists[ix];
+            let more: usize = chunks.iter().map(Vec::len).sum();
+            if more > 0 && held.try_reserve_exact(more).is_err() {
+                let error = self.no_memory(more);
+                self.drop_pairs();
+                return Err(error);
+            }
+            for chunk in chunks.drain(..) {
+                held.extend_from_slice(&chunk);
+            }
+            *chunks = Vec::new();
+        }
+        Ok(())
+    }
+
+    /// Chunks need their room again when they are joined.
+    fn keep_budget(&self) -> Result<(), Error> {
+        let Some(budget) = self.limits.memory_budget else {
+            return Ok(());
+        };
+        let room = |list: &List<T>| {
+            let chunks: usize = list.chunks.iter().map(Vec::capacity).sum();
+            let joined = match chunks {
+                0 => 0,
+                more => list.held.capacity() + more,
+            };
+            list.held.capacity() + chunks + joined
+        };
+        let room: usize = self.lists.iter().map(room).sum();
+        let besides = self.n.saturating_mul(self.limits.besides);
+        let needed = self.held_by_finder + (size_of::<T>() * room) as u64 + besides;
+        if needed <= budget {
+            return Ok(());
+        }
+        Err(Error::MemoryBudget {
+            what: "the pairs found so far besides all else",
+            needed,
+            budget,
+        })
+    }
+
+    fn no_memory(&self, n_more: usize) -> Error {
+        Error::OutOfMemory {
+            what: "pairs",
+            n: self.n,
+            needed: (size_of::<T>() * n_more) as u64,
+        }
+    }
+}
