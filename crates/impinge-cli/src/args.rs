@@ -123,6 +123,7 @@ Examples:
   impinge pairs a.stl b.ply c.msh --self --pairs pairs.npy
   impinge pairs a.ply b.ply --pairs -
   impinge pairs a.ply b.ply --json | jq .pairs
+  impinge pairs a.ply b.ply --any --fail-on-hit
   impinge pairs a.ply b.ply --repeat 100 --threads 2
   impinge pairs a.ply b.ply c.ply --ignore 0,1 --out seen.glb
   impinge pairs a.ply b.ply --curves curves.obj --contacts contacts.csv
@@ -198,9 +199,12 @@ pub struct DetectorArgs {
     /// The most primitives in a group of `--method cells`, 1 to 64
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64), default_value = "64")]
     pub group_size: u32,
-    /// Memory for the detector without the answer, such as 512M or 2GiB [default: no limit]
+    /// Memory for the detector and the answer, such as 512M or 2GiB [default: no limit]
     #[arg(long, value_name = "BYTES", value_parser = bytes)]
     pub memory_budget: Option<u64>,
+    /// End with an error as soon as more than N pairs are certain [default: any number]
+    #[arg(long, value_name = "N")]
+    pub max_pairs: Option<u64>,
     /// Show no progress bar
     #[arg(long)]
     pub no_progress: bool,
@@ -238,6 +242,12 @@ pub struct AskArgs {
 /// Outputs of the answer for one set of meshes.
 #[derive(Debug, Clone, Args)]
 pub struct AnswerArgs {
+    /// Only count the pairs: none of them is held, so there may be more than memory has room for
+    #[arg(long, conflicts_with = "any")]
+    pub count: bool,
+    /// Only say whether there is any pair, and stop at the first one
+    #[arg(long)]
+    pub any: bool,
     /// Run N frames, rewriting positions before each, and show median times
     #[arg(long, value_name = "N", default_value = "1", value_parser = at_least_one)]
     pub repeat: NonZeroUsize,

@@ -22,6 +22,7 @@ pub fn settings(args: &DetectorArgs) -> Settings {
         lambda: args.lambda,
         group_size: args.group_size,
         memory_budget: args.memory_budget,
+        max_pairs: args.max_pairs,
         device: args.device.clone(),
         ..Settings::default()
     }
@@ -81,12 +82,48 @@ pub fn detect<'d>(
     cancel: &CancelToken,
     watch: &Watch,
 ) -> Result<&'d Pairs, Error> {
+    watched(cancel, watch, |control| {
+        Ok(detector.detect_with(scene, query, control)?)
+    })
+}
+
+/// How many pairs there are.
+pub fn count(
+    detector: &mut Detector,
+    scene: &Scene,
+    query: &Query,
+    cancel: &CancelToken,
+    watch: &Watch,
+) -> Result<u64, Error> {
+    watched(cancel, watch, |control| {
+        Ok(detector.count_with(scene, query, control)?)
+    })
+}
+
+/// Whether there is any pair.
+pub fn any(
+    detector: &mut Detector,
+    scene: &Scene,
+    query: &Query,
+    cancel: &CancelToken,
+    watch: &Watch,
+) -> Result<bool, Error> {
+    watched(cancel, watch, |control| {
+        Ok(detector.any_with(scene, query, control)?)
+    })
+}
+
+fn watched<T>(
+    cancel: &CancelToken,
+    watch: &Watch,
+    run: impl FnOnce(&Control<'_>) -> Result<T, Error>,
+) -> Result<T, Error> {
     let report = |progress| watch.report(progress);
     let mut control = Control::new().cancel(cancel);
     if watch.is_shown() {
         control = control.progress(&report);
     }
-    Ok(detector.detect_with(scene, query, &control)?)
+    run(&control)
 }
 
 /// Runs the same frame `n_frames` times. All positions are rewritten before each run, so that no result

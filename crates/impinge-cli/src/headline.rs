@@ -20,25 +20,7 @@ pub fn write(
     pairs: &Pairs,
     regions: Option<&[Region]>,
 ) -> Result<(), Error> {
-    let subject = match bodies {
-        [(_, one)] => (*one).to_owned(),
-        [(_, a), (_, b)] => format!("{a} and {b}"),
-        many => format!("{} meshes", many.len()),
-    };
-    let mut kinds: Vec<(&'static str, usize)> = Vec::new();
-    for &(id, _) in bodies {
-        let body = scene.body(id)?;
-        let kind = body.kind().name();
-        match kinds.iter_mut().find(|(name, _)| *name == kind) {
-            Some((_, n)) => *n += body.n_primitives(),
-            None => kinds.push((kind, body.n_primitives())),
-        }
-    }
-    let of: Vec<String> = kinds
-        .iter()
-        .map(|(kind, n)| format!("{} {kind}", grouped(*n as u64)))
-        .collect();
-    let of = of.join(" and ");
+    let (subject, of) = of_whom(scene, bodies)?;
     if pairs.is_empty() {
         writeln!(to, "{subject}: no pairs of {of}")?;
         return Ok(());
@@ -66,6 +48,41 @@ pub fn write(
         places(to, bodies, regions)?;
     }
     Ok(())
+}
+
+/// The one line of an answer that holds no pairs: `cow.off: 83 pairs of 5,804 triangles`.
+pub fn write_count(
+    to: &mut impl Write,
+    scene: &Scene,
+    bodies: &[(BodyId, &str)],
+    n_pairs: &str,
+) -> Result<(), Error> {
+    let (subject, of) = of_whom(scene, bodies)?;
+    writeln!(to, "{subject}: {n_pairs} of {of}")?;
+    Ok(())
+}
+
+/// Who was asked about, and how many primitives of each kind they have.
+fn of_whom(scene: &Scene, bodies: &[(BodyId, &str)]) -> Result<(String, String), Error> {
+    let subject = match bodies {
+        [(_, one)] => (*one).to_owned(),
+        [(_, a), (_, b)] => format!("{a} and {b}"),
+        many => format!("{} meshes", many.len()),
+    };
+    let mut kinds: Vec<(&'static str, usize)> = Vec::new();
+    for &(id, _) in bodies {
+        let body = scene.body(id)?;
+        let kind = body.kind().name();
+        match kinds.iter_mut().find(|(name, _)| *name == kind) {
+            Some((_, n)) => *n += body.n_primitives(),
+            None => kinds.push((kind, body.n_primitives())),
+        }
+    }
+    let of: Vec<String> = kinds
+        .iter()
+        .map(|(kind, n)| format!("{} {kind}", grouped(*n as u64)))
+        .collect();
+    Ok((subject, of.join(" and ")))
 }
 
 /// Writes one line per two bodies that meet, and per body that meets itself.

@@ -68,6 +68,17 @@ pub fn answer(
     Ok(object)
 }
 
+/// The object of an answer that holds no pairs: what was found, and how.
+pub fn without_pairs((name, found): (&str, Value), stats: &Statistics) -> Map<String, Value> {
+    let mut object = Map::new();
+    object.insert(name.into(), found);
+    object.insert("backend".into(), stats.backend.as_str().into());
+    object.insert("method".into(), stats.method.into());
+    object.insert("ms".into(), json!({ "total": rounded(stats.total_ms) }));
+    object.insert("stats".into(), counters(stats));
+    object
+}
+
 /// Milliseconds, rounded to whole nanoseconds, which is the resolution of the clock.
 pub fn rounded(ms: f64) -> f64 {
     (ms * 1e6).round() / 1e6

@@ -225,7 +225,8 @@ fn budgets_are_kept_by_slabs() {
         let mut free = Detector::with_settings(cpu(method)).unwrap();
         let pairs = free.detect(&built.scene, &query).unwrap();
         let expected = rows(pairs);
-        let held = pairs.stats().bytes_held;
+        // While it is found, the answer takes twice its size, and a part of a chunk more.
+        let held = pairs.stats().bytes_held + 8 * pairs.len() as u64 + (1 << 20);
         // Bisect between a budget that is refused and one that is enough, to the least sufficient budget.
         let (mut refused, mut enough) = (1_000, held);
         let mut most_slabs = 0;

@@ -32,7 +32,9 @@ use crate::watch::{CancelToken, Watch};
 /// threads : int, optional
 ///     CPU threads; by default one a core.
 /// memory_budget : int, optional
-///     Bytes that the detector may hold besides the answer; by default as many as it takes.
+///     Bytes that the detector may hold, the answer included; by default as many as it takes.
+/// max_pairs : int, optional
+///     The most pairs that an answer may have; by default any number.
 /// lambda_ : float
 ///     ``"cells"``: the density coefficient of the paper's equation (1), above 0.
 /// group_size : int
@@ -68,10 +70,10 @@ impl Detector {
     #[pyo3(
         signature = (
             method=None, backend=None, device=None, threads=None, memory_budget=None, *,
-            lambda_=None, group_size=None, recluster=None, instruction_set=None,
+            max_pairs=None, lambda_=None, group_size=None, recluster=None, instruction_set=None,
         ),
         text_signature = "(method=\"clusters\", backend=\"auto\", device=None, threads=None, \
-                          memory_budget=None, *, lambda_=1.0, group_size=64, \
+                          memory_budget=None, *, max_pairs=None, lambda_=1.0, group_size=64, \
                           recluster=\"auto\", instruction_set=\"avx512\")"
     )]
     fn new(
@@ -81,6 +83,7 @@ impl Detector {
         device: Argument<'_, '_>,
         threads: Argument<'_, '_>,
         memory_budget: Argument<'_, '_>,
+        max_pairs: Argument<'_, '_>,
         lambda_: Argument<'_, '_>,
         group_size: Argument<'_, '_>,
         recluster: Argument<'_, '_>,
@@ -92,6 +95,7 @@ impl Detector {
             device,
             threads,
             memory_budget,
+            max_pairs,
             lambda: lambda_,
             group_size,
             recluster,
@@ -143,7 +147,9 @@ impl Detector {
     /// ValueError, TypeError
     ///     A question that makes no sense, a handle of a removed body or of another scene.
     /// MemoryError
-    ///     A memory budget too small for even one slab.
+    ///     No memory for the answer, or a memory budget too small for it.
+    /// TooManyPairs
+    ///     More pairs than `max_pairs` allows, as soon as that is certain.
     /// Cancelled
     ///     Stopped by `cancel`. The detector stays usable.
     /// RuntimeError
@@ -179,7 +185,8 @@ impl Detector {
                       scene: &impinge::Scene,
                       (query, _): &(Query, _),
                       control: &Control<'_>| {
-            detector.detect_with(scene, query, control).cloned()
+            detector.detect_with(scene, query, control)?;
+            Ok(detector.take_pairs())
         };
         let (pairs, (_, asked), number) = Detector::watched(slf, watched, ask, answer)?;
         let mut answer = Answer::new(pairs, number, asked);
@@ -188,6 +195,87 @@ impl Detector {
             answer.retain(&arrays::mask(&keep, "filter", answer.len())?);
         }
         Ok(answer)
+    }
+
+    /// Counts the pairs that `detect` would find. None of them is held, so there may be more than memory has room
+    /// for.
+    ///
+    /// Parameters
+    /// ----------
+    /// scene, between, within, ignore, shared_vertex, progress, cancel
+    ///     As for `detect`.
+    ///
+    /// Returns
+    /// -------
+    /// int
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError, MemoryError, TooManyPairs, Cancelled, RuntimeError
+    ///     As `detect`.
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+    #[pyo3(
+        signature = (
+            scene, *, between=None, within=None, ignore=None, shared_vertex=None, progress=None,
+            cancel=None,
+        ),
+        text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
+                          shared_vertex=\"skip\", progress=None, cancel=None)"
+    )]
+    fn count(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        between: Argument<'_, '_>,
+        within: Argument<'_, '_>,
+        ignore: Argument<'_, '_>,
+        shared_vertex: Argument<'_, '_>,
+        progress: Argument<'_, '_>,
+        cancel: Argument<'_, '_>,
+    ) -> PyResult<u64> {
+        let watched = (scene, progress, cancel);
+        let ask = |scene: &Scene| Ok(question(scene, between, within, ignore, shared_vertex)?.0);
+        let answer = impinge::Detector::count_with;
+        Ok(Detector::watched(slf, watched, ask, answer)?.0)
+    }
+
+    /// Says whether `detect` would find any pair. The search ends with the first one that is certain.
+    ///
+    /// Parameters
+    /// ----------
+    /// scene, between, within, ignore, shared_vertex, progress, cancel
+    ///     As for `detect`.
+    ///
+    /// Returns
+    /// -------
+    /// bool
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError, MemoryError, Cancelled, RuntimeError
+    ///     As `detect`.
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+    #[pyo3(
+        signature = (
+            scene, *, between=None, within=None, ignore=None, shared_vertex=None, progress=None,
+            cancel=None,
+        ),
+        text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
+                          shared_vertex=\"skip\", progress=None, cancel=None)"
+    )]
+    fn any(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        between: Argument<'_, '_>,
+        within: Argument<'_, '_>,
+        ignore: Argument<'_, '_>,
+        shared_vertex: Argument<'_, '_>,
+        progress: Argument<'_, '_>,
+        cancel: Argument<'_, '_>,
+    ) -> PyResult<bool> {
+        let watched = (scene, progress, cancel);
+        let ask = |scene: &Scene| Ok(question(scene, between, within, ignore, shared_vertex)?.0);
+        let answer = impinge::Detector::any_with;
+        Ok(Detector::watched(slf, watched, ask, answer)?.0)
     }
 
     /// Finds all pairs of elements that touch during a step, each with the first time at which it does.
@@ -258,7 +346,8 @@ impl Detector {
                       scene: &impinge::Scene,
                       step: &Step,
                       control: &Control<'_>| {
-            detector.impacts_with(scene, step, control).cloned()
+            detector.impacts_with(scene, step, control)?;
+            Ok(detector.take_impacts())
         };
         let watched = (scene, progress, cancel);
         let (impacts, _, number) = Detector::watched(slf, watched, ask, answer)?;
@@ -445,7 +534,8 @@ impl Detector {
                       scene: &impinge::Scene,
                       query: &CandidateQuery,
                       control: &Control<'_>| {
-            detector.candidates_with(scene, query, control).cloned()
+            detector.candidates_with(scene, query, control)?;
+            Ok(detector.take_candidates())
         };
         let watched = (scene, progress, cancel);
         Ok(Candidates::new(
@@ -489,6 +579,9 @@ impl Detector {
         }
         if let Some(budget) = settings.memory_budget {
             words.push(format!("memory_budget={budget}"));
+        }
+        if let Some(limit) = settings.max_pairs {
+            words.push(format!("max_pairs={limit}"));
         }
         format!("Detector({})", words.join(", "))
     }

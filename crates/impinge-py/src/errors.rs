@@ -14,6 +14,13 @@ create_exception!(
     "A detection was stopped by its CancelToken. The detector stays usable."
 );
 
+create_exception!(
+    impinge,
+    TooManyPairs,
+    PyException,
+    "More pairs were found than `max_pairs` allows. The detector stays usable."
+);
+
 /// What the arguments of the failing call are called.
 #[derive(Clone, Copy)]
 pub struct Names<'a> {
@@ -26,7 +33,10 @@ pub struct Names<'a> {
 /// An error of a call that took no arrays.
 pub fn raise(error: Error) -> PyErr {
     match error {
-        Error::MemoryBudget { .. } => PyMemoryError::new_err(error.to_string()),
+        Error::MemoryBudget { .. } | Error::OutOfMemory { .. } => {
+            PyMemoryError::new_err(error.to_string())
+        }
+        Error::TooManyPairs { .. } => TooManyPairs::new_err(error.to_string()),
         Error::Cancelled => Cancelled::new_err("the detection was cancelled"),
         Error::NoAdapter { .. } | Error::Gpu { .. } | Error::Threads(_) => {
             PyRuntimeError::new_err(error.to_string())

@@ -37,7 +37,7 @@ mod _impinge {
     #[pymodule_export]
     use super::devices::{Device, devices};
     #[pymodule_export]
-    use super::errors::Cancelled;
+    use super::errors::{Cancelled, TooManyPairs};
     #[pymodule_export]
     use super::functions::{hash_rows, pairs, self_pairs};
     #[pymodule_export]

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use impinge::{BodyId, Pairs};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyMemoryError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice};
 
@@ -79,18 +79,34 @@ impl Answer {
         self.pairs.retain(|_, _| keep.next() == Some(&true));
     }
 
-    fn pairs_between(&self, a: BodyId, b: BodyId) -> Vec<[u32; 2]> {
-        let mut pairs: Vec<[u32; 2]> = self.pairs.between(a, b).map(Into::into).collect();
+    fn pairs_between(&self, a: BodyId, b: BodyId) -> PyResult<Vec<[u32; 2]>> {
+        let n = self.pairs.between(a, b).count();
+        let mut pairs = collect(n, self.pairs.between(a, b).map(Into::into))?;
         // They are held in the order of the body with the lower number.
         if b < a {
             pairs.sort_unstable();
         }
-        pairs
+        Ok(pairs)
     }
 
-    fn pairs_within(&self, body: BodyId) -> Vec<[u32; 2]> {
-        self.pairs.within(body).map(Into::into).collect()
+    fn pairs_within(&self, body: BodyId) -> PyResult<Vec<[u32; 2]>> {
+        let n = self.pairs.within(body).count();
+        collect(n, self.pairs.within(body).map(Into::into))
     }
+}
+
+/// Rows in a list, or a `MemoryError`.
+pub fn collect<const N: usize>(
+    n: usize,
+    rows: impl Iterator<Item = [u32; N]>,
+) -> PyResult<Vec<[u32; N]>> {
+    let mut list = Vec::new();
+    list.try_reserve_exact(n).map_err(|_| {
+        let bytes = size_of::<[u32; N]>() * n;
+        PyMemoryError::new_err(format!("an array of {n} pairs needs {bytes} bytes"))
+    })?;
+    list.extend(rows);
+    Ok(list)
 }
 
 /// An `(n, N)` array that owns its rows.
@@ -118,8 +134,8 @@ impl Answer {
     ///     The question was about all bodies: see `rows`, `between` and `within`.
     pub fn pairs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let pairs = match self.asked {
-            Asked::Between(a, b) => py.detach(|| self.pairs_between(a, b)),
-            Asked::Within(body) => py.detach(|| self.pairs_within(body)),
+            Asked::Between(a, b) => py.detach(|| self.pairs_between(a, b))?,
+            Asked::Within(body) => py.detach(|| self.pairs_within(body))?,
             Asked::Many => {
                 return Err(PyValueError::new_err(
                     "the question was about all bodies: take rows, between(a, b) or within(a)",
@@ -156,7 +172,7 @@ impl Answer {
                 "a and b are both body {a}: take within({a})"
             )));
         }
-        to_array(py, py.detach(|| self.pairs_between(a, b)))
+        to_array(py, py.detach(|| self.pairs_between(a, b))?)
     }
 
     /// The pairs of primitives of one body.
@@ -175,14 +191,15 @@ impl Answer {
         body: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let body = self.id(body, "body")?;
-        to_array(py, py.detach(|| self.pairs_within(body)))
+        to_array(py, py.detach(|| self.pairs_within(body))?)
     }
 
     /// numpy.ndarray of uint32, shape (n, 4) : all pairs, sorted, one a row: number of a body,
     /// its primitive, number of the other body, its primitive. A new array at each access.
     #[getter]
     pub fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        to_array(py, py.detach(|| self.pairs.rows().collect()))
+        let rows = py.detach(|| collect(self.pairs.len(), self.pairs.rows()))?;
+        to_array(py, rows)
     }
 
     /// The primitives that take part in any pair, for colouring: of a body, or of all bodies in one pass.

@@ -168,6 +168,7 @@ pub struct Told<'a, 'py> {
     pub device: Argument<'a, 'py>,
     pub threads: Argument<'a, 'py>,
     pub memory_budget: Argument<'a, 'py>,
+    pub max_pairs: Argument<'a, 'py>,
     pub lambda: Argument<'a, 'py>,
     pub group_size: Argument<'a, 'py>,
     pub recluster: Argument<'a, 'py>,
@@ -197,6 +198,9 @@ impl Told<'_, '_> {
         }
         if let Some(budget) = self.memory_budget {
             settings.memory_budget = Some(unsigned(budget, "memory_budget", u64::MAX)?);
+        }
+        if let Some(limit) = self.max_pairs {
+            settings.max_pairs = Some(unsigned(limit, "max_pairs", u64::MAX)?);
         }
         if let Some(lambda) = self.lambda {
             settings.lambda = lambda

@@ -9,7 +9,7 @@ use pyo3::types::PyString;
 use crate::arrays::from_end;
 use crate::bodies::Body;
 use crate::errors::raise;
-use crate::result::to_array;
+use crate::result::{collect, to_array};
 use crate::scene::{Scene, positions_array};
 use crate::settings::{Argument, choose_one, unexpected};
 use crate::statistics::Statistics;
@@ -126,7 +126,7 @@ impl Impacts {
     #[getter]
     fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let rows = self.inner.iter().map(impinge::Impact::row);
-        to_array(py, rows.map(|[a, _, b, _]| [a, b]).collect())
+        to_array(py, collect(self.inner.len(), rows.map(|[a, _, b, _]| [a, b]))?)
     }
 
     /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two elements in their bodies.
@@ -137,7 +137,7 @@ impl Impacts {
     #[getter]
     fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let rows = self.inner.iter().map(impinge::Impact::row);
-        to_array(py, rows.map(|[_, a, _, b]| [a, b]).collect())
+        to_array(py, collect(self.inner.len(), rows.map(|[_, a, _, b]| [a, b]))?)
     }
 
     /// numpy.ndarray of float32, or float64 after ``toi="f64"``, shape (n,) : first times in [0, 1], each
@@ -363,7 +363,8 @@ impl Candidates {
         kind: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let kind = choose_one(kind, "kind", &PairKind::ALL.map(|kind| (kind.name(), kind)))?;
-        to_array(py, py.detach(|| self.inner.rows(kind).collect()))
+        let rows = py.detach(|| collect(self.inner.rows(kind).len(), self.inner.rows(kind)))?;
+        to_array(py, rows)
     }
 
     /// numpy.ndarray of str, shape (n,) : the kind of each pair.
@@ -375,14 +376,16 @@ impl Candidates {
     /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two bodies.
     #[getter]
     fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        to_array(py, self.all().map(|(_, [a, _, b, _])| [a, b]).collect())
+        let rows = self.all().map(|(_, [a, _, b, _])| [a, b]);
+        to_array(py, collect(self.inner.len(), rows)?)
     }
 
     /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two elements in their bodies, as those of
     /// `Impacts.elements`.
     #[getter]
     fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        to_array(py, self.all().map(|(_, [_, a, _, b])| [a, b]).collect())
+        let rows = self.all().map(|(_, [_, a, _, b])| [a, b]);
+        to_array(py, collect(self.inner.len(), rows)?)
     }
 
     /// int : a 64-bit hash of the set that does not depend on its order.

@@ -1,6 +1,9 @@
 """Questions, answers, settings, threads."""
 
 import json
+import pathlib
+import subprocess
+import sys
 import threading
 import time
 
@@ -160,6 +163,7 @@ def test_questions_refused(scene, question, error, message):
         ({"threads": 2.5}, TypeError, "^threads: a whole number expected, float given"),
         ({"threads": True}, TypeError, "^threads: a whole number expected, bool given"),
         ({"memory_budget": -5}, ValueError, "^memory_budget: -5 given"),
+        ({"max_pairs": -1}, ValueError, "^max_pairs: -1 given"),
         ({"memory_budget": 2**64}, ValueError, "^memory_budget: 18446744073709551616 given"),
         ({"lambda_": 0}, ValueError, "^lambda: 0 given, a number above 0 allowed"),
         ({"lambda_": float("nan")}, ValueError, "^lambda: NaN given"),
@@ -197,6 +201,63 @@ def test_numpy_scalars_are_numbers():
 def test_too_small_a_budget_says_what_is_needed(scene):
     with pytest.raises(MemoryError, match="memory budget is 10 bytes, but [0-9]+ bytes are needed"):
         impinge.Detector(memory_budget=10).detect(scene)
+
+
+def pile(n):
+    """n triangles turned around an axis that passes through all of them: each meets each."""
+    angle = np.arange(n) / n * 3.0
+    x, y, one = np.cos(angle), np.sin(angle), np.ones(n)
+    corners = [[-x, -y, -one], [x, y, -one], [0.1 * x, 0.1 * y, one]]
+    vertices = np.array(corners).transpose(2, 0, 1).reshape(-1, 3).astype(np.float32)
+    return vertices, np.arange(3 * n, dtype=np.uint32).reshape(-1, 3)
+
+
+def test_more_pairs_than_allowed():
+    vertices, faces = pile(60)
+    assert len(impinge.self_pairs(vertices, faces, max_pairs=1770)) == 1770
+    match = r"^1770 pairs and more were found, and at most 1769 are allowed$"
+    with pytest.raises(impinge.TooManyPairs, match=match):
+        impinge.self_pairs(vertices, faces, max_pairs=1769)
+    detector = impinge.Detector(max_pairs=5, backend="cpu")
+    assert "max_pairs=5" in repr(detector)
+    scene = impinge.Scene()
+    body = scene.add(vertices, faces)
+    assert detector.any(scene, within=body) is True
+    assert detector.any(scene) is False
+    assert impinge.Detector(backend="cpu").count(scene, within=body) == 1770
+    with pytest.raises(impinge.TooManyPairs):
+        detector.count(scene, within=True)
+    with pytest.raises(TypeError, match="^progress: a callable expected"):
+        detector.any(scene, progress=3)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of address space")
+def test_an_answer_without_memory_is_an_error():
+    # 112 million pairs take 900 MB, of which none are there.
+    script = """
+import resource, impinge, numpy as np
+from test_detector import pile
+vertices, faces = pile(15_000)
+scene = impinge.Scene()
+scene.add(vertices, faces)
+detector = impinge.Detector(backend="cpu", threads=2)
+used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (used + (600 << 20),) * 2)
+for _ in range(2):
+    try:
+        detector.detect(scene, within=True)
+    except MemoryError as error:
+        print(error)
+small = impinge.Scene()
+small.add(*pile(100))
+print(len(detector.detect(small, within=True)))
+"""
+    folder = pathlib.Path(__file__).parent
+    run = subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    first, second, n = run.stdout.splitlines()
+    assert first.startswith("out of memory: ") and second.startswith("out of memory: ")
+    assert n == "4950"
 
 
 def test_statistics(scene):

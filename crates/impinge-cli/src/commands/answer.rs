@@ -9,11 +9,12 @@ use serde_json::Value;
 
 use crate::apart::Inputs;
 use crate::args::{AnswerArgs, AskArgs, DetectorArgs, PairsArgs, WithinArgs};
-use crate::detection::{detector, query, repeat};
+use crate::detection::{any, count, detector, query, repeat};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
 #[cfg(feature = "gpu")]
 use crate::picture::Drawer;
+use crate::text::counted;
 use crate::values::{RowsFile, RowsFormat};
 use crate::watch::Watch;
 use crate::{contacts, headline, json, meshes, output, regions, rows};
@@ -71,6 +72,13 @@ fn answer(
         let text = "--json and --pairs - both write to standard output: give one of them a file";
         return Err(Error::Usage(text.to_owned()));
     }
+    let holds_no_pairs = answer.count || answer.any;
+    let is_one_frame = answer.repeat.get() == 1;
+    if holds_no_pairs && (rows_file.is_some() || !answer.outputs().is_empty() || !is_one_frame) {
+        let option = if answer.count { "--count" } else { "--any" };
+        let text = format!("{option} holds no pairs: there is nothing to write, and one frame");
+        return Err(Error::Usage(text));
+    }
     let Bodies {
         mut scene,
         ids,
@@ -82,14 +90,36 @@ fn answer(
     let mut detector = detector(how)?;
 
     let watch = Watch::detection(!how.no_progress, "detecting");
+    let named = ids.iter().copied().zip(names.iter().map(String::as_str));
+    let bodies: Vec<(BodyId, &str)> = named.collect();
+    if holds_no_pairs {
+        let (n_pairs, text, found) = if answer.count {
+            let n = count(&mut detector, &scene, &query, cancel, &watch)?;
+            let text = match n {
+                0 => "no pairs".to_owned(),
+                n => counted(n, "pair"),
+            };
+            (n, text, ("pairs", Value::from(n)))
+        } else {
+            let any = any(&mut detector, &scene, &query, cancel, &watch)?;
+            let text = if any { "at least one pair" } else { "no pairs" };
+            (u64::from(any), text.to_owned(), ("any", Value::from(any)))
+        };
+        drop(watch);
+        if ask.json {
+            let object = Value::Object(json::without_pairs(found, detector.stats()));
+            writeln!(output::out(), "{object}")?;
+        } else {
+            let mut line = Vec::new();
+            headline::write_count(&mut line, &scene, &bodies, &text)?;
+            output::out().write_all(&line)?;
+        }
+        return hit(ask, n_pairs as usize);
+    }
     let n_frames = answer.repeat.get();
     let (pairs, times) = repeat(&mut detector, &mut scene, &query, n_frames, cancel, &watch)?;
     drop(watch);
 
-    let bodies: Vec<(BodyId, &str)> = ids
-        .into_iter()
-        .zip(names.iter().map(String::as_str))
-        .collect();
     // Files are written first: if one can't be written, no answer is printed that looks like success.
     if let Some(file) = &rows_file {
         rows::write(file, pairs)?;

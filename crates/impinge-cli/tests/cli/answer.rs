@@ -281,3 +281,100 @@ fn polygons_are_fanned_with_a_note() {
     assert_eq!(object["bodies"][0]["primitives"], json!(2));
     assert_eq!(object["stats"]["grid"], Value::Null);
 }
+
+/// Writes `n` triangles turned around one axis that passes through all of them: each meets each.
+fn write_pile(folder: &Folder, name: &str, n: usize) {
+    let mut text = String::new();
+    for k in 0..n {
+        let (sin, cos) = (k as f64 / n as f64 * 3.0).sin_cos();
+        let (x, y) = (0.1 * cos, 0.1 * sin);
+        text += &format!("v {} {} -1\nv {cos} {sin} -1\nv {x} {y} 1\n", -cos, -sin);
+    }
+    for first in (1..3 * n).step_by(3) {
+        text += &format!("f {first} {} {}\n", first + 1, first + 2);
+    }
+    folder.text(name, &text);
+}
+
+#[test]
+fn pairs_are_limited_counted_and_asked_for() {
+    let folder = Folder::new();
+    write_pile(&folder, "pile.obj", 60);
+    let n = 60 * 59 / 2;
+    let most = |limit: usize| {
+        let limit = limit.to_string();
+        folder.run(["self", "pile.obj", "--json", "--max-pairs", &limit])
+    };
+    assert_eq!(most(n).json()["pairs"], json!(n));
+    let line = most(n - 1).error();
+    assert!(
+        line.contains(&format!("{n} pairs and more"))
+            && line.contains(&format!("at most {} are allowed", n - 1)),
+        "{line}"
+    );
+
+    let counted = folder.run(["self", "pile.obj", "--count"]).printed();
+    assert_eq!(counted, "pile.obj: 1,770 pairs of 60 triangles\n");
+    let object = folder.run(["self", "pile.obj", "--count", "--json"]).json();
+    assert_eq!(keys(&object), ["pairs", "backend", "method", "ms", "stats"]);
+    assert_eq!(object["pairs"], json!(n));
+    let any = folder.run(["self", "pile.obj", "--any"]).printed();
+    assert_eq!(any, "pile.obj: at least one pair of 60 triangles\n");
+    let object = folder.run(["self", "pile.obj", "--any", "--json"]).json();
+    assert_eq!(object["any"], json!(true));
+    for option in ["--any", "--count"] {
+        let run = folder.run(["self", "pile.obj", option, "--fail-on-hit"]);
+        assert_eq!((run.code, run.stderr.as_str()), (Some(3), ""));
+        for others in [
+            &["--pairs", "p.csv"][..],
+            &["--out", "p.ply"],
+            &["--repeat", "2"],
+        ] {
+            let arguments = ["self", "pile.obj", option];
+            let said = folder.run(arguments.iter().chain(others)).misuse();
+            assert!(said.contains(option), "{said}");
+        }
+    }
+    folder
+        .run(["self", "pile.obj", "--any", "--count"])
+        .misuse();
+
+    folder.ply("a.ply", &ball(300));
+    folder.ply("b.ply", &ball(300).translated([5.0, 0.0, 0.0]));
+    for option in ["--any", "--count"] {
+        let run = folder.run(["pairs", "a.ply", "b.ply", option, "--fail-on-hit"]);
+        let n = 2 * ball(300).elements.len();
+        let expected = format!("a.ply and b.ply: no pairs of {n} triangles\n");
+        assert_eq!(run.printed(), expected);
+    }
+}
+
+/// 72 million pairs take 576 MB, of 600 that the process may have.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_answer_without_memory_is_an_error() {
+    let folder = Folder::new();
+    write_pile(&folder, "pile.obj", 12_000);
+    let run = |more: &[&str]| {
+        let script = r#"ulimit -v 600000; exec "$0" "$@""#;
+        let output = std::process::Command::new("sh")
+            .args(["-c", script, env!("CARGO_BIN_EXE_impinge")])
+            .args(["self", "pile.obj", "--backend", "cpu", "--threads", "2"])
+            .args(more)
+            .current_dir(folder.path(""))
+            .output()
+            .unwrap();
+        crate::harness::Run::from(output)
+    };
+    let line = run(&[]).error();
+    assert!(line.starts_with("out of memory: "), "{line}");
+    let counted = run(&["--count"]).printed();
+    assert!(counted.contains("71,994,000 pairs"), "{counted}");
+    let line = run(&["--max-pairs", "1000"]).error();
+    assert!(line.contains("at most 1000 are allowed"), "{line}");
+    let line = run(&["--memory-budget", "100M"]).error();
+    assert!(
+        line.starts_with("the memory budget is 100000000 bytes, but "),
+        "{line}"
+    );
+}

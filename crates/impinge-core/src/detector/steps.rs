@@ -477,6 +477,16 @@ impl Detector {
         Ok(&self.steps.candidates)
     }
 
+    /// The impacts that were found last, out of the detector without a copy. Until the next step it then holds none.
+    pub fn take_impacts(&mut self) -> Impacts {
+        std::mem::take(&mut self.steps.impacts)
+    }
+
+    /// The candidates that were found last, out of the detector without a copy. Until the next query it then holds none.
+    pub fn take_candidates(&mut self) -> Candidates {
+        std::mem::take(&mut self.steps.candidates)
+    }
+
     /// Statistics of the last answer about a step: by [`impacts`](Detector::impacts),
     /// [`earliest`](Detector::earliest), [`is_free`](Detector::is_free) or [`advance`](Detector::advance).
     pub fn step_stats(&self) -> &Statistics {

@@ -29,6 +29,7 @@ __all__ = [
     "Result",
     "Scene",
     "Statistics",
+    "TooManyPairs",
     "__version__",
     "_check",
     "_serve_check",
@@ -67,12 +68,14 @@ class _Settings(TypedDict, total=False):
     device: str | None
     threads: SupportsIndex | None
     memory_budget: SupportsIndex | None
+    max_pairs: SupportsIndex | None
     lambda_: SupportsFloat
     group_size: SupportsIndex
     recluster: _Recluster
     instruction_set: _InstructionSet
 
 class Cancelled(Exception): ...
+class TooManyPairs(Exception): ...
 
 @final
 class CancelToken:
@@ -170,6 +173,7 @@ class Detector:
         threads: SupportsIndex | None = None,
         memory_budget: SupportsIndex | None = None,
         *,
+        max_pairs: SupportsIndex | None = None,
         lambda_: SupportsFloat = 1.0,
         group_size: SupportsIndex = 64,
         recluster: _Recluster = "auto",
@@ -188,6 +192,28 @@ class Detector:
         cancel: CancelToken | None = None,
         filter: Callable[[npt.NDArray[np.uint32]], _Array] | None = None,
     ) -> Result: ...
+    def count(
+        self,
+        scene: Scene,
+        *,
+        between: _Pair | bool | None = None,
+        within: _Body | None = None,
+        ignore: Iterable[_Pair] | None = None,
+        shared_vertex: _SharedVertex = "skip",
+        progress: _Progress | None = None,
+        cancel: CancelToken | None = None,
+    ) -> int: ...
+    def any(
+        self,
+        scene: Scene,
+        *,
+        between: _Pair | bool | None = None,
+        within: _Body | None = None,
+        ignore: Iterable[_Pair] | None = None,
+        shared_vertex: _SharedVertex = "skip",
+        progress: _Progress | None = None,
+        cancel: CancelToken | None = None,
+    ) -> bool: ...
     def impacts(
         self,
         scene: Scene,
