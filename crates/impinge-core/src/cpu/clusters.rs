@@ -23,7 +23,8 @@ use crate::stats::Statistics;
 
 use super::bounds::{self, TreeBounds};
 use super::dispatch::NodePair;
-use super::pairing::{WorkItem, Worker};
+use super::met::WorkItem;
+use super::pairing::Worker;
 use super::refit::{Refit, SORTED_FROM};
 use super::remote::Remote;
 use super::simd::Isa;

@@ -21,7 +21,6 @@ use crate::elements::with_corners;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::Grid;
 
-use super::kept::Run;
 use super::world::World;
 use codes::{Codes, Function, greater_bytes, lesser_bytes};
 
@@ -52,6 +51,25 @@ impl Near {
         let ([_, y, z, _], [_, y_end, z_end, _]) =
             (self.low.to_le_bytes(), self.high.to_le_bytes());
         (u32::from(y_end - y) + 1) * (u32::from(z_end - z) + 1)
+    }
+}
+
+/// A task of the bounds stage: a run of one participant's primitives, or of its vertices.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Run {
+    pub participant: u32,
+    pub first: u32,
+    pub end: u32,
+}
+
+impl Run {
+    /// Runs of `n` things of a participant.
+    pub fn cut(participant: usize, n: u32, length: u32) -> impl Iterator<Item = Run> {
+        (0..n).step_by(length as usize).map(move |first| Run {
+            participant: participant as u32,
+            first,
+            end: n.min(first.saturating_add(length)),
+        })
     }
 }
 

@@ -12,7 +12,7 @@ use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::FineRange;
 
 use super::bounds;
-use super::cull::{Cull, MOST_MAPS};
+use super::cull::{Cull, MOST_MAPS, Run};
 use super::dispatch::NodePair;
 use super::simd::{Isa, Simd, dispatch};
 use super::top_level::TopLevel;
@@ -68,25 +68,6 @@ fn few<'a, S>(world: World<'_>, scratches: &'a mut [S]) -> &'a mut [S] {
         false => scratches.len(),
     };
     &mut scratches[..n]
-}
-
-/// A task of the bounds stage: a run of one participant's primitives, or of its vertices.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Run {
-    pub participant: u32,
-    pub first: u32,
-    pub end: u32,
-}
-
-impl Run {
-    /// Runs of `n` things of a participant.
-    fn cut(participant: usize, n: u32, length: u32) -> impl Iterator<Item = Run> {
-        (0..n).step_by(length as usize).map(move |first| Run {
-            participant: participant as u32,
-            first,
-            end: n.min(first.saturating_add(length)),
-        })
-    }
 }
 
 /// The kept primitives of a frame, and the memory for them.

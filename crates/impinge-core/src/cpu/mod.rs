@@ -9,15 +9,18 @@ pub(crate) mod extents;
 mod group_cache;
 mod hubs;
 pub mod kept;
+pub(crate) mod met;
 pub mod narrow;
 pub(crate) mod pairing;
 mod refit;
 pub(crate) mod remote;
+pub(crate) mod runs;
 pub mod simd;
 pub(crate) mod slabs;
 pub(crate) mod steps;
 pub mod subcells;
 pub(crate) mod top_level;
+mod vec4;
 pub mod world;
 
 use std::sync::Arc;

@@ -21,7 +21,7 @@ use crate::positions::Positions;
 use crate::sink::{Answer, BLOCK};
 
 use super::group_cache::Group;
-use super::pairing::{Met, WorkItem};
+use super::met::{Met, WorkItem};
 use super::simd::{Isa, Lanes, Simd, dispatch};
 use super::world::{BodyRef, World};
 

@@ -25,7 +25,8 @@ use crate::grouping::bounds::{Bounds, greater};
 use crate::grouping::clusters::Clustering;
 
 use super::bounds::TreeBounds;
-use super::extents::{self, Extents, Groups, Intervals, Members, RUN, Side};
+use super::extents::{self, Extents, Groups, Intervals, Side};
+use super::runs::{Members, RUN};
 use super::simd::{Lanes, Simd};
 
 /// Some clusters of a node of level 1: bit `k` for child `k`.

@@ -13,7 +13,8 @@ use crate::sink::{Answer, Ending};
 use crate::stats::Statistics;
 
 use super::dispatch::{self, NodePair, Tree};
-use super::pairing::{self, WorkItem, Worker};
+use super::met::WorkItem;
+use super::pairing::{self, Worker};
 use super::simd::{Isa, Simd, dispatch};
 use super::top_level::TopLevel;
 use super::world::World;

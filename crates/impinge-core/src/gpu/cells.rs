@@ -236,7 +236,7 @@ impl InCells for Plan {
     ) -> Result<(), Error> {
         let steps = &mut self.steps;
         steps.clear();
-        self.reaching.plan(world, room, told, steps);
+        self.reaching.plan(world, room, told.lambda, steps);
         self.share = told.share;
         let work = Params {
             first: part.first,

@@ -12,7 +12,6 @@ use super::collect::Collector;
 use super::device::Scopes;
 use super::layout::Cell;
 use super::open::Gpu;
-use super::passes::Outcome;
 use super::pieces;
 use super::room::{Capacities, CellsWanted, Counts, Room};
 use super::topology::Most;
@@ -62,6 +61,14 @@ pub struct Engine {
 pub(super) enum Plan {
     Clusters(Box<clusters::Plan>),
     Cells(Box<dyn InCells>),
+}
+
+/// How a list of work ended.
+#[derive(Debug)]
+pub(super) enum Outcome {
+    Complete,
+    /// There is not enough room for work that cannot be split.
+    Crowded(Error),
 }
 
 impl Plan {

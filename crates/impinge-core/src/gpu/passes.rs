@@ -14,7 +14,7 @@ use super::cells::{Part, Share, Tile, Told};
 use super::clusters;
 use super::collect::{Collected, Guess};
 use super::device::Scopes;
-use super::engine::{Engine, Plan};
+use super::engine::{Engine, Outcome, Plan};
 use super::layout::NodePair;
 use super::room::{Capacities, CellsWanted, Verdict};
 use super::steps::Stages;
@@ -39,14 +39,6 @@ const SETTLED_BY_A_TASK: usize = 64;
 pub(super) enum Work {
     Seeds(Vec<NodePair>),
     Cells(Part, Share),
-}
-
-/// How a list of work ended.
-#[derive(Debug)]
-pub(super) enum Outcome {
-    Complete,
-    /// There is not enough room for work that cannot be split.
-    Crowded(Error),
 }
 
 impl Engine {

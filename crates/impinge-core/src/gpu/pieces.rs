@@ -22,8 +22,7 @@ use rayon::prelude::*;
 
 use super::buffers::count;
 use super::clusterings::bounds_of;
-use super::topology::{Most, Topology, Weight};
-use super::world::narrowed;
+use super::topology::{Most, Topology, Weight, narrowed};
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;

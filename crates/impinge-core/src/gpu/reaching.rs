@@ -6,7 +6,6 @@
 //! ```
 
 use super::bounds::{Bounds, BoundsSteps};
-use super::cells::Told;
 use super::kernels::{BoundsKeep, BoundsReach, GridRanges, GridResolution, GridShift};
 use super::layout::{NO_ROOT, Params};
 use super::open::Gpu;
@@ -41,8 +40,8 @@ pub struct ReachingSteps {
 }
 
 impl ReachingSteps {
-    /// Plans both stages.
-    pub fn plan(&mut self, world: &World, room: &Room, told: Told, steps: &mut Steps) {
+    /// Plans both stages, with cells as dense as `lambda`.
+    pub fn plan(&mut self, world: &World, room: &Room, lambda: f64, steps: &mut Steps) {
         self.bounds.plan(world, steps);
         // Capacities and counts fit 32 bits.
         self.reach = steps.push(Params {
@@ -53,9 +52,7 @@ impl ReachingSteps {
         });
         let over_kept = Params {
             capacity: room.capacities().kept as u32,
-            lambda: (told.lambda as f32)
-                .clamp(f32::MIN_POSITIVE, f32::MAX)
-                .to_bits(),
+            lambda: (lambda as f32).clamp(f32::MIN_POSITIVE, f32::MAX).to_bits(),
             most_cells: room.cells.len() as u32,
             ..Params::default()
         };

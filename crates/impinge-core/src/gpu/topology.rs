@@ -123,3 +123,8 @@ pub struct Most {
     /// Bytes of all buffers that hold topology and positions.
     pub bytes: u64,
 }
+
+/// The bits of a coordinate rounded to nearest; boxes and filter allow for it, see `Body::slack`.
+pub fn narrowed(x: &f64) -> u32 {
+    (*x as f32).to_bits()
+}

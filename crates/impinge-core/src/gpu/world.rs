@@ -35,7 +35,7 @@ use super::layout::{
 };
 use super::open::Gpu;
 use super::pieces::{Chunk, Loaded};
-use super::topology::{Topology, Weight};
+use super::topology::{Topology, Weight, narrowed};
 
 /// Bit 31 of a place is a flag.
 pub const MOST_PRIMITIVES: u64 = 1 << 31;
@@ -506,11 +506,6 @@ impl World {
         }
         true
     }
-}
-
-/// The bits of a coordinate rounded to nearest; boxes and filter allow for it, see `Body::slack`.
-pub fn narrowed(x: &f64) -> u32 {
-    (*x as f32).to_bits()
 }
 
 /// A point of a body: the first corner of its first primitive. The tree over bodies is built from these points.

@@ -173,7 +173,7 @@ impl InCells for Plan {
         let n_entries = capacities.entries as u32;
         let steps = &mut self.steps;
         steps.clear();
-        self.reaching.plan(world, room, told, steps);
+        self.reaching.plan(world, room, told.lambda, steps);
         self.fill_scan = steps.push(Params {
             capacity: capacities.kept as u32,
             ..Params::default()

@@ -15,8 +15,8 @@ use crate::grouping::clusters::CHUNK;
 use crate::grouping::clusters::LocalFaces;
 use crate::settings::InstructionSet;
 
-use super::bounds::of_vertices_f32;
-use super::extents::{self, Members, RUN, RunExtents};
+use super::runs::{self, Members, RUN, RunExtents};
+use super::vec4::of_vertices_f32;
 
 /// The boxes of one group, one per lane; lanes past the group's size hold empty boxes.
 #[derive(Debug, Clone)]
@@ -262,7 +262,7 @@ pub(crate) trait Simd: Copy {
     /// Adds runs of vertices, each with its members, to the extents in `into`.
     #[inline(always)]
     fn add_runs(self, runs: &[[[f32; 3]; RUN]], members: &[Members], into: &mut RunExtents) {
-        extents::add_runs(runs, members, into);
+        runs::add_runs(runs, members, into);
     }
 
     /// The corners of a cluster's triangles as tables; places past its size are arbitrary.

@@ -5,8 +5,8 @@ use std::arch::x86_64::*;
 use crate::exact::filter::number::Lookup;
 use crate::exact::filter::{BATCH, TABLE};
 
-use super::super::bounds::Vec4;
-use super::super::extents::COORDINATES;
+use super::super::runs::COORDINATES;
+use super::super::vec4::Vec4;
 use super::{
     Bounds, BoundsArray, CHUNK, ClusterFaces, GROUP, LANES, LaneBounds, Lanes, Lanes32, LocalFaces,
     Masks, Members, RUN, RunExtents, Simd, Triangles64, number, of_vertices_f32, put_corners,

@@ -26,7 +26,7 @@ use crate::sink::Ending;
 use crate::stats::Statistics;
 
 use super::dispatch::{NodePair, Tree};
-use super::pairing::WorkItem;
+use super::met::WorkItem;
 use super::simd::{Isa, Simd};
 use super::slabs::{self, Counts, Slabs, Stage};
 use super::top_level::TopLevel;

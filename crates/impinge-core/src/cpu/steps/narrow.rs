@@ -11,7 +11,7 @@
 //! The last two take turns, on lists of a thousand pairs, so that no lane waits for another pair's search. What they
 //! leave open goes to exact arithmetic, and so do pairs of bare edges and points, and all times in double precision.
 
-use crate::cpu::pairing::{Met, WorkItem};
+use crate::cpu::met::{Met, WorkItem};
 use crate::cpu::simd::{Isa, Lanes, Simd, dispatch};
 use crate::exact::filter::{
     self, BATCH, Enclosed8, LANES, Look8, Next, Search, Spans8, Steps8, time_between,

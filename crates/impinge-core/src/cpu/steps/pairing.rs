@@ -11,7 +11,8 @@ use std::time::Duration;
 
 use crate::clock::Instant;
 use crate::cpu::group_cache::GroupCache;
-use crate::cpu::pairing::{Met, Side, WorkItem, full};
+use crate::cpu::met::{Met, Side, WorkItem};
+use crate::cpu::pairing::full;
 use crate::cpu::simd::{Isa, LaneBounds, Lanes, Simd, up_to};
 use crate::cpu::slabs::{Counts, Stage};
 use crate::frame::TestId;

@@ -1,0 +1,127 @@
+//! What goes from stage to stage: two clusters that may meet, and the lanes of their elements whose boxes do.
+
+use crate::exact::filter::BATCH;
+use crate::grouping::GROUP;
+
+use super::simd::{Lanes32, Simd};
+
+/// Two clusters that may meet: participants and their clusters.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct WorkItem {
+    pub a: u32,
+    pub b: u32,
+    pub cluster_a: u32,
+    pub cluster_b: u32,
+}
+
+/// The candidates of one work item: lanes of its two groups.
+#[derive(Debug, Default)]
+pub(crate) struct Met {
+    lanes: Box<MetLanes>,
+    n: usize,
+}
+
+#[derive(Debug)]
+struct MetLanes {
+    a: [u8; MOST_MET],
+    b: [u8; MOST_MET],
+}
+
+/// All of one group with all of the other, and what is written or read beyond the last of them.
+const MOST_MET: usize = GROUP * GROUP + GROUP;
+
+impl Default for MetLanes {
+    fn default() -> Self {
+        MetLanes {
+            a: [0; MOST_MET],
+            b: [0; MOST_MET],
+        }
+    }
+}
+
+/// The group whose lanes are rows.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Side {
+    A,
+    B,
+}
+
+impl Met {
+    /// A lane of one group with some of the other.
+    #[inline(always)]
+    pub fn push_row<S: Simd>(&mut self, simd: S, side: Side, row: usize, mask: u64) {
+        let MetLanes { a, b } = &mut *self.lanes;
+        let (own, other) = match side {
+            Side::A => (a, b),
+            Side::B => (b, a),
+        };
+        own[self.n..][..GROUP].fill(row as u8);
+        let list = other[self.n..].first_chunk_mut().expect("padded");
+        self.n += simd.list_lanes(mask, list);
+    }
+
+    /// As `push_row`, where bit k of the mask stands for the lane `map[k]`.
+    #[inline(always)]
+    pub fn push_mapped_row<S: Simd>(
+        &mut self,
+        simd: S,
+        (side, row): (Side, usize),
+        mask: u64,
+        map: &[u8; GROUP],
+    ) {
+        let MetLanes { a, b } = &mut *self.lanes;
+        let (own, other) = match side {
+            Side::A => (a, b),
+            Side::B => (b, a),
+        };
+        own[self.n..][..GROUP].fill(row as u8);
+        let list = other[self.n..].first_chunk_mut().expect("padded");
+        self.n += simd.list_mapped(mask, map, list);
+    }
+
+    /// Drops candidates that share a vertex, given the vertices of each corner of both groups.
+    #[inline(always)]
+    pub fn drop_sharing<S: Simd>(&mut self, simd: S, corners: [&[Lanes32]; 2]) {
+        let mut n_kept = 0;
+        for first in (0..self.n).step_by(BATCH) {
+            let [a, b] = self.batch(first);
+            let (a, b) = (*a, *b);
+            let n = (self.n - first).min(BATCH);
+            let kept = !simd.share_16(corners, [&a, &b]) & u16::MAX >> (BATCH - n);
+            // What is written past those that are kept was read before.
+            let MetLanes {
+                a: into_a,
+                b: into_b,
+            } = &mut *self.lanes;
+            let padded = "padded";
+            simd.keep_16(kept, &a, into_a[n_kept..].first_chunk_mut().expect(padded));
+            simd.keep_16(kept, &b, into_b[n_kept..].first_chunk_mut().expect(padded));
+            n_kept += kept.count_ones() as usize;
+        }
+        self.n = n_kept;
+    }
+
+    /// Bytes held.
+    pub const BYTES: usize = size_of::<MetLanes>();
+
+    pub fn clear(&mut self) {
+        self.n = 0;
+    }
+
+    pub fn len(&self) -> usize {
+        self.n
+    }
+
+    /// The lanes of a candidate.
+    #[inline(always)]
+    pub fn lanes(&self, ix: usize) -> [u8; 2] {
+        [self.lanes.a[ix], self.lanes.b[ix]]
+    }
+
+    /// The lanes of candidates from `first` on; those past the last one are any lanes.
+    #[inline(always)]
+    pub fn batch(&self, first: usize) -> [&[u8; BATCH]; 2] {
+        let MetLanes { a, b } = &*self.lanes;
+        [a, b].map(|lanes| lanes[first..].first_chunk().expect("padded"))
+    }
+}
