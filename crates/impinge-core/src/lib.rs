@@ -5,6 +5,7 @@
 //! frame, boxes, grid, threads, exact test and GPU engine, so that only the method differs.
 
 pub mod clock;
+mod clusterings;
 // Types are documented; fields and small methods of the inside speak for themselves.
 mod advance;
 pub mod contact;

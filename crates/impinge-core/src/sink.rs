@@ -249,6 +249,12 @@ pub trait Ending: Copy + Sync {
     /// # Errors
     /// Those of [`Answer::check`].
     fn check(&self) -> Result<(), Error>;
+
+    /// As [`Answer::share`].
+    fn share(&self, held_by_finder: u64);
+
+    /// As [`Answer::most_items`].
+    fn most_items(&self, room: usize) -> usize;
 }
 
 impl Ending for &Arc<Answer> {
@@ -258,6 +264,14 @@ impl Ending for &Arc<Answer> {
 
     fn check(&self) -> Result<(), Error> {
         Answer::check(self)
+    }
+
+    fn share(&self, held_by_finder: u64) {
+        Answer::share(self, held_by_finder);
+    }
+
+    fn most_items(&self, room: usize) -> usize {
+        Answer::most_items(self, room)
     }
 }
 

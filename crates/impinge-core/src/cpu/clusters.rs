@@ -14,7 +14,9 @@
 
 use std::sync::Arc;
 
+use crate::clusterings::{Fit, spread};
 use crate::error::Error;
+use crate::frame::Layer;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::scene::Body;
@@ -22,14 +24,11 @@ use crate::settings::{InstructionSet, Settings};
 use crate::stats::Statistics;
 
 use super::bounds::{self, TreeBounds};
-use super::dispatch::NodePair;
-use super::met::WorkItem;
 use super::pairing::Worker;
 use super::refit::{Refit, SORTED_FROM};
 use super::remote::Remote;
 use super::simd::Isa;
-use super::slabs::{self, Slabs};
-use super::top_level::TopLevel;
+use super::slabs::{self, Room};
 use super::world::{BodyCache, Caches, World};
 use crate::run::Job;
 use crate::sink::Answer;
@@ -42,25 +41,19 @@ const CALL_FROM: u64 = 30_000;
 pub(crate) struct Clusters {
     isa: Isa,
     caches: Caches,
-    top: TopLevel,
     refit: Refit,
-    items: Vec<WorkItem>,
     scratches: Vec<Worker>,
-    stack: Vec<NodePair>,
-    body_stack: Vec<NodePair>,
+    room: Room,
 }
 
 impl Clusters {
     pub fn new(allowed: InstructionSet) -> Self {
         Clusters {
             isa: Isa::detect(allowed),
-            caches: Vec::new(),
-            top: TopLevel::default(),
+            caches: Caches::default(),
             refit: Refit::default(),
-            items: Vec::new(),
             scratches: Vec::new(),
-            stack: Vec::new(),
-            body_stack: Vec::new(),
+            room: Room::default(),
         }
     }
 
@@ -85,24 +78,15 @@ impl Clusters {
         for worker in &mut self.scratches {
             worker.begin(stats.n_clusters, settings.memory_budget.is_some(), answer);
         }
-        let held = self.bytes() as u64;
-        let most_items = answer.most_items(slabs::most_items(settings.memory_budget, held)?);
-        self.items.clear();
-        self.items.shrink_to(most_items);
-        answer.share(held + slabs::bytes(most_items));
-        answer.check()?;
+        let held = self.bytes_besides_room();
         let Clusters {
-            isa,
             caches,
-            top,
-            items,
+            room,
             scratches,
-            stack,
-            body_stack,
             ..
         } = self;
-        let mut slabs = Slabs {
-            isa: *isa,
+        let task = slabs::Task {
+            isa: self.isa,
             job,
             answer,
             world: World {
@@ -110,73 +94,37 @@ impl Clusters {
                 frame: job.frame,
                 caches: Some(caches),
             },
-            items,
-            most_items,
             scratches,
-            stats,
-            ms: 0.0,
+            budget: settings.memory_budget,
+            held,
         };
-        slabs.run(top, stack, body_stack)?;
-        for worker in scratches.iter_mut() {
-            worker.settler.end();
-        }
-        answer.check()?;
-        stats.bytes_held = (self.bytes() + size_of::<WorkItem>() * self.items.capacity()) as u64;
+        room.run(task, stats)?;
+        stats.bytes_held = (self.bytes_besides_room() + self.room.bytes()) as u64;
         Ok(())
     }
 
-    fn bytes(&self) -> usize {
+    fn bytes_besides_room(&self) -> usize {
         let caches: usize = self
             .caches
             .iter()
-            .flatten()
             .map(|cache| {
                 let remote = cache.remote.as_ref().map_or(0, |remote| remote.bytes());
                 size_of::<BodyCache>() + cache.clustering.bytes() + cache.bounds.bytes() + remote
             })
             .sum();
         let scratches: usize = self.scratches.iter().map(Worker::bytes).sum();
-        caches + scratches + self.top.bytes()
+        caches + scratches
     }
 
     /// Clusters bodies that are new or were re-meshed; forgets removed bodies.
     fn cluster(&mut self, job: Job<'_>, stats: &mut Statistics) -> Result<(), Error> {
-        let Job {
-            scene,
-            frame,
-            workers,
-            control,
-        } = job;
-        let n_slots = frame.layers.last().map_or(0, |last| last.id.index() + 1);
-        if self.caches.len() < n_slots {
-            self.caches.resize_with(n_slots, || None);
-        }
-        if self.caches.len() > scene.n_bodies() {
-            for (slot, cache) in self.caches.iter_mut().enumerate() {
-                let gone = !scene.holds(slot);
-                if gone {
-                    *cache = None;
-                }
-            }
-        }
         let isa = self.isa;
-        for (ix, participant) in frame.layers.iter().enumerate() {
-            let body = frame.body(scene, ix);
-            let cache = &mut self.caches[participant.id.index()];
-            let known = cache
-                .as_ref()
-                .is_some_and(|cache| cache.topology_stamp == body.topology_stamp());
-            if !known {
-                control.step(ix as u64, frame.layers.len() as u64)?;
-                let found = workers.install(body.n_primitives(), || BodyCache::new(body, isa))?;
-                *cache = Some(Box::new(found));
-                stats.n_clustered += 1;
-            }
-            let cache = cache.as_ref().expect("just clustered");
-            stats.n_clusters += cache.clustering.n_clusters() as u64;
-            if participant.within {
-                cache.find_adjacency(workers)?;
-            }
+        let fits = |_: &mut BodyCache, _: &Layer, _: &Body| false;
+        let make = |body: &Body, _: &Layer| BodyCache::new(body, isa);
+        self.caches.update(job, stats, fits, make)?;
+        let layers = job.frame.layers.iter();
+        for layer in layers.filter(|layer| layer.within) {
+            self.caches.at(layer).find_adjacency(job.workers)?;
         }
         Ok(())
     }
@@ -202,7 +150,7 @@ impl BodyCache {
             whole: Bounds::EMPTY,
             remote: (body.n_primitives() >= SORTED_FROM).then(Box::default),
             surface: 0.0,
-            best_spread: f64::INFINITY,
+            fit: Fit::UNKNOWN,
         }
     }
 
@@ -230,7 +178,7 @@ impl BodyCache {
         }
         self.bounds.refit_above(0, &self.clustering.shape);
         self.whole = self.bounds.root();
-        self.best_spread = self.spread();
+        self.fit.is_stale(self.spread());
     }
 
     /// The remote clusters, if the clusters are sorted.
@@ -256,11 +204,6 @@ impl BodyCache {
 
     /// The clusters' summed surface divided by the body's: how well the clusters fit the current pose.
     pub(super) fn spread(&self) -> f64 {
-        let whole = self.bounds.root().half_area();
-        if whole > 0.0 && self.surface.is_finite() {
-            self.surface / whole
-        } else {
-            1.0
-        }
+        spread(self.surface, &self.bounds.root())
     }
 }

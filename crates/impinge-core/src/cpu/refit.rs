@@ -8,9 +8,9 @@
 //! above   nodes; bodies that have flowed away from their clusters are clustered again; clusters are sorted
 //! ```
 
-use crate::clock::Instant;
 use std::sync::{Mutex, PoisonError};
 
+use crate::clusterings::make_anew;
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
@@ -24,7 +24,7 @@ use super::extents::{Extents, Groups};
 use super::pairing::Worker;
 use super::remote::Children;
 use super::simd::{Isa, Simd, dispatch};
-use super::world::{BodyCache, Caches, STALE, World};
+use super::world::{BodyCache, Caches, World};
 use crate::run::Job;
 
 /// Nodes per task, of up to eight clusters each.
@@ -95,7 +95,7 @@ impl Refit {
         self.tasks.clear();
         for (ix, participant) in frame.layers.iter().enumerate() {
             let body = frame.body(scene, ix);
-            let cache = caches[participant.id.index()].as_mut().expect("clustered");
+            let cache = caches.at_mut(participant);
             let n_vertices = body.n_vertices();
             if participant.within || !sorts {
                 cache.interrupt();
@@ -160,7 +160,7 @@ impl Refit {
             let Some(back) = back(world, ix) else {
                 continue;
             };
-            let cache = caches[participant.id.index()].as_mut().expect("clustered");
+            let cache = caches.at_mut(participant);
             let Some(remote) = &mut cache.remote else {
                 continue;
             };
@@ -250,8 +250,7 @@ impl Refit {
         for (task, found) in self.tasks.iter().zip(&mut self.found) {
             let found = found.get_mut().unwrap_or_else(PoisonError::into_inner);
             all_finite &= found.extents.all_finite;
-            let slot = frame.layers[task.participant as usize].id.index();
-            let cache = caches[slot].as_mut().expect("clustered");
+            let cache = caches.at_mut(&frame.layers[task.participant as usize]);
             cache.surface += f64::from(found.surface);
             cache.whole.join(&found.extents.whole);
             if let (What::Read, Some(remote)) = (task.what, &mut cache.remote) {
@@ -278,7 +277,7 @@ impl Refit {
         } = job;
         for (ix, participant) in frame.layers.iter().enumerate() {
             let body = frame.body(scene, ix);
-            let cache = caches[participant.id.index()].as_mut().expect("clustered");
+            let cache = caches.at_mut(participant);
             if cache.positions_stamp == body.positions_stamp() {
                 continue;
             }
@@ -287,20 +286,15 @@ impl Refit {
             if cache.sorted().is_some() {
                 continue;
             }
-            let spread = cache.spread();
-            if settings.recluster == Recluster::Auto && spread > STALE * cache.best_spread {
-                let start = Instant::now();
-                **cache = workers.install(body.n_primitives(), || BodyCache::new(body, isa))?;
+            let is_stale = cache.fit.is_stale(cache.spread());
+            if is_stale && settings.recluster == Recluster::Auto {
+                let n = body.n_primitives();
+                *cache = make_anew(workers, n, stats, || BodyCache::new(body, isa))?;
                 if participant.within {
                     cache.find_adjacency(workers)?;
                 }
                 cache.refit_all(body);
                 cache.positions_stamp = body.positions_stamp();
-                stats.n_clustered += 1;
-                stats.n_reclustered += 1;
-                stats.add_ms("clustering", start.elapsed().as_secs_f64() * 1e3);
-            } else {
-                cache.best_spread = cache.best_spread.min(spread);
             }
         }
         Ok(())
@@ -360,12 +354,12 @@ fn sort(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker]) {
     }
     let mut due: [Mutex<Option<Due<'_>>>; SORTED_TO] = Default::default();
     let mut n_due = 0;
-    let mut caches = caches.iter_mut().enumerate();
+    let mut caches = caches.iter_mut();
     for (ix, participant) in frame.layers.iter().enumerate() {
         let slot = participant.id.index();
         // They come in the order of their slots.
-        let cache = caches.find(|&(other, _)| other == slot);
-        let Some((_, Some(cache))) = cache else {
+        let cache = caches.find(|(other, _)| *other == slot);
+        let Some((_, cache)) = cache else {
             continue;
         };
         let body = frame.body(scene, ix);

@@ -31,14 +31,9 @@ const TASKS_EACH: usize = 12;
 /// With fewer work items, one worker takes them all.
 const PARALLEL_FROM: usize = 64;
 
-/// Bytes of so many work items.
-pub(crate) fn bytes(n_items: usize) -> u64 {
-    (size_of::<WorkItem>() * n_items) as u64
-}
-
 /// How many work items a slab may hold within the budget, when `held` bytes are held besides. An eighth of what is to
 /// spare is for work items, the rest for the answer.
-pub(crate) fn most_items(budget: Option<u64>, held: u64) -> Result<usize, Error> {
+fn most_items(budget: Option<u64>, held: u64) -> Result<usize, Error> {
     let Some(budget) = budget else {
         return Ok(MOST_ITEMS);
     };
@@ -67,6 +62,9 @@ pub(crate) trait Stage: Copy + Sync {
 
     /// Pairs the elements of some work items, and settles the candidates.
     fn pair<S: Simd>(self, simd: S, isa: Isa, items: &[WorkItem], worker: &mut Self::Worker);
+
+    /// Lets a worker hand over what it has found and not handed over yet.
+    fn end(worker: &mut Self::Worker, answer: Self::Answer);
 
     /// What a worker has counted.
     fn counts(worker: &Self::Worker) -> Counts;
@@ -150,6 +148,10 @@ impl<'a> Stage for World<'a> {
         Ok(())
     }
 
+    fn end(worker: &mut Worker, _: Self::Answer) {
+        worker.settler.end();
+    }
+
     fn counts(worker: &Worker) -> Counts {
         Counts {
             busy: worker.settler.busy,
@@ -159,23 +161,87 @@ impl<'a> Stage for World<'a> {
     }
 }
 
-/// A frame from `dispatch` on.
-pub(crate) struct Slabs<'a, W: Stage> {
+/// A frame to be answered from `dispatch` on.
+pub(crate) struct Task<'a, W: Stage> {
     pub isa: Isa,
     pub job: Job<'a>,
     pub answer: W::Answer,
     pub world: W,
-    pub items: &'a mut Vec<WorkItem>,
-    pub most_items: usize,
     pub scratches: &'a mut [W::Worker],
-    pub stats: &'a mut Statistics,
+    pub budget: Option<u64>,
+    /// Bytes that are held besides the room.
+    pub held: usize,
+}
+
+/// Memory of the stages from `dispatch` on; kept from frame to frame.
+#[derive(Default)]
+pub(crate) struct Room {
+    top: TopLevel,
+    items: Vec<WorkItem>,
+    stack: Vec<NodePair>,
+    body_stack: Vec<NodePair>,
+}
+
+impl Room {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.top.bytes() + size_of::<WorkItem>() * self.items.capacity()
+    }
+
+    /// Hands over all that the frame asks for.
+    pub fn run<W: Stage>(
+        &mut self,
+        task: Task<'_, W>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        let Task { answer, budget, .. } = task;
+        let held = (task.held + self.top.bytes()) as u64;
+        let most_items = answer.most_items(most_items(budget, held)?);
+        let Room {
+            top,
+            items,
+            stack,
+            body_stack,
+        } = self;
+        items.clear();
+        items.shrink_to(most_items);
+        answer.share(held + (size_of::<WorkItem>() * most_items) as u64);
+        answer.check()?;
+        let mut slabs = Slabs {
+            isa: task.isa,
+            job: task.job,
+            answer,
+            world: task.world,
+            items,
+            most_items,
+            scratches: task.scratches,
+            stats,
+            ms: 0.0,
+        };
+        slabs.run(top, stack, body_stack)?;
+        for worker in slabs.scratches {
+            W::end(worker, answer);
+        }
+        answer.check()
+    }
+}
+
+struct Slabs<'a, W: Stage> {
+    isa: Isa,
+    job: Job<'a>,
+    answer: W::Answer,
+    world: W,
+    items: &'a mut Vec<WorkItem>,
+    most_items: usize,
+    scratches: &'a mut [W::Worker],
+    stats: &'a mut Statistics,
     /// Time spent on full slabs.
-    pub ms: f64,
+    ms: f64,
 }
 
 impl<W: Stage> Slabs<'_, W> {
-    /// All that the frame asks for; pairs stay with the workers.
-    pub fn run(
+    /// All that the frame asks for; the last pairs stay with the workers.
+    fn run(
         &mut self,
         top: &mut TopLevel,
         stack: &mut Vec<NodePair>,

@@ -1,12 +1,12 @@
 //! Which bodies' boxes meet, for frames of more than two bodies.
 
+use crate::clusterings::Fit;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::hierarchy::{Entry, Shape, order};
 
 use super::bounds::TreeBounds;
 use super::dispatch::{self, NodePair, Tree};
 use super::simd::Simd;
-use super::world::STALE;
 
 /// A tree over the participants' boxes, for frames of more than two bodies. Its order is kept from
 /// frame to frame and made again when bodies have moved away from their neighbours in it.
@@ -16,7 +16,7 @@ pub(crate) struct TopLevel {
     order: Vec<u32>,
     bounds: TreeBounds,
     entries: Vec<Entry>,
-    best_spread: f64,
+    fit: Fit,
 }
 
 impl TopLevel {
@@ -50,14 +50,14 @@ impl TopLevel {
 
     /// Updates the tree to the current boxes of `n` participants.
     pub fn refit(&mut self, n: usize, root: impl Fn(u32) -> Bounds) {
-        if self.order.len() != n {
+        let is_new = self.order.len() != n;
+        if is_new {
             self.shape = Shape::new(n);
             self.bounds.resize(&self.shape);
             self.order = (0..n as u32).collect();
-            self.best_spread = 0.0;
         }
         self.refit_boxes(&root);
-        if self.spread() > STALE * self.best_spread {
+        if self.fit.is_stale(self.spread()) || is_new {
             self.entries.clear();
             self.entries.extend((0..n as u32).map(|ix| Entry {
                 center: root(ix).center(),
@@ -68,9 +68,9 @@ impl TopLevel {
                 self.order[place] = entry.number;
             }
             self.refit_boxes(&root);
-            self.best_spread = self.spread();
+            self.fit = Fit::UNKNOWN;
+            self.fit.is_stale(self.spread());
         }
-        self.best_spread = self.best_spread.min(self.spread());
     }
 
     fn refit_boxes(&mut self, root: &impl Fn(u32) -> Bounds) {

@@ -1,5 +1,6 @@
 //! Read-only view shared by all stages: the scene, its participants, and the cache kept per body.
 
+use crate::clusterings::{Fit, Kept, Store};
 use crate::elements::Elements;
 use crate::exact::Point;
 use crate::frame::{Frame, Layer};
@@ -11,9 +12,6 @@ use crate::scene::Scene;
 use super::bounds::TreeBounds;
 use super::dispatch::Tree;
 use super::remote::Remote;
-
-/// How much summed surface may grow against that of the whole before an order is made anew.
-pub(super) const STALE: f64 = 1.5;
 
 /// What is kept of a body from frame to frame.
 #[derive(Debug)]
@@ -30,12 +28,22 @@ pub(crate) struct BodyCache {
     pub remote: Option<Box<Remote>>,
     /// Half the summed surface of the clusters.
     pub surface: f64,
-    /// That over the body's, at its best so far.
-    pub best_spread: f64,
+    /// How well the clusters have fitted the body.
+    pub fit: Fit,
+}
+
+impl Kept for BodyCache {
+    fn topology_stamp(&self) -> u64 {
+        self.topology_stamp
+    }
+
+    fn n_clusters(&self) -> usize {
+        self.clustering.n_clusters()
+    }
 }
 
 /// Caches by slot of the body.
-pub(crate) type Caches = Vec<Option<Box<BodyCache>>>;
+pub(crate) type Caches = Store<BodyCache>;
 
 /// The data that the narrow stage reads, for every method.
 #[derive(Clone, Copy)]
@@ -88,10 +96,10 @@ impl<'a> World<'a> {
     /// `Clusters` only: the cache of a participant.
     #[inline(always)]
     pub(crate) fn cache(&self, participant_ix: u32) -> &'a BodyCache {
-        let slot = self.frame.layers[participant_ix as usize].id.index();
+        let layer = &self.frame.layers[participant_ix as usize];
         self.caches
-            .and_then(|caches| caches[slot].as_deref())
-            .expect("every participant was clustered")
+            .expect("by the method `Clusters` only")
+            .at(layer)
     }
 }
 

@@ -3,7 +3,9 @@
 
 use std::sync::Arc;
 
+use crate::clusterings::{Fit, Kept, Store, spread};
 use crate::error::Error;
+use crate::frame::Layer;
 use crate::grouping::bounds::{Bounds, round_down, round_up};
 use crate::grouping::clusters::Clustering;
 use crate::ids::BodyId;
@@ -12,8 +14,6 @@ use crate::run::Job;
 use crate::scene::Body;
 use crate::stats::Statistics;
 
-/// How much the clusters' surface may grow against the body's before it is clustered again.
-const STALE: f64 = 1.5;
 /// The number of clusters sampled to judge how well a body's clusters fit its pose.
 const SAMPLES: usize = 64;
 
@@ -25,22 +25,22 @@ pub struct Cached {
     pub number: u64,
     /// The stamp of the positions that were judged last.
     judged_stamp: u64,
-    /// The lowest [`spread`] so far.
-    best_spread: f64,
+    /// How well the sampled clusters have fitted the body.
+    fit: Fit,
     pub(crate) clustering: Arc<Clustering>,
 }
 
 /// Clusterings by slot of the body.
 #[derive(Debug, Default)]
 pub struct Clusterings {
-    known: Vec<Option<Box<Cached>>>,
+    known: Store<Cached>,
     n_made: u64,
 }
 
 impl Clusterings {
     /// The clustering of a body, if it is known.
     pub fn of(&self, id: BodyId) -> Option<&Cached> {
-        self.known.get(id.index())?.as_deref()
+        self.known.of(id)
     }
 
     /// Clusters bodies that are new, were re-meshed, or have flowed away from their clusters;
@@ -56,45 +56,27 @@ impl Clusterings {
         recluster: bool,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let Job {
-            scene,
-            frame,
-            workers,
-            ..
-        } = job;
-        let n_slots = frame.layers.last().map_or(0, |last| last.id.index() + 1);
-        if self.known.len() < n_slots {
-            self.known.resize_with(n_slots, || None);
-        }
-        if self.known.len() > scene.n_bodies() {
-            for (slot, cache) in self.known.iter_mut().enumerate() {
-                if !scene.holds(slot) {
-                    *cache = None;
-                }
-            }
-        }
-        for (ix, participant) in frame.layers.iter().enumerate() {
-            let body = frame.body(scene, ix);
-            let cache = &mut self.known[participant.id.index()];
-            let known = cache
-                .as_mut()
-                .filter(|cache| cache.topology_stamp == body.topology_stamp());
-            if let Some(cache) = known {
-                let is_judged = !recluster
-                    || cache.judged_stamp == body.positions_stamp()
-                    || resident.contains(&participant.id);
-                if is_judged || !cache.is_stale(body) {
-                    continue;
-                }
-                stats.n_reclustered += 1;
-            }
-            stats.n_clustered += 1;
-            self.n_made += 1;
-            let number = self.n_made;
-            let made = workers.install(body.n_primitives(), || Cached::new(body, number))?;
-            *cache = Some(Box::new(made));
-        }
-        Ok(())
+        let Clusterings { known, n_made } = self;
+        let is_stale = |cached: &mut Cached, layer: &Layer, body: &Body| {
+            recluster
+                && cached.judged_stamp != body.positions_stamp()
+                && !resident.contains(&layer.id)
+                && cached.is_stale(body)
+        };
+        known.update(job, stats, is_stale, |body, _| {
+            *n_made += 1;
+            Cached::new(body, *n_made)
+        })
+    }
+}
+
+impl Kept for Cached {
+    fn topology_stamp(&self) -> u64 {
+        self.topology_stamp
+    }
+
+    fn n_clusters(&self) -> usize {
+        self.clustering.n_clusters()
     }
 }
 
@@ -104,11 +86,13 @@ impl Cached {
         let clustering = Clustering::new(elements, |primitive| {
             bounds_of(positions, elements.corners(primitive))
         });
+        let mut fit = Fit::UNKNOWN;
+        fit.is_stale(sampled_spread(&clustering, positions));
         Cached {
             topology_stamp: body.topology_stamp(),
             number,
             judged_stamp: body.positions_stamp(),
-            best_spread: spread(&clustering, positions),
+            fit,
             clustering: Arc::new(clustering),
         }
     }
@@ -116,16 +100,14 @@ impl Cached {
     /// Whether the body has flowed away from its clusters.
     fn is_stale(&mut self, body: &Body) -> bool {
         self.judged_stamp = body.positions_stamp();
-        let spread = spread(&self.clustering, body.positions());
-        let is_stale = spread > STALE * self.best_spread;
-        self.best_spread = self.best_spread.min(spread);
-        is_stale
+        self.fit
+            .is_stale(sampled_spread(&self.clustering, body.positions()))
     }
 }
 
 /// The summed surface of evenly spaced clusters, divided by the surface of the box around them: how well the
 /// clusters fit the current pose. Every frame samples the same clusters for both.
-fn spread(clustering: &Clustering, positions: &Positions) -> f64 {
+fn sampled_spread(clustering: &Clustering, positions: &Positions) -> f64 {
     let n = clustering.n_clusters();
     let n_samples = n.min(SAMPLES);
     let mut whole = Bounds::EMPTY;
@@ -135,12 +117,7 @@ fn spread(clustering: &Clustering, positions: &Positions) -> f64 {
         sum += bounds.half_area();
         whole.join(&bounds);
     }
-    let whole = whole.half_area();
-    if whole > 0.0 && sum.is_finite() {
-        sum / whole
-    } else {
-        1.0
-    }
+    spread(sum, &whole)
 }
 
 pub fn bounds_of(positions: &Positions, corners: &[u32]) -> Bounds {

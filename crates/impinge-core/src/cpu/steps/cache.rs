@@ -1,10 +1,9 @@
 //! The cache of a layer: its clusters, and their boxes at the start and at the end of a step.
 
-use crate::clock::Instant;
+use crate::clusterings::{Fit, Kept, Store, make_anew, spread};
 use crate::cpu::bounds::{self, TreeBounds};
 use crate::cpu::dispatch::Tree;
 use crate::cpu::simd::{Isa, Simd, dispatch};
-use crate::cpu::world::STALE;
 use crate::elements::{Elements, Part};
 use crate::error::Error;
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
@@ -22,19 +21,8 @@ const CLUSTERS: usize = 128;
 /// With fewer elements of all layers together, one thread computes the boxes.
 const PARALLEL_FROM: u64 = 60_000;
 
-/// By slot of the body, then by part.
-pub(super) type Caches = Vec<[Option<Box<LayerCache>>; PARTS]>;
-
-/// Vertices, edges and faces.
-const PARTS: usize = 3;
-
-pub(super) fn part_ix(part: Part) -> usize {
-    match part {
-        Part::Vertices => 0,
-        Part::Edges => 1,
-        Part::Faces | Part::Given => 2,
-    }
-}
+/// By slot of the body, then by part: vertices, edges and faces.
+pub(super) type Caches = Store<LayerCache, 3>;
 
 /// The data kept per layer from step to step.
 #[derive(Debug)]
@@ -48,8 +36,8 @@ pub(super) struct LayerCache {
     bounds: TreeBounds,
     /// The clusters' boxes at the start, and at the end.
     ends: [BoundsArray; 2],
-    /// The clusters' summed surface over the layer's, at its best so far.
-    best_spread: f64,
+    /// How well the clusters have fitted the layer.
+    fit: Fit,
 }
 
 impl LayerCache {
@@ -75,7 +63,7 @@ impl LayerCache {
             clustering,
             bounds,
             ends,
-            best_spread: f64::INFINITY,
+            fit: Fit::UNKNOWN,
         }
     }
 
@@ -100,14 +88,19 @@ impl LayerCache {
 
     /// How well the clusters fit the current pose: the clusters' summed surface divided by the layer's.
     fn spread(&self) -> f64 {
-        let whole = self.bounds.root().half_area();
         let clusters = 0..self.clustering.n_clusters();
         let surface: f64 = clusters.map(|ix| self.ends[0].at(ix).half_area()).sum();
-        if whole > 0.0 && whole.is_finite() && surface.is_finite() {
-            surface / whole
-        } else {
-            1.0
-        }
+        spread(surface, &self.bounds.root())
+    }
+}
+
+impl Kept for LayerCache {
+    fn topology_stamp(&self) -> u64 {
+        self.topology_stamp
+    }
+
+    fn n_clusters(&self) -> usize {
+        self.clustering.n_clusters()
     }
 }
 
@@ -143,25 +136,17 @@ pub(super) fn refit<S: Send>(
     let mut is_stale = false;
     for (ix, layer) in frame.layers.iter().enumerate() {
         let body = frame.body(scene, ix);
-        let Some(cache) = &mut caches[layer.id.index()][part_ix(layer.part)] else {
-            continue;
-        };
+        let cache = caches.at_mut(layer);
         if cache.of == Some((body.step_stamp(), pose)) {
             continue;
         }
         cache.bounds.refit_above(0, &cache.clustering.shape);
         cache.of = Some((body.step_stamp(), pose));
         let spread = cache.spread();
-        if settings.recluster == Recluster::Auto && spread > STALE * cache.best_spread {
-            let start = Instant::now();
-            let n_elements = cache.clustering.order.len();
-            **cache = workers.install(n_elements, || LayerCache::new(body, layer.part))?;
-            stats.n_clustered += 1;
-            stats.n_reclustered += 1;
-            stats.add_ms("clustering", start.elapsed().as_secs_f64() * 1e3);
+        if cache.fit.is_stale(spread) && settings.recluster == Recluster::Auto {
+            let n = cache.clustering.order.len();
+            *cache = make_anew(workers, n, stats, || LayerCache::new(body, layer.part))?;
             is_stale = true;
-        } else {
-            cache.best_spread = cache.best_spread.min(spread);
         }
     }
     if is_stale {
@@ -187,9 +172,7 @@ fn find_boxes<S: Send>(
     let mut tasks = Vec::new();
     for (ix, layer) in frame.layers.iter().enumerate() {
         let body = frame.body(scene, ix);
-        let Some(cache) = &mut caches[layer.id.index()][part_ix(layer.part)] else {
-            continue;
-        };
+        let cache = caches.at_mut(layer);
         if cache.of == Some((body.step_stamp(), pose)) {
             continue;
         }
@@ -199,7 +182,7 @@ fn find_boxes<S: Send>(
             bounds,
             ends: [start, end],
             ..
-        } = &mut **cache;
+        } = cache;
         let Some(leaves) = bounds.levels.first_mut() else {
             continue;
         };
@@ -223,8 +206,7 @@ fn find_boxes<S: Send>(
     workers.for_each(&mut scratches[..n_workers], tasks.len(), |_, ix| {
         let task = tasks[ix];
         let layer = &frame.layers[task.layer];
-        let cache = &caches[layer.id.index()][part_ix(layer.part)];
-        let clustering = &cache.as_ref().expect("clustered").clustering;
+        let clustering = &caches.at(layer).clustering;
         let body = frame.body(scene, task.layer);
         dispatch!(isa, find, (
             clustering: &Clustering = clustering,

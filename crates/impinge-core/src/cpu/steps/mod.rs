@@ -19,21 +19,21 @@ mod pairing;
 mod world;
 
 use crate::error::Error;
+use crate::frame::Layer;
 use crate::grouping::hubs::Hubs;
 use crate::impacts::StepAnswer;
+use crate::scene::Body;
 use crate::settings::InstructionSet;
-use crate::sink::Ending;
 use crate::stats::Statistics;
 
-use super::dispatch::{NodePair, Tree};
+use super::dispatch::Tree;
 use super::met::WorkItem;
 use super::simd::{Isa, Simd};
-use super::slabs::{self, Counts, Slabs, Stage};
-use super::top_level::TopLevel;
+use super::slabs::{self, Counts, Room, Stage};
 use crate::run::Job;
 use crate::settings::Settings;
 
-use cache::{Caches, LayerCache, part_ix};
+use cache::{Caches, LayerCache};
 pub(crate) use hull::Pose;
 use pairing::Worker;
 pub(crate) use world::{Asked, Sought};
@@ -58,6 +58,10 @@ impl<'a> Stage for World<'a> {
         self.cache(layer).clustering.hubs()
     }
 
+    fn end(worker: &mut Worker, answer: StepAnswer<'a>) {
+        worker.end(answer);
+    }
+
     fn counts(worker: &Worker) -> Counts {
         worker.counts()
     }
@@ -71,23 +75,17 @@ impl<'a> Stage for World<'a> {
 pub(crate) struct StepClusters {
     isa: Isa,
     caches: Caches,
-    top: TopLevel,
-    items: Vec<WorkItem>,
     scratches: Vec<Worker>,
-    stack: Vec<NodePair>,
-    layer_stack: Vec<NodePair>,
+    room: Room,
 }
 
 impl StepClusters {
     pub fn new(allowed: InstructionSet) -> Self {
         StepClusters {
             isa: Isa::detect(allowed),
-            caches: Vec::new(),
-            top: TopLevel::default(),
-            items: Vec::new(),
+            caches: Caches::default(),
             scratches: Vec::new(),
-            stack: Vec::new(),
-            layer_stack: Vec::new(),
+            room: Room::default(),
         }
     }
 
@@ -109,14 +107,9 @@ impl StepClusters {
         for worker in &mut self.scratches {
             worker.begin(stats.n_clusters, settings.memory_budget.is_some());
         }
-        let held = self.bytes() as u64;
-        let most_items = slabs::most_items(settings.memory_budget, held)?;
-        self.items.clear();
-        self.items.shrink_to(most_items);
-        answer.share(held + slabs::bytes(most_items));
-        answer.check()?;
+        let held = self.bytes_besides_room();
         let known = Known::new(asked.latest);
-        let mut slabs = Slabs {
+        let task = slabs::Task {
             isa: self.isa,
             job,
             answer,
@@ -128,63 +121,26 @@ impl StepClusters {
                 known: &known,
                 caches: &self.caches,
             },
-            items: &mut self.items,
-            most_items,
             scratches: &mut self.scratches,
-            stats,
-            ms: 0.0,
+            budget: settings.memory_budget,
+            held,
         };
-        slabs.run(&mut self.top, &mut self.stack, &mut self.layer_stack)?;
-        for worker in &mut self.scratches {
-            worker.end(answer);
-        }
-        answer.check()?;
-        stats.bytes_held = (self.bytes() + size_of::<WorkItem>() * self.items.capacity()) as u64;
+        self.room.run(task, stats)?;
+        stats.bytes_held = (self.bytes_besides_room() + self.room.bytes()) as u64;
         Ok(())
     }
 
-    fn bytes(&self) -> usize {
-        let caches = self.caches.iter().flatten().flatten();
-        let caches: usize = caches.map(|cache| cache.bytes()).sum();
+    fn bytes_besides_room(&self) -> usize {
+        let caches: usize = self.caches.iter().map(LayerCache::bytes).sum();
         let scratches: usize = self.scratches.iter().map(Worker::bytes).sum();
-        caches + scratches + self.top.bytes()
+        caches + scratches
     }
 
     /// Clusters layers that are new or were re-meshed; forgets layers of removed bodies.
     fn cluster(&mut self, job: Job<'_>, stats: &mut Statistics) -> Result<(), Error> {
-        let Job {
-            scene,
-            frame,
-            workers,
-            control,
-        } = job;
-        let slots = frame.layers.iter().map(|layer| layer.id.index() + 1);
-        let n_slots = slots.max().unwrap_or(0);
-        if self.caches.len() < n_slots {
-            self.caches.resize_with(n_slots, Default::default);
-        }
-        for (slot, caches) in self.caches.iter_mut().enumerate() {
-            if !scene.holds(slot) {
-                *caches = Default::default();
-            }
-        }
-        for (ix, layer) in frame.layers.iter().enumerate() {
-            let body = frame.body(scene, ix);
-            let cache = &mut self.caches[layer.id.index()][part_ix(layer.part)];
-            let known = cache
-                .as_ref()
-                .is_some_and(|cache| cache.topology_stamp == body.topology_stamp());
-            if !known {
-                control.step(ix as u64, frame.layers.len() as u64)?;
-                let n_elements = body.part(layer.part).len();
-                let new = workers.install(n_elements, || LayerCache::new(body, layer.part))?;
-                *cache = Some(Box::new(new));
-                stats.n_clustered += 1;
-            }
-            let cache = cache.as_ref().expect("just clustered");
-            stats.n_clusters += cache.clustering.n_clusters() as u64;
-        }
-        Ok(())
+        let fits = |_: &mut LayerCache, _: &Layer, _: &Body| false;
+        let make = |body: &Body, layer: &Layer| LayerCache::new(body, layer.part);
+        self.caches.update(job, stats, fits, make)
     }
 
     /// Computes the boxes of layers that have moved.

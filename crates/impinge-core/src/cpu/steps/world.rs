@@ -7,7 +7,7 @@ use crate::impacts::StepAnswer;
 use crate::scene::Scene;
 use crate::step::{Start, Toi};
 
-use super::cache::{Caches, LayerCache, part_ix};
+use super::cache::{Caches, LayerCache};
 use super::hull::Pose;
 
 /// What to look for in a step.
@@ -101,9 +101,6 @@ impl<'a> World<'a> {
     /// The cache of a layer.
     #[inline(always)]
     pub(super) fn cache(&self, layer: u32) -> &'a LayerCache {
-        let layer = &self.frame.layers[layer as usize];
-        self.caches[layer.id.index()][part_ix(layer.part)]
-            .as_deref()
-            .expect("every layer was clustered")
+        self.caches.at(&self.frame.layers[layer as usize])
     }
 }
