@@ -96,13 +96,10 @@ impl Answer {
 }
 
 /// Rows in a list, or a `MemoryError`.
-pub fn collect<const N: usize>(
-    n: usize,
-    rows: impl Iterator<Item = [u32; N]>,
-) -> PyResult<Vec<[u32; N]>> {
+pub fn collect<T>(n: usize, rows: impl Iterator<Item = T>) -> PyResult<Vec<T>> {
     let mut list = Vec::new();
     list.try_reserve_exact(n).map_err(|_| {
-        let bytes = size_of::<[u32; N]>() * n;
+        let bytes = size_of::<T>() * n;
         PyMemoryError::new_err(format!("an array of {n} pairs needs {bytes} bytes"))
     })?;
     list.extend(rows);

@@ -126,7 +126,10 @@ impl Impacts {
     #[getter]
     fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let rows = self.inner.iter().map(impinge::Impact::row);
-        to_array(py, collect(self.inner.len(), rows.map(|[a, _, b, _]| [a, b]))?)
+        to_array(
+            py,
+            collect(self.inner.len(), rows.map(|[a, _, b, _]| [a, b]))?,
+        )
     }
 
     /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two elements in their bodies.
@@ -137,7 +140,10 @@ impl Impacts {
     #[getter]
     fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let rows = self.inner.iter().map(impinge::Impact::row);
-        to_array(py, collect(self.inner.len(), rows.map(|[_, a, _, b]| [a, b]))?)
+        to_array(
+            py,
+            collect(self.inner.len(), rows.map(|[_, a, _, b]| [a, b]))?,
+        )
     }
 
     /// numpy.ndarray of float32, or float64 after ``toi="f64"``, shape (n,) : first times in [0, 1], each
@@ -147,19 +153,23 @@ impl Impacts {
         clippy::cast_possible_truncation,
         reason = "they were rounded to f32 before"
     )]
-    fn toi<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+    fn toi<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let n = self.inner.len();
         let times = self.inner.iter().map(|impact| impact.toi);
-        match self.is_double {
-            true => PyArray1::from_vec(py, times.collect()).into_any(),
-            false => PyArray1::from_vec(py, times.map(|toi| toi as f32).collect()).into_any(),
-        }
+        Ok(match self.is_double {
+            true => PyArray1::from_vec(py, collect(n, times)?).into_any(),
+            false => {
+                let times = times.map(|toi| toi as f32);
+                PyArray1::from_vec(py, collect(n, times)?).into_any()
+            }
+        })
     }
 
     /// numpy.ndarray of bool, shape (n,) : which touch at the start, at time 0.
     #[getter]
-    fn at_start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+    fn at_start<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let at_start = self.inner.iter().map(|impact| impact.at_start);
-        PyArray1::from_vec(py, at_start.collect())
+        Ok(PyArray1::from_vec(py, collect(self.inner.len(), at_start)?))
     }
 
     /// The impact with the least time; of several, the first row.

@@ -22,6 +22,7 @@ use crate::clock::Instant;
 
 use crate::error::Error;
 use crate::grouping::bounds::Bounds;
+pub use crate::grouping::grid::MOST_ENTRIES_EACH;
 use crate::grouping::grid::{FineRange, Grid};
 use crate::progress::Control;
 use crate::query::SharedVertex;
@@ -37,8 +38,6 @@ use super::world::World;
 use crate::run::Job;
 use crate::sink::Answer;
 
-/// Entries of the cell lists a primitive, at most, on average.
-pub const MOST_ENTRIES_EACH: u64 = 16;
 /// Work items of one slab, and of one task.
 const SLAB_ITEMS: usize = 1 << 18;
 const PAIRING_TASK: usize = 32;

@@ -217,7 +217,7 @@ pub enum Groups<'a> {
 }
 
 /// The widest row of workgroups; `shared/arguments.wgsl` has the same.
-const WIDEST: u64 = 32_768;
+pub(super) const WIDEST: u64 = 32_768;
 
 impl Bound {
     /// Dispatches with the parameters of a step.

@@ -7,6 +7,7 @@ use super::buffers::Access;
 use super::kernels::*;
 use super::layout::*;
 use super::pipeline::Source;
+use crate::grouping::grid;
 
 fn parse(source: &Source) -> Module {
     let text = source.text();
@@ -144,20 +145,23 @@ fn structs_are_laid_out_as_on_the_host() {
     assert_eq!(std::mem::offset_of!(Reach, high), 16);
 }
 
+/// The value of a constant of a kernel.
+fn constant(module: &Module, name: &str) -> f64 {
+    let (_, constant) = module
+        .constants
+        .iter()
+        .find(|(_, constant)| constant.name.as_deref() == Some(name))
+        .unwrap_or_else(|| panic!("no constant {name}"));
+    match module.global_expressions[constant.init] {
+        naga::Expression::Literal(naga::Literal::U32(value)) => f64::from(value),
+        naga::Expression::Literal(naga::Literal::F32(value)) => f64::from(value),
+        ref other => panic!("{name} is {other:?}"),
+    }
+}
+
 #[test]
 fn constants_are_those_of_the_host() {
     let module = parse(&NARROW);
-    let value = |name: &str| {
-        let (_, constant) = module
-            .constants
-            .iter()
-            .find(|(_, constant)| constant.name.as_deref() == Some(name))
-            .unwrap_or_else(|| panic!("no constant {name}"));
-        match module.global_expressions[constant.init] {
-            naga::Expression::Literal(naga::Literal::U32(value)) => value,
-            ref other => panic!("{name} is {other:?}"),
-        }
-    };
     for (name, host) in [
         ("ROUNDS", ROUNDS),
         ("N_ITEMS", N_ITEMS),
@@ -177,7 +181,20 @@ fn constants_are_those_of_the_host() {
         ("GATE", GATE),
         ("FLAG", FLAG),
     ] {
-        assert_eq!(value(name), host, "{name}");
+        assert_eq!(constant(&module, name), f64::from(host), "{name}");
+    }
+}
+
+#[test]
+fn constants_of_single_kernels_are_those_of_the_host() {
+    for (source, name, host) in [
+        (&PREPARE, "WIDEST", super::pipeline::WIDEST),
+        (&GRID_RESOLUTION, "MOST_ALONG", grid::MOST_ALONG.into()),
+        (&GRID_SHIFT, "MOST_ENTRIES_EACH", grid::MOST_ENTRIES_EACH),
+    ] {
+        // All are below 2^53.
+        let host = host as f64;
+        assert_eq!(constant(&parse(source), name), host, "{name}");
     }
 }
 

@@ -15,7 +15,9 @@
 use super::bounds::Bounds;
 
 /// The most cells along one axis, so that fine coordinates fit 16 bits.
-const MOST_ALONG: u32 = 1 << 14;
+pub(crate) const MOST_ALONG: u32 = 1 << 14;
+/// The most entries of the cell lists per primitive, on average.
+pub const MOST_ENTRIES_EACH: u64 = 16;
 /// The most cells of the first level, for any lambda: 4 bytes each.
 const MOST_CELLS: u64 = 1 << 25;
 
