@@ -226,7 +226,13 @@ fn budgets_are_kept_by_slabs() {
         let pairs = free.detect(&built.scene, &query).unwrap();
         let expected = rows(pairs);
         // While it is found, the answer takes twice its size, and a part of a chunk more.
-        let held = pairs.stats().bytes_held + 8 * pairs.len() as u64 + (1 << 20);
+        let of_answer = 2 * 8 * pairs.len() as u64 + (1 << 20);
+        // Counting holds no answer: what is left is all of the method.
+        assert_eq!(
+            free.count(&built.scene, &query).unwrap(),
+            expected.len() as u64
+        );
+        let held = free.stats().bytes_held;
         // Bisect between a budget that is refused and one that is enough, to the least sufficient budget.
         let (mut refused, mut enough) = (1_000, held);
         let mut most_slabs = 0;
@@ -237,13 +243,22 @@ fn budgets_are_kept_by_slabs() {
                 ..cpu(method)
             };
             let mut detector = Detector::with_settings(settings).unwrap();
-            match detector.detect(&built.scene, &query) {
-                Ok(pairs) => {
-                    let stats = pairs.stats();
+            match detector.count(&built.scene, &query) {
+                Ok(n) => {
+                    assert_eq!(n, expected.len() as u64);
+                    let stats = detector.stats();
                     let held = stats.bytes_held;
                     assert!(held <= budget, "{method:?}: {held} held, {budget} allowed");
                     most_slabs = most_slabs.max(stats.n_slabs);
+                    let budget_of_pairs = budget + of_answer;
+                    let mut detector = Detector::with_settings(Settings {
+                        memory_budget: Some(budget_of_pairs),
+                        ..cpu(method)
+                    })
+                    .unwrap();
+                    let pairs = detector.detect(&built.scene, &query).unwrap();
                     agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+                    assert!(pairs.stats().bytes_held <= budget_of_pairs);
                     enough = budget;
                 }
                 Err(Error::MemoryBudget {
