@@ -116,6 +116,7 @@ impl Detector {
             step,
             Sought::All,
             (Pose::WHOLE, f64::INFINITY),
+            self.settings.max_pairs,
             control,
         )?;
         let Steps { impacts, found, .. } = &mut self.steps;
@@ -161,7 +162,7 @@ impl Detector {
                 ..Pose::WHOLE
             };
             let latest = first.map_or(f64::INFINITY, |first| beyond(first.toi));
-            self.find(scene, step, Sought::Earliest, (pose, latest), control)?;
+            self.find(scene, step, Sought::Earliest, (pose, latest), None, control)?;
             let found = self.steps.named(step.toi);
             first = found.chain(first).reduce(Impact::earlier);
             // All contacts up to this time have been found, and maybe some later ones.
@@ -196,6 +197,7 @@ impl Detector {
         step: &Step,
         sought: Sought,
         (pose, latest): (Pose, f64),
+        max_pairs: Option<u64>,
         control: &Control<'_>,
     ) -> Result<(), Error> {
         let Steps {
@@ -207,16 +209,13 @@ impl Detector {
             ..
         } = &mut self.steps;
         let stats = impacts.stats_mut();
-        let limits = match sought {
-            Sought::All => Limits {
-                besides: size_of::<Impact>() as u64,
-                ..self.settings.limits()
+        let limits = Limits {
+            max_pairs,
+            besides: match sought {
+                Sought::All => size_of::<Impact>() as u64,
+                _ => 0,
             },
-            // However many touch, one is wanted.
-            _ => Limits {
-                max_pairs: None,
-                ..self.settings.limits()
-            },
+            ..self.settings.limits()
         };
         contacts.begin(limits, Wanted::Pairs, std::mem::take(found));
         if self.settings.method == Method::Naive {
@@ -278,7 +277,7 @@ impl Detector {
         let start = Instant::now();
         self.begin(scene, step)?;
         let whole = (Pose::WHOLE, f64::INFINITY);
-        self.find(scene, step, Sought::Any, whole, control)?;
+        self.find(scene, step, Sought::Any, whole, None, control)?;
         self.steps.impacts.stats_mut().total_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(self.steps.found.iter().all(Vec::is_empty))
     }
@@ -356,7 +355,7 @@ impl Detector {
             if !still_touch {
                 self.begin(&trial, &step)?;
                 let whole = (Pose::WHOLE, f64::INFINITY);
-                self.find(&trial, &step, Sought::All, whole, control)?;
+                self.find(&trial, &step, Sought::All, whole, None, control)?;
                 let found = PairKind::ALL.into_iter().zip(&self.steps.found);
                 known.extend(
                     found.flat_map(|(kind, found)| found.iter().map(move |of| (kind, of.key))),
