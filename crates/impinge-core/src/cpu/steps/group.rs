@@ -49,7 +49,7 @@ impl<'a> Kept<World<'a>> for Group {
         let first = cluster * GROUP;
         with_corners!(&clustering.corners, |elements| {
             let elements = &elements[first..first + self.size];
-            // Of tetrahedra, which no step has, the fourth corner has no list.
+            // Tetrahedra, which steps never have, would have no list for their fourth corner.
             self.n_corners = elements.first().map_or(0, |corners| corners.len().min(3));
             for (k, lanes) in self.corners.iter_mut().enumerate().take(self.n_corners) {
                 // Lanes without an element hold a vertex that there is.

@@ -379,7 +379,7 @@ impl Settler {
         places: Places,
         span: [f64; 2],
     ) {
-        // Others need not be looked at beyond this.
+        // Other pairs need not be searched beyond this time.
         world.known.found(world.asked.sought, span[1]);
         let time = match (world.asked.sought, world.asked.toi) {
             (Sought::Any, _) => Some(span[0]),

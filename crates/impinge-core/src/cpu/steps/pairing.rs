@@ -1,5 +1,5 @@
-//! Stages `pairing` and `narrow` of steps: which elements of two clusters have boxes that meet at both ends, and what
-//! becomes of those that do.
+//! Stages `pairing` and `narrow` of steps: finds the elements of two clusters that are not beside each other at both ends,
+//! and settles them.
 //!
 //! 1. Elements of either cluster that do not meet the other cluster's box drop out.
 //! 2. The boxes of one side's survivors are put side by side, and each survivor of the other side, the smaller one, is
@@ -27,7 +27,7 @@ use super::world::World;
 /// The narrow stage is timed for one work item in this many.
 const SAMPLED: u32 = 16;
 
-/// What one worker has of its own.
+/// The state of one worker.
 #[derive(Debug)]
 pub(crate) struct Worker {
     groups: GroupCache<Group>,

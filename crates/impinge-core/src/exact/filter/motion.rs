@@ -30,7 +30,7 @@ pub struct Motion<T: Number> {
     n_corners: usize,
     /// At the start and at the end.
     corners: [[[T; 3]; 4]; 2],
-    /// From each corner to the next. Of a parallelogram two: the others are their opposites.
+    /// From each corner to the next. Only two for a parallelogram: the others are their opposites.
     edges: [[[T; 3]; 3]; 2],
     /// The largest coordinate of a corner, at either end.
     corner_sizes: [T; 4],
@@ -196,7 +196,7 @@ impl<T: Number> Motion<T> {
         motion
     }
 
-    /// How many edges are kept.
+    /// The number of edges that are stored.
     #[inline(always)]
     fn n_edges(&self) -> usize {
         if self.n_corners == 3 { 3 } else { 2 }

@@ -83,7 +83,7 @@ pub enum Next {
 
 /// The shortest interval that is looked at, in parts of the whole.
 const SHORTEST: f64 = 1.0 / 4096.0;
-/// Steps of a search before a pair is unsure.
+/// The most steps of a search; then a pair is unsure.
 const N_STEPS: u32 = 48;
 
 impl Search {

@@ -130,7 +130,7 @@ pub fn first_contact(pair: ElementPair, start: &[Point; 4], end: &[Point; 4]) ->
     }
     match search_contact(pair, start, end) {
         (Next::Apart, _) => None,
-        // One root of f is between these times, and they are none: it is the first contact.
+        // One root of f lies between these times, which are not roots: it is the first contact.
         (Next::Contact, [low, high]) => {
             let polygon = Polygon::new(pair.corners(), start, end);
             Some(Contact::later(polygon.time_between(low, high)))
