@@ -45,7 +45,9 @@ def test_the_same_bytes_as_the_cpu(device, method, dtype):
         assert truth.stats.backend == "cpu"
 
 
-def test_a_device_that_is_not_there():
+@pytest.mark.parametrize("backend", ["gpu", "auto"])
+def test_a_device_that_is_not_there(backend):
     with pytest.raises(RuntimeError, match="no such adapter"):
-        impinge.Detector(backend="gpu", device="no such adapter")
-    assert impinge.Detector(device="no such adapter").detect(impinge.Scene()).stats.backend == "cpu"
+        impinge.Detector(backend=backend, device="no such adapter")
+    detector = impinge.Detector(backend="cpu", device="no such adapter")
+    assert detector.detect(impinge.Scene()).stats.backend == "cpu"
