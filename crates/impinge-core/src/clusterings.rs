@@ -20,7 +20,7 @@ const STALE: f64 = 1.5;
 
 /// What a backend keeps of a body, or of a part of it.
 pub(crate) trait Kept: Send {
-    /// The topology that was clustered.
+    /// The stamp of the topology that was clustered.
     fn topology_stamp(&self) -> u64;
 
     /// How many clusters there are.

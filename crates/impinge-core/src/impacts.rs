@@ -17,7 +17,7 @@ pub(crate) struct Found<V> {
     pub value: V,
 }
 
-/// What was found, by kind of pair.
+/// Contacts found, by kind of pair.
 pub(crate) type FoundByKind<V = Contact> = [Vec<Found<V>>; PairKind::ALL.len()];
 
 /// Where contacts go while a step is being answered, by kind of pair.
@@ -71,7 +71,7 @@ impl Ending for StepAnswer<'_> {
     }
 }
 
-/// What global numbers stand for.
+/// Maps global numbers to elements of bodies.
 #[derive(Debug, Clone, Default)]
 struct Numbering {
     /// Bodies, and the first number of each of their layers.
@@ -292,7 +292,7 @@ impl Candidates {
         (size_of::<u64>() * n) as u64
     }
 
-    /// How many there are of all kinds.
+    /// The number of candidates of all kinds.
     pub fn len(&self) -> usize {
         self.keys.iter().map(Vec::len).sum()
     }

@@ -6,7 +6,7 @@
 
 pub mod clock;
 mod clusterings;
-// Types are documented; fields and small methods of the inside speak for themselves.
+// Types are documented; internal fields and small methods are self-explanatory.
 mod advance;
 pub mod contact;
 #[allow(missing_docs)]

@@ -74,7 +74,7 @@ pub struct FrameLoop {
 }
 
 impl FrameLoop {
-    /// With `threads` workers; 0 for one per core.
+    /// Creates a loop with `threads` workers; 0 for one per core.
     pub fn new(threads: usize, limits: Limits) -> Self {
         FrameLoop {
             frame: Frame::default(),
@@ -152,7 +152,7 @@ impl FrameLoop {
         self.n_pairs
     }
 
-    /// The threads, for answers that are found otherwise.
+    /// The threads, for answers found without this loop.
     pub fn workers(&self) -> &Workers {
         &self.workers
     }

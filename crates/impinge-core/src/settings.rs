@@ -119,7 +119,7 @@ impl Settings {
         }
     }
 
-    /// Whether everything is in its range.
+    /// Refuses settings that are out of range.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let refuse = |setting, given: String, allowed| {
             Err(Error::Setting {

@@ -218,7 +218,7 @@ impl Workers {
         if !self.wakes.load(Ordering::Relaxed) {
             return;
         }
-        // Within a region it is a helper that calls, or another thread.
+        // Within a region the calling thread is a helper, or another thread.
         if !self.crew.busy.load(Ordering::Relaxed) {
             self.crew.places.caller_is_here();
         }
@@ -245,7 +245,7 @@ impl Workers {
 struct Claims(AtomicU64);
 
 impl Claims {
-    /// The next task that nobody has taken.
+    /// The next task that no worker has taken.
     fn next(&self, n_tasks: usize, from_front: bool) -> Option<usize> {
         const BACK: u64 = 1 << 32;
         let step = if from_front { 1 } else { BACK };
@@ -262,7 +262,7 @@ impl Claims {
     }
 }
 
-/// The first of some scratches, one a worker.
+/// Points to the first of the scratches, one per worker.
 struct Scratches<S>(*mut S);
 
 // SAFETY: each worker takes a different scratch, and `S` may be sent to it.
@@ -277,17 +277,17 @@ impl<S> Scratches<S> {
     }
 }
 
-/// What all workers do in a region, each called with its number.
+/// The work of a region: all workers call it, each with its number.
 type Work<'a> = dyn Fn(usize) + Sync + 'a;
 
-/// What caller and helpers share.
+/// The state that caller and helpers share.
 ///
 /// The gate holds whether a region is open (bit 0), how many helpers are in it (bits 1 to 31), and the region's
-/// number (above). A helper enters an open gate only; the caller closes it and waits until all are out,
-/// so the region's work outlives everyone in it.
+/// number (above). A helper enters only through an open gate. The caller closes it and waits until all helpers are
+/// out, so the region's work outlives every helper in it.
 struct Crew {
     gate: AtomicU64,
-    /// Valid while the gate is open or somebody is inside.
+    /// Valid while the gate is open or a helper is inside.
     work: UnsafeCell<Option<*const Work<'static>>>,
     /// Whether the caller is in a region.
     busy: AtomicBool,
@@ -306,8 +306,8 @@ const INSIDE: u64 = 2;
 const INSIDE_MASK: u64 = (1 << 32) - INSIDE;
 const REGION: u64 = 1 << 32;
 
-// SAFETY: `work` is written by the one caller whose `busy` it is, while the gate is closed and nobody is inside; it
-// is read by those who entered an open gate.
+// SAFETY: only the one caller that has set `busy` writes `work`, while the gate is closed and no helper is inside; only
+// helpers that entered an open gate read it.
 unsafe impl Send for Crew {}
 // SAFETY: as above.
 unsafe impl Sync for Crew {}
@@ -332,18 +332,18 @@ impl Crew {
             .store(time.as_nanos() as u64, Ordering::Relaxed);
     }
 
-    /// Does some work as worker 0, with those helpers that come. Panics if one of them did.
+    /// Does the work as worker 0, together with the helpers that come. Panics if one of them did.
     fn region(&self, work: &Work<'_>) {
         if self.busy.swap(true, Ordering::Acquire) {
-            // A region within a region, or of another thread: helpers are taken.
+            // A region within a region, or of another thread: the helpers are busy.
             return work(0);
         }
-        // One that was left behind when the caller's own part panicked.
+        // Drop a panic that was left over when the caller's own part panicked.
         *self.panic() = None;
-        // SAFETY: only the lifetime changes; `Closing` sees to it that everybody is out before it ends.
+        // SAFETY: only the lifetime changes; `Closing` makes sure that all helpers are out before it ends.
         let work_ptr =
             unsafe { std::mem::transmute::<*const Work<'_>, *const Work<'static>>(work) };
-        // SAFETY: the gate is closed and nobody inside; `busy` keeps other callers off.
+        // SAFETY: the gate is closed and no helper is inside; `busy` excludes other callers.
         unsafe { *self.work.get() = Some(work_ptr) };
         let number = self.gate.load(Ordering::Relaxed) & !(REGION - 1);
         self.gate
@@ -361,7 +361,7 @@ impl Crew {
         self.panic.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A helper's life.
+    /// The loop of a helper thread.
     fn serve(&self, seat: usize) {
         self.places.helper_is_here(seat);
         let mut last_region = 0;
@@ -401,8 +401,8 @@ impl Crew {
         }
     }
 
-    /// Sleeps until called, unless something has happened since the helper looked at the gate. A call that comes
-    /// too early for it to be seen is lost: the region goes on without this helper.
+    /// Sleeps until called, unless the gate has changed since the helper read it as `seen`. A call that comes before the
+    /// helper has announced its sleep is lost: the region goes on without this helper.
     fn sleep(&self, seat: usize, seen: u64) {
         self.asleep[seat - 1].store(true, Ordering::Relaxed);
         fence(Ordering::SeqCst);
@@ -412,9 +412,9 @@ impl Crew {
         self.asleep[seat - 1].store(false, Ordering::Relaxed);
     }
 
-    /// The work of the region that is open.
+    /// Does the work of the open region.
     fn help(&self, seat: usize) {
-        // SAFETY: the helper is inside, so the caller waits for it, and the work lives.
+        // SAFETY: the helper is inside, so the caller waits for it and the work is alive.
         let work = unsafe { (*self.work.get()).map(|work| &*work) };
         let Some(work) = work else { return };
         if let Err(payload) = catch_unwind(AssertUnwindSafe(|| work(seat))) {
@@ -423,7 +423,7 @@ impl Crew {
     }
 }
 
-/// Closes the gate and waits until everybody is out, also when the caller's part of the work panics.
+/// Closes the gate and waits until all helpers are out, even if the caller's part of the work panics.
 struct Closing<'a>(&'a Crew);
 
 impl Drop for Closing<'_> {

@@ -41,7 +41,7 @@ pub(crate) fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
     }
 }
 
-/// Coordinates looked at together in [`of_run`]: several registers of them hide the latency.
+/// Coordinates processed together in [`of_run`]: several registers hide the latency.
 const TOGETHER: usize = 24;
 
 /// The box of a run of a body's vertices.
@@ -82,7 +82,7 @@ pub(crate) fn of_run(positions: &Positions, run: std::ops::Range<usize>) -> Boun
 /// A summary of some clusters.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Summary {
-    /// The box of all of them.
+    /// The box of all of these vertices.
     pub bounds: Bounds,
     /// Half their summed surface; infinite if squares of extents overflow.
     pub surface: f32,

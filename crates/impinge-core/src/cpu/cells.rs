@@ -38,7 +38,7 @@ use super::world::World;
 use crate::run::Job;
 use crate::sink::Answer;
 
-/// Work items of one slab, and of one task.
+/// Work items per slab, and per task.
 const SLAB_ITEMS: usize = 1 << 18;
 const PAIRING_TASK: usize = 32;
 

@@ -63,7 +63,7 @@ pub(crate) struct Run {
 }
 
 impl Run {
-    /// Runs of `n` things of a participant.
+    /// Cuts `n` primitives or vertices of a participant into runs.
     pub fn cut(participant: usize, n: u32, length: u32) -> impl Iterator<Item = Run> {
         (0..n).step_by(length as usize).map(move |first| Run {
             participant: participant as u32,
@@ -73,7 +73,7 @@ impl Run {
     }
 }
 
-/// The map and the memory for it.
+/// The map and its memory.
 #[derive(Default)]
 pub(crate) struct Cull {
     /// From coordinates to cells.

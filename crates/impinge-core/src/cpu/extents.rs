@@ -38,7 +38,7 @@ pub(super) fn clear(members: &mut [Members], groups: Groups) {
     }
 }
 
-/// How far some vertices reach, and those of each group.
+/// The extents of some vertices, and of those of each group.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Extents {
     /// The box of all of these vertices.

@@ -27,7 +27,7 @@ struct MetLanes {
     b: [u8; MOST_MET],
 }
 
-/// All of one group with all of the other, and what is written or read beyond the last of them.
+/// All pairs of two groups, and room for lanes that are written or read past the last pair.
 const MOST_MET: usize = GROUP * GROUP + GROUP;
 
 impl Default for MetLanes {
@@ -39,7 +39,7 @@ impl Default for MetLanes {
     }
 }
 
-/// The group whose lanes are rows.
+/// The group whose lanes are the rows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Side {
     A,
@@ -47,7 +47,7 @@ pub(crate) enum Side {
 }
 
 impl Met {
-    /// A lane of one group with some of the other.
+    /// Appends a lane of one group with some lanes of the other.
     #[inline(always)]
     pub fn push_row<S: Simd>(&mut self, simd: S, side: Side, row: usize, mask: u64) {
         let MetLanes { a, b } = &mut *self.lanes;
@@ -118,7 +118,7 @@ impl Met {
         [self.lanes.a[ix], self.lanes.b[ix]]
     }
 
-    /// The lanes of candidates from `first` on; those past the last one are any lanes.
+    /// The lanes of candidates from `first` on; past the last candidate they are arbitrary.
     #[inline(always)]
     pub fn batch(&self, first: usize) -> [&[u8; BATCH]; 2] {
         let MetLanes { a, b } = &*self.lanes;

@@ -33,7 +33,7 @@ use super::world::{BodyRef, World};
 /// The narrow stage is timed for one work item in this many: reading the clock takes longer than some items.
 const SAMPLED: u32 = 16;
 
-/// What one worker has of its own.
+/// The state of one worker.
 #[derive(Debug, Default)]
 pub(crate) struct Worker {
     pub settler: Settler,
@@ -47,7 +47,7 @@ pub(crate) struct Worker {
 }
 
 impl Worker {
-    /// Makes ready for a frame of so many clusters.
+    /// Prepares for a frame of `n_clusters` clusters.
     pub fn begin(&mut self, n_clusters: u64, in_budget: bool, answer: &Arc<Answer>) {
         self.settler.begin(answer);
         self.n_settled = 0;

@@ -357,7 +357,7 @@ fn sort(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker]) {
     let mut caches = caches.iter_mut();
     for (ix, participant) in frame.layers.iter().enumerate() {
         let slot = participant.id.index();
-        // They come in the order of their slots.
+        // Participants come in the order of their slots.
         let cache = caches.find(|(other, _)| *other == slot);
         let Some((_, cache)) = cache else {
             continue;

@@ -4,18 +4,19 @@
 
 use crate::grouping::bounds::{greater, lesser};
 
-/// Vertices read together.
+/// Vertices per run: they are read together.
 pub(crate) const RUN: usize = 16;
 /// Their coordinates.
 pub(crate) const COORDINATES: usize = 3 * RUN;
 /// Coordinates in a row of members: the bits of a u16.
 pub(crate) const ROW: usize = u16::BITS as usize;
 
-/// Which coordinates of a run belong to a group: those along x of what is beside others along x, and so on. One bit
-/// each, in rows, first those of the groups below, then above; a vertex of several clusters may be in several groups.
+/// Which coordinates of a run belong to a group: the x of vertices in groups that lie beside others along x, and likewise
+/// for y and z. One bit per coordinate, in rows: first those of the groups below, then above. A vertex of several clusters
+/// may be in several groups.
 pub(crate) type Members = [[u16; COORDINATES / ROW]; 2];
 
-/// What a kernel finds, coordinate by coordinate of a run.
+/// The results of a kernel, one per coordinate of a run.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub(crate) struct RunExtents {

@@ -66,13 +66,13 @@ pub(crate) trait Stage: Copy + Sync {
     /// Lets a worker hand over what it has found and not handed over yet.
     fn end(worker: &mut Self::Worker, answer: Self::Answer);
 
-    /// What a worker has counted.
+    /// The counts of a worker.
     fn counts(worker: &Self::Worker) -> Counts;
 
     /// The hubs of a layer: vertices that very many elements name.
     fn hubs(&self, layer: u32) -> Option<&Hubs>;
 
-    /// What is left to do when all work items are settled.
+    /// Called when all work items are settled, for the rest of the work.
     fn finish(
         &self,
         _: Job<'_>,

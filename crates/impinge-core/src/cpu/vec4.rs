@@ -4,7 +4,7 @@ use crate::grouping::bounds::Bounds;
 #[cfg(not(target_arch = "x86_64"))]
 use crate::grouping::bounds::{greater, lesser};
 
-/// x, y, z and a fourth number that nobody looks at.
+/// x, y, z and a fourth number that is ignored.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
 pub(super) struct Vec4(pub(super) std::arch::x86_64::__m128);
@@ -13,11 +13,11 @@ pub(super) struct Vec4(pub(super) std::arch::x86_64::__m128);
 impl Vec4 {
     #[inline(always)]
     pub(super) fn splat(x: f32) -> Self {
-        // SAFETY: SSE2 belongs to every x86-64 processor (here and below).
+        // SAFETY: every x86-64 processor has SSE2 (here and below).
         Vec4(unsafe { std::arch::x86_64::_mm_set1_ps(x) })
     }
 
-    /// One vertex. All but the last are read as 16 bytes, the fourth number being the next
+    /// Loads one vertex. All but the last are read as 16 bytes: the fourth number is the next
     /// vertex's x.
     #[inline(always)]
     pub(super) fn load(positions: &[[f32; 3]], vertex: usize) -> Self {
@@ -120,8 +120,8 @@ impl Vec4 {
     }
 }
 
-/// The box of some vertices, and whether all are certainly finite. The latter costs one addition: a
-/// sum is finite only if all its terms are. (It may overflow on finite ones: then they are looked at.)
+/// The box of some vertices, and whether all are certainly finite. The latter costs one addition per vertex:
+/// a sum is finite only if all its terms are. (If a sum of finite terms overflows, they are checked one by one.)
 #[inline]
 pub(crate) fn of_vertices_f32(positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
     const CHAINS: usize = 4;

@@ -13,7 +13,7 @@ use super::bounds::TreeBounds;
 use super::dispatch::Tree;
 use super::remote::Remote;
 
-/// What is kept of a body from frame to frame.
+/// The data kept per body from frame to frame.
 #[derive(Debug)]
 pub(crate) struct BodyCache {
     /// The stamp of the topology that was clustered.

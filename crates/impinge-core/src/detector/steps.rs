@@ -387,7 +387,7 @@ impl Detector {
                 frame,
                 layer,
                 corners: match part {
-                    // They are numbered as positions are.
+                    // Vertices are numbered as positions are.
                     Part::Vertices => std::slice::from_ref(place),
                     _ => frame.body(scene, layer).part(part).corners(*place as usize),
                 },

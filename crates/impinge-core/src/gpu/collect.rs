@@ -223,7 +223,7 @@ fn append<K: bytemuck::Pod>(keys: &mut Vec<K>, bytes: &[u8]) {
     keys.extend(each.map(bytemuck::pod_read_unaligned::<K>));
 }
 
-/// Maps the front of a buffer for reading.
+/// Maps the first bytes of a buffer for reading.
 pub async fn map(buffer: &wgpu::Buffer, bytes: u64) -> Result<wgpu::BufferView, Error> {
     let mapping = Mapping::default();
     let shared = Arc::clone(&mapping.0);

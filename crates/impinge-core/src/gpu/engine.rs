@@ -176,7 +176,7 @@ impl Engine {
             let Some(before) = before else {
                 return Err(error);
             };
-            // What its passes have given so far is given again.
+            // Drop the keys found so far: `Clusters` finds them again.
             answer.forget();
             let n_reruns = stats.n_slabs + stats.n_reruns;
             *stats = before;

@@ -249,7 +249,7 @@ pub(crate) trait Simd: Copy {
         mask
     }
 
-    /// The box of some vertices, and whether all are certainly finite, as [`of_vertices_f32`] finds them.
+    /// The box of some vertices, and whether all are certainly finite: the results of [`of_vertices_f32`].
     ///
     /// # Panics
     /// If there is no such vertex.
