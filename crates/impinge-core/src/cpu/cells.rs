@@ -50,7 +50,7 @@ pub trait Rule: Sync {
     /// The pairs that the rule is asked about.
     fn asked(&self) -> Asked;
 
-    /// Whether such a pair is a candidate here. What the rule appends to `keys` ends up in the answer.
+    /// Whether such a pair is a candidate here. Keys that the rule appends to `keys` become part of the answer.
     fn admits(&self, a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool;
 }
 
@@ -109,7 +109,7 @@ impl Cells {
         }
     }
 
-    /// Hands over the keys of all pairs that the frame asks for, as the rule has it.
+    /// Hands over the keys of all pairs that the frame asks for and the rule admits.
     ///
     /// # Errors
     /// A memory budget too small for a slab; cancellation.
@@ -204,7 +204,7 @@ impl Cells {
                     budget,
                 });
             }
-            // Half of what is to spare is left for the answer.
+            // Half of the remaining bytes is left for the answer.
             let room = n + 3 + (budget - needed) / 2 / 4;
             most_entries = most_entries.min((room / 2).max(n));
             most_cells = room - (room / 2).max(n);

@@ -1,4 +1,4 @@
-//! What goes from stage to stage: two clusters that may meet, and the lanes of their elements whose boxes do.
+//! The data passed from stage to stage: two clusters that may meet, and the lanes of their elements whose boxes do.
 
 use crate::exact::filter::BATCH;
 use crate::grouping::GROUP;
@@ -60,7 +60,7 @@ impl Met {
         self.n += simd.list_lanes(mask, list);
     }
 
-    /// As `push_row`, where bit k of the mask stands for the lane `map[k]`.
+    /// As `push_row`, but bit k of the mask stands for lane `map[k]`.
     #[inline(always)]
     pub fn push_mapped_row<S: Simd>(
         &mut self,

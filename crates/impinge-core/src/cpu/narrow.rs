@@ -42,7 +42,7 @@ pub struct Candidate {
 const FULL: usize = 1024;
 /// The most candidates: the last work item may add this many more than [`FULL`].
 const MOST: usize = FULL + GROUP * GROUP;
-/// Keys that may gather: a block but for one, those of a work item, those of its candidates.
+/// The most keys: a block less one, plus those of a work item, plus those of the waiting candidates.
 const MOST_KEYS: usize = BLOCK + GROUP * GROUP + MOST;
 
 /// One worker's candidates, pairs and counts.
@@ -51,7 +51,7 @@ pub struct Settler {
     /// Keys of pairs that intersect, handed over in blocks.
     pub keys: Vec<u64>,
     answer: Option<Arc<Answer>>,
-    /// Keys that make a block.
+    /// Keys per block.
     block: usize,
     /// Candidates that were settled.
     pub n_candidates: u64,
@@ -67,7 +67,7 @@ pub struct Settler {
 }
 
 impl Settler {
-    /// Makes ready for a frame. Candidates and keys get all the room that they may ever need.
+    /// Prepares for a frame. Candidates and keys get all the room that they may ever need.
     pub fn begin(&mut self, answer: &Arc<Answer>) {
         self.answer = Some(Arc::clone(answer));
         self.block = answer.block();
@@ -82,7 +82,7 @@ impl Settler {
         self.busy = Duration::ZERO;
     }
 
-    /// Ends a frame: hands over the keys that are left.
+    /// Ends a frame: hands over the remaining keys.
     pub fn end(&mut self) {
         if let Some(answer) = self.answer.take() {
             answer.take(&mut self.keys);

@@ -1,12 +1,12 @@
-//! Runs of sixteen vertices as they lie in memory: 48 coordinates whose axes take turns, and which of them belong to a group.
+//! Runs of sixteen vertices as they lie in memory: 48 coordinates, interleaved x, y, z, and which of them belong to a group.
 //!
-//! `extents` makes boxes and intervals of what is found; each instruction set has a kernel of its own.
+//! `extents` turns the results into boxes and intervals; each instruction set has its own kernel.
 
 use crate::grouping::bounds::{greater, lesser};
 
 /// Vertices per run: they are read together.
 pub(crate) const RUN: usize = 16;
-/// Their coordinates.
+/// Coordinates per run.
 pub(crate) const COORDINATES: usize = 3 * RUN;
 /// Coordinates in a row of members: the bits of a u16.
 pub(crate) const ROW: usize = u16::BITS as usize;

@@ -31,8 +31,8 @@ const TASKS_EACH: usize = 12;
 /// With fewer work items, one worker takes them all.
 const PARALLEL_FROM: usize = 64;
 
-/// How many work items a slab may hold within the budget, when `held` bytes are held besides. An eighth of what is to
-/// spare is for work items, the rest for the answer.
+/// How many work items a slab may hold within the budget, if `held` bytes are held besides. An eighth of the remaining
+/// bytes is for work items, the rest for the answer.
 fn most_items(budget: Option<u64>, held: u64) -> Result<usize, Error> {
     let Some(budget) = budget else {
         return Ok(MOST_ITEMS);
@@ -54,7 +54,7 @@ fn most_items(budget: Option<u64>, held: u64) -> Result<usize, Error> {
 pub(crate) trait Stage: Copy + Sync {
     /// The state of one worker.
     type Worker: Send;
-    /// Where workers hand over what they find.
+    /// Where workers hand over the keys that they find.
     type Answer: Ending;
 
     /// The tree over the clusters of a layer.
@@ -63,7 +63,7 @@ pub(crate) trait Stage: Copy + Sync {
     /// Pairs the elements of some work items, and settles the candidates.
     fn pair<S: Simd>(self, simd: S, isa: Isa, items: &[WorkItem], worker: &mut Self::Worker);
 
-    /// Lets a worker hand over what it has found and not handed over yet.
+    /// Lets a worker hand over the rest of its keys.
     fn end(worker: &mut Self::Worker, answer: Self::Answer);
 
     /// The counts of a worker.
@@ -169,7 +169,7 @@ pub(crate) struct Task<'a, W: Stage> {
     pub world: W,
     pub scratches: &'a mut [W::Worker],
     pub budget: Option<u64>,
-    /// Bytes that are held besides the room.
+    /// Bytes held besides the room.
     pub held: usize,
 }
 
@@ -188,7 +188,7 @@ impl Room {
         self.top.bytes() + size_of::<WorkItem>() * self.items.capacity()
     }
 
-    /// Hands over all that the frame asks for.
+    /// Hands over all pairs that the frame asks for.
     pub fn run<W: Stage>(
         &mut self,
         task: Task<'_, W>,
@@ -240,7 +240,7 @@ struct Slabs<'a, W: Stage> {
 }
 
 impl<W: Stage> Slabs<'_, W> {
-    /// All that the frame asks for; the last pairs stay with the workers.
+    /// Finds all pairs that the frame asks for; the last ones stay with the workers.
     fn run(
         &mut self,
         top: &mut TopLevel,

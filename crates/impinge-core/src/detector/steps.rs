@@ -329,9 +329,9 @@ impl Detector {
         let last_bit = f64::from(if single { f32::EPSILON } else { 0.0 }).max(f64::EPSILON);
         let mut trial = scene.clone();
         let mut back_off = 0.0;
-        // Pairs that touched on the way to positions tried before: most likely they do again.
+        // Pairs that touched on the path to positions tried before: they probably do again.
         let mut known: Vec<(PairKind, u64)> = Vec::new();
-        // Of their times nothing is needed.
+        // Their times are not needed.
         let step = step.toi(Toi::F32);
         loop {
             advance.fraction = first.toi * (1.0 - back_off);

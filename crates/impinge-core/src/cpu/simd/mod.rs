@@ -200,7 +200,7 @@ pub(crate) trait Simd: Copy {
     /// Bit `k`: lane `k` equals `query`; only lanes of `among` are tested.
     fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64;
 
-    /// Writes `map[k]` for each lane k of a mask, lowest first, and anything after them; returns how many there are.
+    /// Writes `map[k]` for each lane k of a mask, lowest first; the rest of the list is arbitrary. Returns the number of lanes.
     #[inline(always)]
     fn list_mapped(self, mask: u64, map: &[u8; GROUP], list: &mut [u8; GROUP]) -> usize {
         let mut n = 0;
@@ -211,7 +211,7 @@ pub(crate) trait Simd: Copy {
         n
     }
 
-    /// Writes the lanes of a mask, lowest first, and anything after them.
+    /// Writes the lanes of a mask, lowest first; the rest of the list is arbitrary.
     #[inline(always)]
     fn keep_16(self, mask: u16, lanes: &[u8; BATCH], list: &mut [u8; BATCH]) {
         for (place, lane) in Lanes(mask.into()).enumerate() {
@@ -219,7 +219,7 @@ pub(crate) trait Simd: Copy {
         }
     }
 
-    /// The boxes in the lanes of a mask, side by side, and anything after them.
+    /// Writes the boxes in the lanes of a mask side by side; the boxes after them are arbitrary.
     #[inline(always)]
     fn put_survivors(self, boxes: &LaneBounds, mask: u64, into: &mut LaneBounds) {
         for axis in 0..3 {
@@ -230,8 +230,8 @@ pub(crate) trait Simd: Copy {
         }
     }
 
-    /// Bit `k`: some corner of the element `places_a[k]` is one of `places_b[k]`. Places are below [`GROUP`], or anything
-    /// where nobody looks at the bit.
+    /// Bit `k`: some corner of the element `places_a[k]` is a corner of `places_b[k]`. Places are below [`GROUP`], except
+    /// those whose bits are ignored.
     #[inline(always)]
     fn share_16(self, [a, b]: [&[Lanes32]; 2], [places_a, places_b]: [&[u8; BATCH]; 2]) -> u16 {
         let mut mask = 0;
@@ -275,7 +275,7 @@ pub(crate) trait Simd: Copy {
         into: &mut Triangles64,
     );
 
-    /// The first `n` of some vertices as rows of x, y and z, and any vertices after them.
+    /// The first `n` of some vertices as rows of x, y and z; the rest of the rows is arbitrary.
     ///
     /// # Panics
     /// If there is no such vertex.

@@ -313,7 +313,7 @@ unsafe fn of_ascending(positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, boo
     }
 }
 
-/// A number per axis, in all lanes.
+/// One number per axis, in all lanes.
 ///
 /// # Safety
 /// The caller must be compiled for AVX-512.

@@ -24,7 +24,7 @@ pub(super) struct Group {
     pub corners: [Lanes32; 3],
     pub n_corners: usize,
     pub size: usize,
-    /// Their points at the start and at the end, where they are `in_tables`: where positions are `f32`.
+    /// The elements' points at the start and at the end, if `in_tables`: if positions are `f32`.
     pub points: Moving64,
     pub in_tables: bool,
 }
@@ -52,7 +52,7 @@ impl<'a> Kept<World<'a>> for Group {
             // Tetrahedra, which steps never have, would have no list for their fourth corner.
             self.n_corners = elements.first().map_or(0, |corners| corners.len().min(3));
             for (k, lanes) in self.corners.iter_mut().enumerate().take(self.n_corners) {
-                // Lanes without an element hold a vertex that there is.
+                // Lanes without an element hold a vertex that exists.
                 let of_first = elements[0][k];
                 for (lane, corners) in elements.iter().enumerate() {
                     lanes.0[lane] = corners[k];

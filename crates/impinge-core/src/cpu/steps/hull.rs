@@ -84,7 +84,7 @@ impl Pose {
         }
     }
 
-    /// [`close`](Self::close) for the boxes of a group, of so many elements: in `f32`, rounded outward by more.
+    /// [`close`](Self::close) for the boxes of a group of `size` elements: in `f32`, rounded farther outward.
     #[inline(always)]
     pub fn close_all(self, [start, end]: [&mut LaneBounds; 2], size: usize) {
         if self.is_plain() {
@@ -123,8 +123,8 @@ impl Pose {
         for lane in 0..GROUP {
             let (x, y) = (start[lane], end[lane]);
             let between = x + until * (y - x);
-            // Four roundings, of numbers no larger than the sum of both sizes. No further out than both ends; those count
-            // where what is between overflows.
+            // Four roundings of numbers up to the sum of both sizes. Not farther out than both ends, which also count
+            // if the interpolation overflows.
             let slack = SLACK * (x.abs() + y.abs()) + f32::MIN_POSITIVE;
             end[lane] = if ARE_LOW {
                 greater(between - slack, lesser(x, y))
@@ -148,7 +148,7 @@ impl Pose {
     }
 }
 
-/// By how much boxes of elements are rounded outward, in parts of their coordinates: 2^-20, sixteen unit roundoffs.
+/// By how much boxes of elements are rounded outward, relative to their coordinates: 2^-20, sixteen unit roundoffs.
 const SLACK: f32 = 1.0 / 1_048_576.0;
 
 #[allow(

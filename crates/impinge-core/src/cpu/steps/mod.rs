@@ -89,7 +89,7 @@ impl StepClusters {
         }
     }
 
-    /// Hands over what is sought.
+    /// Hands over the contacts or candidates that are sought.
     pub fn run(
         &mut self,
         job: Job<'_>,

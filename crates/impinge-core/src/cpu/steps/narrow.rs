@@ -8,8 +8,8 @@
 //! enclose  eight candidates: contact or none, and when, nearly always to all bits of an f32
 //! ```
 //!
-//! The last two take turns, on lists of a thousand pairs, so that no lane waits for another pair's search. What they
-//! leave open goes to exact arithmetic, and so do pairs of bare edges and points, and all times in double precision.
+//! The last two alternate on lists of a thousand pairs, so that no lane waits for another pair's search. Unsure pairs
+//! go to exact arithmetic, and so do pairs of bare edges and points, and all times in double precision.
 
 use crate::cpu::met::{Met, WorkItem};
 use crate::cpu::simd::{Isa, Lanes, Simd, dispatch};
@@ -43,7 +43,7 @@ pub(super) struct Between {
 /// Places of two elements in their clusters' orders.
 type Places = [u32; 2];
 
-/// A pair whose first contact is searched.
+/// A pair whose first contact is sought.
 #[derive(Debug, Clone, Copy)]
 struct Open {
     places: Places,
@@ -53,11 +53,11 @@ struct Open {
 /// One worker's pairs and counts.
 #[derive(Debug, Default)]
 pub(super) struct Settler {
-    /// What was found, handed over in blocks.
+    /// Contacts found, handed over in blocks.
     found: FoundByKind,
     pub n_candidates: u64,
     pub n_unsure: u64,
-    /// What the filter's first step has left of the layers at hand: pairs to be looked at.
+    /// Pairs of the current layers that the filter's first step has left: to be looked at.
     open: Vec<Open>,
     /// Pairs to be looked at in the next round, and pairs with one candidate for a contact.
     later: Vec<Open>,
@@ -85,7 +85,7 @@ impl Settler {
             + size_of::<Found<Contact>>() * found
     }
 
-    /// Ends a step: hands over what is left.
+    /// Ends a step: hands over the remaining contacts.
     pub fn end(&mut self, answer: StepAnswer<'_>) {
         for (kind, found) in PairKind::ALL.into_iter().zip(&mut self.found) {
             answer.take(kind, found);
@@ -318,7 +318,7 @@ fn search<S: Simd>(simd: S, settler: &mut Settler, world: World<'_>) {
 }
 
 impl Settler {
-    /// Sorts pairs by what was seen in their intervals.
+    /// Sorts pairs by the results of looking at their intervals.
     #[inline(always)]
     fn after_look(
         &mut self,
@@ -370,7 +370,7 @@ impl Settler {
         }
     }
 
-    /// Notes a contact that certainly is in an interval of time.
+    /// Records a contact that is certainly in an interval of time.
     #[inline(always)]
     fn report_within(
         &mut self,
@@ -383,7 +383,7 @@ impl Settler {
         world.known.found(world.asked.sought, span[1]);
         let time = match (world.asked.sought, world.asked.toi) {
             (Sought::Any, _) => Some(span[0]),
-            // Nobody wants it.
+            // This contact is not wanted.
             (Sought::Earliest, _) if span[0] > world.until() => return,
             (_, Toi::F32) => time_between(span).map(f64::from),
             (_, Toi::F64) => None,
@@ -433,7 +433,7 @@ impl<'a> Sides<'a> {
         }
     }
 
-    /// The points and the intervals of up to eight pairs; further lanes get those of the first one.
+    /// Loads the points and intervals of up to eight pairs; unused lanes get those of the first.
     #[inline(always)]
     fn fill<S: Simd>(&self, simd: S, chunk: &[Open], steps: &mut Steps8, spans: &mut Spans8) {
         let mut batch = [chunk[0].places; LANES];

@@ -2,10 +2,10 @@
 //! and settles them.
 //!
 //! 1. Elements of either cluster that do not meet the other cluster's box drop out.
-//! 2. The boxes of one side's survivors are put side by side, and each survivor of the other side, the smaller one, is
+//! 2. The boxes of the larger side's survivors are put side by side, and each survivor of the smaller side is
 //!    tested against them, 16 (or 8) lanes at a time.
-//! 3. Within one body, candidates that share a vertex are dropped, again 16 at a time: by the vertices of their corners,
-//!    which are looked up in the tables of both groups.
+//! 3. Within one body, candidates that share a vertex are dropped, again 16 at a time: the vertices of their corners
+//!    are looked up in the tables of both groups.
 
 use std::time::Duration;
 
@@ -61,7 +61,7 @@ impl Worker {
         self.busy = Duration::ZERO;
     }
 
-    /// Ends a step: hands over what is left.
+    /// Ends a step: hands over the remaining contacts.
     pub fn end(&mut self, answer: StepAnswer<'_>) {
         self.settler.end(answer);
     }
@@ -125,7 +125,7 @@ pub(super) fn run<S: Simd>(
     worker.busy += start.elapsed();
 }
 
-/// Lists the candidates of a work item; if there is any, the places of its groups.
+/// Lists the candidates of a work item. Returns the places of its groups; `None` if there are no candidates.
 #[inline(always)]
 fn pair<S: Simd>(
     simd: S,

@@ -1,17 +1,17 @@
 //! Moving elements: certainly apart, certainly in contact within known times, or unsure.
 //!
-//! What it does: asks the difference polygon of two moving elements (see `exact::sweep`) about an interval of time, in
-//! plain `f64` or `f32`. One pair per lane. The search of [0, 1] for the first contact is a sequence of two questions
-//! about an interval, [`Motion::look`] and [`Motion::enclose`], neither of which has a branch: whoever searches keeps
+//! What it does: tests the difference polygon of two moving elements (see `exact::sweep`) over an interval of time, in
+//! plain `f64` or `f32`. One pair per lane. The search of [0, 1] for the first contact is a sequence of two tests
+//! of an interval, [`Motion::look`] and [`Motion::enclose`], which have no branches. The caller stores
 //! the intervals ([`Search`]), and so can keep all lanes busy.
 //!
 //! In: the points at the start and at the end ([`Motion`]). Out: masks and times. Cost in operations for all lanes:
 //! [`Motion::are_apart`] about 300, [`Motion::look`] 500, [`Motion::enclose`] 900.
 //!
 //! Method: over [a, b] the corners V and edges E of the polygon are computed at a and at b, and from them the Bernstein
-//! coefficients over [a, b] of the cubic f = N . V_0 and of the quartics w = N . (V x E), one per edge. All
-//! coefficients of f of one sign, or all of some w negative: no contact. f with one root, and all coefficients of all w
-//! positive around this root: contact. Else the interval is halved.
+//! coefficients over [a, b] of the cubic f = N . V_0 and of the quartics w = N . (V x E), one per edge. If all
+//! coefficients of f have one sign, or all of some w are negative, there is no contact. If f has one root, and all
+//! coefficients of all w are positive around it, there is contact. Else the interval is halved.
 //!
 //! Invariant: with |.| the largest coordinate at either end of the step and u the unit roundoff, computed
 //! coefficients are wrong by less than 128 u |E_0| |E_1| |V_0| (f; three times that for the inner ones, which are kept
@@ -22,8 +22,8 @@ use super::number::Number;
 
 /// The difference polygon of pairs of moving elements: a triangle or a parallelogram.
 ///
-/// How many corners it has is a value, not a parameter of the type: the functions below are long, and are compiled once
-/// per instruction set for both.
+/// The number of corners is a value, not a type parameter: the functions below are long, and this compiles them only once
+/// per instruction set.
 #[derive(Clone, Copy)]
 pub struct Motion<T: Number> {
     /// 3 or 4.
@@ -39,7 +39,7 @@ pub struct Motion<T: Number> {
     is_small: T::Mask,
 }
 
-/// What [`Motion::look`] sees in an interval.
+/// The result of [`Motion::look`] for an interval.
 #[derive(Clone, Copy)]
 pub struct Look<T: Number> {
     /// Certainly no contact.
@@ -50,7 +50,7 @@ pub struct Look<T: Number> {
     pub hopeless: T::Mask,
 }
 
-/// What [`Motion::enclose`] finds in an interval in which f has one root.
+/// The result of [`Motion::enclose`] for an interval in which f has one root.
 #[derive(Clone, Copy)]
 pub struct Enclosed<T: Number> {
     /// Certainly contact at the root.
@@ -60,7 +60,7 @@ pub struct Enclosed<T: Number> {
     /// The root is inside [`first`, `last`].
     pub first: T,
     pub last: T,
-    /// These two are so near each other that halving the interval does not help.
+    /// `first` and `last` are so close that halving the interval does not help.
     pub is_short: T::Mask,
 }
 
@@ -241,7 +241,7 @@ impl<T: Number> Motion<T> {
         ((along | cubic.has_no_root()) & self.is_small) | are_apart_on_an_axis(start, end, bound)
     }
 
-    /// What is certain of an interval [a, b].
+    /// Tests an interval [a, b].
     #[inline(always)]
     #[must_use]
     pub fn look(&self, a: T, b: T) -> Look<T> {
@@ -260,7 +260,7 @@ impl<T: Number> Motion<T> {
         }
     }
 
-    /// Where f has one root in [low, high]: a short interval that has it, and whether there is contact.
+    /// If f has one root in [low, high]: a short interval that has it, and whether there is contact.
     #[inline(always)]
     #[must_use]
     pub fn enclose(&self, low: T, high: T) -> Enclosed<T> {

@@ -12,7 +12,7 @@ use crate::exact::{ElementPair, Point};
 #[repr(align(64))]
 pub struct Steps8(pub [[[[f64; LANES]; 3]; 4]; 2]);
 
-/// Elements of a group that move: `[start or end][corner][axis][place]`.
+/// The moving elements of a group: `[start or end][corner][axis][place]`.
 pub type Moving64 = [[[[f32; TABLE]; 3]; 3]; 2];
 
 /// An interval of time for each of eight pairs.
@@ -25,7 +25,7 @@ pub struct Spans8 {
     pub high: [f64; LANES],
 }
 
-/// What [`look`] sees in the intervals of eight pairs: bit k stands for lane k.
+/// The result of [`look`] for the intervals of eight pairs: bit k stands for lane k.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Look8 {
     /// Certainly no contact in the interval.
@@ -36,7 +36,7 @@ pub struct Look8 {
     pub hopeless: u8,
 }
 
-/// What [`enclose`] finds: bit k stands for lane k.
+/// The result of [`enclose`]: bit k stands for lane k.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Enclosed8 {
     /// Certainly one contact in the interval.
@@ -66,7 +66,7 @@ pub struct Search {
     n_steps: u32,
 }
 
-/// What a search does next.
+/// The next step of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
     /// [`look`] at the interval.
@@ -81,7 +81,7 @@ pub enum Next {
     Unsure,
 }
 
-/// The shortest interval that is looked at, in parts of the whole.
+/// The shortest interval that is examined, as a share of the whole.
 const SHORTEST: f64 = 1.0 / 4096.0;
 /// The most steps of a search; then a pair is unsure.
 const N_STEPS: u32 = 48;
@@ -98,15 +98,15 @@ impl Search {
         }
     }
 
-    /// The interval at hand.
+    /// The current interval.
     #[inline]
     #[must_use]
     pub fn span(&self) -> [f64; 2] {
         [self.low, self.high]
     }
 
-    /// After a look at the interval: a lane of what was seen. `until` may be less than before: what is later is no
-    /// longer of interest.
+    /// Goes on after a look at the interval, with one lane of the result. `until` may be less than before: later contacts
+    /// are no longer of interest.
     #[inline]
     pub fn after_look(&mut self, seen: &Look8, lane: usize, until: f64) -> Next {
         let is = |mask: u8| mask >> lane & 1 == 1;
@@ -119,7 +119,7 @@ impl Search {
         }
     }
 
-    /// After the candidate was enclosed.
+    /// Goes on after the candidate was enclosed.
     #[inline]
     pub fn after_enclosing(&mut self, found: &Enclosed8, lane: usize, until: f64) -> Next {
         let is = |mask: u8| mask >> lane & 1 == 1;
@@ -165,7 +165,7 @@ impl Search {
     }
 }
 
-/// A time that is certainly in an interval, rounded down to `f32`; none where the interval leaves it open.
+/// A time that is certainly in an interval, rounded down to `f32`; `None` if the interval leaves it open.
 #[inline]
 #[must_use]
 pub fn time_between([low, high]: [f64; 2]) -> Option<f32> {
@@ -185,7 +185,7 @@ pub fn are_apart<V: Vector>(pair: ElementPair, steps: &Steps8, until: f64) -> u8
     no
 }
 
-/// What is certain of an interval of each of eight pairs.
+/// Tests one interval of each of eight pairs.
 #[inline(always)]
 #[must_use]
 pub fn look<V: Vector>(pair: ElementPair, steps: &Steps8, spans: &Spans8) -> Look8 {
@@ -200,7 +200,7 @@ pub fn look<V: Vector>(pair: ElementPair, steps: &Steps8, spans: &Spans8) -> Loo
     seen
 }
 
-/// Where [`look`] has seen one candidate for a contact: when it is, and whether it is one.
+/// If [`look`] has found one candidate for a contact: when it is, and whether it is one.
 #[inline(always)]
 #[must_use]
 pub fn enclose<V: Vector>(pair: ElementPair, steps: &Steps8, spans: &Spans8) -> Enclosed8 {
@@ -306,7 +306,7 @@ fn look_up<V: Lookup>([x, y, z]: &[[f32; TABLE]; 3], places: V::Places) -> [V; 3
     ]
 }
 
-/// Searches the whole step of one pair; the interval of the first contact where there certainly is one.
+/// Searches the whole step of one pair. Also returns the interval of the first contact, if there certainly is one.
 #[inline]
 pub(in super::super) fn search_contact(
     pair: ElementPair,

@@ -112,7 +112,7 @@ struct Outcome {
     span: [f64; 2],
 }
 
-/// What a set of instructions says: apart, and how searches end.
+/// The answer of an instruction set: pairs that are apart, and how searches end.
 type Answer = (u8, [Outcome; LANES]);
 
 #[inline(always)]
@@ -265,7 +265,7 @@ fn filter_never_contradicts_exact_roots() {
                         assert!(is_right, "{}", case());
                         let is_early =
                             contact.is_some_and(|c| c.time < span[0]) && next != Next::Apart;
-                        // A time below the interval only by its own rounding is none.
+                        // A time that is below the interval only by its own rounding is not early.
                         let is_early = is_early && !is_floor_of(contact, span[0]);
                         assert!(!is_early, "{} {contact:?} {found:?}", case());
                         if next == Next::Apart {
