@@ -126,7 +126,7 @@ impl<T: Kept, const PARTS: usize> Store<T, PARTS> {
             let known = kept.as_mut();
             let known = known.filter(|kept| kept.topology_stamp() == body.topology_stamp());
             let was_known = known.is_some();
-            if !known.is_some_and(|kept| !is_stale(kept, layer, body)) {
+            if known.is_none_or(|kept| is_stale(kept, layer, body)) {
                 control.step(ix as u64, frame.layers.len() as u64)?;
                 let n_elements = body.part(layer.part).len();
                 let made = workers.install(n_elements, || make(body, layer))?;
