@@ -11,19 +11,19 @@
 //!
 //! A helper that lingers yields to every other thread. Clustering, which rayon parallelises, runs in a rayon pool.
 
+mod crew;
 mod places;
+mod sync;
 
 use crate::clock::Instant;
-use std::any::Any;
-use std::cell::UnsafeCell;
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering, fence};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use crate::error::Error;
 
+use crew::{Claims, Crew};
 use places::Places;
 
 /// How long a helper spins while it waits for the next region; after that it yields between checks.
@@ -42,9 +42,9 @@ const LOOKS: u32 = 64;
 /// The workers of a detector: the caller, its helpers and the rayon pool.
 pub struct Workers {
     n: usize,
-    crew: Arc<Crew>,
+    helpers: Arc<Helpers>,
     /// Started when first needed.
-    helpers: OnceLock<Vec<JoinHandle<()>>>,
+    threads: OnceLock<Vec<JoinHandle<()>>>,
     /// When the last shift ended and how long it took.
     last: Mutex<Option<(Instant, Duration)>>,
     /// Whether helpers that sleep are woken in this shift.
@@ -73,7 +73,7 @@ impl Drop for Shift<'_> {
         let end = Instant::now();
         let took = end - self.start;
         *self.workers.last() = Some((end, took));
-        self.workers.crew.linger(took.min(LINGER));
+        self.workers.helpers.linger(took.min(LINGER));
     }
 }
 
@@ -81,11 +81,11 @@ impl Drop for Workers {
     fn drop(&mut self) {
         if self.process != process() {
             // The threads do not exist in this process: waiting for them would never end.
-            std::mem::forget(self.helpers.take());
+            std::mem::forget(self.threads.take());
             return;
         }
-        self.crew.quit.store(true, Ordering::Relaxed);
-        for helper in self.helpers.take().into_iter().flatten() {
+        self.helpers.crew.quit();
+        for helper in self.threads.take().into_iter().flatten() {
             helper.thread().unpark();
             // Helpers catch panics of the work; there is nothing else to report.
             let _ = helper.join();
@@ -103,8 +103,8 @@ impl Workers {
         };
         Workers {
             n,
-            crew: Arc::new(Crew::new(n - 1)),
-            helpers: OnceLock::new(),
+            helpers: Arc::new(Helpers::new(n - 1)),
+            threads: OnceLock::new(),
             last: Mutex::new(None),
             wakes: AtomicBool::new(true),
             pool,
@@ -129,7 +129,7 @@ impl Workers {
                 .last()
                 .is_none_or(|(end, took)| took >= WORTH || start - end <= LINGER);
         self.wakes.store(wakes, Ordering::Relaxed);
-        self.crew.linger(LINGER);
+        self.helpers.linger(LINGER);
         Shift {
             workers: self,
             start,
@@ -192,7 +192,7 @@ impl Workers {
             }
             return;
         }
-        let claims = Claims::default();
+        let claims = Claims::new();
         let scratches = Scratches(scratches.as_mut_ptr());
         let work = |worker: usize| {
             if worker >= n_workers {
@@ -205,7 +205,7 @@ impl Workers {
             }
         };
         self.call(n_workers - 1);
-        self.crew.region(&work);
+        self.helpers.crew.region(&work);
     }
 
     /// Wakes all helpers, so that they are awake when they are needed.
@@ -219,50 +219,28 @@ impl Workers {
             return;
         }
         // Within a region the calling thread is a helper, or another thread.
-        if !self.crew.busy.load(Ordering::Relaxed) {
-            self.crew.places.caller_is_here();
+        if !self.helpers.crew.is_busy() {
+            self.helpers.places.caller_is_here();
         }
-        let helpers = self.helpers.get_or_init(|| {
+        let threads = self.threads.get_or_init(|| {
             let start = |seat| {
-                let crew = Arc::clone(&self.crew);
+                let helpers = Arc::clone(&self.helpers);
                 thread::Builder::new()
                     .name(format!("impinge-{seat}"))
-                    .spawn(move || crew.serve(seat))
+                    .spawn(move || helpers.serve(seat))
             };
             // If a thread does not start, there are fewer helpers.
             (1..self.n).map_while(|seat| start(seat).ok()).collect()
         });
-        for (helper, asleep) in helpers.iter().zip(&self.crew.asleep).take(n) {
-            if asleep.load(Ordering::Relaxed) && asleep.swap(false, Ordering::AcqRel) {
+        for (seat, helper) in (1..).zip(threads).take(n) {
+            if self.helpers.crew.wakes(seat) {
                 helper.thread().unpark();
             }
         }
     }
 }
 
-/// How many tasks were taken from the front (low half) and from the back (high half).
-#[derive(Default)]
-struct Claims(AtomicU64);
-
-impl Claims {
-    /// The next task that no worker has taken.
-    fn next(&self, n_tasks: usize, from_front: bool) -> Option<usize> {
-        const BACK: u64 = 1 << 32;
-        let step = if from_front { 1 } else { BACK };
-        let taken = self.0.fetch_add(step, Ordering::Relaxed);
-        let (front, back) = ((taken % BACK) as usize, (taken / BACK) as usize);
-        if front + back >= n_tasks {
-            return None;
-        }
-        Some(if from_front {
-            front
-        } else {
-            n_tasks - 1 - back
-        })
-    }
-}
-
-/// Points to the first of the scratches, one per worker.
+/// The first of some scratches, one per worker.
 struct Scratches<S>(*mut S);
 
 // SAFETY: each worker takes a different scratch, and `S` may be sent to it.
@@ -277,52 +255,20 @@ impl<S> Scratches<S> {
     }
 }
 
-/// The work of a region: all workers call it, each with its number.
-type Work<'a> = dyn Fn(usize) + Sync + 'a;
-
-/// The state that caller and helpers share.
-///
-/// The gate holds whether a region is open (bit 0), how many helpers are in it (bits 1 to 31), and the region's
-/// number (above). A helper enters only through an open gate. The caller closes it and waits until all helpers are
-/// out, so the region's work outlives every helper in it.
-struct Crew {
-    gate: AtomicU64,
-    /// Valid while the gate is open or a helper is inside.
-    work: UnsafeCell<Option<*const Work<'static>>>,
-    /// Whether the caller is in a region.
-    busy: AtomicBool,
+/// The helpers of a detector: the protocol that they share with the caller, and how long they stay awake.
+struct Helpers {
+    crew: Crew,
     /// How long helpers that have nothing to do stay awake.
     linger_ns: AtomicU64,
-    /// Whether helpers should end.
-    quit: AtomicBool,
-    /// Which helpers sleep, or are about to.
-    asleep: Box<[AtomicBool]>,
-    panic: Mutex<Option<Box<dyn Any + Send>>>,
     places: Places,
 }
 
-const OPEN: u64 = 1;
-const INSIDE: u64 = 2;
-const INSIDE_MASK: u64 = (1 << 32) - INSIDE;
-const REGION: u64 = 1 << 32;
-
-// SAFETY: only the one caller that has set `busy` writes `work`, while the gate is closed and no helper is inside; only
-// helpers that entered an open gate read it.
-unsafe impl Send for Crew {}
-// SAFETY: as above.
-unsafe impl Sync for Crew {}
-
-impl Crew {
-    fn new(n_helpers: usize) -> Self {
-        Crew {
-            gate: AtomicU64::new(0),
-            work: UnsafeCell::new(None),
-            busy: AtomicBool::new(false),
+impl Helpers {
+    fn new(n: usize) -> Self {
+        Helpers {
+            crew: Crew::new(n),
             linger_ns: AtomicU64::new(0),
-            quit: AtomicBool::new(false),
-            asleep: (0..n_helpers).map(|_| AtomicBool::new(false)).collect(),
-            panic: Mutex::new(None),
-            places: Places::new(n_helpers),
+            places: Places::new(n),
         }
     }
 
@@ -332,55 +278,19 @@ impl Crew {
             .store(time.as_nanos() as u64, Ordering::Relaxed);
     }
 
-    /// Does the work as worker 0, together with the helpers that come. Panics if one of them did.
-    fn region(&self, work: &Work<'_>) {
-        if self.busy.swap(true, Ordering::Acquire) {
-            // A region within a region, or of another thread: the helpers are busy.
-            return work(0);
-        }
-        // Drop a panic that was left over when the caller's own part panicked.
-        *self.panic() = None;
-        // SAFETY: only the lifetime changes; `Closing` makes sure that all helpers are out before it ends.
-        let work_ptr =
-            unsafe { std::mem::transmute::<*const Work<'_>, *const Work<'static>>(work) };
-        // SAFETY: the gate is closed and no helper is inside; `busy` excludes other callers.
-        unsafe { *self.work.get() = Some(work_ptr) };
-        let number = self.gate.load(Ordering::Relaxed) & !(REGION - 1);
-        self.gate
-            .store(number.wrapping_add(REGION) | OPEN, Ordering::Release);
-        let closing = Closing(self);
-        work(0);
-        drop(closing);
-        let panic = self.panic().take();
-        if let Some(payload) = panic {
-            resume_unwind(payload);
-        }
-    }
-
-    fn panic(&self) -> MutexGuard<'_, Option<Box<dyn Any + Send>>> {
-        self.panic.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// The loop of a helper thread.
     fn serve(&self, seat: usize) {
         self.places.helper_is_here(seat);
         let mut last_region = 0;
         let mut since = Instant::now();
         let mut looks = 0u32;
-        while !self.quit.load(Ordering::Relaxed) {
-            let gate = self.gate.load(Ordering::Acquire);
-            let region = gate / REGION;
-            if gate & OPEN != 0 && region != last_region {
-                let entered = self.gate.compare_exchange_weak(
-                    gate,
-                    gate + INSIDE,
-                    Ordering::Acquire,
-                    Ordering::Relaxed,
-                );
-                if entered.is_ok() {
+        while !self.crew.is_over() {
+            let seen = self.crew.look();
+            if let Some(region) = seen.open_region()
+                && region != last_region
+            {
+                if self.crew.help(seat, seen) {
                     last_region = region;
-                    self.help(seat);
-                    self.gate.fetch_sub(INSIDE, Ordering::Release);
                     since = Instant::now();
                 }
                 continue;
@@ -393,52 +303,12 @@ impl Crew {
             looks = 0;
             let idle = since.elapsed();
             if idle > Duration::from_nanos(self.linger_ns.load(Ordering::Relaxed)) {
-                self.sleep(seat, gate);
+                self.crew.sleep(seat, seen);
                 since = Instant::now();
             } else if idle > SPIN {
                 thread::yield_now();
             }
         }
-    }
-
-    /// Sleeps until called, unless the gate has changed since the helper read it as `seen`. A call that comes before the
-    /// helper has announced its sleep is lost: the region goes on without this helper.
-    fn sleep(&self, seat: usize, seen: u64) {
-        self.asleep[seat - 1].store(true, Ordering::Relaxed);
-        fence(Ordering::SeqCst);
-        if self.gate.load(Ordering::Acquire) == seen && !self.quit.load(Ordering::Relaxed) {
-            thread::park();
-        }
-        self.asleep[seat - 1].store(false, Ordering::Relaxed);
-    }
-
-    /// Does the work of the open region.
-    fn help(&self, seat: usize) {
-        // SAFETY: the helper is inside, so the caller waits for it and the work is alive.
-        let work = unsafe { (*self.work.get()).map(|work| &*work) };
-        let Some(work) = work else { return };
-        if let Err(payload) = catch_unwind(AssertUnwindSafe(|| work(seat))) {
-            *self.panic() = Some(payload);
-        }
-    }
-}
-
-/// Closes the gate and waits until all helpers are out, even if the caller's part of the work panics.
-struct Closing<'a>(&'a Crew);
-
-impl Drop for Closing<'_> {
-    fn drop(&mut self) {
-        let crew = self.0;
-        crew.gate.fetch_and(!OPEN, Ordering::AcqRel);
-        let mut looks = 0u32;
-        while crew.gate.load(Ordering::Acquire) & INSIDE_MASK != 0 {
-            looks = looks.wrapping_add(1);
-            if looks.is_multiple_of(LOOKS * LOOKS) {
-                thread::yield_now();
-            }
-            std::hint::spin_loop();
-        }
-        crew.busy.store(false, Ordering::Release);
     }
 }
 
@@ -479,6 +349,8 @@ fn single() -> Result<&'static rayon::ThreadPool, Error> {
 
 #[cfg(test)]
 mod tests {
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
     use super::*;
 
     #[test]
