@@ -52,6 +52,7 @@ impl<T, const PARTS: usize> Store<T, PARTS> {
     }
 
     /// What is kept of a body as a whole, if anything is.
+    #[cfg(feature = "gpu")]
     pub fn of(&self, id: BodyId) -> Option<&T> {
         self.slots.get(id.index())?[Self::ix(Part::Given)].as_deref()
     }
