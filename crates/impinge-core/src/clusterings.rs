@@ -9,6 +9,7 @@ use crate::elements::Part;
 use crate::error::Error;
 use crate::frame::Layer;
 use crate::grouping::bounds::Bounds;
+#[cfg(feature = "gpu")]
 use crate::ids::BodyId;
 use crate::run::Job;
 use crate::scene::Body;
