@@ -111,7 +111,9 @@ impl<T: Kept, const PARTS: usize> Store<T, PARTS> {
             workers,
             control,
         } = job;
-        let n_slots = frame.layers.last().map_or(0, |last| last.id.index() + 1);
+        // Layers come part after part: the last one need not be of the last body.
+        let slots = frame.layers.iter().map(|layer| layer.id.index() + 1);
+        let n_slots = slots.max().unwrap_or(0);
         if self.slots.len() < n_slots {
             self.slots.resize_with(n_slots, || [const { None }; PARTS]);
         }
