@@ -14,10 +14,11 @@
 //! +----------------+----------------+
 //! ```
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::elements::{Kind, Part};
 use crate::error::Error;
+use crate::exact::Reach;
 use crate::ids::BodyId;
 use crate::pair_kind::{PairKind, PairKinds};
 use crate::positions::{Positions, check_positions};
@@ -44,6 +45,8 @@ pub struct Layer {
     /// Whether the body has no edges either.
     is_points: bool,
     filter: Filter,
+    /// How thick the body is: what its elements add to the distance that is asked.
+    radius: f64,
 }
 
 /// The question about pairs of elements.
@@ -89,6 +92,8 @@ pub struct Frame {
     pub shared_vertex: SharedVertex,
     between: bool,
     ignored: BTreeSet<(BodyId, BodyId)>,
+    /// The distance within which elements are near, besides what their bodies add.
+    distance: f64,
 }
 
 impl Frame {
@@ -100,6 +105,7 @@ impl Frame {
     /// Resolves a query for any question.
     pub fn resolve_for(&mut self, scene: &Scene, query: &Query, ask: Ask) -> Result<(), Error> {
         self.layers.clear();
+        self.distance = 0.0;
         self.ask = ask;
         self.shared_vertex = query.shared_vertex;
         if self.ignored != query.ignored {
@@ -116,6 +122,35 @@ impl Frame {
             self.push_part(scene, query, part)?;
         }
         Ok(())
+    }
+
+    /// Sets within which distance elements are near: the sum of `distance` and the radii of both bodies.
+    pub(crate) fn set_reach(&mut self, distance: f64, radii: &BTreeMap<BodyId, f64>) {
+        self.distance = distance;
+        for layer in &mut self.layers {
+            layer.radius = radii.get(&layer.id).copied().unwrap_or(0.0);
+        }
+    }
+
+    /// The distance within which elements are near, besides what their bodies add.
+    pub(crate) fn distance(&self) -> f64 {
+        self.distance
+    }
+
+    /// Within which distance elements of two layers are near.
+    pub(crate) fn reach(&self, a_ix: usize, b_ix: usize) -> Reach {
+        let [a, b] = [a_ix, b_ix].map(|ix| self.layers[ix].radius);
+        Reach::of_sum([self.distance, a, b])
+    }
+
+    /// How far the boxes of a layer must reach beyond its elements, so that those of near elements overlap: those of two
+    /// layers reach at least as far together as their elements may be apart.
+    pub(crate) fn margin(&self, ix: usize) -> f64 {
+        let radius = self.layers[ix].radius;
+        match (self.distance, radius) {
+            (0.0, radius) => radius,
+            (distance, radius) => (radius + (distance / 2.0).next_up()).next_up(),
+        }
     }
 
     fn push_part(&mut self, scene: &Scene, query: &Query, part: Part) -> Result<(), Error> {
@@ -194,6 +229,7 @@ impl Frame {
             is_points: body.kind() == Kind::Points,
             within: within && !self.ignored.contains(&(id, id)),
             filter: filter.unwrap_or(body.filter()),
+            radius: 0.0,
         });
         Ok(())
     }

@@ -73,13 +73,13 @@ impl Ending for StepAnswer<'_> {
 
 /// Maps global numbers to elements of bodies.
 #[derive(Debug, Clone, Default)]
-struct Numbering {
+pub(crate) struct Numbering {
     /// Bodies, and the first number of each of their layers.
     layers: Vec<(BodyId, u32)>,
 }
 
 impl Numbering {
-    fn begin(&mut self, frame: &Frame) {
+    pub fn begin(&mut self, frame: &Frame) {
         self.layers.clear();
         let layers = frame.layers.iter().map(|layer| (layer.id, layer.first));
         self.layers.extend(layers);
@@ -104,7 +104,7 @@ impl Numbering {
         }
     }
 
-    fn pair(&self, key: u64) -> (Primitive, Primitive) {
+    pub fn pair(&self, key: u64) -> (Primitive, Primitive) {
         (self.name((key >> 32) as u32), self.name(key as u32))
     }
 }
@@ -150,7 +150,7 @@ impl Impact {
     }
 }
 
-fn row(a: Primitive, b: Primitive) -> [u32; 4] {
+pub(crate) fn row(a: Primitive, b: Primitive) -> [u32; 4] {
     let index = |body: BodyId| body.index() as u32;
     [index(a.body), a.primitive, index(b.body), b.primitive]
 }
@@ -334,7 +334,7 @@ impl Candidates {
     }
 }
 
-fn hash_row([body_a, a, body_b, b]: [u32; 4]) -> u64 {
+pub(crate) fn hash_row([body_a, a, body_b, b]: [u32; 4]) -> u64 {
     let low = mix(u64::from(body_a) << 32 | u64::from(a));
     let high = mix(u64::from(body_b) << 32 | u64::from(b));
     mix(low.rotate_left(17) ^ high.wrapping_mul(3))

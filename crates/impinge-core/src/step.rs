@@ -44,11 +44,12 @@ impl Toi {
 /// assert_eq!(Step::default(), Step::new(Query::everything()));
 /// # let _ = step;
 /// ```
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Step {
     pub(crate) query: Query,
     pub(crate) start: Start,
     pub(crate) toi: Toi,
+    pub(crate) separation: f64,
 }
 
 impl Step {
@@ -58,6 +59,7 @@ impl Step {
             query,
             start: Start::default(),
             toi: Toi::default(),
+            separation: 0.0,
         }
     }
 
@@ -71,6 +73,20 @@ impl Step {
     pub fn toi(mut self, toi: Toi) -> Self {
         self.toi = toi;
         self
+    }
+
+    /// Sets the distance that elements must keep, in the unit of the scene: finite, 0 or more.
+    ///
+    /// A pair is then reported with the first time at which its distance is at most the separation, decided exactly and
+    /// rounded down, and pairs within the separation at the start count as touching at the start. With 0, which is the
+    /// default, elements must touch.
+    pub fn separation(mut self, separation: f64) -> Self {
+        self.separation = separation;
+        self
+    }
+
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        check_distance("separation", self.separation)
     }
 }
 
@@ -124,13 +140,18 @@ impl CandidateQuery {
     }
 
     pub(crate) fn check(&self) -> Result<(), Error> {
-        if self.distance >= 0.0 && self.distance.is_finite() {
-            return Ok(());
-        }
-        Err(Error::Setting {
-            setting: "distance",
-            given: self.distance.to_string(),
-            allowed: "a finite number that is not below 0",
-        })
+        check_distance("distance", self.distance)
     }
+}
+
+/// Refuses a distance that is negative or not finite.
+pub(crate) fn check_distance(setting: &'static str, distance: f64) -> Result<(), Error> {
+    if distance >= 0.0 && distance.is_finite() {
+        return Ok(());
+    }
+    Err(Error::Setting {
+        setting,
+        given: distance.to_string(),
+        allowed: "a finite number that is not below 0",
+    })
 }

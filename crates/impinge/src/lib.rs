@@ -13,6 +13,8 @@
 //!   positions to their [end positions](Scene::set_end_positions), and the first time of each pair, exact and rounded down.
 //!   For solvers, [`Detector::earliest`] finds the first contact of a step, [`Detector::is_free`] decides whether there is any,
 //!   and [`Detector::advance`] finds how far a step can be taken.
+//! * **Proximity.** [`Detector::within_distance`] finds which vertices, edges and faces are within a distance of each other,
+//!   exactly, and which of their features are nearest.
 //!
 //! ```toml
 //! [dependencies]
@@ -83,10 +85,11 @@
 #[cfg(feature = "gpu")]
 pub use impinge_core::wgpu;
 pub use impinge_core::{
-    Advance, Backend, Body, BodyId, CancelToken, CandidateQuery, Candidates, Control, Detector,
-    Elements, Error, Filter, Impact, Impacts, InstructionSet, Kind, Method, PairKind, PairKinds,
-    Pairs, Part, Positions, Primitive, Progress, Query, Real, Recluster, Scene, Settings,
-    SharedVertex, Stage, Start, Statistics, Step, Toi, hash_rows,
+    Advance, Backend, Body, BodyId, CancelToken, CandidateQuery, Candidates, ClosestPoints,
+    Control, Detector, Elements, Error, Filter, Impact, Impacts, InstructionSet, Kind, Method,
+    NearPair, NearPairs, NearQuery, PairKind, PairKinds, Pairs, Part, Positions, Primitive,
+    Progress, Query, Real, Recluster, Scene, Settings, SharedVertex, Stage, Start, Statistics,
+    Step, Toi, hash_rows,
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{DeviceInfo, ResidentPairs, devices, devices_async};
@@ -101,4 +104,6 @@ const _: () = {
     threads_may_share::<Query>();
     threads_may_share::<Impacts>();
     threads_may_share::<Step>();
+    threads_may_share::<NearPairs>();
+    threads_may_share::<NearQuery>();
 };

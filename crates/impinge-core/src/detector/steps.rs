@@ -1,6 +1,10 @@
 //! A detector's answers about a step: which elements touch while bodies move from their positions to their end positions,
 //! when first, and how far the step can be taken.
 
+mod near;
+
+use std::collections::BTreeMap;
+
 use crate::clock::Instant;
 
 use super::Detector;
@@ -15,6 +19,7 @@ use crate::impacts::{
 };
 use crate::naive;
 use crate::narrow::{Element, FirstContact, Overlap, Test};
+use crate::near::NearPairs;
 use crate::pair_kind::PairKind;
 use crate::positions::Positions;
 use crate::progress::Control;
@@ -30,6 +35,7 @@ pub(super) struct Steps {
     frame: Frame,
     impacts: Impacts,
     candidates: Candidates,
+    near: NearPairs,
     clusters: StepClusters,
     contacts: ContactAnswer,
     keys: KeyAnswer,
@@ -42,6 +48,7 @@ impl Steps {
             frame: Frame::default(),
             impacts: Impacts::default(),
             candidates: Candidates::default(),
+            near: NearPairs::default(),
             clusters: StepClusters::new(settings.instruction_set),
             contacts: ContactAnswer::default(),
             keys: KeyAnswer::default(),
@@ -74,7 +81,8 @@ impl Detector {
     /// are not reported.
     ///
     /// The answer is exact: a pair is reported if and only if the two closed elements share a point at some time, and its
-    /// time is that of the first contact, rounded down: `toi <= first < toi.next_up()`.
+    /// time is that of the first contact, rounded down: `toi <= first < toi.next_up()`. With a
+    /// [separation](Step::separation), the same holds of the first time at which their distance is at most that.
     ///
     /// ```
     /// use impinge::{Backend, Detector, PairKind, Scene, Step};
@@ -179,7 +187,9 @@ impl Detector {
     /// Resolves a step.
     fn begin(&mut self, scene: &Scene, step: &Step) -> Result<(), Error> {
         let Steps { frame, impacts, .. } = &mut self.steps;
+        step.check()?;
         frame.resolve_for(scene, &step.query, Ask::Impacts)?;
+        frame.set_reach(step.separation, &BTreeMap::new());
         impacts.begin(frame);
         frame.check(scene)?;
         begin(

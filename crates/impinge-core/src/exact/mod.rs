@@ -34,6 +34,10 @@ pub use distance::{
     Closest, Feature, Nearest, are_within, closest_points, edge_face_are_within, faces_are_within,
     first_within, nearest_features,
 };
+pub(crate) use distance::{
+    NearestOfElements, Reach, are_within_certainly, closest_of_elements, elements_are_within,
+    nearest_of_elements,
+};
 pub(crate) use orientation::{Projection, collinear};
 pub use orientation::{Sign, orient2d, orient3d};
 pub(crate) use segment::strictly_between;

@@ -1,6 +1,6 @@
 //! Whether two elements touch during a step, and when first.
 
-use crate::exact::{Contact, ElementPair, Point, first_contact};
+use crate::exact::{Contact, ElementPair, Point, first_within};
 use crate::frame::TestId;
 use crate::pair_kind::PairKind;
 
@@ -13,7 +13,11 @@ impl Test for FirstContact {
     type Value = Contact;
 
     fn extent(&self, element: Element<'_>) -> Extent {
-        Extent::of(element.ends().flatten())
+        let extent = Extent::of(element.ends().flatten());
+        match element.frame.margin(element.layer) {
+            0.0 => extent,
+            margin => extent.inflated(margin),
+        }
     }
 
     fn settle(&self, test: TestId, a: Element<'_>, b: Element<'_>) -> Option<Contact> {
@@ -32,7 +36,7 @@ impl Test for FirstContact {
                 points[ix] = end;
             }
         }
-        first_contact(pair, &points[0], &points[1])
+        first_within(pair, &points[0], &points[1], a.frame.distance())
     }
 }
 

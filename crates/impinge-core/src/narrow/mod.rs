@@ -3,6 +3,7 @@
 mod impact;
 mod intersection;
 mod overlap;
+mod within;
 
 #[cfg(feature = "gpu")]
 pub(crate) use intersection::settle;
@@ -10,6 +11,7 @@ pub(crate) use intersection::{Intersection, intersect, intersect_shared};
 
 pub(crate) use impact::{FirstContact, exact_kind};
 pub(crate) use overlap::{Overlap, are_near};
+pub(crate) use within::{Corners, Within};
 
 use crate::frame::{Frame, TestId};
 use crate::scene::Scene;
@@ -60,6 +62,14 @@ impl Extent {
             min: std::array::from_fn(|axis| extent.min[axis].min(point[axis])),
             max: std::array::from_fn(|axis| extent.max[axis].max(point[axis])),
         })
+    }
+
+    /// The extent that reaches beyond this one on all sides by a margin, rounded outward.
+    pub fn inflated(&self, margin: f64) -> Self {
+        Extent {
+            min: self.min.map(|x| (x - margin).next_down()),
+            max: self.max.map(|x| (x + margin).next_up()),
+        }
     }
 
     /// Whether two extents have a point in common.

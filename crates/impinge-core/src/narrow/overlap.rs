@@ -16,10 +16,7 @@ impl Test for Overlap {
     fn extent(&self, element: Element<'_>) -> Extent {
         let extent = Extent::of(element.ends().flatten());
         // Rounded outward: `settle` tests again without rounding.
-        Extent {
-            min: extent.min.map(|x| (x - self.distance).next_down()),
-            max: extent.max.map(|x| (x + self.distance).next_up()),
-        }
+        extent.inflated(self.distance)
     }
 
     fn settle(&self, _: TestId, a: Element<'_>, b: Element<'_>) -> Option<()> {

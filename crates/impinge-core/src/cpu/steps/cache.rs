@@ -137,6 +137,7 @@ pub(super) fn refit<S: Send>(
     for (ix, layer) in frame.layers.iter().enumerate() {
         let body = frame.body(scene, ix);
         let cache = caches.at_mut(layer);
+        let pose = pose.of(frame, ix);
         if cache.of == Some((body.step_stamp(), pose)) {
             continue;
         }
@@ -173,7 +174,7 @@ fn find_boxes<S: Send>(
     for (ix, layer) in frame.layers.iter().enumerate() {
         let body = frame.body(scene, ix);
         let cache = caches.at_mut(layer);
-        if cache.of == Some((body.step_stamp(), pose)) {
+        if cache.of == Some((body.step_stamp(), pose.of(frame, ix))) {
             continue;
         }
         cache.of = None;
@@ -208,6 +209,7 @@ fn find_boxes<S: Send>(
         let layer = &frame.layers[task.layer];
         let clustering = &caches.at(layer).clustering;
         let body = frame.body(scene, task.layer);
+        let pose = pose.of(frame, task.layer);
         dispatch!(isa, find, (
             clustering: &Clustering = clustering,
             body: &Body = body,

@@ -72,8 +72,7 @@ impl<'a> Kept<World<'a>> for Group {
             }
         }
         world
-            .asked
-            .pose
+            .pose(layer)
             .close_all([&mut self.start, &mut self.end], self.size);
     }
 }

@@ -1,5 +1,6 @@
 //! The boxes that are tested, made from moving boxes.
 
+use crate::frame::Frame;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, greater, lesser, round_down, round_up};
 
@@ -8,7 +9,7 @@ use crate::cpu::simd::LaneBounds;
 /// Which part of a step is examined, and by how much boxes are inflated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pose {
-    /// The time up to which elements move, above 0 and at most 1.
+    /// The time up to which elements move, at most 1. With 0 nothing moves.
     pub until: f64,
     /// How far boxes reach beyond their contents, on all sides.
     pub margin: f64,
@@ -24,6 +25,22 @@ impl Pose {
         is_swept: false,
     };
 
+    /// As things are at the start.
+    pub const STILL: Pose = Pose {
+        until: 0.0,
+        margin: 0.0,
+        is_swept: false,
+    };
+
+    /// The pose of a layer: its boxes also reach as far as the frame says.
+    #[inline(always)]
+    pub fn of(self, frame: &Frame, layer: usize) -> Pose {
+        Pose {
+            margin: self.margin + frame.margin(layer),
+            ..self
+        }
+    }
+
     /// Whether the boxes at both ends are used unchanged.
     fn is_plain(self) -> bool {
         self == Pose::WHOLE
@@ -37,6 +54,9 @@ impl Pose {
     pub fn close(self, [start, end]: [Bounds; 2]) -> [Bounds; 2] {
         if self.is_plain() {
             return [start, end];
+        }
+        if self.until == 0.0 {
+            return [self.inflated(start); 2];
         }
         let at = |x: f32, y: f32| {
             let (x, y) = (f64::from(x), f64::from(y));

@@ -15,6 +15,7 @@ mod cache;
 mod group;
 mod hull;
 mod narrow;
+mod near;
 mod pairing;
 mod world;
 

@@ -16,7 +16,7 @@ use crate::cpu::simd::{Isa, Lanes, Simd, dispatch};
 use crate::exact::filter::{
     self, BATCH, Enclosed8, LANES, Look8, Next, Search, Spans8, Steps8, time_between,
 };
-use crate::exact::{Contact, ElementPair, Point, first_contact};
+use crate::exact::{Contact, ElementPair, Point, first_within};
 use crate::frame::pair_key;
 use crate::grouping::GROUP;
 use crate::impacts::{Found, FoundByKind, StepAnswer};
@@ -27,10 +27,18 @@ use crate::sink::BLOCK;
 use crate::step::{Start, Toi};
 
 use super::group::Group;
+use super::near::Near;
 use super::world::{Sought, World};
 
 /// Pairs that the filter's first step leaves open are searched once there are this many.
 const FULL: usize = 1024;
+
+/// What comes with a pair that has no time.
+const NONE: Contact = Contact {
+    time: 0.0,
+    is_exact: false,
+    at_start: false,
+};
 
 /// Two layers, and the kind of their pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -119,6 +127,20 @@ impl Settler {
                     self.settle_boxes(world, between, places(ix), distance);
                 }
             }
+            (Sought::Within, _) => {
+                let near = Near::new(world, [between.a, between.b]);
+                for ix in 0..met.len() {
+                    self.settle_near(&near, world, between, places(ix));
+                }
+            }
+            // The filters below know of contact alone.
+            (_, kind) if world.frame.distance() > 0.0 => {
+                if let Some(pair) = exact_pair(kind) {
+                    for ix in 0..met.len() {
+                        self.settle_exactly(world, between, pair, places(ix));
+                    }
+                }
+            }
             (_, PairKind::VertexFace | PairKind::EdgeEdge) => {
                 let until = world.until();
                 let new = |places: Places| Open {
@@ -184,11 +206,17 @@ impl Settler {
         let [a, b] = [(between.a, places[0]), (between.b, places[1])]
             .map(|(layer, place)| extent(world, layer, place));
         if are_near(&a, &b, distance) {
-            const NONE: Contact = Contact {
-                time: 0.0,
-                is_exact: false,
-                at_start: false,
-            };
+            self.push(world, between, places, NONE);
+        }
+    }
+
+    #[inline(always)]
+    fn settle_near(&mut self, near: &Near<'_>, world: World<'_>, between: Between, places: Places) {
+        let is_near = near.certainly(places).unwrap_or_else(|| {
+            self.n_unsure += 1;
+            near.exactly(places)
+        });
+        if is_near {
             self.push(world, between, places, NONE);
         }
     }
@@ -217,7 +245,7 @@ impl Settler {
                 n += 1;
             }
         }
-        if let Some(contact) = first_contact(pair, &points[0], &points[1]) {
+        if let Some(contact) = first_within(pair, &points[0], &points[1], world.frame.distance()) {
             self.report(world, between, places, contact);
         }
     }

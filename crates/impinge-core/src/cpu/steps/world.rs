@@ -21,6 +21,8 @@ pub(crate) enum Sought {
     Any,
     /// Boxes that overlap when inflated by this much.
     Boxes(f64),
+    /// Elements within the distance that the frame says, at the start.
+    Within,
 }
 
 /// The question about a step.
@@ -67,7 +69,7 @@ impl Known {
                 self.earliest.fetch_min(time.to_bits(), Ordering::Relaxed);
             }
             Sought::Any => self.is_over.store(true, Ordering::Relaxed),
-            Sought::All | Sought::Boxes(_) => {}
+            Sought::All | Sought::Boxes(_) | Sought::Within => {}
         }
     }
 }
@@ -94,8 +96,14 @@ impl<'a> World<'a> {
                 let later = (time * (1.0 + 2f64.powi(-22))).max(f64::from(f32::MIN_POSITIVE));
                 later.min(1.0)
             }
-            Sought::All | Sought::Any | Sought::Boxes(_) => 1.0,
+            Sought::All | Sought::Any | Sought::Boxes(_) | Sought::Within => 1.0,
         }
+    }
+
+    /// How the boxes of a layer are made.
+    #[inline(always)]
+    pub(super) fn pose(&self, layer: u32) -> Pose {
+        self.asked.pose.of(self.frame, layer as usize)
     }
 
     /// The cache of a layer.

@@ -14,17 +14,23 @@
 //!
 //! `docs/exactness.md`, "Distances", has the proofs.
 
+mod elements;
+mod features;
 mod filter;
 mod moving;
 mod nearest;
+mod reach;
 mod rounded;
 
+use super::Point;
 use super::algebra::Integer;
 use super::sweep::ElementPair;
-use super::triangle::segment_meets_triangle;
-use super::{Point, triangles_intersect};
+pub(crate) use elements::{NearestOfElements, are_within_certainly, elements_are_within};
+pub(crate) use elements::{closest_of_elements, nearest_of_elements};
+pub use features::{Feature, Nearest};
 pub use moving::first_within;
-pub use nearest::{Feature, Nearest, nearest_features};
+pub use nearest::nearest_features;
+pub(crate) use reach::Reach;
 pub use rounded::{Closest, closest_points};
 
 /// Whether the distance of two elements is at most `distance`.
@@ -41,52 +47,37 @@ pub use rounded::{Closest, closest_points};
 /// ```
 #[must_use]
 pub fn are_within(pair: ElementPair, points: &[Point; 4], distance: f64) -> bool {
-    if distance.is_nan() || distance < 0.0 {
+    if !is_distance(distance) {
         return false;
     }
     if distance == f64::INFINITY {
         return true;
     }
-    filter::answer(pair, points, distance)
-        .unwrap_or_else(|| nearest::are_within(pair, points, distance))
+    are_within_reach(pair, points, &Reach::from(distance))
+}
+
+fn are_within_reach(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> bool {
+    filter::answer(pair, points, reach).unwrap_or_else(|| nearest::are_within(pair, points, reach))
 }
 
 /// Whether the distance of an edge and a face is at most `distance`. See [`are_within`].
 #[must_use]
 pub fn edge_face_are_within(edge: &[Point; 2], face: &[Point; 3], distance: f64) -> bool {
-    let [p, q] = edge;
-    let [a, b, c] = face;
-    // Where they do not meet, the shortest way between them starts at an end of the edge or ends on the face's border.
-    distance >= 0.0
-        && (segment_meets_triangle(p, q, face)
-            || [p, q]
-                .iter()
-                .any(|v| are_within(ElementPair::VertexFace, &[**v, *a, *b, *c], distance))
-            || EDGES.iter().any(|&[i, j]| {
-                are_within(ElementPair::EdgeEdge, &[*p, *q, face[i], face[j]], distance)
-            }))
+    is_distance(distance)
+        && (distance == f64::INFINITY || elements_are_within(edge, face, &Reach::from(distance)))
 }
 
 /// Whether the distance of two faces is at most `distance`. See [`are_within`].
 #[must_use]
 pub fn faces_are_within(a: &[Point; 3], b: &[Point; 3], distance: f64) -> bool {
-    let vertex_near = |a: &[Point; 3], b: &[Point; 3]| {
-        a.iter()
-            .any(|v| are_within(ElementPair::VertexFace, &[*v, b[0], b[1], b[2]], distance))
-    };
-    distance >= 0.0
-        && (triangles_intersect(a, b)
-            || vertex_near(a, b)
-            || vertex_near(b, a)
-            || EDGES.iter().any(|&[i, j]| {
-                EDGES.iter().any(|&[k, l]| {
-                    are_within(ElementPair::EdgeEdge, &[a[i], a[j], b[k], b[l]], distance)
-                })
-            }))
+    is_distance(distance)
+        && (distance == f64::INFINITY || elements_are_within(a, b, &Reach::from(distance)))
 }
 
-/// The edges of a face as vertex numbers.
-const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
+/// Whether it is a number that is not below zero.
+fn is_distance(distance: f64) -> bool {
+    distance >= 0.0
+}
 
 /// A vector of integers.
 type Vector = [Integer; 3];

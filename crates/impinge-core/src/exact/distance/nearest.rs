@@ -2,59 +2,13 @@
 
 use std::cmp::Ordering;
 
+use super::features::{Nearest, Part};
+use super::filter;
+use super::reach::Reach;
 use super::{Vector, cross, difference, dot};
 use crate::exact::algebra::{Integer, common_integers};
 use crate::exact::sweep::ElementPair;
 use crate::exact::{Point, Sign};
-
-/// A feature of an element.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Feature {
-    /// A vertex of the element, by its number in the element.
-    Vertex(u8),
-    /// An edge: edge k of a face goes from vertex k to the next. An edge itself is its edge 0.
-    Edge(u8),
-    /// The face.
-    Face,
-}
-
-/// The nearest features of two elements: those whose relative interiors contain the nearest points.
-///
-/// A nearest point on the border of a feature belongs to the smaller feature. Where there are several nearest points (of
-/// parallel edges or flat elements), the first of the smallest features counts, in the order of ipc-toolkit's names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Nearest {
-    /// The feature of the first element.
-    pub a: Feature,
-    /// The feature of the second element.
-    pub b: Feature,
-    /// Whether the edges are parallel (or one is a point), or the face is degenerate. There may then be other nearest
-    /// points.
-    pub is_parallel: bool,
-}
-
-impl Nearest {
-    /// ipc-toolkit's name of the distance type: `P_T`, `P_E0`, `P_T0`; `EA_EB`, `EA_EB0`, `EA0_EB1`; for a vertex and an
-    /// edge `P_E`, `P_E0`, `P_E1`; for two vertices `P_P`.
-    #[must_use]
-    pub fn name(&self, pair: ElementPair) -> &'static str {
-        use Feature::{Edge, Vertex};
-        let pick = |names: [&'static str; 3], ix: u8| names[usize::from(ix) % 3];
-        match (pair, self.a, self.b) {
-            (ElementPair::VertexVertex, ..) => "P_P",
-            (ElementPair::VertexEdge, _, Vertex(ix)) => pick(["P_E0", "P_E1", ""], ix),
-            (ElementPair::VertexEdge, ..) => "P_E",
-            (ElementPair::VertexFace, _, Vertex(ix)) => pick(["P_T0", "P_T1", "P_T2"], ix),
-            (ElementPair::VertexFace, _, Edge(ix)) => pick(["P_E0", "P_E1", "P_E2"], ix),
-            (ElementPair::VertexFace, ..) => "P_T",
-            (ElementPair::EdgeEdge, Vertex(0), Vertex(ix)) => pick(["EA0_EB0", "EA0_EB1", ""], ix),
-            (ElementPair::EdgeEdge, Vertex(_), Vertex(ix)) => pick(["EA1_EB0", "EA1_EB1", ""], ix),
-            (ElementPair::EdgeEdge, _, Vertex(ix)) => pick(["EA_EB0", "EA_EB1", ""], ix),
-            (ElementPair::EdgeEdge, Vertex(ix), _) => pick(["EA0_EB", "EA1_EB", ""], ix),
-            (ElementPair::EdgeEdge, ..) => "EA_EB",
-        }
-    }
-}
 
 /// The nearest features of two elements.
 ///
@@ -69,57 +23,20 @@ impl Nearest {
 /// ```
 #[must_use]
 pub fn nearest_features(pair: ElementPair, points: &[Point; 4]) -> Nearest {
-    let polygon = Polygon::new(pair, points, 0.0);
+    if let Some(part) = filter::nearest_part(pair, points) {
+        return part.named(pair, false);
+    }
+    let polygon = Polygon::new(pair, points, &Reach::from(0.0));
     polygon.nearest().named(pair, polygon.is_flat())
 }
 
-/// [`are_within`](super::are_within) by integers alone, for a distance that is finite and not below zero.
-pub(super) fn are_within(pair: ElementPair, points: &[Point; 4], distance: f64) -> bool {
-    let polygon = Polygon::new(pair, points, distance);
+/// [`are_within`](super::are_within) by integers alone.
+pub(super) fn are_within(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> bool {
+    let polygon = Polygon::new(pair, points, reach);
     let nearest = polygon.nearest();
     let (over, under) = polygon.square_of_distance(nearest);
     let square = &polygon.distance * &polygon.distance;
     (&over - &(&square * &under)).sign() != Sign::Positive
-}
-
-/// A part of the difference polygon.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Part {
-    Face,
-    /// From this corner to the next.
-    Edge(usize),
-    Corner(usize),
-}
-
-impl Part {
-    /// The features whose difference the part is.
-    pub(super) fn named(self, pair: ElementPair, is_flat: bool) -> Nearest {
-        use Feature::{Edge, Face, Vertex};
-        let number = |ix: usize| u8::try_from(ix).unwrap_or(0);
-        let (a, b) = match (pair, self) {
-            (ElementPair::EdgeEdge, Self::Face) => (Edge(0), Edge(0)),
-            (ElementPair::EdgeEdge, Self::Edge(ix)) => [
-                (Edge(0), Vertex(0)),
-                (Vertex(1), Edge(0)),
-                (Edge(0), Vertex(1)),
-                (Vertex(0), Edge(0)),
-            ][ix],
-            (ElementPair::EdgeEdge, Self::Corner(ix)) => [
-                (Vertex(0), Vertex(0)),
-                (Vertex(1), Vertex(0)),
-                (Vertex(1), Vertex(1)),
-                (Vertex(0), Vertex(1)),
-            ][ix],
-            (_, Self::Face) => (Vertex(0), Face),
-            (_, Self::Edge(ix)) => (Vertex(0), Edge(number(ix))),
-            (_, Self::Corner(ix)) => (Vertex(0), Vertex(number(ix))),
-        };
-        Nearest {
-            a,
-            b,
-            is_parallel: is_flat,
-        }
-    }
 }
 
 /// The difference polygon at one moment, and a distance, as integers times one power of two.
@@ -134,10 +51,10 @@ pub(super) struct Polygon {
 }
 
 impl Polygon {
-    pub(super) fn new(pair: ElementPair, points: &[Point; 4], distance: f64) -> Self {
+    pub(super) fn new(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> Self {
         let finite = |x: f64| if x.is_finite() { x } else { 0.0 };
-        let numbers: [f64; 13] = std::array::from_fn(|ix| match ix {
-            12 => finite(distance),
+        let numbers: [f64; 12 + Reach::PARTS] = std::array::from_fn(|ix| match ix {
+            12.. => finite(reach.parts[ix - 12]),
             _ => finite(points[ix / 3][ix % 3]),
         });
         let (integers, exponent) = common_integers(numbers);
@@ -155,12 +72,11 @@ impl Polygon {
         let normal = (n > 2)
             .then(|| cross(&edges[0], &edges[1]))
             .filter(|normal| !normal.iter().all(Integer::is_zero));
-        let [.., distance] = integers;
         Self {
             corners,
             edges,
             normal,
-            distance,
+            distance: Reach::sum(&integers[12..]),
             exponent,
         }
     }

@@ -1,9 +1,11 @@
 //! Distances and nearest points as `f64`: quotients of exact integers, rounded.
 
-use super::nearest::{Part, Polygon};
-use super::{Nearest, cross, dot};
+use super::features::Part;
+use super::nearest::Polygon;
+use super::reach::Reach;
+use super::{Nearest, Vector, cross, difference, dot};
 use crate::exact::Point;
-use crate::exact::algebra::Integer;
+use crate::exact::algebra::{Integer, common_integers};
 use crate::exact::sweep::ElementPair;
 
 /// Nearest points of two elements.
@@ -32,7 +34,7 @@ pub struct Closest {
 /// ```
 #[must_use]
 pub fn closest_points(pair: ElementPair, points: &[Point; 4]) -> Closest {
-    let polygon = Polygon::new(pair, points, 0.0);
+    let polygon = Polygon::new(pair, points, &Reach::from(0.0));
     let part = polygon.nearest();
     let [p, q, r, s] = points;
     let points = match (pair, part) {
@@ -91,7 +93,7 @@ fn face_shares(polygon: &Polygon) -> [f64; 2] {
 }
 
 /// A quotient of at most about 1.
-fn quotient(over: &Integer, under: &Integer) -> f64 {
+pub(super) fn quotient(over: &Integer, under: &Integer) -> f64 {
     let ((x, i), (y, j)) = (over.approximate(), under.approximate());
     times_power(x / y, i - j)
 }
@@ -111,6 +113,17 @@ fn times_power(x: f64, exponent: i64) -> f64 {
     x * 2.0_f64.powi(half) * 2.0_f64.powi(exponent - half)
 }
 
-fn between(from: &Point, to: &Point, share: f64) -> Point {
+pub(super) fn between(from: &Point, to: &Point, share: f64) -> Point {
     std::array::from_fn(|k| from[k] + (to[k] - from[k]) * share)
+}
+
+/// How high two points are over the plane of a face, in a common unit.
+pub(super) fn heights(p: &Point, q: &Point, [a, b, c]: [&Point; 3]) -> [Integer; 2] {
+    let points = [p, q, a, b, c];
+    let numbers: [f64; 15] = std::array::from_fn(|ix| points[ix / 3][ix % 3]);
+    let (integers, _) = common_integers(numbers);
+    let point = |ix: usize| -> Vector { std::array::from_fn(|k| integers[3 * ix + k].clone()) };
+    let [a, b, c] = [2, 3, 4].map(point);
+    let normal = cross(&difference(&b, &a), &difference(&c, &a));
+    [0, 1].map(|ix| dot(&normal, &difference(&point(ix), &a)))
 }

@@ -1,0 +1,52 @@
+//! Stage `narrow` of proximity: which candidates are within a distance, at the start of a step.
+//!
+//! In: candidates, whose boxes overlap when they reach half as far each. Out: whether they are near. Plain floats with bounds
+//! settle most (`exact::distance`), exact arithmetic the others.
+
+use crate::elements::Elements;
+use crate::exact::{Reach, are_within_certainly, elements_are_within};
+use crate::narrow::Corners;
+use crate::positions::Positions;
+
+use super::world::World;
+
+/// Two layers, and within which distance their elements are near.
+pub(super) struct Near<'a> {
+    sides: [(&'a Elements, &'a Positions); 2],
+    reach: Reach,
+}
+
+impl<'a> Near<'a> {
+    pub fn new(world: World<'a>, layers: [u32; 2]) -> Self {
+        let sides = layers.map(|layer| {
+            let body = world.frame.body(world.scene, layer as usize);
+            (&world.cache(layer).clustering.corners, body.positions())
+        });
+        Near {
+            sides,
+            reach: world.frame.reach(layers[0] as usize, layers[1] as usize),
+        }
+    }
+
+    /// Whether the elements at two places are near, if that is certain.
+    #[inline(always)]
+    pub fn certainly(&self, places: [u32; 2]) -> Option<bool> {
+        let [a, b] = self.corners(places);
+        are_within_certainly(a.points(), b.points(), &self.reach)
+    }
+
+    /// Whether the elements at two places are near.
+    #[inline(never)]
+    pub fn exactly(&self, places: [u32; 2]) -> bool {
+        let [a, b] = self.corners(places);
+        elements_are_within(a.points(), b.points(), &self.reach)
+    }
+
+    #[inline(always)]
+    fn corners(&self, places: [u32; 2]) -> [Corners; 2] {
+        [0, 1].map(|side| {
+            let (elements, positions) = self.sides[side];
+            Corners::new(positions, elements.corners(places[side] as usize))
+        })
+    }
+}

@@ -1,0 +1,182 @@
+//! What a detector says of elements that are near each other.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::clock::Instant;
+use crate::cpu::steps::{Asked, Pose, Sought};
+use crate::detector::Detector;
+use crate::elements::Part;
+use crate::error::Error;
+use crate::exact::{closest_of_elements, nearest_of_elements};
+use crate::frame::TestId;
+use crate::impacts::StepAnswer;
+use crate::naive;
+use crate::narrow::{Corners, Within};
+use crate::near::{ClosestPoints, NearPair, NearPairs, NearQuery};
+use crate::pair_kind::PairKind;
+use crate::pairs::Primitive;
+use crate::progress::Control;
+use crate::run::Job;
+use crate::scene::Scene;
+use crate::settings::Method;
+use crate::sink::Wanted;
+use crate::step::{Start, Toi};
+
+use super::{Steps, begin};
+
+/// Pairs whose features a task finds.
+const TASK: usize = 256;
+
+impl Detector {
+    /// All pairs of elements whose distance is at most the one that the query says, at the positions that bodies have:
+    /// end positions are not looked at. Each comes with the features that are nearest and, on request, with the distance and
+    /// nearest points.
+    ///
+    /// The answer is exact: a pair is reported if and only if the distance of the two closed elements, as a real number,
+    /// is at most the distance asked for. Of tetrahedra the surface takes part.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, NearQuery, PairKind, Query, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]])?;
+    /// scene.add_points(&[[1.0f32, 1.0, 0.5], [5.0, 0.0, 0.0]])?;
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let query = NearQuery::new(Query::all()).distance(0.5).closest_points();
+    /// let near = detector.within_distance(&scene, &query)?;
+    /// let [pair] = near.as_slice() else { panic!("one pair") };
+    /// assert_eq!((pair.kind, pair.name()), (PairKind::VertexFace, "P_T"));
+    /// let closest = pair.closest.expect("it was asked for");
+    /// assert_eq!((closest.distance, closest.points[1]), (0.5, [1.0, 1.0, 0.0]));
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// A stale id, refused positions, a distance or thickness that is negative or not finite, a memory budget too small for
+    /// even one slab.
+    pub fn within_distance(
+        &mut self,
+        scene: &Scene,
+        query: &NearQuery,
+    ) -> Result<&NearPairs, Error> {
+        self.within_distance_with(scene, query, &Control::new())
+    }
+
+    /// [`within_distance`](Detector::within_distance) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `within_distance`, and [`Error::Cancelled`].
+    pub fn within_distance_with(
+        &mut self,
+        scene: &Scene,
+        query: &NearQuery,
+        control: &Control<'_>,
+    ) -> Result<&NearPairs, Error> {
+        let start = Instant::now();
+        let Steps {
+            frame,
+            near,
+            clusters,
+            keys: answer,
+            ..
+        } = &mut self.steps;
+        let workers = self.frames.workers();
+        query.resolve(scene, frame)?;
+        near.begin(frame);
+        frame.check(scene)?;
+        let stats = near.stats_mut();
+        begin(stats, &self.settings, workers.n());
+        let _shift = workers.shift(frame.n_primitives());
+        answer.begin(self.settings.limits(), Wanted::Pairs, Default::default());
+        if self.settings.method == Method::Naive {
+            stats.time("naive", |stats| {
+                naive::run(&Within, scene, frame, control, stats, |test, key, ()| {
+                    if let TestId::Elements(kind) = test {
+                        answer.extend(kind as usize, [key].into_iter());
+                    }
+                    answer.check()
+                })
+            })?;
+        } else {
+            let job = Job {
+                scene,
+                frame,
+                workers,
+                control,
+            };
+            let asked = Asked {
+                sought: Sought::Within,
+                start: Start::Report,
+                toi: Toi::F32,
+                pose: Pose::STILL,
+                latest: f64::INFINITY,
+            };
+            clusters.run(job, &self.settings, asked, StepAnswer::Keys(answer), stats)?;
+        }
+        let collect = Instant::now();
+        let (mut keys, _) = answer.finish()?;
+        for (kind, keys) in PairKind::ALL.into_iter().zip(&mut keys) {
+            keys.sort_unstable();
+            near.extend(kind, keys.iter().copied());
+        }
+        let ms = collect.elapsed().as_secs_f64() * 1e3;
+        near.stats_mut().add_ms("collect", ms);
+        let features = Instant::now();
+        let tasks: Vec<Mutex<&mut [NearPair]>> =
+            near.pairs_mut().chunks_mut(TASK).map(Mutex::new).collect();
+        let n_tasks = tasks.len();
+        let is_stopped = AtomicBool::new(false);
+        workers.for_each(&mut vec![(); workers.n()], n_tasks, |(), ix| {
+            if is_stopped.load(Ordering::Relaxed)
+                || control.step(ix as u64, n_tasks as u64).is_err()
+            {
+                is_stopped.store(true, Ordering::Relaxed);
+                return;
+            }
+            if let Ok(mut pairs) = tasks[ix].lock() {
+                pairs
+                    .iter_mut()
+                    .for_each(|pair| find_features(scene, pair, query.closest));
+            }
+        });
+        drop(tasks);
+        control.step(n_tasks as u64, n_tasks as u64)?;
+        let stats = near.stats_mut();
+        stats.add_ms("features", features.elapsed().as_secs_f64() * 1e3);
+        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
+        Ok(&self.steps.near)
+    }
+}
+
+/// Finds which features of a pair are nearest, and where.
+fn find_features(scene: &Scene, pair: &mut NearPair, closest: bool) {
+    use Part::{Edges, Faces, Vertices};
+    let parts = match pair.kind {
+        PairKind::VertexFace => [Vertices, Faces],
+        PairKind::EdgeEdge => [Edges, Edges],
+        PairKind::EdgeVertex => [Edges, Vertices],
+        PairKind::VertexVertex => [Vertices, Vertices],
+        PairKind::EdgeFace => [Edges, Faces],
+        PairKind::FaceFace => [Faces, Faces],
+    };
+    let corners = |Primitive { body, primitive }: Primitive, part: Part| {
+        let body = scene.body_in(body.slot());
+        match part {
+            // They are numbered as positions are.
+            Vertices => Corners::new(body.positions(), &[primitive]),
+            _ => Corners::new(
+                body.positions(),
+                body.part(part).corners(primitive as usize),
+            ),
+        }
+    };
+    let (a, b) = (corners(pair.a, parts[0]), corners(pair.b, parts[1]));
+    if closest {
+        let (nearest, distance, points) = closest_of_elements(a.points(), b.points());
+        pair.set_nearest(&nearest);
+        pair.closest = Some(ClosestPoints { distance, points });
+    } else {
+        pair.set_nearest(&nearest_of_elements(a.points(), b.points()));
+    }
+}

@@ -1,0 +1,376 @@
+//! Distances of elements by their corners: one vertex, two ends of an edge, three corners of a face.
+//!
+//! An edge and a face, and two faces, that share no point are as near as some vertex and face of theirs, or some two
+//! edges: `docs/exactness.md`, "Distances".
+
+use std::cmp::Ordering;
+
+use super::features::Part;
+use super::nearest::Polygon;
+use super::reach::Reach;
+use super::rounded::{self, between, quotient};
+use super::{Feature, Nearest, filter, nearest};
+use crate::exact::sweep::ElementPair;
+use crate::exact::triangle::segment_meets_triangle;
+use crate::exact::{Point, Sign, triangles_intersect};
+
+/// The edges of a face as vertex numbers.
+const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
+
+/// The features of two elements that are nearest, and the name of their kinds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct NearestOfElements {
+    /// The feature of the first element, and of the second.
+    pub features: [Feature; 2],
+    /// Whether nearest points may not be the only ones.
+    pub is_parallel: bool,
+    /// ipc-toolkit's name of the distance type. An edge and a face, or two faces, have the names of the kinds of the
+    /// features, without numbers.
+    pub name: &'static str,
+}
+
+/// Whether the distance of two elements of one to three corners is at most a reach, if plain floats are certain to tell.
+#[inline]
+pub(crate) fn are_within_certainly(a: &[Point], b: &[Point], reach: &Reach) -> Option<bool> {
+    if let Some(simple) = Simple::new(a, b) {
+        return filter::answer(simple.pair, &simple.points, reach);
+    }
+    let mut all_apart = true;
+    for part in parts(a, b) {
+        match filter::answer(part.simple.pair, &part.simple.points, reach) {
+            Some(true) => return Some(true),
+            Some(false) => {}
+            None => all_apart = false,
+        }
+    }
+    match all_apart {
+        // What crosses has edges and faces that do: it may be far from the border.
+        true => Some(share_a_point(a, b)),
+        false => None,
+    }
+}
+
+/// Whether the distance of two elements of one to three corners is at most a reach. Exact.
+pub(crate) fn elements_are_within(a: &[Point], b: &[Point], reach: &Reach) -> bool {
+    match Simple::new(a, b) {
+        Some(Simple { pair, points, .. }) => filter::answer(pair, &points, reach)
+            .unwrap_or_else(|| nearest::are_within(pair, &points, reach)),
+        None => {
+            share_a_point(a, b)
+                || parts(a, b).any(|part| {
+                    let Simple { pair, points, .. } = part.simple;
+                    super::are_within_reach(pair, &points, reach)
+                })
+        }
+    }
+}
+
+/// The features of two elements of one to three corners that are nearest. Exact.
+///
+/// Of several pairs of features at the same distance it is the first of the smallest.
+pub(crate) fn nearest_of_elements(a: &[Point], b: &[Point]) -> NearestOfElements {
+    match Simple::new(a, b) {
+        Some(simple) => simple.named(&super::nearest_features(simple.pair, &simple.points)),
+        None => Nearby::new(a, b).nearest,
+    }
+}
+
+/// Nearest points of two elements of one to three corners, and their distance: rounded as in
+/// [`closest_points`](super::closest_points).
+pub(crate) fn closest_of_elements(
+    a: &[Point],
+    b: &[Point],
+) -> (NearestOfElements, f64, [Point; 2]) {
+    if let Some(simple) = Simple::new(a, b) {
+        let closest = super::closest_points(simple.pair, &simple.points);
+        let points = simple.in_order(closest.points);
+        return (simple.named(&closest.nearest), closest.distance, points);
+    }
+    let nearby = Nearby::new(a, b);
+    match nearby.way {
+        Way::Between(simple) => {
+            let closest = super::closest_points(simple.pair, &simple.points);
+            let points = simple.in_order(closest.points);
+            (nearby.nearest, closest.distance, points)
+        }
+        Way::Crossing(point) => (nearby.nearest, 0.0, [point, point]),
+    }
+}
+
+/// Two elements that one [`ElementPair`] stands for.
+#[derive(Clone, Copy)]
+struct Simple {
+    pair: ElementPair,
+    points: [Point; 4],
+    /// Whether the second element comes first.
+    is_swapped: bool,
+}
+
+impl Simple {
+    #[inline]
+    fn new(a: &[Point], b: &[Point]) -> Option<Self> {
+        let mut points = [[0.0; 3]; 4];
+        let (pair, is_swapped) = match (a.len(), b.len()) {
+            (1, 1) => (ElementPair::VertexVertex, false),
+            (1, 2) => (ElementPair::VertexEdge, false),
+            (2, 1) => (ElementPair::VertexEdge, true),
+            (1, 3) => (ElementPair::VertexFace, false),
+            (3, 1) => (ElementPair::VertexFace, true),
+            (2, 2) => (ElementPair::EdgeEdge, false),
+            _ => return None,
+        };
+        let (first, second) = if is_swapped { (b, a) } else { (a, b) };
+        points[..first.len()].copy_from_slice(first);
+        points[first.len()..first.len() + second.len()].copy_from_slice(second);
+        Some(Self {
+            pair,
+            points,
+            is_swapped,
+        })
+    }
+
+    fn in_order<T>(&self, [first, second]: [T; 2]) -> [T; 2] {
+        if self.is_swapped {
+            [second, first]
+        } else {
+            [first, second]
+        }
+    }
+
+    fn named(&self, nearest: &Nearest) -> NearestOfElements {
+        NearestOfElements {
+            features: self.in_order([nearest.a, nearest.b]),
+            is_parallel: nearest.is_parallel,
+            name: nearest.name(self.pair),
+        }
+    }
+}
+
+/// A vertex and a face, or two edges, of two larger elements.
+struct PartOfPair {
+    simple: Simple,
+    /// The numbers of the vertex, edge or face in each element.
+    numbers: [usize; 2],
+}
+
+/// The number of a face in itself.
+const WHOLE: usize = 0;
+
+/// The vertices and faces, and the edges and edges, of an edge and a face or of two faces.
+fn parts<'a>(a: &'a [Point], b: &'a [Point]) -> impl Iterator<Item = PartOfPair> + 'a {
+    let edges = |of: &'a [Point]| EDGES.into_iter().take(if of.len() == 3 { 3 } else { 1 });
+    let vertices_of_a = (0..a.len()).filter(|_| b.len() == 3).filter_map(|ix| {
+        Some(PartOfPair {
+            simple: Simple::new(&a[ix..=ix], b)?,
+            numbers: [ix, WHOLE],
+        })
+    });
+    let vertices_of_b = (0..b.len()).filter(|_| a.len() == 3).filter_map(|ix| {
+        Some(PartOfPair {
+            simple: Simple::new(a, &b[ix..=ix])?,
+            numbers: [WHOLE, ix],
+        })
+    });
+    let pairs_of_edges = edges(a).enumerate().flat_map(move |(m, [i, j])| {
+        edges(b).enumerate().filter_map(move |(n, [k, l])| {
+            Some(PartOfPair {
+                simple: Simple::new(&[a[i], a[j]], &[b[k], b[l]])?,
+                numbers: [m, n],
+            })
+        })
+    });
+    vertices_of_a.chain(vertices_of_b).chain(pairs_of_edges)
+}
+
+impl PartOfPair {
+    /// Features of the part as features of the elements, each with how many dimensions it has.
+    fn features(&self, nearest: &Nearest) -> [(u8, Feature); 2] {
+        let number = |x: usize| u8::try_from(x).unwrap_or(0);
+        let of_part = self.simple.in_order([nearest.a, nearest.b]);
+        let is_edges = self.simple.pair == ElementPair::EdgeEdge;
+        std::array::from_fn(|side| match of_part[side] {
+            Feature::Vertex(end) if is_edges => {
+                let corner = EDGES[self.numbers[side]][usize::from(end) % 2];
+                (0, Feature::Vertex(number(corner)))
+            }
+            Feature::Edge(_) if is_edges => (1, Feature::Edge(number(self.numbers[side]))),
+            // The vertex of a vertex and a face.
+            Feature::Vertex(_) if (side == 0) != self.simple.is_swapped => {
+                (0, Feature::Vertex(number(self.numbers[side])))
+            }
+            Feature::Vertex(ix) => (0, Feature::Vertex(ix)),
+            Feature::Edge(ix) => (1, Feature::Edge(ix)),
+            Feature::Face => (2, Feature::Face),
+        })
+    }
+}
+
+/// How two elements that no [`ElementPair`] stands for are nearest.
+struct Nearby {
+    nearest: NearestOfElements,
+    way: Way,
+}
+
+enum Way {
+    /// Nearest points of a vertex and a face, or of two edges.
+    Between(Simple),
+    /// Where an edge passes through a face.
+    Crossing(Point),
+}
+
+impl Nearby {
+    fn new(a: &[Point], b: &[Point]) -> Self {
+        let parts: Vec<PartOfPair> = parts(a, b).collect();
+        let bounds: Vec<[f64; 2]> = parts
+            .iter()
+            .map(|part| {
+                let bounds = filter::bounds(part.simple.pair, &part.simple.points);
+                bounds.unwrap_or([0.0, f64::INFINITY])
+            })
+            .collect();
+        let most = bounds
+            .iter()
+            .fold(f64::INFINITY, |most: f64, bounds| most.min(bounds[1]));
+        // Those that may be nearest, compared exactly.
+        let near = parts.iter().zip(&bounds).filter(|(_, of)| of[0] <= most);
+        let mut best: Option<Measured<'_>> = None;
+        let mut has_tie = false;
+        for part in near.map(|(part, _)| Measured::new(part)) {
+            let Some(other) = &best else {
+                best = Some(part);
+                continue;
+            };
+            match part.compare(other) {
+                Ordering::Less => (best, has_tie) = (Some(part), false),
+                Ordering::Greater => {}
+                Ordering::Equal => {
+                    has_tie |= part.features != other.features;
+                    if part.order() < other.order() {
+                        best = Some(part);
+                    }
+                }
+            }
+        }
+        let best = best.expect("some part has the least upper bound");
+        let crossing = if best.is_touching() {
+            None
+        } else {
+            crossing(a, b)
+        };
+        if let Some((features, point)) = crossing {
+            return Self {
+                nearest: NearestOfElements {
+                    features,
+                    // Two faces that cross share a segment.
+                    is_parallel: a.len() == b.len(),
+                    name: "E_T",
+                },
+                way: Way::Crossing(point),
+            };
+        }
+        Self {
+            nearest: NearestOfElements {
+                features: best.features.map(|(_, feature)| feature),
+                is_parallel: has_tie || best.is_flat,
+                name: match best.features.map(|(dimensions, _)| dimensions) {
+                    [0, 0] => "P_P",
+                    [0, 1] | [1, 0] => "P_E",
+                    [0, _] | [_, 0] => "P_T",
+                    _ => "E_E",
+                },
+            },
+            way: Way::Between(best.part.simple),
+        }
+    }
+}
+
+/// A part, its nearest features and its distance as an exact fraction.
+struct Measured<'a> {
+    part: &'a PartOfPair,
+    features: [(u8, Feature); 2],
+    is_flat: bool,
+    polygon: Polygon,
+    nearest: Part,
+}
+
+impl<'a> Measured<'a> {
+    fn new(part: &'a PartOfPair) -> Self {
+        let Simple { pair, points, .. } = &part.simple;
+        let polygon = Polygon::new(*pair, points, &Reach::from(0.0));
+        let nearest = polygon.nearest();
+        let is_flat = polygon.is_flat();
+        Self {
+            features: part.features(&nearest.named(*pair, is_flat)),
+            part,
+            is_flat,
+            polygon,
+            nearest,
+        }
+    }
+
+    /// Small features first.
+    fn order(&self) -> (u8, [(u8, Feature); 2]) {
+        (self.features[0].0 + self.features[1].0, self.features)
+    }
+
+    fn is_touching(&self) -> bool {
+        self.polygon.square_of_distance(self.nearest).0.is_zero()
+    }
+
+    fn compare(&self, other: &Self) -> Ordering {
+        let (over, under) = self.polygon.square_of_distance(self.nearest);
+        let (over_other, under_other) = other.polygon.square_of_distance(other.nearest);
+        // Squares are over 4 to the exponent.
+        let exponents = [self, other].map(|measured| 2 * measured.polygon.exponent);
+        let least = exponents[0].min(exponents[1]);
+        let [shift, shift_other] =
+            exponents.map(|exponent| u64::try_from(exponent - least).expect("not below the least"));
+        let left = (&over * &under_other).shifted(shift);
+        let right = (&over_other * &under).shifted(shift_other);
+        match (&left - &right).sign() {
+            Sign::Negative => Ordering::Less,
+            Sign::Zero => Ordering::Equal,
+            Sign::Positive => Ordering::Greater,
+        }
+    }
+}
+
+fn share_a_point(a: &[Point], b: &[Point]) -> bool {
+    match (a, b) {
+        ([p, q], [r, s, t]) | ([r, s, t], [p, q]) => segment_meets_triangle(p, q, &[*r, *s, *t]),
+        ([p, q, r], [s, t, u]) => triangles_intersect(&[*p, *q, *r], &[*s, *t, *u]),
+        _ => false,
+    }
+}
+
+/// An edge of one that passes the inside of a face of the other, and where, rounded. Only asked of elements whose borders
+/// do not touch each other or a face.
+fn crossing(a: &[Point], b: &[Point]) -> Option<([Feature; 2], Point)> {
+    if !share_a_point(a, b) {
+        return None;
+    }
+    let through = |edges: &[Point], face: &[Point]| -> Option<(Feature, Point)> {
+        let face: [Point; 3] = face.try_into().ok()?;
+        let n = if edges.len() == 3 { 3 } else { 1 };
+        (0..n).find_map(|ix| {
+            let [p, q] = EDGES[ix].map(|corner| edges[corner]);
+            if !segment_meets_triangle(&p, &q, &face) {
+                return None;
+            }
+            let number = u8::try_from(ix).unwrap_or(0);
+            Some((Feature::Edge(number), where_crossed(&p, &q, &face)))
+        })
+    };
+    if let Some((edge, point)) = through(a, b) {
+        return Some(([edge, Feature::Face], point));
+    }
+    let (edge, point) = through(b, a)?;
+    Some(([Feature::Face, edge], point))
+}
+
+/// Where an edge passes a face, by the exact heights of its ends.
+fn where_crossed(p: &Point, q: &Point, [a, b, c]: &[Point; 3]) -> Point {
+    let heights = rounded::heights(p, q, [a, b, c]);
+    let share = quotient(&heights[0], &(&heights[0] - &heights[1]));
+    between(p, q, share)
+}

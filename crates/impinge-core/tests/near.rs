@@ -1,0 +1,596 @@
+//! Elements within a distance: against every pair by the exact test, on every method, thread count and budget.
+
+use impinge_core::exact::{
+    ElementPair, Feature, are_within, closest_points, edge_face_are_within, faces_are_within,
+    nearest_features, touch, triangles_intersect,
+};
+use impinge_core::{
+    Backend, BodyId, Control, Detector, Elements, Error, InstructionSet, Kind, Method, NearPair,
+    NearPairs, NearQuery, PairKind, Part, Query, Scene, Settings,
+};
+use impinge_scenes::{Random, soup, surfaces};
+
+type Point = [f64; 3];
+
+fn detector(method: Method) -> Detector {
+    Detector::with_settings(Settings {
+        method,
+        backend: Backend::Cpu,
+        ..Settings::default()
+    })
+    .expect("settings")
+}
+
+fn detectors() -> [Detector; 2] {
+    [Method::Clusters, Method::Naive].map(detector)
+}
+
+/// What is compared of a pair.
+type Row = (PairKind, [u32; 4], [Feature; 2], bool);
+
+fn rows(near: &NearPairs) -> Vec<Row> {
+    let row = |pair: &NearPair| (pair.kind, pair.row(), pair.features, pair.is_parallel);
+    near.iter().map(row).collect()
+}
+
+/// An element with its body, its number and its corners.
+struct Element {
+    body: BodyId,
+    number: u32,
+    ids: Vec<u32>,
+    corners: Vec<Point>,
+}
+
+fn elements(scene: &Scene, part: Part) -> Vec<Element> {
+    let mut all = Vec::new();
+    for (id, body) in scene.bodies() {
+        let elements: &Elements = body.part(part);
+        for ix in 0..elements.len() {
+            let ids = elements.corners(ix).to_vec();
+            all.push(Element {
+                body: id,
+                number: if part == Part::Vertices {
+                    ids[0]
+                } else {
+                    ix as u32
+                },
+                corners: ids
+                    .iter()
+                    .map(|&id| body.positions().point(id as usize))
+                    .collect(),
+                ids,
+            });
+        }
+    }
+    all
+}
+
+fn parts(kind: PairKind) -> [Part; 2] {
+    match kind {
+        PairKind::VertexFace => [Part::Vertices, Part::Faces],
+        PairKind::EdgeEdge => [Part::Edges, Part::Edges],
+        PairKind::EdgeVertex => [Part::Edges, Part::Vertices],
+        PairKind::VertexVertex => [Part::Vertices, Part::Vertices],
+        PairKind::EdgeFace => [Part::Edges, Part::Faces],
+        PairKind::FaceFace => [Part::Faces, Part::Faces],
+    }
+}
+
+fn four(points: &[&[Point]]) -> [Point; 4] {
+    let mut four = [[0.0; 3]; 4];
+    for (to, from) in four.iter_mut().zip(points.iter().copied().flatten()) {
+        *to = *from;
+    }
+    four
+}
+
+/// Whether two elements are near, and the features if one predicate names them.
+fn settle(kind: PairKind, a: &[Point], b: &[Point], distance: f64) -> Option<Option<Row>> {
+    let simple = |pair, points: [Point; 4], swap: bool| {
+        are_within(pair, &points, distance).then(|| {
+            let nearest = nearest_features(pair, &points);
+            let mut features = [nearest.a, nearest.b];
+            if swap {
+                features.reverse();
+            }
+            Some((kind, [0; 4], features, nearest.is_parallel))
+        })
+    };
+    match kind {
+        PairKind::VertexFace => simple(ElementPair::VertexFace, four(&[a, b]), false),
+        PairKind::EdgeEdge => simple(ElementPair::EdgeEdge, four(&[a, b]), false),
+        PairKind::EdgeVertex => simple(ElementPair::VertexEdge, four(&[b, a]), true),
+        PairKind::VertexVertex => simple(ElementPair::VertexVertex, four(&[a, b]), false),
+        PairKind::EdgeFace => {
+            edge_face_are_within(&[a[0], a[1]], &[b[0], b[1], b[2]], distance).then_some(None)
+        }
+        PairKind::FaceFace => {
+            let [a, b] = [a, b].map(|face| [face[0], face[1], face[2]]);
+            faces_are_within(&a, &b, distance).then_some(None)
+        }
+    }
+}
+
+/// Pair by pair: all kinds, everything with everything.
+fn expected(scene: &Scene, distance: f64) -> Vec<Row> {
+    let mut expected = Vec::new();
+    for kind in PairKind::ALL {
+        let [of_a, of_b] = parts(kind).map(|part| elements(scene, part));
+        for a in &of_a {
+            for b in &of_b {
+                let is_twice = parts(kind)[0] == parts(kind)[1]
+                    && (a.body.index(), a.number) >= (b.body.index(), b.number);
+                let shares = a.body == b.body && a.ids.iter().any(|id| b.ids.contains(id));
+                if is_twice || shares {
+                    continue;
+                }
+                let row = [
+                    a.body.index() as u32,
+                    a.number,
+                    b.body.index() as u32,
+                    b.number,
+                ];
+                match settle(kind, &a.corners, &b.corners, distance) {
+                    Some(Some((kind, _, features, parallel))) => {
+                        expected.push((kind, row, features, parallel));
+                    }
+                    Some(None) => expected.push((kind, row, [Feature::Face; 2], false)),
+                    None => {}
+                }
+            }
+        }
+    }
+    expected.sort_by_key(|&(kind, row, ..)| (kind, row));
+    expected
+}
+
+/// Features of compound pairs have a test of their own.
+fn without_compound_features(rows: Vec<Row>) -> Vec<Row> {
+    rows.into_iter()
+        .map(|(kind, row, features, parallel)| match kind {
+            PairKind::EdgeFace | PairKind::FaceFace => (kind, row, [Feature::Face; 2], false),
+            _ => (kind, row, features, parallel),
+        })
+        .collect()
+}
+
+fn all_kinds(distance: f64) -> NearQuery {
+    NearQuery::new(Query::everything())
+        .kinds(PairKind::ALL)
+        .distance(distance)
+}
+
+/// Faces on a lattice, bare edges and points; a third of the elements is degenerate.
+fn lattice(seed: u64, double: bool) -> Scene {
+    let mut random = Random::new(seed);
+    let mut points = |n: usize| -> Vec<[f32; 3]> {
+        let mut at = || random.below(5) as f32;
+        (0..n).map(|_| [at(), at(), at()]).collect()
+    };
+    let faces: Vec<[u32; 3]> = (0..5)
+        .map(|f| [3 * f, 3 * f + 1, (3 * f + 5) % 15])
+        .collect();
+    let mut scene = Scene::new();
+    let of_faces = points(15);
+    if double {
+        let of_faces: Vec<[f64; 3]> = of_faces.iter().map(|p| p.map(f64::from)).collect();
+        scene.add_triangles(&faces, &of_faces).expect("good");
+    } else {
+        scene.add_triangles(&faces, &of_faces).expect("good");
+    }
+    scene
+        .add_triangles(&[[0, 1, 2], [2, 1, 3]], &points(4))
+        .expect("good");
+    scene
+        .add_edges(&[[0, 1], [1, 2], [3, 3]], &points(4))
+        .expect("good");
+    scene.add_points(&points(5)).expect("good");
+    scene
+}
+
+/// Distances that occur on a lattice: exactly, and one unit in the last place beside.
+#[test]
+fn lattices_are_answered_as_pair_by_pair() {
+    let distances = [
+        0.0,
+        1.0,
+        1.0_f64.next_down(),
+        1.5,
+        2.0,
+        2.0_f64.sqrt(),
+        2.0_f64.sqrt().next_up(),
+        0.5,
+    ];
+    for seed in 0..8 {
+        let scene = lattice(seed, seed % 2 == 1);
+        for (ix, distance) in distances.into_iter().enumerate() {
+            if (seed as usize + ix) % 2 == 1 {
+                continue;
+            }
+            let expected = expected(&scene, distance);
+            for mut detector in detectors() {
+                let near = detector
+                    .within_distance(&scene, &all_kinds(distance))
+                    .expect("good");
+                assert_eq!(
+                    without_compound_features(rows(near)),
+                    expected,
+                    "seed {seed}, {distance}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_distance_that_occurs_counts_and_one_below_does_not() {
+    let scene = {
+        let mut scene = Scene::new();
+        let [a, b] = [0.0f32, 3.0].map(|z| [[0.0, 0.0, z], [4.0, 0.0, z], [0.0, 4.0, z]]);
+        scene.add_triangles(&[[0, 1, 2]], &a).expect("good");
+        scene.add_triangles(&[[0, 1, 2]], &b).expect("good");
+        scene
+    };
+    for mut detector in detectors() {
+        let mut count = |distance: f64| {
+            let query = NearQuery::new(Query::all()).kinds(PairKind::ALL);
+            let query = query.distance(distance).closest_points();
+            let near = detector.within_distance(&scene, &query).expect("good");
+            assert!(near.iter().all(|pair| {
+                let closest = pair.closest.expect("asked for");
+                closest.distance == 3.0 && closest.points[0][2] != closest.points[1][2]
+            }));
+            PairKind::ALL.map(|kind| near.of(kind).len())
+        };
+        assert_eq!(count(3.0_f64.next_down()), [0; 6]);
+        // Each vertex is over the other face; each edge is over itself and both neighbours.
+        assert_eq!(count(3.0), [6, 9, 12, 3, 6, 1]);
+    }
+}
+
+#[test]
+fn what_is_reported_by_default_depends_on_what_bodies_are() {
+    let mut scene = Scene::new();
+    let at = |z: f32| [[0.0f32, 0.0, z], [4.0, 0.0, z], [0.0, 4.0, z]];
+    scene.add_triangles(&[[0, 1, 2]], &at(0.0)).expect("good");
+    scene.add_edges(&[[0, 1]], &at(0.5)[..2]).expect("good");
+    scene.add_points(&at(1.0)[..1]).expect("good");
+    scene.add_points(&at(1.5)[..1]).expect("good");
+    let query = NearQuery::new(Query::everything()).distance(2.0);
+    for mut detector in detectors() {
+        let near = detector.within_distance(&scene, &query).expect("good");
+        let kinds = PairKind::ALL.map(|kind| near.of(kind).len());
+        // Four vertices over the face; the bare edge and all three edges of the face; the bare edge and both points; those.
+        assert_eq!(kinds, [4, 3, 2, 1, 0, 0], "{near:?}");
+    }
+}
+
+/// 0.1 + 0.2 as real numbers is less than the float 0.1 + 0.2.
+#[test]
+fn thickness_is_added_as_real_numbers() {
+    let mut scene = Scene::new();
+    let a = scene.add_points(&[[0.0f64; 3]]).expect("good");
+    let b = scene.add_points(&[[0.1 + 0.2, 0.0, 0.0]]).expect("good");
+    let thick = |r: f64, s: f64| {
+        let query = NearQuery::new(Query::between(a, b)).thickness(a, r);
+        query.thickness(b, s)
+    };
+    for mut detector in detectors() {
+        let mut count = |query: NearQuery| {
+            let near = detector.within_distance(&scene, &query).expect("good");
+            near.len()
+        };
+        assert_eq!(count(thick(0.1, 0.2)), 0);
+        assert_eq!(count(thick(0.1, 0.2_f64.next_up())), 1);
+        assert_eq!(count(thick(0.1 + 0.2, 0.0)), 1);
+        assert_eq!(count(thick(0.1, 0.1).distance(0.1)), 0);
+        assert_eq!(count(thick(0.1, 0.1).distance(0.11)), 1);
+        assert_eq!(
+            count(thick(f64::MAX, f64::MAX)),
+            1,
+            "the sum overflows a float"
+        );
+    }
+    // Of one body it counts twice.
+    let mut scene = Scene::new();
+    let body = scene
+        .add_points(&[[0.0f32; 3], [1.0, 0.0, 0.0]])
+        .expect("good");
+    for mut detector in detectors() {
+        for (thickness, n) in [(0.5_f64.next_down(), 0), (0.5, 1)] {
+            let query = NearQuery::new(Query::within(body)).thickness(body, thickness);
+            let near = detector.within_distance(&scene, &query).expect("good");
+            assert_eq!(near.len(), n);
+        }
+    }
+}
+
+/// Faces and edges near faces: the distance is that of the nearest parts, points have it, and features hold the points.
+#[test]
+fn edges_and_faces_are_as_far_as_their_nearest_parts() {
+    let mut n_by_name = std::collections::BTreeMap::new();
+    for seed in 0..6 {
+        let mut scene = Scene::new();
+        let (a, b) = if seed < 3 {
+            (
+                soup::triangles(12, 0.4, 2 * seed),
+                soup::triangles(12, 0.4, 2 * seed + 1),
+            )
+        } else {
+            (
+                soup::lattice_triangles(12, 4, 2 * seed),
+                soup::lattice_triangles(12, 4, 2 * seed + 1),
+            )
+        };
+        a.add_to(&mut scene).expect("good");
+        b.add_to(&mut scene).expect("good");
+        let query = NearQuery::new(Query::all())
+            .kinds([PairKind::EdgeFace, PairKind::FaceFace])
+            .distance(1.0)
+            .closest_points();
+        let mut detector = detector(Method::Clusters);
+        for pair in detector.within_distance(&scene, &query).expect("good") {
+            let corners = |part, body: BodyId, number: u32| -> Vec<Point> {
+                let body = scene.body(body).expect("known");
+                let ids = body.part(part).corners(number as usize);
+                let ids = ids.iter().map(|&id| body.positions().point(id as usize));
+                ids.collect()
+            };
+            let [of_a, of_b] = parts(pair.kind);
+            let a = corners(of_a, pair.a.body, pair.a.primitive);
+            let b = corners(of_b, pair.b.body, pair.b.primitive);
+            let closest = pair.closest.expect("asked for");
+            let mut least = f64::INFINITY;
+            let mut measure = |pair: ElementPair, points: [Point; 4]| {
+                let distance = match touch(pair, &points) {
+                    true => 0.0,
+                    false => closest_points(pair, &points).distance,
+                };
+                least = least.min(distance);
+            };
+            let edges = |of: &[Point]| -> Vec<[Point; 2]> {
+                match of {
+                    [p, q] => vec![[*p, *q]],
+                    _ => vec![[of[0], of[1]], [of[1], of[2]], [of[2], of[0]]],
+                }
+            };
+            for p in &a {
+                measure(ElementPair::VertexFace, four(&[&[*p], &b]));
+            }
+            if a.len() == 3 {
+                for p in &b {
+                    measure(ElementPair::VertexFace, four(&[&[*p], &a]));
+                }
+            }
+            for p in edges(&a) {
+                for q in edges(&b) {
+                    measure(ElementPair::EdgeEdge, four(&[&p, &q]));
+                }
+            }
+            let face = |of: &[Point]| [of[0], of[1], of[of.len() - 1]];
+            if triangles_intersect(&face(&a), &face(&b)) {
+                least = 0.0;
+            }
+            assert_eq!(closest.distance, least, "{pair:?}");
+            let [p, q] = closest.points;
+            let gap =
+                ((p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2) + (p[2] - q[2]).powi(2)).sqrt();
+            assert!((gap - least).abs() < 1e-12, "{pair:?} {gap}");
+            for (feature, point, corners) in [(0, p, &a), (1, q, &b)] {
+                let held: Vec<Point> = match pair.features[feature] {
+                    Feature::Vertex(ix) => vec![corners[usize::from(ix)]],
+                    Feature::Edge(ix) => {
+                        let ix = usize::from(ix);
+                        vec![corners[ix], corners[(ix + 1) % corners.len()]]
+                    }
+                    Feature::Face => corners.clone(),
+                };
+                let mut four = [point, point, point, point];
+                four[1..=held.len()].copy_from_slice(&held);
+                let kind = [
+                    ElementPair::VertexVertex,
+                    ElementPair::VertexEdge,
+                    ElementPair::VertexFace,
+                ][held.len() - 1];
+                assert!(are_within(kind, &four, 1e-12), "{pair:?}");
+            }
+            *n_by_name.entry(pair.name()).or_insert(0) += 1;
+        }
+    }
+    let names: Vec<_> = n_by_name.keys().copied().collect();
+    assert_eq!(names, ["E_E", "E_T", "P_E", "P_P", "P_T"], "{n_by_name:?}");
+}
+
+/// A ball inside a slightly larger one, and a lattice: the same bytes for every thread count, instruction set and budget,
+/// as the oracle says.
+#[test]
+fn the_answer_depends_on_the_input_alone() {
+    let ball = surfaces::icosphere(3);
+    let shell = ball.mapped(|[x, y, z]| [1.05 * x, 1.05 * y, 1.05 * z + 0.01]);
+    let lattice = soup::lattice_triangles(60, 6, 7);
+    let scenes = [
+        (vec![ball, shell], 0.06),
+        (vec![lattice.clone()], 1.0),
+        (
+            vec![soup::triangles(150, 0.2, 1), soup::triangles(150, 0.2, 2)],
+            0.05,
+        ),
+    ];
+    for (models, distance) in scenes {
+        let mut scene = Scene::new();
+        for model in &models {
+            model.add_to(&mut scene).expect("good");
+        }
+        let query = NearQuery::new(Query::everything())
+            .distance(distance)
+            .closest_points();
+        let naive = detector(Method::Naive)
+            .within_distance(&scene, &query)
+            .expect("good")
+            .clone();
+        assert!(naive.len() > 100, "{}", naive.len());
+        let sets = [
+            InstructionSet::Portable,
+            InstructionSet::Avx2,
+            InstructionSet::Avx512,
+        ];
+        for (threads, instruction_set, memory_budget) in [
+            (1, sets[0], None),
+            (2, sets[1], None),
+            (3, sets[2], Some(3_000_000)),
+            (16, sets[2], None),
+        ] {
+            let mut detector = Detector::with_settings(Settings {
+                backend: Backend::Cpu,
+                threads,
+                instruction_set,
+                memory_budget,
+                ..Settings::default()
+            })
+            .expect("settings");
+            for frame in 0..2 {
+                let near = detector.within_distance(&scene, &query).expect("good");
+                assert_eq!(near.as_slice(), naive.as_slice(), "{threads}, {frame}");
+                assert_eq!(near.hash(), naive.hash());
+            }
+        }
+        // One pair more changes the hash.
+        let fewer = NearQuery::new(Query::everything()).distance(distance / 2.0);
+        let fewer = detector(Method::Clusters)
+            .within_distance(&scene, &fewer)
+            .expect("good")
+            .clone();
+        assert!(fewer.len() < naive.len() && fewer.hash() != naive.hash());
+    }
+}
+
+/// What touches is within 0; what is within d is within more.
+#[test]
+fn a_distance_of_zero_is_intersection_and_larger_ones_only_add() {
+    let mut scene = Scene::new();
+    for seed in [3, 4] {
+        let model = soup::triangles(80, 0.4, seed);
+        model.add_to(&mut scene).expect("good");
+    }
+    let mut detector = detector(Method::Clusters);
+    let pairs = detector.detect(&scene, &Query::all()).expect("good");
+    let pairs: Vec<[u32; 2]> = pairs
+        .iter()
+        .map(|(a, b)| [a.primitive, b.primitive])
+        .collect();
+    let faces = NearQuery::new(Query::all()).kinds([PairKind::FaceFace]);
+    let mut last: Vec<[u32; 2]> = Vec::new();
+    for distance in [0.0, 1e-9, 0.01, 0.1, 0.3] {
+        let query = faces.clone().distance(distance);
+        let near = detector.within_distance(&scene, &query).expect("good");
+        let now: Vec<[u32; 2]> = near
+            .iter()
+            .map(|pair| [pair.a.primitive, pair.b.primitive])
+            .collect();
+        if distance == 0.0 {
+            assert_eq!(now, pairs);
+        }
+        assert!(last.iter().all(|row| now.binary_search(row).is_ok()));
+        assert!(now.len() >= last.len());
+        last = now;
+    }
+    assert!(last.len() > pairs.len());
+}
+
+/// End positions are not looked at, and steps are not disturbed.
+#[test]
+fn bodies_stand_still() {
+    let mut scene = Scene::new();
+    scene.add_points(&[[0.0f32; 3]]).expect("good");
+    let moving = scene.add_points(&[[5.0f32, 0.0, 0.0]]).expect("good");
+    scene
+        .set_end_positions(moving, &[[-5.0f32, 0.0, 0.0]])
+        .expect("good");
+    let query = |distance| NearQuery::new(Query::all()).distance(distance);
+    for mut detector in detectors() {
+        for _ in 0..2 {
+            let mut count = |d| {
+                let near = detector.within_distance(&scene, &query(d)).expect("good");
+                near.len()
+            };
+            assert_eq!((count(4.9), count(5.0)), (0, 1));
+            let step = impinge_core::Step::default();
+            assert_eq!(detector.impacts(&scene, &step).expect("good").len(), 1);
+        }
+    }
+}
+
+#[test]
+fn bad_distances_are_refused_by_name() {
+    let mut scene = Scene::new();
+    let body = scene.add_points(&[[0.0f32; 3]]).expect("good");
+    let gone = scene.add_points(&[[1.0f32; 3]]).expect("good");
+    scene.remove(gone).expect("known");
+    let query = || NearQuery::new(Query::everything());
+    for mut detector in detectors() {
+        for bad in [-1.0, f64::NAN, f64::INFINITY, -f64::MIN_POSITIVE] {
+            for (query, name) in [
+                (query().distance(bad), "distance"),
+                (query().thickness(body, bad), "thickness"),
+            ] {
+                let refused = detector.within_distance(&scene, &query);
+                let Err(Error::Setting { setting, given, .. }) = refused else {
+                    panic!("{bad} was accepted");
+                };
+                assert_eq!((setting, given), (name, bad.to_string()));
+            }
+        }
+        let stale = detector.within_distance(&scene, &query().thickness(gone, 1.0));
+        assert!(stale.is_err());
+        let stopped = Control::new();
+        let token = impinge_core::CancelToken::new();
+        token.cancel();
+        let stopped = stopped.cancel(&token);
+        let result = detector.within_distance_with(&scene, &query(), &stopped);
+        assert!(matches!(result, Err(Error::Cancelled)));
+        // A huge distance is no error.
+        let near = detector.within_distance(&scene, &query().distance(f64::MAX));
+        assert!(near.expect("good").is_empty());
+    }
+}
+
+/// Tetrahedra take part with their surface; coordinates of any size are answered.
+#[test]
+fn solids_and_numbers_of_any_size() {
+    let mut scene = Scene::new();
+    let solid = [
+        [0.0f64, 0.0, 0.0],
+        [4.0, 0.0, 0.0],
+        [0.0, 4.0, 0.0],
+        [0.0, 0.0, 4.0],
+    ];
+    let solid = scene
+        .add(vec![[0u32, 1, 2, 3]], solid.to_vec())
+        .expect("good");
+    assert_eq!(scene.body(solid).expect("known").kind(), Kind::Tetrahedra);
+    let far = scene
+        .add_points(&[
+            [1e70f64, 1e70, 1e70],
+            [1.0, 1.0, -1.0],
+            [1e-70, 1e-70, -1e-70],
+        ])
+        .expect("good");
+    for mut detector in detectors() {
+        let mut faces = |distance: f64| -> Vec<u32> {
+            let query = NearQuery::new(Query::between(solid, far)).distance(distance);
+            let near = detector.within_distance(&scene, &query).expect("good");
+            let mut vertices: Vec<u32> = near
+                .of(PairKind::VertexFace)
+                .iter()
+                .map(|p| p.a.primitive)
+                .collect();
+            vertices.dedup();
+            vertices
+        };
+        assert_eq!(faces(0.0), [] as [u32; 0]);
+        assert_eq!(faces(1e-70_f64.next_down()), [] as [u32; 0]);
+        assert_eq!(faces(1e-70), [2]);
+        assert_eq!(faces(1.0), [1, 2]);
+        assert_eq!(faces(1e71), [0, 1, 2]);
+    }
+}
