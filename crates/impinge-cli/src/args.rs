@@ -1,6 +1,7 @@
 //! The command line and its help.
 
 mod choices;
+mod near;
 #[cfg(feature = "gpu")]
 mod picture;
 mod step;
@@ -20,6 +21,7 @@ use crate::values::{
 };
 
 pub use choices::{BackendArg, MethodArg, SharedVertexArg};
+pub use near::NearArgs;
 #[cfg(feature = "gpu")]
 pub use picture::PictureArgs;
 pub use step::{StepArgs, StepHow, ToiArg};
@@ -39,6 +41,7 @@ Examples:
   impinge self cloth.ply                        where a mesh intersects itself
   impinge self part.stl --fail-on-hit           the same as a check: exit code 3 if it does
   impinge pairs a.obj b.obj --pairs -           the pairs themselves, as CSV
+  impinge near a.obj b.obj --distance 0.01      which elements are nearer than that
   impinge check parts/*.stl                     what is wrong with each mesh
   impinge sequence body.ply run.pc2 --self      the pairs of every frame of an animation
   impinge step cloth_0.ply cloth_1.ply          does anything touch on the way, and when first
@@ -62,6 +65,9 @@ pub enum Command {
     /// Find the smallest distance between two meshes, and where it is
     #[command(after_help = DISTANCE_EXAMPLES)]
     Distance(DistanceArgs),
+    /// Find the elements that are within a distance of each other, and which of their features are nearest
+    #[command(after_help = near::NEAR_EXAMPLES)]
+    Near(NearArgs),
     /// Find the pairs in every frame of a deforming mesh
     #[command(after_help = SEQUENCE_EXAMPLES)]
     Sequence(SequenceArgs),

@@ -7,6 +7,7 @@ mod demo_scene;
 #[cfg(feature = "gpu")]
 mod devices;
 mod distance;
+mod near;
 mod record;
 #[cfg(feature = "gpu")]
 mod render;
@@ -21,6 +22,7 @@ pub use demo::demo;
 #[cfg(feature = "gpu")]
 pub use devices::devices;
 pub use distance::distance;
+pub use near::near;
 #[cfg(feature = "gpu")]
 pub use render::render;
 pub use sequence::sequence;

@@ -74,6 +74,17 @@ impl<'a> Loading<'a> {
         }
     }
 
+    /// Files of which it may be asked where a body meets itself, with what the user tells of vertices at one position and
+    /// of standard input.
+    pub fn asked(self, weld: Option<bool>, is_self: bool, format: Option<Format>) -> Self {
+        Loading {
+            weld,
+            is_self,
+            format,
+            ..self
+        }
+    }
+
     /// Whether to weld vertices at one position. Triangles of an STL file share only positions.
     fn welds(&self, format: Format) -> bool {
         match self.weld {

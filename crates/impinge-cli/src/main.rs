@@ -36,6 +36,7 @@ fn main() -> ExitCode {
     let result = listening.and_then(|cancel| match cli.command {
         Command::Demo(args) => commands::demo(&args, &cancel),
         Command::Distance(args) => commands::distance(&args, &cancel),
+        Command::Near(args) => commands::near(&args, &cancel),
         Command::Pairs(args) => commands::pairs(&args, &cancel),
         Command::Within(args) => commands::within(&args, &cancel),
         Command::Sequence(args) => commands::sequence(&args, &cancel),

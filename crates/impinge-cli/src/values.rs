@@ -280,6 +280,14 @@ pub fn lambda(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A distance: a number that is not below 0.
+pub fn distance(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
+        _ => Err("expected a number that is not below 0".to_owned()),
+    }
+}
+
 /// Two body numbers with a comma between them.
 pub fn body_numbers(text: &str) -> Result<(usize, usize), String> {
     text.split_once(',')

@@ -9,7 +9,7 @@ use super::DetectorArgs;
 use super::PictureArgs;
 #[cfg(feature = "gpu")]
 use crate::values::PngFile;
-use crate::values::{MeshFile, RowsFile, body_numbers};
+use crate::values::{MeshFile, RowsFile, body_numbers, distance};
 
 pub const STEP_EXAMPLES: &str = "\
 Examples:
@@ -88,6 +88,9 @@ pub struct StepHow {
     /// Pairs that touch at the start: reported with the time 0, or ignored
     #[arg(long, value_enum, value_name = "RULE", default_value_t = StartArg::Report)]
     pub start: StartArg,
+    /// The distance that elements must keep: report the first time at which they are as near as that
+    #[arg(long, value_name = "D", default_value = "0", allow_negative_numbers = true, value_parser = distance)]
+    pub separation: f64,
 }
 
 /// [`impinge::Toi`] as an option.

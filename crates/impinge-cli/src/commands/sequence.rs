@@ -71,7 +71,8 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     if args.ccd {
         let step = Step::new(query)
             .start(args.step.start.into())
-            .toi(args.step.toi.into());
+            .toi(args.step.toi.into())
+            .separation(args.step.separation);
         return steps_of_sequence(
             (&mut detector, &mut scene, moving),
             &step,

@@ -40,7 +40,8 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     let bodies = Moving::read(args, cancel)?;
     let step = Step::new(query(args, &bodies)?)
         .start(args.how.start.into())
-        .toi(args.how.toi.into());
+        .toi(args.how.toi.into())
+        .separation(args.how.separation);
 
     let watch = Watch::detection(!args.detector.no_progress, "detecting");
     let report = |progress| watch.report(progress);
@@ -100,9 +101,9 @@ fn query(args: &StepArgs, bodies: &Moving) -> Result<Query, Error> {
 
 fn print(args: &StepArgs, bodies: &Moving, found: &Found<'_>) -> Result<(), Error> {
     if args.json {
-        let object = Value::Object(found.json(bodies)?);
+        let object = Value::Object(found.json(bodies, args.how.separation)?);
         writeln!(out(), "{object}")?;
         return Ok(());
     }
-    found.print(bodies)
+    found.print(bodies, args.how.separation)
 }

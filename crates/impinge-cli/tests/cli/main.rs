@@ -9,6 +9,7 @@ mod devices;
 mod first_sight;
 mod harness;
 mod hostile;
+mod near;
 #[cfg(feature = "gpu")]
 mod render;
 mod schema;

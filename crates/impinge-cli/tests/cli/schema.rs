@@ -7,13 +7,15 @@ use serde_json::{Value, json};
 
 use crate::harness::Folder;
 
-fn schema() -> Value {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/answer.schema.json");
+/// `docs/NAME.schema.json`.
+pub fn schema(name: &str) -> Value {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs");
+    let path = format!("{folder}/{name}.schema.json");
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
 /// The errors in `value`, by the part of JSON Schema that the file uses; an unknown keyword is an error too.
-fn wrong(schema: &Value, value: &Value, at: &str) -> Vec<String> {
+pub fn wrong(schema: &Value, value: &Value, at: &str) -> Vec<String> {
     let mut found = Vec::new();
     let mut say = |is_right: bool, what: String| {
         if !is_right {
@@ -105,7 +107,7 @@ fn wrong(schema: &Value, value: &Value, at: &str) -> Vec<String> {
 
 #[test]
 fn every_answer_is_as_described() {
-    let schema = schema();
+    let schema = schema("answer");
     let folder = Folder::new();
     let (a, b) = (ball(320), ball(500).translated([0.7, 0.1, 0.0]));
     folder.ply("a.ply", &a);
@@ -141,7 +143,7 @@ fn every_answer_is_as_described() {
 
 #[test]
 fn the_description_refuses_what_is_not_an_answer() {
-    let schema = schema();
+    let schema = schema("answer");
     let folder = Folder::new();
     folder.ply("a.ply", &ball(320));
     let right = folder.run(["self", "a.ply", "--json"]).json();

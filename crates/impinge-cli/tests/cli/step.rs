@@ -104,6 +104,7 @@ fn the_json_holds_what_the_library_says() {
         "bodies",
         "ms",
         "stats",
+        "separation",
     ];
     assert_eq!(keys(&answer), names);
     let (impacts, hash) = expected(Toi::F32);
@@ -298,4 +299,41 @@ fn a_sequence_is_followed_step_by_step() {
         printed.ends_with("3 steps, 1 free of contact\n"),
         "{printed}"
     );
+}
+
+/// With a distance to keep, what comes near is reported, and earlier.
+#[test]
+fn a_separation_is_kept() {
+    let folder = folder();
+    let step = |more: &[&str]| {
+        let args = ["step"].iter().chain(&FILES).chain(&["--json"]).chain(more);
+        folder.run(args).json()
+    };
+    let (without, with) = (step(&[]), step(&["--separation", "0.0625"]));
+    assert_eq!(
+        (&without["separation"], &with["separation"]),
+        (&0.0.into(), &0.0625.into())
+    );
+    let first = |answer: &Value| answer["earliest"]["toi"].as_f64().unwrap();
+    assert!(first(&with) < first(&without));
+    assert!(with["impacts"].as_u64() > without["impacts"].as_u64());
+    let [a0, a1, b0, b1] = crash().map(|(_, model)| model);
+    let mut scene = Scene::new();
+    for (start, end) in [(a0, a1), (b0, b1)] {
+        let id = start.add_to(&mut scene).unwrap();
+        scene.set_end_positions(id, &end.positions).unwrap();
+    }
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let asked = Step::default().separation(0.0625);
+    let hash = detector.impacts(&scene, &asked).unwrap().hash();
+    assert_eq!(with["hash"], format!("{hash:016x}"));
+    let text = folder.run(
+        ["step"]
+            .iter()
+            .chain(&FILES)
+            .chain(&["--separation", "0.0625"]),
+    );
+    assert!(text.printed().contains(" come within 0.0625 first, "));
+    let misuse = folder.run(["step"].iter().chain(&FILES).chain(&["--separation", "-1"]));
+    assert!(misuse.misuse().contains("not below 0"));
 }

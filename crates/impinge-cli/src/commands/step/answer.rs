@@ -43,9 +43,9 @@ impl<'a> Found<'a> {
         }
     }
 
-    /// `free`, `earliest`, `impacts`, `kinds`, `touching_at_start`, `hash`, `backend`, `bodies`, `ms`, `stats`; counts and
+    /// `free`, `earliest`, `impacts`, `kinds`, `touching_at_start`, `hash`, `backend`, `bodies`, `ms`, `stats`, `separation`; counts and
     /// the hash are null with `--earliest`.
-    pub fn json(&self, bodies: &Moving) -> Result<Map<String, Value>, Error> {
+    pub fn json(&self, bodies: &Moving, separation: f64) -> Result<Map<String, Value>, Error> {
         let described: Vec<Value> = bodies
             .ids
             .iter()
@@ -65,6 +65,7 @@ impl<'a> Found<'a> {
         object.insert("bodies".into(), described.into());
         object.insert("ms".into(), self.ms());
         object.insert("stats".into(), counters(self.stats));
+        object.insert("separation".into(), separation.into());
         Ok(object)
     }
 
@@ -99,18 +100,26 @@ impl<'a> Found<'a> {
     }
 
     /// Prints the answer in the first line, then counts.
-    pub fn print(&self, bodies: &Moving) -> Result<(), crate::error::Error> {
+    pub fn print(&self, bodies: &Moving, separation: f64) -> Result<(), crate::error::Error> {
         let mut to = out();
         let name = |body: impinge::BodyId| bodies.names[body.index()][0].as_str();
         match self.earliest {
+            None if separation > 0.0 => writeln!(
+                to,
+                "free: nothing comes within {separation} from start to end"
+            )?,
             None => writeln!(to, "free: nothing touches from start to end")?,
             Some(first) => writeln!(
                 to,
-                "not free: {} of {} and {} of {} touch first, {}",
+                "not free: {} of {} and {} of {} {} first, {}",
                 element(first.kind, first.a.primitive, true),
                 name(first.a.body),
                 element(first.kind, first.b.primitive, false),
                 name(first.b.body),
+                match separation > 0.0 {
+                    true => format!("come within {separation}"),
+                    false => "touch".to_owned(),
+                },
                 match first.at_start {
                     true => "at the start".to_owned(),
                     false => format!("at time {:?}", first.toi),

@@ -1,0 +1,226 @@
+//! `impinge near`.
+
+use impinge::{Backend, Detector, NearPair, NearQuery, PairKind, Query, Scene};
+use impinge_scenes::Model;
+use impinge_scenes::surfaces::{ball, cube};
+use serde_json::json;
+
+use crate::harness::Folder;
+use crate::schema::{schema, wrong};
+
+const DISTANCE: f64 = 1.25;
+
+fn models() -> [Model; 2] {
+    [ball(80), cube([2.0, 0.125, 0.0], 1.0)]
+}
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    let [a, b] = models();
+    folder.ply("a.ply", &a);
+    folder.ply("b.ply", &b);
+    folder
+}
+
+/// All pairs, by the library.
+fn expected(query: Query, kinds: &[PairKind]) -> (Vec<NearPair>, u64) {
+    let mut scene = Scene::new();
+    for model in models() {
+        model.add_to(&mut scene).unwrap();
+    }
+    let mut query = NearQuery::new(query).distance(DISTANCE).closest_points();
+    if !kinds.is_empty() {
+        query = query.kinds(kinds.iter().copied());
+    }
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let near = detector.within_distance(&scene, &query).unwrap();
+    (near.as_slice().to_vec(), near.hash())
+}
+
+#[test]
+fn the_json_holds_what_the_library_says() {
+    let folder = folder();
+    let schema = schema("near");
+    let near = ["near", "a.ply", "b.ply", "--distance", "1.25", "--json"];
+    for (more, query, kinds) in [
+        (&[][..], Query::all(), &[][..]),
+        (&["--self"], Query::everything(), &[]),
+        (&["--method", "naive"], Query::all(), &[]),
+        (
+            &["--kinds", "ef,ff"],
+            Query::all(),
+            &[PairKind::EdgeFace, PairKind::FaceFace],
+        ),
+    ] {
+        let answer = folder.run(near.iter().chain(more)).json();
+        assert_eq!(wrong(&schema, &answer, "$"), [""; 0], "{more:?}");
+        let (pairs, hash) = expected(query, kinds);
+        assert!(pairs.len() > 10);
+        assert_eq!(answer["pairs"], pairs.len());
+        assert_eq!(answer["hash"], format!("{hash:016x}"));
+        for kind in PairKind::ALL {
+            let n = pairs.iter().filter(|pair| pair.kind == kind).count();
+            assert_eq!(answer["kinds"][kind.name()], n);
+        }
+    }
+    let right = folder.run(near).json();
+    for (key, value) in [
+        ("pairs", json!("12")),
+        ("kinds", json!({"vf": 1})),
+        ("distance", json!(-1.0)),
+        ("new", json!(1)),
+    ] {
+        let mut object = right.clone();
+        object[key] = value;
+        assert!(!wrong(&schema, &object, "$").is_empty(), "{key}");
+    }
+}
+
+#[test]
+fn rows_read_back_to_the_same_bits() {
+    let folder = folder();
+    let (pairs, _) = expected(Query::all(), &[]);
+    let near = ["near", "a.ply", "b.ply", "--distance", "1.25", "--pairs"];
+    let run = folder.run(near.iter().chain(&["-"]));
+    assert!(
+        run.stderr.contains("pairs of elements within 1.25"),
+        "{}",
+        run.stderr
+    );
+    let text = run.printed();
+    let mut lines = text.lines();
+    assert_eq!(
+        lines.next(),
+        Some(
+            "kind,body_a,element_a,body_b,element_b,type,feature_a,feature_b,parallel,distance,ax,ay,az,bx,by,bz"
+        )
+    );
+    let mut n = 0;
+    for (line, pair) in lines.zip(&pairs) {
+        let fields: Vec<&str> = line.split(',').collect();
+        assert_eq!(fields[0], pair.kind.name());
+        let row: [u32; 4] = std::array::from_fn(|k| fields[1 + k].parse().unwrap());
+        assert_eq!((row, fields[5]), (pair.row(), pair.name()));
+        let numbers: Vec<f64> = fields[9..].iter().map(|x| x.parse().unwrap()).collect();
+        let closest = pair.closest.unwrap();
+        assert_eq!(numbers[0], closest.distance);
+        assert_eq!(numbers[1..], *closest.points.as_flattened());
+        n += 1;
+    }
+    assert_eq!(n, pairs.len());
+
+    folder.run(near.iter().chain(&["near.jsonl"])).printed();
+    let text = std::fs::read_to_string(folder.path("near.jsonl")).unwrap();
+    assert_eq!(text.lines().count(), pairs.len());
+    for (line, pair) in text.lines().zip(&pairs) {
+        let object: serde_json::Value = serde_json::from_str(line).unwrap();
+        assert_eq!(object["type"], pair.name());
+        assert_eq!(object["element_b"], pair.b.primitive);
+        assert_eq!(object["distance"], pair.closest.unwrap().distance);
+    }
+
+    folder.run(near.iter().chain(&["near.npy"])).printed();
+    let bytes = std::fs::read(folder.path("near.npy")).unwrap();
+    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let header = std::str::from_utf8(&bytes[10..start]).unwrap();
+    let shape = format!("'shape': ({},)", pairs.len());
+    assert!(header.contains(&shape), "{header}");
+    // Kind, four numbers, type, two features, a byte, distance and points.
+    let size = 8 + 16 + 28 + 16 + 1 + 8 + 48;
+    let rows: Vec<&[u8]> = bytes[start..].chunks_exact(size).collect();
+    assert_eq!(rows.len() * size, bytes.len() - start);
+    assert_eq!(rows.len(), pairs.len());
+    for (row, pair) in rows.iter().zip(&pairs) {
+        let distance = f64::from_le_bytes(row[69..77].try_into().unwrap());
+        assert_eq!(distance, pair.closest.unwrap().distance);
+        assert_eq!(row[68], u8::from(pair.is_parallel));
+    }
+}
+
+#[test]
+fn a_check_of_clearance_fails_on_a_hit() {
+    let folder = folder();
+    let check = |distance: &str| {
+        let args = ["near", "a.ply", "b.ply", "--fail-on-hit", "--distance"];
+        folder.run(args.iter().chain(&[distance]))
+    };
+    let hit = check("1.25");
+    assert_eq!(hit.code, Some(3));
+    assert!(
+        hit.stdout.starts_with("a.ply and b.ply: "),
+        "{}",
+        hit.stdout
+    );
+    let clear = check("0.001").printed();
+    assert!(
+        clear.contains("no pairs of elements within 0.001"),
+        "{clear}"
+    );
+    // One mesh alone is compared with itself, without neighbours.
+    let alone = folder
+        .run(["near", "a.ply", "--distance", "0.001"])
+        .printed();
+    assert!(alone.starts_with("a.ply: no pairs"), "{alone}");
+    let alone = folder.run(["near", "a.ply", "--distance", "1"]).printed();
+    assert!(alone.contains(" vf, "), "{alone}");
+}
+
+#[test]
+fn misuse_is_named() {
+    let folder = folder();
+    for (args, said) in [
+        (&["near", "a.ply", "b.ply"][..], "--distance"),
+        (
+            &["near", "a.ply", "b.ply", "--distance", "-1"],
+            "not below 0",
+        ),
+        (
+            &["near", "a.ply", "b.ply", "--distance", "nan"],
+            "not below 0",
+        ),
+        (
+            &[
+                "near",
+                "a.ply",
+                "b.ply",
+                "--distance",
+                "1",
+                "--json",
+                "--pairs",
+                "-",
+            ],
+            "give one of them a file",
+        ),
+        (
+            &[
+                "near",
+                "a.ply",
+                "b.ply",
+                "--distance",
+                "1",
+                "--ignore",
+                "0,7",
+            ],
+            "names body 7, but 2 bodies",
+        ),
+        (
+            &["near", "a.ply", "b.ply", "--distance", "1", "--kinds", "xy"],
+            "xy",
+        ),
+    ] {
+        let misuse = folder.run(args).misuse();
+        assert!(misuse.contains(said), "{misuse}");
+    }
+    let error = folder
+        .run([
+            "near",
+            "a.ply",
+            "b.ply",
+            "--distance",
+            "1",
+            "--pairs",
+            "a.ply.csv/x.csv",
+        ])
+        .error();
+    assert!(error.contains("a.ply.csv/x.csv"), "{error}");
+}
