@@ -1,12 +1,13 @@
 //! `impinge.Detector`: settings, questions, the run.
 
-use impinge::{CandidateQuery, Control, Query, Step, Toi};
+use impinge::{CandidateQuery, Control, NearQuery, Query, Step, Toi};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use crate::arrays;
 use crate::errors::raise;
+use crate::near::{self, NearPairs};
 use crate::question::{question, step_question};
 use crate::result::Answer;
 use crate::scene::Scene;
@@ -565,6 +566,97 @@ impl Detector {
             settings::instruction_set_name(given.instruction_set),
         )?;
         Ok((PyTuple::empty(py), all))
+    }
+
+    /// Finds the pairs of elements whose distance is at most `distance`, or the thickness of both bodies, at the
+    /// positions that bodies have. Exact: decided without rounding. Pairs of one body that share a vertex are left
+    /// out. Without `between` and `within`, all pairs of all bodies.
+    ///
+    /// Parameters
+    /// ----------
+    /// scene, between, within, ignore, progress, cancel
+    ///     As for `impacts`.
+    /// distance : float
+    ///     The distance in the unit of the scene, 0 or more.
+    /// kinds : sequence of {"vf", "ee", "ev", "vv", "ef", "ff"}, optional
+    ///     Which kinds of pairs; by default vertices and faces, edges and edges, and where bodies are made of edges
+    ///     or points alone also edges and vertices, vertices and vertices.
+    /// thickness : dict of Body to float, optional
+    ///     How thick bodies are: what either body of a pair adds to the distance, of one body twice. The sum is not
+    ///     rounded.
+    /// closest_points : bool
+    ///     Whether to find distances and nearest points, too.
+    ///
+    /// Returns
+    /// -------
+    /// NearPairs
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError, MemoryError, Cancelled, RuntimeError
+    ///     As `detect`; a distance or thickness that is negative or not finite.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import impinge
+    /// >>> scene = impinge.Scene()
+    /// >>> floor = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+    /// >>> point = scene.add_points([[1, 1, 0.5]])
+    /// >>> near = impinge.Detector(backend="cpu").within_distance(scene, 0.5, closest_points=True)
+    /// >>> near
+    /// NearPairs(vf: 1)
+    /// >>> str(near.types[0]), near.distances.tolist(), near.points.tolist()
+    /// ('P_T', [0.5], [[[1.0, 1.0, 0.5], [1.0, 1.0, 0.0]]])
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+    #[pyo3(
+        signature = (
+            scene, distance=None, *, between=None, within=None, ignore=None, kinds=None,
+            thickness=None, closest_points=false, progress=None, cancel=None,
+        ),
+        text_signature = "($self, scene, distance=0.0, *, between=None, within=None, ignore=None, \
+                          kinds=None, thickness=None, closest_points=False, progress=None, \
+                          cancel=None)"
+    )]
+    fn within_distance(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        distance: Argument<'_, '_>,
+        between: Argument<'_, '_>,
+        within: Argument<'_, '_>,
+        ignore: Argument<'_, '_>,
+        kinds: Argument<'_, '_>,
+        thickness: Argument<'_, '_>,
+        closest_points: bool,
+        progress: Argument<'_, '_>,
+        cancel: Argument<'_, '_>,
+    ) -> PyResult<NearPairs> {
+        let kinds = kinds.map(|kinds| steps::kinds(Some(kinds))).transpose()?;
+        let distance = steps::distance(distance)?;
+        let ask = |scene: &Scene| {
+            let query = NearQuery::new(step_question(scene, between, within, ignore)?);
+            let mut query = query.distance(distance);
+            if let Some(kinds) = kinds {
+                query = query.kinds(kinds);
+            }
+            for (body, thickness) in near::thickness(scene, thickness)? {
+                query = query.thickness(body, thickness);
+            }
+            Ok(match closest_points {
+                true => query.closest_points(),
+                false => query,
+            })
+        };
+        let answer = |detector: &mut impinge::Detector,
+                      scene: &impinge::Scene,
+                      query: &NearQuery,
+                      control: &Control<'_>| {
+            detector
+                .within_distance_with(scene, query, control)
+                .cloned()
+        };
+        let watched = (scene, progress, cancel);
+        let (pairs, ..) = Detector::watched(slf, watched, ask, answer)?;
+        Ok(NearPairs::new(pairs, closest_points))
     }
 
     fn __repr__(&self) -> String {

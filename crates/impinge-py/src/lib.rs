@@ -5,12 +5,14 @@
 
 mod arrays;
 mod bodies;
+mod contact;
 mod datasets;
 mod detector;
 mod devices;
 mod errors;
 mod functions;
 mod meshes;
+mod near;
 mod proximity;
 mod question;
 mod result;
@@ -28,6 +30,8 @@ mod _impinge {
     #[pymodule_export]
     use super::bodies::Body;
     #[pymodule_export]
+    use super::contact::Contacts;
+    #[pymodule_export]
     use super::datasets::{
         _check, _serve_check, _tiles_describe, _tiles_merge, _tiles_plan, _tiles_run,
         _tiles_scatter,
@@ -40,6 +44,8 @@ mod _impinge {
     use super::errors::{Cancelled, TooManyPairs};
     #[pymodule_export]
     use super::functions::{hash_rows, pairs, self_pairs};
+    #[pymodule_export]
+    use super::near::NearPairs;
     #[pymodule_export]
     use super::proximity::{Distances, Nearest};
     #[pymodule_export]

@@ -45,6 +45,11 @@ impl Answer {
         }
     }
 
+    /// The pairs, and the number of the scene that they belong to.
+    pub fn parts(&self) -> (&Pairs, u64) {
+        (&self.pairs, self.scene)
+    }
+
     fn id(&self, argument: &Bound<'_, PyAny>, name: &str) -> PyResult<BodyId> {
         let known = || self.pairs.bodies().map(|(id, _)| id);
         let id = body_id(argument, name, self.scene, known())?;

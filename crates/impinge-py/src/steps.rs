@@ -457,7 +457,7 @@ pub fn kinds(argument: Argument<'_, '_>) -> PyResult<Vec<PairKind>> {
 }
 
 /// Names of two letters as NumPy holds them: one 32-bit number per letter.
-fn kinds_array(
+pub fn kinds_array(
     py: Python<'_>,
     kinds: impl Iterator<Item = PairKind>,
 ) -> PyResult<Bound<'_, PyAny>> {
