@@ -81,11 +81,8 @@ fn region(crew: &Crew, n_tasks: usize) {
     });
     for ix in 0..n_tasks {
         // SAFETY: a read; loom fails where another thread may still write.
-        assert_eq!(
-            tasks.0[ix].done.with(|done| unsafe { *done }),
-            1,
-            "task {ix}"
-        );
+        let done = tasks.0[ix].done.with(|done| unsafe { *done });
+        assert_eq!(done, 1, "task {ix}");
     }
 }
 
