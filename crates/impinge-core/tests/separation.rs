@@ -112,7 +112,7 @@ fn expected(scene: &Scene, separation: f64) -> Vec<Row> {
                             continue;
                         }
                         let mut ends = [[[0.0; 3]; 4]; 2];
-                        let mut sides = vec![(body_a, a), (body_b, b)];
+                        let mut sides = [(body_a, a), (body_b, b)];
                         if kind == PairKind::EdgeVertex {
                             sides.reverse();
                         }
