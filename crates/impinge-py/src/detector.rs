@@ -558,6 +558,9 @@ impl Detector {
             all.set_item("threads", given.threads)?;
         }
         all.set_item("memory_budget", given.memory_budget)?;
+        if let Some(limit) = given.max_pairs {
+            all.set_item("max_pairs", limit)?;
+        }
         all.set_item("lambda_", given.lambda)?;
         all.set_item("group_size", given.group_size)?;
         all.set_item("recluster", settings::recluster_name(given.recluster))?;

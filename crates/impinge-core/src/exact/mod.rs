@@ -18,6 +18,7 @@
 
 mod algebra;
 mod distance;
+mod element_pair;
 pub(crate) mod filter;
 mod orientation;
 mod rounding;
@@ -38,6 +39,7 @@ pub(crate) use distance::{
     NearestOfElements, Reach, are_within_certainly, closest_of_elements, elements_are_within,
     nearest_of_elements,
 };
+pub use element_pair::ElementPair;
 pub(crate) use orientation::{Projection, collinear};
 pub use orientation::{Sign, orient2d, orient3d};
 pub(crate) use segment::strictly_between;
@@ -45,7 +47,7 @@ pub use shared::{
     tetrahedra_intersect_beyond_shared, triangle_tetrahedron_intersect_beyond_shared,
     triangles_intersect_beyond_shared,
 };
-pub use sweep::{Contact, ElementPair, first_contact, touch, touch_during};
+pub use sweep::{Contact, first_contact, touch, touch_during};
 pub use tetrahedron::{tetrahedra_intersect, triangle_tetrahedron_intersect};
 pub use triangle::triangles_intersect;
 

@@ -10,7 +10,7 @@ use super::nearest::Polygon;
 use super::reach::Reach;
 use super::rounded::{self, between, quotient};
 use super::{Feature, Nearest, filter, nearest};
-use crate::exact::sweep::ElementPair;
+use crate::exact::element_pair::ElementPair;
 use crate::exact::triangle::segment_meets_triangle;
 use crate::exact::{Point, Sign, triangles_intersect};
 

@@ -1,6 +1,6 @@
 //! Features of elements, and the parts of the difference polygon that they are.
 
-use crate::exact::sweep::ElementPair;
+use crate::exact::element_pair::ElementPair;
 
 /// A feature of an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -3,7 +3,7 @@
 use super::features::Part;
 use super::reach::Reach;
 use crate::exact::Point;
-use crate::exact::sweep::ElementPair;
+use crate::exact::element_pair::ElementPair;
 
 /// 64 unit roundoffs.
 const BOUND: f64 = 32.0 * f64::EPSILON;

@@ -24,7 +24,7 @@ mod rounded;
 
 use super::Point;
 use super::algebra::Integer;
-use super::sweep::ElementPair;
+use super::element_pair::ElementPair;
 pub(crate) use elements::{NearestOfElements, are_within_certainly, elements_are_within};
 pub(crate) use elements::{closest_of_elements, nearest_of_elements};
 pub use features::{Feature, Nearest};

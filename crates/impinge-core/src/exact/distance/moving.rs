@@ -3,7 +3,8 @@
 use crate::exact::algebra::{
     Polynomial, Root, Roots, Time, Vector, cross, difference, dot, square_of_sum,
 };
-use crate::exact::sweep::{Contact, ElementPair, Polygon};
+use crate::exact::element_pair::ElementPair;
+use crate::exact::sweep::{Contact, Polygon};
 use crate::exact::{Point, Sign, first_contact};
 
 use super::{are_within, filter};

@@ -7,7 +7,7 @@ use super::filter;
 use super::reach::Reach;
 use super::{Vector, cross, difference, dot};
 use crate::exact::algebra::{Integer, common_integers};
-use crate::exact::sweep::ElementPair;
+use crate::exact::element_pair::ElementPair;
 use crate::exact::{Point, Sign};
 
 /// The nearest features of two elements.

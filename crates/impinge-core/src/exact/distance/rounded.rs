@@ -6,7 +6,7 @@ use super::reach::Reach;
 use super::{Nearest, Vector, cross, difference, dot};
 use crate::exact::Point;
 use crate::exact::algebra::{Integer, common_integers};
-use crate::exact::sweep::ElementPair;
+use crate::exact::element_pair::ElementPair;
 
 /// Nearest points of two elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
