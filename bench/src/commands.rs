@@ -2,7 +2,7 @@
 
 use impinge::{Backend, Method, Settings};
 use impinge_scenes::deform::Wave;
-use impinge_scenes::{BuiltScene, Model, adversarial, surfaces};
+use impinge_scenes::{BuiltScene, Model, adversarial, regular, surfaces};
 
 use crate::measure::{self, Table};
 use crate::ours::{Feed, Ours};
@@ -15,7 +15,7 @@ use crate::{Failure, Options, files, gpu, steps};
 pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
     let mut report = match command {
         "two-body" | "motion" | "self" | "tets" | "bodies" | "sizes" | "adversarial" | "gpu"
-        | "steps" => Report::new(command),
+        | "regular" | "steps" => Report::new(command),
         "device" => {
             println!("{}", gpu::slug(&gpu::device(options)?));
             return Ok(());
@@ -30,6 +30,7 @@ pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
         "bodies" => bodies(options, &mut report)?,
         "sizes" => sizes(options, &mut report)?,
         "gpu" => gpu::scenes(options, &mut report)?,
+        "regular" => regular_surfaces(options, &mut report)?,
         "steps" => steps::run(options, &mut report)?,
         _ => adversarial_scenes(options, &mut report)?,
     }
@@ -339,6 +340,42 @@ fn adversarial_scenes(options: &Options, report: &mut Report) -> Result<(), Fail
             );
             report.keep(&table);
             report.keep(&base);
+        }
+    }
+    report.say(&text);
+    Ok(())
+}
+
+/// Surfaces at rest, none of which meets itself: each beside the rough one of the same run.
+fn regular_surfaces(options: &Options, report: &mut Report) -> Result<(), Failure> {
+    let size = options.size.unwrap_or(80_000);
+    let mut text = "Self-collision of surfaces that do not meet themselves. `ratio` is to the rough surface under `skip`.\n\n\
+                    | surface | pairs that share a vertex | triangles | candidates | unsure | ms | ratio |\n\
+                    |---|---|---:|---:|---:|---:|---:|\n"
+        .to_owned();
+    let mut rough_ms = None;
+    for surface in regular::ALL {
+        for (ask, rule) in [(Ask::Within, "skip"), (Ask::Resolved, "resolve")] {
+            let model = (surface.build)(size);
+            let problem = Problem::mirrored(surface.name, vec![model], ask)
+                .about(surface.what)
+                .expecting(Some(0));
+            let runner = Ours::new(&problem, settings(options, Method::Clusters), Feed::InPlace)?;
+            let frames = options.frames.unwrap_or(40);
+            let table = measure::run(&problem, vec![Box::new(runner)], frames, options.turn)?;
+            let row = &table.rows[0];
+            let rough_ms = *rough_ms.get_or_insert(row.median_ms);
+            let count = |key: &str| grouped(row.details[key].as_u64().unwrap_or(0));
+            text += &format!(
+                "| {} | {rule} | {} | {} | {} | {} | {:.1} |\n",
+                surface.name,
+                grouped(table.n_primitives as u64),
+                count("candidates"),
+                count("unsure"),
+                figures(row.median_ms),
+                row.median_ms / rough_ms,
+            );
+            report.keep(&table);
         }
     }
     report.say(&text);

@@ -50,6 +50,7 @@ commands:
   bodies        1,000, 10,000 and 100,000 bodies of 12 triangles
   sizes         10^4 to 10^7 triangles in two waving bodies
   adversarial   scenes that break methods which are only fast on average, as ratios to a plain one
+  regular       self-collision of flat and regular surfaces, as ratios to a rough one
   steps         contacts of moving cloth: all, the earliest, any, how far a step can be taken, pairs of boxes;
                 --scene cloth-ball|cloth-funnel
   gpu           the scenes of two-body and self on a GPU: stages on the device beside a lower bound
@@ -59,7 +60,7 @@ options:
   --scene NAME       one scene only (two-body, motion, self, adversarial)
   --frames N         timed frames of each contestant (default 40; fewer for large scenes)
   --turn N           frames of one contestant in a row (default 10); with 1 all caches are cold
-  --size N           adversarial: primitives (default 1,000,000); sizes, bodies: the largest size
+  --size N           adversarial, regular: primitives (default 1,000,000 and 80,000); sizes, bodies: the largest size
   --threads N        threads of impinge (default: all)
   --backend NAME     cpu (default), gpu or auto
   --device NAME      part of a GPU's name, to choose among several

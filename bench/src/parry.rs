@@ -261,7 +261,7 @@ impl<P: Corners> Parry<P> {
     fn new(problem: &Problem, setting: Setting) -> Result<Self, Failure> {
         let groups: Vec<Vec<usize>> = match problem.ask {
             Ask::Between => vec![vec![0], vec![1]],
-            Ask::Within | Ask::All => vec![(0..problem.bodies.len()).collect()],
+            Ask::Within | Ask::Resolved | Ask::All => vec![(0..problem.bodies.len()).collect()],
         };
         let mut sides = Vec::new();
         let mut layout = Vec::new();
@@ -388,7 +388,7 @@ fn test<P: Corners>(
     let asked = match ask {
         Ask::Between => true,
         Ask::All => a.owners[p] != b.owners[q],
-        Ask::Within => {
+        Ask::Within | Ask::Resolved => {
             let of_q = b.indices::<P>(q);
             !a.indices::<P>(p).iter().any(|corner| of_q.contains(corner))
         }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use impinge::{Backend, Detector, Elements, Method, Query, Scene, Settings};
+use impinge::{Backend, Detector, Elements, Method, Query, Scene, Settings, SharedVertex};
 use impinge_scenes::Model;
 use impinge_scenes::deform::Deform;
 
@@ -15,6 +15,8 @@ pub enum Ask {
     Between,
     /// Self-collision of the only body, without pairs that share a vertex.
     Within,
+    /// Self-collision of the only body, and of pairs that share a vertex those that meet in more.
+    Resolved,
     /// Pairs of different bodies.
     All,
 }
@@ -161,6 +163,7 @@ impl Problem {
         let query = match (self.ask, &ids[..]) {
             (Ask::Between, [a, b]) => Query::between(*a, *b),
             (Ask::Within, [a]) => Query::within(*a),
+            (Ask::Resolved, [a]) => Query::within(*a).shared_vertex(SharedVertex::Resolve),
             (Ask::All, _) => Query::all(),
             (ask, _) => return Err(format!("{ask:?} does not fit {} bodies", ids.len()).into()),
         };
