@@ -374,7 +374,7 @@ fn an_answer_without_memory_is_an_error() {
     assert!(line.contains("at most 1000 are allowed"), "{line}");
     let line = run(&["--memory-budget", "100M"]).error();
     assert!(
-        line.starts_with("the memory budget is 100000000 bytes, but "),
+        line.starts_with("the memory budget is 104857600 bytes, but "),
         "{line}"
     );
 }
