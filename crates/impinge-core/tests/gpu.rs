@@ -356,8 +356,9 @@ fn pieces_keep_to_filters_ignored_pairs_and_frames() {
     };
     let mut detectors = [
         Detector::with_most_bound(budget(None), 16 << 10).unwrap(),
-        Detector::with_most_bound(budget(Some(400_000)), 24 << 10).unwrap(),
-        Detector::with_settings(budget(Some(250_000))).unwrap(),
+        // Each answer takes its room beside that of the largest one before.
+        Detector::with_most_bound(budget(Some(1_000_000)), 16 << 10).unwrap(),
+        Detector::with_most_bound(budget(Some(2_000_000)), 16 << 10).unwrap(),
     ];
     let mut sizes = std::collections::BTreeSet::new();
     for frame in 0..2 {

@@ -16,7 +16,7 @@ SETTINGS = [
     {"method": "cells", "threads": 1},
     {"method": "cells", "threads": 2, "lambda_": 20.0},
     {"method": "cells", "lambda_": 0.01, "group_size": 5, "instruction_set": "portable"},
-    {"memory_budget": 1 << 20},
+    {"memory_budget": 1 << 22},
     {"method": "cells", "memory_budget": 1 << 22},
 ]
 
