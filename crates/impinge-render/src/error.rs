@@ -37,6 +37,24 @@ pub enum Error {
         /// How many primitives the body has.
         n_primitives: usize,
     },
+    /// A number that no body of a [`Live`](crate::Live) has.
+    #[error("body {body} was named, but there are {n_bodies} bodies")]
+    NoSuchBody {
+        /// The number as given.
+        body: usize,
+        /// How many bodies there are.
+        n_bodies: usize,
+    },
+    /// Another number of positions than the body has vertices.
+    #[error("body {body}: {given} positions were given, it has {expected} vertices")]
+    WrongNumberOfPositions {
+        /// The body's number in its [`Live`](crate::Live).
+        body: usize,
+        /// How many were given.
+        given: usize,
+        /// How many vertices it has.
+        expected: usize,
+    },
     /// A picture without pixels, or larger than the device can draw.
     #[error("a picture of {} x {} pixels was requested, {allowed} is possible", given[0], given[1])]
     Size {

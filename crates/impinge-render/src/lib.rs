@@ -31,6 +31,10 @@
 //! contact can be followed around a body. For tetrahedra, the boundary is drawn, and all faces of colliding
 //! tetrahedra.
 //!
+//! # Live
+//! [`Live`] draws bodies that move into a texture of the caller's, such as a window's, many times per second. It is simpler
+//! (flat faces, no darkened hollows) and never waits for the device.
+//!
 //! # What it costs
 //! A picture is drawn in tiles, and faces are uploaded in chunks. So device memory beyond the faces themselves
 //! (72 bytes each) is bounded, whatever the size of the picture. The same picture on the same device gives the
@@ -42,6 +46,7 @@ mod corners;
 mod device;
 mod error;
 mod image;
+mod live;
 mod picture;
 mod pipelines;
 mod renderer;
@@ -52,8 +57,9 @@ pub use body::Colors;
 pub use camera::{Camera, Projection, UpAxis};
 pub use error::Error;
 pub use image::Image;
-/// The GPU interface that [`Renderer::with_device`] takes.
+/// The GPU interface of [`Renderer::with_device`] and [`Live`].
 pub use impinge::wgpu;
+pub use live::{Faces, Live, Look, Orbit};
 pub use picture::{Face, Normals, Picture, Surface};
 #[doc(hidden)]
 pub use pipelines::shaders;

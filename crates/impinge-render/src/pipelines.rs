@@ -50,9 +50,8 @@ pub(crate) const SHADERS: [(&str, &str); 3] = [
 
 /// The name and the text of every shader that this crate compiles, for compilers other than naga to check.
 pub fn shaders() -> impl Iterator<Item = (&'static str, String)> {
-    SHADERS
-        .map(|(name, text)| (name, text.to_owned()))
-        .into_iter()
+    let all = SHADERS.into_iter().chain(crate::live::SHADERS);
+    all.map(|(name, text)| (name, text.to_owned()))
 }
 
 pub(crate) const SAMPLES: u32 = 4;
