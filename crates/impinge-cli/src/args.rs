@@ -5,6 +5,8 @@ mod near;
 #[cfg(feature = "gpu")]
 mod picture;
 mod step;
+#[cfg(feature = "view")]
+mod view;
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -25,6 +27,8 @@ pub use near::NearArgs;
 #[cfg(feature = "gpu")]
 pub use picture::PictureArgs;
 pub use step::{StepArgs, StepHow, ToiArg};
+#[cfg(feature = "view")]
+pub use view::ViewArgs;
 
 /// Exact collision detection for deforming meshes of triangles and tetrahedra.
 #[derive(Debug, Parser)]
@@ -90,6 +94,10 @@ pub enum Command {
     #[cfg(feature = "gpu")]
     #[command(after_help = RENDER_EXAMPLES)]
     Render(RenderArgs),
+    /// Show meshes and what collides in them in a window, live; without a mesh, the built-in scene
+    #[cfg(feature = "view")]
+    #[command(after_help = view::VIEW_EXAMPLES)]
+    View(ViewArgs),
     /// List GPUs and software drivers, for --device
     #[cfg(feature = "gpu")]
     Devices(DevicesArgs),

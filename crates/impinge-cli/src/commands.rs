@@ -15,6 +15,8 @@ mod sequence;
 mod simulate;
 mod step;
 mod tiles;
+#[cfg(feature = "view")]
+mod view;
 
 pub use answer::{pairs, within};
 pub use check::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, check, check_worker};
@@ -29,3 +31,5 @@ pub use sequence::sequence;
 pub use simulate::simulate;
 pub use step::step;
 pub use tiles::{TILES_EXAMPLES, TilesArgs, tiles};
+#[cfg(feature = "view")]
+pub use view::view;

@@ -15,6 +15,14 @@ pub enum Error {
     #[cfg(feature = "gpu")]
     #[error(transparent)]
     Picture(#[from] impinge_render::Error),
+    /// A window could not be opened.
+    #[cfg(feature = "view")]
+    #[error(transparent)]
+    Window(#[from] impinge_view::Error),
+    /// A picture of `impinge view --png` could not be made.
+    #[cfg(feature = "view")]
+    #[error("{0}")]
+    View(String),
     /// A mesh file that can't be read or written.
     #[error(transparent)]
     File(#[from] impinge_io::Error),

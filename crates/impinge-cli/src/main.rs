@@ -6,6 +6,8 @@ mod commands;
 mod contacts;
 mod detection;
 mod error;
+#[cfg(any(feature = "view", test))]
+mod files;
 mod headline;
 mod json;
 mod load;
@@ -47,6 +49,8 @@ fn main() -> ExitCode {
         Command::Tiles(args) => commands::tiles(&args, &cancel),
         #[cfg(feature = "gpu")]
         Command::Render(args) => commands::render(&args, &cancel),
+        #[cfg(feature = "view")]
+        Command::View(args) => commands::view(&args, &cancel),
         #[cfg(feature = "gpu")]
         Command::Devices(args) => commands::devices(&args),
     });

@@ -363,6 +363,27 @@ fn fraction(whole: &str, part: &str, unit: u64) -> Option<u64> {
     u64::try_from(total).ok()
 }
 
+/// A body's number and the first three rows of a matrix.
+#[cfg(any(feature = "view", test))]
+pub fn body_matrix(text: &str) -> Result<(usize, [[f64; 4]; 4]), String> {
+    let expected = || {
+        "expected a body's number, a colon and 12 numbers, such as 1:1,0,0,0.5,0,1,0,0,0,0,1,0"
+            .to_owned()
+    };
+    let (body, numbers) = text.split_once(':').ok_or_else(expected)?;
+    let body = body.parse().map_err(|_| expected())?;
+    let numbers: Result<Vec<f64>, _> = numbers.split(',').map(str::parse).collect();
+    let numbers = numbers.map_err(|_| expected())?;
+    if numbers.len() != 12 || numbers.iter().any(|x| !x.is_finite()) {
+        return Err(expected());
+    }
+    let mut matrix = [[0.0, 0.0, 0.0, 1.0]; 4];
+    for (row, numbers) in matrix.iter_mut().zip(numbers.as_chunks().0) {
+        *row = *numbers;
+    }
+    Ok((body, matrix))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -470,6 +491,25 @@ mod tests {
         assert_eq!(lambda("0.5"), Ok(0.5));
         for text in ["0", "-1", "nan", "inf", "x"] {
             assert!(lambda(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn matrices() {
+        let (body, matrix) =
+            body_matrix("1:1,0,0,0.5,0,1,0,-2,0,0,1,3e-1").expect("twelve numbers");
+        assert_eq!(body, 1);
+        assert_eq!(matrix[1], [0.0, 1.0, 0.0, -2.0]);
+        assert_eq!(matrix[2], [0.0, 0.0, 1.0, 0.3]);
+        assert_eq!(matrix[3], [0.0, 0.0, 0.0, 1.0]);
+        for text in [
+            "",
+            "1",
+            "1:2",
+            "a:1,0,0,0,0,1,0,0,0,0,1,0",
+            "0:1,0,0,inf,0,1,0,0,0,0,1,0",
+        ] {
+            assert!(body_matrix(text).is_err(), "{text}");
         }
     }
 }

@@ -19,7 +19,7 @@ struct Actor {
     id: BodyId,
     name: &'static str,
     rest: Vec<[f32; 3]>,
-    motion: Box<dyn Motion>,
+    motion: Box<dyn Motion + Send>,
 }
 
 /// A [`Deform`] behind a pointer, called once per frame, not once per vertex.
@@ -71,7 +71,7 @@ impl DemoScene {
         &mut self,
         name: &'static str,
         model: Model,
-        deform: impl Deform + 'static,
+        deform: impl Deform + Send + 'static,
     ) -> Result<(), Error> {
         let Model {
             positions,

@@ -1,6 +1,7 @@
 //! `impinge sequence`: every frame of a sequence.
 
 use std::io::{Write, stderr};
+use std::path::Path;
 
 use impinge::{BodyId, CancelToken, Control, Pairs, Query, Scene, Step};
 use impinge_io::{Sequence, Weld};
@@ -38,7 +39,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let loading = Loading::new(&args.ask, is_self, cancel);
     let mut bodies = Bodies::default();
     let (moving, weld) = bodies.add(&args.mesh, loading)?;
-    let frames = Frames::open(args, weld)?;
+    let frames = Frames::open(&args.sequence, weld)?;
     for other in &args.others {
         bodies.add(other, loading)?;
     }
@@ -183,15 +184,15 @@ impl<'a> Outputs<'a> {
 }
 
 /// The frames of the sequence, welded like the mesh.
-struct Frames {
+pub(super) struct Frames {
     sequence: Sequence,
     weld: Option<Weld>,
     name: String,
 }
 
 impl Frames {
-    fn open(args: &SequenceArgs, weld: Option<Weld>) -> Result<Self, Error> {
-        let sequence = Sequence::open(&args.sequence)?;
+    pub(super) fn open(path: &Path, weld: Option<Weld>) -> Result<Self, Error> {
+        let sequence = Sequence::open(path)?;
         for [before, after] in sequence.gaps() {
             // A note that nobody can read does no harm.
             let _ = writeln!(
@@ -204,35 +205,50 @@ impl Frames {
         Ok(Frames {
             sequence,
             weld,
-            name: args.sequence.display().to_string(),
+            name: path.display().to_string(),
         })
     }
+}
+
+impl Frames {
+    pub(super) fn n_frames(&self) -> usize {
+        self.sequence.n_frames()
+    }
+}
+
+/// Welds the positions of a frame like the mesh.
+pub(super) fn welded(
+    positions: impinge_io::Positions,
+    weld: Option<&Weld>,
+    name: &str,
+    frame_ix: usize,
+) -> Result<impinge::Positions, Error> {
+    let positions = match weld {
+        None => positions,
+        Some(weld) => {
+            if let Some([a, b]) = weld.torn(&positions) {
+                return Err(Error::Usage(format!(
+                    "{name}: frame {frame_ix}: vertices {a} and {b} are apart, but welded since they are at one position in the \
+                     mesh: use --no-weld"
+                )));
+            }
+            weld.positions(&positions)
+                .ok_or_else(|| impinge_io::Error::Mismatch {
+                    file: name.to_owned(),
+                    what: "positions per frame (the mesh has as many vertices before welding)"
+                        .to_owned(),
+                    expected: weld.map().len() as u64,
+                    found: positions.len() as u64,
+                })?
+        }
+    };
+    Ok(to_positions(positions))
 }
 
 impl step::Frames for Frames {
     fn read(&self, frame_ix: usize) -> Result<impinge::Positions, Error> {
         let positions = self.sequence.frame(frame_ix)?;
-        let positions = match &self.weld {
-            None => positions,
-            Some(weld) => {
-                if let Some([a, b]) = weld.torn(&positions) {
-                    return Err(Error::Usage(format!(
-                        "{}: frame {frame_ix}: vertices {a} and {b} are apart, but welded since they are at one position in the \
-                         mesh: use --no-weld",
-                        self.name
-                    )));
-                }
-                weld.positions(&positions)
-                    .ok_or_else(|| impinge_io::Error::Mismatch {
-                        file: self.name.clone(),
-                        what: "positions per frame (the mesh has as many vertices before welding)"
-                            .to_owned(),
-                        expected: weld.map().len() as u64,
-                        found: positions.len() as u64,
-                    })?
-            }
-        };
-        Ok(to_positions(positions))
+        welded(positions, self.weld.as_ref(), &self.name, frame_ix)
     }
 
     fn refused(&self, frame_ix: usize, source: impinge::Error) -> Error {

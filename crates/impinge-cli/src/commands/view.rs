@@ -1,0 +1,198 @@
+//! `impinge view`: meshes in a window.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use impinge::{BodyId, CancelToken, Positions};
+use impinge_io::{ReadOptions, Weld};
+use impinge_render::{Camera, Colors, Projection};
+use impinge_view::{Command, Content, Options, Shown, show, write_png};
+
+use super::sequence::{Frames, welded};
+use super::step::Frames as _;
+use crate::apart::Inputs;
+use crate::args::ViewArgs;
+use crate::commands::demo_scene::DemoScene;
+use crate::error::Error;
+use crate::files::{Files, FrameFiles};
+use crate::load::{Bodies, Loading};
+use crate::palette;
+
+/// Frames of the built-in scene.
+const DEMO_FRAMES: u32 = 300;
+
+/// `impinge view`.
+pub fn view(args: &ViewArgs, cancel: &CancelToken) -> Result<(), Error> {
+    let options = options(args);
+    if let Some(file) = &args.png {
+        Inputs::new(&args.meshes).check("--png", &file.0)?;
+        let content = content(args, cancel)?;
+        return write_png(content, &options, &file.0).map_err(Error::View);
+    }
+    let (args, cancel) = (args.clone(), cancel.clone());
+    let load = move || content(&args, &cancel).map_err(|error| error.line());
+    Ok(show(load, options)?)
+}
+
+fn options(args: &ViewArgs) -> Options {
+    Options {
+        within: args.within.then_some(true),
+        shared_vertex: args.shared_vertex.into(),
+        method: args.method.into(),
+        backend: args.backend.into(),
+        frame: args.frame,
+        plays: !args.paused,
+        camera: Camera {
+            azimuth: args.azimuth,
+            elevation: args.elevation,
+            up: args.up.into(),
+            projection: match args.orthographic {
+                true => Projection::Orthographic,
+                false => Camera::default().projection,
+            },
+        },
+        moves: args.moves.clone(),
+        size: args.size,
+        folder: PathBuf::from(""),
+        command: command(args),
+        measure: args.measure.map(Into::into),
+    }
+}
+
+/// The words that name the content.
+fn command(args: &ViewArgs) -> Command {
+    let mut words = vec!["impinge".to_owned(), "view".to_owned()];
+    words.extend(args.meshes.iter().map(|path| path.display().to_string()));
+    for (is_given, option) in [
+        (args.sequence, "--sequence"),
+        (args.bodies, "--bodies"),
+        (args.no_weld, "--no-weld"),
+    ] {
+        if is_given {
+            words.push(option.to_owned());
+        }
+    }
+    if args.meshes.is_empty() {
+        words.extend(["--triangles".to_owned(), args.triangles.to_string()]);
+    }
+    Command(words)
+}
+
+fn content(args: &ViewArgs, cancel: &CancelToken) -> Result<Content, Error> {
+    if args.meshes.is_empty() {
+        return demo(args);
+    }
+    let files = Files::of(&args.meshes, args.sequence, args.bodies)?;
+    // Self-collision may be asked for in the window.
+    let loading =
+        Loading::as_they_are(true, cancel).asked(args.no_weld.then_some(false), true, None);
+    let mut bodies = Bodies::default();
+    let (moving, weld) = bodies.add(files.mesh, loading)?;
+    let frames: Option<Arc<dyn impinge_view::Frames>> = match files.frames {
+        FrameFiles::None => None,
+        FrameFiles::Sequence(path) => Some(Arc::new(Moving {
+            body: moving,
+            source: Source::Sequence(Frames::open(path, weld)?),
+        })),
+        FrameFiles::Each(paths) => Some(Arc::new(Moving {
+            body: moving,
+            source: Source::Files(paths.to_vec(), weld),
+        })),
+    };
+    for other in files.others {
+        bodies.add(other, loading)?;
+    }
+    let shown = bodies
+        .ids
+        .iter()
+        .zip(bodies.names)
+        .enumerate()
+        .map(|(ix, (&id, name))| shown(ix, id, name));
+    Ok(Content {
+        bodies: shown.collect(),
+        scene: bodies.scene,
+        frames,
+    })
+}
+
+fn shown(ix: usize, id: BodyId, name: String) -> Shown {
+    let palette::BodyColors { colliding, other } = palette::body(ix);
+    let colors = Colors { colliding, other };
+    Shown { id, name, colors }
+}
+
+/// The body that moves, and its frames.
+struct Moving {
+    body: BodyId,
+    source: Source,
+}
+
+enum Source {
+    Sequence(Frames),
+    Files(Vec<PathBuf>, Option<Weld>),
+}
+
+impl impinge_view::Frames for Moving {
+    fn n_frames(&self) -> usize {
+        match &self.source {
+            Source::Sequence(frames) => frames.n_frames(),
+            Source::Files(files, _) => files.len(),
+        }
+    }
+
+    fn read(&self, frame_ix: usize) -> Result<Vec<(BodyId, Positions)>, String> {
+        let positions = match &self.source {
+            Source::Sequence(frames) => frames.read(frame_ix),
+            Source::Files(files, weld) => read_file(files, weld.as_ref(), frame_ix),
+        };
+        let positions = positions.map_err(|error| error.line())?;
+        Ok(vec![(self.body, positions)])
+    }
+}
+
+fn read_file(files: &[PathBuf], weld: Option<&Weld>, frame_ix: usize) -> Result<Positions, Error> {
+    let Some(path) = files.get(frame_ix) else {
+        let text = format!("frame {frame_ix} of {} frames", files.len());
+        return Err(Error::Usage(text));
+    };
+    let mut mesh = impinge_io::read(path, &ReadOptions::default())?;
+    mesh.positions.narrow_if_exact();
+    welded(mesh.positions, weld, &path.display().to_string(), frame_ix)
+}
+
+/// The built-in scene. Frames are computed when they are asked for.
+struct Demo(Mutex<DemoScene>);
+
+fn demo(args: &ViewArgs) -> Result<Content, Error> {
+    let demo = DemoScene::new(args.triangles as usize)?;
+    let bodies = demo.bodies();
+    let bodies = bodies
+        .iter()
+        .enumerate()
+        .map(|(ix, &(id, name))| shown(ix, id, name.to_owned()))
+        .collect();
+    Ok(Content {
+        scene: demo.scene().clone(),
+        bodies,
+        frames: Some(Arc::new(Demo(Mutex::new(demo)))),
+    })
+}
+
+impl impinge_view::Frames for Demo {
+    fn n_frames(&self) -> usize {
+        DEMO_FRAMES as usize
+    }
+
+    fn read(&self, frame_ix: usize) -> Result<Vec<(BodyId, Positions)>, String> {
+        let mut demo = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        // Frames are at most 300.
+        demo.pose(frame_ix as u32, DEMO_FRAMES)
+            .map_err(|error| error.to_string())?;
+        let ids: Vec<BodyId> = demo.bodies().iter().map(|&(id, _)| id).collect();
+        let positions = |id| {
+            let body = demo.scene().body(id).map_err(|error| error.to_string())?;
+            Ok((id, body.positions().clone()))
+        };
+        ids.into_iter().map(positions).collect()
+    }
+}

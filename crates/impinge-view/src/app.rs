@@ -1,0 +1,247 @@
+//! The app: loads a content, then lets a session show it.
+
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::thread;
+use std::time::Instant;
+
+use eframe::egui;
+use egui_wgpu::RenderState;
+use impinge_render::Camera;
+
+use crate::content::Content;
+use crate::options::Options;
+use crate::session::Session;
+use crate::timeline::Count;
+use crate::{input, panel, view};
+
+/// The app in the window. [`show`](crate::show) opens one; tests run it without a window.
+pub struct Viewer {
+    state: State,
+    options: Options,
+    render: Option<RenderState>,
+    last: Option<Instant>,
+    measured: Measured,
+}
+
+enum State {
+    /// The content is being read.
+    Loading(Receiver<Result<Content, String>>),
+    /// It cannot be shown.
+    Failed(String),
+    Shown(Box<Session>),
+}
+
+/// Frames shown so far, for [`Options::measure`].
+#[derive(Default)]
+struct Measured {
+    n_frames: u32,
+    began: Option<Instant>,
+}
+
+/// Frames that are not measured: buffers and pipelines are made in them.
+const WARM_UP: u32 = 10;
+
+impl Viewer {
+    /// An app for a window, or for a test. `load` runs on a thread of its own.
+    pub fn new(
+        creation: &eframe::CreationContext<'_>,
+        load: impl FnOnce() -> Result<Content, String> + Send + 'static,
+        options: Options,
+    ) -> Self {
+        creation.egui_ctx.set_visuals(egui::Visuals::light());
+        let (to, content) = channel();
+        let ctx = creation.egui_ctx.clone();
+        let thread = thread::Builder::new().name("load".to_owned());
+        let spawned = thread.spawn(move || {
+            // If the window was closed meanwhile, nobody waits for the content.
+            let _ = to.send(load());
+            ctx.request_repaint();
+        });
+        let render = creation.wgpu_render_state.clone();
+        let state = match (spawned, &render) {
+            (Err(error), _) => State::Failed(format!("no thread can be started: {error}")),
+            (_, None) => State::Failed("the window has no graphics device".to_owned()),
+            (Ok(_), Some(_)) => State::Loading(content),
+        };
+        Viewer {
+            state,
+            options,
+            render,
+            last: None,
+            measured: Measured::default(),
+        }
+    }
+
+    /// Whether the content is still being read.
+    pub fn is_loading(&self) -> bool {
+        matches!(self.state, State::Loading(_))
+    }
+
+    /// The message that is shown, if there is one.
+    pub fn message(&self) -> Option<&str> {
+        match &self.state {
+            State::Loading(_) => None,
+            State::Failed(text) => Some(text),
+            State::Shown(session) => session.message.as_deref(),
+        }
+    }
+
+    fn session(&self) -> Option<&Session> {
+        match &self.state {
+            State::Shown(session) => Some(session),
+            _ => None,
+        }
+    }
+
+    /// The number of pairs in the frame that is shown.
+    pub fn n_pairs(&self) -> Option<usize> {
+        let answer = self.session()?.answer.as_ref()?;
+        Some(answer.pairs.len())
+    }
+
+    /// The hash of the pairs in the frame that is shown.
+    pub fn hash(&self) -> Option<u64> {
+        let answer = self.session()?.answer.as_ref()?;
+        Some(answer.pairs.hash())
+    }
+
+    /// Method and backend of the last answer, such as `clusters on cpu`.
+    pub fn how(&self) -> Option<&str> {
+        let answer = self.session()?.answer.as_ref()?;
+        Some(&answer.how)
+    }
+
+    /// The frame that is shown.
+    pub fn frame(&self) -> Option<usize> {
+        Some(self.session()?.stage.frame_ix())
+    }
+
+    /// The timeline, one entry per frame.
+    pub fn counts(&self) -> &[Count] {
+        self.session()
+            .map_or(&[], |session| &session.timeline.counts)
+    }
+
+    /// For the step from each frame to the next: `None` if not known, `Some(None)` if nothing touches, else the time of the
+    /// earliest impact.
+    pub fn earliest(&self) -> &[Option<Option<f64>>] {
+        self.session()
+            .map_or(&[], |session| &session.timeline.earliest)
+    }
+
+    /// The direction of view.
+    pub fn camera(&self) -> Option<Camera> {
+        self.session().map(Session::camera)
+    }
+
+    /// The selected body and primitive.
+    pub fn selected(&self) -> Option<(usize, u32)> {
+        self.session()?.selected
+    }
+
+    /// The path of the last picture that was saved, and the command that makes it again.
+    pub fn saved(&self) -> Option<(&std::path::Path, &str)> {
+        let saved = self.session()?.saved.as_ref()?;
+        Some((&saved.path, &saved.command))
+    }
+
+    /// Takes over the content once it is read.
+    fn load(&mut self, ctx: &egui::Context) {
+        let State::Loading(content) = &self.state else {
+            return;
+        };
+        let loaded = match content.try_recv() {
+            Ok(loaded) => loaded,
+            Err(TryRecvError::Empty) => return,
+            Err(TryRecvError::Disconnected) => Err("reading ended without a result".to_owned()),
+        };
+        let Some(render) = self.render.clone() else {
+            return;
+        };
+        let session = loaded.and_then(|content| Session::new(content, &self.options, render, ctx));
+        self.state = match session {
+            Ok(session) => State::Shown(Box::new(session)),
+            Err(text) => State::Failed(text),
+        };
+    }
+
+    /// Counts frames; after the last one prints how many there were per second, and closes the window.
+    fn measure(&mut self, ctx: &egui::Context) {
+        let Some(wanted) = self.options.measure else {
+            return;
+        };
+        let State::Shown(session) = &self.state else {
+            // Nothing can be measured.
+            if let State::Failed(text) = &self.state {
+                eprintln!("error: {text}");
+                ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+            }
+            return;
+        };
+        // Frames are measured alone, not the timeline beside them.
+        if self.measured.n_frames + 1 == WARM_UP && !session.timeline.is_counted() {
+            return;
+        }
+        self.measured.n_frames += 1;
+        if self.measured.n_frames == WARM_UP {
+            self.measured.began = Some(Instant::now());
+        }
+        let Some(began) = self.measured.began else {
+            return;
+        };
+        let n_frames = self.measured.n_frames - WARM_UP;
+        if n_frames == wanted {
+            let seconds = began.elapsed().as_secs_f64();
+            let detection = session.answer.as_ref().map_or(0.0, |answer| answer.ms);
+            println!(
+                "{n_frames} frames in {seconds:.2} s: {:.1} frames per second; {detection:.3} ms of detection in the last one",
+                f64::from(n_frames) / seconds
+            );
+            ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+    }
+}
+
+impl eframe::App for Viewer {
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        let ctx = ui.ctx().clone();
+        let now = Instant::now();
+        let seconds = self
+            .last
+            .map_or(0.0, |last| now.duration_since(last).as_secs_f64());
+        self.last = Some(now);
+        self.load(&ctx);
+        match &mut self.state {
+            State::Loading(_) => {
+                egui::CentralPanel::default().show(ui, |ui| {
+                    ui.centered_and_justified(|ui| ui.label("reading …"));
+                });
+                // The thread wakes the window, but not if it panics.
+                ctx.request_repaint_after(std::time::Duration::from_millis(200));
+            }
+            State::Failed(text) => {
+                egui::CentralPanel::default().show(ui, |ui| {
+                    ui.centered_and_justified(|ui| {
+                        ui.label(
+                            egui::RichText::new(text.as_str())
+                                .color(panel::RED)
+                                .size(16.0),
+                        )
+                    });
+                });
+            }
+            State::Shown(session) => {
+                input::keys(&ctx, session);
+                let goes_on = session.advance(seconds);
+                panel::side(ui, session);
+                panel::bottom(ui, session);
+                session.refresh(&ctx);
+                view::show(ui, session);
+                if goes_on {
+                    ctx.request_repaint();
+                }
+            }
+        }
+        self.measure(&ctx);
+    }
+}

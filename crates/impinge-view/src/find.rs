@@ -1,0 +1,178 @@
+//! Asks the library, and keeps its answer.
+
+use std::time::Instant;
+
+use impinge::contact::Contacts;
+use impinge::{Detector, Method, NearQuery, PairKind, Pairs, Scene, Settings, Step};
+use impinge_render::wgpu;
+
+use crate::options::{Backend, Question};
+use crate::stage::Stage;
+
+/// More pairs than this are an error, not an answer: no window can show them.
+const MAX_PAIRS: u64 = 20_000_000;
+
+/// The oracle compares every box with every box: beyond this number of primitives it would stop the window.
+pub(crate) const MAX_NAIVE: usize = 40_000;
+
+/// The answer for one frame.
+pub(crate) struct Answer {
+    pub pairs: Pairs,
+    /// The colliding primitives of each body.
+    pub colliding: Vec<Vec<u32>>,
+    pub ms: f64,
+    /// Method, backend and threads, for the user.
+    pub how: String,
+}
+
+/// A detector for the last question.
+#[derive(Default)]
+pub(crate) struct Finder {
+    detector: Option<((Method, Backend), Detector)>,
+}
+
+impl Finder {
+    /// Finds the pairs of a scene.
+    pub fn find(
+        &mut self,
+        stage: &Stage,
+        question: &Question,
+        device: &(wgpu::Device, wgpu::Queue),
+    ) -> Result<Answer, String> {
+        self.find_on(stage, question, Some(device))
+    }
+
+    /// The same on the CPU, whatever the question says.
+    pub fn find_on_cpu(&mut self, stage: &Stage, question: &Question) -> Result<Answer, String> {
+        self.find_on(stage, question, None)
+    }
+
+    fn find_on(
+        &mut self,
+        stage: &Stage,
+        question: &Question,
+        device: Option<&(wgpu::Device, wgpu::Queue)>,
+    ) -> Result<Answer, String> {
+        let scene = stage.scene();
+        let n_primitives: usize = scene.bodies().map(|(_, body)| body.n_primitives()).sum();
+        if question.method == Method::Naive && n_primitives > MAX_NAIVE {
+            return Err(format!(
+                "the method naive is for at most {MAX_NAIVE} primitives, there are {n_primitives}"
+            ));
+        }
+        let started = Instant::now();
+        let detector = self.detector(question, device)?;
+        if let Err(error) = detector.detect(scene, &question.query()) {
+            // A detector whose device is lost finds nothing again.
+            self.detector = None;
+            return Err(error.to_string());
+        }
+        let pairs = detector.take_pairs();
+        let ms = started.elapsed().as_secs_f64() * 1e3;
+        let stats = pairs.stats();
+        Ok(Answer {
+            colliding: stage
+                .content
+                .bodies
+                .iter()
+                .map(|shown| pairs.colliding(shown.id))
+                .collect(),
+            how: format!("{} on {}", stats.method, stats.backend),
+            ms,
+            pairs,
+        })
+    }
+
+    fn detector(
+        &mut self,
+        question: &Question,
+        device: Option<&(wgpu::Device, wgpu::Queue)>,
+    ) -> Result<&mut Detector, String> {
+        let key = (question.method, question.backend);
+        let detector = match self.detector.take() {
+            Some((held, detector)) if held == key => detector,
+            _ => {
+                let settings = Settings {
+                    method: question.method,
+                    max_pairs: Some(MAX_PAIRS),
+                    backend: impinge::Backend::Cpu,
+                    ..Settings::default()
+                };
+                match (question.backend, device) {
+                    (Backend::Gpu, Some((device, queue))) => {
+                        Detector::with_device(device.clone(), queue.clone(), settings)
+                    }
+                    _ => Detector::with_settings(settings),
+                }
+                .map_err(|error| error.to_string())?
+            }
+        };
+        Ok(&mut self.detector.insert((key, detector)).1)
+    }
+}
+
+/// A detector on one thread of the CPU: for work beside the window.
+pub(crate) fn quiet_detector() -> Result<Detector, impinge::Error> {
+    Detector::with_settings(Settings {
+        backend: impinge::Backend::Cpu,
+        threads: 1,
+        max_pairs: Some(MAX_PAIRS),
+        ..Settings::default()
+    })
+}
+
+/// The step of a question.
+pub(crate) fn step(question: &Question) -> Step {
+    Step::new(question.query())
+}
+
+/// The intersection curves as segments.
+pub(crate) fn curves(scene: &Scene, pairs: &Pairs) -> Result<Vec<[[f64; 3]; 2]>, String> {
+    let contacts = Contacts::new(scene, pairs).map_err(|error| error.to_string())?;
+    let curves = contacts.curves();
+    let mut segments = Vec::new();
+    for curve in 0..curves.len() {
+        let points = curves.points(curve);
+        let n_links = points.len() - usize::from(!curves.is_closed(curve));
+        for link in 0..n_links {
+            let ends = [link, (link + 1) % points.len()];
+            segments.push(ends.map(|ix| contacts.points()[points[ix] as usize]));
+        }
+    }
+    Ok(segments)
+}
+
+/// The faces of each body that are within a distance of another one's, as primitives of triangle bodies; pairs of faces that
+/// intersect are among them. Also the number of pairs.
+pub(crate) fn near(
+    stage: &Stage,
+    question: &Question,
+    distance: f64,
+) -> Result<(Vec<Vec<u32>>, usize), String> {
+    let query = NearQuery::new(question.query())
+        .kinds([PairKind::FaceFace])
+        .distance(distance);
+    let mut detector = quiet_detector().map_err(|error| error.to_string())?;
+    let pairs = detector
+        .within_distance(stage.scene(), &query)
+        .map_err(|error| error.to_string())?;
+    let near = stage.content.bodies.iter().map(|shown| {
+        let elements = pairs
+            .iter()
+            .flat_map(|pair| [pair.a, pair.b])
+            .filter(|element| element.body == shown.id);
+        let mut faces: Vec<u32> = elements.map(|element| element.primitive).collect();
+        faces.sort_unstable();
+        faces.dedup();
+        let is_tetrahedra = stage
+            .scene()
+            .body(shown.id)
+            .is_ok_and(|body| body.kind() == impinge::Kind::Tetrahedra);
+        // Boundary faces of tetrahedra have numbers of their own; such bodies keep their colours.
+        match is_tetrahedra {
+            true => Vec::new(),
+            false => faces,
+        }
+    });
+    Ok((near.collect(), pairs.len()))
+}

@@ -1,0 +1,638 @@
+//! Everything that is known while a content is shown: where its bodies are, what collides, what is seen and how.
+
+use eframe::egui;
+use egui_wgpu::RenderState;
+use impinge::{Method, Primitive};
+use impinge_render::{Camera, Look, Orbit};
+
+use crate::content::Content;
+use crate::drag::Drag;
+use crate::find::{Answer, Finder, curves, near, quiet_detector, step};
+use crate::flight::Flight;
+use crate::options::{Backend, Options, Question};
+use crate::pick::{Hit, pick};
+use crate::picture::{self, Saved};
+use crate::places::{Place, places};
+use crate::player::Player;
+use crate::screen::Screen;
+use crate::stage::{IDENTITY, Matrix, Stage};
+use crate::timeline::{NEWS, Timeline};
+use crate::times::{color, first_times};
+
+/// The colour of primitives within the distance, of the one that is selected, and of its partners.
+const NEAR: [u8; 3] = [255, 165, 60];
+const SELECTED: [u8; 3] = [255, 225, 0];
+const PARTNER: [u8; 3] = [0, 170, 120];
+/// The most states that are kept for undoing.
+const MAX_UNDO: usize = 100;
+
+/// What is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Shows {
+    Everything,
+    Colliding,
+    Curves,
+}
+
+impl Shows {
+    pub fn next(self) -> Self {
+        match self {
+            Shows::Everything => Shows::Colliding,
+            Shows::Colliding => Shows::Curves,
+            Shows::Curves => Shows::Everything,
+        }
+    }
+}
+
+/// What has changed since the last refresh.
+#[derive(Debug, Clone, Copy, Default)]
+struct Changed {
+    /// Bodies are elsewhere.
+    positions: bool,
+    /// Other pairs may be the answer.
+    question: bool,
+    /// Marks, colours or lines.
+    marks: bool,
+    /// The timeline is of another question, or of bodies elsewhere.
+    timeline: bool,
+    /// Only the view.
+    view: bool,
+}
+
+pub(crate) struct Session {
+    pub stage: Stage,
+    pub options: Options,
+    pub question: Question,
+    pub player: Player,
+    pub orbit: Orbit,
+    pub shows: Shows,
+    pub shows_curves: bool,
+    pub shows_impacts: bool,
+    pub shows_near: bool,
+    pub distance: f64,
+    pub with_earliest: bool,
+    pub answer: Option<Answer>,
+    /// The number of impacts or of near pairs, for the user.
+    pub note: Option<String>,
+    pub timeline: Timeline,
+    pub selected: Option<(usize, u32)>,
+    pub message: Option<String>,
+    pub saved: Option<Saved>,
+    pub drag: Option<Drag>,
+    screen: Screen,
+    finder: Finder,
+    scratch: Stage,
+    flight: Option<Flight>,
+    /// The box to see completely as soon as the shape of the view is known.
+    bounds: Option<[[f64; 3]; 2]>,
+    /// Width through height of the view.
+    aspect: f64,
+    undo: Vec<Vec<Matrix>>,
+    places: Option<Vec<Place>>,
+    /// The place where the camera is, and of how many.
+    pub place: Option<(usize, usize)>,
+    changed: Changed,
+    /// Milliseconds from one frame to the next, a running mean.
+    pub frame_ms: f64,
+}
+
+impl Session {
+    pub fn new(
+        content: Content,
+        options: &Options,
+        render: RenderState,
+        ctx: &egui::Context,
+    ) -> Result<Self, String> {
+        let mut stage = Stage::new(content);
+        let n_frames = stage.content.n_frames();
+        let mut message = stage.pose(options.frame.min(n_frames - 1)).err();
+        for &(body, matrix) in &options.moves {
+            stage.place(body, matrix)?;
+        }
+        let mut screen = Screen::new(render)?;
+        screen.show(&stage)?;
+        let n_primitives: usize = stage
+            .scene()
+            .bodies()
+            .map(|(_, body)| body.n_primitives())
+            .sum();
+        if n_primitives == 0 {
+            message
+                .get_or_insert_with(|| "there is nothing to see: no body has elements".to_owned());
+        }
+        let question = Question {
+            within: options.within.unwrap_or(stage.content.bodies.len() == 1),
+            shared_vertex: options.shared_vertex,
+            method: options.method,
+            backend: match options.method {
+                Method::Naive => Backend::Cpu,
+                _ => options.backend,
+            },
+        };
+        let mut scratch = stage.clone();
+        let bounds = whole_bounds(&stage, &mut scratch);
+        let diagonal = length(bounds);
+        let timeline = start_timeline(&stage, question, false, ctx);
+        Ok(Session {
+            scratch,
+            orbit: Orbit::around(options.camera, bounds, 1.0),
+            bounds: Some(bounds),
+            aspect: 1.0,
+            stage,
+            question,
+            player: Player::new(options.plays && n_frames > 1),
+            options: options.clone(),
+            shows: Shows::Everything,
+            shows_curves: false,
+            shows_impacts: false,
+            shows_near: false,
+            distance: 0.01 * diagonal,
+            with_earliest: false,
+            answer: None,
+            note: None,
+            timeline,
+            selected: None,
+            message,
+            saved: None,
+            drag: None,
+            screen,
+            finder: Finder::default(),
+            flight: None,
+            undo: Vec::new(),
+            places: None,
+            place: None,
+            changed: Changed {
+                positions: true,
+                ..Changed::default()
+            },
+            frame_ms: 0.0,
+        })
+    }
+
+    pub fn n_frames(&self) -> usize {
+        self.stage.content.n_frames()
+    }
+
+    /// Shows a frame.
+    pub fn go_to(&mut self, frame_ix: usize) {
+        let frame_ix = frame_ix.min(self.n_frames() - 1);
+        if frame_ix == self.stage.frame_ix() {
+            return;
+        }
+        self.message = self.stage.pose(frame_ix).err();
+        if self.message.is_some() {
+            self.player.plays = false;
+        }
+        self.changed.positions = true;
+    }
+
+    /// Stops, and shows the frame so many frames away.
+    pub fn step(&mut self, by: isize) {
+        self.player.plays = false;
+        let n_frames = self.n_frames();
+        let frame_ix = self.stage.frame_ix().checked_add_signed(by);
+        self.go_to(frame_ix.unwrap_or(0).min(n_frames - 1));
+    }
+
+    /// Stops, and shows a frame, if there is one; otherwise says so.
+    pub fn jump(&mut self, frame_ix: Option<usize>) {
+        self.player.plays = false;
+        match frame_ix {
+            Some(frame_ix) => self.go_to(frame_ix),
+            None if self.timeline.is_counted() => {
+                self.message = Some("no such frame has a collision".to_owned());
+            }
+            None => self.message = Some("no such frame yet: frames are still counted".to_owned()),
+        }
+    }
+
+    /// To be called after the question was changed.
+    pub fn asked(&mut self, before: Question) {
+        if self.question == before {
+            return;
+        }
+        if self.question.method == Method::Naive {
+            self.question.backend = Backend::Cpu;
+        }
+        self.changed.question = true;
+        if !self.question.same_pairs(&before) {
+            self.changed.timeline = true;
+        }
+    }
+
+    /// To be called after what is shown was changed.
+    pub fn restyled(&mut self) {
+        self.changed.marks = true;
+    }
+
+    /// To be called after the view was changed.
+    pub fn viewed(&mut self) {
+        self.changed.view = true;
+    }
+
+    pub fn set_earliest(&mut self, with_earliest: bool) {
+        self.with_earliest = with_earliest;
+        self.changed.timeline = true;
+    }
+
+    /// Keeps where the bodies are, for undoing.
+    pub fn remember(&mut self) {
+        if self.undo.len() == MAX_UNDO {
+            self.undo.remove(0);
+        }
+        self.undo.push(self.stage.moves.clone());
+    }
+
+    pub fn undo(&mut self) {
+        if let Some(moves) = self.undo.pop() {
+            self.place_all(&moves);
+        }
+    }
+
+    pub fn is_moved(&self) -> bool {
+        self.stage.moves.iter().any(|matrix| *matrix != IDENTITY)
+    }
+
+    /// Puts all bodies where their files have them.
+    pub fn put_back(&mut self) {
+        self.remember();
+        self.place_all(&vec![IDENTITY; self.stage.moves.len()]);
+    }
+
+    fn place_all(&mut self, moves: &[Matrix]) {
+        for (body, &matrix) in moves.iter().enumerate() {
+            self.place(body, matrix);
+        }
+        self.changed.timeline = true;
+    }
+
+    /// Moves a body; a matrix that is refused changes nothing.
+    pub fn place(&mut self, body: usize, matrix: Matrix) {
+        if let Err(text) = self.stage.place(body, matrix) {
+            self.message = Some(text);
+        }
+        self.changed.positions = true;
+    }
+
+    /// To be called when a body was let go.
+    pub fn released(&mut self) {
+        self.changed.timeline = true;
+    }
+
+    /// The triangle at a point of the view.
+    pub fn hit(&self, aspect: f64, at: [f64; 2]) -> Option<Hit> {
+        let only = match self.shows {
+            Shows::Everything => None,
+            Shows::Colliding => self.answer.as_ref().map(|answer| &answer.colliding[..]),
+            Shows::Curves => return None,
+        };
+        let faces = |body| self.screen.live.faces(body);
+        pick(&self.stage, faces, self.orbit.ray(aspect, at), only)
+    }
+
+    pub fn select(&mut self, selected: Option<(usize, u32)>) {
+        self.selected = selected;
+        self.changed.marks = true;
+    }
+
+    /// The partners of the selected primitive.
+    pub fn partners(&self) -> Vec<(usize, u32)> {
+        let (Some((body, primitive)), Some(answer)) = (self.selected, &self.answer) else {
+            return Vec::new();
+        };
+        let Some(id) = self.stage.id(body) else {
+            return Vec::new();
+        };
+        let own = Primitive {
+            body: id,
+            primitive,
+        };
+        let number = |other: Primitive| {
+            let bodies = &self.stage.content.bodies;
+            let body = bodies.iter().position(|shown| shown.id == other.body)?;
+            Some((body, other.primitive))
+        };
+        let other = |(a, b): (Primitive, Primitive)| match (a == own, b == own) {
+            (true, _) => number(b),
+            (_, true) => number(a),
+            _ => None,
+        };
+        answer.pairs.iter().filter_map(other).collect()
+    }
+
+    /// Flies to the next place of collision, or to the one before.
+    pub fn next_place(&mut self, by: isize) {
+        let Some(answer) = &self.answer else {
+            return;
+        };
+        let places = self
+            .places
+            .get_or_insert_with(|| places(&self.stage, answer));
+        if places.is_empty() {
+            self.place = None;
+            self.message = Some("nothing collides in this frame".to_owned());
+            return;
+        }
+        self.player.plays = false;
+        let n = places.len();
+        let next = match self.place {
+            None if by < 0 => n - 1,
+            None => 0,
+            Some((ix, _)) => (ix % n + n).saturating_add_signed(by) % n,
+        };
+        let bounds = places[next].bounds;
+        self.place = Some((next, n));
+        self.fly(bounds, 2.5);
+    }
+
+    /// Flies to where everything is seen.
+    pub fn frame_all(&mut self) {
+        if let Some(bounds) = self.stage.bounds(None) {
+            self.fly(bounds, 1.0);
+        }
+    }
+
+    /// Flies to the selected primitive.
+    pub fn frame_selected(&mut self) {
+        let Some((body, primitive)) = self.selected else {
+            return;
+        };
+        let held = self
+            .stage
+            .id(body)
+            .and_then(|id| self.stage.scene().body(id).ok());
+        let Some(held) = held else {
+            return;
+        };
+        let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        for &vertex in held.elements().corners(primitive as usize) {
+            let point = held.positions().point(vertex as usize);
+            for k in 0..3 {
+                bounds[0][k] = bounds[0][k].min(point[k]);
+                bounds[1][k] = bounds[1][k].max(point[k]);
+            }
+        }
+        self.fly(bounds, 6.0);
+    }
+
+    /// Flies to a box, seen from so many times the distance at which it fills the view.
+    fn fly(&mut self, bounds: [[f64; 3]; 2], room: f64) {
+        let mut to = Orbit::around(self.orbit.camera, bounds, self.aspect);
+        let everything = self.stage.bounds(None).unwrap_or([[-1.0; 3], [1.0; 3]]);
+        let whole = length(everything);
+        let farthest = Orbit::around(self.orbit.camera, everything, self.aspect).distance;
+        // A box without size is seen from near, not from nowhere.
+        to.distance = match length(bounds) > 0.0 {
+            true => (to.distance * room)
+                .min(farthest.max(to.distance))
+                .max(1e-3 * whole),
+            false => 0.1 * whole,
+        };
+        self.flight = Some(Flight::new(self.orbit, to));
+    }
+
+    /// Tells the shape of the view, width through height.
+    pub fn set_aspect(&mut self, aspect: f64) {
+        self.aspect = aspect;
+        if let Some(bounds) = self.bounds.take() {
+            self.orbit = Orbit::around(self.orbit.camera, bounds, aspect);
+            self.changed.view = true;
+        }
+    }
+
+    /// Ends a flight: the user has taken over.
+    pub fn land(&mut self) {
+        self.flight = None;
+    }
+
+    /// Lets time pass: frames play, the camera flies. Returns whether the window must be drawn again soon.
+    pub fn advance(&mut self, seconds: f64) -> bool {
+        self.timeline.update();
+        self.timeline
+            .set_busy(self.player.plays || self.drag.is_some());
+        self.frame_ms += 0.1 * (1e3 * seconds - self.frame_ms);
+        if self.options.measure.is_some() {
+            self.go_to((self.stage.frame_ix() + 1) % self.n_frames());
+            self.changed.positions = true;
+            return true;
+        }
+        let next = self
+            .player
+            .advance(self.stage.frame_ix(), self.n_frames(), seconds);
+        self.go_to(next);
+        if let Some(flight) = &mut self.flight {
+            let (orbit, is_last) = flight.advance(seconds);
+            self.orbit = orbit;
+            if is_last {
+                self.flight = None;
+            }
+            self.changed.view = true;
+        }
+        self.player.plays || self.flight.is_some()
+    }
+
+    /// Brings answer, marks and timeline up to date.
+    pub fn refresh(&mut self, ctx: &egui::Context) {
+        if let Some(text) = self.screen.take_error() {
+            self.message = Some(format!("the graphics device reports: {text}"));
+        }
+        let changed = self.changed;
+        if changed.timeline {
+            self.timeline = start_timeline(&self.stage, self.question, self.with_earliest, ctx);
+        }
+        if changed.positions || changed.question {
+            self.places = None;
+            self.place = None;
+            match self
+                .finder
+                .find(&self.stage, &self.question, &self.screen.device())
+            {
+                Ok(answer) => self.answer = Some(answer),
+                Err(text) => {
+                    self.answer = None;
+                    self.player.plays = false;
+                    self.message = Some(text);
+                }
+            }
+        }
+        if changed.positions
+            && let Err(text) = self.screen.send_positions(&self.stage)
+        {
+            self.message = Some(text);
+        }
+        if (changed.positions || changed.question || changed.marks)
+            && let Err(text) = self.mark()
+        {
+            self.message = Some(text);
+        }
+        self.changed = Changed {
+            view: changed.view || changed.positions || changed.question || changed.marks,
+            ..Changed::default()
+        };
+    }
+
+    /// Sends marks, colours and lines to the screen.
+    fn mark(&mut self) -> Result<(), String> {
+        let n_bodies = self.stage.content.bodies.len();
+        let mut colors: Vec<Vec<(u32, [u8; 3])>> = vec![Vec::new(); n_bodies];
+        let mut marks = match &self.answer {
+            Some(answer) => answer.colliding.clone(),
+            None => vec![Vec::new(); n_bodies],
+        };
+        self.note = None;
+        if self.shows_near {
+            let (faces, n_pairs) = near(&self.stage, &self.question, self.distance)?;
+            for ((colors, faces), colliding) in colors.iter_mut().zip(faces).zip(&marks) {
+                let near = faces
+                    .into_iter()
+                    .filter(|face| colliding.binary_search(face).is_err());
+                colors.extend(near.map(|face| (face, NEAR)));
+            }
+            self.note = Some(format!("{n_pairs} pairs of faces within {}", self.distance));
+        }
+        if self.shows_impacts {
+            self.note = Some(self.color_impacts(&mut marks, &mut colors)?);
+        }
+        for (body, primitive) in self.partners() {
+            colors[body].push((primitive, PARTNER));
+        }
+        if let Some((body, primitive)) = self.selected {
+            colors[body].push((primitive, SELECTED));
+        }
+        for body in 0..n_bodies {
+            let live = &mut self.screen.live;
+            live.mark(body, &marks[body])
+                .map_err(|error| error.to_string())?;
+            live.color(body, &colors[body])
+                .map_err(|error| error.to_string())?;
+        }
+        let segments = match &self.answer {
+            Some(answer) if self.shows_curves || self.shows == Shows::Curves => {
+                curves(self.stage.scene(), &answer.pairs)?
+            }
+            _ => Vec::new(),
+        };
+        self.screen
+            .live
+            .set_lines(&segments)
+            .map_err(|error| error.to_string())
+    }
+
+    /// Marks what touches on the way to the next frame, in the colours of its time. Returns a note.
+    fn color_impacts(
+        &mut self,
+        marks: &mut [Vec<u32>],
+        colors: &mut [Vec<(u32, [u8; 3])>],
+    ) -> Result<String, String> {
+        if !self.stage.set_ends(&mut self.scratch)? {
+            return Ok("no frame follows: nothing moves".to_owned());
+        }
+        let mut detector = quiet_detector().map_err(|error| error.to_string())?;
+        let impacts = detector
+            .impacts(self.stage.scene(), &step(&self.question))
+            .map_err(|error| error.to_string())?;
+        for (ix, shown) in self.stage.content.bodies.iter().enumerate() {
+            let body = self
+                .stage
+                .scene()
+                .body(shown.id)
+                .map_err(|error| error.to_string())?;
+            let times = first_times(body, shown.id, impacts);
+            marks[ix] = times.iter().map(|&(primitive, _)| primitive).collect();
+            colors[ix].extend(
+                times
+                    .iter()
+                    .map(|&(primitive, toi)| (primitive, color(toi))),
+            );
+        }
+        Ok(match impacts.earliest() {
+            None => "nothing touches before the next frame".to_owned(),
+            Some(first) => format!("{} impacts, the earliest at {:?}", impacts.len(), first.toi),
+        })
+    }
+
+    fn look(&self) -> Look {
+        Look {
+            faces: self.shows != Shows::Curves,
+            only_marked: self.shows == Shows::Colliding,
+            ..Look::default()
+        }
+    }
+
+    /// The texture with the bodies, drawn if anything has changed.
+    pub fn draw(&mut self, size: [u32; 2]) -> Option<egui::TextureId> {
+        let has_size = self.screen.has_size(size);
+        if has_size && !self.changed.view {
+            return self.screen.drawn();
+        }
+        self.changed.view = false;
+        let look = self.look();
+        match self.screen.draw(size, &self.orbit, &look) {
+            Ok(id) => Some(id),
+            Err(text) => {
+                self.message = Some(text);
+                None
+            }
+        }
+    }
+
+    /// Saves a picture in the folder of the options.
+    pub fn save(&mut self) {
+        match picture::save(
+            &self.stage,
+            self.answer.as_ref(),
+            &self.options,
+            &self.question,
+            self.orbit.camera,
+            self.screen.device(),
+        ) {
+            Ok(saved) => self.saved = Some(saved),
+            Err(text) => self.message = Some(text),
+        }
+    }
+
+    /// The direction of view, for tests.
+    pub fn camera(&self) -> Camera {
+        self.orbit.camera
+    }
+}
+
+fn start_timeline(
+    stage: &Stage,
+    question: Question,
+    with_earliest: bool,
+    ctx: &egui::Context,
+) -> Timeline {
+    let ctx = ctx.clone();
+    let wake = move || ctx.request_repaint_after(NEWS);
+    Timeline::start(stage, question, with_earliest, wake)
+}
+
+/// A box around the bodies in the first, the middle and the last frame, and in that of the stage.
+fn whole_bounds(stage: &Stage, scratch: &mut Stage) -> [[f64; 3]; 2] {
+    let mut whole = stage.bounds(None);
+    let n_frames = stage.content.n_frames();
+    if n_frames > 1 {
+        for frame_ix in [0, n_frames / 2, n_frames - 1] {
+            // A frame that cannot be read shows its message when it is looked at.
+            if scratch.pose(frame_ix).is_err() {
+                continue;
+            }
+            if let (Some(whole), Some([low, high])) = (&mut whole, scratch.bounds(None)) {
+                for k in 0..3 {
+                    whole[0][k] = whole[0][k].min(low[k]);
+                    whole[1][k] = whole[1][k].max(high[k]);
+                }
+            }
+        }
+    }
+    whole.unwrap_or([[-1.0; 3], [1.0; 3]])
+}
+
+/// The diagonal of a box.
+fn length([low, high]: [[f64; 3]; 2]) -> f64 {
+    (0..3)
+        .map(|k| (high[k] - low[k]).powi(2))
+        .sum::<f64>()
+        .sqrt()
+}

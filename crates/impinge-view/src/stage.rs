@@ -1,0 +1,136 @@
+//! The bodies where they are now: a frame's positions, moved by the user's matrices.
+
+use impinge::{BodyId, Positions, Scene};
+
+use crate::content::Content;
+
+pub(crate) type Matrix = [[f64; 4]; 4];
+
+pub(crate) const IDENTITY: Matrix = [
+    [1.0, 0.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0, 0.0],
+    [0.0, 0.0, 1.0, 0.0],
+    [0.0, 0.0, 0.0, 1.0],
+];
+
+/// A content in one of its frames.
+#[derive(Clone)]
+pub(crate) struct Stage {
+    pub content: Content,
+    /// One per body, in the order of the content's bodies.
+    pub moves: Vec<Matrix>,
+    frame_ix: usize,
+}
+
+impl Stage {
+    pub fn new(content: Content) -> Self {
+        Stage {
+            moves: vec![IDENTITY; content.bodies.len()],
+            content,
+            frame_ix: 0,
+        }
+    }
+
+    pub fn scene(&self) -> &Scene {
+        &self.content.scene
+    }
+
+    pub fn frame_ix(&self) -> usize {
+        self.frame_ix
+    }
+
+    pub fn id(&self, body: usize) -> Option<BodyId> {
+        self.content.bodies.get(body).map(|shown| shown.id)
+    }
+
+    /// Moves all bodies to where they are in a frame.
+    pub fn pose(&mut self, frame_ix: usize) -> Result<(), String> {
+        if let Some(frames) = &self.content.frames {
+            for (id, positions) in frames.read(frame_ix)? {
+                set_positions(&mut self.content.scene, id, &positions)
+                    .map_err(|error| format!("frame {frame_ix}: {error}"))?;
+                let bodies = &self.content.bodies;
+                let body = bodies.iter().position(|shown| shown.id == id);
+                if let Some(body) = body.filter(|&body| self.moves[body] != IDENTITY) {
+                    let matrix = self.moves[body];
+                    self.place(body, matrix)?;
+                }
+            }
+        }
+        self.frame_ix = frame_ix;
+        Ok(())
+    }
+
+    /// Moves a body by a matrix, from where the frame has it. If it is refused, the body stays where it was.
+    pub fn place(&mut self, body: usize, matrix: Matrix) -> Result<(), String> {
+        let Some(id) = self.id(body) else {
+            let n_bodies = self.content.bodies.len();
+            return Err(format!(
+                "body {body} is moved, but there are {n_bodies} bodies"
+            ));
+        };
+        self.content
+            .scene
+            .set_transform(id, &matrix)
+            .map_err(|error| error.to_string())?;
+        self.moves[body] = matrix;
+        Ok(())
+    }
+
+    /// Sets the positions of the next frame as the end of a step. Returns false if there is no next frame.
+    pub fn set_ends(&mut self, scratch: &mut Stage) -> Result<bool, String> {
+        let next = self.frame_ix + 1;
+        if next >= self.content.n_frames() {
+            return Ok(false);
+        }
+        scratch.moves.clone_from(&self.moves);
+        scratch.pose(next)?;
+        let ids: Vec<BodyId> = self.content.bodies.iter().map(|shown| shown.id).collect();
+        for id in ids {
+            let end = scratch
+                .scene()
+                .body(id)
+                .map_err(|error| error.to_string())?;
+            let end = end.positions().clone();
+            let scene = &mut self.content.scene;
+            match &end {
+                Positions::F32(positions) => scene.set_end_positions(id, positions),
+                Positions::F64(positions) => scene.set_end_positions(id, positions),
+            }
+            .map_err(|error| format!("frame {next}: {error}"))?;
+        }
+        Ok(true)
+    }
+
+    /// The lowest and highest coordinates of the vertices of a body, or of all of them; `None` without any.
+    pub fn bounds(&self, only: Option<usize>) -> Option<[[f64; 3]; 2]> {
+        let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        for (ix, shown) in self.content.bodies.iter().enumerate() {
+            if only.is_some_and(|only| only != ix) {
+                continue;
+            }
+            let Ok(body) = self.scene().body(shown.id) else {
+                continue;
+            };
+            for vertex in 0..body.n_vertices() {
+                let point = body.positions().point(vertex);
+                for k in 0..3 {
+                    bounds[0][k] = bounds[0][k].min(point[k]);
+                    bounds[1][k] = bounds[1][k].max(point[k]);
+                }
+            }
+        }
+        (bounds[0][0] <= bounds[1][0]).then_some(bounds)
+    }
+}
+
+fn set_positions(
+    scene: &mut Scene,
+    body: BodyId,
+    positions: &Positions,
+) -> Result<(), impinge::Error> {
+    match positions {
+        Positions::F32(positions) => scene.set_positions(body, positions),
+        Positions::F64(positions) => scene.set_positions(body, positions),
+    }
+}

@@ -1,0 +1,65 @@
+//! Opens a window.
+
+use std::sync::Arc;
+
+use eframe::egui;
+use impinge_render::wgpu;
+
+use crate::app::Viewer;
+use crate::content::Content;
+use crate::options::Options;
+
+/// A window could not be opened, or ended with an error.
+#[derive(Debug, thiserror::Error)]
+#[error("no window: {what}")]
+pub struct Error {
+    what: String,
+}
+
+/// Opens a window and returns when it is closed. `load` runs on a thread of its own; its error is shown in the window.
+///
+/// # Errors
+/// There is no display, or no device that can draw on it.
+pub fn show(
+    load: impl FnOnce() -> Result<Content, String> + Send + 'static,
+    options: Options,
+) -> Result<(), Error> {
+    let [width, height] = options.size.map(|x| x as f32);
+    let mut wgpu_options = egui_wgpu::WgpuConfiguration::default();
+    if let egui_wgpu::WgpuSetup::CreateNew(setup) = &mut wgpu_options.wgpu_setup {
+        setup.device_descriptor = Arc::new(|adapter| device(&adapter.limits()));
+    }
+    if options.measure.is_some() {
+        wgpu_options.surface.present_mode = wgpu::PresentMode::AutoNoVsync;
+    }
+    let native = eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default()
+            .with_title("impinge view")
+            .with_app_id("impinge")
+            .with_inner_size([width, height]),
+        renderer: eframe::Renderer::Wgpu,
+        wgpu_options,
+        // There are no gradients that need it.
+        dithering: false,
+        ..Default::default()
+    };
+    let create: eframe::AppCreator<'_> =
+        Box::new(move |creation| Ok(Box::new(Viewer::new(creation, load, options))));
+    eframe::run_native("impinge view", native, create).map_err(|error| Error {
+        what: error.to_string(),
+    })
+}
+
+/// A device whose buffers may be as large as the adapter allows, so that large meshes fit.
+fn device(offered: &wgpu::Limits) -> wgpu::DeviceDescriptor<'static> {
+    wgpu::DeviceDescriptor {
+        label: Some("impinge view"),
+        required_limits: wgpu::Limits {
+            max_buffer_size: offered.max_buffer_size,
+            max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
+            max_texture_dimension_2d: offered.max_texture_dimension_2d,
+            ..wgpu::Limits::default()
+        },
+        ..Default::default()
+    }
+}

@@ -1,0 +1,736 @@
+//! The app on a software driver, without a display. The tests fail if there is no adapter.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use eframe::egui::{Key, Modifiers, Pos2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+use impinge::{Backend, BodyId, Detector, Positions, Query, Scene, SharedVertex, Step};
+use impinge_io::Sequence;
+use impinge_render::Colors;
+use impinge_scenes::surfaces::ball;
+use impinge_view::{Command, Content, Count, Frames, Options, Shown, Viewer};
+
+const SIZE: [f32; 2] = [900.0, 800.0];
+const COLORS: [Colors; 2] = [
+    Colors {
+        colliding: [214, 39, 40],
+        other: [200; 3],
+    },
+    Colors {
+        colliding: [27, 95, 217],
+        other: [172, 178, 188],
+    },
+];
+
+fn shown(scene: &Scene) -> Vec<Shown> {
+    let names = ["first", "second"];
+    scene
+        .bodies()
+        .zip(names)
+        .zip(COLORS)
+        .map(|(((id, _), name), colors)| Shown {
+            id,
+            name: name.to_owned(),
+            colors,
+        })
+        .collect()
+}
+
+/// Two balls of about this many triangles; the second one is this far to the right.
+fn balls(n_triangles: usize, offset: f32) -> (Scene, [BodyId; 2]) {
+    let mut scene = Scene::new();
+    let model = ball(n_triangles);
+    let a = model.add_to(&mut scene).expect("a ball");
+    let b = model.translated([offset, 0.125, 0.0]).add_to(&mut scene);
+    (scene, [a, b.expect("a ball")])
+}
+
+/// The second ball comes from the right and goes away again; nothing collides in the first and the last frames.
+struct Passing {
+    body: BodyId,
+    rest: Vec<[f32; 3]>,
+}
+
+impl Passing {
+    const N_FRAMES: usize = 12;
+}
+
+impl Frames for Passing {
+    fn n_frames(&self) -> usize {
+        Self::N_FRAMES
+    }
+
+    fn read(&self, frame_ix: usize) -> Result<Vec<(BodyId, Positions)>, String> {
+        let offset = 3.0 - 0.5 * frame_ix as f32;
+        let moved: Vec<[f32; 3]> = self
+            .rest
+            .iter()
+            .map(|&[x, y, z]| [x + offset, y, z])
+            .collect();
+        Ok(vec![(self.body, moved.into())])
+    }
+}
+
+fn passing() -> Content {
+    let (scene, [_, body]) = balls(600, 0.0);
+    let rest = match scene.body(body).expect("there").positions() {
+        Positions::F32(rest) => rest.clone(),
+        Positions::F64(_) => panic!("models are in single precision"),
+    };
+    Content {
+        bodies: shown(&scene),
+        scene,
+        frames: Some(Arc::new(Passing { body, rest })),
+    }
+}
+
+fn still(n_triangles: usize, offset: f32) -> Content {
+    let (scene, _) = balls(n_triangles, offset);
+    Content {
+        bodies: shown(&scene),
+        scene,
+        frames: None,
+    }
+}
+
+fn paused() -> Options {
+    Options {
+        plays: false,
+        command: Command(vec!["impinge".to_owned(), "view".to_owned()]),
+        ..Options::default()
+    }
+}
+
+/// The app with what it loads.
+fn open(
+    load: impl FnOnce() -> Result<Content, String> + Send + 'static,
+    options: Options,
+) -> Harness<'static, Viewer> {
+    let mut harness = Harness::builder()
+        .with_size(SIZE)
+        .wgpu()
+        .build_eframe(|creation| Viewer::new(creation, load, options));
+    wait(&mut harness, |viewer| !viewer.is_loading());
+    harness.step();
+    harness
+}
+
+fn open_content(content: Content) -> Harness<'static, Viewer> {
+    open(|| Ok(content), paused())
+}
+
+/// Steps until a condition holds, for at most a minute.
+#[track_caller]
+fn wait(harness: &mut Harness<'static, Viewer>, done: impl Fn(&Viewer) -> bool) {
+    let started = Instant::now();
+    while !done(harness.state()) {
+        assert!(
+            started.elapsed() < Duration::from_secs(60),
+            "it takes too long"
+        );
+        std::thread::sleep(Duration::from_millis(5));
+        harness.step();
+    }
+}
+
+fn is_counted(viewer: &Viewer) -> bool {
+    !viewer.counts().contains(&Count::Pending)
+}
+
+fn press(harness: &mut Harness<'static, Viewer>, key: Key) {
+    harness.key_press(key);
+    harness.run_steps(2);
+}
+
+fn click(harness: &mut Harness<'static, Viewer>, label: &str) {
+    harness.get_by_label(label).click();
+    harness.run_steps(2);
+}
+
+/// The middle of the part of the window that shows bodies.
+fn middle(has_timeline: bool) -> Pos2 {
+    let below = if has_timeline { 104.0 } else { 0.0 };
+    Pos2::new((SIZE[0] - 252.0) / 2.0, (SIZE[1] - below) / 2.0)
+}
+
+fn drag(harness: &mut Harness<'static, Viewer>, from: Pos2, by: [f32; 2]) {
+    harness.hover_at(from);
+    harness.step();
+    harness.drag_at(from);
+    harness.step();
+    for part in 1..=4 {
+        let part = part as f32 / 4.0;
+        harness.hover_at(Pos2::new(from.x + part * by[0], from.y + part * by[1]));
+        harness.step();
+    }
+    harness.drop_at(Pos2::new(from.x + by[0], from.y + by[1]));
+    harness.run_steps(2);
+}
+
+/// The pairs that the library finds in each frame.
+fn expected(content: &Content) -> Vec<(u64, u64)> {
+    let mut detector = Detector::new(Backend::Cpu).expect("a detector");
+    let mut scene = content.scene.clone();
+    let query = Query::all().shared_vertex(SharedVertex::Resolve);
+    let frames = content.frames.clone().expect("it moves");
+    (0..frames.n_frames())
+        .map(|frame_ix| {
+            for (id, positions) in frames.read(frame_ix).expect("a frame") {
+                match positions {
+                    Positions::F32(positions) => scene.set_positions(id, &positions),
+                    Positions::F64(positions) => scene.set_positions(id, &positions),
+                }
+                .expect("accepted");
+            }
+            let pairs = detector.detect(&scene, &query).expect("an answer");
+            (pairs.len() as u64, pairs.hash())
+        })
+        .collect()
+}
+
+#[test]
+fn the_answer_is_that_of_the_library() {
+    let content = still(600, 0.5);
+    let mut detector = Detector::new(Backend::Cpu).expect("a detector");
+    let pairs = detector
+        .detect(&content.scene, &Query::all())
+        .expect("an answer");
+    let (n, hash) = (pairs.len(), pairs.hash());
+    assert!(n > 0);
+    let harness = open_content(content);
+    assert_eq!(harness.state().n_pairs(), Some(n));
+    assert_eq!(harness.state().hash(), Some(hash));
+    harness.get_by_label(&format!("{n} pairs"));
+    harness.get_by_label(&format!("hash {hash:016x}"));
+}
+
+#[test]
+fn a_drag_moves_a_body_and_changes_the_pairs_and_undo_brings_them_back() {
+    let mut harness = open_content(still(600, 0.5));
+    let (before, hash) = (harness.state().n_pairs(), harness.state().hash());
+    drag(&mut harness, middle(false), [0.0, -120.0]);
+    assert_eq!(harness.state().message(), None);
+    assert_ne!(harness.state().hash(), hash);
+    let moved = harness.state().hash();
+    // Far away, nothing collides.
+    drag(
+        &mut harness,
+        Pos2::new(middle(false).x, middle(false).y - 120.0),
+        [0.0, -500.0],
+    );
+    assert_eq!(harness.state().n_pairs(), Some(0));
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    harness.run_steps(2);
+    assert_eq!(harness.state().hash(), moved);
+    click(&mut harness, "Put bodies back");
+    assert_eq!(harness.state().n_pairs(), before);
+    assert_eq!(harness.state().hash(), hash);
+}
+
+#[test]
+fn a_drag_beside_the_bodies_turns_the_view_and_leaves_the_pairs() {
+    let mut harness = open_content(still(600, 0.5));
+    let (camera, hash) = (harness.state().camera(), harness.state().hash());
+    drag(&mut harness, Pos2::new(15.0, 780.0), [200.0, 0.0]);
+    assert_ne!(harness.state().camera(), camera);
+    assert_eq!(harness.state().hash(), hash);
+}
+
+#[test]
+fn a_click_names_a_triangle_and_its_partners() {
+    let mut harness = open_content(still(600, 0.5));
+    assert_eq!(harness.state().selected(), None);
+    for pressed in [true, false] {
+        harness.hover_at(middle(false));
+        harness.event(eframe::egui::Event::PointerButton {
+            pos: middle(false),
+            button: eframe::egui::PointerButton::Primary,
+            pressed,
+            modifiers: Modifiers::NONE,
+        });
+    }
+    harness.run_steps(2);
+    let (body, primitive) = harness.state().selected().expect("a triangle is there");
+    let name = ["first", "second"][body];
+    let text = format!("triangle {primitive} of {name} (body {body})");
+    let found = harness.query_all_by_label_contains(&text).count();
+    assert_eq!(found, 1, "{text}");
+    look(&mut harness, "selected");
+    press(&mut harness, Key::Period);
+    press(&mut harness, Key::Escape);
+    assert_eq!(harness.state().selected(), None);
+}
+
+#[test]
+fn switches_change_how_the_answer_is_found_and_not_the_answer() {
+    let mut harness = open_content(still(600, 0.5));
+    let hash = harness.state().hash();
+    let mut ways = vec![harness.state().how().map(str::to_owned)];
+    for label in ["cells", "GPU", "clusters", "CPU", "naive"] {
+        click(&mut harness, label);
+        assert_eq!(harness.state().message(), None, "{label}");
+        assert_eq!(harness.state().hash(), hash, "{label}");
+        let how = harness.state().how().map(str::to_owned);
+        assert!(!ways.contains(&how), "{label}: {how:?} again");
+        ways.push(how);
+        if label == "clusters" {
+            // Back on the CPU it is what it was in the beginning.
+            ways.retain(|way| way.as_deref() != Some("clusters on cpu"));
+        }
+    }
+}
+
+#[test]
+fn self_collision_and_neighbours_change_the_answer_as_the_library_says() {
+    // A strip that is folded onto itself: neighbours overlap.
+    let mut scene = Scene::new();
+    let positions = [
+        [0.0f32, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.5, 0.25, 0.0],
+    ];
+    scene
+        .add_triangles(&[[0, 1, 2], [0, 1, 3]], &positions)
+        .expect("a body");
+    let mut detector = Detector::new(Backend::Cpu).expect("a detector");
+    let mut count = |rule| {
+        let query = Query::everything().shared_vertex(rule);
+        detector.detect(&scene, &query).expect("an answer").len()
+    };
+    let (resolved, skipped) = (count(SharedVertex::Resolve), count(SharedVertex::Skip));
+    assert_eq!((resolved, skipped), (1, 0));
+    let content = Content {
+        bodies: shown(&scene),
+        scene: scene.clone(),
+        frames: None,
+    };
+    let mut harness = open_content(content);
+    // One body alone is asked for itself.
+    assert_eq!(harness.state().n_pairs(), Some(resolved));
+    click(&mut harness, "skip");
+    assert_eq!(harness.state().n_pairs(), Some(skipped));
+    click(&mut harness, "resolve");
+    assert_eq!(harness.state().n_pairs(), Some(resolved));
+    click(&mut harness, "Self-collision");
+    assert_eq!(harness.state().n_pairs(), Some(0));
+}
+
+#[test]
+fn the_timeline_counts_what_the_library_finds_and_keys_jump_along_it() {
+    let content = passing();
+    let expected = expected(&content);
+    let mut harness = open_content(content);
+    wait(&mut harness, is_counted);
+    let counts: Vec<Count> = expected.iter().map(|&(n, _)| Count::Pairs(n)).collect();
+    assert_eq!(harness.state().counts(), counts);
+    let colliding: Vec<usize> = (0..expected.len())
+        .filter(|&ix| expected[ix].0 > 0)
+        .collect();
+    let (first, last) = (colliding[0], colliding[colliding.len() - 1]);
+    assert!(first > 0 && last + 1 < expected.len() && last > first);
+
+    press(&mut harness, Key::B);
+    assert_eq!(harness.state().frame(), Some(first));
+    assert_eq!(harness.state().hash(), Some(expected[first].1));
+    press(&mut harness, Key::N);
+    assert_eq!(harness.state().frame(), Some(colliding[1]));
+    press(&mut harness, Key::P);
+    assert_eq!(harness.state().frame(), Some(first));
+    press(&mut harness, Key::P);
+    assert_eq!(harness.state().frame(), Some(first));
+    assert!(
+        harness
+            .state()
+            .message()
+            .is_some_and(|text| text.contains("no such frame"))
+    );
+    press(&mut harness, Key::End);
+    assert_eq!(harness.state().frame(), Some(expected.len() - 1));
+    press(&mut harness, Key::ArrowLeft);
+    assert_eq!(harness.state().frame(), Some(expected.len() - 2));
+    press(&mut harness, Key::ArrowRight);
+    press(&mut harness, Key::ArrowRight);
+    assert_eq!(harness.state().frame(), Some(expected.len() - 1));
+    press(&mut harness, Key::Home);
+    assert_eq!(harness.state().frame(), Some(0));
+    click(&mut harness, "First collision");
+    assert_eq!(harness.state().frame(), Some(first));
+}
+
+#[test]
+fn space_plays_and_pauses() {
+    let mut harness = open_content(passing());
+    press(&mut harness, Key::Space);
+    wait(&mut harness, |viewer| viewer.frame() > Some(1));
+    press(&mut harness, Key::Space);
+    let frame = harness.state().frame();
+    std::thread::sleep(Duration::from_millis(120));
+    harness.run_steps(3);
+    assert_eq!(harness.state().frame(), frame);
+}
+
+#[test]
+fn a_moved_body_is_counted_where_it_is() {
+    let mut harness = open_content(passing());
+    wait(&mut harness, is_counted);
+    let before = harness.state().counts().to_vec();
+    press(&mut harness, Key::B);
+    press(&mut harness, Key::F);
+    fly(&mut harness);
+    drag(&mut harness, middle(true), [0.0, -500.0]);
+    wait(&mut harness, is_counted);
+    assert_ne!(harness.state().counts(), before);
+    click(&mut harness, "Put bodies back");
+    wait(&mut harness, |viewer| viewer.counts() == before);
+}
+
+#[test]
+fn the_earliest_impacts_are_those_of_the_library() {
+    let content = passing();
+    let frames = content.frames.clone().expect("it moves");
+    let mut scene = content.scene.clone();
+    let mut detector = Detector::new(Backend::Cpu).expect("a detector");
+    let mut expected = Vec::new();
+    for frame_ix in 0..frames.n_frames() - 1 {
+        let [(id, start), (_, end)] =
+            [frame_ix, frame_ix + 1].map(|ix| frames.read(ix).expect("a frame").remove(0));
+        let (Positions::F32(start), Positions::F32(end)) = (start, end) else {
+            panic!("single precision");
+        };
+        scene.set_positions(id, &start).expect("accepted");
+        scene.set_end_positions(id, &end).expect("accepted");
+        let step = Step::new(Query::all());
+        let first = detector.earliest(&scene, &step).expect("an answer");
+        expected.push(Some(first.map(|impact| impact.toi)));
+    }
+    assert!(
+        expected
+            .iter()
+            .flatten()
+            .flatten()
+            .any(|&toi| toi > 0.0 && toi < 1.0)
+    );
+    let mut harness = open_content(content);
+    click(&mut harness, "Earliest impacts");
+    wait(&mut harness, |viewer| {
+        !viewer.earliest().is_empty() && viewer.earliest().iter().all(Option::is_some)
+    });
+    assert_eq!(harness.state().earliest(), expected);
+}
+
+#[test]
+fn a_sequence_from_files_gives_the_same_counts() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("run.pc2");
+    let content = passing();
+    let frames = content.frames.clone().expect("it moves");
+    write_pc2(&file, &*frames);
+    let expected: Vec<Count> = expected(&content)
+        .into_iter()
+        .map(|(n, _)| Count::Pairs(n))
+        .collect();
+    struct Read(Sequence, BodyId);
+    impl Frames for Read {
+        fn n_frames(&self) -> usize {
+            self.0.n_frames()
+        }
+        fn read(&self, frame_ix: usize) -> Result<Vec<(BodyId, Positions)>, String> {
+            let positions = self.0.frame(frame_ix).map_err(|error| error.to_string())?;
+            Ok(vec![(
+                self.1,
+                match positions {
+                    impinge_io::Positions::F32(positions) => positions.into(),
+                    impinge_io::Positions::F64(positions) => positions.into(),
+                },
+            )])
+        }
+    }
+    let (_, id) = (content.bodies[0].id, content.bodies[1].id);
+    let sequence = Sequence::open(&file).expect("a sequence");
+    let content = Content {
+        frames: Some(Arc::new(Read(sequence, id))),
+        ..content
+    };
+    let mut harness = open_content(content);
+    wait(&mut harness, is_counted);
+    assert_eq!(harness.state().counts(), expected);
+}
+
+fn write_pc2(path: &Path, frames: &dyn Frames) {
+    let mut bytes = b"POINTCACHE2\0".to_vec();
+    let (_, first) = frames.read(0).expect("a frame").remove(0);
+    bytes.extend(1i32.to_le_bytes());
+    bytes.extend((first.len() as i32).to_le_bytes());
+    bytes.extend(0f32.to_le_bytes());
+    bytes.extend(1f32.to_le_bytes());
+    bytes.extend((frames.n_frames() as i32).to_le_bytes());
+    for frame_ix in 0..frames.n_frames() {
+        let (_, positions) = frames.read(frame_ix).expect("a frame").remove(0);
+        for vertex in 0..positions.len() {
+            for x in positions.point(vertex) {
+                bytes.extend((x as f32).to_le_bytes());
+            }
+        }
+    }
+    std::fs::write(path, bytes).expect("written");
+}
+
+#[test]
+fn what_cannot_be_read_is_a_message() {
+    let harness = open(|| Err("a.obj: line 3: not a number".to_owned()), paused());
+    assert_eq!(
+        harness.state().message(),
+        Some("a.obj: line 3: not a number")
+    );
+    harness.get_by_label("a.obj: line 3: not a number");
+}
+
+/// The third frame cannot be read, and the fourth is refused.
+struct Broken(BodyId, Positions, AtomicUsize);
+
+impl Frames for Broken {
+    fn n_frames(&self) -> usize {
+        5
+    }
+
+    fn read(&self, frame_ix: usize) -> Result<Vec<(BodyId, Positions)>, String> {
+        self.2.fetch_add(1, Ordering::Relaxed);
+        match frame_ix {
+            2 => Err("run_2.obj: no such file".to_owned()),
+            3 => Ok(vec![(self.0, vec![[f32::NAN; 3]; self.1.len()].into())]),
+            _ => Ok(vec![(self.0, self.1.clone())]),
+        }
+    }
+}
+
+#[test]
+fn bad_frames_are_messages_and_marks_on_the_timeline() {
+    let (scene, [id, _]) = balls(100, 0.5);
+    let positions = scene.body(id).expect("there").positions().clone();
+    let content = Content {
+        bodies: shown(&scene),
+        scene,
+        frames: Some(Arc::new(Broken(id, positions, AtomicUsize::new(0)))),
+    };
+    let mut harness = open_content(content);
+    wait(&mut harness, is_counted);
+    let counts = harness.state().counts();
+    assert_eq!(
+        counts[2],
+        Count::Failed("run_2.obj: no such file".to_owned())
+    );
+    assert!(
+        matches!(&counts[3], Count::Failed(text) if text.contains("NaN")),
+        "{:?}",
+        counts[3]
+    );
+    assert!(matches!(counts[4], Count::Pairs(n) if n > 0));
+    press(&mut harness, Key::ArrowRight);
+    press(&mut harness, Key::ArrowRight);
+    assert_eq!(harness.state().message(), Some("run_2.obj: no such file"));
+    press(&mut harness, Key::End);
+    assert_eq!(harness.state().message(), None);
+    assert!(harness.state().n_pairs() > Some(0));
+}
+
+#[test]
+fn an_empty_mesh_is_a_message() {
+    let mut scene = Scene::new();
+    scene
+        .add_triangles::<f32>(&[], &[])
+        .expect("empty bodies are allowed");
+    let content = Content {
+        bodies: shown(&scene),
+        scene,
+        frames: None,
+    };
+    let mut harness = open_content(content);
+    let text = harness.state().message().expect("a message").to_owned();
+    assert!(text.contains("nothing to see"), "{text}");
+    press(&mut harness, Key::F);
+    press(&mut harness, Key::J);
+    harness.render().expect("a picture");
+}
+
+#[test]
+fn a_window_of_one_pixel_does_no_harm() {
+    let mut harness = open_content(passing());
+    for size in [[1.0, 1.0], [300.0, 2.0], [252.0, 400.0], SIZE] {
+        harness.set_size(size.into());
+        harness.run_steps(3);
+        press(&mut harness, Key::ArrowRight);
+    }
+    assert!(harness.state().n_pairs().is_some());
+    harness.render().expect("a picture");
+}
+
+/// Waits until the camera has arrived.
+fn fly(harness: &mut Harness<'static, Viewer>) {
+    harness.step();
+    std::thread::sleep(Duration::from_millis(500));
+    harness.run_steps(3);
+}
+
+/// Saves a picture for people to look at, in the folder IMPINGE_PICTURES if it is set.
+fn look(harness: &mut Harness<'static, Viewer>, name: &str) {
+    if let Some(folder) = std::env::var_os("IMPINGE_PICTURES") {
+        harness.run_steps(2);
+        let image = harness.render().expect("a picture");
+        image
+            .save(Path::new(&folder).join(format!("{name}.png")))
+            .expect("saved");
+    }
+}
+
+fn n_pixels(harness: &mut Harness<'static, Viewer>, is: impl Fn([u8; 3]) -> bool) -> usize {
+    harness.run_steps(2);
+    let image = harness.render().expect("a picture");
+    // Beside the panels.
+    image
+        .enumerate_pixels()
+        .filter(|(x, y, pixel)| {
+            *x < (SIZE[0] - 252.0) as u32 && *y < SIZE[1] as u32 - 104 && {
+                let [r, g, b, _] = pixel.0;
+                is([r, g, b])
+            }
+        })
+        .count()
+}
+
+fn is_red([r, g, b]: [u8; 3]) -> bool {
+    r > 120 && u32::from(r) > 2 * u32::from(g.max(b))
+}
+
+fn is_grey([r, g, b]: [u8; 3]) -> bool {
+    r.abs_diff(g) < 16 && b.abs_diff(g) < 24 && r < 225
+}
+
+fn is_black([r, g, b]: [u8; 3]) -> bool {
+    r < 60 && g < 60 && b < 60
+}
+
+#[test]
+fn c_shows_everything_then_what_collides_then_curves() {
+    let mut harness = open_content(still(600, 0.5));
+    harness.set_size(SIZE.into());
+    look(&mut harness, "everything");
+    assert!(n_pixels(&mut harness, is_red) > 100);
+    assert!(n_pixels(&mut harness, is_grey) > 20_000);
+    press(&mut harness, Key::C);
+    look(&mut harness, "colliding");
+    assert!(n_pixels(&mut harness, is_red) > 100);
+    assert!(n_pixels(&mut harness, is_grey) < 500);
+    press(&mut harness, Key::C);
+    look(&mut harness, "curves");
+    assert_eq!(n_pixels(&mut harness, is_red), 0);
+    assert!(n_pixels(&mut harness, is_black) > 300);
+    press(&mut harness, Key::C);
+    assert!(n_pixels(&mut harness, is_grey) > 20_000);
+    let before = n_pixels(&mut harness, is_black);
+    press(&mut harness, Key::I);
+    assert!(n_pixels(&mut harness, is_black) > before + 200);
+}
+
+#[test]
+fn impacts_and_near_faces_have_colors() {
+    let mut harness = open_content(passing());
+    wait(&mut harness, is_counted);
+    press(&mut harness, Key::B);
+    press(&mut harness, Key::ArrowLeft);
+    assert_eq!(harness.state().n_pairs(), Some(0));
+    assert_eq!(n_pixels(&mut harness, is_red), 0);
+    click(&mut harness, "Impacts by time");
+    assert_eq!(harness.state().message(), None);
+    assert!(
+        harness
+            .query_by_label_contains("impacts, the earliest at")
+            .is_some()
+    );
+    look(&mut harness, "impacts");
+    let is_warm = |[r, g, b]: [u8; 3]| r > 110 && u32::from(r) > 3 * u32::from(b) && g < r;
+    assert!(n_pixels(&mut harness, is_warm) > 20);
+    click(&mut harness, "Impacts by time");
+    assert_eq!(n_pixels(&mut harness, is_warm), 0);
+    press(&mut harness, Key::ArrowRight);
+    // The number beside it has the same label.
+    harness
+        .get_by_role_and_label(eframe::egui::accesskit::Role::CheckBox, "Within")
+        .click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().message(), None);
+    assert!(
+        harness
+            .query_by_label_contains("pairs of faces within")
+            .is_some()
+    );
+}
+
+#[test]
+fn j_flies_from_place_to_place_and_f_back() {
+    // A small contact.
+    let mut harness = open_content(still(3_000, 0.95));
+    press(&mut harness, Key::C);
+    press(&mut harness, Key::J);
+    harness.get_by_label("place 1 of 1");
+    fly(&mut harness);
+    // The camera is near the contact: it fills more of the view than before.
+    let near = n_pixels(&mut harness, is_red);
+    look(&mut harness, "place");
+    press(&mut harness, Key::F);
+    fly(&mut harness);
+    let far = n_pixels(&mut harness, is_red);
+    assert!(near > 4 * far && far > 0, "{near} {far}");
+}
+
+#[test]
+fn a_saved_picture_is_made_again_by_what_its_command_says() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let content = passing();
+    let options = Options {
+        folder: folder.path().to_owned(),
+        size: [320, 200],
+        ..paused()
+    };
+    let mut harness = open(
+        {
+            let content = content.clone();
+            move || Ok(content)
+        },
+        options.clone(),
+    );
+    wait(&mut harness, is_counted);
+    press(&mut harness, Key::B);
+    drag(&mut harness, Pos2::new(15.0, 600.0), [80.0, 30.0]);
+    press(&mut harness, Key::S);
+    assert_eq!(harness.state().message(), None);
+    let (path, command) = harness.state().saved().expect("a picture");
+    let (frame, camera) = (harness.state().frame(), harness.state().camera());
+    let (frame, camera) = (frame.expect("a frame"), camera.expect("a camera"));
+    assert!(
+        command.starts_with(&format!("impinge view --frame {frame} --azimuth ")),
+        "{command}"
+    );
+    assert!(command.contains(&format!(
+        "--azimuth {:?} --elevation {:?} --size 320x200",
+        camera.azimuth, camera.elevation
+    )));
+    let again = folder.path().join("again.png");
+    let options = Options {
+        frame,
+        camera,
+        ..options
+    };
+    impinge_view::write_png(content, &options, &again).expect("a picture");
+    let bytes = |path: &Path| std::fs::read(path).expect("there");
+    assert!(bytes(path) == bytes(&again));
+    assert!(bytes(&again).len() > 1_000);
+    // The next one has another name.
+    press(&mut harness, Key::S);
+    let (path, _) = harness.state().saved().expect("a picture");
+    assert!(path.ends_with("impinge-2.png"), "{path:?}");
+}
