@@ -339,6 +339,10 @@ fn the_timeline_counts_what_the_library_finds_and_keys_jump_along_it() {
     assert_eq!(harness.state().hash(), Some(expected[first].1));
     press(&mut harness, Key::N);
     assert_eq!(harness.state().frame(), Some(colliding[1]));
+    press(&mut harness, Key::I);
+    press(&mut harness, Key::F);
+    fly(&mut harness);
+    look(&mut harness, "timeline");
     press(&mut harness, Key::P);
     assert_eq!(harness.state().frame(), Some(first));
     press(&mut harness, Key::P);

@@ -55,16 +55,13 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         .zip(names.iter().map(String::as_str))
         .collect();
 
-    let range = args
-        .frames
-        .within(frames.sequence.n_frames())
-        .ok_or_else(|| {
-            Error::Usage(format!(
-                "--frames reaches beyond the {} of {}",
-                counted(frames.sequence.n_frames() as u64, "frame"),
-                frames.name
-            ))
-        })?;
+    let range = args.frames.within(frames.n_frames()).ok_or_else(|| {
+        Error::Usage(format!(
+            "--frames reaches beyond the {} of {}",
+            counted(frames.n_frames() as u64, "frame"),
+            frames.name
+        ))
+    })?;
     let mut detector = detector(&args.detector)?;
     let mut outputs = Outputs::new(args, &frames)?;
     let prints = !args.ask.json && !rows_on_stdout;
