@@ -154,6 +154,10 @@ impl Workers {
         n_primitives: usize,
         work: impl FnOnce() -> T + Send,
     ) -> Result<T, Error> {
+        // No thread can be started there, and a pool of a given size is an error even with one thread.
+        if cfg!(target_family = "wasm") {
+            return Ok(work());
+        }
         // Pools shared by the whole process do not work in a fork of it: there, a detector uses its own pool.
         if !is_forked() {
             if n_primitives < SPREAD_FROM {

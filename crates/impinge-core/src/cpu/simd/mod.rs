@@ -1,4 +1,4 @@
-//! Box tests, many at a time: AVX-512, AVX2, or plain loops that any compiler vectorises (NEON).
+//! Box tests, many at a time: AVX-512, AVX2, WebAssembly's vectors, or plain loops that any compiler vectorises (NEON).
 //!
 //! A binary built for plain x86-64 detects at run time which instruction sets the processor has. Kernels are
 //! generic over `Simd` and wrapped once per instruction set by `dispatch!`; everything between wrapper
@@ -339,6 +339,25 @@ impl Simd for Portable {
     type F64 = number::Portable;
     type F32 = number::Portable32;
 
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    #[inline(always)]
+    fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
+        wasm::overlaps_8(boxes, first, query)
+    }
+
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    #[inline(always)]
+    fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64 {
+        wasm::overlaps_64(boxes, query, among)
+    }
+
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    #[inline(always)]
+    fn meets_64(self, boxes: [&LaneBounds; 2], query: &[Bounds; 2], among: u64) -> u64 {
+        wasm::meets_64(boxes, query, among)
+    }
+
+    #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
     #[inline(always)]
     fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
         let mut overlap = [1u8; 8];
@@ -353,6 +372,7 @@ impl Simd for Portable {
         (0..8).fold(0, |mask, k| mask | u32::from(overlap[k]) << k)
     }
 
+    #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
     #[inline(always)]
     fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64 {
         let mut mask = 0;
@@ -413,6 +433,8 @@ impl Simd for Portable {
 }
 
 mod isa;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 

@@ -1,0 +1,242 @@
+//! The functions that JavaScript calls. `web/package` wraps them; their names are private to the package.
+
+use impinge::{Backend, Detector, PairKind, Settings, Statistics};
+use js_sys::{Array, Float64Array, Object, Reflect, Uint8Array, Uint32Array};
+use wasm_bindgen::prelude::*;
+
+use crate::error::Error;
+use crate::step::{FlatImpacts, StepOptions};
+use crate::world::{Asked, World};
+
+fn thrown(error: Error) -> JsError {
+    JsError::new(&error.to_string())
+}
+
+/// A world, and the hash and the statistics of its last answer.
+#[wasm_bindgen]
+pub struct Engine {
+    world: World,
+    hash: u64,
+    statistics: Object,
+}
+
+#[wasm_bindgen]
+impl Engine {
+    /// An engine on the CPU.
+    #[wasm_bindgen(constructor)]
+    pub fn new(method: &str, shared_vertex: &str) -> Result<Engine, JsError> {
+        let settings = Settings {
+            backend: Backend::Cpu,
+            ..World::settings(method).map_err(thrown)?
+        };
+        Engine::of(Detector::with_settings(settings)?, shared_vertex)
+    }
+
+    /// An engine on the browser's WebGPU device. Software devices are allowed.
+    #[cfg(feature = "gpu")]
+    pub async fn webgpu(method: String, shared_vertex: String) -> Result<Engine, JsError> {
+        let settings = Settings {
+            backend: Backend::Gpu,
+            ..World::settings(&method).map_err(thrown)?
+        };
+        let detector = Detector::with_settings_async(settings).await?;
+        Engine::of(detector, &shared_vertex)
+    }
+
+    fn of(detector: Detector, shared_vertex: &str) -> Result<Engine, JsError> {
+        Ok(Engine {
+            world: World::new(detector, shared_vertex).map_err(thrown)?,
+            hash: 0,
+            statistics: Object::new(),
+        })
+    }
+
+    /// Adds a body in single precision; see [`World::add`].
+    pub fn add_f32(
+        &mut self,
+        index: &[u32],
+        positions: &[f32],
+        corners: usize,
+    ) -> Result<u32, JsError> {
+        self.world.add(index, positions, corners).map_err(thrown)
+    }
+
+    /// Adds a body in double precision; see [`World::add`].
+    pub fn add_f64(
+        &mut self,
+        index: &[u32],
+        positions: &[f64],
+        corners: usize,
+    ) -> Result<u32, JsError> {
+        self.world.add(index, positions, corners).map_err(thrown)
+    }
+
+    /// See [`World::set_positions`].
+    pub fn set_positions_f32(&mut self, body: u32, positions: &[f32]) -> Result<(), JsError> {
+        self.world.set_positions(body, positions).map_err(thrown)
+    }
+
+    /// See [`World::set_positions`].
+    pub fn set_positions_f64(&mut self, body: u32, positions: &[f64]) -> Result<(), JsError> {
+        self.world.set_positions(body, positions).map_err(thrown)
+    }
+
+    /// See [`World::set_end_positions`].
+    pub fn set_end_positions_f32(&mut self, body: u32, positions: &[f32]) -> Result<(), JsError> {
+        let set = self.world.set_end_positions(body, positions);
+        set.map_err(thrown)
+    }
+
+    /// See [`World::set_end_positions`].
+    pub fn set_end_positions_f64(&mut self, body: u32, positions: &[f64]) -> Result<(), JsError> {
+        let set = self.world.set_end_positions(body, positions);
+        set.map_err(thrown)
+    }
+
+    /// See [`World::remove`].
+    pub fn remove(&mut self, body: u32) -> Result<(), JsError> {
+        self.world.remove(body).map_err(thrown)
+    }
+
+    /// The numbers of primitives and of vertices of a body.
+    pub fn size(&self, body: u32) -> Result<Vec<u32>, JsError> {
+        let (n_primitives, n_vertices) = self.world.size(body).map_err(thrown)?;
+        // The library refuses bodies with more than 32 bits can count.
+        Ok(vec![n_primitives as u32, n_vertices as u32])
+    }
+
+    /// See [`World::detect`]; `bodies` as in [`Asked::of`].
+    pub fn detect(&mut self, bodies: &[u32]) -> Result<Vec<u32>, JsError> {
+        let asked = Asked::of(bodies).map_err(thrown)?;
+        let (numbers, pairs) = self.world.detect(asked).map_err(thrown)?;
+        self.hash = pairs.hash();
+        self.statistics = statistics(pairs.stats())?;
+        Ok(numbers)
+    }
+
+    /// [`detect`](Engine::detect) without blocking.
+    #[cfg(feature = "gpu")]
+    pub async fn detect_async(&mut self, bodies: Vec<u32>) -> Result<Vec<u32>, JsError> {
+        let asked = Asked::of(&bodies).map_err(thrown)?;
+        let (numbers, pairs) = self.world.detect_async(asked).await.map_err(thrown)?;
+        self.hash = pairs.hash();
+        self.statistics = statistics(pairs.stats())?;
+        Ok(numbers)
+    }
+
+    /// See [`World::impacts`]: `[kinds, rows, times, at_start]`.
+    pub fn impacts(
+        &mut self,
+        bodies: &[u32],
+        start: &str,
+        toi: &str,
+        separation: f64,
+    ) -> Result<Array, JsError> {
+        let asked = Asked::of(bodies).map_err(thrown)?;
+        let options = StepOptions::new(start, toi, separation).map_err(thrown)?;
+        let (impacts, hash) = self.world.impacts(asked, options).map_err(thrown)?;
+        self.hash = hash;
+        self.statistics = statistics(self.world.step_stats())?;
+        Ok(arrays(&impacts))
+    }
+
+    /// See [`World::earliest`]: `[kinds, rows, times, at_start]`. The hash stays that of the answer before.
+    pub fn earliest(
+        &mut self,
+        bodies: &[u32],
+        start: &str,
+        toi: &str,
+        separation: f64,
+    ) -> Result<Array, JsError> {
+        let asked = Asked::of(bodies).map_err(thrown)?;
+        let options = StepOptions::new(start, toi, separation).map_err(thrown)?;
+        let earliest = self.world.earliest(asked, options).map_err(thrown)?;
+        self.statistics = statistics(self.world.step_stats())?;
+        Ok(arrays(&earliest))
+    }
+
+    /// The hash of the last answer, 16 hexadecimal digits.
+    pub fn hash(&self) -> String {
+        format!("{:016x}", self.hash)
+    }
+
+    /// Statistics of the last answer.
+    pub fn statistics(&self) -> Object {
+        self.statistics.clone()
+    }
+}
+
+/// The names of the kinds that impacts refer to by number.
+#[wasm_bindgen]
+pub fn kind_names() -> Vec<String> {
+    PairKind::ALL.map(|kind| kind.name().to_owned()).into()
+}
+
+fn arrays(impacts: &FlatImpacts) -> Array {
+    Array::of4(
+        &Uint8Array::from(&impacts.kinds[..]),
+        &Uint32Array::from(&impacts.rows[..]),
+        &Float64Array::from(&impacts.times[..]),
+        &Uint8Array::from(&impacts.at_start[..]),
+    )
+}
+
+/// Statistics as an object of JavaScript.
+fn statistics(stats: &Statistics) -> Result<Object, JsError> {
+    let put = |object: &Object, name: &str, value: JsValue| {
+        Reflect::set(object, &JsValue::from_str(name), &value)
+            .map(|_| ())
+            .map_err(|_| JsError::new("statistics cannot be written"))
+    };
+    // Counts stay far below 2^53.
+    let count = |n: u64| JsValue::from_f64(n as f64);
+    let object = Object::new();
+    put(&object, "backend", JsValue::from_str(&stats.backend))?;
+    put(&object, "method", JsValue::from_str(stats.method))?;
+    put(&object, "candidates", count(stats.n_candidates))?;
+    put(&object, "unsure", count(stats.n_unsure))?;
+    put(&object, "clusters", count(stats.n_clusters))?;
+    put(&object, "bytesHeld", count(stats.bytes_held))?;
+    put(&object, "totalMs", JsValue::from_f64(stats.total_ms))?;
+    let stages = Object::new();
+    for stage in &stats.stages {
+        put(&stages, stage.name, JsValue::from_f64(stage.ms))?;
+    }
+    put(&object, "stages", stages.into())?;
+    Ok(object)
+}
+
+/// A mesh that was read from a file.
+#[cfg(feature = "io")]
+#[wasm_bindgen]
+pub struct MeshFile(crate::meshes::FileMesh);
+
+#[cfg(feature = "io")]
+#[wasm_bindgen]
+impl MeshFile {
+    /// Reads the bytes of a file. The extension of its name is that of its format.
+    #[wasm_bindgen(constructor)]
+    pub fn new(name: &str, bytes: &[u8], weld: bool) -> Result<MeshFile, JsError> {
+        let mesh = crate::meshes::read(name, bytes, weld);
+        mesh.map(MeshFile).map_err(thrown)
+    }
+
+    /// Vertex numbers, [`corners`](MeshFile::corners) per primitive.
+    pub fn index(&self) -> Vec<u32> {
+        self.0.index.clone()
+    }
+
+    /// x, y, z per vertex, as a `Float32Array` if the file is in single precision, else as a `Float64Array`.
+    pub fn positions(&self) -> JsValue {
+        use impinge_io::Positions;
+        match &self.0.positions {
+            Positions::F32(rows) => js_sys::Float32Array::from(rows.as_flattened()).into(),
+            Positions::F64(rows) => Float64Array::from(rows.as_flattened()).into(),
+        }
+    }
+
+    /// 3 for triangles, 4 for tetrahedra.
+    pub fn corners(&self) -> u32 {
+        self.0.corners
+    }
+}

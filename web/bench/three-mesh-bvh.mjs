@@ -1,0 +1,197 @@
+// impinge beside three-mesh-bvh, in Node, on the same frames: node three-mesh-bvh.mjs PACKAGE [--record FOLDER]
+//
+// Two deforming balls. Before each frame all vertices are rewritten, off the clock, into the arrays of the three.js
+// geometries. The clock then runs until the pairs are in an array: impinge copies the positions and answers,
+// three-mesh-bvh refits both trees and answers. Both take turns, ten frames each. three-mesh-bvh runs with the settings
+// that were fastest on the same frames; all of them are tried first. The pairs of one pose are compared as sets.
+//
+// To count as a pair, triangles must intersect exactly; three-mesh-bvh decides this in double precision without error
+// bounds. Every frame is the first pose or its mirror image (x to -x, which rounds nothing), so the number of pairs is known.
+
+import assert from "node:assert/strict";
+import { mkdir, writeFile } from "node:fs/promises";
+import { cpus } from "node:os";
+import { join, resolve } from "node:path";
+import * as THREE from "three";
+import { AVERAGE, CENTER, MeshBVH, SAH } from "three-mesh-bvh";
+import { ball } from "../page/shapes.js";
+
+const [folder, option, record] = process.argv.slice(2);
+const { default: init, Detector } = await import(resolve(folder, "index.js"));
+await init();
+
+const TURN = 10;
+const SETTINGS = Object.entries({ CENTER, AVERAGE, SAH }).flatMap(([name, strategy]) =>
+  [1, 4, 10].flatMap((maxLeafSize) =>
+    [false, true].map((boxes) => ({ name, strategy, maxLeafSize, boxes })),
+  ),
+);
+
+function median(times) {
+  const sorted = times.toSorted((a, b) => a - b);
+  return sorted[Math.floor(sorted.length / 2)];
+}
+
+// A ball with bumps, moved by `offset`, in its pose and in the mirror image.
+function body(n, offset) {
+  const { index, positions } = ball(n, 0.5);
+  const poses = [positions, new Float32Array(positions.length)];
+  for (let ix = 0; ix < positions.length; ix += 3) {
+    const [x, y, z] = positions.subarray(ix, ix + 3);
+    const bump = 1 + 0.05 * Math.sin(20 * x) * Math.sin(20 * y) * Math.sin(20 * z);
+    positions.set([x * bump + offset[0], y * bump + offset[1], z * bump + offset[2]], ix);
+    poses[1].set([-positions[ix], positions[ix + 1], positions[ix + 2]], ix);
+  }
+  const geometry = () => {
+    const made = new THREE.BufferGeometry();
+    made.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(positions), 3));
+    made.setIndex(new THREE.BufferAttribute(Uint32Array.from(index), 1));
+    return made;
+  };
+  return { poses, geometry };
+}
+
+// Writes a pose into the geometries of a contestant.
+function pose(contestant, bodies, ix) {
+  for (const [which, geometry] of contestant.geometries.entries()) {
+    geometry.attributes.position.array.set(bodies[which].poses[ix]);
+  }
+}
+
+function impinge(bodies) {
+  const geometries = bodies.map(({ geometry }) => geometry());
+  const detector = new Detector();
+  const start = performance.now();
+  const ids = geometries.map(({ index, attributes }) => detector.add(index.array, attributes.position.array));
+  return {
+    name: "impinge",
+    geometries,
+    built: performance.now() - start,
+    frame() {
+      for (const id of ids) detector.setPositions(id, geometries[id].attributes.position.array);
+      return detector.between(ids[0], ids[1]);
+    },
+  };
+}
+
+function threeMeshBvh(bodies, { name, strategy, maxLeafSize, boxes }) {
+  const geometries = bodies.map(({ geometry }) => geometry());
+  const start = performance.now();
+  const [a, b] = geometries.map((geometry) => new MeshBVH(geometry, { strategy, maxLeafSize }));
+  const identity = new THREE.Matrix4();
+  const apart = (s, t) =>
+    ["x", "y", "z"].some(
+      (k) =>
+        Math.max(s.a[k], s.b[k], s.c[k]) < Math.min(t.a[k], t.b[k], t.c[k]) ||
+        Math.max(t.a[k], t.b[k], t.c[k]) < Math.min(s.a[k], s.b[k], s.c[k]),
+    );
+  return {
+    name: `three-mesh-bvh, ${name}, leaves of ${maxLeafSize}${boxes ? ", boxes of triangles compared first" : ""}`,
+    geometries,
+    built: performance.now() - start,
+    frame() {
+      a.refit();
+      b.refit();
+      const found = [];
+      a.bvhcast(b, identity, {
+        intersectsTriangles(s, t, i, j) {
+          if ((!boxes || !apart(s, t)) && s.intersectsTriangle(t, undefined, true)) found.push(i, j);
+          return false;
+        },
+      });
+      return found;
+    },
+  };
+}
+
+// Pairs by the vertices of their triangles: three-mesh-bvh reorders the triangles of a geometry.
+function named({ geometries }, pairs) {
+  const triangle = (which, ix) => {
+    const of = geometries[which].index.array.subarray(3 * ix, 3 * ix + 3);
+    return [...of].sort((p, q) => p - q).join("-");
+  };
+  const names = new Set();
+  for (let at = 0; at < pairs.length; at += 2) {
+    names.add(`${triangle(0, pairs[at])} ${triangle(1, pairs[at + 1])}`);
+  }
+  return names;
+}
+
+// Median milliseconds of each contestant, in turns.
+function race(contestants, bodies, rounds) {
+  const times = contestants.map(() => []);
+  for (let round = 0; round < rounds; round += 1) {
+    for (const [which, contestant] of contestants.entries()) {
+      for (let frame = 0; frame < TURN; frame += 1) {
+        pose(contestant, bodies, frame % 2);
+        const start = performance.now();
+        const pairs = contestant.frame();
+        times[which].push(performance.now() - start);
+        assert.equal(pairs.length / 2, contestant.expected, contestant.name);
+      }
+    }
+  }
+  return times.map(median);
+}
+
+const results = [];
+for (const n of [1_000, 15_000, 70_000]) {
+  const bodies = [body(n, [0, 0, 0]), body(n, [0.5, 0.25, 0.125])];
+  const ours = impinge(bodies);
+  pose(ours, bodies, 0);
+  const firstFrame = performance.now();
+  const exact = named(ours, ours.frame());
+  ours.built += performance.now() - firstFrame;
+  ours.expected = exact.size;
+  let best = null;
+  for (const setting of SETTINGS) {
+    const peer = threeMeshBvh(bodies, setting);
+    pose(peer, bodies, 0);
+    const found = peer.frame();
+    peer.expected = found.length / 2;
+    const names = named(peer, found);
+    const [missing, extra] = [exact.difference?.(names), names.difference?.(exact)];
+    peer.missing = missing?.size ?? [...exact].filter((pair) => !names.has(pair)).length;
+    peer.extra = extra?.size ?? [...names].filter((pair) => !exact.has(pair)).length;
+    const [ms] = race([peer], bodies, 1);
+    if (best === null || ms < best.ms) best = { peer, ms };
+  }
+  const { peer } = best;
+  const [mine, theirs] = race([ours, peer], bodies, 10);
+  results.push({
+    triangles: n,
+    pairs: exact.size,
+    impinge: { ms: mine, once: ours.built },
+    peer: { name: peer.name, ms: theirs, once: peer.built, missing: peer.missing, extra: peer.extra },
+    ratio: theirs / mine,
+  });
+  console.log(results.at(-1));
+}
+
+const version = async (name) => {
+  const { default: text } = await import(`${name}/package.json`, { with: { type: "json" } }).catch(() => ({ default: {} }));
+  return text.version ?? "";
+};
+const ms = (value) => value.toFixed(value < 10 ? 2 : 0);
+const table = `# impinge and three-mesh-bvh in Node
+
+${cpus()[0].model.trim()}, ${cpus().length} cores; Node ${process.version}; three-mesh-bvh ${await version("three-mesh-bvh")}. Made by
+\`scripts/web bench\`; \`web/bench/three-mesh-bvh.mjs\` says what is timed. Both run on one thread. Two deforming balls, median
+milliseconds per frame over 100 frames each.
+
+| triangles | pairs | impinge (wasm) | three-mesh-bvh | times impinge | its pairs | once: impinge, three-mesh-bvh | its best setting |
+|---|---:|---:|---:|---:|---|---|---|
+${results
+  .map(({ triangles, pairs, impinge: ours, peer, ratio }) => {
+    const wrong = peer.missing + peer.extra === 0 ? "the same" : `+${peer.extra} −${peer.missing}`;
+    const setting = peer.name.replace("three-mesh-bvh, ", "");
+    return `| 2 x ${triangles.toLocaleString("en")} | ${pairs.toLocaleString("en")} | ${ms(ours.ms)} | ${ms(peer.ms)} | ${ratio.toFixed(1)} | ${wrong} | ${ms(ours.once)}, ${ms(peer.once)} | ${setting} |`;
+  })
+  .join("\n")}
+`;
+console.log(table);
+if (option === "--record") {
+  await mkdir(record, { recursive: true });
+  await writeFile(join(record, "three-mesh-bvh.md"), table);
+  await writeFile(join(record, "three-mesh-bvh.json"), `${JSON.stringify(results, null, 2)}\n`);
+}

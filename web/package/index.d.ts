@@ -1,0 +1,134 @@
+/// <reference lib="esnext.disposable" />
+
+/** Vertex numbers, three per triangle or four per tetrahedron. */
+export type Index = Uint32Array | Uint16Array | Uint8Array;
+
+/** x, y, z per vertex, read as the real numbers that they are. */
+export type Positions = Float32Array | Float64Array;
+
+/** The number of a body: 0 for the first one added, and so on. Numbers are not used again. */
+export type Body = number;
+
+export interface Options {
+  /** How candidates are found. All methods give the same pairs. `"clusters"` by default. */
+  method?: "clusters" | "cells" | "naive";
+  /**
+   * Self-collision of pairs that share a vertex: not reported (`"skip"`, the default), or reported if they meet in more
+   * than the parts that they share (`"resolve"`).
+   */
+  sharedVertex?: "skip" | "resolve";
+}
+
+/** Counts and times of the last answer. The answer never depends on them. */
+export interface Statistics {
+  /** `"cpu"` or the name of the GPU. */
+  backend: string;
+  method: string;
+  /** Pairs whose boxes overlap. */
+  candidates: number;
+  /** Candidates that exact arithmetic decided. */
+  unsure: number;
+  clusters: number;
+  /** Bytes that the detector holds. */
+  bytesHeld: number;
+  /** Milliseconds for the whole answer. */
+  totalMs: number;
+  /** Milliseconds per stage. */
+  stages: Record<string, number>;
+}
+
+export interface StepOptions {
+  /** Which bodies: none for all bodies and their self-collision (the default), one for its self-collision, two for pairs between them. */
+  bodies?: readonly [] | readonly [Body] | readonly [Body, Body];
+  /** Pairs that touch at the start: reported with the time 0 (`"report"`, the default) or not at all (`"skip"`). */
+  start?: "report" | "skip";
+  /** The precision to which times are rounded down: `"f32"` by default. */
+  toi?: "f32" | "f64";
+  /** The distance that elements must keep, in the unit of the scene: 0 by default. */
+  separation?: number;
+}
+
+/**
+ * Two elements that touch during a step. The kind says which elements: vertex and face (`"vf"`), two edges (`"ee"`). Vertices are
+ * numbered as positions are, faces as they were given, edges as unique pairs of vertices `(low, high)` in the order of
+ * `(high, low)`.
+ */
+export interface Impact {
+  kind: "vf" | "ee" | "ev" | "vv" | "ef" | "ff";
+  bodyA: Body;
+  elementA: number;
+  bodyB: Body;
+  elementB: number;
+  /** The first time in [0, 1] at which they touch, rounded down. */
+  time: number;
+  /** Whether they touch at the start. */
+  atStart: boolean;
+}
+
+/** All impacts of a step, sorted by kind, bodies and elements. */
+export interface Impacts extends Iterable<Impact> {
+  readonly length: number;
+  at(ix: number): Impact | undefined;
+  /** `[bodyA, elementA, bodyB, elementB]` per impact. */
+  readonly rows: Uint32Array;
+  /** One time per impact. */
+  readonly times: Float64Array;
+  /** One index into `names` per impact. */
+  readonly kinds: Uint8Array;
+  readonly names: readonly Impact["kind"][];
+  /** 1 for impacts at the start, else 0. */
+  readonly atStart: Uint8Array;
+}
+
+/** Everything that a WebAssembly module can be loaded from. */
+export type Module = WebAssembly.Module | BufferSource | Response | URL | string;
+
+/**
+ * Loads the WebAssembly module. Later calls wait for the first. Without an argument the module is loaded from the
+ * folder of this file, in Node too.
+ */
+export default function init(module?: Module | Promise<Module>): Promise<void>;
+
+/**
+ * Finds the primitives that intersect, exactly: touching counts, and there is no tolerance. Errors are `Error`s that
+ * name the body, the index and both numbers.
+ *
+ * ```js
+ * import init, { Detector } from "impinge";
+ * await init();
+ * const detector = new Detector();
+ * const a = detector.add(geometry.index.array, geometry.attributes.position.array);
+ * ```
+ */
+export declare class Detector {
+  constructor(options?: Options);
+  /** Adds a body of triangles and returns its number. */
+  add(index: Index, positions: Positions): Body;
+  /** Adds a body of tetrahedra and returns its number. */
+  addTetrahedra(index: Index, positions: Positions): Body;
+  /** Moves the vertices of a body: as many positions as it has vertices. It stands still until it gets end positions. */
+  setPositions(body: Body, positions: Positions): void;
+  /** Sets the positions at the end of a step. Each vertex moves there on a straight line, from time 0 to time 1. */
+  setEndPositions(body: Body, positions: Positions): void;
+  /** Removes a body. */
+  remove(body: Body): void;
+  /** The numbers of primitives and of vertices of a body. */
+  size(body: Body): { primitives: number; vertices: number };
+  /** Pairs between two bodies: `[i0, j0, i1, j1, …]`, primitive i of `a` and j of `b`, sorted. */
+  between(a: Body, b: Body): Uint32Array;
+  /** Self-collision of a body: `[i0, j0, i1, j1, …]`, sorted. */
+  within(body: Body): Uint32Array;
+  /** All pairs, self-collision included: `[bodyA, i, bodyB, j, …]`, sorted. */
+  everything(): Uint32Array;
+  /** Which elements touch during a step, and when first. */
+  impacts(options?: StepOptions): Impacts;
+  /** The earliest impact of a step, or `null` if nothing touches. Faster than `impacts`. */
+  earliest(options?: StepOptions): Impact | null;
+  /** The hash of the last set of pairs or impacts, 16 hexadecimal digits: the same on every method, backend and machine. */
+  readonly hash: string;
+  /** Statistics of the last answer. */
+  readonly statistics: Statistics;
+  /** Frees the memory. */
+  dispose(): void;
+  [Symbol.dispose](): void;
+}

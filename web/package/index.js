@@ -1,0 +1,73 @@
+// impinge on the CPU: WebAssembly with SIMD, synchronous.
+
+import load, { Engine, kind_names } from "./cpu/impinge.js";
+import { Bodies, bodies, chosen, loader } from "./shared.js";
+
+const [init, mustBeReady] = loader(load, new URL("./cpu/impinge_bg.wasm", import.meta.url));
+export default init;
+
+export class Detector {
+  #bodies;
+
+  constructor(options) {
+    mustBeReady();
+    this.#bodies = new Bodies(new Engine(...chosen(options)));
+  }
+
+  add(index, positions) {
+    return this.#bodies.add(index, positions);
+  }
+
+  addTetrahedra(index, positions) {
+    return this.#bodies.addTetrahedra(index, positions);
+  }
+
+  setPositions(body, positions) {
+    this.#bodies.setPositions(body, positions);
+  }
+
+  setEndPositions(body, positions) {
+    this.#bodies.setEndPositions(body, positions);
+  }
+
+  remove(body) {
+    this.#bodies.remove(body);
+  }
+
+  size(body) {
+    return this.#bodies.size(body);
+  }
+
+  between(a, b) {
+    return this.#bodies.engine.detect(bodies(a, b));
+  }
+
+  within(body) {
+    return this.#bodies.engine.detect(bodies(body));
+  }
+
+  everything() {
+    return this.#bodies.engine.detect(bodies());
+  }
+
+  impacts(options) {
+    return this.#bodies.impacts(kind_names(), options);
+  }
+
+  earliest(options) {
+    return this.#bodies.earliest(kind_names(), options);
+  }
+
+  get hash() {
+    return this.#bodies.hash;
+  }
+
+  get statistics() {
+    return this.#bodies.statistics;
+  }
+
+  dispose() {
+    this.#bodies.dispose();
+  }
+}
+if (Symbol.dispose) Detector.prototype[Symbol.dispose] = Detector.prototype.dispose;

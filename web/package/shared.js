@@ -1,0 +1,157 @@
+// Shared by both builds: loading the module, and arrays in the form that the module takes.
+
+// Returns two functions: one loads the module, once; the other throws as long as it has not been loaded.
+export function loader(load, beside) {
+  let loading;
+  let isReady = false;
+  const init = async (module) => {
+    loading ??= source(module, beside).then((module_or_path) => load({ module_or_path }));
+    try {
+      await loading;
+      isReady = true;
+    } catch (error) {
+      loading = undefined;
+      throw error;
+    }
+  };
+  const mustBeReady = () => {
+    if (!isReady) throw new Error("impinge is not loaded yet: await init() first");
+  };
+  return [init, mustBeReady];
+}
+
+// The module's bytes, or where they are. Node's fetch does not read files.
+async function source(given, beside) {
+  const wanted = given ?? beside;
+  const isFile = wanted instanceof URL && wanted.protocol === "file:";
+  if (!isFile || globalThis.process?.versions?.node === undefined) return wanted;
+  const { readFile } = await import("node:fs/promises");
+  return readFile(wanted);
+}
+
+// Vertex numbers with 32 bits. three.js uses 16 bits if they suffice.
+function wide(index) {
+  if (index instanceof Uint32Array) return index;
+  if (index instanceof Uint16Array || index instanceof Uint8Array) return Uint32Array.from(index);
+  throw new TypeError("index: a Uint32Array, a Uint16Array or a Uint8Array is needed");
+}
+
+function isSingle(positions) {
+  if (positions instanceof Float32Array) return true;
+  if (positions instanceof Float64Array) return false;
+  throw new TypeError("positions: a Float32Array or a Float64Array is needed");
+}
+
+// The number of a body. The module would cut it to 32 bits without an error.
+function body(given) {
+  if (Number.isInteger(given) && given >= 0 && given < 2 ** 32) return given;
+  throw new RangeError(`body: ${String(given)} given, a number that add() returned is needed`);
+}
+
+export function bodies(...given) {
+  return Uint32Array.from(given, body);
+}
+
+export function chosen({ method = "clusters", sharedVertex = "skip" } = {}) {
+  return [String(method), String(sharedVertex)];
+}
+
+function step({ bodies: given = [], start = "report", toi = "f32", separation = 0 } = {}) {
+  return [bodies(...given), String(start), String(toi), Number(separation)];
+}
+
+function impact(impacts, ix) {
+  const { kinds, rows, times, atStart, names } = impacts;
+  const [bodyA, elementA, bodyB, elementB] = rows.subarray(4 * ix);
+  const [time, isAtStart] = [times[ix], atStart[ix] === 1];
+  return { kind: names[kinds[ix]], bodyA, elementA, bodyB, elementB, time, atStart: isAtStart };
+}
+
+class Impacts {
+  constructor(names, [kinds, rows, times, atStart]) {
+    Object.assign(this, { names, kinds, rows, times, atStart });
+  }
+
+  get length() {
+    return this.kinds.length;
+  }
+
+  at(ix) {
+    if (Number.isInteger(ix) && ix >= 0 && ix < this.length) return impact(this, ix);
+    return undefined;
+  }
+
+  *[Symbol.iterator]() {
+    for (let ix = 0; ix < this.length; ix += 1) yield impact(this, ix);
+  }
+}
+
+// The bodies of a detector of either build, and its last answer.
+export class Bodies {
+  #engine;
+
+  constructor(engine) {
+    this.#engine = engine;
+  }
+
+  get engine() {
+    if (this.#engine === null) throw new Error("this detector has been disposed of");
+    return this.#engine;
+  }
+
+  add(index, positions) {
+    return this.#add(index, positions, 3);
+  }
+
+  addTetrahedra(index, positions) {
+    return this.#add(index, positions, 4);
+  }
+
+  #add(index, positions, corners) {
+    const { engine } = this;
+    if (isSingle(positions)) return engine.add_f32(wide(index), positions, corners);
+    return engine.add_f64(wide(index), positions, corners);
+  }
+
+  setPositions(which, positions) {
+    const { engine } = this;
+    if (isSingle(positions)) engine.set_positions_f32(body(which), positions);
+    else engine.set_positions_f64(body(which), positions);
+  }
+
+  setEndPositions(which, positions) {
+    const { engine } = this;
+    if (isSingle(positions)) engine.set_end_positions_f32(body(which), positions);
+    else engine.set_end_positions_f64(body(which), positions);
+  }
+
+  remove(which) {
+    this.engine.remove(body(which));
+  }
+
+  size(which) {
+    const [primitives, vertices] = this.engine.size(body(which));
+    return { primitives, vertices };
+  }
+
+  impacts(names, options) {
+    return new Impacts(names, this.engine.impacts(...step(options)));
+  }
+
+  earliest(names, options) {
+    return new Impacts(names, this.engine.earliest(...step(options))).at(0) ?? null;
+  }
+
+  get hash() {
+    return this.engine.hash();
+  }
+
+  get statistics() {
+    return this.engine.statistics();
+  }
+
+  dispose() {
+    this.#engine?.free();
+    this.#engine = null;
+  }
+}

@@ -1,0 +1,49 @@
+import type { Body, Index, Module, Options, Positions, Statistics } from "./index.js";
+
+/** Loads the WebAssembly module. Later calls wait for the first. */
+export default function init(module?: Module | Promise<Module>): Promise<void>;
+
+/** An answer of the GPU: the same pairs and the same hash as on the CPU. */
+export interface Answer {
+  pairs: Uint32Array;
+  hash: string;
+  statistics: Statistics;
+}
+
+/**
+ * A detector on the browser's WebGPU device. Nothing blocks: every call returns a promise. Calls are answered in the
+ * order in which they were made, and arrays are copied at once.
+ */
+export declare class GpuDetector {
+  private constructor();
+  /** Opens the device. Rejected if the browser offers none. */
+  static open(options?: Options): Promise<GpuDetector>;
+  /** Adds a body of triangles and returns its number. */
+  add(index: Index, positions: Positions): Promise<Body>;
+  /** Adds a body of tetrahedra and returns its number. */
+  addTetrahedra(index: Index, positions: Positions): Promise<Body>;
+  /** Moves the vertices of a body. */
+  setPositions(body: Body, positions: Positions): Promise<void>;
+  /** Removes a body. */
+  remove(body: Body): Promise<void>;
+  /** The numbers of primitives and of vertices of a body. */
+  size(body: Body): Promise<{ primitives: number; vertices: number }>;
+  /** Pairs between two bodies: `[i0, j0, i1, j1, …]`. */
+  between(a: Body, b: Body): Promise<Answer>;
+  /** Self-collision of a body: `[i0, j0, i1, j1, …]`. */
+  within(body: Body): Promise<Answer>;
+  /** All pairs, self-collision included: `[bodyA, i, bodyB, j, …]`. */
+  everything(): Promise<Answer>;
+  /** Frees the memory once all earlier calls are answered. */
+  dispose(): Promise<void>;
+}
+
+/**
+ * Reads a mesh file. The extension of its name is that of its format: obj, ply, stl, off, gltf, glb, msh, vtk, vtu or mesh.
+ * With `weld`, vertices at the same position become one. Needs no GPU.
+ */
+export function readMesh(
+  name: string,
+  bytes: Uint8Array,
+  options?: { weld?: boolean },
+): { index: Uint32Array; positions: Float32Array | Float64Array; corners: 3 | 4 };

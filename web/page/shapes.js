@@ -1,0 +1,154 @@
+// Closed surfaces with one vertex per point, and the motions of the demo scene.
+//
+// Geometries of three.js repeat the vertices of their seams, because texture coordinates differ there. Self-collision
+// needs to know which triangles are neighbours, so these share them.
+
+const TAU = 2 * Math.PI;
+
+// A grid of n by m vertices that closes in both directions.
+function closedGrid(n, m, point) {
+  const positions = new Float32Array(3 * n * m);
+  const index = new Uint32Array(6 * n * m);
+  for (let i = 0; i < n; i += 1) {
+    for (let j = 0; j < m; j += 1) {
+      positions.set(point(i / n, j / m), 3 * (i * m + j));
+      const [right, up] = [((i + 1) % n) * m, (j + 1) % m];
+      const [a, b, c, d] = [i * m + j, right + j, right + up, i * m + up];
+      index.set([a, b, c, a, c, d], 6 * (i * m + j));
+    }
+  }
+  return { index, positions };
+}
+
+// A sphere of about n triangles: rings between two poles.
+export function ball(n, radius) {
+  const rings = Math.max(3, Math.round(Math.sqrt(n / 4)));
+  const around = 2 * rings;
+  const positions = [0, 0, radius];
+  for (let ring = 1; ring < rings; ring += 1) {
+    const [z, r] = [Math.cos((Math.PI * ring) / rings), Math.sin((Math.PI * ring) / rings)];
+    for (let k = 0; k < around; k += 1) {
+      const turn = (TAU * k) / around;
+      positions.push(radius * r * Math.cos(turn), radius * r * Math.sin(turn), radius * z);
+    }
+  }
+  const last = positions.length / 3;
+  positions.push(0, 0, -radius);
+  const at = (ring, k) => 1 + (ring - 1) * around + (k % around);
+  const index = [];
+  for (let k = 0; k < around; k += 1) {
+    index.push(0, at(1, k), at(1, k + 1));
+    for (let ring = 1; ring < rings - 1; ring += 1) {
+      const [a, b, c, d] = [at(ring, k), at(ring + 1, k), at(ring + 1, k + 1), at(ring, k + 1)];
+      index.push(a, b, c, a, c, d);
+    }
+    index.push(last, at(rings - 1, k + 1), at(rings - 1, k));
+  }
+  return { index: Uint32Array.from(index), positions: Float32Array.from(positions) };
+}
+
+// A trefoil-like knot of about n triangles: a tube around a curve on a torus.
+function knot(n, size, tube) {
+  const around = Math.max(6, Math.round(Math.sqrt(n / 24)));
+  const along = Math.max(12, Math.round(n / 2 / around));
+  const centre = (u) => {
+    const [p, q] = [2 * TAU * u, 3 * TAU * u];
+    const r = size * (1 + 0.4 * Math.cos(q));
+    return [r * Math.cos(p), r * Math.sin(p), 0.4 * size * Math.sin(q)];
+  };
+  return closedGrid(along, around, (u, v) => {
+    const here = centre(u);
+    const ahead = centre(u + 1e-3);
+    const tangent = unit(ahead.map((x, axis) => x - here[axis]));
+    const side = unit(cross(tangent, here));
+    const up = cross(side, tangent);
+    const [s, c] = [tube * Math.sin(TAU * v), tube * Math.cos(TAU * v)];
+    return here.map((x, axis) => x + c * side[axis] + s * up[axis]);
+  });
+}
+
+function cross([a, b, c], [x, y, z]) {
+  return [b * z - c * y, c * x - a * z, a * y - b * x];
+}
+
+function unit(v) {
+  const length = Math.hypot(...v);
+  return v.map((x) => x / length);
+}
+
+// Writes `at(x, y, z, t)` of every vertex of the rest pose.
+function moved(at) {
+  return (rest, t, now) => {
+    for (let ix = 0; ix < rest.length; ix += 3) {
+      const [x, y, z] = at(rest[ix], rest[ix + 1], rest[ix + 2], t);
+      now[ix] = x;
+      now[ix + 1] = y;
+      now[ix + 2] = z;
+    }
+  };
+}
+
+// Where the demo scene is.
+export const STAGE = { centre: [0.1, -0.05, 0.05], radius: 0.95 };
+
+// The scene of `impinge demo`: a worm bends into a ring until its head runs into its tail, a rippling knot sinks through
+// the ring, and a bumpy, twisting ball comes in from the side.
+export function demo(nTriangles) {
+  const n = nTriangles / 3;
+  const length = 3;
+  const worm = ball(n, 1);
+  for (let ix = 0; ix < worm.positions.length; ix += 3) {
+    // The poles become head and tail.
+    const [x, y, z] = worm.positions.subarray(ix, ix + 3);
+    worm.positions.set([(length / 2) * z, 0.1 * x, 0.1 * y], ix);
+  }
+  const bumpy = ball(n, 0.22);
+  for (let ix = 0; ix < bumpy.positions.length; ix += 3) {
+    const [x, y, z] = bumpy.positions.subarray(ix, ix + 3).map((value) => value / 0.22);
+    const bump = 1 + 0.25 * Math.sin(9 * x) * Math.sin(9 * y) * Math.sin(9 * z);
+    bumpy.positions.set([0.22 * x * bump, 0.22 * y * bump, 0.22 * z * bump], ix);
+  }
+  return [
+    {
+      name: "worm",
+      ...worm,
+      pose: moved((x, y, z, t) => {
+        const curvature = ((0.3 + 0.77 * t) * TAU) / length;
+        const radius = 1 / curvature;
+        const angle = curvature * x;
+        return [(radius - y) * Math.sin(angle), radius - (radius - y) * Math.cos(angle) - 0.45, z];
+      }),
+    },
+    {
+      name: "knot",
+      ...knot(n, 0.25, 0.055),
+      pose: moved((x, y, z, t) => {
+        const wave = 0.015 * Math.sin((TAU * (x - t)) / 0.12);
+        return [x, y, z + wave + 0.55 - 0.55 * t];
+      }),
+    },
+    {
+      name: "ball",
+      ...bumpy,
+      pose: moved((x, y, z, t) => {
+        const turn = 5 * t * x;
+        const [s, c] = [Math.sin(turn), Math.cos(turn)];
+        return [x + 1.55 - 0.9 * t, c * y - s * z + 0.1, s * y + c * z];
+      }),
+    },
+  ];
+}
+
+// A mesh from a file: a wave runs through it, a fiftieth of its size high.
+export function waving(name, { index, positions, corners }, size) {
+  return {
+    name,
+    index,
+    corners,
+    positions,
+    pose: moved((x, y, z, t) => {
+      const wave = 0.02 * size * Math.sin(TAU * ((4 * (x + y)) / size - 2 * t));
+      return [x, y, z + wave];
+    }),
+  };
+}

@@ -1,0 +1,121 @@
+// Answers the scenes with the installed package. package.mjs runs this file in Node and imports it in a page.
+
+function arrays({ index, positions }) {
+  return [Uint32Array.from(index), Float32Array.from(positions)];
+}
+
+export async function cpu(module, scenes) {
+  const { default: init, Detector } = await import(module);
+  await init();
+  const answers = [];
+  for (const { name, sharedVertex, bodies } of scenes) {
+    for (const method of ["clusters", "cells"]) {
+      const detector = new Detector({ sharedVertex, method });
+      for (const [ix, body] of bodies.entries()) {
+        if (body.corners === 4) detector.addTetrahedra(...arrays(body));
+        else detector.add(...arrays(body));
+        detector.setEndPositions(ix, Float32Array.from(body.end));
+      }
+      const pairs = detector.everything().length / 4;
+      const { hash } = detector;
+      const impacts = detector.impacts();
+      const impactsHash = detector.hash;
+      const { kind, time } = [...impacts].find(({ atStart }) => !atStart);
+      answers.push({ name, pairs, hash, impacts: impacts.length, impactsHash, first: { kind, time } });
+      detector.dispose();
+    }
+  }
+  return answers;
+}
+
+export async function webgpu(module, scenes, method) {
+  const { default: init, GpuDetector } = await import(module);
+  await init();
+  const answers = [];
+  for (const { name, sharedVertex, bodies } of scenes) {
+    const detector = await GpuDetector.open({ sharedVertex, method });
+    // Nothing is awaited before the answer: calls keep their order.
+    for (const body of bodies) {
+      if (body.corners === 4) void detector.addTetrahedra(...arrays(body));
+      else void detector.add(...arrays(body));
+    }
+    const { pairs, hash, statistics } = await detector.everything();
+    if (statistics.backend === "cpu" || statistics.method !== method) {
+      throw new Error(`answered by ${statistics.backend} with ${statistics.method}`);
+    }
+    await detector.dispose();
+    answers.push({ name, pairs: pairs.length / 4, hash });
+  }
+  return answers;
+}
+
+// The text of the error that a call throws, or of its rejection.
+async function refusal(call) {
+  try {
+    await call();
+  } catch (error) {
+    return `${error.constructor.name}: ${error.message}`;
+  }
+  return "nothing was refused";
+}
+
+// Calls that must be refused, and what they say.
+export async function refusals(module) {
+  const { default: init, Detector } = await import(module);
+  const said = {};
+  said.early = await refusal(() => new Detector());
+  await init();
+  const detector = new Detector();
+  const index = new Uint16Array([0, 1, 2]);
+  const triangle = new Float64Array([0, 0, 0, 1, 0, 0, 0, 1, 0]);
+  const a = detector.add(index, triangle);
+  said.number = await refusal(() => detector.setPositions(a, new Float32Array([0, 0, NaN, 1, 0, 0, 0, 1, 0])));
+  said.index = await refusal(() => detector.add(new Uint32Array([0, 1, 7]), triangle));
+  said.ragged = await refusal(() => detector.add(index, triangle.subarray(1)));
+  said.plain = await refusal(() => detector.add([0, 1, 2], triangle));
+  said.list = await refusal(() => detector.add(index, [...triangle]));
+  said.unknown = await refusal(() => detector.within(4));
+  said.wrong = await refusal(() => detector.between(a, "b"));
+  said.self = await refusal(() => detector.between(a, a));
+  said.method = await refusal(() => new Detector({ method: "octree" }));
+  said.separation = await refusal(() => detector.impacts({ separation: NaN }));
+  // The refused calls left it as it was.
+  const b = detector.add(new Uint8Array([0, 1, 2]), Float32Array.from(triangle));
+  said.pairs = [...detector.between(a, b)];
+  detector.setPositions(b, triangle.map((x) => x + 4));
+  said.apart = [...detector.between(a, b)];
+  detector.dispose();
+  said.disposed = await refusal(() => detector.within(a));
+  return said;
+}
+
+export const REFUSALS = {
+  early: "Error: impinge is not loaded yet: await init() first",
+  number: "Error: body 0: vertex 0 has a non-finite position (0, 0, NaN)",
+  index: "Error: body 1: primitive 0 names vertex 7, but there are 3 vertices",
+  ragged: "Error: positions: 8 numbers given, not a multiple of 3",
+  plain: "TypeError: index: a Uint32Array, a Uint16Array or a Uint8Array is needed",
+  list: "TypeError: positions: a Float32Array or a Float64Array is needed",
+  unknown: "Error: there is no body 4: 1 have been added, and 0 of them removed",
+  wrong: "RangeError: body: b given, a number that add() returned is needed",
+  self: "Error: a query between body 0 and itself: ask for collisions within it instead",
+  method: 'Error: method: "octree" given, "clusters", "cells" or "naive" allowed',
+  separation: "Error: separation: NaN given, a finite number that is not below 0 allowed",
+  pairs: [0, 0],
+  apart: [],
+  disposed: "Error: this detector has been disposed of",
+};
+
+if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
+  const { readFile } = await import("node:fs/promises");
+  const scenes = JSON.parse(await readFile("scenes.json", "utf8"));
+  const said = await refusals("impinge");
+  const answers = await cpu("impinge", scenes);
+  const { default: init, GpuDetector, readMesh } = await import("impinge/webgpu");
+  await init();
+  const mesh = readMesh("triangle.obj", new TextEncoder().encode("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
+  const noGpu = await refusal(() => GpuDetector.open());
+  const broken = await refusal(() => readMesh("a.txt", new Uint8Array()));
+  const read = { index: [...mesh.index], positions: [...mesh.positions], corners: mesh.corners, noGpu, broken };
+  process.stdout.write(JSON.stringify({ said, answers, read }));
+}

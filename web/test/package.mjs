@@ -1,0 +1,101 @@
+// The npm package as its users get it: node package.mjs FOLDER-WITH-TARBALL SCENES.json
+//
+// It is installed from its tarball into an empty folder. Node and a page then answer scenes whose pairs, impacts and
+// hashes a native run has written. TypeScript checks a program that uses all of it.
+
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { cp, mkdtemp, readFile, readdir, rm, writeFile } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+import { brotliCompressSync } from "node:zlib";
+import { REFUSALS } from "./answers.mjs";
+import { launch, serve } from "./browser.mjs";
+
+const MOST_BROTLI = 200_000;
+
+const [built, scenesFile] = process.argv.slice(2);
+const tarball = (await readdir(built)).find((name) => name.endsWith(".tgz"));
+assert.ok(tarball, `${built} has a tarball`);
+
+const folder = await mkdtemp(join(tmpdir(), "impinge-npm-"));
+try {
+  await writeFile(join(folder, "package.json"), '{ "private": true, "type": "module" }');
+  const npm = ["install", "--silent", "--no-audit", "--no-fund", "--offline"];
+  execFileSync("npm", [...npm, resolve(built, tarball)], { cwd: folder });
+  await cp(scenesFile, join(folder, "scenes.json"));
+  const here = new URL(".", import.meta.url);
+  for (const name of ["answers.mjs", "use.ts", "empty.html"]) {
+    await cp(new URL(name, here), join(folder, name));
+  }
+  const installed = join(folder, "node_modules/impinge");
+  for (const [build, limit] of [["cpu", MOST_BROTLI], ["gpu", Infinity]]) {
+    const bytes = await readFile(join(installed, build, "impinge_bg.wasm"));
+    const size = brotliCompressSync(bytes).length;
+    console.log(`module ${build}: ${bytes.length} bytes, ${size} in brotli`);
+    assert.ok(size < limit, `${size} bytes, ${limit} allowed`);
+  }
+
+  const tsc = new URL("../node_modules/.bin/tsc", here).pathname;
+  const options = ["--noEmit", "--strict", "--target", "es2022", "--module", "nodenext"];
+  execFileSync(tsc, [...options, "--lib", "es2022,dom", "use.ts"], { cwd: folder, stdio: "inherit" });
+  console.log("types: checked");
+
+  const scenes = JSON.parse(await readFile(scenesFile, "utf8"));
+  assert.equal(scenes.length, 4);
+  const inNode = execFileSync("node", ["answers.mjs"], { cwd: folder, encoding: "utf8", maxBuffer: 1 << 28 });
+  const { said, answers: answersInNode, read } = JSON.parse(inNode);
+  assert.deepEqual(said, REFUSALS);
+  assert.deepEqual(read, {
+    index: [0, 1, 2],
+    positions: [0, 0, 0, 1, 0, 0, 0, 1, 0],
+    corners: 3,
+    noGpu: "Error: there is no WebGPU here",
+    broken: read.broken,
+  });
+  assert.match(read.broken, /^Error: .*a\.txt/);
+  compare("Node, CPU", answersInNode, withImpacts(scenes));
+
+  const server = await serve(folder);
+  const browser = await launch();
+  try {
+    const page = await browser.newPage();
+    const problems = [];
+    page.on("pageerror", (error) => problems.push(error));
+    await page.goto(`${server.url}empty.html`);
+    const answers = (gpu) =>
+      page.evaluate(async (gpu) => {
+        const { cpu, refusals, webgpu } = await import("./answers.mjs");
+        const scenes = await (await fetch("scenes.json")).json();
+        if (gpu !== null) return webgpu("./node_modules/impinge/webgpu.js", scenes, gpu);
+        const said = await refusals("./node_modules/impinge/index.js");
+        return { said, answers: await cpu("./node_modules/impinge/index.js", scenes) };
+      }, gpu);
+    const onCpu = await answers(null);
+    assert.deepEqual(onCpu.said, REFUSALS);
+    compare("Chromium, CPU", onCpu.answers, withImpacts(scenes));
+    for (const method of ["clusters", "cells"]) {
+      const expected = scenes.map(({ name, pairs, hash }) => ({ name, pairs, hash }));
+      compare(`Chromium, WebGPU, ${method}`, await answers(method), expected);
+    }
+    assert.deepEqual(problems, []);
+  } finally {
+    await browser.close();
+    server.close();
+  }
+} finally {
+  await rm(folder, { recursive: true });
+}
+
+// Both methods answer each scene.
+function withImpacts(scenes) {
+  return scenes.flatMap(({ name, pairs, hash, impacts, impactsHash, first }) => {
+    const answer = { name, pairs, hash, impacts, impactsHash, first };
+    return [answer, answer];
+  });
+}
+
+function compare(where, answers, expected) {
+  assert.deepEqual(answers, expected, where);
+  console.log(`${where}: the native answers (${answers.length})`);
+}
