@@ -38,7 +38,7 @@ impl<'a> Drawer<'a> {
     ) -> Result<(), Error> {
         let mut surfaces = surfaces(scene, bodies, pairs)?;
         let contacts = Contacts::new(scene, pairs)?;
-        surfaces.push(tubes(&contacts, &contacts.curves(), diagonal(&surfaces)));
+        surfaces.push(tubes(&contacts, &contacts.curves()?, diagonal(&surfaces)));
         self.draw(path, surfaces)
     }
 

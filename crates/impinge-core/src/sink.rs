@@ -54,12 +54,38 @@ pub(crate) fn reserve<T>(
     n_more: usize,
     what: &'static str,
 ) -> Result<(), Error> {
-    list.try_reserve_exact(n_more)
-        .map_err(|_| Error::OutOfMemory {
-            what,
-            n: list.len() as u64,
-            needed: (size_of::<T>() as u64).saturating_mul(n_more as u64),
-        })
+    let n = list.len();
+    let reserved = list.try_reserve_exact(n_more);
+    reserved.map_err(|_| no_room::<T>(n, n_more, what))
+}
+
+/// An empty list with room for so many.
+///
+/// # Errors
+/// There is no memory for them.
+pub(crate) fn room<T>(n: usize, what: &'static str) -> Result<Vec<T>, Error> {
+    let mut list = Vec::new();
+    reserve(&mut list, n, what)?;
+    Ok(list)
+}
+
+/// Makes room for so many more in a list that grows often: whenever it is full, it doubles.
+///
+/// # Errors
+/// There is no memory for them.
+#[inline]
+pub(crate) fn grow<T>(list: &mut Vec<T>, n_more: usize, what: &'static str) -> Result<(), Error> {
+    let n = list.len();
+    let reserved = list.try_reserve(n_more);
+    reserved.map_err(|_| no_room::<T>(n, n_more, what))
+}
+
+fn no_room<T>(n: usize, n_more: usize, what: &'static str) -> Error {
+    Error::OutOfMemory {
+        what,
+        n: n as u64,
+        needed: (size_of::<T>() as u64).saturating_mul(n_more as u64),
+    }
 }
 
 /// Takes the pairs that a finder finds: keys, unless they come with a value. Each goes to one of several lists.
@@ -111,7 +137,10 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
         self.is_over.store(false, Ordering::Relaxed);
         let state = &mut *self.state();
         *state = State::new(limits, wanted);
-        state.lists = rooms.map(List::in_room);
+        // Under a budget the room of an earlier answer is no gift: it counts beside that of this one.
+        if limits.memory_budget.is_none() {
+            state.lists = rooms.map(List::in_room);
+        }
     }
 
     /// How many pairs make a block: one where one is enough.
@@ -200,10 +229,6 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
     pub fn share(&self, held_by_finder: u64) {
         let state = &mut *self.state();
         state.held_by_finder = held_by_finder;
-        if state.n == 0 && state.keep_budget().is_err() {
-            // The room of an earlier answer.
-            state.drop_pairs();
-        }
         let result = state.keep_budget();
         self.note(result, state);
     }
@@ -386,7 +411,7 @@ impl<T: Copy, const LISTS: usize> State<T, LISTS> {
             return Ok(());
         }
         Err(Error::MemoryBudget {
-            what: "the pairs found so far besides all else",
+            what: "the pairs found so far and the detector itself",
             needed,
             budget,
         })

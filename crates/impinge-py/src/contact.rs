@@ -67,7 +67,7 @@ impl Contacts {
         let (inner, curves) = py
             .detach(|| {
                 let contacts = Inner::new(scene, pairs)?;
-                let curves = contacts.curves();
+                let curves = contacts.curves()?;
                 Ok((contacts, curves))
             })
             .map_err(raise)?;
@@ -185,7 +185,7 @@ impl Contacts {
     ///     coordinates), ``length`` of curves, ``patch_area`` where faces lie in one plane, ``normal`` (the unit
     ///     direction in which to push the first body apart, or ``None``).
     fn regions<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let regions = py.detach(|| self.inner.regions());
+        let regions = py.detach(|| self.inner.regions()).map_err(raise)?;
         regions.iter().map(|region| to_dict(py, region)).collect()
     }
 

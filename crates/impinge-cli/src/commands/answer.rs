@@ -129,7 +129,7 @@ fn answer(
     }
     let met = if answer.contacts.is_some() || answer.curves.is_some() {
         let contacts = Contacts::new(&scene, pairs)?;
-        let curves = contacts.curves();
+        let curves = contacts.curves()?;
         Some((contacts, curves))
     } else {
         None

@@ -16,7 +16,7 @@ use crate::ids::BodyId;
 use crate::pairs::Pairs;
 use crate::positions::{Positions, check_positions};
 use crate::scene::{Body, Scene};
-use crate::sink::reserve;
+use crate::sink::{self, reserve};
 
 /// Pairs per task.
 const CHUNK: usize = 256;
@@ -25,9 +25,7 @@ const WHAT: &str = "contacts";
 
 /// A list with room for so many.
 fn room<T>(n: usize) -> Result<Vec<T>, Error> {
-    let mut list = Vec::new();
-    reserve(&mut list, n, WHAT)?;
-    Ok(list)
+    sink::room(n, WHAT)
 }
 
 pub(super) fn contacts(scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> {

@@ -8,6 +8,11 @@
 //! Only the names of points are compared, so no tolerance decides what is connected. Cost: `O(n log n)`.
 
 use super::{Contacts, Shape};
+use crate::error::Error;
+use crate::sink::{grow, room};
+
+/// What memory is for.
+const WHAT: &str = "curves of contact";
 
 /// Intersection curves as chains of points.
 #[derive(Debug, Clone, Default)]
@@ -30,22 +35,23 @@ struct Link {
 }
 
 impl Curves {
-    pub(super) fn new(contacts: &Contacts) -> Self {
-        let links = links(contacts);
+    pub(super) fn new(contacts: &Contacts) -> Result<Self, Error> {
+        let links = links(contacts)?;
         let mut curves = Curves {
             starts: vec![0],
-            isolated: isolated(contacts),
+            isolated: isolated(contacts)?,
             ..Curves::default()
         };
-        let at = Incidence::new(contacts.points().len(), &links);
-        let mut is_used = vec![false; links.len()];
+        let at = Incidence::new(contacts.points().len(), &links)?;
+        let mut is_used = filled(false, links.len())?;
         // Open chains first, from each end or junction; then loops, each from its lowest segment.
         for point in 0..contacts.points().len() {
             if at.links(point).len() != 2 {
                 for &link in at.links(point) {
                     if !is_used[link as usize] {
-                        let chain = Chain::follow(&links, &at, &mut is_used, link, point as u32);
-                        curves.push(contacts, chain);
+                        let start = point as u32;
+                        let chain = Chain::follow(&links, &at, &mut is_used, link, start)?;
+                        curves.push(contacts, chain)?;
                     }
                 }
             }
@@ -54,14 +60,14 @@ impl Curves {
             if !is_used[link] {
                 let Link { ends, direction } = links[link];
                 let start = ends[usize::from(direction < 0)];
-                let chain = Chain::follow(&links, &at, &mut is_used, link as u32, start);
-                curves.push(contacts, chain);
+                let chain = Chain::follow(&links, &at, &mut is_used, link as u32, start)?;
+                curves.push(contacts, chain)?;
             }
         }
-        curves
+        Ok(curves)
     }
 
-    fn push(&mut self, contacts: &Contacts, chain: Chain) {
+    fn push(&mut self, contacts: &Contacts, chain: Chain) -> Result<(), Error> {
         let Chain {
             mut points,
             n_forward,
@@ -79,12 +85,18 @@ impl Curves {
         let length = (0..n_links)
             .map(|ix| distance(position(ix), position(ix + 1)))
             .sum();
+        grow(&mut self.lengths, 1, WHAT)?;
+        grow(&mut self.closed, 1, WHAT)?;
+        grow(&mut self.directed, 1, WHAT)?;
+        grow(&mut self.starts, 1, WHAT)?;
+        grow(&mut self.points, points.len(), WHAT)?;
         self.lengths.push(length);
         self.closed.push(is_closed);
         self.directed
             .push(n_forward == n_links || n_backward == n_links);
         self.points.extend(points);
         self.starts.push(self.points.len());
+        Ok(())
     }
 
     /// The number of curves.
@@ -153,45 +165,50 @@ pub(super) fn distance(p: [f64; 3], q: [f64; 3]) -> f64 {
     (x * x + y * y + z * z).sqrt()
 }
 
-/// All segments, each once, sorted.
-fn links(contacts: &Contacts) -> Vec<Link> {
-    let mut links: Vec<Link> = (0..contacts.len())
-        .filter(|&contact| contacts.shape(contact) == Shape::Segment)
-        .filter_map(|contact| {
-            let &[from, to] = contacts.corners(contact) else {
-                return None;
-            };
-            let (ends, direction) = if from < to {
-                ([from, to], 1)
-            } else {
-                ([to, from], -1)
-            };
-            Some(Link {
-                ends,
-                direction: if contacts.is_directed(contact) {
-                    direction
-                } else {
-                    0
-                },
-            })
-        })
-        .collect();
-    links.sort_unstable_by_key(|link| (link.ends, link.direction));
-    links
-        .chunk_by(|x, y| x.ends == y.ends)
-        .map(|same| {
-            // Pairs without a direction do not count where other pairs have one.
-            let has = |direction: i8| same.iter().any(|link| link.direction == direction);
-            Link {
-                ends: same[0].ends,
-                direction: i8::from(has(1)) - i8::from(has(-1)),
-            }
-        })
-        .collect()
+/// A list of so many equal values.
+fn filled<T: Clone>(value: T, n: usize) -> Result<Vec<T>, Error> {
+    let mut list = room(n, WHAT)?;
+    list.resize(n, value);
+    Ok(list)
 }
 
-fn isolated(contacts: &Contacts) -> Vec<u32> {
-    let mut is_corner = vec![false; contacts.points().len()];
+/// All segments, each once, sorted.
+fn links(contacts: &Contacts) -> Result<Vec<Link>, Error> {
+    let segments = || (0..contacts.len()).filter(|&ix| contacts.shape(ix) == Shape::Segment);
+    let mut links: Vec<Link> = room(segments().count(), WHAT)?;
+    links.extend(segments().filter_map(|contact| {
+        let &[from, to] = contacts.corners(contact) else {
+            return None;
+        };
+        let (ends, direction) = if from < to {
+            ([from, to], 1)
+        } else {
+            ([to, from], -1)
+        };
+        Some(Link {
+            ends,
+            direction: if contacts.is_directed(contact) {
+                direction
+            } else {
+                0
+            },
+        })
+    }));
+    links.sort_unstable_by_key(|link| (link.ends, link.direction));
+    let mut once = room(links.chunk_by(|x, y| x.ends == y.ends).count(), WHAT)?;
+    once.extend(links.chunk_by(|x, y| x.ends == y.ends).map(|same| {
+        // Pairs without a direction do not count where other pairs have one.
+        let has = |direction: i8| same.iter().any(|link| link.direction == direction);
+        Link {
+            ends: same[0].ends,
+            direction: i8::from(has(1)) - i8::from(has(-1)),
+        }
+    }));
+    Ok(once)
+}
+
+fn isolated(contacts: &Contacts) -> Result<Vec<u32>, Error> {
+    let mut is_corner = filled(false, contacts.points().len())?;
     for contact in 0..contacts.len() {
         if matches!(contacts.shape(contact), Shape::Segment | Shape::Polygon) {
             for &point in contacts.corners(contact) {
@@ -199,10 +216,13 @@ fn isolated(contacts: &Contacts) -> Vec<u32> {
             }
         }
     }
-    (0u32..)
-        .zip(is_corner)
-        .filter_map(|(point, is_corner)| (!is_corner).then_some(point))
-        .collect()
+    let mut isolated = room(
+        is_corner.iter().filter(|&&is_corner| !is_corner).count(),
+        WHAT,
+    )?;
+    let points = (0u32..).zip(is_corner);
+    isolated.extend(points.filter_map(|(point, is_corner)| (!is_corner).then_some(point)));
+    Ok(isolated)
 }
 
 /// The links at each point.
@@ -212,15 +232,15 @@ struct Incidence {
 }
 
 impl Incidence {
-    fn new(n_points: usize, links: &[Link]) -> Self {
-        let mut starts = vec![0; n_points + 2];
+    fn new(n_points: usize, links: &[Link]) -> Result<Self, Error> {
+        let mut starts = filled(0, n_points + 2)?;
         for end in links.iter().flat_map(|link| link.ends) {
             starts[end as usize + 2] += 1;
         }
         for point in 2..starts.len() {
             starts[point] += starts[point - 1];
         }
-        let mut at = vec![0; 2 * links.len()];
+        let mut at = filled(0, 2 * links.len())?;
         for (number, link) in (0u32..).zip(links) {
             for end in link.ends {
                 let place = &mut starts[end as usize + 1];
@@ -228,7 +248,7 @@ impl Incidence {
                 *place += 1;
             }
         }
-        Incidence { starts, links: at }
+        Ok(Incidence { starts, links: at })
     }
 
     fn links(&self, point: usize) -> &[u32] {
@@ -251,7 +271,7 @@ impl Chain {
         is_used: &mut [bool],
         first: u32,
         start: u32,
-    ) -> Chain {
+    ) -> Result<Chain, Error> {
         let mut chain = Chain {
             points: vec![start],
             n_forward: 0,
@@ -271,13 +291,14 @@ impl Chain {
             };
             chain.n_forward += usize::from(along > 0);
             chain.n_backward += usize::from(along < 0);
+            grow(&mut chain.points, 1, WHAT)?;
             chain.points.push(next);
             here = next;
             let onward = at.links(here as usize);
             let unused = onward.iter().find(|&&other| !is_used[other as usize]);
             match unused {
                 Some(&other) if onward.len() == 2 && here != start => link = other,
-                _ => return chain,
+                _ => return Ok(chain),
             }
         }
     }

@@ -26,7 +26,7 @@
 //! assert_eq!(contacts.shape(0), Shape::Segment);
 //! let ends: Vec<_> = contacts.corners(0).iter().map(|&point| contacts.points()[point as usize]).collect();
 //! assert_eq!(ends, [[1.0, 1.0, 0.0], [1.5, 1.0, 0.0]]);
-//! assert!((contacts.curves().length(0) - 0.5).abs() < 1e-15);
+//! assert!((contacts.curves()?.length(0) - 0.5).abs() < 1e-15);
 //! # Ok(()) }
 //! ```
 
@@ -179,16 +179,23 @@ impl Contacts {
     }
 
     /// The segments chained into loops and open curves.
-    pub fn curves(&self) -> Curves {
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn curves(&self) -> Result<Curves, Error> {
         Curves::new(self)
     }
 
     /// The contacts in connected regions, each with its position, its size and a normal. [`Penetration`] finds what
     /// lies inside, and how deep.
-    pub fn regions(&self) -> Vec<Region> {
-        let mut sets = regions::Sets::new(self.points.len());
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn regions(&self) -> Result<Vec<Region>, Error> {
+        let mut sets = regions::Sets::new(self.points.len())?;
         regions::join_contacts(self, &mut sets);
-        regions::regions(self, &self.curves(), &mut sets).0
+        let (regions, _) = regions::regions(self, &self.curves()?, &mut sets)?;
+        Ok(regions)
     }
 
     /// The vertex that stands for this one in names: the lowest one at its position.

@@ -17,13 +17,14 @@ use std::collections::HashMap;
 use super::curves::Curves;
 use super::inside::{Asked, Parts};
 use super::regions::{
-    NO_REGION, Region, Sets, Vector, add, cross, dot, join_contacts, regions, scaled, sub,
+    NO_REGION, Region, Sets, Vector, WHAT, add, cross, dot, join_contacts, regions, scaled, sub,
 };
 use super::topology::Topology;
 use super::{Contacts, Feature, PointName, Shape};
 use crate::error::Error;
 use crate::exact::{Sign, orient3d};
 use crate::scene::{Body, BodyId, Elements, Kind, Scene};
+use crate::sink::grow;
 
 /// Finds how deep closed bodies are in each other. Caches their topology from call to call.
 ///
@@ -102,7 +103,10 @@ impl Penetration {
         let bodies = [scene.body(ids[0])?, scene.body(ids[1])?];
         let topologies = ids.map(|id| &self.topologies[&id.index()].1);
         let numbers = ids.map(|id| id.index() as u32);
-        let crossings = [0, 1].map(|side| Crossings::new(contacts, numbers, side));
+        let crossings = [
+            Crossings::new(contacts, numbers, 0)?,
+            Crossings::new(contacts, numbers, 1)?,
+        ];
         let parts = [0, 1].map(|side| {
             let crossings = &crossings[side];
             let asked = Asked {
@@ -119,7 +123,7 @@ impl Penetration {
             crossings,
             parts,
         };
-        Ok(work.overlap())
+        work.overlap()
     }
 
     /// Caches the topology of a body.
@@ -156,7 +160,7 @@ struct Crossings<'a> {
 }
 
 impl<'a> Crossings<'a> {
-    fn new(contacts: &'a Contacts, bodies: [u32; 2], side: usize) -> Self {
+    fn new(contacts: &'a Contacts, bodies: [u32; 2], side: usize) -> Result<Self, Error> {
         let names = contacts.names();
         let first = names.partition_point(|name| name.bodies < bodies);
         let end = names.partition_point(|name| name.bodies <= bodies);
@@ -169,8 +173,14 @@ impl<'a> Crossings<'a> {
         };
         for (point, name) in (0u32..).zip(names).skip(first).take(end - first) {
             match name.features[side] {
-                Feature::Edge(edge) => crossings.on_edges.push((edge, point)),
-                Feature::Vertex(vertex) => crossings.on_vertices.push(vertex),
+                Feature::Edge(edge) => {
+                    grow(&mut crossings.on_edges, 1, WHAT)?;
+                    crossings.on_edges.push((edge, point));
+                }
+                Feature::Vertex(vertex) => {
+                    grow(&mut crossings.on_vertices, 1, WHAT)?;
+                    crossings.on_vertices.push(vertex);
+                }
                 Feature::Face(_) => {}
             }
         }
@@ -186,7 +196,7 @@ impl<'a> Crossings<'a> {
                 crossings.is_touched[*vertex as usize] = true;
             }
         }
-        crossings
+        Ok(crossings)
     }
 
     fn lowest(&self, vertex: u32) -> u32 {
@@ -239,14 +249,14 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    fn overlap(&self) -> Overlap {
+    fn overlap(&self) -> Result<Overlap, Error> {
         let n_points = self.contacts.points().len();
         let n_parts = self.parts.each_ref().map(Parts::n_parts);
-        let mut sets = Sets::new(n_points + n_parts[0] + n_parts[1]);
+        let mut sets = Sets::new(n_points + n_parts[0] + n_parts[1])?;
         join_contacts(self.contacts, &mut sets);
-        let pieces = [0, 1].map(|side| self.pieces(side, &mut sets));
-        let curves = Curves::new(self.contacts);
-        let (mut regions, mut region_of) = regions(self.contacts, &curves, &mut sets);
+        let pieces = [self.pieces(0, &mut sets)?, self.pieces(1, &mut sets)?];
+        let curves = Curves::new(self.contacts)?;
+        let (mut regions, mut region_of) = regions(self.contacts, &curves, &mut sets)?;
         let numbers = [0, 1].map(|side| self.crossings[side].body);
         let mut inside = [Vec::new(), Vec::new()];
         for (side, inside) in inside.iter_mut().enumerate() {
@@ -278,7 +288,7 @@ impl Work<'_> {
             }
         }
         regions.retain(is_asked);
-        Overlap { inside, regions }
+        Ok(Overlap { inside, regions })
     }
 
     /// The number, among the members of the sets, of a vertex that is inside.
@@ -296,7 +306,7 @@ impl Work<'_> {
     }
 
     /// The pieces of crossed edges that are inside, sorted by edge. Joins the sets of each piece's two ends.
-    fn pieces(&self, side: usize, sets: &mut Sets) -> Vec<Piece> {
+    fn pieces(&self, side: usize, sets: &mut Sets) -> Result<Vec<Piece>, Error> {
         let mut pieces = Vec::new();
         for crossed in self.crossings[side].on_edges.chunk_by(|x, y| x.0 == y.0) {
             let edge = crossed[0].0;
@@ -306,6 +316,7 @@ impl Work<'_> {
                 Some(cut) => {
                     for (piece, ends) in cut {
                         sets.join(ends[0], ends[1]);
+                        grow(&mut pieces, 1, WHAT)?;
                         pieces.push(piece);
                     }
                 }
@@ -321,7 +332,7 @@ impl Work<'_> {
                 }
             }
         }
-        pieces
+        Ok(pieces)
     }
 
     /// Puts points in their order along an edge.

@@ -11,6 +11,11 @@
 
 use super::curves::{Curves, distance};
 use super::{Contacts, Shape};
+use crate::error::Error;
+use crate::sink::{grow, room};
+
+/// What memory is for.
+pub(super) const WHAT: &str = "regions of contact";
 
 /// Connected contacts of two bodies, or within one.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,8 +58,10 @@ pub struct Region {
 pub(super) struct Sets(Vec<u32>);
 
 impl Sets {
-    pub fn new(n: usize) -> Self {
-        Sets((0u32..).take(n).collect())
+    pub fn new(n: usize) -> Result<Self, Error> {
+        let mut sets = room(n, WHAT)?;
+        sets.extend((0u32..).take(n));
+        Ok(Sets(sets))
     }
 
     pub fn find(&mut self, mut x: u32) -> u32 {
@@ -112,8 +119,9 @@ pub(super) fn regions(
     contacts: &Contacts,
     curves: &Curves,
     sets: &mut Sets,
-) -> (Vec<Region>, Vec<u32>) {
-    let mut region_of = vec![NO_REGION; sets.0.len()];
+) -> Result<(Vec<Region>, Vec<u32>), Error> {
+    let mut region_of = room(sets.0.len(), WHAT)?;
+    region_of.resize(sets.0.len(), NO_REGION);
     let mut regions: Vec<Region> = Vec::new();
     let mut middles: Vec<Middles> = Vec::new();
     for contact in 0..contacts.len() {
@@ -124,12 +132,15 @@ pub(super) fn regions(
         let region = &mut region_of[sets.find(first) as usize];
         if *region == NO_REGION {
             *region = regions.len() as u32;
+            grow(&mut regions, 1, WHAT)?;
+            grow(&mut middles, 1, WHAT)?;
             let at = contacts.points()[first as usize];
             regions.push(Region::at(contacts.names()[first as usize].bodies, at));
             middles.push(Middles::default());
         }
         let at = *region as usize;
         let (region, middle) = (&mut regions[at], &mut middles[at]);
+        grow(&mut region.contacts, 1, WHAT)?;
         region.contacts.push(contact as u32);
         let points: Vec<Vector> = corners
             .iter()
@@ -173,7 +184,7 @@ pub(super) fn regions(
     for (region, middle) in regions.iter_mut().zip(middles) {
         region.finish(middle);
     }
-    (regions, region_of)
+    Ok((regions, region_of))
 }
 
 /// No region has this number.

@@ -33,7 +33,7 @@ use super::kept::{Kept, KeptList};
 use super::narrow::{Candidate, Settler};
 use super::simd::Isa;
 use super::simd::Lanes;
-use super::subcells::{Asked, Groups, Lanes64};
+use super::subcells::{Asked, GroupPair, Lanes64};
 use super::world::World;
 use crate::run::Job;
 use crate::sink::Answer;
@@ -76,7 +76,7 @@ impl Rule for Owner {
 
 /// Two groups of one cell: runs of the cell lists.
 #[derive(Debug, Clone, Copy)]
-struct WorkItem {
+struct CellItem {
     cell: [u32; 3],
     first_a: u32,
     first_b: u32,
@@ -92,7 +92,7 @@ pub struct Cells {
     starts: Vec<u32>,
     /// The cell lists: places in `kept`, ascending within a cell, so that those of one body are together.
     entries: Vec<u32>,
-    items: Vec<WorkItem>,
+    items: Vec<CellItem>,
     scratches: Vec<Settler>,
 }
 
@@ -149,7 +149,7 @@ impl Cells {
             self.scatter(&region, n_near as u64, settings, control, stats)
         })?;
         stats.grid = Some(grid.resolution);
-        let items = size_of::<WorkItem>() * self.items.capacity();
+        let items = size_of::<CellItem>() * self.items.capacity();
         answer.share(self.bytes() - items as u64 + slab_bytes(settings));
         answer.check()?;
         let task = Task {
@@ -173,7 +173,7 @@ impl Cells {
     fn bytes(&self) -> u64 {
         let bytes = self.reaching.bytes()
             + size_of::<u32>() * (self.starts.capacity() + self.entries.capacity())
-            + size_of::<WorkItem>() * self.items.capacity()
+            + size_of::<CellItem>() * self.items.capacity()
             + self.scratches.iter().map(Settler::bytes).sum::<usize>();
         bytes as u64
     }
@@ -194,7 +194,7 @@ impl Cells {
         if let Some(budget) = settings.memory_budget {
             // Bytes held by now, mainly the boxes of primitives, without the lists that are sized below.
             let sized_later = size_of::<u32>() * (self.starts.capacity() + self.entries.capacity())
-                + size_of::<WorkItem>() * self.items.capacity();
+                + size_of::<CellItem>() * self.items.capacity();
             let fixed = self.bytes() - sized_later as u64 + slab_bytes(settings) + 8;
             let needed = fixed + 4 * n + 12;
             if needed > budget {
@@ -294,7 +294,7 @@ impl Cells {
                     stats.n_slabs += 1;
                     items.clear();
                 }
-                items.push(WorkItem {
+                items.push(CellItem {
                     cell,
                     first_a: a.start as u32,
                     first_b: b.start as u32,
@@ -324,13 +324,13 @@ fn slab_items(settings: &Settings) -> usize {
         None => SLAB_ITEMS,
         // A small share of the budget; the rest is for boxes and lists.
         Some(budget) => {
-            (budget as usize / 16 / size_of::<WorkItem>()).clamp(PAIRING_TASK, SLAB_ITEMS)
+            (budget as usize / 16 / size_of::<CellItem>()).clamp(PAIRING_TASK, SLAB_ITEMS)
         }
     }
 }
 
 fn slab_bytes(settings: &Settings) -> u64 {
-    (slab_items(settings) * size_of::<WorkItem>()) as u64
+    (slab_items(settings) * size_of::<CellItem>()) as u64
 }
 
 /// A frame and the rule for its pairs.
@@ -445,7 +445,7 @@ fn groups(
 fn pair<R: Rule>(
     isa: Isa,
     lists: Lists<'_>,
-    items: &[WorkItem],
+    items: &[CellItem],
     scratches: &mut [Settler],
     task: Task<'_, R>,
     (done, total): (u64, u64),
@@ -474,7 +474,7 @@ fn pair<R: Rule>(
 fn pair_items<R: Rule>(
     isa: Isa,
     lists: Lists<'_>,
-    items: &[WorkItem],
+    items: &[CellItem],
     rule: &R,
     settler: &mut Settler,
 ) {
@@ -494,7 +494,7 @@ fn pair_items<R: Rule>(
 fn pair_item<R: Rule>(
     isa: Isa,
     lists: Lists<'_>,
-    item: &WorkItem,
+    item: &CellItem,
     rule: &R,
     lanes: &mut Lanes64,
     settler: &mut Settler,
@@ -506,7 +506,7 @@ fn pair_item<R: Rule>(
     // A group's primitives are of one body.
     let owner = kept(group_a[0]).participant;
     let one_body = owner == kept(group_b[0]).participant;
-    let groups = Groups {
+    let groups = GroupPair {
         kept: lists.kept,
         a: group_a,
         b: group_b,

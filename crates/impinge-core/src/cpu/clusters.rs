@@ -3,6 +3,7 @@
 //! ```text
 //! bounds      boxes of the clusters of bodies that moved, and of the trees above them
 //! dispatch    bodies whose boxes meet (more than two: a tree over bodies), then tree against tree
+//! folds       under `SharedVertex::Resolve`: triangles that may meet a neighbour
 //! pairing     boxes of the primitives of clusters that take part; candidates per work item
 //! narrow      filters, then exact arithmetic
 //! ```
@@ -15,10 +16,12 @@
 use std::sync::Arc;
 
 use crate::clusterings::{Fit, spread};
+use crate::elements::Kind;
 use crate::error::Error;
 use crate::frame::Layer;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
+use crate::query::SharedVertex;
 use crate::scene::Body;
 use crate::settings::{InstructionSet, Settings};
 use crate::stats::Statistics;
@@ -75,6 +78,9 @@ impl Clusters {
             self.refit
                 .run(self.isa, job, settings, caches, scratches, stats)
         })?;
+        if job.frame.shared_vertex == SharedVertex::Resolve && settings.memory_budget.is_none() {
+            stats.time("folds", |_| self.find_folds(job))?;
+        }
         for worker in &mut self.scratches {
             worker.begin(stats.n_clusters, settings.memory_budget.is_some(), answer);
         }
@@ -109,7 +115,12 @@ impl Clusters {
             .iter()
             .map(|cache| {
                 let remote = cache.remote.as_ref().map_or(0, |remote| remote.bytes());
-                size_of::<BodyCache>() + cache.clustering.bytes() + cache.bounds.bytes() + remote
+                let folds = cache.folds.as_ref().map_or(0, |folds| folds.bytes());
+                size_of::<BodyCache>()
+                    + cache.clustering.bytes()
+                    + cache.bounds.bytes()
+                    + remote
+                    + folds
             })
             .sum();
         let scratches: usize = self.scratches.iter().map(Worker::bytes).sum();
@@ -125,6 +136,19 @@ impl Clusters {
         let layers = job.frame.layers.iter();
         for layer in layers.filter(|layer| layer.within) {
             self.caches.at(layer).find_adjacency(job.workers)?;
+        }
+        Ok(())
+    }
+}
+
+impl Clusters {
+    /// Finds the triangles that may meet a neighbour, in bodies that are tested against themselves.
+    fn find_folds(&mut self, job: Job<'_>) -> Result<(), Error> {
+        for (ix, layer) in job.frame.layers.iter().enumerate() {
+            if layer.within {
+                let body = job.frame.body(job.scene, ix);
+                self.caches.at_mut(layer).find_folds(body, job.workers)?;
+            }
         }
         Ok(())
     }
@@ -148,6 +172,7 @@ impl BodyCache {
             clustering,
             bounds,
             whole: Bounds::EMPTY,
+            folds: None,
             remote: (body.n_primitives() >= SORTED_FROM).then(Box::default),
             surface: 0.0,
             fit: Fit::UNKNOWN,
@@ -164,6 +189,21 @@ impl BodyCache {
             };
             workers.install(n_primitives, find)?;
         }
+        Ok(())
+    }
+
+    /// Finds the triangles that may meet a neighbour in the body's current pose.
+    fn find_folds(&mut self, body: &Body, workers: &Workers) -> Result<(), Error> {
+        if body.kind() != Kind::Triangles {
+            return Ok(());
+        }
+        let clustering = &self.clustering;
+        if clustering.rings().is_none() {
+            workers.install(clustering.order.len(), || clustering.find_rings())?;
+        }
+        let pose = (body.positions(), body.positions_stamp());
+        let folds = self.folds.get_or_insert_default();
+        folds.find(workers, clustering, pose);
         Ok(())
     }
 

@@ -56,20 +56,22 @@ impl Near {
 
 /// A task of the bounds stage: a run of one participant's primitives, or of its vertices.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Run {
+pub(crate) struct BoundsTask {
     pub participant: u32,
     pub first: u32,
     pub end: u32,
 }
 
-impl Run {
+impl BoundsTask {
     /// Cuts `n` primitives or vertices of a participant into runs.
-    pub fn cut(participant: usize, n: u32, length: u32) -> impl Iterator<Item = Run> {
-        (0..n).step_by(length as usize).map(move |first| Run {
-            participant: participant as u32,
-            first,
-            end: n.min(first.saturating_add(length)),
-        })
+    pub fn cut(participant: usize, n: u32, length: u32) -> impl Iterator<Item = BoundsTask> {
+        (0..n)
+            .step_by(length as usize)
+            .map(move |first| BoundsTask {
+                participant: participant as u32,
+                first,
+                end: n.min(first.saturating_add(length)),
+            })
     }
 }
 
@@ -162,7 +164,7 @@ impl Cull {
     }
 
     /// Lists the primitives of a run that are near `reach`, and marks their cells.
-    pub fn mark(&self, world: World<'_>, run: Run, run_ix: usize, reach: &Bounds) {
+    pub fn mark(&self, world: World<'_>, run: BoundsTask, run_ix: usize, reach: &Bounds) {
         let mut near = self.near[run_ix].lock().expect("no task panics");
         near.clear();
         let body = world.body(run.participant);
@@ -179,7 +181,7 @@ impl Cull {
         &self,
         codes: &[u32],
         corners: &[[u32; N]],
-        run: Run,
+        run: BoundsTask,
         reach: (u32, u32),
         near: &mut Vec<Near>,
     ) {

@@ -12,14 +12,14 @@ use super::simd::Simd;
 
 /// Makes a vertex a member of a group.
 #[inline(always)]
-pub(super) fn insert(members: &mut [Members], vertex: u32, side: Side) {
+pub(super) fn insert(members: &mut [Members], vertex: u32, side: FreeSide) {
     let (run, place) = (vertex as usize / RUN, vertex as usize % RUN);
     let coordinate = 3 * place + side.axis();
     members[run][side.end()][coordinate / ROW] |= 1 << (coordinate % ROW);
 }
 
 /// Removes all members from some groups.
-pub(super) fn clear(members: &mut [Members], groups: Groups) {
+pub(super) fn clear(members: &mut [Members], groups: Sides) {
     let mut kept: Members = [[!0; 3]; 2];
     for side in groups.sides() {
         for coordinate in (side.axis()..COORDINATES).step_by(3) {
@@ -58,7 +58,7 @@ impl Extents {
 }
 
 /// The intervals that the groups span: those below along x, y and z, then those above. Each axis stands for itself, so
-/// these are not boxes. Groups without members have empty intervals.
+/// these are not boxes. Sides without members have empty intervals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Intervals([Bounds; 2]);
 
@@ -79,14 +79,14 @@ impl Intervals {
     }
 
     /// Extends a group's interval to that of a box.
-    pub fn extend(&mut self, side: Side, bounds: &Bounds) {
+    pub fn extend(&mut self, side: FreeSide, bounds: &Bounds) {
         let (groups, axis) = (&mut self.0[side.end()], side.axis());
         groups.min[axis] = lesser(groups.min[axis], bounds.min[axis]);
         groups.max[axis] = greater(groups.max[axis], bounds.max[axis]);
     }
 
     /// Empties the intervals of some groups.
-    pub fn clear(&mut self, which: Groups) {
+    pub fn clear(&mut self, which: Sides) {
         for side in which.sides() {
             let (groups, axis) = (&mut self.0[side.end()], side.axis());
             groups.min[axis] = f32::INFINITY;
@@ -95,9 +95,9 @@ impl Intervals {
     }
 
     /// The groups that are not beside a box: the closed intervals share a number.
-    pub fn back_at(&self, other: &Bounds) -> Groups {
-        let mut back = Groups::default();
-        for side in Groups::ALL.sides() {
+    pub fn back_at(&self, other: &Bounds) -> Sides {
+        let mut back = Sides::default();
+        for side in Sides::ALL.sides() {
             let (groups, axis) = (&self.0[side.end()], side.axis());
             if groups.min[axis] <= other.max[axis] && other.min[axis] <= groups.max[axis] {
                 back.insert(side);
@@ -140,12 +140,12 @@ pub(super) fn of<S: Simd>(simd: S, positions: &[[f32; 3]], members: &[Members]) 
 
 /// The side on which a cluster lies beside others, which is its group: below (0 to 2) or above (3 to 5) along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Side(u8);
+pub(crate) struct FreeSide(u8);
 
-impl Side {
+impl FreeSide {
     #[inline(always)]
-    pub fn new(axis: usize, is_above: bool) -> Side {
-        Side(axis as u8 + 3 * u8::from(is_above))
+    pub fn new(axis: usize, is_above: bool) -> FreeSide {
+        FreeSide(axis as u8 + 3 * u8::from(is_above))
     }
 
     #[inline(always)]
@@ -166,29 +166,31 @@ impl Side {
 
 /// Some of the groups.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Groups(u8);
+pub(crate) struct Sides(u8);
 
-impl Groups {
-    pub const ALL: Groups = Groups(0b11_1111);
+impl Sides {
+    pub const ALL: Sides = Sides(0b11_1111);
 
-    fn insert(&mut self, side: Side) {
+    fn insert(&mut self, side: FreeSide) {
         self.0 |= 1 << side.number();
     }
 
-    pub fn contains(self, side: Side) -> bool {
+    pub fn contains(self, side: FreeSide) -> bool {
         self.0 >> side.number() & 1 == 1
     }
 
-    pub fn union(self, other: Groups) -> Groups {
-        Groups(self.0 | other.0)
+    pub fn union(self, other: Sides) -> Sides {
+        Sides(self.0 | other.0)
     }
 
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    pub fn sides(self) -> impl Iterator<Item = Side> {
-        (0..6).map(Side).filter(move |&side| self.contains(side))
+    pub fn sides(self) -> impl Iterator<Item = FreeSide> {
+        (0..6)
+            .map(FreeSide)
+            .filter(move |&side| self.contains(side))
     }
 }
 

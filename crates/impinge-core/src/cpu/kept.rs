@@ -12,7 +12,7 @@ use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::FineRange;
 
 use super::bounds;
-use super::cull::{Cull, MOST_MAPS, Run};
+use super::cull::{BoundsTask, Cull, MOST_MAPS};
 use super::dispatch::NodePair;
 use super::simd::{Isa, Simd, dispatch};
 use super::top_level::TopLevel;
@@ -79,11 +79,11 @@ pub struct KeptList {
     top: TopLevel,
     stack: Vec<NodePair>,
     /// Runs of primitives.
-    runs: Vec<Run>,
+    runs: Vec<BoundsTask>,
     /// The kept primitives of each run.
     parts: Vec<Mutex<Vec<Kept>>>,
     /// Runs of vertices, with their boxes.
-    vertices: Vec<(Run, Mutex<Bounds>)>,
+    vertices: Vec<(BoundsTask, Mutex<Bounds>)>,
     cull: Cull,
     /// The kept primitives.
     pub kept: Vec<Kept>,
@@ -116,7 +116,7 @@ impl KeptList {
         size_of::<Kept>() * (self.kept.capacity() + parts)
             + size_of::<Bounds>() * (self.bodies.capacity() + self.reach.capacity())
             + self.top.bytes()
-            + size_of::<(Run, Mutex<Bounds>)>() * self.vertices.capacity()
+            + size_of::<(BoundsTask, Mutex<Bounds>)>() * self.vertices.capacity()
             + self.cull.bytes()
     }
 
@@ -207,9 +207,10 @@ impl KeptList {
                 _ => world.body(ix as u32).positions.len() as u32,
             };
             self.runs
-                .extend(Run::cut(ix, participant.n_primitives, PRIMITIVES));
+                .extend(BoundsTask::cut(ix, participant.n_primitives, PRIMITIVES));
             self.vertices.extend(
-                Run::cut(ix, n_vertices, VERTICES).map(|run| (run, Mutex::new(Bounds::EMPTY))),
+                BoundsTask::cut(ix, n_vertices, VERTICES)
+                    .map(|run| (run, Mutex::new(Bounds::EMPTY))),
             );
         }
         self.parts

@@ -6,6 +6,7 @@ pub(crate) mod clusters;
 pub(crate) mod cull;
 pub(crate) mod dispatch;
 pub(crate) mod extents;
+mod folds;
 mod group_cache;
 mod hubs;
 pub mod kept;

@@ -9,8 +9,8 @@
 //!    drop out, for a partner's box lies in its cluster's box.
 //! 2. Each survivor of the smaller side is tested against the survivors of the other, 16 (or 8)
 //!    lanes at a time: one 64-bit mask per primitive.
-//! 3. Within one body the adjacency masks clear, or set apart, the lanes that share a vertex. Pairs that share a
-//!    hub are cleared under any rule: `hubs` settles them.
+//! 3. Within one body the adjacency masks clear the lanes that share a vertex, or set apart those that `folds` leaves
+//!    open. Pairs that share a hub are cleared under any rule: `hubs` settles them.
 //!
 //! Invariant: a pair of primitives lies in one work item only, so no candidate comes twice.
 //! On a CPU these box tests beat the 4x4x4 sub-cell masks of the paper, see `docs/performance.md`.
@@ -190,6 +190,10 @@ fn within_body<S: Simd>(
         first_a: item.cluster_a * GROUP as u32,
         first_b: item.cluster_b * GROUP as u32,
         shared_vertex: world.frame.shared_vertex,
+        folded: [cluster_a, cluster_b].map(|cluster| {
+            let folds = cache.folds.as_ref();
+            folds.map_or(u64::MAX, |folds| folds.of(cluster))
+        }),
     };
     if cluster_a == cluster_b {
         simd.overlaps_within(boxes_a, lanes_a, masks);
@@ -246,6 +250,8 @@ struct Rule<'a> {
     first_a: u32,
     first_b: u32,
     shared_vertex: SharedVertex,
+    /// The lanes of each cluster that may meet a neighbour, under `SharedVertex::Resolve`.
+    folded: [u64; 2],
 }
 
 impl Rule<'_> {
@@ -266,7 +272,17 @@ impl Rule<'_> {
         if self.shared_vertex == SharedVertex::Skip {
             return;
         }
-        for lane in Lanes(mask & shared) {
+        let (folded_rows, folded_lanes) = match side {
+            Side::A => (self.folded[0], self.folded[1]),
+            Side::B => (self.folded[1], self.folded[0]),
+        };
+        let neighbors = mask & shared;
+        let open = match folded_rows >> row & 1 {
+            1 => neighbors & folded_lanes,
+            _ => 0,
+        };
+        settler.n_candidates += u64::from((neighbors & !open).count_ones());
+        for lane in Lanes(open) {
             let (lane_a, lane_b) = match side {
                 Side::A => (row, lane),
                 Side::B => (lane, row),

@@ -20,7 +20,7 @@ use crate::settings::{Recluster, Settings};
 use crate::stats::Statistics;
 
 use super::bounds::{self, Summary};
-use super::extents::{Extents, Groups};
+use super::extents::{Extents, Sides};
 use super::pairing::Worker;
 use super::remote::Children;
 use super::simd::{Isa, Simd, dispatch};
@@ -320,10 +320,10 @@ fn met(frame: &Frame, ix: usize) -> impl Iterator<Item = usize> {
 }
 
 /// The groups of a participant that are not beside all bodies that it could meet; `None` if its clusters are not sorted.
-fn back(world: World<'_>, ix: usize) -> Option<Groups> {
+fn back(world: World<'_>, ix: usize) -> Option<Sides> {
     let sorted = world.cache(ix as u32).sorted()?;
     let groups = met(world.frame, ix).map(|other| sorted.back_at(&world.cache(other as u32).whole));
-    Some(groups.fold(Groups::default(), Groups::union))
+    Some(groups.fold(Sides::default(), Sides::union))
 }
 
 /// A body whose clusters are to be sorted, and the joint box of all bodies that it could meet.

@@ -25,7 +25,7 @@ use crate::grouping::bounds::{Bounds, greater};
 use crate::grouping::clusters::Clustering;
 
 use super::bounds::TreeBounds;
-use super::extents::{self, Extents, Groups, Intervals, Side};
+use super::extents::{self, Extents, FreeSide, Intervals, Sides};
 use super::runs::{Members, RUN};
 use super::simd::{Lanes, Simd};
 
@@ -41,7 +41,7 @@ pub(crate) struct SomeClusters {
 pub(crate) struct Remote {
     is_sorted: bool,
     /// The group of each cluster; `None` for clusters that are near. Clusters in a group have empty boxes.
-    sides: Vec<Option<Side>>,
+    sides: Vec<Option<FreeSide>>,
     /// The clusters that are near.
     near: Vec<SomeClusters>,
     /// The groups of each vertex, run by run.
@@ -50,9 +50,9 @@ pub(crate) struct Remote {
     /// The intervals of the groups in the current pose.
     groups: Intervals,
     /// Groups whose clusters are to be sorted again at the frame's end.
-    unsorted: Groups,
+    unsorted: Sides,
     /// Clusters just found to lie beside the others, and their sides.
-    fresh: Vec<(u32, Side)>,
+    fresh: Vec<(u32, FreeSide)>,
     outlook: Outlook,
 }
 
@@ -100,14 +100,14 @@ impl Remote {
     }
 
     /// The groups that are not beside a box.
-    pub fn back_at(&self, other: &Bounds) -> Groups {
+    pub fn back_at(&self, other: &Bounds) -> Sides {
         self.groups.back_at(other)
     }
 
     /// Ends the sorting. Returns whether all boxes must be found again.
     #[must_use]
     pub fn end(&mut self) -> bool {
-        self.unsorted = Groups::default();
+        self.unsorted = Sides::default();
         std::mem::take(&mut self.is_sorted)
     }
 
@@ -121,7 +121,7 @@ impl Remote {
 
     /// Some groups have come back: their clusters are near from now on. False if groups have come back too often lately:
     /// then the caller ends the sorting.
-    pub fn come_back(&mut self, groups: Groups, clustering: &Clustering) -> bool {
+    pub fn come_back(&mut self, groups: Sides, clustering: &Clustering) -> bool {
         if !self.outlook.affords(groups) {
             return false;
         }
@@ -157,7 +157,7 @@ impl Remote {
             return false;
         };
         if !self.is_sorted {
-            self.unsorted = Groups::ALL;
+            self.unsorted = Sides::ALL;
             self.outlook.begin();
             self.n_vertices = n_vertices;
             self.sides.clear();
@@ -221,21 +221,21 @@ impl Remote {
         size_of::<Remote>()
             + size_of::<Members>() * self.members.capacity()
             + size_of::<SomeClusters>() * self.near.capacity()
-            + size_of::<Option<Side>>() * self.sides.capacity()
-            + size_of::<(u32, Side)>() * self.fresh.capacity()
+            + size_of::<Option<FreeSide>>() * self.sides.capacity()
+            + size_of::<(u32, FreeSide)>() * self.fresh.capacity()
     }
 }
 
 /// The side on which a box is farthest beside others, measured in units of that side's slack; `None` if no gap is larger
 /// than its slack.
-fn side(cluster: &Bounds, others: &Bounds, slack: &[f32; 6]) -> Option<Side> {
+fn side(cluster: &Bounds, others: &Bounds, slack: &[f32; 6]) -> Option<FreeSide> {
     let mut best = None;
     let mut farthest = 1.0;
     for axis in 0..3 {
         let below = others.min[axis] - cluster.max[axis];
         let above = cluster.min[axis] - others.max[axis];
         for (gap, is_above) in [(below, false), (above, true)] {
-            let side = Side::new(axis, is_above);
+            let side = FreeSide::new(axis, is_above);
             let far = gap / slack[side.number()];
             if gap > 0.0 && far > farthest {
                 farthest = far;
@@ -339,7 +339,7 @@ impl Outlook {
     }
 
     /// Groups have come back: returns whether it pays to sort them again.
-    fn affords(&mut self, groups: Groups) -> bool {
+    fn affords(&mut self, groups: Sides) -> bool {
         for side in groups.sides() {
             let group = side.number();
             self.slack[group] = slack_for(self.slack[group], self.ages[group]);

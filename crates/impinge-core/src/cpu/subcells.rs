@@ -33,7 +33,7 @@ pub struct Asked {
 
 /// Two groups of one cell: places in `kept`.
 #[derive(Clone, Copy)]
-pub(crate) struct Groups<'a> {
+pub(crate) struct GroupPair<'a> {
     pub kept: &'a [Kept],
     pub a: &'a [u32],
     pub b: &'a [u32],
@@ -67,10 +67,10 @@ impl Default for Lanes64 {
 
 impl Lanes64 {
     /// Finds the partners in b of each primitive of a.
-    pub fn find(&mut self, isa: Isa, groups: Groups<'_>, asked: Asked) {
+    pub fn find(&mut self, isa: Isa, groups: GroupPair<'_>, asked: Asked) {
         dispatch!(isa, find, (
             lanes: &mut Lanes64 = self,
-            groups: Groups<'_> = groups,
+            groups: GroupPair<'_> = groups,
             asked: Asked = asked,
         ));
     }
@@ -87,8 +87,8 @@ fn along(kept: &Kept, cell: [u32; 3], axis: usize) -> (usize, usize) {
 }
 
 #[inline(always)]
-fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: Groups<'_>, asked: Asked) {
-    let Groups {
+fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: GroupPair<'_>, asked: Asked) {
+    let GroupPair {
         kept,
         a,
         b,
@@ -205,7 +205,7 @@ mod tests {
             (&here[..15], &here[15..], false),
             (&here[..30], &here[..30], true),
         ] {
-            let groups = Groups {
+            let groups = GroupPair {
                 kept: &kept,
                 a,
                 b,

@@ -11,6 +11,7 @@ use crate::scene::Scene;
 
 use super::bounds::TreeBounds;
 use super::dispatch::Tree;
+use super::folds::Folds;
 use super::remote::Remote;
 
 /// The data kept per body from frame to frame.
@@ -26,6 +27,8 @@ pub(crate) struct BodyCache {
     pub whole: Bounds,
     /// The clusters that lie beside all bodies that this one could meet; only for bodies that are large enough.
     pub remote: Option<Box<Remote>>,
+    /// The triangles that may meet a neighbour; found under `SharedVertex::Resolve` only.
+    pub folds: Option<Box<Folds>>,
     /// Half the summed surface of the clusters.
     pub surface: f64,
     /// How well the clusters have fitted the body.

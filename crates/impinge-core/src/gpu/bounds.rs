@@ -3,7 +3,7 @@
 use super::kernels::{BoundsClusters, BoundsLevel, BoundsTop};
 use super::layout::Params;
 use super::open::Gpu;
-use super::pipeline::{Bound, Groups};
+use super::pipeline::{Bound, Workgroups};
 use super::steps::Steps;
 use super::world::World;
 
@@ -12,7 +12,7 @@ const NARROW_LEVEL: u32 = 2048;
 
 /// The kernels with their buffers.
 #[derive(Debug)]
-pub struct Bounds {
+pub struct BoundsLaunches {
     clusters: Bound,
     level: Bound,
     top: Bound,
@@ -53,11 +53,11 @@ impl BoundsSteps {
     }
 }
 
-impl Bounds {
+impl BoundsLaunches {
     pub fn new(gpu: &Gpu, world: &World, steps: &Steps) -> Self {
         let kernels = &gpu.kernels;
         let (bodies, nodes) = (|| world.bodies.read(), || world.nodes.write_to());
-        Bounds {
+        BoundsLaunches {
             clusters: kernels.bounds_clusters.bind(
                 gpu,
                 &BoundsClusters {
@@ -93,14 +93,14 @@ impl Bounds {
         if !world.is_moved {
             return;
         }
-        let n_clusters = Groups::Known(world.forest().n_clusters());
+        let n_clusters = Workgroups::Known(world.forest().n_clusters());
         self.clusters.run(pass, 0, n_clusters);
         for &(step, count) in &steps.wide {
-            let groups = Groups::Known(u64::from(count).div_ceil(64));
+            let groups = Workgroups::Known(u64::from(count).div_ceil(64));
             self.level.run(pass, step, groups);
         }
         if let Some(step) = steps.top {
-            self.top.run(pass, step, Groups::Known(1));
+            self.top.run(pass, step, Workgroups::Known(1));
         }
     }
 }

@@ -17,7 +17,7 @@ use super::kernels::{DispatchCells, DispatchScatter, DispatchTile, GridCount, Pa
 use super::layout::{N_ITEMS, Params, ROUNDS};
 use super::narrow::{Settling, prepare};
 use super::open::Gpu;
-use super::pipeline::{Bound, Groups};
+use super::pipeline::{Bound, Workgroups};
 use super::reaching::{CELLS, KEPT, Reaching, ReachingSteps};
 use super::room::Room;
 use super::steps::{Stages, Steps};
@@ -128,7 +128,7 @@ pub trait InCells: fmt::Debug + Send + Sync {
         world: &World,
         room: &Room,
         told: Told,
-        part: Part,
+        part: CellRange,
     ) -> Result<(), Error>;
 
     /// Encodes all stages.
@@ -139,28 +139,28 @@ pub trait InCells: fmt::Debug + Send + Sync {
 /// a [`Share`]: every pass that fills lists does so in the order in which threads happen to come, so tiles of the
 /// product of the groups would not hold the same primitives from pass to pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Part {
+pub struct CellRange {
     /// The first cell.
     pub first: u32,
     /// The number of cells.
     pub count: u32,
 }
 
-impl Part {
+impl CellRange {
     /// All cells.
-    pub const ALL: Part = Part {
+    pub const ALL: CellRange = CellRange {
         first: 0,
         count: u32::MAX,
     };
 
     /// Two halves of the cells; `None` for a single cell. `n_cells`: the number of cells of the grid.
-    pub fn split(self, n_cells: u32) -> Option<[Part; 2]> {
+    pub fn split(self, n_cells: u32) -> Option<[CellRange; 2]> {
         let count = self.count.min(n_cells.saturating_sub(self.first));
-        let low = Part {
+        let low = CellRange {
             count: count / 2,
             ..self
         };
-        let high = Part {
+        let high = CellRange {
             first: self.first + low.count,
             count: count - low.count,
         };
@@ -183,7 +183,7 @@ struct Launches {
 
 /// All launches of a pass.
 #[derive(Debug)]
-pub struct Plan {
+pub struct CellsPlan {
     steps: Steps,
     launches: Option<Launches>,
     reaching: ReachingSteps,
@@ -194,10 +194,10 @@ pub struct Plan {
     narrow: u32,
 }
 
-impl Plan {
+impl CellsPlan {
     #[allow(clippy::new_without_default)]
     pub fn new() -> Self {
-        Plan {
+        CellsPlan {
             steps: Steps::new(),
             launches: None,
             reaching: ReachingSteps::default(),
@@ -209,13 +209,13 @@ impl Plan {
     }
 }
 
-impl InCells for Plan {
+impl InCells for CellsPlan {
     fn stages(&self) -> &'static [&'static str] {
         STAGES
     }
 
     fn anew(&self) -> Box<dyn InCells> {
-        Box::new(Plan::new())
+        Box::new(CellsPlan::new())
     }
 
     fn unbind(&mut self) {
@@ -232,7 +232,7 @@ impl InCells for Plan {
         world: &World,
         room: &Room,
         told: Told,
-        part: Part,
+        part: CellRange,
     ) -> Result<(), Error> {
         let steps = &mut self.steps;
         steps.clear();
@@ -278,14 +278,16 @@ impl InCells for Plan {
     fn encode(&self, stages: &mut Stages<'_>, world: &World, room: &Room) {
         let launches = self.launches.as_ref().expect("made before it is encoded");
         let arguments = room.arguments.buffer();
-        let kept = || Groups::Indirect(arguments, KEPT);
+        let kept = || Workgroups::Indirect(arguments, KEPT);
         if let Share::Tile(tile) = self.share {
             // Boxes, grid and the list exist already: their stages are empty.
             stages.stage(|_| ());
             stages.stage(|_| ());
             stages.stage(|pass| {
                 let groups = (u64::from(tile.side) * u64::from(tile.side)).div_ceil(64);
-                launches.tile.run(pass, self.work, Groups::Known(groups));
+                launches
+                    .tile
+                    .run(pass, self.work, Workgroups::Known(groups));
             });
         } else {
             stages.encoder.clear_buffer(room.cells.buffer(), 0, None);
@@ -296,15 +298,15 @@ impl InCells for Plan {
                 launches.count.run(pass, 0, kept());
             });
             stages.stage(|pass| {
-                let groups = Groups::Indirect(arguments, CELLS);
+                let groups = Workgroups::Indirect(arguments, CELLS);
                 launches.dispatch.run(pass, self.work, groups);
                 launches.scatter.run(pass, 0, kept());
             });
         }
         stages.stage(|pass| {
             let step = self.prepare_pairing;
-            launches.prepare.run(pass, step, Groups::Known(1));
-            let groups = Groups::Indirect(arguments, ROUNDS);
+            launches.prepare.run(pass, step, Workgroups::Known(1));
+            let groups = Workgroups::Indirect(arguments, ROUNDS);
             launches.pairing.run(pass, self.work, groups);
         });
         stages.stage(|pass| launches.settling.run(pass, room, self.narrow));
@@ -386,7 +388,7 @@ mod tests {
     #[test]
     fn parts_split_down_to_single_cells() {
         let n_cells = 5;
-        let mut waiting = vec![Part::ALL];
+        let mut waiting = vec![CellRange::ALL];
         let mut seen = std::collections::BTreeSet::new();
         while let Some(part) = waiting.pop() {
             match part.split(n_cells) {

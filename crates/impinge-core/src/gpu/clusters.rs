@@ -7,12 +7,12 @@
 //! narrow     prepare · narrow
 //! ```
 
-use super::bounds::{Bounds, BoundsSteps};
+use super::bounds::{BoundsLaunches, BoundsSteps};
 use super::kernels::{Dispatch, Pairing};
 use super::layout::{N_ITEMS, Params, ROUNDS};
 use super::narrow::{Settling, prepare};
 use super::open::Gpu;
-use super::pipeline::{Bound, Groups};
+use super::pipeline::{Bound, Workgroups};
 use super::room::Room;
 use super::steps::{Stages, Steps};
 use super::world::World;
@@ -24,7 +24,7 @@ pub(crate) const STAGES: &[&str] = &["bounds", "dispatch", "pairing", "narrow"];
 /// Kernels with their buffers; bound again when a buffer is replaced.
 #[derive(Debug)]
 struct Launches {
-    bounds: Bounds,
+    bounds: BoundsLaunches,
     prepare: Bound,
     /// From queue a to b, and from b to a.
     dispatch: [Bound; 2],
@@ -34,7 +34,7 @@ struct Launches {
 
 /// All launches of a pass.
 #[derive(Debug)]
-pub(crate) struct Plan {
+pub(crate) struct TreePlan {
     steps: Steps,
     launches: Option<Launches>,
     bounds: BoundsSteps,
@@ -46,9 +46,9 @@ pub(crate) struct Plan {
     narrow: u32,
 }
 
-impl Plan {
+impl TreePlan {
     pub fn new() -> Self {
-        Plan {
+        TreePlan {
             steps: Steps::new(),
             launches: None,
             bounds: BoundsSteps::default(),
@@ -120,19 +120,19 @@ impl Plan {
         stages.stage(|pass| {
             for round in 0..self.n_rounds {
                 let groups = if round == 0 {
-                    Groups::Known(n_seeds)
+                    Workgroups::Known(n_seeds)
                 } else {
                     let step = self.prepare_pairing + round;
-                    launches.prepare.run(pass, step, Groups::Known(1));
-                    Groups::Indirect(arguments, round)
+                    launches.prepare.run(pass, step, Workgroups::Known(1));
+                    Workgroups::Indirect(arguments, round)
                 };
                 launches.dispatch[(round % 2) as usize].run(pass, self.rounds + round, groups);
             }
         });
         stages.stage(|pass| {
             let step = self.prepare_pairing;
-            launches.prepare.run(pass, step, Groups::Known(1));
-            let groups = Groups::Indirect(arguments, ROUNDS);
+            launches.prepare.run(pass, step, Workgroups::Known(1));
+            let groups = Workgroups::Indirect(arguments, ROUNDS);
             launches.pairing.run(pass, self.rounds, groups);
         });
         stages.stage(|pass| launches.settling.run(pass, room, self.narrow));
@@ -155,7 +155,7 @@ impl Launches {
             gpu.kernels.dispatch.bind(gpu, &bindings)
         };
         Launches {
-            bounds: Bounds::new(gpu, world, steps),
+            bounds: BoundsLaunches::new(gpu, world, steps),
             prepare: prepare(gpu, room, steps),
             dispatch: [dispatch(0, 1), dispatch(1, 0)],
             pairing: gpu.kernels.pairing.bind(

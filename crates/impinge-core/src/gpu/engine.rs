@@ -59,7 +59,7 @@ pub struct Engine {
 
 #[derive(Debug)]
 pub(super) enum Plan {
-    Clusters(Box<clusters::Plan>),
+    Clusters(Box<clusters::TreePlan>),
     Cells(Box<dyn InCells>),
 }
 
@@ -74,8 +74,8 @@ pub(super) enum Outcome {
 impl Plan {
     fn of(method: Method) -> Self {
         match method {
-            Method::Cells => Plan::Cells(Box::new(cells::Plan::new())),
-            _ => Plan::Clusters(Box::new(clusters::Plan::new())),
+            Method::Cells => Plan::Cells(Box::new(cells::CellsPlan::new())),
+            _ => Plan::Clusters(Box::new(clusters::TreePlan::new())),
         }
     }
 }

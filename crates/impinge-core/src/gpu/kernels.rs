@@ -243,9 +243,9 @@ kernels! {
     pairing: Pairing = PAIRING []
         from "pairing" ("boxes", "vertices", "ids", "reserve", "groups");
     narrow: Narrow = NARROW [("WITH_SOLIDS", 0.0)]
-        from "narrow" ("filter", "triangles", "neighbours", "solids", "reserve", "groups");
+        from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "reserve", "groups");
     narrow_solids: Narrow = NARROW_SOLIDS [("WITH_SOLIDS", 1.0)]
-        from "narrow" ("filter", "triangles", "neighbours", "solids", "reserve", "groups");
+        from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "reserve", "groups");
     bounds_reach: BoundsReach = BOUNDS_REACH [] from "bounds_reach" ("boxes", "meets", "groups");
     bounds_keep: BoundsKeep = BOUNDS_KEEP []
         from "bounds_keep" ("boxes", "vertices", "reserve", "groups");

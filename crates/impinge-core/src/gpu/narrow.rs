@@ -3,7 +3,7 @@
 use super::kernels::{Narrow, Prepare};
 use super::layout::{N_CANDIDATES, Params, ROUNDS};
 use super::open::Gpu;
-use super::pipeline::{Bound, Groups};
+use super::pipeline::{Bound, Workgroups};
 use super::room::Room;
 use super::steps::Steps;
 use super::world::World;
@@ -69,8 +69,8 @@ impl Settling {
     }
 
     pub fn run(&self, pass: &mut wgpu::ComputePass<'_>, room: &Room, step: u32) {
-        self.prepare.run(pass, step, Groups::Known(1));
-        let groups = Groups::Indirect(room.arguments.buffer(), SLOT);
+        self.prepare.run(pass, step, Workgroups::Known(1));
+        let groups = Workgroups::Indirect(room.arguments.buffer(), SLOT);
         self.narrow.run(pass, step, groups);
     }
 }

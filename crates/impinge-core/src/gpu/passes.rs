@@ -10,7 +10,7 @@
 //! The smallest pass has one work item, for which [`Capacities::LEAST`] is enough.
 
 use super::buffers::count;
-use super::cells::{Part, Share, Tile, Told};
+use super::cells::{CellRange, Share, Tile, Told};
 use super::clusters;
 use super::collect::{Collected, Guess};
 use super::device::Scopes;
@@ -38,7 +38,7 @@ const SETTLED_BY_A_TASK: usize = 64;
 #[derive(Debug, Clone)]
 pub(super) enum Work {
     Seeds(Vec<NodePair>),
-    Cells(Part, Share),
+    Cells(CellRange, Share),
 }
 
 impl Engine {
@@ -111,7 +111,7 @@ impl Engine {
         }
         Some(match self.plan {
             Plan::Clusters(_) => Work::Seeds(self.descend(frame, seeds)),
-            Plan::Cells(_) => Work::Cells(Part::ALL, Share::All),
+            Plan::Cells(_) => Work::Cells(CellRange::ALL, Share::All),
         })
     }
 
@@ -170,7 +170,12 @@ impl Engine {
         }))
     }
 
-    fn split_cells(&self, part: Part, share: Share, collected: &Collected) -> Option<Vec<Work>> {
+    fn split_cells(
+        &self,
+        part: CellRange,
+        share: Share,
+        collected: &Collected,
+    ) -> Option<Vec<Work>> {
         match share {
             Share::All => {
                 // The kept primitives do not depend on the part.
@@ -331,7 +336,7 @@ impl Engine {
 }
 
 /// The quarters of a tile that have any work.
-fn quarters(part: Part, tile: Tile) -> Vec<Work> {
+fn quarters(part: CellRange, tile: Tile) -> Vec<Work> {
     let quarters = tile.split().unwrap_or_default().into_iter();
     quarters
         .map(|quarter| Work::Cells(part, Share::Tile(quarter)))

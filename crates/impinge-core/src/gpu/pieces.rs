@@ -34,7 +34,7 @@ use crate::scene::Scene;
 
 /// Consecutive clusters of one participant.
 #[derive(Debug)]
-pub struct Run {
+pub struct ClusterRun {
     participant: usize,
     first: usize,
     end: usize,
@@ -44,7 +44,7 @@ pub struct Run {
 /// Consecutive runs, at most one per participant.
 #[derive(Debug)]
 pub struct Chunk {
-    pub runs: Vec<Run>,
+    pub runs: Vec<ClusterRun>,
     bounds: Bounds,
 }
 
@@ -81,7 +81,7 @@ pub fn cut<'a>(
             let runs = &mut chunks.last_mut().expect("just pushed").runs;
             match runs.last_mut() {
                 Some(run) if run.participant == participant => run.end = cluster + 1,
-                _ => runs.push(Run {
+                _ => runs.push(ClusterRun {
                     participant,
                     first: cluster,
                     end: cluster + 1,
@@ -125,7 +125,7 @@ pub fn meeting(frame: &Frame, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
         let runs = chunks[chunk_ix].runs.iter().enumerate();
         runs.map(move |(ix, run)| (chunk_ix, (first + ix) as u32, run))
     };
-    let mut runs: Vec<(usize, u32, &Run)> = (0..chunks.len()).flat_map(numbered).collect();
+    let mut runs: Vec<(usize, u32, &ClusterRun)> = (0..chunks.len()).flat_map(numbered).collect();
     runs.sort_by(|a, b| a.2.bounds.min[0].total_cmp(&b.2.bounds.min[0]));
     for (ix, &(chunk_a, a, run_a)) in runs.iter().enumerate() {
         if chunks.len() == 1 && frame.layers[run_a.participant].within {
@@ -144,7 +144,7 @@ pub fn meeting(frame: &Frame, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
     pairs
 }
 
-fn meets(frame: &Frame, a: &Run, b: &Run) -> bool {
+fn meets(frame: &Frame, a: &ClusterRun, b: &ClusterRun) -> bool {
     if a.participant == b.participant {
         frame.layers[a.participant].within
     } else {
@@ -173,7 +173,7 @@ impl Loaded {
         clustering: impl Fn(usize) -> &'a Clustering,
     ) -> Self {
         let mut loaded = Loaded::default();
-        let runs: Vec<&Run> = chunks.iter().flat_map(|chunk| &chunk.runs).collect();
+        let runs: Vec<&ClusterRun> = chunks.iter().flat_map(|chunk| &chunk.runs).collect();
         for runs in runs.chunk_by(|a, b| a.participant == b.participant) {
             let participant = runs[0].participant;
             loaded.push(scene, frame, participant, runs, clustering(participant));
@@ -186,7 +186,7 @@ impl Loaded {
         scene: &Scene,
         frame: &Frame,
         participant: usize,
-        runs: &[&Run],
+        runs: &[&ClusterRun],
         clustering: &Clustering,
     ) {
         let positions = frame.body(scene, participant).positions();

@@ -209,7 +209,7 @@ pub struct Bound {
 }
 
 /// The number of workgroups of a dispatch.
-pub enum Groups<'a> {
+pub enum Workgroups<'a> {
     /// This many, in rows if necessary.
     Known(u64),
     /// As many as the arguments in this slot say.
@@ -221,19 +221,19 @@ pub(super) const WIDEST: u64 = 32_768;
 
 impl Bound {
     /// Dispatches with the parameters of a step.
-    pub fn run(&self, pass: &mut wgpu::ComputePass<'_>, step: u32, groups: Groups<'_>) {
+    pub fn run(&self, pass: &mut wgpu::ComputePass<'_>, step: u32, groups: Workgroups<'_>) {
         pass.set_pipeline(&self.pipeline);
         let offset = [step * STEP];
         let offsets: &[u32] = if self.has_params { &offset } else { &[] };
         pass.set_bind_group(0, &self.group, offsets);
         match groups {
-            Groups::Known(n) => {
+            Workgroups::Known(n) => {
                 // Both fit: counts are below 2^32.
                 let x = n.min(WIDEST) as u32;
                 let y = n.div_ceil(WIDEST) as u32;
                 pass.dispatch_workgroups(x, y, 1);
             }
-            Groups::Indirect(arguments, slot) => {
+            Workgroups::Indirect(arguments, slot) => {
                 let bytes = size_of::<super::layout::Arguments>() as u64;
                 pass.dispatch_workgroups_indirect(arguments, u64::from(slot) * bytes);
             }

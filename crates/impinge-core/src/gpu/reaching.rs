@@ -5,11 +5,11 @@
 //! grid       resolution, eq. (1) · ranges, eq. (3) · shift
 //! ```
 
-use super::bounds::{Bounds, BoundsSteps};
+use super::bounds::{BoundsLaunches, BoundsSteps};
 use super::kernels::{BoundsKeep, BoundsReach, GridRanges, GridResolution, GridShift};
 use super::layout::{NO_ROOT, Params};
 use super::open::Gpu;
-use super::pipeline::{Bound, Groups};
+use super::pipeline::{Bound, Workgroups};
 use super::room::Room;
 use super::steps::Steps;
 use super::world::World;
@@ -22,7 +22,7 @@ pub const CELLS: u32 = 1;
 /// The kernels with their buffers.
 #[derive(Debug)]
 pub struct Reaching {
-    bounds: Bounds,
+    bounds: BoundsLaunches,
     reach: Bound,
     keep: Bound,
     resolution: Bound,
@@ -74,7 +74,7 @@ impl Reaching {
         let params = || steps.params();
         let counters = || room.counters.write_to();
         Reaching {
-            bounds: Bounds::new(gpu, world, steps),
+            bounds: BoundsLaunches::new(gpu, world, steps),
             reach: kernels.bounds_reach.bind(
                 gpu,
                 &BoundsReach {
@@ -144,18 +144,18 @@ impl Reaching {
         steps: &ReachingSteps,
     ) {
         self.bounds.run(pass, world, &steps.bounds);
-        let groups = Groups::Known(world.bodies.len().div_ceil(64));
+        let groups = Workgroups::Known(world.bodies.len().div_ceil(64));
         self.reach.run(pass, steps.reach, groups);
-        let groups = Groups::Known(world.forest().n_clusters());
+        let groups = Workgroups::Known(world.forest().n_clusters());
         self.keep.run(pass, 0, groups);
     }
 
     /// Stage `grid`, up to the ranges and their shift.
     pub fn run_grid(&self, pass: &mut wgpu::ComputePass<'_>, room: &Room, steps: &ReachingSteps) {
         self.resolution
-            .run(pass, steps.resolution, Groups::Known(1));
-        let kept = Groups::Indirect(room.arguments.buffer(), KEPT);
+            .run(pass, steps.resolution, Workgroups::Known(1));
+        let kept = Workgroups::Indirect(room.arguments.buffer(), KEPT);
         self.ranges.run(pass, 0, kept);
-        self.shift.run(pass, steps.shift, Groups::Known(1));
+        self.shift.run(pass, steps.shift, Workgroups::Known(1));
     }
 }

@@ -18,6 +18,7 @@ use super::adjacency::Adjacency;
 use super::bounds::Bounds;
 use super::hierarchy::{Entry, Shape};
 use super::hubs::{self, Hubs};
+use super::rings::Rings;
 use crate::elements::{Elements, with_corners};
 
 /// Runs this short are not split further inside a cluster.
@@ -45,6 +46,7 @@ pub(crate) struct Clustering {
     hubs: Option<Hubs>,
     adjacency: OnceLock<Adjacency>,
     local_faces: OnceLock<Vec<LocalFaces>>,
+    rings: OnceLock<Rings>,
 }
 
 /// The corners of a cluster's triangles as numbers of its vertices: `[corner][place]`. Places past its size hold 0.
@@ -86,6 +88,7 @@ impl Clustering {
             hubs,
             adjacency: OnceLock::new(),
             local_faces: OnceLock::new(),
+            rings: OnceLock::new(),
         }
     }
 
@@ -139,6 +142,19 @@ impl Clustering {
         self.local_faces.get()?.get(cluster)
     }
 
+    /// Finds the rings of the vertices, if the primitives are triangles.
+    pub fn find_rings(&self) {
+        if let Elements::Triangles(faces) = &self.corners {
+            self.rings.get_or_init(|| Rings::new(faces));
+        }
+    }
+
+    /// The rings of the vertices, if they have been found.
+    #[inline(always)]
+    pub fn rings(&self) -> Option<&Rings> {
+        self.rings.get()
+    }
+
     /// Whether [`adjacency`](Self::adjacency) has been found.
     pub fn knows_adjacency(&self) -> bool {
         self.adjacency.get().is_some()
@@ -152,6 +168,7 @@ impl Clustering {
             + self.shape.bytes()
             + self.hubs.as_ref().map_or(0, Hubs::bytes)
             + self.adjacency.get().map_or(0, Adjacency::bytes)
+            + self.rings.get().map_or(0, Rings::bytes)
             + self
                 .local_faces
                 .get()

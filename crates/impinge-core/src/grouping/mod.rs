@@ -9,6 +9,7 @@ pub(crate) mod clusters;
 pub mod grid;
 pub(crate) mod hierarchy;
 pub(crate) mod hubs;
+pub(crate) mod rings;
 
 /// The most primitives that a group holds: one bit each in a 64-bit mask.
 pub const GROUP: usize = 64;

@@ -11,7 +11,7 @@ fn crossing(a: &Model, b: &Model) -> (Contacts, Curves) {
     let ids = [a, b].map(|model| model.add_to(&mut scene).unwrap());
     let pairs = detect(&scene, &Query::between(ids[0], ids[1]));
     let contacts = Contacts::new(&scene, &pairs).unwrap();
-    let curves = contacts.curves();
+    let curves = contacts.curves().unwrap();
     (contacts, curves)
 }
 
@@ -201,7 +201,7 @@ fn a_body_that_runs_into_itself() {
     for rule in [SharedVertex::Skip, SharedVertex::Resolve] {
         let pairs = detect(&scene, &Query::within(id).shared_vertex(rule));
         let contacts = Contacts::new(&scene, &pairs).unwrap();
-        let curves = contacts.curves();
+        let curves = contacts.curves().unwrap();
         assert!(!curves.is_empty());
         assert_eq!(curves.n_closed(), curves.len());
         check_cover(&contacts, &curves);
@@ -227,7 +227,7 @@ fn threads_change_nothing() {
                 .iter()
                 .map(|p| p.map(f64::to_bits))
                 .collect();
-            let curves = contacts.curves();
+            let curves = contacts.curves().unwrap();
             (
                 bits,
                 contacts.all_corners().to_vec(),
@@ -268,5 +268,5 @@ fn pairs_of_another_scene_are_refused_by_name() {
         .unwrap();
     let contacts = Contacts::new(&scene, &pairs).unwrap();
     assert!(contacts.shapes().iter().all(|&shape| shape == Shape::Apart));
-    assert!(contacts.points().is_empty() && contacts.curves().is_empty());
+    assert!(contacts.points().is_empty() && contacts.curves().unwrap().is_empty());
 }

@@ -164,6 +164,43 @@ impl Device<'_> {
     }
 }
 
+impl Device<'_> {
+    /// d x e in the plane of x and y.
+    fn planar(&mut self, d: &[f32; 3], e: &[f32; 3]) -> f32 {
+        if self.coin() {
+            let right = self.multiply(d[1], e[0]);
+            self.multiply_add(d[0], e[1], -right)
+        } else {
+            let left = self.multiply(d[0], e[1]);
+            self.multiply_add(-d[1], e[0], left)
+        }
+    }
+
+    /// The sign of the turn from a - o to b - o in the plane of x and y if it is sure, and the computed value.
+    fn turn(&mut self, [a, b, o]: [&[f32; 3]; 3], narrowing: f32) -> (Option<Sign>, f32) {
+        let (d, e) = (self.difference(a, o), self.difference(b, o));
+        let value = self.planar(&d, &e);
+        let widest = d
+            .iter()
+            .chain(&e)
+            .fold(0.0, |size: f32, x| size.max(x.abs()));
+        if widest < SMALLEST {
+            return (None, value);
+        }
+        let wide = self.add(widest, narrowing);
+        let own = self.multiply(BOUND, wide);
+        let factor = self.multiply_add(8.0, narrowing, own);
+        // The kernels hold two determinants against this bound.
+        let bound = 0.5 * self.multiply(wide, factor);
+        let sign = match value {
+            value if value > bound => Some(Sign::Positive),
+            value if value < -bound => Some(Sign::Negative),
+            _ => None,
+        };
+        (sign, value)
+    }
+}
+
 /// Points for the model: all coordinates at most `LARGEST`.
 fn points(random: &mut Random, kind: Kind, scale: f64) -> Option<[[f64; 3]; 4]> {
     let points = kind.points::<4>(random).map(|p| p.map(|x| x * scale));
@@ -256,6 +293,70 @@ fn device_determinants_of_narrowed_positions_are_right_where_they_are_sure() {
                         sign, exact,
                         "{kind:?} by {scale:e}: {points:?} gives {value:e}"
                     );
+                }
+            }
+        }
+    }
+    assert!(n_sure > n / 5, "{n_sure} of {n} are sure");
+    assert!(
+        n_wrong_value > n / 100,
+        "the model is too kind: {n_wrong_value} of {n} values have a wrong sign"
+    );
+}
+
+#[test]
+fn device_turns_in_a_plane_are_right_where_they_are_sure() {
+    let mut random = Random::new(22);
+    let (mut n, mut n_sure, mut n_wrong_value) = (0, 0, 0);
+    for kind in [
+        Kind::Lattice(3),
+        Kind::Plain,
+        Kind::AnyF32,
+        Kind::NearlyTouching,
+        Kind::Skewed(2),
+    ] {
+        for is_narrowed in [false, true] {
+            for scale in [1.0, 2.0_f64.powi(-29), 2.0_f64.powi(14), 2.0_f64.powi(38)] {
+                for _ in 0..5_000 {
+                    let Some(points) = points(&mut random, kind, scale) else {
+                        continue;
+                    };
+                    // The first corner, and two that are nearly in line with it.
+                    let share = random.unit();
+                    let [a, mut b, o, _] = points.map(|p| {
+                        let blur = if is_narrowed { 1e-9 * scale } else { 0.0 };
+                        p.map(|x| x + blur)
+                    });
+                    if random.below(2) == 0 {
+                        for axis in 0..3 {
+                            b[axis] = o[axis] + share * (a[axis] - o[axis]);
+                        }
+                    }
+                    let narrow = [a, b, o].map(|p| p.map(|x| x as f32));
+                    let [a, b, o] = match is_narrowed {
+                        true => [a, b, o],
+                        false => narrow.map(|p| p.map(f64::from)),
+                    };
+                    let flat = |p: [f64; 3]| [p[0], p[1], 0.0];
+                    let exact = orient3d(&flat(a), &flat(b), &[o[0], o[1], 1.0], &flat(o));
+                    let largest = narrow
+                        .iter()
+                        .flatten()
+                        .fold(0.0, |m: f32, x| m.max(x.abs()));
+                    let slack = if is_narrowed {
+                        NARROWING * largest
+                    } else {
+                        0.0
+                    };
+                    let [p, q, r] = &narrow;
+                    let (sign, value) = Device(&mut random).turn([p, q, r], slack);
+                    n += 1;
+                    n_wrong_value +=
+                        u32::from(value != 0.0 && (value > 0.0) != (exact == Sign::Positive));
+                    if let Some(sign) = sign {
+                        n_sure += 1;
+                        assert_eq!(sign, exact, "{kind:?} by {scale:e}: {narrow:?}");
+                    }
                 }
             }
         }

@@ -19,10 +19,10 @@ use std::sync::Arc;
 use impinge_core::Error;
 use impinge_core::gpu::Gpu;
 use impinge_core::gpu::buffers::Storage;
-use impinge_core::gpu::cells::{InCells, Part, Told};
+use impinge_core::gpu::cells::{CellRange, InCells, Told};
 use impinge_core::gpu::layout::{N_ENTRIES, N_ITEMS, Params, ROUNDS};
 use impinge_core::gpu::narrow::{Settling, prepare};
-use impinge_core::gpu::pipeline::{Bound, Groups};
+use impinge_core::gpu::pipeline::{Bound, Workgroups};
 use impinge_core::gpu::reaching::{KEPT, Reaching, ReachingSteps};
 use impinge_core::gpu::room::Room;
 use impinge_core::gpu::steps::{Stages, Steps};
@@ -163,7 +163,7 @@ impl InCells for Plan {
         world: &World,
         room: &Room,
         told: Told,
-        part: Part,
+        part: CellRange,
     ) -> Result<(), Error> {
         if self.buffers.resize(gpu, room)? {
             self.launches = None;
@@ -230,8 +230,8 @@ impl InCells for Plan {
     fn encode(&self, stages: &mut Stages<'_>, world: &World, room: &Room) {
         let launches = self.launches.as_ref().expect("made before it is encoded");
         let arguments = room.arguments.buffer();
-        let one = || Groups::Known(1);
-        let indirect = |slot| Groups::Indirect(arguments, slot);
+        let one = || Workgroups::Known(1);
+        let indirect = |slot| Workgroups::Indirect(arguments, slot);
         Reaching::clear(stages.encoder, room);
         stages.stage(|pass| launches.reaching.run_bounds(pass, world, &self.reaching));
         stages.stage(|pass| launches.reaching.run_grid(pass, room, &self.reaching));
@@ -244,7 +244,9 @@ impl InCells for Plan {
             launches.prepare.run(pass, self.prepare_blocks, one());
             for (round, &step) in self.digits.iter().enumerate() {
                 launches.sort_count[round % 2].run(pass, step, indirect(BLOCKS));
-                launches.sort_scan.run(pass, step, Groups::Known(DIGITS));
+                launches
+                    .sort_scan
+                    .run(pass, step, Workgroups::Known(DIGITS));
                 launches.sort_scatter[round % 2].run(pass, step, indirect(BLOCKS));
             }
         });

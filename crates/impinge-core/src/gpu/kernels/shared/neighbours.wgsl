@@ -12,7 +12,7 @@
 //          / \ /
 //        b1   a0
 //
-// Two: no, unless coplanar. Three: yes, always.
+// Two: no, unless coplanar; then no if the third vertices certainly lie on different sides. Three: yes, always.
 
 // One bit per vertex of `a`, set when `b` names it too.
 fn shared_by(a: vec3<u32>, b: vec3<u32>) -> u32 {
@@ -48,13 +48,16 @@ fn neighbours(ids_a: vec3<u32>, ids_b: vec3<u32>, a0: vec3<f32>, a1: vec3<f32>, 
             if b_q * b_r < 0 && a_q * a_r < 0 {
                 return select(NO, YES, a_q != b_q);
             }
-            return UNSURE;
+            return select(UNSURE, NO, angles_apart(a.p, a.q, a.r, b.q, b.r, slack));
         }
         case 2u: {
             let a = turned(a0, a1, a2, firstTrailingBit(of_a ^ 7u), false);
             let b = turned(b0, b1, b2, firstTrailingBit(of_b ^ 7u), false);
             let sign = determinant_sign(a.r - a.q, a.p - a.q, b.p - a.q, slack);
-            return select(NO, UNSURE, sign == 0);
+            if sign != 0 {
+                return NO;
+            }
+            return select(UNSURE, NO, sides_apart(a.q, a.r, a.p, b.p, slack));
         }
         case 3u: {
             return YES;

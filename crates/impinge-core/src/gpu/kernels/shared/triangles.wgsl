@@ -1,5 +1,5 @@
 // Triangle against triangle, in the same steps as `exact::filter` on the CPU: planes first, then the
-// two edge-edge determinants of Guigue and Devillers (2003).
+// two edge-edge determinants of Guigue and Devillers (2003), then projections.
 
 const YES: i32 = 1;
 const NO: i32 = -1;
@@ -66,7 +66,7 @@ fn triangles(a0: vec3<f32>, a1: vec3<f32>, a2: vec3<f32>, b0: vec3<f32>, b1: vec
         return NO;
     }
     if any(of_a == vec3<i32>(0)) || any(of_b == vec3<i32>(0)) {
-        return UNSURE;
+        return select(UNSURE, NO, apart_in_a_plane(a0, a1, a2, b0, b1, b2, slack));
     }
     let lone_a = lone(of_a);
     let lone_b = lone(of_b);
@@ -80,5 +80,8 @@ fn triangles(a0: vec3<f32>, a1: vec3<f32>, a2: vec3<f32>, b0: vec3<f32>, b1: vec
     if low > 0 || high < 0 {
         return NO;
     }
-    return select(UNSURE, YES, low < 0 && high > 0);
+    if low < 0 && high > 0 {
+        return YES;
+    }
+    return select(UNSURE, NO, apart_in_a_plane(a0, a1, a2, b0, b1, b2, slack));
 }

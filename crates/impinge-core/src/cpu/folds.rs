@@ -1,0 +1,322 @@
+//! Neighbours that cannot meet, under `SharedVertex::Resolve`: found per vertex instead of per pair.
+//!
+//! In: the rings of a surface, and its positions. Out: for each cluster, the lanes of triangles with a *fold*: a vertex
+//! whose triangles are not certainly side by side. Two triangles that share a vertex are tested only if both have a
+//! fold.
+//!
+//! Seen along an axis, the triangles around a vertex are sectors of a plane. If they all turn the same way and together
+//! go around the vertex no more than once, no two sectors overlap, so no two triangles meet anywhere but in the simplex
+//! that they share. On a smooth surface nearly every vertex passes, also where neighbours lie in one plane: two exact
+//! comparisons and three products per triangle corner replace six pairs per triangle.
+//!
+//! Reason for each discard: sectors that do not overlap. `docs/exactness.md`, "Folds", has the proof and the bound.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::elements::Elements;
+use crate::grouping::GROUP;
+use crate::grouping::clusters::Clustering;
+use crate::grouping::rings::{Ring, Rings};
+use crate::positions::Positions;
+use crate::workers::Workers;
+
+/// Words of 64 vertices, or clusters of 64 triangles, per task.
+const TASK: usize = 32;
+
+/// The folds of one body in one pose.
+#[derive(Debug, Default)]
+pub(crate) struct Folds {
+    /// The stamp of the positions; 0 for none.
+    positions_stamp: u64,
+    /// One bit per vertex.
+    vertices: Vec<AtomicU64>,
+    /// One bit per triangle.
+    lanes: Vec<AtomicU64>,
+}
+
+impl Folds {
+    pub fn bytes(&self) -> usize {
+        size_of::<AtomicU64>() * (self.vertices.capacity() + self.lanes.capacity())
+    }
+
+    /// The triangles of a cluster that have a fold.
+    #[inline(always)]
+    pub fn of(&self, cluster: usize) -> u64 {
+        self.lanes[cluster].load(Ordering::Relaxed)
+    }
+
+    /// Finds the folds of a pose, unless they are known.
+    pub fn find(
+        &mut self,
+        workers: &Workers,
+        clustering: &Clustering,
+        (positions, stamp): (&Positions, u64),
+    ) {
+        let (Elements::Triangles(faces), Some(rings)) = (&clustering.corners, clustering.rings())
+        else {
+            return;
+        };
+        if self.positions_stamp == stamp {
+            return;
+        }
+        self.positions_stamp = stamp;
+        let n_words = rings.n_vertices().div_ceil(64);
+        self.vertices.resize_with(n_words, AtomicU64::default);
+        self.lanes
+            .resize_with(clustering.n_clusters(), AtomicU64::default);
+        let (vertices, lanes) = (&self.vertices, &self.lanes);
+        let no_scratch = &mut vec![(); workers.n()][..];
+        workers.for_each(no_scratch, n_words.div_ceil(TASK), |(), task| {
+            for (word, bits) in chunk(vertices, task) {
+                let folds = match positions {
+                    Positions::F32(positions) => {
+                        folds(rings, word, |vertex| positions[vertex].map(f64::from))
+                    }
+                    Positions::F64(positions) => folds(rings, word, |vertex| positions[vertex]),
+                };
+                bits.store(folds, Ordering::Relaxed);
+            }
+        });
+        let is_fold = |vertex: u32| {
+            vertices[vertex as usize / 64].load(Ordering::Relaxed) >> (vertex % 64) & 1
+        };
+        workers.for_each(no_scratch, lanes.len().div_ceil(TASK), |(), task| {
+            for (cluster, bits) in chunk(lanes, task) {
+                let faces = &faces[cluster * GROUP..][..clustering.size(cluster)];
+                let folded = (0..).zip(faces).fold(0, |folded, (lane, &[a, b, c])| {
+                    folded | (is_fold(a) | is_fold(b) | is_fold(c)) << lane
+                });
+                bits.store(folded, Ordering::Relaxed);
+            }
+        });
+    }
+}
+
+/// The words of one task, numbered.
+fn chunk(words: &[AtomicU64], task: usize) -> impl Iterator<Item = (usize, &AtomicU64)> {
+    let first = task * TASK;
+    (first..).zip(&words[first..words.len().min(first + TASK)])
+}
+
+/// Bit `k`: vertex `64 word + k` is a fold.
+fn folds(rings: &Rings, word: usize, at: impl Fn(usize) -> [f64; 3]) -> u64 {
+    let first = 64 * word;
+    let end = rings.n_vertices().min(first + 64);
+    (first..end).fold(0, |folds, vertex| {
+        let is_fold = match rings.of(vertex) {
+            Ring::None => false,
+            Ring::Irregular => true,
+            Ring::Regular(ring) => !are_side_by_side(at(vertex), ring, &at),
+        };
+        folds | u64::from(is_fold) << (vertex - first)
+    })
+}
+
+/// Whether the triangles of a vertex with consecutive vertices of its ring certainly share nothing but what they share by
+/// their ids.
+#[inline(always)]
+fn are_side_by_side(vertex: [f64; 3], ring: &[u32], at: &impl Fn(usize) -> [f64; 3]) -> bool {
+    let arm = |other: u32| {
+        let other = at(other as usize);
+        [0, 1, 2].map(|axis| other[axis] - vertex[axis])
+    };
+    let first = arm(ring[0]);
+    let mut last = first;
+    let mut seen = [Seen::default(); 3];
+    for &other in &ring[1..] {
+        let next = arm(other);
+        for axis in 0..3 {
+            seen[axis].add(
+                turn(axis, &last, &next),
+                is_below(axis, &last) != is_below(axis, &next),
+            );
+        }
+        last = next;
+    }
+    let is_closed = ring.first() == ring.last();
+    (0..3).any(|axis| {
+        let closing = turn(axis, &last, &first);
+        seen[axis].is_once_at_most((!is_closed).then_some(closing))
+    })
+}
+
+/// What is seen along one axis while going along a ring.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    /// Whether every triangle certainly turns to the left, and whether every one does to the right.
+    all: [bool; 2],
+    /// How often the ring goes from one half-plane to the other.
+    n_crossings: u32,
+}
+
+impl Default for Seen {
+    fn default() -> Self {
+        Seen {
+            all: [true; 2],
+            n_crossings: 0,
+        }
+    }
+}
+
+impl Seen {
+    #[inline(always)]
+    fn add(&mut self, [left, right]: [bool; 2], crosses: bool) {
+        self.all[0] &= left;
+        self.all[1] &= right;
+        self.n_crossings += u32::from(crosses);
+    }
+
+    /// Whether the triangles turn the same way and do not overlap. An open ring also has the turn from its last vertex to
+    /// its first.
+    #[inline(always)]
+    fn is_once_at_most(&self, closing: Option<[bool; 2]>) -> bool {
+        let [left, right] = self.all;
+        match closing {
+            None => (left || right) && self.n_crossings == 2,
+            Some(closing) => match self.n_crossings {
+                0 | 1 => left || right,
+                2 => (left && closing[0]) || (right && closing[1]),
+                _ => false,
+            },
+        }
+    }
+}
+
+/// Seen along an axis, whether the turn from one arm to another is certainly to the left, and certainly to the right.
+#[inline(always)]
+fn turn(axis: usize, from: &[f64; 3], to: &[f64; 3]) -> [bool; 2] {
+    /// 2^-50: eight rounding errors.
+    const RELATIVE: f64 = f64::from_bits((1023 - 50) << 52);
+    /// 2^-1000, far above what is lost when a product underflows.
+    const ABSOLUTE: f64 = f64::from_bits((1023 - 1000) << 52);
+    let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+    let (up, down) = (from[i] * to[j], from[j] * to[i]);
+    let (turn, bound) = (up - down, RELATIVE * (up.abs() + down.abs()) + ABSOLUTE);
+    [turn > bound, turn < -bound]
+}
+
+/// Seen along an axis, which of two half-planes an arm points to: the one of angles from 0 up to but without 180 degrees,
+/// or the other.
+#[inline(always)]
+fn is_below(axis: usize, arm: &[f64; 3]) -> bool {
+    let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+    arm[j] < 0.0 || (arm[j] == 0.0 && arm[i] < 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grouping::bounds::Bounds;
+
+    /// The triangles that have a fold.
+    fn folded(faces: &[[u32; 3]], positions: &[[f64; 3]]) -> Vec<u32> {
+        let elements = Elements::from(faces.to_vec());
+        let clustering = Clustering::new(&elements, |_| Bounds {
+            min: [0.0; 3],
+            max: [0.0; 3],
+        });
+        clustering.find_rings();
+        let mut answers = Vec::new();
+        let single = positions.iter().map(|p| p.map(|x| x as f32)).collect();
+        for positions in [Positions::F64(positions.to_vec()), Positions::F32(single)] {
+            let mut folds = Folds::default();
+            folds.find(&Workers::new(1), &clustering, (&positions, 1));
+            let mut folded: Vec<u32> = (0..faces.len())
+                .filter(|place| folds.of(place / GROUP) >> (place % GROUP) & 1 == 1)
+                .map(|place| clustering.order[place])
+                .collect();
+            folded.sort_unstable();
+            answers.push(folded);
+        }
+        assert_eq!(answers[0], answers[1]);
+        answers.swap_remove(0)
+    }
+
+    /// Triangles around vertex 0, each of so many degrees. A closed fan ends where it began.
+    fn fan(n: u32, degrees: f64, closed: bool, tilt: f64) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
+        let n_vertices = if closed { n } else { n + 1 };
+        let faces = (0..n).map(|ix| [0, 1 + ix, 1 + (ix + 1) % n_vertices]);
+        let rim = (0..n_vertices).map(|ix| {
+            let angle = (f64::from(ix) * degrees + 7.0).to_radians();
+            [angle.cos(), angle.sin(), tilt * angle.cos()]
+        });
+        let positions = std::iter::once([0.0; 3]).chain(rim).collect();
+        (faces.collect(), positions)
+    }
+
+    #[test]
+    fn fans_that_go_around_once_at_most_have_no_fold() {
+        let all = |n: u32| (0..n).collect::<Vec<u32>>();
+        for tilt in [0.0, 0.5, 20.0] {
+            for (n, degrees, closed, is_fold) in [
+                (2, 60.0, false, false),
+                (4, 80.0, false, false),
+                (7, 51.0, false, false),
+                (8, 44.0, false, false),
+                (3, 179.0, false, true),
+                (9, 50.0, false, true),
+                (12, 50.0, false, true),
+                (3, 120.0, true, false),
+                (7, 360.0 / 7.0, true, false),
+                (10, 72.0, true, true),
+                (40, 27.0, true, true),
+            ] {
+                let (faces, positions) = fan(n, degrees, closed, tilt);
+                let expected = if is_fold { all(n) } else { Vec::new() };
+                let name = format!("{n} of {degrees}, closed {closed}, tilt {tilt}");
+                assert_eq!(folded(&faces, &positions), expected, "{name}");
+                // The other way round, seen from every axis.
+                for axis in 1..3 {
+                    let turned = positions.iter().map(|&p| {
+                        let mut p = p;
+                        p[2] = -p[2];
+                        p.rotate_right(axis);
+                        p
+                    });
+                    let turned: Vec<[f64; 3]> = turned.collect();
+                    assert_eq!(folded(&faces, &turned), expected, "{name}, {axis}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_sheet_has_folds_where_it_is_folded() {
+        let n = 12u32;
+        let vertex = |x: u32, y: u32| y * (n + 1) + x;
+        let faces: Vec<[u32; 3]> = (0..n)
+            .flat_map(|y| (0..n).map(move |x| [x, y]))
+            .flat_map(|[x, y]| {
+                let [p, q] = [vertex(x, y), vertex(x + 1, y)];
+                let [r, s] = [vertex(x, y + 1), vertex(x + 1, y + 1)];
+                [[p, q, s], [p, s, r]]
+            })
+            .collect();
+        let sheet = |height: &dyn Fn(u32) -> [f64; 2]| -> Vec<[f64; 3]> {
+            (0..=n)
+                .flat_map(|y| (0..=n).map(move |x| [x, y]))
+                .map(|[x, y]| {
+                    let [x, z] = height(x);
+                    [x, f64::from(y), z]
+                })
+                .collect()
+        };
+        let flat = sheet(&|x| [f64::from(x), 0.0]);
+        assert!(folded(&faces, &flat).is_empty());
+        let wave = sheet(&|x| [f64::from(x), f64::from(x * x % 5)]);
+        assert!(folded(&faces, &wave).is_empty());
+        // Folded back onto itself at x = 6.
+        let back = sheet(&|x| [f64::from(x.min(12 - x)), 0.0]);
+        let found = folded(&faces, &back);
+        let at_crease = |face: &[u32; 3]| face.iter().any(|vertex| vertex % (n + 1) == 6);
+        let expected: Vec<u32> = (0..)
+            .zip(&faces)
+            .filter_map(|(ix, face)| at_crease(face).then_some(ix))
+            .collect();
+        assert_eq!(found, expected);
+        // Not a number is never certain.
+        let mut broken = flat.clone();
+        broken[vertex(3, 3) as usize][0] = f64::NAN;
+        assert!(!folded(&faces, &broken).is_empty());
+    }
+}
