@@ -189,6 +189,15 @@ fn large() -> Case {
     knot.add_to(&mut scene).unwrap();
     ball.add_to(&mut scene).unwrap();
     soup.add_to(&mut scene).unwrap();
+    // Triangles that overlap in one plane, of which every filter is unsure.
+    let faces: Vec<[u32; 3]> = (0..8).map(|ix| [3 * ix, 3 * ix + 1, 3 * ix + 2]).collect();
+    let corners = (0..8).flat_map(|ix| {
+        let x = 0.125 * ix as f32;
+        [[x, 0.0, 0.0], [x + 2.0, 0.0, 0.0], [x, 2.0, 0.0]]
+    });
+    scene
+        .add_triangles(&faces, &corners.collect::<Vec<_>>())
+        .unwrap();
     Case {
         name: "large".into(),
         scene,
