@@ -80,9 +80,9 @@ function box(size, moved) {
 
 async function large(browser) {
   const { page, problems } = await open(browser, { viewport: { width: 1200, height: 760 } });
-  // It plays: the answer changes by itself.
-  const first = await hashOf(page, "cpu");
-  await page.waitForFunction((first) => document.querySelector("#cpu .hash").textContent !== first, first);
+  // It plays: the time changes by itself.
+  const first = await page.locator("#time").inputValue();
+  await page.waitForFunction((first) => document.getElementById("time").value !== first, first);
 
   await pauseAt(page, 1);
   const atEnd = await pairs(page);
