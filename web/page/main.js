@@ -21,6 +21,8 @@ let isMoved = true;
 let mustDraw = true;
 let phase = 0;
 let before = null;
+// Counts the frames that the CPU has answered.
+let frames = 0;
 
 function show(id, pairs, ms, hash) {
   const row = element(id);
@@ -83,6 +85,7 @@ async function openGpu() {
 
 async function askGpu(cpuHash) {
   const { detector: asked, era } = gpu;
+  const thisFrame = frames;
   gpu.isBusy = true;
   try {
     for (const [ix] of bodies.entries()) void asked.setPositions(ix, view.positions(ix));
@@ -101,6 +104,8 @@ async function askGpu(cpuHash) {
     }
   } finally {
     gpu.isBusy = false;
+    // Without this, a scene that was paused meanwhile would keep the answer about an older frame.
+    if (thisFrame !== frames) isMoved = true;
   }
 }
 
@@ -186,6 +191,7 @@ function frame(now) {
     const start = performance.now();
     for (const [ix] of bodies.entries()) detector.setPositions(ix, view.positions(ix));
     rows = detector.everything();
+    frames += 1;
     show("cpu", rows.length / 4, performance.now() - start, detector.hash);
     view.draw(rows);
     if (gpu.detector !== null && !gpu.isBusy) void askGpu(detector.hash);
