@@ -106,38 +106,90 @@ fn folds(rings: &Rings, word: usize, at: impl Fn(usize) -> [f64; 3]) -> u64 {
         let is_fold = match rings.of(vertex) {
             Ring::None => false,
             Ring::Irregular => true,
-            Ring::Regular(ring) => !are_side_by_side(at(vertex), ring, &at),
+            Ring::Regular(ring) => {
+                let arms = Arms::new(at(vertex), ring, &at);
+                !(arms.are_side_by_side_along_an_axis()
+                    || arms.are_side_by_side_along_their_normal())
+            }
         };
         folds | u64::from(is_fold) << (vertex - first)
     })
 }
 
-/// Whether the triangles of a vertex with consecutive vertices of its ring certainly share nothing but what they share by
-/// their ids.
-#[inline(always)]
-fn are_side_by_side(vertex: [f64; 3], ring: &[u32], at: &impl Fn(usize) -> [f64; 3]) -> bool {
-    let arm = |other: u32| {
-        let other = at(other as usize);
-        [0, 1, 2].map(|axis| other[axis] - vertex[axis])
-    };
-    let first = arm(ring[0]);
-    let mut last = first;
-    let mut seen = [Seen::default(); 3];
-    for &other in &ring[1..] {
-        let next = arm(other);
-        for axis in 0..3 {
-            seen[axis].add(
-                turn(axis, &last, &next),
-                is_below(axis, &last) != is_below(axis, &next),
-            );
-        }
-        last = next;
+/// The vertices of a ring as seen from its middle.
+struct Arms<'a, P> {
+    middle: [f64; 3],
+    ring: &'a [u32],
+    at: &'a P,
+}
+
+impl<'a, P: Fn(usize) -> [f64; 3]> Arms<'a, P> {
+    fn new(middle: [f64; 3], ring: &'a [u32], at: &'a P) -> Self {
+        Arms { middle, ring, at }
     }
-    let is_closed = ring.first() == ring.last();
-    (0..3).any(|axis| {
-        let closing = turn(axis, &last, &first);
-        seen[axis].is_once_at_most((!is_closed).then_some(closing))
-    })
+
+    #[inline(always)]
+    fn arm(&self, other: u32) -> [f64; 3] {
+        let other = (self.at)(other as usize);
+        [0, 1, 2].map(|axis| other[axis] - self.middle[axis])
+    }
+
+    fn is_closed(&self) -> bool {
+        self.ring.first() == self.ring.last()
+    }
+
+    /// Whether seen along some axis the triangles certainly do not overlap.
+    #[inline(always)]
+    fn are_side_by_side_along_an_axis(&self) -> bool {
+        let first = self.arm(self.ring[0]);
+        let mut last = first;
+        let mut seen = [Seen::default(); 3];
+        for &other in &self.ring[1..] {
+            let next = self.arm(other);
+            for axis in 0..3 {
+                let crosses = is_below(axis, &last) != is_below(axis, &next);
+                seen[axis].add(turn(axis, &last, &next), crosses);
+            }
+            last = next;
+        }
+        (0..3).any(|axis| {
+            let closing = turn(axis, &last, &first);
+            seen[axis].is_once_at_most((!self.is_closed()).then_some(closing))
+        })
+    }
+
+    /// Whether seen along the sum of their normals the triangles certainly do not overlap: at the edges of boxes and at
+    /// the rims of cylinders they do along every axis.
+    #[inline(never)]
+    fn are_side_by_side_along_their_normal(&self) -> bool {
+        let mut normal = [0.0; 3];
+        for side in self.ring.windows(2) {
+            let [from, to] = [self.arm(side[0]), self.arm(side[1])];
+            let cross = cross(&from, &to);
+            // As long as one another, whatever the size of their triangles.
+            let length = cross.map(|(up, down)| (up - down) * (up - down));
+            let length = (length[0] + length[1] + length[2]).sqrt();
+            for axis in 0..3 {
+                normal[axis] += (cross[axis].0 - cross[axis].1) / length;
+            }
+        }
+        let first = self.arm(self.ring[0]);
+        let Some(mut was_below) = is_below_along(&normal, &first) else {
+            return false;
+        };
+        let mut last = first;
+        let mut seen = Seen::default();
+        for &other in &self.ring[1..] {
+            let next = self.arm(other);
+            let Some(is_below) = is_below_along(&normal, &next) else {
+                return false;
+            };
+            seen.add(turn_along(&normal, &last, &next), was_below != is_below);
+            (last, was_below) = (next, is_below);
+        }
+        let closing = turn_along(&normal, &last, &first);
+        seen.is_once_at_most((!self.is_closed()).then_some(closing))
+    }
 }
 
 /// What is seen along one axis while going along a ring.
@@ -182,17 +234,50 @@ impl Seen {
     }
 }
 
+/// 2^-50: eight rounding errors.
+const RELATIVE: f64 = f64::from_bits((1023 - 50) << 52);
+/// 2^-1000, far above what is lost when a product underflows.
+const ABSOLUTE: f64 = f64::from_bits((1023 - 1000) << 52);
+
+/// The two products of each coordinate of the cross product of two arms.
+#[inline(always)]
+fn cross(from: &[f64; 3], to: &[f64; 3]) -> [(f64, f64); 3] {
+    [0, 1, 2].map(|axis| {
+        let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+        (from[i] * to[j], from[j] * to[i])
+    })
+}
+
 /// Seen along an axis, whether the turn from one arm to another is certainly to the left, and certainly to the right.
 #[inline(always)]
 fn turn(axis: usize, from: &[f64; 3], to: &[f64; 3]) -> [bool; 2] {
-    /// 2^-50: eight rounding errors.
-    const RELATIVE: f64 = f64::from_bits((1023 - 50) << 52);
-    /// 2^-1000, far above what is lost when a product underflows.
-    const ABSOLUTE: f64 = f64::from_bits((1023 - 1000) << 52);
     let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
     let (up, down) = (from[i] * to[j], from[j] * to[i]);
     let (turn, bound) = (up - down, RELATIVE * (up.abs() + down.abs()) + ABSOLUTE);
     [turn > bound, turn < -bound]
+}
+
+/// The same, seen along a direction: the sign of (from x to) . direction.
+#[inline(always)]
+fn turn_along(direction: &[f64; 3], from: &[f64; 3], to: &[f64; 3]) -> [bool; 2] {
+    let (mut turn, mut size) = (0.0, 0.0);
+    for (along, (up, down)) in direction.iter().zip(cross(from, to)) {
+        turn += along * (up - down);
+        size += along.abs() * (up.abs() + down.abs());
+    }
+    let bound = 2.0 * RELATIVE * size + ABSOLUTE;
+    [turn > bound, turn < -bound]
+}
+
+/// Seen along a direction, on which side of a line an arm certainly lies. Any line would do; on the image of a vector that
+/// is like no other, meshes rarely have vertices.
+#[inline(always)]
+fn is_below_along(direction: &[f64; 3], arm: &[f64; 3]) -> Option<bool> {
+    const LINE: [f64; 3] = [0.331, 0.577, 0.747];
+    match turn_along(arm, direction, &LINE) {
+        [false, false] => None,
+        [_, is_below] => Some(is_below),
+    }
 }
 
 /// Seen along an axis, which of two half-planes an arm points to: the one of angles from 0 up to but without 180 degrees,
@@ -281,6 +366,25 @@ mod tests {
     }
 
     #[test]
+    fn the_corner_of_a_box_has_no_fold() {
+        let rim = [
+            [1.0, 0.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 1.0, 1.0],
+            [0.0, 0.0, 1.0],
+            [1.0, 0.0, 1.0],
+        ];
+        let faces: Vec<[u32; 3]> = (0..6).map(|ix| [0, 1 + ix, 1 + (ix + 1) % 6]).collect();
+        let positions = |rim: &[[f64; 3]]| [&[[0.0; 3]], rim].concat();
+        assert!(folded(&faces, &positions(&rim)).is_empty());
+        // A corner pushed through the opposite side.
+        let mut pushed = rim;
+        pushed[1] = [0.25, 0.25, 1.0];
+        assert_eq!(folded(&faces, &positions(&pushed)).len(), 6);
+    }
+
+    #[test]
     fn a_sheet_has_folds_where_it_is_folded() {
         let n = 12u32;
         let vertex = |x: u32, y: u32| y * (n + 1) + x;
@@ -314,6 +418,9 @@ mod tests {
             .filter_map(|(ix, face)| at_crease(face).then_some(ix))
             .collect();
         assert_eq!(found, expected);
+        // Creased by a right angle, so that one half is seen as a line along every axis.
+        let crease = sheet(&|x| [f64::from(x.min(6)), -f64::from(x.max(6) - 6)]);
+        assert!(folded(&faces, &crease).is_empty());
         // Not a number is never certain.
         let mut broken = flat.clone();
         broken[vertex(3, 3) as usize][0] = f64::NAN;
