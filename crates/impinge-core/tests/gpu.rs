@@ -14,7 +14,7 @@ use impinge_core::{
     Statistics, devices, wgpu,
 };
 use impinge_scenes::deform::{self, Deform};
-use impinge_scenes::{soup, surfaces};
+use impinge_scenes::{regular, soup, surfaces};
 
 /// Settings for the GPU. The first call opens a device and keeps it open, so that all tests share
 /// the device and its compiled kernels.
@@ -498,6 +498,27 @@ fn neighbours_are_settled_on_the_device() {
                 let stats = pairs.stats();
                 let share = stats.n_unsure as f64 / stats.n_candidates as f64;
                 assert!(share <= most_unsure, "{}: {stats:?}", case.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn regular_meshes_are_settled_on_the_device() {
+    let mut detectors = [Method::Clusters, Method::Cells]
+        .map(|method| Detector::with_settings(gpu(method)).unwrap());
+    for surface in regular::ALL {
+        let model = (surface.build)(1_000);
+        let mut scene = Scene::new();
+        let body = model.add_to(&mut scene).unwrap();
+        for rule in [SharedVertex::Skip, SharedVertex::Resolve] {
+            let query = Query::within(body).shared_vertex(rule);
+            for detector in &mut detectors {
+                let pairs = detector.detect(&scene, &query).unwrap();
+                let stats = pairs.stats();
+                let name = format!("{} {rule:?}: {stats:?}", surface.name);
+                assert!(pairs.is_empty(), "{name}");
+                assert!(50 * stats.n_unsure <= stats.n_candidates, "{name}");
             }
         }
     }
