@@ -186,7 +186,7 @@ fn numbers<T: std::fmt::Display>(numbers: impl IntoIterator<Item = T>) -> String
 
 /// Where bodies are at the end of the step. Not an affine motion, so that bodies meet themselves too.
 fn end_of(ix: usize, position: [f32; 3]) -> [f32; 3] {
-    let sign = if ix % 2 == 0 { 0.25 } else { -0.25 };
+    let sign = if ix.is_multiple_of(2) { 0.25 } else { -0.25 };
     let [x, y, z] = position;
     [x + sign, y - sign * x, z + sign * x * y]
 }

@@ -146,9 +146,9 @@ impl<'a, P: Fn(usize) -> [f64; 3]> Arms<'a, P> {
         let mut seen = [Seen::default(); 3];
         for &other in &self.ring[1..] {
             let next = self.arm(other);
-            for axis in 0..3 {
+            for (axis, seen) in seen.iter_mut().enumerate() {
                 let crosses = is_below(axis, &last) != is_below(axis, &next);
-                seen[axis].add(turn(axis, &last, &next), crosses);
+                seen.add(turn(axis, &last, &next), crosses);
             }
             last = next;
         }
