@@ -129,7 +129,7 @@ pub(crate) fn step(question: &Question) -> Step {
 /// The intersection curves as segments.
 pub(crate) fn curves(scene: &Scene, pairs: &Pairs) -> Result<Vec<[[f64; 3]; 2]>, String> {
     let contacts = Contacts::new(scene, pairs).map_err(|error| error.to_string())?;
-    let curves = contacts.curves();
+    let curves = contacts.curves().map_err(|error| error.to_string())?;
     let mut segments = Vec::new();
     for curve in 0..curves.len() {
         let points = curves.points(curve);
