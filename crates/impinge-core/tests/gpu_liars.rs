@@ -69,8 +69,8 @@ const OF_BOTH: &[Damage] = &[
     ),
     (
         "narrow",
-        "return select(UNSURE, YES, low < 0 && high > 0);",
-        "return select(UNSURE, NO, low < 0 && high > 0);",
+        "if low < 0 && high > 0 {",
+        "if low < 0 && high > 0 { if low < 0 { return NO; }",
     ),
     (
         "narrow",
@@ -107,8 +107,13 @@ const OF_CLUSTERS: &[Damage] = &[
     ),
     (
         "narrow",
-        "return select(NO, UNSURE, sign == 0);",
-        "return YES;",
+        "if sign != 0 {",
+        "if sign != 0 { if sign != 2 { return YES; }",
+    ),
+    (
+        "narrow",
+        "return min(min(x, y), z) > above || max(max(x, y), z) < below;",
+        "return max(max(x, y), z) > above || min(min(x, y), z) < below;",
     ),
     ("dispatch", "&& !is_ignored(min(a, b), max(a, b))", ""),
     (
