@@ -518,7 +518,8 @@ fn regular_meshes_are_settled_on_the_device() {
                 let stats = pairs.stats();
                 let name = format!("{} {rule:?}: {stats:?}", surface.name);
                 assert!(pairs.is_empty(), "{name}");
-                assert!(50 * stats.n_unsure <= stats.n_candidates, "{name}");
+                // What is left are pairs across the edges of a box.
+                assert!(20 * stats.n_unsure <= stats.n_candidates, "{name}");
             }
         }
     }
