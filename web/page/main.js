@@ -64,14 +64,16 @@ async function openGpu() {
   const era = gpu.era;
   const previous = gpu.detector;
   gpu.detector = null;
-  await previous?.dispose();
+  // At once: what the row shows is an answer of the detector that goes.
+  for (const cell of element("gpu").querySelectorAll("td")) cell.textContent = "";
   if (!useGpu.checked) {
-    for (const cell of element("gpu").querySelectorAll("td")) cell.textContent = "";
     gpu.note(useGpu.disabled ? element("gpu-note").textContent : "WebGPU is off.");
+    await previous?.dispose();
     return;
   }
   gpu.note("Compiling kernels …");
   try {
+    await previous?.dispose();
     const { GpuDetector } = await gpuModule();
     const opened = await GpuDetector.open({ ...OPTIONS, method: method.value });
     for (const [ix, body] of bodies.entries()) await addTo(opened, body, view.positions(ix));
@@ -79,7 +81,7 @@ async function openGpu() {
     gpu.detector = opened;
     isMoved = true;
   } catch (error) {
-    gpu.note(`WebGPU failed: ${error.message}`, "different");
+    if (era === gpu.era) gpu.note(`WebGPU failed: ${error.message}`, "different");
   }
 }
 
