@@ -2,7 +2,7 @@
 
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use eframe::egui;
 use egui_wgpu::RenderState;
@@ -38,26 +38,25 @@ struct Measured {
     began: Option<Instant>,
 }
 
+/// How often the window looks whether the content has been read.
+const LOADING: Duration = Duration::from_millis(20);
+
 /// Frames that are not measured: buffers and pipelines are made in them.
 const WARM_UP: u32 = 10;
 
 impl Viewer {
-    /// An app for a window, or for a test. `load` runs on a thread of its own.
+    /// An app for a window, or for a test, that draws with the device of `render`. `load` runs on a thread of its own.
     pub fn new(
-        creation: &eframe::CreationContext<'_>,
+        render: Option<RenderState>,
         load: impl FnOnce() -> Result<Content, String> + Send + 'static,
         options: Options,
     ) -> Self {
-        creation.egui_ctx.set_visuals(egui::Visuals::light());
         let (to, content) = channel();
-        let ctx = creation.egui_ctx.clone();
         let thread = thread::Builder::new().name("load".to_owned());
         let spawned = thread.spawn(move || {
             // If the window was closed meanwhile, nobody waits for the content.
             let _ = to.send(load());
-            ctx.request_repaint();
         });
-        let render = creation.wgpu_render_state.clone();
         let state = match (spawned, &render) {
             (Err(error), _) => State::Failed(format!("no thread can be started: {error}")),
             (_, None) => State::Failed("the window has no graphics device".to_owned()),
@@ -204,6 +203,13 @@ impl Viewer {
 
 impl eframe::App for Viewer {
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        self.show(ui);
+    }
+}
+
+impl Viewer {
+    /// One frame of the app, with all that its user did since the last one.
+    pub fn show(&mut self, ui: &mut egui::Ui) {
         let ctx = ui.ctx().clone();
         let now = Instant::now();
         let seconds = self
@@ -216,8 +222,7 @@ impl eframe::App for Viewer {
                 egui::CentralPanel::default().show(ui, |ui| {
                     ui.centered_and_justified(|ui| ui.label("reading …"));
                 });
-                // The thread wakes the window, but not if it panics.
-                ctx.request_repaint_after(std::time::Duration::from_millis(200));
+                ctx.request_repaint_after(LOADING);
             }
             State::Failed(text) => {
                 egui::CentralPanel::default().show(ui, |ui| {

@@ -36,11 +36,8 @@ impl Screen {
                 keep_first(&to, error.to_string());
             }));
         let to = Arc::clone(&errors);
-        state.device.set_device_lost_callback(move |reason, text| {
-            // When the window is closed, its device goes.
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                keep_first(&to, format!("the device is lost: {text}"));
-            }
+        state.device.set_device_lost_callback(move |_, text| {
+            keep_first(&to, format!("the device is lost: {text}"));
         });
         // Four samples cost a software driver more than everything else together.
         let is_software = state.adapter.get_info().device_type == wgpu::DeviceType::Cpu;
@@ -62,6 +59,8 @@ impl Screen {
 
     /// The first error of the device since the last call.
     pub fn take_error(&self) -> Option<String> {
+        // Without this, a loss would be told only when the next work is done, and there may be none.
+        let _ = self.state.device.poll(wgpu::PollType::Poll);
         let mut held = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
         held.take()
     }

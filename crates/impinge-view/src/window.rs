@@ -43,8 +43,13 @@ pub fn show(
         dithering: false,
         ..Default::default()
     };
-    let create: eframe::AppCreator<'_> =
-        Box::new(move |creation| Ok(Box::new(Viewer::new(creation, load, options))));
+    let create: eframe::AppCreator<'_> = Box::new(move |creation| {
+        creation
+            .egui_ctx
+            .set_visuals(eframe::egui::Visuals::light());
+        let render = creation.wgpu_render_state.clone();
+        Ok(Box::new(Viewer::new(render, load, options)))
+    });
     eframe::run_native("impinge view", native, create).map_err(|error| Error {
         what: error.to_string(),
     })

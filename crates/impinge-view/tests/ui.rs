@@ -5,9 +5,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use eframe::egui::{Key, Modifiers, Pos2};
+use eframe::egui::{Key, Modifiers, Pos2, UiBuilder};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
+use egui_kittest::wgpu::{WgpuTestRenderer, create_render_state, default_wgpu_setup};
+use egui_wgpu::wgpu::PollType;
+use egui_wgpu::{RenderState, RendererOptions};
 use impinge::{Backend, BodyId, Detector, Positions, Query, Scene, SharedVertex, Step};
 use impinge_io::Sequence;
 use impinge_render::Colors;
@@ -110,10 +113,30 @@ fn open(
     load: impl FnOnce() -> Result<Content, String> + Send + 'static,
     options: Options,
 ) -> Harness<'static, Viewer> {
+    let render = create_render_state(default_wgpu_setup(), RendererOptions::PREDICTABLE);
+    open_on(render, load, options)
+}
+
+/// The same on a device of the test's own.
+fn open_on(
+    render: RenderState,
+    load: impl FnOnce() -> Result<Content, String> + Send + 'static,
+    options: Options,
+) -> Harness<'static, Viewer> {
+    let viewer = Viewer::new(Some(render.clone()), load, options);
     let mut harness = Harness::builder()
         .with_size(SIZE)
-        .wgpu()
-        .build_eframe(|creation| Viewer::new(creation, load, options));
+        .with_theme(eframe::egui::Theme::Light)
+        .renderer(WgpuTestRenderer::from_render_state(render))
+        .build_ui_state(
+            |ui, viewer: &mut Viewer| {
+                // Like a window: without the margin that the harness leaves.
+                let all = ui.ctx().viewport_rect();
+                ui.set_clip_rect(all);
+                ui.scope_builder(UiBuilder::new().max_rect(all), |ui| viewer.show(ui));
+            },
+            viewer,
+        );
     wait(&mut harness, |viewer| !viewer.is_loading());
     harness.step();
     harness
@@ -559,6 +582,29 @@ fn an_empty_mesh_is_a_message() {
     press(&mut harness, Key::F);
     press(&mut harness, Key::J);
     harness.render().expect("a picture");
+}
+
+#[test]
+fn a_lost_device_is_a_message_and_the_cpu_still_answers() {
+    let render = create_render_state(default_wgpu_setup(), RendererOptions::PREDICTABLE);
+    let (device, queue) = (render.device.clone(), render.queue.clone());
+    let mut harness = open_on(render, || Ok(still(1000, 0.6)), paused());
+    let before = harness.state().hash().expect("an answer");
+    // A device that is destroyed is lost once all its work is done.
+    queue.submit([]);
+    device
+        .poll(PollType::wait_indefinitely())
+        .expect("it is done");
+    device.destroy();
+    drag(&mut harness, Pos2::new(20.0, 20.0), [40.0, 0.0]);
+    let message = harness.state().message().expect("a message").to_owned();
+    assert!(message.contains("device"), "{message}");
+    assert_eq!(harness.state().hash(), Some(before));
+    // Detection on this device is refused, and back on the CPU it goes on.
+    click(&mut harness, "GPU");
+    assert!(harness.state().message().is_some());
+    click(&mut harness, "CPU");
+    assert_eq!(harness.state().hash(), Some(before));
 }
 
 #[test]
