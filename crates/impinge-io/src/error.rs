@@ -111,7 +111,7 @@ pub enum Error {
     },
     /// A primitive names a vertex that does not exist. Check the index; the message says how the format counts.
     #[error(
-        "{at}: vertex index {index} is out of range: {n_vertices} vertices, numbered from {first}"
+        "{at}: vertex index {index} is out of range; vertices: {n_vertices}, numbered from {first}"
     )]
     Index {
         /// Where.
@@ -143,7 +143,7 @@ pub enum Error {
     },
     /// The file has no primitive of the wanted kind. Check that it is a surface or a volume, not points or curves.
     #[error(
-        "{file}: no {wanted} in this file ({n_vertices} vertices, {n_triangles} triangles, {n_tetrahedra} tetrahedra, {n_lines} lines, {n_points} points)"
+        "{file}: no {wanted} in this file (vertices: {n_vertices}, triangles: {n_triangles}, tetrahedra: {n_tetrahedra}, lines: {n_lines}, points: {n_points})"
     )]
     NoPrimitives {
         /// The file.

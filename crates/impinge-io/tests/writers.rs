@@ -338,7 +338,7 @@ fn what_does_not_fit_together_is_refused_and_nothing_is_written() {
             .unwrap_err()
             .to_string();
         assert!(
-            message.ends_with("vertex index 4 is out of range: 2 vertices, numbered from 0"),
+            message.ends_with("vertex index 4 is out of range; vertices: 2, numbered from 0"),
             "{message}"
         );
         let nowhere = folder.path().join("no/such").join(name);

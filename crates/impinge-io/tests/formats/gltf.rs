@@ -130,7 +130,7 @@ fn gltf_errors() {
         (
             r#""count":5"#,
             r#""count":4"#,
-            "file: vertex index 4 is out of range: 4 vertices, numbered from 0",
+            "file: vertex index 4 is out of range; vertices: 4, numbered from 0",
         ),
         (
             r#""indices":1"#,

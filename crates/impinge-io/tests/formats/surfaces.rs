@@ -36,19 +36,19 @@ fn obj_errors_name_the_line_and_both_numbers() {
     for (obj, expected) in [
         (
             "v 0 0 0\nf 1 2 3\n",
-            "file:2: vertex index 3 is out of range: 1 vertices, numbered from 1",
+            "file:2: vertex index 3 is out of range; vertices: 1, numbered from 1",
         ),
         (
             "v 0 0 0\nv 0 0 0\nf 1 2 -3\n",
-            "file:3: vertex index -3 is out of range: 2 vertices, numbered from -2",
+            "file:3: vertex index -3 is out of range; vertices: 2, numbered from -2",
         ),
         (
             "v 0 0 0\nf 1 0 1\n",
-            "file:2: vertex index 0 is out of range: 1 vertices, numbered from 1",
+            "file:2: vertex index 0 is out of range; vertices: 1, numbered from 1",
         ),
         (
             "v 0 0 0\nf 1 1 99999999999\n",
-            "file:2: vertex index 99999999999 is out of range: 1 vertices, numbered from 1",
+            "file:2: vertex index 99999999999 is out of range; vertices: 1, numbered from 1",
         ),
         ("v 0 0\n", "file:1: expected z, found the end of the line"),
         ("v 0 0 o\n", "file:1: expected z, found 'o'"),
@@ -74,7 +74,7 @@ fn obj_errors_name_the_line_and_both_numbers() {
         ),
         (
             "v 0 0 0\nl 1 1\n",
-            "file: no triangles or tetrahedra in this file (1 vertices, 0 triangles, 0 tetrahedra, 1 lines, 0 points)",
+            "file: no triangles or tetrahedra in this file (vertices: 1, triangles: 0, tetrahedra: 0, lines: 1, points: 0)",
         ),
     ] {
         assert_eq!(message(Format::Obj, obj), expected);
@@ -125,7 +125,7 @@ fn off_variants() {
         ),
         (
             "OFF\n1 1 0\n0 0 0\n3 0 0 1\n",
-            "file:4: vertex index 1 is out of range: 1 vertices, numbered from 0",
+            "file:4: vertex index 1 is out of range; vertices: 1, numbered from 0",
         ),
         (
             "OFF\n1 1 0\n0 0 0\n3 0 0\n",
@@ -240,8 +240,8 @@ fn ply_errors() {
         ("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n".into(), "file:3: expected a property 'z' of the element 'vertex', found none"),
         (format!("{vertices}element face 1\nproperty list uchar float vertex_indices\nend_header\n0 0 0\n"), "file:7: expected an integer type for vertex indices, found a floating one"),
         (format!("{vertices}element face 1\nproperty int a\nend_header\n0 0 0\n1\n"), "file:7: expected a list 'vertex_indices' of the element 'face', found none"),
-        (format!("{faces}3 0 0 1\n"), "file:11: vertex index 1 is out of range: 1 vertices, numbered from 0"),
-        (format!("{faces}3 0 0 -1\n"), "file:11: vertex index -1 is out of range: 1 vertices, numbered from 0"),
+        (format!("{faces}3 0 0 1\n"), "file:11: vertex index 1 is out of range; vertices: 1, numbered from 0"),
+        (format!("{faces}3 0 0 -1\n"), "file:11: vertex index -1 is out of range; vertices: 1, numbered from 0"),
         (format!("{faces}3 0 0\n"), "file:11: expected an item of a list, found the end of the line"),
         (format!("{faces}3 0 0 0 0\n"), "file:11: expected the end of the line, found '0'"),
         (format!("{faces}2 0 0\n"), "file:11: expected 3 corners of a polygon, or more, found 2"),

@@ -94,7 +94,7 @@ fn vtk_errors() {
         ),
         (
             format!("{start}CELLS 1 4\n3 0 1\n2\nCELL_TYPES 1 5\n"),
-            "file:8: vertex index 2 is out of range: 2 vertices, numbered from 0",
+            "file:8: vertex index 2 is out of range; vertices: 2, numbered from 0",
         ),
         (
             format!("{start}CELLS 1 9\n8\n0 0 0 0 0 0 0 0\nCELL_TYPES 1\n12\n"),
@@ -150,12 +150,12 @@ fn vtu_pieces_and_errors() {
         (
             "0 1 2<",
             "0 1 3<",
-            "vertex index 3 is out of range: 3 vertices, numbered from 0",
+            "vertex index 3 is out of range; vertices: 3, numbered from 0",
         ),
         (
             "0 1 2<",
             "0 1 -1<",
-            "vertex index -1 is out of range: 3 vertices, numbered from 0",
+            "vertex index -1 is out of range; vertices: 3, numbered from 0",
         ),
         (
             ">3<",
@@ -250,7 +250,7 @@ fn medit_errors_and_sections() {
     for (more, expected) in [
         (
             "Triangles 1\n1 2 5 0\n",
-            "file:9: vertex index 5 is out of range: 4 vertices, numbered from 1",
+            "file:9: vertex index 5 is out of range; vertices: 4, numbered from 1",
         ),
         (
             "Triangles 2\n1 2 3 0\n",
@@ -300,7 +300,7 @@ fn tetgen_files_find_each_other() {
         (
             nodes,
             "1 4 0\n0 0 1 2 0\n",
-            "e.ele:2: vertex index 2 is out of range: 2 vertices, numbered from 0",
+            "e.ele:2: vertex index 2 is out of range; vertices: 2, numbered from 0",
         ),
         (
             nodes,
