@@ -6,8 +6,10 @@ mod steps;
 
 use crate::cpu::Cpu;
 use crate::error::Error;
+use crate::ids::BodyId;
 use crate::pairs::Pairs;
 use crate::progress::Control;
+use crate::proximity::{Distances, Nearest};
 use crate::query::Query;
 use crate::run::{FrameLoop, ready};
 use crate::scene::Scene;
@@ -34,6 +36,7 @@ pub struct Detector {
     frames: FrameLoop,
     cpu: Cpu,
     steps: steps::Steps,
+    distances: Distances,
     #[cfg(feature = "gpu")]
     gpu: Option<crate::gpu::Engine>,
 }
@@ -90,6 +93,7 @@ impl Detector {
             frames: FrameLoop::new(settings.threads, settings.limits()),
             cpu: Cpu::new(&settings),
             steps: steps::Steps::new(&settings),
+            distances: Distances::new(),
             settings,
         }
     }
@@ -168,6 +172,37 @@ impl Detector {
     ) -> Result<bool, Error> {
         self.wait_for(scene, query, control, Wanted::Any)?;
         Ok(self.frames.n_pairs() > 0)
+    }
+
+    /// The smallest distance of two bodies at the positions that they have, and the pair of primitives that has it; `None` if one
+    /// body has no primitives. The distance is 0 if and only if they share a point, which is decided exactly. Tetrahedra are
+    /// solid: a body inside one has distance 0.
+    ///
+    /// The detector keeps a tree per body and the nearest pair of each call. So repeated calls for bodies that move cost
+    /// little more than to read their positions. The answer does not depend on earlier calls.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// let triangle = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// let a = scene.add_triangles(&[[0, 1, 2]], &triangle)?;
+    /// let b = scene.add_triangles(&[[0, 1, 2]], &triangle.map(|[x, y, z]| [x, y, z + 3.0]))?;
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let nearest = detector.distance(&scene, a, b)?.expect("both have primitives");
+    /// assert_eq!((nearest.distance, nearest.primitives), (3.0, [0, 0]));
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// A stale id, the same body twice, bad positions that were written in place.
+    pub fn distance(
+        &mut self,
+        scene: &Scene,
+        a: BodyId,
+        b: BodyId,
+    ) -> Result<Option<Nearest>, Error> {
+        self.distances.between(scene, a, b)
     }
 
     /// The pairs that [`detect`](Detector::detect) found last, out of the detector without a copy. Until the next

@@ -43,6 +43,24 @@ impl PairKind {
         }
     }
 
+    /// The parts of bodies that the elements belong to, in the order of the name.
+    ///
+    /// ```
+    /// use impinge_core::{PairKind, Part};
+    /// assert_eq!(PairKind::VertexFace.parts(), [Part::Vertices, Part::Faces]);
+    /// ```
+    pub fn parts(self) -> [Part; 2] {
+        use Part::{Edges, Faces, Vertices};
+        match self {
+            PairKind::VertexFace => [Vertices, Faces],
+            PairKind::EdgeEdge => [Edges, Edges],
+            PairKind::EdgeVertex => [Edges, Vertices],
+            PairKind::VertexVertex => [Vertices, Vertices],
+            PairKind::EdgeFace => [Edges, Faces],
+            PairKind::FaceFace => [Faces, Faces],
+        }
+    }
+
     /// The kind of a pair of elements of two parts.
     pub(crate) fn of(a: Part, b: Part) -> Option<PairKind> {
         use Part::{Edges, Faces, Vertices};

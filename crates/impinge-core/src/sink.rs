@@ -69,6 +69,16 @@ pub(crate) fn room<T>(n: usize, what: &'static str) -> Result<Vec<T>, Error> {
     Ok(list)
 }
 
+/// A list of so many equal values.
+///
+/// # Errors
+/// There is no memory for them.
+pub(crate) fn filled<T: Clone>(value: T, n: usize, what: &'static str) -> Result<Vec<T>, Error> {
+    let mut list = room(n, what)?;
+    list.resize(n, value);
+    Ok(list)
+}
+
 /// Makes room for so many more in a list that grows often: whenever it is full, it doubles.
 ///
 /// # Errors

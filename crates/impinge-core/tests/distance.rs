@@ -152,3 +152,63 @@ fn bodies_without_primitives_and_wrong_questions() {
     scene.remove(ball).unwrap();
     assert!(distances.between(&scene, ball, empty).is_err());
 }
+
+/// A detector that has answered before says the same as one that has not, whatever has happened to the scene meanwhile.
+#[test]
+fn earlier_calls_change_nothing() {
+    let ball = surfaces::bumpy_ball(3_000, 0.2);
+    let (mut scene, [a, mut b]) = scene(&ball, &surfaces::bumpy_ball(2_000, 0.1));
+    let mut kept = Detector::new(Backend::Cpu).unwrap();
+    let (mut n_touching, mut n_pairs) = (0, std::collections::BTreeSet::new());
+    for step in 0..60 {
+        let turn = 0.1 * step as f32;
+        let (sin, cos) = turn.sin_cos();
+        let away = 0.95 + 0.35 * (3.0 * turn).sin();
+        let moved = ball.mapped(|[x, y, z]| {
+            let wave = 1.0 + 0.05 * (5.0 * y + turn).sin();
+            [away * sin + wave * x, away * cos + 0.8 * z, wave * y]
+        });
+        scene.set_positions(a, &moved.positions).unwrap();
+        if step == 20 {
+            // Another body in the same slot, with fewer triangles.
+            scene.remove(b).unwrap();
+            b = surfaces::ball(100).add_to(&mut scene).unwrap();
+        }
+        for (x, y) in [(a, b), (b, a)] {
+            let found = kept.distance(&scene, x, y).unwrap().unwrap();
+            let anew = Distances::new().between(&scene, x, y).unwrap().unwrap();
+            assert_eq!(found, anew, "step {step}");
+            n_touching += u32::from(found.distance == 0.0);
+            n_pairs.insert(found.primitives);
+        }
+    }
+    assert!(
+        n_touching > 5 && n_touching < 110 && n_pairs.len() > 20,
+        "{n_touching}"
+    );
+    assert!(kept.distance(&scene, a, a).is_err());
+}
+
+/// Positions in `f64` whose differences are lost in `f32`: boxes are rounded, distances are not.
+#[test]
+fn far_from_the_origin_in_double_precision() {
+    let ball = surfaces::ball(500);
+    let faces: Vec<[u32; 3]> = (0..ball.elements.len())
+        .map(|ix| ball.elements.corners(ix).try_into().unwrap())
+        .collect();
+    let at = |shift: f64, far: f64| -> Vec<[f64; 3]> {
+        let points = ball.positions.iter().map(|p| p.map(f64::from));
+        points.map(|[x, y, z]| [x + shift + far, y, z]).collect()
+    };
+    let found = [0.0, 1e8].map(|far| {
+        let mut scene = Scene::new();
+        let a = scene.add_triangles(&faces, &at(0.0, far)).unwrap();
+        let b = scene.add_triangles(&faces, &at(1.25, far)).unwrap();
+        Distances::new().between(&scene, a, b).unwrap().unwrap()
+    });
+    assert!(found[0].distance > 0.1);
+    assert!(
+        (found[0].distance - found[1].distance).abs() < 1e-7,
+        "{found:?}"
+    );
+}

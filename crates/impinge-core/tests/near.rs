@@ -65,17 +65,6 @@ fn elements(scene: &Scene, part: Part) -> Vec<Element> {
     all
 }
 
-fn parts(kind: PairKind) -> [Part; 2] {
-    match kind {
-        PairKind::VertexFace => [Part::Vertices, Part::Faces],
-        PairKind::EdgeEdge => [Part::Edges, Part::Edges],
-        PairKind::EdgeVertex => [Part::Edges, Part::Vertices],
-        PairKind::VertexVertex => [Part::Vertices, Part::Vertices],
-        PairKind::EdgeFace => [Part::Edges, Part::Faces],
-        PairKind::FaceFace => [Part::Faces, Part::Faces],
-    }
-}
-
 fn four(points: &[&[Point]]) -> [Point; 4] {
     let mut four = [[0.0; 3]; 4];
     for (to, from) in four.iter_mut().zip(points.iter().copied().flatten()) {
@@ -115,10 +104,10 @@ fn settle(kind: PairKind, a: &[Point], b: &[Point], distance: f64) -> Option<Opt
 fn expected(scene: &Scene, distance: f64) -> Vec<Row> {
     let mut expected = Vec::new();
     for kind in PairKind::ALL {
-        let [of_a, of_b] = parts(kind).map(|part| elements(scene, part));
+        let [of_a, of_b] = kind.parts().map(|part| elements(scene, part));
         for a in &of_a {
             for b in &of_b {
-                let is_twice = parts(kind)[0] == parts(kind)[1]
+                let is_twice = kind.parts()[0] == kind.parts()[1]
                     && (a.body.index(), a.number) >= (b.body.index(), b.number);
                 let shares = a.body == b.body && a.ids.iter().any(|id| b.ids.contains(id));
                 if is_twice || shares {
@@ -336,7 +325,7 @@ fn edges_and_faces_are_as_far_as_their_nearest_parts() {
                 let ids = ids.iter().map(|&id| body.positions().point(id as usize));
                 ids.collect()
             };
-            let [of_a, of_b] = parts(pair.kind);
+            let [of_a, of_b] = pair.kind.parts();
             let a = corners(of_a, pair.a.body, pair.a.primitive);
             let b = corners(of_b, pair.b.body, pair.b.primitive);
             let closest = pair.closest.expect("asked for");

@@ -22,6 +22,7 @@
 //! grows linearly. It is implicit too.
 
 use impinge::Pairs;
+use impinge::contact::SolidOverlap;
 use rayon::prelude::*;
 
 use crate::elasticity::GRAIN;
@@ -29,7 +30,6 @@ use crate::element::{Mat3, Vec3};
 use crate::error::Error;
 use crate::lists::Lists;
 use crate::mesh::Mesh;
-use crate::overlap::Clipper;
 use crate::rotation::cofactors;
 use crate::settings::Settings;
 
@@ -114,18 +114,20 @@ impl Now<'_> {
             pairs
                 .par_iter()
                 .with_min_len(64)
-                .map_init(Clipper::default, |clipper, &pair| {
-                    self.contact(clipper, pair)
+                .map_init(SolidOverlap::new, |overlap, &pair| {
+                    self.contact(overlap, pair)
                 })
                 .flatten_iter(),
         );
     }
 
-    fn contact(&self, clipper: &mut Clipper, pair: [u32; 2]) -> Option<Contact> {
+    fn contact(&self, overlap: &mut SolidOverlap, pair: [u32; 2]) -> Option<Contact> {
         let elements = pair.map(|tet| &self.mesh.elements[tet as usize]);
         let corners = elements.map(|e| e.corners.map(|corner| self.positions[corner as usize]));
-        clipper.clip(&corners[0], &corners[1]);
-        let (volume, at) = clipper.volume()?;
+        let points = corners.map(|corners| corners.map(Into::into));
+        overlap.cut(&points[0], &points[1]);
+        let (volume, at) = overlap.volume()?;
+        let at = Vec3::from(at);
         let weights = [
             barycentric(&corners[0], &at)?,
             barycentric(&corners[1], &at)?,
@@ -151,7 +153,7 @@ impl Now<'_> {
             .sum();
         let (hardness, edge) = self.hardness(pair);
         let force = hardness * volume;
-        let stiffness = force / clipper.extent(&normal).max(depth);
+        let stiffness = force / overlap.extent(&normal.into()).max(depth);
         if !(force.is_finite() && stiffness.is_finite()) {
             return None;
         }

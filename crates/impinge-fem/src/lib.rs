@@ -19,14 +19,12 @@
 //! every sum has a fixed order.
 
 mod contact;
-mod depth;
 mod elasticity;
 mod element;
 mod error;
 mod lists;
 mod matrix;
 mod mesh;
-mod overlap;
 mod rotation;
 pub mod scenes;
 mod settings;

@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
+use impinge::contact::solid_depths;
 use rayon::prelude::*;
 
-use crate::depth::depths;
 use crate::element::{Element, Vec3};
 use crate::error::Error;
 use crate::lists::Lists;
@@ -37,7 +37,7 @@ pub(crate) struct Mesh {
     pub surface: Vec<[u32; 3]>,
     /// A third of the rest area of a vertex's surface triangles; 0 inside.
     pub areas: Vec<f64>,
-    /// The depth of a vertex below the surface at rest; 0 on the surface.
+    /// The depth of a vertex below the surface at rest, along edges; 0 on the surface.
     pub depths: Vec<f64>,
     /// Each vertex's tetrahedra, as 4 · element + corner, ascending.
     pub tets_at: Lists,
@@ -75,7 +75,9 @@ impl Mesh {
             face.iter()
                 .for_each(|&corner| mesh.areas[corner as usize] += third);
         }
-        mesh.depths = depths(&rest, &mesh.elements, &mesh.tets_at, &mesh.faces_at);
+        let points: Vec<[f64; 3]> = rest.iter().map(|&point| point.into()).collect();
+        let tetrahedra: Vec<[u32; 4]> = mesh.elements.iter().map(corners).collect();
+        mesh.depths = solid_depths(&points, &tetrahedra, &mesh.surface);
         Ok(mesh)
     }
 

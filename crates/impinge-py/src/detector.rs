@@ -8,6 +8,7 @@ use pyo3::types::{PyDict, PyTuple};
 use crate::arrays;
 use crate::errors::raise;
 use crate::near::{self, NearPairs};
+use crate::proximity::Nearest;
 use crate::question::{question, step_question};
 use crate::result::Answer;
 use crate::scene::Scene;
@@ -660,6 +661,49 @@ impl Detector {
         let watched = (scene, progress, cancel);
         let (pairs, ..) = Detector::watched(slf, watched, ask, answer)?;
         Ok(NearPairs::new(pairs, closest_points))
+    }
+
+    /// The smallest distance of two bodies at the positions that they have, and the pair of primitives that has it. Tetrahedra
+    /// are solid. Trees and the last pair are kept, so that later calls for bodies that move cost little.
+    ///
+    /// Parameters
+    /// ----------
+    /// scene : Scene
+    /// a, b : Body or int
+    ///
+    /// Returns
+    /// -------
+    /// Nearest or None
+    ///     ``None`` where one of them has no primitive. Its distance is 0 if and only if they share a point.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     A body that the scene does not have, twice the same body.
+    /// RuntimeError
+    ///     A scene or a detector that is busy in another thread.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import impinge
+    /// >>> scene = impinge.Scene()
+    /// >>> floor = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+    /// >>> other = scene.add([[0, 0, 3], [4, 0, 3], [0, 4, 5]], [[0, 1, 2]])
+    /// >>> impinge.Detector(backend="cpu").distance(scene, floor, other)
+    /// Nearest(3.0, primitives (0, 0))
+    fn distance(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        a: &Bound<'_, PyAny>,
+        b: &Bound<'_, PyAny>,
+    ) -> PyResult<Option<Nearest>> {
+        let ask = |scene: &Scene| Ok([scene.id(a, "a")?, scene.id(b, "b")?]);
+        let answer = |detector: &mut impinge::Detector,
+                      scene: &impinge::Scene,
+                      &[a, b]: &[impinge::BodyId; 2],
+                      _: &Control<'_>| detector.distance(scene, a, b);
+        let (nearest, ..) = Detector::watched(slf, (scene, None, None), ask, answer)?;
+        Ok(nearest.map(Nearest::from))
     }
 
     fn __repr__(&self) -> String {

@@ -15,6 +15,12 @@ pub struct Nearest {
     inner: proximity::Nearest,
 }
 
+impl From<proximity::Nearest> for Nearest {
+    fn from(inner: proximity::Nearest) -> Self {
+        Nearest { inner }
+    }
+}
+
 #[pymethods]
 impl Nearest {
     /// float : their distance in the unit of the scene. 0 if and only if they share a point, which is decided
@@ -107,6 +113,6 @@ impl Distances {
         let (a, b) = (scene.id(a, "a")?, scene.id(b, "b")?);
         let (inner, bodies) = (&mut distances.inner, &scene.inner);
         let nearest = py.detach(|| inner.between(bodies, a, b)).map_err(raise)?;
-        Ok(nearest.map(|inner| Nearest { inner }))
+        Ok(nearest.map(Nearest::from))
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use impinge::{Body, BodyId, Impacts, PairKind, Part};
+use impinge::{Body, BodyId, Impacts, Part};
 
 /// The first time of contact of each primitive that touches anything, by itself or by an edge, a vertex or a face of it.
 pub(crate) fn first_times(body: &Body, id: BodyId, impacts: &Impacts) -> Vec<(u32, f64)> {
@@ -10,7 +10,7 @@ pub(crate) fn first_times(body: &Body, id: BodyId, impacts: &Impacts) -> Vec<(u3
     // Sorted corners, filled up with the last one.
     let mut times: HashMap<[u32; 3], f64> = HashMap::new();
     for impact in impacts.iter() {
-        for (part, element) in parts(impact.kind).into_iter().zip([impact.a, impact.b]) {
+        for (part, element) in impact.kind.parts().into_iter().zip([impact.a, impact.b]) {
             if element.body != id {
                 continue;
             }
@@ -65,18 +65,6 @@ fn key(corners: &[u32]) -> [u32; 3] {
         *held = largest;
     }
     key
-}
-
-/// The parts of the first and of the second element of a kind.
-fn parts(kind: PairKind) -> [Part; 2] {
-    match kind {
-        PairKind::VertexFace => [Part::Vertices, Part::Faces],
-        PairKind::EdgeEdge => [Part::Edges; 2],
-        PairKind::EdgeVertex => [Part::Edges, Part::Vertices],
-        PairKind::VertexVertex => [Part::Vertices; 2],
-        PairKind::EdgeFace => [Part::Edges, Part::Faces],
-        PairKind::FaceFace => [Part::Faces; 2],
-    }
 }
 
 /// Red at the start of the step, yellow at its end.

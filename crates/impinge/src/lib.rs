@@ -14,7 +14,7 @@
 //!   For solvers, [`Detector::earliest`] finds the first contact of a step, [`Detector::is_free`] decides whether there is any,
 //!   and [`Detector::advance`] finds how far a step can be taken.
 //! * **Proximity.** [`Detector::within_distance`] finds which vertices, edges and faces are within a distance of each other,
-//!   exactly, and which of their features are nearest.
+//!   exactly, and which of their features are nearest. [`Detector::distance`] finds the smallest distance of two bodies.
 //!
 //! ```toml
 //! [dependencies]

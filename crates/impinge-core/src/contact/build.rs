@@ -16,7 +16,7 @@ use crate::ids::BodyId;
 use crate::pairs::Pairs;
 use crate::positions::{Positions, check_positions};
 use crate::scene::{Body, Scene};
-use crate::sink::{self, reserve};
+use crate::sink::{self, grow, reserve};
 
 /// Pairs per task.
 const CHUNK: usize = 256;
@@ -56,8 +56,7 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> 
         });
     }
     let number = |name: &PointName| names.partition_point(|held| held < name) as u32;
-    let mut corners: Vec<u32> = room(n_corners)?;
-    corners.resize(n_corners, 0);
+    let mut corners: Vec<u32> = sink::filled(0, n_corners, WHAT)?;
     let mut rest = &mut corners[..];
     let mut of_chunks: Vec<(&Met, &mut [u32])> = room(n_chunks)?;
     for met in &met {
@@ -70,8 +69,7 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> 
             *corner = number(name);
         }
     });
-    let mut points: Vec<[f64; 3]> = room(names.len())?;
-    points.resize(names.len(), [0.0; 3]);
+    let mut points: Vec<[f64; 3]> = sink::filled([0.0; 3], names.len(), WHAT)?;
     let places = names.par_iter().zip(&mut points).with_min_len(CHUNK);
     places.for_each(|(name, point)| {
         *point = bodies.place(name).rounded(bodies.precision(name.bodies));
@@ -128,10 +126,7 @@ impl Met {
         };
         let meeting = meet(&a.points, &b.points);
         let corners = meeting.corners();
-        if self.names.capacity() - self.names.len() < corners.len() {
-            let more = self.names.len().max(CHUNK);
-            reserve(&mut self.names, more, WHAT)?;
-        }
+        grow(&mut self.names, corners.len(), WHAT)?;
         self.names.extend(corners.iter().map(|&[in_a, in_b]| {
             let mut features = [a.feature(in_a), b.feature(in_b)];
             if body_a == body_b {

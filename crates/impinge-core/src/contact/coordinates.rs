@@ -16,8 +16,7 @@
 //! triangles leads to the point.
 
 use super::double::{self, Double};
-use super::integer::{Integer, unit_of};
-use crate::exact::{Point, Projection};
+use crate::exact::{Integer, Point, Projection, unit_of};
 
 /// The precision to which coordinates are rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -129,23 +128,23 @@ impl Offset {
     }
 
     /// The determinant as an integer, for coordinates that are multiples of `2^unit`.
-    fn exact(&self, unit: i32) -> Integer {
+    fn exact(&self, unit: i64) -> Integer {
         let whole = |x: f64| Integer::of_multiple(x, unit);
         match self {
             Offset::Plane(d, plane) => {
-                let [a, b, c] = plane.map(|p| [0, 1, 2].map(|k| whole(p[k]).sub(&whole(d[k]))));
+                let [a, b, c] = plane.map(|p| [0, 1, 2].map(|k| &whole(p[k]) - &whole(d[k])));
                 let minor =
-                    |p: &[Integer; 3], q: &[Integer; 3]| p[0].mul(&q[1]).sub(&q[0].mul(&p[1]));
+                    |p: &[Integer; 3], q: &[Integer; 3]| &(&p[0] * &q[1]) - &(&q[0] * &p[1]);
                 let [x, y, z] = [
-                    a[2].mul(&minor(&b, &c)),
-                    b[2].mul(&minor(&c, &a)),
-                    c[2].mul(&minor(&a, &b)),
+                    &a[2] * &minor(&b, &c),
+                    &b[2] * &minor(&c, &a),
+                    &c[2] * &minor(&a, &b),
                 ];
-                x.add(&y).add(&z)
+                &(&x + &y) + &z
             }
             Offset::Line(p, line) => {
-                let [r, s] = line.map(|q| [0, 1].map(|k| whole(q[k]).sub(&whole(p[k]))));
-                r[0].mul(&s[1]).sub(&s[0].mul(&r[1]))
+                let [r, s] = line.map(|q| [0, 1].map(|k| &whole(q[k]) - &whole(p[k])));
+                &(&r[0] * &s[1]) - &(&s[0] * &r[1])
             }
         }
     }
@@ -239,7 +238,7 @@ fn in_integers(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) ->
         .min()
         .unwrap_or(0);
     let [p, q] = offsets.map(|offset| offset.exact(unit).abs());
-    let sum = p.add(&q);
+    let sum = &p + &q;
     let (bits, lowest) = match precision {
         Precision::Single => (24, -149),
         Precision::Double => (53, -1074),
@@ -249,9 +248,7 @@ fn in_integers(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) ->
         if sum.is_zero() {
             return ends[0][axis];
         }
-        from.mul(&q)
-            .add(&to.mul(&p))
-            .quotient(&sum, unit, bits, lowest)
+        (&(&from * &q) + &(&to * &p)).quotient(&sum, unit, bits, lowest)
     })
 }
 

@@ -9,7 +9,7 @@
 
 use super::{Contacts, Shape};
 use crate::error::Error;
-use crate::sink::{grow, room};
+use crate::sink::{filled, grow, room};
 
 /// What memory is for.
 const WHAT: &str = "curves of contact";
@@ -43,7 +43,7 @@ impl Curves {
             ..Curves::default()
         };
         let at = Incidence::new(contacts.points().len(), &links)?;
-        let mut is_used = filled(false, links.len())?;
+        let mut is_used = filled(false, links.len(), WHAT)?;
         // Open chains first, from each end or junction; then loops, each from its lowest segment.
         for point in 0..contacts.points().len() {
             if at.links(point).len() != 2 {
@@ -165,13 +165,6 @@ pub(super) fn distance(p: [f64; 3], q: [f64; 3]) -> f64 {
     (x * x + y * y + z * z).sqrt()
 }
 
-/// A list of so many equal values.
-fn filled<T: Clone>(value: T, n: usize) -> Result<Vec<T>, Error> {
-    let mut list = room(n, WHAT)?;
-    list.resize(n, value);
-    Ok(list)
-}
-
 /// All segments, each once, sorted.
 fn links(contacts: &Contacts) -> Result<Vec<Link>, Error> {
     let segments = || (0..contacts.len()).filter(|&ix| contacts.shape(ix) == Shape::Segment);
@@ -208,7 +201,7 @@ fn links(contacts: &Contacts) -> Result<Vec<Link>, Error> {
 }
 
 fn isolated(contacts: &Contacts) -> Result<Vec<u32>, Error> {
-    let mut is_corner = filled(false, contacts.points().len())?;
+    let mut is_corner = filled(false, contacts.points().len(), WHAT)?;
     for contact in 0..contacts.len() {
         if matches!(contacts.shape(contact), Shape::Segment | Shape::Polygon) {
             for &point in contacts.corners(contact) {
@@ -233,14 +226,14 @@ struct Incidence {
 
 impl Incidence {
     fn new(n_points: usize, links: &[Link]) -> Result<Self, Error> {
-        let mut starts = filled(0, n_points + 2)?;
+        let mut starts = filled(0, n_points + 2, WHAT)?;
         for end in links.iter().flat_map(|link| link.ends) {
             starts[end as usize + 2] += 1;
         }
         for point in 2..starts.len() {
             starts[point] += starts[point - 1];
         }
-        let mut at = filled(0, 2 * links.len())?;
+        let mut at = filled(0, 2 * links.len(), WHAT)?;
         for (number, link) in (0u32..).zip(links) {
             for end in link.ends {
                 let place = &mut starts[end as usize + 1];

@@ -2,7 +2,8 @@
 //!
 //! [`Contacts`] turns the pairs of a detection into points, segments and polygons; [`Curves`] chains these
 //! into loops; [`Penetration`] finds which parts of two closed bodies lie inside the other, and a normal, a
-//! depth and a volume per connected region of contact.
+//! depth and a volume per connected region of contact. For solids of tetrahedra, [`SolidOverlap`] is what two of them have in
+//! common, and [`solid_depths`] how deep vertices lie below the surface.
 //!
 //! **Exact combinatorics.** Which edge crosses which face, in which order, which points are one point,
 //! which segments follow each other: decided by the signs of [`exact`](crate::exact), without
@@ -33,17 +34,20 @@
 mod build;
 mod coordinates;
 mod curves;
+mod depths;
 mod double;
 mod inside;
-mod integer;
 mod meet;
 mod penetration;
 mod regions;
+mod solids;
 mod topology;
 
 pub use curves::Curves;
+pub use depths::solid_depths;
 pub use penetration::{Overlap, Penetration};
 pub use regions::Region;
+pub use solids::SolidOverlap;
 
 use crate::error::Error;
 use crate::pairs::Pairs;

@@ -12,7 +12,7 @@
 use super::curves::{Curves, distance};
 use super::{Contacts, Shape};
 use crate::error::Error;
-use crate::sink::{grow, room};
+use crate::sink::{filled, grow, room};
 
 /// What memory is for.
 pub(super) const WHAT: &str = "regions of contact";
@@ -120,8 +120,7 @@ pub(super) fn regions(
     curves: &Curves,
     sets: &mut Sets,
 ) -> Result<(Vec<Region>, Vec<u32>), Error> {
-    let mut region_of = room(sets.0.len(), WHAT)?;
-    region_of.resize(sets.0.len(), NO_REGION);
+    let mut region_of = filled(NO_REGION, sets.0.len(), WHAT)?;
     let mut regions: Vec<Region> = Vec::new();
     let mut middles: Vec<Middles> = Vec::new();
     for contact in 0..contacts.len() {

@@ -31,13 +31,14 @@ mod triangle;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use algebra::{Integer, unit_of};
+pub(crate) use distance::{
+    Approach, NearestOfElements, Reach, approach, are_within_certainly, closest_of_elements,
+    elements_are_within, nearest_of_elements,
+};
 pub use distance::{
     Closest, Feature, Nearest, are_within, closest_points, edge_face_are_within, faces_are_within,
     first_within, nearest_features,
-};
-pub(crate) use distance::{
-    NearestOfElements, Reach, are_within_certainly, closest_of_elements, elements_are_within,
-    nearest_of_elements,
 };
 pub use element_pair::ElementPair;
 pub(crate) use orientation::{Projection, collinear};

@@ -1,6 +1,6 @@
 //! Exact numbers rounded to floats.
 
-/// The largest `f32` that is not above a number in [0, 1].
+/// The largest `f32` that is not above a number.
 #[allow(clippy::cast_possible_truncation, reason = "rounded here")]
 pub(super) fn round_down(x: f64) -> f32 {
     let nearest = x as f32;

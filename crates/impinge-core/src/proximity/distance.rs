@@ -6,13 +6,14 @@
 //!
 //! A pair of nodes is skipped only if its boxes are farther apart than the best distance by more than
 //! the rounding error. So no pair of primitives is lost whose computed distance is as small or smaller, and the
-//! answer does not depend on the order of the search.
+//! answer does not depend on the order of the search. The pair that was nearest in the last call is compared first: bodies that
+//! move little have a good bound from the start.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BinaryHeap, HashMap};
 
 use super::features::{Gap, gap};
-use super::tree::{Node, Tree};
+use super::tree::{Box64, Node, Tree, box_of};
 use crate::error::Error;
 use crate::exact::Point;
 use crate::ids::BodyId;
@@ -39,6 +40,8 @@ use crate::scene::{Body, Scene};
 pub struct Distances {
     /// By the number of the body.
     trees: HashMap<usize, Tree>,
+    /// The pair found last, by the numbers of the bodies.
+    last: HashMap<[usize; 2], [u32; 2]>,
 }
 
 /// The nearest pair of primitives of two bodies.
@@ -77,6 +80,7 @@ impl Distances {
         if a == b {
             return Err(Error::SameBody { body: a });
         }
+        self.trees.retain(|&slot, _| scene.holds(slot));
         for id in [a, b] {
             self.know(scene, id)?;
         }
@@ -84,7 +88,12 @@ impl Distances {
             bodies: [scene.body(a)?, scene.body(b)?],
             trees: [a, b].map(|id| &self.trees[&id.index()]),
         };
-        Ok(search.nearest())
+        let numbers = [a.index(), b.index()];
+        let nearest = search.nearest(self.last.get(&numbers).copied());
+        if let Some(nearest) = &nearest {
+            self.last.insert(numbers, nearest.primitives);
+        }
+        Ok(nearest)
     }
 
     fn know(&mut self, scene: &Scene, id: BodyId) -> Result<(), Error> {
@@ -98,6 +107,8 @@ impl Distances {
         match self.trees.get_mut(&id.index()) {
             Some(tree) if tree.fits(body) => tree.refit(body),
             _ => {
+                self.last
+                    .retain(|numbers, _| !numbers.contains(&id.index()));
                 self.trees.insert(id.index(), Tree::new(body));
             }
         }
@@ -127,6 +138,10 @@ impl PartialOrd for Waiting {
     }
 }
 
+/// The primitives of two clusters that are compared; the memory is reused.
+#[derive(Default)]
+struct Lists([Vec<(u32, Box64)>; 2]);
+
 struct Search<'a> {
     bodies: [&'a Body; 2],
     trees: [&'a Tree; 2],
@@ -144,7 +159,8 @@ struct Best {
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
 impl Search<'_> {
-    fn nearest(&self) -> Option<Nearest> {
+    /// The nearest pair; `likely` is one to compare first.
+    fn nearest(&self, likely: Option<[u32; 2]>) -> Option<Nearest> {
         let (Some(a), Some(b)) = (self.trees[0].root(), self.trees[1].root()) else {
             return None;
         };
@@ -155,13 +171,21 @@ impl Search<'_> {
             primitives: [u32::MAX; 2],
             points: None,
         };
+        if let Some([x, y]) = likely {
+            self.improve(
+                &mut best,
+                [x, y],
+                [0, 1].map(|side| box_of(self.bodies[side], [x, y][side] as usize)),
+            );
+        }
+        let mut lists = Lists::default();
         let mut waiting = BinaryHeap::from([Reverse(self.waiting([a, b]))]);
         while let Some(Reverse(next)) = waiting.pop() {
             if next.squared > limit(best.squared, error) {
                 break;
             }
             if next.nodes.iter().all(|node| node.level == 0) {
-                self.compare(next.nodes, error, &mut best);
+                self.compare(next.nodes, error, &mut best, &mut lists);
                 continue;
             }
             // The node of higher level is opened; at equal levels, the larger one.
@@ -193,37 +217,45 @@ impl Search<'_> {
     fn waiting(&self, nodes: [Node; 2]) -> Waiting {
         let [x, y] = [0, 1].map(|side| self.trees[side].bounds(nodes[side]));
         Waiting {
-            squared: x.squared_distance(y),
+            squared: x.squared_distance(&y),
             nodes,
         }
     }
 
     /// Compares all primitives of two clusters.
-    fn compare(&self, nodes: [Node; 2], error: f64, best: &mut Best) {
-        let there = self.trees[1].bounds(nodes[1]);
-        for (a, of_a) in self.trees[0].primitives(nodes[0]) {
-            if of_a.squared_distance(there) > limit(best.squared, error) {
+    fn compare(&self, nodes: [Node; 2], error: f64, best: &mut Best, lists: &mut Lists) {
+        let [there, here] = [1, 0].map(|side| self.trees[side].bounds(nodes[side]));
+        let most = limit(best.squared, error);
+        let Lists([list_a, list_b]) = lists;
+        self.trees[0].list_near(self.bodies[0], nodes[0], &there, most, list_a);
+        self.trees[1].list_near(self.bodies[1], nodes[1], &here, most, list_b);
+        for (a, of_a) in &*list_a {
+            if of_a.squared_distance(&there) > limit(best.squared, error) {
                 continue;
             }
-            for (b, of_b) in self.trees[1].primitives(nodes[1]) {
-                let apart = of_a.squared_distance(of_b);
-                if apart > limit(best.squared, error) {
+            for (b, of_b) in &*list_b {
+                if of_a.squared_distance(of_b) > limit(best.squared, error) {
                     continue;
                 }
-                if best.squared == 0.0 && [a, b] > best.primitives {
+                if best.squared == 0.0 && [*a, *b] > best.primitives {
                     continue;
                 }
-                let found = self.gap(a, b, apart);
-                let is_less = found.squared < best.squared
-                    || (found.squared == best.squared && [a, b] < best.primitives);
-                if is_less {
-                    *best = Best {
-                        squared: found.squared,
-                        primitives: [a, b],
-                        points: (found.squared > 0.0).then_some(found.points),
-                    };
-                }
+                self.improve(best, [*a, *b], [*of_a, *of_b]);
             }
+        }
+    }
+
+    /// Takes a pair if it is nearer, or as near and lower.
+    fn improve(&self, best: &mut Best, [a, b]: [u32; 2], boxes: [Box64; 2]) {
+        let found = self.gap(a, b, boxes[0].squared_distance(&boxes[1]));
+        let is_less = found.squared < best.squared
+            || (found.squared == best.squared && [a, b] < best.primitives);
+        if is_less {
+            *best = Best {
+                squared: found.squared,
+                primitives: [a, b],
+                points: (found.squared > 0.0).then_some(found.points),
+            };
         }
     }
 

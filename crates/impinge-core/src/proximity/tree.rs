@@ -1,22 +1,33 @@
 //! The boxes of a body's clusters, and of the tree nodes above them.
 //!
-//! Clusters are found once per topology, in the current pose; boxes once per pose. Cost: `O(n log n)` and `O(n)`.
+//! Clusters are found once per topology, in the current pose; their boxes once per pose, from each cluster's vertices; boxes
+//! of primitives only when a cluster is compared. Cost: `O(n log n)` and `O(n)`.
 
 use crate::exact::Point;
 use crate::grouping::GROUP;
-use crate::grouping::bounds::{Bounds, round_down, round_up};
+use crate::grouping::bounds::{Bounds, greater, lesser, round_down, round_up};
 use crate::grouping::clusters::Clustering;
+use crate::positions::Positions;
 use crate::scene::Body;
 
-/// A box in `f64`: coordinates are taken as they are.
+/// A box in `f64`: of primitives as they are, of clusters rounded outward to `f32`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Box64 {
     pub min: Point,
     pub max: Point,
 }
 
+impl From<&Bounds> for Box64 {
+    fn from(bounds: &Bounds) -> Self {
+        Box64 {
+            min: bounds.min.map(f64::from),
+            max: bounds.max.map(f64::from),
+        }
+    }
+}
+
 impl Box64 {
-    const EMPTY: Self = Box64 {
+    pub const EMPTY: Self = Box64 {
         min: [f64::INFINITY; 3],
         max: [f64::NEG_INFINITY; 3],
     };
@@ -68,9 +79,7 @@ pub(super) struct Tree {
     topology_stamp: u64,
     positions_stamp: u64,
     /// The boxes of each level's nodes, from the clusters up.
-    levels: Vec<Vec<Box64>>,
-    /// The boxes of the primitives in the clusters' order.
-    primitives: Vec<Box64>,
+    levels: Vec<Vec<Bounds>>,
 }
 
 impl Tree {
@@ -87,7 +96,6 @@ impl Tree {
             topology_stamp: body.topology_stamp(),
             positions_stamp: 0,
             levels: Vec::new(),
-            primitives: Vec::new(),
         };
         tree.refit(body);
         tree
@@ -104,24 +112,24 @@ impl Tree {
             return;
         }
         self.positions_stamp = body.positions_stamp();
-        self.primitives.clear();
-        let order = self.clustering.order.iter();
-        self.primitives
-            .extend(order.map(|&primitive| box_of(body, primitive as usize)));
-        let join = |boxes: &[Box64]| {
-            let mut all = Box64::EMPTY;
-            boxes.iter().for_each(|one| all.join(one));
-            all
-        };
         self.levels.clear();
-        self.levels
-            .push(self.primitives.chunks(GROUP).map(join).collect());
+        let clusters = 0..self.clustering.n_clusters();
+        let of_clusters = clusters
+            .map(|cluster| of_vertices(body.positions(), self.clustering.vertices(cluster)))
+            .collect();
+        self.levels.push(of_clusters);
         for level in 1..self.clustering.shape.n_levels() {
             let below = &self.levels[level - 1];
             let shape = &self.clustering.shape;
             let nodes = 0..shape.n_nodes(level);
             let boxes = nodes
-                .map(|node| join(&below[shape.children(level, node)]))
+                .map(|node| {
+                    let mut all = Bounds::EMPTY;
+                    below[shape.children(level, node)]
+                        .iter()
+                        .for_each(|one| all.join(one));
+                    all
+                })
                 .collect();
             self.levels.push(boxes);
         }
@@ -136,8 +144,8 @@ impl Tree {
         })
     }
 
-    pub fn bounds(&self, node: Node) -> &Box64 {
-        &self.levels[node.level as usize][node.number as usize]
+    pub fn bounds(&self, node: Node) -> Box64 {
+        Box64::from(&self.levels[node.level as usize][node.number as usize])
     }
 
     /// The children of a node that is not a cluster.
@@ -152,11 +160,24 @@ impl Tree {
         })
     }
 
-    /// The numbers of a cluster's primitives, and their boxes.
-    pub fn primitives(&self, node: Node) -> impl Iterator<Item = (u32, &Box64)> {
+    /// Puts the primitives of a cluster that are at most this far from a box, each with its own box, into a list.
+    pub fn list_near(
+        &self,
+        body: &Body,
+        node: Node,
+        there: &Box64,
+        squared: f64,
+        list: &mut Vec<(u32, Box64)>,
+    ) {
+        list.clear();
         let first = node.number as usize * GROUP;
         let places = first..first + self.clustering.size(node.number as usize);
-        places.map(|place| (self.clustering.order[place], &self.primitives[place]))
+        for &primitive in &self.clustering.order[places] {
+            let bounds = box_of(body, primitive as usize);
+            if bounds.squared_distance(there) <= squared {
+                list.push((primitive, bounds));
+            }
+        }
     }
 }
 
@@ -167,10 +188,36 @@ pub(super) struct Node {
     pub number: u32,
 }
 
-fn box_of(body: &Body, primitive: usize) -> Box64 {
+/// The box of a primitive, in `f64`.
+pub(super) fn box_of(body: &Body, primitive: usize) -> Box64 {
     let mut found = Box64::EMPTY;
     for &vertex in body.elements().corners(primitive) {
         found.cover(body.positions().point(vertex as usize));
     }
     found
+}
+
+/// The box of some vertices, rounded outward.
+fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
+    let mut bounds = Bounds::EMPTY;
+    match positions {
+        Positions::F32(positions) => {
+            for &vertex in vertices {
+                let point = &positions[vertex as usize];
+                for k in 0..3 {
+                    bounds.min[k] = lesser(bounds.min[k], point[k]);
+                    bounds.max[k] = greater(bounds.max[k], point[k]);
+                }
+            }
+        }
+        Positions::F64(positions) => {
+            let mut exact = Box64::EMPTY;
+            for &vertex in vertices {
+                exact.cover(positions[vertex as usize]);
+            }
+            bounds.min = exact.min.map(round_down);
+            bounds.max = exact.max.map(round_up);
+        }
+    }
+    bounds
 }

@@ -288,6 +288,7 @@ class Detector:
         progress: _Progress | None = None,
         cancel: CancelToken | None = None,
     ) -> NearPairs: ...
+    def distance(self, scene: Scene, a: _Body, b: _Body) -> Nearest | None: ...
 
 @final
 class NearPairs:

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 #[cfg(feature = "gpu")]
 use impinge::Elements;
-use impinge::{Body, BodyId, Impacts, PairKind, Part};
+use impinge::{Body, BodyId, Impacts, Part};
 use impinge_io::ColoredMesh;
 #[cfg(feature = "gpu")]
 use impinge_render::{Face, Normals, Surface};
@@ -29,7 +29,7 @@ impl Times {
         let (edges, faces) = (body.part(Part::Edges), body.part(Part::Faces));
         let mut times = Times::default();
         for impact in impacts {
-            for (part, element) in parts(impact.kind).into_iter().zip([impact.a, impact.b]) {
+            for (part, element) in impact.kind.parts().into_iter().zip([impact.a, impact.b]) {
                 if element.body != id {
                     continue;
                 }
@@ -65,18 +65,6 @@ impl Times {
         let faces =
             triples.filter_map(|triple| self.faces.get(&sorted(&triple.map(|k| corners[k]))));
         vertices.chain(edges).chain(faces).copied().reduce(f64::min)
-    }
-}
-
-/// The parts of the first and of the second element of a kind.
-fn parts(kind: PairKind) -> [Part; 2] {
-    match kind {
-        PairKind::VertexFace => [Part::Vertices, Part::Faces],
-        PairKind::EdgeEdge => [Part::Edges; 2],
-        PairKind::EdgeVertex => [Part::Edges, Part::Vertices],
-        PairKind::VertexVertex => [Part::Vertices; 2],
-        PairKind::EdgeFace => [Part::Edges, Part::Faces],
-        PairKind::FaceFace => [Part::Faces; 2],
     }
 }
 

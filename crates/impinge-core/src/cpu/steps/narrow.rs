@@ -10,13 +10,20 @@
 //!
 //! The last two alternate on lists of a thousand pairs, so that no lane waits for another pair's search. Unsure pairs
 //! go to exact arithmetic, and so do pairs of bare edges and points, and all times in double precision.
+//!
+//! Where a distance is asked for (`exact::filter::nearness`):
+//!
+//! ```text
+//! tables    sixteen pairs at a time in f32: certainly near at the start, or apart until the end
+//! approach  one pair at a time in f64: when it comes near, nearly always to all bits of an f32
+//! ```
 
 use crate::cpu::met::{Met, WorkItem};
 use crate::cpu::simd::{Isa, Lanes, Simd, dispatch};
 use crate::exact::filter::{
     self, BATCH, Enclosed8, LANES, Look8, Next, Search, Spans8, Steps8, time_between,
 };
-use crate::exact::{Contact, ElementPair, Point, first_within};
+use crate::exact::{Approach, Contact, ElementPair, Point, approach, first_within};
 use crate::frame::pair_key;
 use crate::grouping::GROUP;
 use crate::impacts::{Found, FoundByKind, StepAnswer};
@@ -127,17 +134,39 @@ impl Settler {
                     self.settle_boxes(world, between, places(ix), distance);
                 }
             }
-            (Sought::Within, _) => {
+            (sought, kind) if is_near(sought) || world.frame.distance() > 0.0 => {
                 let near = Near::new(world, [between.a, between.b]);
-                for ix in 0..met.len() {
-                    self.settle_near(&near, world, between, places(ix));
-                }
-            }
-            // The filters below know of contact alone.
-            (_, kind) if world.frame.distance() > 0.0 => {
-                if let Some(pair) = exact_pair(kind) {
-                    for ix in 0..met.len() {
-                        self.settle_exactly(world, between, pair, places(ix));
+                let pair = match kind {
+                    PairKind::VertexFace => Some(ElementPair::VertexFace),
+                    PairKind::EdgeEdge => Some(ElementPair::EdgeEdge),
+                    _ => None,
+                };
+                let in_tables = groups.iter().all(|group| group.in_tables);
+                let pair = pair.filter(|_| in_tables);
+                let tables = groups.map(|group| &group.points);
+                let until = greater_f32(world.until());
+                for first in (0..met.len()).step_by(BATCH) {
+                    let lanes = met.batch(first);
+                    let n = (met.len() - first).min(BATCH);
+                    let mut open = u16::MAX >> (BATCH - n);
+                    if let Some(pair) = pair {
+                        let reach = near.enclosing;
+                        let verdict =
+                            filter::are_within_in_tables::<S::F32>(pair, tables, lanes, reach);
+                        for lane in Lanes(u64::from(verdict.yes & open)) {
+                            self.put_near(world, between, places(first + lane));
+                        }
+                        open &= !verdict.yes;
+                        if is_near(sought) {
+                            open &= !verdict.no;
+                        } else if open != 0 {
+                            open &= !filter::stay_beyond_in_tables::<S::F32>(
+                                pair, tables, lanes, until, reach[1],
+                            );
+                        }
+                    }
+                    for lane in Lanes(u64::from(open)) {
+                        self.settle_near(&near, world, between, places(first + lane));
                     }
                 }
             }
@@ -210,14 +239,38 @@ impl Settler {
         }
     }
 
+    /// Takes a pair that is within the distance asked for at the start.
     #[inline(always)]
-    fn settle_near(&mut self, near: &Near<'_>, world: World<'_>, between: Between, places: Places) {
-        let is_near = near.certainly(places).unwrap_or_else(|| {
-            self.n_unsure += 1;
-            near.exactly(places)
-        });
-        if is_near {
+    fn put_near(&mut self, world: World<'_>, between: Between, places: Places) {
+        if is_near(world.asked.sought) {
             self.push(world, between, places, NONE);
+        } else {
+            self.report(world, between, places, Contact::AT_START);
+        }
+    }
+
+    /// Settles a pair where a distance is asked for, in `f64` or exactly.
+    #[inline(never)]
+    fn settle_near(&mut self, near: &Near<'_>, world: World<'_>, between: Between, places: Places) {
+        if is_near(world.asked.sought) {
+            let is_near = near.certainly(places).unwrap_or_else(|| {
+                self.n_unsure += 1;
+                near.exactly(places)
+            });
+            if is_near {
+                self.put_near(world, between, places);
+            }
+            return;
+        }
+        let Some(pair) = exact_pair(between.kind) else {
+            return;
+        };
+        let [start, end] = points(world, between, pair, places);
+        match approach(pair, &start, &end, world.frame.distance(), world.until()) {
+            Approach::Apart => {}
+            Approach::AtStart => self.put_near(world, between, places),
+            Approach::Between(span) => self.report_within(world, (between, pair), places, span),
+            Approach::Unsure => self.settle_exactly(world, between, pair, places),
         }
     }
 
@@ -230,22 +283,8 @@ impl Settler {
         places: Places,
     ) {
         self.n_unsure += 1;
-        let mut sides = [(between.a, places[0]), (between.b, places[1])];
-        if pair == ElementPair::VertexEdge {
-            // Such pairs are named edge first, but tested vertex first.
-            sides.reverse();
-        }
-        let mut points: [[Point; 4]; 2] = Default::default();
-        let mut n = 0;
-        for (layer, place) in sides {
-            let (corners, [start, end]) = element(world, layer, place);
-            for &corner in corners {
-                points[0][n] = start.point(corner as usize);
-                points[1][n] = end.point(corner as usize);
-                n += 1;
-            }
-        }
-        if let Some(contact) = first_within(pair, &points[0], &points[1], world.frame.distance()) {
+        let [start, end] = points(world, between, pair, places);
+        if let Some(contact) = first_within(pair, &start, &end, world.frame.distance()) {
             self.report(world, between, places, contact);
         }
     }
@@ -278,6 +317,37 @@ impl Settler {
             world.answer.take(between.kind, found);
         }
     }
+}
+
+/// Whether pairs within a distance at the start are sought, and no times.
+#[inline(always)]
+fn is_near(sought: Sought) -> bool {
+    matches!(sought, Sought::Within)
+}
+
+/// The points of a pair at the start and at the end, in the order of the exact test.
+fn points(
+    world: World<'_>,
+    between: Between,
+    pair: ElementPair,
+    places: Places,
+) -> [[Point; 4]; 2] {
+    let mut sides = [(between.a, places[0]), (between.b, places[1])];
+    if pair == ElementPair::VertexEdge {
+        // Such pairs are named edge first, but tested vertex first.
+        sides.reverse();
+    }
+    let mut points: [[Point; 4]; 2] = Default::default();
+    let mut n = 0;
+    for (layer, place) in sides {
+        let (corners, [start, end]) = element(world, layer, place);
+        for &corner in corners {
+            points[0][n] = start.point(corner as usize);
+            points[1][n] = end.point(corner as usize);
+            n += 1;
+        }
+    }
+    points
 }
 
 /// An `f32` that is not below a time.

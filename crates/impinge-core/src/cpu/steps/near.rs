@@ -1,7 +1,7 @@
 //! Stage `narrow` of proximity: which candidates are within a distance, at the start of a step.
 //!
-//! In: candidates, whose boxes overlap when they reach half as far each. Out: whether they are near. Plain floats with bounds
-//! settle most (`exact::distance`), exact arithmetic the others.
+//! In: candidates, whose boxes overlap when they reach half as far each, and that the batch filter (`exact::filter::nearness`) has
+//! left open. Out: whether they are near. `f64` with bounds settles most (`exact::distance`), exact arithmetic the others.
 
 use crate::elements::Elements;
 use crate::exact::{Reach, are_within_certainly, elements_are_within};
@@ -14,6 +14,8 @@ use super::world::World;
 pub(super) struct Near<'a> {
     sides: [(&'a Elements, &'a Positions); 2],
     reach: Reach,
+    /// Two `f32` that enclose the distance.
+    pub enclosing: [f32; 2],
 }
 
 impl<'a> Near<'a> {
@@ -22,9 +24,11 @@ impl<'a> Near<'a> {
             let body = world.frame.body(world.scene, layer as usize);
             (&world.cache(layer).clustering.corners, body.positions())
         });
+        let reach = world.frame.reach(layers[0] as usize, layers[1] as usize);
         Near {
             sides,
-            reach: world.frame.reach(layers[0] as usize, layers[1] as usize),
+            enclosing: reach.enclosing_f32(),
+            reach,
         }
     }
 

@@ -151,20 +151,12 @@ impl Detector {
 
 /// Finds which features of a pair are nearest, and where.
 fn find_features(scene: &Scene, pair: &mut NearPair, closest: bool) {
-    use Part::{Edges, Faces, Vertices};
-    let parts = match pair.kind {
-        PairKind::VertexFace => [Vertices, Faces],
-        PairKind::EdgeEdge => [Edges, Edges],
-        PairKind::EdgeVertex => [Edges, Vertices],
-        PairKind::VertexVertex => [Vertices, Vertices],
-        PairKind::EdgeFace => [Edges, Faces],
-        PairKind::FaceFace => [Faces, Faces],
-    };
+    let parts = pair.kind.parts();
     let corners = |Primitive { body, primitive }: Primitive, part: Part| {
         let body = scene.body_in(body.slot());
         match part {
             // They are numbered as positions are.
-            Vertices => Corners::new(body.positions(), &[primitive]),
+            Part::Vertices => Corners::new(body.positions(), &[primitive]),
             _ => Corners::new(
                 body.positions(),
                 body.part(part).corners(primitive as usize),

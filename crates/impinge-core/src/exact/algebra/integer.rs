@@ -16,13 +16,13 @@ type Limbs = SmallVec<[u64; INLINE]>;
 ///
 /// Zero has no limbs and is not negative; the last limb of any other number is not zero.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(in crate::exact) struct Integer {
+pub(crate) struct Integer {
     is_negative: bool,
     limbs: Limbs,
 }
 
 impl Integer {
-    pub(in crate::exact) const fn zero() -> Self {
+    pub(crate) const fn zero() -> Self {
         Self {
             is_negative: false,
             limbs: SmallVec::new_const(),
@@ -30,12 +30,12 @@ impl Integer {
     }
 
     #[inline]
-    pub(in crate::exact) fn is_zero(&self) -> bool {
+    pub(crate) fn is_zero(&self) -> bool {
         self.limbs.is_empty()
     }
 
     #[inline]
-    pub(in crate::exact) fn sign(&self) -> Sign {
+    pub(crate) fn sign(&self) -> Sign {
         match (self.limbs.is_empty(), self.is_negative) {
             (true, _) => Sign::Zero,
             (_, true) => Sign::Negative,
@@ -136,6 +136,17 @@ impl Integer {
             magnitude
         };
         (x, n_bits as i64 - 1)
+    }
+
+    /// Compares magnitudes.
+    pub(super) fn compare_magnitude(&self, other: &Self) -> Ordering {
+        compare_magnitudes(&self.limbs, &other.limbs)
+    }
+
+    /// The magnitude, lowest limb first, without leading zeros.
+    #[cfg(test)]
+    pub(super) fn limbs(&self) -> &[u64] {
+        &self.limbs
     }
 
     /// Drops leading zeros.
@@ -317,7 +328,7 @@ pub(in crate::exact) fn common_integers<const N: usize>(numbers: [f64; N]) -> ([
 
 /// Magnitude of a finite float as mantissa * 2^exponent; the mantissa is odd or zero.
 #[allow(clippy::cast_possible_wrap, reason = "eleven bits")]
-fn parts(x: f64) -> (u64, i64) {
+pub(super) fn parts(x: f64) -> (u64, i64) {
     let bits = x.to_bits();
     let biased = (bits >> 52 & 0x7ff) as i64;
     let fraction = bits & ((1 << 52) - 1);

@@ -1,4 +1,5 @@
-//! Exact arithmetic behind everything that moves: integers of any size, polynomials in Bernstein form, real roots.
+//! Exact arithmetic behind everything that moves: integers of any size, polynomials in Bernstein form, real roots. Contact
+//! geometry takes its coordinates from the same integers.
 //!
 //! What it does: holds the polynomials in time that decide first contacts, isolates their roots in (0, 1], tells the
 //! sign of another polynomial at a root, and rounds a root down to a float. All of it exactly.
@@ -10,8 +11,11 @@
 
 mod integer;
 mod polynomial;
+mod quotient;
 mod roots;
 
-pub(super) use integer::{Integer, common_integers};
+pub(crate) use integer::Integer;
+pub(super) use integer::common_integers;
 pub(super) use polynomial::{Polynomial, Vector, cross, difference, dot, square_of_sum};
+pub(crate) use quotient::unit_of;
 pub(super) use roots::{Root, Roots, Time, floor_between};

@@ -21,6 +21,8 @@ mod moving;
 mod nearest;
 mod reach;
 mod rounded;
+#[cfg(test)]
+mod tests;
 
 use super::Point;
 use super::algebra::Integer;
@@ -28,6 +30,7 @@ use super::element_pair::ElementPair;
 pub(crate) use elements::{NearestOfElements, are_within_certainly, elements_are_within};
 pub(crate) use elements::{closest_of_elements, nearest_of_elements};
 pub use features::{Feature, Nearest};
+pub(crate) use filter::{Approach, approach};
 pub use moving::first_within;
 pub use nearest::nearest_features;
 pub(crate) use reach::Reach;

@@ -7,7 +7,8 @@ use crate::exact::element_pair::ElementPair;
 use crate::exact::sweep::{Contact, Polygon};
 use crate::exact::{Point, Sign, first_contact};
 
-use super::{are_within, filter};
+use super::are_within;
+use super::filter::{self, Approach};
 
 /// The first time at which the distance of two elements is at most `distance`, while their points move from `start` to
 /// `end` on straight lines.
@@ -35,12 +36,24 @@ pub fn first_within(
     if distance.is_nan() || distance < 0.0 {
         return None;
     }
-    if are_within(pair, start, distance) {
-        return Some(Contact::AT_START);
+    match filter::approach(pair, start, end, distance, 1.0) {
+        Approach::Apart => None,
+        Approach::AtStart => Some(Contact::AT_START),
+        Approach::Unsure if are_within(pair, start, distance) => Some(Contact::AT_START),
+        Approach::Between(_) | Approach::Unsure => {
+            first_within_by_roots(pair, start, end, distance)
+        }
     }
-    if filter::stay_apart(pair, start, end, distance) {
-        return None;
-    }
+}
+
+/// [`first_within`] by exact arithmetic alone, for a finite distance above zero and elements that are farther apart at the
+/// start.
+pub(super) fn first_within_by_roots(
+    pair: ElementPair,
+    start: &[Point; 4],
+    end: &[Point; 4],
+    distance: f64,
+) -> Option<Contact> {
     let (polygon, distance) = Polygon::with_distance(pair.corners(), start, end, distance);
     let square = &distance * &distance;
     let corners = polygon.corners();

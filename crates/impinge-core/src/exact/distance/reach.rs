@@ -1,6 +1,7 @@
 //! A distance as callers give it: a sum of numbers, read as real numbers.
 
 use crate::exact::algebra::Integer;
+use crate::exact::rounding::round_down;
 
 /// A sum of three floats that are finite and not below zero, and floats that enclose it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +37,11 @@ impl Reach {
         }
     }
 
+    /// Two `f32` that enclose the sum.
+    pub fn enclosing_f32(&self) -> [f32; 2] {
+        [round_down(self.low), -round_down(-self.high)]
+    }
+
     /// The sum of its parts as integers.
     pub(super) fn sum(integers: &[Integer]) -> Integer {
         integers
@@ -69,6 +75,8 @@ mod tests {
             let sum = parts[0] + parts[1] + parts[2];
             assert!(reach.low <= sum && sum <= reach.high);
             assert!(reach.low < reach.high);
+            let [low, high] = reach.enclosing_f32().map(f64::from);
+            assert!(low <= reach.low && reach.high <= high);
         }
     }
 }

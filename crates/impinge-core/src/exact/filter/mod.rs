@@ -23,8 +23,9 @@
 //! filter"). NaN and overflow make comparisons fail, and so end as unsure.
 
 mod determinant;
-mod motion;
+pub(super) mod motion;
 mod moving;
+pub(super) mod nearness;
 mod neighbours;
 pub mod number;
 mod projections;
@@ -38,6 +39,7 @@ pub use moving::{
     enclose, look, time_between,
 };
 pub(super) use moving::{contact_answer, search_contact};
+pub use nearness::{are_within_in_tables, stay_beyond_in_tables};
 pub(super) use neighbours::{shared_edge, shared_vertex};
 pub(super) use projections::{angles_apart, apart_in_a_plane, sides_apart};
 pub(super) use tetrahedra::tetrahedra_answer;

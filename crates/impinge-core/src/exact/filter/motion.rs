@@ -507,7 +507,7 @@ fn smaller<T: Number>(a: T, b: T) -> T {
 }
 
 #[inline(always)]
-fn between<T: Number>(p: &Vector<T>, q: &Vector<T>, t: T) -> Vector<T> {
+pub(in crate::exact) fn between<T: Number>(p: &Vector<T>, q: &Vector<T>, t: T) -> Vector<T> {
     let rest = T::splat(1.0) - t;
     [
         p[0] * rest + q[0] * t,
@@ -528,7 +528,7 @@ fn cross_over<T: Number>(d: &[Vector<T>; 2], e: &[Vector<T>; 2]) -> [Vector<T>; 
 }
 
 #[inline(always)]
-fn cross<T: Number>(d: &Vector<T>, e: &Vector<T>) -> Vector<T> {
+pub(in crate::exact) fn cross<T: Number>(d: &Vector<T>, e: &Vector<T>) -> Vector<T> {
     [
         d[1] * e[2] - d[2] * e[1],
         d[2] * e[0] - d[0] * e[2],
@@ -537,17 +537,17 @@ fn cross<T: Number>(d: &Vector<T>, e: &Vector<T>) -> Vector<T> {
 }
 
 #[inline(always)]
-fn dot<T: Number>(d: &Vector<T>, e: &Vector<T>) -> T {
+pub(in crate::exact) fn dot<T: Number>(d: &Vector<T>, e: &Vector<T>) -> T {
     d[0] * e[0] + d[1] * e[1] + d[2] * e[2]
 }
 
 #[inline(always)]
-fn difference<T: Number>(p: &Vector<T>, q: &Vector<T>) -> Vector<T> {
+pub(in crate::exact) fn difference<T: Number>(p: &Vector<T>, q: &Vector<T>) -> Vector<T> {
     [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
 }
 
 /// The largest magnitude of the three coordinates.
 #[inline(always)]
-fn size<T: Number>(d: &Vector<T>) -> T {
+pub(in crate::exact) fn size<T: Number>(d: &Vector<T>) -> T {
     d[0].abs().larger(d[1].abs()).larger(d[2].abs())
 }

@@ -238,7 +238,7 @@ fn load_end<V: Vector>([p, q, r, s]: &[[[f64; LANES]; 3]; 4], first: usize) -> [
 }
 
 #[inline(always)]
-fn are_edges(pair: ElementPair) -> bool {
+pub(super) fn are_edges(pair: ElementPair) -> bool {
     debug_assert!(matches!(
         pair,
         ElementPair::VertexFace | ElementPair::EdgeEdge
@@ -278,7 +278,7 @@ pub fn are_apart_in_tables<V: Lookup>(
 }
 
 #[inline(always)]
-fn vertex_and_face<V: Lookup>(
+pub(super) fn vertex_and_face<V: Lookup>(
     [p, ..]: &[[[f32; TABLE]; 3]; 3],
     a: V::Places,
     [q, r, s]: &[[[f32; TABLE]; 3]; 3],
@@ -288,7 +288,7 @@ fn vertex_and_face<V: Lookup>(
 }
 
 #[inline(always)]
-fn two_edges<V: Lookup>(
+pub(super) fn two_edges<V: Lookup>(
     [p, q, _]: &[[[f32; TABLE]; 3]; 3],
     a: V::Places,
     [r, s, _]: &[[[f32; TABLE]; 3]; 3],

@@ -36,6 +36,8 @@ pub trait Number:
     /// The error that underflow may add, with such differences, to the product of a vector with a known one, to a
     /// determinant of three, and to a product of four.
     const TINY: [f64; 3];
+    /// Squares of lengths above this are not wrong by underflow, but for a fraction of a unit roundoff; see `nearness`.
+    const SHORTEST: f64;
 
     /// A bound plus the error that underflow may add.
     #[inline(always)]
@@ -50,6 +52,8 @@ pub trait Number:
     fn splat(x: f64) -> Self;
     /// The magnitude.
     fn abs(self) -> Self;
+    /// The square root, rounded once.
+    fn sqrt(self) -> Self;
     /// The larger of two; if one is NaN, either.
     fn larger(self, other: Self) -> Self;
     /// The smaller of two; if one is NaN, either.
@@ -127,6 +131,8 @@ const LARGEST_DIFFERENCE_F64: f64 = power(100);
 const LARGEST_DIFFERENCE_F32: f64 = power(16);
 const TINY_F64: [f64; 3] = [power(-800), power(-800), power(-700)];
 const TINY_F32: [f64; 3] = [power(-80), power(-80), power(-60)];
+const SHORTEST_F64: f64 = power(-450);
+const SHORTEST_F32: f64 = power(-49);
 
 impl Number for f64 {
     type Mask = bool;
@@ -134,6 +140,7 @@ impl Number for f64 {
     const UNDERFLOW: f64 = 0.0;
     const LARGEST: f64 = LARGEST_DIFFERENCE_F64;
     const TINY: [f64; 3] = TINY_F64;
+    const SHORTEST: f64 = SHORTEST_F64;
 
     #[inline(always)]
     fn splat(x: f64) -> Self {
@@ -142,6 +149,10 @@ impl Number for f64 {
     #[inline(always)]
     fn abs(self) -> Self {
         self.abs()
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.sqrt()
     }
     /// A comparison: `f64::max` costs three instructions to keep NaN out, and NaN is harmless here.
     #[inline(always)]
@@ -176,7 +187,7 @@ macro_rules! operator {
 macro_rules! portable {
     (
         $type:ident, $mask:ident, $number:ty, $bits:ty, $n:expr, [$($k:literal),*], $bound:expr, $underflow:expr,
-        $largest:expr, $tiny:expr
+        $largest:expr, $tiny:expr, $shortest:expr
     ) => {
         #[doc = concat!("Some `", stringify!($number), "` in 128 bits, which SSE2 and NEON have.")]
         #[derive(Debug, Clone, Copy)]
@@ -222,6 +233,7 @@ macro_rules! portable {
             const UNDERFLOW: f64 = $underflow;
             const LARGEST: f64 = $largest;
             const TINY: [f64; 3] = $tiny;
+            const SHORTEST: f64 = $shortest;
 
             #[inline(always)]
             fn splat(x: f64) -> Self {
@@ -230,6 +242,10 @@ macro_rules! portable {
             #[inline(always)]
             fn abs(self) -> Self {
                 $type([$(self.0[$k].abs()),*])
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                $type([$(self.0[$k].sqrt()),*])
             }
             #[inline(always)]
             fn larger(self, other: Self) -> Self {
@@ -264,7 +280,8 @@ portable!(
     BOUND_F64,
     0.0,
     LARGEST_DIFFERENCE_F64,
-    TINY_F64
+    TINY_F64,
+    SHORTEST_F64
 );
 portable!(
     Portable32,
@@ -276,7 +293,8 @@ portable!(
     BOUND_F32,
     UNDERFLOW_F32,
     LARGEST_DIFFERENCE_F32,
-    TINY_F32
+    TINY_F32,
+    SHORTEST_F32
 );
 
 impl Vector for Portable {
@@ -334,9 +352,9 @@ mod x86 {
     macro_rules! register {
         (
             $(#[$doc:meta])* $type:ident($register:ty), $mask:ident($bits:ty),
-            $bound:expr, $underflow:expr, $largest:expr, $tiny:expr,
+            $bound:expr, $underflow:expr, $largest:expr, $tiny:expr, $shortest:expr,
             add $add:ident, sub $sub:ident, mul $mul:ident, div $div:ident, max $max:ident, splat |$x:ident| $splat:expr,
-            abs |$y:ident| $abs:expr, gt |$a:ident, $b:ident| $gt:expr,
+            abs |$y:ident| $abs:expr, sqrt $sqrt:ident, gt |$a:ident, $b:ident| $gt:expr,
             select |$m:ident, $yes:ident, $no:ident| $select:expr,
             and |$p:ident, $q:ident| $and:expr, or |$r:ident, $s:ident| $or:expr,
             xor |$t:ident, $u:ident| $xor:expr, not |$v:ident| $not:expr $(,)?
@@ -405,6 +423,7 @@ mod x86 {
                 const UNDERFLOW: f64 = $underflow;
                 const LARGEST: f64 = $largest;
                 const TINY: [f64; 3] = $tiny;
+                const SHORTEST: f64 = $shortest;
 
                 #[inline(always)]
                 fn splat($x: f64) -> Self {
@@ -416,6 +435,11 @@ mod x86 {
                     let $y = self.0;
                     // SAFETY: see above.
                     $type(unsafe { $abs })
+                }
+                #[inline(always)]
+                fn sqrt(self) -> Self {
+                    // SAFETY: see above.
+                    $type(unsafe { $sqrt(self.0) })
                 }
                 #[inline(always)]
                 fn larger(self, other: Self) -> Self {
@@ -440,10 +464,11 @@ mod x86 {
 
     register! {
         /// Four numbers in a 256-bit register. To be used where `avx2` was detected.
-        Avx2(__m256d), Avx2Mask(__m256d), BOUND_F64, 0.0, LARGEST_DIFFERENCE_F64, TINY_F64,
+        Avx2(__m256d), Avx2Mask(__m256d), BOUND_F64, 0.0, LARGEST_DIFFERENCE_F64, TINY_F64, SHORTEST_F64,
         add _mm256_add_pd, sub _mm256_sub_pd, mul _mm256_mul_pd, div _mm256_div_pd, max _mm256_max_pd,
         splat |x| _mm256_set1_pd(x),
         abs |x| _mm256_andnot_pd(_mm256_set1_pd(-0.0), x),
+        sqrt _mm256_sqrt_pd,
         gt |a, b| _mm256_cmp_pd::<_CMP_GT_OQ>(a, b),
         select |mask, yes, no| _mm256_blendv_pd(no, yes, mask),
         and |a, b| _mm256_and_pd(a, b),
@@ -454,10 +479,11 @@ mod x86 {
 
     register! {
         /// Eight `f32` in a 256-bit register. To be used where `avx2` was detected.
-        Avx2F32(__m256), Avx2F32Mask(__m256), BOUND_F32, UNDERFLOW_F32, LARGEST_DIFFERENCE_F32, TINY_F32,
+        Avx2F32(__m256), Avx2F32Mask(__m256), BOUND_F32, UNDERFLOW_F32, LARGEST_DIFFERENCE_F32, TINY_F32, SHORTEST_F32,
         add _mm256_add_ps, sub _mm256_sub_ps, mul _mm256_mul_ps, div _mm256_div_ps, max _mm256_max_ps,
         splat |x| _mm256_set1_ps(x as f32),
         abs |x| _mm256_andnot_ps(_mm256_set1_ps(-0.0), x),
+        sqrt _mm256_sqrt_ps,
         gt |a, b| _mm256_cmp_ps::<_CMP_GT_OQ>(a, b),
         select |mask, yes, no| _mm256_blendv_ps(no, yes, mask),
         and |a, b| _mm256_and_ps(a, b),
@@ -468,10 +494,11 @@ mod x86 {
 
     register! {
         /// Eight numbers in a 512-bit register. To be used where `avx512f` and `avx512dq` were detected.
-        Avx512(__m512d), Avx512Mask(__mmask8), BOUND_F64, 0.0, LARGEST_DIFFERENCE_F64, TINY_F64,
+        Avx512(__m512d), Avx512Mask(__mmask8), BOUND_F64, 0.0, LARGEST_DIFFERENCE_F64, TINY_F64, SHORTEST_F64,
         add _mm512_add_pd, sub _mm512_sub_pd, mul _mm512_mul_pd, div _mm512_div_pd, max _mm512_max_pd,
         splat |x| _mm512_set1_pd(x),
         abs |x| _mm512_abs_pd(x),
+        sqrt _mm512_sqrt_pd,
         gt |a, b| _mm512_cmp_pd_mask::<_CMP_GT_OQ>(a, b),
         select |mask, yes, no| _mm512_mask_blend_pd(mask, no, yes),
         and |a, b| a & b, or |a, b| a | b, xor |a, b| a ^ b, not |a| !a,
@@ -479,10 +506,11 @@ mod x86 {
 
     register! {
         /// Sixteen `f32` in a 512-bit register. To be used where `avx512f` and `avx512dq` were detected.
-        Avx512F32(__m512), Avx512F32Mask(__mmask16), BOUND_F32, UNDERFLOW_F32, LARGEST_DIFFERENCE_F32, TINY_F32,
+        Avx512F32(__m512), Avx512F32Mask(__mmask16), BOUND_F32, UNDERFLOW_F32, LARGEST_DIFFERENCE_F32, TINY_F32, SHORTEST_F32,
         add _mm512_add_ps, sub _mm512_sub_ps, mul _mm512_mul_ps, div _mm512_div_ps, max _mm512_max_ps,
         splat |x| _mm512_set1_ps(x as f32),
         abs |x| _mm512_abs_ps(x),
+        sqrt _mm512_sqrt_ps,
         gt |a, b| _mm512_cmp_ps_mask::<_CMP_GT_OQ>(a, b),
         select |mask, yes, no| _mm512_mask_blend_ps(mask, no, yes),
         and |a, b| a & b, or |a, b| a | b, xor |a, b| a ^ b, not |a| !a,

@@ -19,7 +19,7 @@
 
 mod polygon;
 #[cfg(test)]
-mod tests;
+pub(in crate::exact) mod tests;
 
 use super::Point;
 use super::algebra::Time;
@@ -45,7 +45,7 @@ pub struct Contact {
 
 impl Contact {
     /// Contact at t = 0.
-    pub(super) const AT_START: Self = Self {
+    pub(crate) const AT_START: Self = Self {
         time: 0.0,
         is_exact: true,
         at_start: true,

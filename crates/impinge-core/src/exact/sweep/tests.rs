@@ -8,9 +8,10 @@ use crate::exact::filter::{
     time_between,
 };
 
-const PAIRS: [ElementPair; 2] = [ElementPair::VertexFace, ElementPair::EdgeEdge];
+pub(in crate::exact) const PAIRS: [ElementPair; 2] =
+    [ElementPair::VertexFace, ElementPair::EdgeEdge];
 
-struct Random(u64);
+pub(in crate::exact) struct Random(pub u64);
 
 impl Random {
     /// splitmix64 (Steele, Lea, Flood 2014).
@@ -27,14 +28,14 @@ impl Random {
         (self.bits() >> 40) as f64 / f64::from(1 << 23) - 1.0
     }
 
-    fn below(&mut self, n: u64) -> u64 {
+    pub(in crate::exact) fn below(&mut self, n: u64) -> u64 {
         self.bits() % n
     }
 }
 
 /// How a step is made.
 #[derive(Clone, Copy, Debug)]
-enum Kind {
+pub(in crate::exact) enum Kind {
     /// Anywhere in a cube.
     Plain,
     /// On a small lattice: ties.
@@ -49,7 +50,7 @@ enum Kind {
     Extreme,
 }
 
-const KINDS: [Kind; 6] = [
+pub(in crate::exact) const KINDS: [Kind; 6] = [
     Kind::Plain,
     Kind::Lattice,
     Kind::NearlyTied,
@@ -63,7 +64,7 @@ fn narrow(x: f64) -> f64 {
 }
 
 /// A step whose coordinates are `f32`.
-fn step(kind: Kind, random: &mut Random) -> [[Point; 4]; 2] {
+pub(in crate::exact) fn step(kind: Kind, random: &mut Random) -> [[Point; 4]; 2] {
     let mut points = [[[0.0; 3]; 4]; 2];
     let axes = [[(); 3]; 3].map(|axis| axis.map(|()| random.unit()));
     let scale = 2.0_f64.powi(random.below(160) as i32 - 120);

@@ -1,0 +1,218 @@
+//! The filters for distances compared with integers and exact roots, on troublesome input and every instruction set. Those are
+//! compared with an independent oracle in `tests/sweep`.
+
+use super::filter::{self, Approach};
+use super::moving::first_within_by_roots;
+use super::{Reach, closest_points, nearest};
+use crate::exact::filter::{
+    BATCH, Moving64, TABLE, Verdict16, are_within_in_tables, number, stay_beyond_in_tables,
+    time_between,
+};
+use crate::exact::sweep::tests::{KINDS, Kind, PAIRS, Random, step};
+use crate::exact::{Contact, ElementPair, Point};
+
+type Step = [[Point; 4]; 2];
+
+/// Sixteen pairs in tables, and what is asked of them.
+struct Asked {
+    pair: ElementPair,
+    tables: [Box<Moving64>; 2],
+    places: [u8; BATCH],
+    until: f32,
+    reach: [f32; 2],
+}
+
+impl Asked {
+    fn new(pair: ElementPair, steps: &[Step], until: f32, reach: [f32; 2]) -> Self {
+        // Elements at odd places, in reverse.
+        let places: [u8; BATCH] = std::array::from_fn(|lane| (2 * (BATCH - lane) - 1) as u8);
+        let table = |points: std::ops::Range<usize>| {
+            let mut table: Box<Moving64> = Box::new([[[[0.0; TABLE]; 3]; 3]; 2]);
+            for (lane, step) in steps.iter().enumerate() {
+                for (end, corners) in table.iter_mut().enumerate() {
+                    for (point, corner) in points.clone().zip(corners) {
+                        for (axis, row) in corner.iter_mut().enumerate() {
+                            row[places[lane] as usize] = step[end][point][axis] as f32;
+                        }
+                    }
+                }
+            }
+            table
+        };
+        let n = if pair == ElementPair::VertexFace {
+            1
+        } else {
+            2
+        };
+        Asked {
+            pair,
+            tables: [table(0..n), table(n..4)],
+            places,
+            until,
+            reach,
+        }
+    }
+
+    #[inline(always)]
+    fn answer<V: number::Lookup>(&self) -> (Verdict16, u16) {
+        let [a, b] = &self.tables;
+        let (groups, places) = ([&**a, &**b], [&self.places; 2]);
+        let within = are_within_in_tables::<V>(self.pair, groups, places, self.reach);
+        let high = self.reach[1];
+        let stay = stay_beyond_in_tables::<V>(self.pair, groups, places, self.until, high);
+        (within, stay)
+    }
+
+    /// The answer of all instruction sets of this processor, which must be the same.
+    fn answer_of_all(&self) -> (Verdict16, u16) {
+        let answer = self.answer::<number::Portable32>();
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx2") {
+                // SAFETY: just detected.
+                assert_eq!(answer, unsafe { answer_avx2(self) });
+            }
+            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
+                // SAFETY: just detected.
+                assert_eq!(answer, unsafe { answer_avx512(self) });
+            }
+        }
+        answer
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn answer_avx2(asked: &Asked) -> (Verdict16, u16) {
+    asked.answer::<number::Avx2F32>()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq")]
+fn answer_avx512(asked: &Asked) -> (Verdict16, u16) {
+    asked.answer::<number::Avx512F32>()
+}
+
+/// A distance that some of the elements have at the start or at the end, or one next to it, or another one.
+fn distance(pair: ElementPair, steps: &[Step], kind: Kind, random: &mut Random) -> f64 {
+    let step = &steps[random.below(BATCH as u64) as usize];
+    let found = closest_points(pair, &step[random.below(2) as usize]).distance;
+    match random.below(6) {
+        0 => found,
+        1 => found.next_up(),
+        2 => found.next_down().max(0.0),
+        3 => f64::from(found as f32),
+        4 => found * 0.75,
+        _ if matches!(kind, Kind::Extreme) => found * 1.5,
+        _ => 0.25 * random.below(8) as f64,
+    }
+}
+
+fn is_in_time(contact: Option<Contact>, until: f64) -> bool {
+    contact.is_some_and(|contact| contact.is_within(until))
+}
+
+#[test]
+fn filters_never_contradict_integers_and_roots() {
+    let mut random = Random(5);
+    for kind in KINDS {
+        for pair in PAIRS {
+            let (mut n_sure, mut n_open, mut n_near, mut n_kept) = (0, 0, 0, 0);
+            let (mut n_between, mut n_rounded, mut n_unsure) = (0, 0, 0);
+            for round in 0..10 {
+                let until = [1.0, 0.5, 0.328_125, 1.0][round % 4];
+                let steps = [(); BATCH].map(|()| step(kind, &mut random));
+                let d = distance(pair, &steps, kind, &mut random);
+                let reach = Reach::from(d);
+                let asked = Asked::new(pair, &steps, until as f32, reach.enclosing_f32());
+                let (within, stay) = asked.answer_of_all();
+                assert_eq!(within.yes & within.no, 0);
+                for (lane, [start, end]) in steps.iter().enumerate() {
+                    let case = || format!("{kind:?} {pair:?} {until} {d:?} {:?}", steps[lane]);
+                    let is = |mask: u16| mask >> lane & 1 == 1;
+                    let is_near = nearest::are_within(pair, start, &reach);
+                    assert!(!is(within.yes) || is_near, "{}", case());
+                    assert!(!is(within.no) || !is_near, "{}", case());
+                    if is(within.yes | within.no) {
+                        n_sure += 1;
+                    } else {
+                        n_open += 1;
+                    }
+                    n_near += u32::from(is_near);
+                    let answer = filter::answer(pair, start, &reach);
+                    assert!(answer.is_none_or(|answer| answer == is_near), "{}", case());
+                    if d == 0.0 {
+                        continue;
+                    }
+                    let contact = if is_near {
+                        Some(Contact::AT_START)
+                    } else {
+                        first_within_by_roots(pair, start, end, d)
+                    };
+                    assert!(!(is(stay) && is_in_time(contact, until)), "{}", case());
+                    n_kept += u32::from(is(stay));
+                    match filter::approach(pair, start, end, d, until) {
+                        Approach::Apart => assert!(!is_in_time(contact, until), "{}", case()),
+                        Approach::AtStart => assert!(is_near, "{}", case()),
+                        Approach::Between([low, high]) => {
+                            n_between += 1;
+                            let contact = contact.unwrap_or_else(|| panic!("{}", case()));
+                            assert!(!contact.at_start, "{}", case());
+                            // After the first, and not after the second.
+                            assert!(!contact.is_within(low), "{} {contact:?}", case());
+                            assert!(contact.is_within(high), "{} {contact:?}", case());
+                            if let Some(time) = time_between([low, high]) {
+                                n_rounded += 1;
+                                assert_eq!(time, contact.time_f32(), "{}", case());
+                            }
+                        }
+                        Approach::Unsure => n_unsure += 1,
+                    }
+                }
+            }
+            let counts = format!(
+                "{kind:?} {pair:?} sure {n_sure} open {n_open} near {n_near} kept {n_kept} \
+                 between {n_between} rounded {n_rounded} unsure {n_unsure}"
+            );
+            match kind {
+                Kind::Plain | Kind::Close => {
+                    // One pair in sixteen is at the distance asked for, or next to it, at an end.
+                    assert!(n_open * 10 < n_sure, "{counts}");
+                    assert!(n_between > 0 && n_near > 10 && n_kept > 5, "{counts}");
+                    assert!(n_rounded * 10 >= n_between * 8, "{counts}");
+                    assert!(n_unsure * 6 < n_sure + n_open, "{counts}");
+                }
+                Kind::Lattice | Kind::NearlyTied | Kind::Flat => {
+                    assert!(n_near > 0 && n_sure > 0 && n_open > 0, "{counts}");
+                }
+                Kind::Extreme => assert!(n_sure > 0, "{counts}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn numbers_that_are_none_are_unsure() {
+    for x in [f64::NAN, f64::INFINITY, f64::MAX] {
+        let steps = std::array::from_fn::<Step, BATCH, _>(|lane| {
+            let mut points = [[[0.25; 3]; 4]; 2];
+            points[lane % 2][lane / 2 % 4] = [x, -x, x];
+            points[0][(lane / 2 + 1) % 4] = [1.0, 2.0, -0.5];
+            points
+        });
+        for pair in PAIRS {
+            let asked = Asked::new(pair, &steps, 1.0, [0.1, 0.1]);
+            let (within, stay) = asked.answer_of_all();
+            assert_eq!(stay, 0, "{x} {pair:?}");
+            // The elements of odd lanes are finite at the start.
+            let at_start = (within.yes | within.no) & 0x5555;
+            assert_eq!(at_start, 0, "{x} {pair:?}");
+            for (lane, [start, end]) in steps.iter().enumerate() {
+                if lane % 2 == 0 {
+                    let found = filter::approach(pair, start, end, 0.1, 1.0);
+                    assert_eq!(found, Approach::Unsure, "{x} {pair:?}");
+                }
+            }
+        }
+    }
+}
