@@ -203,10 +203,9 @@ fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
     match positions {
         Positions::F32(positions) => {
             for &vertex in vertices {
-                let point = &positions[vertex as usize];
-                for k in 0..3 {
-                    bounds.min[k] = lesser(bounds.min[k], point[k]);
-                    bounds.max[k] = greater(bounds.max[k], point[k]);
+                for (k, &x) in positions[vertex as usize].iter().enumerate() {
+                    bounds.min[k] = lesser(bounds.min[k], x);
+                    bounds.max[k] = greater(bounds.max[k], x);
                 }
             }
         }

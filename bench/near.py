@@ -1,0 +1,396 @@
+"""Distances of bodies, and elements within a distance, beside peers on the same positions.
+
+    python bench/near.py                     # all scenes whose meshes exist
+    python bench/near.py --rounds 5 --json near.json --markdown near.md
+
+It installs nothing, names missing peers, and looks for meshes in $IMPINGE_DATA or ../shared/data.
+
+Distances: two bodies at three separations. "Moved" rewrites all positions of both bodies before each question and counts the
+time: `set_positions` here, refitted or rebuilt trees for peers. "Still" asks again about positions that have not changed, which
+is the question of a rigid body. All distances must agree to single precision.
+
+Elements within a distance: a mesh with itself, vertices and faces, edges and edges. ipc-toolkit's `NormalCollisions.build`
+answers the same question in floating point, and reduces pairs whose nearest features are smaller to edge-vertex and
+vertex-vertex collisions, with their number as weight. So the sum of the weights must be the number of pairs here, except pairs at
+the distance itself within rounding.
+
+Times are medians over rounds in which contestants take turns, wall clock and processor time of all threads.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import statistics
+import sys
+import time
+
+import numpy as np
+
+import impinge
+from compare import ROOT, machine, milliseconds
+
+
+def read_ply(path):
+    """Vertices (v, 3) float32 and faces (n, 3) of a binary PLY of triangles."""
+    data = path.read_bytes()
+    header, _, body = data.partition(b"end_header\n")
+    words = [line.split() for line in header.decode().splitlines()]
+    counts = {line[1]: int(line[2]) for line in words if line[0] == "element"}
+    order = {"binary_little_endian": "<", "binary_big_endian": ">"}[words[1][1]]
+    kinds = {"float": "f4", "float32": "f4", "double": "f8", "float64": "f8"}
+    axes = [order + kinds[line[1]] for line in words if line[0] == "property" and line[-1] in "xyz"]
+    if len(axes) != 3 or len([line for line in words if line[0] == "property"]) != 4:
+        raise ValueError(f"{path}: positions and triangles alone are read")
+    n_vertices, n_faces = counts["vertex"], counts["face"]
+    vertices = np.frombuffer(body, axes[0], 3 * n_vertices).reshape(-1, 3)
+    start = vertices.nbytes
+    rows = np.frombuffer(body, [("n", "u1"), ("face", order + "i4", 3)], n_faces, start)
+    if (rows["n"] != 3).any():
+        raise ValueError(f"{path}: a face that is not a triangle")
+    return vertices.astype(np.float32), rows["face"].astype(np.int64)
+
+
+def clock(work):
+    """The result of some work, and its wall and processor time in milliseconds."""
+    wall, processor = time.perf_counter(), time.process_time()
+    result = work()
+    return result, 1e3 * (time.perf_counter() - wall), 1e3 * (time.process_time() - processor)
+
+
+class Ours:
+    label = "impinge"
+
+    def __init__(self, bodies, **settings):
+        self.label = "impinge" + "".join(f", {k}={v}" for k, v in settings.items())
+        self.scene = impinge.Scene()
+        self.ids = [self.scene.add(vertices, faces) for vertices, faces in bodies]
+        self.detector = impinge.Detector(backend="cpu", **settings)
+
+    def arrays(self, positions):
+        return positions
+
+    def move(self, positions):
+        for body, vertices in zip(self.ids, positions):
+            self.scene.set_positions(body, vertices)
+
+    def ask(self):
+        return self.detector.distance(self.scene, *self.ids).distance
+
+
+class Coal:
+    """Trees of oriented boxes and rectangle swept spheres, which Coal has for distances."""
+
+    label = "Coal, OBBRSS, rebuilt"
+
+    def __init__(self, bodies):
+        import coal
+
+        self.coal = coal
+        self.faces = [np.ascontiguousarray(faces, np.int64) for _, faces in bodies]
+        self.here = coal.Transform3s()
+
+    def arrays(self, positions):
+        return [vertices.astype(np.float64) for vertices in positions]
+
+    def move(self, positions):
+        self.models = [self.model(*mesh) for mesh in zip(positions, self.faces)]
+
+    def model(self, vertices, faces):
+        model = self.coal.BVHModelOBBRSS()
+        model.beginModel(len(faces), len(vertices))
+        model.addVertices(vertices)
+        model.addTriangles(faces)
+        model.endModel()
+        return model
+
+    def ask(self):
+        result = self.coal.DistanceResult()
+        a, b = self.models
+        self.coal.distance(a, self.here, b, self.here, self.coal.DistanceRequest(), result)
+        return max(result.min_distance, 0.0)
+
+
+class CoalRefit(Coal):
+    """The same trees, refitted; copying NumPy rows into Coal's own vectors is not counted."""
+
+    label = "Coal, OBBRSS, refitted"
+
+    def __init__(self, bodies):
+        super().__init__(bodies)
+        super().move(super().arrays([vertices for vertices, _ in bodies]))
+
+    def arrays(self, positions):
+        vectors = []
+        for vertices in super().arrays(positions):
+            vectors.append(self.coal.StdVec_Vec3s())
+            vectors[-1].extend(list(vertices))
+        return vectors
+
+    def move(self, positions):
+        for model, vertices in zip(self.models, positions):
+            model.beginReplaceModel()
+            model.replaceSubModel(vertices)
+            model.endReplaceModel(True, True)
+
+
+class Fcl:
+    label = "FCL, rebuilt"
+
+    def __init__(self, bodies):
+        import fcl
+
+        self.fcl = fcl
+        self.faces = [np.ascontiguousarray(faces, np.int64) for _, faces in bodies]
+
+    def arrays(self, positions):
+        return [vertices.astype(np.float64) for vertices in positions]
+
+    def move(self, positions):
+        self.objects = []
+        for vertices, faces in zip(positions, self.faces):
+            model = self.fcl.BVHModel()
+            model.beginModel(len(vertices), len(faces))
+            model.addSubModel(vertices, faces)
+            model.endModel()
+            self.objects.append(self.fcl.CollisionObject(model))
+
+    def ask(self):
+        result = self.fcl.DistanceResult()
+        return max(self.fcl.distance(*self.objects, self.fcl.DistanceRequest(), result), 0.0)
+
+
+class Trimesh:
+    """The nearest point of one body's surface to each vertex of the other, both ways: an upper bound of the distance."""
+
+    label = "trimesh.proximity, vertices alone"
+
+    def __init__(self, bodies):
+        import rtree  # noqa: F401, without it trimesh has no such query
+        import trimesh
+
+        self.trimesh = trimesh
+        self.faces = [faces for _, faces in bodies]
+
+    def arrays(self, positions):
+        return [vertices.astype(np.float64) for vertices in positions]
+
+    def move(self, positions):
+        self.meshes = [
+            self.trimesh.Trimesh(vertices, faces, process=False, validate=False)
+            for vertices, faces in zip(positions, self.faces)
+        ]
+
+    def ask(self):
+        a, b = self.meshes
+        least = np.inf
+        for mesh, other in [(a, b), (b, a)]:
+            least = min(least, self.trimesh.proximity.closest_point(mesh, other.vertices)[1].min())
+        return least
+
+
+def mirrored(bodies, is_mirrored):
+    """The positions, or their mirror image: exact, so that the distance is the same and yet every vertex moves."""
+    sign = np.float32([-1 if is_mirrored else 1, 1, 1])
+    return [np.ascontiguousarray(vertices * sign) for vertices, _ in bodies]
+
+
+def beside(a, b, gap):
+    """Two meshes with their boxes a gap apart along the first axis, in parts of the first one's length."""
+    (of_a, faces_a), (of_b, faces_b) = a, b
+    length = np.ptp(of_a[:, 0])
+    shift = of_a[:, 0].max() - of_b[:, 0].min() + gap * length
+    return [(of_a, faces_a), (of_b + np.float32([shift, 0, 0]), faces_b)]
+
+
+def contest(contestants, bodies, rounds):
+    """Times of each contestant, in turns, and the distance that all agree on."""
+    rows, expected = {}, None
+    for round_ in range(rounds + 1):
+        positions = mirrored(bodies, round_ % 2)
+        for contestant in contestants:
+            row = rows.setdefault(contestant.label, {key: [] for key in KEYS})
+            arrays = contestant.arrays(positions)
+            _, move, move_cpu = clock(lambda: contestant.move(arrays))
+            found, ask, ask_cpu = clock(contestant.ask)
+            _, still, still_cpu = clock(contestant.ask)
+            row["distance"] = found
+            if isinstance(contestant, Trimesh):
+                assert found >= expected * (1 - 1e-6), (contestant.label, found, expected)
+            else:
+                expected = found if expected is None else expected
+                scale = max(np.abs(vertices).max() for vertices in positions)
+                assert abs(found - expected) < 1e-5 * scale, (contestant.label, found, expected)
+            # The first round warms up.
+            if round_:
+                for key, value in zip(KEYS, [move + ask, move_cpu + ask_cpu, still, still_cpu]):
+                    row[key].append(value)
+    return expected, rows
+
+
+KEYS = ["moved", "moved_cpu", "still", "still_cpu"]
+
+
+def made(kinds, bodies, missing):
+    """The contestants that are installed."""
+    present = []
+    for kind in kinds:
+        try:
+            present.append(kind(bodies))
+        except ImportError as error:
+            missing.add(str(error))
+    return present
+
+
+def read_scan(data, name):
+    vertices, faces = read_ply(data / "meshes" / f"{name}.ply")
+    # The same size for all scans.
+    return vertices / np.float32(np.ptp(vertices, axis=0).max()), faces
+
+
+def distances(data, rounds, missing):
+    """The rows of all scenes of distances."""
+    bunny, buddha, dragon = (read_scan(data, name) for name in ["bunny", "buddha", "dragon"])
+    record = []
+    for name, pair in [("dragon and dragon", (dragon, dragon)), ("bunny and buddha", (bunny, buddha))]:
+        for gap in [0.3, 0.03, 0.0]:
+            bodies = beside(*pair, gap)
+            kinds = [Ours, lambda bodies: Ours(bodies, threads=1), Coal, CoalRefit, Fcl]
+            distance, rows = contest(made(kinds, bodies, missing), bodies, rounds)
+            record.append({"scene": name, "gap": gap, "distance": distance, "rows": rows})
+            print(f"{name}, {gap}: {distance:.6g}", file=sys.stderr)
+    # A small mesh for a peer that takes seconds.
+    bodies = beside(*[(v, f) for v, f in [read_off(data, "cow"), read_off(data, "cow")]], 0.03)
+    distance, rows = contest(made([Ours, Trimesh], bodies, missing), bodies, min(rounds, 3))
+    record.append({"scene": "cow and cow", "gap": 0.03, "distance": distance, "rows": rows})
+    return record
+
+
+def read_off(data, name):
+    """Vertices and faces of a text OFF file."""
+    words = (data / "meshes" / f"{name}.off").read_text().split()
+    n, m = int(words[1]), int(words[2])
+    vertices = np.array(words[4 : 4 + 3 * n], np.float32).reshape(-1, 3)
+    faces = np.array(words[4 + 3 * n : 4 + 3 * n + 4 * m], np.int64).reshape(-1, 4)[:, 1:]
+    return vertices / np.float32(np.ptp(vertices, axis=0).max()), faces
+
+
+def near(name, vertices, faces, part, rounds, missing):
+    """One mesh with itself, within a part of its size."""
+    distance = float(part * np.linalg.norm(np.ptp(vertices, axis=0)))
+    row = {"scene": name, "n_faces": len(faces), "distance": distance, "rows": {}}
+    for threads in [0, 1]:
+        scene = impinge.Scene()
+        body = scene.add(vertices, faces)
+        detector = impinge.Detector(backend="cpu", threads=threads) if threads else impinge.Detector(backend="cpu")
+        times = []
+        for round_ in range(rounds + 1):
+            scene.set_positions(body, mirrored([(vertices, faces)], round_ % 2)[0])
+            found, wall, cpu = clock(lambda: detector.within_distance(scene, distance, within=body))
+            times.append((wall, cpu))
+        label = "impinge" + (", threads=1" if threads else "")
+        row["pairs"] = len(found)
+        stats = found.stats
+        row["rows"][label] = medians(times) | {
+            "n_candidates": stats.n_candidates,
+            "n_unsure": stats.n_unsure,
+            "stages": dict(stats.stages),
+        }
+    try:
+        import ipctk
+    except ImportError as error:
+        missing.add(str(error))
+        return row
+    faces = np.asfortranarray(faces, np.int32)
+    edges = ipctk.edges(faces)
+    positions = np.asfortranarray(vertices, np.float64)
+    mesh = ipctk.CollisionMesh(positions, edges, faces)
+    for broad in ["HashGrid", "LBVH"]:
+        times = []
+        for _ in range(max(1, min(rounds, 3))):
+            collisions = ipctk.NormalCollisions()
+            method = getattr(ipctk, broad)()
+            _, wall, cpu = clock(lambda: collisions.build(mesh, positions, distance, 0, method))
+            times.append((wall, cpu))
+        weights = sum(collisions[ix].weight for ix in range(len(collisions)))
+        row["rows"][f"ipc-toolkit, {broad}"] = medians(times) | {"pairs": weights}
+    print(f"{name}: {row['pairs']} pairs, ipc-toolkit {weights}", file=sys.stderr)
+    return row
+
+
+def medians(times):
+    times = times[1:] or times
+    return {key: statistics.median(t[ix] for t in times) for ix, key in enumerate(["wall", "cpu"])}
+
+
+def read_rumba(data, frame):
+    """The positions of one frame of a recorded sequence."""
+    raw = (data / "sequences" / "rumba.pc2").read_bytes()
+    n = int(np.frombuffer(raw, "<i4", 1, 16)[0])
+    return np.frombuffer(raw, "<f4", 3 * n, 32 + 12 * n * frame).reshape(-1, 3)
+
+
+def tables(record):
+    """The record as Markdown."""
+    lines = ["### Smallest distance of two bodies, milliseconds", ""]
+    lines += ["| scene | gap | distance | | moved | still | moved, processor | still, processor | moved / ours | still / ours |"]
+    lines += ["|---|---:|---:|---|---:|---:|---:|---:|---:|---:|"]
+    for scene in record["distances"]:
+        ours = None
+        for label, row in scene["rows"].items():
+            times = [statistics.median(row[key]) for key in KEYS]
+            ours = ours or times
+            cells = [scene["scene"], f"{scene['gap']}", f"{row['distance']:.6g}", label]
+            cells += [milliseconds(time) for time in [times[0], times[2], times[1], times[3]]]
+            cells += [f"{times[1] / ours[1]:,.1f}", f"{times[3] / ours[3]:,.1f}"]
+            lines.append("| " + " | ".join(cells) + " |")
+    lines += ["", "Ratios are of processor time.", ""]
+    lines += ["### Elements within a distance, milliseconds", ""]
+    lines += ["| scene | faces | distance | | pairs | wall | processor | processor / ours |"]
+    lines += ["|---|---:|---:|---|---:|---:|---:|---:|"]
+    for scene in record["near"]:
+        ours = scene["rows"]["impinge"]["cpu"]
+        for label, row in scene["rows"].items():
+            cells = [scene["scene"], f"{scene['n_faces']:,}", f"{scene['distance']:.4g}", label]
+            cells += [f"{row.get('pairs', scene['pairs']):,.0f}", milliseconds(row["wall"])]
+            cells += [milliseconds(row["cpu"]), f"{row['cpu'] / ours:,.1f}"]
+            lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--json", type=pathlib.Path, help="write all figures to this file")
+    parser.add_argument("--markdown", type=pathlib.Path, help="write the tables to this file")
+    arguments = parser.parse_args()
+    data = pathlib.Path(os.environ.get("IMPINGE_DATA", ROOT.parent / "shared" / "data"))
+    if not (data / "meshes" / "dragon.ply").is_file():
+        sys.exit(f"no meshes in {data}: set IMPINGE_DATA")
+    missing = set()
+    cloth = sorted((data / "ccd" / "cloth-ball" / "frames").glob("*.ply"))
+    cloth_vertices, cloth_faces = read_ply(cloth[0])
+    _, rumba_faces = read_ply(data / "sequences" / "rumba.ply")
+    rounds = arguments.rounds
+    record = {
+        "machine": machine(),
+        "near": [
+            near("cloth-ball", cloth_vertices, cloth_faces, 1e-3, rounds, missing),
+            near("cloth-ball", cloth_vertices, cloth_faces, 2e-3, rounds, missing),
+            near("rumba", read_rumba(data, 60), rumba_faces, 1e-3, rounds, missing),
+            near("rumba", read_rumba(data, 60), rumba_faces, 2e-3, rounds, missing),
+        ],
+        "distances": distances(data, rounds, missing),
+    }
+    for error in sorted(missing):
+        print(f"missing: {error}", file=sys.stderr)
+    text = tables(record)
+    print(text)
+    if arguments.json:
+        arguments.json.write_text(json.dumps(record, indent=1) + "\n")
+    if arguments.markdown:
+        arguments.markdown.write_text(text + "\n")
+
+
+if __name__ == "__main__":
+    main()
