@@ -20,6 +20,9 @@ pub(crate) struct Found<V> {
 /// Contacts found, by kind of pair.
 pub(crate) type FoundByKind<V = Contact> = [Vec<Found<V>>; PairKind::ALL.len()];
 
+/// Keys found, by kind of pair.
+pub(crate) type KeysByKind = [Vec<u64>; PairKind::ALL.len()];
+
 /// Where contacts go while a step is being answered, by kind of pair.
 pub(crate) type ContactAnswer = Answer<Found<Contact>, { PairKind::ALL.len() }>;
 /// The same for keys alone.
@@ -33,13 +36,17 @@ pub(crate) enum StepAnswer<'a> {
 }
 
 impl StepAnswer<'_> {
-    /// Takes what was found of one kind; the block is empty afterwards and keeps its memory.
+    /// Takes contacts of one kind; the block is empty afterwards and keeps its memory.
     pub fn take(&self, kind: PairKind, block: &mut Vec<Found<Contact>>) {
-        match self {
-            StepAnswer::Contacts(answer) => answer.extend(kind as usize, block.drain(..)),
-            StepAnswer::Keys(answer) => {
-                answer.extend(kind as usize, block.drain(..).map(|found| found.key));
-            }
+        if let StepAnswer::Contacts(answer) = self {
+            answer.extend(kind as usize, block.drain(..));
+        }
+    }
+
+    /// The same for pairs without a time.
+    pub fn take_keys(&self, kind: PairKind, block: &mut Vec<u64>) {
+        if let StepAnswer::Keys(answer) = self {
+            answer.extend(kind as usize, block.drain(..));
         }
     }
 }
@@ -269,7 +276,7 @@ impl<'a> IntoIterator for &'a Impacts {
 #[derive(Debug, Clone, Default)]
 pub struct Candidates {
     numbering: Numbering,
-    keys: [Vec<u64>; PairKind::ALL.len()],
+    keys: KeysByKind,
     stats: Statistics,
 }
 
@@ -282,7 +289,7 @@ impl Candidates {
     }
 
     /// Its keys, sorted in the end, and its statistics.
-    pub(crate) fn parts_mut(&mut self) -> (&mut [Vec<u64>; PairKind::ALL.len()], &mut Statistics) {
+    pub(crate) fn parts_mut(&mut self) -> (&mut KeysByKind, &mut Statistics) {
         (&mut self.keys, &mut self.stats)
     }
 

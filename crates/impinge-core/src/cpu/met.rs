@@ -84,21 +84,41 @@ impl Met {
     pub fn drop_sharing<S: Simd>(&mut self, simd: S, corners: [&[Lanes32]; 2]) {
         let mut n_kept = 0;
         for first in (0..self.n).step_by(BATCH) {
-            let [a, b] = self.batch(first);
-            let (a, b) = (*a, *b);
-            let n = (self.n - first).min(BATCH);
-            let kept = !simd.share_16(corners, [&a, &b]) & u16::MAX >> (BATCH - n);
-            // What is written past those that are kept was read before.
-            let MetLanes {
-                a: into_a,
-                b: into_b,
-            } = &mut *self.lanes;
-            let padded = "padded";
-            simd.keep_16(kept, &a, into_a[n_kept..].first_chunk_mut().expect(padded));
-            simd.keep_16(kept, &b, into_b[n_kept..].first_chunk_mut().expect(padded));
-            n_kept += kept.count_ones() as usize;
+            let dropped = simd.share_16(corners, self.batch(first));
+            n_kept = self.keep_batch(simd, first, !dropped, n_kept);
         }
         self.n = n_kept;
+    }
+
+    /// Moves some candidates of the batch from `first` on to the place after the `n_kept` that were kept before. Returns how
+    /// many are kept now; [`truncate`](Self::truncate) ends a round of this.
+    #[inline(always)]
+    pub fn keep_batch<S: Simd>(
+        &mut self,
+        simd: S,
+        first: usize,
+        mask: u16,
+        n_kept: usize,
+    ) -> usize {
+        let [a, b] = self.batch(first);
+        let (a, b) = (*a, *b);
+        let n = (self.n - first).min(BATCH);
+        let kept = mask & u16::MAX >> (BATCH - n);
+        // What is written past those that are kept was read before.
+        let MetLanes {
+            a: into_a,
+            b: into_b,
+        } = &mut *self.lanes;
+        let padded = "padded";
+        simd.keep_16(kept, &a, into_a[n_kept..].first_chunk_mut().expect(padded));
+        simd.keep_16(kept, &b, into_b[n_kept..].first_chunk_mut().expect(padded));
+        n_kept + kept.count_ones() as usize
+    }
+
+    /// Forgets all candidates but the first ones.
+    #[inline(always)]
+    pub fn truncate(&mut self, n: usize) {
+        self.n = n;
     }
 
     /// Bytes held.

@@ -1,6 +1,6 @@
 //! A worker's own copy of a cluster: its elements at both ends, their boxes, and their corners.
 //!
-//! Cost: each corner of a cluster once, when it is first needed; 8.5 KB per cluster.
+//! Cost: each corner of a cluster once, when it is first needed; 8.8 KB per cluster.
 
 use crate::cpu::bounds::of_cluster_primitives;
 use crate::cpu::group_cache::Kept;
@@ -9,6 +9,7 @@ use crate::elements::with_corners;
 use crate::exact::filter::Moving64;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{greater, lesser};
+use crate::narrow::Extent;
 use crate::positions::Positions;
 
 use super::world::World;
@@ -17,12 +18,14 @@ use super::world::World;
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub(super) struct Group {
-    /// The elements' boxes at the start and at the end.
+    /// The elements' boxes at the start and at the end; where boxes hold the whole path, only the first.
     pub start: LaneBounds,
     pub end: LaneBounds,
     /// The vertices of each corner; lists past an element's number of corners mean nothing.
     pub corners: [Lanes32; 3],
     pub n_corners: usize,
+    /// The elements' global numbers.
+    pub numbers: Lanes32,
     pub size: usize,
     /// The elements' points at the start and at the end, if `in_tables`: if positions are `f32`.
     pub points: Moving64,
@@ -35,6 +38,7 @@ impl<'a> Kept<World<'a>> for Group {
         end: LaneBounds::EMPTY,
         corners: [const { Lanes32([0; GROUP]) }; 3],
         n_corners: 0,
+        numbers: Lanes32([0; GROUP]),
         size: 0,
         points: [[[[0.0; GROUP]; 3]; 3]; 2],
         in_tables: false,
@@ -60,6 +64,11 @@ impl<'a> Kept<World<'a>> for Group {
                 lanes.0[self.size..].fill(of_first);
             }
         });
+        let first_number = world.frame.layers[layer as usize].first;
+        let order = &clustering.order[first..first + self.size];
+        for (number, &element) in self.numbers.0.iter_mut().zip(order) {
+            *number = first_number + element;
+        }
         if let (Positions::F32(start), Positions::F32(end)) = (start, end.unwrap_or(start)) {
             self.in_tables = true;
             self.put_points(simd, [start, end]);
@@ -78,6 +87,22 @@ impl<'a> Kept<World<'a>> for Group {
 }
 
 impl Group {
+    /// The extent of an element over the whole step, from the tables.
+    #[inline(always)]
+    pub fn extent(&self, lane: usize) -> Extent {
+        let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for points in &self.points {
+            for point in &points[..self.n_corners.min(3)] {
+                for axis in 0..3 {
+                    let x = f64::from(point[axis][lane]);
+                    min[axis] = min[axis].min(x);
+                    max[axis] = max[axis].max(x);
+                }
+            }
+        }
+        Extent { min, max }
+    }
+
     /// Fills the tables of points, and the boxes from those.
     #[inline(always)]
     fn put_points<S: Simd>(&mut self, simd: S, ends: [&[[f32; 3]]; 2]) {

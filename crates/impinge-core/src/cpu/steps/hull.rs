@@ -41,6 +41,12 @@ impl Pose {
         }
     }
 
+    /// Whether the boxes at both ends are the same, so that one of them is enough.
+    #[inline(always)]
+    pub fn is_single(self) -> bool {
+        self.is_swept || self.until == 0.0
+    }
+
     /// Whether the boxes at both ends are used unchanged.
     fn is_plain(self) -> bool {
         self == Pose::WHOLE
@@ -104,7 +110,8 @@ impl Pose {
         }
     }
 
-    /// [`close`](Self::close) for the boxes of a group of `size` elements: in `f32`, rounded farther outward.
+    /// [`close`](Self::close) for the boxes of a group of `size` elements: in `f32`, rounded farther outward. If the pose
+    /// [has single boxes](Self::is_single), `start` is that box, and `end` means nothing afterwards.
     #[inline(always)]
     pub fn close_all(self, [start, end]: [&mut LaneBounds; 2], size: usize) {
         if self.is_plain() {
@@ -112,6 +119,11 @@ impl Pose {
         }
         debug_assert!(size <= GROUP);
         for axis in 0..3 {
+            if self.until == 0.0 {
+                self.inflate_lanes(&mut start.min[axis], -1.0);
+                self.inflate_lanes(&mut start.max[axis], 1.0);
+                continue;
+            }
             if self.until < 1.0 {
                 self.close_lanes::<true>(&start.min[axis], &mut end.min[axis]);
                 self.close_lanes::<false>(&start.max[axis], &mut end.max[axis]);
@@ -122,13 +134,12 @@ impl Pose {
                     *low = lesser(*low, end.min[axis][lane]);
                     *high = greater(*high, end.max[axis][lane]);
                 }
-                end.min[axis] = start.min[axis];
-                end.max[axis] = start.max[axis];
+            } else {
+                self.inflate_lanes(&mut end.min[axis], -1.0);
+                self.inflate_lanes(&mut end.max[axis], 1.0);
             }
-            for bounds in [&mut *start, &mut *end] {
-                self.inflate_lanes(&mut bounds.min[axis], -1.0);
-                self.inflate_lanes(&mut bounds.max[axis], 1.0);
-            }
+            self.inflate_lanes(&mut start.min[axis], -1.0);
+            self.inflate_lanes(&mut start.max[axis], 1.0);
         }
         if size < GROUP {
             start.clear_from(size);
@@ -194,7 +205,7 @@ mod tests {
             let x = (state >> 40) as f32 / (1u64 << 23) as f32 - 1.0;
             x * 2f32.powi((state >> 33 & 15) as i32 - 8)
         };
-        for until in [1.0, 0.5, 0.1, 1e-3, 1e-9] {
+        for until in [1.0, 0.5, 0.1, 1e-3, 1e-9, 0.0] {
             for (margin, is_swept) in [(0.0, false), (0.0, true), (0.25, true), (1e-9, true)] {
                 let pose = Pose {
                     until,
@@ -218,7 +229,8 @@ mod tests {
                     }
                     let [at_start, at_end] = &mut lanes;
                     pose.close_all([at_start, at_end], lane + 1);
-                    let of_group = [lanes[0].at(lane), lanes[1].at(lane)];
+                    let last = usize::from(!pose.is_single());
+                    let of_group = [lanes[0].at(lane), lanes[last].at(lane)];
                     // Boxes of groups are not much larger: coordinates are at most 2^7.
                     let more = 4.0 * SLACK * 256.0;
                     for (wide, tight) in of_group.iter().zip(&closed) {

@@ -3,7 +3,10 @@
 //! In: candidates. Out: keys and times. Vertices with faces and edges with edges go through filters (`exact::filter`):
 //!
 //! ```text
-//! apart    sixteen pairs at a time in f32, from the tables of the two groups (or eight in f64): three of four go
+//! far      sixteen pairs at a time in f32, from the tables of the two groups: apart along a few directions
+//! across   those that are left, put side by side: apart along their normals, or never in one plane
+//! aside    those that are left: one is always beside the other
+//!          (if positions are f64: far and across, eight pairs at a time)
 //! look     eight intervals of time in f64: no contact in it, one candidate, or unclear
 //! enclose  eight candidates: contact or none, and when, nearly always to all bits of an f32
 //! ```
@@ -21,12 +24,12 @@
 use crate::cpu::met::{Met, WorkItem};
 use crate::cpu::simd::{Isa, Lanes, Simd, dispatch};
 use crate::exact::filter::{
-    self, BATCH, Enclosed8, LANES, Look8, Next, Search, Spans8, Steps8, time_between,
+    self, BATCH, Enclosed8, LANES, Look8, Moving64, Next, Search, Spans8, Steps8, time_between,
 };
 use crate::exact::{Approach, Contact, ElementPair, Point, approach, first_within};
 use crate::frame::pair_key;
 use crate::grouping::GROUP;
-use crate::impacts::{Found, FoundByKind, StepAnswer};
+use crate::impacts::{Found, FoundByKind, KeysByKind, StepAnswer};
 use crate::narrow::{Extent, are_near};
 use crate::pair_kind::PairKind;
 use crate::positions::Positions;
@@ -39,13 +42,6 @@ use super::world::{Sought, World};
 
 /// Pairs that the filter's first step leaves open are searched once there are this many.
 const FULL: usize = 1024;
-
-/// What comes with a pair that has no time.
-const NONE: Contact = Contact {
-    time: 0.0,
-    is_exact: false,
-    at_start: false,
-};
 
 /// Two layers, and the kind of their pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,6 +66,8 @@ struct Open {
 pub(super) struct Settler {
     /// Contacts found, handed over in blocks.
     found: FoundByKind,
+    /// The same for pairs without a time.
+    keys: KeysByKind,
     pub n_candidates: u64,
     pub n_unsure: u64,
     /// Pairs of the current layers that the filter's first step has left: to be looked at.
@@ -85,6 +83,7 @@ pub(super) struct Settler {
 impl Settler {
     pub fn clear(&mut self) {
         self.found.iter_mut().for_each(Vec::clear);
+        self.keys.iter_mut().for_each(Vec::clear);
         (self.n_candidates, self.n_unsure) = (0, 0);
         for list in [&mut self.open, &mut self.later, &mut self.single] {
             list.clear();
@@ -95,15 +94,20 @@ impl Settler {
 
     pub fn bytes(&self) -> usize {
         let found: usize = self.found.iter().map(Vec::capacity).sum();
+        let keys: usize = self.keys.iter().map(Vec::capacity).sum();
         let lists = [&self.open, &self.later, &self.single];
         size_of::<Open>() * lists.iter().map(|list| list.capacity()).sum::<usize>()
             + size_of::<Found<Contact>>() * found
+            + size_of::<u64>() * keys
     }
 
-    /// Ends a step: hands over the remaining contacts.
+    /// Ends a step: hands over the remaining contacts and keys.
     pub fn end(&mut self, answer: StepAnswer<'_>) {
         for (kind, found) in PairKind::ALL.into_iter().zip(&mut self.found) {
             answer.take(kind, found);
+        }
+        for (kind, keys) in PairKind::ALL.into_iter().zip(&mut self.keys) {
+            answer.take_keys(kind, keys);
         }
     }
 
@@ -111,28 +115,40 @@ impl Settler {
     #[inline(always)]
     pub fn settle_item<S: Simd>(
         &mut self,
-        _: S,
+        simd: S,
         isa: Isa,
         world: World<'_>,
         (item, between): (&WorkItem, Between),
         groups: [&Group; 2],
-        met: &Met,
+        met: &mut Met,
     ) {
         self.n_candidates += met.len() as u64;
         if self.between != Some(between) {
             self.search(isa, world);
             self.between = Some(between);
         }
-        let places = |ix: usize| {
+        let place_of = |met: &Met, ix: usize| {
             let place = |cluster: u32, lane: u8| cluster * GROUP as u32 + u32::from(lane);
             let [lane_a, lane_b] = met.lanes(ix);
             [place(item.cluster_a, lane_a), place(item.cluster_b, lane_b)]
         };
+        let [group_a, group_b] = groups;
         match (world.asked.sought, between.kind) {
             (Sought::Boxes(distance), _) => {
-                for ix in 0..met.len() {
-                    self.settle_boxes(world, between, places(ix), distance);
+                let keys = &mut self.keys[between.kind as usize];
+                if group_a.in_tables && group_b.in_tables {
+                    put_boxes(groups, met, distance, keys);
+                } else {
+                    for ix in 0..met.len() {
+                        let [a, b] = place_of(met, ix);
+                        let a = extent(world, between.a, a);
+                        let b = extent(world, between.b, b);
+                        if are_near(&a, &b, distance) {
+                            keys.push(key_in(groups, met.lanes(ix)));
+                        }
+                    }
                 }
+                self.hand_over_keys(world, between.kind);
             }
             (sought, kind) if is_near(sought) || world.frame.distance() > 0.0 => {
                 let near = Near::new(world, [between.a, between.b]);
@@ -154,7 +170,7 @@ impl Settler {
                         let verdict =
                             filter::are_within_in_tables::<S::F32>(pair, tables, lanes, reach);
                         for lane in Lanes(u64::from(verdict.yes & open)) {
-                            self.put_near(world, between, places(first + lane));
+                            self.put_near(world, between, place_of(met, first + lane));
                         }
                         open &= !verdict.yes;
                         if is_near(sought) {
@@ -166,7 +182,7 @@ impl Settler {
                         }
                     }
                     for lane in Lanes(u64::from(open)) {
-                        self.settle_near(&near, world, between, places(first + lane));
+                        self.settle_near(&near, world, between, place_of(met, first + lane));
                     }
                 }
             }
@@ -176,35 +192,22 @@ impl Settler {
                     places,
                     search: Search::new(until),
                 };
-                let [group_a, group_b] = groups;
                 self.is_first = !(group_a.in_tables && group_b.in_tables);
                 if !self.is_first {
                     let tables = [&group_a.points, &group_b.points];
                     let until = greater_f32(until);
-                    for first in (0..met.len()).step_by(BATCH) {
-                        let lanes = met.batch(first);
-                        let no = match between.kind {
-                            PairKind::VertexFace => filter::are_apart_in_tables::<S::F32>(
-                                ElementPair::VertexFace,
-                                tables,
-                                lanes,
-                                until,
-                            ),
-                            _ => filter::are_apart_in_tables::<S::F32>(
-                                ElementPair::EdgeEdge,
-                                tables,
-                                lanes,
-                                until,
-                            ),
-                        };
-                        let n = (met.len() - first).min(BATCH);
-                        for lane in Lanes(u64::from(!no & u16::MAX >> (BATCH - n))) {
-                            self.open.push(new(places(first + lane)));
+                    match between.kind {
+                        PairKind::VertexFace => {
+                            drop_apart(simd, ElementPair::VertexFace, tables, until, met);
                         }
+                        _ => drop_apart(simd, ElementPair::EdgeEdge, tables, until, met),
+                    }
+                    for ix in 0..met.len() {
+                        self.open.push(new(place_of(met, ix)));
                     }
                 } else {
                     for ix in 0..met.len() {
-                        self.open.push(new(places(ix)));
+                        self.open.push(new(place_of(met, ix)));
                     }
                 }
                 if self.open.len() >= FULL {
@@ -214,7 +217,7 @@ impl Settler {
             (_, kind) => {
                 if let Some(pair) = exact_pair(kind) {
                     for ix in 0..met.len() {
-                        self.settle_exactly(world, between, pair, places(ix));
+                        self.settle_exactly(world, between, pair, place_of(met, ix));
                     }
                 }
             }
@@ -231,19 +234,12 @@ impl Settler {
         self.open.clear();
     }
 
-    fn settle_boxes(&mut self, world: World<'_>, between: Between, places: Places, distance: f64) {
-        let [a, b] = [(between.a, places[0]), (between.b, places[1])]
-            .map(|(layer, place)| extent(world, layer, place));
-        if are_near(&a, &b, distance) {
-            self.push(world, between, places, NONE);
-        }
-    }
-
     /// Takes a pair that is within the distance asked for at the start.
     #[inline(always)]
     fn put_near(&mut self, world: World<'_>, between: Between, places: Places) {
         if is_near(world.asked.sought) {
-            self.push(world, between, places, NONE);
+            self.keys[between.kind as usize].push(key(world, between, places));
+            self.hand_over_keys(world, between.kind);
         } else {
             self.report(world, between, places, Contact::AT_START);
         }
@@ -271,6 +267,15 @@ impl Settler {
             Approach::AtStart => self.put_near(world, between, places),
             Approach::Between(span) => self.report_within(world, (between, pair), places, span),
             Approach::Unsure => self.settle_exactly(world, between, pair, places),
+        }
+    }
+
+    /// Hands over the keys of a kind once they make a block.
+    #[inline(always)]
+    fn hand_over_keys(&mut self, world: World<'_>, kind: PairKind) {
+        let keys = &mut self.keys[kind as usize];
+        if keys.len() >= BLOCK {
+            world.answer.take_keys(kind, keys);
         }
     }
 
@@ -304,13 +309,9 @@ impl Settler {
 
     #[inline(always)]
     fn push(&mut self, world: World<'_>, between: Between, places: Places, contact: Contact) {
-        let [a, b] = [(between.a, places[0]), (between.b, places[1])].map(|(layer, place)| {
-            let first = world.frame.layers[layer as usize].first;
-            first + world.cache(layer).clustering.order[place as usize]
-        });
         let found = &mut self.found[between.kind as usize];
         found.push(Found {
-            key: pair_key(a, b),
+            key: key(world, between, places),
             value: contact,
         });
         if found.len() >= BLOCK {
@@ -348,6 +349,72 @@ fn points(
         }
     }
     points
+}
+
+/// Drops the candidates that are certainly apart from t = 0 to `until`.
+#[inline(always)]
+fn drop_apart<S: Simd>(
+    simd: S,
+    pair: ElementPair,
+    tables: [&Moving64; 2],
+    until: f32,
+    met: &mut Met,
+) {
+    let mut n_kept = 0;
+    for first in (0..met.len()).step_by(BATCH) {
+        let no = filter::are_far_in_tables::<S::F32>(pair, tables, met.batch(first), until);
+        n_kept = met.keep_batch(simd, first, !no, n_kept);
+    }
+    met.truncate(n_kept);
+    let mut n_kept = 0;
+    for first in (0..met.len()).step_by(BATCH) {
+        let no = filter::are_across_in_tables::<S::F32>(pair, tables, met.batch(first), until);
+        n_kept = met.keep_batch(simd, first, !no, n_kept);
+    }
+    met.truncate(n_kept);
+    let mut n_kept = 0;
+    for first in (0..met.len()).step_by(BATCH) {
+        let no = filter::are_aside_in_tables::<S::F32>(pair, tables, met.batch(first), until);
+        n_kept = met.keep_batch(simd, first, !no, n_kept);
+    }
+    met.truncate(n_kept);
+}
+
+/// Puts down the candidates whose boxes over the step, inflated, overlap. Boxes of groups in tables are not rounded unless
+/// they are inflated.
+#[inline(always)]
+fn put_boxes(groups: [&Group; 2], met: &Met, distance: f64, keys: &mut Vec<u64>) {
+    for ix in 0..met.len() {
+        let lanes = met.lanes(ix);
+        let is_near = distance == 0.0
+            || are_near(
+                &groups[0].extent(lanes[0].into()),
+                &groups[1].extent(lanes[1].into()),
+                distance,
+            );
+        if is_near {
+            keys.push(key_in(groups, lanes));
+        }
+    }
+}
+
+/// The key of a pair.
+#[inline(always)]
+fn key(world: World<'_>, between: Between, places: Places) -> u64 {
+    let [a, b] = [(between.a, places[0]), (between.b, places[1])].map(|(layer, place)| {
+        let first = world.frame.layers[layer as usize].first;
+        first + world.cache(layer).clustering.order[place as usize]
+    });
+    pair_key(a, b)
+}
+
+/// The key of a pair, by its lanes in two groups.
+#[inline(always)]
+fn key_in([a, b]: [&Group; 2], [lane_a, lane_b]: [u8; 2]) -> u64 {
+    pair_key(
+        a.numbers.0[usize::from(lane_a)],
+        b.numbers.0[usize::from(lane_b)],
+    )
 }
 
 /// An `f32` that is not below a time.

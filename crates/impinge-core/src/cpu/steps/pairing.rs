@@ -3,7 +3,7 @@
 //!
 //! 1. Elements of either cluster that do not meet the other cluster's box drop out.
 //! 2. The boxes of the larger side's survivors are put side by side, and each survivor of the smaller side is
-//!    tested against them, 16 (or 8) lanes at a time.
+//!    tested against them, 16 (or 8) lanes at a time; where boxes are single, 16 lanes against all of them.
 //! 3. Within one body, candidates that share a vertex are dropped, again 16 at a time: the vertices of their corners
 //!    are looked up in the tables of both groups.
 
@@ -13,7 +13,7 @@ use crate::clock::Instant;
 use crate::cpu::group_cache::GroupCache;
 use crate::cpu::met::{Met, Side, WorkItem};
 use crate::cpu::pairing::full;
-use crate::cpu::simd::{Isa, LaneBounds, Lanes, Simd, up_to};
+use crate::cpu::simd::{Isa, LaneBounds, Lanes, Masks, Simd, up_to};
 use crate::cpu::slabs::{Counts, Stage};
 use crate::frame::TestId;
 use crate::grouping::GROUP;
@@ -34,6 +34,8 @@ pub(crate) struct Worker {
     met: Met,
     /// The boxes of one side's survivors at the start and at the end.
     survivors: Box<[LaneBounds; 2]>,
+    /// Which lanes each row meets, where boxes are single.
+    masks: Masks,
     settler: Settler,
     busy: Duration,
     n_settled: u32,
@@ -45,6 +47,7 @@ impl Default for Worker {
             groups: GroupCache::default(),
             met: Met::default(),
             survivors: Box::new([LaneBounds::EMPTY, LaneBounds::EMPTY]),
+            masks: Masks::default(),
             settler: Settler::default(),
             busy: Duration::ZERO,
             n_settled: 0,
@@ -137,6 +140,7 @@ fn pair<S: Simd>(
         groups,
         met,
         survivors,
+        masks,
         ..
     } = worker;
     met.clear();
@@ -150,12 +154,25 @@ fn pair<S: Simd>(
     let place_b = groups.place(simd, world, sides[1], place_a);
     let (a, b) = (groups.at(place_a), groups.at(place_b));
     let (mut lanes_a, mut lanes_b) = (full(a.size), full(b.size));
+    let is_single = world.asked.pose.is_single();
     if !is_own {
-        lanes_a = simd.meets_64([&a.start, &a.end], &ends[1], lanes_a);
+        // Boxes of clusters: where they are single, both ends have the same.
+        lanes_a = if is_single {
+            simd.overlaps_64(&a.start, &ends[1][0], lanes_a)
+        } else {
+            simd.meets_64([&a.start, &a.end], &ends[1], lanes_a)
+        };
         if lanes_a == 0 {
             return None;
         }
-        lanes_b = simd.meets_64([&b.start, &b.end], &ends[0], lanes_b);
+        lanes_b = if is_single {
+            simd.overlaps_64(&b.start, &ends[0][0], lanes_b)
+        } else {
+            simd.meets_64([&b.start, &b.end], &ends[0], lanes_b)
+        };
+        if lanes_b == 0 {
+            return None;
+        }
     }
     let layers = &world.frame.layers;
     let same_body = layers[item.a as usize].id == layers[item.b as usize].id;
@@ -166,23 +183,41 @@ fn pair<S: Simd>(
         (Side::B, lanes_b, lanes_a, [b, a])
     };
     let mut map = [0; GROUP];
-    let (boxes, lanes) = if lanes == u64::MAX {
-        simd.list_lanes(lanes, &mut map);
-        ([&other.start, &other.end], lanes)
-    } else {
-        let [start, end] = &mut **survivors;
+    let [start, end] = &mut **survivors;
+    let n = simd.list_lanes(lanes, &mut map);
+    let is_full = lanes == u64::MAX;
+    if !is_full {
         simd.put_survivors(&other.start, lanes, start);
-        simd.put_survivors(&other.end, lanes, end);
-        let n = simd.list_lanes(lanes, &mut map);
-        ([&*start, &*end], full(n))
+        if !is_single {
+            simd.put_survivors(&other.end, lanes, end);
+        }
+    }
+    let boxes = match is_full {
+        true => [&other.start, &other.end],
+        false => [&*start, &*end],
     };
-    for row in Lanes(rows) {
-        let query = [own.start.at(row), own.end.at(row)];
-        // Within a cluster all lanes survive, each in its place.
-        let lanes = if is_own { lanes & !up_to(row) } else { lanes };
-        let mask = simd.meets_64(boxes, &query, lanes);
-        if mask != 0 {
-            met.push_mapped_row(simd, (side, row), mask, &map);
+    let among = full(n);
+    if is_single {
+        if is_own {
+            // All lanes of a cluster survive, each in its place.
+            simd.overlaps_within(boxes[0], among, masks);
+        } else {
+            simd.overlaps_rows(boxes[0], among, &own.start, rows, masks);
+        }
+        for row in Lanes(rows) {
+            let mask = masks.0[row];
+            if mask != 0 {
+                met.push_mapped_row(simd, (side, row), mask, &map);
+            }
+        }
+    } else {
+        for row in Lanes(rows) {
+            let query = [own.start.at(row), own.end.at(row)];
+            let among = if is_own { among & !up_to(row) } else { among };
+            let mask = simd.meets_64(boxes, &query, among);
+            if mask != 0 {
+                met.push_mapped_row(simd, (side, row), mask, &map);
+            }
         }
     }
     if same_body {

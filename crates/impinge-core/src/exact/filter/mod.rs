@@ -35,8 +35,8 @@ mod triangles;
 use super::Point;
 
 pub use moving::{
-    Enclosed8, Look8, Moving64, Next, Search, Spans8, Steps8, are_apart, are_apart_in_tables,
-    enclose, look, time_between,
+    Enclosed8, Look8, Moving64, Next, Search, Spans8, Steps8, are_across_in_tables, are_apart,
+    are_aside_in_tables, are_far_in_tables, enclose, look, time_between,
 };
 pub(super) use moving::{contact_answer, search_contact};
 pub use nearness::{are_within_in_tables, stay_beyond_in_tables};

@@ -6,7 +6,8 @@
 //! the intervals ([`Search`]), and so can keep all lanes busy.
 //!
 //! In: the points at the start and at the end ([`Motion`]). Out: masks and times. Cost in operations for all lanes:
-//! [`Motion::are_apart`] about 300, [`Motion::look`] 500, [`Motion::enclose`] 900.
+//! [`Motion::are_far`] about 200, [`Motion::are_across`] 300, [`Motion::are_aside`] 400, [`Motion::look`] 500,
+//! [`Motion::enclose`] 900.
 //!
 //! Method: over [a, b] the corners V and edges E of the polygon are computed at a and at b, and from them the Bernstein
 //! coefficients over [a, b] of the cubic f = N . V_0 and of the quartics w = N . (V x E), one per edge. If all
@@ -202,18 +203,23 @@ impl<T: Number> Motion<T> {
         if self.n_corners == 3 { 3 } else { 2 }
     }
 
-    /// The lanes whose elements are certainly apart from t = 0 to `until`: either they are apart on an axis or along a direction
-    /// at both ends of that time, or f has one sign. The cheap first step.
+    /// The lanes whose elements are certainly apart from t = 0 to `until`: the cheap first step, [`are_far`](Self::are_far)
+    /// and [`are_across`](Self::are_across).
     #[inline(always)]
     #[must_use]
     pub fn are_apart(&self, until: f64) -> T::Mask {
-        let t = T::splat(until);
-        let start = &self.corners[0];
-        let mut end = *start;
+        self.are_far(until) | self.are_across(until)
+    }
+
+    /// The lanes whose elements are certainly apart from t = 0 to `until`: they are apart on an axis or along the sum of all
+    /// corners, at both ends of that time.
+    #[inline(always)]
+    #[must_use]
+    pub fn are_far(&self, until: f64) -> T::Mask {
+        let [start, end] = self.corners_until(until);
         let mut sum = start[0];
         let mut size = self.corner_sizes[0];
         for ix in 0..self.n_corners {
-            end[ix] = self.corner_at(ix, t);
             size = size.larger(self.corner_sizes[ix]);
             for axis in 0..3 {
                 sum[axis] = sum[axis] + end[ix][axis];
@@ -223,22 +229,68 @@ impl<T: Number> Motion<T> {
             }
         }
         let (start, end) = (&start[..self.n_corners], &end[..self.n_corners]);
-        let edges = [
-            [self.edges[0][0], self.edge_at(0, t)],
-            [self.edges[0][1], self.edge_at(1, t)],
-        ];
-        let normal = cross_over(&edges[0], &edges[1]);
-        let along = are_before(&sum, start, end, size)
-            | are_before(&normal[0], start, end, size)
-            | are_before(&normal[2], start, end, size);
-        let cubic = self.signs(&cubic(&normal, &[start[0], end[0]]));
         // At t = 1 only differences are rounded, and their signs are right.
         let bound = if until == 1.0 {
             T::splat(0.0)
         } else {
             T::splat(T::BOUND / 4.0) * size + T::splat(T::TINY[0])
         };
-        ((along | cubic.has_no_root()) & self.is_small) | are_apart_on_an_axis(start, end, bound)
+        (are_before(&sum, start, end, size) & self.is_small)
+            | are_apart_on_an_axis(start, end, bound)
+    }
+
+    /// The lanes whose elements are certainly apart from t = 0 to `until`: they are apart along a normal at both ends of that
+    /// time, or f has one sign.
+    #[inline(always)]
+    #[must_use]
+    pub fn are_across(&self, until: f64) -> T::Mask {
+        let t = T::splat(until);
+        let [start, end] = self.corners_until(until);
+        let mut size = self.corner_sizes[0];
+        for ix in 1..self.n_corners {
+            size = size.larger(self.corner_sizes[ix]);
+        }
+        let (start, end) = (&start[..self.n_corners], &end[..self.n_corners]);
+        let edges = [
+            [self.edges[0][0], self.edge_at(0, t)],
+            [self.edges[0][1], self.edge_at(1, t)],
+        ];
+        let normal = cross_over(&edges[0], &edges[1]);
+        let along =
+            are_before(&normal[0], start, end, size) | are_before(&normal[2], start, end, size);
+        let cubic = self.signs(&cubic(&normal, &[start[0], end[0]]));
+        (along | cubic.has_no_root()) & self.is_small
+    }
+
+    /// The lanes whose elements are certainly apart from t = 0 to `until`: some w is negative.
+    #[inline(always)]
+    #[must_use]
+    pub fn are_aside(&self, until: f64) -> T::Mask {
+        let (zero, t) = (T::splat(0.0), T::splat(until));
+        let mut edges = [[[zero; 3]; 2]; 3];
+        for (ix, edge) in edges.iter_mut().enumerate().take(self.n_edges()) {
+            *edge = [self.edges[0][ix], self.edge_at(ix, t)];
+        }
+        let normal = cross_over(&edges[0], &edges[1]);
+        let edges_size = self.edge_sizes[0] * self.edge_sizes[1];
+        let mut outside = zero.gt(zero);
+        for ix in 0..self.n_corners {
+            let corner = [self.corners[0][ix], self.corner_at(ix, t)];
+            outside = outside | self.sides(&normal, &corner, &edges, ix, edges_size).1;
+        }
+        outside & self.is_small
+    }
+
+    /// The corners at the start and at a time.
+    #[inline(always)]
+    fn corners_until(&self, until: f64) -> [[Vector<T>; 4]; 2] {
+        let t = T::splat(until);
+        let start = self.corners[0];
+        let mut end = start;
+        for (ix, corner) in end.iter_mut().enumerate().take(self.n_corners) {
+            *corner = self.corner_at(ix, t);
+        }
+        [start, end]
     }
 
     /// Tests an interval [a, b].

@@ -246,35 +246,79 @@ pub(super) fn are_edges(pair: ElementPair) -> bool {
     matches!(pair, ElementPair::EdgeEdge)
 }
 
-/// Which of sixteen pairs are certainly apart from t = 0 to `until`. The elements are those of two groups, named by
-/// their places. In `f32`: for coordinates of any size, but differences above 2^16 are never certain.
+/// Which of sixteen pairs are certainly apart from t = 0 to `until`, by the cheapest test. The elements are those of two
+/// groups, named by their places. In `f32`: for coordinates of any size, but differences above 2^16 are never certain.
 #[inline(always)]
 #[must_use]
-pub fn are_apart_in_tables<V: Lookup>(
+pub fn are_far_in_tables<V: Lookup>(
     pair: ElementPair,
-    [group_a, group_b]: [&Moving64; 2],
-    [places_a, places_b]: [&[u8; BATCH]; 2],
+    groups: [&Moving64; 2],
+    places: [&[u8; BATCH]; 2],
     until: f32,
 ) -> u16 {
     let mut no = 0;
     for first in (0..BATCH).step_by(V::N) {
-        let (a, b) = (V::places(places_a, first), V::places(places_b, first));
-        let motion = if are_edges(pair) {
-            Motion::new(
-                true,
-                &two_edges::<V>(&group_a[0], a, &group_b[0], b),
-                &two_edges::<V>(&group_a[1], a, &group_b[1], b),
-            )
-        } else {
-            Motion::new(
-                false,
-                &vertex_and_face::<V>(&group_a[0], a, &group_b[0], b),
-                &vertex_and_face::<V>(&group_a[1], a, &group_b[1], b),
-            )
-        };
-        no |= V::bits(motion.are_apart(f64::from(until))) << first;
+        let motion = look_up_motion::<V>(pair, groups, places, first);
+        no |= V::bits(motion.are_far(f64::from(until))) << first;
     }
     no
+}
+
+/// The same by normals, for pairs that [`are_far_in_tables`] leaves.
+#[inline(always)]
+#[must_use]
+pub fn are_across_in_tables<V: Lookup>(
+    pair: ElementPair,
+    groups: [&Moving64; 2],
+    places: [&[u8; BATCH]; 2],
+    until: f32,
+) -> u16 {
+    let mut no = 0;
+    for first in (0..BATCH).step_by(V::N) {
+        let motion = look_up_motion::<V>(pair, groups, places, first);
+        no |= V::bits(motion.are_across(f64::from(until))) << first;
+    }
+    no
+}
+
+/// The same by where the elements meet each other's planes, for pairs that the other tests leave.
+#[inline(always)]
+#[must_use]
+pub fn are_aside_in_tables<V: Lookup>(
+    pair: ElementPair,
+    groups: [&Moving64; 2],
+    places: [&[u8; BATCH]; 2],
+    until: f32,
+) -> u16 {
+    let mut no = 0;
+    for first in (0..BATCH).step_by(V::N) {
+        let motion = look_up_motion::<V>(pair, groups, places, first);
+        no |= V::bits(motion.are_aside(f64::from(until))) << first;
+    }
+    no
+}
+
+#[inline(always)]
+fn look_up_motion<V: Lookup>(
+    pair: ElementPair,
+    [group_a, group_b]: [&Moving64; 2],
+    [places_a, places_b]: [&[u8; BATCH]; 2],
+    first: usize,
+) -> Motion<V> {
+    let (a, b) = (V::places(places_a, first), V::places(places_b, first));
+    if are_edges(pair) {
+        Motion::new(
+            true,
+            &two_edges::<V>(&group_a[0], a, &group_b[0], b),
+            &two_edges::<V>(&group_a[1], a, &group_b[1], b),
+        )
+    } else {
+        Motion::new(
+            false,
+            &vertex_and_face::<V>(&group_a[0], a, &group_b[0], b),
+            &vertex_and_face::<V>(&group_a[1], a, &group_b[1], b),
+        )
+    }
 }
 
 #[inline(always)]

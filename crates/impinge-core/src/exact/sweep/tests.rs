@@ -200,7 +200,10 @@ fn ask_tables<V: number::Lookup>(pair: ElementPair, steps: &[[[Point; 4]; 2]], u
         ElementPair::VertexFace => [table(0..1), table(1..4)],
         _ => [table(0..2), table(2..4)],
     };
-    filter::are_apart_in_tables::<V>(pair, [&a, &b], [&places, &places], until)
+    let (tables, places) = ([&a, &b], [&places, &places]);
+    filter::are_far_in_tables::<V>(pair, tables, places, until)
+        | filter::are_across_in_tables::<V>(pair, tables, places, until)
+        | filter::are_aside_in_tables::<V>(pair, tables, places, until)
 }
 
 #[cfg(target_arch = "x86_64")]
