@@ -298,6 +298,9 @@ impl Detector {
     ///     Pairs that touch at the start: reported with the time 0, or left out whatever they do later.
     /// toi : {"f32", "f64"}
     ///     To which precision times are rounded down.
+    /// separation : float
+    ///     The distance that elements must keep, 0 or more. A pair is then reported with the first time at which its
+    ///     distance is at most `separation`, decided exactly; with 0, elements must touch.
     /// progress, cancel
     ///     As for `detect`.
     ///
@@ -308,7 +311,7 @@ impl Detector {
     /// Raises
     /// ------
     /// ValueError, TypeError, MemoryError, Cancelled, RuntimeError
-    ///     As `detect`.
+    ///     As `detect`; a separation that is negative or not finite.
     ///
     /// Examples
     /// --------
@@ -325,11 +328,11 @@ impl Detector {
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     #[pyo3(
         signature = (
-            scene, *, between=None, within=None, ignore=None, start=None, toi=None, progress=None,
-            cancel=None,
+            scene, *, between=None, within=None, ignore=None, start=None, toi=None, separation=None,
+            progress=None, cancel=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          start=\"report\", toi=\"f32\", progress=None, cancel=None)"
+                          start=\"report\", toi=\"f32\", separation=0.0, progress=None, cancel=None)"
     )]
     fn impacts(
         slf: &Bound<'_, Self>,
@@ -339,11 +342,12 @@ impl Detector {
         ignore: Argument<'_, '_>,
         start: Argument<'_, '_>,
         toi: Argument<'_, '_>,
+        separation: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<Impacts> {
         let toi = settings::toi(toi)?;
-        let ask = step((between, within, ignore), start, toi)?;
+        let ask = step((between, within, ignore), start, toi, separation)?;
         let answer = |detector: &mut impinge::Detector,
                       scene: &impinge::Scene,
                       step: &Step,
@@ -361,7 +365,7 @@ impl Detector {
     ///
     /// Parameters
     /// ----------
-    /// scene, between, within, ignore, start, toi, progress, cancel
+    /// scene, between, within, ignore, start, toi, separation, progress, cancel
     ///     As for `impacts`.
     ///
     /// Returns
@@ -376,11 +380,11 @@ impl Detector {
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     #[pyo3(
         signature = (
-            scene, *, between=None, within=None, ignore=None, start=None, toi=None, progress=None,
-            cancel=None,
+            scene, *, between=None, within=None, ignore=None, start=None, toi=None, separation=None,
+            progress=None, cancel=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          start=\"report\", toi=\"f32\", progress=None, cancel=None)"
+                          start=\"report\", toi=\"f32\", separation=0.0, progress=None, cancel=None)"
     )]
     fn earliest(
         slf: &Bound<'_, Self>,
@@ -390,10 +394,16 @@ impl Detector {
         ignore: Argument<'_, '_>,
         start: Argument<'_, '_>,
         toi: Argument<'_, '_>,
+        separation: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<Option<Impact>> {
-        let ask = step((between, within, ignore), start, settings::toi(toi)?)?;
+        let ask = step(
+            (between, within, ignore),
+            start,
+            settings::toi(toi)?,
+            separation,
+        )?;
         let watched = (scene, progress, cancel);
         let answer = impinge::Detector::earliest_with;
         let (first, _, number) = Detector::watched(slf, watched, ask, answer)?;
@@ -404,7 +414,7 @@ impl Detector {
     ///
     /// Parameters
     /// ----------
-    /// scene, between, within, ignore, start, progress, cancel
+    /// scene, between, within, ignore, start, separation, progress, cancel
     ///     As for `impacts`.
     ///
     /// Returns
@@ -418,10 +428,11 @@ impl Detector {
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     #[pyo3(
         signature = (
-            scene, *, between=None, within=None, ignore=None, start=None, progress=None, cancel=None,
+            scene, *, between=None, within=None, ignore=None, start=None, separation=None,
+            progress=None, cancel=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          start=\"report\", progress=None, cancel=None)"
+                          start=\"report\", separation=0.0, progress=None, cancel=None)"
     )]
     fn is_free(
         slf: &Bound<'_, Self>,
@@ -430,10 +441,11 @@ impl Detector {
         within: Argument<'_, '_>,
         ignore: Argument<'_, '_>,
         start: Argument<'_, '_>,
+        separation: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<bool> {
-        let ask = step((between, within, ignore), start, Toi::F32)?;
+        let ask = step((between, within, ignore), start, Toi::F32, separation)?;
         let watched = (scene, progress, cancel);
         let answer = impinge::Detector::is_free_with;
         Ok(Detector::watched(slf, watched, ask, answer)?.0)
@@ -448,7 +460,7 @@ impl Detector {
     ///
     /// Parameters
     /// ----------
-    /// scene, between, within, ignore, start, progress, cancel
+    /// scene, between, within, ignore, start, separation, progress, cancel
     ///     As for `impacts`.
     ///
     /// Returns
@@ -463,10 +475,11 @@ impl Detector {
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     #[pyo3(
         signature = (
-            scene, *, between=None, within=None, ignore=None, start=None, progress=None, cancel=None,
+            scene, *, between=None, within=None, ignore=None, start=None, separation=None,
+            progress=None, cancel=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          start=\"report\", progress=None, cancel=None)"
+                          start=\"report\", separation=0.0, progress=None, cancel=None)"
     )]
     fn advance(
         slf: &Bound<'_, Self>,
@@ -475,10 +488,11 @@ impl Detector {
         within: Argument<'_, '_>,
         ignore: Argument<'_, '_>,
         start: Argument<'_, '_>,
+        separation: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<Advance> {
-        let ask = step((between, within, ignore), start, Toi::F64)?;
+        let ask = step((between, within, ignore), start, Toi::F64, separation)?;
         let watched = (scene, progress, cancel);
         let answer = impinge::Detector::advance_with;
         let (advance, _, number) = Detector::watched(slf, watched, ask, answer)?;
@@ -527,7 +541,7 @@ impl Detector {
         cancel: Argument<'_, '_>,
     ) -> PyResult<Candidates> {
         let kinds = steps::kinds(kinds)?;
-        let distance = steps::distance(distance)?;
+        let distance = steps::distance(distance, "distance")?;
         let ask = |scene: &Scene| {
             let query = step_question(scene, between, within, ignore)?;
             Ok(CandidateQuery::new(query).kinds(kinds).distance(distance))
@@ -635,7 +649,7 @@ impl Detector {
         cancel: Argument<'_, '_>,
     ) -> PyResult<NearPairs> {
         let kinds = kinds.map(|kinds| steps::kinds(Some(kinds))).transpose()?;
-        let distance = steps::distance(distance)?;
+        let distance = steps::distance(distance, "distance")?;
         let ask = |scene: &Scene| {
             let query = NearQuery::new(step_question(scene, between, within, ignore)?);
             let mut query = query.distance(distance);
@@ -726,16 +740,19 @@ impl Detector {
     }
 }
 
-/// A step question as the keywords ask it: the bodies, what touches at the start, the precision of times.
+/// A step question as the keywords ask it: the bodies, what touches at the start, the precision of times, the separation.
 fn step<'a, 'py>(
     (between, within, ignore): (Argument<'a, 'py>, Argument<'a, 'py>, Argument<'a, 'py>),
     start: Argument<'a, 'py>,
     toi: Toi,
+    separation: Argument<'_, '_>,
 ) -> PyResult<impl FnOnce(&Scene) -> PyResult<Step>> {
     let start = settings::start(start)?;
+    let separation = steps::distance(separation, "separation")?;
     Ok(move |scene: &Scene| {
         let query = step_question(scene, between, within, ignore)?;
-        Ok(Step::new(query).start(start).toi(toi))
+        let step = Step::new(query).start(start).toi(toi);
+        Ok(step.separation(separation))
     })
 }
 

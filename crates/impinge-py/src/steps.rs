@@ -471,13 +471,13 @@ pub fn kinds_array(
 }
 
 /// A number that is a distance; `CandidateQuery` refuses what is not finite or below 0.
-pub fn distance(argument: Argument<'_, '_>) -> PyResult<f64> {
+pub fn distance(argument: Argument<'_, '_>, name: &str) -> PyResult<f64> {
     let Some(argument) = argument else {
         return Ok(0.0);
     };
     argument.extract().map_err(|error: PyErr| {
         match error.is_instance_of::<PyTypeError>(argument.py()) {
-            true => unexpected(argument, "distance", "a number"),
+            true => unexpected(argument, name, "a number"),
             false => error,
         }
     })

@@ -164,6 +164,23 @@ def test_every_question_has_the_answer_of_the_naive_method(question, dtype):
     assert candidates.hash == naive.candidates(scene, **scope).hash and len(candidates) > 0
 
 
+def test_a_separation_is_kept(detector, falling):
+    impacts = detector.impacts(falling, separation=0.5)
+    assert len(impacts) >= 15 and impacts.toi.min() == 0.125
+    assert detector.earliest(falling, separation=0.5).toi == 0.125
+    assert detector.earliest(falling, separation=1).at_start
+    assert 0.1249 < detector.advance(falling, separation=0.5).fraction < 0.125
+    falling.set_end_positions(1, lifted(0.75))
+    assert detector.is_free(falling, separation=0.5)
+    assert not detector.is_free(falling, separation=0.75)
+    for ask in (detector.impacts, detector.earliest, detector.is_free, detector.advance):
+        for bad in (-1, float("nan"), float("inf")):
+            with pytest.raises(ValueError, match="separation"):
+                ask(falling, separation=bad)
+        with pytest.raises(TypeError, match="^separation: a number expected, str given"):
+            ask(falling, separation="near")
+
+
 def test_a_step_that_is_advanced_is_free(detector, falling):
     advance = detector.advance(falling)
     assert 0.249999 < advance.fraction < 0.25 and advance.first.toi == 0.25

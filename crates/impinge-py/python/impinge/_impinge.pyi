@@ -225,6 +225,7 @@ class Detector:
         ignore: Iterable[_Pair] | None = None,
         start: _Start = "report",
         toi: _Toi = "f32",
+        separation: SupportsFloat = 0.0,
         progress: _Progress | None = None,
         cancel: CancelToken | None = None,
     ) -> Impacts: ...
@@ -237,6 +238,7 @@ class Detector:
         ignore: Iterable[_Pair] | None = None,
         start: _Start = "report",
         toi: _Toi = "f32",
+        separation: SupportsFloat = 0.0,
         progress: _Progress | None = None,
         cancel: CancelToken | None = None,
     ) -> Impact | None: ...
@@ -248,6 +250,7 @@ class Detector:
         within: _Body | None = None,
         ignore: Iterable[_Pair] | None = None,
         start: _Start = "report",
+        separation: SupportsFloat = 0.0,
         progress: _Progress | None = None,
         cancel: CancelToken | None = None,
     ) -> bool: ...
@@ -259,6 +262,7 @@ class Detector:
         within: _Body | None = None,
         ignore: Iterable[_Pair] | None = None,
         start: _Start = "report",
+        separation: SupportsFloat = 0.0,
         progress: _Progress | None = None,
         cancel: CancelToken | None = None,
     ) -> Advance: ...
