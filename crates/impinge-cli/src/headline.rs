@@ -80,7 +80,14 @@ fn of_whom(scene: &Scene, bodies: &[(BodyId, &str)]) -> Result<(String, String),
     }
     let of: Vec<String> = kinds
         .iter()
-        .map(|(kind, n)| format!("{} {kind}", grouped(*n as u64)))
+        .map(|&(kind, n)| {
+            let noun = match (n, kind) {
+                (1, "tetrahedra") => "tetrahedron",
+                (1, _) => kind.trim_end_matches('s'),
+                _ => kind,
+            };
+            format!("{} {noun}", grouped(n as u64))
+        })
         .collect();
     Ok((subject, of.join(" and ")))
 }

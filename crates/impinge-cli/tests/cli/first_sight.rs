@@ -84,6 +84,9 @@ fn what_is_not_welded_is_counted() {
             [&json!(vertices), &json!(welded), &json!(coincident)]
         );
     }
+    folder.text("one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let text = folder.run(["self", "one.obj"]).printed();
+    assert_eq!(text, "one.obj: no pairs of 1 triangle\n");
     // Between bodies it does not matter, so nothing is counted.
     let object = folder
         .run(["pairs", "split.obj", "split.obj", "--json"])
