@@ -137,7 +137,7 @@ fn other_errors_are_code_1_and_one_line() {
     for (file, words) in [
         ("missing.ply", &["missing.ply"][..]),
         ("broken.obj", &["broken.obj:3", "zero"]),
-        ("range.obj", &["range.obj:4", "4", "3 vertices"]),
+        ("range.obj", &["range.obj:4", "4", "vertices: 3"]),
         ("far.off", &["far.off", "vertex 1", "1e300"]),
         ("mesh.txt", &["mesh.txt", "txt"]),
     ] {
