@@ -336,8 +336,15 @@ fn put_corners(positions: &[[f32; 3]], faces: &[[u32; 3]], first: usize, into: &
 pub(crate) struct Portable;
 
 impl Simd for Portable {
+    #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
     type F64 = number::Portable;
+    #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
     type F32 = number::Portable32;
+
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    type F64 = number::Wasm;
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    type F32 = number::WasmF32;
 
     #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
     #[inline(always)]

@@ -248,7 +248,8 @@ pub(super) fn are_edges(pair: ElementPair) -> bool {
 
 /// Which of sixteen pairs are certainly apart from t = 0 to `until`, by the cheapest test. The elements are those of two
 /// groups, named by their places. In `f32`: for coordinates of any size, but differences above 2^16 are never certain.
-#[inline(always)]
+#[cfg_attr(target_family = "wasm", inline(never))]
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
 pub fn are_far_in_tables<V: Lookup>(
     pair: ElementPair,
@@ -265,7 +266,8 @@ pub fn are_far_in_tables<V: Lookup>(
 }
 
 /// The same by normals, for pairs that [`are_far_in_tables`] leaves.
-#[inline(always)]
+#[cfg_attr(target_family = "wasm", inline(never))]
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
 pub fn are_across_in_tables<V: Lookup>(
     pair: ElementPair,
@@ -282,7 +284,8 @@ pub fn are_across_in_tables<V: Lookup>(
 }
 
 /// The same by where the elements meet each other's planes, for pairs that the other tests leave.
-#[inline(always)]
+#[cfg_attr(target_family = "wasm", inline(never))]
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
 pub fn are_aside_in_tables<V: Lookup>(
     pair: ElementPair,

@@ -277,7 +277,8 @@ fn select<T: Number>(mask: T::Mask, yes: &Vector<T>, no: &Vector<T>) -> Vector<T
 
 /// Which of sixteen pairs are within a distance at the start. The elements are those of two groups, named by their places;
 /// the distance is between two numbers.
-#[inline(always)]
+#[cfg_attr(target_family = "wasm", inline(never))]
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
 pub fn are_within_in_tables<V: Lookup>(
     pair: ElementPair,
@@ -298,7 +299,8 @@ pub fn are_within_in_tables<V: Lookup>(
 
 /// Which of sixteen pairs certainly stay farther apart than a distance from t = 0 to `until`. The elements are those of two
 /// groups, named by their places; the distance is at most the number given.
-#[inline(always)]
+#[cfg_attr(target_family = "wasm", inline(never))]
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
 pub fn stay_beyond_in_tables<V: Lookup>(
     pair: ElementPair,

@@ -105,6 +105,10 @@ mod sealed {
     impl Sealed for f64 {}
     impl Sealed for super::Portable {}
     impl Sealed for super::Portable32 {}
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    impl Sealed for super::Wasm {}
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    impl Sealed for super::WasmF32 {}
     #[cfg(target_arch = "x86_64")]
     impl Sealed for super::Avx2 {}
     #[cfg(target_arch = "x86_64")]
@@ -197,6 +201,10 @@ macro_rules! portable {
         #[derive(Debug, Clone, Copy)]
         pub struct $mask([$bits; $n]);
 
+        #[cfg_attr(
+            all(target_arch = "wasm32", target_feature = "simd128"),
+            allow(dead_code, reason = "WebAssembly has registers of its own")
+        )]
         impl $type {
             #[inline(always)]
             fn zip(self, other: Self, op: impl Fn($number, $number) -> $number) -> Self {
@@ -204,6 +212,10 @@ macro_rules! portable {
             }
         }
 
+        #[cfg_attr(
+            all(target_arch = "wasm32", target_feature = "simd128"),
+            allow(dead_code, reason = "WebAssembly has registers of its own")
+        )]
         impl $mask {
             #[inline(always)]
             fn zip(self, other: Self, op: impl Fn($bits, $bits) -> $bits) -> Self {
@@ -336,6 +348,11 @@ impl Lookup for Portable32 {
     }
 }
 
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
+
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+pub use wasm::{Wasm, WasmF32};
 #[cfg(target_arch = "x86_64")]
 pub use x86::{Avx2, Avx2F32, Avx512, Avx512F32};
 
