@@ -5,15 +5,16 @@
 //! best distance found so far, that distance is the answer.
 //!
 //! A pair of nodes is skipped only if its boxes are farther apart than the best distance by more than
-//! the rounding error. So no pair of primitives is lost whose computed distance is as small or smaller, and the
+//! the rounding error: those along the coordinate axes, or those along the best pair's shortest way and across it. So no pair of primitives is lost whose computed distance is as small or smaller, and the
 //! answer does not depend on the order of the search. The pair that was nearest in the last call is compared first: bodies that
 //! move little have a good bound from the start.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BinaryHeap, HashMap};
 
+use super::axes::{Axes, View};
 use super::features::{Gap, gap};
-use super::tree::{Box64, Node, Tree, box_of};
+use super::tree::{Box64, Node, Tree, box_along, box_of};
 use crate::error::Error;
 use crate::exact::Point;
 use crate::ids::BodyId;
@@ -138,9 +139,14 @@ impl PartialOrd for Waiting {
     }
 }
 
-/// The primitives of two clusters that are compared; the memory is reused.
-#[derive(Default)]
-struct Lists([Vec<(u32, Box64)>; 2]);
+/// A primitive of a cluster that is compared.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    primitive: u32,
+    bounds: Box64,
+    /// Along the axes of the view; as `bounds` before there is one.
+    turned: Box64,
+}
 
 struct Search<'a> {
     bodies: [&'a Body; 2],
@@ -154,9 +160,36 @@ struct Best {
     points: Option<[Point; 2]>,
 }
 
+/// What a search has found, and its memory.
+struct Found {
+    best: Best,
+    /// The bodies along the best pair's shortest way.
+    view: Option<View>,
+    /// Whether the best pair is another one than that of the view.
+    is_newer: bool,
+    /// What rounding may do to distances of boxes: along coordinate axes, and along others.
+    errors: [f64; 2],
+    lists: [Vec<Candidate>; 2],
+}
+
 /// By how much, relative to the largest coordinate, rounding may make a computed distance smaller than the
 /// distance of the boxes.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
+/// The same of boxes along other axes, which are rounded themselves.
+pub(super) const ROUNDING_TURNED: f64 = 256.0 * f64::EPSILON;
+
+impl Found {
+    /// Squared distances of boxes that may hold a pair as near as the best are at most these: along coordinate axes, and along
+    /// others.
+    fn limits(&self) -> [f64; 2] {
+        self.errors.map(|error| limit(self.best.squared, error))
+    }
+
+    fn take(&mut self, best: Best) {
+        self.best = best;
+        self.is_newer = true;
+    }
+}
 
 impl Search<'_> {
     /// The nearest pair; `likely` is one to compare first.
@@ -165,27 +198,34 @@ impl Search<'_> {
             return None;
         };
         let magnitude = self.trees[0].bounds(a).magnitude();
-        let error = ROUNDING * magnitude.max(self.trees[1].bounds(b).magnitude());
-        let mut best = Best {
-            squared: f64::INFINITY,
-            primitives: [u32::MAX; 2],
-            points: None,
+        let magnitude = magnitude.max(self.trees[1].bounds(b).magnitude());
+        let mut found = Found {
+            best: Best {
+                squared: f64::INFINITY,
+                primitives: [u32::MAX; 2],
+                points: None,
+            },
+            view: None,
+            is_newer: false,
+            errors: [ROUNDING, ROUNDING_TURNED].map(|rounding| rounding * magnitude),
+            lists: Default::default(),
         };
-        if let Some([x, y]) = likely {
-            self.improve(
-                &mut best,
-                [x, y],
-                [0, 1].map(|side| box_of(self.bodies[side], [x, y][side] as usize)),
-            );
+        if let Some(pair) = likely {
+            let boxes = [0, 1].map(|side| box_of(self.bodies[side], pair[side] as usize));
+            self.improve(&mut found, pair, boxes);
+            self.look(&mut found);
         }
-        let mut lists = Lists::default();
         let mut waiting = BinaryHeap::from([Reverse(self.waiting([a, b]))]);
         while let Some(Reverse(next)) = waiting.pop() {
-            if next.squared > limit(best.squared, error) {
+            if next.squared > found.limits()[0] {
                 break;
             }
+            if self.is_farther(&mut found, next.nodes) {
+                continue;
+            }
             if next.nodes.iter().all(|node| node.level == 0) {
-                self.compare(next.nodes, error, &mut best, &mut lists);
+                self.compare(next.nodes, &mut found);
+                self.look(&mut found);
                 continue;
             }
             // The node of higher level is opened; at equal levels, the larger one.
@@ -199,14 +239,16 @@ impl Search<'_> {
                 Ordering::Less => 1,
                 Ordering::Equal => usize::from(sizes[1] > sizes[0]),
             };
+            let [most, _] = found.limits();
             for child in self.trees[side].children(next.nodes[side]) {
                 let nodes = if side == 0 { [child, y] } else { [x, child] };
                 let pair = self.waiting(nodes);
-                if pair.squared <= limit(best.squared, error) {
+                if pair.squared <= most {
                     waiting.push(Reverse(pair));
                 }
             }
         }
+        let best = found.best;
         Some(Nearest {
             distance: best.squared.sqrt(),
             primitives: best.primitives,
@@ -222,40 +264,125 @@ impl Search<'_> {
         }
     }
 
-    /// Compares all primitives of two clusters.
-    fn compare(&self, nodes: [Node; 2], error: f64, best: &mut Best, lists: &mut Lists) {
-        let [there, here] = [1, 0].map(|side| self.trees[side].bounds(nodes[side]));
-        let most = limit(best.squared, error);
-        let Lists([list_a, list_b]) = lists;
-        self.trees[0].list_near(self.bodies[0], nodes[0], &there, most, list_a);
-        self.trees[1].list_near(self.bodies[1], nodes[1], &here, most, list_b);
-        for (a, of_a) in &*list_a {
-            if of_a.squared_distance(&there) > limit(best.squared, error) {
-                continue;
-            }
-            for (b, of_b) in &*list_b {
-                if of_a.squared_distance(of_b) > limit(best.squared, error) {
-                    continue;
-                }
-                if best.squared == 0.0 && [*a, *b] > best.primitives {
-                    continue;
-                }
-                self.improve(best, [*a, *b], [*of_a, *of_b]);
-            }
+    /// Turns the view along the shortest way of the best pair, if that is a new one.
+    fn look(&self, found: &mut Found) {
+        if !found.is_newer {
+            return;
+        }
+        found.is_newer = false;
+        // Bodies that touch have no such way: the last view stays, since any axes are right.
+        let Some(axes) = found.best.points.and_then(Axes::along) else {
+            return;
+        };
+        match &mut found.view {
+            Some(view) => view.turn_to(axes),
+            None => found.view = Some(View::new(axes, self.trees)),
         }
     }
 
-    /// Takes a pair if it is nearer, or as near and lower.
-    fn improve(&self, best: &mut Best, [a, b]: [u32; 2], boxes: [Box64; 2]) {
-        let found = self.gap(a, b, boxes[0].squared_distance(&boxes[1]));
-        let is_less = found.squared < best.squared
-            || (found.squared == best.squared && [a, b] < best.primitives);
-        if is_less {
-            *best = Best {
-                squared: found.squared,
-                primitives: [a, b],
-                points: (found.squared > 0.0).then_some(found.points),
+    /// The boxes of two nodes in the view, if there is one.
+    fn turned(&self, view: &mut Option<View>, nodes: [Node; 2]) -> Option<[Box64; 2]> {
+        let view = view.as_mut()?;
+        Some([0, 1].map(|side| view.bounds(side, self.bodies[side], self.trees[side], nodes[side])))
+    }
+
+    /// Whether two nodes are seen to be farther apart than the best pair.
+    fn is_farther(&self, found: &mut Found, nodes: [Node; 2]) -> bool {
+        let [_, most] = found.limits();
+        match self.turned(&mut found.view, nodes) {
+            Some([x, y]) => x.squared_distance(&y) > most,
+            None => false,
+        }
+    }
+
+    /// Compares all primitives of two clusters.
+    fn compare(&self, nodes: [Node; 2], found: &mut Found) {
+        if found.best.squared == f64::INFINITY {
+            self.guess(nodes, found);
+            self.look(found);
+        }
+        let mut lists = std::mem::take(&mut found.lists);
+        let whole = [0, 1].map(|side| self.trees[side].bounds(nodes[side]));
+        let turned = self.turned(&mut found.view, nodes);
+        let limits = found.limits();
+        let axes = found.view.as_ref().map(|view| view.axes);
+        for side in 0..2 {
+            lists[side].clear();
+            for &primitive in self.trees[side].primitives(nodes[side]) {
+                let bounds = box_of(self.bodies[side], primitive as usize);
+                if bounds.squared_distance(&whole[1 - side]) > limits[0] {
+                    continue;
+                }
+                let turned = match (&axes, &turned) {
+                    (Some(axes), Some(others)) => {
+                        let body = self.bodies[side];
+                        let turned = box_along(body, primitive as usize, |p| axes.turn(p));
+                        if turned.squared_distance(&others[1 - side]) > limits[1] {
+                            continue;
+                        }
+                        turned
+                    }
+                    _ => bounds,
+                };
+                lists[side].push(Candidate {
+                    primitive,
+                    bounds,
+                    turned,
+                });
+            }
+        }
+        let mut limits = found.limits();
+        for a in &lists[0] {
+            if a.bounds.squared_distance(&whole[1]) > limits[0] {
+                continue;
+            }
+            for b in &lists[1] {
+                if a.bounds.squared_distance(&b.bounds) > limits[0]
+                    || a.turned.squared_distance(&b.turned) > limits[1]
+                {
+                    continue;
+                }
+                let pair = [a.primitive, b.primitive];
+                if found.best.squared == 0.0 && pair > found.best.primitives {
+                    continue;
+                }
+                self.improve(found, pair, [a.bounds, b.bounds]);
+                limits = found.limits();
+            }
+        }
+        found.lists = lists;
+    }
+
+    /// Takes a first pair of two clusters that is likely to be near: what is nearest to a box, to that, and to that again.
+    fn guess(&self, nodes: [Node; 2], found: &mut Found) {
+        let mut boxes = [0, 1].map(|side| self.trees[side].bounds(nodes[side]));
+        let mut pair = [0; 2];
+        for side in [0, 1, 0] {
+            let near = |&primitive: &u32| {
+                let bounds = box_of(self.bodies[side], primitive as usize);
+                (bounds.squared_distance(&boxes[1 - side]), primitive, bounds)
             };
+            let all = self.trees[side].primitives(nodes[side]).iter().map(near);
+            let nearest = all.min_by(|x, y| x.0.total_cmp(&y.0));
+            if let Some((_, primitive, bounds)) = nearest {
+                (pair[side], boxes[side]) = (primitive, bounds);
+            }
+        }
+        self.improve(found, pair, boxes);
+    }
+
+    /// Takes a pair if it is nearer, or as near and lower.
+    fn improve(&self, found: &mut Found, [a, b]: [u32; 2], boxes: [Box64; 2]) {
+        let best = &found.best;
+        let gap = self.gap(a, b, boxes[0].squared_distance(&boxes[1]));
+        let is_less =
+            gap.squared < best.squared || (gap.squared == best.squared && [a, b] < best.primitives);
+        if is_less {
+            found.take(Best {
+                squared: gap.squared,
+                primitives: [a, b],
+                points: (gap.squared > 0.0).then_some(gap.points),
+            });
         }
     }
 

@@ -1,5 +1,6 @@
 //! Proximity: how near two bodies are.
 
+mod axes;
 mod distance;
 mod features;
 mod tree;

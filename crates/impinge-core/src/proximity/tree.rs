@@ -32,7 +32,7 @@ impl Box64 {
         max: [f64::NEG_INFINITY; 3],
     };
 
-    fn cover(&mut self, point: Point) {
+    pub fn cover(&mut self, point: Point) {
         self.join(&Box64 {
             min: point,
             max: point,
@@ -160,24 +160,10 @@ impl Tree {
         })
     }
 
-    /// Puts the primitives of a cluster that are at most this far from a box, each with its own box, into a list.
-    pub fn list_near(
-        &self,
-        body: &Body,
-        node: Node,
-        there: &Box64,
-        squared: f64,
-        list: &mut Vec<(u32, Box64)>,
-    ) {
-        list.clear();
+    /// The primitives of a cluster.
+    pub fn primitives(&self, node: Node) -> &[u32] {
         let first = node.number as usize * GROUP;
-        let places = first..first + self.clustering.size(node.number as usize);
-        for &primitive in &self.clustering.order[places] {
-            let bounds = box_of(body, primitive as usize);
-            if bounds.squared_distance(there) <= squared {
-                list.push((primitive, bounds));
-            }
-        }
+        &self.clustering.order[first..first + self.clustering.size(node.number as usize)]
     }
 }
 
@@ -190,9 +176,14 @@ pub(super) struct Node {
 
 /// The box of a primitive, in `f64`.
 pub(super) fn box_of(body: &Body, primitive: usize) -> Box64 {
+    box_along(body, primitive, |point| point)
+}
+
+/// The box of a primitive whose corners are mapped.
+pub(super) fn box_along(body: &Body, primitive: usize, map: impl Fn(Point) -> Point) -> Box64 {
     let mut found = Box64::EMPTY;
     for &vertex in body.elements().corners(primitive) {
-        found.cover(body.positions().point(vertex as usize));
+        found.cover(map(body.positions().point(vertex as usize)));
     }
     found
 }
