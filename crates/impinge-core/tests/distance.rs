@@ -70,6 +70,85 @@ fn the_search_loses_nothing() {
     }
 }
 
+/// The box of each primitive.
+fn boxes(model: &Model) -> Vec<[[f32; 3]; 2]> {
+    let elements = 0..model.elements.len();
+    elements
+        .map(|primitive| {
+            let corners = model.elements.corners(primitive);
+            let along = |k: usize| corners.iter().map(move |&v| model.positions[v as usize][k]);
+            [
+                [0, 1, 2].map(|k| along(k).fold(f32::INFINITY, f32::min)),
+                [0, 1, 2].map(|k| along(k).fold(f32::NEG_INFINITY, f32::max)),
+            ]
+        })
+        .collect()
+}
+
+/// The same of bodies of many clusters that face each other askew, so that most are discarded along the shortest way. All pairs
+/// are compared whose boxes are not farther apart than the answer.
+#[test]
+fn the_search_through_many_clusters_loses_nothing() {
+    let wall = surfaces::cloth(12, 12, 0.125);
+    // The same wall farther away, askew: equal numbers in all rows, so many pairs are at the same distance.
+    let askew = |model: &Model, by: f32| Model {
+        positions: model
+            .positions
+            .iter()
+            .map(|&[x, y, z]| [x, y, z + 0.5 * x + 0.25 * y + by])
+            .collect(),
+        elements: model.elements.clone(),
+    };
+    for (a, b) in [
+        (
+            surfaces::ball(700),
+            surfaces::ball(900).translated([1.4, 1.3, 1.1]),
+        ),
+        (
+            surfaces::bumpy_ball(800, 0.2),
+            surfaces::ball(600).translated([-1.7, 1.8, 0.9]),
+        ),
+        (askew(&wall, 0.0), askew(&wall, 0.5)),
+        (
+            askew(&wall, 0.0),
+            surfaces::ball(500).translated([0.4, 0.6, 2.0]),
+        ),
+        (
+            soup::tetrahedra(200, 0.2, 7),
+            soup::triangles(300, 0.2, 8).translated([1.5, 1.4, 1.1]),
+        ),
+    ] {
+        let found = nearest(&a, &b);
+        assert!(found.distance > 0.0, "{found:?}");
+        let boxes = [boxes(&a), boxes(&b)];
+        let (mut least, mut n_compared) = ((f64::INFINITY, [0, 0]), 0);
+        for (i, [low, high]) in boxes[0].iter().enumerate() {
+            for (j, [other_low, other_high]) in boxes[1].iter().enumerate() {
+                let squared: f64 = (0..3)
+                    .map(|k| {
+                        f64::from(
+                            (other_low[k] - high[k])
+                                .max(low[k] - other_high[k])
+                                .max(0.0),
+                        )
+                    })
+                    .map(|gap| gap * gap)
+                    .sum();
+                if squared.sqrt() > found.distance + 1e-5 {
+                    continue;
+                }
+                n_compared += 1;
+                let pair = nearest(&alone(&a, i), &alone(&b, j)).distance;
+                if pair < least.0 {
+                    least = (pair, [i as u32, j as u32]);
+                }
+            }
+        }
+        assert_eq!((found.distance, found.primitives), least);
+        assert!(n_compared > 1);
+    }
+}
+
 #[test]
 fn known_distances() {
     let ball = surfaces::icosphere(4);

@@ -153,9 +153,8 @@ mod tests {
             points.iter().for_each(|&p| bounds.cover(p));
             let turned = axes.turn_box(&bounds);
             for p in points.map(|p| axes.turn(p)) {
-                for k in 0..3 {
-                    assert!(turned.min[k] - 1e-15 < p[k] && p[k] < turned.max[k] + 1e-15);
-                }
+                assert!((0..3).all(|k| turned.min[k] - 1e-15 < p[k]));
+                assert!((0..3).all(|k| p[k] < turned.max[k] + 1e-15));
             }
         }
     }
