@@ -6,7 +6,7 @@ use std::path::Path;
 use impinge::contact::{Contacts, Curves};
 use impinge::{BodyId, Pairs, Scene};
 use impinge_io::AtomicFile;
-use impinge_render::{Camera, Colors, Face, Normals, Picture, Projection, Renderer, Surface};
+use impinge_render::{Camera, Colors, Picture, Projection, Renderer, Surface};
 
 use crate::args::PictureArgs;
 use crate::error::Error;
@@ -90,68 +90,16 @@ const CURVE: [u8; 3] = [20, 20, 20];
 
 /// Curves as thin tubes, about two pixels wide in a picture of a thousand.
 fn tubes(contacts: &Contacts, curves: &Curves, diagonal: f64) -> Surface {
-    const N_SIDES: u32 = 6;
-    let radius = diagonal / 1000.0;
-    let mut tubes = Surface {
-        normals: Normals::Smooth,
-        ..Surface::default()
-    };
+    let mut segments = Vec::new();
     for curve in 0..curves.len() {
         let points = curves.points(curve);
         let n_links = points.len() - usize::from(!curves.is_closed(curve));
         for link in 0..n_links {
-            let [p, q] =
-                [link, (link + 1) % points.len()].map(|ix| contacts.points()[points[ix] as usize]);
-            let Some([u, v]) = across([0, 1, 2].map(|k| q[k] - p[k])) else {
-                continue;
-            };
-            let Ok(first) = u32::try_from(tubes.positions.len()) else {
-                return tubes;
-            };
-            for side in 0..N_SIDES {
-                let (sin, cos) =
-                    (std::f64::consts::TAU * f64::from(side) / f64::from(N_SIDES)).sin_cos();
-                for end in [p, q] {
-                    let out = |k: usize| end[k] + radius * (cos * u[k] + sin * v[k]);
-                    tubes.positions.push([0, 1, 2].map(out));
-                }
-                let [here, next] = [side, (side + 1) % N_SIDES].map(|side| first + 2 * side);
-                for corners in [[here, next, here + 1], [here + 1, next, next + 1]] {
-                    tubes.faces.push(Face {
-                        corners,
-                        color: CURVE,
-                        shows_through: true,
-                    });
-                }
-            }
+            let ends = [link, (link + 1) % points.len()];
+            segments.push(ends.map(|ix| contacts.points()[points[ix] as usize]));
         }
     }
-    tubes
-}
-
-/// Two unit vectors perpendicular to a direction and to each other; `None` for a zero vector.
-fn across(d: [f64; 3]) -> Option<[[f64; 3]; 2]> {
-    let unit = |v: [f64; 3]| {
-        let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-        (length > 0.0).then(|| v.map(|x| x / length))
-    };
-    let cross = |p: [f64; 3], q: [f64; 3]| {
-        [
-            p[1] * q[2] - p[2] * q[1],
-            p[2] * q[0] - p[0] * q[2],
-            p[0] * q[1] - p[1] * q[0],
-        ]
-    };
-    let d = unit(d)?;
-    // The axis that deviates most from the direction.
-    let axis = (1..3).fold(
-        0,
-        |best, k| if d[k].abs() < d[best].abs() { k } else { best },
-    );
-    let mut base = [0.0; 3];
-    base[axis] = 1.0;
-    let u = unit(cross(d, base))?;
-    Some([u, cross(d, u)])
+    Surface::of_segments(&segments, diagonal / 1000.0, CURVE)
 }
 
 /// One surface per body, in the colours of the palette.

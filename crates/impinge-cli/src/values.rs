@@ -363,6 +363,17 @@ fn fraction(whole: &str, part: &str, unit: u64) -> Option<u64> {
     u64::try_from(total).ok()
 }
 
+/// Three coordinates.
+#[cfg(any(feature = "view", test))]
+pub fn point(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(str::parse).collect();
+    numbers
+        .ok()
+        .and_then(|numbers| <[f64; 3]>::try_from(numbers).ok())
+        .filter(|point| point.iter().all(|x| x.is_finite()))
+        .ok_or_else(|| "expected three coordinates, such as 0,1.5,-2".to_owned())
+}
+
 /// A body's number and the first three rows of a matrix.
 #[cfg(any(feature = "view", test))]
 pub fn body_matrix(text: &str) -> Result<(usize, [[f64; 4]; 4]), String> {
@@ -387,6 +398,14 @@ pub fn body_matrix(text: &str) -> Result<(usize, [[f64; 4]; 4]), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn points() {
+        assert_eq!(point("0,1.5,-2e-7"), Ok([0.0, 1.5, -2e-7]));
+        for text in ["", "1,2", "1,2,3,4", "1,2,nan", "1,2,inf", "1, 2,x"] {
+            assert!(point(text).is_err(), "{text}");
+        }
+    }
 
     #[test]
     fn bytes_with_suffixes() {

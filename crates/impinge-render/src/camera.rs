@@ -24,7 +24,7 @@ pub enum Projection {
     Orthographic,
 }
 
-/// The viewpoint of a picture. The distance is chosen so that the picture contains everything.
+/// The viewpoint of a picture. Unless the picture has a [`Focus`], the distance is chosen so that it contains everything.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
     /// Degrees counter-clockwise around the up axis, seen from above. At 0 the viewer is on the side of
@@ -36,6 +36,16 @@ pub struct Camera {
     pub up: UpAxis,
     /// How the picture shows depth.
     pub projection: Projection,
+}
+
+/// What a picture looks at, and from how far.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Focus {
+    /// The point in the middle of the picture, in the unit of the scene.
+    pub target: [f64; 3],
+    /// The distance of the viewer from it, above 0, in the same unit. Without perspective, a quarter of it is half the height
+    /// of what is seen.
+    pub distance: f64,
 }
 
 impl Default for Camera {
@@ -102,4 +112,48 @@ pub(crate) struct Axes {
     pub up: [f64; 3],
     pub back: [f64; 3],
     pub sky: [f64; 3],
+}
+
+impl Focus {
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let refused = |setting, given, allowed| {
+            Err(Error::Setting {
+                setting,
+                given,
+                allowed,
+            })
+        };
+        if let Some(&x) = self.target.iter().find(|x| !x.is_finite()) {
+            return refused("target", x, "finite coordinates");
+        }
+        match self.distance > 0.0 && self.distance.is_finite() {
+            true => Ok(()),
+            false => refused("distance", self.distance, "any finite number above 0"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_focus_at_no_place_is_refused() {
+        let focus = |x, distance| Focus {
+            target: [0.0, x, 0.0],
+            distance,
+        };
+        assert!(focus(1e300, 1e-300).check().is_ok());
+        for (bad, setting) in [
+            (focus(f64::NAN, 1.0), "target"),
+            (focus(f64::INFINITY, 1.0), "target"),
+            (focus(0.0, 0.0), "distance"),
+            (focus(0.0, -1.0), "distance"),
+            (focus(0.0, f64::NAN), "distance"),
+            (focus(0.0, f64::INFINITY), "distance"),
+        ] {
+            let error = bad.check().expect_err("refused").to_string();
+            assert!(error.contains(setting), "{error}");
+        }
+    }
 }

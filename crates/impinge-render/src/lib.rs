@@ -2,7 +2,7 @@
 //! software driver if there is none.
 //!
 //! A [`Picture`] is plain data: [`Surface`]s with one colour per face, a [`Camera`] and a size. A
-//! [`Renderer`] turns it into an [`Image`]. The camera distance is chosen so that everything is visible.
+//! [`Renderer`] turns it into an [`Image`]. Unless the picture has a [`Focus`], the camera distance is chosen so that everything is visible.
 //!
 //! ```no_run
 //! use impinge::{Backend, Detector, Query, Scene};
@@ -51,10 +51,11 @@ mod picture;
 mod pipelines;
 mod renderer;
 mod targets;
+mod tubes;
 mod view;
 
 pub use body::Colors;
-pub use camera::{Camera, Projection, UpAxis};
+pub use camera::{Camera, Focus, Projection, UpAxis};
 pub use error::Error;
 pub use image::Image;
 /// The GPU interface of [`Renderer::with_device`] and [`Live`].

@@ -1,6 +1,6 @@
 //! The content of a picture, as plain data.
 
-use crate::camera::Camera;
+use crate::camera::{Camera, Focus};
 use crate::error::Error;
 
 /// One triangle of a [`Surface`].
@@ -42,6 +42,8 @@ pub struct Picture {
     pub surfaces: Vec<Surface>,
     /// The viewpoint.
     pub camera: Camera,
+    /// What it looks at; `None`: everything.
+    pub focus: Option<Focus>,
     /// Width and height in pixels.
     pub size: [u32; 2],
     /// How visible hidden faces that [show through](Face::shows_through) are, from 0 (not at all) to 1
@@ -58,6 +60,7 @@ impl Default for Picture {
         Picture {
             surfaces: Vec::new(),
             camera: Camera::default(),
+            focus: None,
             size: [1280, 960],
             see_through: 0.5,
             occlusion: 0.7,
@@ -82,6 +85,9 @@ impl Picture {
             }
         }
         self.camera.check()?;
+        if let Some(focus) = &self.focus {
+            focus.check()?;
+        }
         for (surface_ix, surface) in self.surfaces.iter().enumerate() {
             surface.check(surface_ix)?;
         }

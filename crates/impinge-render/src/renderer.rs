@@ -102,7 +102,7 @@ impl Renderer {
         }
         picture.check()?;
         let frame = Frame::of(picture);
-        let view = View::fit(picture, &frame);
+        let view = View::of(picture, &frame);
         let chunks = self.upload(picture, &frame)?;
         let mut image = Image::new(picture.size);
         for row in (0..height).step_by(self.tile as usize) {

@@ -1,6 +1,7 @@
 //! Fits a camera to the content of a picture.
 
-use crate::camera::{Axes, Projection};
+use crate::camera::{Axes, Focus, Projection};
+use crate::live::Orbit;
 use crate::picture::Picture;
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -67,9 +68,81 @@ pub(crate) struct View {
 /// The share of the picture's half width and half height that the content fills.
 const FILLED: f64 = 0.93;
 
+/// The nearest visible point, as a share of the distance of what the picture looks at.
+const NEAREST: f64 = 2e-3;
+
 impl View {
+    /// The view that a picture asks for.
+    pub fn of(picture: &Picture, frame: &Frame) -> View {
+        match picture.focus {
+            Some(focus) => View::at(picture, frame, focus),
+            None => View::fit(picture, frame),
+        }
+    }
+
+    /// Looks at a point, whatever else the picture contains.
+    fn at(picture: &Picture, frame: &Frame, Focus { target, distance }: Focus) -> View {
+        let camera = picture.camera;
+        let axes = camera.axes();
+        let orbit = Orbit {
+            camera,
+            target,
+            distance,
+        };
+        let aspect = f64::from(picture.size[0]) / f64::from(picture.size[1]);
+        let [wide, high] = orbit.visible(aspect).map(|x| x / distance);
+        let (target, distance) = (frame.place(target), distance / frame.half);
+        let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
+        for surface in &picture.surfaces {
+            for face in &surface.faces {
+                for point in surface.points(face).map(|point| frame.place(point)) {
+                    let z = dot(axes.back, point);
+                    (near, far) = (near.max(z), far.min(z));
+                }
+            }
+        }
+        if near < far {
+            (near, far) = (1.0, -1.0);
+        }
+        let room = 1e-3 + 0.01 * (near - far);
+        let middle = [axes.right, axes.up, axes.back].map(|axis| dot(axis, target));
+        match camera.projection {
+            Projection::Perspective { .. } => {
+                let eye = [middle[0], middle[1], middle[2] + distance];
+                let near = (eye[2] - near - room).max(NEAREST * distance);
+                let far = (eye[2] - far + room).max(2.0 * near);
+                View::new(
+                    &axes,
+                    eye,
+                    [
+                        1.0 / wide,
+                        1.0 / high,
+                        far / (near - far),
+                        near * far / (near - far),
+                    ],
+                    true,
+                )
+            }
+            Projection::Orthographic => {
+                let eye = [middle[0], middle[1], near + room];
+                let (near, far) = (0.0, near - far + 2.0 * room);
+                View::new(
+                    &axes,
+                    eye,
+                    [
+                        1.0 / (wide * distance),
+                        1.0 / (high * distance),
+                        1.0 / (near - far),
+                        near / (near - far),
+                    ],
+                    false,
+                )
+            }
+        }
+    }
+
     /// Fits a camera to the picture's faces, so that the outermost points touch the filled part on each side.
-    pub fn fit(picture: &Picture, frame: &Frame) -> View {
+    fn fit(picture: &Picture, frame: &Frame) -> View {
         let camera = &picture.camera;
         let axes = camera.axes();
         let aspect = f64::from(picture.size[0]) / f64::from(picture.size[1]);

@@ -28,6 +28,7 @@ fn front() -> Camera {
 fn plain(surfaces: Vec<Surface>, size: [u32; 2]) -> Picture {
     Picture {
         surfaces,
+        focus: None,
         camera: front(),
         size,
         see_through: 0.0,

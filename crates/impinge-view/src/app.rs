@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use eframe::egui;
 use egui_wgpu::RenderState;
-use impinge_render::Camera;
+use impinge_render::{Camera, Orbit};
 
 use crate::content::Content;
 use crate::options::Options;
@@ -130,7 +130,12 @@ impl Viewer {
 
     /// The direction of view.
     pub fn camera(&self) -> Option<Camera> {
-        self.session().map(Session::camera)
+        self.orbit().map(|orbit| orbit.camera)
+    }
+
+    /// The viewpoint.
+    pub fn orbit(&self) -> Option<Orbit> {
+        self.session().map(|session| session.orbit)
     }
 
     /// The selected body and primitive.

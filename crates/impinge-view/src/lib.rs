@@ -41,7 +41,7 @@ mod window;
 
 pub use app::Viewer;
 pub use content::{Content, Frames, Shown};
-pub use options::{Backend, Command, Options};
+pub use options::{Backend, Command, Options, Shows};
 pub use picture::{draw_png, write_png};
 pub use timeline::Count;
 pub use window::{Error, show};

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use impinge::{Method, Query, SharedVertex};
-use impinge_render::Camera;
+use impinge_render::{Camera, Focus};
 
 /// Where detection runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -13,6 +13,29 @@ pub enum Backend {
     Cpu,
     /// The device that draws the window.
     Gpu,
+}
+
+/// What is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Shows {
+    /// All faces.
+    #[default]
+    Everything,
+    /// The faces of primitives that collide.
+    Colliding,
+    /// Intersection curves, and no faces.
+    Curves,
+}
+
+impl Shows {
+    /// The next one, in turns.
+    pub(crate) fn next(self) -> Self {
+        match self {
+            Shows::Everything => Shows::Colliding,
+            Shows::Colliding => Shows::Curves,
+            Shows::Curves => Shows::Everything,
+        }
+    }
 }
 
 /// The state in which a window begins; the user may change all of it.
@@ -32,6 +55,12 @@ pub struct Options {
     pub plays: bool,
     /// The direction from which the scene is seen.
     pub camera: Camera,
+    /// What is in the middle of the view, and from how far it is seen. `None`: everything is seen.
+    pub focus: Option<Focus>,
+    /// What is drawn.
+    pub shows: Shows,
+    /// Whether intersection curves are drawn over it.
+    pub curves: bool,
     /// Matrices that move bodies, by their number.
     pub moves: Vec<(usize, [[f64; 4]; 4])>,
     /// Width and height of the window in points, and of saved pictures in pixels.
@@ -58,6 +87,9 @@ impl Default for Options {
             frame: 0,
             plays: true,
             camera: Camera::default(),
+            focus: None,
+            shows: Shows::default(),
+            curves: false,
             moves: Vec::new(),
             size: [1280, 800],
             folder: PathBuf::from("."),

@@ -4,8 +4,8 @@ use eframe::egui::{self, Color32, Pos2, Rect, RichText, Sense, Stroke, Ui};
 use impinge::{Method, SharedVertex};
 
 use crate::input::KEYS;
-use crate::options::Backend;
-use crate::session::{Session, Shows};
+use crate::options::{Backend, Shows};
+use crate::session::Session;
 use crate::timeline::Count;
 
 /// The colour of messages, and of the first collision.

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use impinge::{Method, SharedVertex};
-use impinge_render::{Camera, Picture, Projection, Renderer, Surface, UpAxis, wgpu};
+use impinge_render::{Orbit, Picture, Projection, Renderer, Surface, UpAxis, wgpu};
 
 use crate::content::Content;
-use crate::find::{Answer, Finder};
-use crate::options::{Backend, Options, Question};
+use crate::find::{Answer, Finder, curves};
+use crate::options::{Backend, Options, Question, Shows};
 use crate::stage::{IDENTITY, Stage};
 
 /// A picture that was saved.
@@ -18,13 +18,15 @@ pub(crate) struct Saved {
     pub command: String,
 }
 
-/// Saves what is shown as `impinge-N.png` in the folder of the options, with the first number that no file has.
+/// The colour of intersection curves.
+const CURVE: [u8; 3] = [20, 20, 20];
+
+/// Saves what the options show as `impinge-N.png` in the folder of the options, with the first number that no file has.
 pub(crate) fn save(
     stage: &Stage,
     answer: Option<&Answer>,
     options: &Options,
     question: &Question,
-    camera: Camera,
     (device, queue): (wgpu::Device, wgpu::Queue),
 ) -> Result<Saved, String> {
     let path = (1..)
@@ -32,8 +34,8 @@ pub(crate) fn save(
         .find(|path| !path.exists())
         .ok_or("there are too many pictures in this folder")?;
     let renderer = Renderer::with_device(device, queue).map_err(|error| error.to_string())?;
-    draw(stage, answer, options.size, camera, renderer, &path)?;
-    let more = command_options(stage, options.size, question, camera, &path);
+    draw(stage, answer, options, renderer, &path)?;
+    let more = command_options(stage, options, question, &path);
     Ok(Saved {
         path,
         command: options.command.line(&more),
@@ -43,8 +45,7 @@ pub(crate) fn save(
 fn draw(
     stage: &Stage,
     answer: Option<&Answer>,
-    size: [u32; 2],
-    camera: Camera,
+    options: &Options,
     mut renderer: Renderer,
     path: &Path,
 ) -> Result<(), String> {
@@ -56,12 +57,26 @@ fn draw(
             .map_err(|error| error.to_string())?;
         let colliding: &[u32] = answer.map_or(&[], |answer| &answer.colliding[ix]);
         let surface: Result<Surface, _> = Surface::of_body(body, colliding, shown.colors);
-        surfaces.push(surface.map_err(|error| error.to_string())?);
+        let mut surface = surface.map_err(|error| error.to_string())?;
+        match options.shows {
+            Shows::Everything => {}
+            Shows::Colliding => surface.faces.retain(|face| face.shows_through),
+            Shows::Curves => continue,
+        }
+        surfaces.push(surface);
+    }
+    if let Some(answer) = answer
+        && (options.curves || options.shows == Shows::Curves)
+    {
+        let segments = curves(stage.scene(), &answer.pairs)?;
+        let radius = line_radius(stage, options);
+        surfaces.push(Surface::of_segments(&segments, radius, CURVE));
     }
     let picture = Picture {
         surfaces,
-        camera,
-        size,
+        camera: options.camera,
+        focus: options.focus,
+        size: options.size,
         ..Picture::default()
     };
     let image = renderer
@@ -70,14 +85,32 @@ fn draw(
     image.write_png(path).map_err(|error| error.to_string())
 }
 
+/// Half the width of lines: they are two pixels wide at the distance of what the picture looks at, or about so wide in a
+/// picture of everything.
+fn line_radius(stage: &Stage, options: &Options) -> f64 {
+    let [width, height] = options.size.map(f64::from);
+    if let Some(focus) = options.focus {
+        let orbit = Orbit {
+            camera: options.camera,
+            target: focus.target,
+            distance: focus.distance,
+        };
+        let [_, high] = orbit.visible(width / height);
+        return 2.0 * high / height;
+    }
+    let [low, high] = stage.bounds(None).unwrap_or_default();
+    let diagonal: f64 = (0..3).map(|k| (high[k] - low[k]).powi(2)).sum();
+    diagonal.sqrt() / height.max(1.0)
+}
+
 /// The options of `impinge view` that make the picture again.
 fn command_options(
     stage: &Stage,
-    size: [u32; 2],
+    options: &Options,
     question: &Question,
-    camera: Camera,
     path: &Path,
 ) -> Vec<String> {
+    let (camera, size) = (options.camera, options.size);
     let mut words = Vec::new();
     let mut say = |option: &str, value: String| words.extend([option.to_owned(), value]);
     if stage.content.n_frames() > 1 {
@@ -98,6 +131,16 @@ fn command_options(
     if camera.up == UpAxis::Z {
         say("--up", "z".to_owned());
     }
+    if let Some(focus) = options.focus {
+        let target = focus.target.map(|x| format!("{x:?}"));
+        say("--target", target.join(","));
+        say("--eye-distance", format!("{:?}", focus.distance));
+    }
+    match options.shows {
+        Shows::Everything => {}
+        Shows::Colliding => say("--show", "colliding".to_owned()),
+        Shows::Curves => say("--show", "curves".to_owned()),
+    }
     say("--size", format!("{}x{}", size[0], size[1]));
     if question.shared_vertex == SharedVertex::Skip {
         say("--shared-vertex", "skip".to_owned());
@@ -105,6 +148,9 @@ fn command_options(
     say("--png", path.display().to_string());
     if camera.projection == Projection::Orthographic {
         words.push("--orthographic".to_owned());
+    }
+    if options.curves {
+        words.push("--curves".to_owned());
     }
     if question.within && stage.content.bodies.len() > 1 {
         words.push("--self".to_owned());
@@ -151,12 +197,5 @@ pub fn draw_png(
         backend: Backend::Cpu,
     };
     let answer = Finder::default().find_on_cpu(&stage, &question)?;
-    draw(
-        &stage,
-        Some(&answer),
-        options.size,
-        options.camera,
-        renderer,
-        path,
-    )
+    draw(&stage, Some(&answer), options, renderer, path)
 }

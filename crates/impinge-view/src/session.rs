@@ -3,13 +3,13 @@
 use eframe::egui;
 use egui_wgpu::RenderState;
 use impinge::{Method, Primitive};
-use impinge_render::{Camera, Look, Orbit};
+use impinge_render::{Camera, Focus, Look, Orbit};
 
 use crate::content::Content;
 use crate::drag::Drag;
 use crate::find::{Answer, Finder, curves, near, quiet_detector, step};
 use crate::flight::Flight;
-use crate::options::{Backend, Options, Question};
+use crate::options::{Backend, Options, Question, Shows};
 use crate::pick::{Hit, pick};
 use crate::picture::{self, Saved};
 use crate::places::{Place, places};
@@ -25,24 +25,6 @@ const SELECTED: [u8; 3] = [255, 225, 0];
 const PARTNER: [u8; 3] = [0, 170, 120];
 /// The most states that are kept for undoing.
 const MAX_UNDO: usize = 100;
-
-/// What is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Shows {
-    Everything,
-    Colliding,
-    Curves,
-}
-
-impl Shows {
-    pub fn next(self) -> Self {
-        match self {
-            Shows::Everything => Shows::Colliding,
-            Shows::Colliding => Shows::Curves,
-            Shows::Curves => Shows::Everything,
-        }
-    }
-}
 
 /// What has changed since the last refresh.
 #[derive(Debug, Clone, Copy, Default)]
@@ -133,17 +115,21 @@ impl Session {
         let bounds = whole_bounds(&stage, &mut scratch);
         let diagonal = length(bounds);
         let timeline = start_timeline(&stage, question, false, ctx);
+        let (orbit, bounds) = match options.focus {
+            Some(focus) => (focused(options.camera, focus), None),
+            None => (Orbit::around(options.camera, bounds, 1.0), Some(bounds)),
+        };
         Ok(Session {
             scratch,
-            orbit: Orbit::around(options.camera, bounds, 1.0),
-            bounds: Some(bounds),
+            orbit,
+            bounds,
             aspect: 1.0,
             stage,
             question,
             player: Player::new(options.plays && n_frames > 1),
             options: options.clone(),
-            shows: Shows::Everything,
-            shows_curves: false,
+            shows: options.shows,
+            shows_curves: options.curves,
             shows_impacts: false,
             shows_near: false,
             distance: 0.01 * diagonal,
@@ -578,22 +564,30 @@ impl Session {
 
     /// Saves a picture in the folder of the options.
     pub fn save(&mut self) {
-        match picture::save(
-            &self.stage,
-            self.answer.as_ref(),
-            &self.options,
-            &self.question,
-            self.orbit.camera,
-            self.screen.device(),
-        ) {
+        let options = Options {
+            camera: self.orbit.camera,
+            focus: Some(Focus {
+                target: self.orbit.target,
+                distance: self.orbit.distance,
+            }),
+            shows: self.shows,
+            curves: self.shows_curves,
+            ..self.options.clone()
+        };
+        let (answer, device) = (self.answer.as_ref(), self.screen.device());
+        match picture::save(&self.stage, answer, &options, &self.question, device) {
             Ok(saved) => self.saved = Some(saved),
             Err(text) => self.message = Some(text),
         }
     }
+}
 
-    /// The direction of view, for tests.
-    pub fn camera(&self) -> Camera {
-        self.orbit.camera
+/// The viewpoint of a focus.
+fn focused(camera: Camera, Focus { target, distance }: Focus) -> Orbit {
+    Orbit {
+        camera,
+        target,
+        distance,
     }
 }
 

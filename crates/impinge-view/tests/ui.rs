@@ -13,9 +13,9 @@ use egui_wgpu::wgpu::PollType;
 use egui_wgpu::{RenderState, RendererOptions};
 use impinge::{Backend, BodyId, Detector, Positions, Query, Scene, SharedVertex, Step};
 use impinge_io::Sequence;
-use impinge_render::Colors;
+use impinge_render::{Colors, Focus};
 use impinge_scenes::surfaces::ball;
-use impinge_view::{Command, Content, Count, Frames, Options, Shown, Viewer};
+use impinge_view::{Command, Content, Count, Frames, Options, Shown, Shows, Viewer};
 
 const SIZE: [f32; 2] = [900.0, 800.0];
 const COLORS: [Colors; 2] = [
@@ -637,6 +637,13 @@ fn look(harness: &mut Harness<'static, Viewer>, name: &str) {
     }
 }
 
+/// Keeps a saved picture for people to look at, as [`look`] does.
+fn keep(png: &[u8], name: &str) {
+    if let Some(folder) = std::env::var_os("IMPINGE_PICTURES") {
+        std::fs::write(Path::new(&folder).join(format!("{name}.png")), png).expect("saved");
+    }
+}
+
 fn n_pixels(harness: &mut Harness<'static, Viewer>, is: impl Fn([u8; 3]) -> bool) -> usize {
     harness.run_steps(2);
     let image = harness.render().expect("a picture");
@@ -658,6 +665,11 @@ fn is_red([r, g, b]: [u8; 3]) -> bool {
 
 fn is_grey([r, g, b]: [u8; 3]) -> bool {
     r.abs_diff(g) < 16 && b.abs_diff(g) < 24 && r < 225
+}
+
+/// Neither window nor picture has a background as dark as this.
+fn is_body([r, g, b]: [u8; 3]) -> bool {
+    r.min(g).min(b) < 225
 }
 
 fn is_black([r, g, b]: [u8; 3]) -> bool {
@@ -756,31 +768,106 @@ fn a_saved_picture_is_made_again_by_what_its_command_says() {
     wait(&mut harness, is_counted);
     press(&mut harness, Key::B);
     drag(&mut harness, Pos2::new(15.0, 600.0), [80.0, 30.0]);
+    // Near the contact, with its curves.
+    press(&mut harness, Key::J);
+    fly(&mut harness);
+    press(&mut harness, Key::I);
     press(&mut harness, Key::S);
     assert_eq!(harness.state().message(), None);
     let (path, command) = harness.state().saved().expect("a picture");
-    let (frame, camera) = (harness.state().frame(), harness.state().camera());
-    let (frame, camera) = (frame.expect("a frame"), camera.expect("a camera"));
+    let path = path.to_owned();
+    let (frame, orbit) = (harness.state().frame(), harness.state().orbit());
+    let (frame, orbit) = (frame.expect("a frame"), orbit.expect("a viewpoint"));
+    let camera = orbit.camera;
     assert!(
         command.starts_with(&format!("impinge view --frame {frame} --azimuth ")),
         "{command}"
     );
     assert!(command.contains(&format!(
-        "--azimuth {:?} --elevation {:?} --size 320x200",
-        camera.azimuth, camera.elevation
+        "--azimuth {:?} --elevation {:?} --target {:?},{:?},{:?} --eye-distance {:?} --size 320x200",
+        camera.azimuth,
+        camera.elevation,
+        orbit.target[0],
+        orbit.target[1],
+        orbit.target[2],
+        orbit.distance
     )));
+    assert!(command.ends_with(" --curves"), "{command}");
     let again = folder.path().join("again.png");
-    let options = Options {
+    let all = Options {
         frame,
         camera,
-        ..options
+        ..options.clone()
     };
-    impinge_view::write_png(content, &options, &again).expect("a picture");
-    let bytes = |path: &Path| std::fs::read(path).expect("there");
-    assert!(bytes(path) == bytes(&again));
-    assert!(bytes(&again).len() > 1_000);
+    let draw = |options: &Options| {
+        impinge_view::write_png(content.clone(), options, &again).expect("a picture");
+        std::fs::read(&again).expect("there")
+    };
+    let count = |png: &[u8], is: fn([u8; 3]) -> bool| {
+        let image = image::load_from_memory(png).expect("a picture").to_rgb8();
+        image.pixels().filter(|pixel| is(pixel.0)).count()
+    };
+    let focused = Options {
+        focus: Some(Focus {
+            target: orbit.target,
+            distance: orbit.distance,
+        }),
+        ..all.clone()
+    };
+    let with_curves = draw(&Options {
+        curves: true,
+        ..focused.clone()
+    });
+    assert!(std::fs::read(&path).expect("there") == with_curves);
+    keep(&with_curves, "saved");
+    // Framing: from half as far, everything is larger, and a picture of everything is another one.
+    let near = draw(&focused);
+    let closer = draw(&Options {
+        focus: Some(Focus {
+            target: orbit.target,
+            distance: 0.5 * orbit.distance,
+        }),
+        ..focused.clone()
+    });
+    assert!(near != draw(&all), "the focus has no effect");
+    assert!(count(&closer, is_body) > 2 * count(&near, is_body));
+    assert!(
+        count(&with_curves, is_black) > count(&near, is_black) + 20,
+        "curves"
+    );
+    // The window shows the bodies as large as the picture, relative to the heights of both.
+    let in_window = n_pixels(&mut harness, is_body) as f64 / f64::from(SIZE[1] - 104.0).powi(2);
+    let in_picture = count(&with_curves, is_body) as f64 / 200f64.powi(2);
+    assert!(
+        (0.8..1.25).contains(&(in_window / in_picture)),
+        "{in_window} {in_picture}"
+    );
+    for (shows, word) in [(Shows::Colliding, "colliding"), (Shows::Curves, "curves")] {
+        press(&mut harness, Key::C);
+        press(&mut harness, Key::S);
+        let (path, command) = harness.state().saved().expect("a picture");
+        assert!(command.contains(&format!(" --show {word} ")), "{command}");
+        let png = draw(&Options {
+            curves: true,
+            shows,
+            ..focused.clone()
+        });
+        assert!(std::fs::read(path).expect("there") == png, "{word}");
+        assert_eq!(count(&png, is_red) > 0, shows == Shows::Colliding);
+        assert!(count(&png, is_black) > 20, "{word}");
+        keep(&png, word);
+    }
+    // A window that begins with these options shows the same.
+    let same = open(
+        move || Ok(content),
+        Options {
+            curves: true,
+            ..focused
+        },
+    );
+    assert_eq!(same.state().orbit(), Some(orbit));
     // The next one has another name.
     press(&mut harness, Key::S);
     let (path, _) = harness.state().saved().expect("a picture");
-    assert!(path.ends_with("impinge-2.png"), "{path:?}");
+    assert!(path.ends_with("impinge-4.png"), "{path:?}");
 }

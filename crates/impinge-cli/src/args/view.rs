@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 
 use super::picture::UpArg;
 use super::{MethodArg, SharedVertexArg};
-use crate::values::{PngFile, azimuth, body_matrix, elevation, size};
+use crate::values::{PngFile, azimuth, body_matrix, elevation, lambda, point, size};
 
 pub const VIEW_EXAMPLES: &str = "\
 Examples:
@@ -75,12 +75,45 @@ pub struct ViewArgs {
     /// Draw without perspective
     #[arg(long)]
     pub orthographic: bool,
+    /// The point in the middle of the view; by default everything is seen
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, requires = "eye_distance")]
+    pub target: Option<[f64; 3]>,
+    /// The distance from which that point is seen, in the unit of the meshes
+    #[arg(long, value_name = "D", value_parser = lambda, requires = "target")]
+    pub eye_distance: Option<f64>,
+    /// What is drawn
+    #[arg(long, value_enum, default_value_t = ShowArg::Everything)]
+    pub show: ShowArg,
+    /// Draw the curves in which surfaces cross
+    #[arg(long)]
+    pub curves: bool,
     /// Save this picture and open no window
     #[arg(long, value_name = "FILE")]
     pub png: Option<PngFile>,
     /// Show N frames as fast as possible, print how many there were per second, and close the window
     #[arg(long, value_name = "N", hide = true)]
     pub measure: Option<NonZeroU32>,
+}
+
+/// [`impinge_view::Shows`] as an option.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ShowArg {
+    /// All faces
+    Everything,
+    /// The faces that collide
+    Colliding,
+    /// The curves in which surfaces cross, and no faces
+    Curves,
+}
+
+impl From<ShowArg> for impinge_view::Shows {
+    fn from(show: ShowArg) -> Self {
+        match show {
+            ShowArg::Everything => impinge_view::Shows::Everything,
+            ShowArg::Colliding => impinge_view::Shows::Colliding,
+            ShowArg::Curves => impinge_view::Shows::Curves,
+        }
+    }
 }
 
 /// [`impinge_view::Backend`] as an option.

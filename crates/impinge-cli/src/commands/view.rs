@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use impinge::{BodyId, CancelToken, Positions};
 use impinge_io::{ReadOptions, Weld};
-use impinge_render::{Camera, Colors, Projection};
+use impinge_render::{Camera, Colors, Focus, Projection};
 use impinge_view::{Command, Content, Options, Shown, show, write_png};
 
 use super::sequence::{Frames, welded};
@@ -51,6 +51,12 @@ fn options(args: &ViewArgs) -> Options {
                 false => Camera::default().projection,
             },
         },
+        focus: match (args.target, args.eye_distance) {
+            (Some(target), Some(distance)) => Some(Focus { target, distance }),
+            _ => None,
+        },
+        shows: args.show.into(),
+        curves: args.curves,
         moves: args.moves.clone(),
         size: args.size,
         folder: PathBuf::from(""),
