@@ -225,6 +225,24 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
         self.check()
     }
 
+    /// To be called before so many certain pairs are handed over: if they are more than allowed, or than memory holds, the
+    /// answer is over at once. Returns whether the pairs are still wanted, which they are not if only their number is.
+    pub fn announce(&self, n_more: u64) -> bool {
+        if self.is_over() {
+            return false;
+        }
+        let state = &mut *self.state();
+        let n = state.n;
+        let mut result = state.count(n_more);
+        if state.wanted == Wanted::Pairs {
+            // They are counted when they are handed over.
+            state.n = n;
+            result = result.and_then(|()| state.has_room(n_more));
+        }
+        self.note(result, state);
+        state.wanted == Wanted::Pairs && !self.is_over()
+    }
+
     /// Forgets all pairs, for they will be found again in another way.
     pub fn forget(&self) {
         let state = &mut *self.state();
@@ -383,6 +401,24 @@ impl<T: Copy, const LISTS: usize> State<T, LISTS> {
         self.keep_budget()
     }
 
+    /// Whether so many more pairs fit into the budget, and whether there is memory for them.
+    fn has_room(&self, n_more: u64) -> Result<(), Error> {
+        let needed = n_more.saturating_mul(size_of::<T>() as u64 + self.limits.besides);
+        if let Some(budget) = self.limits.memory_budget
+            && needed > budget
+        {
+            return Err(Error::MemoryBudget {
+                what: "the pairs that are certain",
+                needed,
+                budget,
+            });
+        }
+        let mut trial = Vec::<T>::new();
+        let n = usize::try_from(n_more).unwrap_or(usize::MAX);
+        let reserved = trial.try_reserve_exact(n);
+        reserved.map_err(|_| self.no_memory(n))
+    }
+
     /// Appends the chunks to what is held.
     fn join(&mut self) -> Result<(), Error> {
         for ix in 0..LISTS {
@@ -431,7 +467,7 @@ impl<T: Copy, const LISTS: usize> State<T, LISTS> {
         Error::OutOfMemory {
             what: "pairs",
             n: self.n,
-            needed: (size_of::<T>() * n_more) as u64,
+            needed: (size_of::<T>() as u64).saturating_mul(n_more as u64),
         }
     }
 }

@@ -19,6 +19,8 @@
 //! Primitives that share an axis uv also share the direction of its other vertex. They are found by half-planes
 //! around the axis: the half-plane of a point p is given by the direction of (v - u) x (p - u).
 //!
+//! Primitives with the same vertices have the same answers, so one test speaks for all of them.
+//!
 //! Cost: `O(n log n)` per hub for n primitives, and one exact test per pair whose cones' boxes overlap.
 //! Reason for each discard: cones without a common direction. `docs/exactness.md`, "Hubs", has the proof and the bound.
 
@@ -45,19 +47,32 @@ const EVERYWHERE: Bounds = Bounds {
 /// Scratch; kept from frame to frame.
 #[derive(Debug, Default)]
 pub(super) struct Around {
+    /// Places of primitives; those with the same vertices follow each other.
+    places: Vec<u32>,
     entries: Vec<Entry>,
     nodes: Vec<Node>,
     stack: Vec<NodePair>,
-    /// Places of primitives that lie entirely in the shared hub or axis.
-    nowhere: Vec<u32>,
-    /// Places of triangles on the axis' line that extend beyond its first hub, and beyond its second.
-    beyond: [Vec<u32>; 2],
+    /// Triangles on the axis' line that extend beyond its first hub, and beyond its second.
+    beyond: [Vec<Alike>; 2],
+}
+
+/// Primitives with the same vertices: the range of their places in `Around::places`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Alike {
+    start: u32,
+    end: u32,
+}
+
+impl Alike {
+    fn of(self, places: &[u32]) -> &[u32] {
+        &places[self.start as usize..self.end as usize]
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Entry {
     cone: Bounds,
-    place: u32,
+    alike: Alike,
     /// The hubs of the primitive with which the current hub forms an axis.
     partners: HubSet,
 }
@@ -85,11 +100,11 @@ enum Seen {
 
 impl Around {
     pub fn bytes(&self) -> usize {
-        size_of::<Entry>() * self.entries.capacity()
+        size_of::<u32>() * self.places.capacity()
+            + size_of::<Entry>() * self.entries.capacity()
             + size_of::<Node>() * self.nodes.capacity()
             + size_of::<NodePair>() * self.stack.capacity()
-            + size_of::<u32>()
-                * (self.nowhere.capacity() + self.beyond[0].capacity() + self.beyond[1].capacity())
+            + size_of::<Alike>() * (self.beyond[0].capacity() + self.beyond[1].capacity())
     }
 
     /// Settles the pairs that share a hub, or an axis.
@@ -102,42 +117,51 @@ impl Around {
         settler: &mut Settler,
     ) {
         self.entries.clear();
-        self.nowhere.clear();
         self.beyond.iter_mut().for_each(Vec::clear);
-        for &place in places {
-            match seen(body, shared, place) {
-                Seen::Nowhere => self.nowhere.push(place),
-                Seen::Beyond(end) => self.beyond[end].push(place),
+        self.places.clear();
+        self.places.extend_from_slice(places);
+        (self.places).sort_unstable_by_key(|&place| (sorted_ids(body.corners(place)), place));
+        let same = |&a: &u32, &b: &u32| sorted_ids(body.corners(a)) == sorted_ids(body.corners(b));
+        let mut start = 0;
+        for places in self.places.chunk_by(same) {
+            let end = start + places.len() as u32;
+            let alike = Alike { start, end };
+            start = end;
+            let corners = body.corners(places[0]);
+            if hubs.owns(shared, corners, corners) {
+                settler.settle_alike(body, places);
+            }
+            match seen(body, shared, places[0]) {
+                // By the rule, such a primitive meets only primitives with the same vertices.
+                Seen::Nowhere => {}
+                Seen::Beyond(end) => self.beyond[end].push(alike),
                 Seen::Cone(cone) => self.entries.push(Entry {
                     cone,
-                    place,
+                    alike,
                     partners: match shared {
-                        &[hub] => hubs.partners(hub, body.corners(place)),
+                        &[hub] => hubs.partners(hub, corners),
                         _ => HubSet::EMPTY,
                     },
                 }),
             }
         }
-        let mut settle = |a: u32, b: u32| {
-            if hubs.owns(shared, body.corners(a), body.corners(b)) {
-                settler.settle_shared(body, a.min(b), a.max(b));
+        let places = std::mem::take(&mut self.places);
+        let mut settle = |a: Alike, b: Alike| {
+            let (a, b) = (a.of(&places), b.of(&places));
+            if hubs.owns(shared, body.corners(a[0]), body.corners(b[0])) {
+                settler.settle_shared_by_all(body, a, b);
             }
         };
         // All of these meet beyond the shared axis.
         for on_line in &self.beyond {
             each_pair(on_line, &mut settle);
         }
-        // By the rule, a primitive that lies in the shared vertices meets only primitives with the same vertices.
-        let ids = |place: u32| sorted_ids(body.corners(place));
-        self.nowhere.sort_unstable_by_key(|&place| ids(place));
-        for same in self.nowhere.chunk_by(|&a, &b| ids(a) == ids(b)) {
-            each_pair(same, &mut settle);
-        }
         self.meet(&mut settle);
+        self.places = places;
     }
 
     /// Calls `emit` for all pairs of entries whose cones' boxes overlap and that have no common partner.
-    fn meet(&mut self, emit: &mut impl FnMut(u32, u32)) {
+    fn meet(&mut self, emit: &mut impl FnMut(Alike, Alike)) {
         let n = self.entries.len();
         if n < 2 {
             return;
@@ -190,7 +214,7 @@ impl Around {
                 let skipped = if a == b { ix + 1 } else { 0 };
                 for other in &self.entries[range(n, at, b)][skipped..] {
                     if entry.cone.overlaps(&other.cone) && !entry.partners.meets(&other.partners) {
-                        emit(entry.place, other.place);
+                        emit(entry.alike, other.alike);
                     }
                 }
             }
@@ -198,9 +222,9 @@ impl Around {
     }
 }
 
-fn each_pair(places: &[u32], emit: &mut impl FnMut(u32, u32)) {
-    for (ix, &a) in places.iter().enumerate() {
-        for &b in &places[ix + 1..] {
+fn each_pair(list: &[Alike], emit: &mut impl FnMut(Alike, Alike)) {
+    for (ix, &a) in list.iter().enumerate() {
+        for &b in &list[ix + 1..] {
             emit(a, b);
         }
     }
@@ -241,7 +265,7 @@ impl Tree<'_> {
             entries.select_nth_unstable_by(cut, |a, b| {
                 (a.partners.cmp(&b.partners))
                     .then(center(a).total_cmp(&center(b)))
-                    .then(a.place.cmp(&b.place))
+                    .then(a.alike.cmp(&b.alike))
             });
             self.build(at + 1, 2 * node);
             self.build(at + 1, 2 * node + 1);

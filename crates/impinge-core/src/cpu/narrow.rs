@@ -180,16 +180,56 @@ impl Settler {
 
     /// Settles a pair of one body that shares a vertex, under `SharedVertex::Resolve`.
     pub fn settle_shared(&mut self, body: &BodyRef<'_>, place_a: u32, place_b: u32) {
+        self.settle_shared_by_all(body, &[place_a], &[place_b]);
+    }
+
+    /// Settles all pairs of a primitive of the one list with one of the other, under `SharedVertex::Resolve`. Primitives
+    /// of one list have the same vertices, and a vertex is in both.
+    pub fn settle_shared_by_all(&mut self, body: &BodyRef<'_>, a: &[u32], b: &[u32]) {
+        let n_pairs = a.len() as u64 * b.len() as u64;
+        let pairs = a.iter().flat_map(|&a| b.iter().map(move |&b| (a, b)));
+        self.settle_as_one(body, [a[0], b[0]], n_pairs, pairs);
+    }
+
+    /// Settles all pairs of a list, under `SharedVertex::Resolve`. Its primitives have the same vertices.
+    pub fn settle_alike(&mut self, body: &BodyRef<'_>, list: &[u32]) {
+        let &[first, second, ..] = list else {
+            return;
+        };
+        let n_pairs = list.len() as u64 * (list.len() as u64 - 1) / 2;
+        let rest = |ix: usize| &list[ix + 1..];
+        let pairs =
+            (list.iter().enumerate()).flat_map(|(ix, &a)| rest(ix).iter().map(move |&b| (a, b)));
+        self.settle_as_one(body, [first, second], n_pairs, pairs);
+    }
+
+    /// Settles pairs that share vertices and have one answer: that of the pair `example`.
+    fn settle_as_one(
+        &mut self,
+        body: &BodyRef<'_>,
+        example: [u32; 2],
+        n_pairs: u64,
+        pairs: impl Iterator<Item = (u32, u32)>,
+    ) {
         if self.is_over() {
             return;
         }
-        self.n_candidates += 1;
-        let (a, b) = (body.points(place_a), body.points(place_b));
-        let (ids_a, ids_b) = (body.corners(place_a), body.corners(place_b));
+        self.n_candidates += n_pairs;
+        let [a, b] = example.map(|place| body.points(place));
+        let [ids_a, ids_b] = example.map(|place| body.corners(place));
         let rule = crate::SharedVertex::Resolve;
-        if intersect_shared(rule, body.participant.kind, (&a, ids_a), (&b, ids_b)) {
-            self.keys
-                .push(pair_key(body.global(place_a), body.global(place_b)));
+        if !intersect_shared(rule, body.participant.kind, (&a, ids_a), (&b, ids_b)) {
+            return;
+        }
+        // So many may be far more than memory holds.
+        if n_pairs > BLOCK as u64
+            && let Some(answer) = &self.answer
+            && !answer.announce(n_pairs)
+        {
+            return;
+        }
+        for (a, b) in pairs {
+            self.keys.push(pair_key(body.global(a), body.global(b)));
             self.hand_over();
         }
     }
