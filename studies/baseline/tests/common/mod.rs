@@ -66,7 +66,7 @@ pub fn cases() -> Vec<Case> {
         cases.push(Case::new("coincident", &ball, &ball, double));
         cases.push(Case::new("disjoint", &ball, &far, double));
         cases.push(Case::new("empty", &ball, &empty, double));
-        for (n, k) in [(1, 1), (7, 1), (65, 2), (300, 5)] {
+        for (n, k) in [(1, 1), (7, 1), (65, 2), (130, 4)] {
             let a = soup::lattice_triangles(n, k, 1);
             let b = soup::lattice_triangles(n + 3, k, 2);
             let t = soup::lattice_tetrahedra(n, k, 3);
