@@ -308,14 +308,13 @@ fn what_is_more_than_the_device_binds_is_answered_in_pieces() {
         let expected = naive(&case);
         let method = [Method::Clusters, Method::Cells][ix % 2];
         // The positions of one cluster take up to 3 KiB.
-        for most_bound in [1, 8 << 10, 20 << 10] {
-            let mut detector = Detector::with_most_bound(gpu(method), most_bound).unwrap();
-            assert_agree("in pieces", &expected, &mut detector, &case);
-            let pairs = detector.detect(&case.scene, &case.query).unwrap();
-            n_many += u64::from(pairs.stats().n_pieces > 3);
-        }
+        let most_bound = [1, 8 << 10, 20 << 10][ix / 2 % 3];
+        let mut detector = Detector::with_most_bound(gpu(method), most_bound).unwrap();
+        assert_agree("in pieces", &expected, &mut detector, &case);
+        let pairs = detector.detect(&case.scene, &case.query).unwrap();
+        n_many += u64::from(pairs.stats().n_pieces > 3);
     }
-    assert!(n_many > 50, "{n_many}");
+    assert!(n_many > 20, "{n_many}");
 }
 
 #[test]
