@@ -785,6 +785,19 @@ fn resident_frames_take_positions_and_leave_pairs_on_the_device() {
         // Called by `detect`, the same detector answers from the scene's own positions.
         let pairs = detector.detect(&truth, &query).unwrap();
         assert_eq!(pairs.len(), expected.len());
+        // Where they can be drawn from, until the body moves.
+        for (id, model) in [(a, &ball), (b, &moved)] {
+            let (buffer, offset) = detector.positions_on_device(&truth, id).unwrap();
+            let words = read(&device, &queue, buffer);
+            let (first, n) = (offset as usize / 4, 3 * model.positions.len());
+            let there: Vec<f32> = words[first..first + n]
+                .iter()
+                .map(|&x| f32::from_bits(x))
+                .collect();
+            assert_eq!(there, model.positions.as_flattened());
+        }
+        assert!(detector.positions_on_device(&scene, b).is_none());
+        assert!(oracle.positions_on_device(&truth, b).is_none());
         let small = device.create_buffer(&wgpu::BufferDescriptor {
             label: None,
             size: 12,

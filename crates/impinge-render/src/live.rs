@@ -17,6 +17,9 @@ use pipelines::{BodyUniform, DEPTH, N_STORAGE_BUFFERS, Pipelines, ViewUniform};
 
 use orbit::dot;
 
+/// [`BodyUniform::place`] of positions that are in place.
+const IN_PLACE: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
+
 /// What a live view shows, and in which colours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
@@ -182,7 +185,6 @@ impl Live {
     /// that a scene far from the origin, or of any size, keeps its shape in single precision. To be called before
     /// positions and lines are set.
     pub fn set_bounds(&mut self, [low, high]: [[f64; 3]; 2]) {
-        self.middle = std::array::from_fn(|k| 0.5 * low[k] + 0.5 * high[k]);
         let half = (0..3)
             .map(|k| 0.5 * high[k] - 0.5 * low[k])
             .fold(0.0, f64::max);
@@ -191,6 +193,15 @@ impl Live {
         } else {
             1.0
         };
+        self.middle = std::array::from_fn(|k| {
+            let middle = 0.5 * low[k] + 0.5 * high[k];
+            // Where single precision suffices, so that the device can subtract the same number.
+            let narrow = f64::from(middle as f32);
+            match (narrow - middle).abs() <= self.half {
+                true => narrow,
+                false => middle,
+            }
+        });
     }
 
     fn place(&self, point: [f64; 3]) -> [f32; 3] {
@@ -253,6 +264,7 @@ impl Live {
                 other: srgb(colors.other),
                 marked: srgb(colors.colliding),
                 has_colors: [0; 4],
+                place: IN_PLACE,
             },
             uniform_buffer,
             positions,
@@ -297,10 +309,51 @@ impl Live {
         scratch.clear();
         let points = (0..positions.len()).map(|vertex| positions.point(vertex));
         scratch.extend(points.map(|point| self.place(point)));
-        let buffer = &self.body(body)?.positions;
-        self.queue
-            .write_buffer(buffer, 0, bytemuck::cast_slice(&scratch));
+        let queue = self.queue.clone();
+        let held = self.body_mut(body)?;
+        queue.write_buffer(&held.positions, 0, bytemuck::cast_slice(&scratch));
+        held.set_place(&queue, IN_PLACE);
         self.scratch = scratch;
+        Ok(())
+    }
+
+    /// Takes the positions of a body's vertices, `(v, 3)` f32 tightly packed, from a buffer of the same device with the usage
+    /// `COPY_SRC`, from this byte on: such as that of
+    /// [`Detector::positions_on_device`](impinge::Detector::positions_on_device). They are copied when the encoder's commands run.
+    ///
+    /// # Errors
+    /// No such body; a buffer that ends before the last vertex or lacks its usage; an offset that is no multiple of 4; bounds so
+    /// small or so far away that single precision does not have them: then use [`set_positions`](Live::set_positions).
+    pub fn copy_positions(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        body: usize,
+        buffer: &wgpu::Buffer,
+        offset: u64,
+    ) -> Result<(), Error> {
+        let [x, y, z] = self.middle.map(|x| x as f32);
+        let place = [x, y, z, (1.0 / self.half) as f32];
+        let is_narrow = (0..3).all(|k| f64::from(place[k]) == self.middle[k]);
+        let queue = self.queue.clone();
+        let held = self.body_mut(body)?;
+        let bytes = 12 * held.faces.n_vertices() as u64;
+        let refused = |what: String| Err(Error::Gpu { what });
+        if !is_narrow || !place[3].is_normal() {
+            return refused("the bounds are beyond single precision".to_owned());
+        }
+        if offset % 4 != 0 || offset.saturating_add(bytes) > buffer.size() {
+            let size = buffer.size();
+            return refused(format!(
+                "{bytes} bytes of positions from byte {offset} on, the buffer has {size}"
+            ));
+        }
+        if !buffer.usage().contains(wgpu::BufferUsages::COPY_SRC) {
+            return refused("the buffer of the positions lacks the usage COPY_SRC".to_owned());
+        }
+        if bytes > 0 {
+            encoder.copy_buffer_to_buffer(buffer, offset, &held.positions, 0, bytes);
+        }
+        held.set_place(&queue, place);
         Ok(())
     }
 
@@ -550,6 +603,13 @@ impl Live {
 }
 
 impl BodyOnDevice {
+    fn set_place(&mut self, queue: &wgpu::Queue, place: [f32; 4]) {
+        if self.uniform.place != place {
+            self.uniform.place = place;
+            self.write_uniform(queue);
+        }
+    }
+
     fn write_uniform(&self, queue: &wgpu::Queue) {
         queue.write_buffer(&self.uniform_buffer, 0, bytemuck::bytes_of(&self.uniform));
     }

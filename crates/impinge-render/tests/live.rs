@@ -218,6 +218,69 @@ fn positions_move_a_body_and_bounds_do_not() {
 }
 
 #[test]
+fn positions_may_come_from_a_buffer_on_the_device() {
+    let mut stage = Stage::new(1);
+    let body = stage.add(&[triangle(0.0)]);
+    stage.live.set_bounds([[-50.0, -3.0, 0.0], [1.1, 7.0, 2.0]]);
+    let away: Vec<[f32; 3]> = triangle(0.0).map(|[x, y, z]| [x + 10.0, y, z]).to_vec();
+    let here = triangle(0.0);
+    stage
+        .live
+        .set_positions(body, &here.to_vec().into())
+        .expect("three");
+    let expected = stage.draw();
+    stage.live.set_positions(body, &away.into()).expect("three");
+    assert_eq!(stage.at(0.0, 0.0), BACKGROUND);
+    let mut bytes = vec![0; 8];
+    bytes.extend(here.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
+    let buffer = |usage| {
+        stage.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: bytes.len() as u64,
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    };
+    let (from, not_to_copy) = (
+        buffer(wgpu::BufferUsages::COPY_SRC),
+        buffer(wgpu::BufferUsages::STORAGE),
+    );
+    stage.queue.write_buffer(&from, 0, &bytes);
+    let mut encoder = stage.device.create_command_encoder(&Default::default());
+    let mut copy = |body, buffer, offset| {
+        let copied = stage
+            .live
+            .copy_positions(&mut encoder, body, buffer, offset);
+        copied.map_err(|error| error.to_string())
+    };
+    copy(body, &from, 8).expect("three");
+    assert!(
+        copy(body, &from, 12)
+            .is_err_and(|text| text.contains("36 bytes of positions from byte 12"))
+    );
+    assert!(copy(body, &from, 6).is_err());
+    assert!(copy(body, &not_to_copy, 8).is_err_and(|text| text.contains("COPY_SRC")));
+    assert!(copy(body + 1, &from, 8).is_err());
+    stage.queue.submit([encoder.finish()]);
+    assert!(stage.draw() == expected);
+    // Positions that the host sends are in place again.
+    stage
+        .live
+        .set_positions(body, &here.to_vec().into())
+        .expect("three");
+    assert!(stage.draw() == expected);
+    // So small that its inverse is beyond single precision.
+    stage.live.set_bounds([[0.0; 3], [1e-44; 3]]);
+    let mut encoder = stage.device.create_command_encoder(&Default::default());
+    assert!(
+        stage
+            .live
+            .copy_positions(&mut encoder, body, &from, 8)
+            .is_err()
+    );
+}
+
+#[test]
 fn primitives_may_have_colors_of_their_own() {
     let mut stage = Stage::new(1);
     let body = stage.add(&[triangle(0.0)]);

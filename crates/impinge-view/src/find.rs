@@ -47,6 +47,12 @@ impl Finder {
         self.find_on(stage, question, None)
     }
 
+    /// The detector, if it answers on the device of the window.
+    pub fn on_device(&self) -> Option<&Detector> {
+        let ((_, backend), detector) = self.detector.as_ref()?;
+        (*backend == Backend::Gpu).then_some(detector)
+    }
+
     fn find_on(
         &mut self,
         stage: &Stage,

@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use eframe::egui;
 use egui_wgpu::RenderState;
+use impinge::Detector;
 use impinge_render::{Faces, Live, Look, Orbit, wgpu};
 
 use crate::stage::Stage;
@@ -80,20 +81,35 @@ impl Screen {
                 .add(Faces::of_body(body), shown.colors)
                 .map_err(|error| format!("{}: {error}", shown.name))?;
         }
-        self.send_positions(stage)
+        self.send_positions(stage, None)
     }
 
-    /// Sends the positions of all bodies.
-    pub fn send_positions(&mut self, stage: &Stage) -> Result<(), String> {
+    /// Sends the positions of all bodies, except those that a detector already has on the device: these are copied there.
+    pub fn send_positions(
+        &mut self,
+        stage: &Stage,
+        detector: Option<&Detector>,
+    ) -> Result<(), String> {
+        let device = &self.state.device;
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         for (ix, shown) in stage.content.bodies.iter().enumerate() {
             let body = stage
                 .scene()
                 .body(shown.id)
                 .map_err(|error| error.to_string())?;
-            self.live
-                .set_positions(ix, body.positions())
-                .map_err(|error| error.to_string())?;
+            let there =
+                detector.and_then(|detector| detector.positions_on_device(stage.scene(), shown.id));
+            let copied = there.is_some_and(|(buffer, offset)| {
+                let copied = self.live.copy_positions(&mut encoder, ix, buffer, offset);
+                copied.is_ok()
+            });
+            if !copied {
+                self.live
+                    .set_positions(ix, body.positions())
+                    .map_err(|error| error.to_string())?;
+            }
         }
+        self.state.queue.submit([encoder.finish()]);
         Ok(())
     }
 

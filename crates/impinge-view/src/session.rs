@@ -442,7 +442,9 @@ impl Session {
             }
         }
         if changed.positions
-            && let Err(text) = self.screen.send_positions(&self.stage)
+            && let Err(text) = self
+                .screen
+                .send_positions(&self.stage, self.finder.on_device())
         {
             self.message = Some(text);
         }

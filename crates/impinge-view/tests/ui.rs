@@ -699,6 +699,25 @@ fn c_shows_everything_then_what_collides_then_curves() {
 }
 
 #[test]
+fn bodies_that_are_tested_on_the_device_are_drawn_where_they_are() {
+    let mut harness = open_content(still(600, 0.5));
+    harness.set_size(SIZE.into());
+    let mut pictures = Vec::new();
+    for label in ["CPU", "GPU"] {
+        click(&mut harness, label);
+        drag(&mut harness, middle(false), [60.0, 0.0]);
+        assert_eq!(harness.state().message(), None, "{label}");
+        let seen = [is_red, is_grey].map(|is| n_pixels(&mut harness, is));
+        assert!(seen[0] > 100 && seen[1] > 10_000, "{label}: {seen:?}");
+        pictures.push(seen);
+        click(&mut harness, "Put bodies back");
+    }
+    // Rounding may move an edge over the middle of a few pixels.
+    let differ = |k: usize| pictures[0][k].abs_diff(pictures[1][k]);
+    assert!(differ(0) < 20 && differ(1) < 60, "{pictures:?}");
+}
+
+#[test]
 fn impacts_and_near_faces_have_colors() {
     let mut harness = open_content(passing());
     wait(&mut harness, is_counted);

@@ -180,6 +180,17 @@ impl Detector {
         engine.encode(job, positions, encoder)
     }
 
+    /// The positions of a body in the buffer from which the last frame read them, `(v, 3)` f32 tightly packed, and the offset
+    /// of the first byte: to draw what was tested without another upload. The buffer has the usage `COPY_SRC`; the next
+    /// frame may write other positions into it, or replace it.
+    ///
+    /// `None` if they are not there: the last frame was answered on the CPU or in pieces, the body did not take part in it, has
+    /// f64 positions, or has moved since.
+    pub fn positions_on_device(&self, scene: &Scene, body: BodyId) -> Option<(&wgpu::Buffer, u64)> {
+        let engine = self.gpu.as_ref()?;
+        engine.positions_of(body, scene.body(body).ok()?)
+    }
+
     /// Reads the counts of the last encoded frame, whose commands must have been submitted, and
     /// grows the lists that were too small. Returns whether that frame was complete; if not, encode it again.
     ///

@@ -7,7 +7,9 @@ use super::layout::{Counter, N_COUNTERS, N_PAIRS, N_UNSURE};
 use super::room::{Capacities, Counts, Verdict};
 use crate::error::Error;
 use crate::ids::BodyId;
+use crate::positions::Positions;
 use crate::run::Job;
+use crate::scene::Body;
 use crate::stats::Statistics;
 
 /// The buffers that hold the pairs of an encoded frame once its commands have run.
@@ -88,6 +90,15 @@ impl Engine {
             pairs_capacity: capacities.pairs,
             unsure_capacity: capacities.unsure,
         })
+    }
+
+    /// The positions of a body on the device, see
+    /// [`Detector::positions_on_device`](crate::Detector::positions_on_device).
+    pub fn positions_of(&self, id: BodyId, body: &Body) -> Option<(&wgpu::Buffer, u64)> {
+        match body.positions() {
+            Positions::F32(_) => self.world.positions_of(id, body.positions_stamp()),
+            Positions::F64(_) => None,
+        }
     }
 
     /// Reads the counters and grows the buffers that were too small. Returns whether none was.

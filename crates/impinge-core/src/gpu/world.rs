@@ -94,7 +94,10 @@ impl World {
             cluster_vertices: Storage::plain("cluster vertices"),
             corners: Storage::plain("corners"),
             order: Storage::plain("order"),
-            positions: Storage::plain("positions"),
+            positions: Storage::new(
+                "positions",
+                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+            ),
             levels: Storage::plain("levels"),
             ignored: Storage::plain("ignored"),
         }
@@ -416,6 +419,15 @@ impl World {
         let vertex = 3 * size_of::<Coordinate>() as u64;
         let (to, size) = (held.first_vertex * vertex, held.n_vertices * vertex);
         encoder.copy_buffer_to_buffer(buffer, 0, self.positions.buffer(), to, size);
+    }
+
+    /// Where the positions of a body are on the device, if they are those of the pose with this stamp: the buffer and the
+    /// first byte.
+    pub fn positions_of(&self, body: BodyId, stamp: u64) -> Option<(&wgpu::Buffer, u64)> {
+        let is_there = |held: &&Resident| held.id == body && held.positions_stamp == stamp;
+        let held = self.residents.iter().find(is_there)?;
+        let vertex = 3 * size_of::<Coordinate>() as u64;
+        Some((self.positions.buffer(), held.first_vertex * vertex))
     }
 
     /// The length of the list of ignored pairs.

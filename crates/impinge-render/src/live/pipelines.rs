@@ -24,6 +24,7 @@ pub(crate) struct BodyUniform {
     pub other: [f32; 4],
     pub marked: [f32; 4],
     pub has_colors: [u32; 4],
+    pub place: [f32; 4],
 }
 
 /// Names and texts of the live shaders.

@@ -9,6 +9,8 @@ struct Body {
     marked: vec4<f32>,
     // 1 if faces may have colours of their own.
     has_colors: vec4<u32>,
+    // What is subtracted from positions; with what the difference is multiplied.
+    place: vec4<f32>,
 }
 
 @group(1) @binding(0) var<uniform> body: Body;
@@ -28,7 +30,8 @@ struct Shaded {
 
 fn corner(vertex: u32) -> vec3<f32> {
     let at = 3u * vertex;
-    return vec3<f32>(positions[at], positions[at + 1u], positions[at + 2u]);
+    let point = vec3<f32>(positions[at], positions[at + 1u], positions[at + 2u]);
+    return (point - body.place.xyz) * body.place.w;
 }
 
 fn linear(srgb: vec3<f32>) -> vec3<f32> {
