@@ -341,7 +341,7 @@ impl Live {
         if !is_narrow || !place[3].is_normal() {
             return refused("the bounds are beyond single precision".to_owned());
         }
-        if offset % 4 != 0 || offset.saturating_add(bytes) > buffer.size() {
+        if !offset.is_multiple_of(4) || offset.saturating_add(bytes) > buffer.size() {
             let size = buffer.size();
             return refused(format!(
                 "{bytes} bytes of positions from byte {offset} on, the buffer has {size}"
