@@ -111,32 +111,13 @@ impl View {
                 let eye = [middle[0], middle[1], middle[2] + distance];
                 let near = (eye[2] - near - room).max(NEAREST * distance);
                 let far = (eye[2] - far + room).max(2.0 * near);
-                View::new(
-                    &axes,
-                    eye,
-                    [
-                        1.0 / wide,
-                        1.0 / high,
-                        far / (near - far),
-                        near * far / (near - far),
-                    ],
-                    true,
-                )
+                View::perspective(&axes, eye, [wide, high], [near, far])
             }
             Projection::Orthographic => {
                 let eye = [middle[0], middle[1], near + room];
                 let (near, far) = (0.0, near - far + 2.0 * room);
-                View::new(
-                    &axes,
-                    eye,
-                    [
-                        1.0 / (wide * distance),
-                        1.0 / (high * distance),
-                        1.0 / (near - far),
-                        near / (near - far),
-                    ],
-                    false,
-                )
+                let size = [wide * distance, high * distance];
+                View::orthographic(&axes, eye, size, [near, far])
             }
         }
     }
@@ -193,35 +174,39 @@ impl View {
                 let distance = half[0].max(half[1]).max(near + 2.0 * room);
                 let eye = [offset[0] * slope[0], offset[1] * slope[1], distance];
                 let (near, far) = (distance - near - room, distance - far + room);
-                View::new(
-                    &axes,
-                    eye,
-                    [
-                        1.0 / wide,
-                        1.0 / high,
-                        far / (near - far),
-                        near * far / (near - far),
-                    ],
-                    true,
-                )
+                View::perspective(&axes, eye, [wide, high], [near, far])
             }
             Projection::Orthographic => {
                 let high = (half[1].max(half[0] / aspect) / FILLED).max(1e-3);
                 let eye = [offset[0], offset[1], near + room];
                 let (near, far) = (0.0, near - far + 2.0 * room);
-                View::new(
-                    &axes,
-                    eye,
-                    [
-                        1.0 / (high * aspect),
-                        1.0 / high,
-                        1.0 / (near - far),
-                        near / (near - far),
-                    ],
-                    false,
-                )
+                View::orthographic(&axes, eye, [high * aspect, high], [near, far])
             }
         }
+    }
+
+    /// Sees so far to each side (half the width, half the height) at the distance 1, and what is between two distances from the eye.
+    fn perspective(
+        axes: &Axes,
+        eye: [f64; 3],
+        [wide, high]: [f64; 2],
+        [near, far]: [f64; 2],
+    ) -> View {
+        let range = near - far;
+        let projection = [1.0 / wide, 1.0 / high, far / range, near * far / range];
+        View::new(axes, eye, projection, true)
+    }
+
+    /// Sees so far to each side (half the width, half the height) at every distance, and what is between two distances from the eye.
+    fn orthographic(
+        axes: &Axes,
+        eye: [f64; 3],
+        [wide, high]: [f64; 2],
+        [near, far]: [f64; 2],
+    ) -> View {
+        let range = near - far;
+        let projection = [1.0 / wide, 1.0 / high, 1.0 / range, near / range];
+        View::new(axes, eye, projection, false)
     }
 
     /// `eye` is given in the coordinates of `axes`.
