@@ -243,7 +243,7 @@ mod tests {
         let view = members!(ViewUniform: right up back projection sky screen line only_marked);
         assert_eq!(layout_of("live_faces", "View"), Some(view.clone()));
         assert_eq!(layout_of("live_lines", "View"), Some(view));
-        let body = members!(BodyUniform: other marked has_colors);
+        let body = members!(BodyUniform: other marked has_colors place);
         assert_eq!(layout_of("live_faces", "Body"), Some(body));
     }
 }
