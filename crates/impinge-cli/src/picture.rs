@@ -90,15 +90,10 @@ const CURVE: [u8; 3] = [20, 20, 20];
 
 /// Curves as thin tubes, about two pixels wide in a picture of a thousand.
 fn tubes(contacts: &Contacts, curves: &Curves, diagonal: f64) -> Surface {
-    let mut segments = Vec::new();
-    for curve in 0..curves.len() {
-        let points = curves.points(curve);
-        let n_links = points.len() - usize::from(!curves.is_closed(curve));
-        for link in 0..n_links {
-            let ends = [link, (link + 1) % points.len()];
-            segments.push(ends.map(|ix| contacts.points()[points[ix] as usize]));
-        }
-    }
+    let segments: Vec<[[f64; 3]; 2]> = (0..curves.len())
+        .flat_map(|curve| curves.segments(curve))
+        .map(|ends| ends.map(|point| contacts.points()[point as usize]))
+        .collect();
     Surface::of_segments(&segments, diagonal / 1000.0, CURVE)
 }
 

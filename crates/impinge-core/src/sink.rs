@@ -214,12 +214,7 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
     pub fn foresee(&self, n_more: u64) -> Result<(), Error> {
         if n_more > 0 && !self.is_over() {
             let state = &mut *self.state();
-            let n = state.n;
-            let result = state.count(n_more);
-            if state.wanted != Wanted::Any {
-                // They are handed over later.
-                state.n = n;
-            }
+            let result = state.foresee(n_more);
             self.note(result, state);
         }
         self.check()
@@ -232,13 +227,10 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
             return false;
         }
         let state = &mut *self.state();
-        let n = state.n;
-        let mut result = state.count(n_more);
-        if state.wanted == Wanted::Pairs {
-            // They are counted when they are handed over.
-            state.n = n;
-            result = result.and_then(|()| state.has_room(n_more));
-        }
+        let result = match state.wanted {
+            Wanted::Pairs => state.foresee(n_more).and_then(|()| state.has_room(n_more)),
+            Wanted::Count | Wanted::Any => state.count(n_more),
+        };
         self.note(result, state);
         state.wanted == Wanted::Pairs && !self.is_over()
     }
@@ -364,6 +356,16 @@ impl<T: Copy, const LISTS: usize> State<T, LISTS> {
             }
             _ => Ok(()),
         }
+    }
+
+    /// As [`count`](State::count) for pairs that will be counted when they are handed over, unless one is enough.
+    fn foresee(&mut self, n_more: u64) -> Result<(), Error> {
+        let n = self.n;
+        let result = self.count(n_more);
+        if self.wanted != Wanted::Any {
+            self.n = n;
+        }
+        result
     }
 
     fn put(

@@ -61,13 +61,6 @@ impl Default for Camera {
 
 impl Camera {
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let refused = |setting, given, allowed| {
-            Err(Error::Setting {
-                setting,
-                given,
-                allowed,
-            })
-        };
         if !self.azimuth.is_finite() {
             return refused("azimuth", self.azimuth, "any finite angle");
         }
@@ -106,6 +99,14 @@ impl Camera {
     }
 }
 
+fn refused(setting: &'static str, given: f64, allowed: &'static str) -> Result<(), Error> {
+    Err(Error::Setting {
+        setting,
+        given,
+        allowed,
+    })
+}
+
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Axes {
     pub right: [f64; 3],
@@ -116,13 +117,6 @@ pub(crate) struct Axes {
 
 impl Focus {
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let refused = |setting, given, allowed| {
-            Err(Error::Setting {
-                setting,
-                given,
-                allowed,
-            })
-        };
         if let Some(&x) = self.target.iter().find(|x| !x.is_finite()) {
             return refused("target", x, "finite coordinates");
         }

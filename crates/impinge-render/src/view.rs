@@ -81,14 +81,11 @@ impl View {
     }
 
     /// Looks at a point, whatever else the picture contains.
-    fn at(picture: &Picture, frame: &Frame, Focus { target, distance }: Focus) -> View {
+    fn at(picture: &Picture, frame: &Frame, focus: Focus) -> View {
         let camera = picture.camera;
         let axes = camera.axes();
-        let orbit = Orbit {
-            camera,
-            target,
-            distance,
-        };
+        let orbit = Orbit::at(camera, focus);
+        let Focus { target, distance } = focus;
         let aspect = f64::from(picture.size[0]) / f64::from(picture.size[1]);
         let [wide, high] = orbit.visible(aspect).map(|x| x / distance);
         let (target, distance) = (frame.place(target), distance / frame.half);
@@ -111,13 +108,13 @@ impl View {
                 let eye = [middle[0], middle[1], middle[2] + distance];
                 let near = (eye[2] - near - room).max(NEAREST * distance);
                 let far = (eye[2] - far + room).max(2.0 * near);
-                View::perspective(&axes, eye, [wide, high], [near, far])
+                View::new(&axes, eye, [wide, high], [near, far], true)
             }
             Projection::Orthographic => {
                 let eye = [middle[0], middle[1], near + room];
                 let (near, far) = (0.0, near - far + 2.0 * room);
                 let size = [wide * distance, high * distance];
-                View::orthographic(&axes, eye, size, [near, far])
+                View::new(&axes, eye, size, [near, far], false)
             }
         }
     }
@@ -174,43 +171,31 @@ impl View {
                 let distance = half[0].max(half[1]).max(near + 2.0 * room);
                 let eye = [offset[0] * slope[0], offset[1] * slope[1], distance];
                 let (near, far) = (distance - near - room, distance - far + room);
-                View::perspective(&axes, eye, [wide, high], [near, far])
+                View::new(&axes, eye, [wide, high], [near, far], true)
             }
             Projection::Orthographic => {
                 let high = (half[1].max(half[0] / aspect) / FILLED).max(1e-3);
                 let eye = [offset[0], offset[1], near + room];
                 let (near, far) = (0.0, near - far + 2.0 * room);
-                View::orthographic(&axes, eye, [high * aspect, high], [near, far])
+                View::new(&axes, eye, [high * aspect, high], [near, far], false)
             }
         }
     }
 
-    /// Sees so far to each side (half the width, half the height) at the distance 1, and what is between two distances from the eye.
-    fn perspective(
+    /// `eye` is given in the coordinates of `axes`. The view reaches so far to each side (half the width, half the height), in
+    /// perspective at the distance 1, and from one distance from the eye to another.
+    fn new(
         axes: &Axes,
         eye: [f64; 3],
         [wide, high]: [f64; 2],
         [near, far]: [f64; 2],
+        is_perspective: bool,
     ) -> View {
         let range = near - far;
-        let projection = [1.0 / wide, 1.0 / high, far / range, near * far / range];
-        View::new(axes, eye, projection, true)
-    }
-
-    /// Sees so far to each side (half the width, half the height) at every distance, and what is between two distances from the eye.
-    fn orthographic(
-        axes: &Axes,
-        eye: [f64; 3],
-        [wide, high]: [f64; 2],
-        [near, far]: [f64; 2],
-    ) -> View {
-        let range = near - far;
-        let projection = [1.0 / wide, 1.0 / high, 1.0 / range, near / range];
-        View::new(axes, eye, projection, false)
-    }
-
-    /// `eye` is given in the coordinates of `axes`.
-    fn new(axes: &Axes, eye: [f64; 3], projection: [f64; 4], is_perspective: bool) -> View {
+        let depth = match is_perspective {
+            true => [far / range, near * far / range],
+            false => [1.0 / range, near / range],
+        };
         let all = [axes.right, axes.up, axes.back];
         View {
             axes: std::array::from_fn(|k| {
@@ -218,7 +203,7 @@ impl View {
                 [x, y, z, -eye[k]]
             }),
             sky: all.map(|axis| dot(axis, axes.sky)),
-            projection,
+            projection: [1.0 / wide, 1.0 / high, depth[0], depth[1]],
             is_perspective,
         }
     }

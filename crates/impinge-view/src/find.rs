@@ -136,16 +136,10 @@ pub(crate) fn step(question: &Question) -> Step {
 pub(crate) fn curves(scene: &Scene, pairs: &Pairs) -> Result<Vec<[[f64; 3]; 2]>, String> {
     let contacts = Contacts::new(scene, pairs).map_err(|error| error.to_string())?;
     let curves = contacts.curves().map_err(|error| error.to_string())?;
-    let mut segments = Vec::new();
-    for curve in 0..curves.len() {
-        let points = curves.points(curve);
-        let n_links = points.len() - usize::from(!curves.is_closed(curve));
-        for link in 0..n_links {
-            let ends = [link, (link + 1) % points.len()];
-            segments.push(ends.map(|ix| contacts.points()[points[ix] as usize]));
-        }
-    }
-    Ok(segments)
+    let segments = (0..curves.len()).flat_map(|curve| curves.segments(curve));
+    Ok(segments
+        .map(|ends| ends.map(|point| contacts.points()[point as usize]))
+        .collect())
 }
 
 /// The faces of each body that are within a distance of another one's, as primitives of triangle bodies; pairs of faces that

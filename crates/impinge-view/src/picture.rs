@@ -90,12 +90,7 @@ fn draw(
 fn line_radius(stage: &Stage, options: &Options) -> f64 {
     let [width, height] = options.size.map(f64::from);
     if let Some(focus) = options.focus {
-        let orbit = Orbit {
-            camera: options.camera,
-            target: focus.target,
-            distance: focus.distance,
-        };
-        let [_, high] = orbit.visible(width / height);
+        let [_, high] = Orbit::at(options.camera, focus).visible(width / height);
         return 2.0 * high / height;
     }
     let [low, high] = stage.bounds(None).unwrap_or_default();

@@ -3,7 +3,7 @@
 use eframe::egui;
 use egui_wgpu::RenderState;
 use impinge::{Method, Primitive};
-use impinge_render::{Camera, Focus, Look, Orbit};
+use impinge_render::{Focus, Look, Orbit};
 
 use crate::content::Content;
 use crate::drag::Drag;
@@ -116,7 +116,7 @@ impl Session {
         let diagonal = length(bounds);
         let timeline = start_timeline(&stage, question, false, ctx);
         let (orbit, bounds) = match options.focus {
-            Some(focus) => (focused(options.camera, focus), None),
+            Some(focus) => (Orbit::at(options.camera, focus), None),
             None => (Orbit::around(options.camera, bounds, 1.0), Some(bounds)),
         };
         Ok(Session {
@@ -581,15 +581,6 @@ impl Session {
             Ok(saved) => self.saved = Some(saved),
             Err(text) => self.message = Some(text),
         }
-    }
-}
-
-/// The viewpoint of a focus.
-fn focused(camera: Camera, Focus { target, distance }: Focus) -> Orbit {
-    Orbit {
-        camera,
-        target,
-        distance,
     }
 }
 

@@ -115,6 +115,14 @@ impl Curves {
         &self.points[self.starts[curve]..self.starts[curve + 1]]
     }
 
+    /// The two points of each segment of a curve in order, as numbers of [`Contacts::points`]. A closed curve's last segment
+    /// ends at its first point.
+    pub fn segments(&self, curve: usize) -> impl Iterator<Item = [u32; 2]> + '_ {
+        let points = self.points(curve);
+        let n_segments = points.len() - usize::from(!self.is_closed(curve));
+        (0..n_segments).map(|ix| [points[ix], points[(ix + 1) % points.len()]])
+    }
+
     /// The points of all curves, one curve after the other.
     pub fn all_points(&self) -> &[u32] {
         &self.points

@@ -164,13 +164,11 @@ pub(super) fn regions(
         }
     }
     for curve in 0..curves.len() {
-        let points = curves.points(curve);
-        let at = region_of[sets.find(points[0]) as usize] as usize;
+        let at = region_of[sets.find(curves.points(curve)[0]) as usize] as usize;
         let (region, middle) = (&mut regions[at], &mut middles[at]);
         let origin = scaled(add(region.bounds[0], region.bounds[1]), 0.5);
-        let n_links = points.len() - usize::from(!curves.is_closed(curve));
-        for k in 0..n_links {
-            let [p, q] = [k, (k + 1) % points.len()].map(|k| contacts.points()[points[k] as usize]);
+        for ends in curves.segments(curve) {
+            let [p, q] = ends.map(|point| contacts.points()[point as usize]);
             let length = distance(p, q);
             region.length += length;
             middle.curves.take(scaled(add(p, q), 0.5), length);

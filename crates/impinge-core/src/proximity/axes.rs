@@ -9,6 +9,7 @@
 //! Invariant: a distance of such boxes is never larger than that of what they hold by more than rounding
 //! (`docs/exactness.md`, "The smallest distance of two bodies").
 
+use super::features::dot;
 use super::tree::{Box64, Node, Tree};
 use crate::exact::Point;
 use crate::scene::Body;
@@ -54,10 +55,6 @@ impl Axes {
             max: [0, 1, 2].map(|k| center[k] + reach[k]),
         }
     }
-}
-
-fn dot(p: Point, q: Point) -> f64 {
-    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
 fn unit(p: Point) -> Option<Point> {

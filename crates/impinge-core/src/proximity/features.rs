@@ -13,7 +13,7 @@ fn sub(p: Vector, q: Vector) -> Vector {
     [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
 }
 
-fn dot(p: Vector, q: Vector) -> f64 {
+pub(super) fn dot(p: Vector, q: Vector) -> f64 {
     p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 

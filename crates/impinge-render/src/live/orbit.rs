@@ -1,6 +1,6 @@
 //! A viewpoint that turns around a point, as a mouse moves it.
 
-use crate::camera::{Camera, Projection};
+use crate::camera::{Camera, Focus, Projection};
 
 /// Half the height of what an orthographic camera sees, at a distance of 1: about that of the default perspective.
 const ORTHOGRAPHIC: f64 = 0.25;
@@ -18,6 +18,15 @@ pub struct Orbit {
 }
 
 impl Orbit {
+    /// Sees what a picture with this focus sees.
+    pub fn at(camera: Camera, Focus { target, distance }: Focus) -> Self {
+        Orbit {
+            camera,
+            target,
+            distance,
+        }
+    }
+
     /// Sees a box (its lowest and highest coordinates) completely, whatever the direction. `aspect` is width through height.
     pub fn around(camera: Camera, [low, high]: [[f64; 3]; 2], aspect: f64) -> Self {
         // Halve before adding: the sum of two coordinates may overflow.
