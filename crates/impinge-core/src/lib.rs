@@ -38,6 +38,7 @@ mod scene;
 mod settings;
 #[allow(missing_docs)]
 pub mod sink;
+mod sort;
 mod stats;
 mod step;
 mod transform;

@@ -27,6 +27,7 @@ use crate::run::Job;
 use crate::scene::Scene;
 use crate::settings::{Method, Settings};
 use crate::sink::{Limits, Wanted};
+use crate::sort::Sorter;
 use crate::stats::Statistics;
 use crate::step::{CandidateQuery, Start, Step, Toi};
 
@@ -40,6 +41,7 @@ pub(super) struct Steps {
     contacts: ContactAnswer,
     keys: KeyAnswer,
     found: FoundByKind,
+    sorter: Sorter,
 }
 
 impl Steps {
@@ -53,6 +55,7 @@ impl Steps {
             contacts: ContactAnswer::default(),
             keys: KeyAnswer::default(),
             found: FoundByKind::default(),
+            sorter: Sorter::new(settings),
         }
     }
 
@@ -66,10 +69,8 @@ impl Steps {
     }
 }
 
-/// The part of a step in which the earliest contact is sought first: few pairs are close that early.
-const FIRST_UNTIL: f64 = 1.0 / 1024.0;
-/// The factor by which that part grows when it has no contact.
-const FURTHER: f64 = 32.0;
+/// The part of a step in which the earliest contact is sought first: fewer pairs are close that early.
+const FIRST_UNTIL: f64 = 1.0 / 8.0;
 
 impl Detector {
     /// All pairs of elements that touch during a step, each with the first time at which they do.
@@ -178,7 +179,7 @@ impl Detector {
             if bound <= until || until == 1.0 {
                 break;
             }
-            until = bound.min(until * FURTHER).min(1.0);
+            until = bound.min(1.0);
         }
         self.steps.impacts.stats_mut().total_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(first)
@@ -437,6 +438,7 @@ impl Detector {
             candidates,
             clusters,
             keys: answer,
+            sorter,
             ..
         } = &mut self.steps;
         frame.resolve_for(scene, &query.query, Ask::Candidates(query.kinds))?;
@@ -478,9 +480,14 @@ impl Detector {
             clusters.run(job, &self.settings, asked, handed_over, stats)?;
         }
         (*keys, _) = answer.finish()?;
-        keys.iter_mut().for_each(|keys| keys.sort_unstable());
-        let bytes = candidates.bytes();
+        let collect = Instant::now();
+        for keys in keys.iter_mut() {
+            sorter.sort(keys, frame.n_primitives(), self.frames.workers());
+        }
+        let ms = collect.elapsed().as_secs_f64() * 1e3;
+        let bytes = candidates.bytes() + sorter.bytes();
         let (_, stats) = candidates.parts_mut();
+        stats.add_ms("collect", ms);
         stats.bytes_held += bytes;
         stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(&self.steps.candidates)

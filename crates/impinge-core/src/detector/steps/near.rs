@@ -79,6 +79,7 @@ impl Detector {
             near,
             clusters,
             keys: answer,
+            sorter,
             ..
         } = &mut self.steps;
         let workers = self.frames.workers();
@@ -117,7 +118,7 @@ impl Detector {
         let collect = Instant::now();
         let (mut keys, _) = answer.finish()?;
         for (kind, keys) in PairKind::ALL.into_iter().zip(&mut keys) {
-            keys.sort_unstable();
+            sorter.sort(keys, frame.n_primitives(), workers);
             near.extend(kind, keys.iter().copied());
         }
         let ms = collect.elapsed().as_secs_f64() * 1e3;
