@@ -241,7 +241,9 @@ impl Settler {
         }
         let start = Instant::now();
         self.n_candidates += self.candidates.len() as u64;
-        dispatch!(isa, settle, (settler: &mut Settler = self, world: World<'_> = world));
+        dispatch!(isa, reject, (settler: &mut Settler = self, world: World<'_> = world));
+        dispatch!(isa, classify_triangles, (settler: &mut Settler = self, world: World<'_> = world));
+        dispatch!(isa, classify_tetrahedra, (settler: &mut Settler = self, world: World<'_> = world));
         self.candidates.clear();
         self.survivors.clear();
         self.open.clear();
@@ -276,7 +278,10 @@ impl Settler {
     }
 
     #[inline(always)]
-    fn classify<S: Simd>(&mut self, simd: S, world: World<'_>) {
+    fn classify_triangles<S: Simd>(&mut self, simd: S, world: World<'_>) {
+        if self.survivors.is_empty() {
+            return;
+        }
         let mut lookup = Lookup::new(world);
         let mut batch = TrianglePairs8::default();
         let survivors = std::mem::take(&mut self.survivors);
@@ -287,6 +292,14 @@ impl Settler {
             self.take(&mut lookup, chunk, verdict);
         }
         self.survivors = survivors;
+    }
+
+    #[inline(always)]
+    fn classify_tetrahedra<S: Simd>(&mut self, simd: S, world: World<'_>) {
+        if self.open.is_empty() {
+            return;
+        }
+        let mut lookup = Lookup::new(world);
         let mut batch = TetrahedronPairs8::default();
         let open = std::mem::take(&mut self.open);
         for chunk in open.chunks(LANES) {
@@ -347,10 +360,21 @@ fn keep(list: &mut Vec<Candidate>, chunk: &[Candidate], mask: u8) {
     }
 }
 
+// Kernels of their own: without optimisation, one for all of them would need more stack than a thread has.
+
 #[inline(always)]
-fn settle<S: Simd>(simd: S, settler: &mut Settler, world: World<'_>) {
+fn reject<S: Simd>(simd: S, settler: &mut Settler, world: World<'_>) {
     settler.reject(simd, world);
-    settler.classify(simd, world);
+}
+
+#[inline(always)]
+fn classify_triangles<S: Simd>(simd: S, settler: &mut Settler, world: World<'_>) {
+    settler.classify_triangles(simd, world);
+}
+
+#[inline(always)]
+fn classify_tetrahedra<S: Simd>(simd: S, settler: &mut Settler, world: World<'_>) {
+    settler.classify_tetrahedra(simd, world);
 }
 
 /// The two bodies of the current candidate; candidates of the same bodies come in runs.

@@ -113,9 +113,8 @@ impl Settler {
 
     /// Takes the candidates of a work item.
     #[inline(always)]
-    pub fn settle_item<S: Simd>(
+    pub fn settle_item(
         &mut self,
-        simd: S,
         isa: Isa,
         world: World<'_>,
         (item, between): (&WorkItem, Between),
@@ -127,11 +126,7 @@ impl Settler {
             self.search(isa, world);
             self.between = Some(between);
         }
-        let place_of = |met: &Met, ix: usize| {
-            let place = |cluster: u32, lane: u8| cluster * GROUP as u32 + u32::from(lane);
-            let [lane_a, lane_b] = met.lanes(ix);
-            [place(item.cluster_a, lane_a), place(item.cluster_b, lane_b)]
-        };
+        let place_of = |met: &Met, ix: usize| places_of(item, met, ix);
         let [group_a, group_b] = groups;
         match (world.asked.sought, between.kind) {
             (Sought::Boxes(distance), _) => {
@@ -150,41 +145,14 @@ impl Settler {
                 }
                 self.hand_over_keys(world, between.kind);
             }
-            (sought, kind) if is_near(sought) || world.frame.distance() > 0.0 => {
-                let near = Near::new(world, [between.a, between.b]);
-                let pair = match kind {
-                    PairKind::VertexFace => Some(ElementPair::VertexFace),
-                    PairKind::EdgeEdge => Some(ElementPair::EdgeEdge),
-                    _ => None,
-                };
-                let in_tables = groups.iter().all(|group| group.in_tables);
-                let pair = pair.filter(|_| in_tables);
-                let tables = groups.map(|group| &group.points);
-                let until = greater_f32(world.until());
-                for first in (0..met.len()).step_by(BATCH) {
-                    let lanes = met.batch(first);
-                    let n = (met.len() - first).min(BATCH);
-                    let mut open = u16::MAX >> (BATCH - n);
-                    if let Some(pair) = pair {
-                        let reach = near.enclosing;
-                        let verdict =
-                            filter::are_within_in_tables::<S::F32>(pair, tables, lanes, reach);
-                        for lane in Lanes(u64::from(verdict.yes & open)) {
-                            self.put_near(world, between, place_of(met, first + lane));
-                        }
-                        open &= !verdict.yes;
-                        if is_near(sought) {
-                            open &= !verdict.no;
-                        } else if open != 0 {
-                            open &= !filter::stay_beyond_in_tables::<S::F32>(
-                                pair, tables, lanes, until, reach[1],
-                            );
-                        }
-                    }
-                    for lane in Lanes(u64::from(open)) {
-                        self.settle_near(&near, world, between, place_of(met, first + lane));
-                    }
-                }
+            (sought, _) if is_near(sought) || world.frame.distance() > 0.0 => {
+                dispatch!(isa, settle_all_near, (
+                    settler: &mut Settler = self,
+                    world: World<'_> = world,
+                    item: (&WorkItem, Between) = (item, between),
+                    groups: [&Group; 2] = groups,
+                    met: &Met = met,
+                ));
             }
             (_, PairKind::VertexFace | PairKind::EdgeEdge) => {
                 let until = world.until();
@@ -197,10 +165,16 @@ impl Settler {
                     let tables = [&group_a.points, &group_b.points];
                     let until = greater_f32(until);
                     match between.kind {
-                        PairKind::VertexFace => {
-                            drop_apart(simd, ElementPair::VertexFace, tables, until, met);
-                        }
-                        _ => drop_apart(simd, ElementPair::EdgeEdge, tables, until, met),
+                        PairKind::VertexFace => dispatch!(isa, drop_vertices_and_faces, (
+                            tables: [&Moving64; 2] = tables,
+                            until: f32 = until,
+                            met: &mut Met = met,
+                        )),
+                        _ => dispatch!(isa, drop_edges, (
+                            tables: [&Moving64; 2] = tables,
+                            until: f32 = until,
+                            met: &mut Met = met,
+                        )),
                     }
                     for ix in 0..met.len() {
                         self.open.push(new(place_of(met, ix)));
@@ -318,6 +292,71 @@ impl Settler {
             world.answer.take(between.kind, found);
         }
     }
+}
+
+/// The places of a candidate of a work item.
+#[inline(always)]
+fn places_of(item: &WorkItem, met: &Met, ix: usize) -> Places {
+    let place = |cluster: u32, lane: u8| cluster * GROUP as u32 + u32::from(lane);
+    let [lane_a, lane_b] = met.lanes(ix);
+    [place(item.cluster_a, lane_a), place(item.cluster_b, lane_b)]
+}
+
+// Kernels of their own: without optimisation, one for all of them would need more stack than a thread has.
+
+/// Settles the candidates of a work item where a distance is asked for.
+#[inline(always)]
+fn settle_all_near<S: Simd>(
+    _: S,
+    settler: &mut Settler,
+    world: World<'_>,
+    (item, between): (&WorkItem, Between),
+    groups: [&Group; 2],
+    met: &Met,
+) {
+    let sought = world.asked.sought;
+    let near = Near::new(world, [between.a, between.b]);
+    let pair = match between.kind {
+        PairKind::VertexFace => Some(ElementPair::VertexFace),
+        PairKind::EdgeEdge => Some(ElementPair::EdgeEdge),
+        _ => None,
+    };
+    let in_tables = groups.iter().all(|group| group.in_tables);
+    let pair = pair.filter(|_| in_tables);
+    let tables = groups.map(|group| &group.points);
+    let until = greater_f32(world.until());
+    for first in (0..met.len()).step_by(BATCH) {
+        let lanes = met.batch(first);
+        let n = (met.len() - first).min(BATCH);
+        let mut open = u16::MAX >> (BATCH - n);
+        if let Some(pair) = pair {
+            let reach = near.enclosing;
+            let verdict = filter::are_within_in_tables::<S::F32>(pair, tables, lanes, reach);
+            for lane in Lanes(u64::from(verdict.yes & open)) {
+                settler.put_near(world, between, places_of(item, met, first + lane));
+            }
+            open &= !verdict.yes;
+            if is_near(sought) {
+                open &= !verdict.no;
+            } else if open != 0 {
+                open &=
+                    !filter::stay_beyond_in_tables::<S::F32>(pair, tables, lanes, until, reach[1]);
+            }
+        }
+        for lane in Lanes(u64::from(open)) {
+            settler.settle_near(&near, world, between, places_of(item, met, first + lane));
+        }
+    }
+}
+
+#[inline(always)]
+fn drop_vertices_and_faces<S: Simd>(simd: S, tables: [&Moving64; 2], until: f32, met: &mut Met) {
+    drop_apart(simd, ElementPair::VertexFace, tables, until, met);
+}
+
+#[inline(always)]
+fn drop_edges<S: Simd>(simd: S, tables: [&Moving64; 2], until: f32, met: &mut Met) {
+    drop_apart(simd, ElementPair::EdgeEdge, tables, until, met);
 }
 
 /// Whether pairs within a distance at the start are sought, and no times.

@@ -118,7 +118,7 @@ pub(super) fn run<S: Simd>(
             ..
         } = worker;
         let groups = places.map(|place| groups.at(place));
-        settler.settle_item(simd, isa, world, (item, between), groups, met);
+        settler.settle_item(isa, world, (item, between), groups, met);
         if let Some(start) = start {
             worker.busy += start.elapsed() * SAMPLED;
         }
