@@ -134,6 +134,18 @@ impl Body {
         self.checked
     }
 
+    /// Refuses a number of positions other than that of the vertices.
+    fn check_number(&self, body: BodyId, given: usize) -> Result<(), Error> {
+        match self.n_vertices() {
+            expected if expected == given => Ok(()),
+            expected => Err(Error::WrongNumberOfPositions {
+                body,
+                given,
+                expected,
+            }),
+        }
+    }
+
     fn has_moved(&mut self, checked: bool) {
         self.positions_stamp = new_stamp();
         self.step_stamp = self.positions_stamp;
@@ -336,13 +348,7 @@ impl Scene {
         positions: &[[R; 3]],
     ) -> Result<(), Error> {
         let target = self.body_mut(body)?;
-        if positions.len() != target.n_vertices() {
-            return Err(Error::WrongNumberOfPositions {
-                body,
-                given: positions.len(),
-                expected: target.n_vertices(),
-            });
-        }
+        target.check_number(body, positions.len())?;
         check_positions(body, positions)?;
         match R::stored(&mut target.positions) {
             Some(stored) => stored.copy_from_slice(positions),
@@ -367,13 +373,7 @@ impl Scene {
         positions: &[[R; 3]],
     ) -> Result<(), Error> {
         let target = self.body_mut(body)?;
-        if positions.len() != target.n_vertices() {
-            return Err(Error::WrongNumberOfPositions {
-                body,
-                given: positions.len(),
-                expected: target.n_vertices(),
-            });
-        }
+        target.check_number(body, positions.len())?;
         check_positions(body, positions)?;
         match target.end.as_mut().and_then(R::stored) {
             Some(stored) => stored.copy_from_slice(positions),
@@ -408,15 +408,38 @@ impl Scene {
     pub fn positions_mut<R: Real>(&mut self, body: BodyId) -> Result<&mut [[R; 3]], Error> {
         let target = self.body_mut(body)?;
         target.has_moved(false);
-        let stored = target.positions.precision();
-        match R::stored(&mut target.positions) {
-            Some(positions) => Ok(positions),
-            None => Err(Error::WrongPrecision {
-                body,
-                stored,
-                asked: if stored == "f32" { "f64" } else { "f32" },
-            }),
-        }
+        stored(body, &mut target.positions).map(Vec::as_mut_slice)
+    }
+
+    /// Exchanges the positions of a body that stores `R` with an array of the caller's, without a copy: the caller gets the
+    /// body's former positions to write the next ones into. Two arrays in turn serve a whole simulation.
+    /// The next detection checks the new ones, and its error names a bad vertex. End positions are cleared, as by
+    /// [`set_positions`](Scene::set_positions).
+    ///
+    /// ```
+    /// use impinge_core::{Positions, Scene};
+    /// # fn main() -> Result<(), impinge_core::Error> {
+    /// let mut scene = Scene::new();
+    /// let body = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])?;
+    /// let mut next = vec![[0.0f32, 0.0, 0.5], [1.0, 0.0, 0.5], [0.0, 1.0, 0.5]];
+    /// scene.swap_positions(body, &mut next)?;
+    /// assert_eq!(scene.body(body)?.positions().point(1), [1.0, 0.0, 0.5]);
+    /// assert_eq!(next[1], [1.0, 0.0, 0.0]);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// The id names no body, it stores the other precision, or has another number of vertices. Nothing is exchanged then.
+    pub fn swap_positions<R: Real>(
+        &mut self,
+        body: BodyId,
+        positions: &mut Vec<[R; 3]>,
+    ) -> Result<(), Error> {
+        let target = self.body_mut(body)?;
+        target.check_number(body, positions.len())?;
+        std::mem::swap(stored(body, &mut target.positions)?, positions);
+        target.has_moved(false);
+        Ok(())
     }
 
     /// Moves a body by an affine matrix, such as a rigid motion, without passing its vertices again. It moves the rest
@@ -540,6 +563,16 @@ impl Scene {
         let held = self.slots[slot as usize].0.as_ref();
         &held.expect("a participant's slot is in use").1
     }
+}
+
+/// The positions, if they are of this precision.
+fn stored<R: Real>(body: BodyId, positions: &mut Positions) -> Result<&mut Vec<[R; 3]>, Error> {
+    let stored = positions.precision();
+    R::stored(positions).ok_or(Error::WrongPrecision {
+        body,
+        stored,
+        asked: if stored == "f32" { "f64" } else { "f32" },
+    })
 }
 
 /// Refuses offsets that do not partition `n` elements or positions.
