@@ -22,7 +22,7 @@ use crate::exact::Reach;
 use crate::ids::BodyId;
 use crate::pair_kind::{PairKind, PairKinds};
 use crate::positions::{Positions, check_positions};
-use crate::query::{Query, Scope, SharedVertex};
+use crate::query::{Cell, Query, Scope, SharedVertex};
 use crate::scene::{Body, Filter, Scene};
 
 /// One part of one body that takes part in a frame.
@@ -92,6 +92,7 @@ pub struct Frame {
     pub shared_vertex: SharedVertex,
     between: bool,
     ignored: BTreeSet<(BodyId, BodyId)>,
+    cell: Option<Cell>,
     /// The distance within which elements are near, besides what their bodies add.
     distance: f64,
 }
@@ -108,6 +109,8 @@ impl Frame {
         self.distance = 0.0;
         self.ask = ask;
         self.shared_vertex = query.shared_vertex;
+        self.cell = query.cell;
+        self.check_cell()?;
         if self.ignored != query.ignored {
             self.ignored.clone_from(&query.ignored);
         }
@@ -122,6 +125,62 @@ impl Frame {
             self.push_part(scene, query, part)?;
         }
         Ok(())
+    }
+
+    fn check_cell(&self) -> Result<(), Error> {
+        let Some(Cell { low, high }) = self.cell else {
+            return Ok(());
+        };
+        if self.ask != Ask::Intersections {
+            return Err(self.refuse_cell("a question about steps or distances"));
+        }
+        match low.iter().chain(&high).any(|bound| bound.is_nan()) {
+            true => Err(Error::Setting {
+                setting: "owned_by",
+                given: format!("{low:?} to {high:?}"),
+                allowed: "bounds that are numbers or infinite",
+            }),
+            false => Ok(()),
+        }
+    }
+
+    /// The error about a cell in a question that cannot have one.
+    pub(crate) fn refuse_cell(&self, question: &str) -> Error {
+        Error::Setting {
+            setting: "owned_by",
+            given: question.to_owned(),
+            allowed: "pairs that intersect",
+        }
+    }
+
+    /// Whether only the pairs of a cell are wanted.
+    pub fn has_cell(&self) -> bool {
+        self.cell.is_some()
+    }
+
+    /// Whether a pair belongs to the cell, if only its pairs are wanted.
+    pub fn is_owned(&self, scene: &Scene, key: u64) -> bool {
+        let Some(cell) = self.cell else {
+            return true;
+        };
+        let [a, b] =
+            [(key >> 32) as u32, key as u32].map(|number| self.lower_corner(scene, number));
+        cell.holds(std::array::from_fn(|axis| a[axis].max(b[axis])))
+    }
+
+    /// The lower corner of the box of an element that a body was given as.
+    fn lower_corner(&self, scene: &Scene, number: u32) -> [f64; 3] {
+        let layer = self.owner(number);
+        let body = self.body(scene, layer);
+        let corners = body
+            .elements()
+            .corners((number - self.layers[layer].first) as usize);
+        let points = corners
+            .iter()
+            .map(|&corner| body.positions().point(corner as usize));
+        points.fold([f64::INFINITY; 3], |low, point| {
+            std::array::from_fn(|axis| low[axis].min(point[axis]))
+        })
     }
 
     /// Sets within which distance elements are near: the sum of `distance` and the radii of both bodies.

@@ -29,17 +29,31 @@ pub(crate) enum Scope {
     },
 }
 
+/// A half-open box of space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Cell {
+    pub low: [f64; 3],
+    pub high: [f64; 3],
+}
+
+impl Cell {
+    pub fn holds(&self, point: [f64; 3]) -> bool {
+        (0..3).all(|axis| self.low[axis] <= point[axis] && point[axis] < self.high[axis])
+    }
+}
+
 /// The question put to a scene.
 ///
 /// ```
 /// use impinge::{Query, SharedVertex};
 /// let query = Query::everything().shared_vertex(SharedVertex::Resolve);
 /// ```
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Query {
     pub(crate) scope: Scope,
     pub(crate) shared_vertex: SharedVertex,
     pub(crate) ignored: BTreeSet<(BodyId, BodyId)>,
+    pub(crate) cell: Option<Cell>,
 }
 
 impl Query {
@@ -48,6 +62,7 @@ impl Query {
             scope,
             shared_vertex: SharedVertex::default(),
             ignored: BTreeSet::new(),
+            cell: None,
         }
     }
 
@@ -94,6 +109,24 @@ impl Query {
     /// Leaves out the pairs of these two bodies; with `a == b`, the self-collision of `a`.
     pub fn ignore(mut self, a: BodyId, b: BodyId) -> Self {
         self.ignored.insert((a.min(b), a.max(b)));
+        self
+    }
+
+    /// Only the pairs that belong to the half-open box `[low, high)`: for programs that cut space into cells themselves, such
+    /// as MPI codes. A pair belongs to the cell that holds the larger of the lower corners of its two bounding boxes,
+    /// axis by axis. So if each process has all primitives whose boxes touch its cell, and the cells cover space without
+    /// overlap, each pair of the whole is found by exactly one process. Bounds may be infinite.
+    ///
+    /// All pairs of the query are found first: [`Settings::max_pairs`](crate::Settings::max_pairs) and the memory budget
+    /// count them, and [`Detector::any`](crate::Detector::any) does not stop early. For intersections only: steps, distances
+    /// and frames that stay on a device refuse it.
+    ///
+    /// ```
+    /// use impinge::Query;
+    /// let left = Query::everything().owned_by([f64::NEG_INFINITY; 3], [0.0, f64::INFINITY, f64::INFINITY]);
+    /// ```
+    pub fn owned_by(mut self, low: [f64; 3], high: [f64; 3]) -> Self {
+        self.cell = Some(Cell { low, high });
         self
     }
 }

@@ -106,7 +106,13 @@ impl FrameLoop {
             self.frame.check(scene)?;
         }
         let keys = self.pairs.take_keys();
-        self.answer.begin(self.limits, wanted, [keys]);
+        // Which pairs belong to a cell is known only when they are found.
+        let (wanted_first, limits) = match (self.frame.has_cell(), wanted) {
+            (true, Wanted::Any) => (Wanted::Pairs, self.limits.without_max_pairs()),
+            (true, _) => (Wanted::Pairs, self.limits),
+            (false, _) => (wanted, self.limits),
+        };
+        self.answer.begin(limits, wanted_first, [keys]);
         let stats = self.pairs.stats_mut();
         stats.method = finder.method();
         stats.n_threads = self.workers.n();
@@ -125,6 +131,13 @@ impl FrameLoop {
         }
         let ([mut keys], n_pairs) = joined?;
         self.n_pairs = n_pairs;
+        if self.frame.has_cell() {
+            keys.retain(|&key| self.frame.is_owned(scene, key));
+            self.n_pairs = keys.len() as u64;
+            if wanted != Wanted::Pairs {
+                keys.clear();
+            }
+        }
         stats.time("collect", |_| {
             keys.sort_unstable();
             if finder.repeats() {
@@ -160,9 +173,12 @@ impl FrameLoop {
     /// A query resolved and its positions checked, and the threads: for frames whose answer stays elsewhere.
     ///
     /// # Errors
-    /// A stale id, refused positions.
+    /// A stale id, refused positions, a query for the pairs of a cell.
     pub fn resolve(&mut self, scene: &Scene, query: &Query) -> Result<(&Frame, &Workers), Error> {
         self.frame.resolve(scene, query)?;
+        if self.frame.has_cell() {
+            return Err(self.frame.refuse_cell("a frame that stays on a device"));
+        }
         self.frame.check(scene)?;
         Ok((&self.frame, &self.workers))
     }

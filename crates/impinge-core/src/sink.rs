@@ -45,6 +45,16 @@ pub struct Limits {
     pub besides: u64,
 }
 
+impl Limits {
+    /// The same for an answer of any number of pairs.
+    pub fn without_max_pairs(self) -> Limits {
+        Limits {
+            max_pairs: None,
+            ..self
+        }
+    }
+}
+
 /// Makes room for so many more, where as many are there already as the list has.
 ///
 /// # Errors
