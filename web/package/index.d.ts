@@ -10,8 +10,8 @@ export type Positions = Float32Array | Float64Array;
 export type Body = number;
 
 export interface Options {
-  /** How candidates are found. All methods give the same pairs. `"clusters"` by default. */
-  method?: "clusters" | "cells" | "naive";
+  /** How candidates are found. All methods give the same pairs. `"auto"` by default: `"cells"` for large bodies that are new, else `"clusters"`. */
+  method?: "auto" | "clusters" | "cells" | "naive";
   /**
    * Self-collision of pairs that share a vertex: not reported (`"skip"`, the default), or reported if they meet in more
    * than the parts that they share (`"resolve"`).

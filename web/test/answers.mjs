@@ -9,7 +9,7 @@ export async function cpu(module, scenes) {
   await init();
   const answers = [];
   for (const { name, sharedVertex, bodies } of scenes) {
-    for (const method of ["clusters", "cells"]) {
+    for (const method of ["auto", "clusters", "cells"]) {
       const detector = new Detector({ sharedVertex, method });
       for (const [ix, body] of bodies.entries()) {
         if (body.corners === 4) detector.addTetrahedra(...arrays(body));
@@ -99,7 +99,7 @@ export const REFUSALS = {
   unknown: "Error: there is no body 4: 1 have been added, and 0 of them removed",
   wrong: "RangeError: body: b given, a number that add() returned is needed",
   self: "Error: a query between body 0 and itself: ask for collisions within it instead",
-  method: 'Error: method: "octree" given, "clusters", "cells" or "naive" allowed',
+  method: 'Error: method: "octree" given, "auto", "clusters", "cells" or "naive" allowed',
   separation: "Error: separation: NaN given, a finite number that is not below 0 allowed",
   pairs: [0, 0],
   apart: [],

@@ -87,11 +87,11 @@ try {
   await rm(folder, { recursive: true });
 }
 
-// Both methods answer each scene.
+// Three methods answer each scene.
 function withImpacts(scenes) {
   return scenes.flatMap(({ name, pairs, hash, impacts, impactsHash, first }) => {
     const answer = { name, pairs, hash, impacts, impactsHash, first };
-    return [answer, answer];
+    return [answer, answer, answer];
   });
 }
 

@@ -196,7 +196,7 @@ If the mesh of a scene is absent, a generated ball stands in, and the first line
 #[command(next_help_heading = "Detection")]
 pub struct DetectorArgs {
     /// The method that finds candidates; all methods give the same pairs
-    #[arg(long, value_enum, default_value_t = MethodArg::Clusters)]
+    #[arg(long, value_enum, default_value_t = MethodArg::Auto)]
     pub method: MethodArg,
     /// Where detection runs
     #[arg(long, value_enum, default_value_t = BackendArg::Auto)]

@@ -6,8 +6,13 @@ use crate::sink::Limits;
 /// How candidates are found. All methods give the same pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Method {
-    /// Groups are fixed by topology; in each frame only their boxes move. The fast method.
+    /// `Cells` for a frame whose bodies are mostly new to the detector, if that is cheaper, and `Clusters` as soon as
+    /// they come back. [`Statistics::method`](crate::Statistics::method) says which one answered. On a GPU, with a memory
+    /// budget, and for steps and distances always `Clusters`.
     #[default]
+    Auto,
+    /// Groups are fixed by topology; in each frame only their boxes move. The fastest method for bodies that are asked
+    /// about more than once: the first frame pays for the groups.
     Clusters,
     /// The two-level grid of the paper: the primitives of a cell form groups, made anew each frame.
     Cells,
@@ -16,12 +21,24 @@ pub enum Method {
 }
 
 impl Method {
-    /// `"clusters"`, `"cells"` or `"naive"`.
+    /// Every method, the default first.
+    pub const ALL: [Method; 4] = [Method::Auto, Method::Clusters, Method::Cells, Method::Naive];
+
+    /// `"auto"`, `"clusters"`, `"cells"` or `"naive"`.
     pub fn name(self) -> &'static str {
         match self {
+            Method::Auto => "auto",
             Method::Clusters => "clusters",
             Method::Cells => "cells",
             Method::Naive => "naive",
+        }
+    }
+
+    /// What `Auto` comes to for bodies that are asked about again and again; the other methods are themselves.
+    pub fn in_the_long_run(self) -> Method {
+        match self {
+            Method::Auto => Method::Clusters,
+            other => other,
         }
     }
 }
@@ -142,7 +159,7 @@ impl Settings {
             }
             if self.method == Method::Naive {
                 let given = self.method.name().to_owned();
-                return refuse("method on a GPU", given, "clusters or cells");
+                return refuse("method on a GPU", given, "auto, clusters or cells");
             }
         }
         if self.threads > 1024 {

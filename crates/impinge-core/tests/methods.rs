@@ -5,7 +5,7 @@ mod common;
 use common::{agree, cases, check, naive, rows};
 use impinge_core::{
     Backend, Detector, InstructionSet, Method, Positions, Query, Recluster, Scene, Settings,
-    hash_rows,
+    SharedVertex, hash_rows,
 };
 use impinge_scenes::deform::{self, Deform};
 use impinge_scenes::{soup, surfaces};
@@ -23,6 +23,7 @@ fn cpu(method: Method, threads: usize) -> Settings {
 fn methods_agree_with_the_oracle() {
     for case in cases() {
         let expected = naive(&case);
+        check(&case, &expected, cpu(Method::Auto, 1));
         check(&case, &expected, cpu(Method::Clusters, 1));
         check(&case, &expected, cpu(Method::Clusters, 2));
         for instruction_set in [InstructionSet::Portable, InstructionSet::Avx2] {
@@ -289,4 +290,184 @@ fn a_frame_that_failed_leaves_nothing_behind() {
             scene = saved.clone();
         }
     }
+}
+
+/// Two balls of many triangles, and where the second one is at rest.
+fn large_balls(scene: &mut Scene) -> [impinge_core::BodyId; 2] {
+    let ball = surfaces::ball(12_000);
+    let b = ball.translated([0.5, 0.1, 0.0]);
+    [ball, b].map(|model| model.add_to(scene).unwrap())
+}
+
+#[test]
+fn auto_asks_the_grid_once_and_clusters_from_then_on() {
+    let mut scene = Scene::new();
+    let [a, b] = large_balls(&mut scene);
+    let query = Query::between(a, b);
+    let mut auto = Detector::with_settings(cpu(Method::Auto, 2)).unwrap();
+    let mut clusters = Detector::with_settings(cpu(Method::Clusters, 2)).unwrap();
+    let mut ask = |scene: &Scene, query: &Query| {
+        let pairs = auto.detect(scene, query).unwrap();
+        let expected = clusters.detect(scene, query).unwrap();
+        assert!(pairs.same_as(expected));
+        pairs.stats().method
+    };
+    assert_eq!(ask(&scene, &query), "cells");
+    assert_eq!(ask(&scene, &query), "clusters");
+    // Bodies that are known stay known, whichever question they were in.
+    assert_eq!(
+        ask(
+            &scene,
+            &Query::within(a).shared_vertex(SharedVertex::Resolve)
+        ),
+        "clusters"
+    );
+    let [c, d] = large_balls(&mut scene);
+    assert_eq!(
+        ask(&scene, &Query::between(b, c)),
+        "clusters",
+        "half of it is known"
+    );
+    assert_eq!(
+        ask(&scene, &Query::between(a, d)),
+        "clusters",
+        "half of it is known"
+    );
+    let [e, f] = large_balls(&mut scene);
+    assert_eq!(ask(&scene, &Query::between(e, f)), "cells");
+    // A new topology is a new body.
+    for body in [e, f] {
+        let (elements, positions) = {
+            let held = scene.body(body).unwrap();
+            (held.elements().clone(), held.positions().clone())
+        };
+        scene.remesh(body, elements, positions).unwrap();
+    }
+    assert_eq!(ask(&scene, &Query::between(e, f)), "cells");
+    assert_eq!(ask(&scene, &Query::between(e, f)), "clusters");
+    // Small bodies, and neighbours to be resolved.
+    let mut small = Scene::new();
+    surfaces::ball(400).add_to(&mut small).unwrap();
+    surfaces::ball(400)
+        .translated([0.5, 0.1, 0.0])
+        .add_to(&mut small)
+        .unwrap();
+    assert_eq!(ask(&small, &Query::all()), "clusters");
+}
+
+#[test]
+fn auto_leaves_crowded_cells_resolved_neighbours_and_budgets_to_clusters() {
+    let ask = |model: &impinge_scenes::Model, rule, memory_budget| {
+        let mut scene = Scene::new();
+        model.add_to(&mut scene).unwrap();
+        let query = Query::everything().shared_vertex(rule);
+        let mut auto = Detector::with_settings(Settings {
+            memory_budget,
+            ..cpu(Method::Auto, 2)
+        })
+        .unwrap();
+        let pairs = auto.detect(&scene, &query).unwrap();
+        let mut cells = Detector::with_settings(cpu(Method::Cells, 2)).unwrap();
+        assert!(pairs.same_as(cells.detect(&scene, &query).unwrap()));
+        assert_eq!(
+            pairs.stats().grid.is_some(),
+            pairs.stats().method == "cells"
+        );
+        pairs.stats().method
+    };
+    let knot = surfaces::torus_knot(20_000, Default::default());
+    assert_eq!(ask(&knot, SharedVertex::Skip, None), "cells");
+    assert_eq!(ask(&knot, SharedVertex::Resolve, None), "clusters");
+    assert_eq!(ask(&knot, SharedVertex::Skip, Some(1 << 28)), "clusters");
+    // Almost all triangles in a small part of the whole.
+    let mut crowded = surfaces::torus_knot(20_000, Default::default()).scaled(1.0 / 1024.0);
+    crowded.positions[0] = [1.0, 1.0, 1.0];
+    crowded.positions[1] = [-1.0, -1.0, -1.0];
+    assert_eq!(ask(&crowded, SharedVertex::Skip, None), "clusters");
+}
+
+#[test]
+fn auto_refuses_what_the_grid_does_not_look_at() {
+    let mut scene = Scene::new();
+    let [a, b] = large_balls(&mut scene);
+    scene.positions_mut::<f32>(a).unwrap()[7] = [f32::NAN; 3];
+    let mut auto = Detector::with_settings(cpu(Method::Auto, 2)).unwrap();
+    let error = auto.detect(&scene, &Query::between(a, b)).unwrap_err();
+    assert!(error.to_string().contains("vertex 7"), "{error}");
+}
+
+#[test]
+fn pairs_of_all_cells_are_the_pairs_of_the_whole() {
+    const INFINITY: f64 = f64::INFINITY;
+    for case in cases() {
+        let expected = naive(&case);
+        let mut detector = Detector::with_settings(cpu(Method::Clusters, 1)).unwrap();
+        let mut found = Vec::new();
+        for octant in 0..8 {
+            // Cut at lattice points, where boxes end.
+            let is_high = [0, 1, 2].map(|axis| octant >> axis & 1 == 1);
+            let low = is_high.map(|is_high| if is_high { 1.0 } else { -INFINITY });
+            let high = is_high.map(|is_high| if is_high { INFINITY } else { 1.0 });
+            let query = case.query.clone().owned_by(low, high);
+            let n = detector.count(&case.scene, &query).unwrap();
+            assert_eq!(detector.any(&case.scene, &query).unwrap(), n > 0);
+            let pairs = detector.detect(&case.scene, &query).unwrap();
+            assert_eq!(pairs.len() as u64, n);
+            found.extend(pairs.rows());
+        }
+        found.sort_unstable();
+        assert_eq!(found, expected, "{}", case.name);
+    }
+}
+
+#[test]
+fn cells_are_refused_where_they_mean_nothing() {
+    let mut scene = Scene::new();
+    let [a, b] = large_balls(&mut scene);
+    let mut detector = Detector::with_settings(cpu(Method::Auto, 1)).unwrap();
+    let query = Query::between(a, b).owned_by([0.0; 3], [f64::NAN; 3]);
+    let error = detector.detect(&scene, &query).unwrap_err().to_string();
+    assert!(error.starts_with("owned_by: "), "{error}");
+    let query = Query::between(a, b).owned_by([0.0; 3], [1.0; 3]);
+    let step = impinge_core::Step::new(query.clone());
+    let error = detector.impacts(&scene, &step).unwrap_err().to_string();
+    assert!(error.starts_with("owned_by: "), "{error}");
+    let near = impinge_core::NearQuery::new(query);
+    let error = detector
+        .within_distance(&scene, &near)
+        .unwrap_err()
+        .to_string();
+    assert!(error.starts_with("owned_by: "), "{error}");
+}
+
+#[test]
+fn swapped_positions_are_those_of_the_body() {
+    let mut scene = Scene::new();
+    let [a, b] = large_balls(&mut scene);
+    let query = Query::between(a, b);
+    let mut detector = Detector::with_settings(cpu(Method::Clusters, 1)).unwrap();
+    detector.detect(&scene, &query).unwrap();
+    let ball = surfaces::ball(12_000);
+    let mut copied = scene.clone();
+    let mut other = ball.positions.clone();
+    for frame in 1..4 {
+        let next = ball.translated([0.1 * frame as f32, 0.0, 0.2]).positions;
+        copied.set_positions(b, &next).unwrap();
+        other.clone_from(&next);
+        let before = scene.body(b).unwrap().positions().clone();
+        scene.swap_positions(b, &mut other).unwrap();
+        assert_eq!(Positions::from(other.clone()), before);
+        let n = detector.detect(&scene, &query).unwrap().len();
+        assert_eq!(n, detector.detect(&copied, &query).unwrap().len());
+    }
+    let before = scene.body(b).unwrap().positions().clone();
+    let mut short = vec![[0.0f32; 3]; 2];
+    assert!(scene.swap_positions(b, &mut short).is_err());
+    let mut wide = vec![[0.0f64; 3]; before.len()];
+    assert!(scene.swap_positions(b, &mut wide).is_err());
+    assert_eq!((short.len(), wide.len()), (2, before.len()));
+    assert_eq!(*scene.body(b).unwrap().positions(), before);
+    let mut bad = vec![[f32::NAN; 3]; before.len()];
+    scene.swap_positions(b, &mut bad).unwrap();
+    assert!(detector.detect(&scene, &query).is_err());
 }

@@ -143,14 +143,17 @@ fn are_tetrahedra(rows: &[[u32; 4]]) -> bool {
         })
 }
 
-/// A row of numbers, `(4, 4)`, as they are in double precision.
-pub fn matrix(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<[[f64; 4]; 4]> {
+/// Rows of numbers, `(ROWS, COLUMNS)`, as they are in double precision.
+pub fn matrix<const ROWS: usize, const COLUMNS: usize>(
+    argument: &Bound<'_, PyAny>,
+    name: &str,
+) -> PyResult<[[f64; COLUMNS]; ROWS]> {
     let array = as_array(argument, name)?;
     let kind = NumberKind::of(&array, name)?;
-    if array.shape() != [4, 4] {
+    if array.shape() != [ROWS, COLUMNS] {
         let given = array.getattr("shape")?.str()?;
         return Err(PyValueError::new_err(format!(
-            "{name}: shape (4, 4) expected, {given} given"
+            "{name}: shape ({ROWS}, {COLUMNS}) expected, {given} given"
         )));
     }
     let doubles = match kind {

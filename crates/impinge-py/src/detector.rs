@@ -23,10 +23,10 @@ use crate::watch::{CancelToken, Watch};
 ///
 /// Parameters
 /// ----------
-/// method : {"clusters", "cells", "naive"}
-///     How candidates are found. ``"clusters"``: groups fixed by topology, the fast one.
-///     ``"cells"``: the two-level grid of the paper. ``"naive"``: every box against every box,
-///     the oracle.
+/// method : {"auto", "clusters", "cells", "naive"}
+///     How candidates are found. ``"clusters"``: groups fixed by topology, the fast one for bodies that
+///     come back. ``"cells"``: the two-level grid of the paper. ``"auto"``: cells for large bodies that are new,
+///     clusters as soon as they come back. ``"naive"``: every box against every box, the oracle.
 /// backend : {"auto", "cpu", "gpu"}
 ///     Where. ``"auto"`` takes a GPU where there is one.
 /// device : str, optional
@@ -74,7 +74,7 @@ impl Detector {
             method=None, backend=None, device=None, threads=None, memory_budget=None, *,
             max_pairs=None, lambda_=None, group_size=None, recluster=None, instruction_set=None,
         ),
-        text_signature = "(method=\"clusters\", backend=\"auto\", device=None, threads=None, \
+        text_signature = "(method=\"auto\", backend=\"auto\", device=None, threads=None, \
                           memory_budget=None, *, max_pairs=None, lambda_=1.0, group_size=64, \
                           recluster=\"auto\", instruction_set=\"avx512\")"
     )]
@@ -130,6 +130,10 @@ impl Detector {
     /// shared_vertex : {"skip", "resolve"}
     ///     Primitives of one body that share a vertex are not reported, or reported when they
     ///     meet in more than what they share.
+    /// owned_by : (low, high), optional
+    ///     Only the pairs that belong to the half-open box between these two corners, three numbers each: a pair belongs
+    ///     to the cell that holds the larger of the lower corners of its two bounding boxes, axis by axis. For programs
+    ///     that cut space into cells themselves; corners may be infinite.
     /// progress : callable, optional
     ///     Called as ``progress(done, total)`` from this thread, about every 50 ms and at the end
     ///     of each stage. Units differ by stage. An exception stops the run and is raised.
@@ -159,11 +163,11 @@ impl Detector {
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     #[pyo3(
         signature = (
-            scene, *, between=None, within=None, ignore=None, shared_vertex=None, progress=None,
-            cancel=None, filter=None,
+            scene, *, between=None, within=None, ignore=None, shared_vertex=None, owned_by=None,
+            progress=None, cancel=None, filter=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          shared_vertex=\"skip\", progress=None, cancel=None, filter=None)"
+                          shared_vertex=\"skip\", owned_by=None, progress=None, cancel=None, filter=None)"
     )]
     fn detect(
         slf: &Bound<'_, Self>,
@@ -172,6 +176,7 @@ impl Detector {
         within: Argument<'_, '_>,
         ignore: Argument<'_, '_>,
         shared_vertex: Argument<'_, '_>,
+        owned_by: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
         filter: Argument<'_, '_>,
@@ -182,7 +187,7 @@ impl Detector {
             return Err(unexpected(filter, "filter", "a callable"));
         }
         let watched = (scene, progress, cancel);
-        let ask = |scene: &Scene| question(scene, between, within, ignore, shared_vertex);
+        let ask = |scene: &Scene| question(scene, between, within, ignore, shared_vertex, owned_by);
         let answer = |detector: &mut impinge::Detector,
                       scene: &impinge::Scene,
                       (query, _): &(Query, _),
@@ -204,7 +209,7 @@ impl Detector {
     ///
     /// Parameters
     /// ----------
-    /// scene, between, within, ignore, shared_vertex, progress, cancel
+    /// scene, between, within, ignore, shared_vertex, owned_by, progress, cancel
     ///     As for `detect`.
     ///
     /// Returns
@@ -218,11 +223,11 @@ impl Detector {
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     #[pyo3(
         signature = (
-            scene, *, between=None, within=None, ignore=None, shared_vertex=None, progress=None,
-            cancel=None,
+            scene, *, between=None, within=None, ignore=None, shared_vertex=None, owned_by=None,
+            progress=None, cancel=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          shared_vertex=\"skip\", progress=None, cancel=None)"
+                          shared_vertex=\"skip\", owned_by=None, progress=None, cancel=None)"
     )]
     fn count(
         slf: &Bound<'_, Self>,
@@ -231,11 +236,14 @@ impl Detector {
         within: Argument<'_, '_>,
         ignore: Argument<'_, '_>,
         shared_vertex: Argument<'_, '_>,
+        owned_by: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<u64> {
         let watched = (scene, progress, cancel);
-        let ask = |scene: &Scene| Ok(question(scene, between, within, ignore, shared_vertex)?.0);
+        let ask = |scene: &Scene| {
+            Ok(question(scene, between, within, ignore, shared_vertex, owned_by)?.0)
+        };
         let answer = impinge::Detector::count_with;
         Ok(Detector::watched(slf, watched, ask, answer)?.0)
     }
@@ -244,7 +252,7 @@ impl Detector {
     ///
     /// Parameters
     /// ----------
-    /// scene, between, within, ignore, shared_vertex, progress, cancel
+    /// scene, between, within, ignore, shared_vertex, owned_by, progress, cancel
     ///     As for `detect`.
     ///
     /// Returns
@@ -258,11 +266,11 @@ impl Detector {
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     #[pyo3(
         signature = (
-            scene, *, between=None, within=None, ignore=None, shared_vertex=None, progress=None,
-            cancel=None,
+            scene, *, between=None, within=None, ignore=None, shared_vertex=None, owned_by=None,
+            progress=None, cancel=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          shared_vertex=\"skip\", progress=None, cancel=None)"
+                          shared_vertex=\"skip\", owned_by=None, progress=None, cancel=None)"
     )]
     fn any(
         slf: &Bound<'_, Self>,
@@ -271,11 +279,14 @@ impl Detector {
         within: Argument<'_, '_>,
         ignore: Argument<'_, '_>,
         shared_vertex: Argument<'_, '_>,
+        owned_by: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<bool> {
         let watched = (scene, progress, cancel);
-        let ask = |scene: &Scene| Ok(question(scene, between, within, ignore, shared_vertex)?.0);
+        let ask = |scene: &Scene| {
+            Ok(question(scene, between, within, ignore, shared_vertex, owned_by)?.0)
+        };
         let answer = impinge::Detector::any_with;
         Ok(Detector::watched(slf, watched, ask, answer)?.0)
     }

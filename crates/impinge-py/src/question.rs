@@ -5,6 +5,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
 
+use crate::arrays;
 use crate::result::Asked;
 use crate::scene::Scene;
 use crate::settings::{Argument, shared_vertex, unexpected};
@@ -16,10 +17,16 @@ pub fn question(
     within: Argument<'_, '_>,
     ignore: Argument<'_, '_>,
     rule: Argument<'_, '_>,
+    owned_by: Argument<'_, '_>,
 ) -> PyResult<(Query, Asked)> {
     let rule = shared_vertex(rule)?;
     let (query, asked) = scope(scene, between, within, ignore, &Query::all())?;
-    Ok((query.shared_vertex(rule), asked))
+    let query = query.shared_vertex(rule);
+    let Some(cell) = owned_by else {
+        return Ok((query, asked));
+    };
+    let [low, high] = arrays::matrix(cell, "owned_by")?;
+    Ok((query.owned_by(low, high), asked))
 }
 
 /// What the keywords ask of a step. Without `between` and `within`, all pairs of all bodies.

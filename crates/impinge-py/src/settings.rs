@@ -182,8 +182,7 @@ impl Told<'_, '_> {
             method: choose(
                 self.method,
                 "method",
-                &[Method::Clusters, Method::Cells, Method::Naive]
-                    .map(|method| (method.name(), method)),
+                &Method::ALL.map(|method| (method.name(), method)),
             )?,
             backend: choose(self.backend, "backend", &BACKENDS)?,
             recluster: choose(self.recluster, "recluster", &RECLUSTER)?,

@@ -154,7 +154,7 @@ def test_questions_refused(scene, question, error, message):
 @pytest.mark.parametrize(
     "settings, error, message",
     [
-        ({"method": "magic"}, ValueError, '^method: "magic" given, "clusters", "cells", "naive"'),
+        ({"method": "magic"}, ValueError, '^method: "magic" given, "auto", "clusters", "cells", "naive"'),
         ({"backend": "tpu"}, ValueError, '^backend: "tpu" given, "auto", "cpu", "gpu" allowed'),
         ({"recluster": "yes"}, ValueError, "^recluster: "),
         ({"instruction_set": "mmx"}, ValueError, "^instruction_set: "),
@@ -186,6 +186,28 @@ def test_not_a_scene(bad):
         impinge.Detector().detect(bad)
 
 
+def test_cells_share_the_pairs(scene):
+    question = {"between": True, "within": True}
+    detector = impinge.Detector()
+    whole = detector.detect(scene, **question)
+    inf = np.inf
+    cuts = [-inf, 0.5, 1.0, inf]
+    parts = []
+    for low, high in zip(cuts, cuts[1:]):
+        cell = [[low, -inf, -inf], [high, inf, inf]]
+        part = detector.detect(scene, owned_by=cell, **question)
+        assert detector.count(scene, owned_by=np.array(cell), **question) == len(part) > 0
+        assert detector.any(scene, owned_by=tuple(cell), **question)
+        parts.append(part.rows)
+    together = np.concatenate(parts)
+    assert len(together) == len(whole)
+    assert np.array_equal(np.unique(together, axis=0), whole.rows)
+    with pytest.raises(ValueError, match=r"^owned_by: shape \(2, 3\) expected, \(3,\) given"):
+        detector.detect(scene, owned_by=[0, 0, 0])
+    with pytest.raises(ValueError, match="^owned_by: "):
+        detector.detect(scene, owned_by=[[0, 0, 0], [1, 1, np.nan]])
+
+
 def test_numpy_scalars_are_numbers():
     detector = impinge.Detector(
         threads=np.int64(2),
@@ -194,7 +216,7 @@ def test_numpy_scalars_are_numbers():
         group_size=np.uint8(9),
     )
     assert repr(detector) == (
-        'Detector(method="clusters", backend="auto", threads=2, memory_budget=1073741824)'
+        'Detector(method="auto", backend="auto", threads=2, memory_budget=1073741824)'
     )
 
 

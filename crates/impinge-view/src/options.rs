@@ -82,7 +82,7 @@ impl Default for Options {
         Options {
             within: None,
             shared_vertex: SharedVertex::Resolve,
-            method: Method::default(),
+            method: Method::Clusters,
             backend: Backend::default(),
             frame: 0,
             plays: true,

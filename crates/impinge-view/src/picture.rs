@@ -188,7 +188,7 @@ pub fn draw_png(
     let question = Question {
         within: options.within.unwrap_or(stage.content.bodies.len() == 1),
         shared_vertex: options.shared_vertex,
-        method: Method::default(),
+        method: Method::Clusters,
         backend: Backend::Cpu,
     };
     let answer = Finder::default().find_on_cpu(&stage, &question)?;

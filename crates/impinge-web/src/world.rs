@@ -69,13 +69,12 @@ impl World {
         })
     }
 
-    /// Settings with this method: `"clusters"`, `"cells"` or `"naive"`.
+    /// Settings with this method: `"auto"`, `"clusters"`, `"cells"` or `"naive"`.
     ///
     /// # Errors
     /// Another word.
     pub fn settings(method: &str) -> Result<Settings, Error> {
-        let methods = [Method::Clusters, Method::Cells, Method::Naive];
-        match methods.into_iter().find(|known| known.name() == method) {
+        match Method::ALL.into_iter().find(|known| known.name() == method) {
             Some(method) => Ok(Settings {
                 method,
                 ..Settings::default()
@@ -83,7 +82,7 @@ impl World {
             None => Err(Error::Word {
                 what: "method",
                 given: method.to_owned(),
-                allowed: "\"clusters\", \"cells\" or \"naive\"",
+                allowed: "\"auto\", \"clusters\", \"cells\" or \"naive\"",
             }),
         }
     }

@@ -5,7 +5,9 @@ use clap::ValueEnum;
 /// [`impinge::Method`] as an option.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MethodArg {
-    /// Groups fixed by topology; the fastest method
+    /// The grid for large meshes that are asked about for the first time, clusters as soon as they come back
+    Auto,
+    /// Groups fixed by topology; the fastest method for meshes that move
     Clusters,
     /// The two-level grid
     Cells,
@@ -16,6 +18,7 @@ pub enum MethodArg {
 impl From<MethodArg> for impinge::Method {
     fn from(method: MethodArg) -> Self {
         match method {
+            MethodArg::Auto => impinge::Method::Auto,
             MethodArg::Clusters => impinge::Method::Clusters,
             MethodArg::Cells => impinge::Method::Cells,
             MethodArg::Naive => impinge::Method::Naive,

@@ -81,7 +81,7 @@ fn check(
 ) -> Result<(), Error> {
     let told = settings(&args.detector);
     let reference = match told.method {
-        Method::Clusters | Method::Cells => Method::Naive,
+        Method::Auto | Method::Clusters | Method::Cells => Method::Naive,
         Method::Naive => Method::Clusters,
     };
     let sample = Sample::new(demo, pairs)?;
@@ -116,7 +116,7 @@ fn check(
         expected.stats().total_ms,
         match reference {
             Method::Naive => ", every box against every box",
-            Method::Clusters | Method::Cells => "",
+            Method::Auto | Method::Clusters | Method::Cells => "",
         }
     )?;
     Ok(())

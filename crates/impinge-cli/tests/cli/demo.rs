@@ -41,6 +41,7 @@ fn a_small_demo_finds_checks_and_writes() {
 fn every_method_is_checked_by_another_one() {
     let folder = Folder::new();
     for (method, by) in [
+        ("auto", "naive"),
         ("clusters", "naive"),
         ("cells", "naive"),
         ("naive", "clusters"),

@@ -121,6 +121,20 @@ impl Cells {
         rule: &R,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
+        match self.divide(job, answer, settings, stats)? {
+            Some(grid) => self.settle(job, answer, settings, rule, grid, stats),
+            None => Ok(()),
+        }
+    }
+
+    /// Sorts the primitives into the cells of a grid; `None` if no body reaches another, and the answer is complete.
+    pub(super) fn divide(
+        &mut self,
+        job: Job<'_>,
+        answer: &Arc<Answer>,
+        settings: &Settings,
+        stats: &mut Statistics,
+    ) -> Result<Option<Grid>, Error> {
         let Job {
             scene,
             frame,
@@ -143,19 +157,39 @@ impl Cells {
         });
         let Some(region) = self.reaching.region() else {
             stats.n_slabs = 1;
-            return Ok(());
+            return Ok(None);
         };
         let grid = stats.time("grid", |stats| {
             self.scatter(&region, n_near as u64, settings, control, stats)
         })?;
         stats.grid = Some(grid.resolution);
+        Ok(Some(grid))
+    }
+
+    /// How many primitives are in a cell, on average over the entries of the lists: each is paired with so many.
+    pub(super) fn crowding(&self) -> u64 {
+        let pairs = |ends: &[u32]| u64::from(ends[1] - ends[0]).pow(2);
+        let n_pairs: u64 = self.starts.windows(2).map(pairs).sum();
+        n_pairs / self.entries.len().max(1) as u64
+    }
+
+    /// Pairs the primitives of each cell, and hands over the keys.
+    pub(super) fn settle<R: Rule>(
+        &mut self,
+        job: Job<'_>,
+        answer: &Arc<Answer>,
+        settings: &Settings,
+        rule: &R,
+        grid: Grid,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
         let items = size_of::<CellItem>() * self.items.capacity();
         answer.share(self.bytes() - items as u64 + slab_bytes(settings));
         answer.check()?;
         let task = Task {
             job,
             answer,
-            world,
+            world: World::new(job.scene, job.frame),
             rule,
         };
         self.dispatch_items(task, grid, settings, stats)?;
@@ -170,7 +204,7 @@ impl Cells {
         Ok(())
     }
 
-    fn bytes(&self) -> u64 {
+    pub(super) fn bytes(&self) -> u64 {
         let bytes = self.reaching.bytes()
             + size_of::<u32>() * (self.starts.capacity() + self.entries.capacity())
             + size_of::<CellItem>() * self.items.capacity()

@@ -105,8 +105,13 @@ impl Clusters {
             held,
         };
         room.run(task, stats)?;
-        stats.bytes_held = (self.bytes_besides_room() + self.room.bytes()) as u64;
+        stats.bytes_held = self.bytes();
         Ok(())
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> u64 {
+        (self.bytes_besides_room() + self.room.bytes()) as u64
     }
 
     fn bytes_besides_room(&self) -> usize {

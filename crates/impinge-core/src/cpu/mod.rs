@@ -1,5 +1,6 @@
 //! The CPU backend. Most stages have a file of their name; SIMD is chosen at run time.
 
+mod auto;
 pub(crate) mod bounds;
 pub mod cells;
 pub(crate) mod clusters;
@@ -34,6 +35,7 @@ use crate::settings::{Method, Settings};
 use crate::sink::{Answer, BLOCK};
 use crate::stats::Statistics;
 
+use auto::{Acquaintances, MOST_CROWDED};
 use cells::Cells;
 use clusters::Clusters;
 
@@ -42,6 +44,7 @@ pub(crate) struct Cpu {
     settings: Settings,
     clusters: Clusters,
     cells: Cells,
+    acquaintances: Acquaintances,
 }
 
 impl Cpu {
@@ -49,8 +52,40 @@ impl Cpu {
         Cpu {
             clusters: Clusters::new(settings.instruction_set),
             cells: Cells::new(settings.instruction_set),
+            acquaintances: Acquaintances::default(),
             settings: settings.clone(),
         }
+    }
+
+    /// `Auto`: the grid if most bodies are new and it is not crowded, else clusters.
+    fn find_either_way(
+        &mut self,
+        job: Job<'_>,
+        answer: &Arc<Answer>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        let settings = &self.settings;
+        let prefers_grid = self.acquaintances.prefer_grid(job.scene, job.frame);
+        if prefers_grid && settings.memory_budget.is_none() {
+            stats.method = Method::Cells.name();
+            job.frame.check(job.scene)?;
+            let Some(grid) = self.cells.divide(job, answer, settings, stats)? else {
+                return Ok(());
+            };
+            if self.cells.crowding() <= MOST_CROWDED {
+                let rule = &cells::Owner;
+                let found = self.cells.settle(job, answer, settings, rule, grid, stats);
+                stats.bytes_held += self.clusters.bytes();
+                return found;
+            }
+            stats.grid = None;
+        }
+        // The grid is seldom needed twice.
+        if self.cells.bytes() > 0 {
+            self.cells = Cells::new(settings.instruction_set);
+        }
+        stats.method = Method::Clusters.name();
+        self.clusters.run(job, answer, settings, stats)
     }
 }
 
@@ -65,7 +100,7 @@ impl Finder for Cpu {
 
     /// `Clusters` checks positions while it reads them.
     fn checks_positions(&self) -> bool {
-        self.settings.method == Method::Clusters
+        matches!(self.settings.method, Method::Auto | Method::Clusters)
     }
 
     async fn find(
@@ -76,6 +111,7 @@ impl Finder for Cpu {
     ) -> Result<(), Error> {
         let settings = &self.settings;
         match settings.method {
+            Method::Auto => self.find_either_way(job, answer, stats),
             Method::Naive => stats.time("naive", |stats| run_naive(job, answer, stats)),
             Method::Cells => self.cells.run(job, answer, settings, &cells::Owner, stats),
             Method::Clusters => self.clusters.run(job, answer, settings, stats),

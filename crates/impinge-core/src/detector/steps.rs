@@ -519,7 +519,7 @@ fn begin(stats: &mut Statistics, settings: &Settings, n_threads: usize) {
     stats.method = match settings.method {
         Method::Naive => Method::Naive,
         // The grid is for intersections.
-        Method::Clusters | Method::Cells => Method::Clusters,
+        Method::Auto | Method::Clusters | Method::Cells => Method::Clusters,
     }
     .name();
     stats.n_threads = n_threads;

@@ -81,9 +81,14 @@ impl Plan {
 }
 
 impl Engine {
+    /// Creates an engine. A device answers `Auto` as `Clusters`.
     pub fn new(gpu: Arc<Gpu>, settings: &Settings, first: Capacities) -> Self {
+        let settings = Settings {
+            method: settings.method.in_the_long_run(),
+            ..settings.clone()
+        };
         let plan = Plan::of(settings.method);
-        Engine::with_plan(gpu, settings.clone(), first, plan)
+        Engine::with_plan(gpu, settings, first, plan)
     }
 
     /// Creates an engine with a plan of another crate.

@@ -51,7 +51,7 @@ __version__: str
 _Array: TypeAlias = Any  # An array-like, or anything that speaks DLPack or the buffer protocol.
 _Body: TypeAlias = Body | SupportsIndex
 _Pair: TypeAlias = tuple[_Body, _Body]
-_Method: TypeAlias = Literal["clusters", "cells", "naive"]
+_Method: TypeAlias = Literal["auto", "clusters", "cells", "naive"]
 _Backend: TypeAlias = Literal["auto", "cpu", "gpu"]
 _Recluster: TypeAlias = Literal["auto", "never"]
 _InstructionSet: TypeAlias = Literal["portable", "avx2", "avx512"]
@@ -169,7 +169,7 @@ class Scene:
 class Detector:
     def __new__(
         cls,
-        method: _Method = "clusters",
+        method: _Method = "auto",
         backend: _Backend = "auto",
         device: str | None = None,
         threads: SupportsIndex | None = None,
@@ -190,6 +190,7 @@ class Detector:
         within: _Body | None = None,
         ignore: Iterable[_Pair] | None = None,
         shared_vertex: _SharedVertex = "skip",
+        owned_by: _Array | None = None,
         progress: Callable[[int, int], object] | None = None,
         cancel: CancelToken | None = None,
         filter: Callable[[npt.NDArray[np.uint32]], _Array] | None = None,
@@ -202,6 +203,7 @@ class Detector:
         within: _Body | None = None,
         ignore: Iterable[_Pair] | None = None,
         shared_vertex: _SharedVertex = "skip",
+        owned_by: _Array | None = None,
         progress: _Progress | None = None,
         cancel: CancelToken | None = None,
     ) -> int: ...
@@ -213,6 +215,7 @@ class Detector:
         within: _Body | None = None,
         ignore: Iterable[_Pair] | None = None,
         shared_vertex: _SharedVertex = "skip",
+        owned_by: _Array | None = None,
         progress: _Progress | None = None,
         cancel: CancelToken | None = None,
     ) -> bool: ...

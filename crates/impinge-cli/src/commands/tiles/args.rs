@@ -119,7 +119,7 @@ pub struct RunArgs {
     #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Skip)]
     pub shared_vertex: SharedVertexArg,
     /// The method that finds candidates; all methods give the same pairs
-    #[arg(long, value_enum, default_value_t = MethodArg::Clusters)]
+    #[arg(long, value_enum, default_value_t = MethodArg::Auto)]
     pub method: MethodArg,
     /// CPU threads [default: one per core]
     #[arg(long, value_name = "N")]

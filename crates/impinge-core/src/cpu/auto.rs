@@ -1,0 +1,47 @@
+//! The method `Auto`: which of the others answers a frame.
+//!
+//! Clusters are made once for each body, and that costs several times as much as the frame itself does in the grid of
+//! `Cells`. It pays as soon as the body comes back. So a frame whose primitives are mostly of new bodies goes through
+//! the grid, with four exceptions: so few primitives that neither takes long; small bodies, which are few clusters each;
+//! cells that turn out crowded (the grid is uniform, so small details in a large scene can all be in one cell);
+//! and neighbours that must be resolved, which `Clusters` settles per vertex.
+
+use crate::frame::Frame;
+use crate::query::SharedVertex;
+use crate::scene::Scene;
+
+/// From this many primitives of new bodies on, the grid is worth a try. With fewer, clusters are made in about a millisecond.
+const FROM: u64 = 10_000;
+/// Bodies with fewer primitives than this do not count as new.
+const LARGE: u32 = 1_000;
+/// From this many primitives a cell on ([`Cells::crowding`](super::cells::Cells)), making clusters costs less than
+/// pairing all of a cell.
+pub(super) const MOST_CROWDED: u64 = 64;
+
+/// The bodies that were in a frame before.
+#[derive(Debug, Default)]
+pub(super) struct Acquaintances {
+    /// By slot, the stamp of the topology that was last there; 0 for none.
+    stamps: Vec<u64>,
+}
+
+impl Acquaintances {
+    /// Whether the grid may be the faster way to answer this frame. Its bodies are known from now on.
+    pub fn prefer_grid(&mut self, scene: &Scene, frame: &Frame) -> bool {
+        let mut n_new = 0;
+        for (ix, layer) in frame.layers.iter().enumerate() {
+            let slot = layer.id.index();
+            if self.stamps.len() <= slot {
+                self.stamps.resize(slot + 1, 0);
+            }
+            let stamp = frame.body(scene, ix).topology_stamp();
+            let is_new = std::mem::replace(&mut self.stamps[slot], stamp) != stamp;
+            if is_new && layer.n_primitives >= LARGE {
+                n_new += u64::from(layer.n_primitives);
+            }
+        }
+        let resolves = frame.shared_vertex == SharedVertex::Resolve
+            && frame.layers.iter().any(|layer| layer.within);
+        n_new >= FROM && n_new > frame.n_primitives() / 2 && !resolves
+    }
+}
