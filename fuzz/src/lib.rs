@@ -1,6 +1,8 @@
 //! The assertions of all fuzz targets of file formats. libFuzzer checks for panics, endless loops and memory; the
 //! functions here check that returned meshes and errors are valid.
 
+pub mod scene;
+
 use impinge_io::{
     Error, Format, Mesh, Positions, Prefer, ReadOptions, Sequence, SequenceFormat, read_bytes,
     read_tetgen_bytes,
@@ -12,6 +14,7 @@ fn options(prefer: Prefer) -> ReadOptions {
         weld: true,
         prefer,
         max_expanded_bytes: 1 << 24,
+        ..ReadOptions::default()
     }
 }
 
