@@ -36,26 +36,11 @@ try:
 except ModuleNotFoundError as missing:
     sys.exit(f"{missing}: pip install . (in the root of the checkout) installs impinge and NumPy")
 
+from meshes import read_ply
+
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 #: The twist of the last frame, in radians per unit length.
 TWIST = 1.5
-
-
-def read_ply(path):
-    """Vertices (v, 3) float32 and faces (n, 3) of a binary PLY that holds nothing else."""
-    data = path.read_bytes()
-    header, _, body = data.partition(b"end_header\n")
-    counts = {name: int(n) for name, n in re.findall(r"element (\w+) (\d+)", header.decode())}
-    lines = [line for line in header.decode().splitlines() if line.startswith(("prop", "form"))]
-    expected = ["format binary_little_endian 1.0", *(f"property float {axis}" for axis in "xyz")]
-    if lines[:4] != expected or not lines[4].startswith("property list uchar int") or lines[5:]:
-        raise ValueError(f"{path}: not a binary PLY of float vertices and int triangles alone")
-    n_vertices, n_faces = counts["vertex"], counts["face"]
-    vertices = np.frombuffer(body, "<f4", 3 * n_vertices).reshape(-1, 3)
-    rows = np.frombuffer(body, [("n", "u1"), ("face", "<i4", 3)], n_faces, 12 * n_vertices)
-    if (rows["n"] != 3).any():
-        raise ValueError(f"{path}: a face that is not a triangle")
-    return vertices.copy(), rows["face"].astype(np.int64)
 
 
 def ball(n_rings=124, n_segments=124):

@@ -1,4 +1,4 @@
-"""Steps of moving cloth: impinge beside ipc-toolkit, in one run, with the answers checked.
+"""Steps of moving surfaces: impinge beside ipc-toolkit, in one run, with the answers checked.
 
     python bench/compare_steps.py                    # every step whose data exists
     python bench/compare_steps.py cloth-ball --rounds 3 --threads 2
@@ -26,6 +26,7 @@ import time
 
 import numpy as np
 from compare import machine
+from meshes import read_frame, read_ply
 
 try:
     import impinge
@@ -35,24 +36,24 @@ except ModuleNotFoundError as missing:
     sys.exit(f"{missing}: pip install . ipctk")
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-STEPS = {"cloth-ball": ("cloth_ball92", "cloth_ball93"), "cloth-funnel": ("227", "228")}
+CLOTH = {"cloth-ball": ("cloth_ball92", "cloth_ball93"), "cloth-funnel": ("227", "228")}
+#: Two neighbouring frames of a dancer.
+RUMBA = (60, 61)
+STEPS = [*CLOTH, "rumba"]
 #: In the order of their names in ipc-toolkit; some take minutes on the larger step.
 BROAD_PHASES = ["LBVH", "HashGrid", "SpatialHash", "SweepAndPrune"]
 
 
-def read(path):
-    """Vertices (v, 3) and faces (n, 3) of a binary PLY that holds nothing else."""
-    header, _, body = path.read_bytes().partition(b"end_header\n")
-    lines = header.decode().splitlines()
-    counts = {line.split()[1]: int(line.split()[2]) for line in lines if line.startswith("element")}
-    order = {"binary_little_endian": "<", "binary_big_endian": ">"}[lines[1].split()[1]]
-    real = order + {"float": "f4", "double": "f8"}[lines[3].split()[1]]
-    n_vertices, n_faces = counts["vertex"], counts["face"]
-    vertices = np.frombuffer(body, real, 3 * n_vertices).reshape(-1, 3)
-    rows = np.frombuffer(body, [("n", "u1"), ("face", order + "i4", 3)], n_faces, vertices.nbytes)
-    if (rows["n"] != 3).any():
-        raise ValueError(f"{path}: not a binary PLY of triangles")
-    return vertices.astype(real[1:]), rows["face"].astype(np.int32)
+def read(name, data):
+    """Start and end of a step, (v, 3), and the faces."""
+    if name == "rumba":
+        _, faces = read_ply(data / "sequences" / "rumba.ply")
+        frames = (read_frame(data / "sequences" / "rumba.pc2", frame) for frame in RUMBA)
+        return *frames, faces
+    (start, faces), (end, _) = [
+        read_ply(data / "ccd" / name / "frames" / f"{frame}.ply") for frame in CLOTH[name]
+    ]
+    return start, end, faces
 
 
 def fastest(n_rounds, questions):
@@ -88,8 +89,8 @@ def overlapping(rows, sides, ends):
 
 def run(name, data, n_rounds, n_threads, broad_phases):
     """One step: prints its table, returns its figures."""
-    folder = data / "ccd" / name / "frames"
-    (start, faces), (end, _) = [read(folder / f"{frame}.ply") for frame in STEPS[name]]
+    start, end, faces = read(name, data)
+    faces = faces.astype(np.int32)
     doubles = [np.asfortranarray(end, np.float64) for end in (start, end)]
     edges = ipc.edges(faces)
     mesh = ipctk.CollisionMesh(doubles[0], edges, faces)
@@ -167,7 +168,7 @@ def run(name, data, n_rounds, n_threads, broad_phases):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("steps", nargs="*", help="cloth-ball, cloth-funnel; all by default")
+    parser.add_argument("steps", nargs="*", help=f"{', '.join(STEPS)}; all by default")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--threads", type=int, default=0, help="of both; 0: one per core")
     parser.add_argument("--broad-phases", nargs="+", choices=BROAD_PHASES, default=["LBVH"])

@@ -29,26 +29,7 @@ import numpy as np
 
 import impinge
 from compare import ROOT, machine, milliseconds
-
-
-def read_ply(path):
-    """Vertices (v, 3) float32 and faces (n, 3) of a binary PLY of triangles."""
-    data = path.read_bytes()
-    header, _, body = data.partition(b"end_header\n")
-    words = [line.split() for line in header.decode().splitlines()]
-    counts = {line[1]: int(line[2]) for line in words if line[0] == "element"}
-    order = {"binary_little_endian": "<", "binary_big_endian": ">"}[words[1][1]]
-    kinds = {"float": "f4", "float32": "f4", "double": "f8", "float64": "f8"}
-    axes = [order + kinds[line[1]] for line in words if line[0] == "property" and line[-1] in "xyz"]
-    if len(axes) != 3 or len([line for line in words if line[0] == "property"]) != 4:
-        raise ValueError(f"{path}: positions and triangles alone are read")
-    n_vertices, n_faces = counts["vertex"], counts["face"]
-    vertices = np.frombuffer(body, axes[0], 3 * n_vertices).reshape(-1, 3)
-    start = vertices.nbytes
-    rows = np.frombuffer(body, [("n", "u1"), ("face", order + "i4", 3)], n_faces, start)
-    if (rows["n"] != 3).any():
-        raise ValueError(f"{path}: a face that is not a triangle")
-    return vertices.astype(np.float32), rows["face"].astype(np.int64)
+from meshes import read_frame, read_ply
 
 
 def clock(work):
@@ -323,13 +304,6 @@ def medians(times):
     return {key: statistics.median(t[ix] for t in times) for ix, key in enumerate(["wall", "cpu"])}
 
 
-def read_rumba(data, frame):
-    """The positions of one frame of a recorded sequence."""
-    raw = (data / "sequences" / "rumba.pc2").read_bytes()
-    n = int(np.frombuffer(raw, "<i4", 1, 16)[0])
-    return np.frombuffer(raw, "<f4", 3 * n, 32 + 12 * n * frame).reshape(-1, 3)
-
-
 def tables(record):
     """The record as Markdown."""
     lines = ["### Smallest distance of two bodies, milliseconds", ""]
@@ -371,14 +345,15 @@ def main():
     cloth = sorted((data / "ccd" / "cloth-ball" / "frames").glob("*.ply"))
     cloth_vertices, cloth_faces = read_ply(cloth[0])
     _, rumba_faces = read_ply(data / "sequences" / "rumba.ply")
+    rumba = read_frame(data / "sequences" / "rumba.pc2", 60)
     rounds = arguments.rounds
     record = {
         "machine": machine(),
         "near": [
-            near("cloth-ball", cloth_vertices, cloth_faces, 1e-3, rounds, missing),
-            near("cloth-ball", cloth_vertices, cloth_faces, 2e-3, rounds, missing),
-            near("rumba", read_rumba(data, 60), rumba_faces, 1e-3, rounds, missing),
-            near("rumba", read_rumba(data, 60), rumba_faces, 2e-3, rounds, missing),
+            near("cloth-ball", cloth_vertices.astype(np.float32), cloth_faces, 1e-3, rounds, missing),
+            near("cloth-ball", cloth_vertices.astype(np.float32), cloth_faces, 2e-3, rounds, missing),
+            near("rumba", rumba, rumba_faces, 1e-3, rounds, missing),
+            near("rumba", rumba, rumba_faces, 2e-3, rounds, missing),
         ],
         "distances": distances(data, rounds, missing),
     }

@@ -9,13 +9,13 @@ use crate::ours::{Feed, Ours};
 use crate::problem::{Ask, Problem};
 use crate::report::{Report, figures, grouped};
 use crate::runner::Runner;
-use crate::{Failure, Options, files, gpu, steps};
+use crate::{Failure, Options, files, gpu, once, steps};
 
 /// Runs a command by its name.
 pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
     let mut report = match command {
         "two-body" | "motion" | "self" | "tets" | "bodies" | "sizes" | "adversarial" | "gpu"
-        | "regular" | "steps" => Report::new(command),
+        | "regular" | "steps" | "once" => Report::new(command),
         "device" => {
             println!("{}", gpu::slug(&gpu::device(options)?));
             return Ok(());
@@ -32,6 +32,7 @@ pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
         "gpu" => gpu::scenes(options, &mut report)?,
         "regular" => regular_surfaces(options, &mut report)?,
         "steps" => steps::run(options, &mut report)?,
+        "once" => once::run(options, &mut report)?,
         _ => adversarial_scenes(options, &mut report)?,
     }
     report.write(options.json.as_deref(), options.record.as_deref())
@@ -383,7 +384,8 @@ fn regular_surfaces(options: &Options, report: &mut Report) -> Result<(), Failur
 }
 
 /// A built scene as a problem: pairs between the bodies for two bodies, all pairs for more.
-fn posed(built: BuiltScene, about: &str) -> Result<Problem, Failure> {
+/// The problem of a built scene.
+pub fn posed(built: BuiltScene, about: &str) -> Result<Problem, Failure> {
     let name = built.name.clone();
     let models = models(built)?;
     let ask = if models.len() == 2 {

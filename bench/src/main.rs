@@ -16,6 +16,7 @@ mod embree;
 mod files;
 mod gpu;
 mod measure;
+mod once;
 mod ours;
 #[cfg(feature = "parry")]
 mod parry;
@@ -53,6 +54,7 @@ commands:
   regular       self-collision of flat and regular surfaces, as ratios to a rough one
   steps         contacts of moving cloth: all, the earliest, any, how far a step can be taken, pairs of boxes;
                 --scene cloth-ball|cloth-funnel
+  once          the first frame of a new detector, by each method: --scene ball|bunny|buddha|dragon
   gpu           the scenes of two-body and self on a GPU: stages on the device beside a lower bound
   device        prints the name of the GPU in a form for --record
 

@@ -1,0 +1,113 @@
+//! One question, once: how long the first frame of a new detector takes, by each method. Detectors are made off the
+//! clock; a GPU is not asked.
+
+use std::time::Instant;
+
+use impinge::{Backend, Detector, Method, Settings};
+use impinge_scenes::adversarial;
+use serde_json::json;
+
+use crate::commands::{models, posed};
+use crate::problem::{Ask, Problem};
+use crate::report::{Report, figures, grouped};
+use crate::{Failure, Options, files};
+
+/// In the order of the table.
+const METHODS: [Method; 3] = [Method::Auto, Method::Clusters, Method::Cells];
+
+/// The scenes of `two-body` and `self`, many bodies, and scenes that crowd the cells of a grid.
+pub fn run(options: &Options, report: &mut Report) -> Result<(), Failure> {
+    let meshes = ["ball", "bunny", "buddha", "dragon"];
+    let meshes: Vec<&str> = match &options.scene {
+        Some(scene) => vec![scene],
+        None => meshes.to_vec(),
+    };
+    report.say(
+        "Medians of first frames: each is of a new detector.\n\n\
+         | scene | primitives | pairs | auto ms | answered by | clusters ms | cells ms | clusters / auto |\n\
+         |---|---:|---:|---:|---|---:|---:|---:|",
+    );
+    for scene in &meshes {
+        measure(&files::two_body(scene)?, options, report)?;
+    }
+    for scene in &meshes {
+        let mut problem = files::within(scene)?;
+        problem.name += ", self";
+        measure(&problem, options, report)?;
+    }
+    if options.scene.is_some() {
+        return Ok(());
+    }
+    for n_bodies in [1_000, 100_000] {
+        let name = format!("{} bodies", grouped(n_bodies as u64));
+        let cubes = models(adversarial::boxes(n_bodies, 1)?)?;
+        measure(&Problem::mirrored(&name, cubes, Ask::All), options, report)?;
+    }
+    let size = options.size.unwrap_or(200_000);
+    for entry in adversarial::SCENES {
+        let built = (entry.build)(size.min(entry.max_n))?;
+        measure(&posed(built, entry.probes)?, options, report)?;
+    }
+    Ok(())
+}
+
+fn measure(problem: &Problem, options: &Options, report: &mut Report) -> Result<(), Failure> {
+    let (scene, _, query) = problem.scene()?;
+    let n_frames = options.frames.unwrap_or(7).max(1);
+    let mut ms = METHODS.map(|_| Vec::new());
+    let mut answers = Vec::new();
+    let mut answered_by = "";
+    for _ in 0..n_frames {
+        for (method, ms) in METHODS.into_iter().zip(&mut ms) {
+            let mut detector = Detector::with_settings(Settings {
+                method,
+                backend: Backend::Cpu,
+                threads: options.threads,
+                ..Settings::default()
+            })?;
+            let start = Instant::now();
+            let pairs = detector.detect(&scene, &query)?;
+            ms.push(start.elapsed().as_secs_f64() * 1e3);
+            answers.push((pairs.len() as u64, pairs.hash()));
+            if method == Method::Auto {
+                answered_by = pairs.stats().method;
+            }
+        }
+    }
+    let (n_pairs, _) = answers[0];
+    if answers.iter().any(|answer| *answer != answers[0]) {
+        return Err(format!("{}: the methods disagree: {answers:?}", problem.name).into());
+    }
+    if problem.expected.is_some_and(|expected| expected != n_pairs) {
+        return Err(format!(
+            "{}: {n_pairs} pairs, {:?} expected",
+            problem.name, problem.expected
+        )
+        .into());
+    }
+    let [auto, clusters, cells] = ms.map(|mut ms| {
+        ms.sort_by(f64::total_cmp);
+        ms[ms.len() / 2]
+    });
+    report.say(&format!(
+        "| {} | {} | {} | {} | {answered_by} | {} | {} | {:.1} |",
+        problem.name,
+        grouped(problem.n_primitives() as u64),
+        grouped(n_pairs),
+        figures(auto),
+        figures(clusters),
+        figures(cells),
+        clusters / auto,
+    ));
+    report.keep_json(json!({
+        "scene": problem.name,
+        "primitives": problem.n_primitives(),
+        "pairs": n_pairs,
+        "frames": n_frames,
+        "answered_by": answered_by,
+        "auto_ms": auto,
+        "clusters_ms": clusters,
+        "cells_ms": cells,
+    }));
+    Ok(())
+}
