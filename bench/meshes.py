@@ -10,13 +10,15 @@ REALS = {"float": "f4", "float32": "f4", "double": "f8", "float64": "f8"}
 def read_ply(path):
     """Vertices (v, 3), in the precision of the file, and faces (n, 3) int64 of a binary PLY that holds nothing else."""
     header, _, body = path.read_bytes().partition(b"end_header\n")
-    words = [line.split() for line in header.decode().splitlines()]
+    words = [line.split() for line in header.decode().splitlines() if line.strip()]
     [order] = [ORDERS[line[1]] for line in words if line[0] == "format"]
     counts = {line[1]: int(line[2]) for line in words if line[0] == "element"}
     properties = [line for line in words if line[0] == "property"]
-    if [line[-1] for line in properties[:3]] != ["x", "y", "z"] or len(properties) != 4:
+    *axes, corners = [line[1:] for line in properties]
+    is_plain = [axis[-1] for axis in axes] == ["x", "y", "z"] and len({axis[0] for axis in axes}) == 1
+    if not is_plain or corners[:3] not in [["list", "uchar", "int"], ["list", "uint8", "int32"]]:
         raise ValueError(f"{path}: positions and triangles alone are read")
-    real = np.dtype(order + REALS[properties[0][1]])
+    real = np.dtype(order + REALS[axes[0][0]])
     vertices = np.frombuffer(body, real, 3 * counts["vertex"]).reshape(-1, 3)
     face = [("n", "u1"), ("face", order + "i4", 3)]
     rows = np.frombuffer(body, face, counts["face"], vertices.nbytes)

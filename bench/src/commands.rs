@@ -384,7 +384,6 @@ fn regular_surfaces(options: &Options, report: &mut Report) -> Result<(), Failur
 }
 
 /// A built scene as a problem: pairs between the bodies for two bodies, all pairs for more.
-/// The problem of a built scene.
 pub fn posed(built: BuiltScene, about: &str) -> Result<Problem, Failure> {
     let name = built.name.clone();
     let models = models(built)?;

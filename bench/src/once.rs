@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use impinge::{Backend, Detector, Method, Settings};
-use impinge_scenes::adversarial;
+use impinge_scenes::{adversarial, surfaces};
 use serde_json::json;
 
 use crate::commands::{models, posed};
@@ -43,6 +43,12 @@ pub fn run(options: &Options, report: &mut Report) -> Result<(), Failure> {
         let cubes = models(adversarial::boxes(n_bodies, 1)?)?;
         measure(&Problem::mirrored(&name, cubes, Ask::All), options, report)?;
     }
+    let balls = (0..100).map(|ix| {
+        let [x, y] = [ix % 10, ix / 10].map(|at| 0.85 * at as f32);
+        surfaces::ball(10_000).translated([x, y, 0.0])
+    });
+    let balls = Problem::mirrored("100 balls", balls.collect(), Ask::All);
+    measure(&balls, options, report)?;
     let size = options.size.unwrap_or(200_000);
     for entry in adversarial::SCENES {
         let built = (entry.build)(size.min(entry.max_n))?;

@@ -1,5 +1,5 @@
-//! The assertions of all fuzz targets of file formats. libFuzzer checks for panics, endless loops and memory; the
-//! functions here check that returned meshes and errors are valid.
+//! The assertions of the fuzz targets: here those of file formats, in [`scene`] those of the detector. libFuzzer checks for
+//! panics, endless loops and memory; the functions here check that returned meshes and errors are valid.
 
 pub mod scene;
 

@@ -80,7 +80,7 @@ fn add_body(scene: &mut Scene, bytes: &mut Bytes<'_>, mode: u8, moves: bool) -> 
     let n_vertices = 3 + what as usize % 16;
     let n_elements = 1 + bytes.byte()? as usize % 80;
     let positions = bytes.positions(n_vertices, mode)?;
-    // Edges and points are bodies of a step only, so that pairs keep their meaning.
+    // Only steps get bodies of edges and points.
     let elements: Elements = match (what >> 6, moves) {
         (0, true) => bytes.elements::<1>(n_elements, n_vertices)?.into(),
         (1, true) => bytes.elements::<2>(n_elements, n_vertices)?.into(),
@@ -188,7 +188,7 @@ pub fn steps(data: &[u8]) {
 mod tests {
     use super::*;
 
-    /// Random bytes are what a fuzzer begins with. So many scenes must be more than nothing.
+    /// Random bytes are what a fuzzer begins with. Together the scenes must have pairs and impacts, or the test checks nothing.
     #[test]
     fn noise() {
         let mut state = 1u64;

@@ -262,7 +262,7 @@ pub struct AnswerArgs {
     /// Only say whether there is any pair, and stop at the first one
     #[arg(long)]
     pub any: bool,
-    /// Run N frames, rewriting positions before each, and show median times
+    /// Run N frames, rewriting positions before each, and show median times; with N above 1, the method auto is clusters
     #[arg(long, value_name = "N", default_value = "1", value_parser = at_least_one)]
     pub repeat: NonZeroUsize,
     /// Write the pairs (.csv, .jsonl or .npy; "-" is standard output, as CSV unless --pairs-format says otherwise)

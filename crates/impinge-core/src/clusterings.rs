@@ -12,7 +12,7 @@ use crate::grouping::bounds::Bounds;
 #[cfg(feature = "gpu")]
 use crate::ids::BodyId;
 use crate::run::Job;
-use crate::scene::Body;
+use crate::scene::{Body, Scene};
 use crate::stats::Statistics;
 use crate::workers::Workers;
 
@@ -93,6 +93,19 @@ impl<T, const PARTS: usize> Store<T, PARTS> {
 }
 
 impl<T: Kept, const PARTS: usize> Store<T, PARTS> {
+    /// Drops what belongs to bodies that are gone or were re-meshed.
+    pub fn forget_outdated(&mut self, scene: &Scene) {
+        for (slot, parts) in self.slots.iter_mut().enumerate() {
+            let body = scene.holds(slot).then(|| scene.body_in(slot as u32));
+            let stamp = body.map(Body::topology_stamp);
+            for kept in parts {
+                if kept.as_ref().map(|kept| kept.topology_stamp()) != stamp {
+                    *kept = None;
+                }
+            }
+        }
+    }
+
     /// Brings the store up to a frame: drops what belongs to bodies that are gone, and makes what is missing, of
     /// another topology, or stale.
     ///

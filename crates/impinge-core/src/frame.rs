@@ -132,24 +132,20 @@ impl Frame {
             return Ok(());
         };
         if self.ask != Ask::Intersections {
-            return Err(self.refuse_cell("a question about steps or distances"));
+            return Err(Error::Setting {
+                setting: "owned_by",
+                given: "a cell in a question about steps or distances".to_owned(),
+                allowed: "only questions about pairs that intersect",
+            });
         }
-        match low.iter().chain(&high).any(|bound| bound.is_nan()) {
-            true => Err(Error::Setting {
+        // NaN is not at most anything.
+        match (0..3).all(|axis| low[axis] <= high[axis]) {
+            true => Ok(()),
+            false => Err(Error::Setting {
                 setting: "owned_by",
                 given: format!("{low:?} to {high:?}"),
-                allowed: "bounds that are numbers or infinite",
+                allowed: "a lower corner that is nowhere above the upper one",
             }),
-            false => Ok(()),
-        }
-    }
-
-    /// The error about a cell in a question that cannot have one.
-    pub(crate) fn refuse_cell(&self, question: &str) -> Error {
-        Error::Setting {
-            setting: "owned_by",
-            given: question.to_owned(),
-            allowed: "pairs that intersect",
         }
     }
 

@@ -261,7 +261,8 @@ impl Pairs {
     }
 }
 
-/// [`Pairs::hash`] of rows `[body_a, primitive_a, body_b, primitive_b]` that come from elsewhere.
+/// [`Pairs::hash`] of rows `[body_a, primitive_a, body_b, primitive_b]` that come from elsewhere. The order of rows
+/// does not matter. In each row the lower `(body, primitive)` comes first: the other way round gives another hash.
 pub fn hash_rows(rows: impl IntoIterator<Item = [u32; 4]>) -> u64 {
     rows.into_iter().fold(0u64, |sum, [body_a, a, body_b, b]| {
         let low = mix(u64::from(body_a) << 32 | u64::from(a));

@@ -117,9 +117,10 @@ impl Query {
     /// axis by axis. So if each process has all primitives whose boxes touch its cell, and the cells cover space without
     /// overlap, each pair of the whole is found by exactly one process. Bounds may be infinite.
     ///
-    /// All pairs of the query are found first: [`Settings::max_pairs`](crate::Settings::max_pairs) and the memory budget
-    /// count them, and [`Detector::any`](crate::Detector::any) does not stop early. For intersections only: steps, distances
-    /// and frames that stay on a device refuse it.
+    /// All pairs of the query are found and held first: [`Settings::max_pairs`](crate::Settings::max_pairs) and the memory budget
+    /// count them, also those of [`Detector::count`](crate::Detector::count); [`Detector::any`](crate::Detector::any) does not stop
+    /// early, and has no limit of pairs. For intersections only: steps, distances and frames that stay on a device refuse a cell,
+    /// and so does every question if a lower bound is above the upper one.
     ///
     /// ```
     /// use impinge::Query;

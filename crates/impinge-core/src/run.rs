@@ -131,14 +131,14 @@ impl FrameLoop {
         }
         let ([mut keys], n_pairs) = joined?;
         self.n_pairs = n_pairs;
-        if self.frame.has_cell() {
-            keys.retain(|&key| self.frame.is_owned(scene, key));
-            self.n_pairs = keys.len() as u64;
-            if wanted != Wanted::Pairs {
-                keys.clear();
-            }
-        }
         stats.time("collect", |_| {
+            if self.frame.has_cell() {
+                keys.retain(|&key| self.frame.is_owned(scene, key));
+                self.n_pairs = keys.len() as u64;
+                if wanted != Wanted::Pairs {
+                    keys.clear();
+                }
+            }
             keys.sort_unstable();
             if finder.repeats() {
                 keys.dedup();
@@ -177,7 +177,11 @@ impl FrameLoop {
     pub fn resolve(&mut self, scene: &Scene, query: &Query) -> Result<(&Frame, &Workers), Error> {
         self.frame.resolve(scene, query)?;
         if self.frame.has_cell() {
-            return Err(self.frame.refuse_cell("a frame that stays on a device"));
+            return Err(Error::Setting {
+                setting: "owned_by",
+                given: "a cell in a frame that stays on a device".to_owned(),
+                allowed: "only detect, count and any",
+            });
         }
         self.frame.check(scene)?;
         Ok((&self.frame, &self.workers))

@@ -7,7 +7,7 @@ use crate::sink::Limits;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Method {
     /// `Cells` for a frame whose bodies are mostly new to the detector, if that is cheaper, and `Clusters` as soon as
-    /// they come back. [`Statistics::method`](crate::Statistics::method) says which one answered. On a GPU, with a memory
+    /// they come back: their second frame makes the clusters. [`Statistics::method`](crate::Statistics::method) says which one answered. On a GPU, with a memory
     /// budget, and for steps and distances always `Clusters`.
     #[default]
     Auto,
@@ -34,7 +34,7 @@ impl Method {
         }
     }
 
-    /// What `Auto` comes to for bodies that are asked about again and again; the other methods are themselves.
+    /// The method that `Auto` uses for bodies that it has met before. Other methods are returned unchanged.
     pub fn in_the_long_run(self) -> Method {
         match self {
             Method::Auto => Method::Clusters,

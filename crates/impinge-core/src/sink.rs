@@ -46,7 +46,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The same for an answer of any number of pairs.
+    /// These limits without the one on pairs.
     pub fn without_max_pairs(self) -> Limits {
         Limits {
             max_pairs: None,

@@ -345,14 +345,95 @@ fn auto_asks_the_grid_once_and_clusters_from_then_on() {
     }
     assert_eq!(ask(&scene, &Query::between(e, f)), "cells");
     assert_eq!(ask(&scene, &Query::between(e, f)), "clusters");
-    // Small bodies, and neighbours to be resolved.
+    // Small bodies do not count, however many they are; nor do few primitives.
     let mut small = Scene::new();
-    surfaces::ball(400).add_to(&mut small).unwrap();
-    surfaces::ball(400)
-        .translated([0.5, 0.1, 0.0])
-        .add_to(&mut small)
-        .unwrap();
+    for ix in 0..40 {
+        let at = [0.5 * ix as f32, 0.1, 0.0];
+        surfaces::ball(400)
+            .translated(at)
+            .add_to(&mut small)
+            .unwrap();
+    }
     assert_eq!(ask(&small, &Query::all()), "clusters");
+    let mut few = Scene::new();
+    for at in [0.0, 0.5] {
+        surfaces::ball(4_000)
+            .translated([at, 0.1, 0.0])
+            .add_to(&mut few)
+            .unwrap();
+    }
+    assert_eq!(ask(&few, &Query::all()), "clusters");
+}
+
+#[test]
+fn auto_finds_the_same_in_the_grid_as_clusters_do() {
+    let mut scene = Scene::new();
+    let tetrahedra = soup::tetrahedra(3_000, 0.05, 1);
+    let triangles = soup::triangles(6_000, 0.03, 2);
+    let ball = surfaces::bumpy_ball(5_000, 0.2);
+    scene
+        .add(tetrahedra.elements.clone(), tetrahedra.positions.clone())
+        .unwrap();
+    scene
+        .add(triangles.elements.clone(), triangles.positions_f64())
+        .unwrap();
+    scene
+        .add(ball.elements.clone(), ball.positions.clone())
+        .unwrap();
+    scene
+        .add(ball.elements.clone(), ball.positions_f64())
+        .unwrap();
+    // And one that meets no other.
+    ball.translated([3.0, 0.0, 0.0]).add_to(&mut scene).unwrap();
+    for query in [Query::all(), Query::everything()] {
+        let new = |method| Detector::with_settings(cpu(method, 2)).unwrap();
+        let mut clusters = new(Method::Clusters);
+        let expected = clusters.detect(&scene, &query).unwrap();
+        let n = expected.len() as u64;
+        assert!(n > 1_000, "{n}");
+        let mut auto = new(Method::Auto);
+        let found = auto.detect(&scene, &query).unwrap();
+        assert_eq!(found.stats().method, "cells");
+        assert!(expected.same_as(found));
+        assert_eq!(new(Method::Auto).count(&scene, &query).unwrap(), n);
+        assert!(new(Method::Auto).any(&scene, &query).unwrap());
+    }
+}
+
+#[test]
+fn auto_frees_the_grid_and_what_bodies_that_are_gone_had() {
+    let mut scene = Scene::new();
+    let [a, b] = large_balls(&mut scene);
+    let mut auto = Detector::with_settings(cpu(Method::Auto, 1)).unwrap();
+    let mut held = |scene: &Scene, method: &str| {
+        let pairs = auto.detect(scene, &Query::all()).unwrap();
+        assert_eq!(pairs.stats().method, method);
+        pairs.stats().bytes_held - size_of::<u64>() as u64 * pairs.len() as u64
+    };
+    let grid = held(&scene, "cells");
+    let clusters = held(&scene, "clusters");
+    assert!(grid < clusters / 4, "{grid} of {clusters}");
+    // Far apart: the grid is not even made.
+    for (ix, body) in large_balls(&mut scene).into_iter().enumerate() {
+        let matrix = [
+            [1.0, 0.0, 0.0, 100.0 + 100.0 * ix as f64],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ];
+        scene.set_transform(body, &matrix).unwrap();
+    }
+    large_balls(&mut scene);
+    let with_old = held(&scene, "cells");
+    assert!(with_old > clusters / 2, "{with_old} of {clusters}");
+    scene.remove(a).unwrap();
+    scene.remove(b).unwrap();
+    for _ in 0..3 {
+        large_balls(&mut scene);
+    }
+    let left = held(&scene, "cells");
+    // Some twenty bytes for each of 24,000 triangles; the rest is of all bodies together.
+    assert!(left + 20 * 24_000 < with_old, "{left} of {with_old}");
 }
 
 #[test]
@@ -428,6 +509,25 @@ fn cells_are_refused_where_they_mean_nothing() {
     let query = Query::between(a, b).owned_by([0.0; 3], [f64::NAN; 3]);
     let error = detector.detect(&scene, &query).unwrap_err().to_string();
     assert!(error.starts_with("owned_by: "), "{error}");
+    let upside_down = Query::between(a, b).owned_by([1.0; 3], [0.0; 3]);
+    let error = detector
+        .detect(&scene, &upside_down)
+        .unwrap_err()
+        .to_string();
+    assert!(error.starts_with("owned_by: "), "{error}");
+    // All pairs count, but not for a yes or no.
+    let everywhere = Query::between(a, b).owned_by([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]);
+    let mut few = Detector::with_settings(Settings {
+        max_pairs: Some(1),
+        ..cpu(Method::Clusters, 1)
+    })
+    .unwrap();
+    let refused = few.detect(&scene, &everywhere).unwrap_err();
+    assert!(
+        matches!(refused, impinge_core::Error::TooManyPairs { .. }),
+        "{refused}"
+    );
+    assert!(few.any(&scene, &everywhere).unwrap());
     let query = Query::between(a, b).owned_by([0.0; 3], [1.0; 3]);
     let step = impinge_core::Step::new(query.clone());
     let error = detector.impacts(&scene, &step).unwrap_err().to_string();
@@ -457,8 +557,9 @@ fn swapped_positions_are_those_of_the_body() {
         let before = scene.body(b).unwrap().positions().clone();
         scene.swap_positions(b, &mut other).unwrap();
         assert_eq!(Positions::from(other.clone()), before);
-        let n = detector.detect(&scene, &query).unwrap().len();
-        assert_eq!(n, detector.detect(&copied, &query).unwrap().len());
+        let found = rows(detector.detect(&scene, &query).unwrap());
+        assert!(!found.is_empty());
+        assert_eq!(found, rows(detector.detect(&copied, &query).unwrap()));
     }
     let before = scene.body(b).unwrap().positions().clone();
     let mut short = vec![[0.0f32; 3]; 2];

@@ -150,7 +150,7 @@ fn ask<'py>(
 /// Parameters
 /// ----------
 /// rows : array_like of int, shape (n, 4)
-///     As `Result.rows`; their order does not matter.
+///     As `Result.rows`. The order of rows does not matter; in each, the lower (body, primitive) comes first.
 ///
 /// Returns
 /// -------

@@ -105,7 +105,7 @@ impl Session {
         let question = Question {
             within: options.within.unwrap_or(stage.content.bodies.len() == 1),
             shared_vertex: options.shared_vertex,
-            // Its bodies are asked about in every frame.
+            // The window asks about the same bodies in every frame.
             method: options.method.in_the_long_run(),
             backend: match options.method {
                 Method::Naive => Backend::Cpu,

@@ -4,12 +4,12 @@ use std::io::{Write, stderr};
 use std::path::PathBuf;
 
 use impinge::contact::Contacts;
-use impinge::{BodyId, CancelToken, Query};
+use impinge::{BodyId, CancelToken, Detector, Query};
 use serde_json::Value;
 
 use crate::apart::Inputs;
 use crate::args::{AnswerArgs, AskArgs, DetectorArgs, PairsArgs, WithinArgs};
-use crate::detection::{any, count, detector, query, repeat};
+use crate::detection::{any, count, query, repeat, settings};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
 #[cfg(feature = "gpu")]
@@ -87,7 +87,12 @@ fn answer(
     } = Bodies::read(paths, Loading::new(ask, is_self, cancel))?;
     let query = query(asked, ask, &ids)?;
     // The detector comes last, because opening a GPU takes time and some drivers print messages.
-    let mut detector = detector(how)?;
+    let mut settings = settings(how);
+    if !is_one_frame {
+        // Median times are of one method.
+        settings.method = settings.method.in_the_long_run();
+    }
+    let mut detector = Detector::with_settings(settings)?;
 
     let watch = Watch::detection(!how.no_progress, "detecting");
     let named = ids.iter().copied().zip(names.iter().map(String::as_str));

@@ -2,6 +2,7 @@
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Read, Write};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -82,15 +83,43 @@ fn ctrl_c_stops_cleanly() {
     }
 }
 
-/// Starts a run, lets it get to work for a while, and stops it.
-fn stopped(folder: &Folder, args: &[&str], signal: &str) -> (Option<i32>, Duration, String) {
+/// Waits until the child has opened a file, where the system says so.
+fn wait_for_opening(child: &Child, path: &Path) {
+    let folder = format!("/proc/{}/fd", child.id());
+    if !Path::new("/proc/self/fd").exists() {
+        return std::thread::sleep(Duration::from_millis(200));
+    }
+    let started = Instant::now();
+    let is_open = || {
+        let files = std::fs::read_dir(&folder).into_iter().flatten().flatten();
+        files
+            .filter_map(|file| std::fs::read_link(file.path()).ok())
+            .any(|open| open == path)
+    };
+    while !is_open() {
+        assert!(
+            started.elapsed() < Duration::from_secs(60),
+            "{} is not opened",
+            path.display()
+        );
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Starts a run, waits until it is at work, and stops it.
+fn stopped(
+    folder: &Folder,
+    args: &[&str],
+    wait: impl Fn(&Child),
+    signal: &str,
+) -> (Option<i32>, Duration, String) {
     let mut child = folder
         .command(args)
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    std::thread::sleep(Duration::from_millis(500));
+    wait(&child);
     send(&child, signal);
     let (code, took) = ended(&mut child);
     (code, took, said(&mut child))
@@ -99,14 +128,16 @@ fn stopped(folder: &Folder, args: &[&str], signal: &str) -> (Option<i32>, Durati
 #[test]
 fn reading_and_writing_are_stopped_too() {
     let folder = Folder::new();
-    // Reading takes longer than the half second before the signal.
+    // Reading takes some hundred milliseconds at least.
     let mut file = std::fs::File::create(folder.path("long.obj")).unwrap();
     let lines = "v 0.1234567890123456789 0.9876543210987654321 0.5555555555555555\n".repeat(20_000);
     for _ in 0..200 {
         file.write_all(lines.as_bytes()).unwrap();
     }
     drop(file);
-    let (code, took, said) = stopped(&folder, &["self", "long.obj"], "-INT");
+    let path = folder.path("long.obj").canonicalize().unwrap();
+    let wait = |child: &Child| wait_for_opening(child, &path);
+    let (code, took, said) = stopped(&folder, &["self", "long.obj"], wait, "-INT");
     assert_eq!((code, said.as_str()), (Some(130), "impinge: cancelled\n"));
     assert!(took < SOON, "{took:?}");
     std::fs::remove_file(folder.path("long.obj")).unwrap();
@@ -117,7 +148,8 @@ fn reading_and_writing_are_stopped_too() {
     let made = Command::new("mkfifo").arg(folder.path("rows.csv")).status();
     assert!(made.unwrap().success());
     let args = ["pairs", "a.ply", "b.ply", "--pairs", "rows.csv"];
-    let (code, took, said) = stopped(&folder, &args, "-TERM");
+    let wait = |_: &Child| std::thread::sleep(Duration::from_millis(500));
+    let (code, took, said) = stopped(&folder, &args, wait, "-TERM");
     assert_eq!((code, said.as_str()), (Some(143), "impinge: cancelled\n"));
     assert!(took < SOON, "{took:?}");
 }

@@ -2,9 +2,9 @@
 //!
 //! Clusters are made once for each body, and that costs several times as much as the frame itself does in the grid of
 //! `Cells`. It pays as soon as the body comes back. So a frame whose primitives are mostly of new bodies goes through
-//! the grid, with four exceptions: so few primitives that neither takes long; small bodies, which are few clusters each;
-//! cells that turn out crowded (the grid is uniform, so small details in a large scene can all be in one cell);
-//! and neighbours that must be resolved, which `Clusters` settles per vertex.
+//! the grid, except: so few primitives that neither takes long; small bodies, which are few clusters each; cells that turn out
+//! crowded (the grid is uniform, so small details in a large scene can all be in one cell); neighbours that must be
+//! resolved, which `Clusters` settles per vertex; and memory budgets, which the grid would need more of.
 
 use crate::frame::Frame;
 use crate::query::SharedVertex;
@@ -14,8 +14,7 @@ use crate::scene::Scene;
 const FROM: u64 = 10_000;
 /// Bodies with fewer primitives than this do not count as new.
 const LARGE: u32 = 1_000;
-/// From this many primitives a cell on ([`Cells::crowding`](super::cells::Cells)), making clusters costs less than
-/// pairing all of a cell.
+/// With more primitives in a cell than this (see `Cells::crowding`), making clusters costs less than pairing all of a cell.
 pub(super) const MOST_CROWDED: u64 = 64;
 
 /// The bodies that were in a frame before.

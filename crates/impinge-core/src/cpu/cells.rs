@@ -166,7 +166,7 @@ impl Cells {
         Ok(Some(grid))
     }
 
-    /// How many primitives are in a cell, on average over the entries of the lists: each is paired with so many.
+    /// The number of primitives in the cell of an entry, on average over all entries of the lists.
     pub(super) fn crowding(&self) -> u64 {
         let pairs = |ends: &[u32]| u64::from(ends[1] - ends[0]).pow(2);
         let n_pairs: u64 = self.starts.windows(2).map(pairs).sum();
@@ -204,7 +204,7 @@ impl Cells {
         Ok(())
     }
 
-    pub(super) fn bytes(&self) -> u64 {
+    fn bytes(&self) -> u64 {
         let bytes = self.reaching.bytes()
             + size_of::<u32>() * (self.starts.capacity() + self.entries.capacity())
             + size_of::<CellItem>() * self.items.capacity()

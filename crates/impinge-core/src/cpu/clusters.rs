@@ -22,7 +22,7 @@ use crate::frame::Layer;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::query::SharedVertex;
-use crate::scene::Body;
+use crate::scene::{Body, Scene};
 use crate::settings::{InstructionSet, Settings};
 use crate::stats::Statistics;
 
@@ -130,6 +130,11 @@ impl Clusters {
             .sum();
         let scratches: usize = self.scratches.iter().map(Worker::bytes).sum();
         caches + scratches
+    }
+
+    /// Forgets bodies that are gone or were re-meshed.
+    pub fn forget_outdated(&mut self, scene: &Scene) {
+        self.caches.forget_outdated(scene);
     }
 
     /// Clusters bodies that are new or were re-meshed; forgets removed bodies.

@@ -64,28 +64,37 @@ impl Cpu {
         answer: &Arc<Answer>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let settings = &self.settings;
         let prefers_grid = self.acquaintances.prefer_grid(job.scene, job.frame);
-        if prefers_grid && settings.memory_budget.is_none() {
+        let has_room = self.settings.memory_budget.is_none();
+        if prefers_grid && has_room && self.find_in_grid(job, answer, stats)? {
             stats.method = Method::Cells.name();
-            job.frame.check(job.scene)?;
-            let Some(grid) = self.cells.divide(job, answer, settings, stats)? else {
-                return Ok(());
-            };
-            if self.cells.crowding() <= MOST_CROWDED {
-                let rule = &cells::Owner;
-                let found = self.cells.settle(job, answer, settings, rule, grid, stats);
-                stats.bytes_held += self.clusters.bytes();
-                return found;
-            }
-            stats.grid = None;
+            self.clusters.forget_outdated(job.scene);
+            stats.bytes_held = self.clusters.bytes();
+            return Ok(());
         }
-        // The grid is seldom needed twice.
-        if self.cells.bytes() > 0 {
-            self.cells = Cells::new(settings.instruction_set);
-        }
+        (stats.grid, stats.n_reruns) = (None, 0);
         stats.method = Method::Clusters.name();
-        self.clusters.run(job, answer, settings, stats)
+        self.clusters.run(job, answer, &self.settings, stats)
+    }
+
+    /// Answers through a grid whose memory is freed after the frame; false if the grid is too crowded.
+    fn find_in_grid(
+        &self,
+        job: Job<'_>,
+        answer: &Arc<Answer>,
+        stats: &mut Statistics,
+    ) -> Result<bool, Error> {
+        job.frame.check(job.scene)?;
+        let settings = &self.settings;
+        let mut cells = Cells::new(settings.instruction_set);
+        let Some(grid) = cells.divide(job, answer, settings, stats)? else {
+            return Ok(true);
+        };
+        if cells.crowding() > MOST_CROWDED {
+            return Ok(false);
+        }
+        cells.settle(job, answer, settings, &cells::Owner, grid, stats)?;
+        Ok(true)
     }
 }
 

@@ -446,6 +446,7 @@ impl Detector {
         frame.check(scene)?;
         let (keys, stats) = candidates.parts_mut();
         begin(stats, &self.settings, self.frames.workers().n());
+        let _shift = self.frames.workers().shift(frame.n_primitives());
         answer.begin(self.settings.limits(), Wanted::Pairs, std::mem::take(keys));
         if self.settings.method == Method::Naive {
             let test = Overlap {
@@ -458,7 +459,6 @@ impl Detector {
                 answer.check()
             })?;
         } else {
-            let _shift = self.frames.workers().shift(frame.n_primitives());
             let job = Job {
                 scene,
                 frame,

@@ -144,6 +144,7 @@ impl Detector {
         drop(tasks);
         control.step(n_tasks as u64, n_tasks as u64)?;
         let stats = near.stats_mut();
+        stats.bytes_held += sorter.bytes();
         stats.add_ms("features", features.elapsed().as_secs_f64() * 1e3);
         stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(&self.steps.near)
