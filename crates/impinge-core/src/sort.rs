@@ -1,17 +1,18 @@
 //! Sorts the keys of a large answer on all threads.
 //!
 //! A key is a pair of numbers, lower number first, and few numbers have many partners. So keys are counted by their lower
-//! number, the partners of each number are put together in one pass, and threads sort these short runs:
+//! number, the partners of each number are put together, and these short runs are sorted:
 //!
 //! ```text
-//! keys       | 5 9 | 2 7 | 5 6 | 2 3 |   as they were found
+//! keys       | 5 9 | 2 7 | 5 6 | 2 3 |   as they were found; each thread counts and places a part of them
 //! partners   | 7 3 | 9 6 |               of 2, of 5
 //! keys       | 2 3 | 2 7 | 5 6 | 5 9 |   each run sorted, and written back
 //! ```
 //!
-//! Memory, kept from answer to answer: four bytes per key and per number.
+//! Memory, kept from answer to answer: four bytes per key, and per number and part.
 
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::error::Error;
 use crate::settings::Settings;
@@ -22,21 +23,23 @@ use crate::workers::Workers;
 const FROM: usize = 1 << 15;
 /// Keys per task.
 const TASK: usize = 1 << 14;
+/// Each part has counts of its own, so there are few.
+const MOST_PARTS: usize = 4;
 
 /// The memory to sort in.
 #[derive(Debug)]
 pub(crate) struct Sorter {
     /// Under a memory budget.
     in_place: bool,
-    /// Where the partners of each number end.
-    ends: Vec<u32>,
-    partners: Vec<u32>,
+    /// Of each part and number: how many partners, then where the next one goes.
+    parts: Vec<Vec<u32>>,
+    partners: Vec<AtomicU32>,
 }
 
-/// Runs of consecutive lower numbers, from `first` on.
+/// The runs of consecutive lower numbers, from `first` on.
 struct Task<'a> {
     keys: &'a mut [u64],
-    partners: &'a mut [u32],
+    partners: &'a [AtomicU32],
     first: usize,
     ends: &'a [u32],
 }
@@ -46,7 +49,7 @@ impl Sorter {
     pub fn new(settings: &Settings) -> Self {
         Sorter {
             in_place: settings.memory_budget.is_some(),
-            ends: Vec::new(),
+            parts: Vec::new(),
             partners: Vec::new(),
         }
     }
@@ -55,52 +58,88 @@ impl Sorter {
     pub fn sort(&mut self, keys: &mut [u64], n_numbers: u64, workers: &Workers) {
         let n_numbers = n_numbers as usize;
         let is_worth = keys.len() >= FROM.max(n_numbers / 2) && u32::try_from(keys.len()).is_ok();
-        if self.in_place || !is_worth || self.make_room(keys.len(), n_numbers).is_err() {
+        let n_parts = workers.n().min(MOST_PARTS);
+        if self.in_place || !is_worth || self.make_room(keys.len(), n_numbers, n_parts).is_err() {
             keys.sort_unstable();
             return;
         }
-        let Sorter { ends, partners, .. } = self;
-        for key in &*keys {
-            ends[(key >> 32) as usize] += 1;
+        let Sorter {
+            parts, partners, ..
+        } = self;
+        let partners = &partners[..];
+        let n_each = keys.len().div_ceil(n_parts);
+        for_each_part(workers, parts, keys, n_each, |counts, keys| {
+            for key in keys {
+                counts[(key >> 32) as usize] += 1;
+            }
+        });
+        let mut next = 0;
+        for number in 0..n_numbers {
+            for part in &mut *parts {
+                next += std::mem::replace(&mut part[number], next);
+            }
         }
-        let mut start = 0;
-        for end in &mut *ends {
-            start += std::mem::replace(end, start);
-        }
-        // Each end is a start until the partners are there.
-        for key in &*keys {
-            let end = &mut ends[(key >> 32) as usize];
-            partners[*end as usize] = *key as u32;
-            *end += 1;
-        }
+        for_each_part(workers, parts, keys, n_each, |places, keys| {
+            for key in keys {
+                let place = &mut places[(key >> 32) as usize];
+                partners[*place as usize].store(*key as u32, Ordering::Relaxed);
+                *place += 1;
+            }
+        });
+        // The places of the last part are where runs end now.
+        let ends = &parts[n_parts - 1];
         let tasks: Vec<_> = tasks(keys, partners, ends).map(Mutex::new).collect();
-        workers.for_each(&mut vec![(); workers.n()], tasks.len(), |(), ix| {
+        let mut runs = vec![Vec::new(); workers.n()];
+        workers.for_each(&mut runs, tasks.len(), |run, ix| {
             if let Ok(mut task) = tasks[ix].lock() {
-                task.run();
+                task.run(run);
             }
         });
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> u64 {
-        (size_of::<u32>() * (self.ends.capacity() + self.partners.capacity())) as u64
+        let counts: usize = self.parts.iter().map(Vec::capacity).sum();
+        (size_of::<u32>() * (counts + self.partners.capacity())) as u64
     }
 
-    fn make_room(&mut self, n_keys: usize, n_numbers: usize) -> Result<(), Error> {
-        self.ends.clear();
-        self.partners.clear();
-        sink::reserve(&mut self.ends, n_numbers, "room to sort pairs")?;
-        sink::reserve(&mut self.partners, n_keys, "room to sort pairs")?;
-        self.ends.resize(n_numbers, 0);
-        self.partners.resize(n_keys, 0);
+    fn make_room(&mut self, n_keys: usize, n_numbers: usize, n_parts: usize) -> Result<(), Error> {
+        const WHAT: &str = "room to sort pairs";
+        self.parts.resize_with(n_parts, Vec::new);
+        for part in &mut self.parts {
+            part.clear();
+            sink::reserve(part, n_numbers, WHAT)?;
+            part.resize(n_numbers, 0);
+        }
+        let more = n_keys.saturating_sub(self.partners.len());
+        sink::reserve(&mut self.partners, more, WHAT)?;
+        self.partners.resize_with(n_keys, AtomicU32::default);
         Ok(())
     }
 }
 
-/// Parts of about equally many keys.
+/// Calls back for each part, with the keys that belong to it.
+fn for_each_part(
+    workers: &Workers,
+    parts: &mut [Vec<u32>],
+    keys: &[u64],
+    n_each: usize,
+    work: impl Fn(&mut [u32], &[u64]) + Sync,
+) {
+    let pairs = parts.iter_mut().zip(keys.chunks(n_each));
+    let pairs: Vec<_> = pairs.map(Mutex::new).collect();
+    workers.for_each(&mut vec![(); workers.n()], pairs.len(), |(), ix| {
+        if let Ok(mut pair) = pairs[ix].lock() {
+            let (part, keys) = &mut *pair;
+            work(part, keys);
+        }
+    });
+}
+
+/// Runs of about equally many keys.
 fn tasks<'a>(
     mut keys: &'a mut [u64],
-    mut partners: &'a mut [u32],
+    mut partners: &'a [AtomicU32],
     ends: &'a [u32],
 ) -> impl Iterator<Item = Task<'a>> {
     let (mut first, mut start) = (0, 0);
@@ -113,7 +152,7 @@ fn tasks<'a>(
         let end = ends[ends.len() - 1] as usize;
         let task = Task {
             keys: keys.split_off_mut(..end - start)?,
-            partners: partners.split_off_mut(..end - start)?,
+            partners: partners.split_off(..end - start)?,
             first,
             ends,
         };
@@ -123,7 +162,8 @@ fn tasks<'a>(
 }
 
 impl Task<'_> {
-    fn run(&mut self) {
+    /// Sorts the runs, each in the memory given.
+    fn run(&mut self, sorted: &mut Vec<u32>) {
         let n = self.keys.len();
         // Of the keys before this task.
         let offset = self.ends[self.ends.len() - 1] as usize - n;
@@ -131,9 +171,15 @@ impl Task<'_> {
         for (lower, &end) in (self.first as u64..).zip(self.ends) {
             let run = start..end as usize - offset;
             start = run.end;
-            let partners = &mut self.partners[run.clone()];
-            partners.sort_unstable();
-            for (key, &partner) in self.keys[run].iter_mut().zip(&*partners) {
+            sorted.clear();
+            let partners = &self.partners[run.clone()];
+            sorted.extend(
+                partners
+                    .iter()
+                    .map(|partner| partner.load(Ordering::Relaxed)),
+            );
+            sorted.sort_unstable();
+            for (key, &partner) in self.keys[run].iter_mut().zip(&*sorted) {
                 *key = lower << 32 | u64::from(partner);
             }
         }
