@@ -344,14 +344,15 @@ def main():
     missing = set()
     cloth = sorted((data / "ccd" / "cloth-ball" / "frames").glob("*.ply"))
     cloth_vertices, cloth_faces = read_ply(cloth[0])
+    cloth_vertices = cloth_vertices.astype(np.float32)
     _, rumba_faces = read_ply(data / "sequences" / "rumba.ply")
     rumba = read_frame(data / "sequences" / "rumba.pc2", 60)
     rounds = arguments.rounds
     record = {
         "machine": machine(),
         "near": [
-            near("cloth-ball", cloth_vertices.astype(np.float32), cloth_faces, 1e-3, rounds, missing),
-            near("cloth-ball", cloth_vertices.astype(np.float32), cloth_faces, 2e-3, rounds, missing),
+            near("cloth-ball", cloth_vertices, cloth_faces, 1e-3, rounds, missing),
+            near("cloth-ball", cloth_vertices, cloth_faces, 2e-3, rounds, missing),
             near("rumba", rumba, rumba_faces, 1e-3, rounds, missing),
             near("rumba", rumba, rumba_faces, 2e-3, rounds, missing),
         ],

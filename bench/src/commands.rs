@@ -68,7 +68,8 @@ impl Peers {
     }
 }
 
-fn settings(options: &Options, method: Method) -> Settings {
+/// The settings that the options name.
+pub fn settings(options: &Options, method: Method) -> Settings {
     Settings {
         method,
         backend: options.backend,

@@ -1,13 +1,13 @@
-//! One question, once: how long the first frame of a new detector takes, by each method. Detectors are made off the
-//! clock; a GPU is not asked.
+//! One question, once: how long the first frame of a new detector takes, by each method. Detectors are made off the clock.
 
 use std::time::Instant;
 
-use impinge::{Backend, Detector, Method, Settings};
+use impinge::{Detector, Method};
 use impinge_scenes::{adversarial, surfaces};
 use serde_json::json;
 
-use crate::commands::{models, posed};
+use crate::commands::{models, posed, settings};
+use crate::gpu::median;
 use crate::problem::{Ask, Problem};
 use crate::report::{Report, figures, grouped};
 use crate::{Failure, Options, files};
@@ -65,12 +65,7 @@ fn measure(problem: &Problem, options: &Options, report: &mut Report) -> Result<
     let mut answered_by = "";
     for _ in 0..n_frames {
         for (method, ms) in METHODS.into_iter().zip(&mut ms) {
-            let mut detector = Detector::with_settings(Settings {
-                method,
-                backend: Backend::Cpu,
-                threads: options.threads,
-                ..Settings::default()
-            })?;
+            let mut detector = Detector::with_settings(settings(options, method))?;
             let start = Instant::now();
             let pairs = detector.detect(&scene, &query)?;
             ms.push(start.elapsed().as_secs_f64() * 1e3);
@@ -91,10 +86,7 @@ fn measure(problem: &Problem, options: &Options, report: &mut Report) -> Result<
         )
         .into());
     }
-    let [auto, clusters, cells] = ms.map(|mut ms| {
-        ms.sort_by(f64::total_cmp);
-        ms[ms.len() / 2]
-    });
+    let [auto, clusters, cells] = ms.map(|ms: Vec<f64>| median(ms.into_iter()));
     report.say(&format!(
         "| {} | {} | {} | {} | {answered_by} | {} | {} | {:.1} |",
         problem.name,

@@ -4,4 +4,6 @@
 
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|data: &[u8]| impinge_fuzz::scene::pairs(data));
+fuzz_target!(|data: &[u8]| {
+    impinge_fuzz::scene::pairs(data);
+});

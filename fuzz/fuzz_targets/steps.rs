@@ -4,4 +4,6 @@
 
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|data: &[u8]| impinge_fuzz::scene::steps(data));
+fuzz_target!(|data: &[u8]| {
+    impinge_fuzz::scene::steps(data);
+});

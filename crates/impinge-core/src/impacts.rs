@@ -5,7 +5,7 @@ use crate::exact::Contact;
 use crate::frame::{Frame, owner_by_first};
 use crate::ids::BodyId;
 use crate::pair_kind::PairKind;
-use crate::pairs::{Primitive, mix};
+use crate::pairs::{Primitive, hash_row, mix};
 use crate::sink::{Answer, Ending, reserve};
 use crate::stats::Statistics;
 use crate::step::Toi;
@@ -339,10 +339,4 @@ impl Candidates {
     pub fn stats(&self) -> &Statistics {
         &self.stats
     }
-}
-
-pub(crate) fn hash_row([body_a, a, body_b, b]: [u32; 4]) -> u64 {
-    let low = mix(u64::from(body_a) << 32 | u64::from(a));
-    let high = mix(u64::from(body_b) << 32 | u64::from(b));
-    mix(low.rotate_left(17) ^ high.wrapping_mul(3))
 }

@@ -264,11 +264,14 @@ impl Pairs {
 /// [`Pairs::hash`] of rows `[body_a, primitive_a, body_b, primitive_b]` that come from elsewhere. The order of rows
 /// does not matter. In each row the lower `(body, primitive)` comes first: the other way round gives another hash.
 pub fn hash_rows(rows: impl IntoIterator<Item = [u32; 4]>) -> u64 {
-    rows.into_iter().fold(0u64, |sum, [body_a, a, body_b, b]| {
-        let low = mix(u64::from(body_a) << 32 | u64::from(a));
-        let high = mix(u64::from(body_b) << 32 | u64::from(b));
-        sum.wrapping_add(mix(low.rotate_left(17) ^ high.wrapping_mul(3)))
-    })
+    let hashes = rows.into_iter().map(hash_row);
+    hashes.fold(0, u64::wrapping_add)
+}
+
+pub(crate) fn hash_row([body_a, a, body_b, b]: [u32; 4]) -> u64 {
+    let low = mix(u64::from(body_a) << 32 | u64::from(a));
+    let high = mix(u64::from(body_b) << 32 | u64::from(b));
+    mix(low.rotate_left(17) ^ high.wrapping_mul(3))
 }
 
 pub(crate) fn mix(mut x: u64) -> u64 {

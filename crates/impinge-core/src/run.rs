@@ -107,11 +107,13 @@ impl FrameLoop {
         }
         let keys = self.pairs.take_keys();
         // Which pairs belong to a cell is known only when they are found.
-        let (wanted_first, limits) = match (self.frame.has_cell(), wanted) {
-            (true, Wanted::Any) => (Wanted::Pairs, self.limits.without_max_pairs()),
-            (true, _) => (Wanted::Pairs, self.limits),
-            (false, _) => (wanted, self.limits),
-        };
+        let (mut wanted_first, mut limits) = (wanted, self.limits);
+        if self.frame.has_cell() {
+            wanted_first = Wanted::Pairs;
+            if wanted == Wanted::Any {
+                limits.max_pairs = None;
+            }
+        }
         self.answer.begin(limits, wanted_first, [keys]);
         let stats = self.pairs.stats_mut();
         stats.method = finder.method();

@@ -361,7 +361,8 @@ impl Scene {
     /// Sets the vertex positions at the end of a step, `(v, 3)`. Each vertex moves from [`positions`](Body::positions) to
     /// its end position on a straight line at constant speed. They hold until the next [`set_positions`](Scene::set_positions),
     /// [`positions_mut`](Scene::positions_mut), [`swap_positions`](Scene::swap_positions),
-    /// [`set_transform`](Scene::set_transform), [`remesh`](Scene::remesh) or [`clear_end_positions`](Scene::clear_end_positions). A body that has none stands still.
+    /// [`set_transform`](Scene::set_transform), [`remesh`](Scene::remesh) or
+    /// [`clear_end_positions`](Scene::clear_end_positions). A body that has none stands still.
     ///
     /// If start and end have different precisions, the single-precision one is widened, which is exact.
     ///

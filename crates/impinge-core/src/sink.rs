@@ -45,16 +45,6 @@ pub struct Limits {
     pub besides: u64,
 }
 
-impl Limits {
-    /// These limits without the one on pairs.
-    pub fn without_max_pairs(self) -> Limits {
-        Limits {
-            max_pairs: None,
-            ..self
-        }
-    }
-}
-
 /// Makes room for so many more, where as many are there already as the list has.
 ///
 /// # Errors
