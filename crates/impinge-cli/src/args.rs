@@ -26,7 +26,7 @@ pub use choices::{BackendArg, MethodArg, SharedVertexArg};
 pub use near::NearArgs;
 #[cfg(feature = "gpu")]
 pub use picture::PictureArgs;
-pub use step::{StepArgs, StepHow, ToiArg};
+pub use step::{StartArg, StepArgs, StepHow, ToiArg};
 #[cfg(feature = "view")]
 pub use view::ViewArgs;
 

@@ -4,12 +4,12 @@ use std::io::{self, Write};
 
 use impinge::contact::{Contacts, Curves, Feature, Shape};
 use impinge_io::{
-    AtomicFile, Polylines, write_polylines_obj, write_polylines_ply, write_polylines_vtu,
+    AtomicFile, Polylines, npy_header, write_polylines_obj, write_polylines_ply,
+    write_polylines_vtu,
 };
 use serde_json::{Value, json};
 
 use crate::error::Error;
-use crate::rows::npy_header;
 use crate::text::{counted, grouped};
 use crate::values::{CurvesFile, CurvesFormat, RowsFile, RowsFormat};
 

@@ -3,7 +3,7 @@
 use std::io::{self, BufWriter, Write};
 
 use impinge::Pairs;
-use impinge_io::AtomicFile;
+use impinge_io::{AtomicFile, npy_header};
 
 use crate::error::Error;
 use crate::output::out;
@@ -104,21 +104,6 @@ fn npy(to: &mut impl Write, rows: impl ExactSizeIterator<Item = [u32; 4]>) -> io
         to.write_all(row.map(u32::to_le_bytes).as_flattened())?;
     }
     Ok(())
-}
-
-/// The header of NumPy's array format, version 1.0 (NEP 1): magic, version, length of the description, description
-/// padded with spaces so that the data starts at a multiple of 64. The data is little-endian, in C order.
-pub fn npy_header(kind: &str, shape: &str) -> Vec<u8> {
-    const PREAMBLE: usize = 10;
-    let mut text = format!("{{'descr': {kind}, 'fortran_order': False, 'shape': {shape}, }}");
-    let length = (PREAMBLE + text.len() + 1).next_multiple_of(64) - PREAMBLE;
-    text.extend(std::iter::repeat_n(' ', length - 1 - text.len()));
-    text.push('\n');
-    let mut header = b"\x93NUMPY\x01\x00".to_vec();
-    // At most a few hundred bytes, whatever the number of rows.
-    header.extend(u16::try_from(length).unwrap_or(u16::MAX).to_le_bytes());
-    header.extend(text.as_bytes());
-    header
 }
 
 fn csv(to: &mut impl Write, rows: impl Iterator<Item = [u32; 4]>) -> io::Result<()> {

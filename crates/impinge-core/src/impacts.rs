@@ -162,6 +162,15 @@ pub(crate) fn row(a: Primitive, b: Primitive) -> [u32; 4] {
     [index(a.body), a.primitive, index(b.body), b.primitive]
 }
 
+/// [`Impacts::hash`] of impacts given as kind, `[body_a, element_a, body_b, element_b]` and time. The hash of several sets
+/// with no impact in common is the wrapping sum of their hashes.
+pub fn hash_impact_rows(rows: impl IntoIterator<Item = (PairKind, [u32; 4], f64)>) -> u64 {
+    rows.into_iter().fold(0, |sum, (kind, row, toi)| {
+        let time = mix(toi.to_bits() ^ kind as u64);
+        sum.wrapping_add(mix(hash_row(row) ^ time))
+    })
+}
+
 /// All pairs of elements that touch during a step, sorted by `(kind, body_a, element_a, body_b, element_b)`.
 ///
 /// The same input gives the same bytes on every method, backend, thread count and budget.
@@ -251,10 +260,11 @@ impl Impacts {
     /// A hash of the set of impacts, times included, that does not depend on their order: the wrapping sum of a mixed
     /// 64-bit word per impact.
     pub fn hash(&self) -> u64 {
-        self.impacts.iter().fold(0, |sum, impact| {
-            let time = mix(impact.toi.to_bits() ^ impact.kind as u64);
-            sum.wrapping_add(mix(hash_row(impact.row()) ^ time))
-        })
+        hash_impact_rows(
+            self.impacts
+                .iter()
+                .map(|impact| (impact.kind, impact.row(), impact.toi)),
+        )
     }
 
     /// How the answer was found.

@@ -54,7 +54,7 @@ pub use gpu::Capacities;
 #[cfg(feature = "gpu")]
 pub use gpu::{DeviceInfo, ResidentPairs, devices, devices_async};
 pub use ids::BodyId;
-pub use impacts::{Candidates, Impact, Impacts};
+pub use impacts::{Candidates, Impact, Impacts, hash_impact_rows};
 pub use near::{ClosestPoints, NearPair, NearPairs, NearQuery};
 pub use pair_kind::{PairKind, PairKinds};
 pub use pairs::{Pairs, Primitive, hash_rows};

@@ -6,7 +6,7 @@ use std::process::Command;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-use impinge::{Backend, CancelToken, Control, Settings, SharedVertex};
+use impinge::{Backend, CancelToken, Control, Settings};
 use impinge_check::{Limits, Options, Pool, PoolError, apply_limits, serve};
 use impinge_tiles::{Ask, Error, Plan, PlanOptions, RunOptions, ScatterOptions};
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
@@ -14,6 +14,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::errors::{Cancelled, raise};
+use crate::settings::{self, Argument};
 
 /// How often Python gets a look while work goes on in another thread.
 const INTERVAL: Duration = Duration::from_millis(50);
@@ -132,16 +133,6 @@ fn refuse(error: Error) -> PyErr {
     }
 }
 
-fn rule(shared_vertex: &str) -> PyResult<SharedVertex> {
-    match shared_vertex {
-        "skip" => Ok(SharedVertex::Skip),
-        "resolve" => Ok(SharedVertex::Resolve),
-        other => Err(PyValueError::new_err(format!(
-            "shared_vertex: {other:?} given, \"skip\", \"resolve\" allowed"
-        ))),
-    }
-}
-
 fn call_progress(py: Python<'_>, progress: Option<&Py<PyAny>>, at: (u64, u64)) -> PyResult<()> {
     match progress {
         Some(progress) => progress.call1(py, at).map(drop),
@@ -159,6 +150,7 @@ pub fn _tiles_plan<'py>(
     cap: u64,
     chunk: u64,
     weld: bool,
+    step: bool,
     replace: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
@@ -166,6 +158,7 @@ pub fn _tiles_plan<'py>(
         cap,
         chunk,
         weld,
+        step,
         cells: None,
         replace,
     };
@@ -191,6 +184,7 @@ fn describe<'py>(py: Python<'py>, plan: &Plan) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     all.set_item("plan", format!("{:016x}", plan.id()))?;
     all.set_item("files", PyList::new(py, files)?)?;
+    all.set_item("step", plan.is_step())?;
     all.set_item("primitives", n)?;
     all.set_item("tiles", plan.n_tiles())?;
     all.set_item("units", plan.n_units())?;
@@ -235,7 +229,9 @@ pub fn _tiles_run<'py>(
     tiles: Vec<u32>,
     between: bool,
     within: bool,
-    shared_vertex: &str,
+    shared_vertex: Argument<'_, '_>,
+    start: Argument<'_, '_>,
+    toi: Argument<'_, '_>,
     threads: usize,
     memory_budget: Option<u64>,
     again: bool,
@@ -245,7 +241,9 @@ pub fn _tiles_run<'py>(
         ask: Ask {
             between,
             within,
-            shared_vertex: rule(shared_vertex)?,
+            shared_vertex: settings::shared_vertex(shared_vertex)?,
+            start: settings::start(start)?,
+            toi: settings::toi(toi)?,
         },
         settings: Settings {
             backend: Backend::Cpu,
@@ -299,5 +297,17 @@ pub fn _tiles_merge(py: Python<'_>, folder: PathBuf) -> PyResult<Bound<'_, PyDic
     all.set_item("records", merged.n_records)?;
     all.set_item("uncut_tiles", merged.n_uncut)?;
     all.set_item("rows", merged.rows)?;
+    if let Some(step) = merged.step {
+        let kinds = PyDict::new(py);
+        for (kind, n) in step.kinds {
+            kinds.set_item(kind.name(), n)?;
+        }
+        let earliest = step
+            .earliest
+            .map(|(kind, row, toi)| (kind.name(), row, toi));
+        all.set_item("kinds", kinds)?;
+        all.set_item("touching_at_start", step.touching_at_start)?;
+        all.set_item("earliest", earliest)?;
+    }
     Ok(all)
 }

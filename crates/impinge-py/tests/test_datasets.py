@@ -121,6 +121,35 @@ def test_tiles_have_the_answer_of_the_whole(bodies, tmp_path):
     assert np.array_equal(impinge.tiles.rows(folder), truth.rows)
 
 
+@pytest.mark.parametrize("toi", ["f32", "f64"])
+def test_tiles_of_a_step_have_the_impacts_of_the_whole(tmp_path, toi):
+    scene = impinge.Scene()
+    paths = []
+    for ix in range(2):
+        start, faces = soup(500, 0.1, ix)
+        start, end = [at.astype(np.float32) for at in (start, start + soup(500, 0.1, ix + 7)[0] * 0.1)]
+        body = scene.add(start, faces)
+        scene.set_end_positions(body, end)
+        paths += [write_obj(tmp_path / f"{ix}-{pose}.obj", at, faces) for pose, at in enumerate((start, end))]
+    truth = impinge.Detector(backend="cpu").impacts(scene, toi=toi, start="skip")
+    folder = tmp_path / "tiles"
+    plan = impinge.tiles.plan(folder, paths, cap=300, chunk=128, step=True)
+    assert plan["step"] and plan["tiles"] > 2 and plan["primitives"] == 1000
+    impinge.tiles.scatter(folder)
+    impinge.tiles.run(folder, threads=1, start="skip", toi=toi)
+    merged = impinge.tiles.merge(folder)
+    assert merged["pairs"] == len(truth) > 300 and merged["hash"] == f"{truth.hash:016x}"
+    first = truth.earliest()
+    assert merged["earliest"] == (first.kind, tuple(first.row), first.toi)
+    rows = impinge.tiles.rows(folder)
+    assert rows.dtype["toi"] == truth.toi.dtype and np.array_equal(rows["toi"], truth.toi)
+    numbers = np.stack([rows[name] for name in ("body_a", "element_a", "body_b", "element_b")], axis=1)
+    assert np.array_equal(numbers, truth.rows)
+    assert merged["touching_at_start"] == 0 and sum(merged["kinds"].values()) == len(truth)
+    with pytest.raises(ValueError, match="^shared_vertex: resolve given"):
+        impinge.tiles.run(folder, shared_vertex="resolve")
+
+
 def test_tiles_refuse_by_name(bodies, tmp_path):
     paths, _ = bodies
     with pytest.raises((OSError, ValueError), match="missing"):

@@ -14,12 +14,19 @@ pub struct Shape {
     pub corners: usize,
     /// Bytes per coordinate: 4 or 8.
     pub width: usize,
+    /// Positions per vertex: 1, or 2 if the file is a body of a step, which has a start and an end.
+    pub poses: usize,
 }
 
 impl Shape {
+    /// Positions per primitive: those of its corners in each pose.
+    pub fn points(self) -> usize {
+        self.corners * self.poses
+    }
+
     /// Bytes per record: the primitive's number, its vertices' numbers, their coordinates.
     pub fn stride(self) -> usize {
-        4 + self.corners * (4 + 3 * self.width)
+        4 + 4 * self.corners + 3 * self.width * self.points()
     }
 }
 
@@ -30,26 +37,27 @@ pub struct Chunk {
     pub first: u64,
     /// Vertex numbers, `corners` per primitive.
     pub vertices: Vec<u32>,
-    /// Positions of these vertices, `corners` per primitive.
+    /// Positions of these vertices: `corners` per primitive; in a step, `corners` at the start and then as many at the end.
     pub positions: Vec<[f64; 3]>,
 }
 
 impl Chunk {
-    /// The box of each primitive.
+    /// The box of each primitive, in a step over both ends.
     pub fn bounds(&self, shape: Shape) -> impl Iterator<Item = Bounds> {
-        self.positions.chunks_exact(shape.corners).map(bounds)
+        self.positions.chunks_exact(shape.points()).map(bounds)
     }
 
-    /// Refuses coordinates that are not finite, which no tile holds, or outside the range of the exact tests.
-    pub fn check(&self, path: &Path, shape: Shape) -> Result<(), Error> {
+    /// Refuses coordinates that are not finite, which no tile holds, or outside the range of the exact tests. `paths` are
+    /// the files of the start and of the end.
+    pub fn check(&self, paths: [&Path; 2], shape: Shape) -> Result<(), Error> {
         let bad = |x: &f64| !in_range(*x);
         match self.positions.iter().position(|p| p.iter().any(bad)) {
             None => Ok(()),
             Some(ix) => {
                 let value = self.positions[ix].into_iter().find(bad).unwrap_or_default();
                 Err(Error::Coordinate {
-                    path: path.to_owned(),
-                    primitive: self.first + (ix / shape.corners) as u64,
+                    path: paths[ix % shape.points() / shape.corners].to_owned(),
+                    primitive: self.first + (ix / shape.points()) as u64,
                     value,
                     why: if value.is_finite() {
                         "outside the range of exact answers"
@@ -65,10 +73,10 @@ impl Chunk {
     pub fn encode(&self, shape: Shape, ix: usize, to: &mut Vec<u8>) {
         let corners = ix * shape.corners..(ix + 1) * shape.corners;
         to.extend(((self.first + ix as u64) as u32).to_le_bytes());
-        for vertex in &self.vertices[corners.clone()] {
+        for vertex in &self.vertices[corners] {
             to.extend(vertex.to_le_bytes());
         }
-        for position in &self.positions[corners] {
+        for position in &self.positions[ix * shape.points()..][..shape.points()] {
             for &x in position {
                 if shape.width == 4 {
                     to.extend(back_to_f32(x).to_le_bytes());
@@ -124,10 +132,10 @@ impl<'a> Record<'a> {
         self.word(4 + 4 * corner)
     }
 
-    /// The position of a corner.
-    pub fn position(&self, corner: usize) -> [f64; 3] {
-        let Shape { corners, width } = self.shape;
-        let start = 4 + 4 * corners + 3 * width * corner;
+    /// The position of a corner; those at the end of a step follow all those at its start.
+    pub fn position(&self, point: usize) -> [f64; 3] {
+        let Shape { corners, width, .. } = self.shape;
+        let start = 4 + 4 * corners + 3 * width * point;
         std::array::from_fn(|axis| {
             let at = start + width * axis;
             if width == 4 {
@@ -140,8 +148,8 @@ impl<'a> Record<'a> {
 
     /// The box of the primitive, by the same comparisons of the same numbers as in scattering.
     pub fn bounds(&self) -> Bounds {
-        let points: [[f64; 3]; 4] =
-            std::array::from_fn(|corner| self.position(corner.min(self.shape.corners - 1)));
+        let points: [[f64; 3]; 8] =
+            std::array::from_fn(|point| self.position(point.min(self.shape.points() - 1)));
         bounds(&points)
     }
 }

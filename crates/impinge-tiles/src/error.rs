@@ -66,6 +66,16 @@ pub enum Error {
         /// The most there may be.
         limit: u64,
     },
+    /// The two files of a body in a step have different elements.
+    #[error("{}: the end of the step must have the elements of {}: {what}", .end.display(), .start.display())]
+    Ends {
+        /// The file of the start.
+        start: PathBuf,
+        /// The file of the end.
+        end: PathBuf,
+        /// In what they differ.
+        what: String,
+    },
     /// A mesh file has changed since the plan was made. Make a new plan.
     #[error("{}: changed since the plan was made", .path.display())]
     Changed {

@@ -14,6 +14,11 @@
 //! | [`Plan::run`] | one tile of every part | `results/tile-*.npy` (rows) and `results/tile-*.json` |
 //! | [`Plan::merge`] | all results | `rows.npy` (sorted) and `answer.json` |
 //!
+//! With [`PlanOptions::step`] the scene moves: a body is two files, its start and its end, boxes are those over the whole step,
+//! and the answer is the first contacts ([`impinge::Impacts`]). Edges are numbered within their whole body, which no tile
+//! sees. So rows name an edge by its vertices, and each tile also lists the edges whose own lower corner it holds. That is
+//! each edge of the body once, so merging these lists numbers them.
+//!
 //! Binary PLY of triangles, binary STL and `.npy` arrays `(n, 3, 3)` or `(n, 4, 3)` are read in chunks; any other mesh
 //! file is read whole. The positions of an indexed file (12 or 24 bytes per vertex) stay in memory while it is scattered.
 
@@ -30,13 +35,14 @@ mod plan;
 mod run;
 mod scatter;
 mod source;
+mod step;
 
 #[cfg(test)]
 mod tests;
 
 pub use cells::Cells;
 pub use error::Error;
-pub use merge::Merged;
+pub use merge::{Merged, MergedStep};
 pub use plan::{File, Plan, PlanOptions};
 pub use run::{Ask, RunOptions, TileResult};
 pub use scatter::{ScatterOptions, Scattered};

@@ -1,12 +1,14 @@
 //! Merges all results into one answer: sorted rows, their number, their hash.
 
+mod step;
+
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom, Write};
-use std::path::PathBuf;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
 
-use impinge::hash_rows;
+use impinge::{PairKind, hash_rows};
 use serde_json::json;
 
 use crate::disk;
@@ -18,12 +20,12 @@ use crate::run::TileResult;
 const STEP: &str = "tiles run";
 
 /// The answer of the whole scene.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Merged {
     /// All pairs.
     pub n_pairs: u64,
     /// The hash of all pairs: equal to [`Pairs::hash`](impinge::Pairs::hash) of the whole scene in one process, with bodies in
-    /// the order of files.
+    /// the order of files; in a step, to [`Impacts::hash`](impinge::Impacts::hash).
     pub hash: u64,
     /// Records of all tiles together: primitives, counted once per tile that they touch.
     pub n_records: u64,
@@ -31,47 +33,53 @@ pub struct Merged {
     pub n_uncut: u64,
     /// The query that all tiles answered, in words.
     pub asked: String,
-    /// The rows `file_a, primitive_a, file_b, primitive_b` (u32, sorted).
+    /// The rows `file_a, primitive_a, file_b, primitive_b` (u32, sorted); in a step, a structured array of `kind`, `body_a`,
+    /// `element_a`, `body_b`, `element_b` and `toi`, as `impinge step --impacts` writes it.
     pub rows: PathBuf,
+    /// What else is known of a step.
+    pub step: Option<MergedStep>,
+}
+
+/// The answer about a step, besides its rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MergedStep {
+    /// How many contacts there are of each kind: a vertex and a face, two edges.
+    pub kinds: [(PairKind, u64); 2],
+    /// How many touch at the start.
+    pub touching_at_start: u64,
+    /// The first contact: kind, `[file_a, element_a, file_b, element_b]`, time. Of several at the same time, the one whose row
+    /// comes first.
+    pub earliest: Option<(PairKind, [u32; 4], f64)>,
 }
 
 impl Plan {
-    /// Merges the results of all tiles into `rows.npy` and `answer.json`.
+    /// Merges the results of all tiles into `rows.npy` and `answer.json`. All contacts of a step are in memory then, about 150
+    /// bytes each.
     ///
     /// # Errors
     /// A tile whose result is missing, stale, damaged, or for another query than that of tile 0.
     pub fn merge(&self) -> Result<Merged, Error> {
         let results = self.results()?;
-        let n_pairs = results.iter().map(|result| result.n_pairs).sum();
         let path = self.folder().join("rows.npy");
-        // The blocks of rows of all tiles together take 64 MiB.
-        let block = ((64 << 20) / 16 / results.len().max(1)).clamp(256, 1 << 16);
-        let mut tiles = results
+        let hash = results
             .iter()
-            .map(|result| Rows::open(self, result, block))
-            .collect::<Result<Vec<_>, _>>()?;
-        let mut failure = None;
-        let written = disk::replace(&path, |to| {
-            to.write_all(&npy::rows_header(n_pairs))?;
-            if let Err(error) = sort_into(&mut tiles, to) {
-                failure = Some(error);
-                return Err(std::io::Error::other("a tile is damaged"));
-            }
-            Ok(())
-        });
-        if let Some(error) = failure {
-            return Err(error);
-        }
-        written?;
+            .map(|result| result.hash)
+            .fold(0, u64::wrapping_add);
+        let (hash, step) = if self.is_step() {
+            let (hash, step) = self.merge_step(&results, &path)?;
+            (hash, Some(step))
+        } else {
+            self.merge_rows(&results, &path)?;
+            (hash, None)
+        };
         let merged = Merged {
-            n_pairs,
-            hash: results
-                .iter()
-                .fold(0, |sum, result| sum.wrapping_add(result.hash)),
+            n_pairs: results.iter().map(|result| result.n_pairs).sum(),
+            hash,
             n_records: results.iter().map(|result| result.n_primitives).sum(),
             n_uncut: results.iter().filter(|result| result.n_pieces > 1).count() as u64,
             asked: results[0].ask.clone(),
             rows: path,
+            step,
         };
         let object = json!({
             "pairs": merged.n_pairs,
@@ -88,9 +96,35 @@ impl Plan {
         Ok(merged)
     }
 
+    /// Writes the rows of all tiles, sorted.
+    fn merge_rows(&self, results: &[TileResult], path: &Path) -> Result<(), Error> {
+        let of = |result: &TileResult| (self.rows_path(result.tile), result.n_pairs, result.hash);
+        let n_pairs = results.iter().map(|result| result.n_pairs).sum();
+        let mut tiles = open_all(results.iter().map(of))?;
+        let mut failure = None;
+        let written = disk::replace(path, |to| {
+            to.write_all(&npy::rows_header(n_pairs, 4))?;
+            let sorted = each_sorted(&mut tiles, |tile, row| {
+                npy::write_row(to, row)
+                    .map_err(|source| Error::io(&tile.path, "write the rows of", source))
+            });
+            sorted.map_err(|error| {
+                failure = Some(error);
+                std::io::Error::other("a tile is damaged")
+            })
+        });
+        match failure {
+            Some(error) => Err(error),
+            None => written,
+        }
+    }
+
     fn results(&self) -> Result<Vec<TileResult>, Error> {
-        let is_missing =
-            |tile: &u32| !self.result_path(*tile).exists() || !self.rows_path(*tile).exists();
+        let is_missing = |tile: &u32| {
+            let files = [self.result_path(*tile), self.rows_path(*tile)];
+            let names = self.is_step().then(|| self.names_path(*tile));
+            !files.iter().chain(&names).all(|path| path.exists())
+        };
         let missing: Vec<u32> = (0..self.n_tiles()).filter(is_missing).collect();
         if let Some(&tile) = missing.first() {
             return Err(Error::Missing {
@@ -127,9 +161,17 @@ struct Rows {
     expected_hash: u64,
 }
 
+/// Opens files of rows, each given by its path, the number of its rows and their hash.
+fn open_all(files: impl ExactSizeIterator<Item = (PathBuf, u64, u64)>) -> Result<Vec<Rows>, Error> {
+    // The blocks of rows of all tiles together take 64 MiB.
+    let block = ((64 << 20) / 16 / files.len().max(1)).clamp(256, 1 << 16);
+    files
+        .map(|(path, n, hash)| Rows::open(path, n, hash, block))
+        .collect()
+}
+
 impl Rows {
-    fn open(plan: &Plan, result: &TileResult, block: usize) -> Result<Self, Error> {
-        let path = plan.rows_path(result.tile);
+    fn open(path: PathBuf, n: u64, expected_hash: u64, block: usize) -> Result<Self, Error> {
         let damaged = |what: &str| Error::damaged(&path, what, STEP);
         let mut head = Vec::new();
         let file = File::open(&path).map_err(|source| Error::io(&path, "read", source))?;
@@ -141,20 +183,17 @@ impl Rows {
             .read_to_end(&mut head)
             .map_err(|source| Error::io(&path, "read", source))?;
         let header = npy::parse(&head).ok_or_else(|| damaged("its header is invalid"))?;
-        if header.descr != "<u4"
-            || header.shape != [result.n_pairs, 4]
-            || length != header.start + 16 * result.n_pairs
-        {
-            return Err(damaged(&format!("not {} rows", result.n_pairs)));
+        if header.descr != "<u4" || header.shape != [n, 4] || length != header.start + 16 * n {
+            return Err(damaged(&format!("not {n} rows")));
         }
         Ok(Rows {
             start: header.start,
-            n: result.n_pairs,
+            n,
             n_read: 0,
             block,
             held: Vec::new().into_iter(),
             hash: 0,
-            expected_hash: result.hash,
+            expected_hash,
             path,
         })
     }
@@ -195,8 +234,11 @@ impl Rows {
     }
 }
 
-/// Writes the rows of all tiles, ascending. A repeated row, or one out of order, means a damaged file.
-fn sort_into(tiles: &mut [Rows], to: &mut dyn Write) -> Result<(), Error> {
+/// Hands over the rows of all tiles, ascending. A repeated row, or one out of order, means a damaged file.
+fn each_sorted(
+    tiles: &mut [Rows],
+    mut each: impl FnMut(&Rows, [u32; 4]) -> Result<(), Error>,
+) -> Result<(), Error> {
     let mut heap = BinaryHeap::new();
     for (ix, tile) in tiles.iter_mut().enumerate() {
         if let Some(row) = tile.next()? {
@@ -213,8 +255,7 @@ fn sort_into(tiles: &mut [Rows], to: &mut dyn Write) -> Result<(), Error> {
             ));
         }
         last = Some(row);
-        npy::write_row(to, row)
-            .map_err(|source| Error::io(&tiles[ix].path, "write the rows of", source))?;
+        each(&tiles[ix], row)?;
         if let Some(next) = tiles[ix].next()? {
             heap.push(Reverse((next, ix)));
         }

@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use impinge_io::npy_header;
+
 /// The content of a header.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Header {
@@ -50,22 +52,13 @@ pub fn parse(head: &[u8]) -> Option<Header> {
     })
 }
 
-/// The header for `n` rows of four u32.
-pub fn rows_header(n: u64) -> Vec<u8> {
-    const PREAMBLE: usize = 10;
-    let mut header = format!("{{'descr': '<u4', 'fortran_order': False, 'shape': ({n}, 4), }}");
-    let length = (PREAMBLE + header.len() + 1).next_multiple_of(64) - PREAMBLE;
-    header.extend(std::iter::repeat_n(' ', length - 1 - header.len()));
-    header.push('\n');
-    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    // At most 128 bytes, whatever the number of rows.
-    bytes.extend(u16::try_from(length).unwrap_or(u16::MAX).to_le_bytes());
-    bytes.extend(header.into_bytes());
-    bytes
+/// The header for `n` rows of `words` u32.
+pub fn rows_header(n: u64, words: usize) -> Vec<u8> {
+    npy_header("'<u4'", &format!("({n}, {words})"))
 }
 
 /// Writes one row.
-pub fn write_row(to: &mut dyn Write, row: [u32; 4]) -> io::Result<()> {
+pub fn write_row<const N: usize>(to: &mut dyn Write, row: [u32; N]) -> io::Result<()> {
     to.write_all(row.map(u32::to_le_bytes).as_flattened())
 }
 
@@ -76,7 +69,7 @@ mod tests {
     #[test]
     fn headers_are_read_as_written() {
         for n in [0, 7, 1 << 40] {
-            let bytes = rows_header(n);
+            let bytes = rows_header(n, 4);
             let expected = Header {
                 descr: "<u4".to_owned(),
                 shape: vec![n, 4],
@@ -85,8 +78,8 @@ mod tests {
             assert_eq!(parse(&bytes), Some(expected));
             assert_eq!(bytes.len() % 64, 0);
         }
-        let fortran = String::from_utf8_lossy(&rows_header(1)[10..]).replace("False", "True ");
-        let mut bytes = rows_header(1)[..10].to_vec();
+        let fortran = String::from_utf8_lossy(&rows_header(1, 4)[10..]).replace("False", "True ");
+        let mut bytes = rows_header(1, 4)[..10].to_vec();
         bytes.extend(fortran.bytes());
         assert_eq!(parse(&bytes), None);
         assert_eq!(parse(b"\x93NUMPY\x01\x00\xff\xff{"), None);

@@ -5,9 +5,9 @@
 //! 8   u64      the plan's id
 //! 16  u32      number of the unit          20  u32  number of its file
 //! 24  u32      corners per primitive       28  u32  bytes per coordinate
-//! 32  u32      tiles                       36  u32  0
+//! 32  u32      tiles                       36  u32  1 in a step, else 0
 //! 40  per tile: u64 where its records start, u64 how many there are, u64 checksum
-//!     records: u32 primitive, u32 vertex per corner, 3 coordinates per corner
+//!     records: u32 primitive, u32 vertex per corner, 3 coordinates per corner, in a step 3 more per corner at the end
 //! ```
 //!
 //! All numbers are little-endian. A checksum covers the tile's number, the place and number of its records, and the records.
@@ -53,7 +53,7 @@ impl Plan {
             shape.corners,
             shape.width,
             self.n_tiles() as usize,
-            0,
+            shape.poses - 1,
         ] {
             header.extend((word as u32).to_le_bytes());
         }

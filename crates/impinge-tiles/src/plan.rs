@@ -20,6 +20,12 @@ const VERSION: u64 = 1;
 /// The approximate number of boxes in the sample for cuts.
 const SAMPLE: u64 = 500_000;
 
+/// The keys of the length and the checksum of a body's files: the start, and the end of a step.
+const FINGERPRINTS: [[&str; 2]; 2] = [["bytes", "checksum"], ["end_bytes", "end_checksum"]];
+
+/// The length of a file and its checksum.
+type Fingerprint = (u64, u64);
+
 /// How a plan is made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanOptions {
@@ -29,6 +35,9 @@ pub struct PlanOptions {
     pub chunk: u64,
     /// Whether vertices of one file at exactly the same position are welded; formats without shared vertices (STL) need it.
     pub weld: bool,
+    /// Whether the scene moves: a body is then two files with the same elements, its start and its end, and tiles find the
+    /// first contacts between them. Vertices are not welded.
+    pub step: bool,
     /// Cells to use instead of those that the plan would choose.
     pub cells: Option<Cells>,
     /// Whether to remove an existing plan in the folder, and all files made by it.
@@ -41,6 +50,7 @@ impl Default for PlanOptions {
             cap: 2_000_000,
             chunk: 500_000,
             weld: false,
+            step: false,
             cells: None,
             replace: false,
         }
@@ -50,16 +60,17 @@ impl Default for PlanOptions {
 /// A mesh file of a plan: one body, numbered by its place in [`Plan::files`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct File {
-    /// Its path, absolute.
+    /// Its path, absolute; in a step, that of the body's start.
     pub path: PathBuf,
+    /// In a step, the path of the body's end.
+    pub end: Option<PathBuf>,
     /// How many primitives it has.
     pub n_primitives: u64,
     /// How many vertices.
     pub n_vertices: u64,
     pub(crate) reader: String,
     pub(crate) shape: Shape,
-    length: u64,
-    checksum: u64,
+    fingerprints: Vec<Fingerprint>,
 }
 
 /// A plan in its folder.
@@ -83,7 +94,7 @@ pub(crate) struct Unit {
 }
 
 impl Plan {
-    /// Reads every primitive of `files` once (coordinates must be finite), takes a sample, cuts space and writes `plan.json`.
+    /// Reads every primitive of `files` (with [`step`](PlanOptions::step): start, end, start, end, …) once (coordinates must be finite), takes a sample, cuts space and writes `plan.json`.
     /// A folder with exactly the same plan is left as it is. `progress` gets the number of primitives done and the total.
     ///
     /// # Errors
@@ -105,17 +116,25 @@ impl Plan {
         };
         at_least_one("files", files.len() as u64)?;
         at_least_one("cap", options.cap)?;
+        if options.step && options.weld {
+            return Err(Error::Argument {
+                what: "weld",
+                given: "a step".to_owned(),
+                allowed: "only bodies that stand still".to_owned(),
+            });
+        }
         let chunk = at_least_one("chunk", options.chunk)?;
-        let mut sources = files
+        let bodies = bodies(files, options.step)?;
+        let mut sources = bodies
             .iter()
-            .map(|path| source::open(path))
+            .map(|body| body.open(source::open))
             .collect::<Result<Vec<_>, _>>()?;
         let total: u64 = sources.iter().map(|source| source.n_primitives()).sum();
         let step = (total / SAMPLE).max(1);
         let mut sample = Vec::new();
         let mut done = 0;
-        for (path, source) in files.iter().zip(&mut sources) {
-            look_at(path, source, chunk, step, cancel, &mut sample, &mut |n| {
+        for (body, source) in bodies.iter().zip(&mut sources) {
+            look_at(body, source, chunk, step, cancel, &mut sample, &mut |n| {
                 done += n;
                 progress(done.min(total), total);
             })?;
@@ -124,10 +143,10 @@ impl Plan {
             Some(cells) => cells.clone(),
             None => cuts::cells(&sample, step as f64, options.cap),
         };
-        let files = files
+        let files = bodies
             .iter()
             .zip(&sources)
-            .map(|(path, source)| file(path, source.as_ref()));
+            .map(|(body, source)| file(body, source.as_ref()));
         let mut plan = Plan {
             folder: folder.to_owned(),
             id: 0,
@@ -214,6 +233,11 @@ impl Plan {
         &self.cells
     }
 
+    /// Whether the scene moves, so that tiles find first contacts.
+    pub fn is_step(&self) -> bool {
+        self.files.iter().any(|file| file.end.is_some())
+    }
+
     /// How many tiles there are.
     pub fn n_tiles(&self) -> u32 {
         self.cells.n_tiles()
@@ -243,16 +267,22 @@ impl Plan {
     /// The plan as JSON, without the id.
     fn to_json(&self) -> Map<String, Value> {
         let file = |file: &File| {
-            json!({
+            let mut object = json!({
                 "path": file.path,
                 "reader": file.reader,
                 "corners": file.shape.corners,
                 "coordinate_bytes": file.shape.width,
                 "primitives": file.n_primitives,
                 "vertices": file.n_vertices,
-                "bytes": file.length,
-                "checksum": format!("{:016x}", file.checksum),
-            })
+            });
+            for (print, [bytes, checksum]) in file.fingerprints.iter().zip(FINGERPRINTS) {
+                object[bytes] = json!(print.0);
+                object[checksum] = json!(format!("{:016x}", print.1));
+            }
+            if let Some(end) = &file.end {
+                object["end"] = json!(end);
+            }
+            object
         };
         let mut object = Map::new();
         object.insert("impinge_tiles".to_owned(), json!(VERSION));
@@ -272,18 +302,27 @@ impl Plan {
         let number = |value: &Value, key: &str| value.get(key)?.as_u64();
         (number(value, "impinge_tiles")? == VERSION).then_some(())?;
         let file = |value: &Value| {
+            let end = match value.get("end") {
+                None => None,
+                Some(end) => Some(PathBuf::from(end.as_str()?)),
+            };
+            let poses = 1 + usize::from(end.is_some());
+            let fingerprint =
+                |[bytes, checksum]: [&str; 2]| Some((number(value, bytes)?, hex(value, checksum)?));
+            let fingerprints = FINGERPRINTS.into_iter().take(poses).map(fingerprint);
             let shape = Shape {
+                poses,
                 corners: number(value, "corners").filter(|n| [3, 4].contains(n))? as usize,
                 width: number(value, "coordinate_bytes").filter(|n| [4, 8].contains(n))? as usize,
             };
             Some(File {
                 path: value.get("path")?.as_str()?.into(),
+                end,
                 reader: value.get("reader")?.as_str()?.to_owned(),
                 shape,
                 n_primitives: number(value, "primitives")?,
                 n_vertices: number(value, "vertices")?,
-                length: number(value, "bytes")?,
-                checksum: hex(value, "checksum")?,
+                fingerprints: fingerprints.collect::<Option<_>>()?,
             })
         };
         let plan = Plan {
@@ -306,50 +345,119 @@ impl Plan {
 }
 
 impl File {
+    /// The files of its start and its end; of a body that stands still, the same file twice.
+    pub(crate) fn paths(&self) -> [&Path; 2] {
+        [&self.path, self.end.as_ref().unwrap_or(&self.path)]
+    }
+
     fn n_units(&self, chunk: u64) -> usize {
         self.n_primitives.div_ceil(chunk) as usize
     }
 
     /// Opens the file, if it has not changed since the plan was made.
     pub(crate) fn open(&self) -> Result<Box<dyn Source>, Error> {
-        let changed = || Error::Changed {
-            path: self.path.clone(),
+        let changed = |path: &Path| Error::Changed {
+            path: path.to_owned(),
         };
-        if source::fingerprint(&self.path)? != (self.length, self.checksum) {
-            return Err(changed());
+        let mut readers = self.reader.split(',');
+        let mut opened = |path: &Path| source::open_as(path, readers.next().unwrap_or_default());
+        let body = Paths {
+            start: &self.path,
+            end: self.end.as_deref(),
+        };
+        for (path, expected) in body.all().zip(&self.fingerprints) {
+            if source::fingerprint(path)? != *expected {
+                return Err(changed(path));
+            }
         }
-        let source = source::open_as(&self.path, &self.reader)?;
+        let source = body.open(&mut opened)?;
         let is_same = (source.shape(), source.n_primitives(), source.n_vertices())
             == (self.shape, self.n_primitives, self.n_vertices);
-        if is_same { Ok(source) } else { Err(changed()) }
+        if is_same {
+            Ok(source)
+        } else {
+            Err(changed(&self.path))
+        }
     }
 }
 
-fn file(path: &Path, source: &dyn Source) -> Result<File, Error> {
-    let absolute = fs::canonicalize(path).map_err(|error| Error::io(path, "open", error))?;
-    if absolute.to_str().is_none() {
+/// The files of a body.
+#[derive(Clone, Copy)]
+struct Paths<'a> {
+    start: &'a Path,
+    end: Option<&'a Path>,
+}
+
+impl Paths<'_> {
+    fn all(&self) -> impl Iterator<Item = &Path> {
+        [Some(self.start), self.end].into_iter().flatten()
+    }
+
+    fn open(
+        &self,
+        mut open: impl FnMut(&Path) -> Result<Box<dyn Source>, Error>,
+    ) -> Result<Box<dyn Source>, Error> {
+        match self.end {
+            None => open(self.start),
+            Some(end) => source::open_step([self.start, end], open),
+        }
+    }
+}
+
+/// Files by body.
+fn bodies(files: &[PathBuf], step: bool) -> Result<Vec<Paths<'_>>, Error> {
+    if !step {
+        let still = |start| Paths { start, end: None };
+        return Ok(files.iter().map(PathBuf::as_path).map(still).collect());
+    }
+    let (pairs, rest) = files.as_chunks::<2>();
+    if let [alone] = rest {
         return Err(Error::Argument {
-            what: "path of a mesh",
-            given: path.display().to_string(),
-            allowed: "UTF-8".to_owned(),
+            what: "files of a step",
+            given: format!("{} without an end", alone.display()),
+            allowed: "pairs of a start and an end".to_owned(),
         });
     }
-    let (length, checksum) = source::fingerprint(path)?;
+    let mut bodies = Vec::with_capacity(pairs.len());
+    for [start, end] in pairs {
+        bodies.push(Paths {
+            start,
+            end: Some(end),
+        });
+    }
+    Ok(bodies)
+}
+
+fn file(body: &Paths<'_>, source: &dyn Source) -> Result<File, Error> {
+    let absolute = |path: &Path| {
+        let absolute = fs::canonicalize(path).map_err(|error| Error::io(path, "open", error))?;
+        if absolute.to_str().is_none() {
+            return Err(Error::Argument {
+                what: "path of a mesh",
+                given: path.display().to_string(),
+                allowed: "UTF-8".to_owned(),
+            });
+        }
+        Ok(absolute)
+    };
     Ok(File {
-        path: absolute,
-        reader: source.reader().to_owned(),
+        path: absolute(body.start)?,
+        end: body.end.map(absolute).transpose()?,
+        reader: source.reader(),
         shape: source.shape(),
         n_primitives: source.n_primitives(),
         n_vertices: source.n_vertices(),
-        length,
-        checksum,
+        fingerprints: body
+            .all()
+            .map(source::fingerprint)
+            .collect::<Result<_, _>>()?,
     })
 }
 
 /// Checks all primitives of a file and samples every `step`th of them. If the file turns out to hold polygons other than
 /// triangles, its source is replaced by one that reads the whole file.
 fn look_at(
-    path: &Path,
+    body: &Paths<'_>,
     source: &mut Box<dyn Source>,
     chunk: u64,
     step: u64,
@@ -365,13 +473,13 @@ fn look_at(
         }
         let n = chunk.min(source.n_primitives() - first);
         let Some(held) = source.read(first, n as usize)? else {
-            *source = source::open_whole(path)?;
+            *source = body.open(source::open_whole)?;
             sample.truncate(n_before);
             first = 0;
             continue;
         };
         let shape = source.shape();
-        held.check(path, shape)?;
+        held.check([body.start, body.end.unwrap_or(body.start)], shape)?;
         let wanted = (first..)
             .zip(held.bounds(shape))
             .filter(|(ix, _)| ix % step == 0);

@@ -1,11 +1,14 @@
 //! Runs one tile: reads its primitives from all parts, finds the pairs among them, and keeps those that the tile owns.
 
 mod records;
+mod step;
+mod surfaces;
 
 use std::fs;
-use std::path::PathBuf;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 
-use impinge::{Backend, Control, Detector, Query, Settings, SharedVertex, hash_rows};
+use impinge::{Backend, Control, Detector, Query, Settings, SharedVertex, Start, Toi, hash_rows};
 use serde_json::{Value, json};
 
 use self::records::Records;
@@ -21,8 +24,12 @@ pub struct Ask {
     pub between: bool,
     /// Pairs within each file.
     pub within: bool,
-    /// How pairs of one file that share a vertex are treated.
+    /// How pairs of one file that share a vertex are treated. In a step they are always skipped.
     pub shared_vertex: SharedVertex,
+    /// In a step: what happens to pairs that touch at its start.
+    pub start: Start,
+    /// In a step: the precision to which times are rounded down.
+    pub toi: Toi,
 }
 
 impl Default for Ask {
@@ -31,21 +38,31 @@ impl Default for Ask {
             between: true,
             within: true,
             shared_vertex: SharedVertex::Skip,
+            start: Start::Report,
+            toi: Toi::F32,
         }
     }
 }
 
 impl Ask {
     /// The query in words, as in results.
-    pub fn name(self) -> &'static str {
+    pub fn name(self) -> String {
         let resolve = self.shared_vertex == SharedVertex::Resolve;
-        match (self.between, self.within, resolve) {
+        let mut name = match (self.between, self.within, resolve) {
             (true, false, _) => "between",
             (false, _, false) => "self, shared vertices skipped",
             (false, _, true) => "self, shared vertices resolved",
             (true, true, false) => "everything, shared vertices skipped",
             (true, true, true) => "everything, shared vertices resolved",
         }
+        .to_owned();
+        if self.start == Start::Skip {
+            name += ", contacts at the start skipped";
+        }
+        if self.toi == Toi::F64 {
+            name += ", times in f64";
+        }
+        name
     }
 
     fn query(self) -> Query {
@@ -76,10 +93,12 @@ pub struct TileResult {
     pub tile: u32,
     /// Primitives in it.
     pub n_primitives: u64,
-    /// Pairs that belong to it.
+    /// Pairs that belong to it; in a step, first contacts.
     pub n_pairs: u64,
-    /// The sum of the hashes of these pairs; see [`hash_rows`].
+    /// The sum of the hashes of these pairs; see [`hash_rows`]. In a step, a checksum of the rows as the tile stores them: their
+    /// edges have numbers, and the answer its hash, only after merging.
     pub hash: u64,
+    pub(crate) step: Option<OfStep>,
     /// Pairs that were found here but belong to another tile.
     pub n_elsewhere: u64,
     /// The number of pieces into which the tile was split, every piece tested against every other. It is above 1 if its
@@ -90,11 +109,27 @@ pub struct TileResult {
     pub(crate) ask: String,
 }
 
+/// What else a result of a step says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct OfStep {
+    /// The elements that the tile lists so that merging can number them, and the hash of that list.
+    pub n_names: u64,
+    pub names_hash: u64,
+    pub toi: Toi,
+}
+
 impl Plan {
     pub(crate) fn rows_path(&self, tile: u32) -> PathBuf {
         self.folder()
             .join("results")
             .join(format!("tile-{tile:08}.npy"))
+    }
+
+    /// The list of elements to number, in a step.
+    pub(crate) fn names_path(&self, tile: u32) -> PathBuf {
+        self.folder()
+            .join("results")
+            .join(format!("tile-{tile:08}-names.npy"))
     }
 
     pub(crate) fn result_path(&self, tile: u32) -> PathBuf {
@@ -103,7 +138,7 @@ impl Plan {
             .join(format!("tile-{tile:08}.json"))
     }
 
-    /// Finds the pairs of each of `tiles` and writes them, with one tile in memory at a time. Existing results for the same query
+    /// Finds the pairs of each of `tiles`, in a step the first contacts, and writes them, with one tile in memory at a time. Existing results for the same query
     /// are kept. `done` gets the result of each tile.
     ///
     /// # Errors
@@ -115,6 +150,7 @@ impl Plan {
         control: &Control<'_>,
         done: &mut dyn FnMut(&TileResult),
     ) -> Result<(), Error> {
+        self.check_ask(options.ask)?;
         let mut settings = options.settings.clone();
         if settings.backend == Backend::Auto {
             settings.backend = Backend::Cpu;
@@ -146,6 +182,27 @@ impl Plan {
         Ok(())
     }
 
+    /// Refuses options that mean nothing in this plan: they would be mistaken for obeyed.
+    fn check_ask(&self, ask: Ask) -> Result<(), Error> {
+        let refuse = |what, given: &str, allowed: &str| {
+            Err(Error::Argument {
+                what,
+                given: given.to_owned(),
+                allowed: allowed.to_owned(),
+            })
+        };
+        match self.is_step() {
+            true if ask.shared_vertex == SharedVertex::Resolve => {
+                refuse("shared_vertex", "resolve", "only skip in a plan of a step")
+            }
+            false if ask.start == Start::Skip => {
+                refuse("start", "skip", "only report without a step")
+            }
+            false if ask.toi == Toi::F64 => refuse("toi", "f64", "only f32 without a step"),
+            _ => Ok(()),
+        }
+    }
+
     /// Checks that every part exists: otherwise no tile is complete.
     fn check_parts(&self) -> Result<(), Error> {
         let missing: Vec<usize> = (0..self.n_units())
@@ -173,27 +230,19 @@ impl Plan {
         for (unit_ix, unit) in self.units().enumerate() {
             records.add(self.read_segment(unit_ix, unit, tile)?);
         }
+        if self.is_step() {
+            return self.run_step_tile(tile, &records, ask, detector, control);
+        }
         let n = records.len();
-        // The plan aims at `cap` primitives per tile; a tile has more than twice that only if no cut was worth its copies.
-        let piece = if n as u64 > 2 * self.cap {
-            self.cap as usize
-        } else {
-            n.max(1)
-        };
-        let n_pieces = n.div_ceil(piece).max(1);
-        let bounds = |ix: usize| ix * piece..((ix + 1) * piece).min(n);
+        let pieces = self.pieces(n);
         let (mut rows, mut n_elsewhere) = (Vec::new(), 0);
         let refused = |source| match source {
             impinge::Error::Cancelled => Error::Cancelled,
             source => Error::Detection { tile, source },
         };
-        for a in 0..n_pieces {
-            for b in a..n_pieces {
-                let ranges = if a == b {
-                    vec![bounds(a)]
-                } else {
-                    vec![bounds(a), bounds(b)]
-                };
+        for (ix, a) in pieces.iter().enumerate() {
+            for b in &pieces[ix..] {
+                let ranges = both(a, b);
                 let part = records.scene(&ranges, self.weld).map_err(refused)?;
                 let query = ask.query();
                 let pairs = detector
@@ -203,7 +252,7 @@ impl Plan {
                     let (first, second) =
                         (part.record(row[0], row[1]), part.record(row[2], row[3]));
                     // For two pieces, only pairs between them count: each piece was tested by itself before.
-                    if a != b && (first / piece == second / piece) {
+                    if a != b && a.contains(&first) == a.contains(&second) {
                         continue;
                     }
                     if self.cells.owner(records.owner_point(first, second)) == tile {
@@ -214,7 +263,7 @@ impl Plan {
                 }
             }
         }
-        if n_pieces > 1 {
+        if pieces.len() > 1 {
             rows.sort_unstable();
         }
         let result = TileResult {
@@ -222,26 +271,43 @@ impl Plan {
             n_primitives: n as u64,
             n_pairs: rows.len() as u64,
             hash: hash_rows(rows.iter().copied()),
+            step: None,
             n_elsewhere,
-            n_pieces: n_pieces as u64,
+            n_pieces: pieces.len() as u64,
             was_kept: false,
-            ask: ask.name().to_owned(),
+            ask: ask.name(),
         };
-        self.write_result(&result, &rows)?;
+        self.remove_result(tile)?;
+        write_rows(&self.rows_path(tile), &rows)?;
+        self.write_result(&result)?;
         Ok(result)
     }
 
-    /// Removes an older result, then writes the rows, then the result that names them.
-    fn write_result(&self, result: &TileResult, rows: &[[u32; 4]]) -> Result<(), Error> {
-        let path = self.result_path(result.tile);
+    /// Cuts the numbers of a tile's primitives into pieces. The plan aims at `cap` primitives per tile; a tile has more than
+    /// twice that only if no cut was worth its copies.
+    fn pieces(&self, n: usize) -> Vec<Range<usize>> {
+        let piece = if n as u64 > 2 * self.cap {
+            self.cap as usize
+        } else {
+            n.max(1)
+        };
+        let n_pieces = n.div_ceil(piece).max(1);
+        (0..n_pieces)
+            .map(|ix| ix * piece..((ix + 1) * piece).min(n))
+            .collect()
+    }
+
+    /// Removes an older result, so that none names rows of another run. Rows are written next, then the result that names them.
+    fn remove_result(&self, tile: u32) -> Result<(), Error> {
+        let path = self.result_path(tile);
         if path.exists() {
             fs::remove_file(&path).map_err(|source| Error::io(&path, "remove", source))?;
         }
-        disk::replace(&self.rows_path(result.tile), |to| {
-            to.write_all(&npy::rows_header(rows.len() as u64))?;
-            rows.iter().try_for_each(|&row| npy::write_row(to, row))
-        })?;
-        let object = json!({
+        Ok(())
+    }
+
+    fn write_result(&self, result: &TileResult) -> Result<(), Error> {
+        let mut object = json!({
             "plan": format!("{:016x}", self.id()),
             "tile": result.tile,
             "asked": result.ask,
@@ -251,7 +317,14 @@ impl Plan {
             "elsewhere": result.n_elsewhere,
             "pieces": result.n_pieces,
         });
-        disk::replace(&path, |to| writeln!(to, "{object}"))
+        if let Some(step) = result.step {
+            object["names"] = json!(step.n_names);
+            object["names_hash"] = json!(format!("{:016x}", step.names_hash));
+            object["toi_bytes"] = json!(if step.toi == Toi::F64 { 8 } else { 4 });
+        }
+        disk::replace(&self.result_path(result.tile), |to| {
+            writeln!(to, "{object}")
+        })
     }
 
     /// The result of a tile, if it exists and belongs to this plan.
@@ -268,6 +341,18 @@ impl Plan {
                 n_primitives: number("primitives")?,
                 n_pairs: number("pairs")?,
                 hash: hex("hash")?,
+                step: match value.get("names") {
+                    None => None,
+                    Some(n) => Some(OfStep {
+                        n_names: n.as_u64()?,
+                        names_hash: hex("names_hash")?,
+                        toi: match number("toi_bytes")? {
+                            4 => Toi::F32,
+                            8 => Toi::F64,
+                            _ => return None,
+                        },
+                    }),
+                },
                 n_elsewhere: number("elsewhere")?,
                 n_pieces: number("pieces")?,
                 was_kept: false,
@@ -281,4 +366,19 @@ impl Plan {
             Some((_, result)) => Ok(result),
         }
     }
+}
+
+/// The primitives of two pieces, which may be the same one.
+fn both(a: &Range<usize>, b: &Range<usize>) -> Vec<Range<usize>> {
+    match a == b {
+        true => vec![a.clone()],
+        false => vec![a.clone(), b.clone()],
+    }
+}
+
+fn write_rows<const N: usize>(path: &Path, rows: &[[u32; N]]) -> Result<(), Error> {
+    disk::replace(path, |to| {
+        to.write_all(&npy::rows_header(rows.len() as u64, N))?;
+        rows.iter().try_for_each(|&row| npy::write_row(to, row))
+    })
 }

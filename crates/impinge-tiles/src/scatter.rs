@@ -150,12 +150,14 @@ impl Plan {
         unit: Unit,
         source: &dyn Source,
     ) -> Result<u64, Error> {
-        let path = &self.files[unit.file].path;
+        let paths = self.files[unit.file].paths();
         let chunk = source.read(unit.first, unit.n)?;
         // When the plan was made, all faces were triangles.
-        let chunk = chunk.ok_or_else(|| Error::Changed { path: path.clone() })?;
+        let chunk = chunk.ok_or_else(|| Error::Changed {
+            path: paths[0].to_owned(),
+        })?;
         // The plan has checked the coordinates, but the file may have changed: a box with NaN would lie in no tile.
-        chunk.check(path, source.shape())?;
+        chunk.check(paths, source.shape())?;
         self.write_part(unit_ix, unit.file, &chunk)
     }
 }

@@ -3,6 +3,7 @@
 //! Binary PLY of triangles, binary STL and `.npy` arrays have primitives of equal length on disk, so any run of them can be read
 //! separately. All other formats of `impinge-io` are held in memory as a whole.
 
+mod moving;
 mod npy;
 mod ply;
 mod stl;
@@ -18,8 +19,8 @@ use crate::hash::checksum;
 
 /// A mesh file that several threads can read at a time, in runs of primitives.
 pub trait Source: Send + Sync {
-    /// `ply`, `stl`, `npy` or `whole`.
-    fn reader(&self) -> &'static str;
+    /// `ply`, `stl`, `npy` or `whole`; of a step, those of its start and its end with a comma between them.
+    fn reader(&self) -> String;
     /// The kind of its primitives.
     fn shape(&self) -> Shape;
     /// How many primitives there are.
@@ -54,6 +55,16 @@ pub fn open(path: &Path) -> Result<Box<dyn Source>, Error> {
 /// Opens a mesh file and reads all of it.
 pub fn open_whole(path: &Path) -> Result<Box<dyn Source>, Error> {
     Ok(Box::new(whole::Whole::open(path)?))
+}
+
+/// Opens the start and the end of a body as one file of which each vertex has two positions.
+pub fn open_step(
+    paths: [&Path; 2],
+    mut open: impl FnMut(&Path) -> Result<Box<dyn Source>, Error>,
+) -> Result<Box<dyn Source>, Error> {
+    let [start, end] = paths;
+    let moving = moving::Moving::new(paths, [open(start)?, open(end)?])?;
+    Ok(Box::new(moving))
 }
 
 /// Opens a file with the reader that a plan names.

@@ -3,4 +3,5 @@
 mod lattice;
 mod made;
 mod refusals;
+mod steps;
 mod stops;

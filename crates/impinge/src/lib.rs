@@ -89,7 +89,7 @@ pub use impinge_core::{
     Control, Detector, Elements, Error, Filter, Impact, Impacts, InstructionSet, Kind, Method,
     NearPair, NearPairs, NearQuery, PairKind, PairKinds, Pairs, Part, Positions, Primitive,
     Progress, Query, Real, Recluster, Scene, Settings, SharedVertex, Stage, Start, Statistics,
-    Step, Toi, hash_rows,
+    Step, Toi, hash_impact_rows, hash_rows,
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{DeviceInfo, ResidentPairs, devices, devices_async};

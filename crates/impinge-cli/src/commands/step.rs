@@ -22,6 +22,7 @@ use crate::values::RowsFile;
 use crate::watch::Watch;
 
 use answer::Found;
+pub use answer::impact_row;
 pub use frames::{Frames, steps_of_sequence};
 use load::Moving;
 

@@ -5,11 +5,12 @@ mod args;
 use std::io::Write;
 
 use impinge::{Backend, CancelToken, Control, Settings};
-use impinge_tiles::{Ask, Plan, PlanOptions, RunOptions, ScatterOptions, TileResult};
+use impinge_tiles::{Ask, MergedStep, Plan, PlanOptions, RunOptions, ScatterOptions, TileResult};
 use serde_json::{Value, json};
 
 use self::args::{MergeArgs, PlanArgs, RunArgs, ScatterArgs, TilesCommand};
 pub use self::args::{TILES_EXAMPLES, TilesArgs};
+use super::step::impact_row;
 use crate::error::Error;
 use crate::output::out;
 use crate::text::{counted, grouped};
@@ -43,6 +44,7 @@ fn plan(args: &PlanArgs, cancel: &CancelToken) -> Result<(), Error> {
         cap: args.cap,
         chunk: args.chunk,
         weld: args.weld,
+        step: args.step,
         cells: None,
         replace: args.replace,
     };
@@ -61,6 +63,7 @@ fn plan(args: &PlanArgs, cancel: &CancelToken) -> Result<(), Error> {
     let object = json!({
         "plan": hex(plan.id()),
         "files": plan.files().len(),
+        "step": plan.is_step(),
         "primitives": n,
         "tiles": plan.n_tiles(),
         "units": plan.n_units(),
@@ -68,7 +71,14 @@ fn plan(args: &PlanArgs, cancel: &CancelToken) -> Result<(), Error> {
     let text = format!(
         "{} of {} in {}; {} to scatter",
         counted(n, "primitive"),
-        counted(plan.files().len() as u64, "file"),
+        counted(
+            plan.files().len() as u64,
+            if plan.is_step() {
+                "moving body"
+            } else {
+                "file"
+            }
+        ),
         counted(u64::from(plan.n_tiles()), "tile"),
         counted(plan.n_units() as u64, "unit"),
     );
@@ -124,6 +134,8 @@ fn run(args: &RunArgs, cancel: &CancelToken) -> Result<(), Error> {
             between: !args.within,
             within: !args.between,
             shared_vertex: args.shared_vertex.into(),
+            start: args.start.into(),
+            toi: args.toi.into(),
         },
         settings: Settings {
             backend: Backend::Cpu,
@@ -196,7 +208,7 @@ fn merge(args: &MergeArgs) -> Result<(), Error> {
         .iter()
         .map(|file| file.path.display().to_string())
         .collect();
-    let object = json!({
+    let mut object = json!({
         "pairs": merged.n_pairs,
         "hash": hex(merged.hash),
         "asked": merged.asked,
@@ -206,12 +218,40 @@ fn merge(args: &MergeArgs) -> Result<(), Error> {
         "rows": merged.rows.display().to_string(),
         "files": files,
     });
+    let mut found = counted(merged.n_pairs, "pair");
+    if let Some(step) = &merged.step {
+        object["step"] = of_step(step);
+        let kinds = step
+            .kinds
+            .map(|(kind, n)| format!("{} {}", grouped(n), kind.name()));
+        found = format!(
+            "{} ({}), {} touching at the start",
+            counted(merged.n_pairs, "impact"),
+            kinds.join(", "),
+            grouped(step.touching_at_start),
+        );
+    }
     let text = format!(
-        "{}, hash {} ({}); rows in {}",
-        counted(merged.n_pairs, "pair"),
+        "{found}, hash {} ({}); rows in {}",
         hex(merged.hash),
         merged.asked,
         merged.rows.display(),
     );
     print(args.json, &object, &text)
+}
+
+/// What `impinge step --json` says too, under the same keys.
+fn of_step(step: &MergedStep) -> Value {
+    let kinds = step
+        .kinds
+        .map(|(kind, n)| (kind.name().to_owned(), Value::from(n)));
+    let earliest = step
+        .earliest
+        .map(|(kind, row, toi)| impact_row(kind, row, toi));
+    json!({
+        "free": earliest.is_none(),
+        "earliest": earliest,
+        "kinds": Value::Object(kinds.into_iter().collect()),
+        "touching_at_start": step.touching_at_start,
+    })
 }

@@ -79,6 +79,69 @@ fn steps_give_the_answer_of_the_whole() {
 }
 
 #[test]
+fn a_step_gives_the_impacts_of_the_whole() {
+    let folder = Folder::new();
+    let models: [Model; 2] = [
+        soup::triangles(1_500, 0.08, 7),
+        soup::triangles(900, 0.1, 8),
+    ];
+    let mut files = Vec::new();
+    for (ix, model) in models.iter().enumerate() {
+        // Each vertex moves a little towards a vertex of another soup.
+        let other = soup::triangles(model.n_primitives(), 0.08, 20 + ix as u64);
+        let mut end = model.clone();
+        for (at, to) in end.positions.iter_mut().zip(&other.positions) {
+            *at = std::array::from_fn(|axis| at[axis] + (to[axis] - at[axis]) / 16.0);
+        }
+        for (pose, model) in [model, &end].into_iter().enumerate() {
+            files.push(format!("body{ix}-{pose}.ply"));
+            folder.ply(&files[files.len() - 1], model);
+        }
+    }
+    let files: Vec<&str> = files.iter().map(String::as_str).collect();
+    let expected = folder
+        .run([&["step"], &files[..], &["--json", "--impacts", "whole.npy"]].concat())
+        .json();
+    let plan = [
+        &["tiles", "plan", "big", "--step", "--cap", "300", "--json"],
+        &files[..],
+    ]
+    .concat();
+    let plan = folder.run(plan).json();
+    assert!(
+        plan["tiles"].as_u64().unwrap() > 5 && plan["step"] == true,
+        "{plan}"
+    );
+    for step in ["scatter", "run"] {
+        folder.run(["tiles", step, "big"]).printed();
+    }
+    let text = folder.run(["tiles", "merge", "big"]).printed();
+    let n = |kind: &str| expected["kinds"][kind].as_u64().unwrap();
+    assert!(n("vf") > 100 && n("ee") > 300, "{expected}");
+    assert!(
+        text.contains(" vf, ") && text.contains("touching at the start"),
+        "{text}"
+    );
+    let merged = folder.run(["tiles", "merge", "big", "--json"]).json();
+    assert_eq!(
+        (&merged["pairs"], &merged["hash"]),
+        (&expected["impacts"], &expected["hash"])
+    );
+    for key in ["free", "earliest", "touching_at_start"] {
+        assert_eq!(merged["step"][key], expected[key], "{key}");
+    }
+    let kinds = merged["step"]["kinds"].as_object().unwrap();
+    assert!(kinds.iter().all(|(kind, n)| expected["kinds"][kind] == *n));
+    let read = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    assert_eq!(read("big/rows.npy"), read("whole.npy"));
+    // Options that a plan without a step does not have are refused, and so is a body without an end.
+    let alone = folder.run(["tiles", "plan", "odd", "--step", files[0]]);
+    assert!(alone.misuse().contains("body0-0.ply without an end"));
+    let resolve = folder.run(["tiles", "run", "big", "--shared-vertex", "resolve"]);
+    assert!(resolve.misuse().contains("only skip in a plan of a step"));
+}
+
+#[test]
 fn questions_are_chosen() {
     let folder = bodies();
     plan(&folder);

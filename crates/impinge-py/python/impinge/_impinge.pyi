@@ -532,6 +532,7 @@ def _tiles_plan(
     cap: int,
     chunk: int,
     weld: bool,
+    step: bool,
     replace: bool,
     progress: _Progress | None,
 ) -> dict[str, Any]: ...
@@ -545,6 +546,8 @@ def _tiles_run(
     between: bool,
     within: bool,
     shared_vertex: str,
+    start: str,
+    toi: str,
     threads: int,
     memory_budget: int | None,
     again: bool,

@@ -107,6 +107,8 @@ def tiles(
     between: bool = True,
     within: bool = True,
     shared_vertex: Literal["skip", "resolve"] = "skip",
+    start: Literal["report", "skip"] = "report",
+    toi: Literal["f32", "f64"] = "f32",
     memory_budget: int | None = None,
     max_in_flight: int | None = None,
     max_retries: int = 3,
@@ -120,7 +122,7 @@ def tiles(
     ----------
     folder : path
         Seen by all machines under this path.
-    between, within, shared_vertex, memory_budget
+    between, within, shared_vertex, start, toi, memory_budget
         As for `impinge.tiles.run`.
     max_in_flight, max_retries
         As for `check`.
@@ -157,6 +159,8 @@ def tiles(
             between=between,
             within=within,
             shared_vertex=shared_vertex,
+            start=start,
+            toi=toi,
             threads=1,
             memory_budget=memory_budget,
         )

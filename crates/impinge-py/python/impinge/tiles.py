@@ -30,6 +30,7 @@ def plan(
     cap: int = 2_000_000,
     chunk: int = 500_000,
     weld: bool = False,
+    step: bool = False,
     replace: bool = False,
     progress: _Progress | None = None,
 ) -> dict[str, Any]:
@@ -40,13 +41,16 @@ def plan(
     folder : path
         Made if it is not there. One with the very same plan is left as it is.
     files : iterable of paths
-        Mesh files, a body each, numbered in this order.
+        Mesh files, a body each, numbered in this order. With `step`, two files per body: its start and its end.
     cap : int
         About how many primitives a tile may hold; one tile is in memory at a time.
     chunk : int
         Primitives per unit of scattering.
     weld : bool
         Whether vertices of one file at exactly the same position become one.
+    step : bool
+        Whether bodies move from a start to an end. Tiles then find the first contacts, as `Detector.impacts` does. Vertices
+        are not welded.
     replace : bool
         Whether another plan in the folder, and all that was made by it, is removed.
     progress : callable, optional
@@ -63,7 +67,7 @@ def plan(
         Files that cannot be read, coordinates that are refused, another plan in the folder.
     """
     names = [os.fspath(file) for file in files]
-    return _impinge._tiles_plan(os.fspath(folder), names, cap, chunk, weld, replace, progress)
+    return _impinge._tiles_plan(os.fspath(folder), names, cap, chunk, weld, step, replace, progress)
 
 
 def describe(folder: _Path) -> dict[str, Any]:
@@ -72,7 +76,7 @@ def describe(folder: _Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``plan`` (its name), ``files``, ``primitives``, ``tiles``, ``units``.
+        ``plan`` (its name), ``files``, ``step`` (whether bodies move), ``primitives``, ``tiles``, ``units``.
     """
     return _impinge._tiles_describe(os.fspath(folder))
 
@@ -118,6 +122,8 @@ def run(
     between: bool = True,
     within: bool = True,
     shared_vertex: Literal["skip", "resolve"] = "skip",
+    start: Literal["report", "skip"] = "report",
+    toi: Literal["f32", "f64"] = "f32",
     threads: int = 0,
     memory_budget: int | None = None,
     again: bool = False,
@@ -134,7 +140,9 @@ def run(
     between, within : bool
         Pairs of different files, pairs within each file. All tiles must be asked the same.
     shared_vertex : {"skip", "resolve"}
-        As for `Detector.detect`.
+        As for `Detector.detect`. In a step they are always skipped.
+    start, toi
+        In a step, as for `Detector.impacts`.
     threads : int
         Threads; 0 for one per core.
     memory_budget : int, optional
@@ -166,7 +174,7 @@ def run(
         if progress is not None:
             progress(n_done, len(numbers))
 
-    arguments = (between, within, shared_vertex, threads, memory_budget, again, done)
+    arguments = (between, within, shared_vertex, start, toi, threads, memory_budget, again, done)
     return _impinge._tiles_run(os.fspath(folder), numbers, *arguments)
 
 
@@ -177,7 +185,8 @@ def merge(folder: _Path) -> dict[str, Any]:
     -------
     dict
         ``pairs``, ``hash`` (as `Result.hash` in 16 hexadecimal digits), ``asked``, ``tiles``, ``records``, ``uncut_tiles``,
-        ``rows`` (the path of the rows).
+        ``rows`` (the path of the rows). In a step also ``kinds`` (how many of each), ``touching_at_start`` and ``earliest``:
+        ``(kind, (body_a, element_a, body_b, element_b), toi)`` or None.
 
     Raises
     ------
@@ -187,13 +196,14 @@ def merge(folder: _Path) -> dict[str, Any]:
     return _impinge._tiles_merge(os.fspath(folder))
 
 
-def rows(folder: _Path) -> npt.NDArray[np.uint32]:
+def rows(folder: _Path) -> npt.NDArray[Any]:
     """The merged answer, mapped from its file: it may be larger than memory.
 
     Returns
     -------
     numpy.ndarray of uint32, shape (n, 4)
-        As `Result.rows`, with bodies numbered by the order of files.
+        As `Result.rows`, with bodies numbered by the order of files. In a step a structured array of shape (n,) with the fields
+        ``kind``, ``body_a``, ``element_a``, ``body_b``, ``element_b`` and ``toi``.
     """
-    mapped: npt.NDArray[np.uint32] = np.load(os.path.join(folder, "rows.npy"), mmap_mode="r")
+    mapped: npt.NDArray[Any] = np.load(os.path.join(folder, "rows.npy"), mmap_mode="r")
     return mapped

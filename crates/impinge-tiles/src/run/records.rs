@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use impinge::{Elements, Positions, Scene};
 
+use super::surfaces::{Surface, Surfaces};
 use crate::cells::owner_point;
 use crate::chunk::{Record, Shape};
 use crate::parts::Segment;
@@ -98,6 +99,32 @@ impl Records {
         };
         let (a, b) = (named(a), named(b));
         [a.0, a.1, b.0, b.1]
+    }
+
+    /// The surfaces of the files that have any record, for a step.
+    ///
+    /// # Errors
+    /// As adding these primitives to a scene.
+    pub fn surfaces(&self) -> Result<Surfaces, impinge::Error> {
+        let surfaces = self.files.iter().map(|held| {
+            let Shape { corners, width, .. } = held.shape;
+            let records = || (0..held.len()).map(|ix| held.record(ix));
+            let points =
+                || records().flat_map(move |record| (0..corners).map(move |c| (record, c)));
+            let (numbers, firsts) = dense(points().map(|(record, c)| record.vertex(c)));
+            let all: Vec<(Record<'_>, usize)> = points().collect();
+            let vertices = || firsts.iter().map(|&ix| all[ix as usize]);
+            let positions =
+                vertices().map(|(record, c)| [record.position(c), record.position(corners + c)]);
+            let named = vertices().map(|(record, c)| record.vertex(c));
+            let surface = Surface::new(held.file, width, named.collect(), positions.collect());
+            let names = records().map(|record| record.primitive());
+            match corners {
+                3 => Ok(surface.of_triangles(numbers.as_chunks().0, names)),
+                _ => surface.of_tetrahedra(numbers.as_chunks().0, names.collect()),
+            }
+        });
+        Ok(Surfaces(surfaces.collect::<Result<_, _>>()?))
     }
 
     /// A scene of the records in `ranges` (ascending), with one body per file that has any. Vertices are numbered densely.

@@ -43,15 +43,19 @@ impl Npy {
         Ok(Npy {
             path: path.to_owned(),
             start: header.start,
-            shape: Shape { corners, width },
+            shape: Shape {
+                corners,
+                width,
+                poses: 1,
+            },
             n,
         })
     }
 }
 
 impl Source for Npy {
-    fn reader(&self) -> &'static str {
-        "npy"
+    fn reader(&self) -> String {
+        "npy".to_owned()
     }
 
     fn shape(&self) -> Shape {
@@ -67,7 +71,7 @@ impl Source for Npy {
     }
 
     fn read(&self, first: u64, n: usize) -> Result<Option<Chunk>, Error> {
-        let Shape { corners, width } = self.shape;
+        let Shape { corners, width, .. } = self.shape;
         let stride = 3 * corners * width;
         let bytes = read_at(&self.path, self.start + first * stride as u64, n * stride)?;
         let positions = bytes.chunks_exact(3 * width).map(|point| -> [f64; 3] {

@@ -92,8 +92,8 @@ fn positions(path: &Path, layout: &Layout) -> Result<Positions, Error> {
 }
 
 impl Source for Ply {
-    fn reader(&self) -> &'static str {
-        "ply"
+    fn reader(&self) -> String {
+        "ply".to_owned()
     }
 
     fn shape(&self) -> Shape {
@@ -103,6 +103,7 @@ impl Source for Ply {
                 Positions::F32(_) => 4,
                 Positions::F64(_) => 8,
             },
+            poses: 1,
         }
     }
 

@@ -34,14 +34,15 @@ impl Stl {
 }
 
 impl Source for Stl {
-    fn reader(&self) -> &'static str {
-        "stl"
+    fn reader(&self) -> String {
+        "stl".to_owned()
     }
 
     fn shape(&self) -> Shape {
         Shape {
             corners: 3,
             width: 4,
+            poses: 1,
         }
     }
 

@@ -22,8 +22,8 @@ impl Whole {
 }
 
 impl Source for Whole {
-    fn reader(&self) -> &'static str {
-        "whole"
+    fn reader(&self) -> String {
+        "whole".to_owned()
     }
 
     fn shape(&self) -> Shape {
@@ -36,6 +36,7 @@ impl Source for Whole {
                 Positions::F32(_) => 4,
                 Positions::F64(_) => 8,
             },
+            poses: 1,
         }
     }
 

@@ -35,6 +35,7 @@ fn tiles_have_the_rows_of_the_whole() {
             between,
             within,
             shared_vertex,
+            ..Ask::default()
         };
         let cuts = cells(&mut random, if is_f64 { 1.0 / 3.0 } else { 0.25 });
         let options = PlanOptions {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use impinge::{CancelToken, Control, Detector, Method, Scene, Settings};
+use impinge::{CancelToken, Control, Detector, Impacts, Method, Query, Scene, Settings, Step};
 use impinge_io::{ColoredMesh, Elements, Mesh, Positions, write_ply};
 
 use crate::{Ask, Cells, Merged, Plan, PlanOptions, RunOptions, ScatterOptions};
@@ -78,6 +78,28 @@ pub fn lattice(random: &mut Random, n: usize, is_solid: bool, is_f64: bool) -> M
     }
 }
 
+/// The same mesh with most of its vertices elsewhere on the lattice, a few of them far away.
+pub fn moved(random: &mut Random, mesh: &Mesh) -> Mesh {
+    let unit = match mesh.positions {
+        Positions::F32(_) => 0.25,
+        Positions::F64(_) => 1.0 / 3.0,
+    };
+    let mut step = |x: f64| {
+        let reach = if random.chance(16) { 9 } else { 3 };
+        // The product is a lattice coordinate whatever the order of rounding: `x` is one.
+        ((x / unit).round() + f64::from(random.below(reach)) - f64::from(reach / 2)) * unit
+    };
+    let positions = mesh.positions.to_f64();
+    let ends: Vec<[f64; 3]> = positions.iter().map(|p| p.map(&mut step)).collect();
+    Mesh {
+        elements: mesh.elements.clone(),
+        positions: match mesh.positions {
+            Positions::F32(_) => Positions::F32(ends.iter().map(|p| p.map(|x| x as f32)).collect()),
+            Positions::F64(_) => Positions::F64(ends),
+        },
+    }
+}
+
 /// Writes a mesh in a format that preserves it: PLY for triangles, Medit for tetrahedra.
 pub fn write(folder: &Path, name: &str, mesh: &Mesh) -> PathBuf {
     match &mesh.elements {
@@ -112,35 +134,60 @@ pub fn write(folder: &Path, name: &str, mesh: &Mesh) -> PathBuf {
     }
 }
 
-/// Rows and hash of the oracle: every box against every box.
-pub fn oracle(meshes: &[Mesh], ask: Ask) -> (Vec<[u32; 4]>, u64) {
-    let mut scene = Scene::new();
-    for mesh in meshes {
-        let elements: impinge::Elements = match mesh.elements.clone() {
-            Elements::Triangles(faces) => faces.into(),
-            Elements::Tetrahedra(tets) => tets.into(),
-        };
-        let positions: impinge::Positions = match mesh.positions.clone() {
-            Positions::F32(positions) => positions.into(),
-            Positions::F64(positions) => positions.into(),
-        };
-        scene.add(elements, positions).unwrap();
-    }
-    let mut detector = Detector::with_settings(Settings {
+fn add(scene: &mut Scene, mesh: &Mesh) -> impinge::BodyId {
+    let elements: impinge::Elements = match mesh.elements.clone() {
+        Elements::Triangles(faces) => faces.into(),
+        Elements::Tetrahedra(tets) => tets.into(),
+    };
+    let positions: impinge::Positions = match mesh.positions.clone() {
+        Positions::F32(positions) => positions.into(),
+        Positions::F64(positions) => positions.into(),
+    };
+    scene.add(elements, positions).unwrap()
+}
+
+/// Every box against every box.
+fn naive() -> Detector {
+    Detector::with_settings(Settings {
         method: Method::Naive,
         threads: 1,
         ..Settings::default()
     })
-    .unwrap();
-    let query = match (ask.between, ask.within) {
-        (true, true) => impinge::Query::everything(),
-        (true, false) => impinge::Query::all(),
-        _ => impinge::Query::all_within(),
-    };
-    let pairs = detector
-        .detect(&scene, &query.shared_vertex(ask.shared_vertex))
-        .unwrap();
+    .unwrap()
+}
+
+fn query(ask: Ask) -> Query {
+    match (ask.between, ask.within) {
+        (true, true) => Query::everything(),
+        (true, false) => Query::all(),
+        _ => Query::all_within(),
+    }
+}
+
+/// Rows and hash of the oracle.
+pub fn oracle(meshes: &[Mesh], ask: Ask) -> (Vec<[u32; 4]>, u64) {
+    let mut scene = Scene::new();
+    for mesh in meshes {
+        add(&mut scene, mesh);
+    }
+    let query = query(ask).shared_vertex(ask.shared_vertex);
+    let mut detector = naive();
+    let pairs = detector.detect(&scene, &query).unwrap();
     (pairs.rows().collect(), pairs.hash())
+}
+
+/// What the oracle finds while bodies move from their first mesh to their second.
+pub fn step_oracle(bodies: &[[Mesh; 2]], ask: Ask) -> Impacts {
+    let mut scene = Scene::new();
+    for [start, end] in bodies {
+        let id = add(&mut scene, start);
+        match &end.positions {
+            Positions::F32(end) => scene.set_end_positions(id, end).unwrap(),
+            Positions::F64(end) => scene.set_end_positions(id, end).unwrap(),
+        }
+    }
+    let step = Step::new(query(ask)).start(ask.start).toi(ask.toi);
+    naive().impacts(&scene, &step).unwrap().clone()
 }
 
 pub fn one_thread() -> Settings {

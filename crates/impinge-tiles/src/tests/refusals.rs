@@ -212,13 +212,14 @@ fn a_mesh_that_changes_is_noticed() {
 struct Liar;
 
 impl Source for Liar {
-    fn reader(&self) -> &'static str {
-        "ply"
+    fn reader(&self) -> String {
+        "ply".to_owned()
     }
     fn shape(&self) -> Shape {
         Shape {
             corners: 3,
             width: 4,
+            poses: 1,
         }
     }
     fn n_primitives(&self) -> u64 {

@@ -4,12 +4,11 @@ use std::io::{self, BufWriter, Write};
 
 use impinge::exact::Feature;
 use impinge::{NearPair, NearPairs};
-use impinge_io::AtomicFile;
+use impinge_io::{AtomicFile, npy_header};
 use serde_json::json;
 
 use crate::error::Error;
 use crate::output::out;
-use crate::rows::npy_header;
 use crate::values::{RowsFile, RowsFormat};
 
 /// Characters of the longest type, `EA0_EB1`.

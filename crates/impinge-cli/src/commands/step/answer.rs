@@ -170,10 +170,14 @@ fn element(kind: PairKind, number: u32, is_first: bool) -> String {
 
 /// An impact as a JSON object.
 pub fn impact(impact: Impact) -> Value {
-    let [body_a, a, body_b, b] = impact.row();
+    impact_row(impact.kind, impact.row(), impact.toi)
+}
+
+/// The same of an impact given by its row.
+pub fn impact_row(kind: PairKind, [body_a, a, body_b, b]: [u32; 4], toi: f64) -> Value {
     json!({
-        "toi": impact.toi,
-        "kind": impact.kind.name(),
+        "toi": toi,
+        "kind": kind.name(),
         "body_a": body_a,
         "element_a": a,
         "body_b": body_b,

@@ -3,12 +3,11 @@
 use std::io::{self, BufWriter, Write};
 
 use impinge::{Impact, Impacts};
-use impinge_io::AtomicFile;
+use impinge_io::{AtomicFile, npy_header};
 
 use crate::args::ToiArg;
 use crate::error::Error;
 use crate::output::out;
-use crate::rows::npy_header;
 use crate::values::{RowsFile, RowsFormat};
 
 /// Writes rows `kind, body_a, element_a, body_b, element_b, toi`, sorted.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use crate::args::{MethodArg, SharedVertexArg};
+use crate::args::{MethodArg, SharedVertexArg, StartArg, ToiArg};
 use crate::values::{bytes, count};
 
 /// Shown below the help.
@@ -16,6 +16,7 @@ Examples:
   impinge tiles run big --self
   impinge tiles merge big --json                                     pairs and hash of the whole
   impinge tiles run big --rank $SLURM_ARRAY_TASK_ID --world-size 64  one of 64 processes
+  impinge tiles plan big a0.ply a1.ply b0.ply b1.ply --step          bodies that move: start, end, ...
 
 Space is cut into tiles of about --cap primitives each. Steps communicate only through the folder.
 Many processes, on any machine that sees the folder, may run a step. A killed step can be run again
@@ -58,9 +59,12 @@ pub struct PlanArgs {
     /// A folder for the plan and all later files
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// Mesh files, one per body
+    /// Mesh files, one per body; with --step two per body, its start and its end
     #[arg(value_name = "MESH", required = true)]
     pub meshes: Vec<PathBuf>,
+    /// Plan a step: tiles then find what touches while bodies move from start to end, and when first
+    #[arg(long, conflicts_with = "weld")]
+    pub step: bool,
     /// About how many primitives a tile may hold, such as 500k or 2M: about 300 bytes each
     #[arg(long, value_name = "N", value_parser = count, default_value = "2M")]
     pub cap: u64,
@@ -118,6 +122,12 @@ pub struct RunArgs {
     /// Which neighbours are reported: pairs of primitives of one body that share a vertex
     #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Skip)]
     pub shared_vertex: SharedVertexArg,
+    /// Of a step: the precision to which times are rounded down
+    #[arg(long, value_enum, value_name = "PRECISION", default_value_t = ToiArg::F32)]
+    pub toi: ToiArg,
+    /// Of a step: pairs that touch at the start are reported with the time 0, or ignored
+    #[arg(long, value_enum, value_name = "RULE", default_value_t = StartArg::Report)]
+    pub start: StartArg,
     /// The method that finds candidates; all methods give the same pairs
     #[arg(long, value_enum, default_value_t = MethodArg::Auto)]
     pub method: MethodArg,

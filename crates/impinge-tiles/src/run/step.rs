@@ -1,0 +1,76 @@
+//! Runs one tile of a step: finds the first contacts among its surfaces, and keeps those that the tile owns.
+
+use impinge::{Control, Detector, Step, hash_rows};
+
+use super::records::Records;
+use super::{Ask, OfStep, TileResult, both, write_rows};
+use crate::error::Error;
+use crate::plan::Plan;
+use crate::step::{Contact, checksum};
+
+impl Plan {
+    pub(super) fn run_step_tile(
+        &self,
+        tile: u32,
+        records: &Records,
+        ask: Ask,
+        detector: &mut Detector,
+        control: &Control<'_>,
+    ) -> Result<TileResult, Error> {
+        let refused = |source| match source {
+            impinge::Error::Cancelled => Error::Cancelled,
+            source => Error::Detection { tile, source },
+        };
+        let is_mine = |point| self.cells.owner(point) == tile;
+        let surfaces = records.surfaces().map_err(refused)?;
+        let pieces = self.pieces(surfaces.n_faces());
+        let step = Step::new(ask.query()).start(ask.start).toi(ask.toi);
+        let (mut rows, mut n_elsewhere) = (Vec::new(), 0);
+        for (ix, a) in pieces.iter().enumerate() {
+            for b in &pieces[ix..] {
+                let part = surfaces.scene(&both(a, b)).map_err(refused)?;
+                let impacts = detector.impacts_with(&part.scene, &step, control);
+                for impact in impacts.map_err(refused)?.iter() {
+                    let (elements, point) = part.named(impact).map_err(refused)?;
+                    if is_mine(point) {
+                        let contact = Contact {
+                            kind: impact.kind,
+                            elements,
+                            toi: impact.toi,
+                            at_start: impact.at_start,
+                        };
+                        rows.push(contact.to_words());
+                    } else {
+                        n_elsewhere += 1;
+                    }
+                }
+            }
+        }
+        if pieces.len() > 1 {
+            // Two pieces have the pairs within each of them again, and pieces share edges and vertices.
+            rows.sort_unstable();
+            rows.dedup();
+        }
+        let names = surfaces.to_number(is_mine);
+        let result = TileResult {
+            tile,
+            n_primitives: records.len() as u64,
+            n_pairs: rows.len() as u64,
+            hash: checksum(&rows),
+            step: Some(OfStep {
+                n_names: names.len() as u64,
+                names_hash: hash_rows(names.iter().copied()),
+                toi: ask.toi,
+            }),
+            n_elsewhere,
+            n_pieces: pieces.len() as u64,
+            was_kept: false,
+            ask: ask.name(),
+        };
+        self.remove_result(tile)?;
+        write_rows(&self.rows_path(tile), &rows)?;
+        write_rows(&self.names_path(tile), &names)?;
+        self.write_result(&result)?;
+        Ok(result)
+    }
+}
