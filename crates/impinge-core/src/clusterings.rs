@@ -201,6 +201,24 @@ impl Fit {
     }
 }
 
+/// The number of clusters sampled to judge how well all of them fit.
+#[cfg(feature = "gpu")]
+const SAMPLES: usize = 64;
+
+/// The [`spread`] of evenly spaced clusters. The same clusters are sampled every time.
+#[cfg(feature = "gpu")]
+pub(crate) fn sampled_spread(n: usize, bounds_of: impl Fn(usize) -> Bounds) -> f64 {
+    let n_samples = n.min(SAMPLES);
+    let mut whole = Bounds::EMPTY;
+    let mut sum = 0.0;
+    for sample in 0..n_samples {
+        let bounds = bounds_of(sample * n / n_samples);
+        sum += bounds.half_area();
+        whole.join(&bounds);
+    }
+    spread(sum, &whole)
+}
+
 /// The clusters' summed surface over that of the whole: how well they fit the pose at hand. Both are halves.
 pub(crate) fn spread(surface: f64, whole: &Bounds) -> f64 {
     let whole = whole.half_area();

@@ -41,9 +41,9 @@ pub struct Layer {
     /// Whether its self-collision is queried.
     pub within: bool,
     /// Whether the body has no faces.
-    is_bare: bool,
+    pub(crate) is_bare: bool,
     /// Whether the body has no edges either.
-    is_points: bool,
+    pub(crate) is_points: bool,
     filter: Filter,
     /// How thick the body is: what its elements add to the distance that is asked.
     radius: f64,
@@ -343,6 +343,18 @@ impl Frame {
     #[cfg(feature = "gpu")]
     pub fn filter(&self, participant_ix: usize) -> Filter {
         self.layers[participant_ix].filter
+    }
+
+    /// Whether pairs of different bodies are wanted.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn meets_bodies(&self) -> bool {
+        self.between
+    }
+
+    /// Pairs of bodies, lower first and sorted, that do not meet whatever their filters say.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn ignored_bodies(&self) -> impl Iterator<Item = (BodyId, BodyId)> + '_ {
+        self.ignored.iter().copied().filter(|(a, b)| a != b)
     }
 
     /// Pairs of layers, lower first and sorted, that do not meet whatever their filters say.

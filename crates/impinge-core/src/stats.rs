@@ -41,7 +41,8 @@ pub struct Statistics {
     pub n_work_items: u64,
     /// Pairs whose boxes overlap and that the adjacency rule admits.
     pub n_candidates: u64,
-    /// Candidates that the floating-point filter left to exact arithmetic.
+    /// Candidates that the floating-point filter left to exact arithmetic. On a GPU: that the filter on the device left to
+    /// the CPU, which settles them with a filter in `f64` and then exactly.
     pub n_unsure: u64,
     /// Bodies that were clustered in this frame, for the first time or again.
     pub n_clustered: u64,

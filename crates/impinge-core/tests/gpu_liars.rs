@@ -118,16 +118,16 @@ const OF_CLUSTERS: &[Damage] = &[
     ("dispatch", "&& !is_ignored(min(a, b), max(a, b))", ""),
     (
         "dispatch",
-        "found.alive = found.a == found.b || overlap(box_of(a), box_of(b));",
-        "found.alive = found.a != found.b && overlap(box_of(a), box_of(b));",
+        "found.a == found.b || extents_meet(node_extent(found.a), node_extent(found.b));",
+        "found.a != found.b && extents_meet(node_extent(found.a), node_extent(found.b));",
     ),
     ("dispatch", "i <= j && j < n_a", "j < n_a"),
     ("pairing", "walked &= after;", ""),
     ("pairing", "any(a == b.yzwx)", "false"),
     (
         "pairing",
-        "return overlap(own, both);",
-        "return overlap(own, both) && lane != 7u;",
+        "return extents_meet(own, others);",
+        "return extents_meet(own, others) && lane != 7u;",
     ),
     ("pairing", "first_partner + 32u", "first_partner + 31u"),
 ];

@@ -130,6 +130,37 @@ fn every_pair_and_every_time_is_that_of_the_exact_prototype() {
     }
 }
 
+/// Fails where no adapter is found; a software driver is enough.
+#[cfg(feature = "gpu")]
+#[test]
+fn a_device_leaves_every_pair_that_touches() {
+    for scenario in SCENARIOS {
+        let scene = scenario.scene();
+        let settings = Settings {
+            backend: Backend::Gpu,
+            ..Settings::default()
+        };
+        let mut device = Detector::with_settings(settings).expect("a GPU or a software driver");
+        for toi in [Toi::F32, Toi::F64] {
+            let step = Step::default().toi(toi);
+            let impacts = device.impacts(&scene, &step).expect("good").clone();
+            let stats = impacts.stats();
+            println!("{}: {stats:?}", scenario.name);
+            assert_ne!(stats.backend, "cpu");
+            for kind in [PairKind::VertexFace, PairKind::EdgeEdge] {
+                let (found, expected) = (rows(impacts.of(kind)), scenario.expected(kind, toi));
+                assert_eq!(found.len(), expected.len(), "{}", scenario.name);
+                for (found, expected) in found.iter().zip(&expected) {
+                    assert_eq!(found, expected, "{} {} {toi:?}", scenario.name, kind.name());
+                }
+            }
+            let earliest = device.earliest(&scene, &step).expect("good");
+            assert_eq!(earliest, impacts.earliest(), "{} {toi:?}", scenario.name);
+            assert!(!device.is_free(&scene, &step).expect("good"));
+        }
+    }
+}
+
 #[test]
 fn bytes_are_the_same_for_all_instruction_sets_threads_and_budgets() {
     for scenario in SCENARIOS {

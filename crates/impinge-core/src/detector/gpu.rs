@@ -4,14 +4,17 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use super::{Backend, Detector, Settings};
+use crate::cpu::steps::{Asked, StepClusters};
 use crate::error::Error;
 use crate::gpu::{Capacities, Engine, Gpu, ResidentPairs, Wanted};
 use crate::ids::BodyId;
+use crate::impacts::StepAnswer;
 use crate::progress::Control;
 use crate::query::Query;
 use crate::run::Job;
 use crate::scene::Scene;
 use crate::settings::Method;
+use crate::stats::Statistics;
 use crate::workers::is_forked;
 
 /// Opens the GPU that the settings ask for, if they ask for one.
@@ -53,6 +56,49 @@ fn engine_of(
         Err(_) if settings.backend == Backend::Auto => Ok(None),
         Err(error) => Err(error),
     }
+}
+
+/// Has the device find the pairs of a step that may touch, and settles them on the CPU. Returns false if there is no device,
+/// or if the CPU has to answer: steps with a separation, steps that the device cannot hold, any step in a browser, which
+/// cannot wait for a device here. With `Backend::Auto` the CPU takes over for good if the device fails.
+pub(super) fn find_in_step(
+    engine: &mut Option<Engine>,
+    clusters: &mut StepClusters,
+    (job, settings): (Job<'_>, &Settings),
+    (asked, answer): (Asked, StepAnswer<'_>),
+    stats: &mut Statistics,
+) -> Result<bool, Error> {
+    if cfg!(target_family = "wasm") || job.frame.distance() > 0.0 {
+        return Ok(false);
+    }
+    let Some(on_device) = engine else {
+        return Ok(false);
+    };
+    let gpu = Arc::clone(on_device.gpu());
+    let before = stats.clone();
+    let found = clusters.run_on_device(
+        job,
+        settings,
+        asked,
+        answer,
+        stats,
+        |clusterings, take, stats| {
+            let engine = on_device.for_steps();
+            gpu.block_on(engine.find_left(job, clusterings, take, stats))
+        },
+    );
+    match found {
+        Ok(true) => {
+            stats.backend.clear();
+            stats.backend.push_str(gpu.name());
+            return Ok(true);
+        }
+        Err(Error::Gpu { .. }) if settings.backend == Backend::Auto => *engine = None,
+        Ok(false) => {}
+        Err(error) => return Err(error),
+    }
+    *stats = before;
+    Ok(false)
 }
 
 impl Detector {

@@ -69,6 +69,15 @@ impl Steps {
     }
 }
 
+/// Which part of a step was examined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Examined {
+    /// All of it.
+    Whole,
+    /// As much as was asked for.
+    Asked,
+}
+
 /// The part of a step in which the earliest contact is sought first: fewer pairs are close that early.
 const FIRST_UNTIL: f64 = 1.0 / 8.0;
 
@@ -171,12 +180,13 @@ impl Detector {
                 ..Pose::WHOLE
             };
             let latest = first.map_or(f64::INFINITY, |first| beyond(first.toi));
-            self.find(scene, step, Sought::Earliest, (pose, latest), None, control)?;
+            let sought = Sought::Earliest;
+            let part = self.find(scene, step, sought, (pose, latest), None, control)?;
             let found = self.steps.named(step.toi);
             first = found.chain(first).reduce(Impact::earlier);
             // All contacts up to this time have been found, and maybe some later ones.
             let bound = first.map_or(f64::INFINITY, |first| beyond(first.toi));
-            if bound <= until || until == 1.0 {
+            if bound <= until || until == 1.0 || part == Examined::Whole {
                 break;
             }
             until = bound.min(1.0);
@@ -201,7 +211,7 @@ impl Detector {
         Ok(())
     }
 
-    /// Finds what is sought, in any order.
+    /// Finds what is sought, in any order. A device examines the whole step, whatever part is asked for.
     fn find(
         &mut self,
         scene: &Scene,
@@ -210,7 +220,7 @@ impl Detector {
         (pose, latest): (Pose, f64),
         max_pairs: Option<u64>,
         control: &Control<'_>,
-    ) -> Result<(), Error> {
+    ) -> Result<Examined, Error> {
         let Steps {
             frame,
             impacts,
@@ -241,7 +251,7 @@ impl Detector {
                 naive::run(&FirstContact, scene, frame, control, stats, emit)
             })?;
             (*found, _) = contacts.finish()?;
-            return Ok(());
+            return Ok(Examined::Whole);
         }
         let _shift = self.frames.workers().shift(frame.n_primitives());
         let job = Job {
@@ -258,13 +268,31 @@ impl Detector {
             latest,
         };
         let answer = StepAnswer::Contacts(contacts);
-        let result = clusters.run(job, &self.settings, asked, answer, stats);
+        #[cfg(feature = "gpu")]
+        let on_device = super::gpu::find_in_step(
+            &mut self.gpu,
+            clusters,
+            (job, &self.settings),
+            (asked, answer),
+            stats,
+        );
+        #[cfg(not(feature = "gpu"))]
+        let on_device = Ok(false);
+        let result = match on_device {
+            Ok(true) => Ok(Examined::Whole),
+            Ok(false) => {
+                contacts.forget();
+                let done = clusters.run(job, &self.settings, asked, answer, stats);
+                done.map(|()| Examined::Asked)
+            }
+            Err(error) => Err(error),
+        };
         let finished = contacts.finish();
-        result?;
+        let examined = result?;
         (*found, _) = finished?;
         let n: usize = found.iter().map(Vec::capacity).sum();
         stats.bytes_held += (size_of::<Found<Contact>>() * n) as u64;
-        Ok(())
+        Ok(examined)
     }
 
     /// Whether nothing touches during the step. With [`Start::Skip`], pairs that touch at its start do not count.

@@ -56,9 +56,21 @@ impl BoundsSteps {
 impl BoundsLaunches {
     pub fn new(gpu: &Gpu, world: &World, steps: &Steps) -> Self {
         let kernels = &gpu.kernels;
+        let (clusters, level, top) = match world.is_moving() {
+            true => (
+                &kernels.bounds_clusters_moving,
+                &kernels.bounds_level_moving,
+                &kernels.bounds_top_moving,
+            ),
+            false => (
+                &kernels.bounds_clusters,
+                &kernels.bounds_level,
+                &kernels.bounds_top,
+            ),
+        };
         let (bodies, nodes) = (|| world.bodies.read(), || world.nodes.write_to());
         BoundsLaunches {
-            clusters: kernels.bounds_clusters.bind(
+            clusters: clusters.bind(
                 gpu,
                 &BoundsClusters {
                     clusters: world.clusters.read(),
@@ -68,7 +80,7 @@ impl BoundsLaunches {
                     nodes: nodes(),
                 },
             ),
-            level: kernels.bounds_level.bind(
+            level: level.bind(
                 gpu,
                 &BoundsLevel {
                     bodies: bodies(),
@@ -76,7 +88,7 @@ impl BoundsLaunches {
                     params: steps.params(),
                 },
             ),
-            top: kernels.bounds_top.bind(
+            top: top.bind(
                 gpu,
                 &BoundsTop {
                     bodies: bodies(),
@@ -93,7 +105,7 @@ impl BoundsLaunches {
         if !world.is_moved {
             return;
         }
-        let n_clusters = Workgroups::Known(world.forest().n_clusters());
+        let n_clusters = Workgroups::Known(world.n_ends() * world.forest().n_clusters());
         self.clusters.run(pass, 0, n_clusters);
         for &(step, count) in &steps.wide {
             let groups = Workgroups::Known(u64::from(count).div_ceil(64));

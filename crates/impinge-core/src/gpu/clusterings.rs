@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use crate::clusterings::{Fit, Kept, Store, spread};
+use crate::clusterings::{self, Fit, Kept, Store};
 use crate::error::Error;
 use crate::frame::Layer;
 use crate::grouping::bounds::{Bounds, round_down, round_up};
@@ -13,9 +13,6 @@ use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::Body;
 use crate::stats::Statistics;
-
-/// The number of clusters sampled to judge how well a body's clusters fit its pose.
-const SAMPLES: usize = 64;
 
 /// The clusters of a body, kept while its topology stays and they fit its pose.
 #[derive(Debug)]
@@ -105,19 +102,11 @@ impl Cached {
     }
 }
 
-/// The summed surface of evenly spaced clusters, divided by the surface of the box around them: how well the
-/// clusters fit the current pose. Every frame samples the same clusters for both.
+/// How well the clusters fit the current pose.
 fn sampled_spread(clustering: &Clustering, positions: &Positions) -> f64 {
-    let n = clustering.n_clusters();
-    let n_samples = n.min(SAMPLES);
-    let mut whole = Bounds::EMPTY;
-    let mut sum = 0.0;
-    for sample in 0..n_samples {
-        let bounds = bounds_of(positions, clustering.vertices(sample * n / n_samples));
-        sum += bounds.half_area();
-        whole.join(&bounds);
-    }
-    spread(sum, &whole)
+    clusterings::sampled_spread(clustering.n_clusters(), |cluster| {
+        bounds_of(positions, clustering.vertices(cluster))
+    })
 }
 
 pub fn bounds_of(positions: &Positions, corners: &[u32]) -> Bounds {

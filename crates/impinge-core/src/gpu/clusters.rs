@@ -1,4 +1,4 @@
-//! The method `Clusters`: its launches, in order.
+//! The method `Clusters`: its launches, in order. Steps have the same, with kernels for boxes at both ends.
 //!
 //! ```text
 //! bounds     clusters · wide levels, one launch each · all narrow levels in one
@@ -141,6 +141,11 @@ impl TreePlan {
 
 impl Launches {
     fn new(gpu: &Gpu, world: &World, room: &Room, steps: &Steps) -> Self {
+        let kernels = &gpu.kernels;
+        let (dispatch_kernel, pairing) = match world.is_moving() {
+            true => (&kernels.dispatch_moving, &kernels.pairing_moving),
+            false => (&kernels.dispatch, &kernels.pairing),
+        };
         let dispatch = |from: usize, to: usize| {
             let bindings = Dispatch {
                 nodes: world.nodes.read(),
@@ -152,13 +157,13 @@ impl Launches {
                 counters: room.counters.write_to(),
                 params: steps.params(),
             };
-            gpu.kernels.dispatch.bind(gpu, &bindings)
+            dispatch_kernel.bind(gpu, &bindings)
         };
         Launches {
             bounds: BoundsLaunches::new(gpu, world, steps),
             prepare: prepare(gpu, room, steps),
             dispatch: [dispatch(0, 1), dispatch(1, 0)],
-            pairing: gpu.kernels.pairing.bind(
+            pairing: pairing.bind(
                 gpu,
                 &Pairing {
                     nodes: world.nodes.read(),

@@ -12,6 +12,7 @@ use super::collect::Collector;
 use super::device::Scopes;
 use super::layout::Cell;
 use super::open::Gpu;
+use super::passes::Taker;
 use super::pieces;
 use super::room::{Capacities, CellsWanted, Counts, Room};
 use super::topology::Most;
@@ -38,7 +39,7 @@ const WIDEST: u64 = 1 << 34;
 pub struct Engine {
     pub(super) gpu: Arc<Gpu>,
     pub(super) settings: Settings,
-    first: Capacities,
+    pub(super) first: Capacities,
     /// The method in use: `Clusters` for frames that are too large for `Cells`.
     pub(super) method: Method,
     /// The number of primitives of the frame that was too large for `Cells`.
@@ -55,6 +56,8 @@ pub struct Engine {
     pub(super) collector: Collector,
     /// Keys that each worker has settled, until they are appended to the answer.
     pub(super) settled: Vec<Vec<u64>>,
+    /// The engine for steps, once there was one.
+    pub(super) of_steps: Option<Box<Engine>>,
 }
 
 #[derive(Debug)]
@@ -72,7 +75,7 @@ pub(super) enum Outcome {
 }
 
 impl Plan {
-    fn of(method: Method) -> Self {
+    pub(super) fn of(method: Method) -> Self {
         match method {
             Method::Cells => Plan::Cells(Box::new(cells::CellsPlan::new())),
             _ => Plan::Clusters(Box::new(clusters::TreePlan::new())),
@@ -101,7 +104,12 @@ impl Engine {
         Engine::with_plan(gpu, settings, first, Plan::Cells(plan))
     }
 
-    fn with_plan(gpu: Arc<Gpu>, settings: Settings, first: Capacities, plan: Plan) -> Self {
+    pub(super) fn with_plan(
+        gpu: Arc<Gpu>,
+        settings: Settings,
+        first: Capacities,
+        plan: Plan,
+    ) -> Self {
         Engine {
             gpu,
             first,
@@ -116,6 +124,7 @@ impl Engine {
             complete: Vec::new(),
             collector: Collector::default(),
             settled: Vec::new(),
+            of_steps: None,
         }
     }
 
@@ -124,7 +133,7 @@ impl Engine {
     }
 
     /// Starts with new buffers after a device error: the old ones may be in any state.
-    fn begin_anew(&mut self) {
+    pub(super) fn begin_anew(&mut self) {
         let plan = match &self.plan {
             Plan::Cells(plan) => Plan::Cells(plan.anew()),
             Plan::Clusters(_) => Plan::of(self.settings.method),
@@ -176,7 +185,7 @@ impl Engine {
         stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
         let before = self.falls_back().then(|| stats.clone());
         let work = Vec::from_iter(self.whole(frame));
-        let outcome = self.work_off(job, answer, work, stats);
+        let outcome = self.work_off(job, Taker::Answer(answer), work, stats);
         if let Outcome::Crowded(error) = outcome.await? {
             let Some(before) = before else {
                 return Err(error);
@@ -191,7 +200,7 @@ impl Engine {
                 return self.in_pieces(job, answer, stats).await;
             }
             let work = Vec::from_iter(self.whole(frame));
-            let outcome = self.work_off(job, answer, work, stats);
+            let outcome = self.work_off(job, Taker::Answer(answer), work, stats);
             if let Outcome::Crowded(error) = outcome.await? {
                 return Err(error);
             }
@@ -246,7 +255,7 @@ impl Engine {
                 stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
                 stats.n_pieces += 1;
                 let work = self.seeds_in_batches(frame, &pairs);
-                let outcome = self.work_off(job, answer, work, stats);
+                let outcome = self.work_off(job, Taker::Answer(answer), work, stats);
                 if let Outcome::Crowded(error) = outcome.await? {
                     return Err(error);
                 }
@@ -269,7 +278,7 @@ impl Engine {
     }
 
     /// The most topology and positions that may be on the device.
-    fn most(&self) -> Most {
+    pub(super) fn most(&self) -> Most {
         let least = Capacities::LEAST.of(self.method).bytes();
         let budget = self.settings.memory_budget;
         Most {

@@ -89,6 +89,17 @@ bindings! {
 }
 
 bindings! {
+    /// `narrow_moving.wgsl`
+    NarrowMoving {
+        candidates: Read<Candidate>,
+        corners: Read<Corners>,
+        positions: Read<Coordinate>,
+        unsure: Write<UnsureKey>,
+        counters: Write<Counter>,
+    }
+}
+
+bindings! {
     /// `bounds_reach.wgsl`
     BoundsReach {
         nodes: Read<Node>,
@@ -206,16 +217,16 @@ bindings! {
     }
 }
 
-/// Declares the set: for each kernel its source, constants and bindings.
+/// Declares the set: for each kernel its source, constants and bindings. A second kernel of one file has a name of its own.
 macro_rules! kernels {
     ($($name:ident: $bindings:ident = $source:ident [$($constant:expr),*]
-        from $file:literal ($($shared:literal),*);)*) => {
+        from $file:literal $(as $label:literal)? ($($shared:literal),*);)*) => {
         /// Every kernel, compiled when it is first bound.
         pub(crate) struct Kernels {
             $(pub $name: Kernel<$bindings>,)*
         }
 
-        $(pub(crate) const $source: Source = source!($file, [$($shared),*]);)*
+        $(pub(crate) const $source: Source = source!($file $(as $label)?, [$($shared),*]);)*
 
         impl Kernels {
             /// All kernels. `damage` may replace a kernel's text.
@@ -235,18 +246,34 @@ macro_rules! kernels {
 
 kernels! {
     bounds_clusters: BoundsClusters = BOUNDS_CLUSTERS []
-        from "bounds_clusters" ("boxes", "vertices", "groups");
-    bounds_level: BoundsLevel = BOUNDS_LEVEL [] from "bounds_level" ("refit", "groups");
-    bounds_top: BoundsTop = BOUNDS_TOP [] from "bounds_top" ("refit");
+        from "bounds_clusters" ("boxes", "still", "vertices", "groups");
+    bounds_level: BoundsLevel = BOUNDS_LEVEL []
+        from "bounds_level" ("boxes", "still", "refit", "groups");
+    bounds_top: BoundsTop = BOUNDS_TOP [] from "bounds_top" ("boxes", "still", "refit");
     prepare: Prepare = PREPARE [] from "prepare" ("arguments");
-    dispatch: Dispatch = DISPATCH [] from "dispatch" ("boxes", "meets", "reserve", "groups");
+    dispatch: Dispatch = DISPATCH []
+        from "dispatch" ("boxes", "still", "filters", "meets", "reserve", "groups");
     pairing: Pairing = PAIRING []
-        from "pairing" ("boxes", "vertices", "ids", "reserve", "groups");
+        from "pairing" ("boxes", "still", "still_groups", "vertices", "ids", "reserve", "groups");
+    bounds_clusters_moving: BoundsClusters = BOUNDS_CLUSTERS_MOVING []
+        from "bounds_clusters" as "bounds_clusters_moving" ("boxes", "moving", "vertices", "groups");
+    bounds_level_moving: BoundsLevel = BOUNDS_LEVEL_MOVING []
+        from "bounds_level" as "bounds_level_moving" ("boxes", "moving", "refit", "groups");
+    bounds_top_moving: BoundsTop = BOUNDS_TOP_MOVING []
+        from "bounds_top" as "bounds_top_moving" ("boxes", "moving", "refit");
+    dispatch_moving: Dispatch = DISPATCH_MOVING []
+        from "dispatch" as "dispatch_moving"
+        ("boxes", "moving", "filters", "meets_layers", "reserve", "groups");
+    pairing_moving: Pairing = PAIRING_MOVING []
+        from "pairing" as "pairing_moving"
+        ("boxes", "moving", "moving_groups", "vertices", "ids", "reserve", "groups");
+    narrow_moving: NarrowMoving = NARROW_MOVING []
+        from "narrow_moving" ("filter", "polygon", "reserve", "groups");
     narrow: Narrow = NARROW [("WITH_SOLIDS", 0.0)]
         from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "reserve", "groups");
     narrow_solids: Narrow = NARROW_SOLIDS [("WITH_SOLIDS", 1.0)]
         from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "reserve", "groups");
-    bounds_reach: BoundsReach = BOUNDS_REACH [] from "bounds_reach" ("boxes", "meets", "groups");
+    bounds_reach: BoundsReach = BOUNDS_REACH [] from "bounds_reach" ("boxes", "filters", "meets", "groups");
     bounds_keep: BoundsKeep = BOUNDS_KEEP []
         from "bounds_keep" ("boxes", "vertices", "reserve", "groups");
     grid_resolution: GridResolution = GRID_RESOLUTION []
@@ -259,7 +286,7 @@ kernels! {
         from "dispatch_scatter" ("coarse", "groups");
     dispatch_tile: DispatchTile = DISPATCH_TILE [] from "dispatch_tile" ("reserve", "groups");
     pairing_cells: PairingCells = PAIRING_CELLS []
-        from "pairing_cells" ("boxes", "meets", "ids", "reserve", "groups");
+        from "pairing_cells" ("boxes", "filters", "meets", "ids", "reserve", "groups");
 }
 
 /// The name and the text of every shader that this crate compiles, for compilers other than naga to check.

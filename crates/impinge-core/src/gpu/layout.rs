@@ -20,9 +20,9 @@ macro_rules! words {
 words! {
     /// A node of the forest.
     Node { low: [u32; 3], first_child: u32, high: [u32; 3], shape: u32 }
-    /// One participant.
+    /// One participant: a body, or in a step one layer of a body.
     Body {
-        root: u32, slack: u32, within: u32, unused: u32,
+        root: u32, slack: u32, within: u32, layer: u32,
         category: [u32; 2], mask: [u32; 2],
     }
     /// A run of primitives and its unique vertices.
@@ -37,7 +37,7 @@ words! {
     Candidate { a: u32, b: u32 }
     /// Two global primitive numbers that certainly intersect.
     PairKey { low: u32, high: u32 }
-    /// Two global primitive numbers left to exact arithmetic.
+    /// Two global primitive numbers left to exact arithmetic; in a step, two places.
     UnsureKey { low: u32, high: u32 }
     /// Parameters of one dispatch.
     Params {
@@ -110,6 +110,18 @@ pub const N_BOX_TESTS: u32 = 40;
 pub const N_BOX_TESTS_HIGH: u32 = 41;
 /// The number of words for the region and the entries per shift.
 pub const N_TALLIES: u32 = 37;
+/// Parts of bodies, in `Body::layer`.
+pub const EDGES: u32 = 0;
+pub const VERTICES: u32 = 1;
+pub const FACES: u32 = 2;
+/// Marks layers of bodies without faces, in `Body::layer`.
+pub const BARE: u32 = 4;
+/// Marks layers of bodies without edges, in `Body::layer`.
+pub const POINTS: u32 = 8;
+/// Marks layers whose pairs with other layers of the same body are asked for, in `Body::layer`.
+pub const OWN_LAYERS: u32 = 16;
+/// Where the number of the body is, in `Body::layer`.
+pub const BODY_SHIFT: u32 = 5;
 /// The root of a body without primitives, and the top if there is no tree over bodies.
 pub const NO_ROOT: u32 = u32::MAX;
 /// The number of counters.

@@ -4,6 +4,8 @@
 //! frame is one submission: positions go up, counters and results come back, see `clusters` and `cells`. Pairs of
 //! which the filter on the device is unsure are settled exactly on the CPU, from the numbers as given. Only
 //! `waiting` blocks.
+//!
+//! For a step, see `moving`.
 
 mod bounds;
 mod clusterings;
@@ -11,6 +13,7 @@ mod clusters;
 mod collect;
 mod device;
 mod forest;
+mod moving;
 mod open;
 mod passes;
 mod pieces;

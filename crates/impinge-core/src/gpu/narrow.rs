@@ -1,6 +1,6 @@
-//! Stage `narrow`: the filter over all candidates, for both methods.
+//! Stage `narrow`: the filter over all candidates, for both methods and for steps.
 
-use super::kernels::{Narrow, Prepare};
+use super::kernels::{Narrow, NarrowMoving, Prepare};
 use super::layout::{N_CANDIDATES, Params, ROUNDS};
 use super::open::Gpu;
 use super::pipeline::{Bound, Workgroups};
@@ -34,6 +34,21 @@ pub fn prepare(gpu: &Gpu, room: &Room, steps: &Steps) -> Bound {
 
 impl Settling {
     pub fn new(gpu: &Gpu, world: &World, room: &Room, steps: &Steps) -> Self {
+        if world.is_moving() {
+            return Settling {
+                prepare: prepare(gpu, room, steps),
+                narrow: gpu.kernels.narrow_moving.bind(
+                    gpu,
+                    &NarrowMoving {
+                        candidates: room.candidates.read(),
+                        corners: world.corners.read(),
+                        positions: world.positions.read(),
+                        unsure: room.unsure.write_to(),
+                        counters: room.counters.write_to(),
+                    },
+                ),
+            };
+        }
         // Scenes without tetrahedra use a kernel without the code for solids, and the registers it needs.
         let narrow = match world.has_solids {
             true => &gpu.kernels.narrow_solids,

@@ -16,6 +16,7 @@ use super::collect::{Collected, Guess};
 use super::device::Scopes;
 use super::engine::{Engine, Outcome, Plan};
 use super::layout::NodePair;
+use super::moving::TakeLeft;
 use super::room::{Capacities, CellsWanted, Verdict};
 use super::steps::Stages;
 use crate::error::Error;
@@ -41,12 +42,30 @@ pub(super) enum Work {
     Cells(CellRange, Share),
 }
 
+/// Takes the results of complete passes.
+pub(super) enum Taker<'a, 'b> {
+    /// Pairs that intersect.
+    Answer(&'a Answer),
+    /// Pairs of a step that may touch.
+    Left(&'a mut TakeLeft<'b>),
+}
+
+impl Taker<'_, '_> {
+    /// To be told of certain pairs, even where a buffer was too small for them.
+    fn foresee(&self, n_more: u64) -> Result<(), Error> {
+        match self {
+            Taker::Answer(answer) => answer.foresee(n_more),
+            Taker::Left(_) => Ok(()),
+        }
+    }
+}
+
 impl Engine {
     /// Does all of the work. When it is too much, some of the keys have been handed over already.
     pub(super) async fn work_off(
         &mut self,
         job: Job<'_>,
-        answer: &Answer,
+        mut taker: Taker<'_, '_>,
         mut waiting: Vec<Work>,
         stats: &mut Statistics,
     ) -> Result<Outcome, Error> {
@@ -62,16 +81,23 @@ impl Engine {
             }
             let done = stats.n_slabs;
             control.step(done, done + count(waiting.len()) + 1)?;
-            let collected = self.pass(frame, &work, capacities, cells, stats).await?;
-            // These are certain, even where a buffer was too small for them.
-            answer.foresee(collected.counts.needed.pairs)?;
+            let mut collected = self.pass(frame, &work, capacities, cells, stats).await?;
+            taker.foresee(collected.counts.needed.pairs)?;
             let room = self.budget_for_room();
             match collected.counts.judge(&self.gpu, capacities, room) {
                 Verdict::Complete => {
                     book(&collected, self.method, stats);
                     self.complete.push(collected.counts);
                     let settled = &mut self.settled;
-                    stats.time("settle", |_| settle_all(job, answer, &collected, settled))?;
+                    let goes_on = stats.time("settle", |_| match &mut taker {
+                        Taker::Answer(answer) => {
+                            settle_all(job, answer, &collected, settled).map(|()| true)
+                        }
+                        Taker::Left(take) => take(bytemuck::cast_slice_mut(&mut collected.unsure)),
+                    })?;
+                    if !goes_on {
+                        return Ok(Outcome::Complete);
+                    }
                     if let Work::Cells(part, Share::Lists) = work {
                         // No other pass changes the list before the last of its tiles is done.
                         let n_entries = collected.counts.needed.entries as u32;

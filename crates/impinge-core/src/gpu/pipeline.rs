@@ -66,13 +66,16 @@ impl Source {
 
 /// The text of a kernel file and of the shared files that it needs.
 macro_rules! source {
-    ($name:literal, [$($shared:literal),*]) => {
+    ($file:literal, [$($shared:literal),*]) => {
+        $crate::gpu::pipeline::source!($file as $file, [$($shared),*])
+    };
+    ($file:literal as $name:literal, [$($shared:literal),*]) => {
         $crate::gpu::pipeline::Source {
             name: $name,
             parts: &[
                 include_str!("kernels/shared/layout.wgsl"),
                 $(include_str!(concat!("kernels/shared/", $shared, ".wgsl")),)*
-                include_str!(concat!("kernels/", $name, ".wgsl")),
+                include_str!(concat!("kernels/", $file, ".wgsl")),
             ],
         }
     };

@@ -119,7 +119,7 @@ fn structs_are_laid_out_as_on_the_host() {
     let module = parse(&DISPATCH);
     assert_twins!(&module,
         Node { low, first_child, high, shape }
-        Body { root, slack, within, unused, category, mask }
+        Body { root, slack, within, layer, category, mask }
         Cluster { first_place, first_vertex, sizes, body }
         Level { first, count }
         NodePair { a, b }
@@ -180,6 +180,13 @@ fn constants_are_those_of_the_host() {
         ("CHILDREN", CHILDREN),
         ("GATE", GATE),
         ("FLAG", FLAG),
+        ("EDGES", EDGES),
+        ("VERTICES", VERTICES),
+        ("FACES", FACES),
+        ("BARE", BARE),
+        ("POINTS", POINTS),
+        ("OWN_LAYERS", OWN_LAYERS),
+        ("BODY_SHIFT", BODY_SHIFT),
     ] {
         assert_eq!(constant(&module, name), f64::from(host), "{name}");
     }

@@ -13,7 +13,12 @@
 //! height 0        clusters of body 0 | of body 1 | …
 //! ```
 //!
-//! Topology is sent once; each frame sends the positions that have changed.
+//! Topology is sent once; each frame sends the positions that have changed. For steps, [`moving`] sends layers of bodies instead of
+//! bodies, and boxes and positions at both ends.
+
+mod moving;
+
+pub(super) use moving::weigh as weigh_moving;
 
 use std::sync::Arc;
 
@@ -63,6 +68,8 @@ pub struct World {
     bodies_sent: Vec<Body>,
     ignored_sent: Vec<NodePair>,
     words: Vec<u32>,
+    /// The layers of a step, if the device holds those.
+    layers: Option<moving::Layers>,
     /// Whether boxes have to be refitted.
     pub is_moved: bool,
     pub has_solids: bool,
@@ -86,6 +93,7 @@ impl World {
             bodies_sent: Vec::new(),
             ignored_sent: Vec::new(),
             words: Vec::new(),
+            layers: None,
             is_moved: false,
             has_solids: false,
             nodes: Storage::plain("nodes"),
@@ -330,16 +338,7 @@ impl World {
             }
             self.words.clear();
             for participant in from..ix {
-                match frame.body(scene, participant).positions() {
-                    Positions::F32(positions) => {
-                        let words: &[u32] = bytemuck::cast_slice(positions);
-                        self.words.extend_from_slice(words);
-                    }
-                    Positions::F64(positions) => {
-                        self.words
-                            .extend(positions.as_flattened().iter().map(narrowed));
-                    }
-                }
+                put_words(frame.body(scene, participant).positions(), &mut self.words);
             }
             let words: &[Coordinate] = bytemuck::cast_slice(&self.words);
             self.positions.write(gpu, 3 * start, words);
@@ -359,7 +358,6 @@ impl World {
                 .write(gpu, u64::from(self.forest.first_gate), self.forest.gates());
             self.is_moved = true;
         }
-        let words = |bits: u64| [bits as u32, (bits >> 32) as u32];
         let mut bodies = Vec::with_capacity(frame.layers.len());
         for (ix, participant) in frame.layers.iter().enumerate() {
             // Bodies without a category meet no other body.
@@ -378,23 +376,31 @@ impl World {
                 root: self.forest.roots[ix],
                 slack: if rounded { SLACK } else { 0 },
                 within: u32::from(participant.within),
-                unused: 0,
+                layer: 0,
                 category: words(filter.category),
                 mask: words(filter.mask),
             });
         }
+        let ignored = frame.ignored_pairs().map(|(a, b)| NodePair {
+            a: a as u32,
+            b: b as u32,
+        });
+        let ignored = ignored.collect();
+        self.send_records(gpu, bodies, ignored)
+    }
+
+    /// Sends records and ignored pairs that differ from those on the device.
+    fn send_records(
+        &mut self,
+        gpu: &Gpu,
+        bodies: Vec<Body>,
+        ignored: Vec<NodePair>,
+    ) -> Result<bool, Error> {
         let mut is_other = false;
         if bodies != self.bodies_sent {
             is_other |= self.bodies.upload(gpu, &bodies)?;
             self.bodies_sent = bodies;
         }
-        let ignored: Vec<NodePair> = frame
-            .ignored_pairs()
-            .map(|(a, b)| NodePair {
-                a: a as u32,
-                b: b as u32,
-            })
-            .collect();
         if ignored != self.ignored_sent || self.ignored.bytes() == 0 {
             is_other |= self.ignored.upload(gpu, &ignored)?;
             self.ignored_sent = ignored;
@@ -459,7 +465,8 @@ impl World {
             }
         }
         for (ix, participant) in frame.layers.iter().enumerate() {
-            if participant.within && forest.is_filled(ix) {
+            let is_asked = participant.within && frame.test(ix, ix).is_some();
+            if is_asked && forest.is_filled(ix) {
                 seeds.push(NodePair {
                     a: root(ix),
                     b: root(ix),
@@ -489,12 +496,7 @@ impl World {
         }
         if a.is_gate() && b.is_gate() {
             let (body_a, body_b) = (a.first_child as usize, b.first_child as usize);
-            let meets = if body_a == body_b {
-                frame.layers[body_a].within
-            } else {
-                frame.test(body_a, body_b).is_some()
-            };
-            if meets {
+            if frame.test(body_a, body_b).is_some() {
                 into.push(NodePair {
                     a: self.forest.roots[body_a],
                     b: self.forest.roots[body_b],
@@ -517,6 +519,19 @@ impl World {
             }
         }
         true
+    }
+}
+
+/// The low and the high word.
+fn words(bits: u64) -> [u32; 2] {
+    [bits as u32, (bits >> 32) as u32]
+}
+
+/// Appends the coordinates as the device has them.
+fn put_words(positions: &Positions, words: &mut Vec<u32>) {
+    match positions {
+        Positions::F32(positions) => words.extend_from_slice(bytemuck::cast_slice(positions)),
+        Positions::F64(positions) => words.extend(positions.as_flattened().iter().map(narrowed)),
     }
 }
 

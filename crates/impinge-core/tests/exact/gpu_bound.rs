@@ -6,14 +6,31 @@ use crate::generators::{Kind, Random};
 use impinge_core::exact::{Sign, orient3d};
 
 const BOUND: f32 = 1.0 / 65_536.0;
-const SMALLEST: f32 = 1.0 / 4_294_967_296.0;
-const LARGEST: f32 = 1_099_511_627_776.0;
-const NARROWING: f32 = 1.0 / 4_194_304.0;
+pub const SMALLEST: f32 = 1.0 / 4_294_967_296.0;
+pub const LARGEST: f32 = 1_099_511_627_776.0;
+pub const NARROWING: f32 = 1.0 / 4_194_304.0;
 
 /// Arithmetic in `f32` that guarantees only what WGSL guarantees.
-struct Device<'a>(&'a mut Random);
+pub struct Device<'a>(pub &'a mut Random);
 
 impl Device<'_> {
+    /// A random integer below `n`, for orders of operations.
+    pub fn below(&mut self, n: u64) -> u64 {
+        self.0.below(n)
+    }
+
+    /// A product in any order.
+    pub fn product(&mut self, factors: &[f32]) -> f32 {
+        let mut factors = factors.to_vec();
+        while factors.len() > 1 {
+            let x = factors.swap_remove(self.below(factors.len() as u64) as usize);
+            let y = factors.swap_remove(self.below(factors.len() as u64) as usize);
+            let product = self.multiply(x, y);
+            factors.push(product);
+        }
+        factors[0]
+    }
+
     fn coin(&mut self) -> bool {
         self.0.below(2) == 0
     }
@@ -41,7 +58,7 @@ impl Device<'_> {
         self.maybe_flushed(result)
     }
 
-    fn add(&mut self, x: f32, y: f32) -> f32 {
+    pub fn add(&mut self, x: f32, y: f32) -> f32 {
         let (x, y) = (self.maybe_flushed(x), self.maybe_flushed(y));
         self.add_wide(f64::from(x), f64::from(y))
     }

@@ -3,6 +3,7 @@
 
 mod generators;
 mod gpu_bound;
+mod gpu_moving;
 mod oracle;
 mod published;
 

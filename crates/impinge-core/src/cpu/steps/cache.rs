@@ -1,5 +1,9 @@
 //! The cache of a layer: its clusters, and their boxes at the start and at the end of a step.
 
+use std::sync::Arc;
+
+#[cfg(feature = "gpu")]
+use crate::clusterings::sampled_spread;
 use crate::clusterings::{Fit, Kept, Store, make_anew, spread};
 use crate::cpu::bounds::{self, TreeBounds};
 use crate::cpu::dispatch::Tree;
@@ -31,12 +35,22 @@ pub(super) struct LayerCache {
     pub topology_stamp: u64,
     /// The stamp of the step that the boxes belong to, and their pose.
     of: Option<(u64, Pose)>,
-    pub clustering: Clustering,
+    pub clustering: Arc<Clustering>,
     /// Boxes that hold the start and the end.
     bounds: TreeBounds,
     /// The clusters' boxes at the start, and at the end.
     ends: [BoundsArray; 2],
     /// How well the clusters have fitted the layer.
+    fit: Fit,
+    #[cfg(feature = "gpu")]
+    sampled: Sampled,
+}
+
+/// How well some of the clusters have fitted the layer, and the stamp of the positions that were judged last.
+#[cfg(feature = "gpu")]
+#[derive(Debug, Default)]
+struct Sampled {
+    stamp: u64,
     fit: Fit,
 }
 
@@ -60,11 +74,27 @@ impl LayerCache {
         LayerCache {
             topology_stamp: body.topology_stamp(),
             of: None,
-            clustering,
+            clustering: Arc::new(clustering),
             bounds,
             ends,
             fit: Fit::UNKNOWN,
+            #[cfg(feature = "gpu")]
+            sampled: Sampled::default(),
         }
+    }
+
+    /// Whether the layer has flowed away from its clusters, judged by some of them: for a device that finds the boxes.
+    #[cfg(feature = "gpu")]
+    pub fn is_stale(&mut self, body: &Body) -> bool {
+        if self.sampled.stamp == body.positions_stamp() {
+            return false;
+        }
+        let (clustering, positions) = (&self.clustering, body.positions());
+        let bounds = |cluster| bounds::of_vertices(positions, clustering.vertices(cluster));
+        self.sampled.stamp = body.positions_stamp();
+        self.sampled
+            .fit
+            .is_stale(sampled_spread(clustering.n_clusters(), bounds))
     }
 
     #[inline(always)]

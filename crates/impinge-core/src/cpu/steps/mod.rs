@@ -14,13 +14,20 @@
 mod cache;
 mod group;
 mod hull;
+#[cfg(feature = "gpu")]
+mod left;
 mod narrow;
 mod near;
 mod pairing;
 mod world;
 
+#[cfg(feature = "gpu")]
+use std::sync::Arc;
+
 use crate::error::Error;
 use crate::frame::Layer;
+#[cfg(feature = "gpu")]
+use crate::grouping::clusters::Clustering;
 use crate::grouping::hubs::Hubs;
 use crate::impacts::StepAnswer;
 use crate::scene::Body;
@@ -32,7 +39,11 @@ use super::met::WorkItem;
 use super::simd::{Isa, Simd};
 use super::slabs::{self, Counts, Room, Stage};
 use crate::run::Job;
+#[cfg(feature = "gpu")]
+use crate::settings::Recluster;
 use crate::settings::Settings;
+#[cfg(feature = "gpu")]
+use crate::sink::Ending;
 
 use cache::{Caches, LayerCache};
 pub(crate) use hull::Pose;
@@ -131,6 +142,63 @@ impl StepClusters {
         Ok(())
     }
 
+    /// As [`run`](Self::run), where a device finds the candidates: `find` gets the clusters of all layers and hands over the
+    /// places of pairs that may touch. Returns whether it has done so.
+    #[cfg(feature = "gpu")]
+    pub fn run_on_device(
+        &mut self,
+        job: Job<'_>,
+        settings: &Settings,
+        asked: Asked,
+        answer: StepAnswer<'_>,
+        stats: &mut Statistics,
+        find: impl FnOnce(
+            &[Arc<Clustering>],
+            &mut dyn FnMut(&mut [[u32; 2]]) -> Result<bool, Error>,
+            &mut Statistics,
+        ) -> Result<bool, Error>,
+    ) -> Result<bool, Error> {
+        let recluster = settings.recluster == Recluster::Auto;
+        stats.n_clusters = 0;
+        stats.time("clustering", |stats| {
+            let is_stale =
+                |cache: &mut LayerCache, _: &Layer, body: &Body| recluster && cache.is_stale(body);
+            self.update(job, stats, is_stale)
+        })?;
+        let of_layer = |layer: &Layer| Arc::clone(&self.caches.at(layer).clustering);
+        let clusterings: Vec<Arc<Clustering>> = job.frame.layers.iter().map(of_layer).collect();
+        let mut first_places = vec![0];
+        for clustering in &clusterings {
+            // All elements of a frame are numbered in 32 bits.
+            first_places.push(first_places[first_places.len() - 1] + clustering.order.len() as u32);
+        }
+        self.scratches.resize_with(job.workers.n(), Worker::default);
+        for worker in &mut self.scratches {
+            worker.begin(stats.n_clusters, settings.memory_budget.is_some());
+        }
+        answer.share(self.bytes_besides_room() as u64);
+        let known = Known::new(asked.latest);
+        let mut left = left::Left {
+            isa: self.isa,
+            job,
+            world: World {
+                scene: job.scene,
+                frame: job.frame,
+                asked,
+                answer,
+                known: &known,
+                caches: &self.caches,
+            },
+            answer,
+            workers: &mut self.scratches,
+            first_places,
+        };
+        let is_done = find(&clusterings, &mut |pairs| left.settle(pairs), stats)?;
+        left.end()?;
+        stats.bytes_held += self.bytes_besides_room() as u64;
+        Ok(is_done)
+    }
+
     fn bytes_besides_room(&self) -> usize {
         let caches: usize = self.caches.iter().map(LayerCache::bytes).sum();
         let scratches: usize = self.scratches.iter().map(Worker::bytes).sum();
@@ -139,9 +207,17 @@ impl StepClusters {
 
     /// Clusters layers that are new or were re-meshed; forgets layers of removed bodies.
     fn cluster(&mut self, job: Job<'_>, stats: &mut Statistics) -> Result<(), Error> {
-        let fits = |_: &mut LayerCache, _: &Layer, _: &Body| false;
+        self.update(job, stats, |_, _, _| false)
+    }
+
+    fn update(
+        &mut self,
+        job: Job<'_>,
+        stats: &mut Statistics,
+        is_stale: impl FnMut(&mut LayerCache, &Layer, &Body) -> bool,
+    ) -> Result<(), Error> {
         let make = |body: &Body, layer: &Layer| LayerCache::new(body, layer.part);
-        self.caches.update(job, stats, fits, make)
+        self.caches.update(job, stats, is_stale, make)
     }
 
     /// Computes the boxes of layers that have moved.

@@ -198,6 +198,40 @@ impl Settler {
         }
     }
 
+    /// Takes pairs of two layers that a device has not dropped, by their places.
+    #[cfg(feature = "gpu")]
+    pub fn settle_left(
+        &mut self,
+        isa: Isa,
+        world: World<'_>,
+        between: Between,
+        pairs: impl Iterator<Item = Places>,
+    ) {
+        if self.between != Some(between) {
+            self.search(isa, world);
+            self.between = Some(between);
+        }
+        if !matches!(between.kind, PairKind::VertexFace | PairKind::EdgeEdge) {
+            if let Some(pair) = exact_pair(between.kind) {
+                pairs.for_each(|places| self.settle_exactly(world, between, pair, places));
+            }
+            return;
+        }
+        let are_single = [between.a, between.b].iter().all(|&layer| {
+            let body = world.frame.body(world.scene, layer as usize);
+            matches!(body.positions(), Positions::F32(_))
+        });
+        // Over the whole step, the device has taken the filter's first step for positions in single precision.
+        self.is_first = !are_single || matches!(world.asked.sought, Sought::Earliest);
+        for places in pairs {
+            let search = Search::new(world.until());
+            self.open.push(Open { places, search });
+            if self.open.len() >= FULL {
+                self.search(isa, world);
+            }
+        }
+    }
+
     /// Searches the open pairs for first contacts.
     #[inline(never)]
     pub fn search(&mut self, isa: Isa, world: World<'_>) {

@@ -64,6 +64,12 @@ impl Worker {
         self.busy = Duration::ZERO;
     }
 
+    /// Where candidates go that were found elsewhere.
+    #[cfg(feature = "gpu")]
+    pub fn settler(&mut self) -> &mut Settler {
+        &mut self.settler
+    }
+
     /// Ends a step: hands over the remaining contacts.
     pub fn end(&mut self, answer: StepAnswer<'_>) {
         self.settler.end(answer);

@@ -1,7 +1,7 @@
 // Stage `bounds`, first kernel: the box of each cluster.
 //
-// In: unique vertices of each cluster, positions. Out: the boxes of nodes 0 .. n_clusters.
-// One workgroup per cluster. Each lane takes every 64th vertex; then two steps reduce eight boxes to one.
+// In: unique vertices of each cluster, positions. Out: the boxes of nodes 0 .. n_clusters; in a step, then those at the end.
+// One workgroup per cluster and end. Each lane takes every 64th vertex; then two steps reduce eight boxes to one.
 // Cost: 12 bytes per vertex and 4 per index, for each unique vertex of a cluster once.
 // Invariant: a box holds all its vertices exactly, or widened by `slack` when they were rounded.
 
@@ -20,16 +20,21 @@ fn main(
     @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let cluster_ix = group_number(group, n_groups);
-    if cluster_ix >= arrayLength(&clusters) {
+    let n_clusters = arrayLength(&clusters);
+    let ix = group_number(group, n_groups);
+    if ix >= ENDS * n_clusters {
         return;
     }
+    let end = ix / n_clusters;
+    let cluster_ix = ix % n_clusters;
+    let node_ix = end * (arrayLength(&nodes) / ENDS) + cluster_ix;
+    let first_of_end = end * (arrayLength(&positions) / (3u * ENDS));
     let cluster = clusters[cluster_ix];
     let n_vertices = cluster.sizes >> 16u;
     var low = vec3<u32>(0xffffffffu);
     var high = vec3<u32>(0u);
     for (var ix = lane; ix < n_vertices; ix += 64u) {
-        let at = vertex_key(cluster_vertices[cluster.first_vertex + ix]);
+        let at = vertex_key(first_of_end + cluster_vertices[cluster.first_vertex + ix]);
         low = min(low, at);
         high = max(high, at);
     }
@@ -51,7 +56,7 @@ fn main(
             high = max(high, highs[ix]);
         }
         let slack = bodies[cluster.body].slack;
-        nodes[cluster_ix].low = low - slack;
-        nodes[cluster_ix].high = high + slack;
+        nodes[node_ix].low = low - slack;
+        nodes[node_ix].high = high + slack;
     }
 }

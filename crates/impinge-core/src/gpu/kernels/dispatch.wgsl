@@ -62,7 +62,7 @@ fn task(pair: NodePair, lane: u32) -> Task {
         }
         return Task(child(a, i), child(a, j), i <= j && j < n_a);
     }
-    if !overlap(box_of(a), box_of(b)) {
+    if !extents_meet(node_extent(pair.a), node_extent(pair.b)) {
         return Task(0u, 0u, false);
     }
     if (a.shape & b.shape & GATE) != 0u && !meets(a.first_child, b.first_child) {
@@ -103,7 +103,7 @@ fn main(
         if found.alive {
             let a = nodes[found.a];
             let b = nodes[found.b];
-            found.alive = found.a == found.b || overlap(box_of(a), box_of(b));
+            found.alive = found.a == found.b || extents_meet(node_extent(found.a), node_extent(found.b));
             is_item = height(a) == 0u && height(b) == 0u;
         }
     }

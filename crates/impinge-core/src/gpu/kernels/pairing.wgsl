@@ -1,9 +1,9 @@
-// Stage `pairing`: which primitives of two clusters have boxes that meet.
+// Stage `pairing`: which primitives of two clusters have boxes that meet. In a step, boxes at both ends.
 //
 // In: work items. Out: candidates. One workgroup of 64 per work item:
 //
-// 1. Each lane computes the box of one primitive of each cluster. Primitives outside the intersection of the
-//    two clusters' boxes drop out, for a partner's box lies in its cluster's box.
+// 1. Each lane computes the box of one primitive of each cluster. Primitives that do not meet the other cluster's box
+//    drop out, for a partner's box lies in its cluster's box.
 // 2. Lanes take the side with more survivors and walk over the survivors of the other side: one 64-bit
 //    mask per primitive, bit j for partner j, as two words:
 //
@@ -29,24 +29,23 @@
 @group(0) @binding(8) var<uniform> params: Params;
 
 // The primitives of a in entries 0..63, those of b in 64..127.
-var<workgroup> lows: array<vec3<u32>, 128>;
-var<workgroup> highs: array<vec3<u32>, 128>;
+var<workgroup> lows: array<vec3<u32>, 128u * ENDS>;
+var<workgroup> highs: array<vec3<u32>, 128u * ENDS>;
 var<workgroup> ids: array<vec4<u32>, 128>;
 var<workgroup> survivors: array<atomic<u32>, 4>;
 var<workgroup> n_found: atomic<u32>;
 var<workgroup> first_found: u32;
 
-// Stores a primitive's box in its entry; false if there is no primitive or its box misses `both`.
-fn load(cluster: Cluster, lane: u32, entry: u32, both: Box) -> bool {
+// Stores a primitive's box in its entry; false if there is no primitive or its box misses the other cluster's.
+fn load(cluster: Cluster, lane: u32, entry: u32, others: Extent) -> bool {
     if lane >= (cluster.sizes & 0xffffu) {
         return false;
     }
     let corner = corners[cluster.first_place + lane];
-    let own = primitive_box(corner, bodies[cluster.body].slack);
-    lows[entry] = own.low;
-    highs[entry] = own.high;
+    let own = primitive_extent(corner, bodies[cluster.body].slack);
+    put_extent(entry, own);
     ids[entry] = corner;
-    return overlap(own, both);
+    return extents_meet(own, others);
 }
 
 // Writes candidates: the lane's primitive with each partner in one word of its mask.
@@ -83,15 +82,12 @@ fn main(
     let item = items[min(ix, n_items - 1u)];
     let cluster_a = clusters[item.a];
     let cluster_b = clusters[item.b];
-    let node_a = nodes[item.a];
-    let node_b = nodes[item.b];
-    let both = Box(max(node_a.low, node_b.low), min(node_a.high, node_b.high));
     workgroupBarrier();
     let bit = 1u << (lane & 31u);
-    if load(cluster_a, lane, lane, both) {
+    if load(cluster_a, lane, lane, node_extent(item.b)) {
         atomicOr(&survivors[lane >> 5u], bit);
     }
-    if load(cluster_b, lane, lane + 64u, both) {
+    if load(cluster_b, lane, lane + 64u, node_extent(item.a)) {
         atomicOr(&survivors[2u + (lane >> 5u)], bit);
     }
     workgroupBarrier();
@@ -105,7 +101,7 @@ fn main(
     var walked = select(alive_b, alive_a, swap);
     let mine = lane + select(0u, 64u, swap);
     let partners = select(64u, 0u, swap);
-    let is_same_body = cluster_a.body == cluster_b.body;
+    let is_same_body = are_of_one_body(cluster_a, cluster_b);
     let alive = ix < n_items && (select(lanes.x, lanes.y, lane >= 32u) & bit) != 0u;
     var met = vec2<u32>(0u);
     var shared_ids = vec2<u32>(0u);
@@ -116,7 +112,7 @@ fn main(
                 vec2<u32>(0u, ~((bit << 1u) - 1u)), lane >= 32u);
             walked &= after;
         }
-        let own = Box(lows[mine], highs[mine]);
+        let own = extent_at(mine);
         let own_ids = ids[mine];
         for (var word = 0u; word < 2u; word++) {
             var rest = select(walked.x, walked.y, word == 1u);
@@ -126,7 +122,7 @@ fn main(
                 let partner_bit = rest & (0u - rest);
                 let partner = partners + 32u * word + firstTrailingBit(rest);
                 rest ^= partner_bit;
-                if overlap(own, Box(lows[partner], highs[partner])) {
+                if extents_meet(own, extent_at(partner)) {
                     if is_same_body && shares_vertex(own_ids, ids[partner]) {
                         sharing |= partner_bit * params.resolve;
                     } else {
@@ -156,7 +152,7 @@ fn main(
     let rounded = select(0u, FLAG, slack != 0u);
     let my_place = lane + select(cluster_a.first_place, cluster_b.first_place, swap);
     let first_partner = select(cluster_b.first_place, cluster_a.first_place, swap);
-    let plain = vec2<u32>(rounded, 0u);
+    let plain = vec2<u32>(rounded, flag_of(cluster_a));
     let marked = vec2<u32>(rounded, FLAG);
     place = put(met.x, first_partner, my_place, plain, swap, place);
     place = put(met.y, first_partner + 32u, my_place, plain, swap, place);

@@ -23,15 +23,32 @@ const GATE: u32 = 0x1000u;
 // The nodes of one height.
 struct Level { first: u32, count: u32 }
 
-// One participant. `slack`: by how many keys its boxes are widened, for rounded positions.
+// One participant. `slack`: by how many keys its boxes are widened, for rounded positions. In a step each layer of a
+// body is a participant:
+//
+//   layer  31             5      4        3       2     1   0
+//         +----------------+------------+--------+------+------+
+//         |  body number   | own layers | points | bare | part |
+//         +----------------+------------+--------+------+------+
+//
+// Own layers: pairs with other layers of the same body are asked for. Points, bare: the body has no edges, no faces.
 struct Body {
     root: u32,
     slack: u32,
     within: u32,
-    unused: u32,
+    layer: u32,
     category: vec2<u32>,
     mask: vec2<u32>,
 }
+
+const PART: u32 = 3u;
+const EDGES: u32 = 0u;
+const VERTICES: u32 = 1u;
+const FACES: u32 = 2u;
+const BARE: u32 = 4u;
+const POINTS: u32 = 8u;
+const OWN_LAYERS: u32 = 16u;
+const BODY_SHIFT: u32 = 5u;
 
 // A run of at most 64 primitives and the run of its unique vertices.
 //
@@ -49,10 +66,10 @@ struct Cluster {
 struct NodePair { a: u32, b: u32 }
 struct WorkItem { a: u32, b: u32 }
 
-// Two places. Bit 31 of `a`: positions were rounded. Bit 31 of `b`: the two share a vertex.
+// Two places. Bit 31 of `a`: positions were rounded. Bit 31 of `b`: the two share a vertex; in a step, `a` is an edge.
 struct Candidate { a: u32, b: u32 }
 
-// Two global primitive numbers, the lower one first.
+// Two global primitive numbers, the lower one first. In a step an unsure key has two places.
 struct PairKey { low: u32, high: u32 }
 struct UnsureKey { low: u32, high: u32 }
 

@@ -1,0 +1,191 @@
+// Moving elements that certainly do not touch: tests of their difference polygon, in the same steps as `Motion` of
+// `exact::filter::motion` on the CPU.
+//
+// Constants, bounds and their proof: `docs/exactness.md`, "The GPU filter for moving elements". They hold under any
+// rounding direction, contraction and reassociation, with subnormals flushed or kept. All differences are scaled by one
+// power of two, so that the largest of them is in [1, 2). For positions that the host has rounded from f64, each size grows
+// by `slack`.
+
+// Errors that do not depend on sizes: of flushed numbers.
+const TINY: f32 = 0x1p-76f;
+// Bounds of f's outer coefficients, of the quartics' and of a product with the sum of all corners, by the sizes in them.
+const OF_CUBIC: f32 = 0x1p-16f;
+const OF_QUARTIC: f32 = 0x1p-14f;
+const OF_SUM: f32 = 0x1p-13f;
+// How much larger those of other coefficients are: 3 f_1; 4 w_1; 6 w_2.
+const INNER: f32 = 5.0;
+const NEXT: f32 = 8.0;
+const MIDDLE: f32 = 16.0;
+
+// A vector at the start and at the end.
+struct Moving {
+    start: vec3<f32>,
+    end: vec3<f32>,
+}
+
+fn size_of(d: Moving) -> f32 {
+    return max(size(d.start), size(d.end));
+}
+
+fn between(p: Moving, q: Moving) -> Moving {
+    return Moving(p.start - q.start, p.end - q.end);
+}
+
+fn scaled(d: Moving, scale: f32) -> Moving {
+    return Moving(d.start * scale, d.end * scale);
+}
+
+fn opposite(d: Moving) -> Moving {
+    return Moving(-d.start, -d.end);
+}
+
+fn cross3(d: vec3<f32>, e: vec3<f32>) -> vec3<f32> {
+    return vec3<f32>(d.y * e.z - d.z * e.y, d.z * e.x - d.x * e.z, d.x * e.y - d.y * e.x);
+}
+
+fn dot3(d: vec3<f32>, e: vec3<f32>) -> f32 {
+    return d.x * e.x + d.y * e.y + d.z * e.z;
+}
+
+// Bernstein coefficients of a cross product: the first, twice the middle one, the last.
+struct Crossed {
+    first: vec3<f32>,
+    twice: vec3<f32>,
+    last: vec3<f32>,
+}
+
+fn crossed(d: Moving, e: Moving) -> Crossed {
+    return Crossed(
+        cross3(d.start, e.start),
+        cross3(d.start, e.end) + cross3(d.end, e.start),
+        cross3(d.end, e.end),
+    );
+}
+
+// The corners V_0 to V_3 of the difference polygon, and its edges from V_0, V_1 and V_2; a triangle repeats V_2.
+struct Polygon {
+    corners: array<Moving, 4>,
+    edges: array<Moving, 3>,
+}
+
+// Points p and a, b, c of a vertex and a face.
+fn triangle(p: Moving, a: Moving, b: Moving, c: Moving) -> Polygon {
+    let last = between(c, p);
+    return Polygon(
+        array<Moving, 4>(between(a, p), between(b, p), last, last),
+        array<Moving, 3>(between(b, a), between(c, b), between(a, c)),
+    );
+}
+
+// Points p, q and r, s of two edges.
+fn parallelogram(p: Moving, q: Moving, r: Moving, s: Moving) -> Polygon {
+    return Polygon(
+        array<Moving, 4>(between(p, r), between(q, r), between(q, s), between(p, s)),
+        array<Moving, 3>(between(q, p), between(r, s), between(p, q)),
+    );
+}
+
+// Whether all corners at both ends are on one side of the plane through the origin across `direction`.
+fn are_aside(polygon: ptr<function, Polygon>, direction: vec3<f32>, bound: f32) -> bool {
+    var least = dot3(direction, (*polygon).corners[0].start);
+    var most = least;
+    for (var k = 0u; k < 4u; k++) {
+        let at_start = dot3(direction, (*polygon).corners[k].start);
+        let at_end = dot3(direction, (*polygon).corners[k].end);
+        least = min(least, min(at_start, at_end));
+        most = max(most, max(at_start, at_end));
+    }
+    return least > bound || most < -bound;
+}
+
+// Whether all coefficients of w = N . (V x E) are certainly negative.
+fn is_outside(n: Crossed, corner: Moving, edge: Moving, bound: f32) -> bool {
+    let m = crossed(corner, edge);
+    let next = NEXT * bound;
+    return dot3(n.first, m.first) < -bound
+        && dot3(n.first, m.twice) + dot3(n.twice, m.first) < -next
+        && dot3(n.first, m.last) + dot3(n.twice, m.twice) + dot3(n.last, m.first) < -MIDDLE * bound
+        && dot3(n.twice, m.last) + dot3(n.last, m.twice) < -next
+        && dot3(n.last, m.last) < -bound;
+}
+
+// Whether the elements certainly do not touch. `narrowing`: by how much a difference may be wrong because positions were
+// rounded.
+fn never_touch(polygon: ptr<function, Polygon>, are_edges: bool, narrowing: f32) -> bool {
+    var widest = 0.0;
+    for (var k = 0u; k < 4u; k++) {
+        widest = max(widest, size_of((*polygon).corners[k]));
+    }
+    var largest = widest;
+    for (var k = 0u; k < 3u; k++) {
+        largest = max(largest, size_of((*polygon).edges[k]));
+    }
+    if largest < SMALLEST || largest < narrowing {
+        return false;
+    }
+    let scale = bitcast<f32>((254u - (bitcast<u32>(largest) >> 23u)) << 23u);
+    for (var k = 0u; k < 4u; k++) {
+        (*polygon).corners[k] = scaled((*polygon).corners[k], scale);
+    }
+    for (var k = 0u; k < 3u; k++) {
+        (*polygon).edges[k] = scaled((*polygon).edges[k], scale);
+    }
+    let slack = narrowing * scale;
+    let wide = widest * scale + slack;
+
+    // Along the sum of all corners.
+    var sum = vec3<f32>(0.0);
+    for (var k = 0u; k < 3u; k++) {
+        sum += (*polygon).corners[k].start + (*polygon).corners[k].end;
+    }
+    if are_edges {
+        sum += (*polygon).corners[3].start + (*polygon).corners[3].end;
+    }
+    if are_aside(polygon, sum, wide * (OF_SUM * wide + 32.0 * slack) + TINY) {
+        return true;
+    }
+
+    // Along the normal at either end, and by the sign of f = N . V_0.
+    let first = (*polygon).edges[0];
+    let second = (*polygon).edges[1];
+    let n = crossed(first, second);
+    let d = size_of(first) + slack;
+    let e = size_of(second) + slack;
+    let bound = OF_CUBIC * (d * e * wide) + 4.0 * slack * (d * e + (d + e) * wide) + TINY;
+    if are_aside(polygon, n.first, bound) || are_aside(polygon, n.last, bound) {
+        return true;
+    }
+    let v = (*polygon).corners[0];
+    let f_0 = dot3(n.first, v.start);
+    let f_1 = dot3(n.first, v.end) + dot3(n.twice, v.start);
+    let f_2 = dot3(n.twice, v.end) + dot3(n.last, v.start);
+    let f_3 = dot3(n.last, v.end);
+    let inner = INNER * bound;
+    if min(f_0, f_3) > bound && min(f_1, f_2) > inner {
+        return true;
+    }
+    if max(f_0, f_3) < -bound && max(f_1, f_2) < -inner {
+        return true;
+    }
+
+    // Beyond one edge during the whole step.
+    for (var k = 0u; k < 3u; k++) {
+        let corner = (*polygon).corners[k];
+        let edge = (*polygon).edges[k];
+        let c = size_of(corner) + slack;
+        let g = size_of(edge) + slack;
+        let w_bound = OF_QUARTIC * (d * e * c * g)
+            + 8.0 * slack * (d * e * (c + g) + c * g * (d + e)) + TINY;
+        if is_outside(n, corner, edge, w_bound) {
+            return true;
+        }
+    }
+    if are_edges {
+        // The last edge is the opposite of the second one.
+        let corner = (*polygon).corners[3];
+        let c = size_of(corner) + slack;
+        let w_bound = OF_QUARTIC * (d * e * c * e) + 8.0 * slack * (d * e * (c + e) + c * e * (d + e)) + TINY;
+        return is_outside(n, corner, opposite(second), w_bound);
+    }
+    return false;
+}

@@ -1,0 +1,444 @@
+//! The filter of the GPU for moving elements, as `docs/exactness.md` specifies it, in the model of WGSL's arithmetic of
+//! `gpu_bound`. Signs that it calls certain must be right, and elements that it drops must not touch.
+
+use crate::generators::{Kind, Random};
+use crate::gpu_bound::{Device, LARGEST, NARROWING, SMALLEST};
+use impinge_core::exact::{ElementPair, first_contact};
+
+const TINY: f32 = f32::from_bits((127 - 76) << 23);
+const OF_CUBIC: f32 = 1.0 / 65_536.0;
+const OF_QUARTIC: f32 = 1.0 / 16_384.0;
+const OF_SUM: f32 = 1.0 / 8192.0;
+const INNER: f32 = 5.0;
+const NEXT: f32 = 8.0;
+const MIDDLE: f32 = 16.0;
+
+#[cfg(feature = "gpu")]
+#[test]
+fn constants_are_those_of_the_kernel() {
+    let mut shaders = impinge_core::gpu::shaders();
+    let (_, text) = shaders
+        .find(|(name, _)| *name == "narrow_moving")
+        .expect("a kernel");
+    for (name, value, written) in [
+        ("TINY", TINY, "0x1p-76f"),
+        ("OF_CUBIC", OF_CUBIC, "0x1p-16f"),
+        ("OF_QUARTIC", OF_QUARTIC, "0x1p-14f"),
+        ("OF_SUM", OF_SUM, "0x1p-13f"),
+        ("INNER", INNER, "5.0"),
+        ("NEXT", NEXT, "8.0"),
+        ("MIDDLE", MIDDLE, "16.0"),
+    ] {
+        assert!(
+            text.contains(&format!("const {name}: f32 = {written};")),
+            "{name}"
+        );
+        let decimal = match written.strip_prefix("0x1p-") {
+            Some(power) => 2f32.powi(-power.trim_end_matches('f').parse::<i32>().expect("a power")),
+            None => written.parse().expect("a number"),
+        };
+        assert_eq!(value, decimal, "{name}");
+    }
+}
+
+/// A vector at the start and at the end.
+type Moving<T> = [[T; 3]; 2];
+
+/// The difference polygon: corners, and edges from the first three of them.
+struct Polygon<T> {
+    corners: [Moving<T>; 4],
+    edges: [Moving<T>; 3],
+}
+
+impl<T: Copy> Polygon<T> {
+    /// From the points of a pair, at the start and at the end.
+    fn new(pair: ElementPair, points: &[[[T; 3]; 4]; 2], mut minus: impl FnMut(T, T) -> T) -> Self {
+        let mut between = |i: usize, j: usize| -> Moving<T> {
+            points.map(|p| std::array::from_fn(|axis| minus(p[i][axis], p[j][axis])))
+        };
+        match pair {
+            ElementPair::EdgeEdge => Polygon {
+                corners: [between(0, 2), between(1, 2), between(1, 3), between(0, 3)],
+                edges: [between(1, 0), between(2, 3), between(0, 1)],
+            },
+            _ => Polygon {
+                corners: [between(1, 0), between(2, 0), between(3, 0), between(3, 0)],
+                edges: [between(2, 1), between(3, 2), between(1, 3)],
+            },
+        }
+    }
+}
+
+/// A sum of products of numbers: exact, or as a device computes it.
+trait Sum {
+    type Number: Copy;
+    fn negated(x: Self::Number) -> Self::Number;
+    fn of(&mut self, monomials: &[Vec<Self::Number>]) -> Self::Number;
+}
+
+/// Exact integers.
+struct Exactly;
+
+impl Sum for Exactly {
+    type Number = i128;
+    fn negated(x: i128) -> i128 {
+        -x
+    }
+    fn of(&mut self, monomials: &[Vec<i128>]) -> i128 {
+        monomials
+            .iter()
+            .map(|factors| factors.iter().product::<i128>())
+            .sum()
+    }
+}
+
+impl Sum for Device<'_> {
+    type Number = f32;
+    fn negated(x: f32) -> f32 {
+        -x
+    }
+    fn of(&mut self, monomials: &[Vec<f32>]) -> f32 {
+        let mut terms: Vec<f32> = monomials
+            .iter()
+            .map(|factors| self.product(factors))
+            .collect();
+        // Mostly in the order in which they are written, in which terms cancel late; else in any order.
+        let shuffled = self.below(2) == 0;
+        while terms.len() > 1 {
+            let n = terms.len() as u64;
+            let first = if shuffled { self.below(n) as usize } else { 0 };
+            let x = terms.remove(first);
+            let second = if shuffled {
+                self.below(n - 1) as usize
+            } else {
+                0
+            };
+            let y = terms.remove(second);
+            terms.insert(0, self.add(x, y));
+        }
+        terms[0]
+    }
+}
+
+const CYCLES: [[usize; 3]; 3] = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
+
+/// The monomials of each coordinate of d x e.
+fn cross<S: Sum>(d: [S::Number; 3], e: [S::Number; 3]) -> [[Vec<S::Number>; 2]; 3] {
+    [1, 2, 0].map(|ix: usize| {
+        let [i, j, _] = CYCLES[ix];
+        [vec![d[i], e[j]], vec![S::negated(d[j]), e[i]]]
+    })
+}
+
+/// The sum of all d x e . v.
+fn triples<S: Sum>(sum: &mut S, terms: &[[[S::Number; 3]; 3]]) -> S::Number {
+    let mut monomials = Vec::new();
+    for &[d, e, v] in terms {
+        for (axis, normal) in cross::<S>(d, e).into_iter().enumerate() {
+            for mut factors in normal {
+                factors.push(v[axis]);
+                monomials.push(factors);
+            }
+        }
+    }
+    sum.of(&monomials)
+}
+
+/// The sum of all (d x e) . (c x g).
+fn quadruples<S: Sum>(sum: &mut S, terms: &[[[S::Number; 3]; 4]]) -> S::Number {
+    let mut monomials = Vec::new();
+    for &[d, e, c, g] in terms {
+        for (first, second) in cross::<S>(d, e).iter().zip(&cross::<S>(c, g)) {
+            for p in first {
+                for q in second {
+                    monomials.push([&p[..], &q[..]].concat());
+                }
+            }
+        }
+    }
+    sum.of(&monomials)
+}
+
+/// f_0, 3 f_1, 3 f_2, f_3.
+fn cubic<S: Sum>(sum: &mut S, polygon: &Polygon<S::Number>) -> [S::Number; 4] {
+    let ([d, e, _], v) = (polygon.edges, polygon.corners[0]);
+    let term = |[i, j, k]: [usize; 3]| [d[i], e[j], v[k]];
+    [
+        triples(sum, &[[0, 0, 0]].map(term)),
+        triples(sum, &[[0, 0, 1], [0, 1, 0], [1, 0, 0]].map(term)),
+        triples(sum, &[[0, 1, 1], [1, 0, 1], [1, 1, 0]].map(term)),
+        triples(sum, &[[1, 1, 1]].map(term)),
+    ]
+}
+
+/// w_0, 4 w_1, 6 w_2, 4 w_3, w_4 of one edge.
+fn quartic<S: Sum>(sum: &mut S, polygon: &Polygon<S::Number>, ix: usize) -> [S::Number; 5] {
+    let [d, e, _] = polygon.edges;
+    let c = polygon.corners[ix];
+    let g = match ix {
+        3 => polygon.edges[1].map(|edge| edge.map(S::negated)),
+        ix => polygon.edges[ix],
+    };
+    std::array::from_fn(|n_late| {
+        let all = (0..16usize).filter(|bits| bits.count_ones() as usize == n_late);
+        let at = |bits: usize, k: usize| bits >> k & 1;
+        let terms = all.map(|bits| {
+            [
+                d[at(bits, 0)],
+                e[at(bits, 1)],
+                c[at(bits, 2)],
+                g[at(bits, 3)],
+            ]
+        });
+        quadruples(sum, &Vec::from_iter(terms))
+    })
+}
+
+/// n . V for all corners at both ends, for n the sum of all corners, N(0) and N(1).
+fn along<S: Sum>(
+    sum: &mut S,
+    polygon: &Polygon<S::Number>,
+    n_corners: usize,
+) -> [Vec<S::Number>; 3] {
+    let corners = polygon.corners[..n_corners].as_flattened();
+    let [d, e, _] = polygon.edges;
+    let of_sum = corners.iter().map(|v| {
+        let monomials = corners
+            .iter()
+            .flat_map(|w| (0..3).map(|axis| vec![w[axis], v[axis]]));
+        sum.of(&Vec::from_iter(monomials))
+    });
+    let of_sum = of_sum.collect();
+    let [first, last] = [0, 1].map(|end| {
+        let values = corners
+            .iter()
+            .map(|v| triples(sum, &[[d[end], e[end], *v]]));
+        values.collect()
+    });
+    [of_sum, first, last]
+}
+
+fn size(d: &Moving<f32>) -> f32 {
+    d.as_flattened()
+        .iter()
+        .fold(0.0, |size: f32, x| size.max(x.abs()))
+}
+
+/// The kernel's values with their bounds, by test: a direction or a polynomial.
+struct Values {
+    along: [(Vec<f32>, f32); 3],
+    cubic: [(f32, f32); 4],
+    quartics: Vec<[(f32, f32); 5]>,
+}
+
+/// The bounds that the kernel computes, and the values under the model. `None` if the pair is unsure before.
+fn values(
+    device: &mut Device<'_>,
+    pair: ElementPair,
+    points: &[[[f32; 3]; 4]; 2],
+    narrowing: f32,
+) -> Option<Values> {
+    let mut polygon = Polygon::new(pair, points, |x, y| device.add(x, -y));
+    let widest = polygon.corners.iter().map(size).fold(0.0, f32::max);
+    let largest = polygon.edges.iter().map(size).fold(widest, f32::max);
+    if largest < SMALLEST || largest < narrowing {
+        return None;
+    }
+    let scale = f32::from_bits((254 - (largest.to_bits() >> 23)) << 23);
+    let all = polygon.corners.iter_mut().chain(&mut polygon.edges);
+    for x in all.flatten().flatten() {
+        *x = device.product(&[*x, scale]);
+    }
+    let slack = device.product(&[narrowing, scale]);
+    let sizes = |d: &Moving<f32>, device: &mut Device<'_>| device.add(size(d), slack);
+    let wide = device.product(&[widest, scale]);
+    let wide = device.add(wide, slack);
+    let n_corners = if pair == ElementPair::EdgeEdge { 4 } else { 3 };
+    let d = sizes(&polygon.edges[0], device);
+    let e = sizes(&polygon.edges[1], device);
+    let of_sum = device.of(&[
+        vec![OF_SUM, wide, wide],
+        vec![32.0, slack, wide],
+        vec![TINY],
+    ]);
+    let bound = device.of(&[
+        vec![OF_CUBIC, d, e, wide],
+        vec![4.0, slack, d, e],
+        vec![4.0, slack, d, wide],
+        vec![4.0, slack, e, wide],
+        vec![TINY],
+    ]);
+    let [sum, first, last] = along(device, &polygon, n_corners);
+    let inner = device.product(&[INNER, bound]);
+    let [f_0, f_1, f_2, f_3] = cubic(device, &polygon);
+    let mut quartics = Vec::new();
+    for ix in 0..n_corners {
+        let c = sizes(&polygon.corners[ix], device);
+        let g = sizes(
+            &polygon.edges[ix % if n_corners == 4 { 2 } else { 3 }],
+            device,
+        );
+        let outer = device.of(&[
+            vec![OF_QUARTIC, d, e, c, g],
+            vec![8.0, slack, d, e, c],
+            vec![8.0, slack, d, e, g],
+            vec![8.0, slack, c, g, d],
+            vec![8.0, slack, c, g, e],
+            vec![TINY],
+        ]);
+        let [next, middle] = [NEXT, MIDDLE].map(|more| device.product(&[more, outer]));
+        let bounds = [outer, next, middle, next, outer];
+        let w = quartic(device, &polygon, ix);
+        quartics.push(std::array::from_fn(|k| (w[k], bounds[k])));
+    }
+    Some(Values {
+        along: [(sum, of_sum), (first, bound), (last, bound)],
+        cubic: [(f_0, bound), (f_1, inner), (f_2, inner), (f_3, bound)],
+        quartics,
+    })
+}
+
+fn are_all(values: impl Iterator<Item = (f32, f32)> + Clone) -> bool {
+    values.clone().all(|(value, bound)| value > bound)
+        || values.clone().all(|(value, bound)| value < -bound)
+}
+
+/// The kernel's decision.
+fn never_touch(values: &Values) -> bool {
+    values
+        .along
+        .iter()
+        .any(|(along, bound)| are_all(along.iter().map(|&x| (x, *bound))))
+        || are_all(values.cubic.iter().copied())
+        || values
+            .quartics
+            .iter()
+            .any(|w| w.iter().all(|(value, bound)| *value < -bound))
+}
+
+const PAIRS: [ElementPair; 2] = [ElementPair::VertexFace, ElementPair::EdgeEdge];
+
+/// How often values were certain, and how often their signs alone were wrong.
+#[derive(Default)]
+struct Seen {
+    n: u32,
+    n_sure: u32,
+    n_wrong: u32,
+}
+
+impl Seen {
+    fn check(&mut self, (value, bound): (f32, f32), exact: i128, what: &str) {
+        self.n += 1;
+        self.n_wrong += u32::from(value != 0.0 && (value > 0.0) != (exact > 0));
+        if value.abs() > bound {
+            self.n_sure += 1;
+            assert_eq!(value > 0.0, exact > 0, "{what}: {value:e}, exactly {exact}");
+            assert_ne!(exact, 0, "{what}: {value:e}");
+        }
+    }
+}
+
+#[test]
+fn coefficients_are_right_where_they_are_sure() {
+    let mut random = Random::new(50);
+    let mut seen: [Seen; 3] = Default::default();
+    for kind in [
+        Kind::Lattice(3),
+        Kind::Skewed(2),
+        Kind::Planar(4),
+        Kind::Skewed(1),
+    ] {
+        // From scales where the largest difference is barely above `SMALLEST`, up to `LARGEST`.
+        for power in [0, -32, -55, 14] {
+            for _ in 0..1500 {
+                let points: [[f64; 3]; 8] = kind.points(&mut random);
+                // Whole numbers, in `f32` too.
+                let narrow = points.map(|p| p.map(|x| x as f32));
+                let whole = narrow.map(|p| p.map(|x| x as i128));
+                let halves = |p: [[f32; 3]; 8]| [0, 4].map(|k| std::array::from_fn(|i| p[k + i]));
+                let scaled = narrow.map(|p| p.map(|x| x * 2f32.powi(power)));
+                let whole = [0, 4].map(|k| std::array::from_fn(|i| whole[k + i]));
+                let pair = random.pick(&PAIRS);
+                let mut device = Device(&mut random);
+                let Some(values) = values(&mut device, pair, &halves(scaled), 0.0) else {
+                    continue;
+                };
+                let exact = Polygon::new(pair, &whole, |x, y| x - y);
+                let what = format!("{pair:?} {kind:?} 2^{power} {narrow:?}");
+                let n_corners = values.quartics.len();
+                let exact_along = along(&mut Exactly, &exact, n_corners);
+                for ((found, bound), exact) in values.along.iter().zip(&exact_along) {
+                    for (&value, &exact) in found.iter().zip(exact) {
+                        seen[0].check((value, *bound), exact, &what);
+                    }
+                }
+                for (found, exact) in values.cubic.iter().zip(cubic(&mut Exactly, &exact)) {
+                    seen[1].check(*found, exact, &what);
+                }
+                for (ix, found) in values.quartics.iter().enumerate() {
+                    for (found, exact) in found.iter().zip(quartic(&mut Exactly, &exact, ix)) {
+                        seen[2].check(*found, exact, &what);
+                    }
+                }
+            }
+        }
+    }
+    for (Seen { n, n_sure, n_wrong }, what) in seen.iter().zip(["directions", "cubic", "quartics"])
+    {
+        assert!(*n_sure > n / 10, "{what}: {n_sure} of {n} are sure");
+        assert!(
+            *n_wrong > 50,
+            "{what}: the model is too kind, {n_wrong} of {n} signs are wrong"
+        );
+    }
+}
+
+#[test]
+fn what_is_dropped_never_touches() {
+    let mut random = Random::new(51);
+    let (mut n, mut n_dropped) = (0, 0);
+    for kind in Kind::ALL {
+        for is_narrowed in [false, true] {
+            for scale in [1.0, 2f64.powi(-29), 2f64.powi(10)] {
+                for _ in 0..150 {
+                    let points: [[f64; 3]; 8] = kind.points(&mut random);
+                    let shift = random.pick(&[0.0, 1.0, 1000.0]);
+                    let points = points.map(|p| {
+                        p.map(|x| match is_narrowed {
+                            // Smaller ones would be out of range.
+                            true if x.abs() < 1e-60 => 0.0,
+                            true => (x * 1.1 + shift) * scale,
+                            false => f64::from((x * scale) as f32),
+                        })
+                    });
+                    let narrow = points.map(|p| p.map(|x| x as f32));
+                    let largest = narrow
+                        .as_flattened()
+                        .iter()
+                        .fold(0.0, |m: f32, x| m.max(x.abs()));
+                    // Larger ones are unsure at once, and so never dropped.
+                    if largest.is_nan() || largest > LARGEST {
+                        continue;
+                    }
+                    let narrowing = if is_narrowed {
+                        NARROWING * largest
+                    } else {
+                        0.0
+                    };
+                    let pair = random.pick(&PAIRS);
+                    let halves = [0, 4].map(|k| std::array::from_fn(|i| narrow[k + i]));
+                    let mut device = Device(&mut random);
+                    let values = values(&mut device, pair, &halves, narrowing);
+                    n += 1;
+                    if values.is_some_and(|values| never_touch(&values)) {
+                        n_dropped += 1;
+                        let [start, end] = [0, 4].map(|k| std::array::from_fn(|i| points[k + i]));
+                        let contact = first_contact(pair, &start, &end);
+                        assert!(contact.is_none(), "{pair:?} {kind:?}: {start:?} {end:?}");
+                    }
+                }
+            }
+        }
+    }
+    assert!(n_dropped > n / 8, "{n_dropped} of {n} are dropped");
+}
