@@ -130,33 +130,42 @@ fn every_pair_and_every_time_is_that_of_the_exact_prototype() {
     }
 }
 
-/// Fails where no adapter is found; a software driver is enough.
+/// Fails where no adapter is found. A software driver is enough, but takes half a minute for the larger step: that is only
+/// asked for all impacts, and with enough room at once.
 #[cfg(feature = "gpu")]
 #[test]
 fn a_device_leaves_every_pair_that_touches() {
+    let mut room = impinge_core::Capacities::default();
+    (room.items, room.candidates, room.unsure) = (1 << 16, 1 << 21, 1 << 19);
+    let settings = Settings {
+        backend: Backend::Gpu,
+        ..Settings::default()
+    };
+    let device = Detector::with_capacities(settings, room);
+    let mut device = device.expect("a GPU or a software driver");
     for scenario in SCENARIOS {
         let scene = scenario.scene();
-        let settings = Settings {
-            backend: Backend::Gpu,
-            ..Settings::default()
-        };
-        let mut device = Detector::with_settings(settings).expect("a GPU or a software driver");
-        for toi in [Toi::F32, Toi::F64] {
-            let step = Step::default().toi(toi);
-            let impacts = device.impacts(&scene, &step).expect("good").clone();
-            let stats = impacts.stats();
-            println!("{}: {stats:?}", scenario.name);
-            assert_ne!(stats.backend, "cpu");
-            for kind in [PairKind::VertexFace, PairKind::EdgeEdge] {
-                let (found, expected) = (rows(impacts.of(kind)), scenario.expected(kind, toi));
-                assert_eq!(found.len(), expected.len(), "{}", scenario.name);
-                for (found, expected) in found.iter().zip(&expected) {
-                    assert_eq!(found, expected, "{} {} {toi:?}", scenario.name, kind.name());
-                }
+        let step = Step::default();
+        let impacts = device.impacts(&scene, &step).expect("good").clone();
+        let stats = impacts.stats();
+        assert_ne!(stats.backend, "cpu");
+        let (n, n_left) = (stats.n_candidates, stats.n_unsure);
+        println!("{}: {n_left} of {n} are left", scenario.name);
+        assert!(n_left < n / 4, "{}: {n_left} of {n}", scenario.name);
+        for kind in [PairKind::VertexFace, PairKind::EdgeEdge] {
+            let (found, expected) = (rows(impacts.of(kind)), scenario.expected(kind, Toi::F32));
+            assert_eq!(found.len(), expected.len(), "{}", scenario.name);
+            for (found, expected) in found.iter().zip(&expected) {
+                assert_eq!(found, expected, "{} {}", scenario.name, kind.name());
             }
+        }
+        if scenario.name == "cloth-funnel" {
             let earliest = device.earliest(&scene, &step).expect("good");
-            assert_eq!(earliest, impacts.earliest(), "{} {toi:?}", scenario.name);
+            assert_eq!(earliest, impacts.earliest());
             assert!(!device.is_free(&scene, &step).expect("good"));
+            let exact = device.impacts(&scene, &step.toi(Toi::F64)).expect("good");
+            let found = rows(exact.of(PairKind::EdgeEdge));
+            assert_eq!(found, scenario.expected(PairKind::EdgeEdge, Toi::F64));
         }
     }
 }

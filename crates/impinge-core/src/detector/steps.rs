@@ -94,6 +94,10 @@ impl Detector {
     /// time is that of the first contact, rounded down: `toi <= first < toi.next_up()`. With a
     /// [separation](Step::separation), the same holds of the first time at which their distance is at most that.
     ///
+    /// On a GPU the device finds the pairs that may touch, and the CPU finds their times, on all threads: the answer is the same to the
+    /// last bit. The CPU answers alone if there is a separation, or if the device or the memory budget cannot hold the step; in a
+    /// browser it always does. [`Statistics::backend`](crate::Statistics::backend) says who answered.
+    ///
     /// ```
     /// use impinge::{Backend, Detector, PairKind, Scene, Step};
     /// # fn main() -> Result<(), impinge::Error> {
@@ -437,7 +441,7 @@ impl Detector {
     }
 
     /// Pairs of elements whose boxes overlap during a step, each box inflated by a distance: for callers with their own test.
-    /// Sorted and complete.
+    /// Sorted and complete. Always found on the CPU.
     ///
     /// # Errors
     /// As [`impacts`](Detector::impacts), and a distance that is negative or not finite.

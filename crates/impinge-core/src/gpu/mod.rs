@@ -38,6 +38,7 @@ pub mod reaching;
 pub mod room;
 #[allow(missing_docs)]
 pub mod steps;
+mod taker;
 mod topology;
 mod waiting;
 #[allow(missing_docs)]

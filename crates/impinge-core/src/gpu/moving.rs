@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use super::device::Scopes;
 use super::engine::{Engine, Outcome, Plan};
-use super::passes::Taker;
+use super::taker::{TakeLeft, Taker};
 use super::world::weigh_moving;
 use crate::clock::Instant;
 use crate::error::Error;
@@ -18,9 +18,6 @@ use crate::grouping::clusters::Clustering;
 use crate::run::Job;
 use crate::settings::{Method, Settings};
 use crate::stats::Statistics;
-
-/// Takes the places of pairs that the device has left, in any order. Returns whether more are wanted.
-pub type TakeLeft<'a> = dyn FnMut(&mut [[u32; 2]]) -> Result<bool, Error> + 'a;
 
 impl Engine {
     /// The engine for steps, on the same device.

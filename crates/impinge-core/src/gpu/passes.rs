@@ -16,9 +16,9 @@ use super::collect::{Collected, Guess};
 use super::device::Scopes;
 use super::engine::{Engine, Outcome, Plan};
 use super::layout::NodePair;
-use super::moving::TakeLeft;
 use super::room::{Capacities, CellsWanted, Verdict};
 use super::steps::Stages;
+use super::taker::Taker;
 use crate::error::Error;
 use crate::frame::{Frame, pair_key};
 use crate::narrow::settle;
@@ -40,24 +40,6 @@ const SETTLED_BY_A_TASK: usize = 64;
 pub(super) enum Work {
     Seeds(Vec<NodePair>),
     Cells(CellRange, Share),
-}
-
-/// Takes the results of complete passes.
-pub(super) enum Taker<'a, 'b> {
-    /// Pairs that intersect.
-    Answer(&'a Answer),
-    /// Pairs of a step that may touch.
-    Left(&'a mut TakeLeft<'b>),
-}
-
-impl Taker<'_, '_> {
-    /// To be told of certain pairs, even where a buffer was too small for them.
-    fn foresee(&self, n_more: u64) -> Result<(), Error> {
-        match self {
-            Taker::Answer(answer) => answer.foresee(n_more),
-            Taker::Left(_) => Ok(()),
-        }
-    }
 }
 
 impl Engine {
