@@ -200,10 +200,12 @@ def decide(file, pairs, truth, said):
                 continue
             drops = one["reading"] == "drops faces while reading"
             if drops not in other:
-                other[drops] = variants(file.vertices, file.faces[one["numbers"]] if drops else file.faces)
-            names = [name for name, n in other[drops][question].items() if n == theirs]
-            words = [*(["the reader drops faces"] if drops else []), *names[:1]] if names else ["unexplained"]
-            definitions[question] = ("; ".join(word for word in words if word != "exact"), f"{theirs}, exact {truth[question]}")
+                faces = file.faces[one["numbers"]] if drops else file.faces
+                other[drops] = Definitions(file.vertices, faces)
+            name = other[drops].that_gives(question, theirs)
+            words = [*(["the reader drops faces"] if drops else []), *([name] if name != "exact" else [])]
+            example = f"{theirs}, exact {truth[question]}"
+            definitions[question] = ("; ".join(words) if name else "unexplained", example)
         decided.append({"label": one["label"], "classes": dict(tally), "examples": examples, "definitions": definitions})
     return file.path.name, decided
 
@@ -236,51 +238,57 @@ def classified(peer, side, judged, reading):
     return f"peer misses a true one: {kind}{rounds}"
 
 
-def variants(vertices, faces):
-    """The counts under other definitions: question -> {definition: count}."""
-    welded, corners = check_truth.weld(vertices, faces)
-    near = np.unique(np.round(vertices.astype(np.float64) * 1e8), axis=0, return_inverse=True)[1].reshape(-1)[faces]
-    twice, thin = check_truth.names_one_twice(corners), check_truth.has_zero_area(welded, corners)
+class Definitions:
+    """Counts of one mesh under other definitions than those of impinge."""
 
-    def unique(some, turned=False):
-        """The first of faces with the same vertices, in any order or in any rotation."""
-        if turned:
-            start = some.argmin(axis=1)[:, None]
-            keys = np.take_along_axis(some, (start + [0, 1, 2]) % 3, axis=1)
-        else:
-            keys = np.sort(some, axis=1)
-        return some[np.sort(np.unique(keys, axis=0, return_index=True)[1])]
+    def __init__(self, vertices, faces):
+        self.vertices, self.corners = check_truth.weld(vertices, faces)
+        grid = np.round(vertices.astype(np.float64) * 1e8)
+        self.near = check_truth.weld(grid, faces)[1]
+        self.is_thin = check_truth.has_zero_area(self.vertices, self.corners)
 
-    surfaces = {
-        "exact": corners[~twice],
-        "faces that name a vertex twice count": corners,
-        "faces of zero area left out": corners[~thin],
-        "duplicate faces left out": unique(corners[~twice]),
-        "duplicate and zero-area faces left out": unique(corners[~thin]),
-        "vertices within 1e-8 welded": near[~check_truth.names_one_twice(near)],
-        "vertices within 1e-8 welded; faces that name a vertex twice count": near,
-    }
-    counted = {question: {} for question in QUESTIONS}
-    for name, some in surfaces.items():
-        n_faces = check_truth.edges_of(some)[0] if len(some) else np.zeros(0, int)
-        beyond = n_faces[n_faces > 2]
-        counted["non_manifold_edges"][name] = len(beyond)
-        counted["non_manifold_edges"]["counted once per face; " + name] = int(beyond.sum())
-        counted["boundary_edges"][name] = int((n_faces == 1).sum())
-        counted["duplicate_faces"][name] = len(some) - len(unique(some))
-        counted["duplicate_faces"]["turned over is no duplicate; " + name] = len(some) - len(unique(some, True))
-        ways = {"edges": "", "edges of two": "pieces end at edges of more than two faces; ", "vertices": "pieces share vertices; "}
-        for by, words in ways.items():
-            counted["components"][words + name] = check_truth.components(some, by)
-    counted["degenerate"] = {
-        "exact": int(thin.sum()),
-        "only a vertex named twice": int(twice.sum()),
-        "only a vertex named twice, once vertices within 1e-8 are welded": int(check_truth.names_one_twice(near).sum()),
-        "once duplicates are removed": len(unique(corners)) - len(unique(corners[~thin])),
-    }
-    return {
-        question: {name.removesuffix("; exact"): n for name, n in names.items()} for question, names in counted.items()
-    }
+    def surfaces(self):
+        """The same mesh as others see it."""
+        corners, near, thin = self.corners, self.near, self.is_thin
+        simple = corners[~check_truth.names_one_twice(corners)]
+        yield "exact", simple
+        yield "faces that name a vertex twice count", corners
+        yield "faces of zero area left out", corners[~thin]
+        yield "duplicate faces left out", check_truth.first_of_each(simple)
+        yield "duplicate and zero-area faces left out", check_truth.first_of_each(corners[~thin])
+        yield "vertices within 1e-8 welded", near[~check_truth.names_one_twice(near)]
+        yield "vertices within 1e-8 welded; faces that name a vertex twice count", near
+
+    def counts(self, question):
+        """Names of definitions and the counts under them."""
+        if question == "degenerate":
+            first = check_truth.first_of_each
+            yield "exact", int(self.is_thin.sum())
+            yield "only a vertex named twice", int(check_truth.names_one_twice(self.corners).sum())
+            yield "only a vertex named twice, once vertices within 1e-8 are welded", int(check_truth.names_one_twice(self.near).sum())
+            yield "once duplicates are removed", len(first(self.corners)) - len(first(self.corners[~self.is_thin]))
+            return
+        for name, faces in self.surfaces():
+            if question == "duplicate_faces":
+                yield name, len(faces) - len(check_truth.first_of_each(faces))
+                yield f"turned over is no duplicate; {name}", len(faces) - len(check_truth.first_of_each(faces, True))
+            elif question == "components":
+                yield name, check_truth.components(faces)
+                yield f"pieces end at edges of more than two faces; {name}", check_truth.components(faces, "edges of two")
+                yield f"pieces share vertices; {name}", check_truth.components(faces, "vertices")
+            else:
+                n_faces = check_truth.edges_of(faces)[0] if len(faces) else np.zeros(0, int)
+                if question == "boundary_edges":
+                    yield name, int((n_faces == 1).sum())
+                else:
+                    yield name, int((n_faces > 2).sum())
+                    yield f"counted once per face; {name}", int(n_faces[n_faces > 2].sum())
+
+    def that_gives(self, question, count):
+        """The first definition with this count, or None."""
+        names = (name for name, n in self.counts(question) if n == count)
+        name = next(names, None)
+        return name and name.removesuffix("; exact")
 
 
 def outcome(answer):
@@ -372,7 +380,10 @@ def compare(files, pairs, truths, said):
                 if one["reading"]:
                     agree["reader"][one["reading"]] += 1
     with concurrent.futures.ProcessPoolExecutor() as pool:
-        tasks = [pool.submit(decide, file, pairs[file.path], truths[file.path], said[file.path]) for file in files]
+        tasks = [
+            pool.submit(decide, file, pairs[file.path], truths[file.path], said[file.path])
+            for file in sorted(files, key=lambda file: -len(file.faces))
+        ]
         for task in tasks:
             name, decided = task.result()
             for one in decided:
@@ -423,7 +434,9 @@ def run(arguments, data, folder, scratch):
     by_path = dict(zip((file.path for file in files), rows))
     answered = [file for file in good if not by_path[file.path]["error"]]
     pairs = dict(zip((file.path for file in answered), ours.pairs(answered)))
-    truths = {file.path: check_truth.counts(file.vertices, file.faces) for file in good}
+    with concurrent.futures.ProcessPoolExecutor() as pool:
+        tasks = [pool.submit(check_truth.counts, file.vertices, file.faces) for file in good]
+        truths = {file.path: task.result() for file, task in zip(good, tasks)}
     wrong = check_ours(rows, files, truths, pairs)
     answers_of = {"impinge": {file.path: {"seconds": 0, "errors": row["error"]} for file, row in zip(files, rows)}}
 

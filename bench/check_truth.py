@@ -5,6 +5,7 @@ position are one vertex, and a pair is a self-intersection if its triangles shar
 their common vertices.
 """
 
+import functools
 from fractions import Fraction
 
 import numpy as np
@@ -34,6 +35,19 @@ def has_zero_area(vertices, faces):
         a, b, c = whole(vertices[faces[ix]])
         mask[ix] = cross(minus(b, a), minus(c, a)) == (0, 0, 0)
     return mask
+
+
+def first_of_each(faces, as_rotations=False):
+    """The first of all faces with the same vertices, in any order or only in any rotation."""
+    if as_rotations:
+        start = faces.argmin(axis=1)[:, None]
+        corners = np.take_along_axis(faces, (start + [0, 1, 2]) % 3, axis=1)
+    else:
+        corners = np.sort(faces, axis=1)
+    # Three numbers of 21 bits.
+    assert corners.max(initial=0) < 1 << 21
+    keys = corners[:, 0] << 42 | corners[:, 1] << 21 | corners[:, 2]
+    return faces[np.sort(np.unique(keys, return_index=True)[1])]
 
 
 def edges_of(faces):
@@ -79,7 +93,7 @@ def counts(vertices, faces):
     return {
         "vertices_welded": n_vertices - len(vertices),
         "degenerate": int(has_zero_area(vertices, faces).sum()),
-        "duplicate_faces": len(faces) - len(np.unique(np.sort(faces, axis=1), axis=0)),
+        "duplicate_faces": len(faces) - len(first_of_each(faces)),
         "non_manifold_edges": int((n_faces > 2).sum()),
         "boundary_edges": int((n_faces == 1).sum()),
         "components": components(simple),
@@ -217,21 +231,27 @@ class Judge:
     """Decides pairs of one mesh; each pair is decided once."""
 
     def __init__(self, vertices, faces):
-        self.vertices, self.faces = weld(vertices, faces)
-        corners = self.vertices[self.faces]
-        self.low, self.high = corners.min(axis=1), corners.max(axis=1)
-        self.known = {}
+        self.given, self.known = (vertices, faces), {}
+
+    @functools.cached_property
+    def welded(self):
+        return weld(*self.given)
+
+    @functools.cached_property
+    def boxes(self):
+        vertices, faces = self.welded
+        return vertices[faces].min(axis=1), vertices[faces].max(axis=1)
 
     def pair(self, a, b):
         key = (min(a, b), max(a, b))
         if key not in self.known:
-            (of_a, of_b) = (self.faces[ix] for ix in key)
-            self.known[key] = judged(
-                self.vertices[of_a], of_a.tolist(), self.vertices[of_b], of_b.tolist()
-            )
+            vertices, faces = self.welded
+            of_a, of_b = (faces[ix] for ix in key)
+            self.known[key] = judged(vertices[of_a], of_a.tolist(), vertices[of_b], of_b.tolist())
         return self.known[key]
 
     def near(self, face):
         """Faces whose boxes meet that of a face."""
-        beside = (self.low <= self.high[face]) & (self.high >= self.low[face])
+        low, high = self.boxes
+        beside = (low <= high[face]) & (high >= low[face])
         return [int(other) for other in np.flatnonzero(beside.all(axis=1)) if other != face]
