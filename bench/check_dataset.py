@@ -31,9 +31,7 @@ class File:
 
 def grid_faces(n_u, n_v, closes_u=False, closes_v=False):
     """Two triangles per square of a grid of vertices, numbered u * n_v + v."""
-    u, v = np.meshgrid(
-        np.arange(n_u if closes_u else n_u - 1), np.arange(n_v if closes_v else n_v - 1), indexing="ij"
-    )
+    u, v = np.meshgrid(np.arange(n_u if closes_u else n_u - 1), np.arange(n_v if closes_v else n_v - 1), indexing="ij")
     here, right = u * n_v + v, u * n_v + (v + 1) % n_v
     below, across = (u + 1) % n_u * n_v + v, (u + 1) % n_u * n_v + (v + 1) % n_v
     return np.stack([here, below, across, here, across, right], axis=-1).reshape(-1, 3)
@@ -50,9 +48,7 @@ def sphere(random, n, noise=0.0):
     """A closed ball of about n triangles with a bumpy radius; the poles are single vertices."""
     n_v = max(3, round((n / 2) ** 0.5))
     n_u = max(2, n // (2 * n_v))
-    polar, around = np.meshgrid(
-        np.pi * np.arange(1, n_u + 1) / (n_u + 1), 2 * np.pi * np.arange(n_v) / n_v, indexing="ij"
-    )
+    polar, around = np.meshgrid(np.pi * np.arange(1, n_u + 1) / (n_u + 1), 2 * np.pi * np.arange(n_v) / n_v, indexing="ij")
     bumps = 1 + 0.1 * np.sin(random.integers(1, 6) * polar) * np.cos(random.integers(1, 6) * around)
     bumps = bumps + noise * random.standard_normal(bumps.shape)
     unit = np.stack([np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1)
@@ -68,9 +64,7 @@ def torus(random, n):
     """A closed ring; a thick tube runs through itself."""
     n_v = max(3, round((n / 2) ** 0.5))
     n_u = max(3, n // (2 * n_v))
-    u, v = np.meshgrid(
-        2 * np.pi * np.arange(n_u) / n_u, 2 * np.pi * np.arange(n_v) / n_v, indexing="ij"
-    )
+    u, v = np.meshgrid(2 * np.pi * np.arange(n_u) / n_u, 2 * np.pi * np.arange(n_v) / n_v, indexing="ij")
     tube = random.uniform(0.1, 1.3) * (1 + 0.05 * np.sin(5 * u))
     around = 1 + tube * np.cos(v)
     vertices = np.stack([around * np.cos(u), around * np.sin(u), tube * np.sin(v)], axis=-1)
@@ -152,7 +146,9 @@ def coplanar_overlap(random, n):
     shift = random.choice([0.25, 0.5, 1.0, side / 2], 2)
     other = flat + [*shift, 0]
     turn = random.integers(0, 3)
-    return joined((np.roll(flat, turn, axis=1), grid_faces(side, side)), (np.roll(other, turn, axis=1), grid_faces(side, side)))
+    return joined(
+        (np.roll(flat, turn, axis=1), grid_faces(side, side)), (np.roll(other, turn, axis=1), grid_faces(side, side))
+    )
 
 
 def flat_fold(random, n):
@@ -255,6 +251,9 @@ HOSTILE = [
     zero_area, repeated_vertex, duplicate_faces, coplanar_overlap, flat_fold, touching, apexes, fan, one_spot,
     same_triangle, lattice, slivers, huge_and_tiny, far_away, seams,
 ]  # fmt: skip
+
+
+HOSTILE_KINDS = {make.__name__.replace("_", " ") for make in HOSTILE}
 
 
 def ply_bytes(vertices, faces):

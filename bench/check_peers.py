@@ -2,8 +2,7 @@
 
     python bench/check_peers.py NAME        # reads questions from standard input; `check.py` starts this
 
-A peer reads a file with its own reader, welds vertices at the same position if its reader has not done so, and answers what it has
-a function for. Each question is one line of JSON, each answer too. Importing a peer and handing answers over are not timed.
+A peer reads a file with its own reader, welds vertices at the same position, and answers what it has a function for. Each question is one line of JSON, each answer too. Importing a peer and handing answers over are not timed.
 """
 
 import contextlib
@@ -30,6 +29,8 @@ class Peer:
     leaves_out = ()
     #: That definition, with where it says so.
     definition = ""
+    #: Why it has wrong answers, as far as its source or a small test says.
+    why = ""
     #: Whether it finds self-intersections as pairs, as faces, or not at all.
     finds = "pairs"
     #: The most triangles of a mesh that it is asked about, or None.
@@ -55,7 +56,14 @@ class Peer:
 
 class Trimesh(Peer):
     label, package, finds = "trimesh", "trimesh", None
-    how = "`load(process=False)`, `merge_vertices`, `nondegenerate_faces(height=0)`, `unique_faces`, `edges_unique_inverse`, `face_adjacency`"
+    why = (
+        "`merge_vertices` welds on a grid of 1e-8 in 64-bit integers, which coordinates beyond 9.2e10 do not fit: most vertices "
+        "become one"
+    )
+    how = (
+        "`load(process=False)`, `merge_vertices`, `nondegenerate_faces(height=0)`, `unique_faces`, `edges_unique_inverse`, "
+        "`face_adjacency`"
+    )
 
     def __init__(self):
         import trimesh
@@ -91,6 +99,7 @@ class Open3d(Peer):
     )
     leaves_out = (VERTEX_CROSS, VERTEX_TOUCH, VERTEX_PLANE, FOLD, SAME)
     definition = "pairs that share a vertex are never tested"
+    why = "the test of two triangles has tolerances; the reader of OBJ files rounds"
     # Every pair is tested.
     most = 1500
 
@@ -139,8 +148,12 @@ class MeshLab(Peer):
     )
     leaves_out = (FOLD, VERTEX_TOUCH, VERTEX_PLANE)
     definition = (
-        "pairs that share an edge are never tested; of pairs that share a vertex, the opposite edge of each, moved halfway to the "
-        "vertex, is tested against the other, so what only touches or lies in one plane is left out (vcglib, clean.h)"
+        "pairs that share an edge are never tested; of pairs that share a vertex, the opposite edge of each, moved halfway "
+        "to the vertex, is tested against the other, so what only touches or lies in one plane is left out (vcglib, clean.h)"
+    )
+    why = (
+        "nothing is found between faces in one plane that is parallel to a coordinate plane, not even duplicates; touching faces are "
+        "often missed; the reader drops faces that name a vertex twice"
     )
 
     def __init__(self):
@@ -184,6 +197,7 @@ class Libigl(Peer):
         "`copyleft.cgal.remesh_self_intersections(detect_only=True)`"
     )
     leaves_out = (SAME, ZERO_AREA)
+    why = "`detect_only` takes a kernel with inexact constructions, so the plane of a folded neighbour is rounded"
     definition = "faces of zero area are ignored, and so are pairs with the same three vertices (SelfIntersectMesh.h)"
 
     def __init__(self):
@@ -222,9 +236,10 @@ class LibiglPredicates(Libigl):
     label = "libigl (predicates)"
     how = "the same with `predicates.find_self_intersections`"
     leaves_out = ()
-    definition = (
-        "no pair is left out by definition; neighbours are tested with tolerances, an edge only if both faces pass it in opposite "
-        "directions (find_intersections.cpp)"
+    definition = "no pair is left out"
+    why = (
+        "two faces that pass their common edge in the same direction count as neighbours at one vertex, and meet at the other; "
+        "neighbours are tested with tolerances of 1e-8 and 1e-14 (find_intersections.cpp)"
     )
 
     def __init__(self):

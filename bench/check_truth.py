@@ -1,8 +1,8 @@
 """What is right: counts by NumPy on exact comparisons, and pairs of triangles in rational arithmetic.
 
-Short enough to be believed, and shares nothing with the library. Everything follows docs/exactness.md: vertices at exactly the same
-position are one vertex, and a pair is a self-intersection if its triangles share more points than the convex hull of
-their common vertices.
+Short enough to be believed, and shares nothing with the library. Everything follows docs/exactness.md: vertices at exactly
+the same position are one vertex, and a pair is a self-intersection if its triangles share more points than the convex hull
+of their common vertices.
 """
 
 import functools
