@@ -24,7 +24,6 @@ import json
 import os
 import pathlib
 import platform
-import re
 import statistics
 import sys
 import time
@@ -37,8 +36,8 @@ except ModuleNotFoundError as missing:
     sys.exit(f"{missing}: pip install . (in the root of the checkout) installs impinge and NumPy")
 
 from meshes import read_ply
+from records import ROOT, machine, record_folder
 
-ROOT = pathlib.Path(__file__).resolve().parents[1]
 #: The twist of the last frame, in radians per unit length.
 TWIST = 1.5
 
@@ -184,17 +183,6 @@ def abilities(classes):
     return "\n".join(lines)
 
 
-def machine():
-    """The processor's name and its number of threads."""
-    model = platform.processor() or platform.machine()
-    try:
-        cpuinfo = pathlib.Path("/proc/cpuinfo").read_text()
-        model = re.search(r"model name\s*: (.*)", cpuinfo)[1]
-    except (OSError, TypeError):
-        pass
-    return f"{model}, {os.cpu_count()} threads, {platform.system()}"
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("scenes", nargs="*", help="ball, bunny, buddha, dragon; all by default")
@@ -251,9 +239,7 @@ def main():
     )
     print(text)
     if arguments.record:
-        slug = re.sub(r"[^a-z0-9]+", "-", arguments.machine.lower()).strip("-")
-        folder = ROOT / "bench" / "record" / f"{slug}-{today}"
-        folder.mkdir(parents=True, exist_ok=True)
+        folder = record_folder(arguments.machine, today)
         (folder / "compare.md").write_text(text + "\n", encoding="utf-8")
         head = {"machine": arguments.machine, "date": today, "python": platform.python_version()}
         (folder / "compare.json").write_text(

@@ -25,8 +25,8 @@ import sys
 import time
 
 import numpy as np
-from compare import machine
 from meshes import read_frame, read_ply
+from records import machine
 
 try:
     import impinge

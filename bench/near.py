@@ -28,8 +28,9 @@ import time
 import numpy as np
 
 import impinge
-from compare import ROOT, machine, milliseconds
+from compare import milliseconds
 from meshes import read_frame, read_ply
+from records import ROOT, machine
 
 
 def clock(work):
