@@ -323,8 +323,14 @@ class Child:
             began = self.start()
             if began.get("failed") or began.get("missing"):
                 return began
-        self.process.stdin.write(json.dumps(question).encode() + b"\n")
-        self.process.stdin.flush()
+        try:
+            self.process.stdin.write(json.dumps(question).encode() + b"\n")
+            self.process.stdin.flush()
+        except BrokenPipeError:
+            # It has died after its last answer, which says nothing of this file.
+            self.process.wait()
+            self.process = None
+            return self.ask(question, seconds)
         return self.hear(seconds)
 
     def end(self):
