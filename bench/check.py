@@ -218,8 +218,8 @@ def run(arguments, data, folder, scratch):
         parts[2:2] = ["### WRONG ANSWERS OF IMPINGE", "\n".join(f"- {line}" for line in wrong[:50])]
     else:
         parts[2:2] = [
-            f"impinge has the exact counts in every file. No pair of it is wrong or missing: neither among those in which a peer "
-            f"differs, nor among {n_sampled:,} others."
+            "impinge has the exact counts in every file. No pair of it is wrong or missing, neither where a peer differs, nor among "
+            f"the {n_sampled:,} pairs of random faces."
         ]
     text = "\n\n".join(parts)
     print(text)

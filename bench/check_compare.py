@@ -18,7 +18,7 @@ PEERS_BY_LABEL = {peer.label: peer for peer in PEERS.values()}
 #: The class of self-intersections of faces that the peer has not read.
 DROPPED = "another definition: the reader drops the face"
 #: Pairs per file that are decided whatever contestants say: in hostile files, and in others.
-SAMPLED = (100, 10)
+SAMPLED = (50, 5)
 #: Differences of one peer in one file that are decided at most, on either side.
 MOST_DECIDED = 20_000
 
