@@ -20,6 +20,9 @@ use crate::hash;
 /// | boundary face of tetrahedra | the first tetrahedron that has it, the opposite corner in it |
 pub type Name = [u32; 2];
 
+/// A body and the name of one of its elements.
+pub type Element = (u32, Name);
+
 /// The parts whose elements have no number in a tile.
 pub const EDGES: u32 = 0;
 pub const BOUNDARY: u32 = 1;
@@ -29,7 +32,7 @@ pub const BOUNDARY: u32 = 1;
 pub struct Contact {
     pub kind: PairKind,
     /// Bodies and elements, as the kind orders them.
-    pub elements: [(u32, Name); 2],
+    pub elements: [Element; 2],
     pub toi: f64,
     pub at_start: bool,
 }

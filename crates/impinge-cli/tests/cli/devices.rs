@@ -40,7 +40,7 @@ fn a_device_answers_steps_like_the_cpu() {
     );
     let files = ["step", "a.ply", "a.ply", "f0.ply", "f1.ply", "--json"];
     let answer = |arguments: &[&str], backend: &str| {
-        let arguments = arguments.iter().chain(&["--backend", backend]);
+        let arguments = [arguments, &["--backend", backend]].concat();
         let printed = folder.run(arguments).printed();
         let answer: serde_json::Value = serde_json::from_str(&printed).unwrap();
         let found = ["free", "earliest", "hash", "impacts"].map(|key| answer[key].clone());

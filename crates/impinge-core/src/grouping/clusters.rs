@@ -206,25 +206,80 @@ fn gather<const N: usize>(elements: &[[u32; N]], order: &[u32]) -> Vec<[u32; N]>
         .collect()
 }
 
+/// The unique vertices of all clusters, and where each cluster's run starts, and one past the last.
 fn unique_vertices<const N: usize>(corners: &[[u32; N]]) -> (Vec<u32>, Vec<u32>) {
-    let lists: Vec<Vec<u32>> = corners
-        .par_chunks(GROUP)
-        .with_min_len(64)
-        .map(|group| {
-            let mut list = group.as_flattened().to_vec();
-            list.sort_unstable();
-            list.dedup();
-            let last = list[list.len() - 1];
-            list.resize(list.len().next_multiple_of(CHUNK), last);
-            list
+    /// Clusters that a thread takes at a time.
+    const BLOCK: usize = 64;
+    let blocks: Vec<(Vec<u32>, Vec<u32>)> = corners
+        .par_chunks(BLOCK * GROUP)
+        .map(|block| {
+            let mut seen = Seen::default();
+            let (mut vertices, mut lengths) = (Vec::new(), Vec::with_capacity(BLOCK));
+            for group in block.chunks(GROUP) {
+                let start = vertices.len();
+                seen.forget();
+                let corners = group.as_flattened().iter().copied();
+                vertices.extend(corners.filter(|&vertex| seen.is_new(vertex)));
+                vertices[start..].sort_unstable();
+                let last = vertices[vertices.len() - 1];
+                let length = (vertices.len() - start).next_multiple_of(CHUNK);
+                vertices.resize(start + length, last);
+                lengths.push(length as u32);
+            }
+            (vertices, lengths)
         })
         .collect();
-    let mut starts = Vec::with_capacity(lists.len() + 1);
-    starts.push(0);
-    let mut vertices = Vec::with_capacity(lists.iter().map(Vec::len).sum());
-    for list in lists {
-        vertices.extend_from_slice(&list);
-        starts.push(vertices.len() as u32);
+    let mut starts = Vec::with_capacity(corners.len().div_ceil(GROUP) + 1);
+    let mut end = 0;
+    starts.push(end);
+    let mut vertices = Vec::with_capacity(blocks.iter().map(|block| block.0.len()).sum());
+    for (of_block, lengths) in blocks {
+        vertices.extend_from_slice(&of_block);
+        for length in lengths {
+            end += length;
+            starts.push(end);
+        }
     }
     (vertices, starts)
+}
+
+/// The vertices of a cluster seen so far, as a hash table. Sorting only what is new takes less than half the time of
+/// sorting all corners, of which each vertex has about four.
+struct Seen {
+    slots: [(u32, u32); Seen::SLOTS],
+    /// Slots of another turn are empty.
+    turn: u32,
+}
+
+impl Default for Seen {
+    fn default() -> Self {
+        Seen {
+            slots: [(0, 0); Seen::SLOTS],
+            turn: 0,
+        }
+    }
+}
+
+impl Seen {
+    /// At most half of them are taken: a cluster has up to four corners per primitive.
+    const SLOTS: usize = 2 * 4 * GROUP;
+
+    fn forget(&mut self) {
+        self.turn += 1;
+    }
+
+    #[inline(always)]
+    fn is_new(&mut self, vertex: u32) -> bool {
+        // Fibonacci hashing (Knuth, TAOCP 3, 6.4): the highest bits of the product with 2^32 over the golden ratio.
+        let hash = vertex.wrapping_mul(0x9E37_79B1) >> (u32::BITS - Seen::SLOTS.ilog2());
+        let mut slot = hash as usize;
+        while self.slots[slot].0 == self.turn {
+            if self.slots[slot].1 == vertex {
+                return false;
+            }
+            slot = (slot + 1) % Seen::SLOTS;
+        }
+        self.slots[slot] = (self.turn, vertex);
+        true
+    }
 }

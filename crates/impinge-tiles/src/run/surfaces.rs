@@ -10,7 +10,9 @@ use impinge::{BodyId, Elements, Impact, Part, Positions, Scene};
 
 use crate::cells::{Bounds, owner_point};
 use crate::chunk::bounds;
-use crate::step::{BOUNDARY, EDGES, Name};
+use crate::step::{BOUNDARY, EDGES, Element, Name};
+
+type Point = [f64; 3];
 
 /// The surface of one file.
 pub struct Surface {
@@ -221,7 +223,7 @@ impl<'a> SurfaceScene<'a> {
     }
 
     /// The elements of an impact, and the point that decides to which tile it belongs.
-    pub fn named(&self, impact: &Impact) -> Result<([(u32, Name); 2], [f64; 3]), impinge::Error> {
+    pub fn named(&self, impact: &Impact) -> Result<([Element; 2], Point), impinge::Error> {
         let [part_a, part_b] = impact.kind.parts();
         let (a, low_a) = self.element(part_a, impact.a)?;
         let (b, low_b) = self.element(part_b, impact.b)?;
@@ -233,7 +235,7 @@ impl<'a> SurfaceScene<'a> {
         &self,
         part: Part,
         element: impinge::Primitive,
-    ) -> Result<((u32, Name), [f64; 3]), impinge::Error> {
+    ) -> Result<(Element, Point), impinge::Error> {
         let OfSurface {
             id,
             surface,

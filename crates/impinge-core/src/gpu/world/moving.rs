@@ -99,8 +99,8 @@ impl World {
         1 + u64::from(self.is_moving())
     }
 
-    /// Sends what has changed since the last step. Returns whether kernels have to be bound again. The frame must
-    /// [weigh](weigh) something.
+    /// Sends what has changed since the last step, which must have a [weight](weigh). Returns whether kernels have to be bound
+    /// again.
     ///
     /// # Errors
     /// More than the device can bind at once.
