@@ -22,11 +22,11 @@ use crate::values::{
     bytes, lambda, mesh_format,
 };
 
-pub use choices::{BackendArg, MethodArg, SharedVertexArg};
+pub use choices::{BackendArg, MethodArg, SharedVertexArg, StartArg, ToiArg};
 pub use near::NearArgs;
 #[cfg(feature = "gpu")]
 pub use picture::PictureArgs;
-pub use step::{StartArg, StepArgs, StepHow, ToiArg};
+pub use step::{StepArgs, StepHow};
 #[cfg(feature = "view")]
 pub use view::ViewArgs;
 

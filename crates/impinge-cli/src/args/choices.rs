@@ -64,3 +64,39 @@ impl From<SharedVertexArg> for impinge::SharedVertex {
         }
     }
 }
+
+/// [`impinge::Toi`] as an option.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ToiArg {
+    /// Single precision
+    F32,
+    /// Double precision
+    F64,
+}
+
+impl From<ToiArg> for impinge::Toi {
+    fn from(toi: ToiArg) -> Self {
+        match toi {
+            ToiArg::F32 => impinge::Toi::F32,
+            ToiArg::F64 => impinge::Toi::F64,
+        }
+    }
+}
+
+/// [`impinge::Start`] as an option.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum StartArg {
+    /// Reported with the time 0
+    Report,
+    /// Ignored, whatever they do later in the step
+    Skip,
+}
+
+impl From<StartArg> for impinge::Start {
+    fn from(start: StartArg) -> Self {
+        match start {
+            StartArg::Report => impinge::Start::Report,
+            StartArg::Skip => impinge::Start::Skip,
+        }
+    }
+}

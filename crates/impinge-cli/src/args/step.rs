@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::DetectorArgs;
 #[cfg(feature = "gpu")]
 use super::PictureArgs;
+use super::choices::{StartArg, ToiArg};
 #[cfg(feature = "gpu")]
 use crate::values::PngFile;
 use crate::values::{MeshFile, RowsFile, body_numbers, distance};
@@ -91,40 +92,4 @@ pub struct StepHow {
     /// The distance that elements must keep: report the first time at which they are as near as that
     #[arg(long, value_name = "D", default_value = "0", allow_negative_numbers = true, value_parser = distance)]
     pub separation: f64,
-}
-
-/// [`impinge::Toi`] as an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ToiArg {
-    /// Single precision
-    F32,
-    /// Double precision
-    F64,
-}
-
-impl From<ToiArg> for impinge::Toi {
-    fn from(toi: ToiArg) -> Self {
-        match toi {
-            ToiArg::F32 => impinge::Toi::F32,
-            ToiArg::F64 => impinge::Toi::F64,
-        }
-    }
-}
-
-/// [`impinge::Start`] as an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum StartArg {
-    /// Reported with the time 0
-    Report,
-    /// Ignored, whatever they do later in the step
-    Skip,
-}
-
-impl From<StartArg> for impinge::Start {
-    fn from(start: StartArg) -> Self {
-        match start {
-            StartArg::Report => impinge::Start::Report,
-            StartArg::Skip => impinge::Start::Skip,
-        }
-    }
 }
