@@ -5,6 +5,7 @@ numbers of dragons. All steps run on one thread, so that core seconds are what t
 """
 
 import argparse
+import datetime
 import json
 import os
 import pathlib
@@ -16,8 +17,7 @@ import time
 
 import numpy as np
 from meshes import read_ply
-
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+from records import ROOT, machine, record_folder
 
 
 def generated():
@@ -174,7 +174,8 @@ def main():
     parser.add_argument("--cap", type=int, default=2_000_000, help="triangles per tile")
     parser.add_argument("--limit", type=int, default=2048, help="MiB of address space for each step of the tiles")
     parser.add_argument("--program", default="impinge", help="the impinge program")
-    parser.add_argument("--json", type=pathlib.Path, help="also write all numbers to this file")
+    parser.add_argument("--record", action="store_true", help="write table and numbers to bench/record")
+    parser.add_argument("--machine", default=machine(), help="the machine's name in the record")
     arguments = parser.parse_args()
     data = pathlib.Path(os.environ.get("IMPINGE_DATA", ROOT.parent / "shared" / "data"))
     dragon = data / "meshes" / "dragon.ply"
@@ -189,10 +190,22 @@ def main():
             scene = measure(arguments.program, mesh, folder, arguments)
             scene["disk"] = disk_seconds(folder, scene["bytes_on_disk"])
             scenes.append({"triangles": n * len(faces), **scene})
-    print(table(scenes, arguments.limit))
-    if arguments.json:
-        head = {"of": "dragon" if dragon.is_file() else "generated", "cap": arguments.cap}
-        arguments.json.write_text(json.dumps({**head, "scenes": scenes}, indent=1) + "\n")
+    today = datetime.date.today().isoformat()
+    mesh = "a scan of a dragon" if dragon.is_file() else "a generated surface"
+    text = "\n\n".join(
+        [
+            f"# Tile by tile under a limit of memory, {today}",
+            f"{arguments.machine}. Self-collision of copies of {mesh} that cut into each other, {arguments.cap:,} triangles per tile."
+            " Made by `bench/tiles.py`.",
+            table(scenes, arguments.limit),
+        ]
+    )
+    print(text)
+    if arguments.record:
+        folder = record_folder(arguments.machine, today)
+        (folder / "tiles.md").write_text(text + "\n", encoding="utf-8")
+        head = {"machine": arguments.machine, "date": today, "of": mesh, "cap": arguments.cap}
+        (folder / "tiles.json").write_text(json.dumps({**head, "scenes": scenes}, indent=1) + "\n")
 
 
 if __name__ == "__main__":
