@@ -304,7 +304,7 @@ pub fn _tiles_merge(py: Python<'_>, folder: PathBuf) -> PyResult<Bound<'_, PyDic
         }
         let earliest = step
             .earliest
-            .map(|(kind, row, toi)| (kind.name(), row, toi));
+            .map(|(kind, [body_a, a, body_b, b], toi)| (kind.name(), (body_a, a, body_b, b), toi));
         all.set_item("kinds", kinds)?;
         all.set_item("touching_at_start", step.touching_at_start)?;
         all.set_item("earliest", earliest)?;

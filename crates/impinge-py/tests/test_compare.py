@@ -21,6 +21,7 @@ def modules(root, monkeypatch):
 def test_it_runs_and_records(root, tmp_path, modules, monkeypatch, capsys):
     compare, _ = modules
     monkeypatch.setattr(compare, "ROOT", tmp_path)
+    monkeypatch.setattr("records.ROOT", tmp_path)
     monkeypatch.setenv("IMPINGE_DATA", str(tmp_path / "none"))
     arguments = [
         "compare",

@@ -140,11 +140,14 @@ def test_tiles_of_a_step_have_the_impacts_of_the_whole(tmp_path, toi):
     merged = impinge.tiles.merge(folder)
     assert merged["pairs"] == len(truth) > 300 and merged["hash"] == f"{truth.hash:016x}"
     first = truth.earliest()
-    assert merged["earliest"] == (first.kind, tuple(first.row), first.toi)
+    kind, (_, a, _, b), toi = merged["earliest"]
+    assert (kind, (a, b), toi) == (first.kind, first.elements, first.toi)
     rows = impinge.tiles.rows(folder)
     assert rows.dtype["toi"] == truth.toi.dtype and np.array_equal(rows["toi"], truth.toi)
-    numbers = np.stack([rows[name] for name in ("body_a", "element_a", "body_b", "element_b")], axis=1)
-    assert np.array_equal(numbers, truth.rows)
+    bodies = np.stack([rows["body_a"], rows["body_b"]], axis=1)
+    elements = np.stack([rows["element_a"], rows["element_b"]], axis=1)
+    assert np.array_equal(bodies, truth.bodies) and np.array_equal(elements, truth.elements)
+    assert np.array_equal(rows["kind"], truth.kinds)
     assert merged["touching_at_start"] == 0 and sum(merged["kinds"].values()) == len(truth)
     with pytest.raises(ValueError, match="^shared_vertex: resolve given"):
         impinge.tiles.run(folder, shared_vertex="resolve")
