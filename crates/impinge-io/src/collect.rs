@@ -1,8 +1,11 @@
 //! The output of every reader: positions, triangles, tetrahedra, and the counts of fanned polygons and skipped cells.
 
+use std::ops::Range;
+
 use crate::error::{Error, Name, Place};
 use crate::mesh::{Elements, Mesh, Positions};
 use crate::options::{Prefer, ReadOptions, Summary};
+use crate::polygon::mend;
 
 /// A mesh being read.
 #[derive(Debug)]
@@ -12,6 +15,9 @@ pub(crate) struct Collector<'a> {
     pub triangles: Vec<[u32; 3]>,
     pub tetrahedra: Vec<[u32; 4]>,
     pub n_fanned: u64,
+    /// The triangles of polygons of more than three corners. If the fan is no good, they are replaced in the end: some
+    /// formats name vertices before their positions.
+    fans: Vec<Range<usize>>,
     pub n_lines: u64,
     pub n_points: u64,
     /// The corners of the current polygon or strip; its memory is reused.
@@ -26,6 +32,7 @@ impl<'a> Collector<'a> {
             triangles: Vec::new(),
             tetrahedra: Vec::new(),
             n_fanned: 0,
+            fans: Vec::new(),
             n_lines: 0,
             n_points: 0,
             corners: Vec::new(),
@@ -43,7 +50,7 @@ impl<'a> Collector<'a> {
 
     /// Adds the polygon in [`corners`](Self::corners) as a fan around its first corner.
     pub(crate) fn polygon(&mut self, place: Place) -> Result<(), Error> {
-        let [first, rest @ ..] = self.corners.as_slice() else {
+        let [_, rest @ ..] = self.corners.as_slice() else {
             return Err(self
                 .name
                 .count(place, "corners of a polygon, or more", 3, 0));
@@ -57,8 +64,13 @@ impl<'a> Collector<'a> {
             ));
         }
         self.n_fanned += u64::from(rest.len() > 2);
+        if rest.len() > 2 {
+            let first = self.triangles.len();
+            self.fans.push(first..first + rest.len() - 1);
+        }
+        let corner = self.corners[0];
         self.triangles
-            .extend(rest.windows(2).map(|edge| [*first, edge[0], edge[1]]));
+            .extend(rest.windows(2).map(|edge| [corner, edge[0], edge[1]]));
         Ok(())
     }
 
@@ -76,7 +88,11 @@ impl<'a> Collector<'a> {
     }
 
     /// Chooses the primitives that the options ask for, checks that there are some, and welds if the options say so.
-    pub(crate) fn finish(self, options: &ReadOptions) -> Result<(Mesh, Summary), Error> {
+    pub(crate) fn finish(mut self, options: &ReadOptions) -> Result<(Mesh, Summary), Error> {
+        for fan in std::mem::take(&mut self.fans) {
+            let position = |corner: u32| self.positions.get(corner as usize).unwrap_or_default();
+            mend(&mut self.triangles[fan], position);
+        }
         let (n_triangles, n_tetrahedra) =
             (self.triangles.len() as u64, self.tetrahedra.len() as u64);
         let (wanted, tetrahedra) = match options.prefer {

@@ -20,9 +20,9 @@
 //! # What readers preserve
 //! - **Values.** Binary `float` coordinates stay f32. Coordinates in text are read as f64, correctly rounded, whatever
 //!   type a header declares; [`Positions::narrow_if_exact`] converts them to f32 if nothing is lost.
-//! - **Order.** Vertices and primitives keep the order of the file. A polygon of n corners becomes the fan of n - 2
-//!   triangles around its first corner, in its place; a strip becomes its triangles. (A fan covers a convex polygon exactly;
-//!   for a polygon that is not convex, it only connects the same corners.)
+//! - **Order.** Vertices and primitives keep the order of the file. A polygon of n corners becomes n - 2 triangles
+//!   in its place: the fan around its first corner, which covers a convex polygon exactly. If the polygon is concave and its fan
+//!   overlaps itself, as seen along its normal, its ears are clipped instead (up to 256 corners). A strip becomes its triangles.
 //! - **Everything that can collide.** Points and lines are counted and skipped. If a file has tetrahedra, its triangles are
 //!   skipped too, unless [`ReadOptions::prefer`] says otherwise; see [`Summary`]. Hexahedra, prisms, pyramids and
 //!   curved (higher-order) cells are refused with an error: skipping them would lose collisions silently.
@@ -48,6 +48,7 @@ mod formats;
 mod mesh;
 mod npy;
 mod options;
+mod polygon;
 mod read;
 mod sequence;
 mod text;

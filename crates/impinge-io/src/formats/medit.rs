@@ -1,4 +1,4 @@
-//! Medit `.mesh`, ascii: vertices, triangles, quadrilaterals (fanned), tetrahedra.
+//! Medit `.mesh`, ascii: vertices, triangles, quadrilaterals (cut into triangles), tetrahedra.
 //!
 //! Source: P. Frey, "MEDIT: An interactive mesh visualization software", INRIA RT-0253, 2001, section 7.2. Edges and corners
 //! are counted; hexahedra, prisms and pyramids are refused; other sections (normals, tangents, required vertices, …) are

@@ -1,7 +1,7 @@
 //! Gmsh MSH 2.x and 4.1, ascii and binary: `$Nodes` and `$Elements`; other sections are skipped.
 //!
 //! Source: Gmsh reference manual, "MSH file format" (4.1) and "Legacy formats" (2.2). Nodes have tags, perhaps with gaps:
-//! vertices are numbered in the order of the file. Linear triangles, quadrangles (fanned) and tetrahedra are read, lines
+//! vertices are numbered in the order of the file. Linear triangles, quadrangles (cut into triangles) and tetrahedra are read, lines
 //! and points are counted, all other element types are refused.
 
 mod v2;

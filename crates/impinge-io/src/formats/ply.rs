@@ -1,4 +1,4 @@
-//! PLY: ascii and binary of either byte order; faces (polygons fanned), triangle strips, tetrahedra.
+//! PLY: ascii and binary of either byte order; faces (polygons cut into triangles), triangle strips, tetrahedra.
 //!
 //! Source: G. Turk, "The PLY Polygon File Format", 1994. The reader takes the elements
 //! `vertex` (x, y, z), `face` and `tristrips` (a list `vertex_indices` or `vertex_index`; -1 starts a new strip), and `tetra`,

@@ -32,6 +32,20 @@ fn obj_polygons_negative_indices_and_continued_lines() {
 }
 
 #[test]
+fn a_concave_polygon_is_cut_inside_whichever_corner_comes_first() {
+    let vertices = "v 0 0 0\nv 4 0 0\nv 0.5 0.5 0\nv 0 4 0\n";
+    for (face, expected) in [
+        ("f 1 2 3 4\n", [[0, 1, 2], [0, 2, 3]]),
+        ("f 2 3 4 1\n", [[0, 1, 2], [2, 3, 0]]),
+    ] {
+        // Also where the face comes before its vertices.
+        for obj in [format!("{vertices}{face}"), format!("{face}{vertices}")] {
+            assert_eq!(triangles(&load(Format::Obj, &obj).unwrap()), expected);
+        }
+    }
+}
+
+#[test]
 fn obj_errors_name_the_line_and_both_numbers() {
     for (obj, expected) in [
         (
