@@ -14,7 +14,6 @@ pub(crate) struct Collector<'a> {
     pub positions: Positions,
     pub triangles: Vec<[u32; 3]>,
     pub tetrahedra: Vec<[u32; 4]>,
-    pub n_fanned: u64,
     /// The triangles of polygons of more than three corners. If the fan is no good, they are replaced in the end: some
     /// formats name vertices before their positions.
     fans: Vec<Range<usize>>,
@@ -31,7 +30,6 @@ impl<'a> Collector<'a> {
             positions: Positions::F64(Vec::new()),
             triangles: Vec::new(),
             tetrahedra: Vec::new(),
-            n_fanned: 0,
             fans: Vec::new(),
             n_lines: 0,
             n_points: 0,
@@ -63,7 +61,6 @@ impl<'a> Collector<'a> {
                 self.corners.len() as u64,
             ));
         }
-        self.n_fanned += u64::from(rest.len() > 2);
         if rest.len() > 2 {
             let first = self.triangles.len();
             self.fans.push(first..first + rest.len() - 1);
@@ -89,6 +86,7 @@ impl<'a> Collector<'a> {
 
     /// Chooses the primitives that the options ask for, checks that there are some, and welds if the options say so.
     pub(crate) fn finish(mut self, options: &ReadOptions) -> Result<(Mesh, Summary), Error> {
+        let n_polygons_fanned = self.fans.len() as u64;
         for fan in std::mem::take(&mut self.fans) {
             let position = |corner: u32| self.positions.get(corner as usize).unwrap_or_default();
             mend(&mut self.triangles[fan], position);
@@ -126,7 +124,7 @@ impl<'a> Collector<'a> {
             0
         };
         let summary = Summary {
-            n_polygons_fanned: self.n_fanned,
+            n_polygons_fanned,
             n_lines_skipped: self.n_lines,
             n_points_skipped: self.n_points,
             n_triangles_skipped: if tetrahedra { n_triangles } else { 0 },

@@ -61,16 +61,13 @@ impl Plan {
     pub fn merge(&self) -> Result<Merged, Error> {
         let results = self.results()?;
         let path = self.folder().join("rows.npy");
-        let hash = results
-            .iter()
-            .map(|result| result.hash)
-            .fold(0, u64::wrapping_add);
         let (hash, step) = if self.is_step() {
             let (hash, step) = self.merge_step(&results, &path)?;
             (hash, Some(step))
         } else {
             self.merge_rows(&results, &path)?;
-            (hash, None)
+            let hashes = results.iter().map(|result| result.hash);
+            (hashes.fold(0, u64::wrapping_add), None)
         };
         let merged = Merged {
             n_pairs: results.iter().map(|result| result.n_pairs).sum(),

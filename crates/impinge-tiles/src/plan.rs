@@ -94,7 +94,8 @@ pub(crate) struct Unit {
 }
 
 impl Plan {
-    /// Reads every primitive of `files` (with [`step`](PlanOptions::step): start, end, start, end, …) once (coordinates must be finite), takes a sample, cuts space and writes `plan.json`.
+    /// Reads every primitive of `files` once (coordinates must be finite), takes a sample, cuts space and writes `plan.json`. With
+    /// [`step`](PlanOptions::step), files are start, end, start, end and so on.
     /// A folder with exactly the same plan is left as it is. `progress` gets the number of primitives done and the total.
     ///
     /// # Errors

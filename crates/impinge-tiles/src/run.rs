@@ -236,10 +236,7 @@ impl Plan {
         let n = records.len();
         let pieces = self.pieces(n);
         let (mut rows, mut n_elsewhere) = (Vec::new(), 0);
-        let refused = |source| match source {
-            impinge::Error::Cancelled => Error::Cancelled,
-            source => Error::Detection { tile, source },
-        };
+        let refused = refused(tile);
         for (ix, a) in pieces.iter().enumerate() {
             for b in &pieces[ix..] {
                 let ranges = both(a, b);
@@ -373,6 +370,25 @@ fn both(a: &Range<usize>, b: &Range<usize>) -> Vec<Range<usize>> {
     match a == b {
         true => vec![a.clone()],
         false => vec![a.clone(), b.clone()],
+    }
+}
+
+/// The parts of `ranges` that lie in `whole`.
+fn within<'a>(
+    ranges: &'a [Range<usize>],
+    whole: &'a Range<usize>,
+) -> impl Iterator<Item = Range<usize>> + 'a {
+    let parts = ranges
+        .iter()
+        .map(|range| range.start.max(whole.start)..range.end.min(whole.end));
+    parts.filter(|part| !part.is_empty())
+}
+
+/// The error of a detection in a tile.
+fn refused(tile: u32) -> impl Fn(impinge::Error) -> Error + Copy {
+    move |source| match source {
+        impinge::Error::Cancelled => Error::Cancelled,
+        source => Error::Detection { tile, source },
     }
 }
 

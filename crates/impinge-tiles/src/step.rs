@@ -5,8 +5,7 @@
 //! results/tile-*-names.npy  per element that needs a number: body, part, name: four u32, sorted
 //! ```
 
-use impinge::{PairKind, Toi};
-use impinge_io::npy_header;
+use impinge::PairKind;
 
 use crate::hash;
 
@@ -83,30 +82,3 @@ pub fn checksum(rows: &[[u32; WORDS]]) -> u64 {
 
 /// A contact with numbers in place of names: kind, `[body_a, element_a, body_b, element_b]`, time.
 pub type Row = (PairKind, [u32; 4], f64);
-
-/// The bytes of `impacts.npy`, as `impinge step --impacts` writes them: a packed structured array. `kind` is two characters
-/// of four bytes each.
-pub fn encode(rows: &[Row], toi: Toi) -> Vec<u8> {
-    let time = match toi {
-        Toi::F32 => "<f4",
-        Toi::F64 => "<f8",
-    };
-    let fields = format!(
-        "[('kind', '<U2'), ('body_a', '<u4'), ('element_a', '<u4'), ('body_b', '<u4'), ('element_b', '<u4'), ('toi', '{time}')]"
-    );
-    let mut bytes = npy_header(&fields, &format!("({},)", rows.len()));
-    for (kind, row, time) in rows {
-        bytes.extend(
-            kind.name()
-                .chars()
-                .flat_map(|letter| u32::from(letter).to_le_bytes()),
-        );
-        bytes.extend(row.iter().flat_map(|word| word.to_le_bytes()));
-        match toi {
-            // The time is an `f32` already.
-            Toi::F32 => bytes.extend((*time as f32).to_le_bytes()),
-            Toi::F64 => bytes.extend(time.to_le_bytes()),
-        }
-    }
-    bytes
-}

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use impinge::{PairKind, Toi, hash_impact_rows};
+use impinge_io::write_impacts_npy;
 
 use super::{MergedStep, STEP, each_sorted, open_all};
 use crate::disk;
@@ -11,7 +12,7 @@ use crate::error::Error;
 use crate::npy;
 use crate::plan::Plan;
 use crate::run::TileResult;
-use crate::step::{BOUNDARY, Contact, EDGES, Name, Row, WORDS, checksum, encode};
+use crate::step::{BOUNDARY, Contact, EDGES, Name, Row, WORDS, checksum};
 
 /// An element that needs a number: body, part, name.
 type Named = [u32; 4];
@@ -44,7 +45,10 @@ impl Plan {
         rows.sort_unstable_by_key(|&(kind, row, _)| (kind, row));
         // All tiles have answered the same question.
         let toi = results[0].step.map_or(Toi::F32, |step| step.toi);
-        disk::replace(path, |to| to.write_all(&encode(&rows, toi)))?;
+        let named = rows
+            .iter()
+            .map(|&(kind, row, time)| (kind.name(), row, time));
+        disk::replace(path, |to| write_impacts_npy(to, named, toi == Toi::F64))?;
         let first = |a: Row, b: Row| if b.2 < a.2 { b } else { a };
         let of = |kind: PairKind| rows.iter().filter(|row| row.0 == kind).count() as u64;
         let step = MergedStep {

@@ -5,6 +5,7 @@ use std::ops::Range;
 use impinge::{Elements, Positions, Scene};
 
 use super::surfaces::{Surface, Surfaces};
+use super::within;
 use crate::cells::owner_point;
 use crate::chunk::{Record, Shape};
 use crate::parts::Segment;
@@ -135,10 +136,7 @@ impl Records {
         };
         for held in &self.files {
             let whole = held.first..held.first + held.len();
-            let runs = ranges
-                .iter()
-                .map(|range| range.start.max(whole.start)..range.end.min(whole.end));
-            let runs: Vec<Range<usize>> = runs.filter(|run| !run.is_empty()).collect();
+            let runs: Vec<Range<usize>> = within(ranges, &whole).collect();
             if runs.is_empty() {
                 continue;
             }

@@ -1,9 +1,12 @@
 //! Runs one tile of a step: finds the first contacts among its surfaces, and keeps those that the tile owns.
 
+use std::ops::Range;
+
 use impinge::{Control, Detector, Step, hash_rows};
 
 use super::records::Records;
-use super::{Ask, OfStep, TileResult, both, write_rows};
+use super::surfaces::SurfaceScene;
+use super::{Ask, OfStep, TileResult, both, refused, write_rows};
 use crate::error::Error;
 use crate::plan::Plan;
 use crate::step::{Contact, checksum};
@@ -17,41 +20,48 @@ impl Plan {
         detector: &mut Detector,
         control: &Control<'_>,
     ) -> Result<TileResult, Error> {
-        let refused = |source| match source {
-            impinge::Error::Cancelled => Error::Cancelled,
-            source => Error::Detection { tile, source },
-        };
+        let refused = refused(tile);
         let is_mine = |point| self.cells.owner(point) == tile;
         let surfaces = records.surfaces().map_err(refused)?;
-        let pieces = self.pieces(surfaces.n_faces());
+        let n_faces = surfaces.n_faces();
+        let pieces = self.pieces(n_faces);
+        let whole: Range<usize> = 0..n_faces;
+        let whole = surfaces.scene(&[whole]).map_err(refused)?;
+        let names = whole.to_number(is_mine).map_err(refused)?;
         let step = Step::new(ask.query()).start(ask.start).toi(ask.toi);
         let (mut rows, mut n_elsewhere) = (Vec::new(), 0);
-        for (ix, a) in pieces.iter().enumerate() {
-            for b in &pieces[ix..] {
-                let part = surfaces.scene(&both(a, b)).map_err(refused)?;
-                let impacts = detector.impacts_with(&part.scene, &step, control);
-                for impact in impacts.map_err(refused)?.iter() {
-                    let (elements, point) = part.named(impact).map_err(refused)?;
-                    if is_mine(point) {
-                        let contact = Contact {
-                            kind: impact.kind,
-                            elements,
-                            toi: impact.toi,
-                            at_start: impact.at_start,
-                        };
-                        rows.push(contact.to_words());
-                    } else {
-                        n_elsewhere += 1;
-                    }
+        let mut find = |part: &SurfaceScene<'_>| {
+            let impacts = detector.impacts_with(&part.scene, &step, control)?;
+            for impact in impacts.iter() {
+                let (elements, point) = part.named(impact)?;
+                if is_mine(point) {
+                    let contact = Contact {
+                        kind: impact.kind,
+                        elements,
+                        toi: impact.toi,
+                        at_start: impact.at_start,
+                    };
+                    rows.push(contact.to_words());
+                } else {
+                    n_elsewhere += 1;
                 }
             }
-        }
-        if pieces.len() > 1 {
+            Ok(())
+        };
+        if pieces.len() == 1 {
+            find(&whole).map_err(refused)?;
+        } else {
+            drop(whole);
+            for (ix, a) in pieces.iter().enumerate() {
+                for b in &pieces[ix..] {
+                    let part = surfaces.scene(&both(a, b)).map_err(refused)?;
+                    find(&part).map_err(refused)?;
+                }
+            }
             // Two pieces have the pairs within each of them again, and pieces share edges and vertices.
             rows.sort_unstable();
             rows.dedup();
         }
-        let names = surfaces.to_number(is_mine);
         let result = TileResult {
             tile,
             n_primitives: records.len() as u64,

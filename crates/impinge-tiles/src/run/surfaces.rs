@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use impinge::{BodyId, Elements, Impact, Part, Positions, Scene};
 
+use super::within;
 use crate::cells::{Bounds, owner_point};
 use crate::chunk::bounds;
 use crate::step::{BOUNDARY, EDGES, Element, Name};
@@ -108,21 +109,6 @@ impl Surface {
         let (low, _): Bounds = bounds(ends.as_flattened());
         low
     }
-
-    /// Its edges once each, `[higher, lower]` vertex, ascending.
-    fn edges(&self) -> Vec<[u32; 2]> {
-        let sides = self
-            .faces
-            .iter()
-            .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-        let mut edges: Vec<[u32; 2]> = sides
-            .filter(|[a, b]| a != b)
-            .map(|[a, b]| [a.max(b), a.min(b)])
-            .collect();
-        edges.sort_unstable();
-        edges.dedup();
-        edges
-    }
 }
 
 /// All surfaces of a tile, by file. Their faces are numbered from 0, one surface after the other.
@@ -131,27 +117,6 @@ pub struct Surfaces(pub Vec<Surface>);
 impl Surfaces {
     pub fn n_faces(&self) -> usize {
         self.0.iter().map(|surface| surface.faces.len()).sum()
-    }
-
-    /// The elements whose lower corner `is_mine` accepts, of those that merging must number: body, part, name; ascending.
-    pub fn to_number(&self, is_mine: impl Fn([f64; 3]) -> bool) -> Vec<[u32; 4]> {
-        let mut all = Vec::new();
-        for surface in &self.0 {
-            for edge in surface.edges() {
-                if is_mine(surface.low(edge)) {
-                    let [high, low] = edge.map(|v| surface.vertices[v as usize]);
-                    all.push([surface.file, EDGES, high, low]);
-                }
-            }
-            if surface.is_boundary {
-                for (&face, &[tetrahedron, corner]) in surface.faces.iter().zip(&surface.names) {
-                    if is_mine(surface.low(face)) {
-                        all.push([surface.file, BOUNDARY, tetrahedron, corner]);
-                    }
-                }
-            }
-        }
-        all
     }
 
     /// A scene of the faces in `ranges` (ascending), with one moving body per surface that has any.
@@ -164,10 +129,7 @@ impl Surfaces {
         for surface in &self.0 {
             let whole = first..first + surface.faces.len();
             first = whole.end;
-            let runs = ranges
-                .iter()
-                .map(|range| range.start.max(whole.start)..range.end.min(whole.end));
-            let faces: Vec<u32> = runs
+            let faces: Vec<u32> = within(ranges, &whole)
                 .flatten()
                 .map(|face| (face - whole.start) as u32)
                 .collect();
@@ -224,25 +186,49 @@ impl<'a> SurfaceScene<'a> {
 
     /// The elements of an impact, and the point that decides to which tile it belongs.
     pub fn named(&self, impact: &Impact) -> Result<([Element; 2], Point), impinge::Error> {
+        let named = |part, element: impinge::Primitive| {
+            let body = &self.bodies[element.body.index()];
+            self.element(body, part, element.primitive as usize)
+        };
         let [part_a, part_b] = impact.kind.parts();
-        let (a, low_a) = self.element(part_a, impact.a)?;
-        let (b, low_b) = self.element(part_b, impact.b)?;
+        let (a, low_a) = named(part_a, impact.a)?;
+        let (b, low_b) = named(part_b, impact.b)?;
         Ok(([a, b], owner_point(&low_a, &low_b)))
     }
 
-    /// The body and name of an element, and the lower corner of its box over the step.
+    /// The elements whose lower corner `is_mine` accepts, of those that merging must number: body, part, name; ascending.
+    pub fn to_number(
+        &self,
+        is_mine: impl Fn(Point) -> bool,
+    ) -> Result<Vec<[u32; 4]>, impinge::Error> {
+        let mut all = Vec::new();
+        for body in &self.bodies {
+            let faces = body.surface.is_boundary.then_some((Part::Faces, BOUNDARY));
+            for (part, kind) in [Some((Part::Edges, EDGES)), faces].into_iter().flatten() {
+                for number in 0..self.scene.body(body.id)?.part(part).len() {
+                    let ((file, [first, second]), low) = self.element(body, part, number)?;
+                    if is_mine(low) {
+                        all.push([file, kind, first, second]);
+                    }
+                }
+            }
+        }
+        Ok(all)
+    }
+
+    /// The file and name of an element, and the lower corner of its box over the step.
     fn element(
         &self,
+        body: &OfSurface<'_>,
         part: Part,
-        element: impinge::Primitive,
+        number: usize,
     ) -> Result<(Element, Point), impinge::Error> {
         let OfSurface {
             id,
             surface,
             vertices,
             faces,
-        } = &self.bodies[element.body.index()];
-        let number = element.primitive as usize;
+        } = body;
         let (name, low) = match part {
             Part::Vertices => {
                 let vertex = vertices[number];

@@ -3,7 +3,7 @@
 use std::io::{self, BufWriter, Write};
 
 use impinge::{Impact, Impacts};
-use impinge_io::{AtomicFile, npy_header};
+use impinge_io::{AtomicFile, write_impacts_npy};
 
 use crate::args::ToiArg;
 use crate::error::Error;
@@ -33,28 +33,11 @@ fn put(to: &mut impl Write, format: RowsFormat, toi: ToiArg, impacts: &[Impact])
     }
 }
 
-/// A packed structured array: `kind` is two characters of four bytes each, as in NumPy.
 fn npy(to: &mut impl Write, toi: ToiArg, impacts: &[Impact]) -> io::Result<()> {
-    let time = match toi {
-        ToiArg::F32 => "<f4",
-        ToiArg::F64 => "<f8",
-    };
-    let fields = format!(
-        "[('kind', '<U2'), ('body_a', '<u4'), ('element_a', '<u4'), ('body_b', '<u4'), ('element_b', '<u4'), ('toi', '{time}')]"
-    );
-    to.write_all(&npy_header(&fields, &format!("({},)", impacts.len())))?;
-    for impact in impacts {
-        for letter in impact.kind.name().chars() {
-            to.write_all(&u32::from(letter).to_le_bytes())?;
-        }
-        to.write_all(impact.row().map(u32::to_le_bytes).as_flattened())?;
-        match toi {
-            // The time is an `f32` already.
-            ToiArg::F32 => to.write_all(&(impact.toi as f32).to_le_bytes())?,
-            ToiArg::F64 => to.write_all(&impact.toi.to_le_bytes())?,
-        }
-    }
-    Ok(())
+    let rows = impacts
+        .iter()
+        .map(|impact| (impact.kind.name(), impact.row(), impact.toi));
+    write_impacts_npy(to, rows, toi == ToiArg::F64)
 }
 
 /// Times are written with enough digits to read back the same bits, in single and in double precision.
