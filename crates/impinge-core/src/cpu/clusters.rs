@@ -168,12 +168,11 @@ impl BodyCache {
     /// Clusters a body in its current pose.
     pub fn new(body: &Body, isa: Isa) -> Self {
         let (elements, positions) = (body.elements(), body.positions());
-        let clustering = Clustering::new(elements, |primitive| {
-            bounds::of_vertices(positions, elements.corners(primitive))
-        });
-        if isa.looks_corners_up() {
-            clustering.find_local_faces();
-        }
+        let bounds_of = |primitive| bounds::of_vertices(positions, elements.corners(primitive));
+        let clustering = match isa.looks_corners_up() {
+            true => Clustering::with_local_faces(elements, bounds_of),
+            false => Clustering::new(elements, bounds_of),
+        };
         let mut bounds = TreeBounds::default();
         bounds.resize(&clustering.shape);
         BodyCache {

@@ -63,7 +63,7 @@ impl TopLevel {
                 center: root(ix).center(),
                 number: ix,
             }));
-            order(&self.shape, 1, 1, None, &mut self.entries);
+            order(&self.shape, 1, None, &mut self.entries);
             for (place, entry) in self.entries.iter().enumerate() {
                 self.order[place] = entry.number;
             }

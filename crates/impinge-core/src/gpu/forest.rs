@@ -157,7 +157,7 @@ impl Forest {
             self.best_spread = self.best_spread.min(spread);
             return false;
         }
-        order(&self.top_shape, 1, 1, None, &mut self.entries);
+        order(&self.top_shape, 1, None, &mut self.entries);
         for (gate, entry) in self.entries.iter().enumerate() {
             self.nodes[first + gate].first_child = entry.number;
         }

@@ -6,8 +6,8 @@
 //! read once (64 triangles of a closed mesh have about 45 unique vertices, not 192).
 //!
 //! Cost: `O(n log n)` time once per topology; 8 to 12 bytes per primitive for order and vertices, and a
-//! copy of the corners. Inside a cluster, runs of eight primitives lie close together, so that a
-//! vector of lanes tends to be needed whole or not at all.
+//! copy of the corners. Inside a cluster, the order of the primitives does not matter: frames were not faster when runs
+//! of eight lay close together, and half of this work went into that.
 
 use std::sync::OnceLock;
 
@@ -19,13 +19,9 @@ use super::bounds::Bounds;
 use super::hierarchy::{Entry, Shape};
 use super::hubs::{self, Hubs};
 use super::rings::Rings;
+pub(crate) use super::unique::CHUNK;
+use super::unique::{LocalCorners, Unique};
 use crate::elements::{Elements, with_corners};
-
-/// Runs this short are not split further inside a cluster.
-const FINEST_RUN: usize = 8;
-/// A cluster's vertices are padded to whole chunks of this many: a loop over them needs no remainder, and its end
-/// is easy to predict.
-pub(crate) const CHUNK: usize = 8;
 
 /// The clusters of one body.
 #[derive(Debug)]
@@ -45,19 +41,30 @@ pub(crate) struct Clustering {
     pub shape: Shape,
     hubs: Option<Hubs>,
     adjacency: OnceLock<Adjacency>,
-    local_faces: OnceLock<Vec<LocalFaces>>,
+    /// None unless they were asked for.
+    local_faces: Vec<LocalFaces>,
     rings: OnceLock<Rings>,
 }
 
-/// The corners of a cluster's triangles as numbers of its vertices: `[corner][place]`. Places past its size hold 0.
-pub(crate) type LocalFaces = [[u8; GROUP]; 3];
-
-/// With three vertices per triangle, the numbers fit a byte.
-const _: () = assert!(3 * GROUP <= 256);
+/// The corners of a cluster's triangles as numbers of its vertices.
+pub(crate) type LocalFaces = LocalCorners<3>;
 
 impl Clustering {
     /// Clusters primitives whose boxes in the current pose are given by `bounds`.
     pub fn new(elements: &Elements, bounds: impl Fn(usize) -> Bounds + Sync) -> Self {
+        Self::make(elements, bounds, false)
+    }
+
+    /// The same, with the local faces of each cluster, for kernels that look corners up in a table of its vertices.
+    pub fn with_local_faces(elements: &Elements, bounds: impl Fn(usize) -> Bounds + Sync) -> Self {
+        Self::make(elements, bounds, true)
+    }
+
+    fn make(
+        elements: &Elements,
+        bounds: impl Fn(usize) -> Bounds + Sync,
+        with_local_faces: bool,
+    ) -> Self {
         let n = elements.len();
         let shape = Shape::new(n.div_ceil(GROUP));
         let mut entries: Vec<Entry> = (0..n)
@@ -70,11 +77,20 @@ impl Clustering {
             .collect();
         let classes = with_corners!(elements, |corners| hubs::classes(corners));
         let classes = classes.as_deref();
-        super::hierarchy::order(&shape, GROUP, FINEST_RUN, classes, &mut entries);
+        super::hierarchy::order(&shape, GROUP, classes, &mut entries);
         let order: Vec<u32> = entries.iter().map(|entry| entry.number).collect();
         drop(entries);
         let corners = with_corners!(elements, |corners| gather(corners, &order).into());
-        let (vertices, vertex_starts) = with_corners!(&corners, |corners| unique_vertices(corners));
+        let (vertices, vertex_starts, local_faces) = match &corners {
+            Elements::Triangles(faces) if with_local_faces => {
+                let unique = Unique::new(faces);
+                (unique.vertices, unique.starts, unique.corners)
+            }
+            corners => with_corners!(corners, |corners| {
+                let unique = Unique::new(corners);
+                (unique.vertices, unique.starts, Vec::new())
+            }),
+        };
         let hubs = classes
             .is_some()
             .then(|| with_corners!(&corners, |corners| Hubs::new(corners, &shape)));
@@ -87,7 +103,7 @@ impl Clustering {
             shape,
             hubs,
             adjacency: OnceLock::new(),
-            local_faces: OnceLock::new(),
+            local_faces,
             rings: OnceLock::new(),
         }
     }
@@ -121,25 +137,10 @@ impl Clustering {
             .get_or_init(|| with_corners!(&self.corners, |corners| Adjacency::new(corners)))
     }
 
-    /// Finds the corners of each cluster's triangles as numbers of its own vertices, for kernels that look them up.
-    pub fn find_local_faces(&self) {
-        self.local_faces.get_or_init(|| match &self.corners {
-            Elements::Triangles(faces) => (0..self.n_clusters())
-                .into_par_iter()
-                .with_min_len(64)
-                .map(|cluster| {
-                    let places = cluster * GROUP..cluster * GROUP + self.size(cluster);
-                    local_faces(&faces[places], self.vertices(cluster))
-                })
-                .collect(),
-            _ => Vec::new(),
-        });
-    }
-
-    /// The local faces of a cluster, if they have been found.
+    /// The local faces of a cluster, if they were asked for.
     #[inline(always)]
     pub fn local_faces(&self, cluster: usize) -> Option<&LocalFaces> {
-        self.local_faces.get()?.get(cluster)
+        self.local_faces.get(cluster)
     }
 
     /// Finds the rings of the vertices, if the primitives are triangles.
@@ -169,23 +170,8 @@ impl Clustering {
             + self.hubs.as_ref().map_or(0, Hubs::bytes)
             + self.adjacency.get().map_or(0, Adjacency::bytes)
             + self.rings.get().map_or(0, Rings::bytes)
-            + self
-                .local_faces
-                .get()
-                .map_or(0, |faces| size_of_val(&faces[..]))
+            + size_of_val(&self.local_faces[..])
     }
-}
-
-fn local_faces(faces: &[[u32; 3]], vertices: &[u32]) -> LocalFaces {
-    let mut local = [[0; GROUP]; 3];
-    for (place, face) in faces.iter().enumerate() {
-        for corner in 0..3 {
-            // The first occurrence: the last vertex is repeated.
-            let number = vertices.partition_point(|&vertex| vertex < face[corner]);
-            local[corner][place] = number as u8;
-        }
-    }
-    local
 }
 
 /// `n` if vertices `0..n` all occur.
@@ -204,82 +190,4 @@ fn gather<const N: usize>(elements: &[[u32; N]], order: &[u32]) -> Vec<[u32; N]>
         .with_min_len(16 * 1024)
         .map(|&primitive| elements[primitive as usize])
         .collect()
-}
-
-/// The unique vertices of all clusters, and where each cluster's run starts, and one past the last.
-fn unique_vertices<const N: usize>(corners: &[[u32; N]]) -> (Vec<u32>, Vec<u32>) {
-    /// Clusters that a thread takes at a time.
-    const BLOCK: usize = 64;
-    let blocks: Vec<(Vec<u32>, Vec<u32>)> = corners
-        .par_chunks(BLOCK * GROUP)
-        .map(|block| {
-            let mut seen = Seen::default();
-            let (mut vertices, mut lengths) = (Vec::new(), Vec::with_capacity(BLOCK));
-            for group in block.chunks(GROUP) {
-                let start = vertices.len();
-                seen.forget();
-                let corners = group.as_flattened().iter().copied();
-                vertices.extend(corners.filter(|&vertex| seen.is_new(vertex)));
-                vertices[start..].sort_unstable();
-                let last = vertices[vertices.len() - 1];
-                let length = (vertices.len() - start).next_multiple_of(CHUNK);
-                vertices.resize(start + length, last);
-                lengths.push(length as u32);
-            }
-            (vertices, lengths)
-        })
-        .collect();
-    let mut starts = Vec::with_capacity(corners.len().div_ceil(GROUP) + 1);
-    let mut end = 0;
-    starts.push(end);
-    let mut vertices = Vec::with_capacity(blocks.iter().map(|block| block.0.len()).sum());
-    for (of_block, lengths) in blocks {
-        vertices.extend_from_slice(&of_block);
-        for length in lengths {
-            end += length;
-            starts.push(end);
-        }
-    }
-    (vertices, starts)
-}
-
-/// The vertices of a cluster seen so far, as a hash table. Sorting only what is new takes less than half the time of
-/// sorting all corners, of which each vertex has about four.
-struct Seen {
-    slots: [(u32, u32); Seen::SLOTS],
-    /// Slots of another turn are empty.
-    turn: u32,
-}
-
-impl Default for Seen {
-    fn default() -> Self {
-        Seen {
-            slots: [(0, 0); Seen::SLOTS],
-            turn: 0,
-        }
-    }
-}
-
-impl Seen {
-    /// At most half of them are taken: a cluster has up to four corners per primitive.
-    const SLOTS: usize = 2 * 4 * GROUP;
-
-    fn forget(&mut self) {
-        self.turn += 1;
-    }
-
-    #[inline(always)]
-    fn is_new(&mut self, vertex: u32) -> bool {
-        // Fibonacci hashing (Knuth, TAOCP 3, 6.4): the highest bits of the product with 2^32 over the golden ratio.
-        let hash = vertex.wrapping_mul(0x9E37_79B1) >> (u32::BITS - Seen::SLOTS.ilog2());
-        let mut slot = hash as usize;
-        while self.slots[slot].0 == self.turn {
-            if self.slots[slot].1 == vertex {
-                return false;
-            }
-            slot = (slot + 1) % Seen::SLOTS;
-        }
-        self.slots[slot] = (self.turn, vertex);
-        true
-    }
 }

@@ -10,6 +10,7 @@ pub mod grid;
 pub(crate) mod hierarchy;
 pub(crate) mod hubs;
 pub(crate) mod rings;
+mod unique;
 
 /// The most primitives that a group holds: one bit each in a 64-bit mask.
 pub const GROUP: usize = 64;

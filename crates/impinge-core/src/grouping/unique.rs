@@ -1,0 +1,215 @@
+//! The vertices of each cluster, each once, and the corners of its primitives as numbers of those.
+//!
+//! A hash table finds what is new: of 192 corners of 64 triangles about 45 are. These are put in ascending order by
+//! counting for each how many are lower, which needs no branch and is a few comparisons of whole registers.
+//! On the dragon this takes half the time of sorting, and of finding the corners by binary search.
+//!
+//! Cost: `O(n)` once per topology.
+
+use rayon::prelude::*;
+
+use super::GROUP;
+
+/// A cluster's vertices are padded to whole chunks of this many: a loop over them needs no remainder, and its end
+/// is easy to predict.
+pub(crate) const CHUNK: usize = 8;
+/// Clusters that a thread takes at a time.
+const BLOCK: usize = 64;
+
+/// The corners of a cluster's primitives as numbers of its vertices: `[corner][place]`. Places past its size hold 0.
+pub(crate) type LocalCorners<const N: usize> = [[u8; GROUP]; N];
+
+/// With four corners per primitive, the numbers fit a byte.
+const _: () = assert!(4 * GROUP <= 256);
+
+/// The vertices of clusters.
+#[derive(Debug)]
+pub(crate) struct Unique<const N: usize> {
+    /// Cluster after cluster. Each run ascends and repeats its last vertex up to a multiple of [`CHUNK`].
+    pub vertices: Vec<u32>,
+    /// Where each cluster's run starts, and one past the last.
+    pub starts: Vec<u32>,
+    pub corners: Vec<LocalCorners<N>>,
+}
+
+impl<const N: usize> Unique<N> {
+    /// From the corners in the order of the clusters.
+    pub fn new(corners: &[[u32; N]]) -> Self {
+        let blocks: Vec<Self> = corners.par_chunks(BLOCK * GROUP).map(of_block).collect();
+        let n_clusters = corners.len().div_ceil(GROUP);
+        let n_vertices = blocks.iter().map(|block| block.vertices.len()).sum();
+        let mut all = Self::with_capacity(n_clusters, n_vertices);
+        for block in blocks {
+            let first = all.vertices.len() as u32;
+            all.vertices.extend_from_slice(&block.vertices);
+            all.starts
+                .extend(block.starts[1..].iter().map(|end| first + end));
+            all.corners.extend_from_slice(&block.corners);
+        }
+        all
+    }
+
+    fn with_capacity(n_clusters: usize, n_vertices: usize) -> Self {
+        let mut starts = Vec::with_capacity(n_clusters + 1);
+        starts.push(0);
+        Unique {
+            vertices: Vec::with_capacity(n_vertices),
+            starts,
+            corners: Vec::with_capacity(n_clusters),
+        }
+    }
+
+    fn push(&mut self, group: &[[u32; N]], table: &mut Table) {
+        table.clear();
+        let mut local = [[0; GROUP]; N];
+        for (place, primitive) in group.iter().enumerate() {
+            for (corner, &vertex) in primitive.iter().enumerate() {
+                local[corner][place] = table.number(vertex);
+            }
+        }
+        let start = self.vertices.len();
+        let ranks = table.sort_into(&mut self.vertices);
+        for of_corner in &mut local {
+            for number in &mut of_corner[..group.len()] {
+                *number = ranks[usize::from(*number)];
+            }
+        }
+        self.corners.push(local);
+        debug_assert!(self.vertices[start..].is_sorted());
+        self.starts.push(self.vertices.len() as u32);
+    }
+}
+
+fn of_block<const N: usize>(corners: &[[u32; N]]) -> Unique<N> {
+    let mut table = Table::default();
+    let n_clusters = corners.len().div_ceil(GROUP);
+    let mut unique = Unique::with_capacity(n_clusters, n_clusters * GROUP);
+    for group in corners.chunks(GROUP) {
+        unique.push(group, &mut table);
+    }
+    unique
+}
+
+/// The vertices of a cluster seen so far, numbered as they come: a hash table with linear probing.
+struct Table {
+    /// Turn (24 bits), vertex (32), number (8). Slots of another turn are empty.
+    slots: [u64; Table::SLOTS],
+    turn: u64,
+    /// The vertices by number. The highest bit is inverted: registers compare signed numbers.
+    found: [i32; 4 * GROUP],
+    n: usize,
+}
+
+impl Default for Table {
+    fn default() -> Self {
+        Table {
+            slots: [0; Table::SLOTS],
+            turn: 0,
+            found: [0; 4 * GROUP],
+            n: 0,
+        }
+    }
+}
+
+impl Table {
+    /// At most half of them are taken: a cluster has up to four corners per primitive.
+    const SLOTS: usize = 2 * 4 * GROUP;
+
+    fn clear(&mut self) {
+        self.turn += 1;
+        self.n = 0;
+    }
+
+    #[inline(always)]
+    fn number(&mut self, vertex: u32) -> u8 {
+        let key = self.turn << 32 | u64::from(vertex);
+        // Fibonacci hashing (Knuth, TAOCP 3, 6.4): the highest bits of the product with 2^32 over the golden ratio.
+        let hash = vertex.wrapping_mul(0x9E37_79B1) >> (u32::BITS - Table::SLOTS.ilog2());
+        let mut slot = hash as usize;
+        loop {
+            let held = self.slots[slot];
+            let is_known = held >> 8 == key;
+            if is_known || held >> 40 != self.turn {
+                // Written in either case, so that nothing depends on a branch that is hard to predict.
+                let number = if is_known { held as u8 } else { self.n as u8 };
+                self.slots[slot] = key << 8 | u64::from(number);
+                self.found[self.n.min(4 * GROUP - 1)] = vertex as i32 ^ i32::MIN;
+                self.n += usize::from(!is_known);
+                return number;
+            }
+            slot = (slot + 1) % Table::SLOTS;
+        }
+    }
+
+    /// Appends the vertices in ascending order, padded to whole chunks. Returns the place of each number.
+    fn sort_into(&mut self, vertices: &mut Vec<u32>) -> [u8; 4 * GROUP] {
+        let n = self.n;
+        let padded = n.next_multiple_of(CHUNK);
+        self.found[n..padded].fill(i32::MAX);
+        let start = vertices.len();
+        vertices.resize(start + padded, 0);
+        let run = &mut vertices[start..];
+        let mut ranks = [0; 4 * GROUP];
+        for (&vertex, rank) in self.found[..n].iter().zip(&mut ranks) {
+            let mut lower = [0; CHUNK];
+            for chunk in self.found[..padded].as_chunks::<CHUNK>().0 {
+                for lane in 0..CHUNK {
+                    lower[lane] += i32::from(chunk[lane] < vertex);
+                }
+            }
+            *rank = lower.iter().sum::<i32>() as u8;
+            run[usize::from(*rank)] = (vertex ^ i32::MIN) as u32;
+        }
+        let last = run[n - 1];
+        run[n..].fill(last);
+        ranks
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers that look random, by Weyl's sequence.
+    fn scattered(n: usize, below: u32) -> Vec<[u32; 3]> {
+        let number = |k: usize| {
+            let mixed = (k as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+            ((mixed >> 32) * u64::from(below) >> 32) as u32
+        };
+        (0..n)
+            .map(|k| [number(3 * k), number(3 * k + 1), number(3 * k + 2)])
+            .collect()
+    }
+
+    /// The whole range of numbers, all different, all equal, and clusters and blocks that are not full.
+    #[test]
+    fn vertices_ascend_once_each_and_corners_name_them() {
+        let highest = vec![[u32::MAX, 0, u32::MAX - 1], [1 << 31, (1 << 31) - 1, 7]];
+        let different: Vec<[u32; 3]> = (0..64).map(|k| [3 * k + 2, 3 * k, 3 * k + 1]).collect();
+        let cases = [
+            Vec::new(),
+            highest,
+            different,
+            vec![[5; 3]; 130],
+            scattered(BLOCK * GROUP + 100, 60),
+            scattered(2 * BLOCK * GROUP + 1, u32::MAX),
+        ];
+        for faces in cases {
+            let unique = Unique::new(&faces);
+            assert_eq!(unique.starts.len(), faces.len().div_ceil(GROUP) + 1);
+            for (cluster, group) in faces.chunks(GROUP).enumerate() {
+                let run = unique.starts[cluster] as usize..unique.starts[cluster + 1] as usize;
+                let mut expected = group.as_flattened().to_vec();
+                expected.sort_unstable();
+                expected.dedup();
+                let last = expected[expected.len() - 1];
+                expected.resize(expected.len().next_multiple_of(CHUNK), last);
+                assert_eq!(unique.vertices[run], expected);
+                for (place, face) in group.iter().enumerate() {
+                    let numbers = unique.corners[cluster].map(|of_corner| of_corner[place]);
+                    assert_eq!(numbers.map(|number| expected[usize::from(number)]), *face);
+                }
+            }
+        }
+    }
+}
