@@ -2,6 +2,7 @@
 
 use impinge::{
     Backend, BodyId, CancelToken, Control, Detector, Pairs, Positions, Query, Scene, Settings,
+    Statistics,
 };
 
 use crate::args::{AskArgs, BackendArg, DetectorArgs};
@@ -144,14 +145,14 @@ pub fn repeat<'d>(
             .collect();
         for _ in 1..n_frames {
             let pairs = detect(detector, scene, query, cancel, watch)?;
-            times.add(pairs);
+            times.add(pairs.stats());
             for (id, positions) in &rest {
                 set_positions(scene, *id, positions)?;
             }
         }
     }
     let pairs = detect(detector, scene, query, cancel, watch)?;
-    times.add(pairs);
+    times.add(pairs.stats());
     Ok((pairs, times))
 }
 
@@ -177,8 +178,7 @@ pub struct Times {
 
 impl Times {
     /// Adds the times of a frame.
-    pub fn add(&mut self, pairs: &Pairs) {
-        let stats = pairs.stats();
+    pub fn add(&mut self, stats: &Statistics) {
         for stage in &stats.stages {
             if !self.stages.iter().any(|(name, _)| *name == stage.name) {
                 self.stages.push((stage.name, vec![0.0; self.total.len()]));
@@ -188,6 +188,12 @@ impl Times {
             ms.push(stats.stage_ms(name));
         }
         self.total.push(stats.total_ms);
+    }
+
+    /// The same and one more.
+    pub fn and(mut self, stats: &Statistics) -> Self {
+        self.add(stats);
+        self
     }
 
     /// How many frames there were.

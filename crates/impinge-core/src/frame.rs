@@ -296,6 +296,11 @@ impl Frame {
         })
     }
 
+    /// Asks about some kinds of candidates only, of those that the frame was resolved for.
+    pub(crate) fn ask_for(&mut self, kinds: PairKinds) {
+        self.ask = Ask::Candidates(kinds);
+    }
+
     /// Whether any pairs of two different layers are wanted.
     pub fn between(&self) -> bool {
         self.layers.len() > 1 && (self.between || self.ask != Ask::Intersections)

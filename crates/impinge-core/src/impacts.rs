@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::exact::Contact;
 use crate::frame::{Frame, owner_by_first};
 use crate::ids::BodyId;
+use crate::key_ranges::{KeyRanges, Tally};
 use crate::pair_kind::PairKind;
 use crate::pairs::{Primitive, hash_row, mix};
 use crate::sink::{Answer, Ending, reserve};
@@ -33,9 +34,13 @@ pub(crate) type KeyAnswer = Answer<u64, { PairKind::ALL.len() }>;
 pub(crate) enum StepAnswer<'a> {
     Contacts(&'a ContactAnswer),
     Keys(&'a KeyAnswer),
+    /// Only keys in some ranges.
+    KeysIn(&'a KeyAnswer, &'a KeyRanges),
+    /// Keys are counted and forgotten.
+    Counts(&'a Tally),
 }
 
-impl StepAnswer<'_> {
+impl<'a> StepAnswer<'a> {
     /// Takes contacts of one kind; the block is empty afterwards and keeps its memory.
     pub fn take(&self, kind: PairKind, block: &mut Vec<Found<Contact>>) {
         if let StepAnswer::Contacts(answer) = self {
@@ -45,8 +50,26 @@ impl StepAnswer<'_> {
 
     /// The same for pairs without a time.
     pub fn take_keys(&self, kind: PairKind, block: &mut Vec<u64>) {
-        if let StepAnswer::Keys(answer) = self {
-            answer.extend(kind as usize, block.drain(..));
+        match self {
+            StepAnswer::Keys(answer) => answer.extend(kind as usize, block.drain(..)),
+            StepAnswer::KeysIn(answer, ranges) => {
+                block.retain(|&key| ranges.hold(kind, key));
+                answer.extend(kind as usize, block.drain(..));
+            }
+            StepAnswer::Counts(tally) => {
+                tally.count(kind, block);
+                block.clear();
+            }
+            StepAnswer::Contacts(_) => {}
+        }
+    }
+
+    /// The ranges that keys must be in, if not all keys are wanted.
+    pub fn ranges(&self) -> Option<&'a KeyRanges> {
+        match self {
+            StepAnswer::KeysIn(_, ranges) => Some(ranges),
+            StepAnswer::Counts(tally) => Some(tally.ranges()),
+            StepAnswer::Contacts(_) | StepAnswer::Keys(_) => None,
         }
     }
 }
@@ -55,21 +78,26 @@ impl Ending for StepAnswer<'_> {
     fn is_over(&self) -> bool {
         match self {
             StepAnswer::Contacts(answer) => answer.is_over(),
-            StepAnswer::Keys(answer) => answer.is_over(),
+            StepAnswer::Keys(answer) | StepAnswer::KeysIn(answer, _) => answer.is_over(),
+            StepAnswer::Counts(_) => false,
         }
     }
 
     fn check(&self) -> Result<(), Error> {
         match self {
             StepAnswer::Contacts(answer) => answer.check(),
-            StepAnswer::Keys(answer) => answer.check(),
+            StepAnswer::Keys(answer) | StepAnswer::KeysIn(answer, _) => answer.check(),
+            StepAnswer::Counts(_) => Ok(()),
         }
     }
 
     fn share(&self, held_by_finder: u64) {
         match self {
             StepAnswer::Contacts(answer) => answer.share(held_by_finder),
-            StepAnswer::Keys(answer) => answer.share(held_by_finder),
+            StepAnswer::Keys(answer) | StepAnswer::KeysIn(answer, _) => {
+                answer.share(held_by_finder)
+            }
+            StepAnswer::Counts(_) => {}
         }
     }
 

@@ -23,6 +23,7 @@ pub mod grouping;
 pub mod host;
 mod ids;
 mod impacts;
+mod key_ranges;
 mod naive;
 mod narrow;
 mod near;

@@ -5,14 +5,15 @@
 mod common;
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use common::{agree, cases, naive, rows};
 use impinge_core::contact::Contacts;
 use impinge_core::{
-    Backend, BodyId, CandidateQuery, Detector, Error, Method, PairKind, Query, Scene, Settings,
-    Step,
+    Backend, BodyId, CandidateQuery, Candidates, Detector, Error, Method, PairKind, Query, Scene,
+    Settings, Step,
 };
 
 /// Counts the bytes that are held, and refuses large requests beyond a limit, as a system does.
@@ -439,6 +440,66 @@ fn steps_keep_the_same_limits() {
                 }
                 other => panic!("{method:?}: {other:?}"),
             }
+        }
+    }
+}
+
+/// Candidates that the memory budget cannot hold all at once come in runs that it can hold.
+#[test]
+fn runs_of_candidates_keep_the_budget() {
+    let _alone = alone();
+    let n = 1_000;
+    let scene = swarm(n);
+    for (method, budgets) in [
+        (Method::Clusters, [4 << 20, 7 << 20]),
+        (Method::Naive, [1 << 20, 4 << 20]),
+    ] {
+        let mut before = usize::MAX;
+        for budget in budgets {
+            let mut detector = detector(Settings {
+                memory_budget: Some(budget),
+                ..settings(method)
+            });
+            match detector.candidates(&scene, &swarm_candidates()) {
+                Err(Error::MemoryBudget { .. }) => {}
+                other => panic!("{method:?}, {budget}: {:?}", other.map(|all| all.len())),
+            }
+            let (mut next, mut n_runs) = (0, 0);
+            let mut each = |run: Candidates| {
+                assert!(run.stats().bytes_held <= budget, "{:?}", run.stats());
+                for (_, a, b) in run.iter() {
+                    assert_eq!(
+                        (a.primitive, b.primitive),
+                        (next / n as u32, next % n as u32)
+                    );
+                    next += 1;
+                }
+                n_runs += 1;
+                ControlFlow::<()>::Continue(())
+            };
+            let (all, held) = peak(|| {
+                detector.candidates_in_runs(&scene, &swarm_candidates(), u64::MAX, &mut each)
+            });
+            assert_eq!(all, Ok(ControlFlow::Continue((n * n) as u64)));
+            assert_eq!(next as usize, n * n);
+            // The scene's layers and the threads' stacks of the search are not counted.
+            assert!(
+                held as u64 <= budget + (1 << 20),
+                "{method:?}: {held} of {budget}"
+            );
+            assert!((2..before).contains(&n_runs), "{method:?}: {n_runs} runs");
+            before = n_runs;
+        }
+        let mut detector = detector(Settings {
+            memory_budget: Some(100_000),
+            ..settings(method)
+        });
+        let nothing = |_| -> ControlFlow<()> { panic!("no run") };
+        match detector.candidates_in_runs(&scene, &swarm_candidates(), u64::MAX, nothing) {
+            Err(Error::MemoryBudget { needed, budget, .. }) => {
+                assert!(needed > budget && budget == 100_000);
+            }
+            other => panic!("{method:?}: {other:?}"),
         }
     }
 }

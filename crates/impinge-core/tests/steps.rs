@@ -1,9 +1,11 @@
 //! Steps: what touches while bodies move, when first, and how far a step can be taken.
 
+use std::ops::ControlFlow;
+
 use impinge_core::exact::{ElementPair, first_contact};
 use impinge_core::{
-    Backend, BodyId, CancelToken, CandidateQuery, Control, Detector, Error, Method, PairKind, Part,
-    Query, Scene, Settings, Start, Step, Toi,
+    Backend, BodyId, CancelToken, CandidateQuery, Candidates, Control, Detector, Elements, Error,
+    Method, PairKind, Part, Primitive, Query, Scene, Settings, Start, Step, Toi,
 };
 
 const FACE: [[u32; 3]; 1] = [[0, 1, 2]];
@@ -199,6 +201,200 @@ fn candidates_are_boxes_that_overlap_within_twice_the_distance() {
             .set_end_positions(far, &[[1.0f32, 0.0, 0.0]])
             .expect("good");
         assert_eq!([0.49, 0.5].map(|d| count(&scene, d)), [0, 1]);
+    }
+}
+
+/// A surface, edges and points that move at random: all six kinds of pairs, between bodies and within them.
+fn crowd(is_double: bool) -> Scene {
+    let mut random = impinge_scenes::Random::new(5);
+    let mut points = |n: u32, size: f32| -> Vec<[f32; 3]> {
+        let mut at = || random.below(1 << 12) as f32 / 1024.0 * size;
+        (0..n).map(|_| [at(), at(), at()]).collect()
+    };
+    let wide = |points: &[[f32; 3]]| -> Vec<[f64; 3]> {
+        points.iter().map(|point| point.map(f64::from)).collect()
+    };
+    let triangles = (0..32).map(|f| [3 * f, 3 * f + 1, (3 * f + 5) % 96]);
+    let mut scene = Scene::new();
+    for (elements, n) in [
+        (Elements::Triangles(triangles.collect()), 96),
+        (Elements::Edges((0..79).map(|e| [e, e + 1]).collect()), 80),
+        (Elements::Points((0..70).map(|point| [point]).collect()), 70),
+    ] {
+        let (start, way) = (points(n, 1.0), points(n, 0.125));
+        let moved = start.iter().zip(&way);
+        let moved = moved.map(|(p, q)| std::array::from_fn(|axis| p[axis] + q[axis]));
+        let end: Vec<[f32; 3]> = moved.collect();
+        if is_double {
+            let body = scene.add(elements, wide(&start)).expect("good");
+            scene.set_end_positions(body, &wide(&end)).expect("good");
+        } else {
+            let body = scene.add(elements, start).expect("good");
+            scene.set_end_positions(body, &end).expect("good");
+        }
+    }
+    scene
+}
+
+type Candidate = (PairKind, Primitive, Primitive);
+
+/// All candidates run by run, and the lengths of the runs.
+fn in_runs(
+    detector: &mut Detector,
+    scene: &Scene,
+    query: &CandidateQuery,
+    most: u64,
+) -> (Vec<Candidate>, Vec<usize>) {
+    let (mut all, mut lengths) = (Vec::new(), Vec::new());
+    let mut each = |run: Candidates| {
+        all.extend(run.iter());
+        lengths.push(run.len());
+        ControlFlow::<()>::Continue(())
+    };
+    let n = detector.candidates_in_runs(scene, query, most, &mut each);
+    assert_eq!(n, Ok(ControlFlow::Continue(all.len() as u64)));
+    (all, lengths)
+}
+
+#[test]
+fn candidates_in_runs_are_all_candidates_in_their_order() {
+    for is_double in [false, true] {
+        let scene = crowd(is_double);
+        for kinds in [
+            &PairKind::ALL[..],
+            &[PairKind::FaceFace, PairKind::VertexVertex],
+        ] {
+            let query = CandidateQuery::new(Query::everything())
+                .kinds(kinds.iter().copied())
+                .distance(0.0625);
+            let mut expected = None;
+            for (method, threads) in [
+                (Method::Naive, 1),
+                (Method::Clusters, 1),
+                (Method::Clusters, 3),
+            ] {
+                let mut detector = Detector::with_settings(Settings {
+                    method,
+                    threads,
+                    backend: Backend::Cpu,
+                    ..Settings::default()
+                })
+                .expect("settings");
+                let whole = detector.candidates(&scene, &query).expect("good");
+                let hash = whole.hash();
+                let whole: Vec<Candidate> = whole.iter().collect();
+                let expected = &*expected.get_or_insert_with(|| whole.clone());
+                assert_eq!(whole, *expected);
+                let n = whole.len();
+                for kind in kinds {
+                    assert!(whole.iter().any(|row| row.0 == *kind), "{kind:?}");
+                }
+                for most in [n as u64 / 60, n as u64 - 1, n as u64, u64::MAX] {
+                    let most = most.max(1);
+                    let (all, lengths) = in_runs(&mut detector, &scene, &query, most);
+                    assert!(
+                        all == whole,
+                        "{method:?}, {threads} threads, {most} per run"
+                    );
+                    assert!(lengths.iter().all(|&n| n > 0 && n as u64 <= most));
+                    assert_eq!(lengths.len() == 1, most >= n as u64);
+                }
+                let mut sum = 0u64;
+                let all = detector.candidates_in_runs(&scene, &query, 1 + n as u64 / 5, |run| {
+                    sum = sum.wrapping_add(run.hash());
+                    assert!(run.stats().total_ms > 0.0 && run.stats().n_threads == threads);
+                    ControlFlow::<()>::Continue(())
+                });
+                assert_eq!((all, sum), (Ok(ControlFlow::Continue(n as u64)), hash));
+            }
+        }
+    }
+}
+
+/// All candidates have the same lower number, so that runs must be divided by the higher one.
+#[test]
+fn one_element_with_many_candidates_is_divided_too() {
+    let mut scene = Scene::new();
+    scene.add_points(&[[0.0f32; 3]]).expect("good");
+    let many: Vec<[f32; 3]> = (0..1000).map(|i| [i as f32 / 1000.0, 0.0, 0.0]).collect();
+    scene.add_points(&many).expect("good");
+    let query = CandidateQuery::new(Query::all())
+        .kinds([PairKind::VertexVertex])
+        .distance(1.0);
+    for mut detector in detectors() {
+        let (all, lengths) = in_runs(&mut detector, &scene, &query, 7);
+        assert!(lengths.iter().all(|n| (1..=7).contains(n)));
+        let others = all.iter().map(|row| row.2.primitive);
+        assert!(others.eq(0..1000));
+    }
+}
+
+#[test]
+fn runs_of_candidates_end_when_they_are_told_to() {
+    let scene = crowd(false);
+    let query = CandidateQuery::new(Query::everything());
+    for mut detector in detectors() {
+        let whole = detector.candidates(&scene, &query).expect("good").len() as u64;
+        let mut n_runs = 0;
+        let mut third = |run: Candidates| {
+            n_runs += 1;
+            match n_runs {
+                3 => ControlFlow::Break(run.len()),
+                _ => ControlFlow::Continue(()),
+            }
+        };
+        let found = detector.candidates_in_runs(&scene, &query, 20, &mut third);
+        assert!(matches!(found, Ok(ControlFlow::Break(1..=20))), "{found:?}");
+        assert_eq!(n_runs, 3);
+
+        let token = CancelToken::new();
+        let control = Control::new().cancel(&token);
+        let mut n_runs = 0;
+        let cancel = |_| {
+            n_runs += 1;
+            token.cancel();
+            ControlFlow::<()>::Continue(())
+        };
+        let found = detector.candidates_in_runs_with(&scene, &query, 20, cancel, &control);
+        assert_eq!((found, n_runs), (Err(Error::Cancelled), 1));
+
+        let nothing = |_| -> ControlFlow<()> { panic!("no run") };
+        let refused = detector.candidates_in_runs(&scene, &query, 0, nothing);
+        assert!(matches!(
+            refused,
+            Err(Error::Setting {
+                setting: "most",
+                ..
+            })
+        ));
+        let apart = CandidateQuery::new(Query::everything()).kinds([]);
+        let none = detector.candidates_in_runs(&scene, &apart, 20, nothing);
+        assert_eq!(none, Ok(ControlFlow::Continue(0)));
+
+        // The limit of pairs is for all runs together.
+        for (limit, most) in [(whole - 1, 20), (whole - 1, whole), (10, 20), (whole, 20)] {
+            let mut limited = Detector::with_settings(Settings {
+                max_pairs: Some(limit),
+                ..detector.settings().clone()
+            })
+            .expect("settings");
+            let mut n = 0;
+            let found = limited.candidates_in_runs(&scene, &query, most, |run| {
+                n += run.len() as u64;
+                ControlFlow::<()>::Continue(())
+            });
+            match found {
+                Err(Error::TooManyPairs { limit: told, .. }) => {
+                    assert!(limit < whole && told == limit && n == 0);
+                }
+                found => assert_eq!((found, n), (Ok(ControlFlow::Continue(whole)), limit)),
+            }
+        }
+        // The detector goes on.
+        assert_eq!(
+            in_runs(&mut detector, &scene, &query, 50).0.len() as u64,
+            whole
+        );
     }
 }
 

@@ -1,6 +1,7 @@
 //! Steps of real scenes against answers from elsewhere: every pair that touches, and every time to the last bit. Fails
 //! if the data folder (`../shared/data` or `$IMPINGE_DATA`) is absent.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use impinge_core::{
@@ -216,6 +217,18 @@ fn boxes_overlap_as_often_as_others_counted() {
         }
         let rows: Vec<_> = candidates.rows(PairKind::EdgeEdge).collect();
         assert!(rows.is_sorted_by(|a, b| a < b), "sorted, each once");
+        // Run by run, within a budget that does not hold all of them.
+        let all: Vec<_> = candidates.iter().collect();
+        let mut detector = self::detector(2, InstructionSet::default(), Some(30_000_000));
+        let (mut rest, mut n_runs) = (&all[..], 0);
+        let found = detector.candidates_in_runs(&scene, &query, all.len() as u64 / 3, |run| {
+            let (own, others) = rest.split_at(run.len());
+            assert!(run.iter().eq(own.iter().copied()), "{}", scenario.name);
+            (rest, n_runs) = (others, n_runs + 1);
+            ControlFlow::<()>::Continue(())
+        });
+        assert_eq!(found, Ok(ControlFlow::Continue(all.len() as u64)));
+        assert!(n_runs > 3 && rest.is_empty(), "{n_runs} runs");
     }
 }
 

@@ -57,7 +57,7 @@ mod write;
 pub use error::{Error, Location, Place};
 pub use format::Format;
 pub use mesh::{Elements, Mesh, Positions, Weld, weld};
-pub use npy::{npy_header, write_impacts_npy};
+pub use npy::{npy_header, npy_header_in, write_impacts_npy};
 pub use options::{Prefer, ReadOptions, Summary};
 pub use read::{read, read_bytes, read_bytes_with_summary, read_tetgen_bytes, read_with_summary};
 pub use sequence::{Sequence, SequenceFormat};

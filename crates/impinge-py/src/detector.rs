@@ -1,5 +1,7 @@
 //! `impinge.Detector`: settings, questions, the run.
 
+use std::ops::ControlFlow;
+
 use impinge::{CandidateQuery, Control, NearQuery, Query, Step, Toi};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -12,7 +14,7 @@ use crate::proximity::Nearest;
 use crate::question::{question, step_question};
 use crate::result::Answer;
 use crate::scene::Scene;
-use crate::settings::{self, Argument, Told, unexpected};
+use crate::settings::{self, Argument, Told, unexpected, unsigned};
 use crate::steps::{self, Advance, Candidates, Impact, Impacts};
 use crate::watch::{CancelToken, Watch};
 
@@ -568,6 +570,100 @@ impl Detector {
         Ok(Candidates::new(
             Detector::watched(slf, watched, ask, answer)?.0,
         ))
+    }
+
+    /// All `candidates` in sorted runs, one after the other, so that memory need not hold all of them. Run after
+    /// run they are the rows of `candidates`, each once and in the same order, whatever `most`, the memory budget
+    /// and the number of threads.
+    ///
+    /// Candidates are counted first, and then each run is searched for alone, so short runs cost time. A run takes
+    /// 8 bytes per candidate, 12 without a memory budget. The budget makes runs as short as it needs.
+    ///
+    /// Parameters
+    /// ----------
+    /// scene, between, within, ignore, kinds, distance, progress, cancel
+    ///     As for `candidates`.
+    /// each : callable
+    ///     Called with each run, which is never empty. An exception ends the search and is raised.
+    /// most : int
+    ///     Candidates per run at most.
+    ///
+    /// Returns
+    /// -------
+    /// int
+    ///     The number of all candidates.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError, MemoryError, Cancelled, RuntimeError
+    ///     As `candidates`; a ``most`` of 0.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import impinge
+    /// >>> scene = impinge.Scene()
+    /// >>> for _ in range(2):
+    /// ...     _ = scene.add_points([[x, 0, 0] for x in range(5)])
+    /// >>> detector = impinge.Detector(backend="cpu")
+    /// >>> detector.candidates_in_runs(scene, lambda run: print(run.rows("vv").tolist()), kinds="vv", most=3)
+    /// [[0, 0, 1, 0], [0, 1, 1, 1], [0, 2, 1, 2]]
+    /// [[0, 3, 1, 3], [0, 4, 1, 4]]
+    /// 5
+    #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+    #[pyo3(
+        signature = (
+            scene, each, *, between=None, within=None, ignore=None, kinds=None, distance=None,
+            most=None, progress=None, cancel=None,
+        ),
+        text_signature = "($self, scene, each, *, between=None, within=None, ignore=None, \
+                          kinds=(\"vf\", \"ee\"), distance=0.0, most=4194304, progress=None, cancel=None)"
+    )]
+    fn candidates_in_runs(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        each: &Bound<'_, PyAny>,
+        between: Argument<'_, '_>,
+        within: Argument<'_, '_>,
+        ignore: Argument<'_, '_>,
+        kinds: Argument<'_, '_>,
+        distance: Argument<'_, '_>,
+        most: Argument<'_, '_>,
+        progress: Argument<'_, '_>,
+        cancel: Argument<'_, '_>,
+    ) -> PyResult<u64> {
+        let kinds = steps::kinds(kinds)?;
+        let distance = steps::distance(distance, "distance")?;
+        let most = match most {
+            Some(most) => unsigned(most, "most", u64::MAX)?,
+            None => 1 << 22,
+        };
+        if !each.is_callable() {
+            return Err(unexpected(each, "each", "a callable"));
+        }
+        let each = each.clone().unbind();
+        let ask = |scene: &Scene| {
+            let query = step_question(scene, between, within, ignore)?;
+            Ok(CandidateQuery::new(query).kinds(kinds).distance(distance))
+        };
+        let answer = |detector: &mut impinge::Detector,
+                      scene: &impinge::Scene,
+                      query: &CandidateQuery,
+                      control: &Control<'_>| {
+            // Called on the thread that called from Python.
+            let hand_over = |run: impinge::Candidates| {
+                let called = Python::attach(|py| each.call1(py, (Candidates::new(run),)));
+                match called {
+                    Ok(_) => ControlFlow::Continue(()),
+                    Err(error) => ControlFlow::Break(error),
+                }
+            };
+            detector.candidates_in_runs_with(scene, query, most, hand_over, control)
+        };
+        let watched = (scene, progress, cancel);
+        match Detector::watched(slf, watched, ask, answer)?.0 {
+            ControlFlow::Continue(n) => Ok(n),
+            ControlFlow::Break(error) => Err(error),
+        }
     }
 
     /// Pickles and copies are new detectors with the same settings.

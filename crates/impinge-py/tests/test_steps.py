@@ -252,6 +252,28 @@ def test_candidates(detector):
         detector.candidates(scene, kinds=3)
 
 
+def test_candidates_in_runs(detector):
+    scene = lattice_step(40, 3)
+    question = {"kinds": ["vf", "ee", "ff"], "distance": 0.25}
+    whole = detector.candidates(scene, **question)
+    for most in [1000, 2**64 - 1, len(whole), 37]:
+        runs = []
+        assert detector.candidates_in_runs(scene, runs.append, most=most, **question) == len(whole)
+        assert (len(runs) == 1) == (most >= len(whole)) and all(0 < len(run) <= most for run in runs)
+        for name in ["kinds", "bodies", "elements"]:
+            assert np.array_equal(np.concatenate([getattr(run, name) for run in runs]), getattr(whole, name))
+    with pytest.raises(RuntimeError, match="^the detector is busy"):
+        detector.candidates_in_runs(scene, lambda _: detector.candidates(scene))
+    with pytest.raises(ZeroDivisionError):
+        detector.candidates_in_runs(scene, lambda run: len(run) / 0, most=50, **question)
+    with pytest.raises(TypeError, match="^each: a callable expected, int given"):
+        detector.candidates_in_runs(scene, 3)
+    with pytest.raises(ValueError, match="^most: 0 given, at least 1 candidate per run"):
+        detector.candidates_in_runs(scene, print, most=0)
+    runs.clear()
+    assert detector.candidates_in_runs(scene, runs.append, kinds=()) == 0 and not runs
+
+
 def test_all_six_kinds(detector):
     scene = lattice_step(12, 3)
     kinds = ["vf", "ee", "ev", "vv", "ef", "ff"]

@@ -1,5 +1,6 @@
 //! The command line of `impinge step` and of `impinge sequence --ccd`.
 
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -8,9 +9,10 @@ use super::DetectorArgs;
 #[cfg(feature = "gpu")]
 use super::PictureArgs;
 use super::choices::{StartArg, ToiArg};
+use super::near::KindArg;
 #[cfg(feature = "gpu")]
 use crate::values::PngFile;
-use crate::values::{MeshFile, RowsFile, body_numbers, distance};
+use crate::values::{MeshFile, RowsFile, at_least_one, body_numbers, distance};
 
 pub const STEP_EXAMPLES: &str = "\
 Examples:
@@ -18,13 +20,17 @@ Examples:
   impinge step a_0.obj a_1.obj b_0.obj b_1.obj     two bodies, each at the start and at the end
   impinge step cloth_0.ply cloth_1.ply --earliest  only the first contact, which is faster
   impinge step cloth_0.ply cloth_1.ply --impacts impacts.csv --out impacts.glb
+  impinge step cloth_0.ply cloth_1.ply --candidates boxes.npy --distance 0.001
 
 Every vertex moves on a straight line from time 0 to time 1. The two files of a body must have the same elements.
 Times are exact first times, rounded down: nothing touches earlier.
 
 Rows of --impacts are kind, body_a, element_a, body_b, element_b, toi, sorted. In a row of kind vf, a is the vertex
 and b the face. Vertices and faces are numbered as in the file; edges are the unique pairs (low, high) of vertices in
-the order of (high, low). Kinds ev and vv occur if a body has edges or points without faces.";
+the order of (high, low). Kinds ev and vv occur if a body has edges or points without faces.
+
+Rows of --candidates are the same without toi. They are found and written run by run, so that memory need not hold
+all of them: see --memory-budget. In a .npy file they are a structured array.";
 
 #[derive(Debug, Args)]
 pub struct StepArgs {
@@ -32,7 +38,7 @@ pub struct StepArgs {
     #[arg(value_name = "START END", required = true, num_args = 2..)]
     pub meshes: Vec<PathBuf>,
     /// Find only the first contact
-    #[arg(long, conflicts_with_all = ["impacts", "out"])]
+    #[arg(long, conflicts_with_all = ["impacts", "out", "candidates"])]
     #[cfg_attr(feature = "gpu", arg(conflicts_with = "png"))]
     pub earliest: bool,
     /// Ignore the pairs within each body
@@ -52,6 +58,26 @@ pub struct StepArgs {
     /// Write all impacts (.csv, .jsonl or .npy; "-" is standard output, as CSV)
     #[arg(long, value_name = "FILE")]
     pub impacts: Option<RowsFile>,
+    /// Write the pairs whose boxes over the whole step overlap (.csv, .jsonl or .npy; "-" is standard output, as CSV), and
+    /// find no impacts
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["impacts", "out", "repeat", "separation"])]
+    #[cfg_attr(feature = "gpu", arg(conflicts_with = "png"))]
+    pub candidates: Option<RowsFile>,
+    /// How far the boxes of --candidates are inflated on all sides: 0 or more
+    #[arg(long, value_name = "D", default_value = "0", requires = "candidates", allow_negative_numbers = true, value_parser = distance)]
+    pub distance: f64,
+    /// Which --candidates: vertex-face, edge-edge, edge-vertex, vertex-vertex, edge-face, face-face [default: vf,ee]
+    #[arg(
+        long,
+        value_enum,
+        value_name = "KIND",
+        value_delimiter = ',',
+        requires = "candidates"
+    )]
+    pub kinds: Vec<KindArg>,
+    /// Ask N times, rewriting positions at both ends before each, and show median times
+    #[arg(long, value_name = "N", default_value = "1", value_parser = at_least_one)]
+    pub repeat: NonZeroUsize,
     /// Write the meshes at the start of the step, coloured by the time of contact (.ply, .glb or .vtu)
     #[arg(long, value_name = "FILE")]
     pub out: Option<MeshFile>,
@@ -76,7 +102,12 @@ impl StepArgs {
         let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
         #[cfg(not(feature = "gpu"))]
         let png = None;
-        [impacts, out, png].into_iter().flatten().collect()
+        let candidates = self.candidates.as_ref().filter(|file| !file.is_stdout());
+        let candidates = candidates.map(|file| ("--candidates", file.path.as_path()));
+        [impacts, out, png, candidates]
+            .into_iter()
+            .flatten()
+            .collect()
     }
 }
 

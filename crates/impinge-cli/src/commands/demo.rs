@@ -219,7 +219,7 @@ impl Found {
     }
 
     fn add(&mut self, bodies: &[(BodyId, &str)], pairs: &Pairs) {
-        self.times.add(pairs);
+        self.times.add(pairs.stats());
         self.n_pairs.push(pairs.len());
         for meeting in &mut self.meetings {
             let (a, b) = (bodies[meeting.a_ix].0, bodies[meeting.b_ix].0);

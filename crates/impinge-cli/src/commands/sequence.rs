@@ -97,7 +97,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         outputs.frame(frame_ix, &scene, &bodies, pairs)?;
         if args.ask.json {
             let mut times = Times::default();
-            times.add(pairs);
+            times.add(pairs.stats());
             let regions = regions::regions(&scene, &bodies, pairs)?;
             let regions = regions.as_deref();
             let mut line = Map::new();
@@ -298,7 +298,7 @@ impl Lines {
             }
         )?;
         to.flush()?;
-        self.times.add(pairs);
+        self.times.add(pairs.stats());
         let (least, most) = self.extremes.unwrap_or((pairs.len(), pairs.len()));
         self.extremes = Some((least.min(pairs.len()), most.max(pairs.len())));
         Ok(())

@@ -169,7 +169,7 @@ struct Summary {
 
 impl Summary {
     fn found(&mut self, bodies: &[(BodyId, &str)], pairs: &Pairs) {
-        self.times.add(pairs);
+        self.times.add(pairs.stats());
         self.n_pairs.push(pairs.len());
         let colliding = |&(id, _): &(BodyId, &str)| pairs.colliding(id).len();
         self.n_colliding

@@ -1,19 +1,20 @@
 //! `impinge step`: finds what touches while bodies move from one pose to another, and when.
 
 mod answer;
+mod candidates;
 mod colors;
 mod frames;
 mod load;
 mod rows;
 
-use std::io::Write;
+use std::io::{Write, stderr};
 
-use impinge::{CancelToken, Control, Query, Step};
+use impinge::{CancelToken, CandidateQuery, Control, Query, Step};
 use serde_json::Value;
 
 use crate::apart::Inputs;
 use crate::args::StepArgs;
-use crate::detection::detector;
+use crate::detection::{Times, detector};
 use crate::error::Error;
 use crate::output::out;
 #[cfg(feature = "gpu")]
@@ -37,8 +38,13 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
         let text = "--json and --impacts - both write to standard output: give one of them a file";
         return Err(Error::Usage(text.to_owned()));
     }
+    if args.json && args.candidates.as_ref().is_some_and(RowsFile::is_stdout) {
+        let text =
+            "--json and --candidates - both write to standard output: give one of them a file";
+        return Err(Error::Usage(text.to_owned()));
+    }
     let mut detector = detector(&args.detector)?;
-    let bodies = Moving::read(args, cancel)?;
+    let mut bodies = Moving::read(args, cancel)?;
     let step = Step::new(query(args, &bodies)?)
         .start(args.how.start.into())
         .toi(args.how.toi.into())
@@ -50,10 +56,35 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     if watch.is_shown() {
         control = control.progress(&report);
     }
-    if args.earliest {
-        let earliest = detector.earliest(&bodies.scene, &step)?;
+    if let Some(file) = &args.candidates {
+        let query = candidate_query(args, &bodies)?;
+        let asked = (&mut detector, &bodies, &query);
+        let written = candidates::write(file, asked, &control)?;
         drop(watch);
-        let found = Found::first(earliest, detector.step_stats());
+        if args.json {
+            writeln!(out(), "{}", written.json(&bodies, args.distance)?)?;
+        } else if file.is_stdout() {
+            // If standard error is closed, nobody reads the summary.
+            let _ = written.print(&mut stderr());
+        } else {
+            written.print(&mut out())?;
+        }
+        return Ok(());
+    }
+    let mut times = Times::default();
+    for _ in 1..args.repeat.get() {
+        if args.earliest {
+            detector.earliest_with(&bodies.scene, &step, &control)?;
+        } else {
+            detector.impacts_with(&bodies.scene, &step, &control)?;
+        }
+        times.add(detector.step_stats());
+        bodies.rewrite()?;
+    }
+    if args.earliest {
+        let earliest = detector.earliest_with(&bodies.scene, &step, &control)?;
+        drop(watch);
+        let found = Found::first(earliest, detector.step_stats(), times);
         return print(args, &bodies, &found);
     }
     let impacts = detector.impacts_with(&bodies.scene, &step, &control)?;
@@ -66,7 +97,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
         colors::write(file, &bodies, impacts)?;
     }
     if !rows_on_stdout {
-        print(args, &bodies, &Found::all(impacts))?;
+        print(args, &bodies, &Found::all(impacts, times))?;
     }
     #[cfg(feature = "gpu")]
     if let Some(png) = &args.png {
@@ -98,6 +129,14 @@ fn query(args: &StepArgs, bodies: &Moving) -> Result<Query, Error> {
     args.ignore
         .iter()
         .try_fold(asked, |asked, &(a, b)| Ok(asked.ignore(body(a)?, body(b)?)))
+}
+
+fn candidate_query(args: &StepArgs, bodies: &Moving) -> Result<CandidateQuery, Error> {
+    let asked = CandidateQuery::new(query(args, bodies)?).distance(args.distance);
+    Ok(match args.kinds.is_empty() {
+        true => asked,
+        false => asked.kinds(args.kinds.iter().map(|&kind| kind.into())),
+    })
 }
 
 fn print(args: &StepArgs, bodies: &Moving, found: &Found<'_>) -> Result<(), Error> {

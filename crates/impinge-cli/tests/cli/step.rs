@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use impinge::{Backend, Detector, Impact, Scene, Step, Toi};
+use impinge::{Backend, CandidateQuery, Detector, Impact, PairKind, Query, Scene, Step, Toi};
 use impinge_scenes::Model;
 use impinge_scenes::surfaces::{ball, cube};
 use serde_json::Value;
@@ -169,6 +169,149 @@ fn impacts_read_back_to_the_same_bits() {
         };
         assert_eq!(read, rows);
     }
+}
+
+/// All candidates of some kinds, by the library.
+fn expected_candidates(kinds: &[PairKind], distance: f64) -> (Vec<(String, [u32; 4])>, u64) {
+    let [a0, a1, b0, b1] = crash().map(|(_, model)| model);
+    let mut scene = Scene::new();
+    for (start, end) in [(a0, a1), (b0, b1)] {
+        let id = start.add_to(&mut scene).unwrap();
+        scene.set_end_positions(id, &end.positions).unwrap();
+    }
+    let query = CandidateQuery::new(Query::everything())
+        .kinds(kinds.iter().copied())
+        .distance(distance);
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let candidates = detector.candidates(&scene, &query).unwrap();
+    let rows = kinds.iter().flat_map(|&kind| {
+        candidates
+            .rows(kind)
+            .map(move |row| (kind.name().to_owned(), row))
+    });
+    (rows.collect(), candidates.hash())
+}
+
+#[test]
+fn candidates_are_written_in_every_format() {
+    let folder = folder();
+    let defaults = [PairKind::VertexFace, PairKind::EdgeEdge];
+    let all = PairKind::ALL.map(PairKind::name).join(",");
+    let wide = ["--kinds", &all, "--distance", "0.5", "--threads", "1"];
+    // The least budget that is enough, and holds only runs of the candidates.
+    let budgets = (512..4096).step_by(64).map(|kib| format!("{kib}k"));
+    let is_enough = |budget: &String| {
+        let more = ["--candidates", "boxes.csv", "--memory-budget", budget];
+        let arguments = ["step"].iter().chain(&FILES).chain(&wide).chain(&more);
+        folder.run(arguments).code == Some(0)
+    };
+    let budget = budgets.into_iter().find(is_enough).unwrap();
+    let in_runs = [&wide[..], &["--memory-budget", &budget]].concat();
+    for (kinds, distance, more) in [
+        (&defaults[..], 0.0, &[][..]),
+        (&PairKind::ALL, 0.5, &wide),
+        (&PairKind::ALL, 0.5, &in_runs),
+    ] {
+        let (rows, hash) = expected_candidates(kinds, distance);
+        assert!(rows.len() > 100);
+        let mut texts = Vec::new();
+        for name in ["boxes.csv", "boxes.npy", "boxes.jsonl", "-"] {
+            let to = ["--candidates", name];
+            let arguments = ["step"].iter().chain(&FILES).chain(&to);
+            let run = folder.run(arguments.clone().chain(more));
+            if name == "-" {
+                texts.push(run.stdout);
+                continue;
+            }
+            let printed = run.printed();
+            assert!(printed.contains(&format!("hash {hash:016x}")), "{printed}");
+            let answer = folder.run(arguments.chain(more).chain(&["--json"])).json();
+            assert_eq!(answer["candidates"], rows.len());
+            assert_eq!(answer["hash"], format!("{hash:016x}"));
+            assert_eq!(answer["distance"], distance);
+            assert_eq!(
+                answer["runs"].as_u64() > Some(1),
+                more.len() == in_runs.len()
+            );
+            let of_kind = rows.iter().filter(|row| row.0 == "ee").count();
+            assert_eq!(answer["kinds"]["ee"], of_kind);
+            let bytes = std::fs::read(folder.path(name)).unwrap();
+            if name == "boxes.npy" {
+                assert_eq!(npy_candidates(&bytes), rows);
+            } else {
+                texts.push(String::from_utf8(bytes).unwrap());
+            }
+        }
+        let mut csv = "kind,body_a,element_a,body_b,element_b\n".to_owned();
+        let mut jsonl = String::new();
+        for (kind, [body_a, a, body_b, b]) in &rows {
+            csv += &format!("{kind},{body_a},{a},{body_b},{b}\n");
+            jsonl += &format!(
+                "{{\"kind\":\"{kind}\",\"body_a\":{body_a},\"element_a\":{a},\"body_b\":{body_b},\"element_b\":{b}}}\n"
+            );
+        }
+        assert!(texts == [csv.clone(), jsonl, csv]);
+    }
+    let ask = |more: &[&str]| {
+        folder
+            .run(["step"].iter().chain(&FILES).chain(more))
+            .misuse()
+    };
+    let misuse = ask(&["--candidates", "-", "--json"]);
+    assert!(misuse.contains("both write to standard output"), "{misuse}");
+    let misuse = ask(&["--candidates", "a0.ply"]);
+    assert!(misuse.contains("--candidates"), "{misuse}");
+    for with in [&["--impacts", "-"][..], &["--earliest"], &["--repeat", "2"]] {
+        let misuse = ask(&[&["--candidates", "boxes.csv"], with].concat());
+        assert!(misuse.contains("cannot be used with"), "{misuse}");
+    }
+    assert!(ask(&["--distance", "1"]).contains("--candidates"));
+}
+
+fn npy_candidates(bytes: &[u8]) -> Vec<(String, [u32; 4])> {
+    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    assert_eq!(start % 64, 0);
+    let word = |at: &[u8]| u32::from_le_bytes(at[..4].try_into().unwrap());
+    let row = |row: &[u8]| {
+        let kind = [word(row), word(&row[4..])].map(|c| char::from_u32(c).unwrap());
+        (
+            kind.iter().collect(),
+            std::array::from_fn(|k| word(&row[8 + 4 * k..])),
+        )
+    };
+    let rows: Vec<_> = bytes[start..].chunks_exact(24).map(row).collect();
+    let header = std::str::from_utf8(&bytes[10..start]).unwrap();
+    let shape = format!("'shape': ({},)", rows.len());
+    assert!(
+        header.contains(&shape) && header.ends_with('\n'),
+        "{header}"
+    );
+    assert!(!header.contains("toi") && header.contains("'element_b', '<u4')]"));
+    rows
+}
+
+#[test]
+fn a_question_asked_again_has_the_same_answer_and_median_times() {
+    let folder = folder();
+    for more in [&[][..], &["--earliest"]] {
+        let ask = |repeat: &[&str]| {
+            let arguments = ["step"].iter().chain(&FILES).chain(more).chain(repeat);
+            let answer = folder.run(arguments.clone().chain(&["--json"])).json();
+            (answer, folder.run(arguments).printed())
+        };
+        let ((once, of_one), (often, of_many)) = (ask(&[]), ask(&["--repeat", "4"]));
+        for key in ["earliest", "impacts", "hash", "bodies"] {
+            assert_eq!(once[key], often[key]);
+        }
+        assert!(often["ms"]["total"].as_f64() > Some(0.0));
+        assert!(often["ms"]["stages"]["bounds"].as_f64() > Some(0.0));
+        assert!(of_many.contains(" ms, median of 4\n"), "{of_many}");
+        assert!(!of_one.contains("median"), "{of_one}");
+    }
+    let misuse = folder
+        .run(["step", "a0.ply", "a1.ply", "--repeat", "0"])
+        .misuse();
+    assert!(misuse.contains("--repeat"), "{misuse}");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 //! when first, and how far the step can be taken.
 
 mod near;
+mod runs;
 
 use std::collections::BTreeMap;
 
@@ -18,7 +19,7 @@ use crate::impacts::{
     Candidates, ContactAnswer, Found, FoundByKind, Impact, Impacts, KeyAnswer, StepAnswer,
 };
 use crate::naive;
-use crate::narrow::{Element, FirstContact, Overlap, Test};
+use crate::narrow::{Element, FirstContact, Test};
 use crate::near::NearPairs;
 use crate::pair_kind::PairKind;
 use crate::positions::Positions;
@@ -441,7 +442,8 @@ impl Detector {
     }
 
     /// Pairs of elements whose boxes overlap during a step, each box inflated by a distance: for callers with their own test.
-    /// Sorted and complete. Always found on the CPU.
+    /// Sorted and complete. Always found on the CPU. [`candidates_in_runs`](Detector::candidates_in_runs) gives them piece by
+    /// piece, for answers larger than memory.
     ///
     /// # Errors
     /// As [`impacts`](Detector::impacts), and a distance that is negative or not finite.
@@ -463,65 +465,9 @@ impl Detector {
         query: &CandidateQuery,
         control: &Control<'_>,
     ) -> Result<&Candidates, Error> {
-        let start = Instant::now();
-        query.check()?;
-        let Steps {
-            frame,
-            candidates,
-            clusters,
-            keys: answer,
-            sorter,
-            ..
-        } = &mut self.steps;
-        frame.resolve_for(scene, &query.query, Ask::Candidates(query.kinds))?;
-        candidates.begin(frame);
-        frame.check(scene)?;
-        let (keys, stats) = candidates.parts_mut();
-        begin(stats, &self.settings, self.frames.workers().n());
-        let _shift = self.frames.workers().shift(frame.n_primitives());
-        answer.begin(self.settings.limits(), Wanted::Pairs, std::mem::take(keys));
-        if self.settings.method == Method::Naive {
-            let test = Overlap {
-                distance: query.distance,
-            };
-            naive::run(&test, scene, frame, control, stats, |test, key, ()| {
-                if let TestId::Elements(kind) = test {
-                    answer.extend(kind as usize, [key].into_iter());
-                }
-                answer.check()
-            })?;
-        } else {
-            let job = Job {
-                scene,
-                frame,
-                workers: self.frames.workers(),
-                control,
-            };
-            let asked = Asked {
-                sought: Sought::Boxes(query.distance),
-                start: Start::Report,
-                toi: Toi::F32,
-                pose: Pose {
-                    until: 1.0,
-                    margin: query.distance,
-                    is_swept: true,
-                },
-                latest: f64::INFINITY,
-            };
-            let handed_over = StepAnswer::Keys(answer);
-            clusters.run(job, &self.settings, asked, handed_over, stats)?;
-        }
-        (*keys, _) = answer.finish()?;
-        let collect = Instant::now();
-        for keys in keys.iter_mut() {
-            sorter.sort(keys, frame.n_primitives(), self.frames.workers());
-        }
-        let ms = collect.elapsed().as_secs_f64() * 1e3;
-        let bytes = candidates.bytes() + sorter.bytes();
-        let (_, stats) = candidates.parts_mut();
-        stats.add_ms("collect", ms);
-        stats.bytes_held += bytes;
-        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
+        let limits = self.settings.limits();
+        let (mut search, candidates) = self.search(scene, query, control)?;
+        search.find_all(candidates, limits)?;
         Ok(&self.steps.candidates)
     }
 

@@ -107,7 +107,10 @@ impl AtomicFile {
     }
 
     /// Overwrites bytes at `offset`; later writes append to the end again.
-    pub(super) fn patch(&mut self, offset: u64, bytes: &[u8]) -> Result<(), Error> {
+    ///
+    /// # Errors
+    /// [`Error::Io`], for example where the target is a pipe.
+    pub fn patch(&mut self, offset: u64, bytes: &[u8]) -> Result<(), Error> {
         let patched = self.file.as_mut().map_or(Ok(()), |file| {
             file.seek(SeekFrom::Start(offset))?;
             file.write_all(bytes)?;

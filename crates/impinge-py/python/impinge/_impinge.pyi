@@ -281,6 +281,20 @@ class Detector:
         progress: _Progress | None = None,
         cancel: CancelToken | None = None,
     ) -> Candidates: ...
+    def candidates_in_runs(
+        self,
+        scene: Scene,
+        each: Callable[[Candidates], object],
+        *,
+        between: _Pair | bool | None = None,
+        within: _Body | None = None,
+        ignore: Iterable[_Pair] | None = None,
+        kinds: Iterable[_PairKind] = ("vf", "ee"),
+        distance: SupportsFloat = 0.0,
+        most: SupportsIndex = 4194304,
+        progress: _Progress | None = None,
+        cancel: CancelToken | None = None,
+    ) -> int: ...
     def within_distance(
         self,
         scene: Scene,

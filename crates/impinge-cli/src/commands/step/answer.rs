@@ -5,6 +5,7 @@ use std::io::Write;
 use impinge::{Error, Impact, Impacts, PairKind, Statistics};
 use serde_json::{Map, Value, json};
 
+use crate::detection::Times;
 use crate::json::{counters, rounded};
 use crate::output::out;
 use crate::text::{counted, grouped, hex};
@@ -24,45 +25,34 @@ pub struct Found<'a> {
     earliest: Option<Impact>,
     all: Option<&'a Impacts>,
     stats: &'a Statistics,
+    times: Times,
 }
 
 impl<'a> Found<'a> {
-    pub fn all(impacts: &'a Impacts) -> Self {
+    /// `earlier` has the times of the same question, asked before.
+    pub fn all(impacts: &'a Impacts, earlier: Times) -> Self {
         Found {
             earliest: impacts.earliest(),
             all: Some(impacts),
             stats: impacts.stats(),
+            times: earlier.and(impacts.stats()),
         }
     }
 
-    pub fn first(earliest: Option<Impact>, stats: &'a Statistics) -> Self {
+    pub fn first(earliest: Option<Impact>, stats: &'a Statistics, earlier: Times) -> Self {
         Found {
             earliest,
             all: None,
             stats,
+            times: earlier.and(stats),
         }
     }
 
     /// `free`, `earliest`, `impacts`, `kinds`, `touching_at_start`, `hash`, `backend`, `bodies`, `ms`, `stats`, `separation`; counts and
     /// the hash are null with `--earliest`.
     pub fn json(&self, bodies: &Moving, separation: f64) -> Result<Map<String, Value>, Error> {
-        let described: Vec<Value> = bodies
-            .ids
-            .iter()
-            .zip(&bodies.names)
-            .map(|(&id, [start, end])| {
-                let body = bodies.scene.body(id)?;
-                Ok(json!({
-                    "name": start,
-                    "end": end,
-                    "kind": body.kind().name(),
-                    "primitives": body.n_primitives(),
-                    "vertices": body.n_vertices(),
-                }))
-            })
-            .collect::<Result<_, Error>>()?;
         let mut object = self.numbers();
-        object.insert("bodies".into(), described.into());
+        object.insert("bodies".into(), described(bodies)?);
         object.insert("ms".into(), self.ms());
         object.insert("stats".into(), counters(self.stats));
         object.insert("separation".into(), separation.into());
@@ -90,13 +80,14 @@ impl<'a> Found<'a> {
         object
     }
 
-    /// Times of the stages, and the total time.
+    /// Times of the stages, and the total time: medians, if the question was asked more than once.
     pub fn ms(&self) -> Value {
-        let stages = self.stats.stages.iter();
-        let stages: Map<String, Value> = stages
-            .map(|stage| (stage.name.to_owned(), rounded(stage.ms).into()))
+        let stages: Map<String, Value> = self
+            .times
+            .stages_ms()
+            .map(|(name, ms)| (name.to_owned(), rounded(ms).into()))
             .collect();
-        json!({ "total": rounded(self.stats.total_ms), "stages": stages })
+        json!({ "total": rounded(self.times.total_ms(50)), "stages": stages })
     }
 
     /// Prints the answer in the first line, then counts.
@@ -144,16 +135,36 @@ impl<'a> Found<'a> {
         }
         writeln!(
             to,
-            "{} on {}, {}; {}, {} unsure; {:.3} ms",
+            "{} on {}, {}; {}, {} unsure; {:.3} ms{}",
             self.stats.method,
             self.stats.backend,
             counted(self.stats.n_threads as u64, "thread"),
             counted(self.stats.n_candidates, "candidate"),
             grouped(self.stats.n_unsure),
-            self.stats.total_ms
+            self.times.total_ms(50),
+            match self.times.n_frames() {
+                1 => String::new(),
+                n => format!(", median of {n}"),
+            }
         )?;
         Ok(())
     }
+}
+
+/// The bodies as JSON objects.
+pub fn described(bodies: &Moving) -> Result<Value, Error> {
+    let all = bodies.ids.iter().zip(&bodies.names);
+    all.map(|(&id, [start, end])| {
+        let body = bodies.scene.body(id)?;
+        Ok(json!({
+            "name": start,
+            "end": end,
+            "kind": body.kind().name(),
+            "primitives": body.n_primitives(),
+            "vertices": body.n_vertices(),
+        }))
+    })
+    .collect()
 }
 
 /// An element in words.

@@ -6,7 +6,7 @@ use std::ops::Range;
 use impinge::{BodyId, Control, Detector, Positions, Scene, Step};
 use serde_json::{Map, Value};
 
-use crate::detection::set_positions;
+use crate::detection::{Times, set_positions};
 use crate::error::Error;
 use crate::output::out;
 use crate::text::grouped;
@@ -55,7 +55,7 @@ pub fn steps_of_sequence(
         let impacts = detector.impacts_with(scene, step, control)?;
         n_steps += 1;
         n_free += u64::from(impacts.is_empty());
-        let found = Found::all(impacts);
+        let found = Found::all(impacts, Times::default());
         if is_json {
             let mut line = Map::new();
             line.insert("frame".into(), frame_ix.into());

@@ -6,6 +6,7 @@ use impinge::{BodyId, CancelToken, Positions, Scene};
 use impinge_io::{Mesh, ReadOptions, Weld, read_with_summary};
 
 use crate::args::StepArgs;
+use crate::detection::set_positions;
 use crate::error::Error;
 use crate::load::{Vertices, note, to_elements, to_positions};
 use crate::watch::go_on;
@@ -36,6 +37,19 @@ impl Moving {
             bodies.add(start, end, args)?;
         }
         Ok(bodies)
+    }
+
+    /// Writes the positions at both ends again, so that a detector can't reuse anything made from them.
+    pub fn rewrite(&mut self) -> Result<(), Error> {
+        for &id in &self.ids {
+            let body = self.scene.body(id)?;
+            let (start, end) = (body.positions().clone(), body.end_positions().cloned());
+            set_positions(&mut self.scene, id, &start)?;
+            if let Some(end) = end {
+                set_end_positions(&mut self.scene, id, &end)?;
+            }
+        }
+        Ok(())
     }
 
     fn add(&mut self, start: &Path, end: &Path, args: &StepArgs) -> Result<(), Error> {

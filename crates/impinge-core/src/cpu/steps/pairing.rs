@@ -106,7 +106,14 @@ pub(super) fn run<S: Simd>(
         let Some(TestId::Elements(kind)) = test else {
             continue;
         };
-        let Some(places) = pair(simd, world, item, worker) else {
+        let lower = match world.answer.ranges() {
+            None => None,
+            Some(ranges) => match ranges.lower_numbers(kind) {
+                None => continue,
+                lower => lower,
+            },
+        };
+        let Some(places) = pair(simd, world, item, lower, worker) else {
             continue;
         };
         worker.n_settled += 1;
@@ -134,12 +141,14 @@ pub(super) fn run<S: Simd>(
     worker.busy += start.elapsed();
 }
 
-/// Lists the candidates of a work item. Returns the places of its groups; `None` if there are no candidates.
+/// Lists the candidates of a work item. Returns the places of its groups; `None` if there are no candidates. Where only
+/// keys with some lower numbers are wanted, most others are left out.
 #[inline(always)]
 fn pair<S: Simd>(
     simd: S,
     world: World<'_>,
     item: &WorkItem,
+    lower: Option<[u32; 2]>,
     worker: &mut Worker,
 ) -> Option<[usize; 2]> {
     let Worker {
@@ -156,6 +165,10 @@ fn pair<S: Simd>(
     if !is_own && !meet(&ends[0], &ends[1]) {
         return None;
     }
+    let wanted = match lower {
+        Some(lower) => Some(lanes_with_lower(world, item, lower)?),
+        None => None,
+    };
     let place_a = groups.place(simd, world, sides[0], usize::MAX);
     let place_b = groups.place(simd, world, sides[1], place_a);
     let (a, b) = (groups.at(place_a), groups.at(place_b));
@@ -178,6 +191,13 @@ fn pair<S: Simd>(
         };
         if lanes_b == 0 {
             return None;
+        }
+        if let Some(wanted) = wanted {
+            lanes_a &= wanted[0];
+            lanes_b &= wanted[1];
+            if lanes_a == 0 || lanes_b == 0 {
+                return None;
+            }
         }
     }
     let layers = &world.frame.layers;
@@ -231,6 +251,47 @@ fn pair<S: Simd>(
         met.drop_sharing(simd, corners);
     }
     (met.len() > 0).then_some([place_a, place_b])
+}
+
+/// The lanes of two clusters that may have a key whose lower number is in a range, ends included; `None` if no pair has.
+#[inline(always)]
+fn lanes_with_lower(world: World<'_>, item: &WorkItem, [low, high]: [u32; 2]) -> Option<[u64; 2]> {
+    let lanes = |layer: u32, cluster: u32, [low, high]: [u32; 2]| {
+        let first_number = world.frame.layers[layer as usize].first;
+        let clustering = &world.cache(layer).clustering;
+        let first = cluster as usize * GROUP;
+        let order = &clustering.order[first..first + clustering.size(cluster as usize)];
+        let mut are_in = [0u8; GROUP];
+        for (is_in, element) in are_in.iter_mut().zip(order) {
+            let number = first_number + element;
+            *is_in = u8::from(low <= number && number <= high);
+        }
+        // The product has the lowest bits of eight bytes in its highest byte.
+        let (bytes, _) = are_in.as_chunks::<8>();
+        let bits = bytes
+            .iter()
+            .map(|bytes| u64::from_le_bytes(*bytes).wrapping_mul(0x0102_0408_1020_4080) >> 56);
+        bits.rev().fold(0, |lanes, bits| lanes << 8 | bits)
+    };
+    let in_a = lanes(item.a, item.cluster_a, [low, high]);
+    if item.a != item.b {
+        // The elements of the lower layer have lower numbers.
+        return (in_a != 0).then_some([in_a, u64::MAX]);
+    }
+    let in_b = lanes(item.b, item.cluster_b, [low, high]);
+    if in_a | in_b == 0 {
+        return None;
+    }
+    // Either element may have the lower number, and the other one's is not below it.
+    let above = |cluster| lanes(item.a, cluster, [low, u32::MAX]);
+    let wanted = |others: u64, cluster: u32, own: u64| match others {
+        0 => own,
+        _ => above(cluster),
+    };
+    Some([
+        wanted(in_b, item.cluster_a, in_a),
+        wanted(in_a, item.cluster_b, in_b),
+    ])
 }
 
 /// Whether two moving boxes are not beside each other on the same side of an axis at both ends.
