@@ -294,6 +294,7 @@ impl Detector {
         let finished = contacts.finish();
         let examined = result?;
         (*found, _) = finished?;
+        self.frames.workers().report(&mut stats.ways);
         let n: usize = found.iter().map(Vec::capacity).sum();
         stats.bytes_held += (size_of::<Found<Contact>>() * n) as u64;
         Ok(examined)
@@ -513,13 +514,17 @@ impl Detector {
         }
         (*keys, _) = answer.finish()?;
         let collect = Instant::now();
+        let workers = self.frames.workers();
+        let mut n_counted = 0;
         for keys in keys.iter_mut() {
-            sorter.sort(keys, frame.n_primitives(), self.frames.workers());
+            n_counted += u64::from(sorter.sort(keys, frame.n_primitives(), workers));
         }
         let ms = collect.elapsed().as_secs_f64() * 1e3;
         let bytes = candidates.bytes() + sorter.bytes();
         let (_, stats) = candidates.parts_mut();
         stats.add_ms("collect", ms);
+        stats.ways.n_counted = n_counted;
+        workers.report(&mut stats.ways);
         stats.bytes_held += bytes;
         stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(&self.steps.candidates)
