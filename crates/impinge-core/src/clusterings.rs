@@ -14,10 +14,8 @@ use crate::ids::BodyId;
 use crate::run::Job;
 use crate::scene::{Body, Scene};
 use crate::stats::Statistics;
+use crate::tuning::Tuning;
 use crate::workers::Workers;
-
-/// How much the clusters' surface may grow against the body's before the body is clustered anew.
-const STALE: f64 = 1.5;
 
 /// What a backend keeps of a body, or of a part of it.
 pub(crate) trait Kept: Send {
@@ -193,10 +191,15 @@ impl Fit {
         best_spread: f64::INFINITY,
     };
 
-    /// Takes note of the spread in the pose at hand; whether the body has flowed away from its clusters.
-    pub fn is_stale(&mut self, spread: f64) -> bool {
-        let is_stale = spread > STALE * self.best_spread;
+    /// Takes note of the spread in the pose at hand.
+    pub fn note(&mut self, spread: f64) {
         self.best_spread = self.best_spread.min(spread);
+    }
+
+    /// Takes note of the spread in the pose at hand; whether the body has flowed away from its clusters.
+    pub fn is_stale(&mut self, spread: f64, tuning: &Tuning) -> bool {
+        let is_stale = spread > tuning.stale_from * self.best_spread;
+        self.note(spread);
         is_stale
     }
 }

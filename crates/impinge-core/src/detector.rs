@@ -90,7 +90,7 @@ impl Detector {
         Detector {
             #[cfg(feature = "gpu")]
             gpu,
-            frames: FrameLoop::new(settings.threads, settings.limits()),
+            frames: FrameLoop::new(settings.threads, settings.limits(), settings.tuning),
             cpu: Cpu::new(&settings),
             steps: steps::Steps::new(&settings),
             distances: Distances::new(),

@@ -13,6 +13,7 @@ use crate::run::{Finder, FrameLoop, Job, ready};
 use crate::scene::Scene;
 use crate::sink::{Answer, Limits, Wanted};
 use crate::stats::Statistics;
+use crate::tuning::Tuning;
 
 /// The frame loop around a method of another crate, on the CPU.
 pub struct Host {
@@ -22,7 +23,7 @@ pub struct Host {
 impl Host {
     /// Creates a host with `threads` workers; 0 for one per core.
     pub fn new(threads: usize) -> Self {
-        let frames = FrameLoop::new(threads, Limits::default());
+        let frames = FrameLoop::new(threads, Limits::default(), Tuning::default());
         Host { frames }
     }
 

@@ -43,6 +43,7 @@ mod sort;
 mod stats;
 mod step;
 mod transform;
+mod tuning;
 #[allow(missing_docs)]
 pub mod workers;
 
@@ -66,5 +67,6 @@ pub use scene::{Body, Filter, Scene};
 pub use settings::{Backend, InstructionSet, Method, Recluster, Settings};
 pub use stats::{Stage, Statistics};
 pub use step::{CandidateQuery, Start, Step, Toi};
+pub use tuning::{Tuning, Ways};
 #[cfg(feature = "gpu")]
 pub use wgpu;

@@ -16,6 +16,7 @@ use crate::query::Query;
 use crate::scene::Scene;
 use crate::sink::{Answer, Limits, Wanted};
 use crate::stats::Statistics;
+use crate::tuning::Tuning;
 use crate::workers::Workers;
 
 /// One frame as a finder sees it.
@@ -75,14 +76,14 @@ pub struct FrameLoop {
 
 impl FrameLoop {
     /// Creates a loop with `threads` workers; 0 for one per core.
-    pub fn new(threads: usize, limits: Limits) -> Self {
+    pub fn new(threads: usize, limits: Limits, tuning: Tuning) -> Self {
         FrameLoop {
             frame: Frame::default(),
             pairs: Pairs::default(),
             n_pairs: 0,
             answer: Arc::default(),
             limits,
-            workers: Workers::new(threads),
+            workers: Workers::tuned(threads, tuning),
         }
     }
 
@@ -147,6 +148,7 @@ impl FrameLoop {
             }
         });
         stats.bytes_held += size_of::<u64>() as u64 * keys.capacity() as u64;
+        self.workers.report(&mut stats.ways);
         stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
         self.pairs.put_keys(keys);
         Ok(())

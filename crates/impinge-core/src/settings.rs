@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::sink::Limits;
+use crate::tuning::Tuning;
 
 /// How candidates are found. All methods give the same pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -107,6 +108,9 @@ pub struct Settings {
     pub recluster: Recluster,
     /// GPU: part of an adapter's name, to choose among several.
     pub device: Option<String>,
+    /// Not for users: the thresholds of the CPU backend.
+    #[doc(hidden)]
+    pub tuning: Tuning,
 }
 
 impl Default for Settings {
@@ -122,6 +126,7 @@ impl Default for Settings {
             max_pairs: None,
             recluster: Recluster::default(),
             device: None,
+            tuning: Tuning::default(),
         }
     }
 }

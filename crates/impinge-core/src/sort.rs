@@ -19,8 +19,6 @@ use crate::settings::Settings;
 use crate::sink;
 use crate::workers::Workers;
 
-/// With fewer keys than this, or than half as many as numbers, one thread sorts them in place as fast.
-const FROM: usize = 1 << 15;
 /// Keys per task.
 const TASK: usize = 1 << 14;
 /// Each part has counts of its own, so there are few.
@@ -31,6 +29,8 @@ const MOST_PARTS: usize = 4;
 pub(crate) struct Sorter {
     /// Under a memory budget.
     in_place: bool,
+    /// With fewer keys, one thread sorts them in place.
+    from: usize,
     /// Of each part and number: how many partners, then where the next one goes.
     parts: Vec<Vec<u32>>,
     partners: Vec<AtomicU32>,
@@ -49,19 +49,22 @@ impl Sorter {
     pub fn new(settings: &Settings) -> Self {
         Sorter {
             in_place: settings.memory_budget.is_some(),
+            from: settings.tuning.sort_from.max(1),
             parts: Vec::new(),
             partners: Vec::new(),
         }
     }
 
-    /// Sorts keys of numbers below `n_numbers`. Where there is no memory for that, sorts them in place.
-    pub fn sort(&mut self, keys: &mut [u64], n_numbers: u64, workers: &Workers) {
+    /// Sorts keys of numbers below `n_numbers`. Returns whether they were counted: few keys, and keys without memory for
+    /// that, are sorted in place.
+    pub fn sort(&mut self, keys: &mut [u64], n_numbers: u64, workers: &Workers) -> bool {
         let n_numbers = n_numbers as usize;
-        let is_worth = keys.len() >= FROM.max(n_numbers / 2) && u32::try_from(keys.len()).is_ok();
+        let is_worth =
+            keys.len() >= self.from.max(n_numbers / 2) && u32::try_from(keys.len()).is_ok();
         let n_parts = workers.n().min(MOST_PARTS);
         if self.in_place || !is_worth || self.make_room(keys.len(), n_numbers, n_parts).is_err() {
             keys.sort_unstable();
-            return;
+            return false;
         }
         let Sorter {
             parts, partners, ..
@@ -88,13 +91,15 @@ impl Sorter {
         });
         // The places of the last part are where runs end now.
         let ends = &parts[n_parts - 1];
-        let tasks: Vec<_> = tasks(keys, partners, ends).map(Mutex::new).collect();
+        let tasks = tasks(keys, partners, ends, workers.task(TASK));
+        let tasks: Vec<_> = tasks.map(Mutex::new).collect();
         let mut runs = vec![Vec::new(); workers.n()];
         workers.for_each(&mut runs, tasks.len(), |run, ix| {
             if let Ok(mut task) = tasks[ix].lock() {
                 task.run(run);
             }
         });
+        true
     }
 
     /// Bytes held.
@@ -136,18 +141,19 @@ fn for_each_part(
     });
 }
 
-/// Runs of about equally many keys.
+/// Runs of about `n_each` keys.
 fn tasks<'a>(
     mut keys: &'a mut [u64],
     mut partners: &'a [AtomicU32],
     ends: &'a [u32],
+    n_each: usize,
 ) -> impl Iterator<Item = Task<'a>> {
     let (mut first, mut start) = (0, 0);
     std::iter::from_fn(move || {
         if first == ends.len() {
             return None;
         }
-        let full = ends[first..].partition_point(|&end| (end as usize) < start + TASK);
+        let full = ends[first..].partition_point(|&end| (end as usize) < start + n_each);
         let ends = &ends[first..ends.len().min(first + full + 1)];
         let end = ends[ends.len() - 1] as usize;
         let task = Task {
@@ -192,6 +198,7 @@ mod tests {
 
     #[test]
     fn keys_are_sorted_as_in_place() {
+        let from = Settings::default().tuning.sort_from;
         let mut sorter = Sorter::new(&Settings::default());
         let mut state = 1u64;
         let mut next = |below: u64| {
@@ -208,8 +215,8 @@ mod tests {
                 (100, 7),
                 (200_000, 50_000),
                 (3 * TASK, 2),
-                (FROM, 1),
-                (FROM, 100_000),
+                (from, 1),
+                (from, 100_000),
             ] {
                 let keys = (0..n_keys).map(|_| next(n_numbers) << 32 | next(1 << 30));
                 let mut keys: Vec<u64> = keys.collect();

@@ -1,6 +1,7 @@
 //! Counts and times of a frame.
 
 use crate::clock::Instant;
+use crate::tuning::Ways;
 
 /// Time spent in one stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +58,9 @@ pub struct Statistics {
     pub n_reruns: u64,
     /// Bytes that the detector holds, the answer included.
     pub bytes_held: u64,
+    /// Not for users: the ways that the frame went.
+    #[doc(hidden)]
+    pub ways: Ways,
 }
 
 impl Statistics {

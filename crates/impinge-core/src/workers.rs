@@ -22,6 +22,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use crate::error::Error;
+use crate::tuning::{Tuning, Ways};
 
 use crew::{Claims, Crew};
 use places::Places;
@@ -32,10 +33,6 @@ const SPIN: Duration = Duration::from_micros(50);
 const LINGER: Duration = Duration::from_millis(1);
 /// How long a frame must take to be worth waking a helper that will sleep again before the next frame.
 const WORTH: Duration = Duration::from_micros(800);
-/// From this many primitives on, a frame is expected to take that long, whatever the last one took.
-const LARGE: u64 = 300_000;
-/// From this many primitives on, clustering runs on several threads.
-const SPREAD_FROM: usize = 4096;
 /// How often a helper checks the gate between two looks at the clock.
 const LOOKS: u32 = 64;
 
@@ -53,6 +50,8 @@ pub struct Workers {
     pool: OnceLock<Pool>,
     /// The process that created the workers: a fork of that process has none of its threads.
     process: u32,
+    tuning: Tuning,
+    ways: Mutex<Ways>,
 }
 
 /// The rayon pool in use.
@@ -96,6 +95,11 @@ impl Drop for Workers {
 impl Workers {
     /// `threads` workers, the caller among them; 0 for one per core. Threads are started when first needed.
     pub fn new(threads: usize) -> Self {
+        Workers::tuned(threads, Tuning::default())
+    }
+
+    /// As [`new`](Workers::new), with other thresholds.
+    pub(crate) fn tuned(threads: usize, tuning: Tuning) -> Self {
         let (pool, n) = match threads {
             0 if is_forked() => (OnceLock::new(), rayon::current_num_threads()),
             0 => (Pool::OfProcess.into(), rayon::current_num_threads()),
@@ -109,6 +113,8 @@ impl Workers {
             wakes: AtomicBool::new(true),
             pool,
             process: process(),
+            tuning,
+            ways: Mutex::default(),
         }
     }
 
@@ -124,16 +130,49 @@ impl Workers {
     /// then they stay awake for the next one.
     pub fn shift(&self, n_primitives: u64) -> Shift<'_> {
         let start = Instant::now();
-        let wakes = n_primitives >= LARGE
+        let wakes = n_primitives >= self.tuning.wake_from
             || self
                 .last()
                 .is_none_or(|(end, took)| took >= WORTH || start - end <= LINGER);
         self.wakes.store(wakes, Ordering::Relaxed);
+        *self.ways() = Ways {
+            wakes,
+            ..Ways::default()
+        };
         self.helpers.linger(LINGER);
         Shift {
             workers: self,
             start,
         }
+    }
+
+    /// Adds the ways that were gone in this shift to those of a frame.
+    pub(crate) fn report(&self, frame: &mut Ways) {
+        let Ways {
+            n_shared,
+            n_tasks,
+            n_called,
+            wakes,
+            n_pooled,
+            ..
+        } = *self.ways();
+        *frame = Ways {
+            n_shared,
+            n_tasks,
+            n_called,
+            wakes,
+            n_pooled,
+            ..*frame
+        };
+    }
+
+    fn ways(&self) -> MutexGuard<'_, Ways> {
+        self.ways.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// How many units of work to put into a task whose best size this is.
+    pub fn task(&self, size: usize) -> usize {
+        size.min(self.tuning.most_per_task).max(1)
     }
 
     fn last(&self) -> MutexGuard<'_, Option<(Instant, Duration)>> {
@@ -160,10 +199,11 @@ impl Workers {
         }
         // Pools shared by the whole process do not work in a fork of it: there, a detector uses its own pool.
         if !is_forked() {
-            if n_primitives < SPREAD_FROM {
+            if n_primitives < self.tuning.pool_from {
                 return Ok(work());
             }
             if self.n == 1 {
+                self.ways().n_pooled += 1;
                 return Ok(single()?.install(work));
             }
         }
@@ -176,7 +216,10 @@ impl Workers {
         };
         Ok(match pool {
             Pool::OfProcess => work(),
-            Pool::OfDetector(pool) => pool.install(work),
+            Pool::OfDetector(pool) => {
+                self.ways().n_pooled += 1;
+                pool.install(work)
+            }
         })
     }
 
@@ -190,6 +233,11 @@ impl Workers {
         task: impl Fn(&mut S, usize) + Sync,
     ) {
         let n_workers = self.n.min(n_tasks).min(scratches.len());
+        {
+            let mut ways = self.ways();
+            ways.n_tasks += n_tasks as u64;
+            ways.n_shared += u64::from(n_workers > 1);
+        }
         if n_workers <= 1 {
             for ix in 0..n_tasks {
                 task(&mut scratches[0], ix);
@@ -214,6 +262,7 @@ impl Workers {
 
     /// Wakes all helpers, so that they are awake when they are needed.
     pub fn call_all(&self) {
+        self.ways().n_called += 1;
         self.call(self.n - 1);
     }
 
@@ -361,7 +410,7 @@ mod tests {
     fn every_task_is_done_once_whoever_comes() {
         for threads in [1, 2, 5] {
             let workers = Workers::new(threads);
-            let _shift = workers.shift(LARGE);
+            let _shift = workers.shift(u64::MAX);
             let mut sums = vec![0u64; threads];
             for n_tasks in (0..200).chain([10_000]) {
                 sums.fill(0);
@@ -376,7 +425,7 @@ mod tests {
     fn helpers_come_again_after_they_slept() {
         let workers = Workers::new(2);
         for _ in 0..3 {
-            let shift = workers.shift(LARGE);
+            let shift = workers.shift(u64::MAX);
             let deadline = Instant::now() + Duration::from_secs(60);
             let mut helped = [false; 2];
             while !helped[1] {

@@ -1,5 +1,8 @@
 //! Clusters that are proven remote are left out of a frame. Whatever moves and whatever the query, no pair may be lost.
 
+mod common;
+
+use common::leaves_out;
 use impinge_core::{
     Backend, BodyId, Detector, Error, Filter, InstructionSet, Method, Query, Scene, Settings,
 };
@@ -13,18 +16,6 @@ fn settings(method: Method, threads: usize, instruction_set: InstructionSet) -> 
         instruction_set,
         backend: Backend::Cpu,
         ..Settings::default()
-    }
-}
-
-/// Whether remote clusters are left out on this processor: without AVX2 this would gain nothing.
-fn leaves_out() -> bool {
-    #[cfg(target_arch = "x86_64")]
-    {
-        is_x86_feature_detected!("avx2")
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    {
-        false
     }
 }
 

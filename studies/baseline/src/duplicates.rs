@@ -163,7 +163,7 @@ impl TwoLevels {
         Ok(TwoLevels {
             settings,
             host: Host::new(settings.threads),
-            cells: Cells::new(settings.instruction_set),
+            cells: Cells::new(&of_cells(&settings)),
             table: Table::new(Isa::detect(settings.instruction_set)),
         })
     }
@@ -253,6 +253,7 @@ fn of_cells(settings: &Settings) -> impinge_core::Settings {
     impinge_core::Settings {
         lambda: settings.lambda,
         group_size: settings.group_size,
+        instruction_set: settings.instruction_set,
         ..impinge_core::Settings::default()
     }
 }

@@ -63,7 +63,7 @@ impl Method {
         let isa = Isa::detect(allowed);
         Method {
             isa,
-            reaching: KeptList::new(isa),
+            reaching: KeptList::new(isa, impinge_core::Tuning::default()),
             firsts: Vec::new(),
             entries: Vec::new(),
             radix: Radix::default(),

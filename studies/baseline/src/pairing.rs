@@ -68,7 +68,7 @@ impl Default for Scratch {
 
 impl Scratch {
     pub fn begin(&mut self, answer: &Arc<Answer>) {
-        self.settler.begin(answer);
+        self.settler.begin(answer, &impinge_core::Tuning::default());
         self.n_box_tests = 0;
     }
 

@@ -9,13 +9,7 @@
 use crate::frame::Frame;
 use crate::query::SharedVertex;
 use crate::scene::Scene;
-
-/// From this many primitives of new bodies on, the grid is worth a try. With fewer, clusters are made in about a millisecond.
-const FROM: u64 = 10_000;
-/// Bodies with fewer primitives than this do not count as new.
-const LARGE: u32 = 1_000;
-/// With more primitives in a cell than this (see `Cells::crowding`), making clusters costs less than pairing all of a cell.
-pub(super) const MOST_CROWDED: u64 = 64;
+use crate::tuning::Tuning;
 
 /// The bodies that were in a frame before.
 #[derive(Debug, Default)]
@@ -26,7 +20,7 @@ pub(super) struct Acquaintances {
 
 impl Acquaintances {
     /// Whether the grid may be the faster way to answer this frame. Its bodies are known from now on.
-    pub fn prefer_grid(&mut self, scene: &Scene, frame: &Frame) -> bool {
+    pub fn prefer_grid(&mut self, scene: &Scene, frame: &Frame, tuning: &Tuning) -> bool {
         let mut n_new = 0;
         for (ix, layer) in frame.layers.iter().enumerate() {
             let slot = layer.id.index();
@@ -35,12 +29,12 @@ impl Acquaintances {
             }
             let stamp = frame.body(scene, ix).topology_stamp();
             let is_new = std::mem::replace(&mut self.stamps[slot], stamp) != stamp;
-            if is_new && layer.n_primitives >= LARGE {
+            if is_new && layer.n_primitives >= tuning.auto_body_from {
                 n_new += u64::from(layer.n_primitives);
             }
         }
         let resolves = frame.shared_vertex == SharedVertex::Resolve
             && frame.layers.iter().any(|layer| layer.within);
-        n_new >= FROM && n_new > frame.n_primitives() / 2 && !resolves
+        n_new >= tuning.auto_from && n_new > frame.n_primitives() / 2 && !resolves
     }
 }

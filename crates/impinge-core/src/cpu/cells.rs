@@ -26,7 +26,7 @@ pub use crate::grouping::grid::MOST_ENTRIES_EACH;
 use crate::grouping::grid::{FineRange, Grid};
 use crate::progress::Control;
 use crate::query::SharedVertex;
-use crate::settings::{InstructionSet, Settings};
+use crate::settings::Settings;
 use crate::stats::Statistics;
 
 use super::kept::{Kept, KeptList};
@@ -98,10 +98,11 @@ pub struct Cells {
 
 impl Cells {
     /// Uses the best instruction set that is allowed and available.
-    pub fn new(allowed: InstructionSet) -> Self {
+    pub fn new(settings: &Settings) -> Self {
+        let isa = Isa::detect(settings.instruction_set);
         Cells {
-            isa: Isa::detect(allowed),
-            reaching: KeptList::new(Isa::detect(allowed)),
+            isa,
+            reaching: KeptList::new(isa, settings.tuning),
             starts: Vec::new(),
             entries: Vec::new(),
             items: Vec::new(),
@@ -143,7 +144,7 @@ impl Cells {
         } = job;
         self.scratches.resize_with(workers.n(), Settler::default);
         for scratch in &mut self.scratches {
-            scratch.begin(answer);
+            scratch.begin(answer, &settings.tuning);
         }
         self.items.clear();
         let world = World::new(scene, frame);
@@ -155,6 +156,7 @@ impl Cells {
         let n_near = stats.time("bounds", |_| {
             reaching.find_sharing(world, workers, scratches)
         });
+        self.reaching.report(&mut stats.ways);
         let Some(region) = self.reaching.region() else {
             stats.n_slabs = 1;
             return Ok(None);
@@ -197,6 +199,7 @@ impl Cells {
             scratch.end();
             stats.n_candidates += scratch.n_candidates;
             stats.n_unsure += scratch.n_unsure;
+            stats.ways.n_full += scratch.n_full;
         }
         answer.check()?;
         stats.n_entries = self.entries.len() as u64;
@@ -354,13 +357,14 @@ impl Cells {
 }
 
 fn slab_items(settings: &Settings) -> usize {
-    match settings.memory_budget {
+    let most = match settings.memory_budget {
         None => SLAB_ITEMS,
         // A small share of the budget; the rest is for boxes and lists.
         Some(budget) => {
             (budget as usize / 16 / size_of::<CellItem>()).clamp(PAIRING_TASK, SLAB_ITEMS)
         }
-    }
+    };
+    most.min(settings.tuning.most_slab_items).max(1)
 }
 
 fn slab_bytes(settings: &Settings) -> u64 {
@@ -485,19 +489,20 @@ fn pair<R: Rule>(
     (done, total): (u64, u64),
 ) -> Result<f64, Error> {
     let start = Instant::now();
-    let n_tasks = items.len().div_ceil(PAIRING_TASK);
     let Task {
         job, answer, rule, ..
     } = task;
     let Job {
         workers, control, ..
     } = job;
+    let n_each = workers.task(PAIRING_TASK);
+    let n_tasks = items.len().div_ceil(n_each);
     workers.for_each(scratches, n_tasks, |settler, ix| {
         if answer.is_over() || control.step(done, total).is_err() {
             return;
         }
-        let first = ix * PAIRING_TASK;
-        let items = &items[first..items.len().min(first + PAIRING_TASK)];
+        let first = ix * n_each;
+        let items = &items[first..items.len().min(first + n_each)];
         pair_items(isa, lists, items, rule, settler);
     });
     control.step(done, total)?;

@@ -21,24 +21,23 @@ use crate::error::Error;
 use crate::frame::Layer;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
+use crate::positions::Positions;
 use crate::query::SharedVertex;
 use crate::scene::{Body, Scene};
 use crate::settings::{InstructionSet, Settings};
 use crate::stats::Statistics;
+use crate::tuning::Tuning;
 
 use super::bounds::{self, TreeBounds};
 use super::pairing::Worker;
-use super::refit::{Refit, SORTED_FROM};
-use super::remote::Remote;
+use super::refit::Refit;
+use super::remote::body::Remote;
 use super::simd::Isa;
 use super::slabs::{self, Room};
 use super::world::{BodyCache, Caches, World};
 use crate::run::Job;
 use crate::sink::Answer;
 use crate::workers::Workers;
-
-/// From this many primitives of all bodies on, helpers are woken at the beginning of a frame.
-const CALL_FROM: u64 = 30_000;
 
 /// Caches and scratch of the method; kept from frame to frame.
 pub(crate) struct Clusters {
@@ -69,8 +68,10 @@ impl Clusters {
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         self.scratches.resize_with(job.workers.n(), Worker::default);
-        stats.time("clustering", |stats| self.cluster(job, stats))?;
-        if job.frame.n_primitives() >= CALL_FROM {
+        stats.time("clustering", |stats| {
+            self.cluster(job, &settings.tuning, stats)
+        })?;
+        if job.frame.n_primitives() >= settings.tuning.call_from {
             job.workers.call_all();
         }
         stats.time("bounds", |stats| {
@@ -82,7 +83,7 @@ impl Clusters {
             stats.time("folds", |_| self.find_folds(job))?;
         }
         for worker in &mut self.scratches {
-            worker.begin(stats.n_clusters, settings.memory_budget.is_some(), answer);
+            worker.begin(stats.n_clusters, settings, answer);
         }
         let held = self.bytes_besides_room();
         let Clusters {
@@ -101,7 +102,7 @@ impl Clusters {
                 caches: Some(caches),
             },
             scratches,
-            budget: settings.memory_budget,
+            settings,
             held,
         };
         room.run(task, stats)?;
@@ -138,10 +139,15 @@ impl Clusters {
     }
 
     /// Clusters bodies that are new or were re-meshed; forgets removed bodies.
-    fn cluster(&mut self, job: Job<'_>, stats: &mut Statistics) -> Result<(), Error> {
+    fn cluster(
+        &mut self,
+        job: Job<'_>,
+        tuning: &Tuning,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
         let isa = self.isa;
         let fits = |_: &mut BodyCache, _: &Layer, _: &Body| false;
-        let make = |body: &Body, _: &Layer| BodyCache::new(body, isa);
+        let make = |body: &Body, _: &Layer| BodyCache::new(body, isa, tuning);
         self.caches.update(job, stats, fits, make)?;
         let layers = job.frame.layers.iter();
         for layer in layers.filter(|layer| layer.within) {
@@ -166,7 +172,7 @@ impl Clusters {
 
 impl BodyCache {
     /// Clusters a body in its current pose.
-    pub fn new(body: &Body, isa: Isa) -> Self {
+    pub fn new(body: &Body, isa: Isa, tuning: &Tuning) -> Self {
         let (elements, positions) = (body.elements(), body.positions());
         let bounds_of = |primitive| bounds::of_vertices(positions, elements.corners(primitive));
         let clustering = match isa.looks_corners_up() {
@@ -182,7 +188,8 @@ impl BodyCache {
             bounds,
             whole: Bounds::EMPTY,
             folds: None,
-            remote: (body.n_primitives() >= SORTED_FROM).then(Box::default),
+            remote: (body.n_primitives() >= tuning.remote_from)
+                .then(|| Box::new(Remote::new(tuning))),
             surface: 0.0,
             fit: Fit::UNKNOWN,
         }
@@ -227,7 +234,7 @@ impl BodyCache {
         }
         self.bounds.refit_above(0, &self.clustering.shape);
         self.whole = self.bounds.root();
-        self.fit.is_stale(self.spread());
+        self.fit.note(self.spread());
     }
 
     /// The remote clusters, if the clusters are sorted.
@@ -236,19 +243,16 @@ impl BodyCache {
         self.remote.as_deref().filter(|remote| remote.is_sorted())
     }
 
-    /// [`unsort`](Self::unsort), because a frame needs boxes that were left out.
-    pub(super) fn interrupt(&mut self) {
-        if let Some(remote) = &mut self.remote {
-            remote.interrupt();
-        }
-        self.unsort();
+    /// Whether the positions can be read in memory order: they are in single precision, and the primitives name every
+    /// vertex.
+    pub(super) fn can_be_read(&self, body: &Body) -> bool {
+        let is_single = matches!(body.positions(), Positions::F32(_));
+        is_single && self.clustering.n_vertices_covered == Some(body.n_vertices())
     }
 
-    /// Ends the sorting; all boxes must be found again.
-    pub(super) fn unsort(&mut self) {
-        if self.remote.as_mut().is_some_and(|remote| remote.end()) {
-            self.positions_stamp = 0;
-        }
+    /// From now on, the boxes belong to no pose.
+    pub(super) fn forget_boxes(&mut self) {
+        self.positions_stamp = 0;
     }
 
     /// The clusters' summed surface divided by the body's: how well the clusters fit the current pose.

@@ -20,6 +20,7 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use crate::elements::with_corners;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::Grid;
+use crate::tuning::Tuning;
 
 use super::world::World;
 use codes::{Codes, Function, greater_bytes, lesser_bytes};
@@ -27,12 +28,6 @@ use codes::{Codes, Function, greater_bytes, lesser_bytes};
 /// The most cells along each axis. Two more hold vertices outside the region. A row along x then has 64 cells;
 /// along y and z a byte numbers the cells.
 const MOST_ALONG: [u32; 3] = [62, 253, 253];
-/// Primitives of all bodies per cell of the map.
-const PRIMITIVES_A_CELL: u64 = 8;
-/// The most rows of the map that one primitive marks; a larger primitive counts as being everywhere.
-const MOST_MARKED: u32 = 256;
-/// The most maps, and so the most participants.
-pub(crate) const MOST_MAPS: usize = 8;
 /// Primitives that are examined together; then those among them that are near are marked.
 const TOGETHER: usize = 512;
 
@@ -82,6 +77,8 @@ pub(crate) struct Cull {
     function: Function,
     /// The number of cells along each axis, including those outside the region.
     along: [u32; 3],
+    /// The most rows of the map that one primitive marks; a larger primitive counts as being everywhere.
+    most_marked: u32,
     /// The cell of each vertex, one byte per axis, body after body.
     codes: Vec<u32>,
     /// Where each participant's codes start.
@@ -98,11 +95,15 @@ pub(crate) struct Cull {
 }
 
 impl Cull {
-    /// Prepares for a frame of at most [`MOST_MAPS`] participants, which meet within the region; their
+    /// The most maps, and so the most participants: there are sets of them.
+    pub const MOST_MAPS: usize = u32::BITS as usize;
+
+    /// Prepares for a frame of at most [`MOST_MAPS`](Self::MOST_MAPS) participants, which meet within the region; their
     /// primitives come in `n_runs` runs.
-    pub fn begin(&mut self, world: World<'_>, region: &Bounds, n_runs: usize) {
+    pub fn begin(&mut self, world: World<'_>, region: &Bounds, n_runs: usize, tuning: &Tuning) {
+        self.most_marked = tuning.most_marked;
         let frame = world.frame;
-        let wanted = frame.n_primitives() / PRIMITIVES_A_CELL;
+        let wanted = frame.n_primitives() / tuning.map_cell.max(1);
         let along = Grid::new(region, wanted, 1.0).resolution;
         let along: [u32; 3] = std::array::from_fn(|axis| along[axis].min(MOST_ALONG[axis]));
         self.along = along.map(|along| along + 2);
@@ -136,6 +137,11 @@ impl Cull {
             .resize_with(n_maps * self.n_rows(), AtomicU64::default);
         self.near
             .resize_with(n_runs.max(self.near.len()), Mutex::default);
+    }
+
+    /// How many bodies have primitives that count as being everywhere.
+    pub fn n_everywhere(&self) -> u64 {
+        self.everywhere.load(Ordering::Relaxed).count_ones().into()
     }
 
     fn n_rows(&self) -> usize {
@@ -220,7 +226,7 @@ impl Cull {
             }
             near.extend_from_slice(&together[..n]);
             for near in &together[..n] {
-                if near.n_rows() > MOST_MARKED {
+                if near.n_rows() > self.most_marked {
                     self.everywhere.fetch_or(1 << map_ix, Ordering::Relaxed);
                     continue;
                 }
@@ -260,7 +266,7 @@ impl Cull {
     pub fn for_live(&self, run_ix: usize, mut call: impl FnMut(u32)) -> usize {
         let near = self.near[run_ix].lock().expect("no task panics");
         for near in &*near {
-            let mut live = u64::from(near.n_rows() > MOST_MARKED);
+            let mut live = u64::from(near.n_rows() > self.most_marked);
             if live == 0 {
                 self.for_rows(near, |row, cells| live |= self.live[row] & cells);
             }

@@ -66,8 +66,9 @@ impl Folds {
             .resize_with(clustering.n_clusters(), AtomicU64::default);
         let (vertices, lanes) = (&self.vertices, &self.lanes);
         let no_scratch = &mut vec![(); workers.n()][..];
-        workers.for_each(no_scratch, n_words.div_ceil(TASK), |(), task| {
-            for (word, bits) in chunk(vertices, task) {
+        let n_each = workers.task(TASK);
+        workers.for_each(no_scratch, n_words.div_ceil(n_each), |(), task| {
+            for (word, bits) in chunk(vertices, n_each, task) {
                 let folds = match positions {
                     Positions::F32(positions) => {
                         folds(rings, word, |vertex| positions[vertex].map(f64::from))
@@ -80,8 +81,8 @@ impl Folds {
         let is_fold = |vertex: u32| {
             vertices[vertex as usize / 64].load(Ordering::Relaxed) >> (vertex % 64) & 1
         };
-        workers.for_each(no_scratch, lanes.len().div_ceil(TASK), |(), task| {
-            for (cluster, bits) in chunk(lanes, task) {
+        workers.for_each(no_scratch, lanes.len().div_ceil(n_each), |(), task| {
+            for (cluster, bits) in chunk(lanes, n_each, task) {
                 let faces = &faces[cluster * GROUP..][..clustering.size(cluster)];
                 let folded = (0..).zip(faces).fold(0, |folded, (lane, &[a, b, c])| {
                     folded | (is_fold(a) | is_fold(b) | is_fold(c)) << lane
@@ -93,9 +94,13 @@ impl Folds {
 }
 
 /// The words of one task, numbered.
-fn chunk(words: &[AtomicU64], task: usize) -> impl Iterator<Item = (usize, &AtomicU64)> {
-    let first = task * TASK;
-    (first..).zip(&words[first..words.len().min(first + TASK)])
+fn chunk(
+    words: &[AtomicU64],
+    n_each: usize,
+    task: usize,
+) -> impl Iterator<Item = (usize, &AtomicU64)> {
+    let first = task * n_each;
+    (first..).zip(&words[first..words.len().min(first + n_each)])
 }
 
 /// Bit `k`: vertex `64 word + k` is a fold.

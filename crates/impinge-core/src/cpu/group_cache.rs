@@ -9,6 +9,7 @@ use crate::exact::filter::{LARGEST_F32, Triangles64};
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, greater, lesser};
 use crate::positions::Positions;
+use crate::settings::Settings;
 
 use super::bounds::of_cluster_primitives;
 use super::simd::{ClusterFaces, LaneBounds, Simd};
@@ -88,6 +89,8 @@ pub(super) struct GroupCache<G> {
     /// Layer and cluster of each place.
     keys: Vec<u64>,
     groups: Vec<G>,
+    /// Clusters that took the place of others.
+    pub n_evicted: u64,
 }
 
 impl<G> Default for GroupCache<G> {
@@ -95,25 +98,28 @@ impl<G> Default for GroupCache<G> {
         GroupCache {
             keys: Vec::new(),
             groups: Vec::new(),
+            n_evicted: 0,
         }
     }
 }
 
 /// The key of an empty place: there are fewer than 2^32 participants.
 const NOBODY: u64 = u64::MAX;
-/// Clusters kept: 500 KB, which fits in a second-level cache.
-const MOST: u64 = 128;
 /// Clusters kept under a memory budget, 31 KB: hardly slower, for neighbouring clusters come in a row.
 const MOST_IN_BUDGET: u64 = 8;
 
 impl<G> GroupCache<G> {
     /// Prepares for a frame of `n_clusters` clusters.
-    pub fn begin<W>(&mut self, n_clusters: u64, in_budget: bool)
+    pub fn begin<W>(&mut self, n_clusters: u64, settings: &Settings)
     where
         G: Kept<W>,
     {
-        let most = if in_budget { MOST_IN_BUDGET } else { MOST };
-        let n = n_clusters.clamp(4, most).next_power_of_two() as usize;
+        let most = match settings.memory_budget {
+            Some(_) => MOST_IN_BUDGET,
+            None => settings.tuning.most_cached.max(2),
+        };
+        let n = n_clusters.max(4).min(most).next_power_of_two() as usize;
+        self.n_evicted = 0;
         if self.groups.len() < n {
             self.groups.resize(n, G::EMPTY);
         }
@@ -161,6 +167,7 @@ impl<G> GroupCache<G> {
             }
         }
         let place = if first == pinned { first ^ 1 } else { first };
+        self.n_evicted += u64::from(self.keys[place] != NOBODY);
         self.keys[place] = key;
         self.groups[place].fill(simd, world, whose.0, whose.1 as usize);
         place

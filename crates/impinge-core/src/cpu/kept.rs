@@ -12,19 +12,18 @@ use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::FineRange;
 
 use super::bounds;
-use super::cull::{BoundsTask, Cull, MOST_MAPS};
+use super::cull::{BoundsTask, Cull};
 use super::dispatch::NodePair;
 use super::simd::{Isa, Simd, dispatch};
 use super::top_level::TopLevel;
 use super::world::{BodyRef, World};
+use crate::tuning::{Tuning, Ways};
 use crate::workers::Workers;
 
 /// Primitives per task.
-const PRIMITIVES: u32 = 4096;
+const PRIMITIVES: usize = 4096;
 /// Vertices per task.
-const VERTICES: u32 = 1 << 15;
-/// With fewer primitives, waking a thread costs more than it saves.
-const PARALLEL_FROM: u64 = 100_000;
+const VERTICES: usize = 1 << 15;
 
 /// A primitive that reaches the region.
 #[derive(Debug, Clone, Copy)]
@@ -61,18 +60,10 @@ impl Kept {
     }
 }
 
-/// The scratches of as many workers as are worth waking.
-fn few<'a, S>(world: World<'_>, scratches: &'a mut [S]) -> &'a mut [S] {
-    let n = match world.frame.n_primitives() < PARALLEL_FROM {
-        true => 1,
-        false => scratches.len(),
-    };
-    &mut scratches[..n]
-}
-
 /// The kept primitives of a frame, and the memory for them.
 pub struct KeptList {
     isa: Isa,
+    tuning: Tuning,
     bodies: Vec<Bounds>,
     /// For each participant, the box in which others may meet it.
     reach: Vec<Bounds>,
@@ -85,15 +76,18 @@ pub struct KeptList {
     /// Runs of vertices, with their boxes.
     vertices: Vec<(BoundsTask, Mutex<Bounds>)>,
     cull: Cull,
+    /// The bodies in the map; 0 if none was made.
+    n_mapped: u64,
     /// The kept primitives.
     pub kept: Vec<Kept>,
 }
 
 impl KeptList {
     /// An empty list.
-    pub fn new(isa: Isa) -> Self {
+    pub fn new(isa: Isa, tuning: Tuning) -> Self {
         KeptList {
             isa,
+            tuning,
             bodies: Vec::new(),
             reach: Vec::new(),
             top: TopLevel::default(),
@@ -102,6 +96,7 @@ impl KeptList {
             parts: Vec::new(),
             vertices: Vec::new(),
             cull: Cull::default(),
+            n_mapped: 0,
             kept: Vec::new(),
         }
     }
@@ -120,10 +115,27 @@ impl KeptList {
             + self.cull.bytes()
     }
 
+    /// The scratches of as many workers as are worth waking.
+    fn few<'a, S>(&self, world: World<'_>, scratches: &'a mut [S]) -> &'a mut [S] {
+        let n = match world.frame.n_primitives() < self.tuning.kept_parallel_from {
+            true => 1,
+            false => scratches.len(),
+        };
+        &mut scratches[..n]
+    }
+
+    /// Says which ways the frame went.
+    pub(super) fn report(&self, ways: &mut Ways) {
+        ways.n_mapped = self.n_mapped;
+        if self.n_mapped > 0 {
+            ways.n_everywhere = self.cull.n_everywhere();
+        }
+    }
+
     /// Finds the boxes of bodies, where bodies reach each other, and the primitives that reach there. `scratches` has
     /// one entry per worker; only their number matters.
     pub fn find<S: Send>(&mut self, world: World<'_>, workers: &Workers, scratches: &mut [S]) {
-        let scratches = few(world, scratches);
+        let scratches = self.few(world, scratches);
         self.begin(world, workers, scratches);
         let (runs, parts, reach) = (&self.runs, &self.parts, &self.reach);
         workers.for_each(scratches, runs.len(), |_, ix| {
@@ -147,12 +159,12 @@ impl KeptList {
         workers: &Workers,
         scratches: &mut [S],
     ) -> usize {
-        let scratches = few(world, scratches);
+        let scratches = self.few(world, scratches);
         // Bodies queried for self-collision keep every primitive, and with many bodies the map rejects almost
         // nothing; skip it in both cases.
         let participants = &world.frame.layers;
         if !world.frame.between()
-            || participants.len() > MOST_MAPS
+            || participants.len() > self.tuning.most_maps.min(Cull::MOST_MAPS)
             || participants.iter().all(|participant| participant.within)
         {
             self.find(world, workers, scratches);
@@ -163,7 +175,9 @@ impl KeptList {
         let Some(region) = self.joined_reach() else {
             return 0;
         };
-        self.cull.begin(world, &region, self.runs.len());
+        self.cull
+            .begin(world, &region, self.runs.len(), &self.tuning);
+        self.n_mapped = world.frame.layers.len() as u64;
         let isa = self.isa;
         let codes = self.cull.codes();
         let (cull, vertices) = (&self.cull, &self.vertices);
@@ -199,6 +213,9 @@ impl KeptList {
 
     /// Makes the tasks, and finds the boxes of bodies and where they reach each other.
     fn begin<S: Send>(&mut self, world: World<'_>, workers: &Workers, scratches: &mut [S]) {
+        self.n_mapped = 0;
+        let n_primitives = workers.task(PRIMITIVES) as u32;
+        let n_vertices_each = workers.task(VERTICES) as u32;
         self.runs.clear();
         self.vertices.clear();
         for (ix, participant) in world.frame.layers.iter().enumerate() {
@@ -207,9 +224,9 @@ impl KeptList {
                 _ => world.body(ix as u32).positions.len() as u32,
             };
             self.runs
-                .extend(BoundsTask::cut(ix, participant.n_primitives, PRIMITIVES));
+                .extend(BoundsTask::cut(ix, participant.n_primitives, n_primitives));
             self.vertices.extend(
-                BoundsTask::cut(ix, n_vertices, VERTICES)
+                BoundsTask::cut(ix, n_vertices, n_vertices_each)
                     .map(|run| (run, Mutex::new(Bounds::EMPTY))),
             );
         }
@@ -252,6 +269,7 @@ impl KeptList {
         let frame = world.frame;
         let KeptList {
             isa,
+            tuning,
             bodies,
             reach,
             top,
@@ -270,7 +288,7 @@ impl KeptList {
                 }),
         );
         if frame.between() {
-            top.refit(bodies.len(), |ix| bodies[ix as usize]);
+            top.refit(bodies.len(), tuning, |ix| bodies[ix as usize]);
             let bodies = &bodies[..];
             dispatch!(*isa, reach_pairs, (
                 top: &TopLevel = top,

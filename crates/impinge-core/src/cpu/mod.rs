@@ -6,7 +6,6 @@ pub mod cells;
 pub(crate) mod clusters;
 pub(crate) mod cull;
 pub(crate) mod dispatch;
-pub(crate) mod extents;
 mod folds;
 mod group_cache;
 mod hubs;
@@ -15,7 +14,7 @@ pub(crate) mod met;
 pub mod narrow;
 pub(crate) mod pairing;
 mod refit;
-pub(crate) mod remote;
+mod remote;
 pub(crate) mod runs;
 pub mod simd;
 pub(crate) mod slabs;
@@ -35,7 +34,7 @@ use crate::settings::{Method, Settings};
 use crate::sink::{Answer, BLOCK};
 use crate::stats::Statistics;
 
-use auto::{Acquaintances, MOST_CROWDED};
+use auto::Acquaintances;
 use cells::Cells;
 use clusters::Clusters;
 
@@ -51,7 +50,7 @@ impl Cpu {
     pub fn new(settings: &Settings) -> Self {
         Cpu {
             clusters: Clusters::new(settings.instruction_set),
-            cells: Cells::new(settings.instruction_set),
+            cells: Cells::new(settings),
             acquaintances: Acquaintances::default(),
             settings: settings.clone(),
         }
@@ -64,7 +63,8 @@ impl Cpu {
         answer: &Arc<Answer>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let prefers_grid = self.acquaintances.prefer_grid(job.scene, job.frame);
+        let tuning = &self.settings.tuning;
+        let prefers_grid = self.acquaintances.prefer_grid(job.scene, job.frame, tuning);
         let has_room = self.settings.memory_budget.is_none();
         if prefers_grid && has_room && self.find_in_grid(job, answer, stats)? {
             stats.method = Method::Cells.name();
@@ -86,11 +86,11 @@ impl Cpu {
     ) -> Result<bool, Error> {
         job.frame.check(job.scene)?;
         let settings = &self.settings;
-        let mut cells = Cells::new(settings.instruction_set);
+        let mut cells = Cells::new(settings);
         let Some(grid) = cells.divide(job, answer, settings, stats)? else {
             return Ok(true);
         };
-        if cells.crowding() > MOST_CROWDED {
+        if cells.crowding() > settings.tuning.auto_most_crowded {
             return Ok(false);
         }
         cells.settle(job, answer, settings, &cells::Owner, grid, stats)?;

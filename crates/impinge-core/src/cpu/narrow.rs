@@ -19,6 +19,7 @@ use crate::grouping::GROUP;
 use crate::narrow::{intersect, intersect_shared};
 use crate::positions::Positions;
 use crate::sink::{Answer, BLOCK};
+use crate::tuning::Tuning;
 
 use super::group_cache::Group;
 use super::met::{Met, WorkItem};
@@ -38,12 +39,11 @@ pub struct Candidate {
     pub place_b: u32,
 }
 
-/// Candidates are settled once there are this many.
-const FULL: usize = 1024;
-/// The most candidates: the last work item may add this many more than [`FULL`].
-const MOST: usize = FULL + GROUP * GROUP;
-/// The most keys: a block less one, plus those of a work item, plus those of the waiting candidates.
-const MOST_KEYS: usize = BLOCK + GROUP * GROUP + MOST;
+/// Room for the candidates that wait: the last work item may add a full group product to those that are not enough yet.
+pub(super) fn room_to_wait(tuning: &Tuning) -> usize {
+    // A test may ask for more than memory holds.
+    tuning.settle_from.min(1 << 16) + GROUP * GROUP
+}
 
 /// One worker's candidates, pairs and counts.
 #[derive(Debug, Default)]
@@ -57,6 +57,10 @@ pub struct Settler {
     pub n_candidates: u64,
     /// Candidates left to exact arithmetic.
     pub n_unsure: u64,
+    /// Times that there were enough candidates to settle them.
+    pub n_full: u64,
+    /// That many are enough.
+    full: usize,
     /// Time spent here, for the statistics.
     pub busy: Duration,
     candidates: Vec<Candidate>,
@@ -68,15 +72,19 @@ pub struct Settler {
 
 impl Settler {
     /// Prepares for a frame. Candidates and keys get all the room that they may ever need.
-    pub fn begin(&mut self, answer: &Arc<Answer>) {
+    pub fn begin(&mut self, answer: &Arc<Answer>, tuning: &Tuning) {
+        self.full = tuning.settle_from;
+        self.n_full = 0;
         self.answer = Some(Arc::clone(answer));
         self.block = answer.block();
         self.keys.clear();
-        self.keys.reserve_exact(MOST_KEYS);
+        let most = room_to_wait(tuning);
+        // A block less one, plus the keys of a work item, plus those of the waiting candidates.
+        self.keys.reserve_exact(BLOCK + GROUP * GROUP + most);
         self.candidates.clear();
-        self.candidates.reserve_exact(MOST);
-        self.survivors.reserve_exact(MOST);
-        self.open.reserve_exact(MOST);
+        self.candidates.reserve_exact(most);
+        self.survivors.reserve_exact(most);
+        self.open.reserve_exact(most);
         self.n_candidates = 0;
         self.n_unsure = 0;
         self.busy = Duration::ZERO;
@@ -172,7 +180,8 @@ impl Settler {
     /// Settles the candidates once there are enough.
     #[inline(always)]
     pub fn settle_when_full(&mut self, isa: Isa, world: World<'_>) {
-        if self.candidates.len() >= FULL {
+        if self.candidates.len() >= self.full {
+            self.n_full += u64::from(!self.candidates.is_empty());
             self.settle(isa, world);
         }
         self.hand_over();

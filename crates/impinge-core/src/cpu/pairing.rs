@@ -21,6 +21,7 @@ use std::sync::Arc;
 use crate::grouping::GROUP;
 use crate::grouping::hubs::Hubs;
 use crate::query::SharedVertex;
+use crate::settings::Settings;
 use crate::sink::Answer;
 
 use super::group_cache::{Group, GroupCache};
@@ -48,10 +49,15 @@ pub(crate) struct Worker {
 
 impl Worker {
     /// Prepares for a frame of `n_clusters` clusters.
-    pub fn begin(&mut self, n_clusters: u64, in_budget: bool, answer: &Arc<Answer>) {
-        self.settler.begin(answer);
+    pub fn begin(&mut self, n_clusters: u64, settings: &Settings, answer: &Arc<Answer>) {
+        self.settler.begin(answer, &settings.tuning);
         self.n_settled = 0;
-        self.groups.begin::<World<'_>>(n_clusters, in_budget);
+        self.groups.begin::<World<'_>>(n_clusters, settings);
+    }
+
+    /// Clusters that took the place of others in the cache, in this frame.
+    pub fn n_evicted(&self) -> u64 {
+        self.groups.n_evicted
     }
 
     pub fn bytes(&self) -> usize {

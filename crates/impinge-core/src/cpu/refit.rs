@@ -5,24 +5,26 @@
 //!         clusters in no group
 //! prove   whether its groups are beside all bodies that it could meet (see `remote`)
 //! back    if not, also the boxes of clusters that have come back
-//! above   nodes; bodies that have flowed away from their clusters are clustered again; clusters are sorted
+//! above   nodes; bodies that have flowed away from their clusters are clustered again
+//! learn   clusters are sorted for the next frame (see `remote`)
 //! ```
 
 use std::sync::{Mutex, PoisonError};
 
 use crate::clusterings::make_anew;
 use crate::error::Error;
-use crate::frame::Frame;
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
 use crate::positions::Positions;
-use crate::scene::Body;
 use crate::settings::{Recluster, Settings};
 use crate::stats::Statistics;
+use crate::tuning::Tuning;
+use crate::workers::Workers;
 
 use super::bounds::{self, Summary};
-use super::extents::{Extents, Sides};
 use super::pairing::Worker;
-use super::remote::Children;
+use super::remote::body::Children;
+use super::remote::extents::Extents;
+use super::remote::{self, Needed};
 use super::simd::{Isa, Simd, dispatch};
 use super::world::{BodyCache, Caches, World};
 use crate::run::Job;
@@ -31,13 +33,6 @@ use crate::run::Job;
 const NODES: usize = 32;
 /// Runs of vertices per task: 48 KiB of positions.
 const RUNS: usize = 256;
-/// With fewer primitives of all bodies together, one thread computes the boxes. Positions have just been written,
-/// mostly by one thread. If they fit in its cache, this thread reads them faster than another could fetch them.
-const PARALLEL_FROM: u64 = 120_000;
-/// The clusters of a body are sorted if it has at least this many primitives.
-pub(super) const SORTED_FROM: usize = 2_048;
-/// Clusters are sorted in frames of at most this many bodies: more bodies are everywhere.
-const SORTED_TO: usize = 8;
 
 /// Tasks and results of the stage; kept from frame to frame.
 #[derive(Default)]
@@ -87,107 +82,90 @@ impl Refit {
         scratches: &mut [Worker],
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let Job { scene, frame, .. } = job;
-        let sorts = isa.reads_runs()
-            && frame.between()
-            && frame.layers.len() <= SORTED_TO
-            && settings.memory_budget.is_none();
+        let Job {
+            scene,
+            frame,
+            workers,
+            ..
+        } = job;
+        let tuning = &settings.tuning;
+        let is_allowed = remote::is_allowed(isa, frame, settings);
         self.tasks.clear();
         for (ix, participant) in frame.layers.iter().enumerate() {
             let body = frame.body(scene, ix);
             let cache = caches.at_mut(participant);
-            let n_vertices = body.n_vertices();
-            if participant.within || !sorts {
-                cache.interrupt();
-            } else if !cache
-                .sorted()
-                .is_some_and(|sorted| sorted.is_fit_for(n_vertices))
-            {
-                cache.unsort();
-            }
-            if cache.positions_stamp == body.positions_stamp() {
+            let needed = remote::plan(cache, body, is_allowed && !participant.within);
+            if needed == Needed::None {
                 continue;
             }
             // If this frame ends early, for whatever reason, the boxes belong to no pose.
-            cache.positions_stamp = 0;
-            if !can_be_read(cache, body) {
+            cache.forget_boxes();
+            if !cache.can_be_read(body) {
                 frame.check_one(scene, ix)?;
             }
             cache.whole = Bounds::EMPTY;
-            if let Some(remote) = &mut cache.remote {
-                remote.begin();
-            }
-            let Some(sorted) = cache.sorted() else {
-                self.push_all(ix, cache);
-                continue;
-            };
-            // Order tasks so that one thread tends to read a body and compute its boxes: `work` reverses this list, so
-            // the caller starts at its end and helpers at its front.
-            let (n_runs, n_near) = (sorted.n_runs(), sorted.near().len());
-            if 2 * ix < frame.layers.len() {
-                self.push(ix, cache, What::Read, n_runs);
-                self.push(ix, cache, What::Near, n_near);
-            } else {
-                self.push(ix, cache, What::Near, n_near);
-                self.push(ix, cache, What::Read, n_runs);
-            }
+            self.push_needed(workers, ix, frame.layers.len(), cache, needed);
         }
-        if !self.work(isa, job, caches, scratches) {
+        if !self.work(isa, job, tuning, caches, scratches) {
             frame.check(scene)?;
         }
-        if sorts {
-            self.prove(job, caches, stats);
-            self.work(isa, job, caches, scratches);
+        if is_allowed {
+            self.tasks.clear();
+            for (ix, participant) in frame.layers.iter().enumerate() {
+                let needed = remote::prove(job, caches, ix, stats);
+                if needed != Needed::None {
+                    let cache = caches.at_mut(participant);
+                    cache.forget_boxes();
+                    self.push_needed(workers, ix, frame.layers.len(), cache, needed);
+                }
+            }
+            self.work(isa, job, tuning, caches, scratches);
         }
         self.above(isa, job, settings, caches, stats)?;
-        if sorts {
-            sort(job, caches, scratches);
+        if is_allowed {
+            remote::learn(job, caches, for_boxes(job, tuning, scratches));
         }
         Ok(())
     }
 
-    /// Makes tasks for bodies of which groups have come back: for the boxes of all clusters that are near now, or for all
-    /// boxes if groups come back too often.
-    fn prove(&mut self, job: Job<'_>, caches: &mut Caches, stats: &mut Statistics) {
-        let Job { scene, frame, .. } = job;
-        self.tasks.clear();
-        for (ix, participant) in frame.layers.iter().enumerate() {
-            let world = World {
-                scene,
-                frame,
-                caches: Some(caches),
-            };
-            let Some(back) = back(world, ix) else {
-                continue;
-            };
-            let cache = caches.at_mut(participant);
-            let Some(remote) = &mut cache.remote else {
-                continue;
-            };
-            if !back.is_empty() {
-                cache.positions_stamp = 0;
-                if !remote.come_back(back, &cache.clustering) {
-                    cache.unsort();
-                    self.push_all(ix, cache);
-                    continue;
-                }
-                let n_near = remote.near().len();
-                self.push(ix, cache, What::Near, n_near);
+    /// Makes tasks for the boxes that a body needs, one of `n_bodies`.
+    fn push_needed(
+        &mut self,
+        workers: &Workers,
+        participant_ix: usize,
+        n_bodies: usize,
+        cache: &mut BodyCache,
+        needed: Needed,
+    ) {
+        match needed {
+            Needed::None => {}
+            Needed::All => {
+                let n_nodes = cache.bounds.levels.get(1).map_or(1, BoundsArray::len);
+                self.push(workers, participant_ix, cache, What::All, n_nodes);
             }
-            if let Some(sorted) = cache.sorted() {
-                stats.n_remote += (cache.clustering.n_clusters() - sorted.n_near()) as u64;
+            Needed::Near { n_nodes, n_runs } => {
+                // Order tasks so that one thread tends to read a body and compute its boxes: `work` reverses this list,
+                // so the caller starts at its end and helpers at its front.
+                let mut parts = [(What::Read, n_runs), (What::Near, n_nodes)];
+                if 2 * participant_ix >= n_bodies {
+                    parts.reverse();
+                }
+                for (what, n) in parts {
+                    self.push(workers, participant_ix, cache, what, n);
+                }
             }
         }
     }
 
-    /// Makes tasks for all boxes of a body.
-    fn push_all(&mut self, participant_ix: usize, cache: &mut BodyCache) {
-        let n_nodes = cache.bounds.levels.get(1).map_or(1, BoundsArray::len);
-        self.push(participant_ix, cache, What::All, n_nodes);
-    }
-
     /// Makes tasks for `n` runs or nodes of a body.
-    fn push(&mut self, participant_ix: usize, cache: &mut BodyCache, what: What, n: usize) {
+    fn push(
+        &mut self,
+        workers: &Workers,
+        participant_ix: usize,
+        cache: &mut BodyCache,
+        what: What,
+        n: usize,
+    ) {
         let (leaves, parents) = match &mut cache.bounds.levels[..] {
             [] => return,
             [leaves] => (leaves.raw(), None),
@@ -200,6 +178,7 @@ impl Refit {
                 NODES
             }
         };
+        let step = workers.task(step);
         let tasks = (0..n).step_by(step).map(|first| Task {
             participant: participant_ix as u32,
             what,
@@ -216,6 +195,7 @@ impl Refit {
         &mut self,
         isa: Isa,
         job: Job<'_>,
+        tuning: &Tuning,
         caches: &mut Caches,
         scratches: &mut [Worker],
     ) -> bool {
@@ -245,7 +225,7 @@ impl Refit {
             ) -> Found);
             *found[ix].lock().unwrap_or_else(PoisonError::into_inner) = result;
         };
-        workers.for_each(for_boxes(job, scratches), n_tasks, work);
+        workers.for_each(for_boxes(job, tuning, scratches), n_tasks, work);
         let mut all_finite = true;
         for (task, found) in self.tasks.iter().zip(&mut self.found) {
             let found = found.get_mut().unwrap_or_else(PoisonError::into_inner);
@@ -286,10 +266,12 @@ impl Refit {
             if cache.sorted().is_some() {
                 continue;
             }
-            let is_stale = cache.fit.is_stale(cache.spread());
+            let is_stale = cache.fit.is_stale(cache.spread(), &settings.tuning);
             if is_stale && settings.recluster == Recluster::Auto {
                 let n = body.n_primitives();
-                *cache = make_anew(workers, n, stats, || BodyCache::new(body, isa))?;
+                *cache = make_anew(workers, n, stats, || {
+                    BodyCache::new(body, isa, &settings.tuning)
+                })?;
                 if participant.within {
                     cache.find_adjacency(workers)?;
                 }
@@ -302,102 +284,10 @@ impl Refit {
 }
 
 /// The scratches of the workers that compute boxes.
-fn for_boxes<'a>(job: Job<'_>, scratches: &'a mut [Worker]) -> &'a mut [Worker] {
-    let parallel = job.frame.n_primitives() >= PARALLEL_FROM;
+fn for_boxes<'a>(job: Job<'_>, tuning: &Tuning, scratches: &'a mut [Worker]) -> &'a mut [Worker] {
+    let parallel = job.frame.n_primitives() >= tuning.bounds_parallel_from;
     let n_workers = if parallel { job.workers.n() } else { 1 };
     &mut scratches[..n_workers]
-}
-
-/// Whether a body's clusters may be sorted: its positions are in single precision, and its primitives name every vertex.
-fn can_be_read(cache: &BodyCache, body: &Body) -> bool {
-    let is_single = matches!(body.positions(), Positions::F32(_));
-    is_single && cache.clustering.n_vertices_covered == Some(body.n_vertices())
-}
-
-/// The participants that a participant could meet.
-fn met(frame: &Frame, ix: usize) -> impl Iterator<Item = usize> {
-    (0..frame.layers.len()).filter(move |&other| other != ix && frame.test(ix, other).is_some())
-}
-
-/// The groups of a participant that are not beside all bodies that it could meet; `None` if its clusters are not sorted.
-fn back(world: World<'_>, ix: usize) -> Option<Sides> {
-    let sorted = world.cache(ix as u32).sorted()?;
-    let groups = met(world.frame, ix).map(|other| sorted.back_at(&world.cache(other as u32).whole));
-    Some(groups.fold(Sides::default(), Sides::union))
-}
-
-/// A body whose clusters are to be sorted, and the joint box of all bodies that it could meet.
-struct Due<'a> {
-    n_vertices: usize,
-    cache: &'a mut BodyCache,
-    others: Bounds,
-}
-
-/// Sorts the clusters of participants for which that is due.
-fn sort(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker]) {
-    let Job {
-        scene,
-        frame,
-        workers,
-        ..
-    } = job;
-    let world = World {
-        scene,
-        frame,
-        caches: Some(caches),
-    };
-    let mut others = [Bounds::EMPTY; SORTED_TO];
-    for (ix, others) in others[..frame.layers.len()].iter_mut().enumerate() {
-        for other in met(frame, ix) {
-            others.join(&world.cache(other as u32).whole);
-        }
-    }
-    let mut due: [Mutex<Option<Due<'_>>>; SORTED_TO] = Default::default();
-    let mut n_due = 0;
-    let mut caches = caches.iter_mut();
-    for (ix, participant) in frame.layers.iter().enumerate() {
-        let slot = participant.id.index();
-        // Participants come in the order of their slots.
-        let cache = caches.find(|(other, _)| *other == slot);
-        let Some((_, cache)) = cache else {
-            continue;
-        };
-        let body = frame.body(scene, ix);
-        let could = !participant.within && can_be_read(cache, body);
-        let is_due = cache.remote.as_ref().is_some_and(|remote| remote.is_due());
-        if could && is_due {
-            due[n_due] = Mutex::new(Some(Due {
-                n_vertices: body.n_vertices(),
-                cache,
-                others: others[ix],
-            }));
-            n_due += 1;
-        }
-    }
-    workers.for_each(for_boxes(job, scratches), n_due, |_, ix| {
-        let mut due = due[ix].lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(due) = &mut *due {
-            due.sort();
-        }
-    });
-}
-
-impl Due<'_> {
-    fn sort(&mut self) {
-        let BodyCache {
-            clustering,
-            bounds,
-            whole,
-            remote,
-            ..
-        } = &mut *self.cache;
-        let Some(remote) = remote else {
-            return;
-        };
-        if !remote.sort(clustering, self.n_vertices, bounds, whole, &self.others) {
-            self.cache.unsort();
-        }
-    }
 }
 
 impl Found {
@@ -444,11 +334,7 @@ fn work<S: Simd>(simd: S, world: World<'_>, task: Task) -> Found {
         }
     }
     Found {
-        extents: Extents {
-            whole: summary.bounds,
-            all_finite: summary.all_finite,
-            ..Extents::EMPTY
-        },
+        extents: Extents::without_groups(summary.bounds, summary.all_finite),
         surface: summary.surface,
     }
 }

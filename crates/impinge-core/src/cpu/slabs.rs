@@ -9,8 +9,10 @@ use crate::error::Error;
 use crate::grouping::hubs::Hubs;
 use crate::query::SharedVertex;
 use crate::run::Job;
+use crate::settings::Settings;
 use crate::sink::{Answer, Ending};
 use crate::stats::Statistics;
+use crate::tuning::Tuning;
 
 use super::dispatch::{self, NodePair, Tree};
 use super::met::WorkItem;
@@ -28,14 +30,13 @@ const FEWEST_ITEMS: usize = 256;
 const TASK: std::ops::RangeInclusive<usize> = 16..=512;
 /// Tasks per worker, so that no worker waits long for the last task.
 const TASKS_EACH: usize = 12;
-/// With fewer work items, one worker takes them all.
-const PARALLEL_FROM: usize = 64;
 
 /// How many work items a slab may hold within the budget, if `held` bytes are held besides. An eighth of the remaining
 /// bytes is for work items, the rest for the answer.
-fn most_items(budget: Option<u64>, held: u64) -> Result<usize, Error> {
-    let Some(budget) = budget else {
-        return Ok(MOST_ITEMS);
+fn most_items(settings: &Settings, held: u64) -> Result<usize, Error> {
+    let most = settings.tuning.most_slab_items.clamp(1, MOST_ITEMS);
+    let Some(budget) = settings.memory_budget else {
+        return Ok(most);
     };
     let each = size_of::<WorkItem>() as u64;
     let needed = held + each * FEWEST_ITEMS as u64;
@@ -47,7 +48,7 @@ fn most_items(budget: Option<u64>, held: u64) -> Result<usize, Error> {
         });
     }
     let more = (budget - needed) / 8 / each;
-    Ok((FEWEST_ITEMS as u64 + more).min(MOST_ITEMS as u64) as usize)
+    Ok((FEWEST_ITEMS as u64 + more).min(most as u64) as usize)
 }
 
 /// Provides the trees from which work items come, and settles the work items.
@@ -96,6 +97,10 @@ pub(crate) struct Counts {
     pub busy: Duration,
     pub n_candidates: u64,
     pub n_unsure: u64,
+    /// Clusters that took the place of others in the cache.
+    pub n_evicted: u64,
+    /// Times that there were enough candidates to settle them.
+    pub n_full: u64,
 }
 
 impl<'a> Stage for World<'a> {
@@ -153,10 +158,13 @@ impl<'a> Stage for World<'a> {
     }
 
     fn counts(worker: &Worker) -> Counts {
+        let settler = &worker.settler;
         Counts {
-            busy: worker.settler.busy,
-            n_candidates: worker.settler.n_candidates,
-            n_unsure: worker.settler.n_unsure,
+            busy: settler.busy,
+            n_candidates: settler.n_candidates,
+            n_unsure: settler.n_unsure,
+            n_evicted: worker.n_evicted(),
+            n_full: settler.n_full,
         }
     }
 }
@@ -168,7 +176,7 @@ pub(crate) struct Task<'a, W: Stage> {
     pub answer: W::Answer,
     pub world: W,
     pub scratches: &'a mut [W::Worker],
-    pub budget: Option<u64>,
+    pub settings: &'a Settings,
     /// Bytes held besides the room.
     pub held: usize,
 }
@@ -194,9 +202,11 @@ impl Room {
         task: Task<'_, W>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let Task { answer, budget, .. } = task;
+        let Task {
+            answer, settings, ..
+        } = task;
         let held = (task.held + self.top.bytes()) as u64;
-        let most_items = answer.most_items(most_items(budget, held)?);
+        let most_items = answer.most_items(most_items(settings, held)?);
         let Room {
             top,
             items,
@@ -212,6 +222,7 @@ impl Room {
             job: task.job,
             answer,
             world: task.world,
+            tuning: &settings.tuning,
             items,
             most_items,
             scratches: task.scratches,
@@ -231,6 +242,7 @@ struct Slabs<'a, W: Stage> {
     job: Job<'a>,
     answer: W::Answer,
     world: W,
+    tuning: &'a Tuning,
     items: &'a mut Vec<WorkItem>,
     most_items: usize,
     scratches: &'a mut [W::Worker],
@@ -267,6 +279,8 @@ impl<W: Stage> Slabs<'_, W> {
             busy_ms += counts.busy.as_secs_f64() * 1e3;
             stats.n_candidates += counts.n_candidates;
             stats.n_unsure += counts.n_unsure;
+            stats.ways.n_evicted += counts.n_evicted;
+            stats.ways.n_full += counts.n_full;
         }
         let narrow_ms = (busy_ms / self.scratches.len() as f64).min(self.ms);
         stats.add_ms("pairing", self.ms - narrow_ms);
@@ -295,12 +309,13 @@ impl<W: Stage> Slabs<'_, W> {
         let (isa, world, control) = (self.isa, self.world, self.job.control);
         let (workers, answer) = (self.job.workers, self.answer);
         let items = &self.items[..];
-        let n_workers = if items.len() < PARALLEL_FROM {
+        let n_workers = if items.len() < self.tuning.pairing_parallel_from {
             1
         } else {
             workers.n()
         };
         let task = (items.len() / (TASKS_EACH * n_workers)).clamp(*TASK.start(), *TASK.end());
+        let task = workers.task(task);
         let n_tasks = items.len().div_ceil(task);
         let scratches = &mut self.scratches[..n_workers];
         workers.for_each(scratches, n_tasks, |worker, ix| {
@@ -352,7 +367,9 @@ fn all<S: Simd, W: Stage>(
             between(simd, 0, 1, stack, slabs)?;
         }
     } else if frame.between() {
-        top.refit(frame.layers.len(), |ix| world.tree(ix).bounds.root());
+        top.refit(frame.layers.len(), slabs.tuning, |ix| {
+            world.tree(ix).bounds.root()
+        });
         top.pairs(simd, body_stack, |a, b| {
             if frame.test(a as usize, b as usize).is_none() {
                 return Ok(());

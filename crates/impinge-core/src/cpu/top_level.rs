@@ -3,6 +3,7 @@
 use crate::clusterings::Fit;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::hierarchy::{Entry, Shape, order};
+use crate::tuning::Tuning;
 
 use super::bounds::TreeBounds;
 use super::dispatch::{self, NodePair, Tree};
@@ -49,7 +50,7 @@ impl TopLevel {
     }
 
     /// Updates the tree to the current boxes of `n` participants.
-    pub fn refit(&mut self, n: usize, root: impl Fn(u32) -> Bounds) {
+    pub fn refit(&mut self, n: usize, tuning: &Tuning, root: impl Fn(u32) -> Bounds) {
         let is_new = self.order.len() != n;
         if is_new {
             self.shape = Shape::new(n);
@@ -57,7 +58,7 @@ impl TopLevel {
             self.order = (0..n as u32).collect();
         }
         self.refit_boxes(&root);
-        if self.fit.is_stale(self.spread()) || is_new {
+        if self.fit.is_stale(self.spread(), tuning) || is_new {
             self.entries.clear();
             self.entries.extend((0..n as u32).map(|ix| Entry {
                 center: root(ix).center(),
@@ -69,7 +70,7 @@ impl TopLevel {
             }
             self.refit_boxes(&root);
             self.fit = Fit::UNKNOWN;
-            self.fit.is_stale(self.spread());
+            self.fit.note(self.spread());
         }
     }
 

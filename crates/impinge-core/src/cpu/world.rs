@@ -12,7 +12,7 @@ use crate::scene::Scene;
 use super::bounds::TreeBounds;
 use super::dispatch::Tree;
 use super::folds::Folds;
-use super::remote::Remote;
+use super::remote::body::Remote;
 
 /// The data kept per body from frame to frame.
 #[derive(Debug)]

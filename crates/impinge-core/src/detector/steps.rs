@@ -295,6 +295,7 @@ impl Detector {
         let finished = contacts.finish();
         let examined = result?;
         (*found, _) = finished?;
+        self.frames.workers().report(&mut stats.ways);
         let n: usize = found.iter().map(Vec::capacity).sum();
         stats.bytes_held += (size_of::<Found<Contact>>() * n) as u64;
         Ok(examined)

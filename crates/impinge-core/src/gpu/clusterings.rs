@@ -13,6 +13,7 @@ use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::Body;
 use crate::stats::Statistics;
+use crate::tuning::Tuning;
 
 /// The clusters of a body, kept while its topology stays and they fit its pose.
 #[derive(Debug)]
@@ -54,11 +55,12 @@ impl Clusterings {
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         let Clusterings { known, n_made } = self;
+        let tuning = Tuning::default();
         let is_stale = |cached: &mut Cached, layer: &Layer, body: &Body| {
             recluster
                 && cached.judged_stamp != body.positions_stamp()
                 && !resident.contains(&layer.id)
-                && cached.is_stale(body)
+                && cached.is_stale(body, &tuning)
         };
         known.update(job, stats, is_stale, |body, _| {
             *n_made += 1;
@@ -84,7 +86,7 @@ impl Cached {
             bounds_of(positions, elements.corners(primitive))
         });
         let mut fit = Fit::UNKNOWN;
-        fit.is_stale(sampled_spread(&clustering, positions));
+        fit.note(sampled_spread(&clustering, positions));
         Cached {
             topology_stamp: body.topology_stamp(),
             number,
@@ -95,10 +97,10 @@ impl Cached {
     }
 
     /// Whether the body has flowed away from its clusters.
-    fn is_stale(&mut self, body: &Body) -> bool {
+    fn is_stale(&mut self, body: &Body, tuning: &Tuning) -> bool {
         self.judged_stamp = body.positions_stamp();
-        self.fit
-            .is_stale(sampled_spread(&self.clustering, body.positions()))
+        let spread = sampled_spread(&self.clustering, body.positions());
+        self.fit.is_stale(spread, tuning)
     }
 }
 

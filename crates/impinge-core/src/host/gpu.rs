@@ -45,7 +45,7 @@ impl Host {
         };
         let first = first.unwrap_or_default();
         Ok(Host {
-            frames: FrameLoop::new(settings.threads, Limits::default()),
+            frames: FrameLoop::new(settings.threads, Limits::default(), settings.tuning),
             engine: Engine::with_plan_of_guest(gpu, settings, first, plan),
         })
     }

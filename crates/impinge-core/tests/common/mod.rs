@@ -30,6 +30,18 @@ pub fn naive(case: &Case) -> Vec<[u32; 4]> {
     rows(detector.detect(&case.scene, &case.query).unwrap())
 }
 
+/// Whether remote clusters are left out on this processor: without AVX2 this would gain nothing.
+pub fn leaves_out() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    {
+        is_x86_feature_detected!("avx2")
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        false
+    }
+}
+
 /// Whether an answer equals the oracle's: the same rows in the same order, and the same hash.
 pub fn agree(expected: &[[u32; 4]], answer: &[[u32; 4]], hash: u64) -> Result<(), String> {
     if hash != hash_rows(expected.iter().copied()) {

@@ -80,7 +80,7 @@ impl Table {
         } = self;
         settlers.resize_with(job.workers.n(), Settler::default);
         for settler in settlers.iter_mut() {
-            settler.begin(answer);
+            settler.begin(answer, &impinge_core::Tuning::default());
         }
         let world = World::new(job.scene, job.frame);
         let (isa, slots) = (*isa, &slots[..]);

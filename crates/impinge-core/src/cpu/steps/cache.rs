@@ -17,13 +17,13 @@ use crate::run::Job;
 use crate::scene::Body;
 use crate::settings::{Recluster, Settings};
 use crate::stats::Statistics;
+#[cfg(feature = "gpu")]
+use crate::tuning::Tuning;
 
 use super::hull::Pose;
 
 /// Clusters per task.
 const CLUSTERS: usize = 128;
-/// With fewer elements of all layers together, one thread computes the boxes.
-const PARALLEL_FROM: u64 = 60_000;
 
 /// By slot of the body, then by part: vertices, edges and faces.
 pub(super) type Caches = Store<LayerCache, 3>;
@@ -85,16 +85,15 @@ impl LayerCache {
 
     /// Whether the layer has flowed away from its clusters, judged by some of them: for a device that finds the boxes.
     #[cfg(feature = "gpu")]
-    pub fn is_stale(&mut self, body: &Body) -> bool {
+    pub fn is_stale(&mut self, body: &Body, tuning: &Tuning) -> bool {
         if self.sampled.stamp == body.positions_stamp() {
             return false;
         }
         let (clustering, positions) = (&self.clustering, body.positions());
         let bounds = |cluster| bounds::of_vertices(positions, clustering.vertices(cluster));
         self.sampled.stamp = body.positions_stamp();
-        self.sampled
-            .fit
-            .is_stale(sampled_spread(clustering.n_clusters(), bounds))
+        let spread = sampled_spread(clustering.n_clusters(), bounds);
+        self.sampled.fit.is_stale(spread, tuning)
     }
 
     #[inline(always)]
@@ -156,7 +155,7 @@ pub(super) fn refit<S: Send>(
     scratches: &mut [S],
     stats: &mut Statistics,
 ) -> Result<(), Error> {
-    find_boxes(isa, job, pose, caches, scratches);
+    find_boxes(isa, job, settings, pose, caches, scratches);
     let Job {
         scene,
         frame,
@@ -174,7 +173,7 @@ pub(super) fn refit<S: Send>(
         cache.bounds.refit_above(0, &cache.clustering.shape);
         cache.of = Some((body.step_stamp(), pose));
         let spread = cache.spread();
-        if cache.fit.is_stale(spread) && settings.recluster == Recluster::Auto {
+        if cache.fit.is_stale(spread, &settings.tuning) && settings.recluster == Recluster::Auto {
             let n = cache.clustering.order.len();
             *cache = make_anew(workers, n, stats, || LayerCache::new(body, layer.part))?;
             is_stale = true;
@@ -190,6 +189,7 @@ pub(super) fn refit<S: Send>(
 fn find_boxes<S: Send>(
     isa: Isa,
     job: Job<'_>,
+    settings: &Settings,
     pose: Pose,
     caches: &mut Caches,
     scratches: &mut [S],
@@ -225,13 +225,14 @@ fn find_boxes<S: Send>(
             leaves: leaves.raw(),
             ends: [start.raw(), end.raw()],
         };
-        tasks.extend((0..n).step_by(CLUSTERS).map(|first| Task {
+        let n_each = workers.task(CLUSTERS);
+        tasks.extend((0..n).step_by(n_each).map(|first| Task {
             first,
-            end: n.min(first + CLUSTERS),
+            end: n.min(first + n_each),
             ..task
         }));
     }
-    let parallel = frame.n_primitives() >= PARALLEL_FROM;
+    let parallel = frame.n_primitives() >= settings.tuning.step_bounds_parallel_from;
     let n_workers = if parallel { workers.n() } else { 1 };
     let caches = &*caches;
     workers.for_each(&mut scratches[..n_workers], tasks.len(), |_, ix| {

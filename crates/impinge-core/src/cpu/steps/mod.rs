@@ -117,7 +117,7 @@ impl StepClusters {
             self.refit(job, settings, asked.pose, stats)
         })?;
         for worker in &mut self.scratches {
-            worker.begin(stats.n_clusters, settings.memory_budget.is_some());
+            worker.begin(stats.n_clusters, settings);
         }
         let held = self.bytes_besides_room();
         let known = Known::new(asked.latest);
@@ -134,7 +134,7 @@ impl StepClusters {
                 caches: &self.caches,
             },
             scratches: &mut self.scratches,
-            budget: settings.memory_budget,
+            settings,
             held,
         };
         self.room.run(task, stats)?;
@@ -161,8 +161,9 @@ impl StepClusters {
         let recluster = settings.recluster == Recluster::Auto;
         stats.n_clusters = 0;
         stats.time("clustering", |stats| {
-            let is_stale =
-                |cache: &mut LayerCache, _: &Layer, body: &Body| recluster && cache.is_stale(body);
+            let is_stale = |cache: &mut LayerCache, _: &Layer, body: &Body| {
+                recluster && cache.is_stale(body, &settings.tuning)
+            };
             self.update(job, stats, is_stale)
         })?;
         let of_layer = |layer: &Layer| Arc::clone(&self.caches.at(layer).clustering);
@@ -174,7 +175,7 @@ impl StepClusters {
         }
         self.scratches.resize_with(job.workers.n(), Worker::default);
         for worker in &mut self.scratches {
-            worker.begin(stats.n_clusters, settings.memory_budget.is_some());
+            worker.begin(stats.n_clusters, settings);
         }
         answer.share(self.bytes_besides_room() as u64);
         let known = Known::new(asked.latest);

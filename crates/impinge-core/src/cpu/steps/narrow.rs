@@ -22,6 +22,7 @@
 //! ```
 
 use crate::cpu::met::{Met, WorkItem};
+use crate::cpu::narrow::room_to_wait;
 use crate::cpu::simd::{Isa, Lanes, Simd, dispatch};
 use crate::exact::filter::{
     self, BATCH, Enclosed8, LANES, Look8, Moving64, Next, Search, Spans8, Steps8, time_between,
@@ -35,13 +36,11 @@ use crate::pair_kind::PairKind;
 use crate::positions::Positions;
 use crate::sink::BLOCK;
 use crate::step::{Start, Toi};
+use crate::tuning::Tuning;
 
 use super::group::Group;
 use super::near::Near;
 use super::world::{Sought, World};
-
-/// Pairs that the filter's first step leaves open are searched once there are this many.
-const FULL: usize = 1024;
 
 /// Two layers, and the kind of their pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,6 +69,10 @@ pub(super) struct Settler {
     keys: KeysByKind,
     pub n_candidates: u64,
     pub n_unsure: u64,
+    /// Times that there were enough pairs to look at them.
+    pub n_full: u64,
+    /// That many are enough.
+    full: usize,
     /// Pairs of the current layers that the filter's first step has left: to be looked at.
     open: Vec<Open>,
     /// Pairs to be looked at in the next round, and pairs with one candidate for a contact.
@@ -81,13 +84,15 @@ pub(super) struct Settler {
 }
 
 impl Settler {
-    pub fn clear(&mut self) {
+    /// Prepares for a step.
+    pub fn begin(&mut self, tuning: &Tuning) {
+        (self.full, self.n_full) = (tuning.settle_from, 0);
         self.found.iter_mut().for_each(Vec::clear);
         self.keys.iter_mut().for_each(Vec::clear);
         (self.n_candidates, self.n_unsure) = (0, 0);
         for list in [&mut self.open, &mut self.later, &mut self.single] {
             list.clear();
-            list.reserve_exact(FULL + GROUP * GROUP);
+            list.reserve_exact(room_to_wait(tuning));
         }
         self.between = None;
     }
@@ -184,7 +189,8 @@ impl Settler {
                         self.open.push(new(place_of(met, ix)));
                     }
                 }
-                if self.open.len() >= FULL {
+                if self.open.len() >= self.full {
+                    self.n_full += u64::from(!self.open.is_empty());
                     self.search(isa, world);
                 }
             }
@@ -226,7 +232,7 @@ impl Settler {
         for places in pairs {
             let search = Search::new(world.until());
             self.open.push(Open { places, search });
-            if self.open.len() >= FULL {
+            if self.open.len() >= self.full {
                 self.search(isa, world);
             }
         }

@@ -19,6 +19,7 @@ use crate::frame::TestId;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
 use crate::impacts::StepAnswer;
+use crate::settings::Settings;
 
 use super::group::Group;
 use super::narrow::{Between, Settler};
@@ -57,9 +58,9 @@ impl Default for Worker {
 
 impl Worker {
     /// Prepares for a step of `n_clusters` clusters.
-    pub fn begin(&mut self, n_clusters: u64, in_budget: bool) {
-        self.groups.begin::<World<'_>>(n_clusters, in_budget);
-        self.settler.clear();
+    pub fn begin(&mut self, n_clusters: u64, settings: &Settings) {
+        self.groups.begin::<World<'_>>(n_clusters, settings);
+        self.settler.begin(&settings.tuning);
         self.n_settled = 0;
         self.busy = Duration::ZERO;
     }
@@ -80,6 +81,8 @@ impl Worker {
             busy: self.busy,
             n_candidates: self.settler.n_candidates,
             n_unsure: self.settler.n_unsure,
+            n_evicted: self.groups.n_evicted,
+            n_full: self.settler.n_full,
         }
     }
 

@@ -117,15 +117,20 @@ impl Detector {
         }
         let collect = Instant::now();
         let (mut keys, _) = answer.finish()?;
+        let mut n_counted = 0;
         for (kind, keys) in PairKind::ALL.into_iter().zip(&mut keys) {
-            sorter.sort(keys, frame.n_primitives(), workers);
+            n_counted += u64::from(sorter.sort(keys, frame.n_primitives(), workers));
             near.extend(kind, keys.iter().copied());
         }
         let ms = collect.elapsed().as_secs_f64() * 1e3;
         near.stats_mut().add_ms("collect", ms);
+        near.stats_mut().ways.n_counted = n_counted;
         let features = Instant::now();
-        let tasks: Vec<Mutex<&mut [NearPair]>> =
-            near.pairs_mut().chunks_mut(TASK).map(Mutex::new).collect();
+        let tasks: Vec<Mutex<&mut [NearPair]>> = near
+            .pairs_mut()
+            .chunks_mut(workers.task(TASK))
+            .map(Mutex::new)
+            .collect();
         let n_tasks = tasks.len();
         let is_stopped = AtomicBool::new(false);
         workers.for_each(&mut vec![(); workers.n()], n_tasks, |(), ix| {
@@ -145,6 +150,7 @@ impl Detector {
         control.step(n_tasks as u64, n_tasks as u64)?;
         let stats = near.stats_mut();
         stats.bytes_held += sorter.bytes();
+        workers.report(&mut stats.ways);
         stats.add_ms("features", features.elapsed().as_secs_f64() * 1e3);
         stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(&self.steps.near)

@@ -270,14 +270,18 @@ impl Search<'_> {
         let n;
         (*keys, n) = self.answer.finish()?;
         let collect = Instant::now();
+        let workers = self.question.workers;
+        let mut n_counted = 0;
         for keys in keys.iter_mut() {
             let n_numbers = self.frame.n_primitives();
-            self.sorter.sort(keys, n_numbers, self.question.workers);
+            n_counted += u64::from(self.sorter.sort(keys, n_numbers, workers));
         }
         let ms = collect.elapsed().as_secs_f64() * 1e3;
         let bytes = candidates.bytes() + self.sorter.bytes();
         let (_, stats) = candidates.parts_mut();
         stats.add_ms("collect", ms);
+        stats.ways.n_counted = n_counted;
+        workers.report(&mut stats.ways);
         stats.bytes_held += bytes;
         stats.total_ms = self.start.elapsed().as_secs_f64() * 1e3;
         Ok(n)

@@ -7,8 +7,8 @@
 
 use crate::grouping::bounds::{Bounds, greater, lesser};
 
-use super::runs::{COORDINATES, Members, ROW, RUN, RunExtents};
-use super::simd::Simd;
+use crate::cpu::runs::{COORDINATES, Members, ROW, RUN, RunExtents};
+use crate::cpu::simd::Simd;
 
 /// Makes a vertex a member of a group.
 #[inline(always)]
@@ -43,7 +43,7 @@ pub(super) fn clear(members: &mut [Members], groups: Sides) {
 pub(crate) struct Extents {
     /// The box of all of these vertices.
     pub whole: Bounds,
-    pub groups: Intervals,
+    pub(super) groups: Intervals,
     /// Whether all positions are certainly finite. If not, the other fields mean nothing.
     pub all_finite: bool,
 }
@@ -55,6 +55,15 @@ impl Extents {
         groups: Intervals::EMPTY,
         all_finite: true,
     };
+
+    /// The extents of vertices that were read for their boxes, and none for their groups.
+    pub fn without_groups(whole: Bounds, all_finite: bool) -> Extents {
+        Extents {
+            whole,
+            all_finite,
+            ..Extents::EMPTY
+        }
+    }
 }
 
 /// The intervals that the groups span: those below along x, y and z, then those above. Each axis stands for itself, so
@@ -196,8 +205,8 @@ impl Sides {
 
 #[cfg(test)]
 mod tests {
-    use super::super::simd::{Isa, dispatch};
     use super::*;
+    use crate::cpu::simd::{Isa, dispatch};
     use crate::settings::InstructionSet;
 
     /// Pseudo-random numbers.

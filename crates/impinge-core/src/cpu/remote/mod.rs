@@ -1,0 +1,221 @@
+//! Remote clusters: proven, without their boxes, to be beside all other bodies.
+//!
+//! Computing a cluster's box reads vertices from all over memory; reading vertices in memory order costs a fraction of
+//! that. Bodies that meet mostly do so with only a part of them, and clusters that lie beside the
+//! other body mostly stay there for many frames. So clusters are *sorted*: those that lie beside all
+//! bodies that their body could meet go into one of six groups, below or above them along x, y or z.
+//!
+//! ```text
+//!            below, x |  near   | above, x
+//!   body    .c..c..c..|c.c.c..cc|..c...
+//!   others            [.........]
+//! ```
+//!
+//! Each frame reads all positions in order and finds the interval that each group spans along its axis, and the box of
+//! the whole body. A group whose interval touches no other body's box is proven *remote*, however bodies have
+//! moved: none of its primitives can be in a pair, and its clusters keep empty boxes. A group that touches another box
+//! has come back: its clusters are near in this frame and are sorted again at its end, with more slack between them and
+//! the others if the group came back soon.
+//!
+//! In: boxes of clusters, then positions frame by frame. Out: which clusters' boxes a frame needs.
+//!
+//! The stage `bounds` asks three questions per frame: [`plan`], before it reads positions, which boxes a body needs;
+//! [`prove`], once positions are read, which it needs besides; [`learn`], once all boxes are known, sorts clusters for
+//! the next frame.
+
+pub(super) mod body;
+pub(super) mod extents;
+mod outlook;
+
+use std::sync::{Mutex, PoisonError};
+
+use crate::frame::Frame;
+use crate::grouping::bounds::Bounds;
+use crate::run::Job;
+use crate::scene::Body;
+use crate::settings::Settings;
+use crate::stats::Statistics;
+
+use super::pairing::Worker;
+use super::simd::Isa;
+use super::world::{BodyCache, Caches, World};
+use extents::Sides;
+
+/// Clusters are sorted in frames of at most this many bodies: more bodies are everywhere.
+const MOST_BODIES: usize = 8;
+
+/// The boxes of a body that a frame needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Needed {
+    /// No more than are known.
+    None,
+    /// Those of the clusters that are near, in so many nodes; and positions must be read, in so many runs.
+    Near { n_nodes: usize, n_runs: usize },
+    /// Those of all clusters.
+    All,
+}
+
+/// Whether clusters may be left out of a frame.
+pub(super) fn is_allowed(isa: Isa, frame: &Frame, settings: &Settings) -> bool {
+    isa.reads_runs()
+        && frame.between()
+        && frame.layers.len() <= MOST_BODIES
+        && settings.memory_budget.is_none()
+}
+
+/// The boxes that a body needs in its new pose. Known boxes become outdated if they are those of near clusters only and the
+/// frame needs more.
+pub(super) fn plan(cache: &mut BodyCache, body: &Body, is_allowed: bool) -> Needed {
+    if !is_allowed {
+        // The next frames may need all boxes too.
+        if let Some(remote) = &mut cache.remote {
+            remote.interrupt();
+        }
+        unsort(cache);
+    } else if !cache
+        .sorted()
+        .is_some_and(|sorted| sorted.is_fit_for(body.n_vertices()))
+    {
+        unsort(cache);
+    }
+    if cache.positions_stamp == body.positions_stamp() {
+        return Needed::None;
+    }
+    if let Some(remote) = &mut cache.remote {
+        remote.begin();
+    }
+    cache.sorted().map_or(Needed::All, |sorted| Needed::Near {
+        n_nodes: sorted.near().len(),
+        n_runs: sorted.n_runs(),
+    })
+}
+
+/// Proves that the groups of a body are beside all bodies that it could meet. Returns the boxes that it needs besides: of
+/// the clusters that are near now, if groups have come back; of all, if groups come back too often.
+pub(super) fn prove(
+    job: Job<'_>,
+    caches: &mut Caches,
+    ix: usize,
+    stats: &mut Statistics,
+) -> Needed {
+    let Job { scene, frame, .. } = job;
+    let world = World {
+        scene,
+        frame,
+        caches: Some(caches),
+    };
+    let Some(back) = back(world, ix) else {
+        return Needed::None;
+    };
+    let cache = caches.at_mut(&frame.layers[ix]);
+    let Some(remote) = &mut cache.remote else {
+        return Needed::None;
+    };
+    let mut needed = Needed::None;
+    if !back.is_empty() {
+        if !remote.come_back(back, &cache.clustering) {
+            unsort(cache);
+            return Needed::All;
+        }
+        stats.ways.n_came_back += back.sides().count() as u64;
+        needed = Needed::Near {
+            n_nodes: remote.near().len(),
+            n_runs: 0,
+        };
+    }
+    stats.n_remote += (cache.clustering.n_clusters() - remote.n_near()) as u64;
+    needed
+}
+
+/// Sorts the clusters of all bodies for which that is due.
+pub(super) fn learn(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker]) {
+    let Job {
+        scene,
+        frame,
+        workers,
+        ..
+    } = job;
+    let world = World {
+        scene,
+        frame,
+        caches: Some(caches),
+    };
+    let mut others = [Bounds::EMPTY; MOST_BODIES];
+    for (ix, others) in others[..frame.layers.len()].iter_mut().enumerate() {
+        for other in met(frame, ix) {
+            others.join(&world.cache(other as u32).whole);
+        }
+    }
+    let mut due: [Mutex<Option<Due<'_>>>; MOST_BODIES] = Default::default();
+    let mut n_due = 0;
+    let mut caches = caches.iter_mut();
+    for (ix, participant) in frame.layers.iter().enumerate() {
+        let slot = participant.id.index();
+        // Participants come in the order of their slots.
+        let cache = caches.find(|(other, _)| *other == slot);
+        let Some((_, cache)) = cache else {
+            continue;
+        };
+        let body = frame.body(scene, ix);
+        let could = !participant.within && cache.can_be_read(body);
+        let is_due = cache.remote.as_ref().is_some_and(|remote| remote.is_due());
+        if could && is_due {
+            due[n_due] = Mutex::new(Some(Due {
+                n_vertices: body.n_vertices(),
+                cache,
+                others: others[ix],
+            }));
+            n_due += 1;
+        }
+    }
+    workers.for_each(scratches, n_due, |_, ix| {
+        let mut due = due[ix].lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(due) = &mut *due {
+            due.sort();
+        }
+    });
+}
+
+/// The participants that a participant could meet.
+fn met(frame: &Frame, ix: usize) -> impl Iterator<Item = usize> {
+    (0..frame.layers.len()).filter(move |&other| other != ix && frame.test(ix, other).is_some())
+}
+
+/// The groups of a participant that are not beside all bodies that it could meet; `None` if its clusters are not sorted.
+fn back(world: World<'_>, ix: usize) -> Option<Sides> {
+    let sorted = world.cache(ix as u32).sorted()?;
+    let groups = met(world.frame, ix).map(|other| sorted.back_at(&world.cache(other as u32).whole));
+    Some(groups.fold(Sides::default(), Sides::union))
+}
+
+/// Ends the sorting of a body; all its boxes must be found again.
+fn unsort(cache: &mut BodyCache) {
+    if cache.remote.as_mut().is_some_and(|remote| remote.end()) {
+        cache.forget_boxes();
+    }
+}
+
+/// A body whose clusters are to be sorted, and the joint box of all bodies that it could meet.
+struct Due<'a> {
+    n_vertices: usize,
+    cache: &'a mut BodyCache,
+    others: Bounds,
+}
+
+impl Due<'_> {
+    fn sort(&mut self) {
+        let BodyCache {
+            clustering,
+            bounds,
+            whole,
+            remote,
+            ..
+        } = &mut *self.cache;
+        let Some(remote) = remote else {
+            return;
+        };
+        if !remote.sort(clustering, self.n_vertices, bounds, whole, &self.others) {
+            unsort(self.cache);
+        }
+    }
+}

@@ -1,0 +1,520 @@
+//! Every threshold of the CPU backend at 0 and at infinity: the same answers, and the code behind each one is really entered.
+
+mod common;
+
+use std::time::Duration;
+
+use common::{agree, cases, check, leaves_out, naive, rows};
+use impinge_core::{
+    Backend, BodyId, CandidateQuery, Detector, Impact, Method, NearPair, NearQuery, Pairs,
+    Positions, Query, Scene, Settings, SharedVertex, Statistics, Step, Tuning,
+};
+use impinge_scenes::{Model, solids, soup, surfaces};
+
+const ZERO: usize = 0;
+const INFINITY: usize = 1;
+
+fn detector(method: Method, threads: usize, tuning: Tuning) -> Detector {
+    Detector::with_settings(settings(method, threads, tuning)).unwrap()
+}
+
+fn settings(method: Method, threads: usize, tuning: Tuning) -> Settings {
+    Settings {
+        method,
+        threads,
+        tuning,
+        backend: Backend::Cpu,
+        ..Settings::default()
+    }
+}
+
+/// All thresholds where most of the code behind them is entered.
+fn eager() -> Tuning {
+    let late = [
+        "remote_one_in",
+        "remote_lasts",
+        "most_maps",
+        "auto_most_crowded",
+    ];
+    let start = Tuning::ENDS[ZERO];
+    late.iter().fold(start, |tuning, name| {
+        tuning.with(name, &Tuning::ENDS[INFINITY])
+    })
+}
+
+/// Thresholds, and the methods for which they matter.
+struct Tuned {
+    name: String,
+    tuning: Tuning,
+    methods: &'static [Method],
+}
+
+impl Tuned {
+    fn new(name: &str, tuning: Tuning, methods: &'static [Method]) -> Tuned {
+        let name = name.to_owned();
+        Tuned {
+            name,
+            tuning,
+            methods,
+        }
+    }
+}
+
+/// All thresholds at either end, and [`eager`].
+fn extremes() -> Vec<Tuned> {
+    let methods = &[Method::Clusters, Method::Cells, Method::Auto];
+    vec![
+        Tuned::new("all at 0", Tuning::ENDS[ZERO], methods),
+        Tuned::new("all at infinity", Tuning::ENDS[INFINITY], methods),
+        Tuned::new("eager", eager(), methods),
+    ]
+}
+
+/// A tuning, each of whose thresholds is put to either end.
+fn each_of(name: &str, tuning: Tuning) -> Vec<Tuned> {
+    let ends = |threshold: &&str| {
+        let methods: &[Method] = match *threshold {
+            "kept_parallel_from" | "most_maps" | "map_cell" | "most_marked" => &[Method::Cells],
+            "wake_from" | "most_per_task" | "most_slab_items" | "settle_from" => {
+                &[Method::Clusters, Method::Cells]
+            }
+            auto if auto.starts_with("auto") => &[Method::Auto],
+            _ => &[Method::Clusters],
+        };
+        [("0", ZERO), ("infinity", INFINITY)].map(|(end, ix)| {
+            let tuning = tuning.with(threshold, &Tuning::ENDS[ix]);
+            Tuned::new(&format!("{name}, {threshold} at {end}"), tuning, methods)
+        })
+    };
+    let all = Tuning::NAMES.iter().flat_map(ends);
+    all.filter(|tuned| tuned.tuning != tuning).collect()
+}
+
+#[test]
+fn no_threshold_changes_the_answer_to_a_case() {
+    let mut tunings = each_of("default", Tuning::default());
+    tunings.retain(|tuned| !tuned.name.contains("step_") && !tuned.name.contains("sort_"));
+    tunings.extend(extremes());
+    for case in cases() {
+        let expected = naive(&case);
+        for tuned in &tunings {
+            for &method in tuned.methods {
+                check(&case, &expected, settings(method, 2, tuned.tuning));
+            }
+        }
+    }
+}
+
+/// Bodies that are given new positions frame by frame.
+struct Film {
+    name: &'static str,
+    bodies: Vec<Model>,
+    /// Whether the first body is in double precision.
+    double: bool,
+    query: fn(&[BodyId]) -> Query,
+    /// Where a point of a body is in a frame.
+    motion: fn(usize, usize, [f32; 3]) -> [f32; 3],
+}
+
+const N_FRAMES: usize = 9;
+
+impl Film {
+    fn scene(&self) -> (Scene, Vec<BodyId>) {
+        let mut scene = Scene::new();
+        let bodies = self.bodies.iter().enumerate();
+        let add = bodies.map(|(ix, body)| match self.double && ix == 0 {
+            true => scene
+                .add(body.elements.clone(), body.positions_f64())
+                .unwrap(),
+            false => body.add_to(&mut scene).unwrap(),
+        });
+        let bodies = add.collect();
+        (scene, bodies)
+    }
+
+    /// The positions of all bodies in a frame, in single precision.
+    fn pose(&self, frame: usize) -> Vec<Vec<[f32; 3]>> {
+        let bodies = self.bodies.iter().enumerate();
+        bodies
+            .map(|(ix, body)| {
+                body.mapped(|point| (self.motion)(ix, frame, point))
+                    .positions
+            })
+            .collect()
+    }
+
+    fn show(&self, scene: &mut Scene, bodies: &[BodyId], frame: usize) {
+        for (ix, (&body, positions)) in bodies.iter().zip(self.pose(frame)).enumerate() {
+            match self.double && ix == 0 {
+                true => scene.set_positions(body, &wide(&positions)).unwrap(),
+                false => scene.set_positions(body, &positions).unwrap(),
+            }
+        }
+    }
+
+    /// Shows the frames one after the other, the scene being the same.
+    fn for_frames(&self, mut call: impl FnMut(usize, &Scene, &Query)) {
+        let (mut scene, bodies) = self.scene();
+        let query = (self.query)(&bodies);
+        for frame in 0..N_FRAMES {
+            self.show(&mut scene, &bodies, frame);
+            call(frame, &scene, &query);
+        }
+    }
+}
+
+/// Moved off the lattice of `f32`, so that the boxes of bodies in double precision are rounded.
+fn wide(positions: &[[f32; 3]]) -> Vec<[f64; 3]> {
+    let wide = |x: f32| f64::from(x) * (1.0 + 1e-9);
+    positions.iter().map(|point| point.map(wide)).collect()
+}
+
+/// A ball of several hundred triangles: clusters in two levels.
+fn ball() -> Model {
+    surfaces::bumpy_ball(1_300, 0.2)
+}
+
+/// Drifts through, with a jump in the end.
+fn drift(body: usize, frame: usize, [x, y, z]: [f32; 3]) -> [f32; 3] {
+    let t = frame as f32;
+    match body {
+        0 => [x + 0.01 * (t * y).sin(), y, z],
+        1 if frame == 6 => [x, y - 0.9, z],
+        k => [x + 0.9 - 0.03 * t, y + 0.1, z + 0.8 * (k - 1) as f32],
+    }
+}
+
+fn twist(body: usize, frame: usize, [x, y, z]: [f32; 3]) -> [f32; 3] {
+    let (sin, cos) = (0.5 * frame as f32 * z).sin_cos();
+    let offset = 0.3 * body as f32;
+    [cos * x - sin * y + offset, sin * x + cos * y, z]
+}
+
+/// Whole steps, so that points of a lattice stay on it.
+fn hop(body: usize, frame: usize, [x, y, z]: [f32; 3]) -> [f32; 3] {
+    match body {
+        0 => [x, y, z],
+        _ => [x + (frame % 3) as f32, y, z - (frame % 2) as f32],
+    }
+}
+
+fn films() -> Vec<Film> {
+    let between: fn(&[BodyId]) -> Query = |bodies| Query::between(bodies[0], bodies[1]);
+    let resolved: fn(&[BodyId]) -> Query =
+        |_| Query::everything().shared_vertex(SharedVertex::Resolve);
+    let mut films = Vec::new();
+    for double in [false, true] {
+        let film = |name, bodies: [Model; 2], query, motion| Film {
+            name,
+            bodies: bodies.into(),
+            double,
+            query,
+            motion,
+        };
+        let tetrahedra = solids::block(6, 6, 5, 0.2);
+        films.extend([
+            film("balls that drift", [ball(), ball()], between, drift),
+            film("balls that twist", [ball(), ball()], resolved, twist),
+            film(
+                "tetrahedra that drift",
+                [tetrahedra.clone(), tetrahedra.clone()],
+                between,
+                drift,
+            ),
+            film(
+                "tetrahedra that twist",
+                [tetrahedra, soup::tetrahedra(200, 0.4, 3)],
+                resolved,
+                twist,
+            ),
+            film(
+                "lattices that hop",
+                [
+                    soup::lattice_triangles(500, 6, 1),
+                    soup::lattice_tetrahedra(200, 6, 2),
+                ],
+                between,
+                hop,
+            ),
+            film(
+                "webs that hop",
+                [
+                    soup::lattice_web(300, 4, 1),
+                    soup::lattice_web_tetrahedra(200, 4, 2),
+                ],
+                resolved,
+                hop,
+            ),
+        ]);
+        films.push(Film {
+            name: "many that drift",
+            bodies: vec![ball(), ball(), soup::tetrahedra(300, 0.3, 1), ball()],
+            double,
+            query: |_| Query::all(),
+            motion: drift,
+        });
+    }
+    films
+}
+
+/// The boxes of positions in double precision are rounded outward to `f32`, so more of them overlap.
+fn is_single(scene: &Scene) -> bool {
+    let mut bodies = scene.bodies();
+    bodies.all(|(_, body)| matches!(body.positions(), Positions::F32(_)))
+}
+
+#[test]
+fn no_threshold_changes_the_answer_to_a_frame() {
+    let mut tunings = extremes();
+    tunings.extend(each_of("eager", eager()));
+    for film in films() {
+        let mut expected = Vec::new();
+        let mut oracle = detector(Method::Naive, 1, Tuning::default());
+        film.for_frames(|_, scene, query| {
+            let pairs = oracle.detect(scene, query).unwrap();
+            expected.push((rows(pairs), pairs.stats().n_candidates));
+        });
+        assert!(expected.iter().any(|(rows, _)| !rows.is_empty()));
+        for tuned in &tunings {
+            for &method in tuned.methods {
+                let mut detector = detector(method, 2, tuned.tuning);
+                film.for_frames(|frame, scene, query| {
+                    let what = || format!("{} {frame}, {}, {method:?}", film.name, tuned.name);
+                    let (expected, n_candidates) = &expected[frame];
+                    let pairs: &Pairs = detector.detect(scene, query).unwrap();
+                    if let Err(error) = agree(expected, &rows(pairs), pairs.hash()) {
+                        panic!("{}: {error}", what());
+                    }
+                    let found = pairs.stats().n_candidates;
+                    let is_right = match is_single(scene) {
+                        true => found == *n_candidates,
+                        false => found >= *n_candidates,
+                    };
+                    assert!(is_right, "{}: {found} of {n_candidates}", what());
+                });
+            }
+        }
+    }
+}
+
+/// The answers to a step.
+#[derive(Debug, PartialEq)]
+struct Answers {
+    impacts: Vec<Impact>,
+    earliest: Option<Impact>,
+    candidates: u64,
+    near: Vec<NearPair>,
+}
+
+fn answers(detector: &mut Detector, scene: &Scene, query: &Query) -> Answers {
+    let step = Step::new(query.clone());
+    let near = NearQuery::new(query.clone()).distance(0.02);
+    let candidates = CandidateQuery::new(query.clone()).distance(0.02);
+    Answers {
+        impacts: detector.impacts(scene, &step).unwrap().as_slice().into(),
+        earliest: detector.earliest(scene, &step).unwrap(),
+        candidates: detector.candidates(scene, &candidates).unwrap().hash(),
+        near: (detector.within_distance(scene, &near).unwrap().as_slice()).into(),
+    }
+}
+
+#[test]
+fn no_threshold_changes_the_answer_to_a_step() {
+    let mut tunings = extremes();
+    tunings.extend(each_of("default", Tuning::default()));
+    tunings.extend(each_of("eager", eager()));
+    let film = |double, query| Film {
+        name: "steps",
+        bodies: vec![surfaces::bumpy_ball(300, 0.2), solids::block(3, 3, 2, 0.4)],
+        double,
+        query,
+        motion: twist,
+    };
+    for film in [
+        film(false, |bodies| Query::between(bodies[0], bodies[1])),
+        film(true, |_| Query::everything()),
+    ] {
+        let (mut scene, bodies) = film.scene();
+        let query = (film.query)(&bodies);
+        let mut oracle = detector(Method::Naive, 2, Tuning::default());
+        let mut detectors: Vec<_> = tunings
+            .iter()
+            .map(|tuned| (&tuned.name, detector(Method::Clusters, 2, tuned.tuning)))
+            .collect();
+        for frame in 5..7 {
+            film.show(&mut scene, &bodies, frame);
+            for (ix, (&body, positions)) in bodies.iter().zip(film.pose(frame + 1)).enumerate() {
+                match film.double && ix == 0 {
+                    true => scene.set_end_positions(body, &wide(&positions)).unwrap(),
+                    false => scene.set_end_positions(body, &positions).unwrap(),
+                }
+            }
+            let expected = answers(&mut oracle, &scene, &query);
+            let counts = (expected.impacts.len(), expected.near.len());
+            assert!(counts.0 >= 8 && counts.1 >= 8, "{counts:?}");
+            for (name, detector) in &mut detectors {
+                let found = answers(detector, &scene, &query);
+                assert!(found == expected, "frame {frame}, {name}");
+            }
+        }
+    }
+}
+
+/// What a threshold governs, seen in the statistics of a few frames: one number with the threshold at 0, and one at infinity.
+struct Watched {
+    method: Method,
+    /// Thresholds that must be at 0 for this one to matter; all others are at infinity.
+    at_zero: &'static [&'static str],
+    count: fn(&Statistics) -> u64,
+    expected: fn(u64, u64) -> bool,
+}
+
+impl Watched {
+    fn new(
+        method: Method,
+        at_zero: &'static [&'static str],
+        count: fn(&Statistics) -> u64,
+        expected: fn(u64, u64) -> bool,
+    ) -> Watched {
+        Watched {
+            method,
+            at_zero,
+            count,
+            expected,
+        }
+    }
+
+    /// How a threshold shows in the frames of a film. `None` for those of steps.
+    fn of(threshold: &str) -> Option<Watched> {
+        let only_at_zero: fn(u64, u64) -> bool = |zero, infinity| zero > 0 && infinity == 0;
+        let more_at_zero: fn(u64, u64) -> bool = |zero, infinity| zero > infinity;
+        let only_at_infinity: fn(u64, u64) -> bool = |zero, infinity| zero == 0 && infinity > 0;
+        let n_shared: fn(&Statistics) -> u64 = |stats| stats.ways.n_shared;
+        let n_remote: fn(&Statistics) -> u64 = |stats| stats.n_remote;
+        let in_grid: fn(&Statistics) -> u64 = |stats| u64::from(stats.method == "cells");
+        let (clusters, cells, auto) = (Method::Clusters, Method::Cells, Method::Auto);
+        let new = Watched::new;
+        Some(match threshold {
+            "call_from" => new(clusters, &[], |stats| stats.ways.n_called, only_at_zero),
+            // Helpers may be woken for other reasons too.
+            "wake_from" => new(
+                clusters,
+                &[],
+                |stats| stats.ways.wakes.into(),
+                |zero, _| zero == N_FRAMES as u64,
+            ),
+            "pool_from" => new(clusters, &[], |stats| stats.ways.n_pooled, only_at_zero),
+            "most_per_task" => new(clusters, &[], |stats| stats.ways.n_tasks, more_at_zero),
+            "bounds_parallel_from" => new(clusters, &[], n_shared, only_at_zero),
+            "stale_from" => new(clusters, &[], |stats| stats.n_reclustered, only_at_zero),
+            "remote_from" => new(clusters, &[], n_remote, only_at_zero),
+            "remote_one_in" => new(clusters, &["remote_from"], n_remote, only_at_infinity),
+            "remote_cost" => new(
+                clusters,
+                &["remote_from"],
+                |stats| stats.ways.n_came_back,
+                more_at_zero,
+            ),
+            "remote_lasts" => new(clusters, &["remote_from"], n_remote, only_at_infinity),
+            "kept_parallel_from" => new(cells, &[], n_shared, more_at_zero),
+            "most_maps" => new(cells, &[], |stats| stats.ways.n_mapped, only_at_infinity),
+            // A finer map drops more primitives.
+            "map_cell" => new(
+                cells,
+                &[],
+                |stats| stats.n_entries,
+                |zero, infinity| zero < infinity,
+            ),
+            "most_marked" => new(cells, &[], |stats| stats.ways.n_everywhere, only_at_zero),
+            "most_slab_items" => new(
+                clusters,
+                &[],
+                |stats| stats.n_slabs,
+                |zero, infinity| zero > 2 * infinity,
+            ),
+            "pairing_parallel_from" => new(clusters, &[], n_shared, only_at_zero),
+            "most_cached" => new(clusters, &[], |stats| stats.ways.n_evicted, more_at_zero),
+            "settle_from" => new(cells, &[], |stats| stats.ways.n_full, only_at_zero),
+            "auto_from" => new(auto, &["auto_body_from"], in_grid, only_at_zero),
+            "auto_body_from" => new(auto, &["auto_from"], in_grid, only_at_zero),
+            "auto_most_crowded" => new(
+                auto,
+                &["auto_from", "auto_body_from"],
+                in_grid,
+                only_at_infinity,
+            ),
+            "step_bounds_parallel_from" | "sort_from" => return None,
+            other => panic!("nothing shows that the code behind {other} is entered"),
+        })
+    }
+}
+
+#[test]
+fn the_code_behind_each_threshold_is_entered() {
+    let film = Film {
+        name: "balls",
+        bodies: vec![ball(), ball()],
+        double: false,
+        query: |bodies| Query::between(bodies[0], bodies[1]),
+        motion: drift,
+    };
+    for threshold in Tuning::NAMES {
+        let Some(watched) = Watched::of(threshold) else {
+            continue;
+        };
+        let counts = Tuning::ENDS.map(|end| {
+            let zero = Tuning::ENDS[ZERO];
+            let infinity = Tuning::ENDS[INFINITY];
+            let set = |tuning: Tuning, name: &&str| tuning.with(name, &zero);
+            let tuning = watched.at_zero.iter().fold(infinity, set);
+            let mut detector = detector(watched.method, 2, tuning.with(threshold, &end));
+            let mut count = 0;
+            film.for_frames(|_, scene, query| {
+                // So long that helpers sleep.
+                std::thread::sleep(Duration::from_millis(3));
+                let pairs = detector.detect(scene, query).unwrap();
+                count += (watched.count)(pairs.stats());
+            });
+            count
+        });
+        let [zero, infinity] = counts;
+        let is_remote = threshold.starts_with("remote");
+        if is_remote && !leaves_out() {
+            assert_eq!(counts, [0, 0]);
+            continue;
+        }
+        assert!(
+            (watched.expected)(zero, infinity),
+            "{threshold}: {zero} at 0, {infinity} at infinity"
+        );
+    }
+}
+
+#[test]
+fn the_code_behind_thresholds_of_steps_is_entered() {
+    let mut scene = Scene::new();
+    let ball = ball();
+    ball.add_to(&mut scene).unwrap();
+    let b = ball.translated([0.2, 0.1, 0.0]).add_to(&mut scene).unwrap();
+    let to = ball.translated([0.1, 0.1, 0.0]);
+    scene.set_end_positions(b, &to.positions).unwrap();
+    let query = CandidateQuery::new(Query::all()).distance(0.1);
+    let counts = |threshold: &str, count: fn(&Statistics) -> u64| {
+        Tuning::ENDS.map(|end| {
+            let tuning = Tuning::ENDS[INFINITY].with(threshold, &end);
+            let mut detector = detector(Method::Clusters, 2, tuning);
+            count(detector.candidates(&scene, &query).unwrap().stats())
+        })
+    };
+    let [zero, infinity] = counts("step_bounds_parallel_from", |stats| stats.ways.n_shared);
+    assert!(zero > 0 && infinity == 0, "{zero}, {infinity}");
+    let [zero, infinity] = counts("sort_from", |stats| stats.ways.n_counted);
+    assert!(zero > 0 && infinity == 0, "{zero}, {infinity}");
+    let tuned = |end: usize| {
+        let tuning = Tuning::ENDS[INFINITY].with("settle_from", &Tuning::ENDS[end]);
+        let mut detector = detector(Method::Clusters, 2, tuning);
+        let step = Step::new(Query::all());
+        detector.impacts(&scene, &step).unwrap().stats().ways.n_full
+    };
+    assert!(tuned(ZERO) > 0 && tuned(INFINITY) == 0);
+}
