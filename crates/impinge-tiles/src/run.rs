@@ -1,5 +1,6 @@
 //! Runs one tile: reads its primitives from all parts, finds the pairs among them, and keeps those that the tile owns.
 
+mod ranges;
 mod records;
 mod step;
 mod surfaces;
@@ -11,6 +12,7 @@ use std::path::{Path, PathBuf};
 use impinge::{Backend, Control, Detector, Query, Settings, SharedVertex, Start, Toi, hash_rows};
 use serde_json::{Value, json};
 
+use self::ranges::both;
 use self::records::Records;
 use crate::disk;
 use crate::error::Error;
@@ -363,25 +365,6 @@ impl Plan {
             Some((_, result)) => Ok(result),
         }
     }
-}
-
-/// The primitives of two pieces, which may be the same one.
-fn both(a: &Range<usize>, b: &Range<usize>) -> Vec<Range<usize>> {
-    match a == b {
-        true => vec![a.clone()],
-        false => vec![a.clone(), b.clone()],
-    }
-}
-
-/// The parts of `ranges` that lie in `whole`.
-fn within<'a>(
-    ranges: &'a [Range<usize>],
-    whole: &'a Range<usize>,
-) -> impl Iterator<Item = Range<usize>> + 'a {
-    let parts = ranges
-        .iter()
-        .map(|range| range.start.max(whole.start)..range.end.min(whole.end));
-    parts.filter(|part| !part.is_empty())
 }
 
 /// The error of a detection in a tile.

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use impinge::{Elements, Positions, Scene};
 
+use super::ranges::within;
 use super::surfaces::{Surface, Surfaces};
-use super::within;
 use crate::cells::owner_point;
 use crate::chunk::{Record, Shape};
 use crate::parts::Segment;

@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use impinge::{Control, Detector, Step, hash_rows};
 
+use super::ranges::both;
 use super::records::Records;
 use super::surfaces::SurfaceScene;
-use super::{Ask, OfStep, TileResult, both, refused, write_rows};
+use super::{Ask, OfStep, TileResult, refused, write_rows};
 use crate::error::Error;
 use crate::plan::Plan;
 use crate::step::{Contact, checksum};

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use impinge::{BodyId, Elements, Impact, Part, Positions, Scene};
 
-use super::within;
+use super::ranges::within;
 use crate::cells::{Bounds, owner_point};
 use crate::chunk::bounds;
 use crate::step::{BOUNDARY, EDGES, Element, Name};
