@@ -47,6 +47,7 @@ pub(super) fn room_to_wait(tuning: &Tuning) -> usize {
 
 /// One worker's candidates, pairs and counts.
 #[derive(Debug, Default)]
+#[repr(align(128))]
 pub struct Settler {
     /// Keys of pairs that intersect, handed over in blocks.
     pub keys: Vec<u64>,

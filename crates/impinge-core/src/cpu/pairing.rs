@@ -34,8 +34,9 @@ use super::world::{BodyRef, World};
 /// The narrow stage is timed for one work item in this many: reading the clock takes longer than some items.
 const SAMPLED: u32 = 16;
 
-/// The state of one worker.
+/// The state of one worker. Two of them share no cache line, nor a pair of lines that is fetched together.
 #[derive(Debug, Default)]
+#[repr(align(128))]
 pub(crate) struct Worker {
     pub settler: Settler,
     /// Scratch for pairs that share a hub.

@@ -28,8 +28,9 @@ use super::world::World;
 /// The narrow stage is timed for one work item in this many.
 const SAMPLED: u32 = 16;
 
-/// The state of one worker.
+/// The state of one worker. Two of them share no cache line, nor a pair of lines that is fetched together.
 #[derive(Debug)]
+#[repr(align(128))]
 pub(crate) struct Worker {
     groups: GroupCache<Group>,
     met: Met,
