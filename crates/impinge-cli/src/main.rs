@@ -19,6 +19,7 @@ mod picture;
 mod regions;
 mod rows;
 mod stop;
+mod target;
 mod text;
 mod values;
 mod watch;

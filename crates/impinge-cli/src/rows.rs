@@ -1,30 +1,20 @@
 //! Rows of pairs: CSV, lines of JSON, NumPy arrays.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 
 use impinge::Pairs;
-use impinge_io::{AtomicFile, npy_header};
+use impinge_io::npy_header;
 
 use crate::error::Error;
-use crate::output::out;
+use crate::target::Target;
 use crate::values::{RowsFile, RowsFormat};
 
 /// Writes rows `body_a, primitive_a, body_b, primitive_b`, sorted.
 pub fn write(file: &RowsFile, pairs: &Pairs) -> Result<(), Error> {
-    if file.is_stdout() {
-        let mut to = BufWriter::new(out());
-        put(&mut to, file.format, pairs)?;
-        return Ok(to.flush()?);
-    }
-    let mut to = AtomicFile::create(&file.path)?;
-    put(&mut to, file.format, pairs).map_err(|source| Error::Write {
-        path: file.path.clone(),
-        source,
-    })?;
-    Ok(to.finish()?)
+    Target::fill(file, |to| put(to, file.format, pairs))
 }
 
-fn put(to: &mut impl Write, format: RowsFormat, pairs: &Pairs) -> io::Result<()> {
+fn put(to: &mut dyn Write, format: RowsFormat, pairs: &Pairs) -> io::Result<()> {
     match format {
         RowsFormat::Npy => npy(to, pairs.rows()),
         RowsFormat::Csv => csv(to, pairs.rows()),
@@ -34,9 +24,8 @@ fn put(to: &mut impl Write, format: RowsFormat, pairs: &Pairs) -> io::Result<()>
 
 /// The rows of the frames of a sequence, each preceded by the number of its frame.
 pub struct FrameRows {
-    file: RowsFile,
-    /// `None` for standard output.
-    to: Option<AtomicFile>,
+    format: RowsFormat,
+    to: Target,
 }
 
 impl FrameRows {
@@ -46,23 +35,20 @@ impl FrameRows {
             let text = "--pairs: the pairs of a sequence are written as .csv or .jsonl";
             return Err(Error::Usage(text.to_owned()));
         }
-        let mut rows = FrameRows {
-            to: match file.is_stdout() {
-                true => None,
-                false => Some(AtomicFile::create(&file.path)?),
-            },
-            file: file.clone(),
-        };
+        let mut to = Target::create(file)?;
         if file.format == RowsFormat::Csv {
-            rows.put(|to| writeln!(to, "frame,body_a,primitive_a,body_b,primitive_b"))?;
+            to.write(|to| writeln!(to, "frame,body_a,primitive_a,body_b,primitive_b"))?;
         }
-        Ok(rows)
+        Ok(FrameRows {
+            format: file.format,
+            to,
+        })
     }
 
     /// Adds the pairs of a frame.
     pub fn frame(&mut self, frame_ix: usize, pairs: &Pairs) -> Result<(), Error> {
-        let is_csv = self.file.format == RowsFormat::Csv;
-        self.put(|to| {
+        let is_csv = self.format == RowsFormat::Csv;
+        self.to.write(|to| {
             for [body_a, a, body_b, b] in pairs.rows() {
                 if is_csv {
                     writeln!(to, "{frame_ix},{body_a},{a},{body_b},{b}")?;
@@ -77,28 +63,11 @@ impl FrameRows {
 
     /// Gives the file its name.
     pub fn finish(self) -> Result<(), Error> {
-        match self.to {
-            Some(file) => Ok(file.finish()?),
-            None => Ok(()),
-        }
-    }
-
-    fn put(&mut self, act: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Error> {
-        match &mut self.to {
-            Some(file) => act(file).map_err(|source| Error::Write {
-                path: self.file.path.clone(),
-                source,
-            }),
-            None => {
-                let mut to = BufWriter::new(out());
-                act(&mut to)?;
-                Ok(to.flush()?)
-            }
-        }
+        self.to.finish()
     }
 }
 
-fn npy(to: &mut impl Write, rows: impl ExactSizeIterator<Item = [u32; 4]>) -> io::Result<()> {
+fn npy(to: &mut dyn Write, rows: impl ExactSizeIterator<Item = [u32; 4]>) -> io::Result<()> {
     to.write_all(&npy_header("'<u4'", &format!("({}, 4)", rows.len())))?;
     for row in rows {
         to.write_all(row.map(u32::to_le_bytes).as_flattened())?;
@@ -106,7 +75,7 @@ fn npy(to: &mut impl Write, rows: impl ExactSizeIterator<Item = [u32; 4]>) -> io
     Ok(())
 }
 
-fn csv(to: &mut impl Write, rows: impl Iterator<Item = [u32; 4]>) -> io::Result<()> {
+fn csv(to: &mut dyn Write, rows: impl Iterator<Item = [u32; 4]>) -> io::Result<()> {
     writeln!(to, "body_a,primitive_a,body_b,primitive_b")?;
     for [body_a, a, body_b, b] in rows {
         writeln!(to, "{body_a},{a},{body_b},{b}")?;
@@ -114,7 +83,7 @@ fn csv(to: &mut impl Write, rows: impl Iterator<Item = [u32; 4]>) -> io::Result<
     Ok(())
 }
 
-fn jsonl(to: &mut impl Write, rows: impl Iterator<Item = [u32; 4]>) -> io::Result<()> {
+fn jsonl(to: &mut dyn Write, rows: impl Iterator<Item = [u32; 4]>) -> io::Result<()> {
     for row in rows {
         to.write_all(b"{")?;
         members(to, row)?;

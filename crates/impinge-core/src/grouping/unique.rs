@@ -174,7 +174,7 @@ mod tests {
     fn scattered(n: usize, below: u32) -> Vec<[u32; 3]> {
         let number = |k: usize| {
             let mixed = (k as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-            ((mixed >> 32) * u64::from(below) >> 32) as u32
+            (((mixed >> 32) * u64::from(below)) >> 32) as u32
         };
         (0..n)
             .map(|k| [number(3 * k), number(3 * k + 1), number(3 * k + 2)])

@@ -1,14 +1,14 @@
 //! Near pairs as files: NumPy arrays, CSV, lines of JSON.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 
 use impinge::exact::Feature;
 use impinge::{NearPair, NearPairs};
-use impinge_io::{AtomicFile, npy_header};
+use impinge_io::npy_header;
 use serde_json::json;
 
 use crate::error::Error;
-use crate::output::out;
+use crate::target::Target;
 use crate::values::{RowsFile, RowsFormat};
 
 /// Characters of the longest type, `EA0_EB1`.
@@ -16,20 +16,10 @@ const TYPE: usize = 7;
 
 /// Writes a row for each pair, sorted.
 pub fn write(file: &RowsFile, near: &NearPairs) -> Result<(), Error> {
-    if file.is_stdout() {
-        let mut to = BufWriter::new(out());
-        put(&mut to, file.format, near)?;
-        return Ok(to.flush()?);
-    }
-    let mut to = AtomicFile::create(&file.path)?;
-    put(&mut to, file.format, near).map_err(|source| Error::Write {
-        path: file.path.clone(),
-        source,
-    })?;
-    Ok(to.finish()?)
+    Target::fill(file, |to| put(to, file.format, near))
 }
 
-fn put(to: &mut impl Write, format: RowsFormat, near: &NearPairs) -> io::Result<()> {
+fn put(to: &mut dyn Write, format: RowsFormat, near: &NearPairs) -> io::Result<()> {
     match format {
         RowsFormat::Npy => npy(to, near),
         RowsFormat::Csv => csv(to, near),
@@ -54,7 +44,7 @@ fn feature(feature: Feature) -> String {
 }
 
 /// Characters of four bytes each, as NumPy has them, filled up with zeros.
-fn characters(to: &mut impl Write, text: &str, width: usize) -> io::Result<()> {
+fn characters(to: &mut dyn Write, text: &str, width: usize) -> io::Result<()> {
     let letters = text.chars().map(u32::from);
     for letter in letters.chain(std::iter::repeat(0)).take(width) {
         to.write_all(&letter.to_le_bytes())?;
@@ -63,7 +53,7 @@ fn characters(to: &mut impl Write, text: &str, width: usize) -> io::Result<()> {
 }
 
 /// A structured array, packed.
-fn npy(to: &mut impl Write, near: &NearPairs) -> io::Result<()> {
+fn npy(to: &mut dyn Write, near: &NearPairs) -> io::Result<()> {
     let fields = format!(
         "[('kind', '<U2'), ('body_a', '<u4'), ('element_a', '<u4'), ('body_b', '<u4'), ('element_b', '<u4'), \
          ('type', '<U{TYPE}'), ('feature_a', '<U2'), ('feature_b', '<U2'), ('parallel', '|b1'), \
@@ -88,7 +78,7 @@ fn npy(to: &mut impl Write, near: &NearPairs) -> io::Result<()> {
 }
 
 /// Numbers are written so that they read back to the same bits.
-fn csv(to: &mut impl Write, near: &NearPairs) -> io::Result<()> {
+fn csv(to: &mut dyn Write, near: &NearPairs) -> io::Result<()> {
     writeln!(
         to,
         "kind,body_a,element_a,body_b,element_b,type,feature_a,feature_b,parallel,distance,ax,ay,az,bx,by,bz"
@@ -111,7 +101,7 @@ fn csv(to: &mut impl Write, near: &NearPairs) -> io::Result<()> {
     Ok(())
 }
 
-fn jsonl(to: &mut impl Write, near: &NearPairs) -> io::Result<()> {
+fn jsonl(to: &mut dyn Write, near: &NearPairs) -> io::Result<()> {
     for pair in near {
         let [body_a, a, body_b, b] = pair.row();
         let (distance, [point_a, point_b]) = measured(pair);

@@ -1,16 +1,16 @@
 //! `impinge step --candidates`: pairs of elements whose boxes overlap, written run by run, so that memory holds only one run.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
 use impinge::{CandidateQuery, Candidates, Control, Detector, PairKind, Statistics};
-use impinge_io::{AtomicFile, npy_header, npy_header_in};
+use impinge_io::{npy_header, npy_header_in};
 use serde_json::{Map, Value, json};
 
 use crate::error::Error;
 use crate::json::{counters, rounded};
-use crate::output::out;
+use crate::target::Target;
 use crate::text::{counted, grouped, hex};
 use crate::values::{RowsFile, RowsFormat};
 
@@ -118,37 +118,34 @@ impl Written {
     }
 }
 
-/// A file of candidates, or standard output.
-struct Rows<'a> {
-    file: &'a RowsFile,
-    to: Option<AtomicFile>,
+/// A file of candidates.
+struct Rows {
+    format: RowsFormat,
+    to: Target,
     n: u64,
 }
 
-impl<'a> Rows<'a> {
-    fn create(file: &'a RowsFile) -> Result<Self, Error> {
-        let mut rows = Rows {
-            to: match file.is_stdout() {
-                true => None,
-                false => Some(AtomicFile::create(&file.path)?),
-            },
-            file,
-            n: 0,
-        };
+impl Rows {
+    fn create(file: &RowsFile) -> Result<Self, Error> {
+        let mut to = Target::create(file)?;
         match file.format {
-            RowsFormat::Npy => rows.write(|to| to.write_all(&longest_header()))?,
+            RowsFormat::Npy => to.write(|to| to.write_all(&longest_header()))?,
             RowsFormat::Csv => {
-                rows.write(|to| writeln!(to, "kind,body_a,element_a,body_b,element_b"))?;
+                to.write(|to| writeln!(to, "kind,body_a,element_a,body_b,element_b"))?;
             }
             RowsFormat::Jsonl => {}
         }
-        Ok(rows)
+        Ok(Rows {
+            format: file.format,
+            to,
+            n: 0,
+        })
     }
 
     fn put(&mut self, run: &Candidates) -> Result<(), Error> {
-        let format = self.file.format;
+        let format = self.format;
         self.n += run.len() as u64;
-        self.write(|to| {
+        self.to.write(|to| {
             for kind in PairKind::ALL {
                 for row in run.rows(kind) {
                     put(to, format, kind, row)?;
@@ -158,29 +155,13 @@ impl<'a> Rows<'a> {
         })
     }
 
-    fn write(&mut self, act: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Error> {
-        match &mut self.to {
-            Some(file) => act(file).map_err(|source| Error::Write {
-                path: self.file.path.clone(),
-                source,
-            }),
-            None => {
-                let mut to = BufWriter::new(out());
-                act(&mut to)?;
-                Ok(to.flush()?)
-            }
-        }
-    }
-
     /// Writes the number of rows into the header, and gives the file its name.
-    fn finish(self) -> Result<(), Error> {
-        let Some(mut to) = self.to else {
-            return Ok(());
-        };
-        if self.file.format == RowsFormat::Npy {
-            to.patch(0, &header(longest_header().len(), self.n))?;
+    fn finish(mut self) -> Result<(), Error> {
+        if self.format == RowsFormat::Npy {
+            self.to
+                .write_start(&header(longest_header().len(), self.n))?;
         }
-        Ok(to.finish()?)
+        self.to.finish()
     }
 }
 

@@ -1,31 +1,21 @@
 //! Impacts as files: NumPy arrays and CSV.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 
 use impinge::{Impact, Impacts};
-use impinge_io::{AtomicFile, write_impacts_npy};
+use impinge_io::write_impacts_npy;
 
 use crate::args::ToiArg;
 use crate::error::Error;
-use crate::output::out;
+use crate::target::Target;
 use crate::values::{RowsFile, RowsFormat};
 
 /// Writes rows `kind, body_a, element_a, body_b, element_b, toi`, sorted.
 pub fn write(file: &RowsFile, toi: ToiArg, impacts: &Impacts) -> Result<(), Error> {
-    if file.is_stdout() {
-        let mut to = BufWriter::new(out());
-        put(&mut to, file.format, toi, impacts.as_slice())?;
-        return Ok(to.flush()?);
-    }
-    let mut to = AtomicFile::create(&file.path)?;
-    put(&mut to, file.format, toi, impacts.as_slice()).map_err(|source| Error::Write {
-        path: file.path.clone(),
-        source,
-    })?;
-    Ok(to.finish()?)
+    Target::fill(file, |to| put(to, file.format, toi, impacts.as_slice()))
 }
 
-fn put(to: &mut impl Write, format: RowsFormat, toi: ToiArg, impacts: &[Impact]) -> io::Result<()> {
+fn put(to: &mut dyn Write, format: RowsFormat, toi: ToiArg, impacts: &[Impact]) -> io::Result<()> {
     match format {
         RowsFormat::Npy => npy(to, toi, impacts),
         RowsFormat::Csv => csv(to, impacts),
@@ -33,7 +23,7 @@ fn put(to: &mut impl Write, format: RowsFormat, toi: ToiArg, impacts: &[Impact])
     }
 }
 
-fn npy(to: &mut impl Write, toi: ToiArg, impacts: &[Impact]) -> io::Result<()> {
+fn npy(to: &mut dyn Write, toi: ToiArg, impacts: &[Impact]) -> io::Result<()> {
     let rows = impacts
         .iter()
         .map(|impact| (impact.kind.name(), impact.row(), impact.toi));
@@ -41,7 +31,7 @@ fn npy(to: &mut impl Write, toi: ToiArg, impacts: &[Impact]) -> io::Result<()> {
 }
 
 /// Times are written with enough digits to read back the same bits, in single and in double precision.
-fn csv(to: &mut impl Write, impacts: &[Impact]) -> io::Result<()> {
+fn csv(to: &mut dyn Write, impacts: &[Impact]) -> io::Result<()> {
     writeln!(to, "kind,body_a,element_a,body_b,element_b,toi")?;
     for impact in impacts {
         let [body_a, a, body_b, b] = impact.row();
@@ -51,7 +41,7 @@ fn csv(to: &mut impl Write, impacts: &[Impact]) -> io::Result<()> {
     Ok(())
 }
 
-fn jsonl(to: &mut impl Write, impacts: &[Impact]) -> io::Result<()> {
+fn jsonl(to: &mut dyn Write, impacts: &[Impact]) -> io::Result<()> {
     for impact in impacts {
         writeln!(to, "{}", super::answer::impact(*impact))?;
     }
