@@ -553,12 +553,7 @@ impl Detector {
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<Candidates> {
-        let kinds = steps::kinds(kinds)?;
-        let distance = steps::distance(distance, "distance")?;
-        let ask = |scene: &Scene| {
-            let query = step_question(scene, between, within, ignore)?;
-            Ok(CandidateQuery::new(query).kinds(kinds).distance(distance))
-        };
+        let ask = candidate_question([between, within, ignore], kinds, distance)?;
         let answer = |detector: &mut impinge::Detector,
                       scene: &impinge::Scene,
                       query: &CandidateQuery,
@@ -631,8 +626,7 @@ impl Detector {
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<u64> {
-        let kinds = steps::kinds(kinds)?;
-        let distance = steps::distance(distance, "distance")?;
+        let ask = candidate_question([between, within, ignore], kinds, distance)?;
         let most = match most {
             Some(most) => unsigned(most, "most", u64::MAX)?,
             None => 1 << 22,
@@ -641,10 +635,6 @@ impl Detector {
             return Err(unexpected(each, "each", "a callable"));
         }
         let each = each.clone().unbind();
-        let ask = |scene: &Scene| {
-            let query = step_question(scene, between, within, ignore)?;
-            Ok(CandidateQuery::new(query).kinds(kinds).distance(distance))
-        };
         let answer = |detector: &mut impinge::Detector,
                       scene: &impinge::Scene,
                       query: &CandidateQuery,
@@ -917,4 +907,18 @@ impl Detector {
             (None, answer) => Ok((answer.map_err(raise)?, question, scene.number)),
         }
     }
+}
+
+/// What the keywords ask about candidates; bodies (`between`, `within`, `ignore`) are looked up in the scene.
+fn candidate_question<'a, 'py>(
+    [between, within, ignore]: [Argument<'a, 'py>; 3],
+    kinds: Argument<'_, '_>,
+    distance: Argument<'_, '_>,
+) -> PyResult<impl FnOnce(&Scene) -> PyResult<CandidateQuery> + use<'a, 'py>> {
+    let kinds = steps::kinds(kinds)?;
+    let distance = steps::distance(distance, "distance")?;
+    Ok(move |scene: &Scene| {
+        let query = step_question(scene, between, within, ignore)?;
+        Ok(CandidateQuery::new(query).kinds(kinds).distance(distance))
+    })
 }
