@@ -75,7 +75,8 @@ impl Clustering {
                 number: primitive as u32,
             })
             .collect();
-        let classes = with_corners!(elements, |corners| hubs::classes(corners));
+        let counts = with_corners!(elements, |corners| hubs::counts(corners));
+        let classes = with_corners!(elements, |corners| hubs::classes(corners, &counts));
         let classes = classes.as_deref();
         super::hierarchy::order(&shape, GROUP, classes, &mut entries);
         let order: Vec<u32> = entries.iter().map(|entry| entry.number).collect();
@@ -93,9 +94,12 @@ impl Clustering {
         };
         let hubs = classes
             .is_some()
-            .then(|| with_corners!(&corners, |corners| Hubs::new(corners, &shape)));
+            .then(|| with_corners!(&corners, |corners| Hubs::new(corners, &counts, &shape)));
         Clustering {
-            n_vertices_covered: covered(&vertices),
+            n_vertices_covered: counts
+                .iter()
+                .all(|&count| count > 0)
+                .then_some(counts.len()),
             order,
             corners,
             vertices,
@@ -172,16 +176,6 @@ impl Clustering {
             + self.rings.get().map_or(0, Rings::bytes)
             + size_of_val(&self.local_faces[..])
     }
-}
-
-/// `n` if vertices `0..n` all occur.
-fn covered(vertices: &[u32]) -> Option<usize> {
-    let n = vertices.iter().max().map_or(0, |&last| last as usize + 1);
-    let mut seen = vec![false; n];
-    for &vertex in vertices {
-        seen[vertex as usize] = true;
-    }
-    seen.iter().all(|&seen| seen).then_some(n)
 }
 
 fn gather<const N: usize>(elements: &[[u32; N]], order: &[u32]) -> Vec<[u32; N]> {

@@ -100,8 +100,11 @@ pub(super) fn counts<const N: usize>(corners: &[[u32; N]]) -> Vec<u32> {
 }
 
 /// For each primitive, the one of its hubs that is named most often, if it has any; `None` if the body has no hub.
-pub(super) fn classes<const N: usize>(corners: &[[u32; N]]) -> Option<Vec<Option<u32>>> {
-    let counts = counts(corners);
+/// `counts` says how often each vertex is named.
+pub(super) fn classes<const N: usize>(
+    corners: &[[u32; N]],
+    counts: &[u32],
+) -> Option<Vec<Option<u32>>> {
     if counts.iter().all(|&count| count <= HUB) {
         return None;
     }
@@ -117,9 +120,8 @@ pub(super) fn classes<const N: usize>(corners: &[[u32; N]]) -> Option<Vec<Option
 }
 
 impl Hubs {
-    /// Finds the hubs from the corners in the order of the clusters.
-    pub fn new<const N: usize>(corners: &[[u32; N]], shape: &Shape) -> Self {
-        let counts = counts(corners);
+    /// Finds the hubs from the corners in the order of the clusters. `counts` says how often each vertex is named.
+    pub fn new<const N: usize>(corners: &[[u32; N]], counts: &[u32], shape: &Shape) -> Self {
         let sets: Vec<HubSet> = corners
             .iter()
             .map(|primitive| {

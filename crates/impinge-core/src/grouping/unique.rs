@@ -6,6 +6,8 @@
 //!
 //! Cost: `O(n)` once per topology.
 
+use std::hint::select_unpredictable;
+
 use rayon::prelude::*;
 
 use super::GROUP;
@@ -60,13 +62,8 @@ impl<const N: usize> Unique<N> {
     }
 
     fn push(&mut self, group: &[[u32; N]], table: &mut Table) {
-        table.clear();
         let mut local = [[0; GROUP]; N];
-        for (place, primitive) in group.iter().enumerate() {
-            for (corner, &vertex) in primitive.iter().enumerate() {
-                local[corner][place] = table.number(vertex);
-            }
-        }
+        table.number(group, &mut local);
         let start = self.vertices.len();
         let ranks = table.sort_into(&mut self.vertices);
         for of_corner in &mut local {
@@ -92,9 +89,10 @@ fn of_block<const N: usize>(corners: &[[u32; N]]) -> Unique<N> {
 
 /// The vertices of a cluster seen so far, numbered as they come: a hash table with linear probing.
 struct Table {
-    /// Turn (24 bits), vertex (32), number (8). Slots of another turn are empty.
-    slots: [u64; Table::SLOTS],
-    turn: u64,
+    /// The vertex in each slot, or [`EMPTY`](Table::EMPTY).
+    vertices: [u32; Table::SLOTS],
+    /// Its number.
+    numbers: [u8; Table::SLOTS],
     /// The vertices by number. The highest bit is inverted: registers compare signed numbers.
     found: [i32; 4 * GROUP],
     n: usize,
@@ -103,8 +101,8 @@ struct Table {
 impl Default for Table {
     fn default() -> Self {
         Table {
-            slots: [0; Table::SLOTS],
-            turn: 0,
+            vertices: [Table::EMPTY; Table::SLOTS],
+            numbers: [0; Table::SLOTS],
             found: [0; 4 * GROUP],
             n: 0,
         }
@@ -114,31 +112,38 @@ impl Default for Table {
 impl Table {
     /// At most half of them are taken: a cluster has up to four corners per primitive.
     const SLOTS: usize = 2 * 4 * GROUP;
+    /// No vertex: bodies have fewer.
+    const EMPTY: u32 = u32::MAX;
 
-    fn clear(&mut self) {
-        self.turn += 1;
-        self.n = 0;
-    }
-
+    /// Numbers the vertices of a cluster as they come, and writes the number of each corner.
+    ///
+    /// Whether a vertex is new cannot be predicted, so nothing branches on it. The counter stays in a register: in
+    /// memory, each corner would wait for the one before it.
     #[inline(always)]
-    fn number(&mut self, vertex: u32) -> u8 {
-        let key = self.turn << 32 | u64::from(vertex);
-        // Fibonacci hashing (Knuth, TAOCP 3, 6.4): the highest bits of the product with 2^32 over the golden ratio.
-        let hash = vertex.wrapping_mul(0x9E37_79B1) >> (u32::BITS - Table::SLOTS.ilog2());
-        let mut slot = hash as usize;
-        loop {
-            let held = self.slots[slot];
-            let is_known = held >> 8 == key;
-            if is_known || held >> 40 != self.turn {
-                // Written in either case, so that nothing depends on a branch that is hard to predict.
-                let number = if is_known { held as u8 } else { self.n as u8 };
-                self.slots[slot] = key << 8 | u64::from(number);
-                self.found[self.n.min(4 * GROUP - 1)] = vertex as i32 ^ i32::MIN;
-                self.n += usize::from(!is_known);
-                return number;
+    fn number<const N: usize>(&mut self, group: &[[u32; N]], local: &mut LocalCorners<N>) {
+        self.vertices.fill(Table::EMPTY);
+        let mut n = 0;
+        for (place, primitive) in group.iter().enumerate() {
+            for (of_corner, &vertex) in local.iter_mut().zip(primitive) {
+                // Fibonacci hashing (Knuth, TAOCP 3, 6.4): the highest bits of the product with 2^32 over the golden
+                // ratio.
+                let hash = vertex.wrapping_mul(0x9E37_79B1) >> (u32::BITS - Table::SLOTS.ilog2());
+                let mut slot = hash as usize;
+                let mut held = self.vertices[slot];
+                while (held != vertex) & (held != Table::EMPTY) {
+                    slot = (slot + 1) % Table::SLOTS;
+                    held = self.vertices[slot];
+                }
+                let is_new = held != vertex;
+                let number = select_unpredictable(is_new, n as u8, self.numbers[slot]);
+                self.vertices[slot] = vertex;
+                self.numbers[slot] = number;
+                self.found[n % (4 * GROUP)] = vertex as i32 ^ i32::MIN;
+                n += usize::from(is_new);
+                of_corner[place] = number;
             }
-            slot = (slot + 1) % Table::SLOTS;
         }
+        self.n = n;
     }
 
     /// Appends the vertices in ascending order, padded to whole chunks. Returns the place of each number.
@@ -150,15 +155,18 @@ impl Table {
         vertices.resize(start + padded, 0);
         let run = &mut vertices[start..];
         let mut ranks = [0; 4 * GROUP];
-        for (&vertex, rank) in self.found[..n].iter().zip(&mut ranks) {
+        let chunks = self.found[..padded].as_chunks::<CHUNK>().0;
+        for (chunk, of_chunk) in chunks.iter().zip(ranks.as_chunks_mut::<CHUNK>().0) {
             let mut lower = [0; CHUNK];
-            for chunk in self.found[..padded].as_chunks::<CHUNK>().0 {
+            for &vertex in &self.found[..n] {
                 for lane in 0..CHUNK {
-                    lower[lane] += i32::from(chunk[lane] < vertex);
+                    lower[lane] += i32::from(vertex < chunk[lane]);
                 }
             }
-            *rank = lower.iter().sum::<i32>() as u8;
-            run[usize::from(*rank)] = (vertex ^ i32::MIN) as u32;
+            *of_chunk = lower.map(|rank| rank as u8);
+        }
+        for (&vertex, &rank) in self.found[..n].iter().zip(&ranks) {
+            run[usize::from(rank)] = (vertex ^ i32::MIN) as u32;
         }
         let last = run[n - 1];
         run[n..].fill(last);
@@ -184,7 +192,7 @@ mod tests {
     /// The whole range of numbers, all different, all equal, and clusters and blocks that are not full.
     #[test]
     fn vertices_ascend_once_each_and_corners_name_them() {
-        let highest = vec![[u32::MAX, 0, u32::MAX - 1], [1 << 31, (1 << 31) - 1, 7]];
+        let highest = vec![[u32::MAX - 1, 0, u32::MAX - 2], [1 << 31, (1 << 31) - 1, 7]];
         let different: Vec<[u32; 3]> = (0..64).map(|k| [3 * k + 2, 3 * k, 3 * k + 1]).collect();
         let cases = [
             Vec::new(),
@@ -192,7 +200,7 @@ mod tests {
             different,
             vec![[5; 3]; 130],
             scattered(BLOCK * GROUP + 100, 60),
-            scattered(2 * BLOCK * GROUP + 1, u32::MAX),
+            scattered(2 * BLOCK * GROUP + 1, u32::MAX - 1),
         ];
         for faces in cases {
             let unique = Unique::new(&faces);
