@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use common::{agree, cases, check, leaves_out, naive, rows};
 use impinge_core::{
-    Backend, BodyId, CandidateQuery, Detector, Impact, Method, NearPair, NearQuery, Pairs,
-    Positions, Query, Scene, Settings, SharedVertex, Statistics, Step, Tuning,
+    Backend, BodyId, CandidateQuery, Detector, Impact, Method, NearPair, NearQuery, PairKind,
+    Pairs, Positions, Primitive, Query, Scene, Settings, SharedVertex, Statistics, Step, Tuning,
 };
 use impinge_scenes::{Model, solids, soup, surfaces};
 
@@ -302,7 +302,7 @@ fn no_threshold_changes_the_answer_to_a_frame() {
 struct Answers {
     impacts: Vec<Impact>,
     earliest: Option<Impact>,
-    candidates: u64,
+    candidates: Vec<(PairKind, Primitive, Primitive)>,
     near: Vec<NearPair>,
 }
 
@@ -313,7 +313,7 @@ fn answers(detector: &mut Detector, scene: &Scene, query: &Query) -> Answers {
     Answers {
         impacts: detector.impacts(scene, &step).unwrap().as_slice().into(),
         earliest: detector.earliest(scene, &step).unwrap(),
-        candidates: detector.candidates(scene, &candidates).unwrap().hash(),
+        candidates: (detector.candidates(scene, &candidates).unwrap().iter()).collect(),
         near: (detector.within_distance(scene, &near).unwrap().as_slice()).into(),
     }
 }
