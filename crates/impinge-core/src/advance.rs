@@ -34,32 +34,3 @@ impl Advance {
             })
     }
 }
-
-/// `start + fraction (end - start)`, each coordinate computed in double precision and rounded to that of the positions.
-#[allow(clippy::cast_possible_truncation, reason = "positions are stored so")]
-pub(crate) fn blend(start: &Positions, end: &Positions, fraction: f64) -> Positions {
-    if fraction >= 1.0 {
-        return end.clone();
-    }
-    let at = |x: f64, y: f64| {
-        // Rounding must not move it beyond the ends.
-        (x + fraction * (y - x)).clamp(x.min(y), x.max(y))
-    };
-    match (start, end) {
-        (Positions::F32(start), Positions::F32(end)) => Positions::F32(
-            start
-                .iter()
-                .zip(end)
-                .map(|(x, y)| std::array::from_fn(|axis| at(x[axis].into(), y[axis].into()) as f32))
-                .collect(),
-        ),
-        _ => Positions::F64(
-            (0..start.len())
-                .map(|vertex| {
-                    let (x, y) = (start.point(vertex), end.point(vertex));
-                    std::array::from_fn(|axis| at(x[axis], y[axis]))
-                })
-                .collect(),
-        ),
-    }
-}

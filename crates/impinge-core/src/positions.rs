@@ -55,6 +55,34 @@ impl Positions {
         }
     }
 
+    /// The positions at a fraction of the way to others, as many of the same precision: `start + fraction (end - start)`, each
+    /// coordinate computed in double precision and rounded to that of the positions.
+    pub(crate) fn blend(&self, end: &Positions, fraction: f64) -> Positions {
+        fn all<R: Real>(start: &[[R; 3]], end: &[[R; 3]], fraction: f64) -> Vec<[R; 3]> {
+            let pairs = start.iter().zip(end);
+            pairs.map(|(x, y)| between(x, y, fraction)).collect()
+        }
+        match (self, end) {
+            (Positions::F32(start), Positions::F32(end)) => {
+                Positions::F32(all(start, end, fraction))
+            }
+            (Positions::F64(start), Positions::F64(end)) => {
+                Positions::F64(all(start, end, fraction))
+            }
+            _ => unreachable!("both ends of a step have one precision"),
+        }
+    }
+
+    /// One of the positions of [`blend`](Positions::blend).
+    pub(crate) fn blend_point(&self, end: &Positions, vertex: usize, fraction: f64) -> [f64; 3] {
+        match (self, end) {
+            (Positions::F32(start), Positions::F32(end)) => {
+                between(&start[vertex], &end[vertex], fraction).map(f64::from)
+            }
+            _ => between(&self.point(vertex), &end.point(vertex), fraction),
+        }
+    }
+
     pub(crate) fn precision(&self) -> &'static str {
         match self {
             Positions::F32(_) => "f32",
@@ -68,6 +96,19 @@ impl Positions {
             Positions::F64(positions) => size_of_val(&positions[..]),
         }
     }
+}
+
+/// A point at a fraction of its way.
+#[inline(always)]
+fn between<R: Real>(start: &[R; 3], end: &[R; 3], fraction: f64) -> [R; 3] {
+    if fraction >= 1.0 {
+        return *end;
+    }
+    std::array::from_fn(|axis| {
+        let (x, y) = (start[axis].widen(), end[axis].widen());
+        // Rounding must not move it beyond the ends.
+        R::round((x + fraction * (y - x)).clamp(x.min(y), x.max(y)))
+    })
 }
 
 impl From<Vec<[f32; 3]>> for Positions {

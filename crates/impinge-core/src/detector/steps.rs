@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use crate::clock::Instant;
 
 use super::Detector;
-use crate::advance::{Advance, blend};
+use crate::advance::Advance;
 use crate::cpu::steps::{Asked, Pose, Sought, StepClusters};
 use crate::elements::Part;
 use crate::error::Error;
@@ -19,7 +19,7 @@ use crate::impacts::{
     Candidates, ContactAnswer, Found, FoundByKind, Impact, Impacts, KeyAnswer, StepAnswer,
 };
 use crate::naive;
-use crate::narrow::{Element, FirstContact, Test};
+use crate::narrow::{Element, FirstContact};
 use crate::near::NearPairs;
 use crate::pair_kind::PairKind;
 use crate::positions::Positions;
@@ -62,11 +62,14 @@ impl Steps {
 
     /// All contacts found, as impacts.
     fn named(&self, toi: Toi) -> impl Iterator<Item = Impact> + '_ {
+        let found = self.found();
+        found.map(move |(kind, found)| self.impacts.impact(kind, toi, found))
+    }
+
+    /// What was found last, with the kind of the pair.
+    fn found(&self) -> impl Iterator<Item = (PairKind, &Found<Contact>)> {
         let kinds = PairKind::ALL.into_iter().zip(&self.found);
-        kinds.flat_map(move |(kind, found)| {
-            let named = found.iter().map(move |found| (kind, toi, found));
-            named.map(|(kind, toi, found)| self.impacts.impact(kind, toi, found))
-        })
+        kinds.flat_map(|(kind, found)| found.iter().map(move |found| (kind, found)))
     }
 }
 
@@ -372,43 +375,56 @@ impl Detector {
         };
         let single = moving().any(|(_, start, _)| matches!(start, Positions::F32(_)));
         let last_bit = f64::from(if single { f32::EPSILON } else { 0.0 }).max(f64::EPSILON);
+        if first.toi == 0.0 {
+            advance.fraction = 0.0;
+            advance.positions = moving().map(|(id, start, _)| (id, start.clone())).collect();
+            return Ok(advance);
+        }
+        // Pairs that touched on the way to positions tried before: they probably do again.
+        let same =
+            |&(kind, found): &(_, &_)| self.steps.impacts.impact(kind, Toi::F64, found) == first;
+        let mut known: Vec<(PairKind, u64)> = Vec::new();
+        known.extend(
+            self.steps
+                .found()
+                .filter(same)
+                .map(|(kind, found)| (kind, found.key)),
+        );
+        // Times are not needed.
+        let step = step.toi(Toi::F32);
         let mut trial = scene.clone();
         let mut back_off = 0.0;
-        // Pairs that touched on the path to positions tried before: they probably do again.
-        let mut known: Vec<(PairKind, u64)> = Vec::new();
-        // Their times are not needed.
-        let step = step.toi(Toi::F32);
         loop {
-            advance.fraction = first.toi * (1.0 - back_off);
-            advance.positions.clear();
-            let mut moves = false;
-            for (id, start, end) in moving() {
-                let positions = blend(start, end, advance.fraction);
-                moves |= positions != *start;
-                match &positions {
-                    Positions::F32(positions) => trial.set_end_positions(id, positions)?,
-                    Positions::F64(positions) => trial.set_end_positions(id, positions)?,
+            let fraction = first.toi * (1.0 - back_off);
+            if !known
+                .iter()
+                .any(|&pair| self.touch(scene, &step, pair, fraction))
+            {
+                let blended = moving().map(|(id, start, end)| (id, start.blend(end, fraction)));
+                advance.positions = blended.collect();
+                let mut moved = moving().zip(&advance.positions);
+                if moved.all(|((_, start, _), (_, at))| start == at) {
+                    advance.fraction = 0.0;
+                    return Ok(advance);
                 }
-                advance.positions.push((id, positions));
-            }
-            if !moves {
-                advance.fraction = 0.0;
-                return Ok(advance);
-            }
-            advance.n_tried += 1;
-            let still_touch = known.iter().any(|&pair| self.touch(&trial, &step, pair));
-            if !still_touch {
+                for (id, positions) in &advance.positions {
+                    match positions {
+                        Positions::F32(positions) => trial.set_end_positions(*id, positions)?,
+                        Positions::F64(positions) => trial.set_end_positions(*id, positions)?,
+                    }
+                }
                 self.begin(&trial, &step)?;
                 let whole = (Pose::WHOLE, f64::INFINITY);
                 self.find(&trial, &step, Sought::All, whole, None, control)?;
-                let found = PairKind::ALL.into_iter().zip(&self.steps.found);
-                known.extend(
-                    found.flat_map(|(kind, found)| found.iter().map(move |of| (kind, of.key))),
-                );
-                if self.steps.found.iter().all(Vec::is_empty) {
+                let n_known = known.len();
+                known.extend(self.steps.found().map(|(kind, found)| (kind, found.key)));
+                if known.len() == n_known {
+                    advance.fraction = fraction;
+                    advance.n_tried += 1;
                     return Ok(advance);
                 }
             }
+            advance.n_tried += 1;
             back_off = if back_off == 0.0 {
                 last_bit
             } else {
@@ -417,9 +433,15 @@ impl Detector {
         }
     }
 
-    /// Whether two elements touch during a step of a scene with the bodies of the last one; with [`Start::Skip`], not at
-    /// its start.
-    fn touch(&self, scene: &Scene, step: &Step, (kind, key): (PairKind, u64)) -> bool {
+    /// Whether two elements touch on the way to the rounded positions at a fraction of the step; with [`Start::Skip`], not at
+    /// its start. The scene has the bodies of the last one.
+    fn touch(
+        &self,
+        scene: &Scene,
+        step: &Step,
+        (kind, key): (PairKind, u64),
+        fraction: f64,
+    ) -> bool {
         let frame = &self.steps.frame;
         let numbers = [key >> 32, key & u64::from(u32::MAX)].map(|number| number as u32);
         let layers = numbers.map(|number| owner_by_first(&frame.layers, number, |of| of.first));
@@ -438,7 +460,7 @@ impl Detector {
                 },
             }
         });
-        let contact = FirstContact.settle(TestId::Elements(kind), a, b);
+        let contact = FirstContact::settle_part(TestId::Elements(kind), a, b, fraction);
         contact.is_some_and(|contact| !(step.start == Start::Skip && contact.at_start))
     }
 

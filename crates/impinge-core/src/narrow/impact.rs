@@ -21,6 +21,19 @@ impl Test for FirstContact {
     }
 
     fn settle(&self, test: TestId, a: Element<'_>, b: Element<'_>) -> Option<Contact> {
+        Self::settle_part(test, a, b, 1.0)
+    }
+}
+
+impl FirstContact {
+    /// The first contact on the straight way from the start to the positions at a fraction of the step, which are rounded as
+    /// they are stored.
+    pub fn settle_part(
+        test: TestId,
+        a: Element<'_>,
+        b: Element<'_>,
+        fraction: f64,
+    ) -> Option<Contact> {
         let pair = exact_kind(test)?;
         if a.shares_vertex(&b) {
             return None;
@@ -31,7 +44,8 @@ impl Test for FirstContact {
             _ => (a, b),
         };
         let mut points: [[Point; 4]; 2] = Default::default();
-        for (ix, ends) in a.ends().chain(b.ends()).enumerate() {
+        let ends = a.ends_at(fraction).chain(b.ends_at(fraction));
+        for (ix, ends) in ends.enumerate() {
             for (points, end) in points.iter_mut().zip(ends) {
                 points[ix] = end;
             }

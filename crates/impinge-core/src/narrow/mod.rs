@@ -87,12 +87,21 @@ impl Element<'_> {
 
     /// The corners at the start of a step and at its end.
     fn ends(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
+        self.ends_at(1.0)
+    }
+
+    /// The corners at the start of a step and at a fraction of it, rounded to the precision of the positions.
+    fn ends_at(&self, fraction: f64) -> impl Iterator<Item = [[f64; 3]; 2]> {
         let body = self.frame.body(self.scene, self.layer);
         let start = body.positions();
         let end = body.end_positions().unwrap_or(start);
-        self.corners
-            .iter()
-            .map(move |&corner| [start, end].map(|positions| positions.point(corner as usize)))
+        self.corners.iter().map(move |&corner| {
+            let vertex = corner as usize;
+            [
+                start.point(vertex),
+                start.blend_point(end, vertex, fraction),
+            ]
+        })
     }
 }
 
