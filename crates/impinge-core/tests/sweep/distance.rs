@@ -140,6 +140,21 @@ fn features(pair: ElementPair, support: &[usize]) -> Option<(Feature, Feature)> 
     }
 }
 
+/// Of the corners and edges of a flat polygon that are nearest, the first in the order of ipc-toolkit's names.
+fn first_of_nearest(pair: ElementPair, polygon: &[Vector]) -> Vec<usize> {
+    let edges: &[[usize; 2]] = match pair {
+        ElementPair::EdgeEdge => &[[0, 2], [1, 3], [0, 1], [2, 3]],
+        _ => &[[0, 1], [1, 2], [0, 2]],
+    };
+    let corners = (0..polygon.len()).map(|ix| vec![ix]);
+    corners
+        .chain(edges.iter().map(|edge| edge.to_vec()))
+        .filter_map(|support| foot(polygon, support))
+        .reduce(|best, part| if part.is_shorter(&best) { part } else { best })
+        .expect("a corner at least")
+        .support
+}
+
 fn check(pair: ElementPair, points: &[Point; 4], distance: f64) -> bool {
     let mut all: Vec<f64> = points.iter().flatten().copied().collect();
     all.push(distance);
@@ -147,15 +162,19 @@ fn check(pair: ElementPair, points: &[Point; 4], distance: f64) -> bool {
     let vectors: Vec<Vector> = (0..4)
         .map(|ix| std::array::from_fn(|k| all[3 * ix + k].clone()))
         .collect();
-    let expected = shortest(&polygon(pair, &vectors));
+    let polygon = polygon(pair, &vectors);
+    let expected = shortest(&polygon);
     let is_within = expected.is_within(&all[12]);
     let case = || format!("{pair:?} {points:?} {distance}");
     assert_eq!(are_within(pair, points, distance), is_within, "{}", case());
     let nearest = nearest_features(pair, points);
-    if !nearest.is_parallel {
-        let features = features(pair, &expected.support).unwrap();
-        assert_eq!((nearest.a, nearest.b), features, "{}", case());
-    }
+    let support = if nearest.is_parallel {
+        first_of_nearest(pair, &polygon)
+    } else {
+        expected.support
+    };
+    let features = features(pair, &support).unwrap();
+    assert_eq!((nearest.a, nearest.b), features, "{}", case());
     assert!(!nearest.name(pair).is_empty());
     let closest = closest_points(pair, points);
     assert_eq!(closest.nearest, nearest);
@@ -235,6 +254,118 @@ fn distances_agree_with_the_oracle() {
                 n_within += usize::from(check(pair, &points, distance));
             }
             assert!(n_within > 3 && n_within < n, "{kind:?} {pair:?} {n_within}");
+        }
+    }
+}
+
+/// Structured grids, as cloth is laid out: one over another, aligned or shifted by half a step. Features tie, edges are
+/// parallel, and faces coplanar.
+#[derive(Clone, Copy, Debug)]
+enum Grid {
+    /// A step of 1/64.
+    Dyadic,
+    /// 0.1 k as `f32`, and as `f64`: steps that differ in the last bits.
+    Tenths32,
+    Tenths64,
+    /// The same, 1,000 units away.
+    Far32,
+    Far64,
+    /// Rings of a tube, `f32`.
+    Tube32,
+}
+
+impl Grid {
+    const ALL: [Self; 6] = [
+        Self::Dyadic,
+        Self::Tenths32,
+        Self::Tenths64,
+        Self::Far32,
+        Self::Far64,
+        Self::Tube32,
+    ];
+
+    /// A vertex of a layer, in half steps. The gap between layers is a quarter of a step.
+    fn vertex(self, [i, j]: [u64; 2], layer: u64) -> Point {
+        let single = |p: Point| p.map(|x| f64::from(x as f32));
+        let (x, y, z) = (i as f64 / 2.0, j as f64 / 2.0, layer as f64 / 4.0);
+        match self {
+            Self::Dyadic => [x, y, z].map(|x| x / 64.0),
+            Self::Tenths32 => single([0.1 * x, 0.1 * y, 0.1 * z]),
+            Self::Tenths64 => [0.1 * x, 0.1 * y, 0.1 * z],
+            Self::Far32 => single([0.1 * x + 1e3, 0.1 * y - 1e3, 0.1 * z]),
+            Self::Far64 => [0.1 * x + 1e3, 0.1 * y - 1e3, 0.1 * z],
+            Self::Tube32 => {
+                let angle = x * std::f64::consts::TAU / 16.0;
+                let radius = 1.0 + 0.1 * z;
+                single([radius * angle.cos(), radius * angle.sin(), 0.1 * y])
+            }
+        }
+    }
+
+    /// A vertex, an edge or a face of one layer and one of the other; a third have equal corners.
+    fn points(self, pair: ElementPair, random: &mut Random) -> [Point; 4] {
+        let layers = [random.below(3), random.below(3)];
+        let shift = random.below(2);
+        let first = random.below(100);
+        let mut corner = |which: usize| {
+            let mut at = || 2 * random.below(4) + first + if which == 1 { shift } else { 0 };
+            [at(), at()]
+        };
+        let (a, b) = (corner(0), corner(1));
+        let ways = [[2, 0], [0, 2], [2, 2], [0, 0]];
+        let mut way = || {
+            ways[if random.below(6) == 0 {
+                3
+            } else {
+                random.below(3) as usize
+            }]
+        };
+        let on = |[i, j]: [u64; 2], [k, l]: [u64; 2], layer| self.vertex([i + k, j + l], layer);
+        let [p, q] = [way(), way()];
+        match pair {
+            ElementPair::EdgeEdge => [
+                on(a, [0, 0], layers[0]),
+                on(a, p, layers[0]),
+                on(b, [0, 0], layers[1]),
+                on(b, q, layers[1]),
+            ],
+            _ => [
+                on(a, [0, 0], layers[0]),
+                on(b, [0, 0], layers[1]),
+                on(b, p, layers[1]),
+                on(b, q, layers[1]),
+            ],
+        }
+    }
+}
+
+#[test]
+fn grids_agree_with_the_oracle() {
+    let mut random = Random::new(34);
+    for grid in Grid::ALL {
+        for pair in PAIRS {
+            let (mut n_within, mut n_parallel) = (0, 0);
+            let n = 500;
+            for round in 0..n {
+                let points = grid.points(pair, &mut random);
+                let apart = closest_points(pair, &points).distance;
+                let (p, q) = (grid.vertex([0, 0], 1)[2], grid.vertex([0, 0], 0)[2]);
+                let distance = match round % 6 {
+                    0 => p - q,
+                    1 => 0.025,
+                    2 => apart,
+                    3 => apart.next_up(),
+                    4 => apart.next_down().max(0.0),
+                    _ => 0.0,
+                };
+                n_within += usize::from(check(pair, &points, distance));
+                n_parallel += usize::from(nearest_features(pair, &points).is_parallel);
+            }
+            let counts = format!("{grid:?} {pair:?} within {n_within}, parallel {n_parallel}");
+            assert!(n_within > n / 8 && n_within < n, "{counts}");
+            if matches!(pair, ElementPair::VertexFace | ElementPair::EdgeEdge) {
+                assert!(n_parallel > n / 4, "{counts}");
+            }
         }
     }
 }

@@ -4,7 +4,7 @@
 //! left open. Out: whether they are near. `f64` with bounds settles most (`exact::distance`), exact arithmetic the others.
 
 use crate::elements::Elements;
-use crate::exact::{Reach, are_within_certainly, elements_are_within};
+use crate::exact::{Reach, are_within_certainly, unsure_are_within};
 use crate::narrow::Corners;
 use crate::positions::Positions;
 
@@ -39,11 +39,11 @@ impl<'a> Near<'a> {
         are_within_certainly(a.points(), b.points(), &self.reach)
     }
 
-    /// Whether the elements at two places are near.
+    /// Whether the elements at two places are near, if that is not certain.
     #[inline(never)]
     pub fn exactly(&self, places: [u32; 2]) -> bool {
         let [a, b] = self.corners(places);
-        elements_are_within(a.points(), b.points(), &self.reach)
+        unsure_are_within(a.points(), b.points(), &self.reach)
     }
 
     #[inline(always)]

@@ -115,27 +115,8 @@ impl Integer {
     }
 
     /// `x * 2^exponent` with 1 <= |x| < 2, rounded towards zero; (0, 0) for zero. Only for guesses.
-    #[allow(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_wrap,
-        reason = "a guess; fewer than 2^63 bits fit any memory"
-    )]
     pub(in crate::exact) fn approximate(&self) -> (f64, i64) {
-        let n_bits = self.n_bits();
-        if n_bits == 0 {
-            return (0.0, 0);
-        }
-        let last = self.limbs.len() - 1;
-        let below = if last > 0 { self.limbs[last - 1] } else { 0 };
-        let top = (u128::from(self.limbs[last]) << 64 | u128::from(below))
-            << self.limbs[last].leading_zeros();
-        let magnitude = ((top >> 75) as f64) * f64::from_bits((1023 - 52) << 52);
-        let x = if self.is_negative {
-            -magnitude
-        } else {
-            magnitude
-        };
-        (x, n_bits as i64 - 1)
+        approximate(self.is_negative, &self.limbs)
     }
 
     /// Compares magnitudes.
@@ -160,7 +141,45 @@ impl Integer {
         }
     }
 
+    /// A number of at most two limbs, from its magnitude.
+    #[inline]
+    fn short(is_negative: bool, magnitude: u128) -> Self {
+        let [low, high] = halves(magnitude);
+        let n = usize::from(magnitude != 0) + usize::from(high != 0);
+        let mut limbs = [0; INLINE];
+        [limbs[0], limbs[1]] = [low, high];
+        Self {
+            is_negative: is_negative && n > 0,
+            limbs: SmallVec::from_buf_and_len(limbs, n),
+        }
+    }
+
+    /// The magnitude, if it is below 2^127.
+    #[inline]
+    fn short_magnitude(&self) -> Option<u128> {
+        match *self.limbs {
+            [] => Some(0),
+            [low] => Some(u128::from(low)),
+            [low, high] if high >> 63 == 0 => Some(u128::from(high) << 64 | u128::from(low)),
+            _ => None,
+        }
+    }
+
+    #[inline]
     fn sum(&self, other: &Self, other_is_negative: bool) -> Self {
+        if let (Some(a), Some(b)) = (self.short_magnitude(), other.short_magnitude()) {
+            return if self.is_negative == other_is_negative {
+                Self::short(self.is_negative, a + b)
+            } else if a >= b {
+                Self::short(self.is_negative, a - b)
+            } else {
+                Self::short(other_is_negative, b - a)
+            };
+        }
+        self.long_sum(other, other_is_negative)
+    }
+
+    fn long_sum(&self, other: &Self, other_is_negative: bool) -> Self {
         if other.is_zero() {
             return self.clone();
         }
@@ -191,6 +210,24 @@ impl Integer {
     }
 }
 
+/// `x * 2^exponent` with 1 <= |x| < 2, rounded towards zero to 53 bits; (0, 0) for zero. Limbs are lowest first.
+#[allow(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_wrap,
+    reason = "53 bits; fewer than 2^63 bits fit any memory"
+)]
+pub(super) fn approximate(is_negative: bool, limbs: &[u64]) -> (f64, i64) {
+    let Some(last) = limbs.iter().rposition(|&limb| limb != 0) else {
+        return (0.0, 0);
+    };
+    let below = if last > 0 { limbs[last - 1] } else { 0 };
+    let n_zeros = limbs[last].leading_zeros();
+    let top = (u128::from(limbs[last]) << 64 | u128::from(below)) << n_zeros;
+    let magnitude = ((top >> 75) as f64) * f64::from_bits((1023 - 52) << 52);
+    let x = if is_negative { -magnitude } else { magnitude };
+    (x, 64 * last as i64 + 63 - i64::from(n_zeros))
+}
+
 impl From<u64> for Integer {
     fn from(x: u64) -> Self {
         let mut limbs = Limbs::new();
@@ -202,6 +239,12 @@ impl From<u64> for Integer {
             limbs,
         }
     }
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "the lower half is wanted")]
+#[inline]
+pub(super) fn halves(x: u128) -> [u64; 2] {
+    [x as u64, (x >> 64) as u64]
 }
 
 fn compare_magnitudes(a: &[u64], b: &[u64]) -> Ordering {
@@ -284,6 +327,10 @@ impl Mul for &Integer {
     #[allow(clippy::cast_possible_truncation, reason = "limbs of wide products")]
     fn mul(self, other: Self) -> Integer {
         let (a, b) = (&self.limbs, &other.limbs);
+        if let ([x], [y]) = (&**a, &**b) {
+            let product = u128::from(*x) * u128::from(*y);
+            return Self::Output::short(self.is_negative != other.is_negative, product);
+        }
         if a.is_empty() || b.is_empty() {
             return Integer::zero();
         }

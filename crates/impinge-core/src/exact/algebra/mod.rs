@@ -9,11 +9,13 @@
 //!
 //! Invariant: no rounding and no tolerance. Floating-point numbers appear only as guesses that are checked.
 
+mod fixed;
 mod integer;
 mod polynomial;
 mod quotient;
 mod roots;
 
+pub(super) use fixed::{Coordinate, Eight, Factor, Four, Two, Whole};
 pub(crate) use integer::Integer;
 pub(super) use integer::common_integers;
 pub(super) use polynomial::{Polynomial, Vector, cross, difference, dot, square_of_sum};

@@ -10,6 +10,7 @@ use super::nearest::Polygon;
 use super::reach::Reach;
 use super::rounded::{self, between, quotient};
 use super::{Feature, Nearest, filter, nearest};
+use crate::exact::algebra::Integer;
 use crate::exact::element_pair::ElementPair;
 use crate::exact::triangle::segment_meets_triangle;
 use crate::exact::{Point, Sign, triangles_intersect};
@@ -50,11 +51,18 @@ pub(crate) fn are_within_certainly(a: &[Point], b: &[Point], reach: &Reach) -> O
     }
 }
 
+/// [`elements_are_within`] where [`are_within_certainly`] cannot tell.
+pub(crate) fn unsure_are_within(a: &[Point], b: &[Point], reach: &Reach) -> bool {
+    match Simple::new(a, b) {
+        Some(Simple { pair, points, .. }) => nearest::are_within(pair, &points, reach),
+        None => elements_are_within(a, b, reach),
+    }
+}
+
 /// Whether the distance of two elements of one to three corners is at most a reach. Exact.
 pub(crate) fn elements_are_within(a: &[Point], b: &[Point], reach: &Reach) -> bool {
     match Simple::new(a, b) {
-        Some(Simple { pair, points, .. }) => filter::answer(pair, &points, reach)
-            .unwrap_or_else(|| nearest::are_within(pair, &points, reach)),
+        Some(Simple { pair, points, .. }) => super::are_within_reach(pair, &points, reach),
         None => {
             share_a_point(a, b)
                 || parts(a, b).any(|part| {
@@ -289,14 +297,14 @@ struct Measured<'a> {
     part: &'a PartOfPair,
     features: [(u8, Feature); 2],
     is_flat: bool,
-    polygon: Polygon,
+    polygon: Polygon<Integer>,
     nearest: Part,
 }
 
 impl<'a> Measured<'a> {
     fn new(part: &'a PartOfPair) -> Self {
         let Simple { pair, points, .. } = &part.simple;
-        let polygon = Polygon::new(*pair, points, &Reach::from(0.0));
+        let polygon = Polygon::of_any_size(*pair, points, &Reach::from(0.0));
         let nearest = polygon.nearest();
         let is_flat = polygon.is_flat();
         Self {

@@ -25,10 +25,10 @@ mod rounded;
 mod tests;
 
 use super::Point;
-use super::algebra::Integer;
+use super::algebra::{Factor, Integer, Whole};
 use super::element_pair::ElementPair;
 pub(crate) use elements::{NearestOfElements, are_within_certainly, elements_are_within};
-pub(crate) use elements::{closest_of_elements, nearest_of_elements};
+pub(crate) use elements::{closest_of_elements, nearest_of_elements, unsure_are_within};
 pub use features::{Feature, Nearest};
 pub(crate) use filter::{Approach, approach};
 pub use moving::first_within;
@@ -83,16 +83,24 @@ fn is_distance(distance: f64) -> bool {
 }
 
 /// A vector of integers.
-type Vector = [Integer; 3];
+type Vector<T = Integer> = [T; 3];
 
-fn difference(a: &Vector, b: &Vector) -> Vector {
-    std::array::from_fn(|k| &a[k] - &b[k])
+#[inline]
+fn difference<T: Whole>(a: &Vector<T>, b: &Vector<T>) -> Vector<T> {
+    [a[0].minus(&b[0]), a[1].minus(&b[1]), a[2].minus(&b[2])]
 }
 
-fn cross(a: &Vector, b: &Vector) -> Vector {
-    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| &(&a[i] * &b[j]) - &(&a[j] * &b[i]))
+#[inline]
+fn cross<T: Factor>([x, y, z]: &Vector<T>, [u, v, w]: &Vector<T>) -> Vector<T::Product> {
+    [
+        y.product(w).minus(&z.product(v)),
+        z.product(u).minus(&x.product(w)),
+        x.product(v).minus(&y.product(u)),
+    ]
 }
 
-fn dot(a: &Vector, b: &Vector) -> Integer {
-    &(&(&a[0] * &b[0]) + &(&a[1] * &b[1])) + &(&a[2] * &b[2])
+#[inline]
+fn dot<T: Factor>(a: &Vector<T>, b: &Vector<T>) -> T::Product {
+    let first = a[0].product(&b[0]).plus(&a[1].product(&b[1]));
+    first.plus(&a[2].product(&b[2]))
 }

@@ -1,12 +1,12 @@
 //! Which features of two elements are nearest, and whether they are within a distance; in integers.
 
-use std::cmp::Ordering;
-
 use super::features::{Nearest, Part};
 use super::filter;
 use super::reach::Reach;
 use super::{Vector, cross, difference, dot};
-use crate::exact::algebra::{Integer, common_integers};
+use crate::exact::algebra::{
+    Coordinate, Eight, Factor, Four, Integer, Two, Whole, common_integers,
+};
 use crate::exact::element_pair::ElementPair;
 use crate::exact::{Point, Sign};
 
@@ -26,68 +26,185 @@ pub fn nearest_features(pair: ElementPair, points: &[Point; 4]) -> Nearest {
     if let Some(part) = filter::nearest_part(pair, points) {
         return part.named(pair, false);
     }
-    let polygon = Polygon::new(pair, points, &Reach::from(0.0));
-    polygon.nearest().named(pair, polygon.is_flat())
+    nearest_features_exactly(pair, points)
+}
+
+/// Apart, so that the filter's stack stays small.
+#[inline(never)]
+fn nearest_features_exactly(pair: ElementPair, points: &[Point; 4]) -> Nearest {
+    let reach = Reach::from(0.0);
+    match Polygon::short(pair, points, &reach) {
+        Some(polygon) => polygon.nearest_features(pair),
+        None => Polygon::of_any_size(pair, points, &reach).nearest_features(pair),
+    }
 }
 
 /// [`are_within`](super::are_within) by integers alone.
 pub(super) fn are_within(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> bool {
-    let polygon = Polygon::new(pair, points, reach);
-    let nearest = polygon.nearest();
-    let (over, under) = polygon.square_of_distance(nearest);
-    let square = &polygon.distance * &polygon.distance;
-    (&over - &(&square * &under)).sign() != Sign::Positive
+    match Polygon::short(pair, points, reach) {
+        Some(polygon) => polygon.is_within(),
+        None => Polygon::of_any_size(pair, points, reach).is_within(),
+    }
 }
 
 /// The difference polygon at one moment, and a distance, as integers times one power of two.
-pub(super) struct Polygon {
-    pub(super) corners: Vec<Vector>,
-    /// From each corner to the next: no edge for a single corner, one for a segment.
-    pub(super) edges: Vec<Vector>,
-    normal: Option<Vector>,
-    distance: Integer,
+pub(super) struct Polygon<T: Coordinate> {
+    n_corners: usize,
+    /// Where there are fewer than four, they begin again.
+    corners: [Vector<T>; 4],
+    /// From each corner to the next: no edge counts of a single corner, one of a segment.
+    edges: [Vector<T>; 4],
+    normal: Option<Vector<Two<T>>>,
+    distance: T,
     /// The exponent of the power of two.
     pub(super) exponent: i64,
 }
 
-impl Polygon {
-    pub(super) fn new(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> Self {
+/// The magnitude of corners and distance, as integers of 64 bits, is below 2^61.
+const SHORT_BITS: i64 = 61;
+
+impl Polygon<i64> {
+    /// The polygon in integers of fixed width, if its coordinates and the distance are short enough.
+    ///
+    /// Each corner is p - q = high + low, a rounded difference and its error. With the unit 2^e such that all are below
+    /// 2^61 units, it only has to be a whole number of units.
+    pub(super) fn short(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> Option<Self> {
+        let numbers = pair.corners();
+        let n_corners = numbers.len();
+        let mut parts = [[[0.0; 2]; 3]; 4];
+        let mut largest = reach.high.max(SMALLEST);
+        for (ix, corner) in parts.iter_mut().enumerate() {
+            let [i, j] = numbers[ix % n_corners];
+            for (axis, part) in corner.iter_mut().enumerate() {
+                *part = exact_difference(points[i][axis], points[j][axis]);
+                largest = largest.max(part[0].abs());
+            }
+        }
+        if largest >= LARGEST {
+            return None;
+        }
+        // 2^(SHORT_BITS - 1 - e), where 2^e <= largest < 2^(e+1), and its inverse.
+        let exponent = exponent_of(largest) + 1 - SHORT_BITS;
+        let (per_unit, unit) = (power(-exponent), power(exponent));
+        let mut is_whole = true;
+        let mut corners = [[0; 3]; 4];
+        for (corner, parts) in corners.iter_mut().zip(&parts) {
+            for (coordinate, [high, low]) in corner.iter_mut().zip(parts) {
+                let (high, is_high) = whole(*high, per_unit, unit);
+                let (low, is_low) = whole(*low, per_unit, unit);
+                is_whole &= is_high & is_low;
+                *coordinate = high + low;
+            }
+        }
+        let mut distance = 0;
+        for &part in &reach.parts {
+            let (part, is_part) = whole(part, per_unit, unit);
+            is_whole &= is_part;
+            distance += part;
+        }
+        is_whole.then(|| Self::new(n_corners, corners, distance, exponent))
+    }
+}
+
+/// Sizes between which powers of two are far from the ends of the floats.
+const SMALLEST: f64 = f64::from_bits((1023 - 400) << 52);
+const LARGEST: f64 = f64::from_bits((1023 + 400) << 52);
+
+/// A number in units, and whether it is a whole number of them.
+#[allow(clippy::cast_possible_truncation, reason = "checked")]
+#[allow(clippy::cast_precision_loss, reason = "checked")]
+#[inline]
+fn whole(x: f64, per_unit: f64, unit: f64) -> (i64, bool) {
+    let n = (x * per_unit) as i64;
+    (n, n as f64 * unit == x)
+}
+
+/// The exponent of a positive float that is normal: 2^exponent <= x < 2^(exponent + 1).
+#[allow(clippy::cast_possible_wrap, reason = "eleven bits")]
+fn exponent_of(x: f64) -> i64 {
+    (x.to_bits() >> 52) as i64 - 1023
+}
+
+/// 2^exponent, for exponents of magnitude below 1000.
+#[allow(clippy::cast_sign_loss, reason = "positive")]
+fn power(exponent: i64) -> f64 {
+    f64::from_bits(((1023 + exponent) as u64) << 52)
+}
+
+/// The difference of two floats as a rounded difference and its error (Knuth's sum of two); NaN where it overflows.
+#[inline]
+fn exact_difference(a: f64, b: f64) -> [f64; 2] {
+    let high = a - b;
+    let subtracted = a - high;
+    let rest = high + subtracted;
+    [high, (a - rest) + (subtracted - b)]
+}
+
+impl Polygon<Integer> {
+    /// The polygon in integers of any size.
+    pub(super) fn of_any_size(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> Self {
         let finite = |x: f64| if x.is_finite() { x } else { 0.0 };
         let numbers: [f64; 12 + Reach::PARTS] = std::array::from_fn(|ix| match ix {
             12.. => finite(reach.parts[ix - 12]),
             _ => finite(points[ix / 3][ix % 3]),
         });
         let (integers, exponent) = common_integers(numbers);
-        let point = |ix: usize| -> Vector { std::array::from_fn(|k| integers[3 * ix + k].clone()) };
-        let corners: Vec<Vector> = pair
-            .corners()
-            .iter()
-            .map(|&[i, j]| difference(&point(i), &point(j)))
-            .collect();
-        let n = corners.len();
-        let n_edges = if n > 2 { n } else { n - 1 };
-        let edges: Vec<Vector> = (0..n_edges)
-            .map(|ix| difference(&corners[(ix + 1) % n], &corners[ix]))
-            .collect();
-        let normal = (n > 2)
+        let coordinate = |i: usize, j: usize, k: usize| &integers[3 * i + k] - &integers[3 * j + k];
+        let numbers = pair.corners();
+        let corners = std::array::from_fn(|ix| {
+            let [i, j] = numbers[ix % numbers.len()];
+            std::array::from_fn(|k| coordinate(i, j, k))
+        });
+        let distance = Reach::sum(&integers[12..]);
+        Self::new(numbers.len(), corners, distance, exponent)
+    }
+}
+
+impl<T: Coordinate> Polygon<T> {
+    fn new(n_corners: usize, corners: [Vector<T>; 4], distance: T, exponent: i64) -> Self {
+        let edges: [Vector<T>; 4] =
+            std::array::from_fn(|ix| difference(&corners[(ix + 1) % n_corners], &corners[ix]));
+        let normal = (n_corners > 2)
             .then(|| cross(&edges[0], &edges[1]))
-            .filter(|normal| !normal.iter().all(Integer::is_zero));
+            .filter(|normal| !normal.iter().all(|x| x.sign().is_zero()));
         Self {
+            n_corners,
             corners,
             edges,
             normal,
-            distance: Reach::sum(&integers[12..]),
+            distance,
             exponent,
         }
     }
 
-    /// Whether it has more than two corners but no normal.
-    pub(super) fn is_flat(&self) -> bool {
-        self.corners.len() > 2 && self.normal.is_none()
+    pub(super) fn corners(&self) -> &[Vector<T>] {
+        &self.corners[..self.n_corners]
     }
 
-    fn after(&self, ix: usize) -> &Vector {
-        &self.corners[(ix + 1) % self.corners.len()]
+    /// From each corner to the next: no edge of a single corner, one of a segment.
+    pub(super) fn edges(&self) -> &[Vector<T>] {
+        let n = self.n_corners;
+        &self.edges[..if n > 2 { n } else { n - 1 }]
+    }
+
+    /// Whether it has more than two corners but no normal.
+    pub(super) fn is_flat(&self) -> bool {
+        self.n_corners > 2 && self.normal.is_none()
+    }
+
+    fn nearest_features(&self, pair: ElementPair) -> Nearest {
+        self.nearest().named(pair, self.is_flat())
+    }
+
+    /// Whether the origin is at most as far away as the distance.
+    pub(super) fn is_within(&self) -> bool {
+        let (over, under) = self.square_of_distance(self.nearest());
+        let square = self.distance.product(&self.distance).widened();
+        over.minus(&square.product(&under)).sign() != Sign::Positive
+    }
+
+    fn after(&self, ix: usize) -> &Vector<T> {
+        &self.corners[(ix + 1) % self.n_corners]
     }
 
     /// Whether the origin's projection onto the line of an edge is strictly between the ends.
@@ -107,19 +224,19 @@ impl Polygon {
     /// The nearest part of a polygon with a normal. If the origin's projection is in the polygon, that is the face. If the
     /// projection is beyond an edge and between its ends, it is that edge. Else it is the corner from which both edges lead
     /// away from the origin.
-    fn nearest_of_polygon(&self, normal: &Vector) -> Part {
-        let is_inner: Vec<Sign> = (0..self.edges.len())
-            .map(|ix| dot(normal, &cross(&self.corners[ix], &self.edges[ix])).sign())
-            .collect();
+    fn nearest_of_polygon(&self, normal: &Vector<Two<T>>) -> Part {
+        let n = self.n_corners;
+        let mut is_inner = [Sign::Positive; 4];
+        for (ix, edge) in self.edges().iter().enumerate() {
+            is_inner[ix] = dot(normal, &cross(&self.corners[ix], edge)).sign();
+        }
         if is_inner.iter().all(|&sign| sign == Sign::Positive) {
             return Part::Face;
         }
-        let edge =
-            (0..self.edges.len()).find(|&ix| is_inner[ix] != Sign::Positive && self.is_beside(ix));
+        let edge = (0..n).find(|&ix| is_inner[ix] != Sign::Positive && self.is_beside(ix));
         if let Some(ix) = edge {
             return Part::Edge(ix);
         }
-        let n = self.corners.len();
         let is_nearest = |ix: &usize| {
             let before = (ix + n - 1) % n;
             dot(&self.corners[*ix], &self.edges[*ix]).sign() != Sign::Negative
@@ -131,49 +248,63 @@ impl Polygon {
     /// The nearest part of a segment or a point: the nearest of its corners and of the edges that the origin is beside.
     fn nearest_of_segment(&self) -> Part {
         // The order of ipc-toolkit's names: EA0_EB0, EA0_EB1, EA1_EB0, EA1_EB1, EA_EB0, EA_EB1, EA0_EB, EA1_EB.
-        let (corner_order, edge_order): (&[usize], &[usize]) = match self.corners.len() {
+        let (corner_order, edge_order): (&[usize], &[usize]) = match self.n_corners {
             1 => (&[0], &[]),
             2 => (&[0, 1], &[0]),
             3 => (&[0, 1, 2], &[0, 1, 2]),
             _ => (&[0, 3, 1, 2], &[0, 2, 3, 1]),
         };
-        let corners = corner_order.iter().map(|&ix| Part::Corner(ix));
-        let edges = edge_order
-            .iter()
-            .filter(|&&ix| self.is_beside(ix))
-            .map(|&ix| Part::Edge(ix));
-        corners
-            .chain(edges)
-            .reduce(|best, part| match self.compare(part, best) {
-                Ordering::Less => part,
-                _ => best,
-            })
-            .unwrap_or(Part::Corner(0))
-    }
-
-    fn compare(&self, a: Part, b: Part) -> Ordering {
-        let (over_a, under_a) = self.square_of_distance(a);
-        let (over_b, under_b) = self.square_of_distance(b);
-        match (&(&over_a * &under_b) - &(&over_b * &under_a)).sign() {
-            Sign::Negative => Ordering::Less,
-            Sign::Zero => Ordering::Equal,
-            Sign::Positive => Ordering::Greater,
+        let square = |ix: usize| dot(&self.corners[ix], &self.corners[ix]);
+        let mut part = corner_order[0];
+        let mut least = square(part);
+        for &ix in &corner_order[1..] {
+            let other = square(ix);
+            if other.minus(&least).sign() == Sign::Negative {
+                (part, least) = (ix, other);
+            }
         }
+        let mut nearest = Part::Corner(part);
+        let mut least = (least.widened(), Four::<T>::one());
+        for &ix in edge_order.iter().filter(|&&ix| self.is_beside(ix)) {
+            let other = self.square_of_border(Part::Edge(ix));
+            let (left, right) = (other.0.product(&least.1), least.0.product(&other.1));
+            if left.minus(&right).sign() == Sign::Negative {
+                (nearest, least) = (Part::Edge(ix), other);
+            }
+        }
+        nearest
     }
 
     /// The square of the origin's distance from the line, plane or point of a part, as a fraction.
-    pub(super) fn square_of_distance(&self, part: Part) -> (Integer, Integer) {
+    pub(super) fn square_of_distance(&self, part: Part) -> (Eight<T>, Four<T>) {
         match (part, &self.normal) {
             (Part::Face, Some(normal)) => {
-                let f = dot(normal, &self.corners[0]);
-                (&f * &f, dot(normal, normal))
+                let corner = self.corners[0].each_ref().map(T::widened);
+                let f = dot(normal, &corner);
+                (f.product(&f), dot(normal, normal))
             }
-            (Part::Edge(ix), _) => {
-                let moment = cross(&self.corners[ix], &self.edges[ix]);
-                (dot(&moment, &moment), dot(&self.edges[ix], &self.edges[ix]))
+            _ => {
+                let (over, under) = self.square_of_border(part);
+                (over.widened(), under)
             }
-            (Part::Corner(ix), _) => (dot(&self.corners[ix], &self.corners[ix]), Integer::from(1)),
-            (Part::Face, None) => unreachable!("a polygon without inside has no face"),
+        }
+    }
+
+    /// The square of the origin's distance from a corner or the line of an edge, as a fraction.
+    fn square_of_border(&self, part: Part) -> (Four<T>, Four<T>) {
+        match part {
+            Part::Edge(ix) => {
+                let edge = &self.edges[ix];
+                let moment = cross(&self.corners[ix], edge);
+                (dot(&moment, &moment), dot(edge, edge).widened())
+            }
+            Part::Corner(ix) => {
+                let corner = &self.corners[ix];
+                (dot(corner, corner).widened(), Four::<T>::one())
+            }
+            Part::Face => {
+                unreachable!("a face is no border, and only a polygon with an inside has one")
+            }
         }
     }
 }

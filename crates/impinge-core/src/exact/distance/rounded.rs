@@ -5,7 +5,7 @@ use super::nearest::Polygon;
 use super::reach::Reach;
 use super::{Nearest, Vector, cross, difference, dot};
 use crate::exact::Point;
-use crate::exact::algebra::{Integer, common_integers};
+use crate::exact::algebra::{Coordinate, Integer, Whole, common_integers};
 use crate::exact::element_pair::ElementPair;
 
 /// Nearest points of two elements.
@@ -34,16 +34,27 @@ pub struct Closest {
 /// ```
 #[must_use]
 pub fn closest_points(pair: ElementPair, points: &[Point; 4]) -> Closest {
-    let polygon = Polygon::new(pair, points, &Reach::from(0.0));
+    let reach = Reach::from(0.0);
+    match Polygon::short(pair, points, &reach) {
+        Some(polygon) => closest_of(&polygon, pair, points),
+        None => closest_of(&Polygon::of_any_size(pair, points, &reach), pair, points),
+    }
+}
+
+pub(super) fn closest_of<T: Coordinate>(
+    polygon: &Polygon<T>,
+    pair: ElementPair,
+    points: &[Point; 4],
+) -> Closest {
     let part = polygon.nearest();
     let [p, q, r, s] = points;
     let points = match (pair, part) {
         (ElementPair::EdgeEdge, Part::Face) => {
-            let [share_a, share_b] = face_shares(&polygon);
+            let [share_a, share_b] = face_shares(polygon);
             [between(p, q, share_a), between(r, s, share_b)]
         }
         (ElementPair::EdgeEdge, Part::Edge(ix)) => {
-            let share = edge_share(&polygon, ix);
+            let share = edge_share(polygon, ix);
             match ix {
                 0 => [between(p, q, share), *r],
                 1 => [*q, between(r, s, share)],
@@ -53,14 +64,14 @@ pub fn closest_points(pair: ElementPair, points: &[Point; 4]) -> Closest {
         }
         (ElementPair::EdgeEdge, Part::Corner(ix)) => [[*p, *q, *q, *p][ix], [*r, *r, *s, *s][ix]],
         (_, Part::Face) => {
-            let [first, second] = face_shares(&polygon);
+            let [first, second] = face_shares(polygon);
             let foot =
                 std::array::from_fn(|k| q[k] + (r[k] - q[k]) * first + (s[k] - r[k]) * second);
             [*p, foot]
         }
         (_, Part::Edge(ix)) => {
-            let next = points[1 + (ix + 1) % polygon.corners.len()];
-            let share = edge_share(&polygon, ix);
+            let next = points[1 + (ix + 1) % polygon.corners().len()];
+            let share = edge_share(polygon, ix);
             [*p, between(&points[1 + ix], &next, share)]
         }
         (_, Part::Corner(ix)) => [*p, points[1 + ix]],
@@ -74,16 +85,16 @@ pub fn closest_points(pair: ElementPair, points: &[Point; 4]) -> Closest {
 }
 
 /// How far along an edge of the polygon the point nearest to the origin is.
-fn edge_share(polygon: &Polygon, ix: usize) -> f64 {
-    let edge = &polygon.edges[ix];
-    -quotient(&dot(&polygon.corners[ix], edge), &dot(edge, edge))
+fn edge_share<T: Coordinate>(polygon: &Polygon<T>, ix: usize) -> f64 {
+    let edge = &polygon.edges()[ix];
+    -quotient(&dot(&polygon.corners()[ix], edge), &dot(edge, edge))
 }
 
 /// How far along the first edge and the second the foot of the perpendicular is: with V_0 + s E_0 + t E_1 = c N,
 /// s = -N . (V_0 x E_1) / |N|^2 and t = N . (V_0 x E_0) / |N|^2.
-fn face_shares(polygon: &Polygon) -> [f64; 2] {
-    let corner = &polygon.corners[0];
-    let [first, second] = [&polygon.edges[0], &polygon.edges[1]];
+fn face_shares<T: Coordinate>(polygon: &Polygon<T>) -> [f64; 2] {
+    let corner = &polygon.corners()[0];
+    let [first, second] = [&polygon.edges()[0], &polygon.edges()[1]];
     let normal = cross(first, second);
     let square = dot(&normal, &normal);
     [
@@ -93,13 +104,13 @@ fn face_shares(polygon: &Polygon) -> [f64; 2] {
 }
 
 /// A quotient of at most about 1.
-pub(super) fn quotient(over: &Integer, under: &Integer) -> f64 {
+pub(super) fn quotient<T: Whole>(over: &T, under: &T) -> f64 {
     let ((x, i), (y, j)) = (over.approximate(), under.approximate());
     times_power(x / y, i - j)
 }
 
 /// The square root of a quotient, times a power of two.
-fn root_of_quotient(over: &Integer, under: &Integer, exponent: i64) -> f64 {
+fn root_of_quotient(over: &impl Whole, under: &impl Whole, exponent: i64) -> f64 {
     let ((x, i), (y, j)) = (over.approximate(), under.approximate());
     let is_odd = (i - j).rem_euclid(2);
     let half = (i - j - is_odd) / 2;

@@ -191,6 +191,111 @@ fn filters_never_contradict_integers_and_roots() {
     }
 }
 
+/// Numbers of up to 61 bits: all that fixed width takes.
+fn long(bits: u32, random: &mut Random) -> f64 {
+    let whole = random.below(1 << bits.min(53)) as f64;
+    let sign = [1.0, -1.0][random.below(2) as usize];
+    sign * whole * 2.0_f64.powi(random.below(u64::from(bits) - 52) as i32 - 40)
+}
+
+#[test]
+fn integers_of_fixed_width_answer_as_those_of_any_size() {
+    use super::rounded::closest_of;
+    let mut random = Random(6);
+    let (mut n_short, mut n_long) = (0, 0);
+    let mut check = |pair: ElementPair, points: &[Point; 4], d: f64| {
+        let case = || format!("{pair:?} {points:?} {d:?}");
+        let reach = Reach::from(d);
+        let long = nearest::Polygon::of_any_size(pair, points, &reach);
+        let Some(short) = nearest::Polygon::short(pair, points, &reach) else {
+            n_long += 1;
+            return;
+        };
+        n_short += 1;
+        assert_eq!(short.nearest(), long.nearest(), "{}", case());
+        assert_eq!(short.is_flat(), long.is_flat(), "{}", case());
+        assert_eq!(short.is_within(), long.is_within(), "{}", case());
+        let (a, b) = (
+            closest_of(&short, pair, points),
+            closest_of(&long, pair, points),
+        );
+        assert_eq!(a, b, "{}", case());
+        assert_eq!(a.distance.to_bits(), b.distance.to_bits(), "{}", case());
+        let bits = |points: [Point; 2]| points.map(|point| point.map(f64::to_bits));
+        assert_eq!(bits(a.points), bits(b.points), "{}", case());
+    };
+    for round in 0..400 {
+        for kind in KINDS {
+            for pair in [
+                PAIRS[0],
+                PAIRS[1],
+                ElementPair::VertexEdge,
+                ElementPair::VertexVertex,
+            ] {
+                let [start, _] = step(kind, &mut random);
+                let found = closest_points(pair, &start).distance;
+                let d = [found, found.next_up(), found.next_down().max(0.0), 0.5][round % 4];
+                check(pair, &start, d);
+                // As long as it goes, with corners that coincide on some axes.
+                let mut points = [(); 4].map(|()| [(); 3].map(|()| long(61, &mut random)));
+                for _ in 0..random.below(8) {
+                    let [to, from] = [random.below(4), random.below(4)].map(|ix| ix as usize);
+                    let axis = random.below(3) as usize;
+                    points[to][axis] = points[from][axis];
+                }
+                let d = if round % 2 == 0 {
+                    found
+                } else {
+                    long(61, &mut random).abs()
+                };
+                check(pair, &points, d);
+            }
+        }
+    }
+    assert!(n_short > 5000 && n_long > 500, "{n_short} {n_long}");
+}
+
+/// The largest numbers that fixed width takes do not overflow, and one bit more is refused.
+#[test]
+fn the_largest_short_numbers_fit() {
+    let most = (1_u64 << 60) as f64;
+    let almost = 2.0_f64.powi(61).next_down();
+    let tiny = Reach::from(1.0);
+    for signs in 0..1 << 12 {
+        let points: [Point; 4] = std::array::from_fn(|ix| {
+            std::array::from_fn(|axis| {
+                let sign = if signs >> (3 * ix + axis) & 1 == 1 {
+                    -1.0
+                } else {
+                    1.0
+                };
+                sign * if axis == 0 {
+                    almost / 2.0
+                } else {
+                    most - 128.0
+                }
+            })
+        });
+        for pair in PAIRS {
+            for reach in [tiny, Reach::from(almost)] {
+                let long = nearest::Polygon::of_any_size(pair, &points, &reach);
+                let short = nearest::Polygon::short(pair, &points, &reach);
+                let Some(short) = short else {
+                    panic!("{pair:?} {points:?} {reach:?}");
+                };
+                assert_eq!(short.nearest(), long.nearest(), "{pair:?} {points:?}");
+                assert_eq!(short.is_within(), long.is_within(), "{pair:?} {points:?}");
+            }
+            let half = Reach::from(0.5);
+            let far = points.map(|point| point.map(|x| 2.0 * x));
+            let largest = nearest::Polygon::of_any_size(pair, &far, &half);
+            let differs = largest.corners().iter().flatten().any(|x| !x.is_zero());
+            let refused = nearest::Polygon::short(pair, &far, &half).is_none();
+            assert_eq!(refused, differs, "{pair:?} {far:?}");
+        }
+    }
+}
+
 #[test]
 fn numbers_that_are_none_are_unsure() {
     for x in [f64::NAN, f64::INFINITY, f64::MAX] {
