@@ -250,12 +250,11 @@ impl Factor for Wide<4> {
 fn products<const N: usize, const M: usize>(a: [u64; N], b: [u64; N]) -> [u64; M] {
     const { assert!(M == 2 * N) };
     let mut limbs = [0; M];
-    for i in 0..N {
+    for (i, x) in a.into_iter().enumerate() {
         let mut carry = 0;
-        for j in 0..N {
+        for (j, y) in b.into_iter().enumerate() {
             // At most (2^64 - 1)^2 + 2 (2^64 - 1) = 2^128 - 1.
-            let wide =
-                u128::from(a[i]) * u128::from(b[j]) + u128::from(limbs[i + j]) + u128::from(carry);
+            let wide = u128::from(x) * u128::from(y) + u128::from(limbs[i + j]) + u128::from(carry);
             [limbs[i + j], carry] = halves(wide);
         }
         limbs[i + N] = carry;
