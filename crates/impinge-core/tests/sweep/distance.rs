@@ -261,7 +261,7 @@ fn distances_agree_with_the_oracle() {
 /// Structured grids, as cloth is laid out: one over another, aligned or shifted by half a step. Features tie, edges are
 /// parallel, and faces coplanar.
 #[derive(Clone, Copy, Debug)]
-enum Grid {
+pub enum Grid {
     /// A step of 1/64.
     Dyadic,
     /// 0.1 k as `f32`, and as `f64`: steps that differ in the last bits.
@@ -275,7 +275,7 @@ enum Grid {
 }
 
 impl Grid {
-    const ALL: [Self; 6] = [
+    pub const ALL: [Self; 6] = [
         Self::Dyadic,
         Self::Tenths32,
         Self::Tenths64,
@@ -285,7 +285,7 @@ impl Grid {
     ];
 
     /// A vertex of a layer, in half steps. The gap between layers is a quarter of a step.
-    fn vertex(self, [i, j]: [u64; 2], layer: u64) -> Point {
+    pub fn vertex(self, [i, j]: [u64; 2], layer: u64) -> Point {
         let single = |p: Point| p.map(|x| f64::from(x as f32));
         let (x, y, z) = (i as f64 / 2.0, j as f64 / 2.0, layer as f64 / 4.0);
         match self {
@@ -303,7 +303,7 @@ impl Grid {
     }
 
     /// A vertex, an edge or a face of one layer and one of the other; a third have equal corners.
-    fn points(self, pair: ElementPair, random: &mut Random) -> [Point; 4] {
+    pub fn points(self, pair: ElementPair, random: &mut Random) -> [Point; 4] {
         let layers = [random.below(3), random.below(3)];
         let shift = random.below(2);
         let first = random.below(100);

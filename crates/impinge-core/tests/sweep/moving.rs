@@ -3,6 +3,7 @@
 use dashu_int::IBig;
 use impinge_core::exact::{Contact, ElementPair, first_contact, touch};
 
+use crate::distance::Grid;
 use crate::generators::{Kind, Random};
 use crate::oracle;
 
@@ -189,6 +190,45 @@ fn lattices_agree_with_the_oracle() {
 }
 
 const N_CASES: u64 = 150;
+
+/// Layers of cloth of which one moves against the other as a whole: down, aside, both, or within its plane. Edges are parallel, faces
+/// coplanar, and vertices meet edges and vertices.
+#[test]
+fn layers_that_move_as_a_whole_agree_with_the_oracle() {
+    let mut random = Random::new(35);
+    for grid in Grid::ALL {
+        for pair in PAIRS {
+            let (mut n_later, mut n_none) = (0, 0);
+            for round in 0..120 {
+                let points = grid.points(pair, &mut random);
+                let mut twentieth = || (random.below(41) as f64 - 20.0) / 20.0;
+                let aside = if round % 3 == 0 { 0.0 } else { 1.0 };
+                let down = if round % 5 == 0 { 0.0 } else { 1.0 };
+                let to = [aside * twentieth(), aside * twentieth(), down * twentieth()];
+                // In parts of a step of the grid, as the layers' gap is.
+                let size = grid.vertex([2, 0], 0)[0] - grid.vertex([0, 0], 0)[0];
+                let n_moving = if pair == ElementPair::EdgeEdge { 2 } else { 1 };
+                let mut end = points;
+                for point in &mut end[..n_moving] {
+                    for axis in 0..3 {
+                        // Exact for grids of `f32`, so the element does not turn. Those of `f64` round some sums.
+                        point[axis] += f64::from((size * to[axis]) as f32);
+                    }
+                }
+                if check(pair, &points, &end, &format!("{grid:?}")) {
+                    n_later += 1;
+                } else {
+                    n_none += 1;
+                }
+            }
+            assert!(n_none > 0, "{grid:?} {pair:?}");
+            assert!(
+                n_later > 5 || pair == ElementPair::VertexVertex || pair == ElementPair::VertexEdge,
+                "{grid:?} {pair:?} {n_later}"
+            );
+        }
+    }
+}
 
 /// The oracle is slow for kinds with numbers of very different size.
 #[test]

@@ -40,6 +40,32 @@ pub(in crate::exact) trait Coordinate:
 }
 impl<T: Factor<Product: Factor<Product: Factor>>> Coordinate for T {}
 
+/// A vector of integers.
+pub(in crate::exact) type Vector<T = Integer> = [T; 3];
+
+#[inline]
+pub(in crate::exact) fn difference<T: Whole>(a: &Vector<T>, b: &Vector<T>) -> Vector<T> {
+    [a[0].minus(&b[0]), a[1].minus(&b[1]), a[2].minus(&b[2])]
+}
+
+#[inline]
+pub(in crate::exact) fn cross<T: Factor>(
+    [x, y, z]: &Vector<T>,
+    [u, v, w]: &Vector<T>,
+) -> Vector<T::Product> {
+    [
+        y.product(w).minus(&z.product(v)),
+        z.product(u).minus(&x.product(w)),
+        x.product(v).minus(&y.product(u)),
+    ]
+}
+
+#[inline]
+pub(in crate::exact) fn dot<T: Factor>(a: &Vector<T>, b: &Vector<T>) -> T::Product {
+    let first = a[0].product(&b[0]).plus(&a[1].product(&b[1]));
+    first.plus(&a[2].product(&b[2]))
+}
+
 /// Products of two, four and eight.
 pub(in crate::exact) type Two<T> = <T as Factor>::Product;
 pub(in crate::exact) type Four<T> = Two<Two<T>>;
@@ -76,6 +102,12 @@ impl Factor for Integer {
 
     fn widened(&self) -> Integer {
         self.clone()
+    }
+}
+
+impl From<u64> for Wide<4> {
+    fn from(x: u64) -> Self {
+        Self([x, 0, 0, 0])
     }
 }
 
@@ -156,6 +188,15 @@ impl<const N: usize> Wide<N> {
     fn new(is_negative: bool, magnitude: [u64; N]) -> Self {
         let wide = Self(magnitude);
         if is_negative { wide.negated() } else { wide }
+    }
+
+    /// 2^`exponent`, which must be below 2^(64 N - 1).
+    #[inline]
+    pub(super) fn power_of_two(exponent: u64) -> Self {
+        Self(std::array::from_fn(|ix| {
+            let bit = exponent.checked_sub(64 * ix as u64);
+            bit.filter(|&bit| bit < 64).map_or(0, |bit| 1 << bit)
+        }))
     }
 
     #[inline]

@@ -9,15 +9,17 @@
 //!
 //! Invariant: no rounding and no tolerance. Floating-point numbers appear only as guesses that are checked.
 
-mod fixed;
+pub(super) mod fixed;
 mod integer;
 mod polynomial;
 mod quotient;
 mod roots;
+mod unit;
 
 pub(super) use fixed::{Coordinate, Eight, Factor, Four, Two, Whole};
 pub(crate) use integer::Integer;
 pub(super) use integer::common_integers;
 pub(super) use polynomial::{Polynomial, Vector, cross, difference, dot, square_of_sum};
 pub(crate) use quotient::unit_of;
-pub(super) use roots::{Root, Roots, Time, floor_between};
+pub(super) use roots::{Root, Roots, Time, floor_between, floor_of_share};
+pub(super) use unit::{Unit, exact_difference};

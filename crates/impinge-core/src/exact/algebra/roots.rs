@@ -7,7 +7,8 @@
 
 use std::cmp::Ordering;
 
-use super::integer::{Integer, common_integers};
+use super::fixed::{Factor, Whole, Wide};
+use super::integer::{Integer, common_integers, parts};
 use super::polynomial::{Controls, Polynomial};
 use crate::exact::Sign;
 
@@ -304,6 +305,26 @@ pub(in crate::exact) fn floor_between(polynomial: &Polynomial, low: f64, high: f
             Sign::Zero => Ordering::Equal,
             sign if sign == before => Ordering::Greater,
             _ => Ordering::Less,
+        }
+    })
+}
+
+/// `part / (part + rest)` rounded down, for numbers from 0 to 2^190, of which `part` is not 0.
+pub(in crate::exact) fn floor_of_share(part: &Wide<4>, rest: &Wide<4>) -> Time {
+    let whole = part.plus(rest);
+    let ((a, i), (b, j)) = (part.approximate(), whole.approximate());
+    floor_of(scaled((a / b, i), j.unsigned_abs()), |x| {
+        let (mantissa, exponent) = parts(x);
+        let depth = exponent.unsigned_abs();
+        if mantissa == 0 || depth > 250 {
+            // Below 2^-197.
+            return Ordering::Greater;
+        }
+        let part = part.product(&Wide::power_of_two(depth));
+        match part.minus(&whole.product(&Wide::from(mantissa))).sign() {
+            Sign::Negative => Ordering::Less,
+            Sign::Zero => Ordering::Equal,
+            Sign::Positive => Ordering::Greater,
         }
     })
 }

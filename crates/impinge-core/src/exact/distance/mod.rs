@@ -25,7 +25,7 @@ mod rounded;
 mod tests;
 
 use super::Point;
-use super::algebra::{Factor, Integer, Whole};
+use super::algebra::fixed::{Vector, cross, difference, dot};
 use super::element_pair::ElementPair;
 pub(crate) use elements::{NearestOfElements, are_within_certainly, elements_are_within};
 pub(crate) use elements::{closest_of_elements, nearest_of_elements, unsure_are_within};
@@ -80,27 +80,4 @@ pub fn faces_are_within(a: &[Point; 3], b: &[Point; 3], distance: f64) -> bool {
 /// Whether it is a number that is not below zero.
 fn is_distance(distance: f64) -> bool {
     distance >= 0.0
-}
-
-/// A vector of integers.
-type Vector<T = Integer> = [T; 3];
-
-#[inline]
-fn difference<T: Whole>(a: &Vector<T>, b: &Vector<T>) -> Vector<T> {
-    [a[0].minus(&b[0]), a[1].minus(&b[1]), a[2].minus(&b[2])]
-}
-
-#[inline]
-fn cross<T: Factor>([x, y, z]: &Vector<T>, [u, v, w]: &Vector<T>) -> Vector<T::Product> {
-    [
-        y.product(w).minus(&z.product(v)),
-        z.product(u).minus(&x.product(w)),
-        x.product(v).minus(&y.product(u)),
-    ]
-}
-
-#[inline]
-fn dot<T: Factor>(a: &Vector<T>, b: &Vector<T>) -> T::Product {
-    let first = a[0].product(&b[0]).plus(&a[1].product(&b[1]));
-    first.plus(&a[2].product(&b[2]))
 }

@@ -5,7 +5,7 @@ use super::filter;
 use super::reach::Reach;
 use super::{Vector, cross, difference, dot};
 use crate::exact::algebra::{
-    Coordinate, Eight, Factor, Four, Integer, Two, Whole, common_integers,
+    Coordinate, Eight, Factor, Four, Integer, Two, Unit, Whole, common_integers, exact_difference,
 };
 use crate::exact::element_pair::ElementPair;
 use crate::exact::{Point, Sign};
@@ -60,9 +60,6 @@ pub(super) struct Polygon<T: Coordinate> {
     pub(super) exponent: i64,
 }
 
-/// The magnitude of corners and distance, as integers of 64 bits, is below 2^61.
-const SHORT_BITS: i64 = 61;
-
 impl Polygon<i64> {
     /// The polygon in integers of fixed width, if its coordinates and the distance are short enough.
     ///
@@ -72,7 +69,7 @@ impl Polygon<i64> {
         let numbers = pair.corners();
         let n_corners = numbers.len();
         let mut parts = [[[0.0; 2]; 3]; 4];
-        let mut largest = reach.high.max(SMALLEST);
+        let mut largest = reach.high;
         for (ix, corner) in parts.iter_mut().enumerate() {
             let [i, j] = numbers[ix % n_corners];
             for (axis, part) in corner.iter_mut().enumerate() {
@@ -80,64 +77,24 @@ impl Polygon<i64> {
                 largest = largest.max(part[0].abs());
             }
         }
-        if largest >= LARGEST {
-            return None;
-        }
-        // 2^(SHORT_BITS - 1 - e), where 2^e <= largest < 2^(e+1), and its inverse.
-        let exponent = exponent_of(largest) + 1 - SHORT_BITS;
-        let (per_unit, unit) = (power(-exponent), power(exponent));
+        let unit = Unit::for_sizes_to(largest)?;
         let mut is_whole = true;
         let mut corners = [[0; 3]; 4];
         for (corner, parts) in corners.iter_mut().zip(&parts) {
-            for (coordinate, [high, low]) in corner.iter_mut().zip(parts) {
-                let (high, is_high) = whole(*high, per_unit, unit);
-                let (low, is_low) = whole(*low, per_unit, unit);
-                is_whole &= is_high & is_low;
-                *coordinate = high + low;
+            for (coordinate, part) in corner.iter_mut().zip(parts) {
+                let (number, is_number) = unit.count_both(*part);
+                is_whole &= is_number;
+                *coordinate = number;
             }
         }
         let mut distance = 0;
         for &part in &reach.parts {
-            let (part, is_part) = whole(part, per_unit, unit);
+            let (part, is_part) = unit.count(part);
             is_whole &= is_part;
             distance += part;
         }
-        is_whole.then(|| Self::new(n_corners, corners, distance, exponent))
+        is_whole.then(|| Self::new(n_corners, corners, distance, unit.exponent))
     }
-}
-
-/// Sizes between which powers of two are far from the ends of the floats.
-const SMALLEST: f64 = f64::from_bits((1023 - 400) << 52);
-const LARGEST: f64 = f64::from_bits((1023 + 400) << 52);
-
-/// A number in units, and whether it is a whole number of them.
-#[allow(clippy::cast_possible_truncation, reason = "checked")]
-#[allow(clippy::cast_precision_loss, reason = "checked")]
-#[inline]
-fn whole(x: f64, per_unit: f64, unit: f64) -> (i64, bool) {
-    let n = (x * per_unit) as i64;
-    (n, n as f64 * unit == x)
-}
-
-/// The exponent of a positive float that is normal: 2^exponent <= x < 2^(exponent + 1).
-#[allow(clippy::cast_possible_wrap, reason = "eleven bits")]
-fn exponent_of(x: f64) -> i64 {
-    (x.to_bits() >> 52) as i64 - 1023
-}
-
-/// 2^exponent, for exponents of magnitude below 1000.
-#[allow(clippy::cast_sign_loss, reason = "positive")]
-fn power(exponent: i64) -> f64 {
-    f64::from_bits(((1023 + exponent) as u64) << 52)
-}
-
-/// The difference of two floats as a rounded difference and its error (Knuth's sum of two); NaN where it overflows.
-#[inline]
-fn exact_difference(a: f64, b: f64) -> [f64; 2] {
-    let high = a - b;
-    let subtracted = a - high;
-    let rest = high + subtracted;
-    [high, (a - rest) + (subtracted - b)]
 }
 
 impl Polygon<Integer> {

@@ -18,6 +18,7 @@
 //! `docs/exactness.md`, "Continuous collision", has the proofs.
 
 mod polygon;
+mod shift;
 #[cfg(test)]
 pub(in crate::exact) mod tests;
 
@@ -113,8 +114,8 @@ fn first_contact_by_roots(
     if touch(pair, start) {
         return Some(Contact::AT_START);
     }
-    Polygon::new(pair.corners(), start, end)
-        .first_time()
+    shift::first_time(pair.corners(), start, end)
+        .unwrap_or_else(|| Polygon::new(pair.corners(), start, end).first_time())
         .map(Contact::later)
 }
 

@@ -1,0 +1,69 @@
+//! Floats as whole numbers of a unit, in 64 bits.
+
+/// The magnitude of numbers of units is below 2^61.
+const BITS: i64 = 61;
+
+/// Sizes between which powers of two are far from the ends of the floats.
+const SMALLEST: f64 = f64::from_bits((1023 - 400) << 52);
+const LARGEST: f64 = f64::from_bits((1023 + 400) << 52);
+
+/// A power of two.
+pub(in crate::exact) struct Unit {
+    unit: f64,
+    per_unit: f64,
+    pub(in crate::exact) exponent: i64,
+}
+
+impl Unit {
+    /// The unit of which numbers up to a size are less than 2^61. `None` for sizes far out.
+    pub(in crate::exact) fn for_sizes_to(largest: f64) -> Option<Self> {
+        if largest >= LARGEST {
+            return None;
+        }
+        // The inverse is 2^(BITS - 1 - e), where 2^e <= largest < 2^(e+1).
+        let exponent = exponent_of(largest.max(SMALLEST)) + 1 - BITS;
+        Some(Self {
+            unit: power(exponent),
+            per_unit: power(-exponent),
+            exponent,
+        })
+    }
+
+    /// A number in units, and whether it is a whole number of them.
+    #[allow(clippy::cast_possible_truncation, reason = "checked")]
+    #[allow(clippy::cast_precision_loss, reason = "checked")]
+    #[inline]
+    pub(in crate::exact) fn count(&self, x: f64) -> (i64, bool) {
+        let n = (x * self.per_unit) as i64;
+        (n, n as f64 * self.unit == x)
+    }
+
+    /// [`Unit::count`] of the sum of two numbers, each of which must be whole.
+    #[inline]
+    pub(in crate::exact) fn count_both(&self, [high, low]: [f64; 2]) -> (i64, bool) {
+        let (high, is_high) = self.count(high);
+        let (low, is_low) = self.count(low);
+        (high + low, is_high & is_low)
+    }
+}
+
+/// The exponent of a positive float that is normal: 2^exponent <= x < 2^(exponent + 1).
+#[allow(clippy::cast_possible_wrap, reason = "eleven bits")]
+fn exponent_of(x: f64) -> i64 {
+    (x.to_bits() >> 52) as i64 - 1023
+}
+
+/// 2^exponent, for exponents of magnitude below 1000.
+#[allow(clippy::cast_sign_loss, reason = "positive")]
+fn power(exponent: i64) -> f64 {
+    f64::from_bits(((1023 + exponent) as u64) << 52)
+}
+
+/// The difference of two floats as a rounded difference and its error (Knuth's sum of two); NaN where it overflows.
+#[inline]
+pub(in crate::exact) fn exact_difference(a: f64, b: f64) -> [f64; 2] {
+    let high = a - b;
+    let subtracted = a - high;
+    let rest = high + subtracted;
+    [high, (a - rest) + (subtracted - b)]
+}
