@@ -201,19 +201,24 @@ fn layers_that_move_as_a_whole_agree_with_the_oracle() {
             let (mut n_later, mut n_none) = (0, 0);
             for round in 0..120 {
                 let points = grid.points(pair, &mut random);
-                let mut twentieth = || (random.below(41) as f64 - 20.0) / 20.0;
-                let aside = if round % 3 == 0 { 0.0 } else { 1.0 };
-                let down = if round % 5 == 0 { 0.0 } else { 1.0 };
-                let to = [aside * twentieth(), aside * twentieth(), down * twentieth()];
-                // In parts of a step of the grid, as the layers' gap is.
-                let size = grid.vertex([2, 0], 0)[0] - grid.vertex([0, 0], 0)[0];
                 let n_moving = if pair == ElementPair::EdgeEdge { 2 } else { 1 };
+                // Onto a point of the other element, or past it, or not so far; every third time a bit aside.
+                let n_targets = corners(pair).len() / n_moving;
+                let target = points[n_moving + random.below(n_targets as u64) as usize];
+                let far = [1.0, 2.0, 1.25, 0.5][random.below(4) as usize];
+                let size = grid.vertex([2, 0], 0)[0] - grid.vertex([0, 0], 0)[0];
+                let by: [f64; 3] = std::array::from_fn(|axis| {
+                    let aside = if round % 3 == 0 {
+                        random.below(21) as f64 / 20.0
+                    } else {
+                        0.0
+                    };
+                    // Exact sums for grids of `f32`, so the element does not turn. Those of `f64` round some.
+                    f64::from((far * (target[axis] - points[0][axis]) + aside * size) as f32)
+                });
                 let mut end = points;
                 for point in &mut end[..n_moving] {
-                    for axis in 0..3 {
-                        // Exact for grids of `f32`, so the element does not turn. Those of `f64` round some sums.
-                        point[axis] += f64::from((size * to[axis]) as f32);
-                    }
+                    *point = std::array::from_fn(|axis| point[axis] + by[axis]);
                 }
                 if check(pair, &points, &end, &format!("{grid:?}")) {
                     n_later += 1;
@@ -221,11 +226,7 @@ fn layers_that_move_as_a_whole_agree_with_the_oracle() {
                     n_none += 1;
                 }
             }
-            assert!(n_none > 0, "{grid:?} {pair:?}");
-            assert!(
-                n_later > 5 || pair == ElementPair::VertexVertex || pair == ElementPair::VertexEdge,
-                "{grid:?} {pair:?} {n_later}"
-            );
+            assert!(n_none > 0 && n_later > 2, "{grid:?} {pair:?} {n_later}");
         }
     }
 }
