@@ -312,6 +312,60 @@ fn filter_never_contradicts_exact_roots() {
     }
 }
 
+/// Elements that meet at the border of a face or at an end of an edge: the area to one side is exactly zero at all times,
+/// and only its rounding error has a sign.
+#[test]
+fn filter_does_not_trust_the_rounding_error_of_an_area() {
+    let mut random = Random(5);
+    for pair in PAIRS {
+        let mut n_unsure = 0;
+        for _ in 0..200 {
+            let mut batch = Steps8::default();
+            for lane in 0..LANES {
+                let step = meeting_at_a_border(pair, &mut random);
+                let contact = first_contact_by_roots(pair, &step[0], &step[1]);
+                assert_eq!(contact.map(|contact| contact.time), Some(0.5), "{step:?}");
+                batch.set(lane, &step);
+            }
+            let (apart, found) = ask_all(pair, &batch, 1.0);
+            assert_eq!(apart, 0);
+            for outcome in found {
+                assert_ne!(outcome.next, Next::Apart, "{pair:?}");
+                n_unsure += usize::from(outcome.next == Next::Unsure);
+            }
+        }
+        assert!(n_unsure > 0);
+    }
+}
+
+/// The first point, and of two edges the second with it, moves through the middle of the edge between two others, at time
+/// 1/2, in the plane of that edge and the normal. Coordinates are whole numbers below 2^53, and areas are not.
+fn meeting_at_a_border(pair: ElementPair, random: &mut Random) -> [[Point; 4]; 2] {
+    let mut corner = || [(); 3].map(|()| 2.0 * random.below(1 << 13) as f64);
+    let (start, end, third) = (corner(), corner(), corner());
+    let edge: Point = std::array::from_fn(|k| end[k] - start[k]);
+    let other: Point = std::array::from_fn(|k| third[k] - start[k]);
+    let normal: Point = std::array::from_fn(|k| {
+        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        edge[i] * other[j] - edge[j] * other[i]
+    });
+    let along = random.below(1 << 10) as f64;
+    [-1.0, 1.0].map(|side| {
+        let moving = std::array::from_fn(|k| {
+            start[k] + 0.5 * edge[k] + side * (normal[k] + along * edge[k])
+        });
+        match pair {
+            ElementPair::VertexFace => [moving, start, end, third],
+            _ => [
+                moving,
+                std::array::from_fn(|k| moving[k] + other[k]),
+                start,
+                end,
+            ],
+        }
+    })
+}
+
 /// Whether the first time lies in [low, next after its floor).
 fn is_floor_of(contact: Option<Contact>, low: f64) -> bool {
     contact.is_some_and(|contact| !contact.is_exact && contact.time.next_up() >= low)
