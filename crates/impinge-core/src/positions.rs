@@ -58,18 +58,15 @@ impl Positions {
     /// The positions at a fraction of the way to others, as many of the same precision: `start + fraction (end - start)`, each
     /// coordinate computed in double precision and rounded to that of the positions.
     pub(crate) fn blend(&self, end: &Positions, fraction: f64) -> Positions {
-        fn all<R: Real>(start: &[[R; 3]], end: &[[R; 3]], fraction: f64) -> Vec<[R; 3]> {
-            let pairs = start.iter().zip(end);
-            pairs.map(|(x, y)| between(x, y, fraction)).collect()
-        }
         match (self, end) {
             (Positions::F32(start), Positions::F32(end)) => {
-                Positions::F32(all(start, end, fraction))
+                let pairs = start.iter().zip(end);
+                Positions::F32(pairs.map(|(x, y)| between(x, y, fraction)).collect())
             }
-            (Positions::F64(start), Positions::F64(end)) => {
-                Positions::F64(all(start, end, fraction))
+            _ => {
+                let points = (0..self.len()).map(|vertex| self.blend_point(end, vertex, fraction));
+                Positions::F64(points.collect())
             }
-            _ => unreachable!("both ends of a step have one precision"),
         }
     }
 

@@ -5,6 +5,8 @@
 //! a product below 7 · 2^-106, a quotient below 16 · 2^-106. No fused multiply-add, so the bits are the same
 //! on every machine.
 
+use crate::exact::two_sum;
+
 /// `high + low`, where `high` is the sum rounded to nearest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Double {
@@ -15,16 +17,13 @@ pub(super) struct Double {
 /// More than the relative error of any one operation here.
 pub(super) const ERROR: f64 = 1.0 / (1u128 << 101) as f64;
 
-fn two_sum(a: f64, b: f64) -> Double {
-    let high = a + b;
-    let part = high - a;
-    Double {
-        high,
-        low: (a - (high - part)) + (b - part),
-    }
+/// `a + b`, without error.
+fn sum(a: f64, b: f64) -> Double {
+    let [high, low] = two_sum(a, b);
+    Double { high, low }
 }
 
-/// [`two_sum`] where `|a| >= |b|`, or a is zero.
+/// [`sum`] where `|a| >= |b|`, or a is zero.
 fn quick_sum(a: f64, b: f64) -> Double {
     let high = a + b;
     Double {
@@ -53,7 +52,7 @@ fn split(a: f64) -> (f64, f64) {
 impl Double {
     /// `a - b`, without error.
     pub fn difference(a: f64, b: f64) -> Self {
-        two_sum(a, -b)
+        sum(a, -b)
     }
 
     pub fn abs(self) -> Self {
@@ -82,8 +81,8 @@ impl std::ops::Add for Double {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
-        let high = two_sum(self.high, other.high);
-        let low = two_sum(self.low, other.low);
+        let high = sum(self.high, other.high);
+        let low = sum(self.low, other.low);
         let part = quick_sum(high.high, high.low + low.high);
         quick_sum(part.high, low.low + part.low)
     }

@@ -375,11 +375,6 @@ impl Detector {
         };
         let single = moving().any(|(_, start, _)| matches!(start, Positions::F32(_)));
         let last_bit = f64::from(if single { f32::EPSILON } else { 0.0 }).max(f64::EPSILON);
-        if first.toi == 0.0 {
-            advance.fraction = 0.0;
-            advance.positions = moving().map(|(id, start, _)| (id, start.clone())).collect();
-            return Ok(advance);
-        }
         // Pairs that touched on the way to positions tried before: they probably do again.
         let same =
             |&(kind, found): &(_, &_)| self.steps.impacts.impact(kind, Toi::F64, found) == first;
@@ -396,10 +391,11 @@ impl Detector {
         let mut back_off = 0.0;
         loop {
             let fraction = first.toi * (1.0 - back_off);
-            if !known
-                .iter()
-                .any(|&pair| self.touch(scene, &step, pair, fraction))
-            {
+            advance.fraction = fraction;
+            let is_known = |&pair: &_| self.touch(scene, &step, pair, fraction);
+            let touches = fraction > 0.0 && known.iter().any(is_known);
+            let n_known = known.len();
+            if !touches {
                 let blended = moving().map(|(id, start, end)| (id, start.blend(end, fraction)));
                 advance.positions = blended.collect();
                 let mut moved = moving().zip(&advance.positions);
@@ -416,15 +412,12 @@ impl Detector {
                 self.begin(&trial, &step)?;
                 let whole = (Pose::WHOLE, f64::INFINITY);
                 self.find(&trial, &step, Sought::All, whole, None, control)?;
-                let n_known = known.len();
                 known.extend(self.steps.found().map(|(kind, found)| (kind, found.key)));
-                if known.len() == n_known {
-                    advance.fraction = fraction;
-                    advance.n_tried += 1;
-                    return Ok(advance);
-                }
             }
             advance.n_tried += 1;
+            if !touches && known.len() == n_known {
+                return Ok(advance);
+            }
             back_off = if back_off == 0.0 {
                 last_bit
             } else {

@@ -43,6 +43,7 @@ pub use distance::{
 pub use element_pair::ElementPair;
 pub(crate) use orientation::{Projection, collinear};
 pub use orientation::{Sign, orient2d, orient3d};
+pub(crate) use rounding::two_sum;
 pub(crate) use segment::strictly_between;
 pub use shared::{
     tetrahedra_intersect_beyond_shared, triangle_tetrahedron_intersect_beyond_shared,

@@ -1,5 +1,7 @@
 //! The two determinants that everything else is made of, with exact signs.
 
+use std::cmp::Ordering;
+
 use super::Point;
 use robust::{Coord, Coord3D};
 
@@ -26,6 +28,12 @@ impl Sign {
         } else {
             Self::Zero
         }
+    }
+
+    /// How the number compares with zero.
+    #[inline]
+    pub(super) fn order(self) -> Ordering {
+        (self as i8).cmp(&0)
     }
 
     /// Whether the number is zero.

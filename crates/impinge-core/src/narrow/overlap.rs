@@ -1,5 +1,6 @@
 //! Whether the boxes of two elements overlap during a step.
 
+use crate::exact::two_sum;
 use crate::frame::TestId;
 
 use super::{Element, Extent, Test};
@@ -38,10 +39,7 @@ pub(crate) fn are_near(a: &Extent, b: &Extent, distance: f64) -> bool {
 
 /// Whether `low - high > 2 distance`, as real numbers.
 fn is_beyond(low: f64, high: f64, distance: f64) -> bool {
-    // The difference and its rounding error, which is a float (Knuth's two-sum).
-    let gap = low - high;
-    let back = gap - low;
-    let error = (low - (gap - back)) - (high + back);
+    let [gap, error] = two_sum(low, -high);
     let most = 2.0 * distance;
     gap > most || (gap == most && error > 0.0)
 }

@@ -5,5 +5,6 @@ mod distance;
 #[path = "../exact/generators.rs"]
 #[allow(dead_code, reason = "made for another test")]
 mod generators;
+mod grid;
 mod moving;
 mod oracle;

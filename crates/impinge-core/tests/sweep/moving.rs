@@ -3,8 +3,8 @@
 use dashu_int::IBig;
 use impinge_core::exact::{Contact, ElementPair, first_contact, touch};
 
-use crate::distance::Grid;
 use crate::generators::{Kind, Random};
+use crate::grid::Grid;
 use crate::oracle;
 
 pub type Point = [f64; 3];

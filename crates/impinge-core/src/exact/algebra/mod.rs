@@ -22,4 +22,4 @@ pub(super) use integer::common_integers;
 pub(super) use polynomial::{Polynomial, Vector, cross, difference, dot, square_of_sum};
 pub(crate) use quotient::unit_of;
 pub(super) use roots::{Root, Roots, Time, floor_between, floor_of_share};
-pub(super) use unit::{Unit, exact_difference};
+pub(super) use unit::Unit;

@@ -234,16 +234,13 @@ impl Root {
     /// The root compared with a float in [0, 1].
     fn compare(&self, x: f64) -> Ordering {
         let (numerator, depth) = dyadic(x);
-        let order_of = |sign: Sign| match sign {
-            Sign::Negative => Ordering::Less,
-            Sign::Zero => Ordering::Equal,
-            Sign::Positive => Ordering::Greater,
-        };
         match &self.place {
             Place::At {
                 numerator: root,
                 depth: root_depth,
-            } => order_of((&root.shifted(depth) - &numerator.shifted(*root_depth)).sign()),
+            } => (&root.shifted(depth) - &numerator.shifted(*root_depth))
+                .sign()
+                .order(),
             Place::Inside {
                 polynomial,
                 controls,
@@ -321,11 +318,8 @@ pub(in crate::exact) fn floor_of_share(part: &Wide<4>, rest: &Wide<4>) -> Time {
             return Ordering::Greater;
         }
         let part = part.product(&Wide::power_of_two(depth));
-        match part.minus(&whole.product(&Wide::from(mantissa))).sign() {
-            Sign::Negative => Ordering::Less,
-            Sign::Zero => Ordering::Equal,
-            Sign::Positive => Ordering::Greater,
-        }
+        let difference = part.minus(&whole.product(&Wide::from(mantissa)));
+        difference.sign().order()
     })
 }
 

@@ -1,5 +1,8 @@
 //! Floats as whole numbers of a unit, in 64 bits.
 
+use crate::exact::Point;
+use crate::exact::rounding::two_sum;
+
 /// The magnitude of numbers of units is below 2^61.
 const BITS: i64 = 61;
 
@@ -15,8 +18,37 @@ pub(in crate::exact) struct Unit {
 }
 
 impl Unit {
+    /// Differences of points and the unit that they are counted in, with which `other` is below 2^61 too. `None` if one is not a
+    /// whole number of units.
+    ///
+    /// Each coordinate is the sum of a rounded difference and its error. With the unit that keeps all of them below 2^61, they
+    /// only have to be whole.
+    pub(in crate::exact) fn differences<const N: usize>(
+        pairs: [[&Point; 2]; N],
+        other: f64,
+    ) -> Option<(Self, [[i64; 3]; N])> {
+        let mut largest = other;
+        let parts = pairs.map(|[p, q]| {
+            std::array::from_fn::<_, 3, _>(|axis| {
+                let part = two_sum(p[axis], -q[axis]);
+                largest = largest.max(part[0].abs());
+                part
+            })
+        });
+        let unit = Self::for_sizes_to(largest)?;
+        let mut are_whole = true;
+        let numbers = parts.map(|parts| {
+            parts.map(|part| {
+                let (number, is_whole) = unit.count_both(part);
+                are_whole &= is_whole;
+                number
+            })
+        });
+        are_whole.then_some((unit, numbers))
+    }
+
     /// The unit of which numbers up to a size are less than 2^61. `None` for sizes far out.
-    pub(in crate::exact) fn for_sizes_to(largest: f64) -> Option<Self> {
+    fn for_sizes_to(largest: f64) -> Option<Self> {
         if largest >= LARGEST {
             return None;
         }
@@ -40,7 +72,7 @@ impl Unit {
 
     /// [`Unit::count`] of the sum of two numbers, each of which must be whole.
     #[inline]
-    pub(in crate::exact) fn count_both(&self, [high, low]: [f64; 2]) -> (i64, bool) {
+    fn count_both(&self, [high, low]: [f64; 2]) -> (i64, bool) {
         let (high, is_high) = self.count(high);
         let (low, is_low) = self.count(low);
         (high + low, is_high & is_low)
@@ -57,13 +89,4 @@ fn exponent_of(x: f64) -> i64 {
 #[allow(clippy::cast_sign_loss, reason = "positive")]
 fn power(exponent: i64) -> f64 {
     f64::from_bits(((1023 + exponent) as u64) << 52)
-}
-
-/// The difference of two floats as a rounded difference and its error (Knuth's sum of two); NaN where it overflows.
-#[inline]
-pub(in crate::exact) fn exact_difference(a: f64, b: f64) -> [f64; 2] {
-    let high = a - b;
-    let subtracted = a - high;
-    let rest = high + subtracted;
-    [high, (a - rest) + (subtracted - b)]
 }

@@ -13,7 +13,7 @@ use super::{Feature, Nearest, filter, nearest};
 use crate::exact::algebra::Integer;
 use crate::exact::element_pair::ElementPair;
 use crate::exact::triangle::segment_meets_triangle;
-use crate::exact::{Point, Sign, triangles_intersect};
+use crate::exact::{Point, triangles_intersect};
 
 /// The edges of a face as vertex numbers.
 const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
@@ -335,11 +335,7 @@ impl<'a> Measured<'a> {
             exponents.map(|exponent| u64::try_from(exponent - least).expect("not below the least"));
         let left = (&over * &under_other).shifted(shift);
         let right = (&over_other * &under).shifted(shift_other);
-        match (&left - &right).sign() {
-            Sign::Negative => Ordering::Less,
-            Sign::Zero => Ordering::Equal,
-            Sign::Positive => Ordering::Greater,
-        }
+        (&left - &right).sign().order()
     }
 }
 

@@ -5,7 +5,7 @@ use super::filter;
 use super::reach::Reach;
 use super::{Vector, cross, difference, dot};
 use crate::exact::algebra::{
-    Coordinate, Eight, Factor, Four, Integer, Two, Unit, Whole, common_integers, exact_difference,
+    Coordinate, Eight, Factor, Four, Integer, Two, Unit, Whole, common_integers,
 };
 use crate::exact::element_pair::ElementPair;
 use crate::exact::{Point, Sign};
@@ -62,31 +62,12 @@ pub(super) struct Polygon<T: Coordinate> {
 
 impl Polygon<i64> {
     /// The polygon in integers of fixed width, if its coordinates and the distance are short enough.
-    ///
-    /// Each corner is p - q = high + low, a rounded difference and its error. With the unit 2^e such that all are below
-    /// 2^61 units, it only has to be a whole number of units.
     pub(super) fn short(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> Option<Self> {
         let numbers = pair.corners();
         let n_corners = numbers.len();
-        let mut parts = [[[0.0; 2]; 3]; 4];
-        let mut largest = reach.high;
-        for (ix, corner) in parts.iter_mut().enumerate() {
-            let [i, j] = numbers[ix % n_corners];
-            for (axis, part) in corner.iter_mut().enumerate() {
-                *part = exact_difference(points[i][axis], points[j][axis]);
-                largest = largest.max(part[0].abs());
-            }
-        }
-        let unit = Unit::for_sizes_to(largest)?;
+        let pairs = std::array::from_fn(|ix| numbers[ix % n_corners].map(|ix| &points[ix]));
+        let (unit, corners) = Unit::differences(pairs, reach.high)?;
         let mut is_whole = true;
-        let mut corners = [[0; 3]; 4];
-        for (corner, parts) in corners.iter_mut().zip(&parts) {
-            for (coordinate, part) in corner.iter_mut().zip(parts) {
-                let (number, is_number) = unit.count_both(*part);
-                is_whole &= is_number;
-                *coordinate = number;
-            }
-        }
         let mut distance = 0;
         for &part in &reach.parts {
             let (part, is_part) = unit.count(part);

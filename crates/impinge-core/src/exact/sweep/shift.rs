@@ -9,7 +9,7 @@
 //! `docs/exactness.md`, "Continuous collision", has the proof and the bounds.
 
 use crate::exact::algebra::fixed::{Factor, Vector, Whole, Wide, cross, difference, dot};
-use crate::exact::algebra::{Time, Unit, exact_difference, floor_of_share};
+use crate::exact::algebra::{Time, Unit, floor_of_share};
 use crate::exact::{Point, Sign};
 
 /// The first time in (0, 1] at which two elements share a point, provided that they do not at the start. Corners are differences of
@@ -29,7 +29,13 @@ pub(super) fn first_time(
     if n < 2 {
         return None;
     }
-    let corners = short_corners(numbers, start, end)?;
+    let pairs: [_; 8] = std::array::from_fn(|ix| {
+        let points = [start, end][ix / 4];
+        numbers[ix % 4 % n].map(|ix| &points[ix])
+    });
+    let (_, corners) = Unit::differences(pairs, 0.0)?;
+    let corners: [[Vector<i64>; 4]; 2] =
+        [0, 4].map(|first| std::array::from_fn(|ix| corners[first + ix]));
     let shift = |ix: usize| difference(&corners[1][ix], &corners[0][ix]);
     if (1..n).any(|ix| shift(ix) != shift(0)) {
         return None;
@@ -68,36 +74,6 @@ pub(super) fn first_time(
         }
     }
     Some(first)
-}
-
-/// The corners at the start and at the end, if their coordinates are short enough.
-fn short_corners(
-    numbers: &[[usize; 2]],
-    start: &[Point; 4],
-    end: &[Point; 4],
-) -> Option<[[Vector<i64>; 4]; 2]> {
-    let mut parts = [[[[0.0; 2]; 3]; 4]; 2];
-    let mut largest = 0.0_f64;
-    for (parts, points) in parts.iter_mut().zip([start, end]) {
-        for (corner, &[i, j]) in parts.iter_mut().zip(numbers) {
-            for (axis, part) in corner.iter_mut().enumerate() {
-                *part = exact_difference(points[i][axis], points[j][axis]);
-                largest = largest.max(part[0].abs());
-            }
-        }
-    }
-    let unit = Unit::for_sizes_to(largest)?;
-    let mut is_whole = true;
-    let corners = parts.map(|corners| {
-        corners.map(|corner| {
-            corner.map(|part| {
-                let (number, is_number) = unit.count_both(part);
-                is_whole &= is_number;
-                number
-            })
-        })
-    });
-    is_whole.then_some(corners)
 }
 
 /// The root in (0, 1] of a linear function, as before / (before + after).
