@@ -10,7 +10,13 @@ use crate::error::Error;
 use crate::frame::Layer;
 use crate::grouping::bounds::Bounds;
 #[cfg(feature = "gpu")]
+use crate::grouping::clusters::Clustering;
+#[cfg(feature = "gpu")]
+use crate::hull;
+#[cfg(feature = "gpu")]
 use crate::ids::BodyId;
+#[cfg(feature = "gpu")]
+use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::{Body, Scene};
 use crate::stats::Statistics;
@@ -210,12 +216,14 @@ const SAMPLES: usize = 64;
 
 /// The [`spread`] of evenly spaced clusters. The same clusters are sampled every time.
 #[cfg(feature = "gpu")]
-pub(crate) fn sampled_spread(n: usize, bounds_of: impl Fn(usize) -> Bounds) -> f64 {
+pub(crate) fn sampled_spread(clustering: &Clustering, positions: &Positions) -> f64 {
+    let n = clustering.n_clusters();
     let n_samples = n.min(SAMPLES);
     let mut whole = Bounds::EMPTY;
     let mut sum = 0.0;
     for sample in 0..n_samples {
-        let bounds = bounds_of(sample * n / n_samples);
+        let vertices = clustering.vertices(sample * n / n_samples);
+        let bounds = hull::of_vertices(positions, vertices);
         sum += bounds.half_area();
         whole.join(&bounds);
     }

@@ -19,6 +19,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::elements::{Kind, Part};
 use crate::error::Error;
 use crate::exact::Reach;
+use crate::hull::Extent;
 use crate::ids::BodyId;
 use crate::pair_kind::{PairKind, PairKinds};
 use crate::positions::{Positions, check_positions};
@@ -174,9 +175,7 @@ impl Frame {
         let points = corners
             .iter()
             .map(|&corner| body.positions().point(corner as usize));
-        points.fold([f64::INFINITY; 3], |low, point| {
-            std::array::from_fn(|axis| low[axis].min(point[axis]))
-        })
+        Extent::of(points).min
     }
 
     /// Sets within which distance elements are near: the sum of `distance` and the radii of both bodies.

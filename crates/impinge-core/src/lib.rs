@@ -21,6 +21,7 @@ pub mod frame;
 pub mod gpu;
 pub mod grouping;
 pub mod host;
+mod hull;
 mod ids;
 mod impacts;
 mod key_ranges;

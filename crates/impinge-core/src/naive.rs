@@ -5,7 +5,8 @@
 
 use crate::error::Error;
 use crate::frame::{Frame, TestId, pair_key};
-use crate::narrow::{Element, Extent, Test};
+use crate::hull::Extent;
+use crate::narrow::{Element, Test};
 use crate::progress::Control;
 use crate::scene::Scene;
 use crate::stats::Statistics;

@@ -1,83 +1,15 @@
-//! Stage `bounds`: the box of each cluster, of the tree above it, and of single primitives.
+//! Stage `bounds`: the box of each cluster, and of the tree above it.
 //!
 //! In: positions and the unique vertices of each cluster. Out: one box per cluster and per tree node, as
 //! structures of arrays. A vertex is one 4-lane load and two instructions.
 //! Cost: every vertex of a body once per cluster that has it (1.35 times on average in a closed mesh).
 //! Invariant: a box holds all its vertices; f64 positions are rounded outward.
 
-use crate::elements::with_corners;
-use crate::grouping::GROUP;
-use crate::grouping::bounds::{
-    Bounds, BoundsArray, RawBoundsArray, greater, lesser, round_down, round_up,
-};
+use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
+use crate::hull::{self, ReadVertices};
 use crate::positions::Positions;
-
-use super::simd::{LaneBounds, Simd};
-use super::vec4::{Vec4, of_vertices_f32};
-
-/// The box of some vertices.
-#[inline]
-pub(crate) fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
-    match positions {
-        Positions::F32(positions) => of_vertices_f32(positions, vertices).0,
-        Positions::F64(positions) => {
-            let mut min = [f64::INFINITY; 3];
-            let mut max = [f64::NEG_INFINITY; 3];
-            for &vertex in vertices {
-                let point = &positions[vertex as usize];
-                for axis in 0..3 {
-                    let x = point[axis];
-                    min[axis] = if x < min[axis] { x } else { min[axis] };
-                    max[axis] = if x > max[axis] { x } else { max[axis] };
-                }
-            }
-            Bounds {
-                min: min.map(round_down),
-                max: max.map(round_up),
-            }
-        }
-    }
-}
-
-/// Coordinates processed together in [`of_run`]: several registers hide the latency.
-const TOGETHER: usize = 24;
-
-/// The box of a run of a body's vertices.
-pub(crate) fn of_run(positions: &Positions, run: std::ops::Range<usize>) -> Bounds {
-    let mut bounds = Bounds::EMPTY;
-    match positions {
-        Positions::F32(positions) => {
-            let mut min = [f32::INFINITY; TOGETHER];
-            let mut max = [f32::NEG_INFINITY; TOGETHER];
-            let (chunks, rest) = positions[run].as_flattened().as_chunks::<TOGETHER>();
-            for chunk in chunks {
-                for k in 0..TOGETHER {
-                    min[k] = lesser(min[k], chunk[k]);
-                    max[k] = greater(max[k], chunk[k]);
-                }
-            }
-            for (k, &x) in rest.iter().enumerate() {
-                min[k] = lesser(min[k], x);
-                max[k] = greater(max[k], x);
-            }
-            for k in 0..TOGETHER {
-                bounds.min[k % 3] = lesser(bounds.min[k % 3], min[k]);
-                bounds.max[k % 3] = greater(bounds.max[k % 3], max[k]);
-            }
-        }
-        Positions::F64(positions) => {
-            for point in &positions[run] {
-                bounds.join(&Bounds {
-                    min: point.map(round_down),
-                    max: point.map(round_up),
-                });
-            }
-        }
-    }
-    bounds
-}
 
 /// A summary of some clusters.
 #[derive(Debug, Clone, Copy)]
@@ -112,7 +44,7 @@ impl Summary {
 /// # Safety
 /// `into` must be as long as the clustering, and no other thread may access these clusters' boxes at the same time.
 #[inline(always)]
-pub(crate) unsafe fn of_clusters<S: Simd>(
+pub(crate) unsafe fn of_clusters<S: ReadVertices>(
     simd: S,
     positions: &Positions,
     clustering: &Clustering,
@@ -121,12 +53,7 @@ pub(crate) unsafe fn of_clusters<S: Simd>(
 ) -> Summary {
     let mut summary = Summary::EMPTY;
     for cluster in clusters {
-        let vertices = clustering.vertices(cluster);
-        let (bounds, all_finite) = match positions {
-            // SAFETY: a cluster's vertices ascend.
-            Positions::F32(positions) => unsafe { simd.of_ascending(positions, vertices) },
-            Positions::F64(_) => (of_vertices(positions, vertices), true),
-        };
+        let (bounds, all_finite) = hull::of_cluster(simd, positions, clustering, cluster);
         let [x, y, z] = [0, 1, 2].map(|axis| bounds.max[axis] - bounds.min[axis]);
         summary.join(&Summary {
             bounds,
@@ -137,73 +64,6 @@ pub(crate) unsafe fn of_clusters<S: Simd>(
         unsafe { into.put(cluster, &bounds) };
     }
     summary
-}
-
-/// The boxes of a cluster's primitives, one per lane; lanes past its size become empty.
-pub(crate) fn of_cluster_primitives(
-    positions: &Positions,
-    clustering: &Clustering,
-    cluster: usize,
-    lanes: &mut LaneBounds,
-) {
-    let places = cluster * GROUP..cluster * GROUP + clustering.size(cluster);
-    with_corners!(&clustering.corners, |corners| of_primitives(
-        positions,
-        &corners[places],
-        lanes
-    ));
-}
-
-fn of_primitives<const N: usize>(
-    positions: &Positions,
-    corners: &[[u32; N]],
-    lanes: &mut LaneBounds,
-) {
-    match positions {
-        Positions::F32(positions) => {
-            let (fours, rest) = corners.as_chunks::<4>();
-            for (four_ix, four) in fours.iter().enumerate() {
-                let [a, b, c, d] = four;
-                let (min_a, max_a) = extent(positions, a);
-                let (min_b, max_b) = extent(positions, b);
-                let (min_c, max_c) = extent(positions, c);
-                let (min_d, max_d) = extent(positions, d);
-                let min = Vec4::transpose([min_a, min_b, min_c, min_d]);
-                let max = Vec4::transpose([max_a, max_b, max_c, max_d]);
-                let lane = 4 * four_ix;
-                for axis in 0..3 {
-                    lanes.min[axis][lane..lane + 4].copy_from_slice(&min[axis]);
-                    lanes.max[axis][lane..lane + 4].copy_from_slice(&max[axis]);
-                }
-            }
-            let done = corners.len() - rest.len();
-            for (lane, corners) in (done..).zip(rest) {
-                let (min, max) = extent(positions, corners);
-                let (min, max) = (min.xyz(), max.xyz());
-                lanes.put(lane, &Bounds { min, max });
-            }
-        }
-        Positions::F64(_) => {
-            for (lane, corners) in corners.iter().enumerate() {
-                lanes.put(lane, &of_vertices(positions, corners));
-            }
-        }
-    }
-    if corners.len() < GROUP {
-        lanes.clear_from(corners.len());
-    }
-}
-
-#[inline(always)]
-fn extent<const N: usize>(positions: &[[f32; 3]], corners: &[u32; N]) -> (Vec4, Vec4) {
-    let first = Vec4::load(positions, corners[0] as usize);
-    let (mut min, mut max) = (first, first);
-    for &corner in &corners[1..] {
-        let vertex = Vec4::load(positions, corner as usize);
-        min = min.min(vertex);
-        max = max.max(vertex);
-    }
-    (min, max)
 }
 
 /// The boxes of a tree, level by level, leaves first.

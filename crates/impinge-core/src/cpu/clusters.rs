@@ -21,6 +21,7 @@ use crate::error::Error;
 use crate::frame::Layer;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
+use crate::hull;
 use crate::positions::Positions;
 use crate::query::SharedVertex;
 use crate::scene::{Body, Scene};
@@ -28,7 +29,7 @@ use crate::settings::{InstructionSet, Settings};
 use crate::stats::Statistics;
 use crate::tuning::Tuning;
 
-use super::bounds::{self, TreeBounds};
+use super::bounds::TreeBounds;
 use super::pairing::Worker;
 use super::refit::Refit;
 use super::remote::body::Remote;
@@ -174,7 +175,7 @@ impl BodyCache {
     /// Clusters a body in its current pose.
     pub fn new(body: &Body, isa: Isa, tuning: &Tuning) -> Self {
         let (elements, positions) = (body.elements(), body.positions());
-        let bounds_of = |primitive| bounds::of_vertices(positions, elements.corners(primitive));
+        let bounds_of = hull::of_each(elements, positions);
         let clustering = match isa.looks_corners_up() {
             true => Clustering::with_local_faces(elements, bounds_of),
             false => Clustering::new(elements, bounds_of),
@@ -228,7 +229,7 @@ impl BodyCache {
         self.surface = 0.0;
         for cluster in 0..self.clustering.n_clusters() {
             let vertices = self.clustering.vertices(cluster);
-            let bounds = bounds::of_vertices(body.positions(), vertices);
+            let bounds = hull::of_vertices(body.positions(), vertices);
             self.surface += bounds.half_area();
             self.bounds.levels[0].put(cluster, &bounds);
         }

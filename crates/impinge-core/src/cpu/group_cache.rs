@@ -7,11 +7,11 @@
 use crate::elements::Elements;
 use crate::exact::filter::{LARGEST_F32, Triangles64};
 use crate::grouping::GROUP;
-use crate::grouping::bounds::{Bounds, greater, lesser};
+use crate::grouping::bounds::Bounds;
+use crate::hull;
 use crate::positions::Positions;
 use crate::settings::Settings;
 
-use super::bounds::of_cluster_primitives;
 use super::simd::{ClusterFaces, LaneBounds, Simd};
 use super::world::World;
 
@@ -42,7 +42,7 @@ impl Kept<World<'_>> for Group {
         let (Positions::F32(points), Elements::Triangles(faces)) = (positions, &clustering.corners)
         else {
             self.in_tables = false;
-            return of_cluster_primitives(positions, clustering, cluster, &mut self.boxes);
+            return hull::fill(positions, clustering, cluster, &mut self.boxes);
         };
         let size = clustering.size(cluster);
         let faces = ClusterFaces {
@@ -51,17 +51,7 @@ impl Kept<World<'_>> for Group {
             local: clustering.local_faces(cluster),
         };
         simd.put_corners(points, &faces, &mut self.corners);
-        let [p, q, r] = &self.corners;
-        for axis in 0..3 {
-            for lane in 0..GROUP {
-                let (x, y, z) = (p[axis][lane], q[axis][lane], r[axis][lane]);
-                self.boxes.min[axis][lane] = lesser(x, lesser(y, z));
-                self.boxes.max[axis][lane] = greater(x, greater(y, z));
-            }
-        }
-        if size < GROUP {
-            self.boxes.clear_from(size);
-        }
+        self.boxes.hold(self.corners.each_ref(), size);
         self.in_tables = is_small(&cache.bounds.levels[0].at(cluster));
     }
 }

@@ -10,8 +10,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::FineRange;
+use crate::hull;
 
-use super::bounds;
 use super::cull::{BoundsTask, Cull};
 use super::dispatch::NodePair;
 use super::simd::{Isa, Simd, dispatch};
@@ -47,7 +47,7 @@ impl Kept {
         primitive: u32,
         reach: &Bounds,
     ) -> Option<Kept> {
-        let bounds = bounds::of_vertices(body.positions, body.corners(primitive));
+        let bounds = hull::of_vertices(body.positions, body.corners(primitive));
         bounds.overlaps(reach).then_some(Kept {
             bounds,
             range: FineRange {
@@ -237,7 +237,7 @@ impl KeptList {
             let (run, bounds) = &vertices[ix];
             let positions = world.body(run.participant).positions;
             let range = run.first as usize..run.end as usize;
-            *bounds.lock().expect("no task panics") = bounds::of_run(positions, range);
+            *bounds.lock().expect("no task panics") = hull::of_run(positions, range);
         });
         self.bodies.clear();
         self.bodies.resize(world.frame.layers.len(), Bounds::EMPTY);

@@ -21,7 +21,6 @@ pub(crate) mod slabs;
 pub(crate) mod steps;
 pub mod subcells;
 pub(crate) mod top_level;
-mod vec4;
 pub mod world;
 
 use std::sync::Arc;

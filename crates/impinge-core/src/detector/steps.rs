@@ -10,11 +10,12 @@ use crate::clock::Instant;
 
 use super::Detector;
 use crate::advance::Advance;
-use crate::cpu::steps::{Asked, Pose, Sought, StepClusters};
+use crate::cpu::steps::{Asked, Sought, StepClusters};
 use crate::elements::Part;
 use crate::error::Error;
 use crate::exact::Contact;
 use crate::frame::{Ask, Frame, TestId, owner_by_first};
+use crate::hull::Pose;
 use crate::impacts::{
     Candidates, ContactAnswer, Found, FoundByKind, Impact, Impacts, KeyAnswer, StepAnswer,
 };

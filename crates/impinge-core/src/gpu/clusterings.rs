@@ -3,13 +3,12 @@
 
 use std::sync::Arc;
 
-use crate::clusterings::{self, Fit, Kept, Store};
+use crate::clusterings::{Fit, Kept, Store, sampled_spread};
 use crate::error::Error;
 use crate::frame::Layer;
-use crate::grouping::bounds::{Bounds, round_down, round_up};
 use crate::grouping::clusters::Clustering;
+use crate::hull;
 use crate::ids::BodyId;
-use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::Body;
 use crate::stats::Statistics;
@@ -82,9 +81,7 @@ impl Kept for Cached {
 impl Cached {
     fn new(body: &Body, number: u64) -> Self {
         let (elements, positions) = (body.elements(), body.positions());
-        let clustering = Clustering::new(elements, |primitive| {
-            bounds_of(positions, elements.corners(primitive))
-        });
+        let clustering = Clustering::new(elements, hull::of_each(elements, positions));
         let mut fit = Fit::UNKNOWN;
         fit.note(sampled_spread(&clustering, positions));
         Cached {
@@ -102,23 +99,4 @@ impl Cached {
         let spread = sampled_spread(&self.clustering, body.positions());
         self.fit.is_stale(spread, tuning)
     }
-}
-
-/// How well the clusters fit the current pose.
-fn sampled_spread(clustering: &Clustering, positions: &Positions) -> f64 {
-    clusterings::sampled_spread(clustering.n_clusters(), |cluster| {
-        bounds_of(positions, clustering.vertices(cluster))
-    })
-}
-
-pub fn bounds_of(positions: &Positions, corners: &[u32]) -> Bounds {
-    let mut bounds = Bounds::EMPTY;
-    for &corner in corners {
-        let point = positions.point(corner as usize);
-        bounds.join(&Bounds {
-            min: point.map(round_down),
-            max: point.map(round_up),
-        });
-    }
-    bounds
 }

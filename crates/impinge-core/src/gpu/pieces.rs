@@ -21,13 +21,13 @@
 use rayon::prelude::*;
 
 use super::buffers::count;
-use super::clusterings::bounds_of;
 use super::topology::{Most, Topology, Weight, narrowed};
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
+use crate::hull;
 use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::Scene;
@@ -95,7 +95,7 @@ pub fn cut<'a>(
             let clustering = clustering(run.participant);
             let positions = frame.body(scene, run.participant).positions();
             for cluster in run.first..run.end {
-                let bounds = bounds_of(positions, clustering.vertices(cluster));
+                let bounds = hull::of_vertices(positions, clustering.vertices(cluster));
                 run.bounds.join(&bounds);
             }
             chunk.bounds.join(&run.bounds);

@@ -1,7 +1,9 @@
-//! Axis-aligned boxes in single precision, rounded outward.
+//! Axis-aligned boxes in single precision, rounded outward: one, the boxes of a group, arrays of many.
 //!
 //! Rounding may only grow a box, never shrink it. So boxes that do not overlap prove that their
 //! contents do not meet. Boxes of f32 positions are not rounded at all.
+
+use super::GROUP;
 
 /// A closed box. The empty one has `min > max` and overlaps nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,6 +98,50 @@ pub(crate) fn round_up(x: f64) -> f32 {
         nearest.next_up()
     } else {
         nearest
+    }
+}
+
+/// The boxes of one group, one per lane; lanes past the group's size hold empty boxes.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub struct LaneBounds {
+    /// Low ends, one row per axis.
+    pub min: [[f32; GROUP]; 3],
+    /// High ends.
+    pub max: [[f32; GROUP]; 3],
+}
+
+impl LaneBounds {
+    /// Empty boxes in all lanes.
+    pub const EMPTY: LaneBounds = LaneBounds {
+        min: [[f32::INFINITY; GROUP]; 3],
+        max: [[f32::NEG_INFINITY; GROUP]; 3],
+    };
+
+    /// The box of a lane.
+    #[inline(always)]
+    pub fn at(&self, lane: usize) -> Bounds {
+        Bounds {
+            min: [self.min[0][lane], self.min[1][lane], self.min[2][lane]],
+            max: [self.max[0][lane], self.max[1][lane], self.max[2][lane]],
+        }
+    }
+
+    /// Sets the box of a lane.
+    #[inline(always)]
+    pub fn put(&mut self, lane: usize, bounds: &Bounds) {
+        for axis in 0..3 {
+            self.min[axis][lane] = bounds.min[axis];
+            self.max[axis][lane] = bounds.max[axis];
+        }
+    }
+
+    /// Empties the lanes from `lane` on.
+    pub fn clear_from(&mut self, lane: usize) {
+        for axis in 0..3 {
+            self.min[axis][lane..].fill(f32::INFINITY);
+            self.max[axis][lane..].fill(f32::NEG_INFINITY);
+        }
     }
 }
 

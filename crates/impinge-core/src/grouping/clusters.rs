@@ -19,7 +19,6 @@ use super::bounds::Bounds;
 use super::hierarchy::{Entry, Shape};
 use super::hubs::{self, Hubs};
 use super::rings::Rings;
-pub(crate) use super::unique::CHUNK;
 use super::unique::{LocalCorners, Unique};
 use crate::elements::{Elements, with_corners};
 
@@ -31,7 +30,7 @@ pub(crate) struct Clustering {
     /// The corners at each place of the order.
     pub corners: Elements,
     /// Unique vertices of all clusters, cluster after cluster. Each run ascends and repeats its last vertex up
-    /// to a multiple of [`CHUNK`].
+    /// to a multiple of [`CHUNK`](super::CHUNK).
     pub vertices: Vec<u32>,
     /// Where each cluster's run starts, and one past the last.
     pub vertex_starts: Vec<u32>,
@@ -122,7 +121,7 @@ impl Clustering {
         (self.order.len() - cluster * GROUP).min(GROUP)
     }
 
-    /// The unique vertices of a cluster, ascending, the last one repeated up to a multiple of [`CHUNK`].
+    /// The unique vertices of a cluster, ascending, the last one repeated up to a multiple of [`CHUNK`](super::CHUNK).
     #[inline(always)]
     pub fn vertices(&self, cluster: usize) -> &[u32] {
         let starts = &self.vertex_starts;

@@ -14,3 +14,7 @@ mod unique;
 
 /// The most primitives that a group holds: one bit each in a 64-bit mask.
 pub const GROUP: usize = 64;
+
+/// A cluster's vertices are padded to whole chunks of this many: a loop over them needs no remainder, and its end
+/// is easy to predict.
+pub(crate) const CHUNK: usize = 8;

@@ -10,11 +10,8 @@ use std::hint::select_unpredictable;
 
 use rayon::prelude::*;
 
-use super::GROUP;
+use super::{CHUNK, GROUP};
 
-/// A cluster's vertices are padded to whole chunks of this many: a loop over them needs no remainder, and its end
-/// is easy to predict.
-pub(crate) const CHUNK: usize = 8;
 /// Clusters that a thread takes at a time.
 const BLOCK: usize = 64;
 

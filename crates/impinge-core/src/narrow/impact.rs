@@ -2,9 +2,10 @@
 
 use crate::exact::{Contact, ElementPair, Point, first_within};
 use crate::frame::TestId;
+use crate::hull::Extent;
 use crate::pair_kind::PairKind;
 
-use super::{Element, Extent, Test};
+use super::{Element, Test};
 
 /// The test of [`Detector::impacts`](crate::Detector::impacts).
 pub(crate) struct FirstContact;

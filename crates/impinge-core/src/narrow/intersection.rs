@@ -5,11 +5,12 @@ use crate::exact::{self, Point};
 #[cfg(feature = "gpu")]
 use crate::frame::Frame;
 use crate::frame::TestId;
+use crate::hull::Extent;
 use crate::query::SharedVertex;
 #[cfg(feature = "gpu")]
 use crate::scene::Scene;
 
-use super::{Element, Extent, Test};
+use super::{Element, Test};
 
 /// The test of [`Detector::detect`](crate::Detector::detect).
 pub(crate) struct Intersection;

@@ -14,6 +14,7 @@ pub(crate) use overlap::{Overlap, are_near};
 pub(crate) use within::{Corners, Within};
 
 use crate::frame::{Frame, TestId};
+use crate::hull::Extent;
 use crate::scene::Scene;
 
 /// One element of one layer of a frame.
@@ -42,40 +43,6 @@ pub(crate) trait Test {
 
     /// The value of a pair, decided exactly and by the adjacency rule; `None` if the pair is not reported.
     fn settle(&self, test: TestId, a: Element<'_>, b: Element<'_>) -> Option<Self::Value>;
-}
-
-/// A closed box in double precision.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Extent {
-    pub min: [f64; 3],
-    pub max: [f64; 3],
-}
-
-impl Extent {
-    /// The extent of some points.
-    pub fn of(points: impl Iterator<Item = [f64; 3]>) -> Self {
-        let nothing = Extent {
-            min: [f64::INFINITY; 3],
-            max: [f64::NEG_INFINITY; 3],
-        };
-        points.fold(nothing, |extent, point| Extent {
-            min: std::array::from_fn(|axis| extent.min[axis].min(point[axis])),
-            max: std::array::from_fn(|axis| extent.max[axis].max(point[axis])),
-        })
-    }
-
-    /// The extent that reaches beyond this one on all sides by a margin, rounded outward.
-    pub fn inflated(&self, margin: f64) -> Self {
-        Extent {
-            min: self.min.map(|x| (x - margin).next_down()),
-            max: self.max.map(|x| (x + margin).next_up()),
-        }
-    }
-
-    /// Whether two extents have a point in common.
-    pub fn overlaps(&self, other: &Extent) -> bool {
-        (0..3).all(|axis| self.min[axis] <= other.max[axis] && other.min[axis] <= self.max[axis])
-    }
 }
 
 impl Element<'_> {

@@ -2,8 +2,9 @@
 
 use crate::exact::two_sum;
 use crate::frame::TestId;
+use crate::hull::Extent;
 
-use super::{Element, Extent, Test};
+use super::{Element, Test};
 
 /// The test of [`Detector::candidates`](crate::Detector::candidates): whether the boxes over the whole step overlap once each
 /// is inflated by `distance`, so that no axis has a gap of more than twice that.

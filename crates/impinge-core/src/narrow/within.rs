@@ -2,9 +2,10 @@
 
 use crate::exact::{Point, elements_are_within};
 use crate::frame::TestId;
+use crate::hull::Extent;
 use crate::positions::Positions;
 
-use super::{Element, Extent, Test};
+use super::{Element, Test};
 
 /// The test of [`Detector::within_distance`](crate::Detector::within_distance).
 pub(crate) struct Within;

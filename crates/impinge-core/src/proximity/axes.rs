@@ -10,7 +10,9 @@
 //! (`docs/exactness.md`, "The smallest distance of two bodies").
 
 use super::features::dot;
-use super::tree::{Box64, Node, Tree};
+use crate::hull::Extent;
+
+use super::tree::{Node, Tree};
 use crate::exact::Point;
 use crate::scene::Body;
 
@@ -45,12 +47,12 @@ impl Axes {
     }
 
     /// A box that holds a turned box.
-    fn turn_box(&self, bounds: &Box64) -> Box64 {
+    fn turn_box(&self, bounds: &Extent) -> Extent {
         let (low, high) = (bounds.min, bounds.max);
         let center = self.turn([0, 1, 2].map(|k| 0.5 * low[k] + 0.5 * high[k]));
         let half = [0, 1, 2].map(|k| 0.5 * high[k] - 0.5 * low[k]);
         let reach = self.0.map(|axis| dot(axis.map(f64::abs), half));
-        Box64 {
+        Extent {
             min: [0, 1, 2].map(|k| center[k] - reach[k]),
             max: [0, 1, 2].map(|k| center[k] + reach[k]),
         }
@@ -69,7 +71,7 @@ pub(super) struct View {
     pub axes: Axes,
     /// Where each cluster's box is, for either body; [`UNKNOWN`] before it is asked for.
     places: [Vec<u32>; 2],
-    boxes: Vec<Box64>,
+    boxes: Vec<Extent>,
 }
 
 const UNKNOWN: u32 = u32::MAX;
@@ -93,18 +95,17 @@ impl View {
     }
 
     /// The box of a node of the first or the second body: of a cluster from its vertices, of others from their boxes.
-    pub fn bounds(&mut self, side: usize, body: &Body, tree: &Tree, node: Node) -> Box64 {
+    pub fn bounds(&mut self, side: usize, body: &Body, tree: &Tree, node: Node) -> Extent {
         if node.level > 0 {
             return self.axes.turn_box(&tree.bounds(node));
         }
         let place = &mut self.places[side][node.number as usize];
         if *place == UNKNOWN {
             *place = self.boxes.len() as u32;
-            let mut found = Box64::EMPTY;
-            for &vertex in tree.clustering.vertices(node.number as usize) {
-                found.cover(self.axes.turn(body.positions().point(vertex as usize)));
-            }
-            self.boxes.push(found);
+            let vertices = tree.clustering.vertices(node.number as usize).iter();
+            let points = vertices.map(|&vertex| body.positions().point(vertex as usize));
+            let turned = points.map(|point| self.axes.turn(point));
+            self.boxes.push(Extent::of(turned));
         }
         self.boxes[*place as usize]
     }
@@ -145,9 +146,8 @@ mod tests {
         let mut point = || random.point(-1.0, 1.0).map(f64::from);
         for _ in 0..300 {
             let axes = Axes::along([point(), point()]).expect("they differ");
-            let mut bounds = Box64::EMPTY;
             let points = [point(), point(), point()];
-            points.iter().for_each(|&p| bounds.cover(p));
+            let bounds = Extent::of(points.into_iter());
             let turned = axes.turn_box(&bounds);
             for p in points.map(|p| axes.turn(p)) {
                 assert!((0..3).all(|k| turned.min[k] - 1e-15 < p[k]));

@@ -14,7 +14,9 @@ use std::collections::{BinaryHeap, HashMap};
 
 use super::axes::{Axes, View};
 use super::features::{Gap, gap};
-use super::tree::{Box64, Node, Tree, box_along, box_of};
+use crate::hull::Extent;
+
+use super::tree::{Node, Tree, box_along, box_of};
 use crate::error::Error;
 use crate::exact::Point;
 use crate::ids::BodyId;
@@ -143,9 +145,9 @@ impl PartialOrd for Waiting {
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
     primitive: u32,
-    bounds: Box64,
+    bounds: Extent,
     /// Along the axes of the view; as `bounds` before there is one.
-    turned: Box64,
+    turned: Extent,
 }
 
 struct Search<'a> {
@@ -281,7 +283,7 @@ impl Search<'_> {
     }
 
     /// The boxes of two nodes in the view, if there is one.
-    fn turned(&self, view: &mut Option<View>, nodes: [Node; 2]) -> Option<[Box64; 2]> {
+    fn turned(&self, view: &mut Option<View>, nodes: [Node; 2]) -> Option<[Extent; 2]> {
         let view = view.as_mut()?;
         Some([0, 1].map(|side| view.bounds(side, self.bodies[side], self.trees[side], nodes[side])))
     }
@@ -372,7 +374,7 @@ impl Search<'_> {
     }
 
     /// Takes a pair if it is nearer, or as near and lower.
-    fn improve(&self, found: &mut Found, [a, b]: [u32; 2], boxes: [Box64; 2]) {
+    fn improve(&self, found: &mut Found, [a, b]: [u32; 2], boxes: [Extent; 2]) {
         let best = &found.best;
         let gap = self.gap(a, b, boxes[0].squared_distance(&boxes[1]));
         let is_less =

@@ -5,72 +5,10 @@
 
 use crate::exact::Point;
 use crate::grouping::GROUP;
-use crate::grouping::bounds::{Bounds, greater, lesser, round_down, round_up};
+use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
-use crate::positions::Positions;
+use crate::hull::{self, Extent};
 use crate::scene::Body;
-
-/// A box in `f64`: of primitives as they are, of clusters rounded outward to `f32`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Box64 {
-    pub min: Point,
-    pub max: Point,
-}
-
-impl From<&Bounds> for Box64 {
-    fn from(bounds: &Bounds) -> Self {
-        Box64 {
-            min: bounds.min.map(f64::from),
-            max: bounds.max.map(f64::from),
-        }
-    }
-}
-
-impl Box64 {
-    pub const EMPTY: Self = Box64 {
-        min: [f64::INFINITY; 3],
-        max: [f64::NEG_INFINITY; 3],
-    };
-
-    pub fn cover(&mut self, point: Point) {
-        self.join(&Box64 {
-            min: point,
-            max: point,
-        });
-    }
-
-    fn join(&mut self, other: &Box64) {
-        for k in 0..3 {
-            self.min[k] = self.min[k].min(other.min[k]);
-            self.max[k] = self.max[k].max(other.max[k]);
-        }
-    }
-
-    /// The square of the distance of two boxes, rounded; 0 where they meet.
-    pub fn squared_distance(&self, other: &Box64) -> f64 {
-        let mut sum = 0.0;
-        for k in 0..3 {
-            let gap = (other.min[k] - self.max[k])
-                .max(self.min[k] - other.max[k])
-                .max(0.0);
-            sum += gap * gap;
-        }
-        sum
-    }
-
-    pub fn squared_diagonal(&self) -> f64 {
-        (0..3)
-            .map(|k| self.max[k] - self.min[k])
-            .map(|x| x * x)
-            .sum()
-    }
-
-    /// The largest magnitude of a coordinate.
-    pub fn magnitude(&self) -> f64 {
-        let corners = self.min.iter().chain(&self.max);
-        corners.fold(0.0, |most: f64, x| most.max(x.abs()))
-    }
-}
 
 /// A body's clusters and boxes.
 #[derive(Debug)]
@@ -84,15 +22,11 @@ pub(super) struct Tree {
 
 impl Tree {
     pub fn new(body: &Body) -> Self {
-        let bounds = |primitive: usize| {
-            let found = box_of(body, primitive);
-            Bounds {
-                min: found.min.map(round_down),
-                max: found.max.map(round_up),
-            }
-        };
         let mut tree = Tree {
-            clustering: Clustering::new(body.elements(), bounds),
+            clustering: Clustering::new(
+                body.elements(),
+                hull::of_each(body.elements(), body.positions()),
+            ),
             topology_stamp: body.topology_stamp(),
             positions_stamp: 0,
             levels: Vec::new(),
@@ -115,7 +49,7 @@ impl Tree {
         self.levels.clear();
         let clusters = 0..self.clustering.n_clusters();
         let of_clusters = clusters
-            .map(|cluster| of_vertices(body.positions(), self.clustering.vertices(cluster)))
+            .map(|cluster| hull::of_vertices(body.positions(), self.clustering.vertices(cluster)))
             .collect();
         self.levels.push(of_clusters);
         for level in 1..self.clustering.shape.n_levels() {
@@ -144,8 +78,8 @@ impl Tree {
         })
     }
 
-    pub fn bounds(&self, node: Node) -> Box64 {
-        Box64::from(&self.levels[node.level as usize][node.number as usize])
+    pub fn bounds(&self, node: Node) -> Extent {
+        Extent::from(&self.levels[node.level as usize][node.number as usize])
     }
 
     /// The children of a node that is not a cluster.
@@ -175,39 +109,12 @@ pub(super) struct Node {
 }
 
 /// The box of a primitive, in `f64`.
-pub(super) fn box_of(body: &Body, primitive: usize) -> Box64 {
+pub(super) fn box_of(body: &Body, primitive: usize) -> Extent {
     box_along(body, primitive, |point| point)
 }
 
 /// The box of a primitive whose corners are mapped.
-pub(super) fn box_along(body: &Body, primitive: usize, map: impl Fn(Point) -> Point) -> Box64 {
-    let mut found = Box64::EMPTY;
-    for &vertex in body.elements().corners(primitive) {
-        found.cover(map(body.positions().point(vertex as usize)));
-    }
-    found
-}
-
-/// The box of some vertices, rounded outward.
-fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
-    let mut bounds = Bounds::EMPTY;
-    match positions {
-        Positions::F32(positions) => {
-            for &vertex in vertices {
-                for (k, &x) in positions[vertex as usize].iter().enumerate() {
-                    bounds.min[k] = lesser(bounds.min[k], x);
-                    bounds.max[k] = greater(bounds.max[k], x);
-                }
-            }
-        }
-        Positions::F64(positions) => {
-            let mut exact = Box64::EMPTY;
-            for &vertex in vertices {
-                exact.cover(positions[vertex as usize]);
-            }
-            bounds.min = exact.min.map(round_down);
-            bounds.max = exact.max.map(round_up);
-        }
-    }
-    bounds
+pub(super) fn box_along(body: &Body, primitive: usize, map: impl Fn(Point) -> Point) -> Extent {
+    let corners = body.elements().corners(primitive).iter();
+    Extent::of(corners.map(|&vertex| map(body.positions().point(vertex as usize))))
 }

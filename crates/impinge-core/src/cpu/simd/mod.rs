@@ -8,58 +8,15 @@
 
 use crate::exact::filter::number::{self, Lookup, Vector};
 use crate::exact::filter::{BATCH, LANES, Triangles64};
-use crate::grouping::GROUP;
-use crate::grouping::bounds::{Bounds, BoundsArray};
 #[cfg(target_arch = "x86_64")]
-use crate::grouping::clusters::CHUNK;
+use crate::grouping::CHUNK;
+use crate::grouping::GROUP;
+pub use crate::grouping::bounds::LaneBounds;
+use crate::grouping::bounds::{Bounds, BoundsArray};
 use crate::grouping::clusters::LocalFaces;
 
 use super::runs::{self, Members, RUN, RunExtents};
-use super::vec4::of_vertices_f32;
-
-/// The boxes of one group, one per lane; lanes past the group's size hold empty boxes.
-#[derive(Debug, Clone)]
-#[repr(C, align(64))]
-pub struct LaneBounds {
-    /// Low ends, one row per axis.
-    pub min: [[f32; GROUP]; 3],
-    /// High ends.
-    pub max: [[f32; GROUP]; 3],
-}
-
-impl LaneBounds {
-    /// Empty boxes in all lanes.
-    pub const EMPTY: LaneBounds = LaneBounds {
-        min: [[f32::INFINITY; GROUP]; 3],
-        max: [[f32::NEG_INFINITY; GROUP]; 3],
-    };
-
-    /// The box of a lane.
-    #[inline(always)]
-    pub fn at(&self, lane: usize) -> Bounds {
-        Bounds {
-            min: [self.min[0][lane], self.min[1][lane], self.min[2][lane]],
-            max: [self.max[0][lane], self.max[1][lane], self.max[2][lane]],
-        }
-    }
-
-    /// Sets the box of a lane.
-    #[inline(always)]
-    pub fn put(&mut self, lane: usize, bounds: &Bounds) {
-        for axis in 0..3 {
-            self.min[axis][lane] = bounds.min[axis];
-            self.max[axis][lane] = bounds.max[axis];
-        }
-    }
-
-    /// Empties the lanes from `lane` on.
-    pub fn clear_from(&mut self, lane: usize) {
-        for axis in 0..3 {
-            self.min[axis][lane..].fill(f32::INFINITY);
-            self.max[axis][lane..].fill(f32::NEG_INFINITY);
-        }
-    }
-}
+use crate::hull::{ReadVertices, of_vertices_f32};
 
 /// Lanes of a mask, lowest first.
 pub(crate) struct Lanes(pub u64);
@@ -83,7 +40,7 @@ impl Iterator for Lanes {
 pub(crate) struct ClusterFaces<'a> {
     /// At most 64.
     pub faces: &'a [[u32; 3]],
-    /// Unique vertices, in whole chunks of [`CHUNK`](crate::grouping::clusters::CHUNK).
+    /// Unique vertices, in whole chunks of [`CHUNK`](crate::grouping::CHUNK).
     #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
     pub vertices: &'a [u32],
     /// The corners as numbers of `vertices`, if the instruction set looks them up.
@@ -114,7 +71,7 @@ pub(crate) fn up_to(lane: usize) -> u64 {
 pub(crate) struct Lanes32(pub [u32; GROUP]);
 
 /// An instruction set: the box tests that kernels are made of.
-pub(crate) trait Simd: Copy {
+pub(crate) trait Simd: ReadVertices {
     /// The f64 register of the narrow stage's filters.
     type F64: Vector;
 
@@ -249,15 +206,6 @@ pub(crate) trait Simd: Copy {
         mask
     }
 
-    /// The box of some vertices, and whether all are certainly finite: the results of [`of_vertices_f32`].
-    ///
-    /// # Panics
-    /// If there is no such vertex.
-    ///
-    /// # Safety
-    /// `vertices` must not descend.
-    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool);
-
     /// Adds runs of vertices, each with its members, to the extents in `into`.
     #[inline(always)]
     fn add_runs(self, runs: &[[[f32; 3]; RUN]], members: &[Members], into: &mut RunExtents) {
@@ -335,6 +283,13 @@ fn put_corners(positions: &[[f32; 3]], faces: &[[u32; 3]], first: usize, into: &
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Portable;
 
+impl ReadVertices for Portable {
+    #[inline(always)]
+    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
+        of_vertices_f32(positions, vertices)
+    }
+}
+
 impl Simd for Portable {
     #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
     type F64 = number::Portable;
@@ -411,11 +366,6 @@ impl Simd for Portable {
             among &= among - 1;
         }
         mask
-    }
-
-    #[inline(always)]
-    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
-        of_vertices_f32(positions, vertices)
     }
 
     #[inline(always)]

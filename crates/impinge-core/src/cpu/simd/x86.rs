@@ -6,12 +6,12 @@ use crate::exact::filter::number::Lookup;
 use crate::exact::filter::{BATCH, TABLE};
 
 use super::super::runs::COORDINATES;
-use super::super::vec4::Vec4;
 use super::{
     Bounds, BoundsArray, CHUNK, ClusterFaces, GROUP, LANES, LaneBounds, Lanes, Lanes32, LocalFaces,
-    Masks, Members, RUN, RunExtents, Simd, Triangles64, number, of_vertices_f32, put_corners,
-    put_vertices, up_to,
+    Masks, Members, RUN, ReadVertices, RunExtents, Simd, Triangles64, number, of_vertices_f32,
+    put_corners, put_vertices, up_to,
 };
+use crate::hull::Vec4;
 
 /// 256-bit registers. Only created if `avx2` was detected.
 #[derive(Debug, Clone, Copy)]
@@ -271,7 +271,7 @@ unsafe fn add_eight(
 /// Coordinates in 4 KiB: the processor's own prefetching ends with the page.
 const PAGE: usize = 1024;
 
-/// As `Simd::of_ascending`: two vertices per register and four chains, which hide the latency of minimum
+/// As `ReadVertices::of_ascending`: two vertices per register and four chains, which hide the latency of minimum
 /// and maximum.
 ///
 /// # Safety
@@ -339,6 +339,14 @@ unsafe fn look_up_512(lanes: &Lanes32, places: __m512i) -> __m512i {
         let high = _mm512_permutex2var_epi32(load(2), places, load(3));
         let is_high = _mm512_test_epi32_mask(places, _mm512_set1_epi32(32));
         _mm512_mask_blend_epi32(is_high, low, high)
+    }
+}
+
+impl ReadVertices for Avx2 {
+    #[inline(always)]
+    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
+        // SAFETY: `Avx2` exists only where the processor has AVX2; the caller guarantees the order.
+        unsafe { of_ascending(positions, vertices) }
     }
 }
 
@@ -456,12 +464,6 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
-        // SAFETY: `Avx2` exists only where the processor has AVX2; the caller guarantees the order.
-        unsafe { of_ascending(positions, vertices) }
-    }
-
-    #[inline(always)]
     fn add_runs(self, runs: &[[[f32; 3]; RUN]], members: &[Members], into: &mut RunExtents) {
         for (runs, members) in runs.chunks(BLOCK).zip(members.chunks(BLOCK)) {
             for eight in 0..COORDINATES / 8 {
@@ -564,6 +566,14 @@ static LANE: Numbers = {
     }
     Numbers(lanes)
 };
+
+impl ReadVertices for Avx512 {
+    #[inline(always)]
+    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
+        // SAFETY: `Avx512` exists only where the processor has AVX2 too; the caller guarantees the order.
+        unsafe { of_ascending(positions, vertices) }
+    }
+}
 
 impl Simd for Avx512 {
     type F64 = number::Avx512;
@@ -775,12 +785,6 @@ impl Simd for Avx512 {
             }
             mask
         }
-    }
-
-    #[inline(always)]
-    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
-        // SAFETY: `Avx512` exists only where the processor has AVX2 too; the caller guarantees the order.
-        unsafe { of_ascending(positions, vertices) }
     }
 
     #[inline(always)]

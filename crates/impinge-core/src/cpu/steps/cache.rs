@@ -5,22 +5,20 @@ use std::sync::Arc;
 #[cfg(feature = "gpu")]
 use crate::clusterings::sampled_spread;
 use crate::clusterings::{Fit, Kept, Store, make_anew, spread};
-use crate::cpu::bounds::{self, TreeBounds};
+use crate::cpu::bounds::TreeBounds;
 use crate::cpu::dispatch::Tree;
 use crate::cpu::simd::{Isa, Simd, dispatch};
 use crate::elements::{Elements, Part};
 use crate::error::Error;
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
 use crate::grouping::clusters::Clustering;
-use crate::positions::Positions;
+use crate::hull::{self, Hull, Pose};
 use crate::run::Job;
 use crate::scene::Body;
 use crate::settings::{Recluster, Settings};
 use crate::stats::Statistics;
 #[cfg(feature = "gpu")]
 use crate::tuning::Tuning;
-
-use super::hull::Pose;
 
 /// Clusters per task.
 const CLUSTERS: usize = 128;
@@ -58,9 +56,7 @@ impl LayerCache {
     /// Clusters a part of a body in its pose at the start of the step.
     pub fn new(body: &Body, part: Part) -> Self {
         let (elements, positions) = (body.part(part), body.positions());
-        let mut clustering = Clustering::new(elements, |element| {
-            bounds::of_vertices(positions, elements.corners(element))
-        });
+        let mut clustering = Clustering::new(elements, hull::of_each(elements, positions));
         if let (Part::Vertices, Elements::Points(vertices)) = (part, &clustering.corners) {
             // Vertices are numbered as positions are.
             clustering.order = vertices.iter().map(|&[vertex]| vertex).collect();
@@ -89,10 +85,8 @@ impl LayerCache {
         if self.sampled.stamp == body.positions_stamp() {
             return false;
         }
-        let (clustering, positions) = (&self.clustering, body.positions());
-        let bounds = |cluster| bounds::of_vertices(positions, clustering.vertices(cluster));
         self.sampled.stamp = body.positions_stamp();
-        let spread = sampled_spread(clustering.n_clusters(), bounds);
+        let spread = sampled_spread(&self.clustering, body.positions());
         self.sampled.fit.is_stale(spread, tuning)
     }
 
@@ -240,27 +234,19 @@ fn find_boxes<S: Send>(
         let layer = &frame.layers[task.layer];
         let clustering = &caches.at(layer).clustering;
         let body = frame.body(scene, task.layer);
-        let pose = pose.of(frame, task.layer);
+        let hull = Hull::new(body, pose.of(frame, task.layer));
         dispatch!(isa, find, (
             clustering: &Clustering = clustering,
-            body: &Body = body,
-            pose: Pose = pose,
+            hull: Hull<'_> = hull,
             task: Task = task,
         ));
     });
 }
 
 #[inline(always)]
-fn find<S: Simd>(simd: S, clustering: &Clustering, body: &Body, pose: Pose, task: Task) {
-    let (start, end) = (body.positions(), body.end_positions());
+fn find<S: Simd>(simd: S, clustering: &Clustering, hull: Hull<'_>, task: Task) {
     for cluster in task.first..task.end {
-        let vertices = clustering.vertices(cluster);
-        let at_start = of_cluster(simd, start, vertices);
-        let at_end = match end {
-            Some(end) => of_cluster(simd, end, vertices),
-            None => at_start,
-        };
-        let ends = pose.close([at_start, at_end]);
+        let ends = hull.of_cluster(simd, clustering, cluster);
         let mut both = ends[0];
         both.join(&ends[1]);
         // SAFETY: no two tasks have the same cluster, and no thread reads boxes before all tasks are done.
@@ -269,14 +255,5 @@ fn find<S: Simd>(simd: S, clustering: &Clustering, body: &Body, pose: Pose, task
             task.ends[0].put(cluster, &ends[0]);
             task.ends[1].put(cluster, &ends[1]);
         }
-    }
-}
-
-#[inline(always)]
-fn of_cluster<S: Simd>(simd: S, positions: &Positions, vertices: &[u32]) -> Bounds {
-    match positions {
-        // SAFETY: a cluster's vertices ascend.
-        Positions::F32(positions) => unsafe { simd.of_ascending(positions, vertices) }.0,
-        Positions::F64(_) => bounds::of_vertices(positions, vertices),
     }
 }

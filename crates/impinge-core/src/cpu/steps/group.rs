@@ -2,15 +2,12 @@
 //!
 //! Cost: each corner of a cluster once, when it is first needed; 8.8 KB per cluster.
 
-use crate::cpu::bounds::of_cluster_primitives;
 use crate::cpu::group_cache::Kept;
 use crate::cpu::simd::{LaneBounds, Lanes32, Simd};
 use crate::elements::with_corners;
 use crate::exact::filter::Moving64;
 use crate::grouping::GROUP;
-use crate::grouping::bounds::{greater, lesser};
-use crate::narrow::Extent;
-use crate::positions::Positions;
+use crate::hull::Extent;
 
 use super::world::World;
 
@@ -47,8 +44,6 @@ impl<'a> Kept<World<'a>> for Group {
     #[inline(always)]
     fn fill<S: Simd>(&mut self, simd: S, world: World<'a>, layer: u32, cluster: usize) {
         let clustering = &world.cache(layer).clustering;
-        let body = world.frame.body(world.scene, layer as usize);
-        let (start, end) = (body.positions(), body.end_positions());
         self.size = clustering.size(cluster);
         let first = cluster * GROUP;
         with_corners!(&clustering.corners, |elements| {
@@ -69,20 +64,15 @@ impl<'a> Kept<World<'a>> for Group {
         for (number, &element) in self.numbers.0.iter_mut().zip(order) {
             *number = first_number + element;
         }
-        if let (Positions::F32(start), Positions::F32(end)) = (start, end.unwrap_or(start)) {
+        let hull = world.hull(layer);
+        if let Some(ends) = hull.in_f32() {
             self.in_tables = true;
-            self.put_points(simd, [start, end]);
+            self.put_points(simd, ends);
         } else {
             self.in_tables = false;
-            of_cluster_primitives(start, clustering, cluster, &mut self.start);
-            match end {
-                Some(end) => of_cluster_primitives(end, clustering, cluster, &mut self.end),
-                None => self.end.clone_from(&self.start),
-            }
+            hull.fill(clustering, cluster, [&mut self.start, &mut self.end]);
         }
-        world
-            .pose(layer)
-            .close_all([&mut self.start, &mut self.end], self.size);
+        hull.close([&mut self.start, &mut self.end], self.size);
     }
 }
 
@@ -90,17 +80,9 @@ impl Group {
     /// The extent of an element over the whole step, from the tables.
     #[inline(always)]
     pub fn extent(&self, lane: usize) -> Extent {
-        let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for points in &self.points {
-            for point in &points[..self.n_corners.min(3)] {
-                for axis in 0..3 {
-                    let x = f64::from(point[axis][lane]);
-                    min[axis] = min[axis].min(x);
-                    max[axis] = max[axis].max(x);
-                }
-            }
-        }
-        Extent { min, max }
+        let tables = self.points.iter();
+        let corners = tables.flat_map(|points| &points[..self.n_corners]);
+        Extent::of(corners.map(|corner| [0, 1, 2].map(|axis| corner[axis][lane].into())))
     }
 
     /// Fills the tables of points, and the boxes from those.
@@ -116,19 +98,11 @@ impl Group {
             {
                 simd.put_points(positions, &vertices.0, self.size, point);
             }
-            boxes.min = points[0];
-            boxes.max = points[0];
-            for point in points.iter().take(self.n_corners).skip(1) {
-                let axes = boxes.min.iter_mut().zip(&mut boxes.max).zip(point);
-                for ((min, max), row) in axes {
-                    for (lane, &x) in row.iter().enumerate() {
-                        min[lane] = lesser(min[lane], x);
-                        max[lane] = greater(max[lane], x);
-                    }
-                }
-            }
-            if self.size < GROUP {
-                boxes.clear_from(self.size);
+            let [p, q, r] = &*points;
+            match self.n_corners {
+                1 => boxes.hold([p], self.size),
+                2 => boxes.hold([p, q], self.size),
+                _ => boxes.hold([p, q, r], self.size),
             }
         }
     }

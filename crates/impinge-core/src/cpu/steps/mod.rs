@@ -13,7 +13,6 @@
 
 mod cache;
 mod group;
-mod hull;
 #[cfg(feature = "gpu")]
 mod left;
 mod narrow;
@@ -29,6 +28,7 @@ use crate::frame::Layer;
 #[cfg(feature = "gpu")]
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hubs::Hubs;
+use crate::hull::Pose;
 use crate::impacts::StepAnswer;
 use crate::scene::Body;
 use crate::settings::InstructionSet;
@@ -46,7 +46,6 @@ use crate::settings::Settings;
 use crate::sink::Ending;
 
 use cache::{Caches, LayerCache};
-pub(crate) use hull::Pose;
 use pairing::Worker;
 pub(crate) use world::{Asked, Sought};
 use world::{Known, World};

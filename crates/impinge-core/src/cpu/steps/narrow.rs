@@ -30,8 +30,9 @@ use crate::exact::filter::{
 use crate::exact::{Approach, Contact, ElementPair, Point, approach, first_within};
 use crate::frame::pair_key;
 use crate::grouping::GROUP;
+use crate::hull::Extent;
 use crate::impacts::{Found, FoundByKind, KeysByKind, StepAnswer};
-use crate::narrow::{Extent, are_near};
+use crate::narrow::are_near;
 use crate::pair_kind::PairKind;
 use crate::positions::Positions;
 use crate::sink::BLOCK;

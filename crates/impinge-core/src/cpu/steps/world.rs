@@ -3,12 +3,12 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::frame::Frame;
+use crate::hull::{Hull, Pose};
 use crate::impacts::StepAnswer;
 use crate::scene::Scene;
 use crate::step::{Start, Toi};
 
 use super::cache::{Caches, LayerCache};
-use super::hull::Pose;
 
 /// What to look for in a step.
 #[derive(Debug, Clone, Copy)]
@@ -100,10 +100,12 @@ impl<'a> World<'a> {
         }
     }
 
-    /// How the boxes of a layer are made.
+    /// What makes the boxes of a layer.
     #[inline(always)]
-    pub(super) fn pose(&self, layer: u32) -> Pose {
-        self.asked.pose.of(self.frame, layer as usize)
+    pub(super) fn hull(&self, layer: u32) -> Hull<'a> {
+        let layer = layer as usize;
+        let body = self.frame.body(self.scene, layer);
+        Hull::new(body, self.asked.pose.of(self.frame, layer))
     }
 
     /// The cache of a layer.

@@ -4,12 +4,13 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::clock::Instant;
-use crate::cpu::steps::{Asked, Pose, Sought};
+use crate::cpu::steps::{Asked, Sought};
 use crate::detector::Detector;
 use crate::elements::Part;
 use crate::error::Error;
 use crate::exact::{closest_of_elements, nearest_of_elements};
 use crate::frame::TestId;
+use crate::hull::Pose;
 use crate::impacts::StepAnswer;
 use crate::naive;
 use crate::narrow::{Corners, Within};

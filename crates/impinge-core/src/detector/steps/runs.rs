@@ -7,10 +7,11 @@
 use std::ops::ControlFlow;
 
 use crate::clock::Instant;
-use crate::cpu::steps::{Asked, Pose, Sought, StepClusters};
+use crate::cpu::steps::{Asked, Sought, StepClusters};
 use crate::detector::Detector;
 use crate::error::Error;
 use crate::frame::{Ask, Frame, TestId};
+use crate::hull::Pose;
 use crate::impacts::{Candidates, KeyAnswer, StepAnswer};
 use crate::key_ranges::{KeyRanges, Run, Tally};
 use crate::naive;

@@ -2,9 +2,7 @@
 
 use crate::frame::Frame;
 use crate::grouping::GROUP;
-use crate::grouping::bounds::{Bounds, greater, lesser, round_down, round_up};
-
-use crate::cpu::simd::LaneBounds;
+use crate::grouping::bounds::{Bounds, LaneBounds, greater, lesser, round_down, round_up};
 
 /// Which part of a step is examined, and by how much boxes are inflated.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,12 +7,12 @@ use crate::grouping::bounds::{greater, lesser};
 /// x, y, z and a fourth number that is ignored.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
-pub(super) struct Vec4(pub(super) std::arch::x86_64::__m128);
+pub(crate) struct Vec4(pub(crate) std::arch::x86_64::__m128);
 
 #[cfg(target_arch = "x86_64")]
 impl Vec4 {
     #[inline(always)]
-    pub(super) fn splat(x: f32) -> Self {
+    pub(crate) fn splat(x: f32) -> Self {
         // SAFETY: every x86-64 processor has SSE2 (here and below).
         Vec4(unsafe { std::arch::x86_64::_mm_set1_ps(x) })
     }
@@ -20,7 +20,7 @@ impl Vec4 {
     /// Loads one vertex. All but the last are read as 16 bytes: the fourth number is the next
     /// vertex's x.
     #[inline(always)]
-    pub(super) fn load(positions: &[[f32; 3]], vertex: usize) -> Self {
+    pub(crate) fn load(positions: &[[f32; 3]], vertex: usize) -> Self {
         use std::arch::x86_64::*;
         if vertex + 1 < positions.len() {
             // SAFETY: 16 bytes from a vertex that has a successor lie within the slice.
@@ -33,25 +33,25 @@ impl Vec4 {
     }
 
     #[inline(always)]
-    pub(super) fn min(self, other: Self) -> Self {
+    pub(crate) fn min(self, other: Self) -> Self {
         // SAFETY: SSE2.
         Vec4(unsafe { std::arch::x86_64::_mm_min_ps(self.0, other.0) })
     }
 
     #[inline(always)]
-    pub(super) fn max(self, other: Self) -> Self {
+    pub(crate) fn max(self, other: Self) -> Self {
         // SAFETY: SSE2.
         Vec4(unsafe { std::arch::x86_64::_mm_max_ps(self.0, other.0) })
     }
 
     #[inline(always)]
-    pub(super) fn add(self, other: Self) -> Self {
+    pub(crate) fn add(self, other: Self) -> Self {
         // SAFETY: SSE2.
         Vec4(unsafe { std::arch::x86_64::_mm_add_ps(self.0, other.0) })
     }
 
     #[inline(always)]
-    pub(super) fn xyz(self) -> [f32; 3] {
+    pub(crate) fn xyz(self) -> [f32; 3] {
         let mut out = [0.0f32; 4];
         // SAFETY: `out` holds 16 bytes.
         unsafe { std::arch::x86_64::_mm_storeu_ps(out.as_mut_ptr(), self.0) };
@@ -60,7 +60,7 @@ impl Vec4 {
 
     /// Four vertices as the rows of x, of y and of z.
     #[inline(always)]
-    pub(super) fn transpose([a, b, c, d]: [Self; 4]) -> [[f32; 4]; 3] {
+    pub(crate) fn transpose([a, b, c, d]: [Self; 4]) -> [[f32; 4]; 3] {
         use std::arch::x86_64::*;
         let mut rows = [[0.0f32; 4]; 3];
         // SAFETY: SSE2; each row holds 16 bytes.
@@ -79,43 +79,43 @@ impl Vec4 {
 
 #[cfg(not(target_arch = "x86_64"))]
 #[derive(Clone, Copy)]
-pub(super) struct Vec4([f32; 4]);
+pub(crate) struct Vec4([f32; 4]);
 
 #[cfg(not(target_arch = "x86_64"))]
 impl Vec4 {
     #[inline(always)]
-    pub(super) fn splat(x: f32) -> Self {
+    pub(crate) fn splat(x: f32) -> Self {
         Vec4([x; 4])
     }
 
     #[inline(always)]
-    pub(super) fn load(positions: &[[f32; 3]], vertex: usize) -> Self {
+    pub(crate) fn load(positions: &[[f32; 3]], vertex: usize) -> Self {
         let [x, y, z] = positions[vertex];
         Vec4([x, y, z, z])
     }
 
     #[inline(always)]
-    pub(super) fn min(self, other: Self) -> Self {
+    pub(crate) fn min(self, other: Self) -> Self {
         Vec4(std::array::from_fn(|k| lesser(self.0[k], other.0[k])))
     }
 
     #[inline(always)]
-    pub(super) fn max(self, other: Self) -> Self {
+    pub(crate) fn max(self, other: Self) -> Self {
         Vec4(std::array::from_fn(|k| greater(self.0[k], other.0[k])))
     }
 
     #[inline(always)]
-    pub(super) fn add(self, other: Self) -> Self {
+    pub(crate) fn add(self, other: Self) -> Self {
         Vec4(std::array::from_fn(|k| self.0[k] + other.0[k]))
     }
 
     #[inline(always)]
-    pub(super) fn xyz(self) -> [f32; 3] {
+    pub(crate) fn xyz(self) -> [f32; 3] {
         [self.0[0], self.0[1], self.0[2]]
     }
 
     #[inline(always)]
-    pub(super) fn transpose(vertices: [Self; 4]) -> [[f32; 4]; 3] {
+    pub(crate) fn transpose(vertices: [Self; 4]) -> [[f32; 4]; 3] {
         std::array::from_fn(|axis| std::array::from_fn(|k| vertices[k].0[axis]))
     }
 }

@@ -1,0 +1,266 @@
+//! Where vertices become boxes, for both backends on the host. (On a device that is the text of `kernels/still.wgsl` and
+//! `kernels/moving.wgsl`.)
+//!
+//! ```text
+//! vertices of a pose  ->  box of some vertices   of_vertices, of_run, of_cluster; Hull::of_cluster: at both ends of a step
+//! corners in tables   ->  boxes of a group       LaneBounds::hold, fill; Pose: what of a step they must hold
+//! ```
+//!
+//! Boxes of positions in f32 are exact, those of positions in f64 rounded outward.
+
+mod extent;
+mod pose;
+mod vec4;
+
+pub(crate) use extent::Extent;
+pub(crate) use pose::Pose;
+pub(crate) use vec4::{Vec4, of_vertices_f32};
+
+use crate::elements::{Elements, with_corners};
+use crate::grouping::GROUP;
+use crate::grouping::bounds::{Bounds, LaneBounds, greater, lesser, round_down, round_up};
+use crate::grouping::clusters::Clustering;
+use crate::positions::Positions;
+use crate::scene::Body;
+
+/// An instruction set, as far as it reads vertices.
+pub(crate) trait ReadVertices: Copy {
+    /// The box of some vertices, and whether all are certainly finite: the results of [`of_vertices_f32`].
+    ///
+    /// # Panics
+    /// If there is no such vertex.
+    ///
+    /// # Safety
+    /// `vertices` must not descend.
+    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool);
+}
+
+/// The box of some vertices.
+#[inline]
+pub(crate) fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
+    match positions {
+        Positions::F32(positions) => of_vertices_f32(positions, vertices).0,
+        Positions::F64(positions) => {
+            let mut min = [f64::INFINITY; 3];
+            let mut max = [f64::NEG_INFINITY; 3];
+            for &vertex in vertices {
+                let point = &positions[vertex as usize];
+                for axis in 0..3 {
+                    let x = point[axis];
+                    min[axis] = if x < min[axis] { x } else { min[axis] };
+                    max[axis] = if x > max[axis] { x } else { max[axis] };
+                }
+            }
+            Bounds {
+                min: min.map(round_down),
+                max: max.map(round_up),
+            }
+        }
+    }
+}
+
+/// The box of each of some elements, by its number.
+pub(crate) fn of_each<'a>(
+    elements: &'a Elements,
+    positions: &'a Positions,
+) -> impl Fn(usize) -> Bounds + Sync + 'a {
+    |element| of_vertices(positions, elements.corners(element))
+}
+
+/// The box of a cluster, and whether the positions that were read are certainly finite. (f64 positions are checked before.)
+#[inline(always)]
+pub(crate) fn of_cluster<S: ReadVertices>(
+    simd: S,
+    positions: &Positions,
+    clustering: &Clustering,
+    cluster: usize,
+) -> (Bounds, bool) {
+    let vertices = clustering.vertices(cluster);
+    match positions {
+        // SAFETY: a cluster's vertices ascend.
+        Positions::F32(positions) => unsafe { simd.of_ascending(positions, vertices) },
+        Positions::F64(_) => (of_vertices(positions, vertices), true),
+    }
+}
+
+/// Coordinates processed together in [`of_run`]: several registers hide the latency.
+const TOGETHER: usize = 24;
+
+/// The box of a run of a body's vertices.
+pub(crate) fn of_run(positions: &Positions, run: std::ops::Range<usize>) -> Bounds {
+    let mut bounds = Bounds::EMPTY;
+    match positions {
+        Positions::F32(positions) => {
+            let mut min = [f32::INFINITY; TOGETHER];
+            let mut max = [f32::NEG_INFINITY; TOGETHER];
+            let (chunks, rest) = positions[run].as_flattened().as_chunks::<TOGETHER>();
+            for chunk in chunks {
+                for k in 0..TOGETHER {
+                    min[k] = lesser(min[k], chunk[k]);
+                    max[k] = greater(max[k], chunk[k]);
+                }
+            }
+            for (k, &x) in rest.iter().enumerate() {
+                min[k] = lesser(min[k], x);
+                max[k] = greater(max[k], x);
+            }
+            for k in 0..TOGETHER {
+                bounds.min[k % 3] = lesser(bounds.min[k % 3], min[k]);
+                bounds.max[k % 3] = greater(bounds.max[k % 3], max[k]);
+            }
+        }
+        Positions::F64(positions) => {
+            for point in &positions[run] {
+                bounds.join(&Bounds {
+                    min: point.map(round_down),
+                    max: point.map(round_up),
+                });
+            }
+        }
+    }
+    bounds
+}
+
+/// Where a body's vertices are during a step, and what of the step its boxes must hold.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Hull<'a> {
+    start: &'a Positions,
+    /// `None` if the body does not move.
+    end: Option<&'a Positions>,
+    pose: Pose,
+}
+
+impl<'a> Hull<'a> {
+    pub fn new(body: &'a Body, pose: Pose) -> Self {
+        Hull {
+            start: body.positions(),
+            end: body.end_positions(),
+            pose,
+        }
+    }
+
+    /// The boxes of a cluster at the start and at the end.
+    #[inline(always)]
+    pub fn of_cluster<S: ReadVertices>(
+        &self,
+        simd: S,
+        clustering: &Clustering,
+        cluster: usize,
+    ) -> [Bounds; 2] {
+        let (start, _) = of_cluster(simd, self.start, clustering, cluster);
+        let end = match self.end {
+            Some(end) => of_cluster(simd, end, clustering, cluster).0,
+            None => start,
+        };
+        self.pose.close([start, end])
+    }
+
+    /// The positions at the start and at the end, if both are in f32.
+    #[inline(always)]
+    pub fn in_f32(&self) -> Option<[&'a [[f32; 3]]; 2]> {
+        match (self.start, self.end.unwrap_or(self.start)) {
+            (Positions::F32(start), Positions::F32(end)) => Some([start, end]),
+            _ => None,
+        }
+    }
+
+    /// Puts the boxes of a cluster's elements into lanes, by the corners of its elements; to be [closed](Self::close).
+    pub fn fill(&self, clustering: &Clustering, cluster: usize, boxes: [&mut LaneBounds; 2]) {
+        let [start, end] = boxes;
+        fill(self.start, clustering, cluster, start);
+        match self.end {
+            Some(positions) => fill(positions, clustering, cluster, end),
+            None => end.clone_from(start),
+        }
+    }
+
+    /// Makes the boxes to be tested from those of a group's elements at both ends: [`Pose::close_all`].
+    #[inline(always)]
+    pub fn close(&self, boxes: [&mut LaneBounds; 2], size: usize) {
+        self.pose.close_all(boxes, size);
+    }
+}
+
+/// Puts the boxes of a cluster's elements into lanes; lanes past its size become empty.
+pub(crate) fn fill(
+    positions: &Positions,
+    clustering: &Clustering,
+    cluster: usize,
+    lanes: &mut LaneBounds,
+) {
+    let places = cluster * GROUP..cluster * GROUP + clustering.size(cluster);
+    with_corners!(&clustering.corners, |corners| of_elements(
+        positions,
+        &corners[places],
+        lanes
+    ));
+}
+
+fn of_elements<const N: usize>(
+    positions: &Positions,
+    corners: &[[u32; N]],
+    lanes: &mut LaneBounds,
+) {
+    match positions {
+        Positions::F32(positions) => {
+            let (fours, rest) = corners.as_chunks::<4>();
+            for (four_ix, four) in fours.iter().enumerate() {
+                let [a, b, c, d] = four;
+                let (min_a, max_a) = extent(positions, a);
+                let (min_b, max_b) = extent(positions, b);
+                let (min_c, max_c) = extent(positions, c);
+                let (min_d, max_d) = extent(positions, d);
+                let min = Vec4::transpose([min_a, min_b, min_c, min_d]);
+                let max = Vec4::transpose([max_a, max_b, max_c, max_d]);
+                let lane = 4 * four_ix;
+                for axis in 0..3 {
+                    lanes.min[axis][lane..lane + 4].copy_from_slice(&min[axis]);
+                    lanes.max[axis][lane..lane + 4].copy_from_slice(&max[axis]);
+                }
+            }
+            let done = corners.len() - rest.len();
+            for (lane, corners) in (done..).zip(rest) {
+                let (min, max) = extent(positions, corners);
+                let (min, max) = (min.xyz(), max.xyz());
+                lanes.put(lane, &Bounds { min, max });
+            }
+        }
+        Positions::F64(_) => {
+            for (lane, corners) in corners.iter().enumerate() {
+                lanes.put(lane, &of_vertices(positions, corners));
+            }
+        }
+    }
+    lanes.clear_from(corners.len());
+}
+
+#[inline(always)]
+fn extent<const N: usize>(positions: &[[f32; 3]], corners: &[u32; N]) -> (Vec4, Vec4) {
+    let first = Vec4::load(positions, corners[0] as usize);
+    let (mut min, mut max) = (first, first);
+    for &corner in &corners[1..] {
+        let vertex = Vec4::load(positions, corner as usize);
+        min = min.min(vertex);
+        max = max.max(vertex);
+    }
+    (min, max)
+}
+
+impl LaneBounds {
+    /// The boxes of elements whose corners are in tables, one element per lane; lanes past `size` become empty.
+    #[inline(always)]
+    pub fn hold<const N: usize>(&mut self, corners: [&[[f32; GROUP]; 3]; N], size: usize) {
+        for axis in 0..3 {
+            for lane in 0..GROUP {
+                let first = corners[0][axis][lane];
+                let (mut min, mut max) = (first, first);
+                for corner in &corners[1..] {
+                    min = lesser(min, corner[axis][lane]);
+                    max = greater(max, corner[axis][lane]);
+                }
+                (self.min[axis][lane], self.max[axis][lane]) = (min, max);
+            }
+        }
+        self.clear_from(size);
+    }
+}
