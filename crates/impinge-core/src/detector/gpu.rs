@@ -4,9 +4,10 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use super::{Backend, Detector, Settings};
-use crate::cpu::steps::{Asked, StepClusters};
+use crate::cpu::steps::{StepClusters, StepTest};
 use crate::error::Error;
 use crate::gpu::{Capacities, Engine, Gpu, ResidentPairs, Wanted};
+use crate::hull::Pose;
 use crate::ids::BodyId;
 use crate::impacts::StepAnswer;
 use crate::progress::Control;
@@ -65,7 +66,7 @@ pub(super) fn find_in_step(
     engine: &mut Option<Engine>,
     clusters: &mut StepClusters,
     (job, settings): (Job<'_>, &Settings),
-    (asked, answer): (Asked, StepAnswer<'_>),
+    (asked, answer): ((StepTest, Pose), StepAnswer<'_>),
     stats: &mut Statistics,
 ) -> Result<bool, Error> {
     if cfg!(target_family = "wasm") || job.frame.distance() > 0.0 {

@@ -10,7 +10,7 @@ use crate::clock::Instant;
 
 use super::Detector;
 use crate::advance::Advance;
-use crate::cpu::steps::{Asked, Sought, StepClusters};
+use crate::cpu::steps::{Asked, Sought, StepClusters, StepTest};
 use crate::elements::Part;
 use crate::error::Error;
 use crate::exact::Contact;
@@ -273,9 +273,9 @@ impl Detector {
             sought,
             start: step.start,
             toi: step.toi,
-            pose,
             latest,
         };
+        let asked = (StepTest::Contacts(asked), pose);
         let answer = StepAnswer::Contacts(contacts);
         #[cfg(feature = "gpu")]
         let on_device = super::gpu::find_in_step(

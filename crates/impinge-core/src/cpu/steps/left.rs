@@ -12,7 +12,7 @@ use crate::impacts::StepAnswer;
 use crate::run::Job;
 use crate::sink::Ending;
 
-use super::narrow::{Between, Settler};
+use super::narrow::{Between, Contacts, Narrow};
 use super::pairing::Worker;
 use super::world::World;
 
@@ -56,7 +56,8 @@ impl Left<'_, '_> {
                     return;
                 }
                 let mut pairs = tasks[ix].lock().unwrap_or_else(PoisonError::into_inner);
-                if let Err(error) = settle(isa, world, first_places, &mut pairs, worker.settler()) {
+                if let Err(error) = settle(isa, world, first_places, &mut pairs, worker.contacts())
+                {
                     *wrong.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
                 }
             });
@@ -83,7 +84,7 @@ fn settle(
     world: World<'_>,
     first_places: &[u32],
     pairs: &mut [[u32; 2]],
-    settler: &mut Settler,
+    contacts: &mut Contacts,
 ) -> Result<(), Error> {
     let n_places = first_places.last().copied().unwrap_or(0);
     for pair in &mut *pairs {
@@ -102,9 +103,9 @@ fn settle(
         };
         let firsts = [a, b].map(|layer| first_places[layer as usize]);
         let places = run.iter().map(|&[p, q]| [p - firsts[0], q - firsts[1]]);
-        settler.settle_left(isa, world, Between { a, b, kind }, places);
+        contacts.take_left(isa, world, Between { a, b, kind }, places);
     }
-    settler.search(isa, world);
+    contacts.settle(isa, world);
     Ok(())
 }
 

@@ -16,7 +16,6 @@ mod group;
 #[cfg(feature = "gpu")]
 mod left;
 mod narrow;
-mod near;
 mod pairing;
 mod world;
 
@@ -47,7 +46,7 @@ use crate::sink::Ending;
 
 use cache::{Caches, LayerCache};
 use pairing::Worker;
-pub(crate) use world::{Asked, Sought};
+pub(crate) use world::{Asked, Sought, StepTest};
 use world::{Known, World};
 
 impl<'a> Stage for World<'a> {
@@ -105,21 +104,19 @@ impl StepClusters {
         &mut self,
         job: Job<'_>,
         settings: &Settings,
-        asked: Asked,
+        (test, pose): (StepTest, Pose),
         answer: StepAnswer<'_>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         self.scratches.resize_with(job.workers.n(), Worker::default);
         stats.n_clusters = 0;
         stats.time("clustering", |stats| self.cluster(job, stats))?;
-        stats.time("bounds", |stats| {
-            self.refit(job, settings, asked.pose, stats)
-        })?;
+        stats.time("bounds", |stats| self.refit(job, settings, pose, stats))?;
         for worker in &mut self.scratches {
-            worker.begin(stats.n_clusters, settings);
+            worker.begin(stats.n_clusters, test, settings);
         }
         let held = self.bytes_besides_room();
-        let known = Known::new(asked.latest);
+        let known = Known::new(test);
         let task = slabs::Task {
             isa: self.isa,
             job,
@@ -127,7 +124,7 @@ impl StepClusters {
             world: World {
                 scene: job.scene,
                 frame: job.frame,
-                asked,
+                pose,
                 answer,
                 known: &known,
                 caches: &self.caches,
@@ -148,7 +145,7 @@ impl StepClusters {
         &mut self,
         job: Job<'_>,
         settings: &Settings,
-        asked: Asked,
+        (test, pose): (StepTest, Pose),
         answer: StepAnswer<'_>,
         stats: &mut Statistics,
         find: impl FnOnce(
@@ -174,17 +171,17 @@ impl StepClusters {
         }
         self.scratches.resize_with(job.workers.n(), Worker::default);
         for worker in &mut self.scratches {
-            worker.begin(stats.n_clusters, settings);
+            worker.begin(stats.n_clusters, test, settings);
         }
         answer.share(self.bytes_besides_room() as u64);
-        let known = Known::new(asked.latest);
+        let known = Known::new(test);
         let mut left = left::Left {
             isa: self.isa,
             job,
             world: World {
                 scene: job.scene,
                 frame: job.frame,
-                asked,
+                pose,
                 answer,
                 known: &known,
                 caches: &self.caches,

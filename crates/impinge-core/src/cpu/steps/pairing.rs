@@ -22,8 +22,8 @@ use crate::impacts::StepAnswer;
 use crate::settings::Settings;
 
 use super::group::Group;
-use super::narrow::{Between, Settler};
-use super::world::World;
+use super::narrow::{Batch, Between, NarrowCounts, Settler};
+use super::world::{StepTest, World};
 
 /// The narrow stage is timed for one work item in this many.
 const SAMPLED: u32 = 16;
@@ -59,17 +59,17 @@ impl Default for Worker {
 
 impl Worker {
     /// Prepares for a step of `n_clusters` clusters.
-    pub fn begin(&mut self, n_clusters: u64, settings: &Settings) {
+    pub fn begin(&mut self, n_clusters: u64, test: StepTest, settings: &Settings) {
         self.groups.begin::<World<'_>>(n_clusters, settings);
-        self.settler.begin(&settings.tuning);
+        self.settler.begin(test, &settings.tuning);
         self.n_settled = 0;
         self.busy = Duration::ZERO;
     }
 
-    /// Where candidates go that were found elsewhere.
+    /// Where contacts go that were found elsewhere.
     #[cfg(feature = "gpu")]
-    pub fn settler(&mut self) -> &mut Settler {
-        &mut self.settler
+    pub fn contacts(&mut self) -> &mut super::narrow::Contacts {
+        self.settler.contacts()
     }
 
     /// Ends a step: hands over the remaining contacts.
@@ -78,12 +78,13 @@ impl Worker {
     }
 
     pub fn counts(&self) -> Counts {
+        let NarrowCounts { n_unsure, n_full } = self.settler.counts();
         Counts {
             busy: self.busy,
             n_candidates: self.settler.n_candidates,
-            n_unsure: self.settler.n_unsure,
+            n_unsure,
             n_evicted: self.groups.n_evicted,
-            n_full: self.settler.n_full,
+            n_full,
         }
     }
 
@@ -135,13 +136,19 @@ pub(super) fn run<S: Simd>(
             ..
         } = worker;
         let groups = places.map(|place| groups.at(place));
-        settler.settle_item(isa, world, (item, between), groups, met);
+        let batch = Batch {
+            item,
+            between,
+            groups,
+            met,
+        };
+        settler.take(isa, world, batch);
         if let Some(start) = start {
             worker.busy += start.elapsed() * SAMPLED;
         }
     }
     let start = Instant::now();
-    worker.settler.search(isa, world);
+    worker.settler.settle(isa, world);
     worker.busy += start.elapsed();
 }
 
@@ -177,7 +184,7 @@ fn pair<S: Simd>(
     let place_b = groups.place(simd, world, sides[1], place_a);
     let (a, b) = (groups.at(place_a), groups.at(place_b));
     let (mut lanes_a, mut lanes_b) = (full(a.size), full(b.size));
-    let is_single = world.asked.pose.is_single();
+    let is_single = world.pose.is_single();
     if !is_own {
         // Boxes of clusters: where they are single, both ends have the same.
         lanes_a = if is_single {

@@ -1,4 +1,4 @@
-//! Read-only view shared by all stages of a step: the question, the layers, and what is known of the answer so far.
+//! Read-only view shared by all stages of a step: the layers, and what is known of the answer so far.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -10,30 +10,38 @@ use crate::step::{Start, Toi};
 
 use super::cache::{Caches, LayerCache};
 
-/// What to look for in a step.
-#[derive(Debug, Clone, Copy)]
+/// The test of the pairs of a step.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) enum StepTest {
+    /// Whether boxes overlap when inflated by a distance.
+    Overlap { distance: f64 },
+    /// Whether elements are within the distance that the frame says, at the start.
+    #[default]
+    Within,
+    /// When elements touch first, or come within the distance that the frame says.
+    Contacts(Asked),
+}
+
+/// What is asked about contacts.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Asked {
+    pub sought: Sought,
+    pub start: Start,
+    pub toi: Toi,
+    /// Contacts later than this are not wanted.
+    pub latest: f64,
+}
+
+/// Which contacts to look for.
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) enum Sought {
     /// Every contact.
+    #[default]
     All,
     /// The earliest contact, and all whose times may round to the same time.
     Earliest,
     /// Any contact.
     Any,
-    /// Boxes that overlap when inflated by this much.
-    Boxes(f64),
-    /// Elements within the distance that the frame says, at the start.
-    Within,
-}
-
-/// The question about a step.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Asked {
-    pub sought: Sought,
-    pub start: Start,
-    pub toi: Toi,
-    pub pose: Pose,
-    /// Contacts later than this are not wanted.
-    pub latest: f64,
 }
 
 /// What is known of the answer while workers look for it.
@@ -45,7 +53,11 @@ pub(crate) struct Known {
 }
 
 impl Known {
-    pub fn new(latest: f64) -> Self {
+    pub fn new(test: StepTest) -> Self {
+        let latest = match test {
+            StepTest::Contacts(asked) => asked.latest,
+            StepTest::Overlap { .. } | StepTest::Within => f64::INFINITY,
+        };
         Known {
             earliest: AtomicU64::new(latest.to_bits()),
             is_over: AtomicBool::new(false),
@@ -58,7 +70,7 @@ impl Known {
     }
 
     /// The earliest time found so far.
-    fn earliest(&self) -> f64 {
+    pub fn earliest(&self) -> f64 {
         f64::from_bits(self.earliest.load(Ordering::Relaxed))
     }
 
@@ -69,7 +81,7 @@ impl Known {
                 self.earliest.fetch_min(time.to_bits(), Ordering::Relaxed);
             }
             Sought::Any => self.is_over.store(true, Ordering::Relaxed),
-            Sought::All | Sought::Boxes(_) | Sought::Within => {}
+            Sought::All => {}
         }
     }
 }
@@ -79,33 +91,19 @@ impl Known {
 pub(crate) struct World<'a> {
     pub scene: &'a Scene,
     pub frame: &'a Frame,
-    pub asked: Asked,
+    pub pose: Pose,
     pub(super) answer: StepAnswer<'a>,
     pub(super) known: &'a Known,
     pub(super) caches: &'a Caches,
 }
 
 impl<'a> World<'a> {
-    /// Contacts later than this are not wanted.
-    #[inline(always)]
-    pub(super) fn until(&self) -> f64 {
-        match self.asked.sought {
-            // Contacts that are later by less than rounding are wanted, for their keys may be lower.
-            Sought::Earliest => {
-                let time = self.known.earliest();
-                let later = (time * (1.0 + 2f64.powi(-22))).max(f64::from(f32::MIN_POSITIVE));
-                later.min(1.0)
-            }
-            Sought::All | Sought::Any | Sought::Boxes(_) | Sought::Within => 1.0,
-        }
-    }
-
     /// What makes the boxes of a layer.
     #[inline(always)]
     pub(super) fn hull(&self, layer: u32) -> Hull<'a> {
         let layer = layer as usize;
         let body = self.frame.body(self.scene, layer);
-        Hull::new(body, self.asked.pose.of(self.frame, layer))
+        Hull::new(body, self.pose.of(self.frame, layer))
     }
 
     /// The cache of a layer.

@@ -4,7 +4,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::clock::Instant;
-use crate::cpu::steps::{Asked, Sought};
+use crate::cpu::steps::StepTest;
 use crate::detector::Detector;
 use crate::elements::Part;
 use crate::error::Error;
@@ -22,7 +22,6 @@ use crate::run::Job;
 use crate::scene::Scene;
 use crate::settings::Method;
 use crate::sink::Wanted;
-use crate::step::{Start, Toi};
 
 use super::{Steps, begin};
 
@@ -107,13 +106,7 @@ impl Detector {
                 workers,
                 control,
             };
-            let asked = Asked {
-                sought: Sought::Within,
-                start: Start::Report,
-                toi: Toi::F32,
-                pose: Pose::STILL,
-                latest: f64::INFINITY,
-            };
+            let asked = (StepTest::Within, Pose::STILL);
             clusters.run(job, &self.settings, asked, StepAnswer::Keys(answer), stats)?;
         }
         let collect = Instant::now();

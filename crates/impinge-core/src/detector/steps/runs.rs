@@ -7,7 +7,7 @@
 use std::ops::ControlFlow;
 
 use crate::clock::Instant;
-use crate::cpu::steps::{Asked, Sought, StepClusters};
+use crate::cpu::steps::{StepClusters, StepTest};
 use crate::detector::Detector;
 use crate::error::Error;
 use crate::frame::{Ask, Frame, TestId};
@@ -23,7 +23,7 @@ use crate::settings::{Method, Settings};
 use crate::sink::{self, BLOCK, Ending, Limits, Wanted};
 use crate::sort::Sorter;
 use crate::stats::Statistics;
-use crate::step::{CandidateQuery, Start, Toi};
+use crate::step::CandidateQuery;
 use crate::workers::Workers;
 
 use super::{Steps, begin};
@@ -330,17 +330,12 @@ impl Question<'_> {
             workers,
             control,
         };
-        let asked = Asked {
-            sought: Sought::Boxes(distance),
-            start: Start::Report,
-            toi: Toi::F32,
-            pose: Pose {
-                until: 1.0,
-                margin: distance,
-                is_swept: true,
-            },
-            latest: f64::INFINITY,
+        let pose = Pose {
+            until: 1.0,
+            margin: distance,
+            is_swept: true,
         };
+        let asked = (StepTest::Overlap { distance }, pose);
         clusters.run(job, settings, asked, answer, stats)
     }
 }

@@ -1,0 +1,177 @@
+//! What the tests of stage `narrow` share: the candidates of a work item, keys, and the points of a pair.
+
+use crate::cpu::met::{Met, WorkItem};
+use crate::cpu::simd::Isa;
+use crate::exact::{ElementPair, Point};
+use crate::frame::{TestId, pair_key};
+use crate::grouping::GROUP;
+use crate::impacts::{KeysByKind, StepAnswer};
+use crate::narrow::exact_kind;
+use crate::pair_kind::PairKind;
+use crate::positions::Positions;
+use crate::sink::BLOCK;
+
+use super::super::group::Group;
+use super::super::world::World;
+
+/// One test of the candidates.
+pub(crate) trait Narrow {
+    /// Takes the candidates of a work item; some may wait for more.
+    fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>);
+
+    /// Settles the candidates that wait.
+    fn settle(&mut self, _: Isa, _: World<'_>) {}
+
+    /// Ends a step: hands over what is left of the answer.
+    fn end(&mut self, answer: StepAnswer<'_>);
+
+    fn counts(&self) -> NarrowCounts;
+}
+
+/// The counts of one test in a step.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct NarrowCounts {
+    /// Pairs left to exact arithmetic.
+    pub n_unsure: u64,
+    /// Times that there were enough pairs to look at them.
+    pub n_full: u64,
+}
+
+/// The candidates of a work item.
+pub(crate) struct Batch<'a> {
+    pub item: &'a WorkItem,
+    pub between: Between,
+    pub groups: [&'a Group; 2],
+    pub met: &'a mut Met,
+}
+
+impl Batch<'_> {
+    /// The places of a candidate.
+    #[inline(always)]
+    pub fn places(&self, ix: usize) -> Places {
+        let place = |cluster: u32, lane: u8| cluster * GROUP as u32 + u32::from(lane);
+        let [lane_a, lane_b] = self.met.lanes(ix);
+        [
+            place(self.item.cluster_a, lane_a),
+            place(self.item.cluster_b, lane_b),
+        ]
+    }
+
+    /// Whether the corners of both groups are in tables.
+    #[inline(always)]
+    pub fn is_in_tables(&self) -> bool {
+        self.groups.iter().all(|group| group.in_tables)
+    }
+
+    /// The kind of the pairs, if a filter decides from tables whether such pairs are within a distance.
+    #[inline(always)]
+    pub fn near_in_tables(&self) -> Option<ElementPair> {
+        let pair = match self.between.kind {
+            PairKind::VertexFace => Some(ElementPair::VertexFace),
+            PairKind::EdgeEdge => Some(ElementPair::EdgeEdge),
+            _ => None,
+        };
+        pair.filter(|_| self.is_in_tables())
+    }
+}
+
+/// Two layers, and the kind of their pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Between {
+    pub a: u32,
+    pub b: u32,
+    pub kind: PairKind,
+}
+
+/// Places of two elements in their clusters' orders.
+pub(crate) type Places = [u32; 2];
+
+/// Keys of pairs without a value, handed over in blocks.
+#[derive(Debug, Default)]
+pub(super) struct Keys(KeysByKind);
+
+impl Keys {
+    pub fn begin(&mut self) {
+        self.0.iter_mut().for_each(Vec::clear);
+    }
+
+    #[inline(always)]
+    pub fn push(&mut self, kind: PairKind, key: u64) {
+        self.0[kind as usize].push(key);
+    }
+
+    /// Hands over the keys of a kind once they make a block.
+    #[inline(always)]
+    pub fn hand_over(&mut self, world: World<'_>, kind: PairKind) {
+        let keys = &mut self.0[kind as usize];
+        if keys.len() >= BLOCK {
+            world.answer.take_keys(kind, keys);
+        }
+    }
+
+    pub fn end(&mut self, answer: StepAnswer<'_>) {
+        for (kind, keys) in PairKind::ALL.into_iter().zip(&mut self.0) {
+            answer.take_keys(kind, keys);
+        }
+    }
+
+    pub fn bytes(&self) -> usize {
+        size_of::<u64>() * self.0.iter().map(Vec::capacity).sum::<usize>()
+    }
+}
+
+/// The pair as the exact predicate names it.
+pub(super) fn exact_pair(kind: PairKind) -> Option<ElementPair> {
+    exact_kind(TestId::Elements(kind))
+}
+
+/// The key of a pair.
+#[inline(always)]
+pub(super) fn key(world: World<'_>, between: Between, places: Places) -> u64 {
+    let [a, b] = [(between.a, places[0]), (between.b, places[1])].map(|(layer, place)| {
+        let first = world.frame.layers[layer as usize].first;
+        first + world.cache(layer).clustering.order[place as usize]
+    });
+    pair_key(a, b)
+}
+
+/// The points of a pair at the start and at the end, in the order of the exact test.
+pub(super) fn points(
+    world: World<'_>,
+    between: Between,
+    pair: ElementPair,
+    places: Places,
+) -> [[Point; 4]; 2] {
+    let mut sides = [(between.a, places[0]), (between.b, places[1])];
+    if pair == ElementPair::VertexEdge {
+        // Such pairs are named edge first, but tested vertex first.
+        sides.reverse();
+    }
+    let mut points: [[Point; 4]; 2] = Default::default();
+    let mut n = 0;
+    for (layer, place) in sides {
+        let (corners, [start, end]) = element(world, layer, place);
+        for &corner in corners {
+            points[0][n] = start.point(corner as usize);
+            points[1][n] = end.point(corner as usize);
+            n += 1;
+        }
+    }
+    points
+}
+
+/// The corners of an element, and its body's positions at both ends.
+pub(super) fn element<'a>(
+    world: World<'a>,
+    layer: u32,
+    place: u32,
+) -> (&'a [u32], [&'a Positions; 2]) {
+    let body = world.frame.body(world.scene, layer as usize);
+    let corners = world
+        .cache(layer)
+        .clustering
+        .corners
+        .corners(place as usize);
+    let start = body.positions();
+    (corners, [start, body.end_positions().unwrap_or(start)])
+}

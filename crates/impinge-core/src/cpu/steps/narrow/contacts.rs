@@ -1,0 +1,159 @@
+//! The contacts that one worker has found in a step, and the pairs whose contacts are still sought.
+
+use crate::cpu::narrow::room_to_wait;
+use crate::exact::filter::{Search, time_between};
+use crate::exact::{Contact, ElementPair, first_within};
+use crate::impacts::{Found, FoundByKind, StepAnswer};
+use crate::pair_kind::PairKind;
+use crate::sink::BLOCK;
+use crate::step::{Start, Toi};
+use crate::tuning::Tuning;
+
+use super::super::world::{Asked, Sought, World};
+use super::batch::{Between, NarrowCounts, Places, key, points};
+
+/// A pair whose first contact is sought.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Open {
+    pub places: Places,
+    pub search: Search,
+}
+
+/// Contacts found, and open pairs.
+#[derive(Debug, Default)]
+pub(crate) struct Contacts {
+    pub(super) asked: Asked,
+    /// Contacts found, handed over in blocks.
+    found: FoundByKind,
+    pub(super) counts: NarrowCounts,
+    /// That many open pairs are enough.
+    pub(super) full: usize,
+    /// Pairs of the current layers that the filter's first step has left: to be looked at.
+    pub(super) open: Vec<Open>,
+    /// Pairs to be looked at in the next round, and pairs with one candidate for a contact.
+    pub(super) later: Vec<Open>,
+    pub(super) single: Vec<Open>,
+    pub(super) between: Option<Between>,
+    /// Whether the filter's first step is still to be taken, in `f64`.
+    pub(super) is_first: bool,
+}
+
+impl Contacts {
+    /// Prepares for a step.
+    pub fn begin(&mut self, asked: Asked, tuning: &Tuning) {
+        self.asked = asked;
+        self.full = tuning.settle_from;
+        self.counts = NarrowCounts::default();
+        self.found.iter_mut().for_each(Vec::clear);
+        for list in [&mut self.open, &mut self.later, &mut self.single] {
+            list.clear();
+            list.reserve_exact(room_to_wait(tuning));
+        }
+        self.between = None;
+    }
+
+    pub fn bytes(&self) -> usize {
+        let found: usize = self.found.iter().map(Vec::capacity).sum();
+        let lists = [&self.open, &self.later, &self.single];
+        size_of::<Open>() * lists.iter().map(|list| list.capacity()).sum::<usize>()
+            + size_of::<Found<Contact>>() * found
+    }
+}
+
+impl Contacts {
+    /// Hands over the contacts that were found.
+    pub fn hand_over(&mut self, answer: StepAnswer<'_>) {
+        for (kind, found) in PairKind::ALL.into_iter().zip(&mut self.found) {
+            answer.take(kind, found);
+        }
+    }
+
+    /// Contacts later than this are not wanted.
+    #[inline(always)]
+    pub(super) fn until(&self, world: World<'_>) -> f64 {
+        match self.asked.sought {
+            // Contacts that are later by less than rounding are wanted, for their keys may be lower.
+            Sought::Earliest => {
+                let time = world.known.earliest();
+                let later = (time * (1.0 + 2f64.powi(-22))).max(f64::from(f32::MIN_POSITIVE));
+                later.min(1.0)
+            }
+            Sought::All | Sought::Any => 1.0,
+        }
+    }
+
+    #[inline(never)]
+    pub(super) fn settle_exactly(
+        &mut self,
+        world: World<'_>,
+        between: Between,
+        pair: ElementPair,
+        places: Places,
+    ) {
+        self.counts.n_unsure += 1;
+        let [start, end] = points(world, between, pair, places);
+        if let Some(contact) = first_within(pair, &start, &end, world.frame.distance()) {
+            self.report(world, between, places, contact);
+        }
+    }
+
+    /// Records a contact, unless it is not wanted.
+    #[inline(always)]
+    pub(super) fn report(
+        &mut self,
+        world: World<'_>,
+        between: Between,
+        places: Places,
+        contact: Contact,
+    ) {
+        if self.asked.start == Start::Skip && contact.at_start {
+            return;
+        }
+        if contact.time > self.until(world) {
+            return;
+        }
+        world.known.found(self.asked.sought, contact.time);
+        self.push(world, between, places, contact);
+    }
+
+    #[inline(always)]
+    fn push(&mut self, world: World<'_>, between: Between, places: Places, contact: Contact) {
+        let found = &mut self.found[between.kind as usize];
+        found.push(Found {
+            key: key(world, between, places),
+            value: contact,
+        });
+        if found.len() >= BLOCK {
+            world.answer.take(between.kind, found);
+        }
+    }
+
+    /// Records a contact that is certainly in an interval of time.
+    #[inline(always)]
+    pub(super) fn report_within(
+        &mut self,
+        world: World<'_>,
+        (between, pair): (Between, ElementPair),
+        places: Places,
+        span: [f64; 2],
+    ) {
+        // Other pairs need not be searched beyond this time.
+        world.known.found(self.asked.sought, span[1]);
+        let time = match (self.asked.sought, self.asked.toi) {
+            (Sought::Any, _) => Some(span[0]),
+            // This contact is not wanted.
+            (Sought::Earliest, _) if span[0] > self.until(world) => return,
+            (_, Toi::F32) => time_between(span).map(f64::from),
+            (_, Toi::F64) => None,
+        };
+        let Some(time) = time else {
+            return self.settle_exactly(world, between, pair, places);
+        };
+        let contact = Contact {
+            time,
+            is_exact: false,
+            at_start: false,
+        };
+        self.report(world, between, places, contact);
+    }
+}

@@ -1,0 +1,127 @@
+//! Whether elements are within a distance at the start of a step.
+//!
+//! In: candidates, whose boxes overlap when each reaches half as far. Sixteen pairs at a time are settled in `f32` from the tables
+//! (`exact::filter::nearness`); most others in `f64` with bounds (`exact::distance`), the rest in exact arithmetic.
+
+use crate::cpu::simd::{Isa, Lanes, Simd, dispatch};
+use crate::elements::Elements;
+use crate::exact::filter::{self, BATCH};
+use crate::exact::{Reach, are_within_certainly, unsure_are_within};
+use crate::impacts::StepAnswer;
+use crate::narrow::Corners;
+use crate::positions::Positions;
+
+use super::super::world::World;
+use super::batch::{Batch, Between, Keys, Narrow, NarrowCounts, Places, key};
+
+/// The test of one worker.
+#[derive(Debug, Default)]
+pub(super) struct Near {
+    keys: Keys,
+    n_unsure: u64,
+}
+
+impl Near {
+    /// Prepares for a step.
+    pub fn begin(&mut self) {
+        self.n_unsure = 0;
+        self.keys.begin();
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.keys.bytes()
+    }
+}
+
+impl Narrow for Near {
+    fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
+        dispatch!(isa, take, (
+            near: &mut Near = self,
+            world: World<'_> = world,
+            batch: Batch<'_> = batch,
+        ));
+    }
+
+    fn end(&mut self, answer: StepAnswer<'_>) {
+        self.keys.end(answer);
+    }
+
+    fn counts(&self) -> NarrowCounts {
+        NarrowCounts {
+            n_unsure: self.n_unsure,
+            n_full: 0,
+        }
+    }
+}
+
+#[inline(always)]
+fn take<S: Simd>(_: S, near: &mut Near, world: World<'_>, batch: Batch<'_>) {
+    let between = batch.between;
+    let pairs = Pairs::new(world, between);
+    let pair = batch.near_in_tables();
+    let tables = batch.groups.map(|group| &group.points);
+    let reach = pairs.reach.enclosing_f32();
+    for first in (0..batch.met.len()).step_by(BATCH) {
+        let lanes = batch.met.batch(first);
+        let n = (batch.met.len() - first).min(BATCH);
+        let mut open = u16::MAX >> (BATCH - n);
+        let mut yes = 0;
+        if let Some(pair) = pair {
+            let verdict = filter::are_within_in_tables::<S::F32>(pair, tables, lanes, reach);
+            yes = verdict.yes & open;
+            open &= !(verdict.yes | verdict.no);
+        }
+        for lane in Lanes(u64::from(yes)) {
+            near.put(world, between, batch.places(first + lane));
+        }
+        for lane in Lanes(u64::from(open)) {
+            let places = batch.places(first + lane);
+            if near.settle_open(&pairs, places) {
+                near.put(world, between, places);
+            }
+        }
+    }
+}
+
+impl Near {
+    #[inline(always)]
+    fn put(&mut self, world: World<'_>, between: Between, places: Places) {
+        self.keys.push(between.kind, key(world, between, places));
+        self.keys.hand_over(world, between.kind);
+    }
+
+    /// Whether the elements at two places are near, in `f64` or exactly.
+    #[inline(never)]
+    fn settle_open(&mut self, pairs: &Pairs<'_>, places: Places) -> bool {
+        let [a, b] = pairs.corners(places);
+        are_within_certainly(a.points(), b.points(), &pairs.reach).unwrap_or_else(|| {
+            self.n_unsure += 1;
+            unsure_are_within(a.points(), b.points(), &pairs.reach)
+        })
+    }
+}
+
+/// Two layers, and within which distance their elements are near.
+struct Pairs<'a> {
+    sides: [(&'a Elements, &'a Positions); 2],
+    reach: Reach,
+}
+
+impl<'a> Pairs<'a> {
+    fn new(world: World<'a>, between: Between) -> Self {
+        let sides = [between.a, between.b].map(|layer| {
+            let body = world.frame.body(world.scene, layer as usize);
+            (&world.cache(layer).clustering.corners, body.positions())
+        });
+        let reach = (world.frame).reach(between.a as usize, between.b as usize);
+        Pairs { sides, reach }
+    }
+
+    #[inline(always)]
+    fn corners(&self, places: Places) -> [Corners; 2] {
+        [0, 1].map(|side| {
+            let (elements, positions) = self.sides[side];
+            Corners::new(positions, elements.corners(places[side] as usize))
+        })
+    }
+}

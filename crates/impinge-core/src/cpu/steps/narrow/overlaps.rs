@@ -1,0 +1,87 @@
+//! Whether the boxes of elements over the whole step, inflated, overlap.
+//!
+//! Stage `pairing` has tested boxes in `f32` that were rounded outward; here they are tested as they are.
+
+use crate::cpu::simd::Isa;
+use crate::frame::pair_key;
+use crate::hull::Extent;
+use crate::impacts::StepAnswer;
+use crate::narrow::are_near;
+
+use super::super::group::Group;
+use super::super::world::World;
+use super::batch::{Batch, Keys, Narrow, NarrowCounts, element};
+
+/// The test of one worker.
+#[derive(Debug, Default)]
+pub(super) struct Overlaps {
+    /// By how much boxes are inflated.
+    distance: f64,
+    keys: Keys,
+}
+
+impl Overlaps {
+    /// Prepares for a step.
+    pub fn begin(&mut self, distance: f64) {
+        self.distance = distance;
+        self.keys.begin();
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.keys.bytes()
+    }
+}
+
+impl Narrow for Overlaps {
+    fn take(&mut self, _: Isa, world: World<'_>, batch: Batch<'_>) {
+        let (distance, between) = (self.distance, batch.between);
+        let is_in_tables = batch.is_in_tables();
+        if is_in_tables && distance == 0.0 {
+            // The boxes of groups in tables are not rounded.
+            for ix in 0..batch.met.len() {
+                let key = key_in(batch.groups, batch.met.lanes(ix));
+                self.keys.push(between.kind, key);
+            }
+            return self.keys.hand_over(world, between.kind);
+        }
+        for ix in 0..batch.met.len() {
+            let lanes = batch.met.lanes(ix);
+            let [a, b] = if is_in_tables {
+                [0, 1].map(|side| batch.groups[side].extent(lanes[side].into()))
+            } else {
+                let [a, b] = batch.places(ix);
+                [extent(world, between.a, a), extent(world, between.b, b)]
+            };
+            if are_near(&a, &b, distance) {
+                self.keys.push(between.kind, key_in(batch.groups, lanes));
+            }
+        }
+        self.keys.hand_over(world, between.kind);
+    }
+
+    fn end(&mut self, answer: StepAnswer<'_>) {
+        self.keys.end(answer);
+    }
+
+    fn counts(&self) -> NarrowCounts {
+        NarrowCounts::default()
+    }
+}
+
+/// The key of a pair, by its lanes in two groups.
+#[inline(always)]
+fn key_in([a, b]: [&Group; 2], [lane_a, lane_b]: [u8; 2]) -> u64 {
+    pair_key(
+        a.numbers.0[usize::from(lane_a)],
+        b.numbers.0[usize::from(lane_b)],
+    )
+}
+
+/// The extent of an element over the whole step.
+fn extent(world: World<'_>, layer: u32, place: u32) -> Extent {
+    let (corners, ends) = element(world, layer, place);
+    let points = corners
+        .iter()
+        .flat_map(|&corner| ends.map(|positions| positions.point(corner as usize)));
+    Extent::of(points)
+}

@@ -1,0 +1,216 @@
+//! First contacts of pairs whose times are not known yet: intervals of time, eight pairs at a time.
+//!
+//! ```text
+//! look     eight intervals of time in f64: no contact in it, one candidate, or unclear
+//! enclose  eight candidates: contact or none, and when, nearly always to all bits of an f32
+//! ```
+//!
+//! The two alternate on lists of a thousand pairs, so that no lane waits for another pair's search.
+
+use crate::cpu::simd::{Lanes, Simd};
+use crate::exact::ElementPair;
+use crate::exact::filter::{self, Enclosed8, LANES, Look8, Next, Spans8, Steps8};
+use crate::positions::Positions;
+
+use super::super::world::World;
+use super::batch::{Between, Places, exact_pair};
+use super::contacts::{Contacts, Open};
+
+/// Settles the open pairs of the current layers.
+#[inline(always)]
+pub(super) fn search<S: Simd>(simd: S, contacts: &mut Contacts, world: World<'_>) {
+    let Some(between) = contacts.between else {
+        return;
+    };
+    let Some(pair) = exact_pair(between.kind) else {
+        return;
+    };
+    let sides = Sides::new(world, between);
+    let mut steps = Steps8::default();
+    let mut spans = Spans8::default();
+    let mut open = std::mem::take(&mut contacts.open);
+    let mut later = std::mem::take(&mut contacts.later);
+    let mut single = std::mem::take(&mut contacts.single);
+    if contacts.is_first {
+        let until = contacts.until(world);
+        for chunk in open.chunks(LANES) {
+            sides.fill(simd, chunk, &mut steps, &mut spans);
+            let no = filter::are_apart::<S::F64>(pair, &steps, until);
+            let among = u8::MAX >> (LANES - chunk.len());
+            for lane in Lanes(u64::from(!no & among)) {
+                later.push(chunk[lane]);
+            }
+        }
+        open.clear();
+        std::mem::swap(&mut open, &mut later);
+    }
+    while !open.is_empty() {
+        for chunk in open.chunks(LANES) {
+            sides.fill(simd, chunk, &mut steps, &mut spans);
+            let seen = filter::look::<S::F64>(pair, &steps, &spans);
+            let among = u8::MAX >> (LANES - chunk.len());
+            contacts.after_look(
+                world,
+                (between, pair),
+                chunk,
+                among,
+                &seen,
+                (&mut later, &mut single),
+            );
+        }
+        open.clear();
+        for chunk in single.chunks(LANES) {
+            sides.fill(simd, chunk, &mut steps, &mut spans);
+            let found = filter::enclose::<S::F64>(pair, &steps, &spans);
+            contacts.after_enclosing(world, (between, pair), chunk, &found, &mut later);
+        }
+        single.clear();
+        std::mem::swap(&mut open, &mut later);
+    }
+    (contacts.open, contacts.later, contacts.single) = (open, later, single);
+}
+
+impl Contacts {
+    /// Sorts pairs by the results of looking at their intervals.
+    #[inline(always)]
+    fn after_look(
+        &mut self,
+        world: World<'_>,
+        (between, pair): (Between, ElementPair),
+        chunk: &[Open],
+        among: u8,
+        seen: &Look8,
+        (later, single): (&mut Vec<Open>, &mut Vec<Open>),
+    ) {
+        let until = self.until(world);
+        for lane in Lanes(u64::from(among)) {
+            let mut open = chunk[lane];
+            match open.search.after_look(seen, lane, until) {
+                Next::Apart => {}
+                Next::Look => later.push(open),
+                Next::Enclose => single.push(open),
+                Next::Contact | Next::Unsure => {
+                    self.settle_exactly(world, between, pair, open.places);
+                }
+            }
+        }
+    }
+
+    /// Reports contacts, and sorts other pairs.
+    #[inline(always)]
+    fn after_enclosing(
+        &mut self,
+        world: World<'_>,
+        (between, pair): (Between, ElementPair),
+        chunk: &[Open],
+        found: &Enclosed8,
+        later: &mut Vec<Open>,
+    ) {
+        let until = self.until(world);
+        for (lane, &open) in chunk.iter().enumerate() {
+            let mut open = open;
+            match open.search.after_enclosing(found, lane, until) {
+                Next::Apart => {}
+                Next::Look => later.push(open),
+                Next::Contact => {
+                    let span = [found.span.low[lane], found.span.high[lane]];
+                    self.report_within(world, (between, pair), open.places, span);
+                }
+                Next::Enclose | Next::Unsure => {
+                    self.settle_exactly(world, between, pair, open.places);
+                }
+            }
+        }
+    }
+}
+
+/// The corners and positions of two layers' elements.
+struct Sides<'a> {
+    /// The corners at each place: of vertices and faces, or of edges.
+    corners: Corners<'a>,
+    /// The positions of each layer, at the start and at the end.
+    positions: [[&'a Positions; 2]; 2],
+}
+
+enum Corners<'a> {
+    VertexFace(&'a [[u32; 1]], &'a [[u32; 3]]),
+    EdgeEdge(&'a [[u32; 2]], &'a [[u32; 2]]),
+    None,
+}
+
+impl<'a> Sides<'a> {
+    fn new(world: World<'a>, between: Between) -> Self {
+        use crate::elements::Elements::{Edges, Points, Triangles};
+        let layers = [between.a, between.b];
+        let elements = layers.map(|layer| &world.cache(layer).clustering.corners);
+        Sides {
+            corners: match elements {
+                [Points(vertices), Triangles(faces)] => Corners::VertexFace(vertices, faces),
+                [Edges(a), Edges(b)] => Corners::EdgeEdge(a, b),
+                _ => Corners::None,
+            },
+            positions: layers.map(|layer| {
+                let body = world.frame.body(world.scene, layer as usize);
+                let start = body.positions();
+                [start, body.end_positions().unwrap_or(start)]
+            }),
+        }
+    }
+
+    /// Loads the points and intervals of up to eight pairs; unused lanes get those of the first.
+    #[inline(always)]
+    fn fill<S: Simd>(&self, simd: S, chunk: &[Open], steps: &mut Steps8, spans: &mut Spans8) {
+        let mut batch = [chunk[0].places; LANES];
+        for lane in 0..LANES {
+            let open = chunk[if lane < chunk.len() { lane } else { 0 }];
+            batch[lane] = open.places;
+            [spans.low[lane], spans.high[lane]] = open.search.span();
+        }
+        let batch = &batch;
+        match self.corners {
+            Corners::VertexFace(vertices, faces) => {
+                fill(simd, (vertices, 0, 0), self.positions[0], batch, steps);
+                fill(simd, (faces, 1, 1), self.positions[1], batch, steps);
+            }
+            Corners::EdgeEdge(a, b) => {
+                fill(simd, (a, 0, 0), self.positions[0], batch, steps);
+                fill(simd, (b, 1, 2), self.positions[1], batch, steps);
+            }
+            Corners::None => {}
+        }
+    }
+}
+
+/// Loads the points of one side, from a given point of the pair on.
+#[inline(always)]
+fn fill<S: Simd, const N: usize>(
+    simd: S,
+    (corners, side, first): (&[[u32; N]], usize, usize),
+    ends: [&Positions; 2],
+    batch: &[Places; LANES],
+    Steps8(steps): &mut Steps8,
+) {
+    let mut ids = [[0; LANES]; N];
+    for (lane, places) in batch.iter().enumerate() {
+        let corners = &corners[places[side] as usize];
+        for k in 0..N {
+            ids[k][lane] = corners[k];
+        }
+    }
+    for (end, positions) in ends.into_iter().enumerate() {
+        for k in 0..N {
+            let rows = &mut steps[end][first + k];
+            match positions {
+                Positions::F32(positions) => simd.put_vertices(positions, ids[k], rows),
+                Positions::F64(positions) => {
+                    for (lane, &vertex) in ids[k].iter().enumerate() {
+                        let point = &positions[vertex as usize];
+                        for axis in 0..3 {
+                            rows[axis][lane] = point[axis];
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

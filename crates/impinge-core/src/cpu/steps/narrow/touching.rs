@@ -1,0 +1,191 @@
+//! Which elements touch during a step, and when first.
+//!
+//! In: candidates. Out: keys and times. Vertices with faces and edges with edges go through filters (`exact::filter`):
+//!
+//! ```text
+//! far     sixteen pairs at a time in f32, from the tables of the two groups: apart along a few directions
+//! across  those that are left, put side by side: apart along their normals, or never in one plane
+//! aside   those that are left: one is always beside the other
+//!         (if positions are f64: far and across, eight pairs at a time)
+//! search  those that are left, a thousand at a time
+//! ```
+//!
+//! Unsure pairs go to exact arithmetic, and so do pairs of bare edges and points, and all times in double precision.
+
+use crate::cpu::met::Met;
+use crate::cpu::simd::{Isa, Simd, dispatch};
+use crate::exact::ElementPair;
+use crate::exact::filter::{self, BATCH, Moving64, Search};
+use crate::grouping::bounds::round_up;
+use crate::impacts::StepAnswer;
+use crate::pair_kind::PairKind;
+#[cfg(feature = "gpu")]
+use crate::positions::Positions;
+
+#[cfg(feature = "gpu")]
+use super::super::world::Sought;
+use super::super::world::World;
+#[cfg(feature = "gpu")]
+use super::batch::Places;
+use super::batch::{Batch, Between, Narrow, NarrowCounts, exact_pair};
+use super::contacts::{Contacts, Open};
+use super::search::search;
+use super::separated;
+
+impl Narrow for Contacts {
+    fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
+        let between = batch.between;
+        self.go_to(isa, world, between);
+        if world.frame.distance() > 0.0 {
+            return dispatch!(isa, separated, (
+                contacts: &mut Contacts = self,
+                world: World<'_> = world,
+                batch: Batch<'_> = batch,
+            ));
+        }
+        if !matches!(between.kind, PairKind::VertexFace | PairKind::EdgeEdge) {
+            if let Some(pair) = exact_pair(between.kind) {
+                for ix in 0..batch.met.len() {
+                    self.settle_exactly(world, between, pair, batch.places(ix));
+                }
+            }
+            return;
+        }
+        let until = self.until(world);
+        self.is_first = !batch.is_in_tables();
+        if !self.is_first {
+            let tables = batch.groups.map(|group| &group.points);
+            let (until, met) = (round_up(until), &mut *batch.met);
+            match between.kind {
+                PairKind::VertexFace => dispatch!(isa, drop_vertices_and_faces, (
+                    tables: [&Moving64; 2] = tables,
+                    until: f32 = until,
+                    met: &mut Met = met,
+                )),
+                _ => dispatch!(isa, drop_edges, (
+                    tables: [&Moving64; 2] = tables,
+                    until: f32 = until,
+                    met: &mut Met = met,
+                )),
+            }
+        }
+        for ix in 0..batch.met.len() {
+            self.open.push(Open {
+                places: batch.places(ix),
+                search: Search::new(until),
+            });
+        }
+        if self.open.len() >= self.full {
+            self.counts.n_full += u64::from(!self.open.is_empty());
+            self.settle(isa, world);
+        }
+    }
+
+    /// Searches the open pairs for first contacts.
+    #[inline(never)]
+    fn settle(&mut self, isa: Isa, world: World<'_>) {
+        if self.open.is_empty() {
+            return;
+        }
+        dispatch!(isa, search, (contacts: &mut Contacts = self, world: World<'_> = world));
+        self.open.clear();
+    }
+
+    fn end(&mut self, answer: StepAnswer<'_>) {
+        self.hand_over(answer);
+    }
+
+    fn counts(&self) -> NarrowCounts {
+        self.counts
+    }
+}
+
+impl Contacts {
+    /// Turns to the pairs of two layers.
+    #[inline(always)]
+    fn go_to(&mut self, isa: Isa, world: World<'_>, between: Between) {
+        if self.between != Some(between) {
+            self.settle(isa, world);
+            self.between = Some(between);
+        }
+    }
+
+    /// Takes pairs of two layers that a device has not dropped, by their places.
+    #[cfg(feature = "gpu")]
+    pub fn take_left(
+        &mut self,
+        isa: Isa,
+        world: World<'_>,
+        between: Between,
+        pairs: impl Iterator<Item = Places>,
+    ) {
+        self.go_to(isa, world, between);
+        if !matches!(between.kind, PairKind::VertexFace | PairKind::EdgeEdge) {
+            if let Some(pair) = exact_pair(between.kind) {
+                pairs.for_each(|places| self.settle_exactly(world, between, pair, places));
+            }
+            return;
+        }
+        let are_single = [between.a, between.b].iter().all(|&layer| {
+            let body = world.frame.body(world.scene, layer as usize);
+            matches!(body.positions(), Positions::F32(_))
+        });
+        // Over the whole step, the device has taken the filter's first step for positions in single precision.
+        self.is_first = !are_single || matches!(self.asked.sought, Sought::Earliest);
+        for places in pairs {
+            self.open.push(Open {
+                places,
+                search: Search::new(self.until(world)),
+            });
+            if self.open.len() >= self.full {
+                self.settle(isa, world);
+            }
+        }
+    }
+}
+
+// Kernels of their own: without optimisation, one for all of them would need more stack than a thread has.
+
+#[inline(always)]
+fn separated<S: Simd>(simd: S, contacts: &mut Contacts, world: World<'_>, batch: Batch<'_>) {
+    separated::take(simd, contacts, world, batch);
+}
+
+#[inline(always)]
+fn drop_vertices_and_faces<S: Simd>(simd: S, tables: [&Moving64; 2], until: f32, met: &mut Met) {
+    drop_apart(simd, ElementPair::VertexFace, tables, until, met);
+}
+
+#[inline(always)]
+fn drop_edges<S: Simd>(simd: S, tables: [&Moving64; 2], until: f32, met: &mut Met) {
+    drop_apart(simd, ElementPair::EdgeEdge, tables, until, met);
+}
+
+/// Drops the candidates that are certainly apart from t = 0 to `until`.
+#[inline(always)]
+fn drop_apart<S: Simd>(
+    simd: S,
+    pair: ElementPair,
+    tables: [&Moving64; 2],
+    until: f32,
+    met: &mut Met,
+) {
+    let mut n_kept = 0;
+    for first in (0..met.len()).step_by(BATCH) {
+        let no = filter::are_far_in_tables::<S::F32>(pair, tables, met.batch(first), until);
+        n_kept = met.keep_batch(simd, first, !no, n_kept);
+    }
+    met.truncate(n_kept);
+    let mut n_kept = 0;
+    for first in (0..met.len()).step_by(BATCH) {
+        let no = filter::are_across_in_tables::<S::F32>(pair, tables, met.batch(first), until);
+        n_kept = met.keep_batch(simd, first, !no, n_kept);
+    }
+    met.truncate(n_kept);
+    let mut n_kept = 0;
+    for first in (0..met.len()).step_by(BATCH) {
+        let no = filter::are_aside_in_tables::<S::F32>(pair, tables, met.batch(first), until);
+        n_kept = met.keep_batch(simd, first, !no, n_kept);
+    }
+    met.truncate(n_kept);
+}
