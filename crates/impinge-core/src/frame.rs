@@ -94,6 +94,8 @@ pub struct Frame {
     between: bool,
     ignored: BTreeSet<(BodyId, BodyId)>,
     cell: Option<Cell>,
+    /// Whether the question is about a step, not about the positions at its start.
+    is_step: bool,
     /// The distance within which elements are near, besides what their bodies add.
     distance: f64,
 }
@@ -111,6 +113,7 @@ impl Frame {
         self.ask = ask;
         self.shared_vertex = query.shared_vertex;
         self.cell = query.cell;
+        self.is_step = ask != Ask::Intersections;
         self.check_cell()?;
         if self.ignored != query.ignored {
             self.ignored.clone_from(&query.ignored);
@@ -132,13 +135,6 @@ impl Frame {
         let Some(Cell { low, high }) = self.cell else {
             return Ok(());
         };
-        if self.ask != Ask::Intersections {
-            return Err(Error::Setting {
-                setting: "owned_by",
-                given: "a cell in a question about steps or distances".to_owned(),
-                allowed: "only questions about pairs that intersect",
-            });
-        }
         // NaN is not at most anything.
         match (0..3).all(|axis| low[axis] <= high[axis]) {
             true => Ok(()),
@@ -156,26 +152,40 @@ impl Frame {
     }
 
     /// Whether a pair belongs to the cell, if only its pairs are wanted.
+    #[inline(always)]
     pub fn is_owned(&self, scene: &Scene, key: u64) -> bool {
-        let Some(cell) = self.cell else {
-            return true;
-        };
+        match self.cell {
+            None => true,
+            Some(cell) => self.is_in_cell(scene, key, cell),
+        }
+    }
+
+    #[inline(never)]
+    fn is_in_cell(&self, scene: &Scene, key: u64, cell: Cell) -> bool {
         let [a, b] =
             [(key >> 32) as u32, key as u32].map(|number| self.lower_corner(scene, number));
         cell.holds(std::array::from_fn(|axis| a[axis].max(b[axis])))
     }
 
-    /// The lower corner of the box of an element that a body was given as.
+    /// The lower corner of the box of an element: over the whole step, if the question is about one.
     fn lower_corner(&self, scene: &Scene, number: u32) -> [f64; 3] {
         let layer = self.owner(number);
         let body = self.body(scene, layer);
-        let corners = body
-            .elements()
-            .corners((number - self.layers[layer].first) as usize);
-        let points = corners
-            .iter()
-            .map(|&corner| body.positions().point(corner as usize));
+        let Layer { part, first, .. } = self.layers[layer];
+        let element = number - first;
+        let corners = match part {
+            Part::Vertices => &[element][..],
+            _ => body.part(part).corners(element as usize),
+        };
+        let end = body.end_positions().filter(|_| self.is_step);
+        let ends = std::iter::once(body.positions()).chain(end);
+        let points = ends.flat_map(|at| corners.iter().map(|&corner| at.point(corner as usize)));
         Extent::of(points).min
+    }
+
+    /// Makes this a question about the positions that bodies have, whether or not they have others at the end of a step.
+    pub(crate) fn stand_still(&mut self) {
+        self.is_step = false;
     }
 
     /// Sets within which distance elements are near: the sum of `distance` and the radii of both bodies.

@@ -87,6 +87,7 @@ impl NearQuery {
             None => Ask::Impacts,
         };
         frame.resolve_for(scene, &self.query, ask)?;
+        frame.stand_still();
         frame.set_reach(self.distance, &self.thickness);
         Ok(())
     }

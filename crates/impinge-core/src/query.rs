@@ -117,10 +117,16 @@ impl Query {
     /// axis by axis. So if each process has all primitives whose boxes touch its cell, and the cells cover space without
     /// overlap, each pair of the whole is found by exactly one process. Bounds may be infinite.
     ///
-    /// All pairs of the query are found and held first: [`Settings::max_pairs`](crate::Settings::max_pairs) and the memory budget
-    /// count them, also those of [`Detector::count`](crate::Detector::count); [`Detector::any`](crate::Detector::any) does not stop
-    /// early, and has no limit of pairs. For intersections only: steps, distances and frames that stay on a device refuse a cell,
-    /// and so does every question if a lower bound is above the upper one.
+    /// For a step, boxes hold their elements from the start to the end. If pairs at a distance count as well, a process
+    /// needs all elements whose boxes touch its cell when they are inflated, on all sides, by that distance: the
+    /// separation of a step, the distance of a [`NearQuery`](crate::NearQuery) with both bodies' thickness, twice the distance of a
+    /// [`CandidateQuery`](crate::CandidateQuery).
+    ///
+    /// All intersections of the query are found and held first: [`Settings::max_pairs`](crate::Settings::max_pairs) and the memory
+    /// budget count them, also those of [`Detector::count`](crate::Detector::count); [`Detector::any`](crate::Detector::any) does not
+    /// stop early, and has no limit of pairs. Steps and distances hold only the pairs of the cell.
+    /// [`Detector::advance`](crate::Detector::advance) and frames that stay on a device refuse a cell, and so does every question if a
+    /// lower bound is above the upper one.
     ///
     /// ```
     /// use impinge::Query;

@@ -529,16 +529,6 @@ fn cells_are_refused_where_they_mean_nothing() {
         "{refused}"
     );
     assert!(few.any(&scene, &everywhere).unwrap());
-    let query = Query::between(a, b).owned_by([0.0; 3], [1.0; 3]);
-    let step = impinge_core::Step::new(query.clone());
-    let error = detector.impacts(&scene, &step).unwrap_err().to_string();
-    assert!(error.starts_with("owned_by: "), "{error}");
-    let near = impinge_core::NearQuery::new(query);
-    let error = detector
-        .within_distance(&scene, &near)
-        .unwrap_err()
-        .to_string();
-    assert!(error.starts_with("owned_by: "), "{error}");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use impinge_core::exact::{ElementPair, first_contact};
 use impinge_core::{
     Backend, BodyId, CancelToken, CandidateQuery, Candidates, Control, Detector, Elements, Error,
-    Method, PairKind, Part, Primitive, Query, Scene, Settings, Start, Step, Toi,
+    Method, NearQuery, PairKind, Part, Primitive, Query, Scene, Settings, Start, Step, Toi,
 };
 
 const FACE: [[u32; 3]; 1] = [[0, 1, 2]];
@@ -308,6 +308,149 @@ fn candidates_in_runs_are_all_candidates_in_their_order() {
                 assert_eq!((all, sum), (Ok(ControlFlow::Continue(n as u64)), hash));
             }
         }
+    }
+}
+
+/// The octants around a point, as half-open cells.
+fn octants(middle: [f64; 3]) -> impl Iterator<Item = [[f64; 3]; 2]> {
+    (0..8).map(move |octant| {
+        let side = |low: f64, high: f64| {
+            std::array::from_fn(|axis| match octant >> axis & 1 {
+                0 => low,
+                _ => high,
+            })
+        };
+        let [low, high] = [side(f64::NEG_INFINITY, 0.0), side(0.0, f64::INFINITY)];
+        let cut = |end: [f64; 3]| {
+            std::array::from_fn(|axis| {
+                if end[axis] == 0.0 {
+                    middle[axis]
+                } else {
+                    end[axis]
+                }
+            })
+        };
+        [cut(low), cut(high)]
+    })
+}
+
+/// Whether the box of an element over a step, inflated, has points in a cell.
+fn touches_cell(
+    scene: &Scene,
+    (part, element): (Part, Primitive),
+    margin: f64,
+    [low, high]: [[f64; 3]; 2],
+) -> bool {
+    let body = scene.body(element.body).expect("known");
+    let corners = match part {
+        Part::Vertices => vec![element.primitive],
+        _ => body.part(part).corners(element.primitive as usize).to_vec(),
+    };
+    let end = body.end_positions().expect("all move");
+    (0..3).all(|axis| {
+        let of_axis = |p: &impinge_core::Positions, v: u32| p.point(v as usize)[axis];
+        let ends = corners
+            .iter()
+            .flat_map(|&v| [of_axis(body.positions(), v), of_axis(end, v)]);
+        let (min, max) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), x| {
+            (x.min(min), x.max(max))
+        });
+        min - margin < high[axis] && low[axis] <= max + margin
+    })
+}
+
+fn parts(kind: PairKind) -> [Part; 2] {
+    match kind {
+        PairKind::VertexFace => [Part::Vertices, Part::Faces],
+        PairKind::EdgeEdge => [Part::Edges, Part::Edges],
+        PairKind::EdgeVertex => [Part::Edges, Part::Vertices],
+        PairKind::VertexVertex => [Part::Vertices, Part::Vertices],
+        PairKind::EdgeFace => [Part::Edges, Part::Faces],
+        PairKind::FaceFace => [Part::Faces, Part::Faces],
+    }
+}
+
+/// Each pair belongs to one cell, and a process that has what touches the cell has both of its elements.
+#[test]
+fn pairs_of_all_cells_are_the_pairs_of_the_whole() {
+    // Coordinates are multiples of 2^-10 or less: boxes end at the cut.
+    let middle = [2.0, 1.5, 1.75];
+    for (is_double, separation) in [(false, 0.0), (true, 0.0), (false, 0.0625), (true, 0.0625)] {
+        let scene = crowd(is_double);
+        let whole = Step::default().separation(separation);
+        let near = |query| {
+            NearQuery::new(query)
+                .kinds(PairKind::ALL)
+                .distance(separation)
+        };
+        let boxes = |query| {
+            CandidateQuery::new(query)
+                .kinds(PairKind::ALL)
+                .distance(0.0625)
+        };
+        for mut detector in detectors() {
+            let expected = detector.impacts(&scene, &whole).expect("good");
+            let (n, hash) = (expected.len(), expected.hash());
+            assert!(n > 100, "{n}");
+            let first = detector.earliest(&scene, &whole).expect("good");
+            let everything = Query::everything();
+            let pairs = detector.within_distance(&scene, &near(everything.clone()));
+            let of_near = pairs.expect("good").hash();
+            let of_boxes = detector.candidates(&scene, &boxes(everything));
+            let of_boxes = of_boxes.expect("good").hash();
+            let (mut sums, mut n_found, mut firsts) = ([0u64; 3], 0, Vec::new());
+            for cell @ [low, high] in octants(middle) {
+                let query = Query::everything().owned_by(low, high);
+                let step = Step::new(query.clone()).separation(separation);
+                let found = detector.impacts(&scene, &step).expect("good");
+                n_found += found.len();
+                let (is_empty, hash) = (found.is_empty(), found.hash());
+                for impact in found.iter() {
+                    let [a, b] = parts(impact.kind);
+                    assert!(
+                        touches_cell(&scene, (a, impact.a), separation, cell),
+                        "{impact:?}"
+                    );
+                    assert!(
+                        touches_cell(&scene, (b, impact.b), separation, cell),
+                        "{impact:?}"
+                    );
+                }
+                assert_eq!(detector.is_free(&scene, &step).expect("good"), is_empty);
+                firsts.extend(detector.earliest(&scene, &step).expect("good"));
+                let pairs = detector.within_distance(&scene, &near(query.clone()));
+                let of_near = pairs.expect("good").hash();
+                let found = detector
+                    .candidates(&scene, &boxes(query.clone()))
+                    .expect("good");
+                for (kind, a, b) in found.iter() {
+                    let [of_a, of_b] = parts(kind);
+                    assert!(touches_cell(&scene, (of_a, a), 0.125, cell));
+                    assert!(touches_cell(&scene, (of_b, b), 0.125, cell));
+                }
+                let of_boxes = found.hash();
+                let found: Vec<Candidate> = found.iter().collect();
+                let (runs, _) = in_runs(&mut detector, &scene, &boxes(query), 97);
+                assert_eq!(runs, found);
+                for (sum, hash) in sums.iter_mut().zip([hash, of_near, of_boxes]) {
+                    *sum = sum.wrapping_add(hash);
+                }
+            }
+            assert_eq!((n_found, sums), (n, [hash, of_near, of_boxes]));
+            let key =
+                |impact: &impinge_core::Impact| (impact.toi.to_bits(), impact.kind, impact.row());
+            assert_eq!(firsts.into_iter().min_by_key(key), first);
+        }
+    }
+}
+
+#[test]
+fn the_way_that_a_step_can_be_taken_has_no_cell() {
+    let (scene, ..) = falling();
+    let step = Step::new(Query::all().owned_by([0.0; 3], [1.0; 3]));
+    for mut detector in detectors() {
+        let error = detector.advance(&scene, &step).unwrap_err().to_string();
+        assert!(error.starts_with("owned_by: "), "{error}");
     }
 }
 

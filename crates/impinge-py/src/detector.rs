@@ -314,6 +314,9 @@ impl Detector {
     /// separation : float
     ///     The distance that elements must keep, 0 or more. A pair is then reported with the first time at which its
     ///     distance is at most `separation`, decided exactly; with 0, elements must touch.
+    /// owned_by : (low, high), optional
+    ///     As for `detect`, with boxes that hold their elements from the start to the end. If a distance is asked for as well, a
+    ///     program needs the elements whose boxes touch its cell when inflated by it, by twice the distance of `candidates`.
     /// progress, cancel
     ///     As for `detect`.
     ///
@@ -342,10 +345,10 @@ impl Detector {
     #[pyo3(
         signature = (
             scene, *, between=None, within=None, ignore=None, start=None, toi=None, separation=None,
-            progress=None, cancel=None,
+            owned_by=None, progress=None, cancel=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          start=\"report\", toi=\"f32\", separation=0.0, progress=None, cancel=None)"
+                          start=\"report\", toi=\"f32\", separation=0.0, owned_by=None, progress=None, cancel=None)"
     )]
     fn impacts(
         slf: &Bound<'_, Self>,
@@ -356,11 +359,12 @@ impl Detector {
         start: Argument<'_, '_>,
         toi: Argument<'_, '_>,
         separation: Argument<'_, '_>,
+        owned_by: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<Impacts> {
         let toi = settings::toi(toi)?;
-        let ask = step((between, within, ignore), start, toi, separation)?;
+        let ask = step([between, within, ignore, owned_by], start, toi, separation)?;
         let answer = |detector: &mut impinge::Detector,
                       scene: &impinge::Scene,
                       step: &Step,
@@ -378,7 +382,7 @@ impl Detector {
     ///
     /// Parameters
     /// ----------
-    /// scene, between, within, ignore, start, toi, separation, progress, cancel
+    /// scene, between, within, ignore, start, toi, separation, owned_by, progress, cancel
     ///     As for `impacts`.
     ///
     /// Returns
@@ -394,10 +398,10 @@ impl Detector {
     #[pyo3(
         signature = (
             scene, *, between=None, within=None, ignore=None, start=None, toi=None, separation=None,
-            progress=None, cancel=None,
+            owned_by=None, progress=None, cancel=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          start=\"report\", toi=\"f32\", separation=0.0, progress=None, cancel=None)"
+                          start=\"report\", toi=\"f32\", separation=0.0, owned_by=None, progress=None, cancel=None)"
     )]
     fn earliest(
         slf: &Bound<'_, Self>,
@@ -408,11 +412,12 @@ impl Detector {
         start: Argument<'_, '_>,
         toi: Argument<'_, '_>,
         separation: Argument<'_, '_>,
+        owned_by: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<Option<Impact>> {
         let ask = step(
-            (between, within, ignore),
+            [between, within, ignore, owned_by],
             start,
             settings::toi(toi)?,
             separation,
@@ -427,7 +432,7 @@ impl Detector {
     ///
     /// Parameters
     /// ----------
-    /// scene, between, within, ignore, start, separation, progress, cancel
+    /// scene, between, within, ignore, start, separation, owned_by, progress, cancel
     ///     As for `impacts`.
     ///
     /// Returns
@@ -442,10 +447,10 @@ impl Detector {
     #[pyo3(
         signature = (
             scene, *, between=None, within=None, ignore=None, start=None, separation=None,
-            progress=None, cancel=None,
+            owned_by=None, progress=None, cancel=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          start=\"report\", separation=0.0, progress=None, cancel=None)"
+                          start=\"report\", separation=0.0, owned_by=None, progress=None, cancel=None)"
     )]
     fn is_free(
         slf: &Bound<'_, Self>,
@@ -455,10 +460,11 @@ impl Detector {
         ignore: Argument<'_, '_>,
         start: Argument<'_, '_>,
         separation: Argument<'_, '_>,
+        owned_by: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<bool> {
-        let ask = step((between, within, ignore), start, Toi::F32, separation)?;
+        let ask = step([between, within, ignore, owned_by], start, Toi::F32, separation)?;
         let watched = (scene, progress, cancel);
         let answer = impinge::Detector::is_free_with;
         Ok(Detector::watched(slf, watched, ask, answer)?.0)
@@ -505,7 +511,7 @@ impl Detector {
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<Advance> {
-        let ask = step((between, within, ignore), start, Toi::F64, separation)?;
+        let ask = step([between, within, ignore, None], start, Toi::F64, separation)?;
         let watched = (scene, progress, cancel);
         let answer = impinge::Detector::advance_with;
         let (advance, _, number) = Detector::watched(slf, watched, ask, answer)?;
@@ -518,7 +524,7 @@ impl Detector {
     ///
     /// Parameters
     /// ----------
-    /// scene, between, within, ignore, progress, cancel
+    /// scene, between, within, ignore, owned_by, progress, cancel
     ///     As for `impacts`.
     /// kinds : sequence of {"vf", "ee", "ev", "vv", "ef", "ff"}
     ///     Which kinds of pairs; ``("vf", "ee")`` by default.
@@ -537,10 +543,10 @@ impl Detector {
     #[pyo3(
         signature = (
             scene, *, between=None, within=None, ignore=None, kinds=None, distance=None,
-            progress=None, cancel=None,
+            owned_by=None, progress=None, cancel=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          kinds=(\"vf\", \"ee\"), distance=0.0, progress=None, cancel=None)"
+                          kinds=(\"vf\", \"ee\"), distance=0.0, owned_by=None, progress=None, cancel=None)"
     )]
     fn candidates(
         slf: &Bound<'_, Self>,
@@ -550,10 +556,11 @@ impl Detector {
         ignore: Argument<'_, '_>,
         kinds: Argument<'_, '_>,
         distance: Argument<'_, '_>,
+        owned_by: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<Candidates> {
-        let ask = candidate_question([between, within, ignore], kinds, distance)?;
+        let ask = candidate_question([between, within, ignore, owned_by], kinds, distance)?;
         let answer = |detector: &mut impinge::Detector,
                       scene: &impinge::Scene,
                       query: &CandidateQuery,
@@ -576,7 +583,7 @@ impl Detector {
     ///
     /// Parameters
     /// ----------
-    /// scene, between, within, ignore, kinds, distance, progress, cancel
+    /// scene, between, within, ignore, kinds, distance, owned_by, progress, cancel
     ///     As for `candidates`.
     /// each : callable
     ///     Called with each run, which is never empty. An exception ends the search and is raised.
@@ -608,10 +615,10 @@ impl Detector {
     #[pyo3(
         signature = (
             scene, each, *, between=None, within=None, ignore=None, kinds=None, distance=None,
-            most=None, progress=None, cancel=None,
+            most=None, owned_by=None, progress=None, cancel=None,
         ),
         text_signature = "($self, scene, each, *, between=None, within=None, ignore=None, \
-                          kinds=(\"vf\", \"ee\"), distance=0.0, most=4194304, progress=None, cancel=None)"
+                          kinds=(\"vf\", \"ee\"), distance=0.0, most=4194304, owned_by=None, progress=None, cancel=None)"
     )]
     fn candidates_in_runs(
         slf: &Bound<'_, Self>,
@@ -623,10 +630,11 @@ impl Detector {
         kinds: Argument<'_, '_>,
         distance: Argument<'_, '_>,
         most: Argument<'_, '_>,
+        owned_by: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<u64> {
-        let ask = candidate_question([between, within, ignore], kinds, distance)?;
+        let ask = candidate_question([between, within, ignore, owned_by], kinds, distance)?;
         let most = match most {
             Some(most) => unsigned(most, "most", u64::MAX)?,
             None => 1 << 22,
@@ -689,7 +697,7 @@ impl Detector {
     ///
     /// Parameters
     /// ----------
-    /// scene, between, within, ignore, progress, cancel
+    /// scene, between, within, ignore, owned_by, progress, cancel
     ///     As for `impacts`.
     /// distance : float
     ///     The distance in the unit of the scene, 0 or more.
@@ -726,10 +734,10 @@ impl Detector {
     #[pyo3(
         signature = (
             scene, distance=None, *, between=None, within=None, ignore=None, kinds=None,
-            thickness=None, closest_points=false, progress=None, cancel=None,
+            thickness=None, closest_points=false, owned_by=None, progress=None, cancel=None,
         ),
         text_signature = "($self, scene, distance=0.0, *, between=None, within=None, ignore=None, \
-                          kinds=None, thickness=None, closest_points=False, progress=None, \
+                          kinds=None, thickness=None, closest_points=False, owned_by=None, progress=None, \
                           cancel=None)"
     )]
     fn within_distance(
@@ -742,13 +750,14 @@ impl Detector {
         kinds: Argument<'_, '_>,
         thickness: Argument<'_, '_>,
         closest_points: bool,
+        owned_by: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<NearPairs> {
         let kinds = kinds.map(|kinds| steps::kinds(Some(kinds))).transpose()?;
         let distance = steps::distance(distance, "distance")?;
         let ask = |scene: &Scene| {
-            let query = NearQuery::new(step_question(scene, between, within, ignore)?);
+            let query = NearQuery::new(step_question(scene, [between, within, ignore, owned_by])?);
             let mut query = query.distance(distance);
             if let Some(kinds) = kinds {
                 query = query.kinds(kinds);
@@ -837,9 +846,9 @@ impl Detector {
     }
 }
 
-/// A step question as the keywords ask it: the bodies, what touches at the start, the precision of times, the separation.
+/// A step question as the keywords ask it: those of [`step_question`], what touches at the start, the precision of times, the separation.
 fn step<'a, 'py>(
-    (between, within, ignore): (Argument<'a, 'py>, Argument<'a, 'py>, Argument<'a, 'py>),
+    bodies: [Argument<'a, 'py>; 4],
     start: Argument<'a, 'py>,
     toi: Toi,
     separation: Argument<'_, '_>,
@@ -847,7 +856,7 @@ fn step<'a, 'py>(
     let start = settings::start(start)?;
     let separation = steps::distance(separation, "separation")?;
     Ok(move |scene: &Scene| {
-        let query = step_question(scene, between, within, ignore)?;
+        let query = step_question(scene, bodies)?;
         let step = Step::new(query).start(start).toi(toi);
         Ok(step.separation(separation))
     })
@@ -909,16 +918,16 @@ impl Detector {
     }
 }
 
-/// What the keywords ask about candidates; bodies (`between`, `within`, `ignore`) are looked up in the scene.
+/// What the keywords ask about candidates; `bodies` are the keywords of [`step_question`].
 fn candidate_question<'a, 'py>(
-    [between, within, ignore]: [Argument<'a, 'py>; 3],
+    bodies: [Argument<'a, 'py>; 4],
     kinds: Argument<'_, '_>,
     distance: Argument<'_, '_>,
 ) -> PyResult<impl FnOnce(&Scene) -> PyResult<CandidateQuery> + use<'a, 'py>> {
     let kinds = steps::kinds(kinds)?;
     let distance = steps::distance(distance, "distance")?;
     Ok(move |scene: &Scene| {
-        let query = step_question(scene, between, within, ignore)?;
+        let query = step_question(scene, bodies)?;
         Ok(CandidateQuery::new(query).kinds(kinds).distance(distance))
     })
 }

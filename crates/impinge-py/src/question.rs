@@ -22,21 +22,25 @@ pub fn question(
     let rule = shared_vertex(rule)?;
     let (query, asked) = scope(scene, between, within, ignore, &Query::all())?;
     let query = query.shared_vertex(rule);
-    let Some(cell) = owned_by else {
-        return Ok((query, asked));
-    };
-    let [low, high] = arrays::matrix(cell, "owned_by")?;
-    Ok((query.owned_by(low, high), asked))
+    Ok((of_cell(query, owned_by)?, asked))
 }
 
-/// What the keywords ask of a step. Without `between` and `within`, all pairs of all bodies.
+/// Only the pairs of a cell, if there is one.
+fn of_cell(query: Query, owned_by: Argument<'_, '_>) -> PyResult<Query> {
+    let Some(cell) = owned_by else {
+        return Ok(query);
+    };
+    let [low, high] = arrays::matrix(cell, "owned_by")?;
+    Ok(query.owned_by(low, high))
+}
+
+/// What the keywords `between`, `within`, `ignore` and `owned_by` ask of a step. Without the first two, all pairs of all bodies.
 pub fn step_question(
     scene: &Scene,
-    between: Argument<'_, '_>,
-    within: Argument<'_, '_>,
-    ignore: Argument<'_, '_>,
+    [between, within, ignore, owned_by]: [Argument<'_, '_>; 4],
 ) -> PyResult<Query> {
-    Ok(scope(scene, between, within, ignore, &Query::everything())?.0)
+    let (query, _) = scope(scene, between, within, ignore, &Query::everything())?;
+    of_cell(query, owned_by)
 }
 
 fn scope(

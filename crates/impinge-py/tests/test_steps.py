@@ -274,6 +274,27 @@ def test_candidates_in_runs(detector):
     assert detector.candidates_in_runs(scene, runs.append, kinds=()) == 0 and not runs
 
 
+def test_cells_share_the_pairs_of_a_step(detector):
+    scene = lattice_step()
+    inf = np.inf
+    # Cut at lattice points, where boxes end.
+    cells = [[[low, -inf, -inf], [high, inf, inf]] for low, high in [(-inf, 2), (2, 4), (4, inf)]]
+    parts = [detector.impacts(scene, owned_by=cell) for cell in cells]
+    whole = detector.impacts(scene)
+    assert sum(map(len, parts)) == len(whole) and all(map(len, parts))
+    assert sum(part.hash for part in parts) % 2**64 == whole.hash
+    firsts = [detector.earliest(scene, owned_by=cell) for cell in cells]
+    assert min(first.toi for first in firsts) == detector.earliest(scene).toi
+    assert not any(detector.is_free(scene, owned_by=cell) for cell in cells)
+    rows = [detector.candidates(scene, owned_by=np.array(cell), distance=0.5) for cell in cells]
+    assert sum(map(len, rows)) == len(detector.candidates(scene, distance=0.5))
+    near = [detector.within_distance(scene, 0.5, owned_by=cell) for cell in cells]
+    assert sum(map(len, near)) == len(detector.within_distance(scene, 0.5)) > 0
+    for ask in [detector.impacts, detector.earliest, detector.is_free, detector.candidates]:
+        with pytest.raises(ValueError, match="^owned_by: "):
+            ask(scene, owned_by=[[0, 0, 0], [1, 1, np.nan]])
+
+
 def test_all_six_kinds(detector):
     scene = lattice_step(12, 3)
     kinds = ["vf", "ee", "ev", "vv", "ef", "ff"]

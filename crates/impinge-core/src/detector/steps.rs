@@ -251,7 +251,10 @@ impl Detector {
         if self.settings.method == Method::Naive {
             stats.time("naive", |stats| {
                 let emit = |test, key, value: Contact| match test {
-                    TestId::Elements(kind) if !(step.start == Start::Skip && value.at_start) => {
+                    TestId::Elements(kind)
+                        if !(step.start == Start::Skip && value.at_start)
+                            && frame.is_owned(scene, key) =>
+                    {
                         contacts.extend(kind as usize, [Found { key, value }].into_iter());
                         contacts.check()
                     }
@@ -358,6 +361,13 @@ impl Detector {
         step: &Step,
         control: &Control<'_>,
     ) -> Result<Advance, Error> {
+        if step.query.cell.is_some() {
+            return Err(Error::Setting {
+                setting: "owned_by",
+                given: "a cell for the way that a step can be taken".to_owned(),
+                allowed: "all pairs; or let each process ask for its earliest contact, and take the least of them",
+            });
+        }
         let step = step.clone().toi(Toi::F64);
         let first = self.earliest_with(scene, &step, control)?;
         let moving = || {

@@ -229,6 +229,7 @@ class Detector:
         start: _Start = "report",
         toi: _Toi = "f32",
         separation: SupportsFloat = 0.0,
+        owned_by: _Array | None = None,
         progress: _Progress | None = None,
         cancel: CancelToken | None = None,
     ) -> Impacts: ...
@@ -242,6 +243,7 @@ class Detector:
         start: _Start = "report",
         toi: _Toi = "f32",
         separation: SupportsFloat = 0.0,
+        owned_by: _Array | None = None,
         progress: _Progress | None = None,
         cancel: CancelToken | None = None,
     ) -> Impact | None: ...
@@ -254,6 +256,7 @@ class Detector:
         ignore: Iterable[_Pair] | None = None,
         start: _Start = "report",
         separation: SupportsFloat = 0.0,
+        owned_by: _Array | None = None,
         progress: _Progress | None = None,
         cancel: CancelToken | None = None,
     ) -> bool: ...
@@ -278,6 +281,7 @@ class Detector:
         ignore: Iterable[_Pair] | None = None,
         kinds: Iterable[_PairKind] = ("vf", "ee"),
         distance: SupportsFloat = 0.0,
+        owned_by: _Array | None = None,
         progress: _Progress | None = None,
         cancel: CancelToken | None = None,
     ) -> Candidates: ...
@@ -292,6 +296,7 @@ class Detector:
         kinds: Iterable[_PairKind] = ("vf", "ee"),
         distance: SupportsFloat = 0.0,
         most: SupportsIndex = 4194304,
+        owned_by: _Array | None = None,
         progress: _Progress | None = None,
         cancel: CancelToken | None = None,
     ) -> int: ...
@@ -306,6 +311,7 @@ class Detector:
         kinds: Iterable[_PairKind] | None = None,
         thickness: dict[Body, float] | None = None,
         closest_points: bool = False,
+        owned_by: _Array | None = None,
         progress: _Progress | None = None,
         cancel: CancelToken | None = None,
     ) -> NearPairs: ...

@@ -93,7 +93,9 @@ impl Detector {
         if self.settings.method == Method::Naive {
             stats.time("naive", |stats| {
                 naive::run(&Within, scene, frame, control, stats, |test, key, ()| {
-                    if let TestId::Elements(kind) = test {
+                    if let TestId::Elements(kind) = test
+                        && frame.is_owned(scene, key)
+                    {
                         answer.extend(kind as usize, [key].into_iter());
                     }
                     answer.check()

@@ -316,7 +316,9 @@ impl Question<'_> {
                 control,
                 stats,
                 |test, key, ()| {
-                    if let TestId::Elements(kind) = test {
+                    if let TestId::Elements(kind) = test
+                        && frame.is_owned(scene, key)
+                    {
                         block.push(key);
                         answer.take_keys(kind, &mut block);
                     }

@@ -135,6 +135,12 @@ pub(super) fn key(world: World<'_>, between: Between, places: Places) -> u64 {
     pair_key(a, b)
 }
 
+/// Whether a pair belongs to the cell whose pairs are wanted, if only those of one are.
+#[inline(always)]
+pub(super) fn is_owned(world: World<'_>, between: Between, places: Places) -> bool {
+    !world.frame.has_cell() || (world.frame).is_owned(world.scene, key(world, between, places))
+}
+
 /// The points of a pair at the start and at the end, in the order of the exact test.
 pub(super) fn points(
     world: World<'_>,

@@ -10,7 +10,7 @@ use crate::step::{Start, Toi};
 use crate::tuning::Tuning;
 
 use super::super::world::{Asked, Sought, World};
-use super::batch::{Between, NarrowCounts, Places, key, points};
+use super::batch::{Between, NarrowCounts, Places, is_owned, key, points};
 
 /// A pair whose first contact is sought.
 #[derive(Debug, Clone, Copy)]
@@ -109,6 +109,9 @@ impl Contacts {
         if self.asked.start == Start::Skip && contact.at_start {
             return;
         }
+        if !is_owned(world, between, places) {
+            return;
+        }
         if contact.time > self.until(world) {
             return;
         }
@@ -137,6 +140,9 @@ impl Contacts {
         places: Places,
         span: [f64; 2],
     ) {
+        if !is_owned(world, between, places) {
+            return;
+        }
         // Other pairs need not be searched beyond this time.
         world.known.found(self.asked.sought, span[1]);
         let time = match (self.asked.sought, self.asked.toi) {

@@ -12,7 +12,7 @@ use crate::narrow::Corners;
 use crate::positions::Positions;
 
 use super::super::world::World;
-use super::batch::{Batch, Between, Keys, Narrow, NarrowCounts, Places, key};
+use super::batch::{Batch, Between, Keys, Narrow, NarrowCounts, Places, is_owned, key};
 
 /// The test of one worker.
 #[derive(Debug, Default)]
@@ -86,8 +86,10 @@ fn take<S: Simd>(_: S, near: &mut Near, world: World<'_>, batch: Batch<'_>) {
 impl Near {
     #[inline(always)]
     fn put(&mut self, world: World<'_>, between: Between, places: Places) {
-        self.keys.push(between.kind, key(world, between, places));
-        self.keys.hand_over(world, between.kind);
+        if is_owned(world, between, places) {
+            self.keys.push(between.kind, key(world, between, places));
+            self.keys.hand_over(world, between.kind);
+        }
     }
 
     /// Whether the elements at two places are near, in `f64` or exactly.

@@ -36,7 +36,8 @@ impl Narrow for Overlaps {
     fn take(&mut self, _: Isa, world: World<'_>, batch: Batch<'_>) {
         let (distance, between) = (self.distance, batch.between);
         let is_in_tables = batch.is_in_tables();
-        if is_in_tables && distance == 0.0 {
+        let has_cell = world.frame.has_cell();
+        if is_in_tables && distance == 0.0 && !has_cell {
             // The boxes of groups in tables are not rounded.
             for ix in 0..batch.met.len() {
                 let key = key_in(batch.groups, batch.met.lanes(ix));
@@ -52,8 +53,9 @@ impl Narrow for Overlaps {
                 let [a, b] = batch.places(ix);
                 [extent(world, between.a, a), extent(world, between.b, b)]
             };
-            if are_near(&a, &b, distance) {
-                self.keys.push(between.kind, key_in(batch.groups, lanes));
+            let key = key_in(batch.groups, lanes);
+            if are_near(&a, &b, distance) && world.frame.is_owned(world.scene, key) {
+                self.keys.push(between.kind, key);
             }
         }
         self.keys.hand_over(world, between.kind);
