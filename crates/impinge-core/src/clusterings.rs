@@ -135,14 +135,14 @@ impl<T: Kept, const PARTS: usize> Store<T, PARTS> {
                 }
             }
         }
-        for (ix, layer) in frame.layers.iter().enumerate() {
+        for (ix, layer) in frame.numbered_layers() {
             let body = frame.body(scene, ix);
             let kept = &mut self.slots[layer.id.index()][Self::ix(layer.part)];
             let known = kept.as_mut();
             let known = known.filter(|kept| kept.topology_stamp() == body.topology_stamp());
             let was_known = known.is_some();
             if known.is_none_or(|kept| is_stale(kept, layer, body)) {
-                control.step(ix as u64, frame.layers.len() as u64)?;
+                control.step(ix.raw().into(), frame.layers.len() as u64)?;
                 let n_elements = body.part(layer.part).len();
                 let made = workers.install(n_elements, || make(body, layer))?;
                 *kept = Some(Box::new(made));

@@ -23,6 +23,7 @@ pub mod grouping;
 pub mod host;
 mod ids;
 mod impacts;
+pub mod index;
 mod key_ranges;
 mod naive;
 mod narrow;

@@ -133,8 +133,8 @@ impl Scratch {
             return;
         }
         self.settler.push(Candidate {
-            a: a.participant,
-            b: b.participant,
+            a: a.layer,
+            b: b.layer,
             place_a: a.primitive,
             place_b: b.primitive,
         });

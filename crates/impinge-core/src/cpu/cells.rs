@@ -24,6 +24,7 @@ use crate::error::Error;
 use crate::grouping::bounds::Bounds;
 pub use crate::grouping::grid::MOST_ENTRIES_EACH;
 use crate::grouping::grid::{FineRange, Grid};
+use crate::index::LayerIx;
 use crate::progress::Control;
 use crate::query::SharedVertex;
 use crate::settings::Settings;
@@ -433,8 +434,8 @@ impl Lists<'_> {
         let frame = self.world.frame;
         let mut a = list.start;
         while a < list.end {
-            let (ix_a, run_a) = self.run(a, list.end);
-            if frame.layers[ix_a].within && run_a.len() > 1 {
+            let (layer_a, run_a) = self.run(a, list.end);
+            if frame.layer(layer_a).within && run_a.len() > 1 {
                 for group_a in groups(run_a.clone(), group_size) {
                     for group_b in groups(group_a.start..run_a.end, group_size) {
                         emit(group_a.clone(), group_b)?;
@@ -443,8 +444,8 @@ impl Lists<'_> {
             }
             let mut b = run_a.end;
             while b < list.end && frame.between() {
-                let (ix_b, run_b) = self.run(b, list.end);
-                if frame.test(ix_a, ix_b).is_some() {
+                let (layer_b, run_b) = self.run(b, list.end);
+                if frame.test(layer_a, layer_b).is_some() {
                     for group_a in groups(run_a.clone(), group_size) {
                         for group_b in groups(run_b.clone(), group_size) {
                             emit(group_a.clone(), group_b)?;
@@ -458,15 +459,15 @@ impl Lists<'_> {
         Ok(())
     }
 
-    /// The participant at a place of a list, and the run of its entries from there on.
-    fn run(&self, start: usize, end: usize) -> (usize, std::ops::Range<usize>) {
-        let owner = |entry: u32| self.kept[entry as usize].participant;
-        let participant = owner(self.entries[start]);
-        if owner(self.entries[end - 1]) == participant {
-            return (participant as usize, start..end);
+    /// The layer at a place of a list, and the run of its entries from there on.
+    fn run(&self, start: usize, end: usize) -> (LayerIx, std::ops::Range<usize>) {
+        let owner = |entry: u32| self.kept[entry as usize].layer;
+        let layer = owner(self.entries[start]);
+        if owner(self.entries[end - 1]) == layer {
+            return (layer, start..end);
         }
-        let len = self.entries[start..end].partition_point(|&entry| owner(entry) == participant);
-        (participant as usize, start..start + len)
+        let len = self.entries[start..end].partition_point(|&entry| owner(entry) == layer);
+        (layer, start..start + len)
     }
 }
 
@@ -543,8 +544,8 @@ fn pair_item<R: Rule>(
     let group_a = &lists.entries[first_a..first_a + usize::from(item.n_a)];
     let group_b = &lists.entries[first_b..first_b + usize::from(item.n_b)];
     // A group's primitives are of one body.
-    let owner = kept(group_a[0]).participant;
-    let one_body = owner == kept(group_b[0]).participant;
+    let owner = kept(group_a[0]).layer;
+    let one_body = owner == kept(group_b[0]).layer;
     let groups = GroupPair {
         kept: lists.kept,
         a: group_a,
@@ -562,8 +563,8 @@ fn pair_item<R: Rule>(
             let b = kept(group_b[j]);
             if rule.admits(a, b, &mut settler.keys) {
                 settler.push(Candidate {
-                    a: a.participant,
-                    b: b.participant,
+                    a: a.layer,
+                    b: b.layer,
                     place_a: a.primitive,
                     place_b: b.primitive,
                 });

@@ -160,7 +160,7 @@ impl Clusters {
 impl Clusters {
     /// Finds the triangles that may meet a neighbour, in bodies that are tested against themselves.
     fn find_folds(&mut self, job: Job<'_>) -> Result<(), Error> {
-        for (ix, layer) in job.frame.layers.iter().enumerate() {
+        for (ix, layer) in job.frame.numbered_layers() {
             if layer.within {
                 let body = job.frame.body(job.scene, ix);
                 self.caches.at_mut(layer).find_folds(body, job.workers)?;

@@ -8,6 +8,7 @@ use crate::elements::Elements;
 use crate::exact::filter::{LARGEST_F32, Triangles64};
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, greater, lesser};
+use crate::index::LayerIx;
 use crate::positions::Positions;
 use crate::settings::Settings;
 
@@ -35,9 +36,9 @@ impl Kept<World<'_>> for Group {
     };
 
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, world: World<'_>, participant: u32, cluster: usize) {
-        let positions = world.body(participant).positions;
-        let cache = world.cache(participant);
+    fn fill<S: Simd>(&mut self, simd: S, world: World<'_>, layer: LayerIx, cluster: usize) {
+        let positions = world.body(layer).positions;
+        let cache = world.cache(layer);
         let clustering = &cache.clustering;
         let (Positions::F32(points), Elements::Triangles(faces)) = (positions, &clustering.corners)
         else {
@@ -78,7 +79,7 @@ pub(super) trait Kept<W>: Clone {
     const EMPTY: Self;
 
     /// Computes the data of a cluster of a layer.
-    fn fill<S: Simd>(&mut self, simd: S, world: W, layer: u32, cluster: usize);
+    fn fill<S: Simd>(&mut self, simd: S, world: W, layer: LayerIx, cluster: usize);
 }
 
 /// The clusters that a worker has seen last.
@@ -103,7 +104,7 @@ impl<G> Default for GroupCache<G> {
     }
 }
 
-/// The key of an empty place: there are fewer than 2^32 participants.
+/// The key of an empty place: there are fewer than 2^32 layers.
 const NOBODY: u64 = u64::MAX;
 /// Clusters kept under a memory budget, 31 KB: hardly slower, for neighbouring clusters come in a row.
 const MOST_IN_BUDGET: u64 = 8;
@@ -131,30 +132,30 @@ impl<G> GroupCache<G> {
         size_of::<u64>() * self.keys.capacity() + size_of::<G>() * self.groups.capacity()
     }
 
-    fn key((participant, cluster): (u32, u32)) -> u64 {
-        u64::from(participant) << 32 | u64::from(cluster)
+    fn key((layer, cluster): (LayerIx, u32)) -> u64 {
+        u64::from(layer.raw()) << 32 | u64::from(cluster)
     }
 
-    fn first_place(&self, (participant, cluster): (u32, u32)) -> usize {
-        let hash = participant.wrapping_mul(67).wrapping_add(cluster) as usize;
+    fn first_place(&self, (layer, cluster): (LayerIx, u32)) -> usize {
+        let hash = layer.raw().wrapping_mul(67).wrapping_add(cluster) as usize;
         hash & (self.keys.len() - 1)
     }
 
-    /// Whether a cluster of a participant is cached.
+    /// Whether a cluster of a layer is cached.
     #[inline(always)]
-    pub fn holds(&self, whose: (u32, u32)) -> bool {
+    pub fn holds(&self, whose: (LayerIx, u32)) -> bool {
         let (key, first) = (Self::key(whose), self.first_place(whose));
         self.keys[first] == key || self.keys[first ^ 1] == key
     }
 
-    /// The place of a cluster of a participant; computes its data if it is not cached. The cluster at the place `pinned`
+    /// The place of a cluster of a layer; computes its data if it is not cached. The cluster at the place `pinned`
     /// stays.
     #[inline(always)]
     pub fn place<S: Simd, W>(
         &mut self,
         simd: S,
         world: W,
-        whose: (u32, u32),
+        whose: (LayerIx, u32),
         pinned: usize,
     ) -> usize
     where

@@ -2,14 +2,15 @@
 
 use crate::exact::filter::BATCH;
 use crate::grouping::GROUP;
+use crate::index::LayerIx;
 
 use super::simd::{Lanes32, Simd};
 
-/// Two clusters that may meet: participants and their clusters.
+/// Two clusters that may meet: layers and their clusters.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct WorkItem {
-    pub a: u32,
-    pub b: u32,
+    pub a: LayerIx,
+    pub b: LayerIx,
     pub cluster_a: u32,
     pub cluster_b: u32,
 }

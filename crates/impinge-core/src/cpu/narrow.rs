@@ -16,6 +16,7 @@ use crate::exact::filter::{
 };
 use crate::frame::pair_key;
 use crate::grouping::GROUP;
+use crate::index::LayerIx;
 use crate::narrow::{intersect, intersect_shared};
 use crate::positions::Positions;
 use crate::sink::{Answer, BLOCK};
@@ -26,13 +27,13 @@ use super::met::{Met, WorkItem};
 use super::simd::{Isa, Lanes, Simd, dispatch};
 use super::world::{BodyRef, World};
 
-/// Two primitives whose boxes overlap: participants, and places in their clusters' orders.
+/// Two primitives whose boxes overlap: layers, and places in their clusters' orders.
 #[derive(Debug, Clone, Copy)]
 pub struct Candidate {
-    /// The first participant.
-    pub a: u32,
-    /// The second participant.
-    pub b: u32,
+    /// The first layer.
+    pub a: LayerIx,
+    /// The second layer.
+    pub b: LayerIx,
     /// Place of the primitive of `a`.
     pub place_a: u32,
     /// Place of the primitive of `b`.
@@ -228,7 +229,7 @@ impl Settler {
         let [a, b] = example.map(|place| body.points(place));
         let [ids_a, ids_b] = example.map(|place| body.corners(place));
         let rule = crate::SharedVertex::Resolve;
-        if !intersect_shared(rule, body.participant.kind, (&a, ids_a), (&b, ids_b)) {
+        if !intersect_shared(rule, body.layer.kind, (&a, ids_a), (&b, ids_b)) {
             return;
         }
         // So many may be far more than memory holds.
@@ -348,7 +349,7 @@ impl Settler {
     fn settle_exactly(&mut self, a: &BodyRef<'_>, b: &BodyRef<'_>, candidate: Candidate) {
         let points_a = a.points(candidate.place_a);
         let points_b = b.points(candidate.place_b);
-        if intersect(a.participant.kind, &points_a, b.participant.kind, &points_b) {
+        if intersect(a.layer.kind, &points_a, b.layer.kind, &points_b) {
             self.keys.push(pair_key(
                 a.global(candidate.place_a),
                 b.global(candidate.place_b),
@@ -390,19 +391,20 @@ fn classify_tetrahedra<S: Simd>(simd: S, settler: &mut Settler, world: World<'_>
 /// The two bodies of the current candidate; candidates of the same bodies come in runs.
 struct Lookup<'a> {
     world: World<'a>,
-    a_ix: u32,
-    b_ix: u32,
+    a_ix: LayerIx,
+    b_ix: LayerIx,
     a: BodyRef<'a>,
     b: BodyRef<'a>,
 }
 
 impl<'a> Lookup<'a> {
     fn new(world: World<'a>) -> Self {
-        let first = world.body(0);
+        let ix = LayerIx::new(0);
+        let first = world.body(ix);
         Lookup {
             world,
-            a_ix: 0,
-            b_ix: 0,
+            a_ix: ix,
+            b_ix: ix,
             a: first,
             b: first,
         }

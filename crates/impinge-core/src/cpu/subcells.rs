@@ -162,6 +162,7 @@ mod tests {
     use super::*;
     use crate::grouping::bounds::Bounds;
     use crate::grouping::grid::{Grid, owns};
+    use crate::index::LayerIx;
     use crate::settings::InstructionSet;
 
     #[test]
@@ -187,7 +188,7 @@ mod tests {
                 Kept {
                     bounds,
                     range: grid.range(&bounds),
-                    participant: 0,
+                    layer: LayerIx::new(0),
                     primitive,
                 }
             })

@@ -1,6 +1,6 @@
 //! Frames that are too large for the device, answered piece by piece.
 //!
-//! The clusters of all participants, body after body, are cut into chunks of which two fit on the device. The pieces
+//! The clusters of all layers, body after body, are cut into chunks of which two fit on the device. The pieces
 //! are every chunk by itself, and every two chunks whose boxes meet. Each piece is a separate query, for which its
 //! topology and positions are sent.
 //!
@@ -28,20 +28,21 @@ use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
+use crate::index::LayerIx;
 use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::Scene;
 
-/// Consecutive clusters of one participant.
+/// Consecutive clusters of one layer.
 #[derive(Debug)]
 pub struct ClusterRun {
-    participant: usize,
+    layer: LayerIx,
     first: usize,
     end: usize,
     bounds: Bounds,
 }
 
-/// Consecutive runs, at most one per participant.
+/// Consecutive runs, at most one per layer.
 #[derive(Debug)]
 pub struct Chunk {
     pub runs: Vec<ClusterRun>,
@@ -55,7 +56,7 @@ pub struct Chunk {
 pub fn cut<'a>(
     job: Job<'_>,
     most: Most,
-    clustering: impl Fn(usize) -> &'a Clustering + Sync,
+    clustering: impl Fn(LayerIx) -> &'a Clustering + Sync,
 ) -> Result<Vec<Chunk>, Error> {
     let Job {
         scene,
@@ -65,8 +66,8 @@ pub fn cut<'a>(
     } = job;
     let mut chunks: Vec<Chunk> = Vec::new();
     let mut weight = Weight::default();
-    for participant in 0..frame.layers.len() {
-        let clustering = clustering(participant);
+    for layer in frame.layer_ixs() {
+        let clustering = clustering(layer);
         for cluster in 0..clustering.n_clusters() {
             let (n, n_vertices) = (clustering.size(cluster), clustering.vertices(cluster).len());
             weight.add_cluster(count(n), count(n_vertices));
@@ -80,9 +81,9 @@ pub fn cut<'a>(
             }
             let runs = &mut chunks.last_mut().expect("just pushed").runs;
             match runs.last_mut() {
-                Some(run) if run.participant == participant => run.end = cluster + 1,
+                Some(run) if run.layer == layer => run.end = cluster + 1,
                 _ => runs.push(ClusterRun {
-                    participant,
+                    layer,
                     first: cluster,
                     end: cluster + 1,
                     bounds: Bounds::EMPTY,
@@ -92,8 +93,8 @@ pub fn cut<'a>(
     }
     let find_boxes = |chunk: &mut Chunk| {
         for run in &mut chunk.runs {
-            let clustering = clustering(run.participant);
-            let positions = frame.body(scene, run.participant).positions();
+            let clustering = clustering(run.layer);
+            let positions = frame.body(scene, run.layer).positions();
             for cluster in run.first..run.end {
                 let bounds = bounds_of(positions, clustering.vertices(cluster));
                 run.bounds.join(&bounds);
@@ -128,7 +129,7 @@ pub fn meeting(frame: &Frame, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
     let mut runs: Vec<(usize, u32, &ClusterRun)> = (0..chunks.len()).flat_map(numbered).collect();
     runs.sort_by(|a, b| a.2.bounds.min[0].total_cmp(&b.2.bounds.min[0]));
     for (ix, &(chunk_a, a, run_a)) in runs.iter().enumerate() {
-        if chunks.len() == 1 && frame.layers[run_a.participant].within {
+        if chunks.len() == 1 && frame.layer(run_a.layer).within {
             pairs.push([a, a]);
         }
         for &(chunk_b, b, run_b) in &runs[ix + 1..] {
@@ -145,10 +146,10 @@ pub fn meeting(frame: &Frame, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
 }
 
 fn meets(frame: &Frame, a: &ClusterRun, b: &ClusterRun) -> bool {
-    if a.participant == b.participant {
-        frame.layers[a.participant].within
+    if a.layer == b.layer {
+        frame.layer(a.layer).within
     } else {
-        frame.test(a.participant, b.participant).is_some()
+        frame.test(a.layer, b.layer).is_some()
     }
 }
 
@@ -165,18 +166,18 @@ pub struct Loaded {
 }
 
 impl Loaded {
-    /// Runs of one participant become one body, in the order of the chunks.
+    /// Runs of one layer become one body, in the order of the chunks.
     pub fn new<'a>(
         scene: &Scene,
         frame: &Frame,
         chunks: &[&Chunk],
-        clustering: impl Fn(usize) -> &'a Clustering,
+        clustering: impl Fn(LayerIx) -> &'a Clustering,
     ) -> Self {
         let mut loaded = Loaded::default();
         let runs: Vec<&ClusterRun> = chunks.iter().flat_map(|chunk| &chunk.runs).collect();
-        for runs in runs.chunk_by(|a, b| a.participant == b.participant) {
-            let participant = runs[0].participant;
-            loaded.push(scene, frame, participant, runs, clustering(participant));
+        for runs in runs.chunk_by(|a, b| a.layer == b.layer) {
+            let layer = runs[0].layer;
+            loaded.push(scene, frame, layer, runs, clustering(layer));
         }
         loaded
     }
@@ -185,11 +186,11 @@ impl Loaded {
         &mut self,
         scene: &Scene,
         frame: &Frame,
-        participant: usize,
+        layer: LayerIx,
         runs: &[&ClusterRun],
         clustering: &Clustering,
     ) {
-        let positions = frame.body(scene, participant).positions();
+        let positions = frame.body(scene, layer).positions();
         // Where each vertex of the body is on the device.
         let mut places = vec![u32::MAX; positions.len()];
         for run in runs {
@@ -215,7 +216,7 @@ impl Loaded {
         }
         let body = self.is_rounded.len() as u32;
         self.is_rounded.push(matches!(positions, Positions::F64(_)));
-        let first = frame.layers[participant].first;
+        let first = frame.layer(layer).first;
         for run in runs {
             self.topology
                 .push(clustering, run.first..run.end, first, body, |vertex| {

@@ -6,6 +6,7 @@ use super::layout::{Body, Cluster, ClusterVertex, Coordinate, Corners, Node, Ord
 use crate::elements::Kind;
 use crate::grouping::GROUP;
 use crate::grouping::clusters::Clustering;
+use crate::index::{ElementIx, Number};
 
 /// Clusters as kernels read them.
 #[derive(Debug, Default)]
@@ -25,7 +26,7 @@ impl Topology {
         &mut self,
         clustering: &Clustering,
         clusters: Range<usize>,
-        first: u32,
+        first: Number,
         body: u32,
         place: impl Fn(u32) -> u32,
     ) {
@@ -55,7 +56,7 @@ impl Topology {
         self.corners.extend(corners);
         let order = clustering.order[primitives].iter();
         self.numbers.extend(order.map(|&primitive| Order {
-            number: first + primitive,
+            number: first.plus(ElementIx::new(primitive)).raw(),
         }));
     }
 }

@@ -14,6 +14,7 @@ use impinge_core::cpu::narrow::{Candidate, Settler};
 use impinge_core::cpu::simd::Isa;
 use impinge_core::cpu::subcells::Asked;
 use impinge_core::cpu::world::World;
+use impinge_core::index::LayerIx;
 use impinge_core::run::Job;
 use impinge_core::sink::Answer;
 use impinge_core::{Error, Statistics};
@@ -91,8 +92,8 @@ impl Table {
                     let pair = slot.load(Ordering::Relaxed);
                     if pair != FREE {
                         settler.push(Candidate {
-                            a: 0,
-                            b: 1,
+                            a: LayerIx::new(0),
+                            b: LayerIx::new(1),
                             place_a: (pair >> 32) as u32,
                             place_b: pair as u32,
                         });

@@ -4,6 +4,7 @@ use impinge_core::cpu::cells::Rule;
 use impinge_core::cpu::kept::Kept;
 use impinge_core::cpu::subcells::Asked;
 use impinge_core::frame::{Frame, pair_key};
+use impinge_core::index::ElementIx;
 
 use super::Possible;
 
@@ -45,9 +46,11 @@ impl Rule for Recorded<'_> {
 
     #[inline(always)]
     fn admits(&self, a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool {
-        let global =
-            |kept: &Kept| self.frame.layers[kept.participant as usize].first + kept.primitive;
-        keys.push(pair_key(global(a), global(b)));
+        let [a, b] = [a, b].map(|kept| {
+            let element = ElementIx::new(kept.primitive);
+            self.frame.layer(kept.layer).number(element)
+        });
+        keys.push(pair_key(a, b));
         false
     }
 }

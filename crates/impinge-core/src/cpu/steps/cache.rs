@@ -12,6 +12,7 @@ use crate::elements::{Elements, Part};
 use crate::error::Error;
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
 use crate::grouping::clusters::Clustering;
+use crate::index::LayerIx;
 use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::Body;
@@ -136,7 +137,7 @@ impl Kept for LayerCache {
 /// Some clusters of a layer.
 #[derive(Debug, Clone, Copy)]
 struct Task {
-    layer: usize,
+    layer: LayerIx,
     first: usize,
     end: usize,
     /// Where boxes are written.
@@ -163,7 +164,7 @@ pub(super) fn refit<S: Send>(
         ..
     } = job;
     let mut is_stale = false;
-    for (ix, layer) in frame.layers.iter().enumerate() {
+    for (ix, layer) in frame.numbered_layers() {
         let body = frame.body(scene, ix);
         let cache = caches.at_mut(layer);
         let pose = pose.of(frame, ix);
@@ -201,7 +202,7 @@ fn find_boxes<S: Send>(
         ..
     } = job;
     let mut tasks = Vec::new();
-    for (ix, layer) in frame.layers.iter().enumerate() {
+    for (ix, layer) in frame.numbered_layers() {
         let body = frame.body(scene, ix);
         let cache = caches.at_mut(layer);
         if cache.of == Some((body.step_stamp(), pose.of(frame, ix))) {
@@ -237,7 +238,7 @@ fn find_boxes<S: Send>(
     let caches = &*caches;
     workers.for_each(&mut scratches[..n_workers], tasks.len(), |_, ix| {
         let task = tasks[ix];
-        let layer = &frame.layers[task.layer];
+        let layer = frame.layer(task.layer);
         let clustering = &caches.at(layer).clustering;
         let body = frame.body(scene, task.layer);
         let pose = pose.of(frame, task.layer);

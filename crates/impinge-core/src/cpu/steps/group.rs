@@ -9,6 +9,7 @@ use crate::elements::with_corners;
 use crate::exact::filter::Moving64;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{greater, lesser};
+use crate::index::LayerIx;
 use crate::narrow::Extent;
 use crate::positions::Positions;
 
@@ -45,9 +46,9 @@ impl<'a> Kept<World<'a>> for Group {
     };
 
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, world: World<'a>, layer: u32, cluster: usize) {
+    fn fill<S: Simd>(&mut self, simd: S, world: World<'a>, layer: LayerIx, cluster: usize) {
         let clustering = &world.cache(layer).clustering;
-        let body = world.frame.body(world.scene, layer as usize);
+        let body = world.frame.body(world.scene, layer);
         let (start, end) = (body.positions(), body.end_positions());
         self.size = clustering.size(cluster);
         let first = cluster * GROUP;
@@ -64,7 +65,7 @@ impl<'a> Kept<World<'a>> for Group {
                 lanes.0[self.size..].fill(of_first);
             }
         });
-        let first_number = world.frame.layers[layer as usize].first;
+        let first_number = world.frame.layer(layer).first.raw();
         let order = &clustering.order[first..first + self.size];
         for (number, &element) in self.numbers.0.iter_mut().zip(order) {
             *number = first_number + element;

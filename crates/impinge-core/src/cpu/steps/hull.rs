@@ -3,6 +3,7 @@
 use crate::frame::Frame;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, greater, lesser, round_down, round_up};
+use crate::index::LayerIx;
 
 use crate::cpu::simd::LaneBounds;
 
@@ -34,7 +35,7 @@ impl Pose {
 
     /// The pose of a layer: its boxes also reach as far as the frame says.
     #[inline(always)]
-    pub fn of(self, frame: &Frame, layer: usize) -> Pose {
+    pub fn of(self, frame: &Frame, layer: LayerIx) -> Pose {
         Pose {
             margin: self.margin + frame.margin(layer),
             ..self

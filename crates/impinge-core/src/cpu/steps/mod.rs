@@ -30,6 +30,7 @@ use crate::frame::Layer;
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hubs::Hubs;
 use crate::impacts::StepAnswer;
+use crate::index::LayerIx;
 use crate::scene::Body;
 use crate::settings::InstructionSet;
 use crate::stats::Statistics;
@@ -56,7 +57,7 @@ impl<'a> Stage for World<'a> {
     type Answer = StepAnswer<'a>;
 
     #[inline(always)]
-    fn tree(&self, layer: u32) -> Tree<'_> {
+    fn tree(&self, layer: LayerIx) -> Tree<'_> {
         self.cache(layer).tree()
     }
 
@@ -66,7 +67,7 @@ impl<'a> Stage for World<'a> {
     }
 
     #[inline(always)]
-    fn hubs(&self, layer: u32) -> Option<&Hubs> {
+    fn hubs(&self, layer: LayerIx) -> Option<&Hubs> {
         self.cache(layer).clustering.hubs()
     }
 

@@ -31,6 +31,7 @@ use crate::exact::{Approach, Contact, ElementPair, Point, approach, first_within
 use crate::frame::pair_key;
 use crate::grouping::GROUP;
 use crate::impacts::{Found, FoundByKind, KeysByKind, StepAnswer};
+use crate::index::{ElementIx, LayerIx, Number};
 use crate::narrow::{Extent, are_near};
 use crate::pair_kind::PairKind;
 use crate::positions::Positions;
@@ -45,8 +46,8 @@ use super::world::{Sought, World};
 /// Two layers, and the kind of their pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Between {
-    pub a: u32,
-    pub b: u32,
+    pub a: LayerIx,
+    pub b: LayerIx,
     pub kind: PairKind,
 }
 
@@ -224,7 +225,7 @@ impl Settler {
             return;
         }
         let are_single = [between.a, between.b].iter().all(|&layer| {
-            let body = world.frame.body(world.scene, layer as usize);
+            let body = world.frame.body(world.scene, layer);
             matches!(body.positions(), Positions::F32(_))
         });
         // Over the whole step, the device has taken the filter's first step for positions in single precision.
@@ -481,8 +482,8 @@ fn put_boxes(groups: [&Group; 2], met: &Met, distance: f64, keys: &mut Vec<u64>)
 #[inline(always)]
 fn key(world: World<'_>, between: Between, places: Places) -> u64 {
     let [a, b] = [(between.a, places[0]), (between.b, places[1])].map(|(layer, place)| {
-        let first = world.frame.layers[layer as usize].first;
-        first + world.cache(layer).clustering.order[place as usize]
+        let element = world.cache(layer).clustering.order[place as usize];
+        world.frame.layer(layer).number(ElementIx::new(element))
     });
     pair_key(a, b)
 }
@@ -491,8 +492,8 @@ fn key(world: World<'_>, between: Between, places: Places) -> u64 {
 #[inline(always)]
 fn key_in([a, b]: [&Group; 2], [lane_a, lane_b]: [u8; 2]) -> u64 {
     pair_key(
-        a.numbers.0[usize::from(lane_a)],
-        b.numbers.0[usize::from(lane_b)],
+        Number::new(a.numbers.0[usize::from(lane_a)]),
+        Number::new(b.numbers.0[usize::from(lane_b)]),
     )
 }
 
@@ -670,7 +671,7 @@ impl<'a> Sides<'a> {
                 _ => Corners::None,
             },
             positions: layers.map(|layer| {
-                let body = world.frame.body(world.scene, layer as usize);
+                let body = world.frame.body(world.scene, layer);
                 let start = body.positions();
                 [start, body.end_positions().unwrap_or(start)]
             }),
@@ -741,8 +742,8 @@ fn exact_pair(kind: PairKind) -> Option<ElementPair> {
 }
 
 /// The corners of an element, and its body's positions at both ends.
-fn element<'a>(world: World<'a>, layer: u32, place: u32) -> (&'a [u32], [&'a Positions; 2]) {
-    let body = world.frame.body(world.scene, layer as usize);
+fn element<'a>(world: World<'a>, layer: LayerIx, place: u32) -> (&'a [u32], [&'a Positions; 2]) {
+    let body = world.frame.body(world.scene, layer);
     let corners = world
         .cache(layer)
         .clustering
@@ -753,7 +754,7 @@ fn element<'a>(world: World<'a>, layer: u32, place: u32) -> (&'a [u32], [&'a Pos
 }
 
 /// The extent of an element over the whole step.
-fn extent(world: World<'_>, layer: u32, place: u32) -> Extent {
+fn extent(world: World<'_>, layer: LayerIx, place: u32) -> Extent {
     let (corners, ends) = element(world, layer, place);
     let points = corners
         .iter()

@@ -5,6 +5,7 @@
 
 use crate::elements::Elements;
 use crate::exact::{Reach, are_within_certainly, unsure_are_within};
+use crate::index::LayerIx;
 use crate::narrow::Corners;
 use crate::positions::Positions;
 
@@ -19,12 +20,12 @@ pub(super) struct Near<'a> {
 }
 
 impl<'a> Near<'a> {
-    pub fn new(world: World<'a>, layers: [u32; 2]) -> Self {
+    pub fn new(world: World<'a>, layers: [LayerIx; 2]) -> Self {
         let sides = layers.map(|layer| {
-            let body = world.frame.body(world.scene, layer as usize);
+            let body = world.frame.body(world.scene, layer);
             (&world.cache(layer).clustering.corners, body.positions())
         });
-        let reach = world.frame.reach(layers[0] as usize, layers[1] as usize);
+        let reach = world.frame.reach(layers[0], layers[1]);
         Near {
             sides,
             enclosing: reach.enclosing_f32(),

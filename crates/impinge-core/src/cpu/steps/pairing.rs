@@ -19,6 +19,7 @@ use crate::frame::TestId;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
 use crate::impacts::StepAnswer;
+use crate::index::{LayerIx, Number};
 use crate::settings::Settings;
 
 use super::group::Group;
@@ -106,7 +107,7 @@ pub(super) fn run<S: Simd>(
         if world.is_over() {
             break;
         }
-        let test = world.frame.test(item.a as usize, item.b as usize);
+        let test = world.frame.test(item.a, item.b);
         let Some(TestId::Elements(kind)) = test else {
             continue;
         };
@@ -114,7 +115,7 @@ pub(super) fn run<S: Simd>(
             None => None,
             Some(ranges) => match ranges.lower_numbers(kind) {
                 None => continue,
-                lower => lower,
+                Some(lower) => Some(lower.map(Number::raw)),
             },
         };
         let Some(places) = pair(simd, world, item, lower, worker) else {
@@ -204,8 +205,8 @@ fn pair<S: Simd>(
             }
         }
     }
-    let layers = &world.frame.layers;
-    let same_body = layers[item.a as usize].id == layers[item.b as usize].id;
+    let ids = [item.a, item.b].map(|layer| world.frame.layer(layer).id);
+    let same_body = ids[0] == ids[1];
     // The lanes of the side with fewer of them are the rows.
     let (side, rows, lanes, [own, other]) = if lanes_a.count_ones() <= lanes_b.count_ones() {
         (Side::A, lanes_a, lanes_b, [a, b])
@@ -260,8 +261,8 @@ fn pair<S: Simd>(
 /// The lanes of two clusters that may have a key whose lower number is in a range, ends included; `None` if no pair has.
 #[inline(always)]
 fn lanes_with_lower(world: World<'_>, item: &WorkItem, [low, high]: [u32; 2]) -> Option<[u64; 2]> {
-    let lanes = |layer: u32, cluster: u32, [low, high]: [u32; 2]| {
-        let first_number = world.frame.layers[layer as usize].first;
+    let lanes = |layer: LayerIx, cluster: u32, [low, high]: [u32; 2]| {
+        let first_number = world.frame.layer(layer).first.raw();
         let clustering = &world.cache(layer).clustering;
         let first = cluster as usize * GROUP;
         let order = &clustering.order[first..first + clustering.size(cluster as usize)];

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::frame::Frame;
 use crate::impacts::StepAnswer;
+use crate::index::LayerIx;
 use crate::scene::Scene;
 use crate::step::{Start, Toi};
 
@@ -102,13 +103,13 @@ impl<'a> World<'a> {
 
     /// How the boxes of a layer are made.
     #[inline(always)]
-    pub(super) fn pose(&self, layer: u32) -> Pose {
-        self.asked.pose.of(self.frame, layer as usize)
+    pub(super) fn pose(&self, layer: LayerIx) -> Pose {
+        self.asked.pose.of(self.frame, layer)
     }
 
     /// The cache of a layer.
     #[inline(always)]
-    pub(super) fn cache(&self, layer: u32) -> &'a LayerCache {
-        self.caches.at(&self.frame.layers[layer as usize])
+    pub(super) fn cache(&self, layer: LayerIx) -> &'a LayerCache {
+        self.caches.at(self.frame.layer(layer))
     }
 }
