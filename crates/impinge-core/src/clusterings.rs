@@ -11,6 +11,8 @@ use crate::frame::Layer;
 use crate::grouping::bounds::Bounds;
 #[cfg(feature = "gpu")]
 use crate::ids::BodyId;
+#[cfg(feature = "gpu")]
+use crate::index::ClusterIx;
 use crate::run::Job;
 use crate::scene::{Body, Scene};
 use crate::stats::Statistics;
@@ -210,12 +212,12 @@ const SAMPLES: usize = 64;
 
 /// The [`spread`] of evenly spaced clusters. The same clusters are sampled every time.
 #[cfg(feature = "gpu")]
-pub(crate) fn sampled_spread(n: usize, bounds_of: impl Fn(usize) -> Bounds) -> f64 {
+pub(crate) fn sampled_spread(n: usize, bounds_of: impl Fn(ClusterIx) -> Bounds) -> f64 {
     let n_samples = n.min(SAMPLES);
     let mut whole = Bounds::EMPTY;
     let mut sum = 0.0;
     for sample in 0..n_samples {
-        let bounds = bounds_of(sample * n / n_samples);
+        let bounds = bounds_of(ClusterIx::from_usize(sample * n / n_samples));
         sum += bounds.half_area();
         whole.join(&bounds);
     }

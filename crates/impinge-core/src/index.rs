@@ -56,7 +56,13 @@ macro_rules! index_types {
             /// The first `n` indices.
             #[inline(always)]
             pub fn up_to(n: usize) -> impl ExactSizeIterator<Item = Self> + Clone {
-                (0..Self::from_usize(n).0).map($name)
+                Self::each(0..n)
+            }
+
+            /// The indices of a range of entries of a list.
+            #[inline(always)]
+            pub fn each(range: Range<usize>) -> impl ExactSizeIterator<Item = Self> + Clone {
+                (Self::from_usize(range.start).0..Self::from_usize(range.end).0).map($name)
             }
         }
     )+};
@@ -69,7 +75,8 @@ index_types! {
     /// A cluster of a clustering.
     ClusterIx
 
-    /// Where an element is in the order of a clustering: cluster after cluster, [`GROUP`] elements each.
+    /// Where an element is in the order of a clustering: cluster after cluster, [`GROUP`] elements each. Methods without
+    /// clusters leave elements in the order in which users number them.
     ///
     /// ```text
     ///  31            6 5       0
@@ -87,19 +94,13 @@ index_types! {
 }
 
 impl ClusterIx {
-    /// The place of the first element.
-    #[inline(always)]
-    pub const fn first_place(self) -> Place {
-        Place(self.0 * GROUP as u32)
-    }
-
     /// The place of the element in a lane.
     #[inline(always)]
     pub const fn place(self, lane: u32) -> Place {
-        Place(self.first_place().0 + lane)
+        Place(self.0 * GROUP as u32 + lane)
     }
 
-    /// The places of all elements, where there are `n` elements in all clusters together.
+    /// The places of its elements, if all clusters have `n` elements together.
     #[inline(always)]
     pub fn places(self, n: usize) -> Range<usize> {
         let first = self.index() * GROUP;

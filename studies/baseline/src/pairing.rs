@@ -135,8 +135,8 @@ impl Scratch {
         self.settler.push(Candidate {
             a: a.layer,
             b: b.layer,
-            place_a: a.primitive,
-            place_b: b.primitive,
+            place_a: a.place(),
+            place_b: b.place(),
         });
     }
 }

@@ -12,6 +12,7 @@ use crate::grouping::bounds::{
 };
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
+use crate::index::ClusterIx;
 use crate::positions::Positions;
 
 use super::simd::{LaneBounds, Simd};
@@ -116,7 +117,7 @@ pub(crate) unsafe fn of_clusters<S: Simd>(
     simd: S,
     positions: &Positions,
     clustering: &Clustering,
-    clusters: impl Iterator<Item = usize>,
+    clusters: impl Iterator<Item = ClusterIx>,
     into: RawBoundsArray,
 ) -> Summary {
     let mut summary = Summary::EMPTY;
@@ -134,7 +135,7 @@ pub(crate) unsafe fn of_clusters<S: Simd>(
             all_finite,
         });
         // SAFETY: by the contract of this function.
-        unsafe { into.put(cluster, &bounds) };
+        unsafe { into.put(cluster.index(), &bounds) };
     }
     summary
 }
@@ -143,10 +144,10 @@ pub(crate) unsafe fn of_clusters<S: Simd>(
 pub(crate) fn of_cluster_primitives(
     positions: &Positions,
     clustering: &Clustering,
-    cluster: usize,
+    cluster: ClusterIx,
     lanes: &mut LaneBounds,
 ) {
-    let places = cluster * GROUP..cluster * GROUP + clustering.size(cluster);
+    let places = clustering.places(cluster);
     with_corners!(&clustering.corners, |corners| of_primitives(
         positions,
         &corners[places],

@@ -565,8 +565,8 @@ fn pair_item<R: Rule>(
                 settler.push(Candidate {
                     a: a.layer,
                     b: b.layer,
-                    place_a: a.primitive,
-                    place_b: b.primitive,
+                    place_a: a.place(),
+                    place_b: b.place(),
                 });
             }
         }
@@ -576,7 +576,7 @@ fn pair_item<R: Rule>(
         for j in Lanes(lanes.adjacent[i]) {
             let b = kept(group_b[j]);
             if rule.admits(a, b, &mut settler.keys) && resolve {
-                settler.settle_shared(&body, a.primitive, b.primitive);
+                settler.settle_shared(&body, a.place(), b.place());
             }
         }
     }

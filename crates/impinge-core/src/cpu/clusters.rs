@@ -226,11 +226,11 @@ impl BodyCache {
     /// Computes all boxes on this thread, for new clusters: their spread is the best so far.
     pub(super) fn refit_all(&mut self, body: &Body) {
         self.surface = 0.0;
-        for cluster in 0..self.clustering.n_clusters() {
+        for cluster in self.clustering.clusters() {
             let vertices = self.clustering.vertices(cluster);
             let bounds = bounds::of_vertices(body.positions(), vertices);
             self.surface += bounds.half_area();
-            self.bounds.levels[0].put(cluster, &bounds);
+            self.bounds.levels[0].put(cluster.index(), &bounds);
         }
         self.bounds.refit_above(0, &self.clustering.shape);
         self.whole = self.bounds.root();

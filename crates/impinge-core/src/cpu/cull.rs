@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use crate::elements::with_corners;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::Grid;
-use crate::index::LayerIx;
+use crate::index::{ElementIx, LayerIx};
 use crate::tuning::Tuning;
 
 use super::world::World;
@@ -35,7 +35,7 @@ const TOGETHER: usize = 512;
 /// A primitive within its body's reach, and the first and last cell of its vertices along x, y, z, one byte per axis.
 #[derive(Debug, Clone, Copy)]
 struct Near {
-    primitive: u32,
+    primitive: ElementIx,
     low: u32,
     high: u32,
 }
@@ -196,7 +196,7 @@ impl Cull {
         let n_rows = self.n_rows();
         let map = &self.maps[map_ix * n_rows..][..n_rows];
         let mut together = [Near {
-            primitive: 0,
+            primitive: ElementIx::new(0),
             low: 0,
             high: 0,
         }; TOGETHER];
@@ -207,7 +207,7 @@ impl Cull {
         {
             // No branch: whether a primitive is near is unpredictable.
             let mut n = 0;
-            for (primitive, corners) in (first..).zip(corners) {
+            for (primitive, corners) in (first..).map(ElementIx::new).zip(corners) {
                 let vertex = codes[corners[0] as usize];
                 let (mut low, mut high) = (vertex, vertex);
                 for &corner in &corners[1..] {
@@ -264,7 +264,7 @@ impl Cull {
     }
 
     /// Calls back for the primitives of a run that may have partners, in order. Returns how many were near.
-    pub fn for_live(&self, run_ix: usize, mut call: impl FnMut(u32)) -> usize {
+    pub fn for_live(&self, run_ix: usize, mut call: impl FnMut(ElementIx)) -> usize {
         let near = self.near[run_ix].lock().expect("no task panics");
         for near in &*near {
             let mut live = u64::from(near.n_rows() > self.most_marked);

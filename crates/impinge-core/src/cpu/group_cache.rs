@@ -8,7 +8,7 @@ use crate::elements::Elements;
 use crate::exact::filter::{LARGEST_F32, Triangles64};
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, greater, lesser};
-use crate::index::LayerIx;
+use crate::index::{ClusterIx, LayerIx};
 use crate::positions::Positions;
 use crate::settings::Settings;
 
@@ -36,7 +36,7 @@ impl Kept<World<'_>> for Group {
     };
 
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, world: World<'_>, layer: LayerIx, cluster: usize) {
+    fn fill<S: Simd>(&mut self, simd: S, world: World<'_>, layer: LayerIx, cluster: ClusterIx) {
         let positions = world.body(layer).positions;
         let cache = world.cache(layer);
         let clustering = &cache.clustering;
@@ -47,7 +47,7 @@ impl Kept<World<'_>> for Group {
         };
         let size = clustering.size(cluster);
         let faces = ClusterFaces {
-            faces: &faces[cluster * GROUP..cluster * GROUP + size],
+            faces: &faces[clustering.places(cluster)],
             vertices: clustering.vertices(cluster),
             local: clustering.local_faces(cluster),
         };
@@ -63,7 +63,7 @@ impl Kept<World<'_>> for Group {
         if size < GROUP {
             self.boxes.clear_from(size);
         }
-        self.in_tables = is_small(&cache.bounds.levels[0].at(cluster));
+        self.in_tables = is_small(&cache.bounds.levels[0].at(cluster.index()));
     }
 }
 
@@ -79,7 +79,7 @@ pub(super) trait Kept<W>: Clone {
     const EMPTY: Self;
 
     /// Computes the data of a cluster of a layer.
-    fn fill<S: Simd>(&mut self, simd: S, world: W, layer: LayerIx, cluster: usize);
+    fn fill<S: Simd>(&mut self, simd: S, world: W, layer: LayerIx, cluster: ClusterIx);
 }
 
 /// The clusters that a worker has seen last.
@@ -132,18 +132,18 @@ impl<G> GroupCache<G> {
         size_of::<u64>() * self.keys.capacity() + size_of::<G>() * self.groups.capacity()
     }
 
-    fn key((layer, cluster): (LayerIx, u32)) -> u64 {
-        u64::from(layer.raw()) << 32 | u64::from(cluster)
+    fn key((layer, cluster): (LayerIx, ClusterIx)) -> u64 {
+        u64::from(layer.raw()) << 32 | u64::from(cluster.raw())
     }
 
-    fn first_place(&self, (layer, cluster): (LayerIx, u32)) -> usize {
-        let hash = layer.raw().wrapping_mul(67).wrapping_add(cluster) as usize;
+    fn first_place(&self, (layer, cluster): (LayerIx, ClusterIx)) -> usize {
+        let hash = layer.raw().wrapping_mul(67).wrapping_add(cluster.raw()) as usize;
         hash & (self.keys.len() - 1)
     }
 
     /// Whether a cluster of a layer is cached.
     #[inline(always)]
-    pub fn holds(&self, whose: (LayerIx, u32)) -> bool {
+    pub fn holds(&self, whose: (LayerIx, ClusterIx)) -> bool {
         let (key, first) = (Self::key(whose), self.first_place(whose));
         self.keys[first] == key || self.keys[first ^ 1] == key
     }
@@ -155,7 +155,7 @@ impl<G> GroupCache<G> {
         &mut self,
         simd: S,
         world: W,
-        whose: (LayerIx, u32),
+        whose: (LayerIx, ClusterIx),
         pinned: usize,
     ) -> usize
     where
@@ -170,7 +170,7 @@ impl<G> GroupCache<G> {
         let place = if first == pinned { first ^ 1 } else { first };
         self.n_evicted += u64::from(self.keys[place] != NOBODY);
         self.keys[place] = key;
-        self.groups[place].fill(simd, world, whose.0, whose.1 as usize);
+        self.groups[place].fill(simd, world, whose.0, whose.1);
         place
     }
 

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::FineRange;
-use crate::index::LayerIx;
+use crate::index::{ElementIx, LayerIx, Place};
 
 use super::bounds;
 use super::cull::{BoundsTask, Cull};
@@ -36,19 +36,25 @@ pub struct Kept {
     /// Its layer.
     pub layer: LayerIx,
     /// Its index within the body.
-    pub primitive: u32,
+    pub primitive: ElementIx,
 }
 
 impl Kept {
+    /// Its place, where there are no clusters.
+    #[inline(always)]
+    pub fn place(&self) -> Place {
+        unclustered(self.primitive)
+    }
+
     /// A primitive, if its box meets `reach`.
     #[inline(always)]
     fn reaching(
         body: &BodyRef<'_>,
         layer: LayerIx,
-        primitive: u32,
+        primitive: ElementIx,
         reach: &Bounds,
     ) -> Option<Kept> {
-        let bounds = bounds::of_vertices(body.positions, body.corners(primitive));
+        let bounds = bounds::of_vertices(body.positions, body.corners(unclustered(primitive)));
         bounds.overlaps(reach).then_some(Kept {
             bounds,
             range: FineRange {
@@ -59,6 +65,12 @@ impl Kept {
             primitive,
         })
     }
+}
+
+/// The place of a primitive, where there are no clusters.
+#[inline(always)]
+fn unclustered(primitive: ElementIx) -> Place {
+    Place::new(primitive.raw())
 }
 
 /// The kept primitives of a frame, and the memory for them.
@@ -145,7 +157,7 @@ impl KeptList {
             let reach = &reach[run.layer.index()];
             let mut part = parts[ix].lock().expect("no task panics");
             part.clear();
-            for primitive in run.first..run.end {
+            for primitive in (run.first..run.end).map(ElementIx::new) {
                 part.extend(Kept::reaching(&body, run.layer, primitive, reach));
             }
         });

@@ -2,7 +2,7 @@
 
 use crate::exact::filter::BATCH;
 use crate::grouping::GROUP;
-use crate::index::LayerIx;
+use crate::index::{ClusterIx, LayerIx};
 
 use super::simd::{Lanes32, Simd};
 
@@ -11,8 +11,8 @@ use super::simd::{Lanes32, Simd};
 pub(crate) struct WorkItem {
     pub a: LayerIx,
     pub b: LayerIx,
-    pub cluster_a: u32,
-    pub cluster_b: u32,
+    pub cluster_a: ClusterIx,
+    pub cluster_b: ClusterIx,
 }
 
 /// The candidates of one work item: lanes of its two groups.

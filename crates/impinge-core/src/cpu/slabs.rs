@@ -7,7 +7,7 @@ use std::time::Duration;
 use crate::clock::Instant;
 use crate::error::Error;
 use crate::grouping::hubs::Hubs;
-use crate::index::LayerIx;
+use crate::index::{ClusterIx, LayerIx};
 use crate::query::SharedVertex;
 use crate::run::Job;
 use crate::settings::Settings;
@@ -388,13 +388,13 @@ fn all<S: Simd, W: Stage>(
     for ix in frame.layer_ixs() {
         if frame.test(ix, ix).is_some() {
             let (tree, hubs) = (world.tree(ix), world.hubs(ix));
-            dispatch::within(simd, tree, hubs, stack, |cluster_a, cluster_b| {
+            dispatch::within(simd, tree, hubs, stack, |leaf_a, leaf_b| {
                 // Adjacency masks are stored with the lower cluster.
                 slabs.put(WorkItem {
                     a: ix,
                     b: ix,
-                    cluster_a: cluster_a.min(cluster_b),
-                    cluster_b: cluster_a.max(cluster_b),
+                    cluster_a: ClusterIx::new(leaf_a.min(leaf_b)),
+                    cluster_b: ClusterIx::new(leaf_a.max(leaf_b)),
                 })
             })?;
         }
@@ -412,12 +412,12 @@ fn between<S: Simd, W: Stage>(
 ) -> Result<(), Error> {
     let world = slabs.world;
     let (tree_a, tree_b) = (world.tree(a), world.tree(b));
-    dispatch::between(simd, tree_a, tree_b, stack, |cluster_a, cluster_b| {
+    dispatch::between(simd, tree_a, tree_b, stack, |leaf_a, leaf_b| {
         slabs.put(WorkItem {
             a,
             b,
-            cluster_a,
-            cluster_b,
+            cluster_a: ClusterIx::new(leaf_a),
+            cluster_b: ClusterIx::new(leaf_b),
         })
     })
 }

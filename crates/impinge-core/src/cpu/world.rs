@@ -6,7 +6,7 @@ use crate::exact::Point;
 use crate::frame::{Frame, Layer};
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
-use crate::index::{ElementIx, LayerIx, Number};
+use crate::index::{ElementIx, LayerIx, Number, Place};
 use crate::positions::Positions;
 use crate::scene::Scene;
 
@@ -70,7 +70,7 @@ pub struct BodyRef<'a> {
     pub positions: &'a Positions,
     /// The corners at each place.
     pub elements: &'a Elements,
-    order: Option<&'a [u32]>,
+    order: Option<&'a [ElementIx]>,
 }
 
 impl<'a> World<'a> {
@@ -119,21 +119,23 @@ impl BodyCache {
 impl<'a> BodyRef<'a> {
     /// The global number of the primitive at a place.
     #[inline(always)]
-    pub fn global(&self, place: u32) -> Number {
-        let element = self.order.map_or(place, |order| order[place as usize]);
-        self.layer.number(ElementIx::new(element))
+    pub fn global(&self, place: Place) -> Number {
+        self.layer.number(match self.order {
+            Some(order) => order[place.index()],
+            None => ElementIx::new(place.raw()),
+        })
     }
 
     /// The vertex ids of the primitive at a place.
     #[inline(always)]
-    pub fn corners(&self, place: u32) -> &'a [u32] {
-        self.elements.corners(place as usize)
+    pub fn corners(&self, place: Place) -> &'a [u32] {
+        self.elements.corners(place.index())
     }
 
     /// The corners at a place in double precision; an element with fewer than four repeats its last.
     #[inline(always)]
-    pub fn points(&self, place: u32) -> [Point; 4] {
-        let corners = self.elements.four_corners(place as usize);
+    pub fn points(&self, place: Place) -> [Point; 4] {
+        let corners = self.elements.four_corners(place.index());
         corners.map(|corner| self.positions.point(corner as usize))
     }
 }

@@ -18,6 +18,8 @@
 //! Cost: quadratic in the number of chunks, but chunks are compact and most of their boxes do
 //! not meet. Invariant: every two clusters lie in one pair of runs of one piece.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::buffers::count;
@@ -28,7 +30,7 @@ use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
-use crate::index::LayerIx;
+use crate::index::{ClusterIx, LayerIx};
 use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::Scene;
@@ -37,8 +39,7 @@ use crate::scene::Scene;
 #[derive(Debug)]
 pub struct ClusterRun {
     layer: LayerIx,
-    first: usize,
-    end: usize,
+    clusters: Range<usize>,
     bounds: Bounds,
 }
 
@@ -68,7 +69,7 @@ pub fn cut<'a>(
     let mut weight = Weight::default();
     for layer in frame.layer_ixs() {
         let clustering = clustering(layer);
-        for cluster in 0..clustering.n_clusters() {
+        for cluster in clustering.clusters() {
             let (n, n_vertices) = (clustering.size(cluster), clustering.vertices(cluster).len());
             weight.add_cluster(count(n), count(n_vertices));
             if chunks.is_empty() || !weight.fits(most) {
@@ -81,11 +82,10 @@ pub fn cut<'a>(
             }
             let runs = &mut chunks.last_mut().expect("just pushed").runs;
             match runs.last_mut() {
-                Some(run) if run.layer == layer => run.end = cluster + 1,
+                Some(run) if run.layer == layer => run.clusters.end = cluster.index() + 1,
                 _ => runs.push(ClusterRun {
                     layer,
-                    first: cluster,
-                    end: cluster + 1,
+                    clusters: cluster.index()..cluster.index() + 1,
                     bounds: Bounds::EMPTY,
                 }),
             }
@@ -95,7 +95,7 @@ pub fn cut<'a>(
         for run in &mut chunk.runs {
             let clustering = clustering(run.layer);
             let positions = frame.body(scene, run.layer).positions();
-            for cluster in run.first..run.end {
+            for cluster in ClusterIx::each(run.clusters.clone()) {
                 let bounds = bounds_of(positions, clustering.vertices(cluster));
                 run.bounds.join(&bounds);
             }
@@ -194,7 +194,7 @@ impl Loaded {
         // Where each vertex of the body is on the device.
         let mut places = vec![u32::MAX; positions.len()];
         for run in runs {
-            for cluster in run.first..run.end {
+            for cluster in ClusterIx::each(run.clusters.clone()) {
                 for &vertex in clustering.vertices(cluster) {
                     places[vertex as usize] = 0;
                 }
@@ -219,10 +219,10 @@ impl Loaded {
         let first = frame.layer(layer).first;
         for run in runs {
             self.topology
-                .push(clustering, run.first..run.end, first, body, |vertex| {
+                .push(clustering, run.clusters.clone(), first, body, |vertex| {
                     places[vertex as usize]
                 });
-            self.shapes.push(Shape::new(run.end - run.first));
+            self.shapes.push(Shape::new(run.clusters.len()));
         }
     }
 }

@@ -6,7 +6,7 @@ use super::layout::{Body, Cluster, ClusterVertex, Coordinate, Corners, Node, Ord
 use crate::elements::Kind;
 use crate::grouping::GROUP;
 use crate::grouping::clusters::Clustering;
-use crate::index::{ElementIx, Number};
+use crate::index::{ClusterIx, Number};
 
 /// Clusters as kernels read them.
 #[derive(Debug, Default)]
@@ -31,10 +31,10 @@ impl Topology {
         place: impl Fn(u32) -> u32,
     ) {
         let begin = (clusters.start * GROUP).min(clustering.order.len());
-        let primitives = begin..(clusters.end * GROUP).min(clustering.order.len());
-        for cluster in clusters {
+        let places = begin..(clusters.end * GROUP).min(clustering.order.len());
+        for cluster in ClusterIx::each(clusters) {
             let vertices = clustering.vertices(cluster);
-            let first_place = self.corners.len() + cluster * GROUP - begin;
+            let first_place = self.corners.len() + cluster.place(0).index() - begin;
             self.clusters.push(Cluster {
                 // Places and vertices fit 32 bits: the caller has checked the sizes.
                 first_place: first_place as u32,
@@ -48,15 +48,15 @@ impl Topology {
             self.cluster_vertices.extend(vertices);
         }
         let is_solid = clustering.corners.kind() == Kind::Tetrahedra;
-        self.has_solids |= is_solid && !primitives.is_empty();
+        self.has_solids |= is_solid && !places.is_empty();
         // Edges and points become degenerate triangles.
-        let corners = primitives.clone().map(|primitive| Corners {
-            vertices: clustering.corners.four_corners(primitive).map(&place),
+        let corners = places.clone().map(|ix| Corners {
+            vertices: clustering.corners.four_corners(ix).map(&place),
         });
         self.corners.extend(corners);
-        let order = clustering.order[primitives].iter();
+        let order = clustering.order[places].iter();
         self.numbers.extend(order.map(|&primitive| Order {
-            number: first.plus(ElementIx::new(primitive)).raw(),
+            number: first.plus(primitive).raw(),
         }));
     }
 }

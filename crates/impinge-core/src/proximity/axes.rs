@@ -12,6 +12,7 @@
 use super::features::dot;
 use super::tree::{Box64, Node, Tree};
 use crate::exact::Point;
+use crate::index::ClusterIx;
 use crate::scene::Body;
 
 /// Three directions at right angles and of length 1, but for rounding.
@@ -101,7 +102,7 @@ impl View {
         if *place == UNKNOWN {
             *place = self.boxes.len() as u32;
             let mut found = Box64::EMPTY;
-            for &vertex in tree.clustering.vertices(node.number as usize) {
+            for &vertex in tree.clustering.vertices(ClusterIx::new(node.number)) {
                 found.cover(self.axes.turn(body.positions().point(vertex as usize)));
             }
             self.boxes.push(found);

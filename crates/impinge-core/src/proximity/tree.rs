@@ -4,9 +4,9 @@
 //! of primitives only when a cluster is compared. Cost: `O(n log n)` and `O(n)`.
 
 use crate::exact::Point;
-use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, greater, lesser, round_down, round_up};
 use crate::grouping::clusters::Clustering;
+use crate::index::{ClusterIx, ElementIx};
 use crate::positions::Positions;
 use crate::scene::Body;
 
@@ -113,7 +113,7 @@ impl Tree {
         }
         self.positions_stamp = body.positions_stamp();
         self.levels.clear();
-        let clusters = 0..self.clustering.n_clusters();
+        let clusters = self.clustering.clusters();
         let of_clusters = clusters
             .map(|cluster| of_vertices(body.positions(), self.clustering.vertices(cluster)))
             .collect();
@@ -161,9 +161,8 @@ impl Tree {
     }
 
     /// The primitives of a cluster.
-    pub fn primitives(&self, node: Node) -> &[u32] {
-        let first = node.number as usize * GROUP;
-        &self.clustering.order[first..first + self.clustering.size(node.number as usize)]
+    pub fn primitives(&self, node: Node) -> &[ElementIx] {
+        self.clustering.primitives(ClusterIx::new(node.number))
     }
 }
 

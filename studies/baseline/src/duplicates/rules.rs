@@ -4,7 +4,6 @@ use impinge_core::cpu::cells::Rule;
 use impinge_core::cpu::kept::Kept;
 use impinge_core::cpu::subcells::Asked;
 use impinge_core::frame::{Frame, pair_key};
-use impinge_core::index::ElementIx;
 
 use super::Possible;
 
@@ -46,10 +45,7 @@ impl Rule for Recorded<'_> {
 
     #[inline(always)]
     fn admits(&self, a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool {
-        let [a, b] = [a, b].map(|kept| {
-            let element = ElementIx::new(kept.primitive);
-            self.frame.layer(kept.layer).number(element)
-        });
+        let [a, b] = [a, b].map(|kept| self.frame.layer(kept.layer).number(kept.primitive));
         keys.push(pair_key(a, b));
         false
     }

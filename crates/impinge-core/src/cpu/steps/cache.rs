@@ -12,7 +12,7 @@ use crate::elements::{Elements, Part};
 use crate::error::Error;
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
 use crate::grouping::clusters::Clustering;
-use crate::index::LayerIx;
+use crate::index::{ClusterIx, ElementIx, LayerIx};
 use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::Body;
@@ -64,7 +64,7 @@ impl LayerCache {
         });
         if let (Part::Vertices, Elements::Points(vertices)) = (part, &clustering.corners) {
             // Vertices are numbered as positions are.
-            clustering.order = vertices.iter().map(|&[vertex]| vertex).collect();
+            clustering.order = vertices.iter().map(|&[ix]| ElementIx::new(ix)).collect();
         }
         let mut bounds = TreeBounds::default();
         bounds.resize(&clustering.shape);
@@ -107,8 +107,8 @@ impl LayerCache {
 
     /// The boxes of a cluster at the start and at the end.
     #[inline(always)]
-    pub fn ends(&self, cluster: usize) -> [Bounds; 2] {
-        [self.ends[0].at(cluster), self.ends[1].at(cluster)]
+    pub fn ends(&self, cluster: ClusterIx) -> [Bounds; 2] {
+        self.ends.each_ref().map(|end| end.at(cluster.index()))
     }
 
     pub fn bytes(&self) -> usize {
@@ -255,7 +255,7 @@ fn find_boxes<S: Send>(
 fn find<S: Simd>(simd: S, clustering: &Clustering, body: &Body, pose: Pose, task: Task) {
     let (start, end) = (body.positions(), body.end_positions());
     for cluster in task.first..task.end {
-        let vertices = clustering.vertices(cluster);
+        let vertices = clustering.vertices(ClusterIx::from_usize(cluster));
         let at_start = of_cluster(simd, start, vertices);
         let at_end = match end {
             Some(end) => of_cluster(simd, end, vertices),

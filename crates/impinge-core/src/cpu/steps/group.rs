@@ -9,7 +9,7 @@ use crate::elements::with_corners;
 use crate::exact::filter::Moving64;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{greater, lesser};
-use crate::index::LayerIx;
+use crate::index::{ClusterIx, LayerIx};
 use crate::narrow::Extent;
 use crate::positions::Positions;
 
@@ -46,14 +46,14 @@ impl<'a> Kept<World<'a>> for Group {
     };
 
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, world: World<'a>, layer: LayerIx, cluster: usize) {
+    fn fill<S: Simd>(&mut self, simd: S, world: World<'a>, layer: LayerIx, cluster: ClusterIx) {
         let clustering = &world.cache(layer).clustering;
         let body = world.frame.body(world.scene, layer);
         let (start, end) = (body.positions(), body.end_positions());
         self.size = clustering.size(cluster);
-        let first = cluster * GROUP;
+        let places = clustering.places(cluster);
         with_corners!(&clustering.corners, |elements| {
-            let elements = &elements[first..first + self.size];
+            let elements = &elements[places];
             // Tetrahedra, which steps never have, would have no list for their fourth corner.
             self.n_corners = elements.first().map_or(0, |corners| corners.len().min(3));
             for (k, lanes) in self.corners.iter_mut().enumerate().take(self.n_corners) {
@@ -65,10 +65,10 @@ impl<'a> Kept<World<'a>> for Group {
                 lanes.0[self.size..].fill(of_first);
             }
         });
-        let first_number = world.frame.layer(layer).first.raw();
-        let order = &clustering.order[first..first + self.size];
-        for (number, &element) in self.numbers.0.iter_mut().zip(order) {
-            *number = first_number + element;
+        let held = world.frame.layer(layer);
+        let elements = clustering.primitives(cluster);
+        for (number, &element) in self.numbers.0.iter_mut().zip(elements) {
+            *number = held.number(element).raw();
         }
         if let (Positions::F32(start), Positions::F32(end)) = (start, end.unwrap_or(start)) {
             self.in_tables = true;

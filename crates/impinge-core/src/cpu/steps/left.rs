@@ -9,7 +9,7 @@ use crate::cpu::simd::Isa;
 use crate::error::Error;
 use crate::frame::{TestId, owner_by_first};
 use crate::impacts::StepAnswer;
-use crate::index::LayerIx;
+use crate::index::{LayerIx, Place};
 use crate::run::Job;
 use crate::sink::Ending;
 
@@ -103,7 +103,9 @@ fn settle(
             return Err(not_asked(run[0]));
         };
         let firsts = [a, b].map(|layer| first_places[layer.index()]);
-        let places = run.iter().map(|&[p, q]| [p - firsts[0], q - firsts[1]]);
+        let places = run
+            .iter()
+            .map(|&[p, q]| [p - firsts[0], q - firsts[1]].map(Place::new));
         settler.settle_left(isa, world, Between { a, b, kind }, places);
     }
     settler.search(isa, world);

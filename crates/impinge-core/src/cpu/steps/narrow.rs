@@ -29,9 +29,8 @@ use crate::exact::filter::{
 };
 use crate::exact::{Approach, Contact, ElementPair, Point, approach, first_within};
 use crate::frame::pair_key;
-use crate::grouping::GROUP;
 use crate::impacts::{Found, FoundByKind, KeysByKind, StepAnswer};
-use crate::index::{ElementIx, LayerIx, Number};
+use crate::index::{LayerIx, Number, Place};
 use crate::narrow::{Extent, are_near};
 use crate::pair_kind::PairKind;
 use crate::positions::Positions;
@@ -52,7 +51,7 @@ pub(super) struct Between {
 }
 
 /// Places of two elements in their clusters' orders.
-type Places = [u32; 2];
+type Places = [Place; 2];
 
 /// A pair whose first contact is sought.
 #[derive(Debug, Clone, Copy)]
@@ -338,9 +337,8 @@ impl Settler {
 /// The places of a candidate of a work item.
 #[inline(always)]
 fn places_of(item: &WorkItem, met: &Met, ix: usize) -> Places {
-    let place = |cluster: u32, lane: u8| cluster * GROUP as u32 + u32::from(lane);
-    let [lane_a, lane_b] = met.lanes(ix);
-    [place(item.cluster_a, lane_a), place(item.cluster_b, lane_b)]
+    let [lane_a, lane_b] = met.lanes(ix).map(u32::from);
+    [item.cluster_a.place(lane_a), item.cluster_b.place(lane_b)]
 }
 
 // Kernels of their own: without optimisation, one for all of them would need more stack than a thread has.
@@ -482,8 +480,8 @@ fn put_boxes(groups: [&Group; 2], met: &Met, distance: f64, keys: &mut Vec<u64>)
 #[inline(always)]
 fn key(world: World<'_>, between: Between, places: Places) -> u64 {
     let [a, b] = [(between.a, places[0]), (between.b, places[1])].map(|(layer, place)| {
-        let element = world.cache(layer).clustering.order[place as usize];
-        world.frame.layer(layer).number(ElementIx::new(element))
+        let element = world.cache(layer).clustering.primitive(place);
+        world.frame.layer(layer).number(element)
     });
     pair_key(a, b)
 }
@@ -713,7 +711,7 @@ fn fill<S: Simd, const N: usize>(
 ) {
     let mut ids = [[0; LANES]; N];
     for (lane, places) in batch.iter().enumerate() {
-        let corners = &corners[places[side] as usize];
+        let corners = &corners[places[side].index()];
         for k in 0..N {
             ids[k][lane] = corners[k];
         }
@@ -742,19 +740,15 @@ fn exact_pair(kind: PairKind) -> Option<ElementPair> {
 }
 
 /// The corners of an element, and its body's positions at both ends.
-fn element<'a>(world: World<'a>, layer: LayerIx, place: u32) -> (&'a [u32], [&'a Positions; 2]) {
+fn element<'a>(world: World<'a>, layer: LayerIx, place: Place) -> (&'a [u32], [&'a Positions; 2]) {
     let body = world.frame.body(world.scene, layer);
-    let corners = world
-        .cache(layer)
-        .clustering
-        .corners
-        .corners(place as usize);
+    let corners = world.cache(layer).clustering.corners.corners(place.index());
     let start = body.positions();
     (corners, [start, body.end_positions().unwrap_or(start)])
 }
 
 /// The extent of an element over the whole step.
-fn extent(world: World<'_>, layer: LayerIx, place: u32) -> Extent {
+fn extent(world: World<'_>, layer: LayerIx, place: Place) -> Extent {
     let (corners, ends) = element(world, layer, place);
     let points = corners
         .iter()

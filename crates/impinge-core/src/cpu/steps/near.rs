@@ -5,7 +5,7 @@
 
 use crate::elements::Elements;
 use crate::exact::{Reach, are_within_certainly, unsure_are_within};
-use crate::index::LayerIx;
+use crate::index::{LayerIx, Place};
 use crate::narrow::Corners;
 use crate::positions::Positions;
 
@@ -35,23 +35,23 @@ impl<'a> Near<'a> {
 
     /// Whether the elements at two places are near, if that is certain.
     #[inline(always)]
-    pub fn certainly(&self, places: [u32; 2]) -> Option<bool> {
+    pub fn certainly(&self, places: [Place; 2]) -> Option<bool> {
         let [a, b] = self.corners(places);
         are_within_certainly(a.points(), b.points(), &self.reach)
     }
 
     /// Whether the elements at two places are near, if that is not certain.
     #[inline(never)]
-    pub fn exactly(&self, places: [u32; 2]) -> bool {
+    pub fn exactly(&self, places: [Place; 2]) -> bool {
         let [a, b] = self.corners(places);
         unsure_are_within(a.points(), b.points(), &self.reach)
     }
 
     #[inline(always)]
-    fn corners(&self, places: [u32; 2]) -> [Corners; 2] {
+    fn corners(&self, places: [Place; 2]) -> [Corners; 2] {
         [0, 1].map(|side| {
             let (elements, positions) = self.sides[side];
-            Corners::new(positions, elements.corners(places[side] as usize))
+            Corners::new(positions, elements.corners(places[side].index()))
         })
     }
 }

@@ -19,7 +19,7 @@ use crate::frame::TestId;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
 use crate::impacts::StepAnswer;
-use crate::index::{LayerIx, Number};
+use crate::index::{ClusterIx, LayerIx, Number};
 use crate::settings::Settings;
 
 use super::group::Group;
@@ -115,7 +115,7 @@ pub(super) fn run<S: Simd>(
             None => None,
             Some(ranges) => match ranges.lower_numbers(kind) {
                 None => continue,
-                Some(lower) => Some(lower.map(Number::raw)),
+                lower => lower,
             },
         };
         let Some(places) = pair(simd, world, item, lower, worker) else {
@@ -153,7 +153,7 @@ fn pair<S: Simd>(
     simd: S,
     world: World<'_>,
     item: &WorkItem,
-    lower: Option<[u32; 2]>,
+    lower: Option<[Number; 2]>,
     worker: &mut Worker,
 ) -> Option<[usize; 2]> {
     let Worker {
@@ -166,7 +166,7 @@ fn pair<S: Simd>(
     met.clear();
     let sides = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
     let is_own = sides[0] == sides[1];
-    let ends = sides.map(|(layer, cluster)| world.cache(layer).ends(cluster as usize));
+    let ends = sides.map(|(layer, cluster)| world.cache(layer).ends(cluster));
     if !is_own && !meet(&ends[0], &ends[1]) {
         return None;
     }
@@ -260,15 +260,17 @@ fn pair<S: Simd>(
 
 /// The lanes of two clusters that may have a key whose lower number is in a range, ends included; `None` if no pair has.
 #[inline(always)]
-fn lanes_with_lower(world: World<'_>, item: &WorkItem, [low, high]: [u32; 2]) -> Option<[u64; 2]> {
-    let lanes = |layer: LayerIx, cluster: u32, [low, high]: [u32; 2]| {
-        let first_number = world.frame.layer(layer).first.raw();
-        let clustering = &world.cache(layer).clustering;
-        let first = cluster as usize * GROUP;
-        let order = &clustering.order[first..first + clustering.size(cluster as usize)];
+fn lanes_with_lower(
+    world: World<'_>,
+    item: &WorkItem,
+    [low, high]: [Number; 2],
+) -> Option<[u64; 2]> {
+    let lanes = |layer: LayerIx, cluster: ClusterIx, [low, high]: [Number; 2]| {
+        let held = world.frame.layer(layer);
+        let elements = world.cache(layer).clustering.primitives(cluster);
         let mut are_in = [0u8; GROUP];
-        for (is_in, element) in are_in.iter_mut().zip(order) {
-            let number = first_number + element;
+        for (is_in, &element) in are_in.iter_mut().zip(elements) {
+            let number = held.number(element);
             *is_in = u8::from(low <= number && number <= high);
         }
         // The product has the lowest bits of eight bytes in its highest byte.
@@ -288,8 +290,8 @@ fn lanes_with_lower(world: World<'_>, item: &WorkItem, [low, high]: [u32; 2]) ->
         return None;
     }
     // Either element may have the lower number, and the other one's is not below it.
-    let above = |cluster| lanes(item.a, cluster, [low, u32::MAX]);
-    let wanted = |others: u64, cluster: u32, own: u64| match others {
+    let above = |cluster| lanes(item.a, cluster, [low, Number::new(u32::MAX)]);
+    let wanted = |others: u64, cluster: ClusterIx, own: u64| match others {
         0 => own,
         _ => above(cluster),
     };
