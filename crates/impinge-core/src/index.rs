@@ -6,6 +6,7 @@
 //! Place       an element, by where it is in the order of a clustering
 //! ElementIx   an element, by its number in its part of the body: as users number it
 //! Number      an element, by its number among those of all layers of a frame
+//! VertexIx    a vertex of a body, where it is passed around by itself
 //!
 //!             clustering          layer
 //!    Place   ----------->  ElementIx  <----->  Number      two of them make the key of a pair
@@ -91,6 +92,9 @@ index_types! {
 
     /// The global number of an element in a frame: see [`frame`](crate::frame).
     Number
+
+    /// A vertex of a body, as its positions are numbered.
+    VertexIx
 }
 
 impl ClusterIx {
@@ -142,6 +146,12 @@ impl Number {
         ElementIx(self.0 - first.0)
     }
 
+    /// The key of a pair of which this is the lower number.
+    #[inline(always)]
+    pub const fn key_with(self, higher: Number) -> u64 {
+        self.first_key() | higher.0 as u64
+    }
+
     /// The lowest key of a pair whose lower number is this one.
     #[inline(always)]
     pub const fn first_key(self) -> u64 {
@@ -153,7 +163,7 @@ impl Number {
 #[inline(always)]
 pub fn pair_key(a: Number, b: Number) -> u64 {
     let (low, high) = if a < b { (a, b) } else { (b, a) };
-    low.first_key() | u64::from(high.raw())
+    low.key_with(high)
 }
 
 /// The lower number of a pair.

@@ -144,6 +144,7 @@ impl Settler {
         [group_a, group_b]: [&Group; 2],
         met: &Met,
     ) {
+        let (cluster_a, cluster_b) = (item.cluster_a, item.cluster_b);
         let in_tables = group_a.in_tables && group_b.in_tables;
         let (body_a, body_b) = (world.body(item.a), world.body(item.b));
         for first in (0..met.len()).step_by(BATCH) {
@@ -157,7 +158,7 @@ impl Settler {
             };
             let places = |lane: usize| {
                 let [lane_a, lane_b] = batch.map(|lanes| u32::from(lanes[lane]));
-                (item.cluster_a.place(lane_a), item.cluster_b.place(lane_b))
+                (cluster_a.place(lane_a), cluster_b.place(lane_b))
             };
             for lane in Lanes(u64::from(verdict.yes) & lanes) {
                 let (place_a, place_b) = places(lane);

@@ -192,20 +192,20 @@ impl Loaded {
     ) {
         let positions = frame.body(scene, layer).positions();
         // Where each vertex of the body is on the device.
-        let mut places = vec![u32::MAX; positions.len()];
+        let mut on_device = vec![u32::MAX; positions.len()];
         for run in runs {
             for cluster in ClusterIx::each(run.clusters.clone()) {
                 for &vertex in clustering.vertices(cluster) {
-                    places[vertex as usize] = 0;
+                    on_device[vertex as usize] = 0;
                 }
             }
         }
         let mut next = (self.words.len() / 3) as u32;
-        for (vertex, place) in places.iter_mut().enumerate() {
-            if *place == u32::MAX {
+        for (vertex, on_device) in on_device.iter_mut().enumerate() {
+            if *on_device == u32::MAX {
                 continue;
             }
-            *place = next;
+            *on_device = next;
             next += 1;
             match positions {
                 Positions::F32(positions) => self.words.extend(positions[vertex].map(f32::to_bits)),
@@ -220,7 +220,7 @@ impl Loaded {
         for run in runs {
             self.topology
                 .push(clustering, run.clusters.clone(), first, body, |vertex| {
-                    places[vertex as usize]
+                    on_device[vertex as usize]
                 });
             self.shapes.push(Shape::new(run.clusters.len()));
         }

@@ -21,14 +21,14 @@ pub struct Topology {
 
 impl Topology {
     /// Appends a run of clusters of a body whose first primitive has the global number `first`. `body`: its
-    /// number on the device; `place`: where each of its vertices is on the device.
+    /// number on the device; `on_device`: where each of its vertices is there.
     pub fn push(
         &mut self,
         clustering: &Clustering,
         clusters: Range<usize>,
         first: Number,
         body: u32,
-        place: impl Fn(u32) -> u32,
+        on_device: impl Fn(u32) -> u32,
     ) {
         let begin = (clusters.start * GROUP).min(clustering.order.len());
         let places = begin..(clusters.end * GROUP).min(clustering.order.len());
@@ -43,7 +43,7 @@ impl Topology {
                 body,
             });
             let vertices = vertices.iter().map(|&vertex| ClusterVertex {
-                vertex: place(vertex),
+                vertex: on_device(vertex),
             });
             self.cluster_vertices.extend(vertices);
         }
@@ -51,7 +51,7 @@ impl Topology {
         self.has_solids |= is_solid && !places.is_empty();
         // Edges and points become degenerate triangles.
         let corners = places.clone().map(|ix| Corners {
-            vertices: clustering.corners.four_corners(ix).map(&place),
+            vertices: clustering.corners.four_corners(ix).map(&on_device),
         });
         self.corners.extend(corners);
         let order = clustering.order[places].iter();

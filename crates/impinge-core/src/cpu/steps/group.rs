@@ -65,10 +65,10 @@ impl<'a> Kept<World<'a>> for Group {
                 lanes.0[self.size..].fill(of_first);
             }
         });
-        let held = world.frame.layer(layer);
+        let first = world.frame.layer(layer).first;
         let elements = clustering.primitives(cluster);
         for (number, &element) in self.numbers.0.iter_mut().zip(elements) {
-            *number = held.number(element).raw();
+            *number = first.plus(element).raw();
         }
         if let (Positions::F32(start), Positions::F32(end)) = (start, end.unwrap_or(start)) {
             self.in_tables = true;

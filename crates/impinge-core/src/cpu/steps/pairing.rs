@@ -266,11 +266,11 @@ fn lanes_with_lower(
     [low, high]: [Number; 2],
 ) -> Option<[u64; 2]> {
     let lanes = |layer: LayerIx, cluster: ClusterIx, [low, high]: [Number; 2]| {
-        let held = world.frame.layer(layer);
+        let first = world.frame.layer(layer).first;
         let elements = world.cache(layer).clustering.primitives(cluster);
         let mut are_in = [0u8; GROUP];
         for (is_in, &element) in are_in.iter_mut().zip(elements) {
-            let number = held.number(element);
+            let number = first.plus(element);
             *is_in = u8::from(low <= number && number <= high);
         }
         // The product has the lowest bits of eight bytes in its highest byte.
