@@ -82,7 +82,7 @@ impl Pairs {
         self.keys.iter().map(|&key| self.pair(key))
     }
 
-    /// One pair by its place in that order.
+    /// One pair by its index in that order.
     pub fn get(&self, ix: usize) -> Option<(Primitive, Primitive)> {
         self.keys.get(ix).map(|&key| self.pair(key))
     }

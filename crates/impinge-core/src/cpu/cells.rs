@@ -91,7 +91,7 @@ pub struct Cells {
     reaching: KeptList,
     /// Where each cell's list starts, and one past the last.
     starts: Vec<u32>,
-    /// The cell lists: places in `kept`, ascending within a cell, so that those of one body are together.
+    /// The cell lists: indices in `kept`, ascending within a cell, so that those of one body are together.
     entries: Vec<u32>,
     items: Vec<CellItem>,
     scratches: Vec<Settler>,
@@ -261,13 +261,13 @@ impl Cells {
             grid = coarser;
             stats.n_reruns += 1;
         }
-        // Counts go two places past the cell's own: the prefix sum moves them back by one, and so does the scatter.
+        // Counts go two entries past the cell's own: the prefix sum moves them back by one, and so does the scatter.
         let n_starts = grid.n_cells() as usize + 2;
         self.starts.clear();
         self.starts.reserve_exact(n_starts);
         self.starts.resize(n_starts, 0);
         for kept in &self.reaching.kept {
-            for_places(&grid, &kept.range, |cell| self.starts[cell + 2] += 1);
+            for_indices(&grid, &kept.range, |cell| self.starts[cell + 2] += 1);
         }
         let mut n_entries = 0;
         for start in &mut self.starts {
@@ -277,10 +277,10 @@ impl Cells {
         self.entries.clear();
         self.entries.reserve_exact(n_entries as usize);
         self.entries.resize(n_entries as usize, 0);
-        for (place, kept) in (0u32..).zip(&self.reaching.kept) {
-            for_places(&grid, &kept.range, |cell| {
+        for (ix, kept) in (0u32..).zip(&self.reaching.kept) {
+            for_indices(&grid, &kept.range, |cell| {
                 let next = &mut self.starts[cell + 1];
-                self.entries[*next as usize] = place;
+                self.entries[*next as usize] = ix;
                 *next += 1;
             });
         }
@@ -401,9 +401,9 @@ pub fn for_cells(range: &FineRange, mut call: impl FnMut([u32; 3])) {
     }
 }
 
-/// As [`for_cells`], with the cells' places in the linear array.
+/// As [`for_cells`], with the cells' indices in the linear array.
 #[inline(always)]
-fn for_places(grid: &Grid, range: &FineRange, mut call: impl FnMut(usize)) {
+fn for_indices(grid: &Grid, range: &FineRange, mut call: impl FnMut(usize)) {
     let (lo, hi) = range.coarse();
     for z in lo[2]..=hi[2] {
         for y in lo[1]..=hi[1] {
@@ -459,7 +459,7 @@ impl Lists<'_> {
         Ok(())
     }
 
-    /// The layer at a place of a list, and the run of its entries from there on.
+    /// The layer of an entry of a list, and the run of its entries from there on.
     fn run(&self, start: usize, end: usize) -> (LayerIx, std::ops::Range<usize>) {
         let owner = |entry: u32| self.kept[entry as usize].layer;
         let layer = owner(self.entries[start]);

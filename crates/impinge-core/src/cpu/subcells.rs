@@ -31,7 +31,7 @@ pub struct Asked {
     pub adjacent: bool,
 }
 
-/// Two groups of one cell: places in `kept`.
+/// Two groups of one cell: indices in `kept`.
 #[derive(Clone, Copy)]
 pub(crate) struct GroupPair<'a> {
     pub kept: &'a [Kept],

@@ -66,8 +66,8 @@ impl TopLevel {
                 number: layer.raw(),
             }));
             order(&self.shape, 1, None, &mut self.entries);
-            for (place, entry) in self.entries.iter().enumerate() {
-                self.order[place] = LayerIx::new(entry.number);
+            for (layer, entry) in self.order.iter_mut().zip(&self.entries) {
+                *layer = LayerIx::new(entry.number);
             }
             self.refit_boxes(&root);
             self.fit = Fit::UNKNOWN;
@@ -76,8 +76,8 @@ impl TopLevel {
     }
 
     fn refit_boxes(&mut self, root: &impl Fn(LayerIx) -> Bounds) {
-        for (place, &layer) in self.order.iter().enumerate() {
-            self.bounds.levels[0].put(place, &root(layer));
+        for (leaf, &layer) in self.order.iter().enumerate() {
+            self.bounds.levels[0].put(leaf, &root(layer));
         }
         self.bounds.refit_above(0, &self.shape);
     }

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use super::layout::{Body, Cluster, ClusterVertex, Coordinate, Corners, Node, Order};
 use crate::elements::Kind;
-use crate::grouping::GROUP;
 use crate::grouping::clusters::Clustering;
 use crate::index::{ClusterIx, Number};
 
@@ -30,11 +29,10 @@ impl Topology {
         body: u32,
         on_device: impl Fn(u32) -> u32,
     ) {
-        let begin = (clusters.start * GROUP).min(clustering.order.len());
-        let places = begin..(clusters.end * GROUP).min(clustering.order.len());
+        let places = clustering.places_of_run(&clusters);
         for cluster in ClusterIx::each(clusters) {
             let vertices = clustering.vertices(cluster);
-            let first_place = self.corners.len() + cluster.place(0).index() - begin;
+            let first_place = self.corners.len() + cluster.place(0).index() - places.start;
             self.clusters.push(Cluster {
                 // Places and vertices fit 32 bits: the caller has checked the sizes.
                 first_place: first_place as u32,

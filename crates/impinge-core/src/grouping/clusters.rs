@@ -136,6 +136,13 @@ impl Clustering {
         cluster.places(self.order.len())
     }
 
+    /// The places of the primitives of a run of clusters.
+    #[cfg(feature = "gpu")]
+    pub fn places_of_run(&self, run: &Range<usize>) -> Range<usize> {
+        let n = self.order.len();
+        n.min(run.start * GROUP)..n.min(run.end * GROUP)
+    }
+
     /// The primitives of a cluster.
     #[inline(always)]
     pub fn primitives(&self, cluster: ClusterIx) -> &[ElementIx] {

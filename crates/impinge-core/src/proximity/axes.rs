@@ -68,8 +68,8 @@ fn unit(p: Point) -> Option<Point> {
 #[derive(Debug)]
 pub(super) struct View {
     pub axes: Axes,
-    /// Where each cluster's box is, for either body; [`UNKNOWN`] before it is asked for.
-    places: [Vec<u32>; 2],
+    /// Which of the boxes is that of each cluster, for either body; [`UNKNOWN`] before it is asked for.
+    box_ixs: [Vec<u32>; 2],
     boxes: Vec<Box64>,
 }
 
@@ -79,7 +79,7 @@ impl View {
     pub fn new(axes: Axes, trees: [&Tree; 2]) -> Self {
         View {
             axes,
-            places: trees.map(|tree| vec![UNKNOWN; tree.clustering.n_clusters()]),
+            box_ixs: trees.map(|tree| vec![UNKNOWN; tree.clustering.n_clusters()]),
             boxes: Vec::new(),
         }
     }
@@ -87,9 +87,7 @@ impl View {
     /// Looks along other axes; the memory is kept.
     pub fn turn_to(&mut self, axes: Axes) {
         self.axes = axes;
-        self.places
-            .iter_mut()
-            .for_each(|places| places.fill(UNKNOWN));
+        self.box_ixs.iter_mut().for_each(|ixs| ixs.fill(UNKNOWN));
         self.boxes.clear();
     }
 
@@ -98,16 +96,16 @@ impl View {
         if node.level > 0 {
             return self.axes.turn_box(&tree.bounds(node));
         }
-        let place = &mut self.places[side][node.number as usize];
-        if *place == UNKNOWN {
-            *place = self.boxes.len() as u32;
+        let ix = &mut self.box_ixs[side][node.number as usize];
+        if *ix == UNKNOWN {
+            *ix = self.boxes.len() as u32;
             let mut found = Box64::EMPTY;
             for &vertex in tree.clustering.vertices(ClusterIx::new(node.number)) {
                 found.cover(self.axes.turn(body.positions().point(vertex as usize)));
             }
             self.boxes.push(found);
         }
-        self.boxes[*place as usize]
+        self.boxes[*ix as usize]
     }
 }
 
