@@ -16,6 +16,8 @@ use crate::hull;
 #[cfg(feature = "gpu")]
 use crate::ids::BodyId;
 #[cfg(feature = "gpu")]
+use crate::index::ClusterIx;
+#[cfg(feature = "gpu")]
 use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::{Body, Scene};
@@ -141,14 +143,14 @@ impl<T: Kept, const PARTS: usize> Store<T, PARTS> {
                 }
             }
         }
-        for (ix, layer) in frame.layers.iter().enumerate() {
+        for (ix, layer) in frame.numbered_layers() {
             let body = frame.body(scene, ix);
             let kept = &mut self.slots[layer.id.index()][Self::ix(layer.part)];
             let known = kept.as_mut();
             let known = known.filter(|kept| kept.topology_stamp() == body.topology_stamp());
             let was_known = known.is_some();
             if known.is_none_or(|kept| is_stale(kept, layer, body)) {
-                control.step(ix as u64, frame.layers.len() as u64)?;
+                control.step(ix.raw().into(), frame.layers.len() as u64)?;
                 let n_elements = body.part(layer.part).len();
                 let made = workers.install(n_elements, || make(body, layer))?;
                 *kept = Some(Box::new(made));
@@ -222,8 +224,8 @@ pub(crate) fn sampled_spread(clustering: &Clustering, positions: &Positions) -> 
     let mut whole = Bounds::EMPTY;
     let mut sum = 0.0;
     for sample in 0..n_samples {
-        let vertices = clustering.vertices(sample * n / n_samples);
-        let bounds = hull::of_vertices(positions, vertices);
+        let cluster = ClusterIx::from_usize(sample * n / n_samples);
+        let bounds = hull::of_vertices(positions, clustering.vertices(cluster));
         sum += bounds.half_area();
         whole.join(&bounds);
     }

@@ -15,12 +15,15 @@
 //! ```
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use crate::elements::{Kind, Part};
 use crate::error::Error;
 use crate::exact::Reach;
 use crate::hull::Extent;
 use crate::ids::BodyId;
+pub use crate::index::pair_key;
+use crate::index::{ElementIx, LayerIx, Number, pair_numbers};
 use crate::pair_kind::{PairKind, PairKinds};
 use crate::positions::{Positions, check_positions};
 use crate::query::{Cell, Query, Scope, SharedVertex};
@@ -34,7 +37,7 @@ pub struct Layer {
     /// Which of its elements.
     pub part: Part,
     /// Global number of its first element.
-    pub first: u32,
+    pub first: Number,
     /// How many numbers its elements take up. Vertices are numbered as positions are, whether they take part or not.
     pub n_primitives: u32,
     /// The kind of its elements.
@@ -48,6 +51,25 @@ pub struct Layer {
     filter: Filter,
     /// How thick the body is: what its elements add to the distance that is asked.
     radius: f64,
+}
+
+impl Layer {
+    /// The global number of an element.
+    #[inline(always)]
+    pub fn number(&self, element: ElementIx) -> Number {
+        self.first.plus(element)
+    }
+
+    /// The element that has a global number.
+    #[inline(always)]
+    pub fn element(&self, number: Number) -> ElementIx {
+        number.minus(self.first)
+    }
+
+    /// The global numbers of its elements.
+    pub fn numbers(&self) -> Range<Number> {
+        self.first..self.number(ElementIx::new(self.n_primitives))
+    }
 }
 
 /// The question about pairs of elements.
@@ -162,20 +184,17 @@ impl Frame {
 
     #[inline(never)]
     fn is_in_cell(&self, scene: &Scene, key: u64, cell: Cell) -> bool {
-        let [a, b] =
-            [(key >> 32) as u32, key as u32].map(|number| self.lower_corner(scene, number));
+        let [a, b] = pair_numbers(key).map(|number| self.lower_corner(scene, number));
         cell.holds(std::array::from_fn(|axis| a[axis].max(b[axis])))
     }
 
     /// The lower corner of the box of an element: over the whole step, if the question is about one.
-    fn lower_corner(&self, scene: &Scene, number: u32) -> [f64; 3] {
-        let layer = self.owner(number);
+    fn lower_corner(&self, scene: &Scene, number: Number) -> [f64; 3] {
+        let (layer, element) = self.locate(number);
         let body = self.body(scene, layer);
-        let Layer { part, first, .. } = self.layers[layer];
-        let element = number - first;
-        let corners = match part {
-            Part::Vertices => &[element][..],
-            _ => body.part(part).corners(element as usize),
+        let corners = match self.layer(layer).part {
+            Part::Vertices => element.as_corners(),
+            part => body.part(part).corners(element.index()),
         };
         let end = body.end_positions().filter(|_| self.is_step);
         let ends = std::iter::once(body.positions()).chain(end);
@@ -202,15 +221,15 @@ impl Frame {
     }
 
     /// Within which distance elements of two layers are near.
-    pub(crate) fn reach(&self, a_ix: usize, b_ix: usize) -> Reach {
-        let [a, b] = [a_ix, b_ix].map(|ix| self.layers[ix].radius);
+    pub(crate) fn reach(&self, a: LayerIx, b: LayerIx) -> Reach {
+        let [a, b] = [a, b].map(|layer| self.layer(layer).radius);
         Reach::of_sum([self.distance, a, b])
     }
 
     /// How far the boxes of a layer must reach beyond its elements, so that those of near elements overlap: those of two
     /// layers reach at least as far together as their elements may be apart.
-    pub(crate) fn margin(&self, ix: usize) -> f64 {
-        let radius = self.layers[ix].radius;
+    pub(crate) fn margin(&self, layer: LayerIx) -> f64 {
+        let radius = self.layer(layer).radius;
         match (self.distance, radius) {
             (0.0, radius) => radius,
             (distance, radius) => (radius + (distance / 2.0).next_up()).next_up(),
@@ -241,16 +260,17 @@ impl Frame {
 
     /// Refuses positions that were written in place and are not finite or out of range.
     pub fn check(&self, scene: &Scene) -> Result<(), Error> {
-        (0..self.layers.len()).try_for_each(|ix| self.check_one(scene, ix))
+        self.layer_ixs()
+            .try_for_each(|layer| self.check_one(scene, layer))
     }
 
-    /// As [`check`](Frame::check), for one participant.
-    pub fn check_one(&self, scene: &Scene, participant_ix: usize) -> Result<(), Error> {
-        let body = self.body(scene, participant_ix);
+    /// As [`check`](Frame::check), for one layer.
+    pub fn check_one(&self, scene: &Scene, layer: LayerIx) -> Result<(), Error> {
+        let body = self.body(scene, layer);
         if body.is_checked() {
             return Ok(());
         }
-        let id = self.layers[participant_ix].id;
+        let id = self.layer(layer).id;
         match body.positions() {
             Positions::F32(positions) => check_positions(id, positions),
             Positions::F64(positions) => check_positions(id, positions),
@@ -286,7 +306,7 @@ impl Frame {
         self.layers.push(Layer {
             id,
             part,
-            first: first as u32,
+            first: Number::new(first as u32),
             n_primitives: n as u32,
             kind: elements.kind(),
             is_bare: body.kind() < Kind::Triangles,
@@ -300,9 +320,9 @@ impl Frame {
 
     /// The number of elements of all layers together.
     pub fn n_primitives(&self) -> u64 {
-        self.layers.last().map_or(0, |last| {
-            u64::from(last.first) + u64::from(last.n_primitives)
-        })
+        self.layers
+            .last()
+            .map_or(0, |last| u64::from(last.numbers().end.raw()))
     }
 
     /// Asks about some kinds of candidates only, of those that the frame was resolved for.
@@ -317,8 +337,8 @@ impl Frame {
 
     /// The test for pairs of elements of two layers, or of one with itself; `None` if no pair of them is wanted.
     #[inline]
-    pub fn test(&self, a_ix: usize, b_ix: usize) -> Option<TestId> {
-        let (a, b) = (&self.layers[a_ix], &self.layers[b_ix]);
+    pub fn test(&self, a: LayerIx, b: LayerIx) -> Option<TestId> {
+        let (a, b) = (self.layer(a), self.layer(b));
         let is_asked = if a.id == b.id {
             a.within
         } else {
@@ -353,10 +373,10 @@ impl Frame {
                 || !self.ignored.contains(&(a.id.min(b.id), a.id.max(b.id))))
     }
 
-    /// The filter of a participant.
+    /// The filter of a layer.
     #[cfg(feature = "gpu")]
-    pub fn filter(&self, participant_ix: usize) -> Filter {
-        self.layers[participant_ix].filter
+    pub fn filter(&self, layer: LayerIx) -> Filter {
+        self.layer(layer).filter
     }
 
     /// Whether pairs of different bodies are wanted.
@@ -373,11 +393,10 @@ impl Frame {
 
     /// Pairs of layers, lower first and sorted, that do not meet whatever their filters say.
     #[cfg(feature = "gpu")]
-    pub fn ignored_pairs(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+    pub fn ignored_pairs(&self) -> impl Iterator<Item = (LayerIx, LayerIx)> + '_ {
         let find = |id: BodyId| {
-            self.layers
-                .binary_search_by_key(&id, |participant| participant.id)
-                .ok()
+            let found = self.layers.binary_search_by_key(&id, |layer| layer.id);
+            found.ok().map(LayerIx::from_usize)
         };
         self.ignored
             .iter()
@@ -389,43 +408,58 @@ impl Frame {
     pub(crate) fn elements<'a>(
         &self,
         scene: &'a Scene,
-        layer_ix: usize,
-    ) -> impl Iterator<Item = (u32, &'a [u32])> + use<'a> {
-        let Layer { part, first, .. } = self.layers[layer_ix];
-        let elements = self.body(scene, layer_ix).part(part);
-        (0..elements.len()).map(move |ix| {
-            let corners = elements.corners(ix);
-            let number = match part {
-                Part::Vertices => corners[0],
-                _ => ix as u32,
+        layer: LayerIx,
+    ) -> impl Iterator<Item = (Number, &'a [u32])> + use<'a> {
+        let Layer { part, first, .. } = *self.layer(layer);
+        let elements = self.body(scene, layer).part(part);
+        ElementIx::up_to(elements.len()).map(move |ix| {
+            let corners = elements.corners(ix.index());
+            let element = match part {
+                // Vertices are numbered as positions are.
+                Part::Vertices => ElementIx::new(corners[0]),
+                _ => ix,
             };
-            (first + number, corners)
+            (first.plus(element), corners)
         })
+    }
+
+    /// All layers, by their indices.
+    pub fn layer_ixs(&self) -> impl ExactSizeIterator<Item = LayerIx> + Clone + use<> {
+        LayerIx::up_to(self.layers.len())
+    }
+
+    /// All layers, with their indices.
+    pub fn numbered_layers(&self) -> impl ExactSizeIterator<Item = (LayerIx, &Layer)> + Clone {
+        self.layer_ixs().zip(&self.layers)
+    }
+
+    /// A layer.
+    #[inline(always)]
+    pub fn layer(&self, layer: LayerIx) -> &Layer {
+        &self.layers[layer.index()]
     }
 
     /// The body of a layer.
     #[inline]
-    pub fn body<'a>(&self, scene: &'a Scene, participant_ix: usize) -> &'a Body {
-        scene.body_in(self.layers[participant_ix].id.slot())
+    pub fn body<'a>(&self, scene: &'a Scene, layer: LayerIx) -> &'a Body {
+        scene.body_in(self.layer(layer).id.slot())
     }
 
-    /// The layer that a global primitive number belongs to.
+    /// The layer and the element that a global number belongs to.
     #[inline]
-    pub fn owner(&self, global: u32) -> usize {
-        owner_by_first(&self.layers, global, |participant| participant.first)
+    pub fn locate(&self, number: Number) -> (LayerIx, ElementIx) {
+        let ix = owner_by_first(&self.layers, number, |layer| layer.first);
+        (LayerIx::from_usize(ix), self.layers[ix].element(number))
     }
 }
 
-/// Index of the last entry whose `first` is at most `global`. Empty bodies share the `first`
-/// of their successor; the last one of the run is the one that holds the primitive.
+/// Index of the last entry whose `first` is at most `number`. Empty layers share the `first`
+/// of their successor; the last one of the run is the one that holds the element.
 #[inline]
-pub(crate) fn owner_by_first<T>(entries: &[T], global: u32, first: impl Fn(&T) -> u32) -> usize {
-    entries.partition_point(|entry| first(entry) <= global) - 1
-}
-
-/// The key of a pair of global primitive numbers, lower number first.
-#[inline(always)]
-pub fn pair_key(a: u32, b: u32) -> u64 {
-    let (low, high) = if a < b { (a, b) } else { (b, a) };
-    u64::from(low) << 32 | u64::from(high)
+pub(crate) fn owner_by_first<T, N: Ord>(
+    entries: &[T],
+    number: N,
+    first: impl Fn(&T) -> N,
+) -> usize {
+    entries.partition_point(|entry| first(entry) <= number) - 1
 }

@@ -20,6 +20,7 @@ use crate::elements::{Elements, with_corners};
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, LaneBounds, greater, lesser, round_down, round_up};
 use crate::grouping::clusters::Clustering;
+use crate::index::ClusterIx;
 use crate::positions::Positions;
 use crate::scene::Body;
 
@@ -73,7 +74,7 @@ pub(crate) fn of_cluster<S: ReadVertices>(
     simd: S,
     positions: &Positions,
     clustering: &Clustering,
-    cluster: usize,
+    cluster: ClusterIx,
 ) -> (Bounds, bool) {
     let vertices = clustering.vertices(cluster);
     match positions {
@@ -145,7 +146,7 @@ impl<'a> Hull<'a> {
         &self,
         simd: S,
         clustering: &Clustering,
-        cluster: usize,
+        cluster: ClusterIx,
     ) -> [Bounds; 2] {
         let (start, _) = of_cluster(simd, self.start, clustering, cluster);
         let end = match self.end {
@@ -165,7 +166,7 @@ impl<'a> Hull<'a> {
     }
 
     /// Puts the boxes of a cluster's elements into lanes, by the corners of its elements; to be [closed](Self::close).
-    pub fn fill(&self, clustering: &Clustering, cluster: usize, boxes: [&mut LaneBounds; 2]) {
+    pub fn fill(&self, clustering: &Clustering, cluster: ClusterIx, boxes: [&mut LaneBounds; 2]) {
         let [start, end] = boxes;
         fill(self.start, clustering, cluster, start);
         match self.end {
@@ -185,10 +186,10 @@ impl<'a> Hull<'a> {
 pub(crate) fn fill(
     positions: &Positions,
     clustering: &Clustering,
-    cluster: usize,
+    cluster: ClusterIx,
     lanes: &mut LaneBounds,
 ) {
-    let places = cluster * GROUP..cluster * GROUP + clustering.size(cluster);
+    let places = clustering.places(cluster);
     with_corners!(&clustering.corners, |corners| of_elements(
         positions,
         &corners[places],

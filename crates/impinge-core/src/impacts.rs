@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::exact::Contact;
 use crate::frame::{Frame, owner_by_first};
 use crate::ids::BodyId;
+use crate::index::{Number, pair_numbers};
 use crate::key_ranges::{KeyRanges, Tally};
 use crate::pair_kind::PairKind;
 use crate::pairs::{Primitive, hash_row, mix};
@@ -110,7 +111,7 @@ impl Ending for StepAnswer<'_> {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Numbering {
     /// Bodies, and the first number of each of their layers.
-    layers: Vec<(BodyId, u32)>,
+    layers: Vec<(BodyId, Number)>,
 }
 
 impl Numbering {
@@ -120,11 +121,11 @@ impl Numbering {
         self.layers.extend(layers);
     }
 
-    fn name(&self, number: u32) -> Primitive {
+    fn name(&self, number: Number) -> Primitive {
         let (body, first) = self.layers[owner_by_first(&self.layers, number, |layer| layer.1)];
         Primitive {
             body,
-            primitive: number - first,
+            primitive: number.minus(first).raw(),
         }
     }
 
@@ -140,7 +141,8 @@ impl Numbering {
     }
 
     pub fn pair(&self, key: u64) -> (Primitive, Primitive) {
-        (self.name((key >> 32) as u32), self.name(key as u32))
+        let [a, b] = pair_numbers(key).map(|number| self.name(number));
+        (a, b)
     }
 }
 

@@ -15,7 +15,8 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::Error;
-use crate::frame::Frame;
+use crate::frame::{Frame, Layer};
+use crate::index::{Number, lower_number};
 use crate::pair_kind::{PairKind, PairKinds};
 use crate::sink;
 
@@ -35,13 +36,12 @@ impl KeyRanges {
             // The element that a kind names first has the lower number.
             let part = kind.parts()[0];
             let layers = frame.layers.iter().filter(|layer| layer.part == part);
-            let numbers = layers.map(|layer| {
-                let first = u64::from(layer.first);
-                first..first + u64::from(layer.n_primitives)
-            });
+            let numbers = layers.map(Layer::numbers);
             let joined = numbers.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end));
             match joined {
-                Some(numbers) if kinds.contains(kind) => numbers.start << 32..numbers.end << 32,
+                Some(Range { start, end }) if kinds.contains(kind) => {
+                    start.first_key()..end.first_key()
+                }
                 _ => 0..0,
             }
         }))
@@ -59,9 +59,9 @@ impl KeyRanges {
 
     /// The lowest and the highest lower number that a key of a kind may have; `None` if the kind has no keys.
     #[inline]
-    pub fn lower_numbers(&self, kind: PairKind) -> Option<[u32; 2]> {
+    pub fn lower_numbers(&self, kind: PairKind) -> Option<[Number; 2]> {
         let Range { start, end } = *self.of(kind);
-        (start < end).then(|| [start, end - 1].map(|key| (key >> 32) as u32))
+        (start < end).then(|| [start, end - 1].map(lower_number))
     }
 
     fn of(&self, kind: PairKind) -> &Range<u64> {
@@ -297,7 +297,7 @@ mod tests {
         assert_eq!(runs.len(), 1);
         assert_eq!(
             runs[0].ranges.lower_numbers(PairKind::EdgeEdge),
-            Some([0, 0])
+            Some([Number::new(0); 2])
         );
         assert_eq!(runs[0].ranges.lower_numbers(PairKind::VertexFace), None);
     }

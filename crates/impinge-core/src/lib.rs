@@ -24,6 +24,7 @@ pub mod host;
 mod hull;
 mod ids;
 mod impacts;
+pub mod index;
 mod key_ranges;
 mod naive;
 mod narrow;

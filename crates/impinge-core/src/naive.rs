@@ -6,6 +6,7 @@
 use crate::error::Error;
 use crate::frame::{Frame, TestId, pair_key};
 use crate::hull::Extent;
+use crate::index::Number;
 use crate::narrow::{Element, Test};
 use crate::progress::Control;
 use crate::scene::Scene;
@@ -45,8 +46,9 @@ fn elements<'a, T: Test>(
     test: &T,
     scene: &'a Scene,
     frame: &'a Frame,
-) -> Vec<(u32, Element<'a>, Extent)> {
-    (0..frame.layers.len())
+) -> Vec<(Number, Element<'a>, Extent)> {
+    frame
+        .layer_ixs()
         .flat_map(|layer| {
             frame.elements(scene, layer).map(move |(number, corners)| {
                 let element = Element {

@@ -1,8 +1,11 @@
 //! The answer: sorted pairs, colliding primitives, a hash, statistics.
 
+use std::ops::Range;
+
 use crate::elements::Kind;
 use crate::frame::{Frame, owner_by_first};
 use crate::ids::BodyId;
+use crate::index::{ElementIx, Number, lower_number, pair_numbers};
 use crate::stats::Statistics;
 
 /// One primitive of one body.
@@ -17,9 +20,13 @@ pub struct Primitive {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct PairBody {
     id: BodyId,
-    first: u32,
+    /// The global number of its first primitive.
+    first: Number,
     kind: Kind,
 }
+
+/// The numbers of no primitives.
+const NONE: Range<Number> = Number::new(0)..Number::new(0);
 
 /// Every pair that intersects, sorted by `(body_a, primitive_a, body_b, primitive_b)`, where
 /// `body_a < body_b`, or within one body `primitive_a < primitive_b`.
@@ -38,10 +45,10 @@ impl Pairs {
         self.keys.clear();
         self.bodies.clear();
         self.bodies
-            .extend(frame.layers.iter().map(|participant| PairBody {
-                id: participant.id,
-                first: participant.first,
-                kind: participant.kind,
+            .extend(frame.layers.iter().map(|layer| PairBody {
+                id: layer.id,
+                first: layer.first,
+                kind: layer.kind,
             }));
         self.stats.clear();
     }
@@ -72,49 +79,46 @@ impl Pairs {
 
     /// All pairs in order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (Primitive, Primitive)> + '_ {
-        self.keys.iter().map(|&key| {
-            (
-                self.primitive((key >> 32) as u32),
-                self.primitive(key as u32),
-            )
-        })
+        self.keys.iter().map(|&key| self.pair(key))
     }
 
-    /// One pair by its place in that order.
+    /// One pair by its index in that order.
     pub fn get(&self, ix: usize) -> Option<(Primitive, Primitive)> {
-        let key = *self.keys.get(ix)?;
-        Some((
-            self.primitive((key >> 32) as u32),
-            self.primitive(key as u32),
-        ))
+        self.keys.get(ix).map(|&key| self.pair(key))
     }
 
-    fn primitive(&self, global: u32) -> Primitive {
-        let body = self.bodies[owner_by_first(&self.bodies, global, |body| body.first)];
+    fn pair(&self, key: u64) -> (Primitive, Primitive) {
+        let [a, b] = pair_numbers(key).map(|number| self.primitive(number));
+        (a, b)
+    }
+
+    fn owner(&self, number: Number) -> &PairBody {
+        &self.bodies[owner_by_first(&self.bodies, number, |body| body.first)]
+    }
+
+    fn primitive(&self, number: Number) -> Primitive {
+        let body = self.owner(number);
         Primitive {
             body: body.id,
-            primitive: global - body.first,
+            primitive: number.minus(body.first).raw(),
         }
     }
 
     /// The range of global numbers of a body that took part.
-    fn numbers(&self, body: BodyId) -> Option<std::ops::Range<u64>> {
+    fn numbers(&self, body: BodyId) -> Option<Range<Number>> {
         let ix = self
             .bodies
             .binary_search_by_key(&body, |held| held.id)
             .ok()?;
-        let end = self
-            .bodies
-            .get(ix + 1)
-            .map_or(1 << 32, |next| u64::from(next.first));
-        Some(u64::from(self.bodies[ix].first)..end)
+        // No primitive has the highest number: there are fewer than 2^32.
+        let end = self.bodies.get(ix + 1).map(|next| next.first);
+        Some(self.bodies[ix].first..end.unwrap_or(Number::new(u32::MAX)))
     }
 
     /// The keys whose lower primitive belongs to the range.
-    fn run(&self, numbers: &std::ops::Range<u64>) -> &[u64] {
-        let start = self.keys.partition_point(|&key| key >> 32 < numbers.start);
-        let end = self.keys.partition_point(|&key| key >> 32 < numbers.end);
-        &self.keys[start..end]
+    fn run(&self, numbers: &Range<Number>) -> &[u64] {
+        let below = |end: Number| self.keys.partition_point(|&key| lower_number(key) < end);
+        &self.keys[below(numbers.start)..below(numbers.end)]
     }
 
     /// Pairs `(i, j)` of primitive `i` of `a` and primitive `j` of `b`, in the order in which they
@@ -124,12 +128,12 @@ impl Pairs {
         let (low, high) = if swapped { (b, a) } else { (a, b) };
         let (low, high) = match (self.numbers(low), self.numbers(high)) {
             (Some(low), Some(high)) if a != b => (low, high),
-            _ => (0..0, 0..0),
+            _ => (NONE, NONE),
         };
         self.run(&low).iter().filter_map(move |&key| {
-            let j = key & u64::from(u32::MAX);
+            let [i, j] = pair_numbers(key);
             high.contains(&j).then(|| {
-                let (i, j) = (((key >> 32) - low.start) as u32, (j - high.start) as u32);
+                let (i, j) = (i.minus(low.start).raw(), j.minus(high.start).raw());
                 if swapped { (j, i) } else { (i, j) }
             })
         })
@@ -137,15 +141,11 @@ impl Pairs {
 
     /// Pairs `(i, j)`, `i < j`, of primitives of one body.
     pub fn within(&self, body: BodyId) -> impl Iterator<Item = (u32, u32)> + '_ {
-        let numbers = self.numbers(body).unwrap_or(0..0);
+        let numbers = self.numbers(body).unwrap_or(NONE);
         self.run(&numbers).iter().filter_map(move |&key| {
-            let j = key & u64::from(u32::MAX);
-            numbers.contains(&j).then(|| {
-                (
-                    ((key >> 32) - numbers.start) as u32,
-                    (j - numbers.start) as u32,
-                )
-            })
+            let [i, j] = pair_numbers(key);
+            let local = |number: Number| number.minus(numbers.start).raw();
+            numbers.contains(&j).then(|| (local(i), local(j)))
         })
     }
 
@@ -169,14 +169,10 @@ impl Pairs {
         };
         // One bit per primitive: pairs may be many more than primitives.
         let mut words: Vec<u64> = Vec::new();
-        for global in self
-            .keys
-            .iter()
-            .flat_map(|&key| [key >> 32, key & u64::from(u32::MAX)])
-        {
-            if numbers.contains(&global) {
-                let primitive = global - numbers.start;
-                let word = (primitive / 64) as usize;
+        for number in self.keys.iter().flat_map(|&key| pair_numbers(key)) {
+            if numbers.contains(&number) {
+                let primitive = number.minus(numbers.start).index();
+                let word = primitive / 64;
                 if word >= words.len() {
                     words.resize(word + 1, 0);
                 }
@@ -197,17 +193,16 @@ impl Pairs {
     /// The primitives of each body that take part in any pair, found in one pass: sorted, each once. Bodies come in order;
     /// bodies without such a primitive are left out.
     pub fn all_colliding(&self) -> Vec<(BodyId, Vec<u32>)> {
-        let both = |&key: &u64| [(key >> 32) as u32, key as u32];
-        let mut colliding: Vec<u32> = self.keys.iter().flat_map(both).collect();
+        let numbers = self.keys.iter().flat_map(|&key| pair_numbers(key));
+        let mut colliding: Vec<Number> = numbers.collect();
         colliding.sort_unstable();
         colliding.dedup();
-        let owner = |number: u32| owner_by_first(&self.bodies, number, |body| body.first);
         colliding
-            .chunk_by(|&a, &b| owner(a) == owner(b))
+            .chunk_by(|&a, &b| self.owner(a).id == self.owner(b).id)
             .map(|numbers| {
-                let body = self.bodies[owner(numbers[0])];
-                let local = numbers.iter().map(|number| number - body.first);
-                (body.id, local.collect())
+                let body = self.owner(numbers[0]);
+                let local = numbers.iter().map(|number| number.minus(body.first));
+                (body.id, local.map(ElementIx::raw).collect())
             })
             .collect()
     }
@@ -233,8 +228,8 @@ impl Pairs {
     pub fn retain(&mut self, mut keep: impl FnMut(Primitive, Primitive) -> bool) {
         let mut keys = std::mem::take(&mut self.keys);
         keys.retain(|&key| {
-            let a = self.primitive((key >> 32) as u32);
-            keep(a, self.primitive(key as u32))
+            let (a, b) = self.pair(key);
+            keep(a, b)
         });
         self.keys = keys;
     }

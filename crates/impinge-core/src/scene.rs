@@ -8,6 +8,7 @@ use crate::elements::{Part, Topology};
 use crate::error::Error;
 pub(crate) use crate::ids::BodyId;
 use crate::ids::new_stamp;
+use crate::index::ElementIx;
 use crate::positions::Real;
 pub(crate) use crate::positions::{Positions, check_positions};
 use crate::transform::{Affine, Motion};
@@ -68,6 +69,15 @@ impl Body {
     /// topology. Their numbers depend on the given elements alone.
     pub fn part(&self, part: Part) -> &Elements {
         self.topology.part(part)
+    }
+
+    /// The corners of an element of a part.
+    pub(crate) fn corners<'a>(&'a self, part: Part, element: &'a ElementIx) -> &'a [u32] {
+        match part {
+            // Vertices are numbered as positions are.
+            Part::Vertices => element.as_corners(),
+            _ => self.part(part).corners(element.index()),
+        }
     }
 
     /// The current positions: where a step starts.
@@ -562,7 +572,7 @@ impl Scene {
     #[inline]
     pub(crate) fn body_in(&self, slot: u32) -> &Body {
         let held = self.slots[slot as usize].0.as_ref();
-        &held.expect("a participant's slot is in use").1
+        &held.expect("a layer's slot is in use").1
     }
 }
 

@@ -15,6 +15,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::error::Error;
+use crate::index::{Number, lower_number, pair_numbers};
 use crate::settings::Settings;
 use crate::sink;
 use crate::workers::Workers;
@@ -73,7 +74,7 @@ impl Sorter {
         let n_each = keys.len().div_ceil(n_parts);
         for_each_part(workers, parts, keys, n_each, |counts, keys| {
             for key in keys {
-                counts[(key >> 32) as usize] += 1;
+                counts[lower_number(*key).index()] += 1;
             }
         });
         let mut next = 0;
@@ -84,8 +85,9 @@ impl Sorter {
         }
         for_each_part(workers, parts, keys, n_each, |places, keys| {
             for key in keys {
-                let place = &mut places[(key >> 32) as usize];
-                partners[*place as usize].store(*key as u32, Ordering::Relaxed);
+                let [lower, partner] = pair_numbers(*key);
+                let place = &mut places[lower.index()];
+                partners[*place as usize].store(partner.raw(), Ordering::Relaxed);
                 *place += 1;
             }
         });
@@ -174,7 +176,8 @@ impl Task<'_> {
         // Of the keys before this task.
         let offset = self.ends[self.ends.len() - 1] as usize - n;
         let mut start = 0;
-        for (lower, &end) in (self.first as u64..).zip(self.ends) {
+        let numbers = Number::each(self.first..self.first + self.ends.len());
+        for (lower, &end) in numbers.zip(self.ends) {
             let run = start..end as usize - offset;
             start = run.end;
             sorted.clear();
@@ -186,7 +189,7 @@ impl Task<'_> {
             );
             sorted.sort_unstable();
             for (key, &partner) in self.keys[run].iter_mut().zip(&*sorted) {
-                *key = lower << 32 | u64::from(partner);
+                *key = lower.key_with(Number::new(partner));
             }
         }
     }

@@ -464,7 +464,12 @@ impl Detector {
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<bool> {
-        let ask = step([between, within, ignore, owned_by], start, Toi::F32, separation)?;
+        let ask = step(
+            [between, within, ignore, owned_by],
+            start,
+            Toi::F32,
+            separation,
+        )?;
         let watched = (scene, progress, cancel);
         let answer = impinge::Detector::is_free_with;
         Ok(Detector::watched(slf, watched, ask, answer)?.0)

@@ -219,7 +219,7 @@ impl Method {
             .resize_with(n_tasks.max(self.parts.len()), Mutex::default);
         // Kept primitives of the first body come first.
         let kept = &self.reaching.kept;
-        let first_of_b = kept.partition_point(|kept| kept.participant == 0) as u64;
+        let first_of_b = kept.partition_point(|kept| kept.layer.index() == 0) as u64;
         let parts = &self.parts;
         let cell = |ix: usize| entries[ix] >> 32;
         job.workers

@@ -133,10 +133,10 @@ impl Scratch {
             return;
         }
         self.settler.push(Candidate {
-            a: a.participant,
-            b: b.participant,
-            place_a: a.primitive,
-            place_b: b.primitive,
+            a: a.layer,
+            b: b.layer,
+            place_a: a.place(),
+            place_b: b.place(),
         });
     }
 }

@@ -6,13 +6,14 @@
 
 use rayon::prelude::*;
 
-use super::coordinates::{Place, Precision};
+use super::coordinates::{Definition, Precision};
 use super::meet::{Local, ends, meet};
-use super::{Contacts, Feature, PointName, Shape};
+use super::{Contacts, Doubles, Feature, PointName, Shape, lowest};
 use crate::elements::{Elements, Kind};
 use crate::error::Error;
 use crate::exact::Point;
 use crate::ids::BodyId;
+use crate::index::VertexIx;
 use crate::pairs::Pairs;
 use crate::positions::{Positions, check_positions};
 use crate::scene::{Body, Scene};
@@ -72,7 +73,9 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> 
     let mut points: Vec<[f64; 3]> = sink::filled([0.0; 3], names.len(), WHAT)?;
     let places = names.par_iter().zip(&mut points).with_min_len(CHUNK);
     places.for_each(|(name, point)| {
-        *point = bodies.place(name).rounded(bodies.precision(name.bodies));
+        *point = bodies
+            .definition(name)
+            .rounded(bodies.precision(name.bodies));
     });
 
     let mut contacts = Contacts {
@@ -154,16 +157,16 @@ impl Met {
 /// A triangle and the names of its features.
 struct Triangle {
     points: [Point; 3],
-    vertices: [u32; 3],
+    vertices: [VertexIx; 3],
     face: u32,
 }
 
 impl Triangle {
     fn feature(&self, local: Local) -> Feature {
         match local {
-            Local::Vertex(corner) => Feature::Vertex(self.vertices[corner]),
+            Local::Vertex(corner) => Feature::Vertex(self.vertices[corner].raw()),
             Local::Edge(edge) => {
-                let mut vertices = ends(edge).map(|corner| self.vertices[corner]);
+                let mut vertices = ends(edge).map(|corner| self.vertices[corner].raw());
                 vertices.sort_unstable();
                 Feature::Edge(vertices)
             }
@@ -179,9 +182,8 @@ struct Bodies<'a> {
 
 struct Taking<'a> {
     body: &'a Body,
-    /// Vertices of the triangles in contact that are not the lowest one at their position, each with
-    /// the lowest; sorted. Empty for most meshes.
-    doubles: Vec<(u32, u32)>,
+    /// Of the triangles in contact. Empty for most meshes.
+    doubles: Doubles,
 }
 
 impl<'a> Bodies<'a> {
@@ -201,7 +203,7 @@ impl<'a> Bodies<'a> {
     }
 
     /// The doubles of all bodies that have any.
-    fn doubles(self) -> Vec<(u32, Vec<(u32, u32)>)> {
+    fn doubles(self) -> Vec<(u32, Doubles)> {
         (0u32..)
             .zip(self.bodies)
             .filter_map(|(number, taking)| Some((number, taking?.doubles)))
@@ -224,7 +226,7 @@ impl<'a> Bodies<'a> {
         let corners = faces[face as usize];
         Some(Triangle {
             points: corners.map(|vertex| taking.body.positions().point(vertex as usize)),
-            vertices: corners.map(|vertex| taking.lowest(vertex)),
+            vertices: corners.map(|vertex| lowest(&taking.doubles, VertexIx::new(vertex))),
             face,
         })
     }
@@ -239,7 +241,7 @@ impl<'a> Bodies<'a> {
     }
 
     /// The points that define a corner.
-    fn place(&self, name: &PointName) -> Place {
+    fn definition(&self, name: &PointName) -> Definition {
         let point = |side: usize, vertex: u32| {
             let body = self.taking(name.bodies[side]).body;
             body.positions().point(vertex as usize)
@@ -251,21 +253,13 @@ impl<'a> Bodies<'a> {
             [0, 1, 2].map(|k| point(side, corners[k]))
         };
         match name.features {
-            [Feature::Vertex(vertex), _] => Place::Vertex(point(0, vertex)),
-            [_, Feature::Vertex(vertex)] => Place::Vertex(point(1, vertex)),
-            [Feature::Edge(a), Feature::Face(b)] => Place::OnPlane(edge(0, a), face(1, b)),
-            [Feature::Face(a), Feature::Edge(b)] => Place::OnPlane(edge(1, b), face(0, a)),
-            [Feature::Edge(a), Feature::Edge(b)] => Place::OnLine(edge(0, a), edge(1, b)),
-            [Feature::Face(a), Feature::Face(_)] => Place::Vertex(face(0, a)[0]),
+            [Feature::Vertex(vertex), _] => Definition::Vertex(point(0, vertex)),
+            [_, Feature::Vertex(vertex)] => Definition::Vertex(point(1, vertex)),
+            [Feature::Edge(a), Feature::Face(b)] => Definition::OnPlane(edge(0, a), face(1, b)),
+            [Feature::Face(a), Feature::Edge(b)] => Definition::OnPlane(edge(1, b), face(0, a)),
+            [Feature::Edge(a), Feature::Edge(b)] => Definition::OnLine(edge(0, a), edge(1, b)),
+            [Feature::Face(a), Feature::Face(_)] => Definition::Vertex(face(0, a)[0]),
         }
-    }
-}
-
-impl Taking<'_> {
-    fn lowest(&self, vertex: u32) -> u32 {
-        self.doubles
-            .binary_search_by_key(&vertex, |&(double, _)| double)
-            .map_or(vertex, |ix| self.doubles[ix].1)
     }
 }
 
@@ -294,24 +288,22 @@ fn check(id: BodyId, body: &Body, kind: Kind, colliding: &[u32]) -> Result<(), E
 /// The vertices of some triangles that are not the lowest one at their position, each with the lowest.
 ///
 /// Meshes that repeat their vertices for each face would fall apart into single triangles otherwise.
-fn doubles(body: &Body, colliding: &[u32]) -> Vec<(u32, u32)> {
+fn doubles(body: &Body, colliding: &[u32]) -> Doubles {
     let Elements::Triangles(faces) = body.elements() else {
         return Vec::new();
     };
-    let mut vertices: Vec<u32> = colliding
-        .iter()
-        .flat_map(|&face| faces[face as usize])
-        .collect();
+    let named = colliding.iter().flat_map(|&face| faces[face as usize]);
+    let mut vertices: Vec<VertexIx> = named.map(VertexIx::new).collect();
     vertices.sort_unstable();
     vertices.dedup();
-    let bits = |vertex: u32| {
-        let point = body.positions().point(vertex as usize);
+    let bits = |vertex: VertexIx| {
+        let point = body.positions().point(vertex.index());
         // Turns minus zero into zero.
         point.map(|x| (x + 0.0).to_bits())
     };
-    let mut at: Vec<([u64; 3], u32)> = vertices.iter().map(|&v| (bits(v), v)).collect();
+    let mut at: Vec<([u64; 3], VertexIx)> = vertices.iter().map(|&v| (bits(v), v)).collect();
     at.par_sort_unstable();
-    let mut doubles: Vec<(u32, u32)> = at
+    let mut doubles: Doubles = at
         .chunk_by(|(x, _), (y, _)| x == y)
         .flat_map(|same| same[1..].iter().map(|&(_, vertex)| (vertex, same[0].1)))
         .collect();

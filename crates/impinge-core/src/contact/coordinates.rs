@@ -29,7 +29,7 @@ pub(super) enum Precision {
 
 /// A corner by the points that define it.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Place {
+pub(super) enum Definition {
     Vertex(Point),
     /// Where the segment between the first two points crosses the plane of the others.
     OnPlane([Point; 2], [Point; 3]),
@@ -37,16 +37,16 @@ pub(super) enum Place {
     OnLine([Point; 2], [Point; 2]),
 }
 
-impl Place {
+impl Definition {
     /// The coordinates, rounded to nearest, ties to even. A vertex has the coordinates that it was given.
     pub fn rounded(&self, precision: Precision) -> Point {
         let rounded = match self {
-            Place::Vertex(point) => *point,
-            Place::OnPlane(ends, plane) => {
+            Definition::Vertex(point) => *point,
+            Definition::OnPlane(ends, plane) => {
                 let offsets = ends.map(|end| Offset::Plane(end, *plane));
                 crossing(ends, offsets, precision)
             }
-            Place::OnLine(ends, line) => crossing(ends, from_line(ends, line), precision),
+            Definition::OnLine(ends, line) => crossing(ends, from_line(ends, line), precision),
         };
         // Turns minus zero into zero.
         rounded.map(|x| x + 0.0)
@@ -256,11 +256,11 @@ fn in_integers(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) ->
 mod tests {
     use super::*;
 
-    fn stages(place: &Place, precision: Precision) -> [Option<Point>; 3] {
-        let (ends, offsets) = match place {
-            Place::Vertex(_) => unreachable!(),
-            Place::OnPlane(ends, plane) => (ends, ends.map(|end| Offset::Plane(end, *plane))),
-            Place::OnLine(ends, line) => (ends, from_line(ends, line)),
+    fn stages(definition: &Definition, precision: Precision) -> [Option<Point>; 3] {
+        let (ends, offsets) = match definition {
+            Definition::Vertex(_) => unreachable!(),
+            Definition::OnPlane(ends, plane) => (ends, ends.map(|end| Offset::Plane(end, *plane))),
+            Definition::OnLine(ends, line) => (ends, from_line(ends, line)),
         };
         [
             in_single(ends, offsets, precision),
@@ -284,7 +284,7 @@ mod tests {
                     Precision::Double => f64::from(x) * 1.1 * scale,
                 })
             };
-            let place = match round % 6 {
+            let definition = match round % 6 {
                 0 | 1 => {
                     // Four points in the plane x = z, and where the segments between them cross.
                     let [p, q, r, s] = [0; 4].map(|_| {
@@ -299,7 +299,7 @@ mod tests {
                     {
                         continue;
                     }
-                    Place::OnLine([p, q], [r, s])
+                    Definition::OnLine([p, q], [r, s])
                 }
                 _ => {
                     let plane = [point(), point(), point()];
@@ -309,18 +309,18 @@ mod tests {
                     if !height(&p).strictly_opposite(height(&q)) {
                         continue;
                     }
-                    Place::OnPlane([p, q], plane)
+                    Definition::OnPlane([p, q], plane)
                 }
             };
             n += 1;
-            let [first, second, exact] = stages(&place, precision);
+            let [first, second, exact] = stages(&definition, precision);
             for (stage, found) in [first, second].into_iter().enumerate() {
                 if let Some(found) = found {
-                    assert_eq!(Some(found), exact, "stage {stage} of {place:?}");
+                    assert_eq!(Some(found), exact, "stage {stage} of {definition:?}");
                     sure[stage] += 1;
                 }
             }
-            assert_eq!(place.rounded(precision), exact.unwrap());
+            assert_eq!(definition.rounded(precision), exact.unwrap());
         }
         assert!(
             n > 1_500 && sure[0] > n * 4 / 10 && sure[1] > n * 9 / 10,

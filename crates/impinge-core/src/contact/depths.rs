@@ -8,12 +8,13 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use crate::exact::Point;
+use crate::index::{ElementIx, VertexIx};
 
 /// A vertex in the queue: nearest first, ties by number.
 #[derive(PartialEq)]
 struct Waiting {
     depth: f64,
-    vertex: u32,
+    vertex: VertexIx,
 }
 
 impl Eq for Waiting {}
@@ -52,23 +53,24 @@ pub fn solid_depths(
     let around = Around::new(positions.len(), tetrahedra);
     let mut depths = vec![f64::INFINITY; positions.len()];
     let mut waiting = BinaryHeap::new();
-    for &vertex in surface.as_flattened() {
-        if depths[vertex as usize] != 0.0 {
-            depths[vertex as usize] = 0.0;
+    for &corner in surface.as_flattened() {
+        let vertex = VertexIx::new(corner);
+        if depths[vertex.index()] != 0.0 {
+            depths[vertex.index()] = 0.0;
             waiting.push(Waiting { depth: 0.0, vertex });
         }
     }
     while let Some(Waiting { depth, vertex }) = waiting.pop() {
-        if depth > depths[vertex as usize] {
+        if depth > depths[vertex.index()] {
             continue;
         }
         for &tetrahedron in around.of(vertex) {
-            for next in tetrahedra[tetrahedron as usize] {
-                let [p, q] = [vertex, next].map(|vertex| positions[vertex as usize]);
+            for next in tetrahedra[tetrahedron.index()].map(VertexIx::new) {
+                let [p, q] = [vertex, next].map(|vertex| positions[vertex.index()]);
                 let [x, y, z] = [q[0] - p[0], q[1] - p[1], q[2] - p[2]];
                 let through = depth + (x * x + y * y + z * z).sqrt();
-                if through < depths[next as usize] {
-                    depths[next as usize] = through;
+                if through < depths[next.index()] {
+                    depths[next.index()] = through;
                     waiting.push(Waiting {
                         depth: through,
                         vertex: next,
@@ -88,7 +90,7 @@ pub fn solid_depths(
 /// The tetrahedra around each vertex, one list after the other.
 struct Around {
     starts: Vec<u32>,
-    tetrahedra: Vec<u32>,
+    tetrahedra: Vec<ElementIx>,
 }
 
 impl Around {
@@ -101,10 +103,10 @@ impl Around {
             starts[ix + 1] += starts[ix];
         }
         let mut next = starts.clone();
-        let mut around = vec![0; 4 * tetrahedra.len()];
-        for (number, corners) in (0u32..).zip(tetrahedra) {
+        let mut around = vec![ElementIx::default(); 4 * tetrahedra.len()];
+        for (tetrahedron, corners) in (0..).map(ElementIx::new).zip(tetrahedra) {
             for &corner in corners {
-                around[next[corner as usize] as usize] = number;
+                around[next[corner as usize] as usize] = tetrahedron;
                 next[corner as usize] += 1;
             }
         }
@@ -114,8 +116,8 @@ impl Around {
         }
     }
 
-    fn of(&self, vertex: u32) -> &[u32] {
-        let [start, end] = [0, 1].map(|ix| self.starts[vertex as usize + ix] as usize);
+    fn of(&self, vertex: VertexIx) -> &[ElementIx] {
+        let [start, end] = [0, 1].map(|k| self.starts[vertex.index() + k] as usize);
         &self.tetrahedra[start..end]
     }
 }

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 
 use super::topology::Topology;
 use crate::exact::{Point, Sign, orient2d, orient3d};
+use crate::index::VertexIx;
 use crate::scene::{Body, Elements};
 
 /// The part of each vertex, and the winding number of each part.
@@ -31,9 +32,9 @@ pub(super) struct Asked<'a> {
     pub body: &'a Body,
     pub topology: &'a Topology,
     /// Whether a vertex lies on the other surface.
-    pub is_on: &'a (dyn Fn(u32) -> bool + Sync),
+    pub is_on: &'a (dyn Fn(VertexIx) -> bool + Sync),
     /// Whether an edge meets the other surface.
-    pub is_crossed: &'a (dyn Fn([u32; 2]) -> bool + Sync),
+    pub is_crossed: &'a (dyn Fn([VertexIx; 2]) -> bool + Sync),
 }
 
 impl Parts {
@@ -47,16 +48,16 @@ impl Parts {
         let Some(bounds) = bounds(other) else {
             return parts;
         };
-        let position = |vertex: u32| asked.body.positions().point(vertex as usize);
-        let is_near = |vertex: u32| {
+        let position = |vertex: VertexIx| asked.body.positions().point(vertex.index());
+        let is_near = |vertex: VertexIx| {
             let point = position(vertex);
             (0..3).all(|k| bounds[0][k] <= point[k] && point[k] <= bounds[1][k])
         };
         let mut seeds: Vec<(Point, u32)> = Vec::new();
-        let mut members: Vec<u32> = Vec::new();
+        let mut members: Vec<VertexIx> = Vec::new();
         let mut is_seen = vec![false; n_vertices];
-        for seed in 0..n_vertices as u32 {
-            if is_seen[seed as usize]
+        for seed in VertexIx::up_to(n_vertices) {
+            if is_seen[seed.index()]
                 || asked.topology.neighbours(seed).is_empty()
                 || !is_near(seed)
                 || (asked.is_on)(seed)
@@ -64,7 +65,7 @@ impl Parts {
                 continue;
             }
             // All vertices joined to the seed, and whether any of them is beyond the box.
-            is_seen[seed as usize] = true;
+            is_seen[seed.index()] = true;
             members.clear();
             members.push(seed);
             let mut is_outside = false;
@@ -79,8 +80,8 @@ impl Parts {
                     }
                     if !is_near(other) {
                         is_outside = true;
-                    } else if !is_seen[other as usize] {
-                        is_seen[other as usize] = true;
+                    } else if !is_seen[other.index()] {
+                        is_seen[other.index()] = true;
                         members.push(other);
                     }
                 }
@@ -89,7 +90,7 @@ impl Parts {
                 let part = seeds.len() as u32;
                 seeds.push((position(seed), part));
                 for &vertex in &members {
-                    parts.part_of[vertex as usize] = part;
+                    parts.part_of[vertex.index()] = part;
                 }
             }
         }
@@ -98,14 +99,14 @@ impl Parts {
     }
 
     /// The part of a vertex; `None` unless it is inside.
-    pub fn inside(&self, vertex: u32) -> Option<u32> {
-        let part = self.part_of[vertex as usize];
+    pub fn inside(&self, vertex: VertexIx) -> Option<u32> {
+        let part = self.part_of[vertex.index()];
         (part != NO_PART && self.winding[part as usize] != 0).then_some(part)
     }
 
     /// How often the other surface winds around a vertex that is not on it.
-    pub fn winding(&self, vertex: u32) -> i32 {
-        match self.part_of[vertex as usize] {
+    pub fn winding(&self, vertex: VertexIx) -> i32 {
+        match self.part_of[vertex.index()] {
             NO_PART => 0,
             part => self.winding[part as usize],
         }

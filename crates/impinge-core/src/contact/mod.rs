@@ -50,6 +50,7 @@ pub use regions::Region;
 pub use solids::SolidOverlap;
 
 use crate::error::Error;
+use crate::index::VertexIx;
 use crate::pairs::Pairs;
 use crate::scene::Scene;
 
@@ -111,7 +112,7 @@ pub struct Contacts {
     names: Vec<PointName>,
     points: Vec<[f64; 3]>,
     /// For each body that has any: vertices that are not the lowest one at their position, each with the lowest.
-    doubles: Vec<(u32, Vec<(u32, u32)>)>,
+    doubles: Vec<(u32, Doubles)>,
 }
 
 impl Contacts {
@@ -203,12 +204,17 @@ impl Contacts {
     }
 
     /// The vertex that stands for this one in names: the lowest one at its position.
-    fn lowest(&self, body: u32, vertex: u32) -> u32 {
-        let Some((_, doubles)) = self.doubles.iter().find(|(held, _)| *held == body) else {
-            return vertex;
-        };
-        doubles
-            .binary_search_by_key(&vertex, |&(double, _)| double)
-            .map_or(vertex, |ix| doubles[ix].1)
+    fn lowest(&self, body: u32, vertex: VertexIx) -> VertexIx {
+        let doubles = self.doubles.iter().find(|(held, _)| *held == body);
+        doubles.map_or(vertex, |(_, doubles)| lowest(doubles, vertex))
     }
+}
+
+/// Vertices that are not the lowest one at their position, each with the lowest; sorted.
+type Doubles = Vec<(VertexIx, VertexIx)>;
+
+/// The lowest vertex at the position of a vertex.
+fn lowest(doubles: &Doubles, vertex: VertexIx) -> VertexIx {
+    let found = doubles.binary_search_by_key(&vertex, |&(double, _)| double);
+    found.map_or(vertex, |ix| doubles[ix].1)
 }

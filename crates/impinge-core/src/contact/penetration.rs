@@ -23,6 +23,7 @@ use super::topology::Topology;
 use super::{Contacts, Feature, PointName, Shape};
 use crate::error::Error;
 use crate::exact::{Sign, orient3d};
+use crate::index::VertexIx;
 use crate::scene::{Body, BodyId, Elements, Kind, Scene};
 use crate::sink::grow;
 
@@ -147,14 +148,17 @@ impl Penetration {
     }
 }
 
+/// The two vertices of an edge, lower first where it is a name.
+type Edge = [VertexIx; 2];
+
 /// The points of contact on the edges and vertices of one body.
 struct Crossings<'a> {
     contacts: &'a Contacts,
     body: u32,
     /// Edges with the points on them, sorted.
-    on_edges: Vec<([u32; 2], u32)>,
+    on_edges: Vec<(Edge, u32)>,
     /// Vertices on the other surface, sorted.
-    on_vertices: Vec<u32>,
+    on_vertices: Vec<VertexIx>,
     /// Whether any edge at a vertex is crossed.
     is_touched: Vec<bool>,
 }
@@ -175,11 +179,11 @@ impl<'a> Crossings<'a> {
             match name.features[side] {
                 Feature::Edge(edge) => {
                     grow(&mut crossings.on_edges, 1, WHAT)?;
-                    crossings.on_edges.push((edge, point));
+                    crossings.on_edges.push((edge.map(VertexIx::new), point));
                 }
                 Feature::Vertex(vertex) => {
                     grow(&mut crossings.on_vertices, 1, WHAT)?;
-                    crossings.on_vertices.push(vertex);
+                    crossings.on_vertices.push(VertexIx::new(vertex));
                 }
                 Feature::Face(_) => {}
             }
@@ -188,39 +192,43 @@ impl<'a> Crossings<'a> {
         crossings.on_vertices.sort_unstable();
         crossings.on_vertices.dedup();
         for (edge, _) in &crossings.on_edges {
-            let n = edge[1] as usize + 1;
+            let n = edge[1].index() + 1;
             if crossings.is_touched.len() < n {
                 crossings.is_touched.resize(n, false);
             }
             for vertex in edge {
-                crossings.is_touched[*vertex as usize] = true;
+                crossings.is_touched[vertex.index()] = true;
             }
         }
         Ok(crossings)
     }
 
-    fn lowest(&self, vertex: u32) -> u32 {
+    fn lowest(&self, vertex: VertexIx) -> VertexIx {
         self.contacts.lowest(self.body, vertex)
     }
 
-    fn is_on(&self, vertex: u32) -> bool {
+    fn is_on(&self, vertex: VertexIx) -> bool {
         !self.on_vertices.is_empty() && self.on_vertices.binary_search(&self.lowest(vertex)).is_ok()
     }
 
-    fn is_touched(&self, vertex: u32) -> bool {
-        self.is_touched.get(self.lowest(vertex) as usize) == Some(&true)
+    fn is_touched(&self, vertex: VertexIx) -> bool {
+        self.is_touched_by_name(self.lowest(vertex))
     }
 
-    fn name(&self, edge: [u32; 2]) -> [u32; 2] {
+    /// The same of a vertex that is the lowest one at its position, as in names.
+    fn is_touched_by_name(&self, lowest: VertexIx) -> bool {
+        self.is_touched.get(lowest.index()) == Some(&true)
+    }
+
+    fn name(&self, edge: Edge) -> Edge {
         let mut name = edge.map(|vertex| self.lowest(vertex));
         name.sort_unstable();
         name
     }
 
-    fn is_crossed(&self, edge: [u32; 2]) -> bool {
+    fn is_crossed(&self, edge: Edge) -> bool {
         let [low, high] = self.name(edge);
-        let is_touched = |vertex: u32| self.is_touched.get(vertex as usize) == Some(&true);
-        if !(is_touched(low) && is_touched(high)) {
+        if !(self.is_touched_by_name(low) && self.is_touched_by_name(high)) {
             return false;
         }
         let first = self
@@ -235,7 +243,7 @@ impl<'a> Crossings<'a> {
 /// A piece of an edge that is inside the other body, from the end nearer to the lower vertex, and a member of its
 /// region's set.
 struct Piece {
-    edge: [u32; 2],
+    edge: Edge,
     from: Vector,
     to: Vector,
     node: u32,
@@ -260,12 +268,12 @@ impl Work<'_> {
         let numbers = [0, 1].map(|side| self.crossings[side].body);
         let mut inside = [Vec::new(), Vec::new()];
         for (side, inside) in inside.iter_mut().enumerate() {
-            for vertex in 0..self.bodies[side].n_vertices() as u32 {
+            for vertex in VertexIx::up_to(self.bodies[side].n_vertices()) {
                 let Some(node) = self.node(side, vertex) else {
                     continue;
                 };
-                inside.push(vertex);
-                let at = self.bodies[side].positions().point(vertex as usize);
+                inside.push(vertex.raw());
+                let at = self.position(side, vertex);
                 let region = &mut region_of[sets.find(node) as usize];
                 if *region == NO_REGION {
                     // A shell of one body that has no contact with the other.
@@ -273,7 +281,7 @@ impl Work<'_> {
                     regions.push(Region::at(numbers, at));
                 }
                 let region = &mut regions[*region as usize];
-                region.inside[side].push(vertex);
+                region.inside[side].push(vertex.raw());
                 region.cover(at);
             }
         }
@@ -292,7 +300,7 @@ impl Work<'_> {
     }
 
     /// The number, among the members of the sets, of a vertex that is inside.
-    fn node(&self, side: usize, vertex: u32) -> Option<u32> {
+    fn node(&self, side: usize, vertex: VertexIx) -> Option<u32> {
         let n_before = match side {
             0 => 0,
             _ => self.parts[0].n_parts(),
@@ -301,8 +309,8 @@ impl Work<'_> {
         Some((self.contacts.points().len() + n_before) as u32 + part)
     }
 
-    fn position(&self, side: usize, vertex: u32) -> Vector {
-        self.bodies[side].positions().point(vertex as usize)
+    fn position(&self, side: usize, vertex: VertexIx) -> Vector {
+        self.bodies[side].positions().point(vertex.index())
     }
 
     /// The pieces of crossed edges that are inside, sorted by edge. Joins the sets of each piece's two ends.
@@ -336,7 +344,7 @@ impl Work<'_> {
     }
 
     /// Puts points in their order along an edge.
-    fn sort_along(&self, side: usize, edge: [u32; 2], points: &mut [u32]) {
+    fn sort_along(&self, side: usize, edge: Edge, points: &mut [u32]) {
         let [from, to] = edge.map(|vertex| self.position(side, vertex));
         let along = sub(to, from);
         let axis = (1..3).fold(0, |best, k| {
@@ -353,7 +361,7 @@ impl Work<'_> {
 
     /// The pieces of one edge that are inside, each with the two set members that it joins; `None` if the edge does
     /// not just cross faces.
-    fn cut(&self, side: usize, edge: [u32; 2], points: &[u32]) -> Option<Vec<(Piece, [u32; 2])>> {
+    fn cut(&self, side: usize, edge: Edge, points: &[u32]) -> Option<Vec<(Piece, [u32; 2])>> {
         let [low, high] = edge;
         let crossings = &self.crossings[side];
         if crossings.is_on(low) || crossings.is_on(high) {
@@ -391,9 +399,9 @@ impl Work<'_> {
     }
 
     /// By how much the winding number grows where an edge, coming from vertex `from`, crosses a face of the other body.
-    fn step(&self, side: usize, from: u32, face: u32) -> i32 {
+    fn step(&self, side: usize, from: VertexIx, face: u32) -> i32 {
         let corners = self.bodies[1 - side].elements().corners(face as usize);
-        let [a, b, c] = [0, 1, 2].map(|k| self.position(1 - side, corners[k]));
+        let [a, b, c] = [0, 1, 2].map(|k| self.position(1 - side, VertexIx::new(corners[k])));
         match orient3d(&a, &b, &c, &self.position(side, from)) {
             // The vertex is beneath the face: the edge leaves through it.
             Sign::Positive => -1,
@@ -427,7 +435,7 @@ impl Work<'_> {
         });
         let inside = (0..2).flat_map(|side| {
             let vertices = region.inside[side].iter();
-            vertices.map(move |&vertex| self.position(side, vertex))
+            vertices.map(move |&vertex| self.position(side, VertexIx::new(vertex)))
         });
         let heights = corners.chain(inside).map(|point| dot(point, normal));
         let (low, high) = heights
@@ -467,7 +475,7 @@ impl Work<'_> {
                 }
                 let on = |side: usize, face: u32| {
                     let corners = self.bodies[side].elements().corners(face as usize);
-                    self.position(side, corners[0])
+                    self.position(side, VertexIx::new(corners[0]))
                 };
                 // The part inside lies to the left as seen from outside a, to the right as seen from outside b.
                 add_side(number, on(0, a), from, to);
@@ -479,8 +487,8 @@ impl Work<'_> {
                 continue;
             };
             let crossings = &self.crossings[side];
-            for face in faces {
-                let is_touched = |vertex: &u32| {
+            for face in faces.iter().map(|face| face.map(VertexIx::new)) {
+                let is_touched = |vertex: &VertexIx| {
                     self.parts[side].inside(*vertex).is_some() || crossings.is_touched(*vertex)
                 };
                 if !face.iter().any(is_touched) {

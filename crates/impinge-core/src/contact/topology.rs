@@ -8,13 +8,14 @@
 use rayon::prelude::*;
 
 use crate::error::Error;
+use crate::index::VertexIx;
 use crate::scene::BodyId;
 
 /// The edges at each vertex.
 #[derive(Debug)]
 pub(super) struct Topology {
     starts: Vec<u32>,
-    neighbours: Vec<u32>,
+    neighbours: Vec<VertexIx>,
 }
 
 impl Topology {
@@ -56,11 +57,11 @@ impl Topology {
         for vertex in 2..starts.len() {
             starts[vertex] += starts[vertex - 1];
         }
-        let mut neighbours = vec![0; 2 * edges.len()];
+        let mut neighbours = vec![VertexIx::default(); 2 * edges.len()];
         for &[low, high] in &edges {
             for (at, other) in [(low, high), (high, low)] {
                 let place = &mut starts[at as usize + 1];
-                neighbours[*place as usize] = other;
+                neighbours[*place as usize] = VertexIx::new(other);
                 *place += 1;
             }
         }
@@ -68,8 +69,8 @@ impl Topology {
     }
 
     /// The vertices that share an edge with this one; none for a vertex of no face.
-    pub fn neighbours(&self, vertex: u32) -> &[u32] {
-        let at = vertex as usize;
+    pub fn neighbours(&self, vertex: VertexIx) -> &[VertexIx] {
+        let at = vertex.index();
         &self.neighbours[self.starts[at] as usize..self.starts[at + 1] as usize]
     }
 }

@@ -22,7 +22,7 @@ impl Acquaintances {
     /// Whether the grid may be the faster way to answer this frame. Its bodies are known from now on.
     pub fn prefer_grid(&mut self, scene: &Scene, frame: &Frame, tuning: &Tuning) -> bool {
         let mut n_new = 0;
-        for (ix, layer) in frame.layers.iter().enumerate() {
+        for (ix, layer) in frame.numbered_layers() {
             let slot = layer.id.index();
             if self.stamps.len() <= slot {
                 self.stamps.resize(slot + 1, 0);

@@ -9,6 +9,7 @@ use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
 use crate::hull::{self, ReadVertices};
+use crate::index::ClusterIx;
 use crate::positions::Positions;
 
 /// A summary of some clusters.
@@ -48,7 +49,7 @@ pub(crate) unsafe fn of_clusters<S: ReadVertices>(
     simd: S,
     positions: &Positions,
     clustering: &Clustering,
-    clusters: impl Iterator<Item = usize>,
+    clusters: impl Iterator<Item = ClusterIx>,
     into: RawBoundsArray,
 ) -> Summary {
     let mut summary = Summary::EMPTY;
@@ -61,7 +62,7 @@ pub(crate) unsafe fn of_clusters<S: ReadVertices>(
             all_finite,
         });
         // SAFETY: by the contract of this function.
-        unsafe { into.put(cluster, &bounds) };
+        unsafe { into.put(cluster.index(), &bounds) };
     }
     summary
 }

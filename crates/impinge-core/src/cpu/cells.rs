@@ -24,6 +24,7 @@ use crate::error::Error;
 use crate::grouping::bounds::Bounds;
 pub use crate::grouping::grid::MOST_ENTRIES_EACH;
 use crate::grouping::grid::{FineRange, Grid};
+use crate::index::LayerIx;
 use crate::progress::Control;
 use crate::query::SharedVertex;
 use crate::settings::Settings;
@@ -90,7 +91,7 @@ pub struct Cells {
     reaching: KeptList,
     /// Where each cell's list starts, and one past the last.
     starts: Vec<u32>,
-    /// The cell lists: places in `kept`, ascending within a cell, so that those of one body are together.
+    /// The cell lists: indices in `kept`, ascending within a cell, so that those of one body are together.
     entries: Vec<u32>,
     items: Vec<CellItem>,
     scratches: Vec<Settler>,
@@ -260,13 +261,13 @@ impl Cells {
             grid = coarser;
             stats.n_reruns += 1;
         }
-        // Counts go two places past the cell's own: the prefix sum moves them back by one, and so does the scatter.
+        // Counts go two entries past the cell's own: the prefix sum moves them back by one, and so does the scatter.
         let n_starts = grid.n_cells() as usize + 2;
         self.starts.clear();
         self.starts.reserve_exact(n_starts);
         self.starts.resize(n_starts, 0);
         for kept in &self.reaching.kept {
-            for_places(&grid, &kept.range, |cell| self.starts[cell + 2] += 1);
+            for_indices(&grid, &kept.range, |cell| self.starts[cell + 2] += 1);
         }
         let mut n_entries = 0;
         for start in &mut self.starts {
@@ -276,10 +277,10 @@ impl Cells {
         self.entries.clear();
         self.entries.reserve_exact(n_entries as usize);
         self.entries.resize(n_entries as usize, 0);
-        for (place, kept) in (0u32..).zip(&self.reaching.kept) {
-            for_places(&grid, &kept.range, |cell| {
+        for (ix, kept) in (0u32..).zip(&self.reaching.kept) {
+            for_indices(&grid, &kept.range, |cell| {
                 let next = &mut self.starts[cell + 1];
-                self.entries[*next as usize] = place;
+                self.entries[*next as usize] = ix;
                 *next += 1;
             });
         }
@@ -400,9 +401,9 @@ pub fn for_cells(range: &FineRange, mut call: impl FnMut([u32; 3])) {
     }
 }
 
-/// As [`for_cells`], with the cells' places in the linear array.
+/// As [`for_cells`], with the cells' indices in the linear array.
 #[inline(always)]
-fn for_places(grid: &Grid, range: &FineRange, mut call: impl FnMut(usize)) {
+fn for_indices(grid: &Grid, range: &FineRange, mut call: impl FnMut(usize)) {
     let (lo, hi) = range.coarse();
     for z in lo[2]..=hi[2] {
         for y in lo[1]..=hi[1] {
@@ -433,8 +434,8 @@ impl Lists<'_> {
         let frame = self.world.frame;
         let mut a = list.start;
         while a < list.end {
-            let (ix_a, run_a) = self.run(a, list.end);
-            if frame.layers[ix_a].within && run_a.len() > 1 {
+            let (layer_a, run_a) = self.run(a, list.end);
+            if frame.layer(layer_a).within && run_a.len() > 1 {
                 for group_a in groups(run_a.clone(), group_size) {
                     for group_b in groups(group_a.start..run_a.end, group_size) {
                         emit(group_a.clone(), group_b)?;
@@ -443,8 +444,8 @@ impl Lists<'_> {
             }
             let mut b = run_a.end;
             while b < list.end && frame.between() {
-                let (ix_b, run_b) = self.run(b, list.end);
-                if frame.test(ix_a, ix_b).is_some() {
+                let (layer_b, run_b) = self.run(b, list.end);
+                if frame.test(layer_a, layer_b).is_some() {
                     for group_a in groups(run_a.clone(), group_size) {
                         for group_b in groups(run_b.clone(), group_size) {
                             emit(group_a.clone(), group_b)?;
@@ -458,15 +459,15 @@ impl Lists<'_> {
         Ok(())
     }
 
-    /// The participant at a place of a list, and the run of its entries from there on.
-    fn run(&self, start: usize, end: usize) -> (usize, std::ops::Range<usize>) {
-        let owner = |entry: u32| self.kept[entry as usize].participant;
-        let participant = owner(self.entries[start]);
-        if owner(self.entries[end - 1]) == participant {
-            return (participant as usize, start..end);
+    /// The layer of an entry of a list, and the run of its entries from there on.
+    fn run(&self, start: usize, end: usize) -> (LayerIx, std::ops::Range<usize>) {
+        let owner = |entry: u32| self.kept[entry as usize].layer;
+        let layer = owner(self.entries[start]);
+        if owner(self.entries[end - 1]) == layer {
+            return (layer, start..end);
         }
-        let len = self.entries[start..end].partition_point(|&entry| owner(entry) == participant);
-        (participant as usize, start..start + len)
+        let len = self.entries[start..end].partition_point(|&entry| owner(entry) == layer);
+        (layer, start..start + len)
     }
 }
 
@@ -543,8 +544,8 @@ fn pair_item<R: Rule>(
     let group_a = &lists.entries[first_a..first_a + usize::from(item.n_a)];
     let group_b = &lists.entries[first_b..first_b + usize::from(item.n_b)];
     // A group's primitives are of one body.
-    let owner = kept(group_a[0]).participant;
-    let one_body = owner == kept(group_b[0]).participant;
+    let owner = kept(group_a[0]).layer;
+    let one_body = owner == kept(group_b[0]).layer;
     let groups = GroupPair {
         kept: lists.kept,
         a: group_a,
@@ -562,10 +563,10 @@ fn pair_item<R: Rule>(
             let b = kept(group_b[j]);
             if rule.admits(a, b, &mut settler.keys) {
                 settler.push(Candidate {
-                    a: a.participant,
-                    b: b.participant,
-                    place_a: a.primitive,
-                    place_b: b.primitive,
+                    a: a.layer,
+                    b: b.layer,
+                    place_a: a.place(),
+                    place_b: b.place(),
                 });
             }
         }
@@ -575,7 +576,7 @@ fn pair_item<R: Rule>(
         for j in Lanes(lanes.adjacent[i]) {
             let b = kept(group_b[j]);
             if rule.admits(a, b, &mut settler.keys) && resolve {
-                settler.settle_shared(&body, a.primitive, b.primitive);
+                settler.settle_shared(&body, a.place(), b.place());
             }
         }
     }

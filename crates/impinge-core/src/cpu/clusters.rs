@@ -161,7 +161,7 @@ impl Clusters {
 impl Clusters {
     /// Finds the triangles that may meet a neighbour, in bodies that are tested against themselves.
     fn find_folds(&mut self, job: Job<'_>) -> Result<(), Error> {
-        for (ix, layer) in job.frame.layers.iter().enumerate() {
+        for (ix, layer) in job.frame.numbered_layers() {
             if layer.within {
                 let body = job.frame.body(job.scene, ix);
                 self.caches.at_mut(layer).find_folds(body, job.workers)?;
@@ -227,11 +227,11 @@ impl BodyCache {
     /// Computes all boxes on this thread, for new clusters: their spread is the best so far.
     pub(super) fn refit_all(&mut self, body: &Body) {
         self.surface = 0.0;
-        for cluster in 0..self.clustering.n_clusters() {
+        for cluster in self.clustering.clusters() {
             let vertices = self.clustering.vertices(cluster);
             let bounds = hull::of_vertices(body.positions(), vertices);
             self.surface += bounds.half_area();
-            self.bounds.levels[0].put(cluster, &bounds);
+            self.bounds.levels[0].put(cluster.index(), &bounds);
         }
         self.bounds.refit_above(0, &self.clustering.shape);
         self.whole = self.bounds.root();

@@ -20,6 +20,7 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use crate::elements::with_corners;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::Grid;
+use crate::index::{ElementIx, LayerIx};
 use crate::tuning::Tuning;
 
 use super::world::World;
@@ -34,7 +35,7 @@ const TOGETHER: usize = 512;
 /// A primitive within its body's reach, and the first and last cell of its vertices along x, y, z, one byte per axis.
 #[derive(Debug, Clone, Copy)]
 struct Near {
-    primitive: u32,
+    primitive: ElementIx,
     low: u32,
     high: u32,
 }
@@ -49,21 +50,21 @@ impl Near {
     }
 }
 
-/// A task of the bounds stage: a run of one participant's primitives, or of its vertices.
+/// A task of the bounds stage: a run of one layer's primitives, or of its vertices.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BoundsTask {
-    pub participant: u32,
+    pub layer: LayerIx,
     pub first: u32,
     pub end: u32,
 }
 
 impl BoundsTask {
-    /// Cuts `n` primitives or vertices of a participant into runs.
-    pub fn cut(participant: usize, n: u32, length: u32) -> impl Iterator<Item = BoundsTask> {
+    /// Cuts `n` primitives or vertices of a layer into runs.
+    pub fn cut(layer: LayerIx, n: u32, length: u32) -> impl Iterator<Item = BoundsTask> {
         (0..n)
             .step_by(length as usize)
             .map(move |first| BoundsTask {
-                participant: participant as u32,
+                layer,
                 first,
                 end: n.min(first.saturating_add(length)),
             })
@@ -81,7 +82,7 @@ pub(crate) struct Cull {
     most_marked: u32,
     /// The cell of each vertex, one byte per axis, body after body.
     codes: Vec<u32>,
-    /// Where each participant's codes start.
+    /// Where each layer's codes start.
     firsts: Vec<usize>,
     /// The maps of all bodies, one after the other: rows along x, bit k for cell k.
     maps: Vec<AtomicU64>,
@@ -95,10 +96,10 @@ pub(crate) struct Cull {
 }
 
 impl Cull {
-    /// The most maps, and so the most participants: there are sets of them.
+    /// The most maps, and so the most layers: there are sets of them.
     pub const MOST_MAPS: usize = u32::BITS as usize;
 
-    /// Prepares for a frame of at most [`MOST_MAPS`](Self::MOST_MAPS) participants, which meet within the region; their
+    /// Prepares for a frame of at most [`MOST_MAPS`](Self::MOST_MAPS) layers, which meet within the region; their
     /// primitives come in `n_runs` runs.
     pub fn begin(&mut self, world: World<'_>, region: &Bounds, n_runs: usize, tuning: &Tuning) {
         self.most_marked = tuning.most_marked;
@@ -124,10 +125,10 @@ impl Cull {
         self.firsts.clear();
         self.alone = 0;
         let mut n_codes = 0;
-        for (ix, participant) in frame.layers.iter().enumerate() {
+        for (ix, layer) in frame.numbered_layers() {
             self.firsts.push(n_codes);
-            n_codes += world.body(ix as u32).positions.len();
-            self.alone |= u32::from(participant.within) << ix;
+            n_codes += world.body(ix).positions.len();
+            self.alone |= u32::from(layer.within) << ix.raw();
         }
         self.codes.resize(n_codes, 0);
         *self.everywhere.get_mut() = 0;
@@ -164,17 +165,17 @@ impl Cull {
         }
     }
 
-    /// Where a participant's codes start.
-    pub fn first_code(&self, participant: u32) -> usize {
-        self.firsts[participant as usize]
+    /// Where a layer's codes start.
+    pub fn first_code(&self, layer: LayerIx) -> usize {
+        self.firsts[layer.index()]
     }
 
     /// Lists the primitives of a run that are near `reach`, and marks their cells.
     pub fn mark(&self, world: World<'_>, run: BoundsTask, run_ix: usize, reach: &Bounds) {
         let mut near = self.near[run_ix].lock().expect("no task panics");
         near.clear();
-        let body = world.body(run.participant);
-        let codes = &self.codes[self.first_code(run.participant)..];
+        let body = world.body(run.layer);
+        let codes = &self.codes[self.first_code(run.layer)..];
         let reach = (
             self.function.code(&reach.min),
             self.function.code(&reach.max),
@@ -191,11 +192,11 @@ impl Cull {
         reach: (u32, u32),
         near: &mut Vec<Near>,
     ) {
-        let map_ix = run.participant as usize;
+        let map_ix = run.layer.index();
         let n_rows = self.n_rows();
         let map = &self.maps[map_ix * n_rows..][..n_rows];
         let mut together = [Near {
-            primitive: 0,
+            primitive: ElementIx::new(0),
             low: 0,
             high: 0,
         }; TOGETHER];
@@ -206,7 +207,7 @@ impl Cull {
         {
             // No branch: whether a primitive is near is unpredictable.
             let mut n = 0;
-            for (primitive, corners) in (first..).zip(corners) {
+            for (primitive, corners) in (first..).map(ElementIx::new).zip(corners) {
                 let vertex = codes[corners[0] as usize];
                 let (mut low, mut high) = (vertex, vertex);
                 for &corner in &corners[1..] {
@@ -263,7 +264,7 @@ impl Cull {
     }
 
     /// Calls back for the primitives of a run that may have partners, in order. Returns how many were near.
-    pub fn for_live(&self, run_ix: usize, mut call: impl FnMut(u32)) -> usize {
+    pub fn for_live(&self, run_ix: usize, mut call: impl FnMut(ElementIx)) -> usize {
         let near = self.near[run_ix].lock().expect("no task panics");
         for near in &*near {
             let mut live = u64::from(near.n_rows() > self.most_marked);

@@ -14,9 +14,9 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::elements::Elements;
-use crate::grouping::GROUP;
 use crate::grouping::clusters::Clustering;
 use crate::grouping::rings::{Ring, Rings};
+use crate::index::ClusterIx;
 use crate::positions::Positions;
 use crate::workers::Workers;
 
@@ -41,8 +41,8 @@ impl Folds {
 
     /// The triangles of a cluster that have a fold.
     #[inline(always)]
-    pub fn of(&self, cluster: usize) -> u64 {
-        self.lanes[cluster].load(Ordering::Relaxed)
+    pub fn of(&self, cluster: ClusterIx) -> u64 {
+        self.lanes[cluster.index()].load(Ordering::Relaxed)
     }
 
     /// Finds the folds of a pose, unless they are known.
@@ -83,7 +83,8 @@ impl Folds {
         };
         workers.for_each(no_scratch, lanes.len().div_ceil(n_each), |(), task| {
             for (cluster, bits) in chunk(lanes, n_each, task) {
-                let faces = &faces[cluster * GROUP..][..clustering.size(cluster)];
+                let cluster = ClusterIx::from_usize(cluster);
+                let faces = &faces[clustering.places(cluster)];
                 let folded = (0..).zip(faces).fold(0, |folded, (lane, &[a, b, c])| {
                     folded | (is_fold(a) | is_fold(b) | is_fold(c)) << lane
                 });
@@ -297,6 +298,7 @@ fn is_below(axis: usize, arm: &[f64; 3]) -> bool {
 mod tests {
     use super::*;
     use crate::grouping::bounds::Bounds;
+    use crate::index::Place;
 
     /// The triangles that have a fold.
     fn folded(faces: &[[u32; 3]], positions: &[[f64; 3]]) -> Vec<u32> {
@@ -311,9 +313,9 @@ mod tests {
         for positions in [Positions::F64(positions.to_vec()), Positions::F32(single)] {
             let mut folds = Folds::default();
             folds.find(&Workers::new(1), &clustering, (&positions, 1));
-            let mut folded: Vec<u32> = (0..faces.len())
-                .filter(|place| folds.of(place / GROUP) >> (place % GROUP) & 1 == 1)
-                .map(|place| clustering.order[place])
+            let mut folded: Vec<u32> = Place::up_to(faces.len())
+                .filter(|place| folds.of(place.cluster()) >> place.lane() & 1 == 1)
+                .map(|place| clustering.primitive(place).raw())
                 .collect();
             folded.sort_unstable();
             answers.push(folded);

@@ -9,6 +9,7 @@ use crate::exact::filter::{LARGEST_F32, Triangles64};
 use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
 use crate::hull;
+use crate::index::{ClusterIx, LayerIx};
 use crate::positions::Positions;
 use crate::settings::Settings;
 
@@ -35,9 +36,9 @@ impl Kept<World<'_>> for Group {
     };
 
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, world: World<'_>, participant: u32, cluster: usize) {
-        let positions = world.body(participant).positions;
-        let cache = world.cache(participant);
+    fn fill<S: Simd>(&mut self, simd: S, world: World<'_>, layer: LayerIx, cluster: ClusterIx) {
+        let positions = world.body(layer).positions;
+        let cache = world.cache(layer);
         let clustering = &cache.clustering;
         let (Positions::F32(points), Elements::Triangles(faces)) = (positions, &clustering.corners)
         else {
@@ -46,13 +47,13 @@ impl Kept<World<'_>> for Group {
         };
         let size = clustering.size(cluster);
         let faces = ClusterFaces {
-            faces: &faces[cluster * GROUP..cluster * GROUP + size],
+            faces: &faces[clustering.places(cluster)],
             vertices: clustering.vertices(cluster),
             local: clustering.local_faces(cluster),
         };
         simd.put_corners(points, &faces, &mut self.corners);
         self.boxes.hold(self.corners.each_ref(), size);
-        self.in_tables = is_small(&cache.bounds.levels[0].at(cluster));
+        self.in_tables = is_small(&cache.bounds.levels[0].at(cluster.index()));
     }
 }
 
@@ -68,7 +69,7 @@ pub(super) trait Kept<W>: Clone {
     const EMPTY: Self;
 
     /// Computes the data of a cluster of a layer.
-    fn fill<S: Simd>(&mut self, simd: S, world: W, layer: u32, cluster: usize);
+    fn fill<S: Simd>(&mut self, simd: S, world: W, layer: LayerIx, cluster: ClusterIx);
 }
 
 /// The clusters that a worker has seen last.
@@ -93,7 +94,7 @@ impl<G> Default for GroupCache<G> {
     }
 }
 
-/// The key of an empty place: there are fewer than 2^32 participants.
+/// The key of an empty place: there are fewer than 2^32 layers.
 const NOBODY: u64 = u64::MAX;
 /// Clusters kept under a memory budget, 31 KB: hardly slower, for neighbouring clusters come in a row.
 const MOST_IN_BUDGET: u64 = 8;
@@ -121,30 +122,30 @@ impl<G> GroupCache<G> {
         size_of::<u64>() * self.keys.capacity() + size_of::<G>() * self.groups.capacity()
     }
 
-    fn key((participant, cluster): (u32, u32)) -> u64 {
-        u64::from(participant) << 32 | u64::from(cluster)
+    fn key((layer, cluster): (LayerIx, ClusterIx)) -> u64 {
+        u64::from(layer.raw()) << 32 | u64::from(cluster.raw())
     }
 
-    fn first_place(&self, (participant, cluster): (u32, u32)) -> usize {
-        let hash = participant.wrapping_mul(67).wrapping_add(cluster) as usize;
+    fn first_place(&self, (layer, cluster): (LayerIx, ClusterIx)) -> usize {
+        let hash = layer.raw().wrapping_mul(67).wrapping_add(cluster.raw()) as usize;
         hash & (self.keys.len() - 1)
     }
 
-    /// Whether a cluster of a participant is cached.
+    /// Whether a cluster of a layer is cached.
     #[inline(always)]
-    pub fn holds(&self, whose: (u32, u32)) -> bool {
+    pub fn holds(&self, whose: (LayerIx, ClusterIx)) -> bool {
         let (key, first) = (Self::key(whose), self.first_place(whose));
         self.keys[first] == key || self.keys[first ^ 1] == key
     }
 
-    /// The place of a cluster of a participant; computes its data if it is not cached. The cluster at the place `pinned`
+    /// The place of a cluster of a layer; computes its data if it is not cached. The cluster at the place `pinned`
     /// stays.
     #[inline(always)]
     pub fn place<S: Simd, W>(
         &mut self,
         simd: S,
         world: W,
-        whose: (u32, u32),
+        whose: (LayerIx, ClusterIx),
         pinned: usize,
     ) -> usize
     where
@@ -159,7 +160,7 @@ impl<G> GroupCache<G> {
         let place = if first == pinned { first ^ 1 } else { first };
         self.n_evicted += u64::from(self.keys[place] != NOBODY);
         self.keys[place] = key;
-        self.groups[place].fill(simd, world, whose.0, whose.1 as usize);
+        self.groups[place].fill(simd, world, whose.0, whose.1);
         place
     }
 

@@ -27,6 +27,7 @@
 use crate::exact::{Point, collinear, strictly_between};
 use crate::grouping::bounds::{Bounds, round_down, round_up};
 use crate::grouping::hubs::{HubSet, Hubs};
+use crate::index::Place;
 
 use super::narrow::Settler;
 use super::world::BodyRef;
@@ -48,7 +49,7 @@ const EVERYWHERE: Bounds = Bounds {
 #[derive(Debug, Default)]
 pub(super) struct Around {
     /// Places of primitives; those with the same vertices follow each other.
-    places: Vec<u32>,
+    places: Vec<Place>,
     entries: Vec<Entry>,
     nodes: Vec<Node>,
     stack: Vec<NodePair>,
@@ -64,7 +65,7 @@ struct Alike {
 }
 
 impl Alike {
-    fn of(self, places: &[u32]) -> &[u32] {
+    fn of(self, places: &[Place]) -> &[Place] {
         &places[self.start as usize..self.end as usize]
     }
 }
@@ -100,7 +101,7 @@ enum Seen {
 
 impl Around {
     pub fn bytes(&self) -> usize {
-        size_of::<u32>() * self.places.capacity()
+        size_of::<Place>() * self.places.capacity()
             + size_of::<Entry>() * self.entries.capacity()
             + size_of::<Node>() * self.nodes.capacity()
             + size_of::<NodePair>() * self.stack.capacity()
@@ -113,7 +114,7 @@ impl Around {
         body: &BodyRef<'_>,
         hubs: &Hubs,
         shared: &[u32],
-        places: &[u32],
+        places: &[Place],
         settler: &mut Settler,
     ) {
         self.entries.clear();
@@ -121,7 +122,8 @@ impl Around {
         self.places.clear();
         self.places.extend_from_slice(places);
         (self.places).sort_unstable_by_key(|&place| (sorted_ids(body.corners(place)), place));
-        let same = |&a: &u32, &b: &u32| sorted_ids(body.corners(a)) == sorted_ids(body.corners(b));
+        let same =
+            |&a: &Place, &b: &Place| sorted_ids(body.corners(a)) == sorted_ids(body.corners(b));
         let mut start = 0;
         for places in self.places.chunk_by(same) {
             let end = start + places.len() as u32;
@@ -287,7 +289,7 @@ fn sorted_ids(corners: &[u32]) -> [u32; 4] {
 }
 
 /// Where a primitive lies as seen from a hub or from an axis.
-fn seen(body: &BodyRef<'_>, shared: &[u32], place: u32) -> Seen {
+fn seen(body: &BodyRef<'_>, shared: &[u32], place: Place) -> Seen {
     let corners = body.corners(place);
     let point = |id: u32| body.positions.point(id as usize);
     let rest = corners

@@ -11,6 +11,7 @@ use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::FineRange;
 use crate::hull;
+use crate::index::{ElementIx, LayerIx, Place};
 
 use super::cull::{BoundsTask, Cull};
 use super::dispatch::NodePair;
@@ -32,32 +33,44 @@ pub struct Kept {
     pub bounds: Bounds,
     /// The fine cells that it touches; the grid fills them in.
     pub range: FineRange,
-    /// Its participant.
-    pub participant: u32,
+    /// Its layer.
+    pub layer: LayerIx,
     /// Its index within the body.
-    pub primitive: u32,
+    pub primitive: ElementIx,
 }
 
 impl Kept {
+    /// Its place, where there are no clusters.
+    #[inline(always)]
+    pub fn place(&self) -> Place {
+        unclustered(self.primitive)
+    }
+
     /// A primitive, if its box meets `reach`.
     #[inline(always)]
     fn reaching(
         body: &BodyRef<'_>,
-        participant: u32,
-        primitive: u32,
+        layer: LayerIx,
+        primitive: ElementIx,
         reach: &Bounds,
     ) -> Option<Kept> {
-        let bounds = hull::of_vertices(body.positions, body.corners(primitive));
+        let bounds = hull::of_vertices(body.positions, body.corners(unclustered(primitive)));
         bounds.overlaps(reach).then_some(Kept {
             bounds,
             range: FineRange {
                 lo: [0; 3],
                 hi: [0; 3],
             },
-            participant,
+            layer,
             primitive,
         })
     }
+}
+
+/// The place of a primitive, where there are no clusters.
+#[inline(always)]
+fn unclustered(primitive: ElementIx) -> Place {
+    Place::new(primitive.raw())
 }
 
 /// The kept primitives of a frame, and the memory for them.
@@ -65,7 +78,7 @@ pub struct KeptList {
     isa: Isa,
     tuning: Tuning,
     bodies: Vec<Bounds>,
-    /// For each participant, the box in which others may meet it.
+    /// For each layer, the box in which others may meet it.
     reach: Vec<Bounds>,
     top: TopLevel,
     stack: Vec<NodePair>,
@@ -140,12 +153,12 @@ impl KeptList {
         let (runs, parts, reach) = (&self.runs, &self.parts, &self.reach);
         workers.for_each(scratches, runs.len(), |_, ix| {
             let run = runs[ix];
-            let body = world.body(run.participant);
-            let reach = &reach[run.participant as usize];
+            let body = world.body(run.layer);
+            let reach = &reach[run.layer.index()];
             let mut part = parts[ix].lock().expect("no task panics");
             part.clear();
-            for primitive in run.first..run.end {
-                part.extend(Kept::reaching(&body, run.participant, primitive, reach));
+            for primitive in (run.first..run.end).map(ElementIx::new) {
+                part.extend(Kept::reaching(&body, run.layer, primitive, reach));
             }
         });
         self.gather();
@@ -162,10 +175,10 @@ impl KeptList {
         let scratches = self.few(world, scratches);
         // Bodies queried for self-collision keep every primitive, and with many bodies the map rejects almost
         // nothing; skip it in both cases.
-        let participants = &world.frame.layers;
+        let layers = &world.frame.layers;
         if !world.frame.between()
-            || participants.len() > self.tuning.most_maps.min(Cull::MOST_MAPS)
-            || participants.iter().all(|participant| participant.within)
+            || layers.len() > self.tuning.most_maps.min(Cull::MOST_MAPS)
+            || layers.iter().all(|layer| layer.within)
         {
             self.find(world, workers, scratches);
             return self.kept.len();
@@ -184,26 +197,26 @@ impl KeptList {
         workers.for_each(scratches, vertices.len(), |_, ix| {
             let run = vertices[ix].0;
             let range = run.first as usize..run.end as usize;
-            let positions = world.body(run.participant).positions;
+            let positions = world.body(run.layer).positions;
             // SAFETY: runs do not overlap, and codes are read only after all are written.
-            unsafe { codes.put(isa, positions, range, cull.first_code(run.participant)) };
+            unsafe { codes.put(isa, positions, range, cull.first_code(run.layer)) };
         });
         let (runs, parts, reach) = (&self.runs, &self.parts, &self.reach);
         workers.for_each(scratches, runs.len(), |_, ix| {
             let run = runs[ix];
-            cull.mark(world, run, ix, &reach[run.participant as usize]);
+            cull.mark(world, run, ix, &reach[run.layer.index()]);
         });
         self.cull.compare();
         let cull = &self.cull;
         let n_near = AtomicUsize::new(0);
         workers.for_each(scratches, runs.len(), |_, ix| {
             let run = runs[ix];
-            let body = world.body(run.participant);
-            let reach = &reach[run.participant as usize];
+            let body = world.body(run.layer);
+            let reach = &reach[run.layer.index()];
             let mut part = parts[ix].lock().expect("no task panics");
             part.clear();
             let n = cull.for_live(ix, |primitive| {
-                part.extend(Kept::reaching(&body, run.participant, primitive, reach));
+                part.extend(Kept::reaching(&body, run.layer, primitive, reach));
             });
             n_near.fetch_add(n, Ordering::Relaxed);
         });
@@ -218,13 +231,13 @@ impl KeptList {
         let n_vertices_each = workers.task(VERTICES) as u32;
         self.runs.clear();
         self.vertices.clear();
-        for (ix, participant) in world.frame.layers.iter().enumerate() {
-            let n_vertices = match participant.n_primitives {
+        for (ix, layer) in world.frame.numbered_layers() {
+            let n_vertices = match layer.n_primitives {
                 0 => 0,
-                _ => world.body(ix as u32).positions.len() as u32,
+                _ => world.body(ix).positions.len() as u32,
             };
             self.runs
-                .extend(BoundsTask::cut(ix, participant.n_primitives, n_primitives));
+                .extend(BoundsTask::cut(ix, layer.n_primitives, n_primitives));
             self.vertices.extend(
                 BoundsTask::cut(ix, n_vertices, n_vertices_each)
                     .map(|run| (run, Mutex::new(Bounds::EMPTY))),
@@ -235,7 +248,7 @@ impl KeptList {
         let vertices = &self.vertices;
         workers.for_each(scratches, vertices.len(), |_, ix| {
             let (run, bounds) = &vertices[ix];
-            let positions = world.body(run.participant).positions;
+            let positions = world.body(run.layer).positions;
             let range = run.first as usize..run.end as usize;
             *bounds.lock().expect("no task panics") = hull::of_run(positions, range);
         });
@@ -243,7 +256,7 @@ impl KeptList {
         self.bodies.resize(world.frame.layers.len(), Bounds::EMPTY);
         for (run, bounds) in &mut self.vertices {
             let bounds = bounds.get_mut().expect("no task panics");
-            self.bodies[run.participant as usize].join(bounds);
+            self.bodies[run.layer.index()].join(bounds);
         }
         self.find_reach(world);
     }
@@ -263,7 +276,7 @@ impl KeptList {
         }
     }
 
-    /// Finds the box in which each participant may meet others. Reason for the discard that follows: the boxes of a
+    /// Finds the box in which each layer may meet others. Reason for the discard that follows: the boxes of a
     /// pair share a point. It lies in both bodies' boxes, so each primitive meets the intersection of the two.
     fn find_reach(&mut self, world: World<'_>) {
         let frame = world.frame;
@@ -282,13 +295,13 @@ impl KeptList {
                 .layers
                 .iter()
                 .zip(&*bodies)
-                .map(|(participant, bounds)| match participant.within {
+                .map(|(layer, bounds)| match layer.within {
                     true => *bounds,
                     false => Bounds::EMPTY,
                 }),
         );
         if frame.between() {
-            top.refit(bodies.len(), tuning, |ix| bodies[ix as usize]);
+            top.refit(bodies.len(), tuning, |layer| bodies[layer.index()]);
             let bodies = &bodies[..];
             dispatch!(*isa, reach_pairs, (
                 top: &TopLevel = top,
@@ -324,8 +337,8 @@ fn reach_pairs<S: Simd>(
     reach: &mut [Bounds],
 ) {
     let met = top.pairs(simd, stack, |a, b| {
-        let (a, b) = (a as usize, b as usize);
         if frame.test(a, b).is_some() {
+            let (a, b) = (a.index(), b.index());
             let both = bodies[a].intersection(&bodies[b]);
             reach[a].join(&both);
             reach[b].join(&both);

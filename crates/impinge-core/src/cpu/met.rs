@@ -2,16 +2,17 @@
 
 use crate::exact::filter::BATCH;
 use crate::grouping::GROUP;
+use crate::index::{ClusterIx, LayerIx};
 
 use super::simd::{Lanes32, Simd};
 
-/// Two clusters that may meet: participants and their clusters.
+/// Two clusters that may meet: layers and their clusters.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct WorkItem {
-    pub a: u32,
-    pub b: u32,
-    pub cluster_a: u32,
-    pub cluster_b: u32,
+    pub a: LayerIx,
+    pub b: LayerIx,
+    pub cluster_a: ClusterIx,
+    pub cluster_b: ClusterIx,
 }
 
 /// The candidates of one work item: lanes of its two groups.

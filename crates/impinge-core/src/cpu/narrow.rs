@@ -16,6 +16,7 @@ use crate::exact::filter::{
 };
 use crate::frame::pair_key;
 use crate::grouping::GROUP;
+use crate::index::{LayerIx, Place};
 use crate::narrow::{intersect, intersect_shared};
 use crate::positions::Positions;
 use crate::sink::{Answer, BLOCK};
@@ -26,17 +27,17 @@ use super::met::{Met, WorkItem};
 use super::simd::{Isa, Lanes, Simd, dispatch};
 use super::world::{BodyRef, World};
 
-/// Two primitives whose boxes overlap: participants, and places in their clusters' orders.
+/// Two primitives whose boxes overlap: layers, and places in their clusters' orders.
 #[derive(Debug, Clone, Copy)]
 pub struct Candidate {
-    /// The first participant.
-    pub a: u32,
-    /// The second participant.
-    pub b: u32,
+    /// The first layer.
+    pub a: LayerIx,
+    /// The second layer.
+    pub b: LayerIx,
     /// Place of the primitive of `a`.
-    pub place_a: u32,
+    pub place_a: Place,
     /// Place of the primitive of `b`.
-    pub place_b: u32,
+    pub place_b: Place,
 }
 
 /// Room for the candidates that wait: the last work item may add a full group product to those that are not enough yet.
@@ -143,7 +144,7 @@ impl Settler {
         [group_a, group_b]: [&Group; 2],
         met: &Met,
     ) {
-        let (first_a, first_b) = (item.cluster_a * GROUP as u32, item.cluster_b * GROUP as u32);
+        let (cluster_a, cluster_b) = (item.cluster_a, item.cluster_b);
         let in_tables = group_a.in_tables && group_b.in_tables;
         let (body_a, body_b) = (world.body(item.a), world.body(item.b));
         for first in (0..met.len()).step_by(BATCH) {
@@ -157,7 +158,7 @@ impl Settler {
             };
             let places = |lane: usize| {
                 let [lane_a, lane_b] = batch.map(|lanes| u32::from(lanes[lane]));
-                (first_a + lane_a, first_b + lane_b)
+                (cluster_a.place(lane_a), cluster_b.place(lane_b))
             };
             for lane in Lanes(u64::from(verdict.yes) & lanes) {
                 let (place_a, place_b) = places(lane);
@@ -189,20 +190,20 @@ impl Settler {
     }
 
     /// Settles a pair of one body that shares a vertex, under `SharedVertex::Resolve`.
-    pub fn settle_shared(&mut self, body: &BodyRef<'_>, place_a: u32, place_b: u32) {
+    pub fn settle_shared(&mut self, body: &BodyRef<'_>, place_a: Place, place_b: Place) {
         self.settle_shared_by_all(body, &[place_a], &[place_b]);
     }
 
     /// Settles all pairs of a primitive of the one list with one of the other, under `SharedVertex::Resolve`. Primitives
     /// of one list have the same vertices, and a vertex is in both.
-    pub fn settle_shared_by_all(&mut self, body: &BodyRef<'_>, a: &[u32], b: &[u32]) {
+    pub fn settle_shared_by_all(&mut self, body: &BodyRef<'_>, a: &[Place], b: &[Place]) {
         let n_pairs = a.len() as u64 * b.len() as u64;
         let pairs = a.iter().flat_map(|&a| b.iter().map(move |&b| (a, b)));
         self.settle_as_one(body, [a[0], b[0]], n_pairs, pairs);
     }
 
     /// Settles all pairs of a list, under `SharedVertex::Resolve`. Its primitives have the same vertices.
-    pub fn settle_alike(&mut self, body: &BodyRef<'_>, list: &[u32]) {
+    pub fn settle_alike(&mut self, body: &BodyRef<'_>, list: &[Place]) {
         let &[first, second, ..] = list else {
             return;
         };
@@ -217,9 +218,9 @@ impl Settler {
     fn settle_as_one(
         &mut self,
         body: &BodyRef<'_>,
-        example: [u32; 2],
+        example: [Place; 2],
         n_pairs: u64,
-        pairs: impl Iterator<Item = (u32, u32)>,
+        pairs: impl Iterator<Item = (Place, Place)>,
     ) {
         if self.is_over() {
             return;
@@ -228,7 +229,7 @@ impl Settler {
         let [a, b] = example.map(|place| body.points(place));
         let [ids_a, ids_b] = example.map(|place| body.corners(place));
         let rule = crate::SharedVertex::Resolve;
-        if !intersect_shared(rule, body.participant.kind, (&a, ids_a), (&b, ids_b)) {
+        if !intersect_shared(rule, body.layer.kind, (&a, ids_a), (&b, ids_b)) {
             return;
         }
         // So many may be far more than memory holds.
@@ -348,7 +349,7 @@ impl Settler {
     fn settle_exactly(&mut self, a: &BodyRef<'_>, b: &BodyRef<'_>, candidate: Candidate) {
         let points_a = a.points(candidate.place_a);
         let points_b = b.points(candidate.place_b);
-        if intersect(a.participant.kind, &points_a, b.participant.kind, &points_b) {
+        if intersect(a.layer.kind, &points_a, b.layer.kind, &points_b) {
             self.keys.push(pair_key(
                 a.global(candidate.place_a),
                 b.global(candidate.place_b),
@@ -390,19 +391,20 @@ fn classify_tetrahedra<S: Simd>(simd: S, settler: &mut Settler, world: World<'_>
 /// The two bodies of the current candidate; candidates of the same bodies come in runs.
 struct Lookup<'a> {
     world: World<'a>,
-    a_ix: u32,
-    b_ix: u32,
+    a_ix: LayerIx,
+    b_ix: LayerIx,
     a: BodyRef<'a>,
     b: BodyRef<'a>,
 }
 
 impl<'a> Lookup<'a> {
     fn new(world: World<'a>) -> Self {
-        let first = world.body(0);
+        let ix = LayerIx::new(0);
+        let first = world.body(ix);
         Lookup {
             world,
-            a_ix: 0,
-            b_ix: 0,
+            a_ix: ix,
+            b_ix: ix,
             a: first,
             b: first,
         }
@@ -473,7 +475,7 @@ impl<'a> Lookup<'a> {
                 put_all(simd, side_b, b.positions, corners_b, places_b);
                 return true;
             }
-            let (place_a, place_b) = (candidate.place_a as usize, candidate.place_b as usize);
+            let (place_a, place_b) = (candidate.place_a.index(), candidate.place_b.index());
             put(side_a, lane, a.positions, &corners_a[place_a]);
             put(side_b, lane, b.positions, &corners_b[place_b]);
         }
@@ -483,7 +485,7 @@ impl<'a> Lookup<'a> {
 
 /// The places of candidates of the same two bodies; unused lanes repeat the first.
 #[inline(always)]
-fn places_in_common(chunk: &[Candidate]) -> Option<([u32; LANES], [u32; LANES])> {
+fn places_in_common(chunk: &[Candidate]) -> Option<([Place; LANES], [Place; LANES])> {
     let first = chunk[0];
     let mut places = ([first.place_a; LANES], [first.place_b; LANES]);
     let mut same = true;
@@ -502,13 +504,13 @@ fn put_all<S: Simd, const N: usize>(
     side: &mut [[[f64; LANES]; 3]; N],
     positions: &Positions,
     corners: &[[u32; N]],
-    places: [u32; LANES],
+    places: [Place; LANES],
 ) {
     match positions {
         Positions::F32(positions) => {
             let mut ids = [[0; LANES]; N];
             for (lane, &place) in places.iter().enumerate() {
-                let corners = &corners[place as usize];
+                let corners = &corners[place.index()];
                 for k in 0..N {
                     ids[k][lane] = corners[k];
                 }
@@ -519,7 +521,7 @@ fn put_all<S: Simd, const N: usize>(
         }
         Positions::F64(positions) => {
             for (lane, &place) in places.iter().enumerate() {
-                let corners = &corners[place as usize];
+                let corners = &corners[place.index()];
                 for k in 0..N {
                     put_vertex(&mut side[k], lane, &positions[corners[k] as usize]);
                 }

@@ -20,6 +20,7 @@ use std::sync::Arc;
 
 use crate::grouping::GROUP;
 use crate::grouping::hubs::Hubs;
+use crate::index::ClusterIx;
 use crate::query::SharedVertex;
 use crate::settings::Settings;
 use crate::sink::Answer;
@@ -134,8 +135,8 @@ fn cull<S: Simd>(
     const NOWHERE: usize = usize::MAX;
     let sides = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
     let caches = [world.cache(item.a), world.cache(item.b)];
-    let size = |side: usize| caches[side].clustering.size(sides[side].1 as usize);
-    let leaf = |side: usize| caches[side].bounds.levels[0].at(sides[side].1 as usize);
+    let size = |side: usize| caches[side].clustering.size(sides[side].1);
+    let leaf = |side: usize| caches[side].bounds.levels[0].at(sides[side].1.index());
     let both = leaf(0).intersection(&leaf(1));
     let mut places = [NOWHERE; 2];
     let mut lanes = [0; 2];
@@ -191,11 +192,11 @@ fn within_body<S: Simd>(
     let cache = world.cache(item.a);
     let adjacency = cache.clustering.adjacency();
     let hubs = cache.clustering.hubs();
-    let (cluster_a, cluster_b) = (item.cluster_a as usize, item.cluster_b as usize);
+    let (cluster_a, cluster_b) = (item.cluster_a, item.cluster_b);
     let rule = Rule {
         body: world.body(item.a),
-        first_a: item.cluster_a * GROUP as u32,
-        first_b: item.cluster_b * GROUP as u32,
+        cluster_a,
+        cluster_b,
         shared_vertex: world.frame.shared_vertex,
         folded: [cluster_a, cluster_b].map(|cluster| {
             let folds = cache.folds.as_ref();
@@ -240,7 +241,7 @@ fn within_body<S: Simd>(
 /// Clears the pairs that share a hub.
 #[inline(never)]
 fn clear_hubs(hubs: &Hubs, item: &WorkItem, rows: Side, masks: &mut Masks) {
-    for (lanes_a, lanes_b) in hubs.between(item.cluster_a as usize, item.cluster_b as usize) {
+    for (lanes_a, lanes_b) in hubs.between(item.cluster_a, item.cluster_b) {
         let (rows, lanes) = match rows {
             Side::A => (lanes_a, lanes_b),
             Side::B => (lanes_b, lanes_a),
@@ -254,8 +255,8 @@ fn clear_hubs(hubs: &Hubs, item: &WorkItem, rows: Side, masks: &mut Masks) {
 /// Treats the primitives of one body that share a vertex.
 struct Rule<'a> {
     body: BodyRef<'a>,
-    first_a: u32,
-    first_b: u32,
+    cluster_a: ClusterIx,
+    cluster_b: ClusterIx,
     shared_vertex: SharedVertex,
     /// The lanes of each cluster that may meet a neighbour, under `SharedVertex::Resolve`.
     folded: [u64; 2],
@@ -294,7 +295,8 @@ impl Rule<'_> {
                 Side::A => (row, lane),
                 Side::B => (lane, row),
             };
-            let (place_a, place_b) = (self.first_a + lane_a as u32, self.first_b + lane_b as u32);
+            let place_a = self.cluster_a.place(lane_a as u32);
+            let place_b = self.cluster_b.place(lane_b as u32);
             settler.settle_shared(&self.body, place_a, place_b);
         }
     }

@@ -14,6 +14,7 @@ use std::sync::{Mutex, PoisonError};
 use crate::clusterings::make_anew;
 use crate::error::Error;
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
+use crate::index::LayerIx;
 use crate::positions::Positions;
 use crate::settings::{Recluster, Settings};
 use crate::stats::Statistics;
@@ -55,7 +56,7 @@ enum What {
 
 #[derive(Debug, Clone, Copy)]
 struct Task {
-    participant: u32,
+    layer: LayerIx,
     what: What,
     first: u32,
     end: u32,
@@ -91,10 +92,10 @@ impl Refit {
         let tuning = &settings.tuning;
         let is_allowed = remote::is_allowed(isa, frame, settings);
         self.tasks.clear();
-        for (ix, participant) in frame.layers.iter().enumerate() {
+        for (ix, layer) in frame.numbered_layers() {
             let body = frame.body(scene, ix);
-            let cache = caches.at_mut(participant);
-            let needed = remote::plan(cache, body, is_allowed && !participant.within);
+            let cache = caches.at_mut(layer);
+            let needed = remote::plan(cache, body, is_allowed && !layer.within);
             if needed == Needed::None {
                 continue;
             }
@@ -111,10 +112,10 @@ impl Refit {
         }
         if is_allowed {
             self.tasks.clear();
-            for (ix, participant) in frame.layers.iter().enumerate() {
+            for (ix, layer) in frame.numbered_layers() {
                 let needed = remote::prove(job, caches, ix, stats);
                 if needed != Needed::None {
-                    let cache = caches.at_mut(participant);
+                    let cache = caches.at_mut(layer);
                     cache.forget_boxes();
                     self.push_needed(workers, ix, frame.layers.len(), cache, needed);
                 }
@@ -132,7 +133,7 @@ impl Refit {
     fn push_needed(
         &mut self,
         workers: &Workers,
-        participant_ix: usize,
+        layer: LayerIx,
         n_bodies: usize,
         cache: &mut BodyCache,
         needed: Needed,
@@ -141,17 +142,17 @@ impl Refit {
             Needed::None => {}
             Needed::All => {
                 let n_nodes = cache.bounds.levels.get(1).map_or(1, BoundsArray::len);
-                self.push(workers, participant_ix, cache, What::All, n_nodes);
+                self.push(workers, layer, cache, What::All, n_nodes);
             }
             Needed::Near { n_nodes, n_runs } => {
                 // Order tasks so that one thread tends to read a body and compute its boxes: `work` reverses this list,
                 // so the caller starts at its end and helpers at its front.
                 let mut parts = [(What::Read, n_runs), (What::Near, n_nodes)];
-                if 2 * participant_ix >= n_bodies {
+                if 2 * layer.index() >= n_bodies {
                     parts.reverse();
                 }
                 for (what, n) in parts {
-                    self.push(workers, participant_ix, cache, what, n);
+                    self.push(workers, layer, cache, what, n);
                 }
             }
         }
@@ -161,7 +162,7 @@ impl Refit {
     fn push(
         &mut self,
         workers: &Workers,
-        participant_ix: usize,
+        layer: LayerIx,
         cache: &mut BodyCache,
         what: What,
         n: usize,
@@ -180,7 +181,7 @@ impl Refit {
         };
         let step = workers.task(step);
         let tasks = (0..n).step_by(step).map(|first| Task {
-            participant: participant_ix as u32,
+            layer,
             what,
             first: first as u32,
             end: n.min(first + step) as u32,
@@ -230,7 +231,7 @@ impl Refit {
         for (task, found) in self.tasks.iter().zip(&mut self.found) {
             let found = found.get_mut().unwrap_or_else(PoisonError::into_inner);
             all_finite &= found.extents.all_finite;
-            let cache = caches.at_mut(&frame.layers[task.participant as usize]);
+            let cache = caches.at_mut(frame.layer(task.layer));
             cache.surface += f64::from(found.surface);
             cache.whole.join(&found.extents.whole);
             if let (What::Read, Some(remote)) = (task.what, &mut cache.remote) {
@@ -255,9 +256,9 @@ impl Refit {
             workers,
             ..
         } = job;
-        for (ix, participant) in frame.layers.iter().enumerate() {
+        for (ix, layer) in frame.numbered_layers() {
             let body = frame.body(scene, ix);
-            let cache = caches.at_mut(participant);
+            let cache = caches.at_mut(layer);
             if cache.positions_stamp == body.positions_stamp() {
                 continue;
             }
@@ -272,7 +273,7 @@ impl Refit {
                 *cache = make_anew(workers, n, stats, || {
                     BodyCache::new(body, isa, &settings.tuning)
                 })?;
-                if participant.within {
+                if layer.within {
                     cache.find_adjacency(workers)?;
                 }
                 cache.refit_all(body);
@@ -300,8 +301,8 @@ impl Found {
 /// Does one task.
 #[inline(always)]
 fn work<S: Simd>(simd: S, world: World<'_>, task: Task) -> Found {
-    let positions = world.body(task.participant).positions;
-    let cache = world.cache(task.participant);
+    let positions = world.body(task.layer).positions;
+    let cache = world.cache(task.layer);
     let (clustering, run) = (&cache.clustering, task.first as usize..task.end as usize);
     let mut summary = Summary::EMPTY;
     let near = match (task.what, cache.sorted(), positions) {

@@ -7,6 +7,7 @@ use std::time::Duration;
 use crate::clock::Instant;
 use crate::error::Error;
 use crate::grouping::hubs::Hubs;
+use crate::index::{ClusterIx, LayerIx};
 use crate::query::SharedVertex;
 use crate::run::Job;
 use crate::settings::Settings;
@@ -59,7 +60,7 @@ pub(crate) trait Stage: Copy + Sync {
     type Answer: Ending;
 
     /// The tree over the clusters of a layer.
-    fn tree(&self, layer: u32) -> Tree<'_>;
+    fn tree(&self, layer: LayerIx) -> Tree<'_>;
 
     /// Pairs the elements of some work items, and settles the candidates.
     fn pair<S: Simd>(self, simd: S, isa: Isa, items: &[WorkItem], worker: &mut Self::Worker);
@@ -71,7 +72,7 @@ pub(crate) trait Stage: Copy + Sync {
     fn counts(worker: &Self::Worker) -> Counts;
 
     /// The hubs of a layer: vertices that very many elements name.
-    fn hubs(&self, layer: u32) -> Option<&Hubs>;
+    fn hubs(&self, layer: LayerIx) -> Option<&Hubs>;
 
     /// Called when all work items are settled, for the rest of the work.
     fn finish(
@@ -108,7 +109,7 @@ impl<'a> Stage for World<'a> {
     type Answer = &'a Arc<Answer>;
 
     #[inline(always)]
-    fn tree(&self, layer: u32) -> Tree<'_> {
+    fn tree(&self, layer: LayerIx) -> Tree<'_> {
         self.cache(layer).tree()
     }
 
@@ -118,7 +119,7 @@ impl<'a> Stage for World<'a> {
     }
 
     #[inline(always)]
-    fn hubs(&self, layer: u32) -> Option<&Hubs> {
+    fn hubs(&self, layer: LayerIx) -> Option<&Hubs> {
         self.cache(layer).clustering.hubs()
     }
 
@@ -133,7 +134,7 @@ impl<'a> Stage for World<'a> {
         if job.frame.shared_vertex != SharedVertex::Resolve {
             return Ok(());
         }
-        for (ix, layer) in (0u32..).zip(&job.frame.layers) {
+        for (ix, layer) in job.frame.numbered_layers() {
             let Some(hubs) = Stage::hubs(self, ix).filter(|_| layer.within) else {
                 continue;
             };
@@ -363,36 +364,37 @@ fn all<S: Simd, W: Stage>(
 ) -> Result<(), Error> {
     let (world, frame) = (slabs.world, slabs.job.frame);
     if frame.between() && frame.layers.len() == 2 {
-        if frame.test(0, 1).is_some() {
-            between(simd, 0, 1, stack, slabs)?;
+        let [a, b] = [0, 1].map(LayerIx::new);
+        if frame.test(a, b).is_some() {
+            between(simd, a, b, stack, slabs)?;
         }
     } else if frame.between() {
         top.refit(frame.layers.len(), slabs.tuning, |ix| {
             world.tree(ix).bounds.root()
         });
         top.pairs(simd, body_stack, |a, b| {
-            if frame.test(a as usize, b as usize).is_none() {
+            if frame.test(a, b).is_none() {
                 return Ok(());
             }
             // Compiled separately: inside this closure the instruction set would be lost.
             dispatch!(slabs.isa, between, <W: Stage> (
-                a: u32 = a,
-                b: u32 = b,
+                a: LayerIx = a,
+                b: LayerIx = b,
                 stack: &mut Vec<NodePair> = stack,
                 slabs: &mut Slabs<'_, W> = slabs,
             ) -> Result<(), Error>)
         })?;
     }
-    for ix in 0..frame.layers.len() as u32 {
-        if frame.test(ix as usize, ix as usize).is_some() {
+    for ix in frame.layer_ixs() {
+        if frame.test(ix, ix).is_some() {
             let (tree, hubs) = (world.tree(ix), world.hubs(ix));
-            dispatch::within(simd, tree, hubs, stack, |cluster_a, cluster_b| {
+            dispatch::within(simd, tree, hubs, stack, |leaf_a, leaf_b| {
                 // Adjacency masks are stored with the lower cluster.
                 slabs.put(WorkItem {
                     a: ix,
                     b: ix,
-                    cluster_a: cluster_a.min(cluster_b),
-                    cluster_b: cluster_a.max(cluster_b),
+                    cluster_a: ClusterIx::new(leaf_a.min(leaf_b)),
+                    cluster_b: ClusterIx::new(leaf_a.max(leaf_b)),
                 })
             })?;
         }
@@ -403,19 +405,19 @@ fn all<S: Simd, W: Stage>(
 #[inline(always)]
 fn between<S: Simd, W: Stage>(
     simd: S,
-    a: u32,
-    b: u32,
+    a: LayerIx,
+    b: LayerIx,
     stack: &mut Vec<NodePair>,
     slabs: &mut Slabs<'_, W>,
 ) -> Result<(), Error> {
     let world = slabs.world;
     let (tree_a, tree_b) = (world.tree(a), world.tree(b));
-    dispatch::between(simd, tree_a, tree_b, stack, |cluster_a, cluster_b| {
+    dispatch::between(simd, tree_a, tree_b, stack, |leaf_a, leaf_b| {
         slabs.put(WorkItem {
             a,
             b,
-            cluster_a,
-            cluster_b,
+            cluster_a: ClusterIx::new(leaf_a),
+            cluster_b: ClusterIx::new(leaf_b),
         })
     })
 }

@@ -31,7 +31,7 @@ pub struct Asked {
     pub adjacent: bool,
 }
 
-/// Two groups of one cell: places in `kept`.
+/// Two groups of one cell: indices in `kept`.
 #[derive(Clone, Copy)]
 pub(crate) struct GroupPair<'a> {
     pub kept: &'a [Kept],
@@ -109,7 +109,7 @@ fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: GroupPair<'_>, asked: Ask
     }
     if let Some(body) = &body {
         for (lane, &entry) in b.iter().enumerate() {
-            let corners = body.corners(kept[entry as usize].primitive);
+            let corners = body.corners(kept[entry as usize].place());
             for (row, &corner) in lanes.corners.iter_mut().zip(corners) {
                 row.0[lane] = corner;
             }
@@ -146,7 +146,7 @@ fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: GroupPair<'_>, asked: Ask
         if let Some(body) = &body
             && partners != 0
         {
-            let corners = body.corners(kept.primitive);
+            let corners = body.corners(kept.place());
             for row in &lanes.corners[..corners.len()] {
                 for &corner in corners {
                     adjacent |= simd.equals_64(row, corner, partners);
@@ -162,6 +162,7 @@ mod tests {
     use super::*;
     use crate::grouping::bounds::Bounds;
     use crate::grouping::grid::{Grid, owns};
+    use crate::index::{ElementIx, LayerIx};
     use crate::settings::InstructionSet;
 
     #[test]
@@ -177,7 +178,7 @@ mod tests {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(99);
             (state >> 33) % n
         };
-        let kept: Vec<Kept> = (0..400)
+        let kept: Vec<Kept> = ElementIx::up_to(400)
             .map(|primitive| {
                 let min: [f32; 3] = std::array::from_fn(|_| random(30) as f32 / 10.0);
                 let bounds = Bounds {
@@ -187,7 +188,7 @@ mod tests {
                 Kept {
                     bounds,
                     range: grid.range(&bounds),
-                    participant: 0,
+                    layer: LayerIx::new(0),
                     primitive,
                 }
             })

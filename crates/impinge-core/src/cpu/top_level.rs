@@ -3,31 +3,32 @@
 use crate::clusterings::Fit;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::hierarchy::{Entry, Shape, order};
+use crate::index::LayerIx;
 use crate::tuning::Tuning;
 
 use super::bounds::TreeBounds;
 use super::dispatch::{self, NodePair, Tree};
 use super::simd::Simd;
 
-/// A tree over the participants' boxes, for frames of more than two bodies. Its order is kept from
+/// A tree over the layers' boxes, for frames of more than two bodies. Its order is kept from
 /// frame to frame and made again when bodies have moved away from their neighbours in it.
 #[derive(Default)]
 pub(crate) struct TopLevel {
     shape: Shape,
-    order: Vec<u32>,
+    order: Vec<LayerIx>,
     bounds: TreeBounds,
     entries: Vec<Entry>,
     fit: Fit,
 }
 
 impl TopLevel {
-    /// Calls `emit(a, b)`, `a < b`, once for each pair of participants whose boxes overlap.
+    /// Calls `emit(a, b)`, `a < b`, once for each pair of layers whose boxes overlap.
     #[inline(always)]
     pub fn pairs<S: Simd, E>(
         &self,
         simd: S,
         stack: &mut Vec<NodePair>,
-        mut emit: impl FnMut(u32, u32) -> Result<(), E>,
+        mut emit: impl FnMut(LayerIx, LayerIx) -> Result<(), E>,
     ) -> Result<(), E> {
         let tree = Tree {
             shape: &self.shape,
@@ -49,24 +50,24 @@ impl TopLevel {
             + self.bounds.bytes()
     }
 
-    /// Updates the tree to the current boxes of `n` participants.
-    pub fn refit(&mut self, n: usize, tuning: &Tuning, root: impl Fn(u32) -> Bounds) {
+    /// Updates the tree to the current boxes of `n` layers.
+    pub fn refit(&mut self, n: usize, tuning: &Tuning, root: impl Fn(LayerIx) -> Bounds) {
         let is_new = self.order.len() != n;
         if is_new {
             self.shape = Shape::new(n);
             self.bounds.resize(&self.shape);
-            self.order = (0..n as u32).collect();
+            self.order = LayerIx::up_to(n).collect();
         }
         self.refit_boxes(&root);
         if self.fit.is_stale(self.spread(), tuning) || is_new {
             self.entries.clear();
-            self.entries.extend((0..n as u32).map(|ix| Entry {
-                center: root(ix).center(),
-                number: ix,
+            self.entries.extend(LayerIx::up_to(n).map(|layer| Entry {
+                center: root(layer).center(),
+                number: layer.raw(),
             }));
             order(&self.shape, 1, None, &mut self.entries);
-            for (place, entry) in self.entries.iter().enumerate() {
-                self.order[place] = entry.number;
+            for (layer, entry) in self.order.iter_mut().zip(&self.entries) {
+                *layer = LayerIx::new(entry.number);
             }
             self.refit_boxes(&root);
             self.fit = Fit::UNKNOWN;
@@ -74,9 +75,9 @@ impl TopLevel {
         }
     }
 
-    fn refit_boxes(&mut self, root: &impl Fn(u32) -> Bounds) {
-        for (place, &ix) in self.order.iter().enumerate() {
-            self.bounds.levels[0].put(place, &root(ix));
+    fn refit_boxes(&mut self, root: &impl Fn(LayerIx) -> Bounds) {
+        for (leaf, &layer) in self.order.iter().enumerate() {
+            self.bounds.levels[0].put(leaf, &root(layer));
         }
         self.bounds.refit_above(0, &self.shape);
     }

@@ -1,4 +1,4 @@
-//! Read-only view shared by all stages: the scene, its participants, and the cache kept per body.
+//! Read-only view shared by all stages: the scene, its layers, and the cache kept per body.
 
 use crate::clusterings::{Fit, Kept, Store};
 use crate::elements::Elements;
@@ -6,6 +6,7 @@ use crate::exact::Point;
 use crate::frame::{Frame, Layer};
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
+use crate::index::{ElementIx, LayerIx, Number, Place};
 use crate::positions::Positions;
 use crate::scene::Scene;
 
@@ -53,23 +54,23 @@ pub(crate) type Caches = Store<BodyCache>;
 pub struct World<'a> {
     /// The bodies.
     pub scene: &'a Scene,
-    /// The participants.
+    /// The layers.
     pub frame: &'a Frame,
     /// `Clusters` only: places of primitives are places in the clusters' orders.
     pub(crate) caches: Option<&'a Caches>,
 }
 
-/// One participant's data. A *place* names a primitive: in the order of the clusters if there
+/// One layer's data. A *place* names a primitive: in the order of the clusters if there
 /// are any, else as the body numbers it.
 #[derive(Clone, Copy)]
 pub struct BodyRef<'a> {
-    /// The participant.
-    pub participant: &'a Layer,
+    /// The layer.
+    pub layer: &'a Layer,
     /// The positions of its vertices.
     pub positions: &'a Positions,
     /// The corners at each place.
     pub elements: &'a Elements,
-    order: Option<&'a [u32]>,
+    order: Option<&'a [ElementIx]>,
 }
 
 impl<'a> World<'a> {
@@ -82,27 +83,26 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Looks up a participant.
+    /// Looks up a layer.
     #[inline(always)]
-    pub fn body(&self, participant_ix: u32) -> BodyRef<'a> {
-        let participant = &self.frame.layers[participant_ix as usize];
-        let body = self.scene.body_in(participant.id.slot());
-        let clustering = self.caches.map(|_| &self.cache(participant_ix).clustering);
+    pub fn body(&self, layer_ix: LayerIx) -> BodyRef<'a> {
+        let layer = self.frame.layer(layer_ix);
+        let body = self.scene.body_in(layer.id.slot());
+        let clustering = self.caches.map(|_| &self.cache(layer_ix).clustering);
         BodyRef {
-            participant,
+            layer,
             positions: body.positions(),
             elements: clustering.map_or(body.elements(), |clustering| &clustering.corners),
             order: clustering.map(|clustering| &clustering.order[..]),
         }
     }
 
-    /// `Clusters` only: the cache of a participant.
+    /// `Clusters` only: the cache of a layer.
     #[inline(always)]
-    pub(crate) fn cache(&self, participant_ix: u32) -> &'a BodyCache {
-        let layer = &self.frame.layers[participant_ix as usize];
+    pub(crate) fn cache(&self, layer: LayerIx) -> &'a BodyCache {
         self.caches
             .expect("by the method `Clusters` only")
-            .at(layer)
+            .at(self.frame.layer(layer))
     }
 }
 
@@ -119,20 +119,23 @@ impl BodyCache {
 impl<'a> BodyRef<'a> {
     /// The global number of the primitive at a place.
     #[inline(always)]
-    pub fn global(&self, place: u32) -> u32 {
-        self.participant.first + self.order.map_or(place, |order| order[place as usize])
+    pub fn global(&self, place: Place) -> Number {
+        self.layer.number(match self.order {
+            Some(order) => order[place.index()],
+            None => ElementIx::new(place.raw()),
+        })
     }
 
     /// The vertex ids of the primitive at a place.
     #[inline(always)]
-    pub fn corners(&self, place: u32) -> &'a [u32] {
-        self.elements.corners(place as usize)
+    pub fn corners(&self, place: Place) -> &'a [u32] {
+        self.elements.corners(place.index())
     }
 
     /// The corners at a place in double precision; an element with fewer than four repeats its last.
     #[inline(always)]
-    pub fn points(&self, place: u32) -> [Point; 4] {
-        let corners = self.elements.four_corners(place as usize);
+    pub fn points(&self, place: Place) -> [Point; 4] {
+        let corners = self.elements.four_corners(place.index());
         corners.map(|corner| self.positions.point(corner as usize))
     }
 }

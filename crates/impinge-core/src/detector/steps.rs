@@ -11,14 +11,14 @@ use crate::clock::Instant;
 use super::Detector;
 use crate::advance::Advance;
 use crate::cpu::steps::{Asked, Sought, StepClusters, StepTest};
-use crate::elements::Part;
 use crate::error::Error;
 use crate::exact::Contact;
-use crate::frame::{Ask, Frame, TestId, owner_by_first};
+use crate::frame::{Ask, Frame, TestId};
 use crate::hull::Pose;
 use crate::impacts::{
     Candidates, ContactAnswer, Found, FoundByKind, Impact, Impacts, KeyAnswer, StepAnswer,
 };
+use crate::index::pair_numbers;
 use crate::naive;
 use crate::narrow::{Element, FirstContact};
 use crate::near::NearPairs;
@@ -447,22 +447,14 @@ impl Detector {
         fraction: f64,
     ) -> bool {
         let frame = &self.steps.frame;
-        let numbers = [key >> 32, key & u64::from(u32::MAX)].map(|number| number as u32);
-        let layers = numbers.map(|number| owner_by_first(&frame.layers, number, |of| of.first));
-        let places = [0, 1].map(|side| numbers[side] - frame.layers[layers[side]].first);
-        let [a, b] = [0, 1].map(|side| {
-            let (layer, place) = (layers[side], &places[side]);
-            let part = frame.layers[layer].part;
-            Element {
-                scene,
-                frame,
-                layer,
-                corners: match part {
-                    // Vertices are numbered as positions are.
-                    Part::Vertices => std::slice::from_ref(place),
-                    _ => frame.body(scene, layer).part(part).corners(*place as usize),
-                },
-            }
+        let located = pair_numbers(key).map(|number| frame.locate(number));
+        let [a, b] = located.each_ref().map(|(layer, element)| Element {
+            scene,
+            frame,
+            layer: *layer,
+            corners: frame
+                .body(scene, *layer)
+                .corners(frame.layer(*layer).part, element),
         });
         let contact = FirstContact::settle_part(TestId::Elements(kind), a, b, fraction);
         contact.is_some_and(|contact| !(step.start == Start::Skip && contact.at_start))

@@ -231,7 +231,7 @@ impl Engine {
         };
         let world = &self.world;
         stats.n_clusters = world.weigh(scene, frame).n_clusters;
-        let clustering = |participant_ix| world.clustering(frame, participant_ix);
+        let clustering = |layer| world.clustering(frame, layer);
         let chunks = pieces::cut(job, most, clustering)?;
         for (ix, a) in chunks.iter().enumerate() {
             for b in &chunks[ix..] {

@@ -3,6 +3,8 @@
 use crate::grouping::bounds::Bounds;
 use crate::grouping::hierarchy::{Entry, FANOUT, Shape, order};
 
+use crate::index::LayerIx;
+
 use super::layout::{Level, NO_ROOT, Node, NodePair};
 
 /// Bodies, empty ones included, that need no tree over bodies if at most two are filled.
@@ -15,7 +17,7 @@ const STALE: f64 = 1.5;
 pub struct Forest {
     pub nodes: Vec<Node>,
     pub levels: Vec<Level>,
-    /// Root of each participant; meaningless for an empty one.
+    /// Root of each layer, or of each run of clusters of a piece; meaningless for an empty one.
     pub roots: Vec<u32>,
     n_clusters: u64,
     pub first_gate: u32,
@@ -28,10 +30,10 @@ pub struct Forest {
 
 impl Forest {
     /// One tree per body and, if there are more than a few, a tree over the bodies, built from one point of each.
-    pub(crate) fn new(shapes: &[&Shape], sample: impl Fn(usize) -> [f32; 3]) -> Self {
+    pub(crate) fn new(shapes: &[&Shape], sample: impl Fn(LayerIx) -> [f32; 3]) -> Self {
         let mut forest = Forest::of_trees(shapes);
-        let filled: Vec<u32> = (0..shapes.len() as u32)
-            .filter(|&ix| forest.is_filled(ix as usize))
+        let filled: Vec<LayerIx> = LayerIx::up_to(shapes.len())
+            .filter(|&layer| forest.is_filled(layer))
             .collect();
         // Without a tree, kernels loop over all bodies, empty ones too.
         if filled.len() > 2 || (shapes.len() > FEW_BODIES && !filled.is_empty()) {
@@ -92,13 +94,13 @@ impl Forest {
     }
 
     /// Appends gates and the tree over them.
-    fn push_top(&mut self, filled: &[u32]) {
+    fn push_top(&mut self, filled: &[LayerIx]) {
         self.first_gate = self.nodes.len() as u32;
         self.n_gates = filled.len() as u32;
         let gate_height = self.levels.len() as u32;
         let gates = filled
             .iter()
-            .map(|&body| Node::new(body, 1, gate_height, true));
+            .map(|layer| Node::new(layer.raw(), 1, gate_height, true));
         self.nodes.extend(gates);
         self.push_level(self.first_gate);
         self.top_shape = Shape::new(filled.len());
@@ -124,8 +126,13 @@ impl Forest {
         self.has_top.then(|| self.nodes.len() as u32 - 1)
     }
 
-    pub fn is_filled(&self, participant_ix: usize) -> bool {
-        self.roots[participant_ix] != NO_ROOT
+    /// The root of a layer.
+    pub fn root(&self, layer: LayerIx) -> u32 {
+        self.roots[layer.index()]
+    }
+
+    pub fn is_filled(&self, layer: LayerIx) -> bool {
+        self.root(layer) != NO_ROOT
     }
 
     pub fn n_clusters(&self) -> u64 {
@@ -138,7 +145,7 @@ impl Forest {
     }
 
     /// Reorders the gates if bodies have moved away from their neighbours. Returns whether it did.
-    pub fn reorder(&mut self, sample: impl Fn(usize) -> [f32; 3]) -> bool {
+    pub fn reorder(&mut self, sample: impl Fn(LayerIx) -> [f32; 3]) -> bool {
         if !self.has_top {
             return false;
         }
@@ -147,7 +154,7 @@ impl Forest {
         for gate in first..first + self.n_gates as usize {
             let number = self.nodes[gate].first_child;
             self.entries.push(Entry {
-                center: sample(number as usize),
+                center: sample(LayerIx::new(number)),
                 number,
             });
         }

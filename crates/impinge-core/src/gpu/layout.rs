@@ -20,7 +20,7 @@ macro_rules! words {
 words! {
     /// A node of the forest.
     Node { low: [u32; 3], first_child: u32, high: [u32; 3], shape: u32 }
-    /// One participant: a body, or in a step one layer of a body.
+    /// One layer of a frame.
     Body {
         root: u32, slack: u32, within: u32, layer: u32,
         category: [u32; 2], mask: [u32; 2],
@@ -29,7 +29,7 @@ words! {
     Cluster { first_place: u32, first_vertex: u32, sizes: u32, body: u32 }
     /// The nodes of one height.
     Level { first: u32, count: u32 }
-    /// Two nodes whose boxes may overlap; in the list of ignored pairs, two participants.
+    /// Two nodes whose boxes may overlap; in the list of ignored pairs, two layers.
     NodePair { a: u32, b: u32 }
     /// Two clusters.
     WorkItem { a: u32, b: u32 }

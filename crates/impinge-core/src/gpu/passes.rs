@@ -21,6 +21,7 @@ use super::steps::Stages;
 use super::taker::Taker;
 use crate::error::Error;
 use crate::frame::{Frame, pair_key};
+use crate::index::Number;
 use crate::narrow::settle;
 use crate::query::SharedVertex;
 use crate::run::Job;
@@ -379,9 +380,10 @@ fn settle_all(
         ..
     } = job;
     settled.resize_with(workers.n(), Vec::new);
+    let key = |a: u32, b: u32| pair_key(Number::new(a), Number::new(b));
     for certain in collected.pairs.chunks(BLOCK) {
         let keys = &mut settled[0];
-        keys.extend(certain.iter().map(|pair| pair_key(pair.low, pair.high)));
+        keys.extend(certain.iter().map(|pair| key(pair.low, pair.high)));
         answer.take(keys);
     }
     let unsure = &collected.unsure[..];
@@ -393,8 +395,9 @@ fn settle_all(
     workers.for_each(&mut settled[..n_workers], n_tasks, |keys, ix| {
         let first = ix * SETTLED_BY_A_TASK;
         for pair in &unsure[first..unsure.len().min(first + SETTLED_BY_A_TASK)] {
-            if settle(scene, frame, pair.low, pair.high) {
-                keys.push(pair_key(pair.low, pair.high));
+            let key = key(pair.low, pair.high);
+            if settle(scene, frame, key) {
+                keys.push(key);
             }
         }
         if keys.len() >= BLOCK {

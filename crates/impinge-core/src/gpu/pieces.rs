@@ -1,6 +1,6 @@
 //! Frames that are too large for the device, answered piece by piece.
 //!
-//! The clusters of all participants, body after body, are cut into chunks of which two fit on the device. The pieces
+//! The clusters of all layers, body after body, are cut into chunks of which two fit on the device. The pieces
 //! are every chunk by itself, and every two chunks whose boxes meet. Each piece is a separate query, for which its
 //! topology and positions are sent.
 //!
@@ -18,6 +18,8 @@
 //! Cost: quadratic in the number of chunks, but chunks are compact and most of their boxes do
 //! not meet. Invariant: every two clusters lie in one pair of runs of one piece.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::buffers::count;
@@ -28,20 +30,20 @@ use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
 use crate::hull;
+use crate::index::{ClusterIx, LayerIx};
 use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::Scene;
 
-/// Consecutive clusters of one participant.
+/// Consecutive clusters of one layer.
 #[derive(Debug)]
 pub struct ClusterRun {
-    participant: usize,
-    first: usize,
-    end: usize,
+    layer: LayerIx,
+    clusters: Range<usize>,
     bounds: Bounds,
 }
 
-/// Consecutive runs, at most one per participant.
+/// Consecutive runs, at most one per layer.
 #[derive(Debug)]
 pub struct Chunk {
     pub runs: Vec<ClusterRun>,
@@ -55,7 +57,7 @@ pub struct Chunk {
 pub fn cut<'a>(
     job: Job<'_>,
     most: Most,
-    clustering: impl Fn(usize) -> &'a Clustering + Sync,
+    clustering: impl Fn(LayerIx) -> &'a Clustering + Sync,
 ) -> Result<Vec<Chunk>, Error> {
     let Job {
         scene,
@@ -65,9 +67,9 @@ pub fn cut<'a>(
     } = job;
     let mut chunks: Vec<Chunk> = Vec::new();
     let mut weight = Weight::default();
-    for participant in 0..frame.layers.len() {
-        let clustering = clustering(participant);
-        for cluster in 0..clustering.n_clusters() {
+    for layer in frame.layer_ixs() {
+        let clustering = clustering(layer);
+        for cluster in clustering.clusters() {
             let (n, n_vertices) = (clustering.size(cluster), clustering.vertices(cluster).len());
             weight.add_cluster(count(n), count(n_vertices));
             if chunks.is_empty() || !weight.fits(most) {
@@ -80,11 +82,10 @@ pub fn cut<'a>(
             }
             let runs = &mut chunks.last_mut().expect("just pushed").runs;
             match runs.last_mut() {
-                Some(run) if run.participant == participant => run.end = cluster + 1,
+                Some(run) if run.layer == layer => run.clusters.end = cluster.index() + 1,
                 _ => runs.push(ClusterRun {
-                    participant,
-                    first: cluster,
-                    end: cluster + 1,
+                    layer,
+                    clusters: cluster.index()..cluster.index() + 1,
                     bounds: Bounds::EMPTY,
                 }),
             }
@@ -92,9 +93,9 @@ pub fn cut<'a>(
     }
     let find_boxes = |chunk: &mut Chunk| {
         for run in &mut chunk.runs {
-            let clustering = clustering(run.participant);
-            let positions = frame.body(scene, run.participant).positions();
-            for cluster in run.first..run.end {
+            let clustering = clustering(run.layer);
+            let positions = frame.body(scene, run.layer).positions();
+            for cluster in ClusterIx::each(run.clusters.clone()) {
                 let bounds = hull::of_vertices(positions, clustering.vertices(cluster));
                 run.bounds.join(&bounds);
             }
@@ -128,7 +129,7 @@ pub fn meeting(frame: &Frame, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
     let mut runs: Vec<(usize, u32, &ClusterRun)> = (0..chunks.len()).flat_map(numbered).collect();
     runs.sort_by(|a, b| a.2.bounds.min[0].total_cmp(&b.2.bounds.min[0]));
     for (ix, &(chunk_a, a, run_a)) in runs.iter().enumerate() {
-        if chunks.len() == 1 && frame.layers[run_a.participant].within {
+        if chunks.len() == 1 && frame.layer(run_a.layer).within {
             pairs.push([a, a]);
         }
         for &(chunk_b, b, run_b) in &runs[ix + 1..] {
@@ -145,10 +146,10 @@ pub fn meeting(frame: &Frame, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
 }
 
 fn meets(frame: &Frame, a: &ClusterRun, b: &ClusterRun) -> bool {
-    if a.participant == b.participant {
-        frame.layers[a.participant].within
+    if a.layer == b.layer {
+        frame.layer(a.layer).within
     } else {
-        frame.test(a.participant, b.participant).is_some()
+        frame.test(a.layer, b.layer).is_some()
     }
 }
 
@@ -165,18 +166,18 @@ pub struct Loaded {
 }
 
 impl Loaded {
-    /// Runs of one participant become one body, in the order of the chunks.
+    /// Runs of one layer become one body, in the order of the chunks.
     pub fn new<'a>(
         scene: &Scene,
         frame: &Frame,
         chunks: &[&Chunk],
-        clustering: impl Fn(usize) -> &'a Clustering,
+        clustering: impl Fn(LayerIx) -> &'a Clustering,
     ) -> Self {
         let mut loaded = Loaded::default();
         let runs: Vec<&ClusterRun> = chunks.iter().flat_map(|chunk| &chunk.runs).collect();
-        for runs in runs.chunk_by(|a, b| a.participant == b.participant) {
-            let participant = runs[0].participant;
-            loaded.push(scene, frame, participant, runs, clustering(participant));
+        for runs in runs.chunk_by(|a, b| a.layer == b.layer) {
+            let layer = runs[0].layer;
+            loaded.push(scene, frame, layer, runs, clustering(layer));
         }
         loaded
     }
@@ -185,26 +186,26 @@ impl Loaded {
         &mut self,
         scene: &Scene,
         frame: &Frame,
-        participant: usize,
+        layer: LayerIx,
         runs: &[&ClusterRun],
         clustering: &Clustering,
     ) {
-        let positions = frame.body(scene, participant).positions();
+        let positions = frame.body(scene, layer).positions();
         // Where each vertex of the body is on the device.
-        let mut places = vec![u32::MAX; positions.len()];
+        let mut on_device = vec![u32::MAX; positions.len()];
         for run in runs {
-            for cluster in run.first..run.end {
+            for cluster in ClusterIx::each(run.clusters.clone()) {
                 for &vertex in clustering.vertices(cluster) {
-                    places[vertex as usize] = 0;
+                    on_device[vertex as usize] = 0;
                 }
             }
         }
         let mut next = (self.words.len() / 3) as u32;
-        for (vertex, place) in places.iter_mut().enumerate() {
-            if *place == u32::MAX {
+        for (vertex, on_device) in on_device.iter_mut().enumerate() {
+            if *on_device == u32::MAX {
                 continue;
             }
-            *place = next;
+            *on_device = next;
             next += 1;
             match positions {
                 Positions::F32(positions) => self.words.extend(positions[vertex].map(f32::to_bits)),
@@ -215,13 +216,13 @@ impl Loaded {
         }
         let body = self.is_rounded.len() as u32;
         self.is_rounded.push(matches!(positions, Positions::F64(_)));
-        let first = frame.layers[participant].first;
+        let first = frame.layer(layer).first;
         for run in runs {
             self.topology
-                .push(clustering, run.first..run.end, first, body, |vertex| {
-                    places[vertex as usize]
+                .push(clustering, run.clusters.clone(), first, body, |vertex| {
+                    on_device[vertex as usize]
                 });
-            self.shapes.push(Shape::new(run.end - run.first));
+            self.shapes.push(Shape::new(run.clusters.len()));
         }
     }
 }

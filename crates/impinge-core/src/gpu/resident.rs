@@ -16,7 +16,7 @@ use crate::stats::Statistics;
 ///
 /// Both lists hold two `u32` per pair: the numbers of its primitives, the lower one first. Primitives are
 /// numbered consecutively, body after body in the order of their ids: primitive `i` of a body has the number
-/// `first + i`, where `first` is the number of primitives of all participants before it. The order of
+/// `first + i`, where `first` is the number of primitives of all layers before it. The order of
 /// pairs is not specified.
 ///
 /// A count may be larger than its list: the list then holds as many pairs as fit, and

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use super::layout::{Body, Cluster, ClusterVertex, Coordinate, Corners, Node, Order};
 use crate::elements::Kind;
-use crate::grouping::GROUP;
 use crate::grouping::clusters::Clustering;
+use crate::index::{ClusterIx, Number};
 
 /// Clusters as kernels read them.
 #[derive(Debug, Default)]
@@ -20,20 +20,19 @@ pub struct Topology {
 
 impl Topology {
     /// Appends a run of clusters of a body whose first primitive has the global number `first`. `body`: its
-    /// number on the device; `place`: where each of its vertices is on the device.
+    /// number on the device; `on_device`: where each of its vertices is there.
     pub fn push(
         &mut self,
         clustering: &Clustering,
         clusters: Range<usize>,
-        first: u32,
+        first: Number,
         body: u32,
-        place: impl Fn(u32) -> u32,
+        on_device: impl Fn(u32) -> u32,
     ) {
-        let begin = (clusters.start * GROUP).min(clustering.order.len());
-        let primitives = begin..(clusters.end * GROUP).min(clustering.order.len());
-        for cluster in clusters {
+        let places = clustering.places_of_run(&clusters);
+        for cluster in ClusterIx::each(clusters) {
             let vertices = clustering.vertices(cluster);
-            let first_place = self.corners.len() + cluster * GROUP - begin;
+            let first_place = self.corners.len() + cluster.place(0).index() - places.start;
             self.clusters.push(Cluster {
                 // Places and vertices fit 32 bits: the caller has checked the sizes.
                 first_place: first_place as u32,
@@ -42,20 +41,20 @@ impl Topology {
                 body,
             });
             let vertices = vertices.iter().map(|&vertex| ClusterVertex {
-                vertex: place(vertex),
+                vertex: on_device(vertex),
             });
             self.cluster_vertices.extend(vertices);
         }
         let is_solid = clustering.corners.kind() == Kind::Tetrahedra;
-        self.has_solids |= is_solid && !primitives.is_empty();
+        self.has_solids |= is_solid && !places.is_empty();
         // Edges and points become degenerate triangles.
-        let corners = primitives.clone().map(|primitive| Corners {
-            vertices: clustering.corners.four_corners(primitive).map(&place),
+        let corners = places.clone().map(|ix| Corners {
+            vertices: clustering.corners.four_corners(ix).map(&on_device),
         });
         self.corners.extend(corners);
-        let order = clustering.order[primitives].iter();
+        let order = clustering.order[places].iter();
         self.numbers.extend(order.map(|&primitive| Order {
-            number: first + primitive,
+            number: first.plus(primitive).raw(),
         }));
     }
 }

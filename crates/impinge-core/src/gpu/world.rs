@@ -1,4 +1,4 @@
-//! The participants on the device: a forest of clusters, and positions.
+//! The layers on the device: a forest of clusters, and positions.
 //!
 //! All trees lie in one array of nodes, ordered by height over all bodies, so that one launch refits one
 //! height of every tree. Above three or more bodies there is a tree over bodies, whose leaves are
@@ -27,6 +27,7 @@ use crate::frame::Frame;
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Shape;
 use crate::ids::BodyId;
+use crate::index::LayerIx;
 use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::{Filter, Scene};
@@ -46,7 +47,7 @@ use super::topology::{Topology, Weight, narrowed};
 pub const MOST_PRIMITIVES: u64 = 1 << 31;
 /// By how many keys the boxes of rounded positions are widened: see `boxes.wgsl`.
 const SLACK: u32 = 2;
-/// One participant on the device.
+/// One layer on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Resident {
     id: BodyId,
@@ -58,7 +59,7 @@ struct Resident {
     n_vertices: u64,
 }
 
-/// The data on participants that the kernels read.
+/// The data on layers that the kernels read.
 #[derive(Debug)]
 pub struct World {
     pub clusterings: Clusterings,
@@ -165,19 +166,22 @@ impl World {
 
     fn is_resident(&self, frame: &Frame) -> bool {
         self.residents.len() == frame.layers.len()
-            && self.residents.iter().enumerate().all(|(ix, resident)| {
-                let cache = self.clusterings.of(resident.id);
-                resident.id == frame.layers[ix].id
-                    && cache.is_some_and(|cache| cache.number == resident.number)
-            })
+            && frame
+                .layer_ixs()
+                .zip(&self.residents)
+                .all(|(ix, resident)| {
+                    let cache = self.clusterings.of(resident.id);
+                    resident.id == frame.layer(ix).id
+                        && cache.is_some_and(|cache| cache.number == resident.number)
+                })
     }
 
     fn send_topology(&mut self, gpu: &Gpu, scene: &Scene, frame: &Frame) -> Result<(), Error> {
         let caches: Vec<(u64, Arc<Clustering>)> = frame
             .layers
             .iter()
-            .map(|participant| {
-                let cache = self.clusterings.of(participant.id);
+            .map(|layer| {
+                let cache = self.clusterings.of(layer.id);
                 let cache = cache.expect("just clustered");
                 (cache.number, Arc::clone(&cache.clustering))
             })
@@ -185,9 +189,8 @@ impl World {
         let mut residents = Vec::with_capacity(caches.len());
         let mut topology = Topology::default();
         let mut first_vertex = 0u64;
-        for (ix, (number, clustering)) in caches.iter().enumerate() {
+        for ((ix, layer), (number, clustering)) in frame.numbered_layers().zip(&caches) {
             let n_vertices = count(frame.body(scene, ix).n_vertices());
-            let participant = &frame.layers[ix];
             let limit = u64::from(u32::MAX) / 3;
             if first_vertex + n_vertices > limit {
                 return Err(Error::TooMany {
@@ -199,15 +202,11 @@ impl World {
             // Vertices fit 32 bits: just checked.
             let first = first_vertex as u32;
             let clusters = 0..clustering.n_clusters();
-            topology.push(
-                clustering,
-                clusters,
-                participant.first,
-                ix as u32,
-                |vertex| first + vertex,
-            );
+            topology.push(clustering, clusters, layer.first, ix.raw(), |vertex| {
+                first + vertex
+            });
             residents.push(Resident {
-                id: participant.id,
+                id: layer.id,
                 number: *number,
                 positions_stamp: 0,
                 first_vertex,
@@ -251,9 +250,7 @@ impl World {
         chunks: &[&Chunk],
     ) -> Result<(), Error> {
         self.residents.clear();
-        let loaded = Loaded::new(scene, frame, chunks, |participant_ix| {
-            self.clustering(frame, participant_ix)
-        });
+        let loaded = Loaded::new(scene, frame, chunks, |layer| self.clustering(frame, layer));
         self.forest = Forest::of_trees(&Vec::from_iter(&loaded.shapes));
         self.send_trees(gpu, &loaded.topology)?;
         let words: &[Coordinate] = bytemuck::cast_slice(&loaded.words);
@@ -279,9 +276,9 @@ impl World {
         };
     }
 
-    /// The clustering of a participant, which must be known.
-    pub(crate) fn clustering(&self, frame: &Frame, participant_ix: usize) -> &Clustering {
-        let id = frame.layers[participant_ix].id;
+    /// The clustering of a layer, which must be known.
+    pub(crate) fn clustering(&self, frame: &Frame, layer: LayerIx) -> &Clustering {
+        let id = frame.layer(layer).id;
         let cache = self.clusterings.of(id);
         &cache.expect("just clustered").clustering
     }
@@ -289,7 +286,7 @@ impl World {
     /// The size of a whole frame on the device.
     pub fn weigh(&self, scene: &Scene, frame: &Frame) -> Weight {
         let mut weight = Weight::default();
-        for ix in 0..frame.layers.len() {
+        for ix in frame.layer_ixs() {
             let clustering = self.clustering(frame, ix);
             weight.n_primitives += count(clustering.order.len());
             weight.n_vertices += count(frame.body(scene, ix).n_vertices());
@@ -314,7 +311,8 @@ impl World {
             let from = ix;
             let start = self.residents[from].first_vertex;
             while ix < self.residents.len() {
-                let stamp = frame.body(scene, ix).positions_stamp();
+                let layer = LayerIx::from_usize(ix);
+                let stamp = frame.body(scene, layer).positions_stamp();
                 let is_there = self.residents[ix].positions_stamp == stamp
                     || resident.contains(&self.residents[ix].id);
                 if is_there {
@@ -330,15 +328,15 @@ impl World {
             self.is_moved = true;
             if let ([only], Positions::F32(positions)) = (
                 &self.residents[from..ix],
-                frame.body(scene, from).positions(),
+                frame.body(scene, LayerIx::from_usize(from)).positions(),
             ) {
                 let words: &[Coordinate] = bytemuck::cast_slice(positions);
                 self.positions.write(gpu, 3 * only.first_vertex, words);
                 continue;
             }
             self.words.clear();
-            for participant in from..ix {
-                put_words(frame.body(scene, participant).positions(), &mut self.words);
+            for layer in (from..ix).map(LayerIx::from_usize) {
+                put_words(frame.body(scene, layer).positions(), &mut self.words);
             }
             let words: &[Coordinate] = bytemuck::cast_slice(&self.words);
             self.positions.write(gpu, 3 * start, words);
@@ -359,7 +357,7 @@ impl World {
             self.is_moved = true;
         }
         let mut bodies = Vec::with_capacity(frame.layers.len());
-        for (ix, participant) in frame.layers.iter().enumerate() {
+        for (ix, layer) in frame.numbered_layers() {
             // Bodies without a category meet no other body.
             let filter = match frame.between() {
                 true => frame.filter(ix),
@@ -370,20 +368,20 @@ impl World {
             };
             let rounded = match frame.body(scene, ix).positions() {
                 Positions::F32(_) => false,
-                Positions::F64(_) => !resident.contains(&participant.id),
+                Positions::F64(_) => !resident.contains(&layer.id),
             };
             bodies.push(Body {
-                root: self.forest.roots[ix],
+                root: self.forest.root(ix),
                 slack: if rounded { SLACK } else { 0 },
-                within: u32::from(participant.within),
+                within: u32::from(layer.within),
                 layer: 0,
                 category: words(filter.category),
                 mask: words(filter.mask),
             });
         }
         let ignored = frame.ignored_pairs().map(|(a, b)| NodePair {
-            a: a as u32,
-            b: b as u32,
+            a: a.raw(),
+            b: b.raw(),
         });
         let ignored = ignored.collect();
         self.send_records(gpu, bodies, ignored)
@@ -444,7 +442,7 @@ impl World {
     /// The seeds of a traversal: pairs of nodes, whose boxes need not overlap.
     pub fn seeds(&self, frame: &Frame) -> Vec<NodePair> {
         let forest = &self.forest;
-        let root = |ix: usize| forest.roots[ix];
+        let root = |layer: LayerIx| forest.root(layer);
         let mut seeds = Vec::new();
         if let Some(top) = forest.top()
             && frame.between()
@@ -452,9 +450,8 @@ impl World {
             return vec![NodePair { a: top, b: top }];
         }
         if frame.between() {
-            let filled: Vec<usize> = (0..frame.layers.len())
-                .filter(|&ix| forest.is_filled(ix))
-                .collect();
+            let filled = frame.layer_ixs().filter(|&ix| forest.is_filled(ix));
+            let filled: Vec<LayerIx> = filled.collect();
             if let [a, b] = filled[..]
                 && frame.test(a, b).is_some()
             {
@@ -464,8 +461,8 @@ impl World {
                 });
             }
         }
-        for (ix, participant) in frame.layers.iter().enumerate() {
-            let is_asked = participant.within && frame.test(ix, ix).is_some();
+        for (ix, layer) in frame.numbered_layers() {
+            let is_asked = layer.within && frame.test(ix, ix).is_some();
             if is_asked && forest.is_filled(ix) {
                 seeds.push(NodePair {
                     a: root(ix),
@@ -495,11 +492,11 @@ impl World {
             return false;
         }
         if a.is_gate() && b.is_gate() {
-            let (body_a, body_b) = (a.first_child as usize, b.first_child as usize);
-            if frame.test(body_a, body_b).is_some() {
+            let [layer_a, layer_b] = [a, b].map(|gate| LayerIx::new(gate.first_child));
+            if frame.test(layer_a, layer_b).is_some() {
                 into.push(NodePair {
-                    a: self.forest.roots[body_a],
-                    b: self.forest.roots[body_b],
+                    a: self.forest.root(layer_a),
+                    b: self.forest.root(layer_b),
                 });
             }
             return true;
@@ -536,8 +533,8 @@ fn put_words(positions: &Positions, words: &mut Vec<u32>) {
 }
 
 /// A point of a body: the first corner of its first primitive. The tree over bodies is built from these points.
-fn sample(scene: &Scene, frame: &Frame, ix: usize) -> [f32; 3] {
-    let body = frame.body(scene, ix);
+fn sample(scene: &Scene, frame: &Frame, layer: LayerIx) -> [f32; 3] {
+    let body = frame.body(scene, layer);
     let vertex = body.elements().corners(0)[0];
     body.positions().point(vertex as usize).map(|x| x as f32)
 }

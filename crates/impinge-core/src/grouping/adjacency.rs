@@ -18,6 +18,8 @@
 
 use rayon::prelude::*;
 
+use crate::index::{ClusterIx, Place};
+
 use super::GROUP;
 use super::hubs::{self, HUB};
 
@@ -35,7 +37,7 @@ pub(crate) struct Adjacency {
 
 #[derive(Debug, Clone, Copy)]
 struct Neighbor {
-    cluster: u32,
+    cluster: ClusterIx,
     /// First entry in `lanes` and `masks`; the entries end where the next neighbour's begin.
     first: u32,
 }
@@ -44,7 +46,7 @@ struct Neighbor {
 struct Part {
     own: Vec<u64>,
     /// `(neighbour cluster, lane, mask)`, sorted.
-    entries: Vec<(u32, u8, u64)>,
+    entries: Vec<(ClusterIx, u8, u64)>,
 }
 
 impl Adjacency {
@@ -55,7 +57,7 @@ impl Adjacency {
         let parts: Vec<Part> = (0..n_clusters)
             .into_par_iter()
             .with_min_len(32)
-            .map(|cluster| part(cluster, corners, &incidence))
+            .map(|cluster| part(ClusterIx::from_usize(cluster), corners, &incidence))
             .collect();
         let mut adjacency = Adjacency {
             own: Vec::with_capacity(corners.len()),
@@ -84,7 +86,7 @@ impl Adjacency {
         }
         let end = adjacency.lanes.len() as u32;
         adjacency.neighbors.push(Neighbor {
-            cluster: u32::MAX,
+            cluster: ClusterIx::new(u32::MAX),
             first: end,
         });
         adjacency
@@ -92,18 +94,18 @@ impl Adjacency {
 
     /// The own masks of a cluster's primitives, one per lane.
     #[inline(always)]
-    pub fn own(&self, cluster: usize) -> &[u64] {
-        let end = self.own.len().min((cluster + 1) * GROUP);
-        &self.own[cluster * GROUP..end]
+    pub fn own(&self, cluster: ClusterIx) -> &[u64] {
+        &self.own[cluster.places(self.own.len())]
     }
 
     /// Lanes of cluster `a` that share vertices with lanes of cluster `b > a`, and those lanes' masks.
     #[inline]
-    pub fn between(&self, a: usize, b: usize) -> impl Iterator<Item = (usize, u64)> + '_ {
-        let neighbors = self.neighbor_starts[a] as usize..self.neighbor_starts[a + 1] as usize;
+    pub fn between(&self, a: ClusterIx, b: ClusterIx) -> impl Iterator<Item = (usize, u64)> + '_ {
+        let (starts, a) = (&self.neighbor_starts, a.index());
+        let neighbors = starts[a] as usize..starts[a + 1] as usize;
         let entries = neighbors
             .clone()
-            .find(|&ix| self.neighbors[ix].cluster as usize == b)
+            .find(|&ix| self.neighbors[ix].cluster == b)
             .map_or(0..0, |ix| {
                 self.neighbors[ix].first as usize..self.neighbors[ix + 1].first as usize
             });
@@ -125,7 +127,7 @@ impl Adjacency {
 /// For each vertex, the places of the primitives that name it.
 struct Incidence {
     starts: Vec<u32>,
-    places: Vec<u32>,
+    places: Vec<Place>,
 }
 
 impl Incidence {
@@ -142,11 +144,11 @@ impl Incidence {
             starts.push(start);
         }
         let mut next = starts.clone();
-        let mut places = vec![0u32; *starts.last().expect("never empty") as usize];
+        let mut places = vec![Place::default(); *starts.last().expect("never empty") as usize];
         for (slot, &vertex) in flat.iter().enumerate() {
             let vertex = vertex as usize;
             if !is_hub(vertex) {
-                places[next[vertex] as usize] = (slot / N) as u32;
+                places[next[vertex] as usize] = Place::from_usize(slot / N);
                 next[vertex] += 1;
             }
         }
@@ -154,26 +156,25 @@ impl Incidence {
     }
 
     /// The places that name the vertex; empty for a hub.
-    fn of(&self, vertex: u32) -> &[u32] {
+    fn of(&self, vertex: u32) -> &[Place] {
         let vertex = vertex as usize;
         &self.places[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
     }
 }
 
-fn part<const N: usize>(cluster: usize, corners: &[[u32; N]], incidence: &Incidence) -> Part {
-    let start = cluster * GROUP;
-    let group = &corners[start..corners.len().min(start + GROUP)];
+fn part<const N: usize>(cluster: ClusterIx, corners: &[[u32; N]], incidence: &Incidence) -> Part {
+    let group = &corners[cluster.places(corners.len())];
     let mut own = vec![0u64; group.len()];
-    let mut entries: Vec<(u32, u8, u64)> = Vec::new();
+    let mut entries: Vec<(ClusterIx, u8, u64)> = Vec::new();
     for (lane, primitive) in group.iter().enumerate() {
         own[lane] |= 1 << lane;
         for &vertex in primitive {
             for &place in incidence.of(vertex) {
-                let (other, bit) = (place as usize / GROUP, 1u64 << (place as usize % GROUP));
+                let (other, bit) = (place.cluster(), 1u64 << place.lane());
                 if other == cluster {
                     own[lane] |= bit;
                 } else if other > cluster {
-                    entries.push((other as u32, lane as u8, bit));
+                    entries.push((other, lane as u8, bit));
                 }
             }
         }

@@ -9,6 +9,7 @@
 //! copy of the corners. Inside a cluster, the order of the primitives does not matter: frames were not faster when runs
 //! of eight lay close together, and half of this work went into that.
 
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
@@ -21,12 +22,13 @@ use super::hubs::{self, Hubs};
 use super::rings::Rings;
 use super::unique::{LocalCorners, Unique};
 use crate::elements::{Elements, with_corners};
+use crate::index::{ClusterIx, ElementIx, Place};
 
 /// The clusters of one body.
 #[derive(Debug)]
 pub(crate) struct Clustering {
     /// The primitive at each place of the order.
-    pub order: Vec<u32>,
+    pub order: Vec<ElementIx>,
     /// The corners at each place of the order.
     pub corners: Elements,
     /// Unique vertices of all clusters, cluster after cluster. Each run ascends and repeats its last vertex up
@@ -78,7 +80,8 @@ impl Clustering {
         let classes = with_corners!(elements, |corners| hubs::classes(corners, &counts));
         let classes = classes.as_deref();
         super::hierarchy::order(&shape, GROUP, classes, &mut entries);
-        let order: Vec<u32> = entries.iter().map(|entry| entry.number).collect();
+        let numbers = entries.iter().map(|entry| entry.number);
+        let order: Vec<ElementIx> = numbers.map(ElementIx::new).collect();
         drop(entries);
         let corners = with_corners!(elements, |corners| gather(corners, &order).into());
         let (vertices, vertex_starts, local_faces) = match &corners {
@@ -115,17 +118,47 @@ impl Clustering {
         self.vertex_starts.len() - 1
     }
 
+    /// All clusters.
+    pub fn clusters(&self) -> impl ExactSizeIterator<Item = ClusterIx> + Clone + use<> {
+        ClusterIx::up_to(self.n_clusters())
+    }
+
     /// How many primitives a cluster holds.
     #[inline(always)]
-    pub fn size(&self, cluster: usize) -> usize {
-        (self.order.len() - cluster * GROUP).min(GROUP)
+    pub fn size(&self, cluster: ClusterIx) -> usize {
+        self.places(cluster).len()
+    }
+
+    /// The places of a cluster's primitives.
+    #[inline(always)]
+    pub fn places(&self, cluster: ClusterIx) -> Range<usize> {
+        cluster.places(self.order.len())
+    }
+
+    /// The places of the primitives of a run of clusters.
+    #[cfg(feature = "gpu")]
+    pub fn places_of_run(&self, run: &Range<usize>) -> Range<usize> {
+        let n = self.order.len();
+        n.min(run.start * GROUP)..n.min(run.end * GROUP)
+    }
+
+    /// The primitives of a cluster.
+    #[inline(always)]
+    pub fn primitives(&self, cluster: ClusterIx) -> &[ElementIx] {
+        &self.order[self.places(cluster)]
+    }
+
+    /// The primitive at a place.
+    #[inline(always)]
+    pub fn primitive(&self, place: Place) -> ElementIx {
+        self.order[place.index()]
     }
 
     /// The unique vertices of a cluster, ascending, the last one repeated up to a multiple of [`CHUNK`](super::CHUNK).
     #[inline(always)]
-    pub fn vertices(&self, cluster: usize) -> &[u32] {
-        let starts = &self.vertex_starts;
-        &self.vertices[starts[cluster] as usize..starts[cluster + 1] as usize]
+    pub fn vertices(&self, cluster: ClusterIx) -> &[u32] {
+        let (starts, ix) = (&self.vertex_starts, cluster.index());
+        &self.vertices[starts[ix] as usize..starts[ix + 1] as usize]
     }
 
     /// Vertices that very many primitives name, if there are any.
@@ -142,8 +175,8 @@ impl Clustering {
 
     /// The local faces of a cluster, if they were asked for.
     #[inline(always)]
-    pub fn local_faces(&self, cluster: usize) -> Option<&LocalFaces> {
-        self.local_faces.get(cluster)
+    pub fn local_faces(&self, cluster: ClusterIx) -> Option<&LocalFaces> {
+        self.local_faces.get(cluster.index())
     }
 
     /// Finds the rings of the vertices, if the primitives are triangles.
@@ -177,10 +210,10 @@ impl Clustering {
     }
 }
 
-fn gather<const N: usize>(elements: &[[u32; N]], order: &[u32]) -> Vec<[u32; N]> {
+fn gather<const N: usize>(elements: &[[u32; N]], order: &[ElementIx]) -> Vec<[u32; N]> {
     order
         .par_iter()
         .with_min_len(16 * 1024)
-        .map(|&primitive| elements[primitive as usize])
+        .map(|primitive| elements[primitive.index()])
         .collect()
 }

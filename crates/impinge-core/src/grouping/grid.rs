@@ -128,14 +128,14 @@ impl Grid {
         })
     }
 
-    /// Equation (2): the cell's place in the linear array.
+    /// Equation (2): the cell's index in the linear array.
     #[inline(always)]
     pub fn index(&self, cell: [u32; 3]) -> usize {
         let [n_x, n_y, _] = self.resolution;
         ((cell[2] as usize * n_y as usize) + cell[1] as usize) * n_x as usize + cell[0] as usize
     }
 
-    /// The cell at a place of the linear array.
+    /// The cell with an index in the linear array.
     #[inline(always)]
     pub fn cell(&self, index: usize) -> [u32; 3] {
         let [n_x, n_y, _] = self.resolution;

@@ -17,6 +17,7 @@
 
 use super::GROUP;
 use super::hierarchy::Shape;
+use crate::index::{ClusterIx, Place};
 
 /// A vertex that more corners name than this is a hub.
 pub(crate) const HUB: u32 = 96;
@@ -63,14 +64,14 @@ impl HubSet {
 struct Axis {
     /// The two vertices, lower first.
     hubs: [u32; 2],
-    places: Vec<u32>,
+    places: Vec<Place>,
 }
 
 /// One hub and the places of the primitives that name it.
 #[derive(Debug)]
 struct Hub {
     vertex: u32,
-    places: Vec<u32>,
+    places: Vec<Place>,
 }
 
 /// The hubs of one body's clusters.
@@ -167,10 +168,10 @@ impl Hubs {
     }
 
     /// For each hub that two clusters (or one with itself) both name: `(lanes of a, lanes of b)` that name it.
-    pub fn between(&self, a: usize, b: usize) -> impl Iterator<Item = (u64, u64)> + '_ {
-        let of = |cluster: usize| {
-            let starts = &self.lane_starts;
-            &self.lanes[starts[cluster] as usize..starts[cluster + 1] as usize]
+    pub fn between(&self, a: ClusterIx, b: ClusterIx) -> impl Iterator<Item = (u64, u64)> + '_ {
+        let of = |cluster: ClusterIx| {
+            let (starts, ix) = (&self.lane_starts, cluster.index());
+            &self.lanes[starts[ix] as usize..starts[ix + 1] as usize]
         };
         let (of_a, mut of_b) = (of(a), of(b));
         of_a.iter().filter_map(move |&(hub, lanes_a)| {
@@ -190,7 +191,7 @@ impl Hubs {
     }
 
     /// The vertices of each hub and axis, and the places of the primitives that name them.
-    pub fn to_settle(&self) -> impl Iterator<Item = (&[u32], &[u32])> {
+    pub fn to_settle(&self) -> impl Iterator<Item = (&[u32], &[Place])> {
         let hubs = self.hubs.iter();
         let hubs = hubs.map(|hub| (std::slice::from_ref(&hub.vertex), &hub.places[..]));
         hubs.chain(
@@ -243,15 +244,19 @@ impl Hubs {
             .chain(self.axes.iter().map(|axis| axis.places.len()))
             .sum();
         let nodes: usize = self.common.iter().map(Vec::len).sum();
-        size_of::<u32>() * (places + self.lane_starts.len())
+        size_of::<Place>() * places
+            + size_of_val(&self.lane_starts[..])
             + size_of::<HubSet>() * nodes
             + size_of_val(&self.lanes[..])
     }
 }
 
 /// Inverts a list: `things` gives each place's hubs or axes; returns the places of each, sorted by hub or axis.
-fn runs(things: impl Iterator<Item = impl Iterator<Item = [u32; 2]>>) -> Vec<([u32; 2], Vec<u32>)> {
-    let mut all: Vec<([u32; 2], u32)> = (0u32..)
+fn runs(
+    things: impl Iterator<Item = impl Iterator<Item = [u32; 2]>>,
+) -> Vec<([u32; 2], Vec<Place>)> {
+    let places = (0..).map(Place::new);
+    let mut all: Vec<([u32; 2], Place)> = places
         .zip(things)
         .flat_map(|(place, things)| things.map(move |thing| (thing, place)))
         .collect();

@@ -1,5 +1,5 @@
 //! Groups of at most 64 primitives, and the structures over them that both backends share: boxes,
-//! clusters, trees, adjacency masks, the grid. Imports only `elements`.
+//! clusters, trees, adjacency masks, the grid. Imports only `elements` and `index`.
 
 pub(crate) mod adjacency;
 #[allow(missing_docs)]
@@ -12,8 +12,7 @@ pub(crate) mod hubs;
 pub(crate) mod rings;
 mod unique;
 
-/// The most primitives that a group holds: one bit each in a 64-bit mask.
-pub const GROUP: usize = 64;
+pub use crate::index::GROUP;
 
 /// A cluster's vertices are padded to whole chunks of this many: a loop over them needs no remainder, and its end
 /// is easy to predict.

@@ -1,6 +1,5 @@
 //! The boxes that are tested, made from moving boxes.
 
-use crate::frame::Frame;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, LaneBounds, greater, lesser, round_down, round_up};
 
@@ -30,11 +29,11 @@ impl Pose {
         is_swept: false,
     };
 
-    /// The pose of a layer: its boxes also reach as far as the frame says.
+    /// The same pose, with boxes that reach farther by a margin.
     #[inline(always)]
-    pub fn of(self, frame: &Frame, layer: usize) -> Pose {
+    pub fn with_margin(self, margin: f64) -> Pose {
         Pose {
-            margin: self.margin + frame.margin(layer),
+            margin: self.margin + margin,
             ..self
         }
     }

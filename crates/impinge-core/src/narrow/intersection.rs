@@ -6,6 +6,8 @@ use crate::exact::{self, Point};
 use crate::frame::Frame;
 use crate::frame::TestId;
 use crate::hull::Extent;
+#[cfg(feature = "gpu")]
+use crate::index::pair_numbers;
 use crate::query::SharedVertex;
 #[cfg(feature = "gpu")]
 use crate::scene::Scene;
@@ -28,7 +30,7 @@ impl Test for Intersection {
 
     fn settle(&self, _: TestId, a: Element<'_>, b: Element<'_>) -> Option<()> {
         let (points_a, points_b) = (a.points(), b.points());
-        let kind = |element: Element<'_>| element.frame.layers[element.layer].kind;
+        let kind = |element: Element<'_>| element.frame.layer(element.layer).kind;
         let is_reported = if a.shares_vertex(&b) {
             let rule = a.frame.shared_vertex;
             intersect_shared(
@@ -44,18 +46,17 @@ impl Test for Intersection {
     }
 }
 
-/// Settles a pair of global numbers.
+/// Settles a pair, given its key.
 #[cfg(feature = "gpu")]
-pub(crate) fn settle(scene: &Scene, frame: &Frame, a: u32, b: u32) -> bool {
-    let [a, b] = [a, b].map(|number| {
-        let layer = frame.owner(number);
-        let held = &frame.layers[layer];
-        let elements = frame.body(scene, layer).part(held.part);
+pub(crate) fn settle(scene: &Scene, frame: &Frame, key: u64) -> bool {
+    let [a, b] = pair_numbers(key).map(|number| {
+        let (layer, element) = frame.locate(number);
+        let elements = frame.body(scene, layer).part(frame.layer(layer).part);
         Element {
             scene,
             frame,
             layer,
-            corners: elements.corners((number - held.first) as usize),
+            corners: elements.corners(element.index()),
         }
     });
     Intersection.settle(TestId::Intersection, a, b).is_some()

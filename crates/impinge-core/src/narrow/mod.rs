@@ -15,6 +15,7 @@ pub(crate) use within::{Corners, Within};
 
 use crate::frame::{Frame, TestId};
 use crate::hull::Extent;
+use crate::index::LayerIx;
 use crate::scene::Scene;
 
 /// One element of one layer of a frame.
@@ -23,7 +24,7 @@ pub(crate) struct Element<'a> {
     pub scene: &'a Scene,
     pub frame: &'a Frame,
     /// The layer.
-    pub layer: usize,
+    pub layer: LayerIx,
     /// Its corners, as vertices of the layer's body.
     pub corners: &'a [u32],
 }
@@ -48,7 +49,7 @@ pub(crate) trait Test {
 impl Element<'_> {
     /// Whether two elements are of one body and name a common vertex of it.
     pub fn shares_vertex(&self, other: &Element<'_>) -> bool {
-        let same_body = self.frame.layers[self.layer].id == self.frame.layers[other.layer].id;
+        let same_body = self.frame.layer(self.layer).id == self.frame.layer(other.layer).id;
         same_body && share_vertex(self.corners, other.corners)
     }
 

@@ -14,6 +14,7 @@ use crate::hull::Extent;
 
 use super::tree::{Node, Tree};
 use crate::exact::Point;
+use crate::index::ClusterIx;
 use crate::scene::Body;
 
 /// Three directions at right angles and of length 1, but for rounding.
@@ -69,8 +70,8 @@ fn unit(p: Point) -> Option<Point> {
 #[derive(Debug)]
 pub(super) struct View {
     pub axes: Axes,
-    /// Where each cluster's box is, for either body; [`UNKNOWN`] before it is asked for.
-    places: [Vec<u32>; 2],
+    /// Which of the boxes is that of each cluster, for either body; [`UNKNOWN`] before it is asked for.
+    box_ixs: [Vec<u32>; 2],
     boxes: Vec<Extent>,
 }
 
@@ -80,7 +81,7 @@ impl View {
     pub fn new(axes: Axes, trees: [&Tree; 2]) -> Self {
         View {
             axes,
-            places: trees.map(|tree| vec![UNKNOWN; tree.clustering.n_clusters()]),
+            box_ixs: trees.map(|tree| vec![UNKNOWN; tree.clustering.n_clusters()]),
             boxes: Vec::new(),
         }
     }
@@ -88,9 +89,7 @@ impl View {
     /// Looks along other axes; the memory is kept.
     pub fn turn_to(&mut self, axes: Axes) {
         self.axes = axes;
-        self.places
-            .iter_mut()
-            .for_each(|places| places.fill(UNKNOWN));
+        self.box_ixs.iter_mut().for_each(|ixs| ixs.fill(UNKNOWN));
         self.boxes.clear();
     }
 
@@ -99,15 +98,15 @@ impl View {
         if node.level > 0 {
             return self.axes.turn_box(&tree.bounds(node));
         }
-        let place = &mut self.places[side][node.number as usize];
-        if *place == UNKNOWN {
-            *place = self.boxes.len() as u32;
-            let vertices = tree.clustering.vertices(node.number as usize).iter();
+        let ix = &mut self.box_ixs[side][node.number as usize];
+        if *ix == UNKNOWN {
+            *ix = self.boxes.len() as u32;
+            let vertices = tree.clustering.vertices(ClusterIx::new(node.number)).iter();
             let points = vertices.map(|&vertex| body.positions().point(vertex as usize));
             let turned = points.map(|point| self.axes.turn(point));
             self.boxes.push(Extent::of(turned));
         }
-        self.boxes[*place as usize]
+        self.boxes[*ix as usize]
     }
 }
 

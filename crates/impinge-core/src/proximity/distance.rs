@@ -20,6 +20,7 @@ use super::tree::{Node, Tree, box_along, box_of};
 use crate::error::Error;
 use crate::exact::Point;
 use crate::ids::BodyId;
+use crate::index::ElementIx;
 use crate::narrow::intersect;
 use crate::positions::{Positions, check_positions};
 use crate::scene::{Body, Scene};
@@ -44,7 +45,7 @@ pub struct Distances {
     /// By the number of the body.
     trees: HashMap<usize, Tree>,
     /// The pair found last, by the numbers of the bodies.
-    last: HashMap<[usize; 2], [u32; 2]>,
+    last: HashMap<[usize; 2], [ElementIx; 2]>,
 }
 
 /// The nearest pair of primitives of two bodies.
@@ -94,7 +95,8 @@ impl Distances {
         let numbers = [a.index(), b.index()];
         let nearest = search.nearest(self.last.get(&numbers).copied());
         if let Some(nearest) = &nearest {
-            self.last.insert(numbers, nearest.primitives);
+            let pair = nearest.primitives.map(ElementIx::new);
+            self.last.insert(numbers, pair);
         }
         Ok(nearest)
     }
@@ -144,7 +146,7 @@ impl PartialOrd for Waiting {
 /// A primitive of a cluster that is compared.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
-    primitive: u32,
+    primitive: ElementIx,
     bounds: Extent,
     /// Along the axes of the view; as `bounds` before there is one.
     turned: Extent,
@@ -158,7 +160,7 @@ struct Search<'a> {
 /// The best pair so far.
 struct Best {
     squared: f64,
-    primitives: [u32; 2],
+    primitives: [ElementIx; 2],
     points: Option<[Point; 2]>,
 }
 
@@ -195,7 +197,7 @@ impl Found {
 
 impl Search<'_> {
     /// The nearest pair; `likely` is one to compare first.
-    fn nearest(&self, likely: Option<[u32; 2]>) -> Option<Nearest> {
+    fn nearest(&self, likely: Option<[ElementIx; 2]>) -> Option<Nearest> {
         let (Some(a), Some(b)) = (self.trees[0].root(), self.trees[1].root()) else {
             return None;
         };
@@ -204,7 +206,7 @@ impl Search<'_> {
         let mut found = Found {
             best: Best {
                 squared: f64::INFINITY,
-                primitives: [u32::MAX; 2],
+                primitives: [ElementIx::new(u32::MAX); 2],
                 points: None,
             },
             view: None,
@@ -213,7 +215,7 @@ impl Search<'_> {
             lists: Default::default(),
         };
         if let Some(pair) = likely {
-            let boxes = [0, 1].map(|side| box_of(self.bodies[side], pair[side] as usize));
+            let boxes = [0, 1].map(|side| box_of(self.bodies[side], pair[side].index()));
             self.improve(&mut found, pair, boxes);
             self.look(&mut found);
         }
@@ -253,7 +255,7 @@ impl Search<'_> {
         let best = found.best;
         Some(Nearest {
             distance: best.squared.sqrt(),
-            primitives: best.primitives,
+            primitives: best.primitives.map(ElementIx::raw),
             points: best.points,
         })
     }
@@ -311,14 +313,14 @@ impl Search<'_> {
         for side in 0..2 {
             lists[side].clear();
             for &primitive in self.trees[side].primitives(nodes[side]) {
-                let bounds = box_of(self.bodies[side], primitive as usize);
+                let bounds = box_of(self.bodies[side], primitive.index());
                 if bounds.squared_distance(&whole[1 - side]) > limits[0] {
                     continue;
                 }
                 let turned = match (&axes, &turned) {
                     (Some(axes), Some(others)) => {
                         let body = self.bodies[side];
-                        let turned = box_along(body, primitive as usize, |p| axes.turn(p));
+                        let turned = box_along(body, primitive.index(), |p| axes.turn(p));
                         if turned.squared_distance(&others[1 - side]) > limits[1] {
                             continue;
                         }
@@ -358,10 +360,10 @@ impl Search<'_> {
     /// Takes a first pair of two clusters that is likely to be near: what is nearest to a box, to that, and to that again.
     fn guess(&self, nodes: [Node; 2], found: &mut Found) {
         let mut boxes = [0, 1].map(|side| self.trees[side].bounds(nodes[side]));
-        let mut pair = [0; 2];
+        let mut pair = [ElementIx::new(0); 2];
         for side in [0, 1, 0] {
-            let near = |&primitive: &u32| {
-                let bounds = box_of(self.bodies[side], primitive as usize);
+            let near = |&primitive: &ElementIx| {
+                let bounds = box_of(self.bodies[side], primitive.index());
                 (bounds.squared_distance(&boxes[1 - side]), primitive, bounds)
             };
             let all = self.trees[side].primitives(nodes[side]).iter().map(near);
@@ -374,7 +376,7 @@ impl Search<'_> {
     }
 
     /// Takes a pair if it is nearer, or as near and lower.
-    fn improve(&self, found: &mut Found, [a, b]: [u32; 2], boxes: [Extent; 2]) {
+    fn improve(&self, found: &mut Found, [a, b]: [ElementIx; 2], boxes: [Extent; 2]) {
         let best = &found.best;
         let gap = self.gap(a, b, boxes[0].squared_distance(&boxes[1]));
         let is_less =
@@ -389,7 +391,7 @@ impl Search<'_> {
     }
 
     /// The distance of two primitives: 0 if and only if they meet.
-    fn gap(&self, a: u32, b: u32, apart: f64) -> Gap {
+    fn gap(&self, a: ElementIx, b: ElementIx, apart: f64) -> Gap {
         let [body_a, body_b] = self.bodies;
         let (a, b) = (corners(body_a, a), corners(body_b, b));
         // Primitives in boxes that are apart do not meet. But the distance of such boxes may underflow to 0.
@@ -410,8 +412,8 @@ impl Search<'_> {
 }
 
 /// The corners of a primitive; one with fewer than four repeats its last.
-fn corners(body: &Body, primitive: u32) -> [Point; 4] {
-    let vertices = body.elements().four_corners(primitive as usize);
+fn corners(body: &Body, primitive: ElementIx) -> [Point; 4] {
+    let vertices = body.elements().four_corners(primitive.index());
     vertices.map(|vertex| body.positions().point(vertex as usize))
 }
 

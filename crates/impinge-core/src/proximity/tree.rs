@@ -4,10 +4,10 @@
 //! of primitives only when a cluster is compared. Cost: `O(n log n)` and `O(n)`.
 
 use crate::exact::Point;
-use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::hull::{self, Extent};
+use crate::index::{ClusterIx, ElementIx};
 use crate::scene::Body;
 
 /// A body's clusters and boxes.
@@ -47,7 +47,7 @@ impl Tree {
         }
         self.positions_stamp = body.positions_stamp();
         self.levels.clear();
-        let clusters = 0..self.clustering.n_clusters();
+        let clusters = self.clustering.clusters();
         let of_clusters = clusters
             .map(|cluster| hull::of_vertices(body.positions(), self.clustering.vertices(cluster)))
             .collect();
@@ -95,9 +95,8 @@ impl Tree {
     }
 
     /// The primitives of a cluster.
-    pub fn primitives(&self, node: Node) -> &[u32] {
-        let first = node.number as usize * GROUP;
-        &self.clustering.order[first..first + self.clustering.size(node.number as usize)]
+    pub fn primitives(&self, node: Node) -> &[ElementIx] {
+        self.clustering.primitives(ClusterIx::new(node.number))
     }
 }
 

@@ -14,6 +14,7 @@ use impinge_core::cpu::narrow::{Candidate, Settler};
 use impinge_core::cpu::simd::Isa;
 use impinge_core::cpu::subcells::Asked;
 use impinge_core::cpu::world::World;
+use impinge_core::index::{LayerIx, Place};
 use impinge_core::run::Job;
 use impinge_core::sink::Answer;
 use impinge_core::{Error, Statistics};
@@ -91,10 +92,10 @@ impl Table {
                     let pair = slot.load(Ordering::Relaxed);
                     if pair != FREE {
                         settler.push(Candidate {
-                            a: 0,
-                            b: 1,
-                            place_a: (pair >> 32) as u32,
-                            place_b: pair as u32,
+                            a: LayerIx::new(0),
+                            b: LayerIx::new(1),
+                            place_a: Place::new((pair >> 32) as u32),
+                            place_b: Place::new(pair as u32),
                         });
                     }
                     settler.settle_when_full(isa, world);
@@ -125,8 +126,9 @@ impl Rule for Insert<'_> {
 
     #[inline(always)]
     fn admits(&self, a: &Kept, b: &Kept, _: &mut Vec<u64>) -> bool {
-        let pair = u64::from(a.primitive) << 32 | u64::from(b.primitive);
-        let slot = &self.slots[djb2(a.primitive, b.primitive) as usize % self.slots.len()];
+        let (a, b) = (a.primitive.raw(), b.primitive.raw());
+        let pair = u64::from(a) << 32 | u64::from(b);
+        let slot = &self.slots[djb2(a, b) as usize % self.slots.len()];
         // Repetitions are frequent: most of them find their pair in the slot and write nothing.
         if slot.load(Ordering::Relaxed) > pair {
             slot.fetch_min(pair, Ordering::Relaxed);

@@ -45,9 +45,8 @@ impl Rule for Recorded<'_> {
 
     #[inline(always)]
     fn admits(&self, a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool {
-        let global =
-            |kept: &Kept| self.frame.layers[kept.participant as usize].first + kept.primitive;
-        keys.push(pair_key(global(a), global(b)));
+        let [a, b] = [a, b].map(|kept| self.frame.layer(kept.layer).number(kept.primitive));
+        keys.push(pair_key(a, b));
         false
     }
 }

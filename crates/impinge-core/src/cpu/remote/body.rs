@@ -7,6 +7,7 @@ use crate::cpu::runs::{Members, RUN};
 use crate::cpu::simd::{Lanes, Simd};
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
+use crate::index::ClusterIx;
 use crate::tuning::Tuning;
 
 use super::extents::{self, Extents, FreeSide, Intervals, Sides};
@@ -35,7 +36,7 @@ pub(crate) struct Remote {
     /// Groups whose clusters are to be sorted again at the frame's end.
     unsorted: Sides,
     /// Clusters just found to lie beside the others, and their sides.
-    fresh: Vec<(u32, FreeSide)>,
+    fresh: Vec<(ClusterIx, FreeSide)>,
     /// Clusters stay sorted if at least one in so many is in a group.
     one_in: usize,
     outlook: Outlook,
@@ -169,11 +170,11 @@ impl Remote {
         let slack = self.outlook.slack(whole);
         self.fresh.clear();
         let mut n_beside = 0;
-        for (cluster, known) in self.sides.iter_mut().enumerate() {
+        for (cluster, known) in clustering.clusters().zip(&mut self.sides) {
             if known.is_none() {
-                *known = side(&leaves.at(cluster), others, &slack);
+                *known = side(&leaves.at(cluster.index()), others, &slack);
                 if let Some(side) = *known {
-                    self.fresh.push((cluster as u32, side));
+                    self.fresh.push((cluster, side));
                 }
             }
             n_beside += usize::from(known.is_some());
@@ -187,9 +188,9 @@ impl Remote {
         extents::clear(&mut self.members, unsorted);
         self.groups.clear(unsorted);
         for &(cluster, side) in &self.fresh {
-            self.groups.extend(side, &leaves.at(cluster as usize));
-            leaves.put(cluster as usize, &Bounds::EMPTY);
-            for &vertex in clustering.vertices(cluster as usize) {
+            self.groups.extend(side, &leaves.at(cluster.index()));
+            leaves.put(cluster.index(), &Bounds::EMPTY);
+            for &vertex in clustering.vertices(cluster) {
                 extents::insert(&mut self.members, vertex, side);
             }
         }
@@ -222,7 +223,7 @@ impl Remote {
             + size_of::<Members>() * self.members.capacity()
             + size_of::<SomeClusters>() * self.near.capacity()
             + size_of::<Option<FreeSide>>() * self.sides.capacity()
-            + size_of::<(u32, FreeSide)>() * self.fresh.capacity()
+            + size_of::<(ClusterIx, FreeSide)>() * self.fresh.capacity()
     }
 }
 
@@ -264,10 +265,10 @@ impl Children {
 }
 
 impl Iterator for Children {
-    type Item = usize;
+    type Item = ClusterIx;
 
     #[inline(always)]
-    fn next(&mut self) -> Option<usize> {
-        Some(self.first + self.lanes.next()?)
+    fn next(&mut self) -> Option<ClusterIx> {
+        Some(ClusterIx::from_usize(self.first + self.lanes.next()?))
     }
 }

@@ -13,8 +13,8 @@ use crate::cpu::simd::Simd;
 /// Makes a vertex a member of a group.
 #[inline(always)]
 pub(super) fn insert(members: &mut [Members], vertex: u32, side: FreeSide) {
-    let (run, place) = (vertex as usize / RUN, vertex as usize % RUN);
-    let coordinate = 3 * place + side.axis();
+    let (run, at) = (vertex as usize / RUN, vertex as usize % RUN);
+    let coordinate = 3 * at + side.axis();
     members[run][side.end()][coordinate / ROW] |= 1 << (coordinate % ROW);
 }
 
@@ -124,7 +124,7 @@ pub(super) fn of<S: Simd>(simd: S, positions: &[[f32; 3]], members: &[Members]) 
     let (members, last_members) = members.split_at(runs.len());
     simd.add_runs(runs, members, &mut found);
     if let [first, ..] = rest {
-        // Filled up with its first vertex; these places have no members.
+        // Filled up with its first vertex; these entries have no members.
         let mut run = [*first; RUN];
         run[..rest.len()].copy_from_slice(rest);
         simd.add_runs(&[run], &last_members[..1], &mut found);

@@ -31,6 +31,7 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
+use crate::index::LayerIx;
 use crate::run::Job;
 use crate::scene::Body;
 use crate::settings::Settings;
@@ -95,7 +96,7 @@ pub(super) fn plan(cache: &mut BodyCache, body: &Body, is_allowed: bool) -> Need
 pub(super) fn prove(
     job: Job<'_>,
     caches: &mut Caches,
-    ix: usize,
+    layer: LayerIx,
     stats: &mut Statistics,
 ) -> Needed {
     let Job { scene, frame, .. } = job;
@@ -104,10 +105,10 @@ pub(super) fn prove(
         frame,
         caches: Some(caches),
     };
-    let Some(back) = back(world, ix) else {
+    let Some(back) = back(world, layer) else {
         return Needed::None;
     };
-    let cache = caches.at_mut(&frame.layers[ix]);
+    let cache = caches.at_mut(frame.layer(layer));
     let Some(remote) = &mut cache.remote else {
         return Needed::None;
     };
@@ -141,29 +142,29 @@ pub(super) fn learn(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker])
         caches: Some(caches),
     };
     let mut others = [Bounds::EMPTY; MOST_BODIES];
-    for (ix, others) in others[..frame.layers.len()].iter_mut().enumerate() {
-        for other in met(frame, ix) {
-            others.join(&world.cache(other as u32).whole);
+    for (layer, others) in frame.layer_ixs().zip(&mut others) {
+        for other in met(frame, layer) {
+            others.join(&world.cache(other).whole);
         }
     }
     let mut due: [Mutex<Option<Due<'_>>>; MOST_BODIES] = Default::default();
     let mut n_due = 0;
     let mut caches = caches.iter_mut();
-    for (ix, participant) in frame.layers.iter().enumerate() {
-        let slot = participant.id.index();
-        // Participants come in the order of their slots.
+    for (ix, layer) in frame.numbered_layers() {
+        let slot = layer.id.index();
+        // Layers come in the order of their slots.
         let cache = caches.find(|(other, _)| *other == slot);
         let Some((_, cache)) = cache else {
             continue;
         };
         let body = frame.body(scene, ix);
-        let could = !participant.within && cache.can_be_read(body);
+        let could = !layer.within && cache.can_be_read(body);
         let is_due = cache.remote.as_ref().is_some_and(|remote| remote.is_due());
         if could && is_due {
             due[n_due] = Mutex::new(Some(Due {
                 n_vertices: body.n_vertices(),
                 cache,
-                others: others[ix],
+                others: others[ix.index()],
             }));
             n_due += 1;
         }
@@ -176,15 +177,16 @@ pub(super) fn learn(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker])
     });
 }
 
-/// The participants that a participant could meet.
-fn met(frame: &Frame, ix: usize) -> impl Iterator<Item = usize> {
-    (0..frame.layers.len()).filter(move |&other| other != ix && frame.test(ix, other).is_some())
+/// The layers that a layer could meet.
+fn met(frame: &Frame, layer: LayerIx) -> impl Iterator<Item = LayerIx> {
+    let others = frame.layer_ixs().filter(move |&other| other != layer);
+    others.filter(move |&other| frame.test(layer, other).is_some())
 }
 
-/// The groups of a participant that are not beside all bodies that it could meet; `None` if its clusters are not sorted.
-fn back(world: World<'_>, ix: usize) -> Option<Sides> {
-    let sorted = world.cache(ix as u32).sorted()?;
-    let groups = met(world.frame, ix).map(|other| sorted.back_at(&world.cache(other as u32).whole));
+/// The groups of a layer that are not beside all bodies that it could meet; `None` if its clusters are not sorted.
+fn back(world: World<'_>, layer: LayerIx) -> Option<Sides> {
+    let sorted = world.cache(layer).sorted()?;
+    let groups = met(world.frame, layer).map(|other| sorted.back_at(&world.cache(other).whole));
     Some(groups.fold(Sides::default(), Sides::union))
 }
 

@@ -13,6 +13,7 @@ use crate::error::Error;
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
 use crate::grouping::clusters::Clustering;
 use crate::hull::{self, Hull, Pose};
+use crate::index::{ClusterIx, ElementIx, LayerIx};
 use crate::run::Job;
 use crate::scene::Body;
 use crate::settings::{Recluster, Settings};
@@ -59,7 +60,7 @@ impl LayerCache {
         let mut clustering = Clustering::new(elements, hull::of_each(elements, positions));
         if let (Part::Vertices, Elements::Points(vertices)) = (part, &clustering.corners) {
             // Vertices are numbered as positions are.
-            clustering.order = vertices.iter().map(|&[vertex]| vertex).collect();
+            clustering.order = vertices.iter().map(|&[ix]| ElementIx::new(ix)).collect();
         }
         let mut bounds = TreeBounds::default();
         bounds.resize(&clustering.shape);
@@ -100,8 +101,8 @@ impl LayerCache {
 
     /// The boxes of a cluster at the start and at the end.
     #[inline(always)]
-    pub fn ends(&self, cluster: usize) -> [Bounds; 2] {
-        [self.ends[0].at(cluster), self.ends[1].at(cluster)]
+    pub fn ends(&self, cluster: ClusterIx) -> [Bounds; 2] {
+        self.ends.each_ref().map(|end| end.at(cluster.index()))
     }
 
     pub fn bytes(&self) -> usize {
@@ -130,7 +131,7 @@ impl Kept for LayerCache {
 /// Some clusters of a layer.
 #[derive(Debug, Clone, Copy)]
 struct Task {
-    layer: usize,
+    layer: LayerIx,
     first: usize,
     end: usize,
     /// Where boxes are written.
@@ -157,10 +158,10 @@ pub(super) fn refit<S: Send>(
         ..
     } = job;
     let mut is_stale = false;
-    for (ix, layer) in frame.layers.iter().enumerate() {
+    for (ix, layer) in frame.numbered_layers() {
         let body = frame.body(scene, ix);
         let cache = caches.at_mut(layer);
-        let pose = pose.of(frame, ix);
+        let pose = pose.with_margin(frame.margin(ix));
         if cache.of == Some((body.step_stamp(), pose)) {
             continue;
         }
@@ -195,10 +196,10 @@ fn find_boxes<S: Send>(
         ..
     } = job;
     let mut tasks = Vec::new();
-    for (ix, layer) in frame.layers.iter().enumerate() {
+    for (ix, layer) in frame.numbered_layers() {
         let body = frame.body(scene, ix);
         let cache = caches.at_mut(layer);
-        if cache.of == Some((body.step_stamp(), pose.of(frame, ix))) {
+        if cache.of == Some((body.step_stamp(), pose.with_margin(frame.margin(ix)))) {
             continue;
         }
         cache.of = None;
@@ -231,10 +232,10 @@ fn find_boxes<S: Send>(
     let caches = &*caches;
     workers.for_each(&mut scratches[..n_workers], tasks.len(), |_, ix| {
         let task = tasks[ix];
-        let layer = &frame.layers[task.layer];
+        let layer = frame.layer(task.layer);
         let clustering = &caches.at(layer).clustering;
         let body = frame.body(scene, task.layer);
-        let hull = Hull::new(body, pose.of(frame, task.layer));
+        let hull = Hull::new(body, pose.with_margin(frame.margin(task.layer)));
         dispatch!(isa, find, (
             clustering: &Clustering = clustering,
             hull: Hull<'_> = hull,
@@ -246,7 +247,7 @@ fn find_boxes<S: Send>(
 #[inline(always)]
 fn find<S: Simd>(simd: S, clustering: &Clustering, hull: Hull<'_>, task: Task) {
     for cluster in task.first..task.end {
-        let ends = hull.of_cluster(simd, clustering, cluster);
+        let ends = hull.of_cluster(simd, clustering, ClusterIx::from_usize(cluster));
         let mut both = ends[0];
         both.join(&ends[1]);
         // SAFETY: no two tasks have the same cluster, and no thread reads boxes before all tasks are done.

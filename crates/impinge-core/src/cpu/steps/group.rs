@@ -8,6 +8,7 @@ use crate::elements::with_corners;
 use crate::exact::filter::Moving64;
 use crate::grouping::GROUP;
 use crate::hull::Extent;
+use crate::index::{ClusterIx, LayerIx};
 
 use super::world::World;
 
@@ -42,12 +43,12 @@ impl<'a> Kept<World<'a>> for Group {
     };
 
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, world: World<'a>, layer: u32, cluster: usize) {
+    fn fill<S: Simd>(&mut self, simd: S, world: World<'a>, layer: LayerIx, cluster: ClusterIx) {
         let clustering = &world.cache(layer).clustering;
         self.size = clustering.size(cluster);
-        let first = cluster * GROUP;
+        let places = clustering.places(cluster);
         with_corners!(&clustering.corners, |elements| {
-            let elements = &elements[first..first + self.size];
+            let elements = &elements[places];
             // Tetrahedra, which steps never have, would have no list for their fourth corner.
             self.n_corners = elements.first().map_or(0, |corners| corners.len().min(3));
             for (k, lanes) in self.corners.iter_mut().enumerate().take(self.n_corners) {
@@ -59,10 +60,10 @@ impl<'a> Kept<World<'a>> for Group {
                 lanes.0[self.size..].fill(of_first);
             }
         });
-        let first_number = world.frame.layers[layer as usize].first;
-        let order = &clustering.order[first..first + self.size];
-        for (number, &element) in self.numbers.0.iter_mut().zip(order) {
-            *number = first_number + element;
+        let first = world.frame.layer(layer).first;
+        let elements = clustering.primitives(cluster);
+        for (number, &element) in self.numbers.0.iter_mut().zip(elements) {
+            *number = first.plus(element).raw();
         }
         let hull = world.hull(layer);
         if let Some(ends) = hull.in_f32() {

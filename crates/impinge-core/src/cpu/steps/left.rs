@@ -9,6 +9,7 @@ use crate::cpu::simd::Isa;
 use crate::error::Error;
 use crate::frame::{TestId, owner_by_first};
 use crate::impacts::StepAnswer;
+use crate::index::{LayerIx, Place};
 use crate::run::Job;
 use crate::sink::Ending;
 
@@ -93,16 +94,19 @@ fn settle(
             return Err(not_asked(*pair));
         }
     }
-    let layer = |place: u32| owner_by_first(first_places, place, |first| *first) as u32;
+    let layer =
+        |place: u32| LayerIx::from_usize(owner_by_first(first_places, place, |first| *first));
     pairs.sort_unstable_by_key(|&[a, b]| (layer(a), layer(b), a, b));
     for run in pairs.chunk_by(|p, q| p.map(layer) == q.map(layer)) {
         let [a, b] = run[0].map(layer);
-        let test = world.frame.test(a as usize, b as usize);
+        let test = world.frame.test(a, b);
         let Some(TestId::Elements(kind)) = test else {
             return Err(not_asked(run[0]));
         };
-        let firsts = [a, b].map(|layer| first_places[layer as usize]);
-        let places = run.iter().map(|&[p, q]| [p - firsts[0], q - firsts[1]]);
+        let firsts = [a, b].map(|layer| first_places[layer.index()]);
+        let places = run
+            .iter()
+            .map(|&[p, q]| [p - firsts[0], q - firsts[1]].map(Place::new));
         contacts.take_left(isa, world, Between { a, b, kind }, places);
     }
     contacts.settle(isa, world);

@@ -29,6 +29,7 @@ use crate::grouping::clusters::Clustering;
 use crate::grouping::hubs::Hubs;
 use crate::hull::Pose;
 use crate::impacts::StepAnswer;
+use crate::index::LayerIx;
 use crate::scene::Body;
 use crate::settings::InstructionSet;
 use crate::stats::Statistics;
@@ -54,7 +55,7 @@ impl<'a> Stage for World<'a> {
     type Answer = StepAnswer<'a>;
 
     #[inline(always)]
-    fn tree(&self, layer: u32) -> Tree<'_> {
+    fn tree(&self, layer: LayerIx) -> Tree<'_> {
         self.cache(layer).tree()
     }
 
@@ -64,7 +65,7 @@ impl<'a> Stage for World<'a> {
     }
 
     #[inline(always)]
-    fn hubs(&self, layer: u32) -> Option<&Hubs> {
+    fn hubs(&self, layer: LayerIx) -> Option<&Hubs> {
         self.cache(layer).clustering.hubs()
     }
 

@@ -19,6 +19,7 @@ use crate::frame::TestId;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
 use crate::impacts::StepAnswer;
+use crate::index::{ClusterIx, LayerIx, Number};
 use crate::settings::Settings;
 
 use super::group::Group;
@@ -107,7 +108,7 @@ pub(super) fn run<S: Simd>(
         if world.is_over() {
             break;
         }
-        let test = world.frame.test(item.a as usize, item.b as usize);
+        let test = world.frame.test(item.a, item.b);
         let Some(TestId::Elements(kind)) = test else {
             continue;
         };
@@ -159,7 +160,7 @@ fn pair<S: Simd>(
     simd: S,
     world: World<'_>,
     item: &WorkItem,
-    lower: Option<[u32; 2]>,
+    lower: Option<[Number; 2]>,
     worker: &mut Worker,
 ) -> Option<[usize; 2]> {
     let Worker {
@@ -172,7 +173,7 @@ fn pair<S: Simd>(
     met.clear();
     let sides = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
     let is_own = sides[0] == sides[1];
-    let ends = sides.map(|(layer, cluster)| world.cache(layer).ends(cluster as usize));
+    let ends = sides.map(|(layer, cluster)| world.cache(layer).ends(cluster));
     if !is_own && !meet(&ends[0], &ends[1]) {
         return None;
     }
@@ -211,8 +212,8 @@ fn pair<S: Simd>(
             }
         }
     }
-    let layers = &world.frame.layers;
-    let same_body = layers[item.a as usize].id == layers[item.b as usize].id;
+    let ids = [item.a, item.b].map(|layer| world.frame.layer(layer).id);
+    let same_body = ids[0] == ids[1];
     // The lanes of the side with fewer of them are the rows.
     let (side, rows, lanes, [own, other]) = if lanes_a.count_ones() <= lanes_b.count_ones() {
         (Side::A, lanes_a, lanes_b, [a, b])
@@ -266,15 +267,17 @@ fn pair<S: Simd>(
 
 /// The lanes of two clusters that may have a key whose lower number is in a range, ends included; `None` if no pair has.
 #[inline(always)]
-fn lanes_with_lower(world: World<'_>, item: &WorkItem, [low, high]: [u32; 2]) -> Option<[u64; 2]> {
-    let lanes = |layer: u32, cluster: u32, [low, high]: [u32; 2]| {
-        let first_number = world.frame.layers[layer as usize].first;
-        let clustering = &world.cache(layer).clustering;
-        let first = cluster as usize * GROUP;
-        let order = &clustering.order[first..first + clustering.size(cluster as usize)];
+fn lanes_with_lower(
+    world: World<'_>,
+    item: &WorkItem,
+    [low, high]: [Number; 2],
+) -> Option<[u64; 2]> {
+    let lanes = |layer: LayerIx, cluster: ClusterIx, [low, high]: [Number; 2]| {
+        let first = world.frame.layer(layer).first;
+        let elements = world.cache(layer).clustering.primitives(cluster);
         let mut are_in = [0u8; GROUP];
-        for (is_in, element) in are_in.iter_mut().zip(order) {
-            let number = first_number + element;
+        for (is_in, &element) in are_in.iter_mut().zip(elements) {
+            let number = first.plus(element);
             *is_in = u8::from(low <= number && number <= high);
         }
         // The product has the lowest bits of eight bytes in its highest byte.
@@ -294,8 +297,8 @@ fn lanes_with_lower(world: World<'_>, item: &WorkItem, [low, high]: [u32; 2]) ->
         return None;
     }
     // Either element may have the lower number, and the other one's is not below it.
-    let above = |cluster| lanes(item.a, cluster, [low, u32::MAX]);
-    let wanted = |others: u64, cluster: u32, own: u64| match others {
+    let above = |cluster| lanes(item.a, cluster, [low, Number::new(u32::MAX)]);
+    let wanted = |others: u64, cluster: ClusterIx, own: u64| match others {
         0 => own,
         _ => above(cluster),
     };

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use crate::frame::Frame;
 use crate::hull::{Hull, Pose};
 use crate::impacts::StepAnswer;
+use crate::index::LayerIx;
 use crate::scene::Scene;
 use crate::step::{Start, Toi};
 
@@ -100,15 +101,14 @@ pub(crate) struct World<'a> {
 impl<'a> World<'a> {
     /// What makes the boxes of a layer.
     #[inline(always)]
-    pub(super) fn hull(&self, layer: u32) -> Hull<'a> {
-        let layer = layer as usize;
+    pub(super) fn hull(&self, layer: LayerIx) -> Hull<'a> {
         let body = self.frame.body(self.scene, layer);
-        Hull::new(body, self.pose.of(self.frame, layer))
+        Hull::new(body, self.pose.with_margin(self.frame.margin(layer)))
     }
 
     /// The cache of a layer.
     #[inline(always)]
-    pub(super) fn cache(&self, layer: u32) -> &'a LayerCache {
-        self.caches.at(&self.frame.layers[layer as usize])
+    pub(super) fn cache(&self, layer: LayerIx) -> &'a LayerCache {
+        self.caches.at(self.frame.layer(layer))
     }
 }

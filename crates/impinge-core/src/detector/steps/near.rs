@@ -12,6 +12,7 @@ use crate::exact::{closest_of_elements, nearest_of_elements};
 use crate::frame::TestId;
 use crate::hull::Pose;
 use crate::impacts::StepAnswer;
+use crate::index::ElementIx;
 use crate::naive;
 use crate::narrow::{Corners, Within};
 use crate::near::{ClosestPoints, NearPair, NearPairs, NearQuery};
@@ -158,14 +159,8 @@ fn find_features(scene: &Scene, pair: &mut NearPair, closest: bool) {
     let parts = pair.kind.parts();
     let corners = |Primitive { body, primitive }: Primitive, part: Part| {
         let body = scene.body_in(body.slot());
-        match part {
-            // They are numbered as positions are.
-            Part::Vertices => Corners::new(body.positions(), &[primitive]),
-            _ => Corners::new(
-                body.positions(),
-                body.part(part).corners(primitive as usize),
-            ),
-        }
+        let element = ElementIx::new(primitive);
+        Corners::new(body.positions(), body.corners(part, &element))
     };
     let (a, b) = (corners(pair.a, parts[0]), corners(pair.b, parts[1]));
     if closest {

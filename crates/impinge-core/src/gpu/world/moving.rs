@@ -154,12 +154,12 @@ impl World {
             layers.n_vertices += count(scene.body_in(id.slot()).n_vertices());
         }
         let mut topology = Topology::default();
-        for (ix, (layer, clustering)) in frame.layers.iter().zip(clusterings).enumerate() {
+        for ((ix, layer), clustering) in frame.numbered_layers().zip(clusterings) {
             let body = layers.number(layer.id).expect("its body was listed");
             // Vertices fit 32 bits, or the frame would weigh nothing.
             let first = layers.bodies[body].first_vertex as u32;
             let clusters = 0..clustering.n_clusters();
-            topology.push(clustering, clusters, layer.first, ix as u32, |vertex| {
+            topology.push(clustering, clusters, layer.first, ix.raw(), |vertex| {
                 first + vertex
             });
         }
@@ -225,7 +225,7 @@ impl World {
             return Ok(false);
         };
         let number = |id: BodyId| layers.number(id).map(|number| number as u32);
-        let records = frame.layers.iter().enumerate().map(|(ix, layer)| {
+        let records = frame.numbered_layers().map(|(ix, layer)| {
             // Bodies without a category meet no other body.
             let filter = match frame.meets_bodies() {
                 true => frame.filter(ix),
@@ -240,7 +240,7 @@ impl World {
                 .flatten()
                 .any(|positions| matches!(positions, Positions::F64(_)));
             Body {
-                root: self.forest.roots[ix],
+                root: self.forest.root(ix),
                 slack: if is_rounded { SLACK } else { 0 },
                 within: u32::from(frame.test(ix, ix).is_some()),
                 layer: flags(layer) | number(layer.id).unwrap_or_default() << BODY_SHIFT,

@@ -4,8 +4,8 @@ use crate::cpu::met::{Met, WorkItem};
 use crate::cpu::simd::Isa;
 use crate::exact::{ElementPair, Point};
 use crate::frame::{TestId, pair_key};
-use crate::grouping::GROUP;
 use crate::impacts::{KeysByKind, StepAnswer};
+use crate::index::{LayerIx, Place};
 use crate::narrow::exact_kind;
 use crate::pair_kind::PairKind;
 use crate::positions::Positions;
@@ -49,12 +49,13 @@ impl Batch<'_> {
     /// The places of a candidate.
     #[inline(always)]
     pub fn places(&self, ix: usize) -> Places {
-        let place = |cluster: u32, lane: u8| cluster * GROUP as u32 + u32::from(lane);
-        let [lane_a, lane_b] = self.met.lanes(ix);
-        [
-            place(self.item.cluster_a, lane_a),
-            place(self.item.cluster_b, lane_b),
-        ]
+        let [lane_a, lane_b] = self.met.lanes(ix).map(u32::from);
+        let WorkItem {
+            cluster_a,
+            cluster_b,
+            ..
+        } = self.item;
+        [cluster_a.place(lane_a), cluster_b.place(lane_b)]
     }
 
     /// Whether the corners of both groups are in tables.
@@ -78,13 +79,13 @@ impl Batch<'_> {
 /// Two layers, and the kind of their pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Between {
-    pub a: u32,
-    pub b: u32,
+    pub a: LayerIx,
+    pub b: LayerIx,
     pub kind: PairKind,
 }
 
 /// Places of two elements in their clusters' orders.
-pub(crate) type Places = [u32; 2];
+pub(crate) type Places = [Place; 2];
 
 /// Keys of pairs without a value, handed over in blocks.
 #[derive(Debug, Default)]
@@ -129,8 +130,8 @@ pub(super) fn exact_pair(kind: PairKind) -> Option<ElementPair> {
 #[inline(always)]
 pub(super) fn key(world: World<'_>, between: Between, places: Places) -> u64 {
     let [a, b] = [(between.a, places[0]), (between.b, places[1])].map(|(layer, place)| {
-        let first = world.frame.layers[layer as usize].first;
-        first + world.cache(layer).clustering.order[place as usize]
+        let element = world.cache(layer).clustering.primitive(place);
+        world.frame.layer(layer).number(element)
     });
     pair_key(a, b)
 }
@@ -169,15 +170,11 @@ pub(super) fn points(
 /// The corners of an element, and its body's positions at both ends.
 pub(super) fn element<'a>(
     world: World<'a>,
-    layer: u32,
-    place: u32,
+    layer: LayerIx,
+    place: Place,
 ) -> (&'a [u32], [&'a Positions; 2]) {
-    let body = world.frame.body(world.scene, layer as usize);
-    let corners = world
-        .cache(layer)
-        .clustering
-        .corners
-        .corners(place as usize);
+    let body = world.frame.body(world.scene, layer);
+    let corners = world.cache(layer).clustering.corners.corners(place.index());
     let start = body.positions();
     (corners, [start, body.end_positions().unwrap_or(start)])
 }

@@ -112,10 +112,10 @@ struct Pairs<'a> {
 impl<'a> Pairs<'a> {
     fn new(world: World<'a>, between: Between) -> Self {
         let sides = [between.a, between.b].map(|layer| {
-            let body = world.frame.body(world.scene, layer as usize);
+            let body = world.frame.body(world.scene, layer);
             (&world.cache(layer).clustering.corners, body.positions())
         });
-        let reach = (world.frame).reach(between.a as usize, between.b as usize);
+        let reach = world.frame.reach(between.a, between.b);
         Pairs { sides, reach }
     }
 
@@ -123,7 +123,7 @@ impl<'a> Pairs<'a> {
     fn corners(&self, places: Places) -> [Corners; 2] {
         [0, 1].map(|side| {
             let (elements, positions) = self.sides[side];
-            Corners::new(positions, elements.corners(places[side] as usize))
+            Corners::new(positions, elements.corners(places[side].index()))
         })
     }
 }

@@ -6,6 +6,7 @@ use crate::cpu::simd::Isa;
 use crate::frame::pair_key;
 use crate::hull::Extent;
 use crate::impacts::StepAnswer;
+use crate::index::{LayerIx, Number, Place};
 use crate::narrow::are_near;
 
 use super::super::group::Group;
@@ -74,13 +75,13 @@ impl Narrow for Overlaps {
 #[inline(always)]
 fn key_in([a, b]: [&Group; 2], [lane_a, lane_b]: [u8; 2]) -> u64 {
     pair_key(
-        a.numbers.0[usize::from(lane_a)],
-        b.numbers.0[usize::from(lane_b)],
+        Number::new(a.numbers.0[usize::from(lane_a)]),
+        Number::new(b.numbers.0[usize::from(lane_b)]),
     )
 }
 
 /// The extent of an element over the whole step.
-fn extent(world: World<'_>, layer: u32, place: u32) -> Extent {
+fn extent(world: World<'_>, layer: LayerIx, place: Place) -> Extent {
     let (corners, ends) = element(world, layer, place);
     let points = corners
         .iter()

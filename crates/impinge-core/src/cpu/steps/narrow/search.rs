@@ -150,7 +150,7 @@ impl<'a> Sides<'a> {
                 _ => Corners::None,
             },
             positions: layers.map(|layer| {
-                let body = world.frame.body(world.scene, layer as usize);
+                let body = world.frame.body(world.scene, layer);
                 let start = body.positions();
                 [start, body.end_positions().unwrap_or(start)]
             }),
@@ -192,7 +192,7 @@ fn fill<S: Simd, const N: usize>(
 ) {
     let mut ids = [[0; LANES]; N];
     for (lane, places) in batch.iter().enumerate() {
-        let corners = &corners[places[side] as usize];
+        let corners = &corners[places[side].index()];
         for k in 0..N {
             ids[k][lane] = corners[k];
         }

@@ -18,7 +18,7 @@ use super::contacts::Contacts;
 #[inline(always)]
 pub(super) fn take<S: Simd>(_: S, contacts: &mut Contacts, world: World<'_>, batch: Batch<'_>) {
     let between = batch.between;
-    let reach = world.frame.reach(between.a as usize, between.b as usize);
+    let reach = world.frame.reach(between.a, between.b);
     let reach = reach.enclosing_f32();
     let pair = batch.near_in_tables();
     let tables = batch.groups.map(|group| &group.points);

@@ -127,7 +127,7 @@ impl Contacts {
             return;
         }
         let are_single = [between.a, between.b].iter().all(|&layer| {
-            let body = world.frame.body(world.scene, layer as usize);
+            let body = world.frame.body(world.scene, layer);
             matches!(body.positions(), Positions::F32(_))
         });
         // Over the whole step, the device has taken the filter's first step for positions in single precision.
