@@ -26,7 +26,7 @@ use crate::tuning::Tuning;
 use crate::workers::Workers;
 
 /// What a backend keeps of a body, or of a part of it.
-pub(crate) trait Kept: Send {
+pub(crate) trait Clustered: Send {
     /// The stamp of the topology that was clustered.
     fn topology_stamp(&self) -> u64;
 
@@ -98,7 +98,7 @@ impl<T, const PARTS: usize> Store<T, PARTS> {
     }
 }
 
-impl<T: Kept, const PARTS: usize> Store<T, PARTS> {
+impl<T: Clustered, const PARTS: usize> Store<T, PARTS> {
     /// Drops what belongs to bodies that are gone or were re-meshed.
     pub fn forget_outdated(&mut self, scene: &Scene) {
         for (slot, parts) in self.slots.iter_mut().enumerate() {

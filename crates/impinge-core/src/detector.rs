@@ -35,7 +35,7 @@ pub struct Detector {
     settings: Settings,
     frames: FrameLoop,
     cpu: Cpu,
-    steps: steps::Steps,
+    steps: steps::StepMemory,
     distances: Distances,
     #[cfg(feature = "gpu")]
     gpu: Option<crate::gpu::Engine>,
@@ -92,7 +92,7 @@ impl Detector {
             gpu,
             frames: FrameLoop::new(settings.threads, settings.limits(), settings.tuning),
             cpu: Cpu::new(&settings),
-            steps: steps::Steps::new(&settings),
+            steps: steps::StepMemory::new(&settings),
             distances: Distances::new(),
             settings,
         }

@@ -22,7 +22,7 @@ use crate::sink;
 
 const KINDS: usize = PairKind::ALL.len();
 
-/// Parts of all ranges together, at most.
+/// RangeParts of all ranges together, at most.
 const MOST_PARTS: usize = 1 << 12;
 
 /// A range of keys per kind of pair.
@@ -71,7 +71,7 @@ impl KeyRanges {
 
 /// The parts of one kind's range.
 #[derive(Debug, Clone, Default)]
-struct Parts {
+struct RangeParts {
     /// The number of the first one.
     first: usize,
     n: usize,
@@ -83,7 +83,7 @@ struct Parts {
 #[derive(Debug)]
 pub(crate) struct Tally {
     ranges: KeyRanges,
-    parts: [Parts; KINDS],
+    parts: [RangeParts; KINDS],
     counts: Vec<AtomicU64>,
 }
 
@@ -102,10 +102,10 @@ impl Tally {
         let parts = PairKind::ALL.map(|kind| {
             let width = ranges.of(kind).end - ranges.of(kind).start;
             let Some(last) = width.checked_sub(1) else {
-                return Parts::default();
+                return RangeParts::default();
             };
             let shift = (0..).find(|shift| last >> shift < most_each).unwrap_or(0);
-            let parts = Parts {
+            let parts = RangeParts {
                 first: n,
                 n: (last >> shift) as usize + 1,
                 shift,

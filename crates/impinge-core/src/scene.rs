@@ -11,7 +11,7 @@ use crate::ids::new_stamp;
 use crate::index::ElementIx;
 use crate::positions::Real;
 pub(crate) use crate::positions::{Positions, check_positions};
-use crate::transform::{Affine, Motion};
+use crate::transform::{Affine, RestPose};
 
 /// Which bodies meet in [`Query::all`](crate::Query::all): two bodies meet when the `category` of
 /// each shares a bit with the `mask` of the other. By default all bodies meet.
@@ -50,7 +50,7 @@ pub struct Body {
     /// Whether `end` counts. If not, only its memory is kept.
     moves: bool,
     /// How the body was moved by a transform, if it was.
-    motion: Option<Box<Motion>>,
+    motion: Option<Box<RestPose>>,
     filter: Filter,
     topology_stamp: u64,
     positions_stamp: u64,
@@ -497,11 +497,11 @@ impl Scene {
                 Some(matrix) => matrix.write(&rest, &mut target.positions),
                 None => target.positions.clone_from(&rest),
             }
-            target.motion = before.map(|matrix| Box::new(Motion { rest, matrix }));
+            target.motion = before.map(|matrix| Box::new(RestPose { rest, matrix }));
             return Err(error);
         }
         target.has_moved(true);
-        target.motion = Some(Box::new(Motion { rest, matrix }));
+        target.motion = Some(Box::new(RestPose { rest, matrix }));
         Ok(())
     }
 

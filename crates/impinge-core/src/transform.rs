@@ -7,7 +7,7 @@ use crate::positions::{Positions, Real};
 
 /// The rest positions of a body, and the matrix that moved them.
 #[derive(Debug, Clone)]
-pub(crate) struct Motion {
+pub(crate) struct RestPose {
     pub rest: Arc<Positions>,
     pub matrix: Affine,
 }

@@ -35,8 +35,8 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> 
     let mut rows: Vec<[u32; 4]> = room(n)?;
     rows.extend(pairs.rows());
     let n_chunks = n.div_ceil(CHUNK);
-    let mut met: Vec<Met> = room(n_chunks)?;
-    met.resize_with(n_chunks, Met::default);
+    let mut met: Vec<ChunkContacts> = room(n_chunks)?;
+    met.resize_with(n_chunks, ChunkContacts::default);
     rows.par_chunks(CHUNK)
         .zip(&mut met)
         .try_for_each(|(rows, met)| {
@@ -59,7 +59,7 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> 
     let number = |name: &PointName| names.partition_point(|held| held < name) as u32;
     let mut corners: Vec<u32> = sink::filled(0, n_corners, WHAT)?;
     let mut rest = &mut corners[..];
-    let mut of_chunks: Vec<(&Met, &mut [u32])> = room(n_chunks)?;
+    let mut of_chunks: Vec<(&ChunkContacts, &mut [u32])> = room(n_chunks)?;
     for met in &met {
         let (of_chunk, others) = rest.split_at_mut(met.names.len());
         of_chunks.push((met, of_chunk));
@@ -101,18 +101,18 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> 
 
 /// The contacts of a chunk of pairs.
 #[derive(Default)]
-struct Met {
-    contacts: Vec<Found>,
+struct ChunkContacts {
+    contacts: Vec<FoundContact>,
     names: Vec<PointName>,
 }
 
-struct Found {
+struct FoundContact {
     shape: Shape,
     n_corners: usize,
     directed: bool,
 }
 
-impl Met {
+impl ChunkContacts {
     fn add(
         &mut self,
         bodies: &Bodies<'_>,
@@ -120,7 +120,7 @@ impl Met {
     ) -> Result<(), Error> {
         let sides = [(body_a, a), (body_b, b)].map(|(body, face)| bodies.triangle(body, face));
         let [Some(a), Some(b)] = sides else {
-            self.contacts.push(Found {
+            self.contacts.push(FoundContact {
                 shape: Shape::Solid,
                 n_corners: 0,
                 directed: false,
@@ -140,7 +140,7 @@ impl Met {
                 features,
             }
         }));
-        self.contacts.push(Found {
+        self.contacts.push(FoundContact {
             shape: match corners.len() {
                 0 => Shape::Apart,
                 1 => Shape::Point,

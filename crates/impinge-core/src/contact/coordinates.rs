@@ -69,19 +69,19 @@ enum Offset {
 }
 
 /// The arithmetic in which determinants are computed.
-trait Number:
+trait Arithmetic:
     Copy + std::ops::Add<Output = Self> + std::ops::Sub<Output = Self> + std::ops::Mul<Output = Self>
 {
     fn difference(a: f64, b: f64) -> Self;
 }
 
-impl Number for f64 {
+impl Arithmetic for f64 {
     fn difference(a: f64, b: f64) -> Self {
         a - b
     }
 }
 
-impl Number for Double {
+impl Arithmetic for Double {
     fn difference(a: f64, b: f64) -> Self {
         Double::difference(a, b)
     }
@@ -89,7 +89,7 @@ impl Number for Double {
 
 impl Offset {
     /// The determinant, in the precision of `T`.
-    fn value<T: Number>(&self) -> T {
+    fn value<T: Arithmetic>(&self) -> T {
         match *self {
             Offset::Plane(d, [a, b, c]) => {
                 let [a, b, c] = [a, b, c].map(|p| [0, 1, 2].map(|k| T::difference(p[k], d[k])));

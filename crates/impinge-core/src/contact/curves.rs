@@ -42,7 +42,7 @@ impl Curves {
             isolated: isolated(contacts)?,
             ..Curves::default()
         };
-        let at = Incidence::new(contacts.points().len(), &links)?;
+        let at = LinksAtPoints::new(contacts.points().len(), &links)?;
         let mut is_used = filled(false, links.len(), WHAT)?;
         // Open chains first, from each end or junction; then loops, each from its lowest segment.
         for point in 0..contacts.points().len() {
@@ -227,12 +227,12 @@ fn isolated(contacts: &Contacts) -> Result<Vec<u32>, Error> {
 }
 
 /// The links at each point.
-struct Incidence {
+struct LinksAtPoints {
     starts: Vec<usize>,
     links: Vec<u32>,
 }
 
-impl Incidence {
+impl LinksAtPoints {
     fn new(n_points: usize, links: &[Link]) -> Result<Self, Error> {
         let mut starts = filled(0, n_points + 2, WHAT)?;
         for end in links.iter().flat_map(|link| link.ends) {
@@ -249,7 +249,7 @@ impl Incidence {
                 *place += 1;
             }
         }
-        Ok(Incidence { starts, links: at })
+        Ok(LinksAtPoints { starts, links: at })
     }
 
     fn links(&self, point: usize) -> &[u32] {
@@ -268,7 +268,7 @@ impl Chain {
     /// Follows links from a point to an end, to a junction, or back to the start.
     fn follow(
         links: &[Link],
-        at: &Incidence,
+        at: &LinksAtPoints,
         is_used: &mut [bool],
         first: u32,
         start: u32,

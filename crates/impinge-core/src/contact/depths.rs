@@ -12,14 +12,14 @@ use crate::index::{ElementIx, VertexIx};
 
 /// A vertex in the queue: nearest first, ties by number.
 #[derive(PartialEq)]
-struct Waiting {
+struct WaitingVertex {
     depth: f64,
     vertex: VertexIx,
 }
 
-impl Eq for Waiting {}
+impl Eq for WaitingVertex {}
 
-impl Ord for Waiting {
+impl Ord for WaitingVertex {
     fn cmp(&self, other: &Self) -> Ordering {
         other
             .depth
@@ -28,7 +28,7 @@ impl Ord for Waiting {
     }
 }
 
-impl PartialOrd for Waiting {
+impl PartialOrd for WaitingVertex {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
@@ -50,17 +50,17 @@ pub fn solid_depths(
     tetrahedra: &[[u32; 4]],
     surface: &[[u32; 3]],
 ) -> Vec<f64> {
-    let around = Around::new(positions.len(), tetrahedra);
+    let around = TetrahedraAround::new(positions.len(), tetrahedra);
     let mut depths = vec![f64::INFINITY; positions.len()];
     let mut waiting = BinaryHeap::new();
     for &corner in surface.as_flattened() {
         let vertex = VertexIx::new(corner);
         if depths[vertex.index()] != 0.0 {
             depths[vertex.index()] = 0.0;
-            waiting.push(Waiting { depth: 0.0, vertex });
+            waiting.push(WaitingVertex { depth: 0.0, vertex });
         }
     }
-    while let Some(Waiting { depth, vertex }) = waiting.pop() {
+    while let Some(WaitingVertex { depth, vertex }) = waiting.pop() {
         if depth > depths[vertex.index()] {
             continue;
         }
@@ -71,7 +71,7 @@ pub fn solid_depths(
                 let through = depth + (x * x + y * y + z * z).sqrt();
                 if through < depths[next.index()] {
                     depths[next.index()] = through;
-                    waiting.push(Waiting {
+                    waiting.push(WaitingVertex {
                         depth: through,
                         vertex: next,
                     });
@@ -88,12 +88,12 @@ pub fn solid_depths(
 }
 
 /// The tetrahedra around each vertex, one list after the other.
-struct Around {
+struct TetrahedraAround {
     starts: Vec<u32>,
     tetrahedra: Vec<ElementIx>,
 }
 
-impl Around {
+impl TetrahedraAround {
     fn new(n_vertices: usize, tetrahedra: &[[u32; 4]]) -> Self {
         let mut starts = vec![0u32; n_vertices + 1];
         for &corner in tetrahedra.as_flattened() {
@@ -110,7 +110,7 @@ impl Around {
                 next[corner as usize] += 1;
             }
         }
-        Around {
+        TetrahedraAround {
             starts,
             tetrahedra: around,
         }

@@ -12,13 +12,13 @@
 
 use rayon::prelude::*;
 
-use super::topology::Topology;
+use super::topology::EdgesAround;
 use crate::exact::{Point, Sign, orient2d, orient3d};
 use crate::index::VertexIx;
 use crate::scene::{Body, Elements};
 
 /// The part of each vertex, and the winding number of each part.
-pub(super) struct Parts {
+pub(super) struct ConnectedParts {
     /// For each vertex: its part, or [`NO_PART`].
     part_of: Vec<u32>,
     winding: Vec<i32>,
@@ -30,18 +30,18 @@ const NO_PART: u32 = u32::MAX;
 /// A surface whose vertices inside another body are wanted, and where it meets that body's surface.
 pub(super) struct Asked<'a> {
     pub body: &'a Body,
-    pub topology: &'a Topology,
+    pub topology: &'a EdgesAround,
     /// Whether a vertex lies on the other surface.
     pub is_on: &'a (dyn Fn(VertexIx) -> bool + Sync),
     /// Whether an edge meets the other surface.
     pub is_crossed: &'a (dyn Fn([VertexIx; 2]) -> bool + Sync),
 }
 
-impl Parts {
+impl ConnectedParts {
     /// The parts of a surface inside another body.
     pub fn new(asked: &Asked<'_>, other: &Body) -> Self {
         let n_vertices = asked.body.n_vertices();
-        let mut parts = Parts {
+        let mut parts = ConnectedParts {
             part_of: vec![NO_PART; n_vertices],
             winding: Vec::new(),
         };

@@ -63,13 +63,13 @@ impl Meeting {
 }
 
 /// A triangle as the convex set that it is: point, segment or triangle.
-struct Hull<'a> {
+struct ConvexTriangle<'a> {
     points: &'a [Point; 3],
-    shape: Shape,
+    shape: Degeneracy,
 }
 
 #[derive(Clone, Copy)]
-enum Shape {
+enum Degeneracy {
     Point,
     /// The outermost corners, the edge between them, and a corner strictly between them.
     Segment {
@@ -89,20 +89,20 @@ pub(super) fn ends(edge: usize) -> [usize; 2] {
     [edge, (edge + 1) % 3]
 }
 
-impl<'a> Hull<'a> {
+impl<'a> ConvexTriangle<'a> {
     fn new(points: &'a [Point; 3]) -> Self {
         let [a, b, c] = points;
         let shape = match Projection::injective(a, b, c) {
-            Some(projection) => Shape::Triangle {
+            Some(projection) => Degeneracy::Triangle {
                 projection,
                 turn: projection.turn(a, b, c),
             },
             None => Self::degenerate(points),
         };
-        Hull { points, shape }
+        ConvexTriangle { points, shape }
     }
 
-    fn degenerate(points: &[Point; 3]) -> Shape {
+    fn degenerate(points: &[Point; 3]) -> Degeneracy {
         let mut outermost = None;
         for edge in 0..3 {
             let [i, j] = ends(edge);
@@ -113,7 +113,7 @@ impl<'a> Hull<'a> {
             let is_between = strictly_between(&points[other], &points[i], &points[j]);
             let at_an_end = points[other] == points[i] || points[other] == points[j];
             if is_between || (at_an_end && outermost.is_none()) {
-                outermost = Some(Shape::Segment {
+                outermost = Some(Degeneracy::Segment {
                     // Of several corners at one place, the lowest stands for all.
                     ends: [i, j].map(|k| first_at(points, k)),
                     edge,
@@ -121,24 +121,24 @@ impl<'a> Hull<'a> {
                 });
             }
         }
-        outermost.unwrap_or(Shape::Point)
+        outermost.unwrap_or(Degeneracy::Point)
     }
 
     /// The corners of the hull.
     fn vertices(&self) -> ([usize; 3], usize) {
         match self.shape {
-            Shape::Point => ([0; 3], 1),
-            Shape::Segment { ends: [i, j], .. } => ([i, j, 0], 2),
-            Shape::Triangle { .. } => ([0, 1, 2], 3),
+            Degeneracy::Point => ([0; 3], 1),
+            Degeneracy::Segment { ends: [i, j], .. } => ([i, j, 0], 2),
+            Degeneracy::Triangle { .. } => ([0, 1, 2], 3),
         }
     }
 
     /// The edges of the hull.
     fn edges(&self) -> std::ops::Range<usize> {
         match self.shape {
-            Shape::Point => 0..0,
-            Shape::Segment { edge, .. } => edge..edge + 1,
-            Shape::Triangle { .. } => 0..3,
+            Degeneracy::Point => 0..0,
+            Degeneracy::Segment { edge, .. } => edge..edge + 1,
+            Degeneracy::Triangle { .. } => 0..3,
         }
     }
 
@@ -147,7 +147,7 @@ impl<'a> Hull<'a> {
     }
 
     fn is_triangle(&self) -> bool {
-        matches!(self.shape, Shape::Triangle { .. })
+        matches!(self.shape, Degeneracy::Triangle { .. })
     }
 
     /// On which side of the plane a point lies: positive where the triangle turns counter-clockwise.
@@ -159,8 +159,8 @@ impl<'a> Hull<'a> {
     /// The feature in whose relative interior a point of known height lies; `None` outside.
     fn locate(&self, point: &Point, height: Sign) -> Option<Local> {
         match self.shape {
-            Shape::Point => (*point == self.points[0]).then_some(Local::Vertex(0)),
-            Shape::Segment { ends, edge, middle } => {
+            Degeneracy::Point => (*point == self.points[0]).then_some(Local::Vertex(0)),
+            Degeneracy::Segment { ends, edge, middle } => {
                 let at = |&corner: &usize| *point == self.points[corner];
                 if let Some(corner) = ends.into_iter().chain(middle).find(at) {
                     return Some(Local::Vertex(corner));
@@ -169,7 +169,7 @@ impl<'a> Hull<'a> {
                 (collinear(p, q, point) && strictly_between(point, p, q))
                     .then_some(Local::Edge(edge))
             }
-            Shape::Triangle { projection, turn } => {
+            Degeneracy::Triangle { projection, turn } => {
                 if !height.is_zero() {
                     return None;
                 }
@@ -211,7 +211,7 @@ fn feature_by_sides(sides: [Sign; 3], inside: Sign) -> Option<Local> {
 
 /// The intersection of two closed triangles.
 pub(super) fn meet(a: &[Point; 3], b: &[Point; 3]) -> Meeting {
-    let hulls = [Hull::new(a), Hull::new(b)];
+    let hulls = [ConvexTriangle::new(a), ConvexTriangle::new(b)];
     let heights = [
         heights(&hulls[1], hulls[0].points),
         heights(&hulls[0], hulls[1].points),
@@ -239,7 +239,7 @@ pub(super) fn meet(a: &[Point; 3], b: &[Point; 3]) -> Meeting {
 }
 
 /// The heights of the points over the plane of a hull; zero if the hull has no plane.
-fn heights(hull: &Hull<'_>, points: &[Point; 3]) -> [Sign; 3] {
+fn heights(hull: &ConvexTriangle<'_>, points: &[Point; 3]) -> [Sign; 3] {
     if hull.is_triangle() {
         points.each_ref().map(|point| hull.height(point))
     } else {
@@ -249,8 +249,8 @@ fn heights(hull: &Hull<'_>, points: &[Point; 3]) -> [Sign; 3] {
 
 /// One of the two triangles, and the other one.
 struct One<'a> {
-    hull: &'a Hull<'a>,
-    other: &'a Hull<'a>,
+    hull: &'a ConvexTriangle<'a>,
+    other: &'a ConvexTriangle<'a>,
     /// The heights of its corners over the plane of the other.
     heights: [Sign; 3],
     side: usize,
@@ -326,9 +326,9 @@ fn edges_cross([p, q]: [&Point; 2], [r, s]: [&Point; 2]) -> bool {
 
 /// Names a corner at the middle corner of a flat triangle by that vertex, not by the edge: the triangle's
 /// neighbours name it by the vertex too.
-fn name_middles(hulls: &[Hull<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut Meeting) {
+fn name_middles(hulls: &[ConvexTriangle<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut Meeting) {
     for side in 0..2 {
-        let Shape::Segment {
+        let Degeneracy::Segment {
             middle: Some(middle),
             ..
         } = hulls[side].shape
@@ -353,8 +353,8 @@ fn name_middles(hulls: &[Hull<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut Me
 /// The line of both planes enters triangle a where a's boundary goes up through b's plane, and leaves a where
 /// the boundary goes down; for b it is the other way round. (With d = n_a × n_b and an edge e of a, n_a × e
 /// leads into a, and d · (n_a × e) = |n_a|² (n_b · e).)
-fn direct(hulls: &[Hull<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut Meeting) {
-    if !hulls.iter().all(Hull::is_triangle) {
+fn direct(hulls: &[ConvexTriangle<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut Meeting) {
+    if !hulls.iter().all(ConvexTriangle::is_triangle) {
         return;
     }
     let rise = |side: usize, local: Local| -> i8 {
@@ -384,7 +384,7 @@ fn direct(hulls: &[Hull<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut Meeting)
 ///
 /// Every side of the polygon lies on an edge of one of the triangles. The line of an edge holds two corners if
 /// a side lies on it, and fewer otherwise. So two corners are neighbours if and only if some edge has both.
-fn order(hulls: &[Hull<'_>; 2], meeting: &mut Meeting) {
+fn order(hulls: &[ConvexTriangle<'_>; 2], meeting: &mut Meeting) {
     let found = *meeting;
     let n = found.n_corners;
     let are_neighbours = |i: usize, j: usize| {
@@ -414,11 +414,11 @@ fn is_on(feature: Local, edge: usize) -> bool {
 }
 
 /// Two neighbouring corners in counter-clockwise order.
-fn first_side(hulls: &[Hull<'_>; 2], found: &Meeting) -> Option<(usize, usize)> {
-    let Shape::Triangle { projection, turn } = hulls[0].shape else {
+fn first_side(hulls: &[ConvexTriangle<'_>; 2], found: &Meeting) -> Option<(usize, usize)> {
+    let Degeneracy::Triangle { projection, turn } = hulls[0].shape else {
         return None;
     };
-    let Shape::Triangle { .. } = hulls[1].shape else {
+    let Degeneracy::Triangle { .. } = hulls[1].shape else {
         return None;
     };
     let [p, q, r] = hulls[1].points;
@@ -443,7 +443,13 @@ fn first_side(hulls: &[Hull<'_>; 2], found: &Meeting) -> Option<(usize, usize)> 
 }
 
 /// Whether `x` comes before `y`, two different corners on an edge.
-fn comes_first(hulls: &[Hull<'_>; 2], side: usize, edge: usize, x: Corner, y: Corner) -> bool {
+fn comes_first(
+    hulls: &[ConvexTriangle<'_>; 2],
+    side: usize,
+    edge: usize,
+    x: Corner,
+    y: Corner,
+) -> bool {
     let [start, end] = ends(edge);
     for (corner, is_first) in [(x, true), (y, false)] {
         match corner[side] {
@@ -455,7 +461,7 @@ fn comes_first(hulls: &[Hull<'_>; 2], side: usize, edge: usize, x: Corner, y: Co
     // Both lie strictly inside the edge, so each is at a vertex of the other triangle or crosses one of its
     // edges. The corner where the edge enters that triangle is the first.
     let (here, there) = (&hulls[side], &hulls[1 - side]);
-    let Shape::Triangle { projection, turn } = there.shape else {
+    let Degeneracy::Triangle { projection, turn } = there.shape else {
         return true;
     };
     for (corner, is_first) in [(x, true), (y, false)] {

@@ -15,11 +15,11 @@
 use std::collections::HashMap;
 
 use super::curves::Curves;
-use super::inside::{Asked, Parts};
+use super::inside::{Asked, ConnectedParts};
 use super::regions::{
     NO_REGION, Region, Sets, Vector, WHAT, add, cross, dot, join_contacts, regions, scaled, sub,
 };
-use super::topology::Topology;
+use super::topology::EdgesAround;
 use super::{Contacts, Feature, PointName, Shape};
 use crate::error::Error;
 use crate::exact::{Sign, orient3d};
@@ -51,7 +51,7 @@ use crate::sink::grow;
 #[derive(Debug, Default)]
 pub struct Penetration {
     /// By the number of the body; the first of the pair is the stamp of the topology.
-    topologies: HashMap<usize, (u64, Topology)>,
+    topologies: HashMap<usize, (u64, EdgesAround)>,
 }
 
 /// The overlap of two closed bodies.
@@ -116,9 +116,9 @@ impl Penetration {
                 is_on: &|vertex| crossings.is_on(vertex),
                 is_crossed: &|edge| crossings.is_crossed(edge),
             };
-            Parts::new(&asked, bodies[1 - side])
+            ConnectedParts::new(&asked, bodies[1 - side])
         });
-        let work = Work {
+        let work = OverlapWork {
             contacts,
             bodies,
             crossings,
@@ -142,7 +142,7 @@ impl Penetration {
                 expected: Kind::Triangles.name(),
             });
         };
-        let topology = Topology::new(id, faces, body.n_vertices())?;
+        let topology = EdgesAround::new(id, faces, body.n_vertices())?;
         self.topologies.insert(id.index(), (stamp, topology));
         Ok(())
     }
@@ -249,17 +249,17 @@ struct Piece {
     node: u32,
 }
 
-struct Work<'a> {
+struct OverlapWork<'a> {
     contacts: &'a Contacts,
     bodies: [&'a Body; 2],
     crossings: [Crossings<'a>; 2],
-    parts: [Parts; 2],
+    parts: [ConnectedParts; 2],
 }
 
-impl Work<'_> {
+impl OverlapWork<'_> {
     fn overlap(&self) -> Result<Overlap, Error> {
         let n_points = self.contacts.points().len();
-        let n_parts = self.parts.each_ref().map(Parts::n_parts);
+        let n_parts = self.parts.each_ref().map(ConnectedParts::n_parts);
         let mut sets = Sets::new(n_points + n_parts[0] + n_parts[1])?;
         join_contacts(self.contacts, &mut sets);
         let pieces = [self.pieces(0, &mut sets)?, self.pieces(1, &mut sets)?];

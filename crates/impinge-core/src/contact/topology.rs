@@ -13,12 +13,12 @@ use crate::scene::BodyId;
 
 /// The edges at each vertex.
 #[derive(Debug)]
-pub(super) struct Topology {
+pub(super) struct EdgesAround {
     starts: Vec<u32>,
     neighbours: Vec<VertexIx>,
 }
 
-impl Topology {
+impl EdgesAround {
     /// # Errors
     /// The surface is not closed; the error names an edge.
     pub fn new(body: BodyId, faces: &[[u32; 3]], n_vertices: usize) -> Result<Self, Error> {
@@ -65,7 +65,7 @@ impl Topology {
                 *place += 1;
             }
         }
-        Ok(Topology { starts, neighbours })
+        Ok(EdgesAround { starts, neighbours })
     }
 
     /// The vertices that share an edge with this one; none for a vertex of no face.

@@ -7,7 +7,7 @@
 
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
 use crate::grouping::clusters::Clustering;
-use crate::grouping::hierarchy::Shape;
+use crate::grouping::hierarchy::TreeShape;
 use crate::hull::{self, ReadVertices};
 use crate::index::ClusterIx;
 use crate::positions::Positions;
@@ -75,7 +75,7 @@ pub(crate) struct TreeBounds {
 
 impl TreeBounds {
     /// Makes room for the boxes of a shape.
-    pub fn resize(&mut self, shape: &Shape) {
+    pub fn resize(&mut self, shape: &TreeShape) {
         self.levels
             .resize_with(shape.n_levels(), BoundsArray::default);
         for (level, boxes) in self.levels.iter_mut().enumerate() {
@@ -84,7 +84,7 @@ impl TreeBounds {
     }
 
     /// Computes the boxes of the nodes above a level from those of the level.
-    pub fn refit_above(&mut self, below: usize, shape: &Shape) {
+    pub fn refit_above(&mut self, below: usize, shape: &TreeShape) {
         for level in below + 1..self.levels.len() {
             let (below, above) = self.levels.split_at_mut(level);
             let (children, nodes) = (&below[level - 1], &mut above[0]);

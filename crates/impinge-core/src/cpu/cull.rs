@@ -34,13 +34,13 @@ const TOGETHER: usize = 512;
 
 /// A primitive within its body's reach, and the first and last cell of its vertices along x, y, z, one byte per axis.
 #[derive(Debug, Clone, Copy)]
-struct Near {
+struct WithinReach {
     primitive: ElementIx,
     low: u32,
     high: u32,
 }
 
-impl Near {
+impl WithinReach {
     /// How many rows of the map it touches.
     #[inline(always)]
     fn n_rows(&self) -> u32 {
@@ -92,7 +92,7 @@ pub(crate) struct Cull {
     everywhere: AtomicU32,
     /// Maps of bodies whose self-collision is queried.
     alone: u32,
-    near: Vec<Mutex<Vec<Near>>>,
+    near: Vec<Mutex<Vec<WithinReach>>>,
 }
 
 impl Cull {
@@ -150,11 +150,11 @@ impl Cull {
     }
 
     pub fn bytes(&self) -> usize {
-        let near = |part: &Mutex<Vec<Near>>| part.lock().map_or(0, |part| part.capacity());
+        let near = |part: &Mutex<Vec<WithinReach>>| part.lock().map_or(0, |part| part.capacity());
         size_of::<u32>() * self.codes.capacity()
             + size_of::<u64>() * (self.maps.capacity() + self.live.capacity())
             + size_of::<usize>() * self.firsts.capacity()
-            + size_of::<Near>() * self.near.iter().map(near).sum::<usize>()
+            + size_of::<WithinReach>() * self.near.iter().map(near).sum::<usize>()
     }
 
     /// Write access to the vertices' cells for several threads at once.
@@ -190,12 +190,12 @@ impl Cull {
         corners: &[[u32; N]],
         run: BoundsTask,
         reach: (u32, u32),
-        near: &mut Vec<Near>,
+        near: &mut Vec<WithinReach>,
     ) {
         let map_ix = run.layer.index();
         let n_rows = self.n_rows();
         let map = &self.maps[map_ix * n_rows..][..n_rows];
-        let mut together = [Near {
+        let mut together = [WithinReach {
             primitive: ElementIx::new(0),
             low: 0,
             high: 0,
@@ -218,7 +218,7 @@ impl Cull {
                 // Partners can only meet it within reach.
                 low = greater_bytes(low, reach.0);
                 high = lesser_bytes(high, reach.1);
-                together[n] = Near {
+                together[n] = WithinReach {
                     primitive,
                     low,
                     high,
@@ -280,7 +280,7 @@ impl Cull {
 
     /// Calls back for the rows of a primitive's range, each with its cells of that row.
     #[inline(always)]
-    fn for_rows(&self, near: &Near, mut call: impl FnMut(usize, u64)) {
+    fn for_rows(&self, near: &WithinReach, mut call: impl FnMut(usize, u64)) {
         let ([x, y, z, _], [x_end, y_end, z_end, _]) =
             (near.low.to_le_bytes(), near.high.to_le_bytes());
         let cells = (u64::MAX << x) & (u64::MAX >> (63 - x_end));

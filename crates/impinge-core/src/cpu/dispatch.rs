@@ -6,7 +6,7 @@
 //! hold primitives that cannot meet.
 
 use crate::grouping::bounds::Bounds;
-use crate::grouping::hierarchy::Shape;
+use crate::grouping::hierarchy::TreeShape;
 use crate::grouping::hubs::Hubs;
 
 use super::bounds::TreeBounds;
@@ -15,7 +15,7 @@ use super::simd::Simd;
 /// A tree: its shape and its current boxes.
 #[derive(Clone, Copy)]
 pub(crate) struct Tree<'a> {
-    pub shape: &'a Shape,
+    pub shape: &'a TreeShape,
     pub bounds: &'a TreeBounds,
 }
 
@@ -35,11 +35,17 @@ impl Tree<'_> {
 
     /// The children of a node that overlap a box: the first child, and one bit per child.
     #[inline(always)]
-    fn children_meeting<S: Simd>(&self, simd: S, level: u32, node: u32, query: &Bounds) -> Met {
+    fn children_meeting<S: Simd>(
+        &self,
+        simd: S,
+        level: u32,
+        node: u32,
+        query: &Bounds,
+    ) -> MetChildren {
         let children = self.shape.children(level as usize, node as usize);
         let boxes = &self.bounds.levels[level as usize - 1];
         let mask = simd.overlaps_8(boxes, children.start, query) & ((1 << children.len()) - 1);
-        Met {
+        MetChildren {
             first: children.start as u32,
             mask,
         }
@@ -47,12 +53,12 @@ impl Tree<'_> {
 }
 
 #[derive(Clone, Copy)]
-struct Met {
+struct MetChildren {
     first: u32,
     mask: u32,
 }
 
-impl Iterator for Met {
+impl Iterator for MetChildren {
     type Item = u32;
 
     #[inline(always)]

@@ -4,7 +4,7 @@
 //! whose triangles are not certainly side by side. Two triangles that share a vertex are tested only if both have a
 //! fold.
 //!
-//! Seen along an axis, the triangles around a vertex are sectors of a plane. If they all turn the same way and together
+//! TurnsSeen along an axis, the triangles around a vertex are sectors of a plane. If they all turn the same way and together
 //! go around the vertex no more than once, no two sectors overlap, so no two triangles meet anywhere but in the simplex
 //! that they share. On a smooth surface nearly every vertex passes, also where neighbours lie in one plane: two exact
 //! comparisons and three products per triangle corner replace six pairs per triangle.
@@ -149,7 +149,7 @@ impl<'a, P: Fn(usize) -> [f64; 3]> Arms<'a, P> {
     fn are_side_by_side_along_an_axis(&self) -> bool {
         let first = self.arm(self.ring[0]);
         let mut last = first;
-        let mut seen = [Seen::default(); 3];
+        let mut seen = [TurnsSeen::default(); 3];
         for &other in &self.ring[1..] {
             let next = self.arm(other);
             for (axis, seen) in seen.iter_mut().enumerate() {
@@ -184,7 +184,7 @@ impl<'a, P: Fn(usize) -> [f64; 3]> Arms<'a, P> {
             return false;
         };
         let mut last = first;
-        let mut seen = Seen::default();
+        let mut seen = TurnsSeen::default();
         for &other in &self.ring[1..] {
             let next = self.arm(other);
             let Some(is_below) = is_below_along(&normal, &next) else {
@@ -200,23 +200,23 @@ impl<'a, P: Fn(usize) -> [f64; 3]> Arms<'a, P> {
 
 /// What is seen along one axis while going along a ring.
 #[derive(Debug, Clone, Copy)]
-struct Seen {
+struct TurnsSeen {
     /// Whether every triangle certainly turns to the left, and whether every one does to the right.
     all: [bool; 2],
     /// How often the ring goes from one half-plane to the other.
     n_crossings: u32,
 }
 
-impl Default for Seen {
+impl Default for TurnsSeen {
     fn default() -> Self {
-        Seen {
+        TurnsSeen {
             all: [true; 2],
             n_crossings: 0,
         }
     }
 }
 
-impl Seen {
+impl TurnsSeen {
     #[inline(always)]
     fn add(&mut self, [left, right]: [bool; 2], crosses: bool) {
         self.all[0] &= left;
@@ -254,7 +254,7 @@ fn cross(from: &[f64; 3], to: &[f64; 3]) -> [(f64, f64); 3] {
     })
 }
 
-/// Seen along an axis, whether the turn from one arm to another is certainly to the left, and certainly to the right.
+/// TurnsSeen along an axis, whether the turn from one arm to another is certainly to the left, and certainly to the right.
 #[inline(always)]
 fn turn(axis: usize, from: &[f64; 3], to: &[f64; 3]) -> [bool; 2] {
     let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -275,7 +275,7 @@ fn turn_along(direction: &[f64; 3], from: &[f64; 3], to: &[f64; 3]) -> [bool; 2]
     [turn > bound, turn < -bound]
 }
 
-/// Seen along a direction, on which side of a line an arm certainly lies. Any line would do; on the image of a vector that
+/// TurnsSeen along a direction, on which side of a line an arm certainly lies. Any line would do; on the image of a vector that
 /// is like no other, meshes rarely have vertices.
 #[inline(always)]
 fn is_below_along(direction: &[f64; 3], arm: &[f64; 3]) -> Option<bool> {
@@ -286,7 +286,7 @@ fn is_below_along(direction: &[f64; 3], arm: &[f64; 3]) -> Option<bool> {
     }
 }
 
-/// Seen along an axis, which of two half-planes an arm points to: the one of angles from 0 up to but without 180 degrees,
+/// TurnsSeen along an axis, which of two half-planes an arm points to: the one of angles from 0 up to but without 180 degrees,
 /// or the other.
 #[inline(always)]
 fn is_below(axis: usize, arm: &[f64; 3]) -> bool {

@@ -28,7 +28,7 @@ pub(super) struct Group {
     pub in_tables: bool,
 }
 
-impl Kept<World<'_>> for Group {
+impl PerCluster<World<'_>> for Group {
     const EMPTY: Group = Group {
         boxes: LaneBounds::EMPTY,
         corners: [[[0.0; GROUP]; 3]; 3],
@@ -64,7 +64,7 @@ fn is_small(bounds: &Bounds) -> bool {
 }
 
 /// The data kept per cluster.
-pub(super) trait Kept<W>: Clone {
+pub(super) trait PerCluster<W>: Clone {
     /// The data of no cluster.
     const EMPTY: Self;
 
@@ -103,7 +103,7 @@ impl<G> GroupCache<G> {
     /// Prepares for a frame of `n_clusters` clusters.
     pub fn begin<W>(&mut self, n_clusters: u64, settings: &Settings)
     where
-        G: Kept<W>,
+        G: PerCluster<W>,
     {
         let most = match settings.memory_budget {
             Some(_) => MOST_IN_BUDGET,
@@ -149,7 +149,7 @@ impl<G> GroupCache<G> {
         pinned: usize,
     ) -> usize
     where
-        G: Kept<W>,
+        G: PerCluster<W>,
     {
         let (key, first) = (Self::key(whose), self.first_place(whose));
         for place in [first, first ^ 1] {

@@ -2,7 +2,7 @@
 //!
 //! In: the hubs and axes of a body, and its positions. Out: pairs for the exact test.
 //!
-//! The boxes of all primitives around a hub v overlap there, so boxes in space separate nothing. Seen from v, each
+//! The boxes of all primitives around a hub v overlap there, so boxes in space separate nothing. SeenFrom from v, each
 //! primitive is a cone of directions, and two primitives that meet in a point other than v share the direction
 //! of that point. So each cone gets a box on the surface of the cube of all directions, and a tree over these
 //! boxes finds those that overlap:
@@ -47,17 +47,17 @@ const EVERYWHERE: Bounds = Bounds {
 
 /// Scratch; kept from frame to frame.
 #[derive(Debug, Default)]
-pub(super) struct Around {
+pub(super) struct HubScratch {
     /// Places of primitives; those with the same vertices follow each other.
     places: Vec<Place>,
-    entries: Vec<Entry>,
-    nodes: Vec<Node>,
-    stack: Vec<NodePair>,
+    entries: Vec<ConeEntry>,
+    nodes: Vec<ConeNode>,
+    stack: Vec<ConePair>,
     /// Triangles on the axis' line that extend beyond its first hub, and beyond its second.
     beyond: [Vec<Alike>; 2],
 }
 
-/// Primitives with the same vertices: the range of their places in `Around::places`.
+/// Primitives with the same vertices: the range of their places in `HubScratch::places`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Alike {
     start: u32,
@@ -71,7 +71,7 @@ impl Alike {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Entry {
+struct ConeEntry {
     cone: Bounds,
     alike: Alike,
     /// The hubs of the primitive with which the current hub forms an axis.
@@ -79,32 +79,32 @@ struct Entry {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Node {
+struct ConeNode {
     cone: Bounds,
     partners: HubSet,
 }
 
 /// Two nodes of one depth.
 #[derive(Debug, Clone, Copy)]
-struct NodePair {
+struct ConePair {
     depth: u32,
     a: usize,
     b: usize,
 }
 
 /// Where a primitive lies as seen from the shared hub or axis.
-enum Seen {
+enum SeenFrom {
     Cone(Bounds),
     Nowhere,
     Beyond(usize),
 }
 
-impl Around {
+impl HubScratch {
     pub fn bytes(&self) -> usize {
         size_of::<Place>() * self.places.capacity()
-            + size_of::<Entry>() * self.entries.capacity()
-            + size_of::<Node>() * self.nodes.capacity()
-            + size_of::<NodePair>() * self.stack.capacity()
+            + size_of::<ConeEntry>() * self.entries.capacity()
+            + size_of::<ConeNode>() * self.nodes.capacity()
+            + size_of::<ConePair>() * self.stack.capacity()
             + size_of::<Alike>() * (self.beyond[0].capacity() + self.beyond[1].capacity())
     }
 
@@ -135,9 +135,9 @@ impl Around {
             }
             match seen(body, shared, places[0]) {
                 // By the rule, such a primitive meets only primitives with the same vertices.
-                Seen::Nowhere => {}
-                Seen::Beyond(end) => self.beyond[end].push(alike),
-                Seen::Cone(cone) => self.entries.push(Entry {
+                SeenFrom::Nowhere => {}
+                SeenFrom::Beyond(end) => self.beyond[end].push(alike),
+                SeenFrom::Cone(cone) => self.entries.push(ConeEntry {
                     cone,
                     alike,
                     partners: match shared {
@@ -169,26 +169,26 @@ impl Around {
             return;
         }
         let depth = n.div_ceil(LEAF).next_power_of_two().ilog2();
-        let nothing = Node {
+        let nothing = ConeNode {
             cone: Bounds::EMPTY,
             partners: HubSet::EMPTY,
         };
         self.nodes.clear();
         self.nodes.resize(2 << depth, nothing);
-        Tree {
+        ConeTree {
             entries: &mut self.entries,
             nodes: &mut self.nodes,
             depth,
         }
         .build(0, 0);
         self.stack.clear();
-        let root = NodePair {
+        let root = ConePair {
             depth: 0,
             a: 0,
             b: 0,
         };
         self.stack.push(root);
-        while let Some(NodePair { depth: at, a, b }) = self.stack.pop() {
+        while let Some(ConePair { depth: at, a, b }) = self.stack.pop() {
             let first = 1 << at;
             let (node_a, node_b) = (&self.nodes[first + a], &self.nodes[first + b]);
             if !node_a.cone.overlaps(&node_b.cone) || node_a.partners.meets(&node_b.partners) {
@@ -203,7 +203,7 @@ impl Around {
                     (high, 2 * b + 1),
                 ] {
                     if a <= b {
-                        self.stack.push(NodePair {
+                        self.stack.push(ConePair {
                             depth: at + 1,
                             a,
                             b,
@@ -239,18 +239,18 @@ fn range(n: usize, depth: u32, node: usize) -> std::ops::Range<usize> {
 }
 
 /// The entries of a hub as a binary tree whose nodes are numbered like those of a heap.
-struct Tree<'a> {
-    entries: &'a mut [Entry],
-    nodes: &'a mut [Node],
+struct ConeTree<'a> {
+    entries: &'a mut [ConeEntry],
+    nodes: &'a mut [ConeNode],
     depth: u32,
 }
 
-impl Tree<'_> {
+impl ConeTree<'_> {
     /// Sorts the entries of a node, by partners and then by cones, and fills the nodes below.
-    fn build(&mut self, at: u32, node: usize) -> Node {
+    fn build(&mut self, at: u32, node: usize) -> ConeNode {
         let n = self.entries.len();
         let entries = &mut self.entries[range(n, at, node)];
-        let mut all = Node {
+        let mut all = ConeNode {
             cone: Bounds::EMPTY,
             partners: entries[0].partners,
         };
@@ -262,7 +262,7 @@ impl Tree<'_> {
         if at < self.depth {
             let extent = |axis: usize| all.cone.max[axis] - all.cone.min[axis];
             let axis = (0..3).fold(0, |best, k| if extent(k) > extent(best) { k } else { best });
-            let center = |entry: &Entry| entry.cone.min[axis] + entry.cone.max[axis];
+            let center = |entry: &ConeEntry| entry.cone.min[axis] + entry.cone.max[axis];
             let cut = range(n, at + 1, 2 * node).len();
             entries.select_nth_unstable_by(cut, |a, b| {
                 (a.partners.cmp(&b.partners))
@@ -289,7 +289,7 @@ fn sorted_ids(corners: &[u32]) -> [u32; 4] {
 }
 
 /// Where a primitive lies as seen from a hub or from an axis.
-fn seen(body: &BodyRef<'_>, shared: &[u32], place: Place) -> Seen {
+fn seen(body: &BodyRef<'_>, shared: &[u32], place: Place) -> SeenFrom {
     let corners = body.corners(place);
     let point = |id: u32| body.positions.point(id as usize);
     let rest = corners
@@ -309,14 +309,14 @@ fn seen(body: &BodyRef<'_>, shared: &[u32], place: Place) -> Seen {
         if size(&normal) > SHORTEST * (size(&along) * size(&to)) {
             cone.add(normal);
         } else if corners.len() > 3 || !collinear(&u, &v, &p) {
-            return Seen::Cone(EVERYWHERE);
+            return SeenFrom::Cone(EVERYWHERE);
         } else if strictly_between(&u, &v, &p) {
-            return Seen::Beyond(0);
+            return SeenFrom::Beyond(0);
         } else if strictly_between(&v, &u, &p) {
-            return Seen::Beyond(1);
+            return SeenFrom::Beyond(1);
         }
     }
-    cone.bounds().map_or(Seen::Nowhere, Seen::Cone)
+    cone.bounds().map_or(SeenFrom::Nowhere, SeenFrom::Cone)
 }
 
 /// The directions of some points: their box on the surface of the cube.

@@ -266,7 +266,7 @@ impl Settler {
     /// faces. Settles batches of mixed kinds right away.
     #[inline(always)]
     fn reject<S: Simd>(&mut self, simd: S, world: World<'_>) {
-        let mut lookup = Lookup::new(world);
+        let mut lookup = BodyLookup::new(world);
         let mut triangles = TrianglePairs8::default();
         let mut tetrahedra = TetrahedronPairs8::default();
         let candidates = std::mem::take(&mut self.candidates);
@@ -293,7 +293,7 @@ impl Settler {
         if self.survivors.is_empty() {
             return;
         }
-        let mut lookup = Lookup::new(world);
+        let mut lookup = BodyLookup::new(world);
         let mut batch = TrianglePairs8::default();
         let survivors = std::mem::take(&mut self.survivors);
         for chunk in survivors.chunks(LANES) {
@@ -310,7 +310,7 @@ impl Settler {
         if self.open.is_empty() {
             return;
         }
-        let mut lookup = Lookup::new(world);
+        let mut lookup = BodyLookup::new(world);
         let mut batch = TetrahedronPairs8::default();
         let open = std::mem::take(&mut self.open);
         for chunk in open.chunks(LANES) {
@@ -324,7 +324,7 @@ impl Settler {
 
     /// Records the verdict on a batch; settles its unsure pairs exactly.
     #[inline(always)]
-    fn take(&mut self, lookup: &mut Lookup<'_>, chunk: &[Candidate], verdict: Verdict) {
+    fn take(&mut self, lookup: &mut BodyLookup<'_>, chunk: &[Candidate], verdict: Verdict) {
         self.take_pairs(lookup, chunk, verdict.yes);
         for lane in lanes(chunk, !(verdict.yes | verdict.no)) {
             lookup.go_to(chunk[lane]);
@@ -335,7 +335,7 @@ impl Settler {
 
     /// Records pairs that certainly intersect.
     #[inline(always)]
-    fn take_pairs(&mut self, lookup: &mut Lookup<'_>, chunk: &[Candidate], yes: u8) {
+    fn take_pairs(&mut self, lookup: &mut BodyLookup<'_>, chunk: &[Candidate], yes: u8) {
         for lane in lanes(chunk, yes) {
             let candidate = chunk[lane];
             lookup.go_to(candidate);
@@ -389,7 +389,7 @@ fn classify_tetrahedra<S: Simd>(simd: S, settler: &mut Settler, world: World<'_>
 }
 
 /// The two bodies of the current candidate; candidates of the same bodies come in runs.
-struct Lookup<'a> {
+struct BodyLookup<'a> {
     world: World<'a>,
     a_ix: LayerIx,
     b_ix: LayerIx,
@@ -397,11 +397,11 @@ struct Lookup<'a> {
     b: BodyRef<'a>,
 }
 
-impl<'a> Lookup<'a> {
+impl<'a> BodyLookup<'a> {
     fn new(world: World<'a>) -> Self {
         let ix = LayerIx::new(0);
         let first = world.body(ix);
-        Lookup {
+        BodyLookup {
             world,
             a_ix: ix,
             b_ix: ix,

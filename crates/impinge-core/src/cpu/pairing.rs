@@ -1,4 +1,4 @@
-//! Stage `pairing`: which primitives of two clusters have boxes that meet.
+//! SlabStages `pairing`: which primitives of two clusters have boxes that meet.
 //!
 //! In: work items (two clusters). Out: candidates, which `narrow` settles item by item, while both groups are in
 //! the cache.
@@ -26,7 +26,7 @@ use crate::settings::Settings;
 use crate::sink::Answer;
 
 use super::group_cache::{Group, GroupCache};
-use super::hubs::Around;
+use super::hubs::HubScratch;
 use super::met::{Met, Side, WorkItem};
 use super::narrow::Settler;
 use super::simd::{Isa, Lanes, Masks, Simd};
@@ -41,7 +41,7 @@ const SAMPLED: u32 = 16;
 pub(crate) struct Worker {
     pub settler: Settler,
     /// Scratch for pairs that share a hub.
-    pub(super) around: Around,
+    pub(super) around: HubScratch,
     groups: GroupCache<Group>,
     met: Met,
     masks: Masks,
@@ -193,7 +193,7 @@ fn within_body<S: Simd>(
     let adjacency = cache.clustering.adjacency();
     let hubs = cache.clustering.hubs();
     let (cluster_a, cluster_b) = (item.cluster_a, item.cluster_b);
-    let rule = Rule {
+    let rule = VertexRule {
         body: world.body(item.a),
         cluster_a,
         cluster_b,
@@ -253,7 +253,7 @@ fn clear_hubs(hubs: &Hubs, item: &WorkItem, rows: Side, masks: &mut Masks) {
 }
 
 /// Treats the primitives of one body that share a vertex.
-struct Rule<'a> {
+struct VertexRule<'a> {
     body: BodyRef<'a>,
     cluster_a: ClusterIx,
     cluster_b: ClusterIx,
@@ -262,7 +262,7 @@ struct Rule<'a> {
     folded: [u64; 2],
 }
 
-impl Rule<'_> {
+impl VertexRule<'_> {
     /// Makes candidates of the lanes that a row has met; treats those in `shared` by the rule.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "one call for each way to meet")]

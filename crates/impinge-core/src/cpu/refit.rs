@@ -40,7 +40,7 @@ const RUNS: usize = 256;
 pub(super) struct Refit {
     tasks: Vec<Task>,
     /// The result of each task.
-    found: Vec<Mutex<Found>>,
+    found: Vec<Mutex<FoundBoxes>>,
 }
 
 /// What a task does with its range `first..end`.
@@ -66,7 +66,7 @@ struct Task {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Found {
+struct FoundBoxes {
     extents: Extents,
     /// Half the summed surface of the clusters.
     surface: f32,
@@ -211,7 +211,7 @@ impl Refit {
         let n_tasks = self.tasks.len();
         if self.found.len() < n_tasks {
             self.found
-                .resize_with(n_tasks, || Mutex::new(Found::NOTHING));
+                .resize_with(n_tasks, || Mutex::new(FoundBoxes::NOTHING));
         }
         let (tasks, found) = (&self.tasks, &self.found);
         let world = World {
@@ -223,7 +223,7 @@ impl Refit {
             let result = dispatch!(isa, work, (
                 world: World<'_> = world,
                 task: Task = tasks[ix],
-            ) -> Found);
+            ) -> FoundBoxes);
             *found[ix].lock().unwrap_or_else(PoisonError::into_inner) = result;
         };
         workers.for_each(for_boxes(job, tuning, scratches), n_tasks, work);
@@ -291,8 +291,8 @@ fn for_boxes<'a>(job: Job<'_>, tuning: &Tuning, scratches: &'a mut [Worker]) -> 
     &mut scratches[..n_workers]
 }
 
-impl Found {
-    const NOTHING: Found = Found {
+impl FoundBoxes {
+    const NOTHING: FoundBoxes = FoundBoxes {
         extents: Extents::EMPTY,
         surface: 0.0,
     };
@@ -300,14 +300,14 @@ impl Found {
 
 /// Does one task.
 #[inline(always)]
-fn work<S: Simd>(simd: S, world: World<'_>, task: Task) -> Found {
+fn work<S: Simd>(simd: S, world: World<'_>, task: Task) -> FoundBoxes {
     let positions = world.body(task.layer).positions;
     let cache = world.cache(task.layer);
     let (clustering, run) = (&cache.clustering, task.first as usize..task.end as usize);
     let mut summary = Summary::EMPTY;
     let near = match (task.what, cache.sorted(), positions) {
         (What::Read, Some(sorted), Positions::F32(positions)) => {
-            return Found {
+            return FoundBoxes {
                 extents: sorted.read(simd, positions, run),
                 surface: 0.0,
             };
@@ -334,7 +334,7 @@ fn work<S: Simd>(simd: S, world: World<'_>, task: Task) -> Found {
             summary.join(&of_node);
         }
     }
-    Found {
+    FoundBoxes {
         extents: Extents::without_groups(summary.bounds, summary.all_finite),
         surface: summary.surface,
     }

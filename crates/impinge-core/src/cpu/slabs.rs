@@ -53,7 +53,7 @@ fn most_items(settings: &Settings, held: u64) -> Result<usize, Error> {
 }
 
 /// Provides the trees from which work items come, and settles the work items.
-pub(crate) trait Stage: Copy + Sync {
+pub(crate) trait SlabStages: Copy + Sync {
     /// The state of one worker.
     type Worker: Send;
     /// Where workers hand over the keys that they find.
@@ -104,7 +104,7 @@ pub(crate) struct Counts {
     pub n_full: u64,
 }
 
-impl<'a> Stage for World<'a> {
+impl<'a> SlabStages for World<'a> {
     type Worker = Worker;
     type Answer = &'a Arc<Answer>;
 
@@ -135,7 +135,7 @@ impl<'a> Stage for World<'a> {
             return Ok(());
         }
         for (ix, layer) in job.frame.numbered_layers() {
-            let Some(hubs) = Stage::hubs(self, ix).filter(|_| layer.within) else {
+            let Some(hubs) = SlabStages::hubs(self, ix).filter(|_| layer.within) else {
                 continue;
             };
             let start = Instant::now();
@@ -171,7 +171,7 @@ impl<'a> Stage for World<'a> {
 }
 
 /// A frame to be answered from `dispatch` on.
-pub(crate) struct Task<'a, W: Stage> {
+pub(crate) struct Task<'a, W: SlabStages> {
     pub isa: Isa,
     pub job: Job<'a>,
     pub answer: W::Answer,
@@ -198,7 +198,7 @@ impl Room {
     }
 
     /// Hands over all pairs that the frame asks for.
-    pub fn run<W: Stage>(
+    pub fn run<W: SlabStages>(
         &mut self,
         task: Task<'_, W>,
         stats: &mut Statistics,
@@ -238,7 +238,7 @@ impl Room {
     }
 }
 
-struct Slabs<'a, W: Stage> {
+struct Slabs<'a, W: SlabStages> {
     isa: Isa,
     job: Job<'a>,
     answer: W::Answer,
@@ -252,7 +252,7 @@ struct Slabs<'a, W: Stage> {
     ms: f64,
 }
 
-impl<W: Stage> Slabs<'_, W> {
+impl<W: SlabStages> Slabs<'_, W> {
     /// Finds all pairs that the frame asks for; the last ones stay with the workers.
     fn run(
         &mut self,
@@ -261,7 +261,7 @@ impl<W: Stage> Slabs<'_, W> {
         body_stack: &mut Vec<NodePair>,
     ) -> Result<(), Error> {
         let start = Instant::now();
-        dispatch!(self.isa, all, <W: Stage> (
+        dispatch!(self.isa, all, <W: SlabStages> (
             slabs: &mut Slabs<'_, W> = self,
             top: &mut TopLevel = top,
             stack: &mut Vec<NodePair> = stack,
@@ -325,7 +325,7 @@ impl<W: Stage> Slabs<'_, W> {
                 return;
             }
             let items = &items[ix * task..items.len().min((ix + 1) * task)];
-            dispatch!(isa, pair, <W: Stage> (
+            dispatch!(isa, pair, <W: SlabStages> (
                 world: W = world,
                 isa: Isa = isa,
                 items: &[WorkItem] = items,
@@ -343,7 +343,7 @@ impl<W: Stage> Slabs<'_, W> {
 }
 
 #[inline(always)]
-fn pair<S: Simd, W: Stage>(
+fn pair<S: Simd, W: SlabStages>(
     simd: S,
     world: W,
     isa: Isa,
@@ -355,7 +355,7 @@ fn pair<S: Simd, W: Stage>(
 
 /// Runs dispatch for every pair of layers and every single layer that the frame asks for.
 #[inline(always)]
-fn all<S: Simd, W: Stage>(
+fn all<S: Simd, W: SlabStages>(
     simd: S,
     slabs: &mut Slabs<'_, W>,
     top: &mut TopLevel,
@@ -377,7 +377,7 @@ fn all<S: Simd, W: Stage>(
                 return Ok(());
             }
             // Compiled separately: inside this closure the instruction set would be lost.
-            dispatch!(slabs.isa, between, <W: Stage> (
+            dispatch!(slabs.isa, between, <W: SlabStages> (
                 a: LayerIx = a,
                 b: LayerIx = b,
                 stack: &mut Vec<NodePair> = stack,
@@ -403,7 +403,7 @@ fn all<S: Simd, W: Stage>(
 }
 
 #[inline(always)]
-fn between<S: Simd, W: Stage>(
+fn between<S: Simd, W: SlabStages>(
     simd: S,
     a: LayerIx,
     b: LayerIx,

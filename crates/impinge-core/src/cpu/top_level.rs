@@ -2,7 +2,7 @@
 
 use crate::clusterings::Fit;
 use crate::grouping::bounds::Bounds;
-use crate::grouping::hierarchy::{Entry, Shape, order};
+use crate::grouping::hierarchy::{Entry, TreeShape, order};
 use crate::index::LayerIx;
 use crate::tuning::Tuning;
 
@@ -14,7 +14,7 @@ use super::simd::Simd;
 /// frame to frame and made again when bodies have moved away from their neighbours in it.
 #[derive(Default)]
 pub(crate) struct TopLevel {
-    shape: Shape,
+    shape: TreeShape,
     order: Vec<LayerIx>,
     bounds: TreeBounds,
     entries: Vec<Entry>,
@@ -54,7 +54,7 @@ impl TopLevel {
     pub fn refit(&mut self, n: usize, tuning: &Tuning, root: impl Fn(LayerIx) -> Bounds) {
         let is_new = self.order.len() != n;
         if is_new {
-            self.shape = Shape::new(n);
+            self.shape = TreeShape::new(n);
             self.bounds.resize(&self.shape);
             self.order = LayerIx::up_to(n).collect();
         }

@@ -1,6 +1,6 @@
 //! Read-only view shared by all stages: the scene, its layers, and the cache kept per body.
 
-use crate::clusterings::{Fit, Kept, Store};
+use crate::clusterings::{Clustered, Fit, Store};
 use crate::elements::Elements;
 use crate::exact::Point;
 use crate::frame::{Frame, Layer};
@@ -36,7 +36,7 @@ pub(crate) struct BodyCache {
     pub fit: Fit,
 }
 
-impl Kept for BodyCache {
+impl Clustered for BodyCache {
     fn topology_stamp(&self) -> u64 {
         self.topology_stamp
     }

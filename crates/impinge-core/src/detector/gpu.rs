@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::{Backend, Detector, Settings};
 use crate::cpu::steps::{StepClusters, StepTest};
 use crate::error::Error;
-use crate::gpu::{Capacities, Engine, Gpu, ResidentPairs, Wanted};
+use crate::gpu::{Capacities, Engine, Gpu, ResidentPairs, WantedAdapter};
 use crate::hull::Pose;
 use crate::ids::BodyId;
 use crate::impacts::StepAnswer;
@@ -33,16 +33,16 @@ pub(super) async fn open_async(settings: &Settings) -> Result<Option<Engine>, Er
     engine_of(gpu, settings)
 }
 
-fn wanted(settings: &Settings) -> Option<Wanted<'_>> {
-    let named = settings.device.as_deref().map(Wanted::Named);
+fn wanted(settings: &Settings) -> Option<WantedAdapter<'_>> {
+    let named = settings.device.as_deref().map(WantedAdapter::Named);
     match settings.backend {
         Backend::Cpu => None,
         Backend::Auto if settings.method == Method::Naive => None,
         // GPU drivers do not survive a fork.
         Backend::Auto if is_forked() => None,
         // A software driver is slower than the CPU backend.
-        Backend::Auto => Some(named.unwrap_or(Wanted::Hardware)),
-        Backend::Gpu => Some(named.unwrap_or(Wanted::Any)),
+        Backend::Auto => Some(named.unwrap_or(WantedAdapter::Hardware)),
+        Backend::Gpu => Some(named.unwrap_or(WantedAdapter::Any)),
     }
 }
 

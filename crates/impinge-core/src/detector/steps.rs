@@ -34,7 +34,7 @@ use crate::stats::Statistics;
 use crate::step::{CandidateQuery, Start, Step, Toi};
 
 /// The memory kept from step to step.
-pub(super) struct Steps {
+pub(super) struct StepMemory {
     frame: Frame,
     impacts: Impacts,
     candidates: Candidates,
@@ -46,9 +46,9 @@ pub(super) struct Steps {
     sorter: Sorter,
 }
 
-impl Steps {
+impl StepMemory {
     pub fn new(settings: &Settings) -> Self {
-        Steps {
+        StepMemory {
             frame: Frame::default(),
             impacts: Impacts::default(),
             candidates: Candidates::default(),
@@ -146,7 +146,7 @@ impl Detector {
             self.settings.max_pairs,
             control,
         )?;
-        let Steps { impacts, found, .. } = &mut self.steps;
+        let StepMemory { impacts, found, .. } = &mut self.steps;
         impacts.stats_mut().time("collect", |_| {
             found
                 .iter_mut()
@@ -206,7 +206,7 @@ impl Detector {
 
     /// Resolves a step.
     fn begin(&mut self, scene: &Scene, step: &Step) -> Result<(), Error> {
-        let Steps { frame, impacts, .. } = &mut self.steps;
+        let StepMemory { frame, impacts, .. } = &mut self.steps;
         step.check()?;
         frame.resolve_for(scene, &step.query, Ask::Impacts)?;
         frame.set_reach(step.separation, &BTreeMap::new());
@@ -230,7 +230,7 @@ impl Detector {
         max_pairs: Option<u64>,
         control: &Control<'_>,
     ) -> Result<Examined, Error> {
-        let Steps {
+        let StepMemory {
             frame,
             impacts,
             clusters,

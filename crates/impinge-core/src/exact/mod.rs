@@ -37,8 +37,8 @@ pub(crate) use distance::{
     elements_are_within, nearest_of_elements, unsure_are_within,
 };
 pub use distance::{
-    Closest, Feature, Nearest, are_within, closest_points, edge_face_are_within, faces_are_within,
-    first_within, nearest_features,
+    Closest, Feature, NearestFeatures, are_within, closest_points, edge_face_are_within,
+    faces_are_within, first_within, nearest_features,
 };
 pub use element_pair::ElementPair;
 pub(crate) use orientation::{Projection, collinear};

@@ -44,7 +44,7 @@ pub fn triangles_intersect_beyond_shared(
     ids_b: [u32; 3],
 ) -> bool {
     neighbours_answer(a, ids_a, b, ids_b)
-        .unwrap_or_else(|| Parts::new(a, ids_a, b, ids_b).meet_beyond_shared())
+        .unwrap_or_else(|| SplitCorners::new(a, ids_a, b, ids_b).meet_beyond_shared())
 }
 
 /// The filter's answer for triangles with three different ids each that share one or two; `None` when
@@ -107,7 +107,7 @@ pub fn tetrahedra_intersect_beyond_shared(
     b: &[Point; 4],
     ids_b: [u32; 4],
 ) -> bool {
-    Parts::new(a, ids_a, b, ids_b).meet_beyond_shared()
+    SplitCorners::new(a, ids_a, b, ids_b).meet_beyond_shared()
 }
 
 /// Whether a triangle and a tetrahedron of one body meet beyond the vertices that they share.
@@ -121,7 +121,7 @@ pub fn triangle_tetrahedron_intersect_beyond_shared(
     k: &[Point; 4],
     ids_k: [u32; 4],
 ) -> bool {
-    Parts::new(t, ids_t, k, ids_k).meet_beyond_shared()
+    SplitCorners::new(t, ids_t, k, ids_k).meet_beyond_shared()
 }
 
 /// Up to four points, without heap allocation.
@@ -173,13 +173,13 @@ impl Points {
 }
 
 /// Two primitives split into the vertices that they share and the rest of each.
-struct Parts {
+struct SplitCorners {
     shared: Points,
     rest_a: Points,
     rest_b: Points,
 }
 
-impl Parts {
+impl SplitCorners {
     fn new<const N: usize, const M: usize>(
         a: &[Point; N],
         ids_a: [u32; N],

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use crate::clusterings::{Fit, Kept, Store, sampled_spread};
+use crate::clusterings::{Clustered, Fit, Store, sampled_spread};
 use crate::error::Error;
 use crate::frame::Layer;
 use crate::grouping::clusters::Clustering;
@@ -68,7 +68,7 @@ impl Clusterings {
     }
 }
 
-impl Kept for Cached {
+impl Clustered for Cached {
     fn topology_stamp(&self) -> u64 {
         self.topology_stamp
     }

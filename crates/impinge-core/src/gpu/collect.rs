@@ -13,7 +13,7 @@ use std::task::{Context, Poll, Waker};
 
 use super::layout::{Counter, Grid, N_COUNTERS, PairKey, UnsureKey};
 use super::open::Gpu;
-use super::room::{Counts, Room};
+use super::room::{PassCounts, Room};
 use crate::error::Error;
 
 const COUNTERS: u64 = N_COUNTERS as u64 * size_of::<Counter>() as u64;
@@ -52,7 +52,7 @@ pub struct Guess {
 /// The results of a pass.
 #[derive(Debug)]
 pub struct Collected {
-    pub counts: Counts,
+    pub counts: PassCounts,
     /// The grid of `Cells`.
     pub grid: Grid,
     /// Milliseconds per stage, if the device has a clock.
@@ -152,7 +152,7 @@ impl Collector {
             let counters: Vec<Counter> = bytemuck::pod_collect_to_vec(at(0, COUNTERS));
             let grid: Grid = bytemuck::pod_read_unaligned(at(COUNTERS, GRID));
             let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(at(COUNTERS + GRID, TIMES));
-            let counts = Counts::new(&counters);
+            let counts = PassCounts::new(&counters);
             let capacities = room.capacities();
             let n_pairs = counts.needed.pairs.min(capacities.pairs);
             let n_unsure = counts.needed.unsure.min(capacities.unsure);

@@ -13,7 +13,7 @@ use super::device::Scopes;
 use super::layout::Cell;
 use super::open::Gpu;
 use super::pieces;
-use super::room::{Capacities, CellsWanted, Counts, Room};
+use super::room::{Capacities, CellsWanted, PassCounts, Room};
 use super::taker::Taker;
 use super::topology::Most;
 use super::world::World;
@@ -52,7 +52,7 @@ pub struct Engine {
     pub(super) room: Room,
     pub(super) plan: Plan,
     /// The counts of each complete pass of the last frame.
-    pub complete: Vec<Counts>,
+    pub complete: Vec<PassCounts>,
     pub(super) collector: Collector,
     /// Keys that each worker has settled, until they are appended to the answer.
     pub(super) settled: Vec<Vec<u64>>,

@@ -1,7 +1,7 @@
 //! All trees of a frame, or of a piece of one, in one array of nodes: see [`world`](super::world).
 
 use crate::grouping::bounds::Bounds;
-use crate::grouping::hierarchy::{Entry, FANOUT, Shape, order};
+use crate::grouping::hierarchy::{Entry, FANOUT, TreeShape, order};
 
 use crate::index::LayerIx;
 
@@ -23,14 +23,14 @@ pub struct Forest {
     pub first_gate: u32,
     n_gates: u32,
     has_top: bool,
-    top_shape: Shape,
+    top_shape: TreeShape,
     best_spread: f64,
     entries: Vec<Entry>,
 }
 
 impl Forest {
     /// One tree per body and, if there are more than a few, a tree over the bodies, built from one point of each.
-    pub(crate) fn new(shapes: &[&Shape], sample: impl Fn(LayerIx) -> [f32; 3]) -> Self {
+    pub(crate) fn new(shapes: &[&TreeShape], sample: impl Fn(LayerIx) -> [f32; 3]) -> Self {
         let mut forest = Forest::of_trees(shapes);
         let filled: Vec<LayerIx> = LayerIx::up_to(shapes.len())
             .filter(|&layer| forest.is_filled(layer))
@@ -45,7 +45,7 @@ impl Forest {
     }
 
     /// The trees of the bodies, without a tree over them.
-    pub(crate) fn of_trees(shapes: &[&Shape]) -> Self {
+    pub(crate) fn of_trees(shapes: &[&TreeShape]) -> Self {
         let mut forest = Forest {
             roots: vec![NO_ROOT; shapes.len()],
             ..Forest::default()
@@ -103,7 +103,7 @@ impl Forest {
             .map(|layer| Node::new(layer.raw(), 1, gate_height, true));
         self.nodes.extend(gates);
         self.push_level(self.first_gate);
-        self.top_shape = Shape::new(filled.len());
+        self.top_shape = TreeShape::new(filled.len());
         let mut below = self.first_gate;
         for level in 1..self.top_shape.n_levels() {
             let first = self.nodes.len() as u32;

@@ -50,7 +50,7 @@ pub use room::Capacities;
 
 pub(crate) use engine::Engine;
 pub use kernels::shaders;
-pub use open::{Gpu, Wanted, devices, devices_async};
+pub use open::{Gpu, WantedAdapter, devices, devices_async};
 
 /// The texts from which kernels are assembled. `LAYOUT`, with the structs of all kernels, comes first.
 pub mod shared {

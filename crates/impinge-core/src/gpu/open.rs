@@ -91,7 +91,7 @@ impl Deref for Gpu {
 
 /// Which adapters are acceptable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wanted<'a> {
+pub enum WantedAdapter<'a> {
     /// Any, hardware before software.
     Any,
     /// Hardware only.
@@ -108,7 +108,7 @@ impl Gpu {
     ///
     /// # Errors
     /// No adapter fits; the driver refuses. Always an error in a browser.
-    pub fn open(wanted: Wanted<'_>) -> Result<Arc<Gpu>, Error> {
+    pub fn open(wanted: WantedAdapter<'_>) -> Result<Arc<Gpu>, Error> {
         wait(Gpu::open_async(wanted))
     }
 
@@ -116,16 +116,16 @@ impl Gpu {
     ///
     /// # Errors
     /// No adapter fits; the driver refuses.
-    pub async fn open_async(wanted: Wanted<'_>) -> Result<Arc<Gpu>, Error> {
-        if wanted == Wanted::Hardware && !may_have_hardware() {
+    pub async fn open_async(wanted: WantedAdapter<'_>) -> Result<Arc<Gpu>, Error> {
+        if wanted == WantedAdapter::Hardware && !may_have_hardware() {
             let found = "none in hardware: the system has no device of a GPU".to_owned();
             return Err(Error::NoAdapter { found });
         }
         let adapters = adapters().await;
         let fits = |info: &DeviceInfo| match wanted {
-            Wanted::Any => true,
-            Wanted::Hardware => !info.is_software,
-            Wanted::Named(name) => info.name.to_lowercase().contains(&name.to_lowercase()),
+            WantedAdapter::Any => true,
+            WantedAdapter::Hardware => !info.is_software,
+            WantedAdapter::Named(name) => info.name.to_lowercase().contains(&name.to_lowercase()),
         };
         let Some((adapter, info)) = adapters.iter().find(|(_, info)| fits(info)) else {
             let names: Vec<String> = adapters.iter().map(|(_, info)| info.to_string()).collect();
@@ -134,9 +134,9 @@ impl Gpu {
                 names => format!("there are {}", names.join(", ")),
             };
             let found = match wanted {
-                Wanted::Any => there,
-                Wanted::Hardware => format!("none in hardware; {there}"),
-                Wanted::Named(name) => format!("none is called \"{name}\"; {there}"),
+                WantedAdapter::Any => there,
+                WantedAdapter::Hardware => format!("none in hardware; {there}"),
+                WantedAdapter::Named(name) => format!("none is called \"{name}\"; {there}"),
             };
             return Err(Error::NoAdapter { found });
         };

@@ -16,7 +16,7 @@ use super::collect::{Collected, Guess};
 use super::device::Scopes;
 use super::engine::{Engine, Outcome, Plan};
 use super::layout::NodePair;
-use super::room::{Capacities, CellsWanted, Verdict};
+use super::room::{Capacities, CellsWanted, NextPass};
 use super::steps::Stages;
 use super::taker::Taker;
 use crate::error::Error;
@@ -68,7 +68,7 @@ impl Engine {
             taker.foresee(collected.counts.needed.pairs)?;
             let room = self.budget_for_room();
             match collected.counts.judge(&self.gpu, capacities, room) {
-                Verdict::Complete => {
+                NextPass::Complete => {
                     book(&collected, self.method, stats);
                     self.complete.push(collected.counts);
                     let settled = &mut self.settled;
@@ -90,12 +90,12 @@ impl Engine {
                         );
                     }
                 }
-                Verdict::Grow(larger) => {
+                NextPass::Grow(larger) => {
                     stats.n_reruns += 1;
                     capacities = larger;
                     waiting.push(work);
                 }
-                Verdict::Split => {
+                NextPass::Split => {
                     stats.n_reruns += 1;
                     if let Some(parts) = self.split(frame, &work, &collected)? {
                         waiting.extend(parts);

@@ -23,12 +23,12 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::buffers::count;
-use super::topology::{Most, Topology, Weight, narrowed};
+use super::topology::{DeviceClusters, Most, Weight, narrowed};
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
-use crate::grouping::hierarchy::Shape;
+use crate::grouping::hierarchy::TreeShape;
 use crate::hull;
 use crate::index::{ClusterIx, LayerIx};
 use crate::positions::Positions;
@@ -156,9 +156,9 @@ fn meets(frame: &Frame, a: &ClusterRun, b: &ClusterRun) -> bool {
 /// The data of a piece as it is sent to the device.
 #[derive(Debug, Default)]
 pub struct Loaded {
-    pub topology: Topology,
+    pub topology: DeviceClusters,
     /// The trees of the runs.
-    pub shapes: Vec<Shape>,
+    pub shapes: Vec<TreeShape>,
     /// For each body on the device, whether its positions were rounded.
     pub is_rounded: Vec<bool>,
     /// The coordinates of all named vertices, as bits.
@@ -222,7 +222,7 @@ impl Loaded {
                 .push(clustering, run.clusters.clone(), first, body, |vertex| {
                     on_device[vertex as usize]
                 });
-            self.shapes.push(Shape::new(run.clusters.len()));
+            self.shapes.push(TreeShape::new(run.clusters.len()));
         }
     }
 }

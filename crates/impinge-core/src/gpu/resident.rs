@@ -4,7 +4,7 @@ use super::buffers::count;
 use super::collect::map;
 use super::engine::Engine;
 use super::layout::{Counter, N_COUNTERS, N_PAIRS, N_UNSURE};
-use super::room::{Capacities, Counts, Verdict};
+use super::room::{Capacities, NextPass, PassCounts};
 use crate::error::Error;
 use crate::ids::BodyId;
 use crate::positions::Positions;
@@ -126,15 +126,15 @@ impl Engine {
             encoder.copy_buffer_to_buffer(counters, 0, &staging, 0, bytes);
             self.gpu().queue.submit([encoder.finish()]);
             let view = map(&staging, bytes).await?;
-            Counts::new(&bytemuck::pod_collect_to_vec::<u8, Counter>(&view))
+            PassCounts::new(&bytemuck::pod_collect_to_vec::<u8, Counter>(&view))
         };
         match counts.judge(self.gpu(), capacities, self.budget_for_room()) {
-            Verdict::Complete => Ok(true),
-            Verdict::Grow(larger) => {
+            NextPass::Complete => Ok(true),
+            NextPass::Grow(larger) => {
                 self.grow_to(larger);
                 Ok(false)
             }
-            Verdict::Split => Err(self.too_small("the frame at once", counts.needed)),
+            NextPass::Split => Err(self.too_small("the frame at once", counts.needed)),
         }
     }
 }

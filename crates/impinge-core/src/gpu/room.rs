@@ -286,7 +286,7 @@ impl Room {
 
 /// The counts of a pass.
 #[derive(Debug, Clone, Copy)]
-pub struct Counts {
+pub struct PassCounts {
     /// The capacities that would have been enough; a lower bound for stages after one that overflowed.
     pub needed: Capacities,
     /// Cells that went through the second level.
@@ -298,7 +298,7 @@ pub struct Counts {
 
 /// What to do after a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
+pub enum NextPass {
     /// Everything fitted.
     Complete,
     /// Run again with this much room.
@@ -307,10 +307,10 @@ pub enum Verdict {
     Split,
 }
 
-impl Counts {
+impl PassCounts {
     pub fn new(counters: &[Counter]) -> Self {
         let at = |ix: u32| u64::from(counters[ix as usize].n);
-        Counts {
+        PassCounts {
             needed: Capacities {
                 queue: (0..ROUNDS).map(at).max().unwrap_or(0),
                 items: at(N_ITEMS),
@@ -327,12 +327,12 @@ impl Counts {
     }
 
     /// Compares the counts with the room that the pass had. `bytes`: the most that these buffers may take together.
-    pub fn judge(&self, gpu: &Gpu, room: Capacities, bytes: Option<u64>) -> Verdict {
+    pub fn judge(&self, gpu: &Gpu, room: Capacities, bytes: Option<u64>) -> NextPass {
         if self.too_much {
-            return Verdict::Split;
+            return NextPass::Split;
         }
         if self.needed.fits(room) {
-            return Verdict::Complete;
+            return NextPass::Complete;
         }
         let limit = Capacities::limit(gpu);
         // Too small buffers get a quarter more than needed: the next frame may need a little more.
@@ -346,9 +346,9 @@ impl Counts {
         let larger = larger.zip(limit, u64::min);
         let is_allowed = bytes.is_none_or(|bytes| larger.bytes() <= bytes);
         if self.needed.fits(larger) && is_allowed {
-            Verdict::Grow(larger)
+            NextPass::Grow(larger)
         } else {
-            Verdict::Split
+            NextPass::Split
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::index::{ClusterIx, Number};
 
 /// Clusters as kernels read them.
 #[derive(Debug, Default)]
-pub struct Topology {
+pub struct DeviceClusters {
     pub clusters: Vec<Cluster>,
     pub cluster_vertices: Vec<ClusterVertex>,
     pub corners: Vec<Corners>,
@@ -18,7 +18,7 @@ pub struct Topology {
     pub has_solids: bool,
 }
 
-impl Topology {
+impl DeviceClusters {
     /// Appends a run of clusters of a body whose first primitive has the global number `first`. `body`: its
     /// number on the device; `on_device`: where each of its vertices is there.
     pub fn push(

@@ -13,7 +13,7 @@
 //! height 0        clusters of body 0 | of body 1 | …
 //! ```
 //!
-//! Topology is sent once; each frame sends the positions that have changed. For steps, `moving` sends layers of bodies instead of
+//! DeviceClusters is sent once; each frame sends the positions that have changed. For steps, `moving` sends layers of bodies instead of
 //! bodies, and boxes and positions at both ends.
 
 mod moving;
@@ -25,7 +25,7 @@ use std::sync::Arc;
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::grouping::clusters::Clustering;
-use crate::grouping::hierarchy::Shape;
+use crate::grouping::hierarchy::TreeShape;
 use crate::ids::BodyId;
 use crate::index::LayerIx;
 use crate::positions::Positions;
@@ -41,7 +41,7 @@ use super::layout::{
 };
 use super::open::Gpu;
 use super::pieces::{Chunk, Loaded};
-use super::topology::{Topology, Weight, narrowed};
+use super::topology::{DeviceClusters, Weight, narrowed};
 
 /// Bit 31 of a place is a flag.
 pub const MOST_PRIMITIVES: u64 = 1 << 31;
@@ -187,7 +187,7 @@ impl World {
             })
             .collect();
         let mut residents = Vec::with_capacity(caches.len());
-        let mut topology = Topology::default();
+        let mut topology = DeviceClusters::default();
         let mut first_vertex = 0u64;
         for ((ix, layer), (number, clustering)) in frame.numbered_layers().zip(&caches) {
             let n_vertices = count(frame.body(scene, ix).n_vertices());
@@ -214,7 +214,7 @@ impl World {
             });
             first_vertex += n_vertices;
         }
-        let shapes: Vec<&Shape> = caches
+        let shapes: Vec<&TreeShape> = caches
             .iter()
             .map(|(_, clustering)| &clustering.shape)
             .collect();
@@ -226,7 +226,7 @@ impl World {
         Ok(())
     }
 
-    fn send_trees(&mut self, gpu: &Gpu, topology: &Topology) -> Result<(), Error> {
+    fn send_trees(&mut self, gpu: &Gpu, topology: &DeviceClusters) -> Result<(), Error> {
         self.has_solids = topology.has_solids;
         self.clusters.upload(gpu, &topology.clusters)?;
         self.cluster_vertices

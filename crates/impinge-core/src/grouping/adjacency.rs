@@ -43,7 +43,7 @@ struct Neighbor {
 }
 
 /// The masks of one cluster.
-struct Part {
+struct ClusterMasks {
     own: Vec<u64>,
     /// `(neighbour cluster, lane, mask)`, sorted.
     entries: Vec<(ClusterIx, u8, u64)>,
@@ -52,9 +52,9 @@ struct Part {
 impl Adjacency {
     /// From the corners in cluster order.
     pub fn new<const N: usize>(corners: &[[u32; N]]) -> Self {
-        let incidence = Incidence::new(corners);
+        let incidence = ElementsAtVertices::new(corners);
         let n_clusters = corners.len().div_ceil(GROUP);
-        let parts: Vec<Part> = (0..n_clusters)
+        let parts: Vec<ClusterMasks> = (0..n_clusters)
             .into_par_iter()
             .with_min_len(32)
             .map(|cluster| part(ClusterIx::from_usize(cluster), corners, &incidence))
@@ -125,12 +125,12 @@ impl Adjacency {
 }
 
 /// For each vertex, the places of the primitives that name it.
-struct Incidence {
+struct ElementsAtVertices {
     starts: Vec<u32>,
     places: Vec<Place>,
 }
 
-impl Incidence {
+impl ElementsAtVertices {
     fn new<const N: usize>(corners: &[[u32; N]]) -> Self {
         let flat = corners.as_flattened();
         let counts = hubs::counts(corners);
@@ -152,7 +152,7 @@ impl Incidence {
                 next[vertex] += 1;
             }
         }
-        Incidence { starts, places }
+        ElementsAtVertices { starts, places }
     }
 
     /// The places that name the vertex; empty for a hub.
@@ -162,7 +162,11 @@ impl Incidence {
     }
 }
 
-fn part<const N: usize>(cluster: ClusterIx, corners: &[[u32; N]], incidence: &Incidence) -> Part {
+fn part<const N: usize>(
+    cluster: ClusterIx,
+    corners: &[[u32; N]],
+    incidence: &ElementsAtVertices,
+) -> ClusterMasks {
     let group = &corners[cluster.places(corners.len())];
     let mut own = vec![0u64; group.len()];
     let mut entries: Vec<(ClusterIx, u8, u64)> = Vec::new();
@@ -187,5 +191,5 @@ fn part<const N: usize>(cluster: ClusterIx, corners: &[[u32; N]], incidence: &In
         }
         same
     });
-    Part { own, entries }
+    ClusterMasks { own, entries }
 }

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use super::GROUP;
 use super::adjacency::Adjacency;
 use super::bounds::Bounds;
-use super::hierarchy::{Entry, Shape};
+use super::hierarchy::{Entry, TreeShape};
 use super::hubs::{self, Hubs};
 use super::rings::Rings;
 use super::unique::{LocalCorners, Unique};
@@ -39,7 +39,7 @@ pub(crate) struct Clustering {
     /// The number of vertices, if every vertex up to the highest index belongs to some primitive; else `None`.
     pub n_vertices_covered: Option<usize>,
     /// The tree over the clusters.
-    pub shape: Shape,
+    pub shape: TreeShape,
     hubs: Option<Hubs>,
     adjacency: OnceLock<Adjacency>,
     /// None unless they were asked for.
@@ -67,7 +67,7 @@ impl Clustering {
         with_local_faces: bool,
     ) -> Self {
         let n = elements.len();
-        let shape = Shape::new(n.div_ceil(GROUP));
+        let shape = TreeShape::new(n.div_ceil(GROUP));
         let mut entries: Vec<Entry> = (0..n)
             .into_par_iter()
             .with_min_len(4096)

@@ -25,13 +25,13 @@ pub(crate) const FANOUT: usize = 8;
 
 /// The tree's shape: for each level above the leaves, where each node's children start.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Shape {
+pub(crate) struct TreeShape {
     n_leaves: usize,
     /// `child_starts[l]` has one entry per node of level `l + 1`, and one more for the end of the last.
     child_starts: Vec<Vec<u32>>,
 }
 
-impl Shape {
+impl TreeShape {
     /// The shape over `n_leaves` leaves; without leaves it has no levels.
     pub fn new(n_leaves: usize) -> Self {
         // How many leaves each node of the level holds, from the root down.
@@ -59,7 +59,7 @@ impl Shape {
             child_starts.push(children);
         }
         child_starts.reverse();
-        Shape {
+        TreeShape {
             n_leaves,
             child_starts,
         }
@@ -122,7 +122,7 @@ const SAMPLE: usize = 32;
 /// Puts entries in the order of the shape. Its leaves hold `leaf_size` entries each, the last leaf the
 /// rest. If entries have classes, by number, those of one class follow each other, whatever their centers.
 pub(crate) fn order(
-    shape: &Shape,
+    shape: &TreeShape,
     leaf_size: usize,
     classes: Option<&[Option<u32>]>,
     entries: &mut [Entry],
@@ -139,7 +139,7 @@ pub(crate) fn order(
 }
 
 struct Split<'a> {
-    shape: &'a Shape,
+    shape: &'a TreeShape,
     leaf_size: usize,
     classes: Option<&'a [Option<u32>]>,
 }
@@ -217,7 +217,7 @@ mod tests {
     #[test]
     fn shapes_partition_their_leaves() {
         for n_leaves in (0..600).chain([4095, 4096, 4097, 6250, 100_000]) {
-            let shape = Shape::new(n_leaves);
+            let shape = TreeShape::new(n_leaves);
             for level in 1..shape.n_levels() {
                 let mut next = 0;
                 for node in 0..shape.n_nodes(level) {
@@ -238,7 +238,7 @@ mod tests {
     #[test]
     fn orders_are_permutations_even_of_equal_centers() {
         for n in [1usize, 63, 64, 65, 1000, 20_000] {
-            let leaves = Shape::new(n.div_ceil(64));
+            let leaves = TreeShape::new(n.div_ceil(64));
             let mut entries: Vec<Entry> = (0..n as u32)
                 .map(|number| Entry {
                     center: [(number % 7) as f32, 0.0, f32::from(number % 3 == 0)],

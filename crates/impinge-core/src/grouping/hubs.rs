@@ -16,7 +16,7 @@
 //! Cost: one count per corner per topology. Bodies without hubs keep nothing.
 
 use super::GROUP;
-use super::hierarchy::Shape;
+use super::hierarchy::TreeShape;
 use crate::index::{ClusterIx, Place};
 
 /// A vertex that more corners name than this is a hub.
@@ -122,7 +122,7 @@ pub(super) fn classes<const N: usize>(
 
 impl Hubs {
     /// Finds the hubs from the corners in the order of the clusters. `counts` says how often each vertex is named.
-    pub fn new<const N: usize>(corners: &[[u32; N]], counts: &[u32], shape: &Shape) -> Self {
+    pub fn new<const N: usize>(corners: &[[u32; N]], counts: &[u32], shape: &TreeShape) -> Self {
         let sets: Vec<HubSet> = corners
             .iter()
             .map(|primitive| {
@@ -266,7 +266,7 @@ fn runs(
         .collect()
 }
 
-fn common(sets: &[HubSet], shape: &Shape) -> Vec<Vec<HubSet>> {
+fn common(sets: &[HubSet], shape: &TreeShape) -> Vec<Vec<HubSet>> {
     let of_all = |sets: &[HubSet]| {
         let (first, rest) = sets.split_first().expect("no node is empty");
         rest.iter().fold(*first, |common, set| common.and(set))

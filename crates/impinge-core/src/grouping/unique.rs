@@ -58,7 +58,7 @@ impl<const N: usize> Unique<N> {
         }
     }
 
-    fn push(&mut self, group: &[[u32; N]], table: &mut Table) {
+    fn push(&mut self, group: &[[u32; N]], table: &mut VertexTable) {
         let mut local = [[0; GROUP]; N];
         table.number(group, &mut local);
         let start = self.vertices.len();
@@ -75,7 +75,7 @@ impl<const N: usize> Unique<N> {
 }
 
 fn of_block<const N: usize>(corners: &[[u32; N]]) -> Unique<N> {
-    let mut table = Table::default();
+    let mut table = VertexTable::default();
     let n_clusters = corners.len().div_ceil(GROUP);
     let mut unique = Unique::with_capacity(n_clusters, n_clusters * GROUP);
     for group in corners.chunks(GROUP) {
@@ -85,28 +85,28 @@ fn of_block<const N: usize>(corners: &[[u32; N]]) -> Unique<N> {
 }
 
 /// The vertices of a cluster seen so far, numbered as they come: a hash table with linear probing.
-struct Table {
-    /// The vertex in each slot, or [`EMPTY`](Table::EMPTY).
-    vertices: [u32; Table::SLOTS],
+struct VertexTable {
+    /// The vertex in each slot, or [`EMPTY`](VertexTable::EMPTY).
+    vertices: [u32; VertexTable::SLOTS],
     /// Its number.
-    numbers: [u8; Table::SLOTS],
+    numbers: [u8; VertexTable::SLOTS],
     /// The vertices by number. The highest bit is inverted: registers compare signed numbers.
     found: [i32; 4 * GROUP],
     n: usize,
 }
 
-impl Default for Table {
+impl Default for VertexTable {
     fn default() -> Self {
-        Table {
-            vertices: [Table::EMPTY; Table::SLOTS],
-            numbers: [0; Table::SLOTS],
+        VertexTable {
+            vertices: [VertexTable::EMPTY; VertexTable::SLOTS],
+            numbers: [0; VertexTable::SLOTS],
             found: [0; 4 * GROUP],
             n: 0,
         }
     }
 }
 
-impl Table {
+impl VertexTable {
     /// At most half of them are taken: a cluster has up to four corners per primitive.
     const SLOTS: usize = 2 * 4 * GROUP;
     /// No vertex: bodies have fewer.
@@ -118,17 +118,18 @@ impl Table {
     /// memory, each corner would wait for the one before it.
     #[inline(always)]
     fn number<const N: usize>(&mut self, group: &[[u32; N]], local: &mut LocalCorners<N>) {
-        self.vertices.fill(Table::EMPTY);
+        self.vertices.fill(VertexTable::EMPTY);
         let mut n = 0;
         for (place, primitive) in group.iter().enumerate() {
             for (of_corner, &vertex) in local.iter_mut().zip(primitive) {
                 // Fibonacci hashing (Knuth, TAOCP 3, 6.4): the highest bits of the product with 2^32 over the golden
                 // ratio.
-                let hash = vertex.wrapping_mul(0x9E37_79B1) >> (u32::BITS - Table::SLOTS.ilog2());
+                let hash =
+                    vertex.wrapping_mul(0x9E37_79B1) >> (u32::BITS - VertexTable::SLOTS.ilog2());
                 let mut slot = hash as usize;
                 let mut held = self.vertices[slot];
-                while (held != vertex) & (held != Table::EMPTY) {
-                    slot = (slot + 1) % Table::SLOTS;
+                while (held != vertex) & (held != VertexTable::EMPTY) {
+                    slot = (slot + 1) % VertexTable::SLOTS;
                     held = self.vertices[slot];
                 }
                 let is_new = held != vertex;

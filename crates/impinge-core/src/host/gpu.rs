@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use crate::error::Error;
 use crate::gpu::cells::InCells;
-use crate::gpu::room::{Capacities, Counts};
-use crate::gpu::{Engine, Gpu, Wanted};
+use crate::gpu::room::{Capacities, PassCounts};
+use crate::gpu::{Engine, Gpu, WantedAdapter};
 use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
@@ -35,7 +35,7 @@ impl Host {
         memory_budget: Option<u64>,
         plan: Box<dyn InCells>,
     ) -> Result<Self, Error> {
-        let gpu = Gpu::open(device.map_or(Wanted::Any, Wanted::Named))?;
+        let gpu = Gpu::open(device.map_or(WantedAdapter::Any, WantedAdapter::Named))?;
         let settings = Settings {
             method: Method::Cells,
             backend: Backend::Gpu,
@@ -59,7 +59,7 @@ impl Host {
         scene: &Scene,
         query: &Query,
         name: &'static str,
-    ) -> Result<(&Pairs, &[Counts]), Error> {
+    ) -> Result<(&Pairs, &[PassCounts]), Error> {
         let gpu = Arc::clone(self.engine.gpu());
         let engine = &mut self.engine;
         let mut guest = Guest { name, engine };

@@ -10,7 +10,7 @@ pub(crate) use intersection::settle;
 pub(crate) use intersection::{Intersection, intersect, intersect_shared};
 
 pub(crate) use impact::{FirstContact, exact_kind};
-pub(crate) use overlap::{Overlap, are_near};
+pub(crate) use overlap::{BoxOverlap, are_near};
 pub(crate) use within::{Corners, Within};
 
 use crate::frame::{Frame, TestId};

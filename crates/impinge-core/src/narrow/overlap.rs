@@ -8,11 +8,11 @@ use super::{Element, Test};
 
 /// The test of [`Detector::candidates`](crate::Detector::candidates): whether the boxes over the whole step overlap once each
 /// is inflated by `distance`, so that no axis has a gap of more than twice that.
-pub(crate) struct Overlap {
+pub(crate) struct BoxOverlap {
     pub distance: f64,
 }
 
-impl Test for Overlap {
+impl Test for BoxOverlap {
     type Value = ();
 
     fn extent(&self, element: Element<'_>) -> Extent {

@@ -88,7 +88,7 @@ impl Distances {
         for id in [a, b] {
             self.know(scene, id)?;
         }
-        let search = Search {
+        let search = DistanceSearch {
             bodies: [scene.body(a)?, scene.body(b)?],
             trees: [a, b].map(|id| &self.trees[&id.index()]),
         };
@@ -123,21 +123,21 @@ impl Distances {
 
 /// Two nodes in the queue: nearest first, equally near ones by number.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Waiting {
+struct WaitingNodes {
     squared: f64,
     nodes: [Node; 2],
 }
 
-impl Eq for Waiting {}
+impl Eq for WaitingNodes {}
 
-impl Ord for Waiting {
+impl Ord for WaitingNodes {
     fn cmp(&self, other: &Self) -> Ordering {
         let by_distance = self.squared.total_cmp(&other.squared);
         by_distance.then(self.nodes.cmp(&other.nodes))
     }
 }
 
-impl PartialOrd for Waiting {
+impl PartialOrd for WaitingNodes {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
@@ -145,14 +145,14 @@ impl PartialOrd for Waiting {
 
 /// A primitive of a cluster that is compared.
 #[derive(Debug, Clone, Copy)]
-struct Candidate {
+struct ComparedPrimitive {
     primitive: ElementIx,
     bounds: Extent,
     /// Along the axes of the view; as `bounds` before there is one.
     turned: Extent,
 }
 
-struct Search<'a> {
+struct DistanceSearch<'a> {
     bodies: [&'a Body; 2],
     trees: [&'a Tree; 2],
 }
@@ -165,7 +165,7 @@ struct Best {
 }
 
 /// What a search has found, and its memory.
-struct Found {
+struct FoundDistance {
     best: Best,
     /// The bodies along the best pair's shortest way.
     view: Option<View>,
@@ -173,7 +173,7 @@ struct Found {
     is_newer: bool,
     /// What rounding may do to distances of boxes: along coordinate axes, and along others.
     errors: [f64; 2],
-    lists: [Vec<Candidate>; 2],
+    lists: [Vec<ComparedPrimitive>; 2],
 }
 
 /// By how much, relative to the largest coordinate, rounding may make a computed distance smaller than the
@@ -182,7 +182,7 @@ const ROUNDING: f64 = 32.0 * f64::EPSILON;
 /// The same of boxes along other axes, which are rounded themselves.
 pub(super) const ROUNDING_TURNED: f64 = 256.0 * f64::EPSILON;
 
-impl Found {
+impl FoundDistance {
     /// Squared distances of boxes that may hold a pair as near as the best are at most these: along coordinate axes, and along
     /// others.
     fn limits(&self) -> [f64; 2] {
@@ -195,7 +195,7 @@ impl Found {
     }
 }
 
-impl Search<'_> {
+impl DistanceSearch<'_> {
     /// The nearest pair; `likely` is one to compare first.
     fn nearest(&self, likely: Option<[ElementIx; 2]>) -> Option<Nearest> {
         let (Some(a), Some(b)) = (self.trees[0].root(), self.trees[1].root()) else {
@@ -203,7 +203,7 @@ impl Search<'_> {
         };
         let magnitude = self.trees[0].bounds(a).magnitude();
         let magnitude = magnitude.max(self.trees[1].bounds(b).magnitude());
-        let mut found = Found {
+        let mut found = FoundDistance {
             best: Best {
                 squared: f64::INFINITY,
                 primitives: [ElementIx::new(u32::MAX); 2],
@@ -260,16 +260,16 @@ impl Search<'_> {
         })
     }
 
-    fn waiting(&self, nodes: [Node; 2]) -> Waiting {
+    fn waiting(&self, nodes: [Node; 2]) -> WaitingNodes {
         let [x, y] = [0, 1].map(|side| self.trees[side].bounds(nodes[side]));
-        Waiting {
+        WaitingNodes {
             squared: x.squared_distance(&y),
             nodes,
         }
     }
 
     /// Turns the view along the shortest way of the best pair, if that is a new one.
-    fn look(&self, found: &mut Found) {
+    fn look(&self, found: &mut FoundDistance) {
         if !found.is_newer {
             return;
         }
@@ -291,7 +291,7 @@ impl Search<'_> {
     }
 
     /// Whether two nodes are seen to be farther apart than the best pair.
-    fn is_farther(&self, found: &mut Found, nodes: [Node; 2]) -> bool {
+    fn is_farther(&self, found: &mut FoundDistance, nodes: [Node; 2]) -> bool {
         let [_, most] = found.limits();
         match self.turned(&mut found.view, nodes) {
             Some([x, y]) => x.squared_distance(&y) > most,
@@ -300,7 +300,7 @@ impl Search<'_> {
     }
 
     /// Compares all primitives of two clusters.
-    fn compare(&self, nodes: [Node; 2], found: &mut Found) {
+    fn compare(&self, nodes: [Node; 2], found: &mut FoundDistance) {
         if found.best.squared == f64::INFINITY {
             self.guess(nodes, found);
             self.look(found);
@@ -328,7 +328,7 @@ impl Search<'_> {
                     }
                     _ => bounds,
                 };
-                lists[side].push(Candidate {
+                lists[side].push(ComparedPrimitive {
                     primitive,
                     bounds,
                     turned,
@@ -358,7 +358,7 @@ impl Search<'_> {
     }
 
     /// Takes a first pair of two clusters that is likely to be near: what is nearest to a box, to that, and to that again.
-    fn guess(&self, nodes: [Node; 2], found: &mut Found) {
+    fn guess(&self, nodes: [Node; 2], found: &mut FoundDistance) {
         let mut boxes = [0, 1].map(|side| self.trees[side].bounds(nodes[side]));
         let mut pair = [ElementIx::new(0); 2];
         for side in [0, 1, 0] {
@@ -376,7 +376,7 @@ impl Search<'_> {
     }
 
     /// Takes a pair if it is nearer, or as near and lower.
-    fn improve(&self, found: &mut Found, [a, b]: [ElementIx; 2], boxes: [Extent; 2]) {
+    fn improve(&self, found: &mut FoundDistance, [a, b]: [ElementIx; 2], boxes: [Extent; 2]) {
         let best = &found.best;
         let gap = self.gap(a, b, boxes[0].squared_distance(&boxes[1]));
         let is_less =

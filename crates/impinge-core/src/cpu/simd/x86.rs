@@ -166,7 +166,7 @@ unsafe fn put_corners_by_vertices(
     local: &LocalFaces,
     into: &mut Triangles64,
 ) {
-    let mut points = Table([[0.0f32; TABLE]; 3]);
+    let mut points = CornerTable([[0.0f32; TABLE]; 3]);
     let (chunks, _) = vertices.as_chunks::<CHUNK>();
     for (chunk_ix, &chunk) in chunks.iter().take(TABLE / CHUNK).enumerate() {
         let first = CHUNK * chunk_ix;
@@ -198,7 +198,7 @@ unsafe fn put_corners_by_vertices(
 }
 
 #[repr(C, align(64))]
-struct Table([[f32; TABLE]; 3]);
+struct CornerTable([[f32; TABLE]; 3]);
 
 /// Expands eight membership bits into lane masks. Non-members become all ones, an f32 NaN, for which `minps` and `maxps`
 /// return their second operand.

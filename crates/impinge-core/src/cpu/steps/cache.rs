@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 #[cfg(feature = "gpu")]
 use crate::clusterings::sampled_spread;
-use crate::clusterings::{Fit, Kept, Store, make_anew, spread};
+use crate::clusterings::{Clustered, Fit, Store, make_anew, spread};
 use crate::cpu::bounds::TreeBounds;
 use crate::cpu::dispatch::Tree;
 use crate::cpu::simd::{Isa, Simd, dispatch};
@@ -118,7 +118,7 @@ impl LayerCache {
     }
 }
 
-impl Kept for LayerCache {
+impl Clustered for LayerCache {
     fn topology_stamp(&self) -> u64 {
         self.topology_stamp
     }

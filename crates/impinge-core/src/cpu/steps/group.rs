@@ -2,7 +2,7 @@
 //!
 //! Cost: each corner of a cluster once, when it is first needed; 8.8 KB per cluster.
 
-use crate::cpu::group_cache::Kept;
+use crate::cpu::group_cache::PerCluster;
 use crate::cpu::simd::{LaneBounds, Lanes32, Simd};
 use crate::elements::with_corners;
 use crate::exact::filter::Moving64;
@@ -30,7 +30,7 @@ pub(super) struct Group {
     pub in_tables: bool,
 }
 
-impl<'a> Kept<World<'a>> for Group {
+impl<'a> PerCluster<World<'a>> for Group {
     const EMPTY: Self = Group {
         start: LaneBounds::EMPTY,
         end: LaneBounds::EMPTY,

@@ -13,7 +13,7 @@ use crate::index::{LayerIx, Place};
 use crate::run::Job;
 use crate::sink::Ending;
 
-use super::narrow::{Between, Contacts, Narrow};
+use super::narrow::{Between, FirstContacts, Narrow};
 use super::pairing::Worker;
 use super::world::World;
 
@@ -85,7 +85,7 @@ fn settle(
     world: World<'_>,
     first_places: &[u32],
     pairs: &mut [[u32; 2]],
-    contacts: &mut Contacts,
+    contacts: &mut FirstContacts,
 ) -> Result<(), Error> {
     let n_places = first_places.last().copied().unwrap_or(0);
     for pair in &mut *pairs {

@@ -37,7 +37,7 @@ use crate::stats::Statistics;
 use super::dispatch::Tree;
 use super::met::WorkItem;
 use super::simd::{Isa, Simd};
-use super::slabs::{self, Counts, Room, Stage};
+use super::slabs::{self, Counts, Room, SlabStages};
 use crate::run::Job;
 #[cfg(feature = "gpu")]
 use crate::settings::Recluster;
@@ -50,7 +50,7 @@ use pairing::Worker;
 pub(crate) use world::{Asked, Sought, StepTest};
 use world::{Known, World};
 
-impl<'a> Stage for World<'a> {
+impl<'a> SlabStages for World<'a> {
     type Worker = Worker;
     type Answer = StepAnswer<'a>;
 

@@ -24,17 +24,17 @@ use crate::tuning::Tuning;
 use super::world::{StepTest, World};
 
 pub(super) use batch::{Batch, Between, Narrow, NarrowCounts};
-pub(super) use contacts::Contacts;
-use near::Near;
+pub(super) use contacts::FirstContacts;
+use near::NearElements;
 use overlaps::Overlaps;
 
 /// One worker's tests, of which each step needs one.
 #[derive(Debug, Default)]
 pub(super) struct Settler {
     asked: StepTest,
-    contacts: Contacts,
+    contacts: FirstContacts,
     overlaps: Overlaps,
-    near: Near,
+    near: NearElements,
     pub n_candidates: u64,
 }
 
@@ -60,7 +60,7 @@ impl Settler {
 
     /// Where contacts go that are left by a device.
     #[cfg(feature = "gpu")]
-    pub fn contacts(&mut self) -> &mut Contacts {
+    pub fn contacts(&mut self) -> &mut FirstContacts {
         &mut self.contacts
     }
 

@@ -14,7 +14,7 @@ use crate::cpu::group_cache::GroupCache;
 use crate::cpu::met::{Met, Side, WorkItem};
 use crate::cpu::pairing::full;
 use crate::cpu::simd::{Isa, LaneBounds, Lanes, Masks, Simd, up_to};
-use crate::cpu::slabs::{Counts, Stage};
+use crate::cpu::slabs::{Counts, SlabStages};
 use crate::frame::TestId;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
@@ -69,7 +69,7 @@ impl Worker {
 
     /// Where contacts go that were found elsewhere.
     #[cfg(feature = "gpu")]
-    pub fn contacts(&mut self) -> &mut super::narrow::Contacts {
+    pub fn contacts(&mut self) -> &mut super::narrow::FirstContacts {
         self.settler.contacts()
     }
 

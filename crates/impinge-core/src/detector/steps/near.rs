@@ -24,7 +24,7 @@ use crate::scene::Scene;
 use crate::settings::Method;
 use crate::sink::Wanted;
 
-use super::{Steps, begin};
+use super::{StepMemory, begin};
 
 /// Pairs whose features a task finds.
 const TASK: usize = 256;
@@ -75,7 +75,7 @@ impl Detector {
         control: &Control<'_>,
     ) -> Result<&NearPairs, Error> {
         let start = Instant::now();
-        let Steps {
+        let StepMemory {
             frame,
             near,
             clusters,

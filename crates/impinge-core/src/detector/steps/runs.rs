@@ -15,7 +15,7 @@ use crate::hull::Pose;
 use crate::impacts::{Candidates, KeyAnswer, StepAnswer};
 use crate::key_ranges::{KeyRanges, Run, Tally};
 use crate::naive;
-use crate::narrow::Overlap;
+use crate::narrow::BoxOverlap;
 use crate::progress::Control;
 use crate::run::Job;
 use crate::scene::Scene;
@@ -26,7 +26,7 @@ use crate::stats::Statistics;
 use crate::step::CandidateQuery;
 use crate::workers::Workers;
 
-use super::{Steps, begin};
+use super::{StepMemory, begin};
 
 /// The question about candidates.
 #[derive(Clone, Copy)]
@@ -39,7 +39,7 @@ struct Question<'a> {
 }
 
 /// A question, and what searching for its candidates takes.
-pub(super) struct Search<'a> {
+pub(super) struct RunSearch<'a> {
     question: Question<'a>,
     frame: &'a mut Frame,
     clusters: &'a mut StepClusters,
@@ -148,10 +148,10 @@ impl Detector {
         scene: &'a Scene,
         query: &CandidateQuery,
         control: &'a Control<'a>,
-    ) -> Result<(Search<'a>, &'a mut Candidates), Error> {
+    ) -> Result<(RunSearch<'a>, &'a mut Candidates), Error> {
         let start = Instant::now();
         query.check()?;
-        let Steps {
+        let StepMemory {
             frame,
             candidates,
             clusters,
@@ -162,7 +162,7 @@ impl Detector {
         frame.resolve_for(scene, &query.query, Ask::Candidates(query.kinds))?;
         candidates.begin(frame);
         frame.check(scene)?;
-        let search = Search {
+        let search = RunSearch {
             question: Question {
                 settings: &self.settings,
                 scene,
@@ -180,7 +180,7 @@ impl Detector {
     }
 }
 
-impl Search<'_> {
+impl RunSearch<'_> {
     /// Finds all candidates within some limits. Returns how many there are.
     pub fn find_all(&mut self, candidates: &mut Candidates, limits: Limits) -> Result<u64, Error> {
         let (keys, stats) = candidates.parts_mut();
@@ -310,7 +310,7 @@ impl Question<'_> {
         if settings.method == Method::Naive {
             let mut block = Vec::new();
             return naive::run(
-                &Overlap { distance },
+                &BoxOverlap { distance },
                 scene,
                 frame,
                 control,

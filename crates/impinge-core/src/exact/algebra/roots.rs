@@ -23,11 +23,11 @@ type Path = Vec<bool>;
 pub(in crate::exact) struct Root {
     /// The interval that isolates the root; not used for a dyadic root.
     path: Path,
-    place: Place,
+    place: RootPlace,
 }
 
 #[derive(Debug)]
-enum Place {
+enum RootPlace {
     /// The only root of `polynomial` inside the interval, and simple. `controls` are over the interval.
     Inside {
         polynomial: Polynomial,
@@ -68,10 +68,10 @@ pub(in crate::exact) struct Roots {
     polynomial: Polynomial,
     is_squarefree: bool,
     /// Parts not yet examined, the earliest last.
-    stack: Vec<Part>,
+    stack: Vec<Unexamined>,
 }
 
-enum Part {
+enum Unexamined {
     Inside(Path, Controls),
     At(Integer, u64),
 }
@@ -81,10 +81,10 @@ impl Roots {
         debug_assert!(!polynomial.is_zero(), "everything is a root of zero");
         let mut stack = Vec::new();
         if polynomial.sign_at_end().is_zero() {
-            stack.push(Part::At(Integer::from(1), 0));
+            stack.push(Unexamined::At(Integer::from(1), 0));
         }
         if polynomial.variations() > 0 {
-            stack.push(Part::Inside(Path::new(), polynomial.controls()));
+            stack.push(Unexamined::Inside(Path::new(), polynomial.controls()));
         }
         Self {
             polynomial,
@@ -104,7 +104,7 @@ impl Roots {
         }
         self.polynomial = self.polynomial.quotient(&divisor);
         for part in &mut self.stack {
-            if let Part::Inside(path, controls) = part {
+            if let Unexamined::Inside(path, controls) = part {
                 *controls = self.polynomial.controls_over(path);
             }
         }
@@ -117,25 +117,25 @@ impl Iterator for Roots {
     fn next(&mut self) -> Option<Root> {
         loop {
             let (path, controls) = match self.stack.pop()? {
-                Part::At(numerator, depth) => {
+                Unexamined::At(numerator, depth) => {
                     return Some(Root {
                         path: Path::new(),
-                        place: Place::At { numerator, depth },
+                        place: RootPlace::At { numerator, depth },
                     });
                 }
-                Part::Inside(path, controls) => (path, controls),
+                Unexamined::Inside(path, controls) => (path, controls),
             };
             match controls.variations() {
                 0 => {}
                 1 => {
-                    let place = Place::Inside {
+                    let place = RootPlace::Inside {
                         polynomial: self.polynomial.clone(),
                         controls,
                     };
                     return Some(Root { path, place });
                 }
                 _ if path.len() >= PATIENCE && !self.is_squarefree => {
-                    self.stack.push(Part::Inside(path, controls));
+                    self.stack.push(Unexamined::Inside(path, controls));
                     self.remove_multiple_roots();
                 }
                 _ => {
@@ -146,13 +146,13 @@ impl Iterator for Roots {
                     let mut left_path = path;
                     left_path.push(false);
                     if middle.is_zero() {
-                        let at = Part::At(start_of(&right_path), right_path.len() as u64);
-                        self.stack.push(Part::Inside(right_path, right));
+                        let at = Unexamined::At(start_of(&right_path), right_path.len() as u64);
+                        self.stack.push(Unexamined::Inside(right_path, right));
                         self.stack.push(at);
                     } else {
-                        self.stack.push(Part::Inside(right_path, right));
+                        self.stack.push(Unexamined::Inside(right_path, right));
                     }
-                    self.stack.push(Part::Inside(left_path, left));
+                    self.stack.push(Unexamined::Inside(left_path, left));
                 }
             }
         }
@@ -176,24 +176,24 @@ impl Root {
             return Sign::Zero;
         }
         let mut controls = match &self.place {
-            Place::At { numerator, depth } => return other.sign_at(numerator, *depth),
-            Place::Inside { .. } => other.controls_over(&self.path),
+            RootPlace::At { numerator, depth } => return other.sign_at(numerator, *depth),
+            RootPlace::Inside { .. } => other.controls_over(&self.path),
         };
         for round in 0.. {
             if let Some(sign) = controls.sign() {
                 return sign;
             }
             match &self.place {
-                Place::At { numerator, depth } => return other.sign_at(numerator, *depth),
+                RootPlace::At { numerator, depth } => return other.sign_at(numerator, *depth),
                 // A root of the divisor is a root of the polynomial, which has only this one inside, and it is simple.
                 // So the divisor has at most one root inside, and its variations are odd if and only if it has one.
-                Place::Inside { polynomial, .. } if round == PATIENCE => {
+                RootPlace::Inside { polynomial, .. } if round == PATIENCE => {
                     let divisor = polynomial.common_divisor(other);
                     if divisor.controls_over(&self.path).variations() % 2 == 1 {
                         return Sign::Zero;
                     }
                 }
-                Place::Inside { .. } => {}
+                RootPlace::Inside { .. } => {}
             }
             if let Some(is_right) = self.halve() {
                 let [left, right] = controls.halves();
@@ -206,14 +206,14 @@ impl Root {
     /// Halves the interval. Returns whether the right half has the root; `None` where the root is the middle, and from
     /// then on.
     fn halve(&mut self) -> Option<bool> {
-        let Place::Inside { controls, .. } = &mut self.place else {
+        let RootPlace::Inside { controls, .. } = &mut self.place else {
             return None;
         };
         let [left, right] = controls.halves();
         let middle = left.sign_at_end();
         if middle.is_zero() {
             self.path.push(true);
-            self.place = Place::At {
+            self.place = RootPlace::At {
                 numerator: start_of(&self.path),
                 depth: self.path.len() as u64,
             };
@@ -235,13 +235,13 @@ impl Root {
     fn compare(&self, x: f64) -> Ordering {
         let (numerator, depth) = dyadic(x);
         match &self.place {
-            Place::At {
+            RootPlace::At {
                 numerator: root,
                 depth: root_depth,
             } => (&root.shifted(depth) - &numerator.shifted(*root_depth))
                 .sign()
                 .order(),
-            Place::Inside {
+            RootPlace::Inside {
                 polynomial,
                 controls,
             } => {
@@ -267,8 +267,8 @@ impl Root {
     /// The root as a float, nearly always to the last bit or two.
     fn guess(&self) -> f64 {
         match &self.place {
-            Place::At { numerator, depth } => scaled(numerator.approximate(), *depth),
-            Place::Inside { controls, .. } => {
+            RootPlace::At { numerator, depth } => scaled(numerator.approximate(), *depth),
+            RootPlace::Inside { controls, .. } => {
                 let inside = guess_inside(controls);
                 let depth = self.path.len() as u64;
                 scaled(start_of(&self.path).approximate(), depth) + scaled((inside, 0), depth)

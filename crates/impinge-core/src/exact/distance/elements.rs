@@ -5,11 +5,11 @@
 
 use std::cmp::Ordering;
 
-use super::features::Part;
+use super::features::PolygonPart;
 use super::nearest::Polygon;
 use super::reach::Reach;
 use super::rounded::{self, between, quotient};
-use super::{Feature, Nearest, filter, nearest};
+use super::{Feature, NearestFeatures, filter, nearest};
 use crate::exact::algebra::Integer;
 use crate::exact::element_pair::ElementPair;
 use crate::exact::triangle::segment_meets_triangle;
@@ -83,7 +83,7 @@ pub(crate) fn nearest_of_elements(a: &[Point], b: &[Point]) -> NearestOfElements
     }
 }
 
-/// Nearest points of two elements of one to three corners, and their distance: rounded as in
+/// NearestFeatures points of two elements of one to three corners, and their distance: rounded as in
 /// [`closest_points`](super::closest_points).
 pub(crate) fn closest_of_elements(
     a: &[Point],
@@ -145,7 +145,7 @@ impl Simple {
         }
     }
 
-    fn named(&self, nearest: &Nearest) -> NearestOfElements {
+    fn named(&self, nearest: &NearestFeatures) -> NearestOfElements {
         NearestOfElements {
             features: self.in_order([nearest.a, nearest.b]),
             is_parallel: nearest.is_parallel,
@@ -192,7 +192,7 @@ fn parts<'a>(a: &'a [Point], b: &'a [Point]) -> impl Iterator<Item = PartOfPair>
 
 impl PartOfPair {
     /// Features of the part as features of the elements, each with how many dimensions it has.
-    fn features(&self, nearest: &Nearest) -> [(u8, Feature); 2] {
+    fn features(&self, nearest: &NearestFeatures) -> [(u8, Feature); 2] {
         let number = |x: usize| u8::try_from(x).unwrap_or(0);
         let of_part = self.simple.in_order([nearest.a, nearest.b]);
         let is_edges = self.simple.pair == ElementPair::EdgeEdge;
@@ -220,7 +220,7 @@ struct Nearby {
 }
 
 enum Way {
-    /// Nearest points of a vertex and a face, or of two edges.
+    /// NearestFeatures points of a vertex and a face, or of two edges.
     Between(Simple),
     /// Where an edge passes through a face.
     Crossing(Point),
@@ -298,7 +298,7 @@ struct Measured<'a> {
     features: [(u8, Feature); 2],
     is_flat: bool,
     polygon: Polygon<Integer>,
-    nearest: Part,
+    nearest: PolygonPart,
 }
 
 impl<'a> Measured<'a> {

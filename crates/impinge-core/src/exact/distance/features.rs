@@ -18,7 +18,7 @@ pub enum Feature {
 /// A nearest point on the border of a feature belongs to the smaller feature. Where there are several nearest points (of
 /// parallel edges or flat elements), the first of the smallest features counts, in the order of ipc-toolkit's names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Nearest {
+pub struct NearestFeatures {
     /// The feature of the first element.
     pub a: Feature,
     /// The feature of the second element.
@@ -28,7 +28,7 @@ pub struct Nearest {
     pub is_parallel: bool,
 }
 
-impl Nearest {
+impl NearestFeatures {
     /// ipc-toolkit's name of the distance type: `P_T`, `P_E0`, `P_T0`; `EA_EB`, `EA_EB0`, `EA0_EB1`; for a vertex and an
     /// edge `P_E`, `P_E0`, `P_E1`; for two vertices `P_P`.
     #[must_use]
@@ -53,16 +53,16 @@ impl Nearest {
 
 /// A part of the difference polygon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Part {
+pub(super) enum PolygonPart {
     Face,
     /// From this corner to the next.
     Edge(usize),
     Corner(usize),
 }
 
-impl Part {
+impl PolygonPart {
     /// The features whose difference the part is.
-    pub(super) fn named(self, pair: ElementPair, is_flat: bool) -> Nearest {
+    pub(super) fn named(self, pair: ElementPair, is_flat: bool) -> NearestFeatures {
         use Feature::{Edge, Face, Vertex};
         let number = |ix: usize| u8::try_from(ix).unwrap_or(0);
         let (a, b) = match (pair, self) {
@@ -83,7 +83,7 @@ impl Part {
             (_, Self::Edge(ix)) => (Vertex(0), Edge(number(ix))),
             (_, Self::Corner(ix)) => (Vertex(0), Vertex(number(ix))),
         };
-        Nearest {
+        NearestFeatures {
             a,
             b,
             is_parallel: is_flat,

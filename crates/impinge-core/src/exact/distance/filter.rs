@@ -1,6 +1,6 @@
 //! Distances in `f64` with bounds: most pairs are settled here.
 
-use super::features::Part;
+use super::features::PolygonPart;
 use super::reach::Reach;
 use crate::exact::Point;
 use crate::exact::element_pair::ElementPair;
@@ -131,7 +131,7 @@ pub(crate) fn approach(
 /// The part of the polygon with the nearest point in its inside, if signs of rounded values are certain to tell.
 ///
 /// As the exact decision goes by signs (`Polygon::nearest`), with none of them zero.
-pub(super) fn nearest_part(pair: ElementPair, points: &[Point; 4]) -> Option<Part> {
+pub(super) fn nearest_part(pair: ElementPair, points: &[Point; 4]) -> Option<PolygonPart> {
     let polygon = Polygon::of_pair(pair, points);
     if !(SMALLEST..f64::LARGEST).contains(&polygon.size()) {
         return None;
@@ -145,12 +145,12 @@ pub(super) fn nearest_part(pair: ElementPair, points: &[Point; 4]) -> Option<Par
         is_positive(dot(corner, edge), size(corner) * size(edge))
     };
     match n {
-        1 => return Some(Part::Corner(0)),
+        1 => return Some(PolygonPart::Corner(0)),
         2 => {
             return match (is_along(0, 0)?, is_along(1, 0)?) {
-                (true, _) => Some(Part::Corner(0)),
-                (_, false) => Some(Part::Corner(1)),
-                (false, true) => Some(Part::Edge(0)),
+                (true, _) => Some(PolygonPart::Corner(0)),
+                (_, false) => Some(PolygonPart::Corner(1)),
+                (false, true) => Some(PolygonPart::Edge(0)),
             };
         }
         _ => {}
@@ -164,16 +164,16 @@ pub(super) fn nearest_part(pair: ElementPair, points: &[Point; 4]) -> Option<Par
         is_inner[ix] = is_positive(dot(&normal, &moment), 4.0 * scale * moment_scale)?;
     }
     if is_inner[..n].iter().all(|&is_inner| is_inner) {
-        return Some(Part::Face);
+        return Some(PolygonPart::Face);
     }
     for (ix, is_inner) in is_inner[..n].iter().enumerate() {
         if !is_inner && !is_along(ix, ix)? && is_along(ix + 1, ix)? {
-            return Some(Part::Edge(ix));
+            return Some(PolygonPart::Edge(ix));
         }
     }
     for ix in 0..n {
         if is_along(ix, ix)? && !is_along(ix, (ix + n - 1) % n)? {
-            return Some(Part::Corner(ix));
+            return Some(PolygonPart::Corner(ix));
         }
     }
     None

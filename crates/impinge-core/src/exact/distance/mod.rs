@@ -9,7 +9,7 @@
 //! a corner. Then one comparison of degree six decides. Most pairs are settled before that by a nearest point in `f64`
 //! and the plane through it.
 //!
-//! In: positions and d. Out: booleans, [`Nearest`], [`Contact`](super::Contact). Distances and points as `f64` are
+//! In: positions and d. Out: booleans, [`NearestFeatures`], [`Contact`](super::Contact). Distances and points as `f64` are
 //! rounded, but computed in one fixed order of operations, so they are the same everywhere.
 //!
 //! `docs/exactness.md`, "Distances", has the proofs.
@@ -29,7 +29,7 @@ use super::algebra::fixed::{Vector, cross, difference, dot};
 use super::element_pair::ElementPair;
 pub(crate) use elements::{NearestOfElements, are_within_certainly, elements_are_within};
 pub(crate) use elements::{closest_of_elements, nearest_of_elements, unsure_are_within};
-pub use features::{Feature, Nearest};
+pub use features::{Feature, NearestFeatures};
 pub(crate) use filter::{Approach, approach};
 pub use moving::first_within;
 pub use nearest::nearest_features;

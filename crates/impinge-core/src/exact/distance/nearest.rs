@@ -1,6 +1,6 @@
 //! Which features of two elements are nearest, and whether they are within a distance; in integers.
 
-use super::features::{Nearest, Part};
+use super::features::{NearestFeatures, PolygonPart};
 use super::filter;
 use super::reach::Reach;
 use super::{Vector, cross, difference, dot};
@@ -22,7 +22,7 @@ use crate::exact::{Point, Sign};
 /// assert_eq!(nearest.name(ElementPair::VertexFace), "P_E0");
 /// ```
 #[must_use]
-pub fn nearest_features(pair: ElementPair, points: &[Point; 4]) -> Nearest {
+pub fn nearest_features(pair: ElementPair, points: &[Point; 4]) -> NearestFeatures {
     if let Some(part) = filter::nearest_part(pair, points) {
         return part.named(pair, false);
     }
@@ -31,7 +31,7 @@ pub fn nearest_features(pair: ElementPair, points: &[Point; 4]) -> Nearest {
 
 /// Apart, so that the filter's stack stays small.
 #[inline(never)]
-fn nearest_features_exactly(pair: ElementPair, points: &[Point; 4]) -> Nearest {
+fn nearest_features_exactly(pair: ElementPair, points: &[Point; 4]) -> NearestFeatures {
     let reach = Reach::from(0.0);
     match Polygon::short(pair, points, &reach) {
         Some(polygon) => polygon.nearest_features(pair),
@@ -130,7 +130,7 @@ impl<T: Coordinate> Polygon<T> {
         self.n_corners > 2 && self.normal.is_none()
     }
 
-    fn nearest_features(&self, pair: ElementPair) -> Nearest {
+    fn nearest_features(&self, pair: ElementPair) -> NearestFeatures {
         self.nearest().named(pair, self.is_flat())
     }
 
@@ -152,7 +152,7 @@ impl<T: Coordinate> Polygon<T> {
     }
 
     /// The part whose relative interior contains the nearest point.
-    pub(super) fn nearest(&self) -> Part {
+    pub(super) fn nearest(&self) -> PolygonPart {
         match &self.normal {
             Some(normal) => self.nearest_of_polygon(normal),
             None => self.nearest_of_segment(),
@@ -162,29 +162,29 @@ impl<T: Coordinate> Polygon<T> {
     /// The nearest part of a polygon with a normal. If the origin's projection is in the polygon, that is the face. If the
     /// projection is beyond an edge and between its ends, it is that edge. Else it is the corner from which both edges lead
     /// away from the origin.
-    fn nearest_of_polygon(&self, normal: &Vector<Two<T>>) -> Part {
+    fn nearest_of_polygon(&self, normal: &Vector<Two<T>>) -> PolygonPart {
         let n = self.n_corners;
         let mut is_inner = [Sign::Positive; 4];
         for (ix, edge) in self.edges().iter().enumerate() {
             is_inner[ix] = dot(normal, &cross(&self.corners[ix], edge)).sign();
         }
         if is_inner.iter().all(|&sign| sign == Sign::Positive) {
-            return Part::Face;
+            return PolygonPart::Face;
         }
         let edge = (0..n).find(|&ix| is_inner[ix] != Sign::Positive && self.is_beside(ix));
         if let Some(ix) = edge {
-            return Part::Edge(ix);
+            return PolygonPart::Edge(ix);
         }
         let is_nearest = |ix: &usize| {
             let before = (ix + n - 1) % n;
             dot(&self.corners[*ix], &self.edges[*ix]).sign() != Sign::Negative
                 && dot(&self.corners[*ix], &self.edges[before]).sign() != Sign::Positive
         };
-        Part::Corner((0..n).find(is_nearest).unwrap_or(0))
+        PolygonPart::Corner((0..n).find(is_nearest).unwrap_or(0))
     }
 
     /// The nearest part of a segment or a point: the nearest of its corners and of the edges that the origin is beside.
-    fn nearest_of_segment(&self) -> Part {
+    fn nearest_of_segment(&self) -> PolygonPart {
         // The order of ipc-toolkit's names: EA0_EB0, EA0_EB1, EA1_EB0, EA1_EB1, EA_EB0, EA_EB1, EA0_EB, EA1_EB.
         let (corner_order, edge_order): (&[usize], &[usize]) = match self.n_corners {
             1 => (&[0], &[]),
@@ -201,22 +201,22 @@ impl<T: Coordinate> Polygon<T> {
                 (part, least) = (ix, other);
             }
         }
-        let mut nearest = Part::Corner(part);
+        let mut nearest = PolygonPart::Corner(part);
         let mut least = (least.widened(), Four::<T>::one());
         for &ix in edge_order.iter().filter(|&&ix| self.is_beside(ix)) {
-            let other = self.square_of_border(Part::Edge(ix));
+            let other = self.square_of_border(PolygonPart::Edge(ix));
             let (left, right) = (other.0.product(&least.1), least.0.product(&other.1));
             if left.minus(&right).sign() == Sign::Negative {
-                (nearest, least) = (Part::Edge(ix), other);
+                (nearest, least) = (PolygonPart::Edge(ix), other);
             }
         }
         nearest
     }
 
     /// The square of the origin's distance from the line, plane or point of a part, as a fraction.
-    pub(super) fn square_of_distance(&self, part: Part) -> (Eight<T>, Four<T>) {
+    pub(super) fn square_of_distance(&self, part: PolygonPart) -> (Eight<T>, Four<T>) {
         match (part, &self.normal) {
-            (Part::Face, Some(normal)) => {
+            (PolygonPart::Face, Some(normal)) => {
                 let corner = self.corners[0].each_ref().map(T::widened);
                 let f = dot(normal, &corner);
                 (f.product(&f), dot(normal, normal))
@@ -229,18 +229,18 @@ impl<T: Coordinate> Polygon<T> {
     }
 
     /// The square of the origin's distance from a corner or the line of an edge, as a fraction.
-    fn square_of_border(&self, part: Part) -> (Four<T>, Four<T>) {
+    fn square_of_border(&self, part: PolygonPart) -> (Four<T>, Four<T>) {
         match part {
-            Part::Edge(ix) => {
+            PolygonPart::Edge(ix) => {
                 let edge = &self.edges[ix];
                 let moment = cross(&self.corners[ix], edge);
                 (dot(&moment, &moment), dot(edge, edge).widened())
             }
-            Part::Corner(ix) => {
+            PolygonPart::Corner(ix) => {
                 let corner = &self.corners[ix];
                 (dot(corner, corner).widened(), Four::<T>::one())
             }
-            Part::Face => {
+            PolygonPart::Face => {
                 unreachable!("a face is no border, and only a polygon with an inside has one")
             }
         }

@@ -1,18 +1,18 @@
 //! Distances and nearest points as `f64`: quotients of exact integers, rounded.
 
-use super::features::Part;
+use super::features::PolygonPart;
 use super::nearest::Polygon;
 use super::reach::Reach;
-use super::{Nearest, Vector, cross, difference, dot};
+use super::{NearestFeatures, Vector, cross, difference, dot};
 use crate::exact::Point;
 use crate::exact::algebra::{Coordinate, Integer, Whole, common_integers};
 use crate::exact::element_pair::ElementPair;
 
-/// Nearest points of two elements.
+/// NearestFeatures points of two elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Closest {
     /// The features that contain them; exact.
-    pub nearest: Nearest,
+    pub nearest: NearestFeatures,
     /// Their distance, wrong by a few units in the last place at most. For decisions use
     /// [`are_within`](super::are_within).
     pub distance: f64,
@@ -21,7 +21,7 @@ pub struct Closest {
     pub points: [Point; 2],
 }
 
-/// Nearest points of two elements and their distance.
+/// NearestFeatures points of two elements and their distance.
 ///
 /// The features are exact. Distance and points are computed in `f64` from exact quotients, in one order of operations: the
 /// same on every machine, but rounded. The points and their order are those of the [`ElementPair`].
@@ -49,11 +49,11 @@ pub(super) fn closest_of<T: Coordinate>(
     let part = polygon.nearest();
     let [p, q, r, s] = points;
     let points = match (pair, part) {
-        (ElementPair::EdgeEdge, Part::Face) => {
+        (ElementPair::EdgeEdge, PolygonPart::Face) => {
             let [share_a, share_b] = face_shares(polygon);
             [between(p, q, share_a), between(r, s, share_b)]
         }
-        (ElementPair::EdgeEdge, Part::Edge(ix)) => {
+        (ElementPair::EdgeEdge, PolygonPart::Edge(ix)) => {
             let share = edge_share(polygon, ix);
             match ix {
                 0 => [between(p, q, share), *r],
@@ -62,19 +62,21 @@ pub(super) fn closest_of<T: Coordinate>(
                 _ => [*p, between(s, r, share)],
             }
         }
-        (ElementPair::EdgeEdge, Part::Corner(ix)) => [[*p, *q, *q, *p][ix], [*r, *r, *s, *s][ix]],
-        (_, Part::Face) => {
+        (ElementPair::EdgeEdge, PolygonPart::Corner(ix)) => {
+            [[*p, *q, *q, *p][ix], [*r, *r, *s, *s][ix]]
+        }
+        (_, PolygonPart::Face) => {
             let [first, second] = face_shares(polygon);
             let foot =
                 std::array::from_fn(|k| q[k] + (r[k] - q[k]) * first + (s[k] - r[k]) * second);
             [*p, foot]
         }
-        (_, Part::Edge(ix)) => {
+        (_, PolygonPart::Edge(ix)) => {
             let next = points[1 + (ix + 1) % polygon.corners().len()];
             let share = edge_share(polygon, ix);
             [*p, between(&points[1 + ix], &next, share)]
         }
-        (_, Part::Corner(ix)) => [*p, points[1 + ix]],
+        (_, PolygonPart::Corner(ix)) => [*p, points[1 + ix]],
     };
     let (over, under) = polygon.square_of_distance(part);
     Closest {

@@ -46,7 +46,7 @@ pub(super) fn first_time(
         let normal = cross(&edge(0), &edge(1));
         let heights = corners.map(|corners| dot(&normal, &corners[0].map(i128::from)));
         if heights.iter().any(|height| !height.sign().is_zero()) {
-            return Some(Share::of(&heights).and_then(|share| {
+            return Some(TimeShare::of(&heights).and_then(|share| {
                 let is_inside = (0..n).all(|ix| {
                     let sides = moments(ix).map(|moment| dot(&normal, &moment));
                     share.sign_of(&sides) != Sign::Negative
@@ -61,7 +61,7 @@ pub(super) fn first_time(
         let along = |axis: usize| moments.map(|moment| moment[axis]);
         // If the edge's line always has the origin, this is not decided here.
         let moving = (0..3).find(|&axis| along(axis) != [0, 0])?;
-        let Some(share) = Share::of(&along(moving)) else {
+        let Some(share) = TimeShare::of(&along(moving)) else {
             continue;
         };
         let is_on_line = (0..3).all(|axis| share.sign_of(&along(axis)).is_zero());
@@ -77,14 +77,14 @@ pub(super) fn first_time(
 }
 
 /// The root in (0, 1] of a linear function, as before / (before + after).
-struct Share<T> {
+struct TimeShare<T> {
     /// Magnitude at the start; not 0.
     before: T,
     /// Magnitude at the end.
     after: T,
 }
 
-impl<T: Factor> Share<T> {
+impl<T: Factor> TimeShare<T> {
     /// From the values at the start and at the end, not both 0.
     fn of([start, end]: &[T; 2]) -> Option<Self> {
         let (sign, sign_at_end) = (start.sign(), end.sign());
@@ -104,13 +104,13 @@ impl<T: Factor> Share<T> {
     }
 }
 
-impl Share<Wide<4>> {
+impl TimeShare<Wide<4>> {
     fn floor(&self) -> Time {
         floor_of_share(&self.before, &self.after)
     }
 }
 
-impl Share<i128> {
+impl TimeShare<i128> {
     fn floor(&self) -> Time {
         floor_of_share(&self.before.widened(), &self.after.widened())
     }

@@ -19,9 +19,9 @@ use crate::gpu::layout::{
     BARE, BODY_SHIFT, Body, Coordinate, EDGES, FACES, NodePair, OWN_LAYERS, POINTS, VERTICES,
 };
 use crate::gpu::open::Gpu;
-use crate::gpu::topology::{Topology, Weight};
+use crate::gpu::topology::{DeviceClusters, Weight};
 use crate::grouping::clusters::Clustering;
-use crate::grouping::hierarchy::Shape;
+use crate::grouping::hierarchy::TreeShape;
 use crate::ids::BodyId;
 use crate::positions::Positions;
 use crate::run::Job;
@@ -153,7 +153,7 @@ impl World {
             });
             layers.n_vertices += count(scene.body_in(id.slot()).n_vertices());
         }
-        let mut topology = Topology::default();
+        let mut topology = DeviceClusters::default();
         for ((ix, layer), clustering) in frame.numbered_layers().zip(clusterings) {
             let body = layers.number(layer.id).expect("its body was listed");
             // Vertices fit 32 bits, or the frame would weigh nothing.
@@ -165,7 +165,7 @@ impl World {
         }
         // The host names elements by their places.
         topology.numbers.clear();
-        let shapes: Vec<&Shape> = clusterings.iter().map(|held| &held.shape).collect();
+        let shapes: Vec<&TreeShape> = clusterings.iter().map(|held| &held.shape).collect();
         self.forest = Forest::new(&shapes, |ix| sample(scene, frame, ix));
         self.send_trees(gpu, &topology)?;
         let both = [&self.forest.nodes[..], &self.forest.nodes[..]].concat();

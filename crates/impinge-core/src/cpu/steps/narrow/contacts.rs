@@ -19,11 +19,11 @@ pub(super) struct Open {
     pub search: Search,
 }
 
-/// Contacts found, and open pairs.
+/// FirstContacts found, and open pairs.
 #[derive(Debug, Default)]
-pub(crate) struct Contacts {
+pub(crate) struct FirstContacts {
     pub(super) asked: Asked,
-    /// Contacts found, handed over in blocks.
+    /// FirstContacts found, handed over in blocks.
     found: FoundByKind,
     pub(super) counts: NarrowCounts,
     /// That many open pairs are enough.
@@ -38,7 +38,7 @@ pub(crate) struct Contacts {
     pub(super) is_first: bool,
 }
 
-impl Contacts {
+impl FirstContacts {
     /// Prepares for a step.
     pub fn begin(&mut self, asked: Asked, tuning: &Tuning) {
         self.asked = asked;
@@ -60,7 +60,7 @@ impl Contacts {
     }
 }
 
-impl Contacts {
+impl FirstContacts {
     /// Hands over the contacts that were found.
     pub fn hand_over(&mut self, answer: StepAnswer<'_>) {
         for (kind, found) in PairKind::ALL.into_iter().zip(&mut self.found) {
@@ -68,11 +68,11 @@ impl Contacts {
         }
     }
 
-    /// Contacts later than this are not wanted.
+    /// FirstContacts later than this are not wanted.
     #[inline(always)]
     pub(super) fn until(&self, world: World<'_>) -> f64 {
         match self.asked.sought {
-            // Contacts that are later by less than rounding are wanted, for their keys may be lower.
+            // FirstContacts that are later by less than rounding are wanted, for their keys may be lower.
             Sought::Earliest => {
                 let time = world.known.earliest();
                 let later = (time * (1.0 + 2f64.powi(-22))).max(f64::from(f32::MIN_POSITIVE));

@@ -16,12 +16,12 @@ use super::batch::{Batch, Between, Keys, Narrow, NarrowCounts, Places, is_owned,
 
 /// The test of one worker.
 #[derive(Debug, Default)]
-pub(super) struct Near {
+pub(super) struct NearElements {
     keys: Keys,
     n_unsure: u64,
 }
 
-impl Near {
+impl NearElements {
     /// Prepares for a step.
     pub fn begin(&mut self) {
         self.n_unsure = 0;
@@ -33,10 +33,10 @@ impl Near {
     }
 }
 
-impl Narrow for Near {
+impl Narrow for NearElements {
     fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
         dispatch!(isa, take, (
-            near: &mut Near = self,
+            near: &mut NearElements = self,
             world: World<'_> = world,
             batch: Batch<'_> = batch,
         ));
@@ -55,9 +55,9 @@ impl Narrow for Near {
 }
 
 #[inline(always)]
-fn take<S: Simd>(_: S, near: &mut Near, world: World<'_>, batch: Batch<'_>) {
+fn take<S: Simd>(_: S, near: &mut NearElements, world: World<'_>, batch: Batch<'_>) {
     let between = batch.between;
-    let pairs = Pairs::new(world, between);
+    let pairs = LayerPair::new(world, between);
     let pair = batch.near_in_tables();
     let tables = batch.groups.map(|group| &group.points);
     let reach = pairs.reach.enclosing_f32();
@@ -83,7 +83,7 @@ fn take<S: Simd>(_: S, near: &mut Near, world: World<'_>, batch: Batch<'_>) {
     }
 }
 
-impl Near {
+impl NearElements {
     #[inline(always)]
     fn put(&mut self, world: World<'_>, between: Between, places: Places) {
         if is_owned(world, between, places) {
@@ -94,7 +94,7 @@ impl Near {
 
     /// Whether the elements at two places are near, in `f64` or exactly.
     #[inline(never)]
-    fn settle_open(&mut self, pairs: &Pairs<'_>, places: Places) -> bool {
+    fn settle_open(&mut self, pairs: &LayerPair<'_>, places: Places) -> bool {
         let [a, b] = pairs.corners(places);
         are_within_certainly(a.points(), b.points(), &pairs.reach).unwrap_or_else(|| {
             self.n_unsure += 1;
@@ -104,19 +104,19 @@ impl Near {
 }
 
 /// Two layers, and within which distance their elements are near.
-struct Pairs<'a> {
+struct LayerPair<'a> {
     sides: [(&'a Elements, &'a Positions); 2],
     reach: Reach,
 }
 
-impl<'a> Pairs<'a> {
+impl<'a> LayerPair<'a> {
     fn new(world: World<'a>, between: Between) -> Self {
         let sides = [between.a, between.b].map(|layer| {
             let body = world.frame.body(world.scene, layer);
             (&world.cache(layer).clustering.corners, body.positions())
         });
         let reach = world.frame.reach(between.a, between.b);
-        Pairs { sides, reach }
+        LayerPair { sides, reach }
     }
 
     #[inline(always)]

@@ -14,18 +14,18 @@ use crate::positions::Positions;
 
 use super::super::world::World;
 use super::batch::{Between, Places, exact_pair};
-use super::contacts::{Contacts, Open};
+use super::contacts::{FirstContacts, Open};
 
 /// Settles the open pairs of the current layers.
 #[inline(always)]
-pub(super) fn search<S: Simd>(simd: S, contacts: &mut Contacts, world: World<'_>) {
+pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: World<'_>) {
     let Some(between) = contacts.between else {
         return;
     };
     let Some(pair) = exact_pair(between.kind) else {
         return;
     };
-    let sides = Sides::new(world, between);
+    let sides = PairSides::new(world, between);
     let mut steps = Steps8::default();
     let mut spans = Spans8::default();
     let mut open = std::mem::take(&mut contacts.open);
@@ -70,7 +70,7 @@ pub(super) fn search<S: Simd>(simd: S, contacts: &mut Contacts, world: World<'_>
     (contacts.open, contacts.later, contacts.single) = (open, later, single);
 }
 
-impl Contacts {
+impl FirstContacts {
     /// Sorts pairs by the results of looking at their intervals.
     #[inline(always)]
     fn after_look(
@@ -125,29 +125,29 @@ impl Contacts {
 }
 
 /// The corners and positions of two layers' elements.
-struct Sides<'a> {
+struct PairSides<'a> {
     /// The corners at each place: of vertices and faces, or of edges.
-    corners: Corners<'a>,
+    corners: PairCorners<'a>,
     /// The positions of each layer, at the start and at the end.
     positions: [[&'a Positions; 2]; 2],
 }
 
-enum Corners<'a> {
+enum PairCorners<'a> {
     VertexFace(&'a [[u32; 1]], &'a [[u32; 3]]),
     EdgeEdge(&'a [[u32; 2]], &'a [[u32; 2]]),
     None,
 }
 
-impl<'a> Sides<'a> {
+impl<'a> PairSides<'a> {
     fn new(world: World<'a>, between: Between) -> Self {
         use crate::elements::Elements::{Edges, Points, Triangles};
         let layers = [between.a, between.b];
         let elements = layers.map(|layer| &world.cache(layer).clustering.corners);
-        Sides {
+        PairSides {
             corners: match elements {
-                [Points(vertices), Triangles(faces)] => Corners::VertexFace(vertices, faces),
-                [Edges(a), Edges(b)] => Corners::EdgeEdge(a, b),
-                _ => Corners::None,
+                [Points(vertices), Triangles(faces)] => PairCorners::VertexFace(vertices, faces),
+                [Edges(a), Edges(b)] => PairCorners::EdgeEdge(a, b),
+                _ => PairCorners::None,
             },
             positions: layers.map(|layer| {
                 let body = world.frame.body(world.scene, layer);
@@ -168,15 +168,15 @@ impl<'a> Sides<'a> {
         }
         let batch = &batch;
         match self.corners {
-            Corners::VertexFace(vertices, faces) => {
+            PairCorners::VertexFace(vertices, faces) => {
                 fill(simd, (vertices, 0, 0), self.positions[0], batch, steps);
                 fill(simd, (faces, 1, 1), self.positions[1], batch, steps);
             }
-            Corners::EdgeEdge(a, b) => {
+            PairCorners::EdgeEdge(a, b) => {
                 fill(simd, (a, 0, 0), self.positions[0], batch, steps);
                 fill(simd, (b, 1, 2), self.positions[1], batch, steps);
             }
-            Corners::None => {}
+            PairCorners::None => {}
         }
     }
 }

@@ -12,11 +12,16 @@ use crate::grouping::bounds::round_up;
 
 use super::super::world::World;
 use super::batch::{Batch, Between, Places, exact_pair, points};
-use super::contacts::Contacts;
+use super::contacts::FirstContacts;
 
 /// Settles the candidates of a work item.
 #[inline(always)]
-pub(super) fn take<S: Simd>(_: S, contacts: &mut Contacts, world: World<'_>, batch: Batch<'_>) {
+pub(super) fn take<S: Simd>(
+    _: S,
+    contacts: &mut FirstContacts,
+    world: World<'_>,
+    batch: Batch<'_>,
+) {
     let between = batch.between;
     let reach = world.frame.reach(between.a, between.b);
     let reach = reach.enclosing_f32();
@@ -45,7 +50,7 @@ pub(super) fn take<S: Simd>(_: S, contacts: &mut Contacts, world: World<'_>, bat
     }
 }
 
-impl Contacts {
+impl FirstContacts {
     /// Settles a pair in `f64` or exactly.
     #[inline(never)]
     fn settle_separated(&mut self, world: World<'_>, between: Between, places: Places) {

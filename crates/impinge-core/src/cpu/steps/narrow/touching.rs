@@ -28,17 +28,17 @@ use super::super::world::World;
 #[cfg(feature = "gpu")]
 use super::batch::Places;
 use super::batch::{Batch, Between, Narrow, NarrowCounts, exact_pair};
-use super::contacts::{Contacts, Open};
+use super::contacts::{FirstContacts, Open};
 use super::search::search;
 use super::separated;
 
-impl Narrow for Contacts {
+impl Narrow for FirstContacts {
     fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
         let between = batch.between;
         self.go_to(isa, world, between);
         if world.frame.distance() > 0.0 {
             return dispatch!(isa, separated, (
-                contacts: &mut Contacts = self,
+                contacts: &mut FirstContacts = self,
                 world: World<'_> = world,
                 batch: Batch<'_> = batch,
             ));
@@ -87,7 +87,7 @@ impl Narrow for Contacts {
         if self.open.is_empty() {
             return;
         }
-        dispatch!(isa, search, (contacts: &mut Contacts = self, world: World<'_> = world));
+        dispatch!(isa, search, (contacts: &mut FirstContacts = self, world: World<'_> = world));
         self.open.clear();
     }
 
@@ -100,7 +100,7 @@ impl Narrow for Contacts {
     }
 }
 
-impl Contacts {
+impl FirstContacts {
     /// Turns to the pairs of two layers.
     #[inline(always)]
     fn go_to(&mut self, isa: Isa, world: World<'_>, between: Between) {
@@ -147,7 +147,7 @@ impl Contacts {
 // Kernels of their own: without optimisation, one for all of them would need more stack than a thread has.
 
 #[inline(always)]
-fn separated<S: Simd>(simd: S, contacts: &mut Contacts, world: World<'_>, batch: Batch<'_>) {
+fn separated<S: Simd>(simd: S, contacts: &mut FirstContacts, world: World<'_>, batch: Batch<'_>) {
     separated::take(simd, contacts, world, batch);
 }
 
