@@ -38,7 +38,7 @@ macro_rules! index_types {
             /// The index of an entry of a list, which has at most 2^32 of them.
             #[inline(always)]
             pub const fn from_usize(index: usize) -> Self {
-                debug_assert!(index <= u32::MAX as usize);
+                debug_assert!(index as u32 as usize == index);
                 $name(index as u32)
             }
 
