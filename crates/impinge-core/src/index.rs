@@ -38,7 +38,7 @@ macro_rules! index_types {
             /// The index of an entry of a list, which has at most 2^32 of them.
             #[inline(always)]
             pub const fn from_usize(index: usize) -> Self {
-                debug_assert!(index <= u32::MAX as usize);
+                debug_assert!(index as u32 as usize == index);
                 $name(index as u32)
             }
 
@@ -176,4 +176,43 @@ pub const fn lower_number(key: u64) -> Number {
 #[inline(always)]
 pub const fn pair_numbers(key: u64) -> [Number; 2] {
     [lower_number(key), Number(key as u32)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_a_cluster_and_a_lane() {
+        for raw in [0, 63, 64, 65, 1000, u32::MAX] {
+            let place = Place::new(raw);
+            assert_eq!(place.cluster().place(place.lane()), place);
+        }
+        let places = ClusterIx::up_to(3).map(|cluster| cluster.places(130));
+        assert_eq!(Vec::from_iter(places), [0..64, 64..128, 128..130]);
+        assert!(ClusterIx::new(3).places(130).is_empty());
+    }
+
+    #[test]
+    fn keys_are_sorted_as_pairs_of_numbers_are() {
+        let numbers = [0, 1, 7, u32::MAX - 1, u32::MAX].map(Number::new);
+        let mut keys = Vec::new();
+        for (ix, &low) in numbers.iter().enumerate() {
+            for &high in &numbers[ix..] {
+                assert_eq!(pair_key(low, high), pair_key(high, low));
+                assert_eq!(pair_numbers(pair_key(low, high)), [low, high]);
+                assert_eq!(lower_number(low.key_with(high)), low);
+                keys.push(pair_key(low, high));
+            }
+            assert!(low.first_key() <= pair_key(low, low));
+        }
+        assert!(keys.is_sorted());
+    }
+
+    #[test]
+    fn a_number_is_that_of_an_element_of_a_layer() {
+        let (first, element) = (Number::new(100), ElementIx::new(5));
+        assert_eq!(first.plus(element), Number::new(105));
+        assert_eq!(first.plus(element).minus(first), element);
+    }
 }
