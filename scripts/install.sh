@@ -18,3 +18,12 @@ install() {
   as_root apt-get update -qq
   as_root apt-get install -y -qq --no-install-recommends "$@" >/dev/null
 }
+
+# cross_std TARGET...
+# Installs what scripts/cross-cargo needs for these targets, unless rustup has installed the standard library of each.
+cross_std() {
+  local libraries present="true" target
+  libraries=$(rustc --print sysroot)/lib/rustlib
+  for target; do present+=" && ls -d $libraries/$target/lib"; done
+  install "($present) || ls -d /usr/lib/rustlib/src/rust/library/std /usr/bin/cargo" rustc-web cargo-web rust-web-src
+}

@@ -75,12 +75,13 @@ pub fn settings(options: &Options, method: Method) -> Settings {
         backend: options.backend,
         device: options.device.clone(),
         threads: options.threads,
+        placement: options.placements[0],
         ..Settings::default()
     }
 }
 
 /// The library's contestants; the others are compared with the first one. `variants` adds positions
-/// copied on the clock, and a single thread.
+/// copied on the clock, and a single thread. Other placements of helper threads follow the first contestant.
 fn ours(
     problem: &Problem,
     options: &Options,
@@ -89,6 +90,13 @@ fn ours(
     let clusters = settings(options, Method::Clusters);
     let in_place = Ours::new(problem, clusters.clone(), Feed::InPlace)?;
     let mut runners: Vec<Box<dyn Runner>> = vec![Box::new(in_place)];
+    for &placement in &options.placements[1..] {
+        let other = Settings {
+            placement,
+            ..clusters.clone()
+        };
+        runners.push(Box::new(Ours::new(problem, other, Feed::InPlace)?));
+    }
     if variants {
         let copied = Ours::new(problem, clusters.clone(), Feed::Copied)?;
         runners.push(Box::new(copied));

@@ -32,7 +32,7 @@ mod tune;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use impinge::Backend;
+use impinge::{Backend, Placement};
 
 /// Anything that ends a run.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -64,6 +64,7 @@ options:
   --turn N           frames of one contestant in a row (default 10); with 1 all caches are cold
   --size N           adversarial, regular: primitives (default 1,000,000 and 80,000); sizes, bodies: the largest size
   --threads N        threads of impinge (default: all)
+  --placement NAME   where its helper threads run: auto (default), inherited; in a contest also both, which take turns
   --backend NAME     cpu (default), gpu or auto
   --device NAME      part of a GPU's name, to choose among several
   --no-cells         without impinge's other method, Cells
@@ -82,6 +83,8 @@ pub struct Options {
     turn: usize,
     size: Option<usize>,
     threads: usize,
+    /// At least one. The further ones are compared with the first.
+    placements: Vec<Placement>,
     backend: Backend,
     device: Option<String>,
     cells: bool,
@@ -98,6 +101,7 @@ fn parse() -> Result<Option<(String, Options)>, lexopt::Error> {
         turn: 10,
         size: None,
         threads: 0,
+        placements: vec![Placement::Auto],
         backend: Backend::Cpu,
         device: None,
         cells: true,
@@ -115,6 +119,14 @@ fn parse() -> Result<Option<(String, Options)>, lexopt::Error> {
             Long("turn") => options.turn = parser.value()?.parse()?,
             Long("size") => options.size = Some(parser.value()?.parse()?),
             Long("threads") => options.threads = parser.value()?.parse()?,
+            Long("placement") => {
+                options.placements = parser.value()?.parse_with(|name| match name {
+                    "auto" => Ok(vec![Placement::Auto]),
+                    "inherited" => Ok(vec![Placement::Inherited]),
+                    "both" => Ok(vec![Placement::Auto, Placement::Inherited]),
+                    _ => Err("auto, inherited or both"),
+                })?;
+            }
             Long("backend") => {
                 options.backend = parser.value()?.parse_with(|name| match name {
                     "cpu" => Ok(Backend::Cpu),

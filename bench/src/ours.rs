@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use impinge::{BodyId, Detector, Method, Query, Scene, Settings, Statistics};
+use impinge::{BodyId, Detector, Method, Placement, Query, Scene, Settings, Statistics};
 use serde_json::json;
 
 use crate::Failure;
@@ -67,6 +67,9 @@ impl Runner for Ours {
             if settings.threads > 1 {
                 name.push('s');
             }
+        }
+        if settings.placement == Placement::Inherited {
+            name += ", helpers anywhere";
         }
         if self.feed == Feed::Copied {
             name += ", positions copied";

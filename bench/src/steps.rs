@@ -154,6 +154,7 @@ fn measure(known: &Known, options: &Options, report: &mut Report) -> Result<(), 
         for &n_threads in &threads {
             let mut detector = Detector::with_settings(Settings {
                 threads: n_threads,
+                placement: options.placements[0],
                 backend: options.backend,
                 ..Settings::default()
             })?;

@@ -90,7 +90,12 @@ impl Detector {
         Detector {
             #[cfg(feature = "gpu")]
             gpu,
-            frames: FrameLoop::new(settings.threads, settings.limits(), settings.tuning),
+            frames: FrameLoop::new(
+                settings.threads,
+                settings.placement,
+                settings.limits(),
+                settings.tuning,
+            ),
             cpu: Cpu::new(&settings),
             steps: steps::StepMemory::new(&settings),
             distances: Distances::new(),

@@ -11,6 +11,7 @@ use crate::progress::Control;
 use crate::query::Query;
 use crate::run::{Finder, FrameLoop, Job, ready};
 use crate::scene::Scene;
+use crate::settings::Placement;
 use crate::sink::{Answer, Limits, Wanted};
 use crate::stats::Statistics;
 use crate::tuning::Tuning;
@@ -23,7 +24,12 @@ pub struct Host {
 impl Host {
     /// Creates a host with `threads` workers; 0 for one per core.
     pub fn new(threads: usize) -> Self {
-        let frames = FrameLoop::new(threads, Limits::default(), Tuning::default());
+        let frames = FrameLoop::new(
+            threads,
+            Placement::default(),
+            Limits::default(),
+            Tuning::default(),
+        );
         Host { frames }
     }
 

@@ -66,7 +66,7 @@ pub use positions::{Positions, Real};
 pub use progress::{CancelToken, Control, Progress};
 pub use query::{Query, SharedVertex};
 pub use scene::{Body, Filter, Scene};
-pub use settings::{Backend, InstructionSet, Method, Recluster, Settings};
+pub use settings::{Backend, InstructionSet, Method, Placement, Recluster, Settings};
 pub use stats::{Stage, Statistics};
 pub use step::{CandidateQuery, Start, Step, Toi};
 pub use tuning::{Tuning, Ways};

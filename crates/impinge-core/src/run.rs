@@ -14,6 +14,7 @@ use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
 use crate::scene::Scene;
+use crate::settings::Placement;
 use crate::sink::{Answer, Limits, Wanted};
 use crate::stats::Statistics;
 use crate::tuning::Tuning;
@@ -76,14 +77,14 @@ pub struct FrameLoop {
 
 impl FrameLoop {
     /// Creates a loop with `threads` workers; 0 for one per core.
-    pub fn new(threads: usize, limits: Limits, tuning: Tuning) -> Self {
+    pub fn new(threads: usize, placement: Placement, limits: Limits, tuning: Tuning) -> Self {
         FrameLoop {
             frame: Frame::default(),
             pairs: Pairs::default(),
             n_pairs: 0,
             answer: Arc::default(),
             limits,
-            workers: Workers::tuned(threads, tuning),
+            workers: Workers::tuned(threads, placement, tuning),
         }
     }
 

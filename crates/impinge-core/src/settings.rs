@@ -82,6 +82,24 @@ pub enum InstructionSet {
     Avx512,
 }
 
+/// Which cores the helper threads of the CPU backend may run on. The answer does not depend on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Placement {
+    /// On Linux, with up to 8 threads: every core that the helper was started with, except the one on which the calling
+    /// thread is running. Otherwise as `Inherited`.
+    ///
+    /// The system often wakes a helper on the caller's core, where it runs only after the caller is done. A frame then takes
+    /// as long as with fewer threads.
+    #[default]
+    Auto,
+    /// Those that the system chooses: no thread's affinity is ever set. A helper starts with the affinity of the
+    /// thread that asked the first question.
+    ///
+    /// For programs that place threads themselves: ranks of MPI, real-time threads, containers whose cores are changed while
+    /// they run, `taskset` on a running process. `Auto` would overwrite what they set for a helper.
+    Inherited,
+}
+
 /// The settings of a detector.
 #[derive(Debug, Clone)]
 pub struct Settings {
@@ -91,6 +109,8 @@ pub struct Settings {
     pub backend: Backend,
     /// CPU threads; 0 means one per core.
     pub threads: usize,
+    /// Which cores the helper threads may run on.
+    pub placement: Placement,
     /// The widest vector instructions that the CPU backend may use.
     pub instruction_set: InstructionSet,
     /// `Cells`: the density coefficient λ of the paper's equation (1), above 0.
@@ -119,6 +139,7 @@ impl Default for Settings {
             method: Method::default(),
             backend: Backend::default(),
             threads: 0,
+            placement: Placement::default(),
             instruction_set: InstructionSet::default(),
             lambda: 1.0,
             group_size: 64,

@@ -22,6 +22,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use crate::error::Error;
+use crate::settings::Placement;
 use crate::tuning::{Tuning, Ways};
 
 use crew::{Claims, Crew};
@@ -95,11 +96,11 @@ impl Drop for Workers {
 impl Workers {
     /// `threads` workers, the caller among them; 0 for one per core. Threads are started when first needed.
     pub fn new(threads: usize) -> Self {
-        Workers::tuned(threads, Tuning::default())
+        Workers::tuned(threads, Placement::default(), Tuning::default())
     }
 
-    /// As [`new`](Workers::new), with other thresholds.
-    pub(crate) fn tuned(threads: usize, tuning: Tuning) -> Self {
+    /// As [`new`](Workers::new), with another placement of helpers and other thresholds.
+    pub(crate) fn tuned(threads: usize, placement: Placement, tuning: Tuning) -> Self {
         let (pool, n) = match threads {
             0 if is_forked() => (OnceLock::new(), rayon::current_num_threads()),
             0 => (Pool::OfProcess.into(), rayon::current_num_threads()),
@@ -107,7 +108,7 @@ impl Workers {
         };
         Workers {
             n,
-            helpers: Arc::new(Helpers::new(n - 1)),
+            helpers: Arc::new(Helpers::new(n - 1, placement)),
             threads: OnceLock::new(),
             last: Mutex::new(None),
             wakes: AtomicBool::new(true),
@@ -317,11 +318,11 @@ struct Helpers {
 }
 
 impl Helpers {
-    fn new(n: usize) -> Self {
+    fn new(n: usize, placement: Placement) -> Self {
         Helpers {
             crew: Crew::new(n),
             linger_ns: AtomicU64::new(0),
-            places: Places::new(n),
+            places: Places::new(n, placement),
         }
     }
 
@@ -468,5 +469,62 @@ mod tests {
             *sum += inner.iter().sum::<usize>();
         });
         assert_eq!(sums.iter().sum::<usize>(), 450);
+    }
+
+    /// The caller moves from core to core, and another program moves a helper.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn affinities_are_set_by_auto_alone() {
+        use rustix::thread::{CpuSet, Pid, gettid, sched_getaffinity, sched_setaffinity};
+
+        let affinity = |thread: Option<Pid>| sched_getaffinity(thread).expect("has a set of cores");
+        let with_core = |core: usize| {
+            let mut cores = CpuSet::new();
+            cores.set(core);
+            cores
+        };
+        let moves = |placement: Placement| {
+            let all = affinity(None);
+            let mut cores = (0..CpuSet::MAX_CPU).filter(|&core| all.is_set(core));
+            let workers = Workers::tuned(3, placement, Tuning::default());
+            let _shift = workers.shift(u64::MAX);
+            let deadline = Instant::now() + Duration::from_secs(60);
+            let mut threads = [None; 3];
+            while threads.contains(&None) {
+                assert!(Instant::now() < deadline, "no helper came");
+                workers.for_each(&mut threads, 64, |thread, _| {
+                    *thread = Some(gettid());
+                    thread::sleep(Duration::from_micros(20));
+                });
+            }
+            let helpers = &threads[1..];
+            let first = cores.next().expect("at least one core");
+            for core in [Some(first), cores.next(), Some(first)]
+                .into_iter()
+                .flatten()
+            {
+                sched_setaffinity(None, &with_core(core)).expect("its own core");
+                workers.for_each(&mut threads.clone(), 64, |_, _| ());
+                let mut expected = all;
+                if placement == Placement::Auto && all.count() > 1 {
+                    expected.unset(core);
+                }
+                for &helper in helpers {
+                    assert!(affinity(helper) == expected, "{placement:?}, core {core}");
+                }
+            }
+            if placement == Placement::Inherited {
+                sched_setaffinity(helpers[0], &with_core(first)).expect("the helper lives");
+                sched_setaffinity(None, &all).expect("its own cores");
+                workers.for_each(&mut threads.clone(), 64, |_, _| ());
+                assert!(affinity(helpers[0]) == with_core(first), "overwritten");
+            }
+        };
+        for placement in [Placement::Auto, Placement::Inherited] {
+            // The caller is a thread of its own, whose affinity ends with it.
+            thread::scope(|scope| {
+                scope.spawn(|| moves(placement));
+            });
+        }
     }
 }

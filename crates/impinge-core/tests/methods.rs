@@ -4,8 +4,8 @@ mod common;
 
 use common::{agree, cases, check, naive, rows};
 use impinge_core::{
-    Backend, Detector, InstructionSet, Method, Positions, Query, Recluster, Scene, Settings,
-    SharedVertex, hash_rows,
+    Backend, Detector, InstructionSet, Method, Placement, Positions, Query, Recluster, Scene,
+    Settings, SharedVertex, hash_rows,
 };
 use impinge_scenes::deform::{self, Deform};
 use impinge_scenes::{soup, surfaces};
@@ -25,7 +25,13 @@ fn methods_agree_with_the_oracle() {
         let expected = naive(&case);
         check(&case, &expected, cpu(Method::Auto, 1));
         check(&case, &expected, cpu(Method::Clusters, 1));
-        check(&case, &expected, cpu(Method::Clusters, 2));
+        for placement in [Placement::Auto, Placement::Inherited] {
+            let settings = Settings {
+                placement,
+                ..cpu(Method::Clusters, 2)
+            };
+            check(&case, &expected, settings);
+        }
         for instruction_set in [InstructionSet::Portable, InstructionSet::Avx2] {
             for method in [Method::Clusters, Method::Cells] {
                 let settings = Settings {

@@ -47,6 +47,10 @@ use crate::watch::{CancelToken, Watch};
 ///     ``"clusters"``: whether a body that has flowed far from its rest pose is clustered anew.
 /// instruction_set : {"avx512", "avx2", "portable"}
 ///     The widest vector instructions that the CPU may use, where it has them.
+/// placement : {"auto", "inherited"}
+///     Which cores helper threads may run on. ``"auto"``: on Linux, with up to 8 threads, not the one on which the
+///     calling thread is running. ``"inherited"``: the affinity of no thread is ever set, for programs that place
+///     threads themselves (MPI, ``taskset``).
 ///
 /// Raises
 /// ------
@@ -75,10 +79,11 @@ impl Detector {
         signature = (
             method=None, backend=None, device=None, threads=None, memory_budget=None, *,
             max_pairs=None, lambda_=None, group_size=None, recluster=None, instruction_set=None,
+            placement=None,
         ),
         text_signature = "(method=\"auto\", backend=\"auto\", device=None, threads=None, \
                           memory_budget=None, *, max_pairs=None, lambda_=1.0, group_size=64, \
-                          recluster=\"auto\", instruction_set=\"avx512\")"
+                          recluster=\"auto\", instruction_set=\"avx512\", placement=\"auto\")"
     )]
     fn new(
         py: Python<'_>,
@@ -92,6 +97,7 @@ impl Detector {
         group_size: Argument<'_, '_>,
         recluster: Argument<'_, '_>,
         instruction_set: Argument<'_, '_>,
+        placement: Argument<'_, '_>,
     ) -> PyResult<Self> {
         let told = Told {
             method,
@@ -104,6 +110,7 @@ impl Detector {
             group_size,
             recluster,
             instruction_set,
+            placement,
         };
         let settings = told.settings()?;
         // Looking for a GPU and starting threads takes a while.
@@ -688,6 +695,7 @@ impl Detector {
         }
         all.set_item("lambda_", given.lambda)?;
         all.set_item("group_size", given.group_size)?;
+        all.set_item("placement", settings::placement_name(given.placement))?;
         all.set_item("recluster", settings::recluster_name(given.recluster))?;
         all.set_item(
             "instruction_set",

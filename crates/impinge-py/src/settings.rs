@@ -1,7 +1,8 @@
 //! Keyword arguments as the library's settings.
 
 use impinge::{
-    Backend, InstructionSet, Kind, Method, Part, Recluster, Settings, SharedVertex, Start, Toi,
+    Backend, InstructionSet, Kind, Method, Part, Placement, Recluster, Settings, SharedVertex,
+    Start, Toi,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -133,6 +134,10 @@ const BACKENDS: [(&str, Backend); 3] = [
     ("cpu", Backend::Cpu),
     ("gpu", Backend::Gpu),
 ];
+const PLACEMENTS: [(&str, Placement); 2] = [
+    ("auto", Placement::Auto),
+    ("inherited", Placement::Inherited),
+];
 const RECLUSTER: [(&str, Recluster); 2] = [("auto", Recluster::Auto), ("never", Recluster::Never)];
 const INSTRUCTION_SETS: [(&str, InstructionSet); 3] = [
     ("portable", InstructionSet::Portable),
@@ -149,6 +154,11 @@ fn name_of<T: PartialEq>(value: T, choices: &[(&'static str, T)]) -> Option<&'st
 /// The name of a backend.
 pub fn backend_name(backend: Backend) -> Option<&'static str> {
     name_of(backend, &BACKENDS)
+}
+
+/// The name of a placement of helper threads.
+pub fn placement_name(placement: Placement) -> Option<&'static str> {
+    name_of(placement, &PLACEMENTS)
 }
 
 /// The name of a rule of clustering again.
@@ -173,6 +183,7 @@ pub struct Told<'a, 'py> {
     pub group_size: Argument<'a, 'py>,
     pub recluster: Argument<'a, 'py>,
     pub instruction_set: Argument<'a, 'py>,
+    pub placement: Argument<'a, 'py>,
 }
 
 impl Told<'_, '_> {
@@ -185,6 +196,7 @@ impl Told<'_, '_> {
                 &Method::ALL.map(|method| (method.name(), method)),
             )?,
             backend: choose(self.backend, "backend", &BACKENDS)?,
+            placement: choose(self.placement, "placement", &PLACEMENTS)?,
             recluster: choose(self.recluster, "recluster", &RECLUSTER)?,
             instruction_set: choose(self.instruction_set, "instruction_set", &INSTRUCTION_SETS)?,
             ..Settings::default()

@@ -158,6 +158,7 @@ def test_questions_refused(scene, question, error, message):
         ({"backend": "tpu"}, ValueError, '^backend: "tpu" given, "auto", "cpu", "gpu" allowed'),
         ({"recluster": "yes"}, ValueError, "^recluster: "),
         ({"instruction_set": "mmx"}, ValueError, "^instruction_set: "),
+        ({"placement": "nowhere"}, ValueError, '^placement: "nowhere" given, "auto", "inherited" allowed'),
         ({"threads": -1}, ValueError, "^threads: -1 given, 0 to 1024 allowed"),
         ({"threads": 1025}, ValueError, "^threads: 1025 given"),
         ({"threads": 2.5}, TypeError, "^threads: a whole number expected, float given"),

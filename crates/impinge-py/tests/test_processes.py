@@ -9,7 +9,7 @@ import time
 import pytest
 
 import impinge
-from shapes import ball
+from shapes import ball, soup
 
 # Large triangles that all overlap: minutes of work for every method.
 LONG_RUN = """
@@ -127,3 +127,34 @@ def test_spawned_workers():
         [sys.executable, "-c", code, here], capture_output=True, text=True, timeout=120
     )
     assert out.stdout == f"{[count(0.25), count(0.5), 0]}\n", out
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="affinities are set on Linux only")
+def test_placement_of_helper_threads():
+    def helpers(before):
+        """The threads started since, by their names: helpers, not those of the pool for clustering."""
+        for thread in set(os.listdir("/proc/self/task")) - before:
+            with open(f"/proc/self/task/{thread}/comm") as name:
+                if name.read().strip() in ("impinge-1", "impinge-2"):
+                    yield int(thread)
+
+    scene = impinge.Scene()
+    for seed in range(2):
+        scene.add(*soup(20_000, 0.05, seed))
+    everywhere = os.sched_getaffinity(0)
+    answers = set()
+    for placement, n_left_out in [("auto", min(1, len(everywhere) - 1)), ("inherited", 0)]:
+        before = set(os.listdir("/proc/self/task"))
+        detector = impinge.Detector("clusters", "cpu", threads=3, placement=placement)
+        deadline = time.monotonic() + 60
+        n_each = None
+        while n_each != 2 * [n_left_out]:
+            assert time.monotonic() < deadline, n_each
+            answers.add(detector.detect(scene).hash)
+            n_each = [len(everywhere - os.sched_getaffinity(thread)) for thread in helpers(before)]
+        # Later frames change nothing.
+        for _ in range(10):
+            answers.add(detector.detect(scene).hash)
+            for thread in helpers(before):
+                assert len(everywhere - os.sched_getaffinity(thread)) == n_left_out
+    assert len(answers) == 1

@@ -136,12 +136,12 @@ def test_scenes_pickle(duplicate):
 
 def test_settings_pickle():
     settings = dict(method="cells", backend="cpu", threads=2, memory_budget=1 << 30, max_pairs=1000, lambda_=2.0)
-    detector = impinge.Detector(**settings, group_size=32, recluster="never", instruction_set="avx2")
+    detector = impinge.Detector(**settings, group_size=32, recluster="never", instruction_set="avx2", placement="inherited")
     other = pickle.loads(pickle.dumps(detector))
     assert repr(other) == repr(detector) == 'Detector(method="cells", backend="cpu", threads=2, memory_budget=1073741824, max_pairs=1000)'
     arguments, keywords = other.__getnewargs_ex__()
     assert arguments == () and {**settings, "group_size": 32, "recluster": "never"}.items() <= keywords.items()
-    assert keywords["instruction_set"] == "avx2"
+    assert keywords["instruction_set"] == "avx2" and keywords["placement"] == "inherited"
     scene = a_scene()
     assert copy.deepcopy(detector).detect(scene).hash == detector.detect(scene).hash
 

@@ -45,7 +45,12 @@ impl Host {
         };
         let first = first.unwrap_or_default();
         Ok(Host {
-            frames: FrameLoop::new(settings.threads, Limits::default(), settings.tuning),
+            frames: FrameLoop::new(
+                settings.threads,
+                settings.placement,
+                Limits::default(),
+                settings.tuning,
+            ),
             engine: Engine::with_plan_of_guest(gpu, settings, first, plan),
         })
     }

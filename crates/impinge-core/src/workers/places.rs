@@ -1,4 +1,4 @@
-//! Where helpers run: not on the caller's core, if there is another.
+//! Where helpers run: not on the caller's core, if there is another, unless users place threads themselves.
 //!
 //! A helper that wakes on the core of the busy caller runs only when the caller is done, which is too late, and the
 //! system does not soon move one of two busy threads to another core. (Linux wakes threads on the caller's core when it
@@ -6,8 +6,8 @@
 //! second burst of frames began so, with 1.0 ms per frame instead of 0.55.) So helpers are kept off the caller's core: the
 //! core's number is read once per region, and if it has changed there is one system call per helper.
 //!
-//! Helpers run where the system puts them if it has no such call, if the call fails, or if there are many helpers, for
-//! whom a core is free then.
+//! Helpers run where the system puts them with [`Placement::Inherited`](crate::Placement::Inherited), if there is no such
+//! call, if the call fails, or if there are many helpers, for whom a core is free then.
 
 #[cfg(target_os = "linux")]
 pub(super) use linux::Places;
@@ -19,6 +19,7 @@ mod linux {
     use std::sync::OnceLock;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
+    use crate::settings::Placement;
     use rustix::thread::{CpuSet, Pid, gettid, sched_getaffinity, sched_getcpu, sched_setaffinity};
 
     /// The caller's core, and the helpers' threads.
@@ -40,8 +41,11 @@ mod linux {
     const MANY: usize = 8;
 
     impl Places {
-        pub fn new(n_helpers: usize) -> Self {
-            let n = if n_helpers < MANY { n_helpers } else { 0 };
+        pub fn new(n_helpers: usize, placement: Placement) -> Self {
+            let n = match placement {
+                Placement::Auto if n_helpers < MANY => n_helpers,
+                _ => 0,
+            };
             Places {
                 caller: AtomicUsize::new(UNKNOWN),
                 helpers: (0..n).map(|_| OnceLock::new()).collect(),
@@ -112,7 +116,7 @@ mod linux {
         #[test]
         fn helpers_keep_off_the_callers_core() {
             let allowed = sched_getaffinity(None).expect("has a set of cores");
-            let places = Places::new(1);
+            let places = Places::new(1, Placement::Auto);
             places.caller_is_here();
             let (started, is_started) = mpsc::channel();
             let (end, ended) = mpsc::channel::<()>();
@@ -143,11 +147,13 @@ mod linux {
 
 #[cfg(not(target_os = "linux"))]
 mod other {
+    use crate::settings::Placement;
+
     /// Does nothing: cores are not known.
     pub(crate) struct Places;
 
     impl Places {
-        pub fn new(_: usize) -> Self {
+        pub fn new(_: usize, _: Placement) -> Self {
             Places
         }
 

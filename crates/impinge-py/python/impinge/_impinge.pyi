@@ -54,6 +54,7 @@ _Pair: TypeAlias = tuple[_Body, _Body]
 _Method: TypeAlias = Literal["auto", "clusters", "cells", "naive"]
 _Backend: TypeAlias = Literal["auto", "cpu", "gpu"]
 _Recluster: TypeAlias = Literal["auto", "never"]
+_Placement: TypeAlias = Literal["auto", "inherited"]
 _InstructionSet: TypeAlias = Literal["portable", "avx2", "avx512"]
 _Kind: TypeAlias = Literal["points", "edges", "triangles", "tetrahedra"]
 _RowKind: TypeAlias = Literal["points", "edges", "triangles", "tetrahedra", "quads"]
@@ -75,6 +76,7 @@ class _Settings(TypedDict, total=False):
     group_size: SupportsIndex
     recluster: _Recluster
     instruction_set: _InstructionSet
+    placement: _Placement
 
 class Cancelled(Exception): ...
 class TooManyPairs(Exception): ...
@@ -180,6 +182,7 @@ class Detector:
         group_size: SupportsIndex = 64,
         recluster: _Recluster = "auto",
         instruction_set: _InstructionSet = "avx512",
+        placement: _Placement = "auto",
     ) -> Detector: ...
     def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]: ...
     def detect(
