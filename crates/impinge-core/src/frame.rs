@@ -192,10 +192,7 @@ impl Frame {
     fn lower_corner(&self, scene: &Scene, number: Number) -> [f64; 3] {
         let (layer, element) = self.locate(number);
         let body = self.body(scene, layer);
-        let corners = match self.layer(layer).part {
-            Part::Vertices => element.as_corners(),
-            part => body.part(part).corners(element.index()),
-        };
+        let corners = body.corners(self.layer(layer).part, &element);
         let end = body.end_positions().filter(|_| self.is_step);
         let ends = std::iter::once(body.positions()).chain(end);
         let points = ends.flat_map(|at| corners.iter().map(|&corner| at.point(corner as usize)));
