@@ -2,11 +2,11 @@
 
 use impinge::{Backend, Method, Settings};
 use impinge_scenes::deform::Wave;
-use impinge_scenes::{BuiltScene, Model, adversarial, regular, surfaces};
+use impinge_scenes::{adversarial, regular, surfaces};
 
 use crate::measure::{self, Table};
 use crate::ours::{Feed, Ours};
-use crate::problem::{Ask, Problem};
+use crate::problem::{Ask, Problem, models, posed};
 use crate::report::{Report, figures, grouped};
 use crate::runner::Runner;
 use crate::{Failure, Options, files, gpu, once, steps};
@@ -68,18 +68,6 @@ impl Peers {
     }
 }
 
-/// The settings that the options name.
-pub fn settings(options: &Options, method: Method) -> Settings {
-    Settings {
-        method,
-        backend: options.backend,
-        device: options.device.clone(),
-        threads: options.threads,
-        placement: options.placements[0],
-        ..Settings::default()
-    }
-}
-
 /// The library's contestants; the others are compared with the first one. `variants` adds positions
 /// copied on the clock, and a single thread. Other placements of helper threads follow the first contestant.
 fn ours(
@@ -87,7 +75,7 @@ fn ours(
     options: &Options,
     variants: bool,
 ) -> Result<Vec<Box<dyn Runner>>, Failure> {
-    let clusters = settings(options, Method::Clusters);
+    let clusters = options.settings(Method::Clusters);
     let in_place = Ours::new(problem, clusters.clone(), Feed::InPlace)?;
     let mut runners: Vec<Box<dyn Runner>> = vec![Box::new(in_place)];
     for &placement in &options.placements[1..] {
@@ -109,7 +97,7 @@ fn ours(
         }
     }
     if options.cells {
-        let cells = settings(options, Method::Cells);
+        let cells = options.settings(Method::Cells);
         runners.push(Box::new(Ours::new(problem, cells, Feed::InPlace)?));
     }
     Ok(runners)
@@ -192,24 +180,6 @@ fn tets(options: &Options, report: &mut Report) -> Result<(), Failure> {
         true,
     )?);
     Ok(())
-}
-
-/// The models of a built scene, to be posed again.
-pub fn models(built: BuiltScene) -> Result<Vec<Model>, Failure> {
-    built
-        .bodies
-        .iter()
-        .map(|&id| {
-            let body = built.scene.body(id)?;
-            match body.positions() {
-                impinge::Positions::F32(positions) => Ok(Model {
-                    positions: positions.clone(),
-                    elements: body.elements().clone(),
-                }),
-                impinge::Positions::F64(_) => Err("scenes are built in single precision".into()),
-            }
-        })
-        .collect()
 }
 
 fn bodies(options: &Options, report: &mut Report) -> Result<(), Failure> {
@@ -319,7 +289,7 @@ fn adversarial_scenes(options: &Options, report: &mut Report) -> Result<(), Fail
         )?;
         for &method in &methods {
             let measured = |problem: &Problem| -> Result<Table, Failure> {
-                let runner = Ours::new(problem, settings(options, method), Feed::InPlace)?;
+                let runner = Ours::new(problem, options.settings(method), Feed::InPlace)?;
                 measure::run(
                     problem,
                     vec![Box::new(runner)],
@@ -370,7 +340,7 @@ fn regular_surfaces(options: &Options, report: &mut Report) -> Result<(), Failur
             let problem = Problem::mirrored(surface.name, vec![model], ask)
                 .about(surface.what)
                 .expecting(Some(0));
-            let runner = Ours::new(&problem, settings(options, Method::Clusters), Feed::InPlace)?;
+            let runner = Ours::new(&problem, options.settings(Method::Clusters), Feed::InPlace)?;
             let frames = options.frames.unwrap_or(40);
             let table = measure::run(&problem, vec![Box::new(runner)], frames, options.turn)?;
             let row = &table.rows[0];
@@ -390,16 +360,4 @@ fn regular_surfaces(options: &Options, report: &mut Report) -> Result<(), Failur
     }
     report.say(&text);
     Ok(())
-}
-
-/// A built scene as a problem: pairs between the bodies for two bodies, all pairs for more.
-pub fn posed(built: BuiltScene, about: &str) -> Result<Problem, Failure> {
-    let name = built.name.clone();
-    let models = models(built)?;
-    let ask = if models.len() == 2 {
-        Ask::Between
-    } else {
-        Ask::All
-    };
-    Ok(Problem::mirrored(&name, models, ask).about(about))
 }

@@ -32,7 +32,7 @@ mod tune;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use impinge::{Backend, Placement};
+use impinge::{Backend, Method, Placement, Settings};
 
 /// Anything that ends a run.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -91,6 +91,20 @@ pub struct Options {
     peers: bool,
     json: Option<PathBuf>,
     record: Option<String>,
+}
+
+impl Options {
+    /// The settings that the options name.
+    pub fn settings(&self, method: Method) -> Settings {
+        Settings {
+            method,
+            backend: self.backend,
+            device: self.device.clone(),
+            threads: self.threads,
+            placement: self.placements[0],
+            ..Settings::default()
+        }
+    }
 }
 
 fn parse() -> Result<Option<(String, Options)>, lexopt::Error> {

@@ -253,7 +253,7 @@ mod tests {
         };
         let balls = pair(surfaces::ball(2_000), [0.7, 0.01, 0.02]);
         let solids = pair(solids::solid_ball(1_000), [0.6, 0.011, 0.017]);
-        let cubes = crate::commands::models(adversarial::boxes(100, 1).expect("valid"));
+        let cubes = crate::problem::models(adversarial::boxes(100, 1).expect("valid"));
         // A wave that moves vertices along its own travel folds the knot into itself.
         let fold = impinge_scenes::deform::Wave {
             amplitude: 0.1,

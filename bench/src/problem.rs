@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use impinge::{Backend, Detector, Elements, Method, Query, Scene, Settings, SharedVertex};
-use impinge_scenes::Model;
 use impinge_scenes::deform::Deform;
+use impinge_scenes::{BuiltScene, Model};
 
 use crate::Failure;
 
@@ -169,4 +169,34 @@ impl Problem {
         };
         Ok((scene, ids, query))
     }
+}
+
+/// The models of a built scene, to be posed again.
+pub fn models(built: BuiltScene) -> Result<Vec<Model>, Failure> {
+    built
+        .bodies
+        .iter()
+        .map(|&id| {
+            let body = built.scene.body(id)?;
+            match body.positions() {
+                impinge::Positions::F32(positions) => Ok(Model {
+                    positions: positions.clone(),
+                    elements: body.elements().clone(),
+                }),
+                impinge::Positions::F64(_) => Err("scenes are built in single precision".into()),
+            }
+        })
+        .collect()
+}
+
+/// A built scene as a problem: pairs between the bodies for two bodies, all pairs for more.
+pub fn posed(built: BuiltScene, about: &str) -> Result<Problem, Failure> {
+    let name = built.name.clone();
+    let models = models(built)?;
+    let ask = if models.len() == 2 {
+        Ask::Between
+    } else {
+        Ask::All
+    };
+    Ok(Problem::mirrored(&name, models, ask).about(about))
 }
