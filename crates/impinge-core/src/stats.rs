@@ -33,7 +33,7 @@ pub struct Statistics {
     /// `Cells`: entries of the cell lists, where a primitive counts once per cell. Primitives that no other body
     /// comes near may have none.
     pub n_entries: u64,
-    /// `Clusters`: clusters of all participants.
+    /// `Clusters`: clusters of all bodies that take part.
     pub n_clusters: u64,
     /// `Clusters` on the CPU: clusters that were proven to lie beside all other bodies, so that their boxes were not
     /// needed.

@@ -23,8 +23,8 @@ const GATE: u32 = 0x1000u;
 // The nodes of one height.
 struct Level { first: u32, count: u32 }
 
-// One participant. `slack`: by how many keys its boxes are widened, for rounded positions. In a step each layer of a
-// body is a participant:
+// One layer of the frame: of a body one, in a step up to three. `slack`: by how many keys its boxes are widened, for
+// rounded positions. In a step, the bits of `layer`:
 //
 //   layer  31             5      4        3       2     1   0
 //         +----------------+------------+--------+------+------+
