@@ -203,11 +203,10 @@ fn summarise(results: &[TileResult]) -> Result<(), Error> {
 fn merge(args: &MergeArgs) -> Result<(), Error> {
     let plan = Plan::open(&args.folder)?;
     let merged = plan.merge()?;
-    let files: Vec<String> = plan
-        .files()
-        .iter()
-        .map(|file| file.path.display().to_string())
-        .collect();
+    // As `plan` takes them: in a step, the start and the end of each body.
+    let files = plan.files().iter();
+    let paths = files.flat_map(|file| std::iter::once(&file.path).chain(&file.end));
+    let files: Vec<String> = paths.map(|path| path.display().to_string()).collect();
     let mut object = json!({
         "pairs": merged.n_pairs,
         "hash": hex(merged.hash),

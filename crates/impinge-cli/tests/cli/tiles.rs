@@ -127,6 +127,11 @@ fn a_step_gives_the_impacts_of_the_whole() {
         (&merged["pairs"], &merged["hash"]),
         (&expected["impacts"], &expected["hash"])
     );
+    let named = merged["files"].as_array().unwrap();
+    assert_eq!(named.len(), files.len());
+    for (path, file) in named.iter().zip(&files) {
+        assert!(path.as_str().unwrap().ends_with(file), "{path}, {file}");
+    }
     for key in ["free", "earliest", "touching_at_start"] {
         assert_eq!(merged["step"][key], expected[key], "{key}");
     }
