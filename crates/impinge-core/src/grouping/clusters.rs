@@ -86,11 +86,11 @@ impl Clustering {
         let corners = with_corners!(elements, |corners| gather(corners, &order).into());
         let (vertices, vertex_starts, local_faces) = match &corners {
             Elements::Triangles(faces) if with_local_faces => {
-                let unique = Unique::new(faces);
+                let unique = Unique::new(faces, true);
                 (unique.vertices, unique.starts, unique.corners)
             }
             corners => with_corners!(corners, |corners| {
-                let unique = Unique::new(corners);
+                let unique = Unique::new(corners, false);
                 (unique.vertices, unique.starts, Vec::new())
             }),
         };

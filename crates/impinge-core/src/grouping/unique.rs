@@ -28,16 +28,18 @@ pub(crate) struct Unique<const N: usize> {
     pub vertices: Vec<u32>,
     /// Where each cluster's run starts, and one past the last.
     pub starts: Vec<u32>,
+    /// The corners as numbers of these vertices, if they were asked for.
     pub corners: Vec<LocalCorners<N>>,
 }
 
 impl<const N: usize> Unique<N> {
-    /// From the corners in the order of the clusters.
-    pub fn new(corners: &[[u32; N]]) -> Self {
-        let blocks: Vec<Self> = corners.par_chunks(BLOCK * GROUP).map(of_block).collect();
+    /// From the corners in the order of the clusters; `with_corners`, if these are to be numbered too.
+    pub fn new(corners: &[[u32; N]], with_corners: bool) -> Self {
+        let blocks = corners.par_chunks(BLOCK * GROUP);
+        let blocks: Vec<Self> = blocks.map(|block| of_block(block, with_corners)).collect();
         let n_clusters = corners.len().div_ceil(GROUP);
         let n_vertices = blocks.iter().map(|block| block.vertices.len()).sum();
-        let mut all = Self::with_capacity(n_clusters, n_vertices);
+        let mut all = Self::with_capacity(n_clusters, n_vertices, with_corners);
         for block in blocks {
             let first = all.vertices.len() as u32;
             all.vertices.extend_from_slice(&block.vertices);
@@ -48,38 +50,40 @@ impl<const N: usize> Unique<N> {
         all
     }
 
-    fn with_capacity(n_clusters: usize, n_vertices: usize) -> Self {
+    fn with_capacity(n_clusters: usize, n_vertices: usize, with_corners: bool) -> Self {
         let mut starts = Vec::with_capacity(n_clusters + 1);
         starts.push(0);
         Unique {
             vertices: Vec::with_capacity(n_vertices),
             starts,
-            corners: Vec::with_capacity(n_clusters),
+            corners: Vec::with_capacity(if with_corners { n_clusters } else { 0 }),
         }
     }
 
-    fn push(&mut self, group: &[[u32; N]], table: &mut VertexTable) {
+    fn push(&mut self, group: &[[u32; N]], table: &mut VertexTable, with_corners: bool) {
         let mut local = [[0; GROUP]; N];
         table.number(group, &mut local);
         let start = self.vertices.len();
         let ranks = table.sort_into(&mut self.vertices);
-        for of_corner in &mut local {
-            for number in &mut of_corner[..group.len()] {
-                *number = ranks[usize::from(*number)];
+        if with_corners {
+            for of_corner in &mut local {
+                for number in &mut of_corner[..group.len()] {
+                    *number = ranks[usize::from(*number)];
+                }
             }
+            self.corners.push(local);
         }
-        self.corners.push(local);
         debug_assert!(self.vertices[start..].is_sorted());
         self.starts.push(self.vertices.len() as u32);
     }
 }
 
-fn of_block<const N: usize>(corners: &[[u32; N]]) -> Unique<N> {
+fn of_block<const N: usize>(corners: &[[u32; N]], with_corners: bool) -> Unique<N> {
     let mut table = VertexTable::default();
     let n_clusters = corners.len().div_ceil(GROUP);
-    let mut unique = Unique::with_capacity(n_clusters, n_clusters * GROUP);
+    let mut unique = Unique::with_capacity(n_clusters, n_clusters * GROUP, with_corners);
     for group in corners.chunks(GROUP) {
-        unique.push(group, &mut table);
+        unique.push(group, &mut table, with_corners);
     }
     unique
 }
@@ -201,7 +205,10 @@ mod tests {
             scattered(2 * BLOCK * GROUP + 1, u32::MAX - 1),
         ];
         for faces in cases {
-            let unique = Unique::new(&faces);
+            let unique = Unique::new(&faces, true);
+            let alone = Unique::new(&faces, false);
+            assert_eq!(alone.vertices, unique.vertices);
+            assert!(alone.starts == unique.starts && alone.corners.is_empty());
             assert_eq!(unique.starts.len(), faces.len().div_ceil(GROUP) + 1);
             for (cluster, group) in faces.chunks(GROUP).enumerate() {
                 let run = unique.starts[cluster] as usize..unique.starts[cluster + 1] as usize;
