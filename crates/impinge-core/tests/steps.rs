@@ -5,7 +5,8 @@ use std::ops::ControlFlow;
 use impinge_core::exact::{ElementPair, first_contact};
 use impinge_core::{
     Backend, BodyId, CancelToken, CandidateQuery, Candidates, Control, Detector, Elements, Error,
-    Method, NearQuery, PairKind, Part, Primitive, Query, Scene, Settings, Start, Step, Toi,
+    Method, NearQuery, PairKind, Part, Positions, Primitive, Query, Scene, Settings, Start, Step,
+    Toi,
 };
 
 const FACE: [[u32; 3]; 1] = [[0, 1, 2]];
@@ -311,6 +312,26 @@ fn candidates_in_runs_are_all_candidates_in_their_order() {
     }
 }
 
+/// The same step backwards.
+fn reversed(scene: &Scene) -> Scene {
+    let mut reversed = scene.clone();
+    for (id, body) in scene.bodies() {
+        let end = body.end_positions().expect("all move");
+        match (body.positions(), end) {
+            (Positions::F32(start), Positions::F32(end)) => {
+                reversed.set_positions(id, end).expect("good");
+                reversed.set_end_positions(id, start).expect("good");
+            }
+            (Positions::F64(start), Positions::F64(end)) => {
+                reversed.set_positions(id, end).expect("good");
+                reversed.set_end_positions(id, start).expect("good");
+            }
+            _ => unreachable!("one precision per body"),
+        }
+    }
+    reversed
+}
+
 /// The octants around a point, as half-open cells.
 fn octants(middle: [f64; 3]) -> impl Iterator<Item = [[f64; 3]; 2]> {
     (0..8).map(move |octant| {
@@ -348,7 +369,7 @@ fn touches_cell(
     };
     let end = body.end_positions().expect("all move");
     (0..3).all(|axis| {
-        let of_axis = |p: &impinge_core::Positions, v: u32| p.point(v as usize)[axis];
+        let of_axis = |p: &Positions, v: u32| p.point(v as usize)[axis];
         let ends = corners
             .iter()
             .flat_map(|&v| [of_axis(body.positions(), v), of_axis(end, v)]);
@@ -376,7 +397,8 @@ fn pairs_of_all_cells_are_the_pairs_of_the_whole() {
     // Coordinates are multiples of 2^-10 or less: boxes end at the cut.
     let middle = [2.0, 1.5, 1.75];
     for (is_double, separation) in [(false, 0.0), (true, 0.0), (false, 0.0625), (true, 0.0625)] {
-        let scene = crowd(is_double);
+        // Backwards: boxes over the step begin where elements end.
+        let scene = reversed(&crowd(is_double));
         let whole = Step::default().separation(separation);
         let near = |query| {
             NearQuery::new(query)
