@@ -20,7 +20,7 @@ use std::ops::Range;
 use crate::elements::{Kind, Part};
 use crate::error::Error;
 use crate::exact::Reach;
-use crate::hull::Extent;
+use crate::hull::{Extent, Pose};
 use crate::ids::BodyId;
 pub use crate::index::pair_key;
 use crate::index::{ElementIx, LayerIx, Number, pair_numbers};
@@ -231,6 +231,12 @@ impl Frame {
             (0.0, radius) => radius,
             (distance, radius) => (radius + (distance / 2.0).next_up()).next_up(),
         }
+    }
+
+    /// The pose of a layer: its boxes also reach by its [`margin`](Frame::margin).
+    #[inline(always)]
+    pub(crate) fn pose(&self, pose: Pose, layer: LayerIx) -> Pose {
+        pose.with_margin(self.margin(layer))
     }
 
     fn push_part(&mut self, scene: &Scene, query: &Query, part: Part) -> Result<(), Error> {

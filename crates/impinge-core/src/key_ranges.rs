@@ -22,7 +22,7 @@ use crate::sink;
 
 const KINDS: usize = PairKind::ALL.len();
 
-/// RangeParts of all ranges together, at most.
+/// Parts of all ranges together, at most.
 const MOST_PARTS: usize = 1 << 12;
 
 /// A range of keys per kind of pair.

@@ -4,7 +4,7 @@
 //! whose triangles are not certainly side by side. Two triangles that share a vertex are tested only if both have a
 //! fold.
 //!
-//! TurnsSeen along an axis, the triangles around a vertex are sectors of a plane. If they all turn the same way and together
+//! Seen along an axis, the triangles around a vertex are sectors of a plane. If they all turn the same way and together
 //! go around the vertex no more than once, no two sectors overlap, so no two triangles meet anywhere but in the simplex
 //! that they share. On a smooth surface nearly every vertex passes, also where neighbours lie in one plane: two exact
 //! comparisons and three products per triangle corner replace six pairs per triangle.
@@ -254,7 +254,7 @@ fn cross(from: &[f64; 3], to: &[f64; 3]) -> [(f64, f64); 3] {
     })
 }
 
-/// TurnsSeen along an axis, whether the turn from one arm to another is certainly to the left, and certainly to the right.
+/// Seen along an axis, whether the turn from one arm to another is certainly to the left, and certainly to the right.
 #[inline(always)]
 fn turn(axis: usize, from: &[f64; 3], to: &[f64; 3]) -> [bool; 2] {
     let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -275,7 +275,7 @@ fn turn_along(direction: &[f64; 3], from: &[f64; 3], to: &[f64; 3]) -> [bool; 2]
     [turn > bound, turn < -bound]
 }
 
-/// TurnsSeen along a direction, on which side of a line an arm certainly lies. Any line would do; on the image of a vector that
+/// Seen along a direction, on which side of a line an arm certainly lies. Any line would do; on the image of a vector that
 /// is like no other, meshes rarely have vertices.
 #[inline(always)]
 fn is_below_along(direction: &[f64; 3], arm: &[f64; 3]) -> Option<bool> {
@@ -286,7 +286,7 @@ fn is_below_along(direction: &[f64; 3], arm: &[f64; 3]) -> Option<bool> {
     }
 }
 
-/// TurnsSeen along an axis, which of two half-planes an arm points to: the one of angles from 0 up to but without 180 degrees,
+/// Seen along an axis, which of two half-planes an arm points to: the one of angles from 0 up to but without 180 degrees,
 /// or the other.
 #[inline(always)]
 fn is_below(axis: usize, arm: &[f64; 3]) -> bool {

@@ -2,7 +2,7 @@
 //!
 //! In: the hubs and axes of a body, and its positions. Out: pairs for the exact test.
 //!
-//! The boxes of all primitives around a hub v overlap there, so boxes in space separate nothing. SeenFrom from v, each
+//! The boxes of all primitives around a hub v overlap there, so boxes in space separate nothing. Seen from v, each
 //! primitive is a cone of directions, and two primitives that meet in a point other than v share the direction
 //! of that point. So each cone gets a box on the surface of the cube of all directions, and a tree over these
 //! boxes finds those that overlap:

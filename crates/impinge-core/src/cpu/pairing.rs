@@ -1,4 +1,4 @@
-//! SlabStages `pairing`: which primitives of two clusters have boxes that meet.
+//! Stage `pairing`: which primitives of two clusters have boxes that meet.
 //!
 //! In: work items (two clusters). Out: candidates, which `narrow` settles item by item, while both groups are in
 //! the cache.

@@ -13,7 +13,7 @@
 //! height 0        clusters of body 0 | of body 1 | …
 //! ```
 //!
-//! DeviceClusters is sent once; each frame sends the positions that have changed. For steps, `moving` sends layers of bodies instead of
+//! Topology is sent once; each frame sends the positions that have changed. For steps, `moving` sends layers of bodies instead of
 //! bodies, and boxes and positions at both ends.
 
 mod moving;

@@ -161,7 +161,7 @@ pub(super) fn refit<S: Send>(
     for (ix, layer) in frame.numbered_layers() {
         let body = frame.body(scene, ix);
         let cache = caches.at_mut(layer);
-        let pose = pose.with_margin(frame.margin(ix));
+        let pose = frame.pose(pose, ix);
         if cache.of == Some((body.step_stamp(), pose)) {
             continue;
         }
@@ -199,7 +199,7 @@ fn find_boxes<S: Send>(
     for (ix, layer) in frame.numbered_layers() {
         let body = frame.body(scene, ix);
         let cache = caches.at_mut(layer);
-        if cache.of == Some((body.step_stamp(), pose.with_margin(frame.margin(ix)))) {
+        if cache.of == Some((body.step_stamp(), frame.pose(pose, ix))) {
             continue;
         }
         cache.of = None;
@@ -235,7 +235,7 @@ fn find_boxes<S: Send>(
         let layer = frame.layer(task.layer);
         let clustering = &caches.at(layer).clustering;
         let body = frame.body(scene, task.layer);
-        let hull = Hull::new(body, pose.with_margin(frame.margin(task.layer)));
+        let hull = Hull::new(body, frame.pose(pose, task.layer));
         dispatch!(isa, find, (
             clustering: &Clustering = clustering,
             hull: Hull<'_> = hull,

@@ -5,7 +5,7 @@
 //! ```text
 //! touching   FirstContact: whether two elements touch during the step, and when first (search: the times)
 //! separated  the same where a distance is asked for
-//! overlaps   Overlap: whether the boxes over the whole step overlap
+//! overlaps   BoxOverlap: whether the boxes over the whole step overlap
 //! near       Within: whether two elements are within a distance at the start
 //! ```
 

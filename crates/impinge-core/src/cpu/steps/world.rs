@@ -103,7 +103,7 @@ impl<'a> World<'a> {
     #[inline(always)]
     pub(super) fn hull(&self, layer: LayerIx) -> Hull<'a> {
         let body = self.frame.body(self.scene, layer);
-        Hull::new(body, self.pose.with_margin(self.frame.margin(layer)))
+        Hull::new(body, self.frame.pose(self.pose, layer))
     }
 
     /// The cache of a layer.

@@ -83,7 +83,7 @@ pub(crate) fn nearest_of_elements(a: &[Point], b: &[Point]) -> NearestOfElements
     }
 }
 
-/// NearestFeatures points of two elements of one to three corners, and their distance: rounded as in
+/// Nearest points of two elements of one to three corners, and their distance: rounded as in
 /// [`closest_points`](super::closest_points).
 pub(crate) fn closest_of_elements(
     a: &[Point],
@@ -220,7 +220,7 @@ struct Nearby {
 }
 
 enum Way {
-    /// NearestFeatures points of a vertex and a face, or of two edges.
+    /// Nearest points of a vertex and a face, or of two edges.
     Between(Simple),
     /// Where an edge passes through a face.
     Crossing(Point),

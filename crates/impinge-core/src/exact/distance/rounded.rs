@@ -8,7 +8,7 @@ use crate::exact::Point;
 use crate::exact::algebra::{Coordinate, Integer, Whole, common_integers};
 use crate::exact::element_pair::ElementPair;
 
-/// NearestFeatures points of two elements.
+/// Nearest points of two elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Closest {
     /// The features that contain them; exact.
@@ -21,7 +21,7 @@ pub struct Closest {
     pub points: [Point; 2],
 }
 
-/// NearestFeatures points of two elements and their distance.
+/// Nearest points of two elements and their distance.
 ///
 /// The features are exact. Distance and points are computed in `f64` from exact quotients, in one order of operations: the
 /// same on every machine, but rounded. The points and their order are those of the [`ElementPair`].

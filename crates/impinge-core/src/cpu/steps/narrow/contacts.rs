@@ -19,11 +19,11 @@ pub(super) struct Open {
     pub search: Search,
 }
 
-/// FirstContacts found, and open pairs.
+/// Contacts found, and open pairs.
 #[derive(Debug, Default)]
 pub(crate) struct FirstContacts {
     pub(super) asked: Asked,
-    /// FirstContacts found, handed over in blocks.
+    /// Contacts found, handed over in blocks.
     found: FoundByKind,
     pub(super) counts: NarrowCounts,
     /// That many open pairs are enough.
@@ -58,9 +58,7 @@ impl FirstContacts {
         size_of::<Open>() * lists.iter().map(|list| list.capacity()).sum::<usize>()
             + size_of::<Found<Contact>>() * found
     }
-}
 
-impl FirstContacts {
     /// Hands over the contacts that were found.
     pub fn hand_over(&mut self, answer: StepAnswer<'_>) {
         for (kind, found) in PairKind::ALL.into_iter().zip(&mut self.found) {
@@ -68,11 +66,11 @@ impl FirstContacts {
         }
     }
 
-    /// FirstContacts later than this are not wanted.
+    /// Contacts later than this are not wanted.
     #[inline(always)]
     pub(super) fn until(&self, world: World<'_>) -> f64 {
         match self.asked.sought {
-            // FirstContacts that are later by less than rounding are wanted, for their keys may be lower.
+            // Contacts that are later by less than rounding are wanted, for their keys may be lower.
             Sought::Earliest => {
                 let time = world.known.earliest();
                 let later = (time * (1.0 + 2f64.powi(-22))).max(f64::from(f32::MIN_POSITIVE));
