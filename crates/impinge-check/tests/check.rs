@@ -1,10 +1,10 @@
 //! Counts compared with closed forms, with plain definitions, and with published numbers.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
 
 use impinge_check::{Counts, ErrorKind, Options, Problem, check_file, check_mesh};
 use impinge_io::{Elements, Mesh, Positions};
+use impinge_scenes::data::test_file;
 
 fn triangles(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Mesh {
     Mesh {
@@ -307,24 +307,16 @@ fn random_meshes_agree_with_the_definitions() {
     assert!(seen.iter().all(|&n| n > 0), "{seen:?}");
 }
 
-fn shared_data() -> PathBuf {
-    let given = std::env::var_os("IMPINGE_DATA").map(PathBuf::from);
-    given.unwrap_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"))
-}
-
+/// Fails if the data is absent, unless `IMPINGE_NO_DATA=1` is set.
 #[test]
 fn real_meshes_have_the_published_self_intersections() {
-    let text = match std::fs::read_to_string(shared_data().join("expected/self_intersections.json"))
-    {
-        Ok(text) => text,
-        Err(error) => {
-            eprintln!("skipped: the shared data is not here: {error}");
-            return;
-        }
+    let Some(path) = test_file("expected/self_intersections.json") else {
+        return;
     };
+    let text = std::fs::read_to_string(path).unwrap();
     let published: serde_json::Value = serde_json::from_str(&text).unwrap();
     for (name, expected) in published.as_object().unwrap() {
-        let row = check_file(&shared_data().join(name), &Options::default());
+        let row = check_file(&test_file(name).unwrap(), &Options::default());
         let counts = row.result.unwrap();
         let hits = ["hits_noshared", "hits_shared1", "hits_shared2"]
             .map(|key| expected[key].as_u64().unwrap());

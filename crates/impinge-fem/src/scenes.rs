@@ -239,8 +239,7 @@ mod tests {
 
     #[test]
     fn a_file_of_triangles_is_refused() {
-        let Some(path) = data::data_file("meshes/cow.off") else {
-            println!("skipped: the folder of shared data is absent");
+        let Some(path) = data::test_file("meshes/cow.off") else {
             return;
         };
         let error = build(SceneName::Bunny7k, Some(&path)).unwrap_err();

@@ -253,7 +253,7 @@ def test_candidates(detector):
 
 
 def test_candidates_in_runs(detector):
-    scene = lattice_step(40, 3)
+    scene = lattice_step(14, 3)
     question = {"kinds": ["vf", "ee", "ff"], "distance": 0.25}
     whole = detector.candidates(scene, **question)
     for most in [1000, 2**64 - 1, len(whole), 37]:
