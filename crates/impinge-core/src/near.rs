@@ -185,6 +185,11 @@ impl NearPairs {
         }));
     }
 
+    /// Bytes of the answer.
+    pub(crate) fn bytes(&self) -> u64 {
+        (size_of::<NearPair>() * self.pairs.capacity()) as u64
+    }
+
     pub(crate) fn pairs_mut(&mut self) -> &mut [NearPair] {
         &mut self.pairs
     }

@@ -15,6 +15,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::error::Error;
+use crate::impacts::KeysByKind;
 use crate::index::{Number, lower_number, pair_numbers};
 use crate::settings::Settings;
 use crate::sink;
@@ -56,9 +57,16 @@ impl Sorter {
         }
     }
 
+    /// Sorts the keys of each kind. Returns how many kinds were counted.
+    pub fn sort_kinds(&mut self, keys: &mut KeysByKind, n_numbers: u64, workers: &Workers) -> u64 {
+        let counted = keys.iter_mut();
+        let counted = counted.map(|keys| u64::from(self.sort(keys, n_numbers, workers)));
+        counted.sum()
+    }
+
     /// Sorts keys of numbers below `n_numbers`. Returns whether they were counted: few keys, and keys without memory for
     /// that, are sorted in place.
-    pub fn sort(&mut self, keys: &mut [u64], n_numbers: u64, workers: &Workers) -> bool {
+    fn sort(&mut self, keys: &mut [u64], n_numbers: u64, workers: &Workers) -> bool {
         let n_numbers = n_numbers as usize;
         let is_worth =
             keys.len() >= self.from.max(n_numbers / 2) && u32::try_from(keys.len()).is_ok();

@@ -125,28 +125,36 @@ impl<'a> Text<'a> {
     /// Skips `n` bytes, counting the lines in them.
     pub(crate) fn skip(&mut self, n: usize) {
         let end = self.bytes.len().min(self.offset.saturating_add(n));
-        self.line += self.bytes[self.offset..end]
-            .iter()
-            .filter(|&&b| b == b'\n')
-            .count() as u64;
+        self.line += (self.offset..end).filter(|&at| self.ends_line(at)).count() as u64;
         self.offset = end;
     }
 
-    /// The next line, ended by `\n`, `\r\n` or the end of the file; `None` at the end of the file.
+    /// Whether a line ends with the byte at this offset: `\n`, or a `\r` that no `\n` follows.
+    fn ends_line(&self, at: usize) -> bool {
+        match self.bytes.get(at) {
+            Some(b'\n') => true,
+            Some(b'\r') => self.bytes.get(at + 1) != Some(&b'\n'),
+            _ => false,
+        }
+    }
+
+    /// The next line, ended by `\n`, `\r\n`, `\r` or the end of the file; `None` at the end of the file.
     pub(crate) fn line(&mut self) -> Option<Line<'a>> {
         let rest = self.rest();
         if rest.is_empty() {
             return None;
         }
         let number = self.line;
-        let (taken, end) = match rest.iter().position(|&b| b == b'\n') {
-            Some(end) => (end + 1, end),
-            None => (rest.len(), rest.len()),
+        let end = rest.iter().position(|b| matches!(b, b'\n' | b'\r'));
+        let end = end.unwrap_or(rest.len());
+        let taken = match &rest[end..] {
+            [b'\r', b'\n', ..] => 2,
+            ended => ended.len().min(1),
         };
-        self.offset += taken;
-        self.line += u64::from(taken > end);
+        self.offset += end + taken;
+        self.line += u64::from(taken > 0);
         Some(Line {
-            bytes: rest[..end].strip_suffix(b"\r").unwrap_or(&rest[..end]),
+            bytes: &rest[..end],
             number,
         })
     }
@@ -176,11 +184,11 @@ impl<'a> Text<'a> {
     fn skip_space(&mut self) {
         while let Some(&byte) = self.bytes.get(self.offset) {
             if Some(byte) == self.comment {
-                while self.bytes.get(self.offset).is_some_and(|&b| b != b'\n') {
+                while self.offset < self.bytes.len() && !self.ends_line(self.offset) {
                     self.offset += 1;
                 }
             } else if is_space(byte) {
-                self.line += u64::from(byte == b'\n');
+                self.line += u64::from(self.ends_line(self.offset));
                 self.offset += 1;
             } else {
                 break;
@@ -229,23 +237,31 @@ mod tests {
 
     #[test]
     fn lines_are_counted_and_trimmed() {
-        let mut text = Text::new(Name("t"), b"a b\r\n\n# c\n d # e\nlast");
-        assert_eq!(
-            text.line().map(|l| (l.bytes, l.number)),
-            Some((&b"a b"[..], 1))
-        );
-        let line = text.content_line(b'#').unwrap();
-        assert_eq!((line.words().next(), line.number), (Some(&b"d"[..]), 4));
-        assert_eq!(
-            text.line().map(|l| (l.bytes, l.number)),
-            Some((&b"last"[..], 5))
-        );
-        assert!(text.line().is_none());
+        for bytes in [
+            &b"a b\r\n\n# c\n d # e\nlast"[..],
+            b"a b\r\r# c\r d # e\rlast",
+        ] {
+            let mut text = Text::new(Name("t"), bytes);
+            assert_eq!(
+                text.line().map(|l| (l.bytes, l.number)),
+                Some((&b"a b"[..], 1))
+            );
+            let line = text.content_line(b'#').unwrap();
+            assert_eq!((line.words().next(), line.number), (Some(&b"d"[..]), 4));
+            assert_eq!(
+                text.line().map(|l| (l.bytes, l.number)),
+                Some((&b"last"[..], 5))
+            );
+            assert!(text.line().is_none());
+            let mut skipped = Text::new(Name("t"), bytes);
+            skipped.skip(bytes.len());
+            assert_eq!(skipped.place(), Place::Line(5));
+        }
     }
 
     #[test]
     fn words_cross_lines_and_skip_comments() {
-        let mut text = Text::new(Name("t"), b"1 2# no\n\n 3").with_comments(b'#');
+        let mut text = Text::new(Name("t"), b"1 2# no\r\r\n 3").with_comments(b'#');
         let numbers: Vec<(u32, Place)> = (0..3)
             .map(|_| (text.number("n").unwrap(), text.place()))
             .collect();

@@ -114,10 +114,9 @@ impl Detector {
         }
         let collect = Instant::now();
         let (mut keys, _) = answer.finish()?;
-        let mut n_counted = 0;
-        for (kind, keys) in PairKind::ALL.into_iter().zip(&mut keys) {
-            n_counted += u64::from(sorter.sort(keys, frame.n_primitives(), workers));
-            near.extend(kind, keys.iter().copied());
+        let n_counted = sorter.sort_kinds(&mut keys, frame.n_primitives(), workers);
+        for (kind, keys) in PairKind::ALL.into_iter().zip(keys) {
+            near.extend(kind, keys.into_iter());
         }
         let ms = collect.elapsed().as_secs_f64() * 1e3;
         near.stats_mut().add_ms("collect", ms);
@@ -145,8 +144,9 @@ impl Detector {
         });
         drop(tasks);
         control.step(n_tasks as u64, n_tasks as u64)?;
+        let bytes = near.bytes() + sorter.bytes();
         let stats = near.stats_mut();
-        stats.bytes_held += sorter.bytes();
+        stats.bytes_held += bytes;
         workers.report(&mut stats.ways);
         stats.add_ms("features", features.elapsed().as_secs_f64() * 1e3);
         stats.total_ms = start.elapsed().as_secs_f64() * 1e3;

@@ -272,11 +272,8 @@ impl RunSearch<'_> {
         (*keys, n) = self.answer.finish()?;
         let collect = Instant::now();
         let workers = self.question.workers;
-        let mut n_counted = 0;
-        for keys in keys.iter_mut() {
-            let n_numbers = self.frame.n_primitives();
-            n_counted += u64::from(self.sorter.sort(keys, n_numbers, workers));
-        }
+        let n_numbers = self.frame.n_primitives();
+        let n_counted = self.sorter.sort_kinds(keys, n_numbers, workers);
         let ms = collect.elapsed().as_secs_f64() * 1e3;
         let bytes = candidates.bytes() + self.sorter.bytes();
         let (_, stats) = candidates.parts_mut();
