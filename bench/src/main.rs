@@ -25,6 +25,7 @@ mod plain;
 mod problem;
 mod report;
 mod runner;
+mod step_sizes;
 mod steps;
 #[cfg_attr(not(any(feature = "embree", feature = "parry")), allow(dead_code))]
 mod tune;
@@ -54,6 +55,7 @@ commands:
   regular       self-collision of flat and regular surfaces, as ratios to a rough one
   steps         contacts of moving cloth: all, the earliest, any, how far a step can be taken, pairs of boxes;
                 --scene cloth-ball|cloth-funnel
+  step-sizes    the same questions about two layers of cloth of 10^3 to 10^6 faces: time and memory against size
   once          the first frame of a new detector, by each method: --scene ball|bunny|buddha|dragon
   gpu           the scenes of two-body and self on a GPU: stages on the device beside a lower bound
   device        prints the name of the GPU in a form for --record
@@ -62,7 +64,8 @@ options:
   --scene NAME       one scene only (two-body, motion, self, adversarial)
   --frames N         timed frames of each contestant (default 40; fewer for large scenes)
   --turn N           frames of one contestant in a row (default 10); with 1 all caches are cold
-  --size N           adversarial, regular: primitives (default 1,000,000 and 80,000); sizes, bodies: the largest size
+  --size N           adversarial, regular: primitives (default 1,000,000 and 80,000); sizes, step-sizes, bodies:
+                     the largest size
   --threads N        threads of impinge (default: all)
   --placement NAME   where its helper threads run: auto (default), inherited; in a contest also both, which take turns
   --backend NAME     cpu (default), gpu or auto
