@@ -9,11 +9,14 @@
 //! keys       | 2 3 | 2 7 | 5 6 | 5 9 |   each run sorted, and written back
 //! ```
 //!
+//! Short runs are sorted sixteen at a time, one per lane of a register, by a network of exchanges.
+//!
 //! Memory, kept from answer to answer: four bytes per key, and per number and part.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use crate::cpu::simd::{Isa, Simd, dispatch};
 use crate::error::Error;
 use crate::impacts::KeysByKind;
 use crate::index::{Number, lower_number, pair_numbers};
@@ -25,6 +28,12 @@ use crate::workers::Workers;
 const TASK: usize = 1 << 14;
 /// Each part has counts of its own, so there are few.
 const MOST_PARTS: usize = 4;
+/// Runs that are sorted at the same time.
+const LANES: usize = 16;
+/// Longer runs are sorted one by one.
+const LONGEST: usize = 256;
+/// Runs of a batch have about the same length: up to 32, 64, 128 and 256 keys.
+const N_BATCHES: usize = 4;
 
 /// The memory to sort in.
 #[derive(Debug)]
@@ -33,6 +42,7 @@ pub(crate) struct Sorter {
     in_place: bool,
     /// With fewer keys, one thread sorts them in place.
     from: usize,
+    isa: Isa,
     /// Of each part and number: how many partners, then where the next one goes.
     parts: Vec<Vec<u32>>,
     partners: Vec<AtomicU32>,
@@ -52,6 +62,7 @@ impl Sorter {
         Sorter {
             in_place: settings.memory_budget.is_some(),
             from: settings.tuning.sort_from.max(1),
+            isa: Isa::detect(settings.instruction_set),
             parts: Vec::new(),
             partners: Vec::new(),
         }
@@ -103,10 +114,11 @@ impl Sorter {
         let ends = &parts[n_parts - 1];
         let tasks = tasks(keys, partners, ends, workers.task(TASK));
         let tasks: Vec<_> = tasks.map(Mutex::new).collect();
-        let mut runs = vec![Vec::new(); workers.n()];
-        workers.for_each(&mut runs, tasks.len(), |run, ix| {
+        let isa = self.isa;
+        workers.for_each(&mut vec![(); workers.n()], tasks.len(), |(), ix| {
             if let Ok(mut task) = tasks[ix].lock() {
-                task.run(run);
+                let task = &mut *task;
+                dispatch!(isa, sort_runs, (task: &mut Task<'_> = task));
             }
         });
         true
@@ -177,29 +189,124 @@ fn tasks<'a>(
     })
 }
 
-impl Task<'_> {
-    /// Sorts the runs, each in the memory given.
-    fn run(&mut self, sorted: &mut Vec<u32>) {
-        let n = self.keys.len();
-        // Of the keys before this task.
-        let offset = self.ends[self.ends.len() - 1] as usize - n;
-        let mut start = 0;
-        let numbers = Number::each(self.first..self.first + self.ends.len());
-        for (lower, &end) in numbers.zip(self.ends) {
-            let run = start..end as usize - offset;
-            start = run.end;
-            sorted.clear();
-            let partners = &self.partners[run.clone()];
-            sorted.extend(
-                partners
-                    .iter()
-                    .map(|partner| partner.load(Ordering::Relaxed)),
-            );
-            sorted.sort_unstable();
-            for (key, &partner) in self.keys[run].iter_mut().zip(&*sorted) {
-                *key = lower.key_with(Number::new(partner));
+/// Sorts the runs of a task.
+#[inline(always)]
+fn sort_runs(_: impl Simd, task: &mut Task<'_>) {
+    let Task {
+        keys,
+        partners,
+        first,
+        ends,
+    } = task;
+    // Of the keys before this task.
+    let offset = ends[ends.len() - 1] as usize - keys.len();
+    let mut batches = [const { Batch::new() }; N_BATCHES];
+    let mut start = 0;
+    for (lower, &end) in Number::each(*first..*first + ends.len()).zip(*ends) {
+        let run = start..end as usize - offset;
+        start = run.end;
+        let partners = &partners[run.clone()];
+        if partners.len() < 2 || partners.len() > LONGEST {
+            let keys = &mut keys[run];
+            for (key, partner) in keys.iter_mut().zip(partners) {
+                *key = lower.key_with(Number::new(partner.load(Ordering::Relaxed)));
+            }
+            keys.sort_unstable();
+            continue;
+        }
+        let more_than_32 = (partners.len() - 1) / 32;
+        let batch = &mut batches[more_than_32.checked_ilog2().map_or(0, |log| log as usize + 1)];
+        batch.add(lower, run.start, partners);
+        if batch.n == LANES {
+            batch.write(keys);
+        }
+    }
+    for batch in &mut batches {
+        batch.write(keys);
+    }
+}
+
+/// One partner of each run.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Row([u32; LANES]);
+
+/// Behind the end of every run.
+const END: Row = Row([u32::MAX; LANES]);
+
+/// Short runs, one per lane.
+struct Batch {
+    rows: [Row; LONGEST],
+    /// The lower number of each run, where its keys go, and how many.
+    runs: [(Number, usize, usize); LANES],
+    n: usize,
+    /// The length of the longest run.
+    n_rows: usize,
+}
+
+impl Batch {
+    const fn new() -> Self {
+        Batch {
+            rows: [END; LONGEST],
+            runs: [(Number::new(0), 0, 0); LANES],
+            n: 0,
+            n_rows: 0,
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, lower: Number, start: usize, partners: &[AtomicU32]) {
+        let lane = self.n;
+        for (row, partner) in self.rows.iter_mut().zip(partners) {
+            row.0[lane] = partner.load(Ordering::Relaxed);
+        }
+        self.runs[lane] = (lower, start, partners.len());
+        self.n += 1;
+        self.n_rows = self.n_rows.max(partners.len());
+    }
+
+    /// Sorts the runs and writes their keys. The batch is empty afterwards.
+    #[inline(always)]
+    fn write(&mut self, keys: &mut [u64]) {
+        let rows = &mut self.rows[..self.n_rows];
+        sort_lanes(rows);
+        for (lane, &(lower, start, n)) in self.runs[..self.n].iter().enumerate() {
+            for (key, row) in keys[start..start + n].iter_mut().zip(&*rows) {
+                *key = lower.key_with(Number::new(row.0[lane]));
             }
         }
+        rows.fill(END);
+        (self.n, self.n_rows) = (0, 0);
+    }
+}
+
+/// Sorts each lane by Batcher's merge exchange: Knuth, The Art of Computer Programming, volume 3, section 5.2.2,
+/// algorithm M. Which rows are compared depends on how many there are, and on nothing else.
+#[inline(always)]
+fn sort_lanes(rows: &mut [Row]) {
+    let half = rows.len().next_power_of_two() / 2;
+    let mut p = half;
+    while p > 0 {
+        let (mut q, mut r, mut d) = (half, 0, p);
+        loop {
+            let mut block = r;
+            while block + d < rows.len() {
+                for low in block..(block + p).min(rows.len() - d) {
+                    let (Row(a), Row(b)) = (rows[low], rows[low + d]);
+                    for lane in 0..LANES {
+                        rows[low].0[lane] = a[lane].min(b[lane]);
+                        rows[low + d].0[lane] = a[lane].max(b[lane]);
+                    }
+                }
+                block += 2 * p;
+            }
+            if q == p {
+                break;
+            }
+            (d, r) = (q - p, p);
+            q /= 2;
+        }
+        p /= 2;
     }
 }
 
