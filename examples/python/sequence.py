@@ -1,4 +1,4 @@
-"""Two bodies that deform into each other: a progress bar, and a plot of pairs a frame.
+"""Two bodies that deform into each other: a progress bar, and a plot of pairs per frame.
 
     python sequence.py --frames 120 --plot pairs.png
 

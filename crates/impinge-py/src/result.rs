@@ -196,7 +196,7 @@ impl Answer {
         to_array(py, py.detach(|| self.pairs_within(body))?)
     }
 
-    /// numpy.ndarray of uint32, shape (n, 4) : all pairs, sorted, one a row: number of a body,
+    /// numpy.ndarray of uint32, shape (n, 4) : all pairs, sorted, one per row: number of a body,
     /// its primitive, number of the other body, its primitive. A new array at each access.
     #[getter]
     pub fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
