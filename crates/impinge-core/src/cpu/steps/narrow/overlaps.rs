@@ -3,15 +3,16 @@
 //! Stage `pairing` has tested boxes in `f32` that were rounded outward; here they are tested as they are.
 
 use crate::cpu::simd::Isa;
+use crate::elements::Elements;
 use crate::frame::pair_key;
-use crate::hull::Extent;
+use crate::hull::{Extent, Hull};
 use crate::impacts::StepAnswer;
-use crate::index::{LayerIx, Number, Place};
+use crate::index::{Number, Place};
 use crate::narrow::are_near;
 
 use super::super::group::Group;
 use super::super::world::World;
-use super::batch::{Batch, Keys, Narrow, NarrowCounts, element};
+use super::batch::{Batch, Keys, Narrow, NarrowCounts};
 
 /// The test of one worker.
 #[derive(Debug, Default)]
@@ -46,13 +47,17 @@ impl Narrow for Overlaps {
             }
             return self.keys.hand_over(world, between.kind);
         }
+        let sides = [between.a, between.b].map(|layer| LayerSide {
+            elements: &world.cache(layer).clustering.corners,
+            hull: world.hull(layer),
+        });
         for ix in 0..batch.met.len() {
             let lanes = batch.met.lanes(ix);
             let [a, b] = if is_in_tables {
                 [0, 1].map(|side| batch.groups[side].extent(lanes[side].into()))
             } else {
                 let [a, b] = batch.places(ix);
-                [extent(world, between.a, a), extent(world, between.b, b)]
+                [sides[0].extent(a), sides[1].extent(b)]
             };
             let key = key_in(batch.groups, lanes);
             if are_near(&a, &b, distance) && world.frame.is_owned(world.scene, key) {
@@ -80,11 +85,16 @@ fn key_in([a, b]: [&Group; 2], [lane_a, lane_b]: [u8; 2]) -> u64 {
     )
 }
 
-/// The extent of an element over the whole step.
-fn extent(world: World<'_>, layer: LayerIx, place: Place) -> Extent {
-    let (corners, ends) = element(world, layer, place);
-    let points = corners
-        .iter()
-        .flat_map(|&corner| ends.map(|positions| positions.point(corner as usize)));
-    Extent::of(points)
+/// The elements of a layer, and what makes their boxes.
+struct LayerSide<'a> {
+    elements: &'a Elements,
+    hull: Hull<'a>,
+}
+
+impl LayerSide<'_> {
+    /// The box of an element over the whole step.
+    #[inline(always)]
+    fn extent(&self, place: Place) -> Extent {
+        self.hull.extent(self.elements.corners(place.index()))
+    }
 }
