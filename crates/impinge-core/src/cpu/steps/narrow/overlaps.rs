@@ -3,15 +3,13 @@
 //! Stage `pairing` has tested boxes in `f32` that were rounded outward; here they are tested as they are.
 
 use crate::cpu::simd::Isa;
-use crate::frame::pair_key;
 use crate::hull::Extent;
 use crate::impacts::StepAnswer;
-use crate::index::{LayerIx, Number, Place};
+use crate::index::{LayerIx, Place};
 use crate::narrow::are_near;
 
-use super::super::group::Group;
 use super::super::world::World;
-use super::batch::{Batch, Keys, Narrow, NarrowCounts, element};
+use super::batch::{Batch, Keys, Narrow, NarrowCounts, element, key_in};
 
 /// The test of one worker.
 #[derive(Debug, Default)]
@@ -69,15 +67,6 @@ impl Narrow for Overlaps {
     fn counts(&self) -> NarrowCounts {
         NarrowCounts::default()
     }
-}
-
-/// The key of a pair, by its lanes in two groups.
-#[inline(always)]
-fn key_in([a, b]: [&Group; 2], [lane_a, lane_b]: [u8; 2]) -> u64 {
-    pair_key(
-        Number::new(a.numbers.0[usize::from(lane_a)]),
-        Number::new(b.numbers.0[usize::from(lane_b)]),
-    )
 }
 
 /// The extent of an element over the whole step.
