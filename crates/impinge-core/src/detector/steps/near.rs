@@ -129,7 +129,7 @@ impl Detector {
         }
         let collect = Instant::now();
         let (mut keys, _) = answer.finish()?;
-        let n_counted = sorter.sort_kinds(&mut keys, frame.n_primitives(), workers);
+        let n_counted = sorter.sort_kinds(&mut keys, frame, workers);
         let stats = near.stats_mut();
         stats.add_ms("collect", collect.elapsed().as_secs_f64() * 1e3);
         stats.ways.n_counted = n_counted;
