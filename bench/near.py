@@ -2,6 +2,7 @@
 
     python bench/near.py                     # all scenes whose meshes exist
     python bench/near.py --rounds 5 --json near.json --markdown near.md
+    python bench/near.py --only near         # elements alone, or distances alone
 
 It installs nothing, names missing peers, and looks for meshes in $IMPINGE_DATA or ../shared/data.
 
@@ -432,22 +433,32 @@ def tables(record):
             cells += [f"{times[1] / ours[1]:,.1f}", f"{times[3] / ours[3]:,.1f}"]
             lines.append("| " + " | ".join(cells) + " |")
     lines += ["", "Ratios are of processor time.", ""]
+    lines = lines if record["distances"] else []
+    if not record["near"]:
+        return "\n".join(lines)
     lines += ["### Elements within a distance, milliseconds", ""]
-    lines += ["| scene | faces | distance | | pairs | wall | processor | processor / ours |"]
-    lines += ["|---|---:|---:|---|---:|---:|---:|---:|"]
+    lines += ["| scene | faces | distance | | pairs | wall | processor | wall / ours | processor / ours |"]
+    lines += ["|---|---:|---:|---|---:|---:|---:|---:|---:|"]
     for scene in record["near"]:
-        ours = scene["rows"]["impinge"]["cpu"]
+        ours = scene["rows"]["impinge"]
         for label, row in scene["rows"].items():
             cells = [scene["scene"], f"{scene['n_faces']:,}", f"{scene['distance']:.4g}", label]
             cells += [f"{row.get('pairs', scene['pairs']):,.0f}", milliseconds(row["wall"])]
-            cells += [milliseconds(row["cpu"]), f"{row['cpu'] / ours:,.1f}"]
+            cells += [milliseconds(row["cpu"])]
+            cells += [f"{row[key] / ours[key]:,.1f}" for key in ["wall", "cpu"]]
             lines.append("| " + " | ".join(cells) + " |")
+    lines += ["", "Pairs whose collisions in ipc-toolkit differ:", ""]
+    for scene in record["near"]:
+        differences = scene.get("differences", ["not compared"])
+        lines += [f"* {scene['scene']}, {scene['distance']:.4g}: {len(differences)}"]
+        lines += [f"  * {difference}" for difference in differences]
     return "\n".join(lines)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--only", choices=["near", "distances"], help="one of the two questions")
     parser.add_argument("--json", type=pathlib.Path, help="write all figures to this file")
     parser.add_argument("--markdown", type=pathlib.Path, help="write the tables to this file")
     arguments = parser.parse_args()
@@ -461,16 +472,12 @@ def main():
     _, rumba_faces = read_ply(data / "sequences" / "rumba.ply")
     rumba = read_frame(data / "sequences" / "rumba.pc2", 60)
     rounds = arguments.rounds
-    record = {
-        "machine": machine(),
-        "near": [
-            near("cloth-ball", cloth_vertices, cloth_faces, 1e-3, rounds, missing),
-            near("cloth-ball", cloth_vertices, cloth_faces, 2e-3, rounds, missing),
-            near("rumba", rumba, rumba_faces, 1e-3, rounds, missing),
-            near("rumba", rumba, rumba_faces, 2e-3, rounds, missing),
-        ],
-        "distances": distances(data, rounds, missing),
-    }
+    record = {"machine": machine(), "near": [], "distances": []}
+    if arguments.only != "distances":
+        meshes = [("cloth-ball", cloth_vertices, cloth_faces), ("rumba", rumba, rumba_faces)]
+        record["near"] = [near(*mesh, part, rounds, missing) for mesh in meshes for part in [1e-3, 2e-3]]
+    if arguments.only != "near":
+        record["distances"] = distances(data, rounds, missing)
     for error in sorted(missing):
         print(f"missing: {error}", file=sys.stderr)
     text = tables(record)
