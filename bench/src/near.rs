@@ -73,6 +73,9 @@ trait Peer {
     fn find(&mut self, distance: f64) -> Result<&[Row], Failure>;
 }
 
+/// Peers, each with the kind of pairs that it finds.
+type Peers = Vec<(PairKind, Box<dyn Peer>)>;
+
 /// A mesh, as peers get it.
 #[cfg_attr(
     not(any(feature = "embree", feature = "parry")),
@@ -88,8 +91,8 @@ struct Mesh<'a> {
     not(any(feature = "embree", feature = "parry")),
     allow(unused, reason = "no peers")
 )]
-fn peers(mesh: &Mesh<'_>, n_threads: usize) -> Result<Vec<(PairKind, Box<dyn Peer>)>, Failure> {
-    let mut peers: Vec<(PairKind, Box<dyn Peer>)> = Vec::new();
+fn peers(mesh: &Mesh<'_>, n_threads: usize) -> Result<Peers, Failure> {
+    let mut peers = Peers::new();
     #[cfg(feature = "embree")]
     for is_refitted in [false, true] {
         let peer = embree::Points::new(mesh, is_refitted, n_threads)?;

@@ -180,9 +180,10 @@ impl Peer for Points {
                         square: distance * distance,
                         rows: Vec::new(),
                     };
-                    for vertex in task * TASK..positions.len().min((task + 1) * TASK) {
+                    let vertices = positions.iter().enumerate();
+                    for (vertex, &position) in vertices.skip(task * TASK).take(TASK) {
                         query.vertex = vertex as u32;
-                        query.point = point(positions[vertex]);
+                        query.point = point(position);
                         scene.ask(&mut query, radius);
                     }
                     query.rows
