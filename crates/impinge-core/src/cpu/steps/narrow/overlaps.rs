@@ -4,15 +4,13 @@
 
 use crate::cpu::simd::Isa;
 use crate::elements::Elements;
-use crate::frame::pair_key;
 use crate::hull::{Extent, Hull};
 use crate::impacts::StepAnswer;
-use crate::index::{Number, Place};
+use crate::index::Place;
 use crate::narrow::are_near;
 
-use super::super::group::Group;
 use super::super::world::World;
-use super::batch::{Batch, Keys, Narrow, NarrowCounts};
+use super::batch::{Batch, Keys, Narrow, NarrowCounts, key_in};
 
 /// The test of one worker.
 #[derive(Debug, Default)]
@@ -74,15 +72,6 @@ impl Narrow for Overlaps {
     fn counts(&self) -> NarrowCounts {
         NarrowCounts::default()
     }
-}
-
-/// The key of a pair, by its lanes in two groups.
-#[inline(always)]
-fn key_in([a, b]: [&Group; 2], [lane_a, lane_b]: [u8; 2]) -> u64 {
-    pair_key(
-        Number::new(a.numbers.0[usize::from(lane_a)]),
-        Number::new(b.numbers.0[usize::from(lane_b)]),
-    )
 }
 
 /// The elements of a layer, and what makes their boxes.
