@@ -697,8 +697,8 @@ fn damaged_kernels_are_noticed() {
         ),
         (
             "narrow_moving",
-            "UnsureKey(candidate.a & ~FLAG,",
-            "UnsureKey(candidate.a,",
+            "let a = candidate.a & ~FLAG;\n    let b = candidate.b & ~FLAG;\n    if params",
+            "let a = candidate.a;\n    let b = candidate.b & ~FLAG;\n    if params",
         ),
     ] {
         assert_ne!(damaged(&scenes, damage), truth, "{damage:?}");

@@ -94,8 +94,10 @@ bindings! {
         candidates: Read<Candidate>,
         corners: Read<Corners>,
         positions: Read<Coordinate>,
+        order: Read<Order>,
         unsure: Write<UnsureKey>,
         counters: Write<Counter>,
+        params: Uniform<Params>,
     }
 }
 

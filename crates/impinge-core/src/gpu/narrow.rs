@@ -43,8 +43,10 @@ impl Settling {
                         candidates: room.candidates.read(),
                         corners: world.corners.read(),
                         positions: world.positions.read(),
+                        order: world.order.read(),
                         unsure: room.unsure.write_to(),
                         counters: room.counters.write_to(),
+                        params: steps.params(),
                     },
                 ),
             };
@@ -71,14 +73,15 @@ impl Settling {
         }
     }
 
-    /// Plans the stage and returns its step.
-    pub fn plan(steps: &mut Steps, room: &Room) -> u32 {
+    /// Plans the stage and returns its step. `by_number`: the pairs of a step are named by global numbers.
+    pub fn plan(steps: &mut Steps, room: &Room, by_number: bool) -> u32 {
         steps.push(Params {
             counter: N_CANDIDATES,
             per_group: GROUP,
             // Capacities fit 32 bits.
             capacity: room.capacities().candidates as u32,
             slot: SLOT,
+            by_number: u32::from(by_number),
             ..Params::default()
         })
     }

@@ -1,7 +1,7 @@
 // Stage `narrow` of a step: which candidates certainly do not touch while they move.
 //
-// In: candidates. Out: the places of all others, which the host settles. One thread per candidate.
-// Cost: 32 bytes of corners and 96 of positions read.
+// In: candidates. Out: all others, by their places for the host, which settles them, or by global numbers for the caller's
+// shaders. One thread per candidate. Cost: 32 bytes of corners and 96 of positions read.
 // Invariant: what is dropped is proven not to touch, whatever the device's rounding (`docs/exactness.md`).
 //
 // A vertex repeats itself, an edge its second end, a face its third corner. So an edge and a vertex are two edges of
@@ -10,8 +10,10 @@
 @group(0) @binding(0) var<storage, read> candidates: array<Candidate>;
 @group(0) @binding(1) var<storage, read> corners: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> positions: array<u32>;
-@group(0) @binding(3) var<storage, read_write> unsure: array<UnsureKey>;
-@group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(3) var<storage, read> order: array<u32>;
+@group(0) @binding(4) var<storage, read_write> unsure: array<UnsureKey>;
+@group(0) @binding(5) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(6) var<uniform> params: Params;
 
 var<workgroup> n_unsure: atomic<u32>;
 var<workgroup> first_unsure: u32;
@@ -68,6 +70,15 @@ fn may_touch(candidate: Candidate) -> bool {
     return !never_touch(&polygon, are_edges, narrowing);
 }
 
+fn name_of(candidate: Candidate) -> UnsureKey {
+    let a = candidate.a & ~FLAG;
+    let b = candidate.b & ~FLAG;
+    if params.by_number == 0u {
+        return UnsureKey(a, b);
+    }
+    return UnsureKey(min(order[a], order[b]), max(order[a], order[b]));
+}
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -98,7 +109,7 @@ fn main(
     if is_left {
         place += first_unsure;
         if place < arrayLength(&unsure) {
-            unsure[place] = UnsureKey(candidate.a & ~FLAG, candidate.b & ~FLAG);
+            unsure[place] = name_of(candidate);
         }
     }
 }
