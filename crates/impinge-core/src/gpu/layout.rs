@@ -35,10 +35,12 @@ words! {
     WorkItem { a: u32, b: u32 }
     /// Two places, with flags.
     Candidate { a: u32, b: u32 }
-    /// Two global primitive numbers that certainly intersect.
+    /// Two global primitive numbers that certainly intersect; in a step, two places of a pair that is searched, with flags.
     PairKey { low: u32, high: u32 }
     /// Two global primitive numbers left to exact arithmetic; in a step that the host settles, two places.
     UnsureKey { low: u32, high: u32 }
+    /// A time of a step: the bits of an f32.
+    Time { bits: u32 }
     /// Parameters of one dispatch.
     Params {
         first: u32, count: u32,

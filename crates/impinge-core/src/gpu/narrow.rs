@@ -1,7 +1,7 @@
 //! Stage `narrow`: the filter over all candidates, for both methods and for steps.
 
-use super::kernels::{Narrow, NarrowMoving, Prepare};
-use super::layout::{N_CANDIDATES, Params, ROUNDS};
+use super::kernels::{Narrow, NarrowMoving, NarrowSearch, Prepare};
+use super::layout::{N_CANDIDATES, N_PAIRS, Params, ROUNDS};
 use super::open::Gpu;
 use super::pipeline::{Bound, Workgroups};
 use super::room::Room;
@@ -10,14 +10,17 @@ use super::world::World;
 
 /// Candidates per workgroup.
 const GROUP: u32 = 64;
-/// The slot of this stage's arguments.
+/// The slot of this stage's arguments, and that of a search.
 const SLOT: u32 = ROUNDS + 1;
+const SLOT_OF_SEARCH: u32 = ROUNDS + 2;
 
 /// The kernels with their buffers.
 #[derive(Debug)]
 pub struct Settling {
     prepare: Bound,
     narrow: Bound,
+    /// In a step: the search of pairs that are left.
+    search: Option<Bound>,
 }
 
 /// Binds `prepare`, for any stage.
@@ -35,21 +38,7 @@ pub fn prepare(gpu: &Gpu, room: &Room, steps: &Steps) -> Bound {
 impl Settling {
     pub fn new(gpu: &Gpu, world: &World, room: &Room, steps: &Steps) -> Self {
         if world.is_moving() {
-            return Settling {
-                prepare: prepare(gpu, room, steps),
-                narrow: gpu.kernels.narrow_moving.bind(
-                    gpu,
-                    &NarrowMoving {
-                        candidates: room.candidates.read(),
-                        corners: world.corners.read(),
-                        positions: world.positions.read(),
-                        order: world.order.read(),
-                        unsure: room.unsure.write_to(),
-                        counters: room.counters.write_to(),
-                        params: steps.params(),
-                    },
-                ),
-            };
+            return Settling::of_step(gpu, world, room, steps);
         }
         // Scenes without tetrahedra use a kernel without the code for solids, and the registers it needs.
         let narrow = match world.has_solids {
@@ -70,25 +59,60 @@ impl Settling {
                     counters: room.counters.write_to(),
                 },
             ),
+            search: None,
         }
     }
 
-    /// Plans the stage and returns its step. `by_number`: the pairs of a step are named by global numbers.
+    fn of_step(gpu: &Gpu, world: &World, room: &Room, steps: &Steps) -> Self {
+        let narrow = NarrowMoving {
+            candidates: room.candidates.read(),
+            corners: world.corners.read(),
+            positions: world.positions.read(),
+            pairs: room.pairs.write_to(),
+            counters: room.counters.write_to(),
+        };
+        let search = NarrowSearch {
+            pairs: room.pairs.read(),
+            corners: world.corners.read(),
+            positions: world.positions.read(),
+            order: world.order.read(),
+            unsure: room.unsure.write_to(),
+            times: room.times.write_to(),
+            counters: room.counters.write_to(),
+            params: steps.params(),
+        };
+        Settling {
+            prepare: prepare(gpu, room, steps),
+            narrow: gpu.kernels.narrow_moving.bind(gpu, &narrow),
+            search: Some(gpu.kernels.narrow_search.bind(gpu, &search)),
+        }
+    }
+
+    /// Plans the stage and returns its first step. `by_number`: the pairs of a step are named by global numbers.
     pub fn plan(steps: &mut Steps, room: &Room, by_number: bool) -> u32 {
-        steps.push(Params {
-            counter: N_CANDIDATES,
+        // Capacities fit 32 bits.
+        let step = |counter: u32, capacity: u64, slot: u32| Params {
+            counter,
             per_group: GROUP,
-            // Capacities fit 32 bits.
-            capacity: room.capacities().candidates as u32,
-            slot: SLOT,
+            capacity: capacity as u32,
+            slot,
             by_number: u32::from(by_number),
             ..Params::default()
-        })
+        };
+        let capacities = room.capacities();
+        let first = steps.push(step(N_CANDIDATES, capacities.candidates, SLOT));
+        steps.push(step(N_PAIRS, capacities.pairs, SLOT_OF_SEARCH));
+        first
     }
 
     pub fn run(&self, pass: &mut wgpu::ComputePass<'_>, room: &Room, step: u32) {
         self.prepare.run(pass, step, Workgroups::Known(1));
         let groups = Workgroups::Indirect(room.arguments.buffer(), SLOT);
         self.narrow.run(pass, step, groups);
+        if let Some(search) = &self.search {
+            self.prepare.run(pass, step + 1, Workgroups::Known(1));
+            let groups = Workgroups::Indirect(room.arguments.buffer(), SLOT_OF_SEARCH);
+            search.run(pass, step + 1, groups);
+        }
     }
 }

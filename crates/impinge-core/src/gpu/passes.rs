@@ -76,7 +76,7 @@ impl Engine {
                         Taker::Answer(answer) => {
                             settle_all(job, answer, &collected, settled).map(|()| true)
                         }
-                        Taker::Left(take) => take(bytemuck::cast_slice_mut(&mut collected.unsure)),
+                        Taker::Left(take) => take(&mut collected.left),
                     })?;
                     if !goes_on {
                         return Ok(Outcome::Complete);
@@ -287,9 +287,12 @@ impl Engine {
         self.is_encoded = false;
         self.encode_pass(frame, Some(work), capacities, cells, times, &mut encoder)?;
         let (gpu, n_stages) = (&*self.gpu, self.stages().len() as u32);
-        let guess = self
-            .collector
-            .encode(gpu, &mut encoder, &self.room, n_stages);
+        let guess = self.collector.encode(
+            gpu,
+            &mut encoder,
+            &self.room,
+            (n_stages, self.world.is_moving()),
+        );
         gpu.queue.submit([encoder.finish()]);
         Ok(guess)
     }

@@ -79,6 +79,9 @@ pub struct ResidentPairs {
 pub struct ResidentStep {
     /// Pairs that may touch. All others certainly do not.
     pub pairs: wgpu::Buffer,
+    /// Holds an `f32` per pair of the list, in the same order: until this time of the step, 0 to 1, the pair certainly does not
+    /// touch. So up to the least of them nothing does.
+    pub free_until: wgpu::Buffer,
     /// Holds the count as a `u32`.
     pub counts: wgpu::Buffer,
     /// Byte offset of the number of pairs in `counts`.
@@ -194,6 +197,7 @@ impl Engine {
         };
         Ok(ResidentStep {
             pairs: self.room.unsure.buffer().clone(),
+            free_until: self.room.times.buffer().clone(),
             counts: self.room.counters.buffer().clone(),
             n_pairs_offset: u64::from(N_UNSURE) * COUNTER,
             pairs_capacity: self.room.capacities().unsure,

@@ -30,6 +30,8 @@ use crate::grouping::hubs::Hubs;
 use crate::hull::Pose;
 #[cfg(feature = "gpu")]
 use crate::ids::BodyId;
+#[cfg(feature = "gpu")]
+use crate::impacts::LeftPair;
 use crate::impacts::StepAnswer;
 use crate::index::LayerIx;
 use crate::scene::Body;
@@ -153,7 +155,7 @@ impl StepClusters {
         stats: &mut Statistics,
         find: impl FnOnce(
             &[Arc<Clustering>],
-            &mut dyn FnMut(&mut [[u32; 2]]) -> Result<bool, Error>,
+            &mut dyn FnMut(&mut [LeftPair]) -> Result<bool, Error>,
             &mut Statistics,
         ) -> Result<bool, Error>,
     ) -> Result<bool, Error> {

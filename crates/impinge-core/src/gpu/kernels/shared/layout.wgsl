@@ -69,7 +69,8 @@ struct WorkItem { a: u32, b: u32 }
 // Two places. Bit 31 of `a`: positions were rounded. Bit 31 of `b`: the two share a vertex; in a step, `a` is an edge.
 struct Candidate { a: u32, b: u32 }
 
-// Two global primitive numbers, the lower one first. In a step that the host settles, an unsure key has two places.
+// Two global primitive numbers, the lower one first. In a step, a pair key is a candidate; and an unsure key has two places, if the
+// host settles it.
 struct PairKey { low: u32, high: u32 }
 struct UnsureKey { low: u32, high: u32 }
 
