@@ -268,7 +268,7 @@ impl InCells for CellsPlan {
             slot: ROUNDS,
             ..Params::default()
         });
-        self.narrow = Settling::plan(steps, room, false);
+        self.narrow = Settling::plan(steps, room);
         if steps.send(gpu)? || self.launches.is_none() {
             self.launches = Some(Launches::new(gpu, world, room, &self.steps));
         }

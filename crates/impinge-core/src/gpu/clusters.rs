@@ -110,7 +110,10 @@ impl TreePlan {
         for round in 1..n_rounds {
             steps.push(prepare(round, capacities.queue, round));
         }
-        self.narrow = Settling::plan(steps, room, told.by_number);
+        self.narrow = match world.is_moving() {
+            true => Settling::plan_step(steps, room, told.by_number),
+            false => Settling::plan(steps, room),
+        };
         if steps.send(gpu)? || self.launches.is_none() {
             self.launches = Some(Launches::new(gpu, world, room, &self.steps));
         }

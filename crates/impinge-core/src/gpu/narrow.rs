@@ -35,6 +35,17 @@ pub fn prepare(gpu: &Gpu, room: &Room, steps: &Steps) -> Bound {
     )
 }
 
+fn of_candidates(room: &Room) -> Params {
+    Params {
+        counter: N_CANDIDATES,
+        per_group: GROUP,
+        // Capacities fit 32 bits.
+        capacity: room.capacities().candidates as u32,
+        slot: SLOT,
+        ..Params::default()
+    }
+}
+
 impl Settling {
     pub fn new(gpu: &Gpu, world: &World, room: &Room, steps: &Steps) -> Self {
         if world.is_moving() {
@@ -88,20 +99,22 @@ impl Settling {
         }
     }
 
-    /// Plans the stage and returns its first step. `by_number`: the pairs of a step are named by global numbers.
-    pub fn plan(steps: &mut Steps, room: &Room, by_number: bool) -> u32 {
-        // Capacities fit 32 bits.
-        let step = |counter: u32, capacity: u64, slot: u32| Params {
-            counter,
-            per_group: GROUP,
-            capacity: capacity as u32,
-            slot,
+    /// Plans the stage and returns its step.
+    pub fn plan(steps: &mut Steps, room: &Room) -> u32 {
+        steps.push(of_candidates(room))
+    }
+
+    /// Plans the stage for a step, and returns the first of its two dispatches. `by_number`: pairs are named by global numbers.
+    pub fn plan_step(steps: &mut Steps, room: &Room, by_number: bool) -> u32 {
+        let first = steps.push(of_candidates(room));
+        steps.push(Params {
+            counter: N_PAIRS,
+            // Capacities fit 32 bits.
+            capacity: room.capacities().pairs as u32,
+            slot: SLOT_OF_SEARCH,
             by_number: u32::from(by_number),
-            ..Params::default()
-        };
-        let capacities = room.capacities();
-        let first = steps.push(step(N_CANDIDATES, capacities.candidates, SLOT));
-        steps.push(step(N_PAIRS, capacities.pairs, SLOT_OF_SEARCH));
+            ..of_candidates(room)
+        });
         first
     }
 
