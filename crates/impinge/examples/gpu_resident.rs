@@ -58,13 +58,15 @@ fn main(
 }
 ";
 
-/// Counts the pairs of a step that may touch, by kind: vertices with faces, and edges with edges.
+/// Counts the pairs of a step that may touch, by kind: vertices with faces, and edges with edges. The third number becomes the time
+/// until which nothing touches, as bits; those of numbers from 0 to 1 are ordered as the numbers are.
 const COUNT: &str = "
 struct Pair { low: u32, high: u32 }
 @group(0) @binding(0) var<storage, read> pairs: array<Pair>;
-@group(0) @binding(1) var<storage, read> counts: array<u32>;
-@group(0) @binding(2) var<storage, read_write> of_kind: array<atomic<u32>, 2>;
-@group(0) @binding(3) var<uniform> told: vec4<u32>;
+@group(0) @binding(1) var<storage, read> free_until: array<f32>;
+@group(0) @binding(2) var<storage, read> counts: array<u32>;
+@group(0) @binding(3) var<storage, read_write> found: array<atomic<u32>, 3>;
+@group(0) @binding(4) var<uniform> told: vec4<u32>;
 
 @compute @workgroup_size(64)
 fn main(
@@ -76,7 +78,8 @@ fn main(
     for (var ix = id.x; ix < n; ix += 64u * n_groups.x) {
         // Edges have the lowest numbers, faces the highest ones.
         let are_edges = pairs[ix].high < first_vertex;
-        atomicAdd(&of_kind[select(0u, 1u, are_edges)], 1u);
+        atomicAdd(&found[select(0u, 1u, are_edges)], 1u);
+        atomicMin(&found[2], bitcast<u32>(free_until[ix]));
     }
 }
 ";
@@ -116,9 +119,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         &words,
         Usage::COPY_SRC | Usage::COPY_DST,
     );
-    let of_kind = buffer(
+    let nothing = [0, 0, 1f32.to_bits()].map(u32::to_le_bytes);
+    let nothing = buffer("nothing", nothing.as_flattened(), Usage::COPY_SRC);
+    let of_step = buffer(
         "pairs of a step",
-        &[0; 8],
+        &[0; 12],
         Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST,
     );
     let time = buffer("time", &[0; 16], Usage::UNIFORM | Usage::COPY_DST);
@@ -169,8 +174,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let words = [found.n_pairs_offset as u32 / 4, found.first_vertex, 0, 0];
         let words: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         let told = buffer("told", &words, Usage::UNIFORM);
-        let buffers = [&found.pairs, &found.counts, &of_kind, &told];
-        encoder.clear_buffer(&of_kind, 0, None);
+        let (pairs, times) = (&found.pairs, &found.free_until);
+        let buffers = [pairs, times, &found.counts, &of_step, &told];
+        encoder.copy_buffer_to_buffer(&nothing, 0, &of_step, 0, nothing.size());
         run(&mut encoder, &count, &group(&device, &count, &buffers), 64);
         queue.submit([encoder.finish()]);
     }
@@ -180,13 +186,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let is_complete = detector.make_room()?;
     let staging = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("staging"),
-        size: is_hit.size() + of_kind.size(),
+        size: is_hit.size() + of_step.size(),
         usage: Usage::MAP_READ | Usage::COPY_DST,
         mapped_at_creation: false,
     });
     let mut encoder = device.create_command_encoder(&Default::default());
     encoder.copy_buffer_to_buffer(&is_hit, 0, &staging, 0, is_hit.size());
-    encoder.copy_buffer_to_buffer(&of_kind, 0, &staging, is_hit.size(), of_kind.size());
+    encoder.copy_buffer_to_buffer(&of_step, 0, &staging, is_hit.size(), of_step.size());
     queue.submit([encoder.finish()]);
     staging.map_async(wgpu::MapMode::Read, .., |_| ());
     device.poll(wgpu::PollType::wait_indefinitely())?;
@@ -204,8 +210,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "{n_hit} of {n_primitives} triangles hit, complete: {is_complete}, {ms:.2} ms per frame"
     );
     println!(
-        "{} pairs of a vertex and a face, and {} pairs of edges, may touch on the way there",
-        may_touch[0], may_touch[1]
+        "on the way there {} pairs of a vertex and a face and {} pairs of edges may touch, none before t = {}",
+        may_touch[0],
+        may_touch[1],
+        f32::from_bits(may_touch[2])
     );
     Ok(())
 }
