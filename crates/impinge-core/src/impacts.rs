@@ -19,6 +19,16 @@ pub(crate) struct Found<V> {
     pub value: V,
 }
 
+/// A pair of a step that a device has not dropped.
+#[cfg(feature = "gpu")]
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LeftPair {
+    /// The places of its elements, those of all layers numbered consecutively.
+    pub places: [u32; 2],
+    /// Until this time it certainly does not touch.
+    pub free_until: f32,
+}
+
 /// Contacts found, by kind of pair.
 pub(crate) type FoundByKind<V = Contact> = [Vec<Found<V>>; PairKind::ALL.len()];
 

@@ -56,7 +56,7 @@ pub use error::Error;
 #[cfg(feature = "gpu")]
 pub use gpu::Capacities;
 #[cfg(feature = "gpu")]
-pub use gpu::{DeviceInfo, ResidentPairs, devices, devices_async};
+pub use gpu::{DeviceInfo, ResidentLayer, ResidentPairs, ResidentStep, devices, devices_async};
 pub use ids::BodyId;
 pub use impacts::{Candidates, Impact, Impacts, hash_impact_rows};
 pub use near::{ClosestPoints, NearPair, NearPairs, NearQuery};

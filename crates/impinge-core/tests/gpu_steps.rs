@@ -6,8 +6,8 @@
 use std::sync::{Mutex, OnceLock};
 
 use impinge_core::{
-    Backend, BodyId, CancelToken, Capacities, Control, Detector, Error, Method, PairKind, Query,
-    Real, Recluster, Scene, Settings, Start, Step, Toi, wgpu,
+    Backend, BodyId, CancelToken, Capacities, Control, Detector, Error, Impact, Method, PairKind,
+    Query, Real, Recluster, Scene, Settings, Start, Step, Toi, wgpu,
 };
 use impinge_scenes::{Random, solids, soup, surfaces};
 
@@ -419,10 +419,11 @@ fn rooms_that_are_too_small_grow() {
     let step = Step::default();
     let expected = on_cpu().impacts(&scene, &step).expect("good").hash();
     type Shrink = fn(&mut Capacities);
-    let shrunk: [(&str, Shrink); 4] = [
+    let shrunk: [(&str, Shrink); 5] = [
         ("queue", |room| room.queue = 512),
         ("items", |room| room.items = 3),
         ("candidates", |room| room.candidates = 5),
+        ("pairs", |room| room.pairs = 9),
         ("unsure", |room| room.unsure = 7),
     ];
     let mut rooms = vec![("least", Capacities::LEAST)];
@@ -601,13 +602,21 @@ fn device() -> (wgpu::Device, wgpu::Queue) {
     pollster::block_on(adapter.request_device(&Default::default())).expect("a device")
 }
 
-/// The impacts of some steps, on a device one of whose kernels has one line replaced.
-fn damaged(steps: &[(Scene, Step)], damage: (&str, &str, &str)) -> Vec<Result<u64, Error>> {
+/// The hash of a step's impacts, and the earliest one.
+type Answers = Result<(u64, Option<Impact>), Error>;
+
+/// The answers about some steps, on a device one of whose kernels has one line replaced.
+fn damaged(steps: &[(Scene, Step)], damage: (&str, &str, &str)) -> Vec<Answers> {
     let (open, queue) = device();
     let device = Detector::with_damage(open, queue, Settings::default(), damage);
     let mut device = device.expect("a line");
-    let hash = |(scene, step): &(Scene, Step)| Ok(device.impacts(scene, step)?.hash());
-    steps.iter().map(hash).collect()
+    let ask = |(scene, step): &(Scene, Step)| answers(&mut device, scene, step);
+    steps.iter().map(ask).collect()
+}
+
+fn answers(detector: &mut Detector, scene: &Scene, step: &Step) -> Answers {
+    let hash = detector.impacts(scene, step)?.hash();
+    Ok((hash, detector.earliest(scene, step)?))
 }
 
 #[test]
@@ -621,18 +630,18 @@ fn damaged_kernels_are_noticed() {
         (many_edges(), Step::default()),
         (boxes, Step::new(some)),
     ];
-    let truth = scenes.each_ref().map(|(scene, step)| {
-        let mut cpu = on_cpu();
-        Ok(cpu.impacts(scene, step).expect("good").hash())
-    });
+    let truth = scenes
+        .each_ref()
+        .map(|(scene, step)| Ok(answers(&mut on_cpu(), scene, step).expect("good")));
     for harmless in [
         ("dispatch_moving", "let a_first =", "let  a_first ="),
         // A device that drops nothing is slow, not wrong.
         (
             "narrow_moving",
-            "return !never_touch(&polygon, are_edges, narrowing);",
+            "return !never_touch(&polygon, &sizes, pair.are_edges);",
             "return true;",
         ),
+        ("narrow_search", "n < N_INTERVALS;", "n < 0u;"),
     ] {
         assert_eq!(damaged(&scenes, harmless), truth, "{harmless:?}");
     }
@@ -692,13 +701,40 @@ fn damaged_kernels_are_noticed() {
         ),
         (
             "narrow_moving",
+            "first_left = reserve(N_PAIRS, atomicLoad(&n_left));",
+            "first_left = reserve(N_PAIRS, atomicLoad(&n_left) / 2u);",
+        ),
+        (
+            "narrow_search",
+            "d.start * (1.0 - time)",
+            "d.end * (1.0 - time)",
+        ),
+        (
+            "narrow_search",
+            "Moving(at(d, low), at(d, high))",
+            "Moving(at(d, high), at(d, high))",
+        ),
+        ("narrow_search", "if high == 1.0 {", "if high >= 0.5 {"),
+        ("narrow_search", "low = high;", "low = high + length;"),
+        (
+            "narrow_search",
+            "let is_left = time <= 1.0;",
+            "let is_left = time <= 0.25;",
+        ),
+        (
+            "narrow_search",
+            "times[place] = time;",
+            "times[place] = time + 0.5;",
+        ),
+        (
+            "narrow_search",
             "first_unsure = reserve(N_UNSURE, atomicLoad(&n_unsure));",
             "first_unsure = reserve(N_UNSURE, atomicLoad(&n_unsure) / 2u);",
         ),
         (
-            "narrow_moving",
-            "UnsureKey(candidate.a & ~FLAG,",
-            "UnsureKey(candidate.a,",
+            "narrow_search",
+            "let a = pair.low & ~FLAG;",
+            "let a = pair.low;",
         ),
     ] {
         assert_ne!(damaged(&scenes, damage), truth, "{damage:?}");

@@ -139,7 +139,8 @@ fn every_pair_and_every_time_is_that_of_the_exact_prototype() {
 #[test]
 fn a_device_leaves_every_pair_that_touches() {
     let mut room = impinge_core::Capacities::default();
-    (room.items, room.candidates, room.unsure) = (1 << 16, 1 << 21, 1 << 19);
+    (room.items, room.candidates) = (1 << 16, 1 << 21);
+    (room.pairs, room.unsure) = (1 << 19, 1 << 18);
     let settings = Settings {
         backend: Backend::Gpu,
         ..Settings::default()
@@ -153,7 +154,9 @@ fn a_device_leaves_every_pair_that_touches() {
         assert_ne!(stats.backend, "cpu");
         let (n, n_left) = (stats.n_candidates, stats.n_unsure);
         println!("{}: {n_left} of {n} are left", scenario.name);
-        assert!(n_left < n / 4, "{}: {n_left} of {n}", scenario.name);
+        // Hardly more than touch; in a small step of cloth at rest on cloth, a few hundred more.
+        let n_most = impacts.len() as u64 * 101 / 100 + 600;
+        assert!(n_left < n_most, "{}: {n_left} of {n}", scenario.name);
         for kind in [PairKind::VertexFace, PairKind::EdgeEdge] {
             let (found, expected) = (rows(impacts.of(kind)), scenario.expected(kind, Toi::F32));
             assert_eq!(found.len(), expected.len(), "{}", scenario.name);

@@ -1,10 +1,11 @@
-//! A simulation that never leaves the GPU: a compute shader deforms a mesh, the detector finds the
-//! pairs, another shader uses them. The host only submits; it reads back once, after the last frame.
+//! A simulation that never leaves the GPU: a compute shader deforms a mesh, the detector finds the pairs that intersect now
+//! and those that may touch on the way to the next pose, other shaders use them. The host only submits; it reads back once, after
+//! the last frame.
 //!
 //! `cargo run --release --example gpu_resident --features gpu`
 
 use impinge::wgpu::{self, util::DeviceExt};
-use impinge::{Detector, Query, Scene, Settings};
+use impinge::{Detector, Query, Scene, Settings, Step};
 use impinge_scenes::surfaces;
 
 const FRAMES: u32 = 60;
@@ -57,6 +58,32 @@ fn main(
 }
 ";
 
+/// Counts the pairs of a step that may touch, by kind: vertices with faces, and edges with edges. The third number becomes the time
+/// until which nothing touches, as bits; those of numbers from 0 to 1 are ordered as the numbers are.
+const COUNT: &str = "
+struct Pair { low: u32, high: u32 }
+@group(0) @binding(0) var<storage, read> pairs: array<Pair>;
+@group(0) @binding(1) var<storage, read> free_until: array<f32>;
+@group(0) @binding(2) var<storage, read> counts: array<u32>;
+@group(0) @binding(3) var<storage, read_write> found: array<atomic<u32>, 3>;
+@group(0) @binding(4) var<uniform> told: vec4<u32>;
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(global_invocation_id) id: vec3<u32>,
+    @builtin(num_workgroups) n_groups: vec3<u32>,
+) {
+    let n = min(counts[told.x], arrayLength(&pairs));
+    let first_vertex = told.y;
+    for (var ix = id.x; ix < n; ix += 64u * n_groups.x) {
+        // Edges have the lowest numbers, faces the highest ones.
+        let are_edges = pairs[ix].high < first_vertex;
+        atomicAdd(&found[select(0u, 1u, are_edges)], 1u);
+        atomicMin(&found[2], bitcast<u32>(free_until[ix]));
+    }
+}
+";
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let instance = wgpu::Instance::default();
     let adapter = pollster::block_on(instance.request_adapter(&Default::default()))?;
@@ -87,6 +114,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     use wgpu::BufferUsages as Usage;
     let rest = buffer("rest", &words, Usage::STORAGE);
     let positions = buffer("positions", &words, Usage::STORAGE | Usage::COPY_SRC);
+    let before = buffer(
+        "positions before",
+        &words,
+        Usage::COPY_SRC | Usage::COPY_DST,
+    );
+    let nothing = [0, 0, 1f32.to_bits()].map(u32::to_le_bytes);
+    let nothing = buffer("nothing", nothing.as_flattened(), Usage::COPY_SRC);
+    let of_step = buffer(
+        "pairs of a step",
+        &[0; 12],
+        Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST,
+    );
     let time = buffer("time", &[0; 16], Usage::UNIFORM | Usage::COPY_DST);
     let n_primitives = 2 * ball.n_primitives();
     let is_hit = buffer(
@@ -96,6 +135,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     let deform = pipeline(&device, DEFORM);
     let mark = pipeline(&device, MARK);
+    let count = pipeline(&device, COUNT);
     let deform_group = group(&device, &deform, &[&rest, &positions, &time]);
 
     let start = std::time::Instant::now();
@@ -103,6 +143,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let now = frame as f32 * 0.5;
         queue.write_buffer(&time, 0, &now.to_le_bytes());
         let mut encoder = device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(&positions, 0, &before, 0, before.size());
         run(
             &mut encoder,
             &deform,
@@ -125,30 +166,54 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ];
         encoder.clear_buffer(&is_hit, 0, None);
         run(&mut encoder, &mark, &group(&device, &mark, &buffers), 64);
+
+        // What may touch on the way from the last pose to this one.
+        let step = Step::new(query.clone());
+        let (starts, ends) = ([(moving, &before)], [(moving, &positions)]);
+        let found = detector.encode_step(&scene, &step, &starts, &ends, &mut encoder)?;
+        let words = [found.n_pairs_offset as u32 / 4, found.first_vertex, 0, 0];
+        let words: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        let told = buffer("told", &words, Usage::UNIFORM);
+        let (pairs, times) = (&found.pairs, &found.free_until);
+        let buffers = [pairs, times, &found.counts, &of_step, &told];
+        encoder.copy_buffer_to_buffer(&nothing, 0, &of_step, 0, nothing.size());
+        run(&mut encoder, &count, &group(&device, &count, &buffers), 64);
         queue.submit([encoder.finish()]);
     }
 
-    // The only read-back: did everything fit, and how many primitives were hit in the last frame?
+    // The only read-back: did everything fit, how many primitives were hit in the last frame, and how many pairs may have touched
+    // on the way to it?
     let is_complete = detector.make_room()?;
     let staging = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("staging"),
-        size: is_hit.size(),
+        size: is_hit.size() + of_step.size(),
         usage: Usage::MAP_READ | Usage::COPY_DST,
         mapped_at_creation: false,
     });
     let mut encoder = device.create_command_encoder(&Default::default());
     encoder.copy_buffer_to_buffer(&is_hit, 0, &staging, 0, is_hit.size());
+    encoder.copy_buffer_to_buffer(&of_step, 0, &staging, is_hit.size(), of_step.size());
     queue.submit([encoder.finish()]);
     staging.map_async(wgpu::MapMode::Read, .., |_| ());
     device.poll(wgpu::PollType::wait_indefinitely())?;
-    let n_hit = staging
-        .get_mapped_range(..)?
-        .chunks_exact(4)
-        .filter(|word| word[0] == 1)
-        .count();
+    let view = staging.get_mapped_range(..)?;
+    let words = view
+        .as_chunks::<4>()
+        .0
+        .iter()
+        .map(|word| u32::from_le_bytes(*word));
+    let words: Vec<u32> = words.collect();
+    let (hit, may_touch) = words.split_at(n_primitives);
+    let n_hit: u32 = hit.iter().sum();
     let ms = start.elapsed().as_secs_f64() * 1e3 / f64::from(FRAMES);
     println!(
         "{n_hit} of {n_primitives} triangles hit, complete: {is_complete}, {ms:.2} ms per frame"
+    );
+    println!(
+        "on the way there {} pairs of a vertex and a face and {} pairs of edges may touch, none before t = {}",
+        may_touch[0],
+        may_touch[1],
+        f32::from_bits(may_touch[2])
     );
     Ok(())
 }

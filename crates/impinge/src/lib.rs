@@ -81,7 +81,7 @@
 //!
 //! This crate is the stable interface of the engine in `impinge-core`.
 
-/// The GPU interface of [`Detector::with_device`] and [`Detector::encode`].
+/// The GPU interface of [`Detector::with_device`], [`Detector::encode`] and [`Detector::encode_step`].
 #[cfg(feature = "gpu")]
 pub use impinge_core::wgpu;
 pub use impinge_core::{
@@ -92,7 +92,9 @@ pub use impinge_core::{
     Statistics, Step, Toi, hash_impact_rows, hash_rows,
 };
 #[cfg(feature = "gpu")]
-pub use impinge_core::{DeviceInfo, ResidentPairs, devices, devices_async};
+pub use impinge_core::{
+    DeviceInfo, ResidentLayer, ResidentPairs, ResidentStep, devices, devices_async,
+};
 pub use impinge_core::{contact, exact, proximity};
 
 // The types that users hold are `Send` and `Sync`.

@@ -135,7 +135,7 @@ impl Detector {
     /// workgroups of 256 (WebGPU's defaults do). `settings.backend` and `settings.device` are ignored.
     ///
     /// Such a detector answers [`detect`](Detector::detect) like any other, and also
-    /// [`encode`](Detector::encode), where positions and pairs stay on the device. This constructor waits for nothing, so
+    /// [`encode`](Detector::encode) and [`encode_step`](Detector::encode_step), where positions and pairs stay on the device. This constructor waits for nothing, so
     /// it works in a browser too. Kernels are compiled when the first frame needs them.
     ///
     /// # Errors
@@ -238,8 +238,9 @@ impl Detector {
         engine.positions_of(body, scene.body(body).ok()?)
     }
 
-    /// Reads the counts of the last encoded frame, whose commands must have been submitted, and
-    /// grows the lists that were too small. Returns whether that frame was complete; if not, encode it again.
+    /// Reads the counts of the last encoded frame, and of the last encoded step, whose commands must have been submitted, and
+    /// grows the lists that were too small. Returns whether both were complete; if not, encode them again. To be called
+    /// before the detector answers another question.
     ///
     /// # Errors
     /// A lost device; lists larger than it can bind; a memory budget that does not allow them.

@@ -2,6 +2,8 @@
 //! when first, and how far the step can be taken.
 
 mod near;
+#[cfg(feature = "gpu")]
+mod resident;
 mod runs;
 
 use std::collections::BTreeMap;

@@ -46,6 +46,17 @@ pub(crate) struct TreePlan {
     narrow: u32,
 }
 
+/// What a pass is told.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Told {
+    /// The rounds of the traversal.
+    pub n_rounds: u32,
+    /// Whether pairs that share a vertex are resolved.
+    pub resolve: bool,
+    /// Whether the pairs of a step are named by global numbers.
+    pub by_number: bool,
+}
+
 impl TreePlan {
     pub fn new() -> Self {
         TreePlan {
@@ -68,21 +79,15 @@ impl TreePlan {
     ///
     /// # Errors
     /// As [`Steps::send`].
-    pub fn make(
-        &mut self,
-        gpu: &Gpu,
-        world: &World,
-        room: &Room,
-        n_rounds: u32,
-        resolve: bool,
-    ) -> Result<(), Error> {
+    pub fn make(&mut self, gpu: &Gpu, world: &World, room: &Room, told: Told) -> Result<(), Error> {
+        let Told { n_rounds, .. } = told;
         let steps = &mut self.steps;
         steps.clear();
         self.bounds.plan(world, steps);
         self.n_rounds = n_rounds;
         self.rounds = steps.push(Params {
             n_ignored: world.n_ignored(),
-            resolve: u32::from(resolve),
+            resolve: u32::from(told.resolve),
             ..Params::default()
         });
         for round in 1..n_rounds {
@@ -105,7 +110,10 @@ impl TreePlan {
         for round in 1..n_rounds {
             steps.push(prepare(round, capacities.queue, round));
         }
-        self.narrow = Settling::plan(steps, room);
+        self.narrow = match world.is_moving() {
+            true => Settling::plan_step(steps, room, told.by_number),
+            false => Settling::plan(steps, room),
+        };
         if steps.send(gpu)? || self.launches.is_none() {
             self.launches = Some(Launches::new(gpu, world, room, &self.steps));
         }

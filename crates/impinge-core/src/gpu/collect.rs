@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! counters | grid | times of the stages | pairs, a quarter more than last time | unsure pairs, likewise
+//!                                in a step:  unsure pairs, likewise | their times
 //! ```
 //!
 //! If there are more than were copied, the rest follows in a second copy; no kernel runs again.
@@ -11,10 +12,12 @@ use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll, Waker};
 
-use super::layout::{Counter, Grid, N_COUNTERS, PairKey, UnsureKey};
+use super::buffers::count;
+use super::layout::{Counter, Grid, N_COUNTERS, PairKey, Time, UnsureKey};
 use super::open::Gpu;
 use super::room::{PassCounts, Room};
 use crate::error::Error;
+use crate::impacts::LeftPair;
 
 const COUNTERS: u64 = N_COUNTERS as u64 * size_of::<Counter>() as u64;
 const GRID: u64 = size_of::<Grid>() as u64;
@@ -23,6 +26,7 @@ const MOST_STAGES: usize = 8;
 const TIMES: u64 = 2 * MOST_STAGES as u64 * size_of::<u64>() as u64;
 const HEADER: u64 = COUNTERS + GRID + TIMES;
 const KEY: u64 = size_of::<PairKey>() as u64;
+const TIME: u64 = size_of::<Time>() as u64;
 /// At least this many keys are copied.
 const LEAST: u64 = 1024;
 
@@ -47,6 +51,14 @@ struct Times {
 pub struct Guess {
     pairs: u64,
     unsure: u64,
+    /// Of unsure pairs in a step; else none.
+    times: u64,
+}
+
+impl Guess {
+    fn bytes(&self) -> u64 {
+        HEADER + KEY * (self.pairs + self.unsure) + TIME * self.times
+    }
 }
 
 /// The results of a pass.
@@ -59,6 +71,8 @@ pub struct Collected {
     pub stage_ms: Option<Vec<f64>>,
     pub pairs: Vec<PairKey>,
     pub unsure: Vec<UnsureKey>,
+    /// In a step: the unsure pairs with their times.
+    pub left: Vec<LeftPair>,
 }
 
 impl Collector {
@@ -104,16 +118,25 @@ impl Collector {
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         room: &Room,
-        n_stages: u32,
+        (n_stages, is_step): (u32, bool),
     ) -> Guess {
         let capacities = room.capacities();
         let guess = |last: u64, capacity: u64| (last + last / 4).max(LEAST).min(capacity);
-        let guess = Guess {
-            pairs: guess(self.n_pairs, capacities.pairs),
-            unsure: guess(self.n_unsure, capacities.unsure),
+        let unsure = guess(self.n_unsure, capacities.unsure);
+        let guess = match is_step {
+            // The pairs of a step go to its search, and no farther.
+            true => Guess {
+                pairs: 0,
+                unsure,
+                times: unsure,
+            },
+            false => Guess {
+                pairs: guess(self.n_pairs, capacities.pairs),
+                unsure,
+                times: 0,
+            },
         };
-        let bytes = HEADER + KEY * (guess.pairs + guess.unsure);
-        let staging = self.reserve(gpu, bytes);
+        let staging = self.reserve(gpu, guess.bytes());
         let mut copy = |from: &wgpu::Buffer, to: u64, size: u64| {
             encoder.copy_buffer_to_buffer(from, 0, &staging, to, size);
         };
@@ -123,6 +146,8 @@ impl Collector {
         copy(room.pairs.buffer(), pairs, KEY * guess.pairs);
         let unsure = pairs + KEY * guess.pairs;
         copy(room.unsure.buffer(), unsure, KEY * guess.unsure);
+        let times = unsure + KEY * guess.unsure;
+        copy(room.times.buffer(), times, TIME * guess.times);
         if let Some(times) = &self.times {
             encoder.resolve_query_set(&times.queries, 0..2 * n_stages, &times.resolved, 0);
             let to = COUNTERS + GRID;
@@ -144,17 +169,21 @@ impl Collector {
     ) -> Result<Collected, Error> {
         // Given back when all went well: a buffer that stays mapped is of no more use.
         let staging = self.staging.take().expect("encoded before");
-        let bytes = HEADER + KEY * (guess.pairs + guess.unsure);
-        let (mut pairs, mut unsure) = (Vec::new(), Vec::new());
+        let is_step = guess.times > 0;
+        let (mut pairs, mut unsure) = (Vec::new(), Vec::<UnsureKey>::new());
+        let mut until = Vec::<Time>::new();
         let (counts, grid, ticks, n_pairs, n_unsure) = {
-            let view = map(&staging, bytes).await?;
+            let view = map(&staging, guess.bytes()).await?;
             let at = |from: u64, size: u64| &view[from as usize..(from + size) as usize];
             let counters: Vec<Counter> = bytemuck::pod_collect_to_vec(at(0, COUNTERS));
             let grid: Grid = bytemuck::pod_read_unaligned(at(COUNTERS, GRID));
             let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(at(COUNTERS + GRID, TIMES));
             let counts = PassCounts::new(&counters);
             let capacities = room.capacities();
-            let n_pairs = counts.needed.pairs.min(capacities.pairs);
+            let n_pairs = match is_step {
+                true => 0,
+                false => counts.needed.pairs.min(capacities.pairs),
+            };
             let n_unsure = counts.needed.unsure.min(capacities.unsure);
             let first = HEADER;
             reserve_all(&mut pairs, n_pairs)?;
@@ -162,6 +191,11 @@ impl Collector {
             append(&mut pairs, at(first, KEY * n_pairs.min(guess.pairs)));
             let first = first + KEY * guess.pairs;
             append(&mut unsure, at(first, KEY * n_unsure.min(guess.unsure)));
+            if is_step {
+                reserve_all(&mut until, n_unsure)?;
+                let first = first + KEY * guess.unsure;
+                append(&mut until, at(first, TIME * n_unsure.min(guess.times)));
+            }
             (counts, grid, ticks, n_pairs, n_unsure)
         };
         staging.unmap();
@@ -169,25 +203,31 @@ impl Collector {
         (self.n_pairs, self.n_unsure) = (n_pairs, n_unsure);
         let more_pairs = n_pairs.saturating_sub(guess.pairs);
         let more_unsure = n_unsure.saturating_sub(guess.unsure);
+        let more_times = if is_step { more_unsure } else { 0 };
         if more_pairs + more_unsure > 0 {
-            let bytes = KEY * (more_pairs + more_unsure);
+            let keys = KEY * (more_pairs + more_unsure);
+            let bytes = keys + TIME * more_times;
             let staging = self.reserve(gpu, bytes);
             let mut encoder = gpu
                 .device
                 .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            let mut copy = |from: &wgpu::Buffer, first: u64, to: u64, n: u64| {
-                let (first, to, size) = (KEY * first, KEY * to, KEY * n);
+            let mut copy = |from: &wgpu::Buffer, first: u64, to: u64, size: u64| {
                 encoder.copy_buffer_to_buffer(from, first, &staging, to, size);
             };
-            copy(room.pairs.buffer(), guess.pairs, 0, more_pairs);
-            copy(room.unsure.buffer(), guess.unsure, more_pairs, more_unsure);
+            let of_pairs = KEY * more_pairs;
+            copy(room.pairs.buffer(), KEY * guess.pairs, 0, of_pairs);
+            let (first, size) = (KEY * guess.unsure, KEY * more_unsure);
+            copy(room.unsure.buffer(), first, of_pairs, size);
+            let (first, size) = (TIME * guess.times, TIME * more_times);
+            copy(room.times.buffer(), first, keys, size);
             gpu.queue.submit([encoder.finish()]);
             {
                 let view = map(&staging, bytes).await?;
-                let (of_pairs, of_unsure) =
-                    view[..bytes as usize].split_at((KEY * more_pairs) as usize);
+                let (of_keys, of_times) = view[..bytes as usize].split_at(keys as usize);
+                let (of_pairs, of_unsure) = of_keys.split_at(of_pairs as usize);
                 append(&mut pairs, of_pairs);
                 append(&mut unsure, of_unsure);
+                append(&mut until, of_times);
             }
             staging.unmap();
         }
@@ -196,7 +236,15 @@ impl Collector {
             let span = |stage: usize| ticks[2 * stage + 1].saturating_sub(ticks[2 * stage]);
             (0..n_stages).map(|stage| span(stage) as f64 * ms).collect()
         });
+        let mut left = Vec::new();
+        reserve_all(&mut left, count(until.len()))?;
+        let each = unsure.iter().zip(&until);
+        left.extend(each.map(|(pair, time)| LeftPair {
+            places: [pair.low, pair.high],
+            free_until: f32::from_bits(time.bits),
+        }));
         Ok(Collected {
+            left,
             counts,
             grid,
             stage_ms,
@@ -213,7 +261,7 @@ impl Collector {
 fn reserve_all<K>(keys: &mut Vec<K>, n: u64) -> Result<(), Error> {
     let reserved = keys.try_reserve_exact(usize::try_from(n).unwrap_or(usize::MAX));
     let what = "pairs of one pass";
-    let needed = n * KEY;
+    let needed = n * size_of::<K>() as u64;
     reserved.map_err(|_| Error::OutOfMemory { what, n, needed })
 }
 

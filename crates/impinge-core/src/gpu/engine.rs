@@ -48,6 +48,8 @@ pub struct Engine {
     pub most_bound: u64,
     /// Whether the device holds a piece of a frame, not a whole one.
     has_pieces: bool,
+    /// Whether the last pass was encoded for the caller, who has its results on the device.
+    pub(super) is_encoded: bool,
     pub(super) world: World,
     pub(super) room: Room,
     pub(super) plan: Plan,
@@ -118,6 +120,7 @@ impl Engine {
             too_much: None,
             most_bound: u64::MAX,
             has_pieces: false,
+            is_encoded: false,
             world: World::new(),
             room: Room::new(),
             plan,

@@ -3,7 +3,7 @@
 use super::layout::{
     Arguments, Body, Candidate, Cell, CellItem, Cluster, ClusterVertex, Coordinate, Corners,
     Counter, Grid, Kept, Level, ListEntry, Node, NodePair, Order, PairKey, Params, Reach, Start,
-    Tally, UnsureKey, WorkItem,
+    Tally, Time, UnsureKey, WorkItem,
 };
 use super::pipeline::{Kernel, Source, bindings, source};
 
@@ -94,8 +94,22 @@ bindings! {
         candidates: Read<Candidate>,
         corners: Read<Corners>,
         positions: Read<Coordinate>,
-        unsure: Write<UnsureKey>,
+        pairs: Write<PairKey>,
         counters: Write<Counter>,
+    }
+}
+
+bindings! {
+    /// `narrow_search.wgsl`
+    NarrowSearch {
+        pairs: Read<PairKey>,
+        corners: Read<Corners>,
+        positions: Read<Coordinate>,
+        order: Read<Order>,
+        unsure: Write<UnsureKey>,
+        times: Write<Time>,
+        counters: Write<Counter>,
+        params: Uniform<Params>,
     }
 }
 
@@ -268,7 +282,9 @@ kernels! {
         from "pairing" as "pairing_moving"
         ("boxes", "moving", "moving_groups", "vertices", "ids", "reserve", "groups");
     narrow_moving: NarrowMoving = NARROW_MOVING []
-        from "narrow_moving" ("filter", "polygon", "reserve", "groups");
+        from "narrow_moving" ("filter", "polygon", "pair", "reserve", "groups");
+    narrow_search: NarrowSearch = NARROW_SEARCH []
+        from "narrow_search" ("filter", "polygon", "pair", "reserve", "groups");
     narrow: Narrow = NARROW [("WITH_SOLIDS", 0.0)]
         from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "reserve", "groups");
     narrow_solids: Narrow = NARROW_SOLIDS [("WITH_SOLIDS", 1.0)]

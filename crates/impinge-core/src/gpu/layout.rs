@@ -35,10 +35,12 @@ words! {
     WorkItem { a: u32, b: u32 }
     /// Two places, with flags.
     Candidate { a: u32, b: u32 }
-    /// Two global primitive numbers that certainly intersect.
+    /// Two global primitive numbers that certainly intersect; in a step, two places of a pair that is searched, with flags.
     PairKey { low: u32, high: u32 }
-    /// Two global primitive numbers left to exact arithmetic; in a step, two places.
+    /// Two global primitive numbers left to exact arithmetic; in a step that the host settles, two places.
     UnsureKey { low: u32, high: u32 }
+    /// A time of a step: the bits of an f32.
+    Time { bits: u32 }
     /// Parameters of one dispatch.
     Params {
         first: u32, count: u32,
@@ -46,6 +48,7 @@ words! {
         n_ignored: u32, resolve: u32,
         group_size: u32, lambda: u32, most_cells: u32, owner_rule: u32,
         lists_only: u32, n_entries: u32, tile_row: u32, tile_column: u32, tile_side: u32,
+        by_number: u32,
     }
     /// A primitive within its body's reach.
     Kept { low: [u32; 3], place: u32, high: [u32; 3], body: u32, range: [u32; 3], unused: u32 }
@@ -159,14 +162,14 @@ impl Node {
 #[repr(C)]
 pub struct Step {
     pub params: Params,
-    padding: [u32; 47],
+    padding: [u32; 46],
 }
 
 impl From<Params> for Step {
     fn from(params: Params) -> Self {
         Step {
             params,
-            padding: [0; 47],
+            padding: [0; 46],
         }
     }
 }

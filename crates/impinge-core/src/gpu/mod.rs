@@ -45,7 +45,7 @@ mod waiting;
 pub mod world;
 
 pub use device::{Device, DeviceInfo};
-pub use resident::ResidentPairs;
+pub use resident::{ResidentLayer, ResidentPairs, ResidentStep};
 pub use room::Capacities;
 
 pub(crate) use engine::Engine;

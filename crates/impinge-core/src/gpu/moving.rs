@@ -11,7 +11,7 @@ use std::sync::Arc;
 use super::device::Scopes;
 use super::engine::{Engine, Outcome, Plan};
 use super::taker::{TakeLeft, Taker};
-use super::world::weigh_moving;
+use super::world::{ResidentEnds, weigh_moving};
 use crate::clock::Instant;
 use crate::error::Error;
 use crate::grouping::clusters::Clustering;
@@ -70,7 +70,9 @@ impl Engine {
             return Ok(false);
         }
         let scopes = Scopes::open(&self.gpu.device);
-        let updated = self.world.update_moving(&self.gpu, job, clusterings, stats);
+        let none = ResidentEnds::default();
+        let world = &mut self.world;
+        let updated = world.update_moving(&self.gpu, job, clusterings, &none, stats);
         let closed = scopes.close();
         if updated? {
             self.unbind();
@@ -81,7 +83,7 @@ impl Engine {
             self.world.forget_buffers();
             self.unbind();
             self.world
-                .update_moving(&self.gpu, job, clusterings, stats)?;
+                .update_moving(&self.gpu, job, clusterings, &none, stats)?;
         }
         stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
         let work = Vec::from_iter(self.whole(job.frame));

@@ -10,7 +10,7 @@
 //! The smallest pass has one work item, for which [`Capacities::LEAST`] is enough.
 
 use super::buffers::count;
-use super::cells::{CellRange, Share, Tile, Told};
+use super::cells::{self, CellRange, Share, Tile};
 use super::clusters;
 use super::collect::{Collected, Guess};
 use super::device::Scopes;
@@ -76,7 +76,7 @@ impl Engine {
                         Taker::Answer(answer) => {
                             settle_all(job, answer, &collected, settled).map(|()| true)
                         }
-                        Taker::Left(take) => take(bytemuck::cast_slice_mut(&mut collected.unsure)),
+                        Taker::Left(take) => take(&mut collected.left),
                     })?;
                     if !goes_on {
                         return Ok(Outcome::Complete);
@@ -284,11 +284,15 @@ impl Engine {
             });
         let times = self.collector.times(&self.gpu).cloned();
         let times = times.as_ref();
+        self.is_encoded = false;
         self.encode_pass(frame, Some(work), capacities, cells, times, &mut encoder)?;
         let (gpu, n_stages) = (&*self.gpu, self.stages().len() as u32);
-        let guess = self
-            .collector
-            .encode(gpu, &mut encoder, &self.room, n_stages);
+        let guess = self.collector.encode(
+            gpu,
+            &mut encoder,
+            &self.room,
+            (n_stages, self.world.is_moving()),
+        );
         gpu.queue.submit([encoder.finish()]);
         Ok(guess)
     }
@@ -324,11 +328,16 @@ impl Engine {
         };
         match (&mut self.plan, work) {
             (Plan::Clusters(plan), Some(Work::Seeds(seeds))) => {
-                plan.make(gpu, world, room, world.forest().rounds(seeds), resolve)?;
+                let told = clusters::Told {
+                    n_rounds: world.forest().rounds(seeds),
+                    resolve,
+                    by_number: self.is_encoded,
+                };
+                plan.make(gpu, world, room, told)?;
                 plan.encode(&mut stages, world, room, count(seeds.len()));
             }
             (Plan::Cells(plan), Some(Work::Cells(part, share))) => {
-                let told = Told {
+                let told = cells::Told {
                     lambda: self.settings.lambda,
                     group_size: self.settings.group_size,
                     resolve,

@@ -1,15 +1,22 @@
-//! Frames that stay on the device: positions come from the caller's buffers, pairs go to ours.
+//! Frames and steps that stay on the device: positions come from the caller's buffers, pairs go to ours.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::buffers::count;
 use super::collect::map;
 use super::engine::Engine;
 use super::layout::{Counter, N_COUNTERS, N_PAIRS, N_UNSURE};
 use super::room::{Capacities, NextPass, PassCounts};
+use super::world::{ResidentEnds, weigh_moving};
+use crate::elements::Part;
 use crate::error::Error;
+use crate::frame::Frame;
+use crate::grouping::clusters::Clustering;
 use crate::ids::BodyId;
 use crate::positions::Positions;
 use crate::run::Job;
-use crate::scene::Body;
+use crate::scene::{Body, Scene};
 use crate::stats::Statistics;
 
 /// The buffers that hold the pairs of an encoded frame once its commands have run.
@@ -41,6 +48,68 @@ pub struct ResidentPairs {
     pub unsure_capacity: u64,
 }
 
+/// The buffers that hold the pairs of an encoded step which may touch, once its commands have run.
+///
+/// The list has two `u32` per pair: the numbers of its elements, the lower one first. Elements are numbered consecutively:
+/// first the edges of all bodies, then their vertices, then their faces, each in the order of the bodies' ids.
+///
+/// ```text
+/// 0            first_vertex            first_face
+/// +--------------+-----------------------+--------------+
+/// |  all edges   |     all vertices      |  all faces   |
+/// +--------------+-----------------------+--------------+
+/// ```
+///
+/// So the two numbers `low < high` of a pair say its kind:
+///
+/// | kind | `low` | `high` |
+/// |---|---|---|
+/// | two edges | an edge | below `first_vertex` |
+/// | an edge and a vertex | an edge | from `first_vertex` on |
+/// | two vertices | a vertex | below `first_face` |
+/// | a vertex and a face | a vertex | from `first_face` on |
+///
+/// Element `i` of a part of a body has the number `first + i` of its [layer](ResidentLayer). Vertices are numbered as positions are,
+/// whether an element uses them or not; edges and faces as [`Body::part`](crate::Body::part) lists them. The order of pairs is not specified.
+///
+/// The count may be larger than the list: the list then holds as many pairs as fit, and
+/// [`Detector::make_room`](crate::Detector::make_room) makes it larger.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct ResidentStep {
+    /// Pairs that may touch. All others certainly do not.
+    pub pairs: wgpu::Buffer,
+    /// Holds an `f32` per pair of the list, in the same order: until this time of the step, 0 to 1, the pair certainly does not
+    /// touch. So up to the least of them nothing does.
+    pub free_until: wgpu::Buffer,
+    /// Holds the count as a `u32`.
+    pub counts: wgpu::Buffer,
+    /// Byte offset of the number of pairs in `counts`.
+    pub n_pairs_offset: u64,
+    /// The number of pairs that the list has room for.
+    pub pairs_capacity: u64,
+    /// The number of the first vertex.
+    pub first_vertex: u32,
+    /// The number of the first face.
+    pub first_face: u32,
+    /// The numbers of each part of each body that takes part, in their order.
+    pub layers: Vec<ResidentLayer>,
+}
+
+/// The numbers of one part of one body in an encoded step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct ResidentLayer {
+    /// The body.
+    pub body: BodyId,
+    /// Edges, vertices or faces. Tetrahedra have those of their surface.
+    pub part: Part,
+    /// The number of its first element.
+    pub first: u32,
+    /// How many elements it has.
+    pub len: u32,
+}
+
 const COUNTER: u64 = size_of::<Counter>() as u64;
 
 impl Engine {
@@ -56,20 +125,7 @@ impl Engine {
     ) -> Result<ResidentPairs, Error> {
         let Job { scene, frame, .. } = job;
         for &(body, buffer) in positions {
-            let needed = 12 * count(scene.body(body)?.n_vertices());
-            if buffer.size() < needed {
-                return Err(Error::Gpu {
-                    what: format!(
-                        "body {body}: its positions take {needed} bytes, the buffer has {}",
-                        buffer.size()
-                    ),
-                });
-            }
-            if !buffer.usage().contains(wgpu::BufferUsages::COPY_SRC) {
-                return Err(Error::Gpu {
-                    what: format!("body {body}: its buffer lacks the usage COPY_SRC"),
-                });
-            }
+            check_buffer(scene, body, buffer, "positions")?;
         }
         let ids: Vec<BodyId> = positions.iter().map(|&(body, _)| body).collect();
         self.update(job, &ids, &mut Statistics::default())?;
@@ -79,6 +135,7 @@ impl Engine {
         let cells = self.cells_wanted(frame);
         let capacities = self.first_room(cells)?;
         let work = self.whole(frame);
+        self.is_encoded = true;
         self.encode_pass(frame, work.as_ref(), capacities, cells, None, encoder)?;
         let capacities = self.room.capacities();
         Ok(ResidentPairs {
@@ -92,6 +149,64 @@ impl Engine {
         })
     }
 
+    /// Encodes all work of a step as one pass. `ends`: the buffers of bodies' positions at the start, and at the end.
+    ///
+    /// # Errors
+    /// Those of [`Detector::encode_step`](crate::Detector::encode_step).
+    pub fn encode_step(
+        &mut self,
+        job: Job<'_>,
+        clusterings: &[Arc<Clustering>],
+        [starts, ends]: [&[(BodyId, &wgpu::Buffer)]; 2],
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<ResidentStep, Error> {
+        let Job { scene, frame, .. } = job;
+        self.gpu.check_lost()?;
+        for (buffers, what) in [(starts, "positions"), (ends, "end positions")] {
+            for &(body, buffer) in buffers {
+                check_buffer(scene, body, buffer, what)?;
+            }
+        }
+        let [starts, mut ends] =
+            [starts, ends].map(|end| end.iter().copied().collect::<BTreeMap<_, _>>());
+        for (&body, &buffer) in &starts {
+            // A body without end positions does not move.
+            if scene.body(body)?.end_positions().is_none() {
+                ends.entry(body).or_insert(buffer);
+            }
+        }
+        let resident = ResidentEnds([starts, ends]);
+        let most = self.most();
+        if !weigh_moving(job, clusterings).is_some_and(|weight| weight.fits(most)) {
+            return Err(self.too_small("the step at once", Capacities::LEAST));
+        }
+        let stats = &mut Statistics::default();
+        let world = &mut self.world;
+        if world.update_moving(&self.gpu, job, clusterings, &resident, stats)? {
+            self.unbind();
+        }
+        self.world.copy_ends(&resident, encoder);
+        let capacities = self.first_room(None)?;
+        let work = self.whole(frame);
+        self.is_encoded = true;
+        self.encode_pass(frame, work.as_ref(), capacities, None, None, encoder)?;
+        let of_parts = |parts: &[Part]| {
+            let layers = frame.layers.iter();
+            let numbers = layers.filter(|layer| parts.contains(&layer.part));
+            numbers.map(|layer| layer.n_primitives).sum()
+        };
+        Ok(ResidentStep {
+            pairs: self.room.unsure.buffer().clone(),
+            free_until: self.room.times.buffer().clone(),
+            counts: self.room.counters.buffer().clone(),
+            n_pairs_offset: u64::from(N_UNSURE) * COUNTER,
+            pairs_capacity: self.room.capacities().unsure,
+            first_vertex: of_parts(&[Part::Edges]),
+            first_face: of_parts(&[Part::Edges, Part::Vertices]),
+            layers: layers(frame),
+        })
+    }
+
     /// The positions of a body on the device, see
     /// [`Detector::positions_on_device`](crate::Detector::positions_on_device).
     pub fn positions_of(&self, id: BodyId, body: &Body) -> Option<(&wgpu::Buffer, u64)> {
@@ -101,16 +216,24 @@ impl Engine {
         }
     }
 
-    /// Reads the counters and grows the buffers that were too small. Returns whether none was.
+    /// Reads the counters of the encoded frame and step, and grows the buffers that were too small. Returns whether none was.
     ///
     /// # Errors
     /// Those of [`Detector::make_room`](crate::Detector::make_room).
     pub async fn make_room(&mut self) -> Result<bool, Error> {
         self.gpu().check_lost()?;
-        let capacities = self.room.capacities();
-        if capacities == Capacities::NONE {
+        let is_complete = self.make_own_room().await?;
+        match &mut self.of_steps {
+            Some(steps) => Ok(steps.make_own_room().await? && is_complete),
+            None => Ok(is_complete),
+        }
+    }
+
+    async fn make_own_room(&mut self) -> Result<bool, Error> {
+        if !self.is_encoded {
             return Ok(true);
         }
+        let capacities = self.room.capacities();
         let counts = {
             let bytes = u64::from(N_COUNTERS) * COUNTER;
             let device = &self.gpu().device;
@@ -137,4 +260,39 @@ impl Engine {
             NextPass::Split => Err(self.too_small("the frame at once", counts.needed)),
         }
     }
+}
+
+/// Refuses a buffer that does not hold a body's positions.
+fn check_buffer(
+    scene: &Scene,
+    body: BodyId,
+    buffer: &wgpu::Buffer,
+    what: &str,
+) -> Result<(), Error> {
+    let needed = 12 * count(scene.body(body)?.n_vertices());
+    if buffer.size() < needed {
+        return Err(Error::Gpu {
+            what: format!(
+                "body {body}: its {what} take {needed} bytes, the buffer has {}",
+                buffer.size()
+            ),
+        });
+    }
+    if !buffer.usage().contains(wgpu::BufferUsages::COPY_SRC) {
+        return Err(Error::Gpu {
+            what: format!("body {body}: the buffer of its {what} lacks the usage COPY_SRC"),
+        });
+    }
+    Ok(())
+}
+
+/// The numbers of all layers.
+fn layers(frame: &Frame) -> Vec<ResidentLayer> {
+    let layers = frame.layers.iter().map(|layer| ResidentLayer {
+        body: layer.id,
+        part: layer.part,
+        first: layer.first.raw(),
+        len: layer.n_primitives,
+    });
+    layers.collect()
 }

@@ -8,7 +8,7 @@ use super::buffers::Storage;
 use super::layout::{
     Arguments, Candidate, Cell, CellItem, Counter, Grid, Kept, ListEntry, N_BOX_TESTS,
     N_BOX_TESTS_HIGH, N_CANDIDATES, N_COUNTERS, N_ENTRIES, N_ITEMS, N_KEPT, N_PAIRS, N_SUBDIVIDED,
-    N_TALLIES, N_UNSURE, NodePair, PairKey, ROUNDS, Reach, Start, TOO_MUCH, Tally, UnsureKey,
+    N_TALLIES, N_UNSURE, NodePair, PairKey, ROUNDS, Reach, Start, TOO_MUCH, Tally, Time, UnsureKey,
     WorkItem,
 };
 use super::open::Gpu;
@@ -29,9 +29,9 @@ pub struct Capacities {
     pub entries: u64,
     /// Candidates.
     pub candidates: u64,
-    /// Pairs that certainly intersect.
+    /// Pairs that certainly intersect. In a step, pairs that tests of the whole step leave.
     pub pairs: u64,
-    /// Pairs left to exact arithmetic.
+    /// Pairs left to exact arithmetic. In a step, all that the device leaves.
     pub unsure: u64,
 }
 
@@ -95,7 +95,7 @@ impl Capacities {
             + self.entries * size_of::<ListEntry>() as u64
             + self.candidates * size_of::<Candidate>() as u64
             + 2 * self.pairs * size_of::<PairKey>() as u64
-            + 2 * self.unsure * size_of::<UnsureKey>() as u64
+            + 2 * self.unsure * (size_of::<UnsureKey>() + size_of::<Time>()) as u64
     }
 
     fn zip(self, other: Self, pick: impl Fn(u64, u64) -> u64) -> Self {
@@ -145,6 +145,7 @@ pub struct Room {
     pub candidates: Storage<Candidate>,
     pub pairs: Storage<PairKey>,
     pub unsure: Storage<UnsureKey>,
+    pub times: Storage<Time>,
     pub counters: Storage<Counter>,
     pub arguments: Storage<Arguments>,
     pub cell_items: Storage<CellItem>,
@@ -188,6 +189,7 @@ impl Room {
             candidates: Storage::plain("candidates"),
             pairs: Storage::new("pairs", copied),
             unsure: Storage::new("unsure", copied),
+            times: Storage::new("times of pairs", copied),
             counters: Storage::new("counters", copied),
             arguments: Storage::new("arguments", indirect),
             cell_items: Storage::plain("work items of cells"),
@@ -225,8 +227,9 @@ impl Room {
         self.candidates.resize_exactly(gpu, wanted.candidates);
         self.pairs.resize_exactly(gpu, wanted.pairs);
         self.unsure.resize_exactly(gpu, wanted.unsure);
+        self.times.resize_exactly(gpu, wanted.unsure);
         self.counters.resize_exactly(gpu, u64::from(N_COUNTERS));
-        self.arguments.resize_exactly(gpu, u64::from(ROUNDS) + 2);
+        self.arguments.resize_exactly(gpu, u64::from(ROUNDS) + 3);
         self.cell_items.resize_exactly(gpu, of_cells);
         self.kept.resize_exactly(gpu, wanted.kept);
         self.entries.resize_exactly(gpu, wanted.entries);

@@ -1,10 +1,11 @@
 //! Where the results of passes go: pairs to the sink of a frame, the rest of a step's candidates to the host's stages.
 
 use crate::error::Error;
+use crate::impacts::LeftPair;
 use crate::sink::Answer;
 
-/// Takes the places of pairs that the device has left, in any order. Returns whether more are wanted.
-pub type TakeLeft<'a> = dyn FnMut(&mut [[u32; 2]]) -> Result<bool, Error> + 'a;
+/// Takes pairs that the device has left, in any order. Returns whether more are wanted.
+pub(crate) type TakeLeft<'a> = dyn FnMut(&mut [LeftPair]) -> Result<bool, Error> + 'a;
 
 /// Takes the results of complete passes.
 pub(super) enum Taker<'a, 'b> {

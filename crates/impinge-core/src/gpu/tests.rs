@@ -129,7 +129,8 @@ fn structs_are_laid_out_as_on_the_host() {
         UnsureKey { low, high }
         Params {
             first, count, counter, per_group, capacity, slot, n_ignored, resolve, group_size,
-            lambda, most_cells, owner_rule, lists_only, n_entries, tile_row, tile_column, tile_side
+            lambda, most_cells, owner_rule, lists_only, n_entries, tile_row, tile_column, tile_side,
+            by_number
         }
         Kept { low, place, high, body, range, unused }
         Grid { origin, shift, scale, n_cells, finest, unused, resolution, unused_too }

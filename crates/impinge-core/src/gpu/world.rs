@@ -18,7 +18,7 @@
 
 mod moving;
 
-pub(super) use moving::weigh as weigh_moving;
+pub(super) use moving::{ResidentEnds, weigh as weigh_moving};
 
 use std::sync::Arc;
 

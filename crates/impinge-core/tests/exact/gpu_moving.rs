@@ -1,5 +1,6 @@
 //! The filter of the GPU for moving elements, as `docs/exactness.md` specifies it, in the model of WGSL's arithmetic of
-//! `gpu_bound`. Signs that it calls certain must be right, and elements that it drops must not touch.
+//! `gpu_bound`. Signs that it calls certain must be right, for the whole step and for intervals of it, elements that it drops must not
+//! touch, and all others not before the time that it says.
 
 use crate::generators::{Kind, Random};
 use crate::gpu_bound::{Device, LARGEST, NARROWING, SMALLEST};
@@ -12,14 +13,19 @@ const OF_SUM: f32 = 1.0 / 8192.0;
 const INNER: f32 = 5.0;
 const NEXT: f32 = 8.0;
 const MIDDLE: f32 = 16.0;
+const SHORTEST: f32 = 1.0 / 1024.0;
+const N_INTERVALS: u32 = 32;
 
 #[cfg(feature = "gpu")]
 #[test]
 fn constants_are_those_of_the_kernel() {
     let mut shaders = impinge_core::gpu::shaders();
+    // It has the texts of `narrow_moving`, too.
     let (_, text) = shaders
-        .find(|(name, _)| *name == "narrow_moving")
+        .find(|(name, _)| *name == "narrow_search")
         .expect("a kernel");
+    let line = format!("const N_INTERVALS: u32 = {N_INTERVALS}u;");
+    assert!(text.contains(&line), "{line}");
     for (name, value, written) in [
         ("TINY", TINY, "0x1p-76f"),
         ("OF_CUBIC", OF_CUBIC, "0x1p-16f"),
@@ -28,6 +34,7 @@ fn constants_are_those_of_the_kernel() {
         ("INNER", INNER, "5.0"),
         ("NEXT", NEXT, "8.0"),
         ("MIDDLE", MIDDLE, "16.0"),
+        ("SHORTEST", SHORTEST, "0x1p-10f"),
     ] {
         assert!(
             text.contains(&format!("const {name}: f32 = {written};")),
@@ -65,6 +72,19 @@ impl<T: Copy> Polygon<T> {
                 corners: [between(1, 0), between(2, 0), between(3, 0), between(3, 0)],
                 edges: [between(2, 1), between(3, 2), between(1, 3)],
             },
+        }
+    }
+}
+
+impl<T: Copy> Polygon<T> {
+    /// The polygon at the ends of an interval. `at`: a number that moves, at the first or at the second of them.
+    fn over(&self, mut at: impl FnMut([T; 2], usize) -> T) -> Self {
+        let mut over = |[start, end]: &Moving<T>| -> Moving<T> {
+            [0, 1].map(|ix| std::array::from_fn(|axis| at([start[axis], end[axis]], ix)))
+        };
+        Polygon {
+            corners: self.corners.each_ref().map(&mut over),
+            edges: self.edges.each_ref().map(&mut over),
         }
     }
 }
@@ -231,13 +251,23 @@ struct Values {
     quartics: Vec<[(f32, f32); 5]>,
 }
 
-/// The bounds that the kernel computes, and the values under the model. `None` if the pair is unsure before.
-fn values(
+/// The polygon, and the sizes of its corners and edges over the whole step.
+struct Pair {
+    pair: ElementPair,
+    polygon: Polygon<f32>,
+    corners: [f32; 4],
+    edges: [f32; 3],
+    wide: f32,
+    slack: f32,
+}
+
+/// A pair as the kernels load it. `None` if it is unsure at once.
+fn load(
     device: &mut Device<'_>,
     pair: ElementPair,
     points: &[[[f32; 3]; 4]; 2],
     narrowing: f32,
-) -> Option<Values> {
+) -> Option<Pair> {
     let mut polygon = Polygon::new(pair, points, |x, y| device.add(x, -y));
     let widest = polygon.corners.iter().map(size).fold(0.0, f32::max);
     let largest = polygon.edges.iter().map(size).fold(widest, f32::max);
@@ -250,12 +280,31 @@ fn values(
         *x = device.product(&[*x, scale]);
     }
     let slack = device.product(&[narrowing, scale]);
-    let sizes = |d: &Moving<f32>, device: &mut Device<'_>| device.add(size(d), slack);
     let wide = device.product(&[widest, scale]);
     let wide = device.add(wide, slack);
+    let corners = polygon.corners.map(|d| device.add(size(&d), slack));
+    let edges = polygon.edges.map(|d| device.add(size(&d), slack));
+    Some(Pair {
+        pair,
+        polygon,
+        corners,
+        edges,
+        wide,
+        slack,
+    })
+}
+
+/// The bounds that the kernels compute, and the values under the model: for the whole step, or for an interval of it.
+fn values(device: &mut Device<'_>, loaded: &Pair, interval: Option<[f32; 2]>) -> Values {
+    let &Pair {
+        pair, wide, slack, ..
+    } = loaded;
+    let polygon = loaded.polygon.over(|ends, ix| match interval {
+        None => ends[ix],
+        Some(times) => device.of(&[vec![ends[0], 1.0 - times[ix]], vec![ends[1], times[ix]]]),
+    });
     let n_corners = if pair == ElementPair::EdgeEdge { 4 } else { 3 };
-    let d = sizes(&polygon.edges[0], device);
-    let e = sizes(&polygon.edges[1], device);
+    let [d, e, _] = loaded.edges;
     let of_sum = device.of(&[
         vec![OF_SUM, wide, wide],
         vec![32.0, slack, wide],
@@ -273,11 +322,8 @@ fn values(
     let [f_0, f_1, f_2, f_3] = cubic(device, &polygon);
     let mut quartics = Vec::new();
     for ix in 0..n_corners {
-        let c = sizes(&polygon.corners[ix], device);
-        let g = sizes(
-            &polygon.edges[ix % if n_corners == 4 { 2 } else { 3 }],
-            device,
-        );
+        let c = loaded.corners[ix];
+        let g = loaded.edges[ix % if n_corners == 4 { 2 } else { 3 }];
         let outer = device.of(&[
             vec![OF_QUARTIC, d, e, c, g],
             vec![8.0, slack, d, e, c],
@@ -291,11 +337,11 @@ fn values(
         let w = quartic(device, &polygon, ix);
         quartics.push(std::array::from_fn(|k| (w[k], bounds[k])));
     }
-    Some(Values {
+    Values {
         along: [(sum, of_sum), (first, bound), (last, bound)],
         cubic: [(f_0, bound), (f_1, inner), (f_2, inner), (f_3, bound)],
         quartics,
-    })
+    }
 }
 
 fn are_all(values: impl Iterator<Item = (f32, f32)> + Clone) -> bool {
@@ -314,6 +360,26 @@ fn never_touch(values: &Values) -> bool {
             .quartics
             .iter()
             .any(|w| w.iter().all(|(value, bound)| *value < -bound))
+}
+
+/// The search of the second kernel: the time until which the pair does not touch; `None` if it never does.
+fn free_until(device: &mut Device<'_>, loaded: &Pair) -> Option<f32> {
+    let (mut low, mut length) = (0.0, 0.5);
+    for _ in 0..N_INTERVALS {
+        let high = f32::min(low + length, 1.0);
+        if never_touch(&values(device, loaded, Some([low, high]))) {
+            if high == 1.0 {
+                return None;
+            }
+            low = high;
+            length *= 2.0;
+        } else if length > SHORTEST {
+            length *= 0.5;
+        } else {
+            break;
+        }
+    }
+    Some(low)
 }
 
 const PAIRS: [ElementPair; 2] = [ElementPair::VertexFace, ElementPair::EdgeEdge];
@@ -359,12 +425,23 @@ fn coefficients_are_right_where_they_are_sure() {
                 let scaled = narrow.map(|p| p.map(|x| x * 2f32.powi(power)));
                 let whole = [0, 4].map(|k| std::array::from_fn(|i| whole[k + i]));
                 let pair = random.pick(&PAIRS);
+                // The whole step, or from one multiple of 1/32 to another: larger integers would be too long.
+                let low = random.below(32);
+                let times = [low, low + 1 + random.below(32 - low)];
+                let interval = (random.below(2) == 0).then_some(times.map(|t| t as f32 / 32.0));
                 let mut device = Device(&mut random);
-                let Some(values) = values(&mut device, pair, &halves(scaled), 0.0) else {
+                let Some(loaded) = load(&mut device, pair, &halves(scaled), 0.0) else {
                     continue;
                 };
-                let exact = Polygon::new(pair, &whole, |x, y| x - y);
-                let what = format!("{pair:?} {kind:?} 2^{power} {narrow:?}");
+                let values = values(&mut device, &loaded, interval);
+                let mut exact = Polygon::new(pair, &whole, |x, y| x - y);
+                if interval.is_some() {
+                    exact = exact.over(|[x, y], ix| {
+                        let time = i128::from(times[ix]);
+                        x * (32 - time) + y * time
+                    });
+                }
+                let what = format!("{pair:?} {kind:?} 2^{power} {interval:?} {narrow:?}");
                 let n_corners = values.quartics.len();
                 let exact_along = along(&mut Exactly, &exact, n_corners);
                 for ((found, bound), exact) in values.along.iter().zip(&exact_along) {
@@ -394,9 +471,9 @@ fn coefficients_are_right_where_they_are_sure() {
 }
 
 #[test]
-fn what_is_dropped_never_touches() {
+fn what_is_dropped_never_touches_and_others_not_too_early() {
     let mut random = Random::new(51);
-    let (mut n, mut n_dropped) = (0, 0);
+    let (mut n, mut n_dropped, mut n_later, mut n_waiting) = (0, 0, 0, 0);
     for kind in Kind::ALL {
         for is_narrowed in [false, true] {
             for scale in [1.0, 2f64.powi(-29), 2f64.powi(10)] {
@@ -428,17 +505,32 @@ fn what_is_dropped_never_touches() {
                     let pair = random.pick(&PAIRS);
                     let halves = [0, 4].map(|k| std::array::from_fn(|i| narrow[k + i]));
                     let mut device = Device(&mut random);
-                    let values = values(&mut device, pair, &halves, narrowing);
                     n += 1;
-                    if values.is_some_and(|values| never_touch(&values)) {
-                        n_dropped += 1;
-                        let [start, end] = [0, 4].map(|k| std::array::from_fn(|i| points[k + i]));
-                        let contact = first_contact(pair, &start, &end);
-                        assert!(contact.is_none(), "{pair:?} {kind:?}: {start:?} {end:?}");
+                    let Some(loaded) = load(&mut device, pair, &halves, narrowing) else {
+                        continue;
+                    };
+                    let is_dropped = never_touch(&values(&mut device, &loaded, None));
+                    let until = free_until(&mut device, &loaded);
+                    n_dropped += u32::from(is_dropped);
+                    n_later += u32::from(!is_dropped && until.is_none());
+                    if !is_dropped && until == Some(0.0) {
+                        continue;
                     }
+                    let [start, end] = [0, 4].map(|k| std::array::from_fn(|i| points[k + i]));
+                    let Some(contact) = first_contact(pair, &start, &end) else {
+                        continue;
+                    };
+                    let what = format!("{pair:?} {kind:?}: {start:?} {end:?}");
+                    assert!(!is_dropped, "{what}");
+                    let until = until.expect(&what);
+                    assert!(until == 0.0 || !contact.at_start, "{what}");
+                    assert!(f64::from(until) <= contact.time, "{until} {what}");
+                    n_waiting += u32::from(until > 0.0);
                 }
             }
         }
     }
     assert!(n_dropped > n / 8, "{n_dropped} of {n} are dropped");
+    assert!(n_later > n / 40, "{n_later} of {n} by the search alone");
+    assert!(n_waiting > n / 40, "{n_waiting} of {n} touch later");
 }

@@ -1,14 +1,16 @@
 //! Stage `settle`: pairs that a device has not dropped, with their first contacts.
 //!
-//! In: places of two elements, in any order. Out: contacts, as from stage `narrow`, whose lists and filters do the work.
-//! Runs of pairs are tasks; each is sorted first, so that pairs of two layers, and elements in memory, come together.
+//! In: places of two elements, in any order, and times until which they certainly do not touch. Out: contacts, as from stage `narrow`,
+//! whose lists and filters do the work. Runs of pairs are tasks; each is sorted first, so that pairs of two layers, and elements in
+//! memory, come together. Where the earliest contact is sought, pairs come in the order of their times, a few at first, up to the
+//! earliest contact found.
 
 use std::sync::{Mutex, PoisonError};
 
 use crate::cpu::simd::Isa;
 use crate::error::Error;
 use crate::frame::{TestId, owner_by_first};
-use crate::impacts::StepAnswer;
+use crate::impacts::{LeftPair, StepAnswer};
 use crate::index::{LayerIx, Place};
 use crate::run::Job;
 use crate::sink::Ending;
@@ -20,6 +22,8 @@ use super::world::World;
 
 /// Pairs per task.
 const TASK: usize = 2048;
+/// Where the earliest contact is sought: how many pairs are settled before the time of each other pair is compared with it.
+const SOONEST: usize = 256;
 
 /// Settles pairs as they come.
 pub(super) struct Left<'a, 'b> {
@@ -37,7 +41,38 @@ impl Left<'_, '_> {
     ///
     /// # Errors
     /// Cancellation, those of the answer, and pairs that nobody asked for.
-    pub fn settle(&mut self, pairs: &mut [[u32; 2]]) -> Result<bool, Error> {
+    pub fn settle(&mut self, mut pairs: &mut [LeftPair]) -> Result<bool, Error> {
+        if !self.workers[0].contacts().seeks_earliest() {
+            return self.settle_each(pairs);
+        }
+        let mut n_soonest = SOONEST;
+        loop {
+            n_soonest = n_soonest.min(pairs.len());
+            if n_soonest < pairs.len() {
+                let by_time = |a: &LeftPair, b: &LeftPair| a.free_until.total_cmp(&b.free_until);
+                pairs.select_nth_unstable_by(n_soonest, by_time);
+            }
+            let (soonest, later) = pairs.split_at_mut(n_soonest);
+            let goes_on = self.settle_each(soonest)?;
+            if !goes_on || later.is_empty() {
+                return Ok(goes_on);
+            }
+            // The others touch after the earliest contact found, if at all.
+            let until = self.workers[0].contacts().until(self.world);
+            let mut n = 0;
+            for ix in 0..later.len() {
+                if f64::from(later[ix].free_until) <= until {
+                    later.swap(n, ix);
+                    n += 1;
+                }
+            }
+            pairs = &mut later[..n];
+            n_soonest *= 4;
+        }
+    }
+
+    /// Settles pairs, run by run.
+    fn settle_each(&mut self, pairs: &mut [LeftPair]) -> Result<bool, Error> {
         let Left {
             isa,
             job,
@@ -49,7 +84,7 @@ impl Left<'_, '_> {
         let (isa, world, answer, job) = (*isa, *world, *answer, *job);
         let first_places = &first_places[..];
         let wrong = Mutex::new(None);
-        let tasks: Vec<Mutex<&mut [[u32; 2]]>> = pairs.chunks_mut(TASK).map(Mutex::new).collect();
+        let tasks: Vec<Mutex<&mut [LeftPair]>> = pairs.chunks_mut(TASK).map(Mutex::new).collect();
         let n_workers = workers.len().min(tasks.len()).max(1);
         job.workers
             .for_each(&mut workers[..n_workers], tasks.len(), |worker, ix| {
@@ -86,29 +121,30 @@ fn settle(
     isa: Isa,
     world: World<'_>,
     first_places: &[u32],
-    pairs: &mut [[u32; 2]],
+    pairs: &mut [LeftPair],
     contacts: &mut FirstContacts,
 ) -> Result<(), Error> {
     let n_places = first_places.last().copied().unwrap_or(0);
-    for pair in &mut *pairs {
-        pair.sort_unstable();
-        if pair[1] >= n_places {
-            return Err(not_asked(*pair));
+    for LeftPair { places, .. } in &mut *pairs {
+        places.sort_unstable();
+        if places[1] >= n_places {
+            return Err(not_asked(*places));
         }
     }
     let layer =
         |place: u32| LayerIx::from_usize(owner_by_first(first_places, place, |first| *first));
-    pairs.sort_unstable_by_key(|&[a, b]| (layer(a), layer(b), a, b));
-    for run in pairs.chunk_by(|p, q| p.map(layer) == q.map(layer)) {
-        let [a, b] = run[0].map(layer);
+    let layers = |pair: &LeftPair| pair.places.map(layer);
+    pairs.sort_unstable_by_key(|pair| (layers(pair), pair.places));
+    for run in pairs.chunk_by(|p, q| layers(p) == layers(q)) {
+        let [a, b] = layers(&run[0]);
         let test = world.frame.test(a, b);
         let Some(TestId::Elements(kind)) = test else {
-            return Err(not_asked(run[0]));
+            return Err(not_asked(run[0].places));
         };
         let firsts = [a, b].map(|layer| first_places[layer.index()]);
         let places = run
             .iter()
-            .map(|&[p, q]| [p - firsts[0], q - firsts[1]].map(Place::new));
+            .map(|LeftPair { places: [p, q], .. }| [p - firsts[0], q - firsts[1]].map(Place::new));
         contacts.take_left(isa, world, Between { a, b, kind }, places);
     }
     contacts.settle(isa, world);

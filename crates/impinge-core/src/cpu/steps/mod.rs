@@ -29,6 +29,10 @@ use crate::frame::Layer;
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hubs::Hubs;
 use crate::hull::Pose;
+#[cfg(feature = "gpu")]
+use crate::ids::BodyId;
+#[cfg(feature = "gpu")]
+use crate::impacts::LeftPair;
 use crate::impacts::StepAnswer;
 use crate::index::LayerIx;
 use crate::scene::Body;
@@ -167,20 +171,11 @@ impl StepClusters {
         stats: &mut Statistics,
         find: impl FnOnce(
             &[Arc<Clustering>],
-            &mut dyn FnMut(&mut [[u32; 2]]) -> Result<bool, Error>,
+            &mut dyn FnMut(&mut [LeftPair]) -> Result<bool, Error>,
             &mut Statistics,
         ) -> Result<bool, Error>,
     ) -> Result<bool, Error> {
-        let recluster = settings.recluster == Recluster::Auto;
-        stats.n_clusters = 0;
-        stats.time("clustering", |stats| {
-            let is_stale = |cache: &mut LayerCache, _: &Layer, body: &Body| {
-                recluster && cache.is_stale(body, &settings.tuning)
-            };
-            self.update(job, stats, is_stale)
-        })?;
-        let of_layer = |layer: &Layer| Arc::clone(&self.caches.at(layer).clustering);
-        let clusterings: Vec<Arc<Clustering>> = job.frame.layers.iter().map(of_layer).collect();
+        let clusterings = self.clusterings(job, settings, |_| false, stats)?;
         let mut first_places = vec![0];
         for clustering in &clusterings {
             // All elements of a frame are numbered in 32 bits.
@@ -213,6 +208,31 @@ impl StepClusters {
         left.end()?;
         stats.bytes_held += self.bytes_besides_room() as u64;
         Ok(is_done)
+    }
+
+    /// The clusters of all layers, for a device. The host does not know the pose of `resident` bodies, so it does not judge
+    /// their clusters.
+    ///
+    /// # Errors
+    /// Threads that do not start.
+    #[cfg(feature = "gpu")]
+    pub fn clusterings(
+        &mut self,
+        job: Job<'_>,
+        settings: &Settings,
+        resident: impl Fn(BodyId) -> bool,
+        stats: &mut Statistics,
+    ) -> Result<Vec<Arc<Clustering>>, Error> {
+        let recluster = settings.recluster == Recluster::Auto;
+        stats.n_clusters = 0;
+        stats.time("clustering", |stats| {
+            let is_stale = |cache: &mut LayerCache, layer: &Layer, body: &Body| {
+                recluster && !resident(layer.id) && cache.is_stale(body, &settings.tuning)
+            };
+            self.update(job, stats, is_stale)
+        })?;
+        let of_layer = |layer: &Layer| Arc::clone(&self.caches.at(layer).clustering);
+        Ok(job.frame.layers.iter().map(of_layer).collect())
     }
 
     fn bytes_besides_room(&self) -> usize {

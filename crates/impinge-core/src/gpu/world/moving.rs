@@ -7,6 +7,7 @@
 //!
 //! Layers of one body share its positions, so equal vertex ids mean the same vertex.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::{MOST_PRIMITIVES, SLACK, World, put_words, sample, words};
@@ -25,7 +26,7 @@ use crate::grouping::hierarchy::TreeShape;
 use crate::ids::BodyId;
 use crate::positions::Positions;
 use crate::run::Job;
-use crate::scene::{Filter, Scene};
+use crate::scene::{self, Filter, Scene};
 use crate::stats::Statistics;
 
 /// What the device holds of a step.
@@ -47,6 +48,27 @@ struct Moving {
     step_stamp: u64,
     /// Index of its first vertex among those of one end.
     first_vertex: u64,
+}
+
+/// Positions that are on the device already, by body: at the start, and at the end.
+#[derive(Debug, Default)]
+pub(in crate::gpu) struct ResidentEnds<'a>(pub [BTreeMap<BodyId, &'a wgpu::Buffer>; 2]);
+
+impl ResidentEnds<'_> {
+    /// Whether the device has the positions of a body at both ends.
+    fn has_both(&self, id: BodyId) -> bool {
+        self.0.iter().all(|end| end.contains_key(&id))
+    }
+
+    /// Whether the host has rounded the positions of a body at an end.
+    fn are_rounded(&self, id: BodyId, body: &scene::Body) -> bool {
+        [Some(body.positions()), body.end_positions()]
+            .into_iter()
+            .zip(&self.0)
+            .any(|(positions, end)| {
+                matches!(positions, Some(Positions::F64(_))) && !end.contains_key(&id)
+            })
+    }
 }
 
 impl Layers {
@@ -99,8 +121,8 @@ impl World {
         1 + u64::from(self.is_moving())
     }
 
-    /// Sends what has changed since the last step, which must have a [weight](weigh). Returns whether kernels have to be bound
-    /// again.
+    /// Sends what has changed since the last step, which must have a [weight](weigh), except positions that are on the device.
+    /// Returns whether kernels have to be bound again.
     ///
     /// # Errors
     /// More than the device can bind at once.
@@ -109,6 +131,7 @@ impl World {
         gpu: &Gpu,
         job: Job<'_>,
         clusterings: &[Arc<Clustering>],
+        resident: &ResidentEnds<'_>,
         stats: &mut Statistics,
     ) -> Result<bool, Error> {
         let Job { scene, frame, .. } = job;
@@ -128,8 +151,8 @@ impl World {
             self.layers = Some(layers);
             is_other = true;
         }
-        self.send_ends(gpu, scene);
-        is_other |= self.send_layer_records(gpu, scene, frame)?;
+        self.send_ends(gpu, scene, resident);
+        is_other |= self.send_layer_records(gpu, scene, frame, resident)?;
         stats.n_clusters = self.forest.n_clusters();
         Ok(is_other)
     }
@@ -163,8 +186,6 @@ impl World {
                 first + vertex
             });
         }
-        // The host names elements by their places.
-        topology.numbers.clear();
         let shapes: Vec<&TreeShape> = clusterings.iter().map(|held| &held.shape).collect();
         self.forest = Forest::new(&shapes, |ix| sample(scene, frame, ix));
         self.send_trees(gpu, &topology)?;
@@ -175,13 +196,16 @@ impl World {
         Ok(layers)
     }
 
-    /// Sends both ends of bodies that have moved; runs of consecutive bodies in one write per end.
-    fn send_ends(&mut self, gpu: &Gpu, scene: &Scene) {
+    /// Sends both ends of bodies that have moved, unless the device has both; runs of consecutive bodies in one write per end.
+    fn send_ends(&mut self, gpu: &Gpu, scene: &Scene, resident: &ResidentEnds<'_>) {
         let Some(layers) = &mut self.layers else {
             return;
         };
         let n_vertices = layers.n_vertices;
-        let is_new = |body: &Moving| body.step_stamp != scene.body_in(body.id.slot()).step_stamp();
+        let is_new = |body: &Moving| {
+            body.step_stamp != scene.body_in(body.id.slot()).step_stamp()
+                && !resident.has_both(body.id)
+        };
         for run in layers.bodies.chunk_by_mut(|a, b| is_new(a) == is_new(b)) {
             if !is_new(&run[0]) {
                 continue;
@@ -209,12 +233,45 @@ impl World {
         }
     }
 
+    /// Encodes the copies of positions from buffers on the device, of the bodies that take part.
+    pub(in crate::gpu) fn copy_ends(
+        &mut self,
+        resident: &ResidentEnds<'_>,
+        encoder: &mut wgpu::CommandEncoder,
+    ) {
+        let Some(layers) = &mut self.layers else {
+            return;
+        };
+        let bytes = 3 * size_of::<Coordinate>() as u64;
+        let all = layers.n_vertices;
+        let firsts = layers.bodies.iter().map(|body| body.first_vertex);
+        let ends: Vec<u64> = firsts.skip(1).chain([all]).collect();
+        for (end, buffers) in (0..).zip(&resident.0) {
+            for (&id, buffer) in buffers {
+                let Some(ix) = layers.number(id) else {
+                    continue;
+                };
+                let moving = &mut layers.bodies[ix];
+                // The device no longer has the scene's positions.
+                moving.step_stamp = 0;
+                self.is_moved = true;
+                let n_vertices = ends[ix] - moving.first_vertex;
+                let (to, size) = (
+                    bytes * (end * all + moving.first_vertex),
+                    bytes * n_vertices,
+                );
+                encoder.copy_buffer_to_buffer(buffer, 0, self.positions.buffer(), to, size);
+            }
+        }
+    }
+
     /// Sends the records of all layers and the pairs of bodies that are ignored, if they have changed.
     fn send_layer_records(
         &mut self,
         gpu: &Gpu,
         scene: &Scene,
         frame: &Frame,
+        resident: &ResidentEnds<'_>,
     ) -> Result<bool, Error> {
         if self.forest.reorder(|ix| sample(scene, frame, ix)) {
             let first = u64::from(self.forest.first_gate);
@@ -234,11 +291,7 @@ impl World {
                     mask: 0,
                 },
             };
-            let body = frame.body(scene, ix);
-            let is_rounded = [Some(body.positions()), body.end_positions()]
-                .into_iter()
-                .flatten()
-                .any(|positions| matches!(positions, Positions::F64(_)));
+            let is_rounded = resident.are_rounded(layer.id, frame.body(scene, ix));
             Body {
                 root: self.forest.root(ix),
                 slack: if is_rounded { SLACK } else { 0 },

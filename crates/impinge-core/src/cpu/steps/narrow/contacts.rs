@@ -77,9 +77,15 @@ impl FirstContacts {
         }
     }
 
+    /// Whether only the earliest contacts are wanted.
+    #[cfg(feature = "gpu")]
+    pub fn seeks_earliest(&self) -> bool {
+        matches!(self.asked.sought, Sought::Earliest)
+    }
+
     /// Contacts later than this are not wanted.
     #[inline(always)]
-    pub(super) fn until(&self, world: World<'_>) -> f64 {
+    pub(in super::super) fn until(&self, world: World<'_>) -> f64 {
         match self.asked.sought {
             // Contacts that are later by less than rounding are wanted, for their keys may be lower.
             Sought::Earliest => {

@@ -69,7 +69,8 @@ struct WorkItem { a: u32, b: u32 }
 // Two places. Bit 31 of `a`: positions were rounded. Bit 31 of `b`: the two share a vertex; in a step, `a` is an edge.
 struct Candidate { a: u32, b: u32 }
 
-// Two global primitive numbers, the lower one first. In a step an unsure key has two places.
+// Two global primitive numbers, the lower one first. In a step, a pair key is a candidate; and an unsure key has two places, if the
+// host settles it.
 struct PairKey { low: u32, high: u32 }
 struct UnsureKey { low: u32, high: u32 }
 
@@ -100,6 +101,8 @@ struct Params {
     tile_row: u32,
     tile_column: u32,
     tile_side: u32,
+    // Steps: 1 when pairs are named by global numbers, 0 when by places.
+    by_number: u32,
 }
 
 // A primitive within its body's reach: its box, its place (bit 31: rounded), its body, and the

@@ -109,29 +109,53 @@ fn is_outside(n: Crossed, corner: Moving, edge: Moving, bound: f32) -> bool {
         && dot3(n.last, m.last) < -bound;
 }
 
-// Whether the elements certainly do not touch. `narrowing`: by how much a difference may be wrong because positions were
-// rounded.
-fn never_touch(polygon: ptr<function, Polygon>, are_edges: bool, narrowing: f32) -> bool {
+// Sizes of corners and edges over the whole step, after scaling, with what rounded positions add.
+struct Sizes {
+    corners: array<f32, 4>,
+    edges: array<f32, 3>,
+    // The largest of a corner.
+    wide: f32,
+    slack: f32,
+    // Whether bounds hold for differences of these sizes.
+    are_in_range: bool,
+}
+
+// Scales all differences. `narrowing`: by how much a difference may be wrong because positions were rounded.
+fn scale_all(polygon: ptr<function, Polygon>, narrowing: f32) -> Sizes {
+    var sizes = Sizes();
     var widest = 0.0;
     for (var k = 0u; k < 4u; k++) {
-        widest = max(widest, size_of((*polygon).corners[k]));
+        sizes.corners[k] = size_of((*polygon).corners[k]);
+        widest = max(widest, sizes.corners[k]);
     }
     var largest = widest;
     for (var k = 0u; k < 3u; k++) {
-        largest = max(largest, size_of((*polygon).edges[k]));
+        sizes.edges[k] = size_of((*polygon).edges[k]);
+        largest = max(largest, sizes.edges[k]);
     }
     if largest < SMALLEST || largest < narrowing {
-        return false;
+        return sizes;
     }
     let scale = bitcast<f32>((254u - (bitcast<u32>(largest) >> 23u)) << 23u);
+    let slack = narrowing * scale;
     for (var k = 0u; k < 4u; k++) {
         (*polygon).corners[k] = scaled((*polygon).corners[k], scale);
+        sizes.corners[k] = sizes.corners[k] * scale + slack;
     }
     for (var k = 0u; k < 3u; k++) {
         (*polygon).edges[k] = scaled((*polygon).edges[k], scale);
+        sizes.edges[k] = sizes.edges[k] * scale + slack;
     }
-    let slack = narrowing * scale;
-    let wide = widest * scale + slack;
+    sizes.wide = widest * scale + slack;
+    sizes.slack = slack;
+    sizes.are_in_range = true;
+    return sizes;
+}
+
+// Whether the elements certainly do not touch between the two ends of `polygon`.
+fn never_touch(polygon: ptr<function, Polygon>, sizes: ptr<function, Sizes>, are_edges: bool) -> bool {
+    let slack = (*sizes).slack;
+    let wide = (*sizes).wide;
 
     // Along the sum of all corners.
     var sum = vec3<f32>(0.0);
@@ -149,8 +173,8 @@ fn never_touch(polygon: ptr<function, Polygon>, are_edges: bool, narrowing: f32)
     let first = (*polygon).edges[0];
     let second = (*polygon).edges[1];
     let n = crossed(first, second);
-    let d = size_of(first) + slack;
-    let e = size_of(second) + slack;
+    let d = (*sizes).edges[0];
+    let e = (*sizes).edges[1];
     let bound = OF_CUBIC * (d * e * wide) + 4.0 * slack * (d * e + (d + e) * wide) + TINY;
     if are_aside(polygon, n.first, bound) || are_aside(polygon, n.last, bound) {
         return true;
@@ -168,24 +192,21 @@ fn never_touch(polygon: ptr<function, Polygon>, are_edges: bool, narrowing: f32)
         return true;
     }
 
-    // Beyond one edge during the whole step.
+    // Beyond one edge all the time.
     for (var k = 0u; k < 3u; k++) {
-        let corner = (*polygon).corners[k];
-        let edge = (*polygon).edges[k];
-        let c = size_of(corner) + slack;
-        let g = size_of(edge) + slack;
+        let c = (*sizes).corners[k];
+        let g = (*sizes).edges[k];
         let w_bound = OF_QUARTIC * (d * e * c * g)
             + 8.0 * slack * (d * e * (c + g) + c * g * (d + e)) + TINY;
-        if is_outside(n, corner, edge, w_bound) {
+        if is_outside(n, (*polygon).corners[k], (*polygon).edges[k], w_bound) {
             return true;
         }
     }
     if are_edges {
         // The last edge is the opposite of the second one.
-        let corner = (*polygon).corners[3];
-        let c = size_of(corner) + slack;
+        let c = (*sizes).corners[3];
         let w_bound = OF_QUARTIC * (d * e * c * e) + 8.0 * slack * (d * e * (c + e) + c * e * (d + e)) + TINY;
-        return is_outside(n, corner, opposite(second), w_bound);
+        return is_outside(n, (*polygon).corners[3], opposite(second), w_bound);
     }
     return false;
 }

@@ -1,0 +1,504 @@
+//! Steps whose positions and pairs stay on the device, against the CPU.
+//!
+//! These tests fail where no adapter is found; a software driver is enough.
+#![cfg(feature = "gpu")]
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use impinge_core::{
+    Backend, BodyId, CandidateQuery, Detector, Error, PairKind, Part, Query, ResidentStep, Scene,
+    Settings, Step, wgpu,
+};
+use impinge_scenes::{Random, surfaces};
+
+/// Pairs, and until when each certainly does not touch.
+type Listed = BTreeMap<[u32; 2], f32>;
+
+/// A device of the caller's.
+struct Caller {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+}
+
+impl Caller {
+    fn new() -> Self {
+        let instance = wgpu::Instance::default();
+        let adapter = pollster::block_on(instance.request_adapter(&Default::default()));
+        let adapter = adapter.expect("these tests need a GPU or a software driver");
+        let device = pollster::block_on(adapter.request_device(&Default::default()));
+        let (device, queue) = device.expect("a device");
+        Caller { device, queue }
+    }
+
+    fn detector(&self, settings: Settings) -> Detector {
+        let (device, queue) = (self.device.clone(), self.queue.clone());
+        Detector::with_device(device, queue, settings).expect("settings")
+    }
+
+    fn encoder(&self) -> wgpu::CommandEncoder {
+        self.device.create_command_encoder(&Default::default())
+    }
+
+    fn buffer(&self, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size,
+            usage,
+            mapped_at_creation: false,
+        })
+    }
+
+    /// Positions on the device.
+    fn upload(&self, positions: &[[f32; 3]]) -> wgpu::Buffer {
+        use wgpu::BufferUsages as Usage;
+        let bytes: Vec<u8> = positions
+            .as_flattened()
+            .iter()
+            .flat_map(|x| x.to_le_bytes())
+            .collect();
+        let buffer = self.buffer(bytes.len() as u64, Usage::COPY_SRC | Usage::COPY_DST);
+        self.queue.write_buffer(&buffer, 0, &bytes);
+        buffer
+    }
+
+    /// Words of a buffer on the device.
+    fn read(&self, buffer: &wgpu::Buffer) -> Vec<u32> {
+        use wgpu::BufferUsages as Usage;
+        let staging = self.buffer(buffer.size(), Usage::MAP_READ | Usage::COPY_DST);
+        let mut encoder = self.encoder();
+        encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
+        self.queue.submit([encoder.finish()]);
+        staging.map_async(wgpu::MapMode::Read, .., |_| ());
+        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
+        polled.expect("the device runs");
+        let view = staging.get_mapped_range(..).expect("mapped");
+        let words = view.as_chunks::<4>().0.iter();
+        words.map(|word| u32::from_le_bytes(*word)).collect()
+    }
+
+    /// Encodes a step until there is room for its pairs, and reads them. Also returns how often the step was encoded.
+    fn pairs(
+        &self,
+        detector: &mut Detector,
+        scene: &Scene,
+        step: &Step,
+        [starts, ends]: [&[(BodyId, &wgpu::Buffer)]; 2],
+    ) -> (ResidentStep, Listed, u32) {
+        for n_tries in 1..9 {
+            let mut encoder = self.encoder();
+            let found = detector.encode_step(scene, step, starts, ends, &mut encoder);
+            let found = found.expect("good buffers");
+            self.queue.submit([encoder.finish()]);
+            if !detector.make_room().expect("room") {
+                continue;
+            }
+            let n = self.read(&found.counts)[found.n_pairs_offset as usize / 4] as usize;
+            assert!(n as u64 <= found.pairs_capacity);
+            let pairs = self.read(&found.pairs);
+            let times = self.read(&found.free_until);
+            let times = times.iter().map(|&bits| f32::from_bits(bits));
+            let each = pairs.as_chunks::<2>().0[..n].iter().copied();
+            let pairs = Listed::from_iter(each.zip(times));
+            assert_eq!(pairs.len(), n, "each pair is listed once");
+            return (found, pairs, n_tries);
+        }
+        panic!("there never is enough room");
+    }
+}
+
+/// The numbers of a pair in the list.
+fn numbers(found: &ResidentStep, kind: PairKind, elements: [(BodyId, u32); 2]) -> [u32; 2] {
+    let mut numbers = [0; 2];
+    for ((part, (body, element)), number) in
+        kind.parts().into_iter().zip(elements).zip(&mut numbers)
+    {
+        let mut layers = found.layers.iter();
+        let layer = layers.find(|layer| layer.part == part && layer.body == body);
+        let layer = layer.expect("a layer of each part that takes part");
+        assert!(element < layer.len);
+        *number = layer.first + element;
+    }
+    numbers
+}
+
+/// The kind of a pair in the list, as a shader finds it.
+fn kind(found: &ResidentStep, [low, high]: [u32; 2]) -> PairKind {
+    assert!(low < high);
+    if high < found.first_vertex {
+        PairKind::EdgeEdge
+    } else if low < found.first_vertex {
+        PairKind::EdgeVertex
+    } else if high < found.first_face {
+        PairKind::VertexVertex
+    } else {
+        PairKind::VertexFace
+    }
+}
+
+const KINDS: [PairKind; 4] = [
+    PairKind::VertexFace,
+    PairKind::EdgeEdge,
+    PairKind::EdgeVertex,
+    PairKind::VertexVertex,
+];
+
+/// Asserts that the list has all impacts of a scene and only candidates of it. Returns the number of impacts.
+fn assert_between(
+    name: &str,
+    found: &ResidentStep,
+    pairs: &Listed,
+    truth: &Scene,
+    step: &Step,
+    query: &Query,
+) -> usize {
+    let mut cpu = Detector::new(Backend::Cpu).expect("settings");
+    let impacts = cpu.impacts(truth, step).expect(name).clone();
+    for impact in &impacts {
+        let elements = [impact.a, impact.b].map(|at| (at.body, at.primitive));
+        let pair = numbers(found, impact.kind, elements);
+        let until = pairs.get(&pair);
+        let until = until.unwrap_or_else(|| panic!("{name}: {impact:?} is missing"));
+        assert!(
+            f64::from(*until) <= impact.toi,
+            "{name}: {until} {impact:?}"
+        );
+        assert!(
+            *until == 0.0 || !impact.at_start,
+            "{name}: {until} {impact:?}"
+        );
+        assert_eq!(kind(found, pair), impact.kind, "{name}");
+    }
+    let asked = CandidateQuery::new(query.clone()).kinds(KINDS);
+    let candidates = cpu.candidates(truth, &asked).expect(name);
+    let candidates = candidates
+        .iter()
+        .map(|(kind, a, b)| numbers(found, kind, [a, b].map(|at| (at.body, at.primitive))));
+    let candidates = BTreeSet::from_iter(candidates);
+    let are_candidates = pairs.keys().all(|pair| candidates.contains(pair));
+    assert!(are_candidates, "{name}");
+    let (n, n_candidates) = (pairs.len(), candidates.len());
+    assert!(n < n_candidates, "{name}: {n} of {n_candidates} are left");
+    impacts.len()
+}
+
+/// A body, and where it is at both ends.
+type Moving = (BodyId, [Vec<[f32; 3]>; 2]);
+
+/// Two balls that run into each other: the truth, and the same scene as the host knows it, where nothing moves.
+fn balls(n: usize) -> (Scene, Scene, Vec<Moving>) {
+    let ball = surfaces::ball(n / 2);
+    let (low, high) = ball.bounds().expect("not empty");
+    let width = high[2] - low[2];
+    let other = ball.translated([0.0, 0.1 * width, 1.02 * width]);
+    let end_a = ball.mapped(|[x, y, z]| [1.01 * x, y, z + 0.05 * x]);
+    let end_b = other.mapped(|[x, y, z]| [x, y, z - 0.2 * width + 0.01 * y]);
+    let mut known = Scene::new();
+    let a = ball.add_to(&mut known).expect("good");
+    // Of the second ball the host knows another pose.
+    let b = ball.add_to(&mut known).expect("good");
+    let mut truth = known.clone();
+    truth.set_positions(b, &other.positions).expect("good");
+    for (body, end) in [(a, &end_a), (b, &end_b)] {
+        truth.set_end_positions(body, &end.positions).expect("good");
+    }
+    let moving = vec![
+        (a, [ball.positions, end_a.positions]),
+        (b, [other.positions, end_b.positions]),
+    ];
+    (truth, known, moving)
+}
+
+#[test]
+fn pairs_that_may_touch_stay_on_the_device() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let (truth, known, moving) = balls(3000);
+    let buffers = Vec::from_iter(moving.iter().map(|(body, ends)| {
+        let [start, end] = ends.each_ref().map(|end| caller.upload(end));
+        (*body, start, end)
+    }));
+    let starts = Vec::from_iter(buffers.iter().map(|(body, start, _)| (*body, start)));
+    let ends = Vec::from_iter(buffers.iter().map(|(body, _, end)| (*body, end)));
+    let mut counts = Vec::new();
+    for query in [
+        Query::everything(),
+        Query::all(),
+        Query::within(moving[0].0),
+    ] {
+        let name = format!("{query:?}");
+        let step = Step::new(query.clone());
+        let (found, pairs, _) = caller.pairs(&mut detector, &known, &step, [&starts, &ends]);
+        let n = assert_between(&name, &found, &pairs, &truth, &step, &query);
+        // The same as from the host's positions, and as many as the host would be handed over.
+        let (_, by_host, _) = caller.pairs(&mut detector, &truth, &step, [&[], &[]]);
+        assert!(pairs == by_host, "{name}");
+        let impacts = detector.impacts(&truth, &step).expect("good");
+        assert_eq!(impacts.len(), n, "{name}");
+        let stats = impacts.stats();
+        assert_ne!(stats.backend, "cpu");
+        assert_eq!(stats.n_unsure, pairs.len() as u64, "{name}");
+        counts.push(n);
+        // Some positions from the device and some from the host.
+        let mut half = known.clone();
+        half.set_end_positions(moving[0].0, &moving[0].1[1])
+            .expect("good");
+        half.set_positions(moving[1].0, &moving[1].1[0])
+            .expect("good");
+        let (_, mixed, _) = caller.pairs(&mut detector, &half, &step, [&starts[..1], &ends[1..]]);
+        assert!(pairs == mixed, "{name}");
+    }
+    assert!(counts[0] > 100 && counts[2] == 0, "{counts:?}");
+    // Without positions at the end, bodies stay where the device has them.
+    let mut still = truth.clone();
+    still
+        .set_positions(moving[0].0, &moving[0].1[1])
+        .expect("good");
+    still
+        .set_positions(moving[1].0, &moving[1].1[1])
+        .expect("good");
+    for (body, _) in &moving {
+        still.clear_end_positions(*body).expect("known");
+    }
+    let step = Step::default();
+    let (_, pairs, _) = caller.pairs(&mut detector, &known, &step, [&ends, &[]]);
+    let (found, by_host, _) = caller.pairs(&mut detector, &still, &step, [&[], &[]]);
+    assert!(pairs == by_host);
+    let query = Query::everything();
+    assert_between("still", &found, &pairs, &still, &step, &query);
+}
+
+/// Points of a lattice of n^3 cells.
+fn lattice(random: &mut Random, n_points: usize, n: u32) -> Vec<[f32; 3]> {
+    let mut at = || random.below(n + 1) as f32;
+    (0..n_points).map(|_| [at(), at(), at()]).collect()
+}
+
+/// Triangles that share some of their vertices.
+fn faces(n_points: usize) -> Vec<[u32; 3]> {
+    let n = n_points as u32;
+    (0..n / 3)
+        .map(|f| [3 * f, 3 * f + 1, (3 * f + 5) % n])
+        .collect()
+}
+
+#[test]
+fn numbers_name_elements_of_every_kind_of_body() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    for seed in 0..3 {
+        let mut random = Random::new(300 + seed);
+        let edges: Vec<[u32; 2]> = (0..39).step_by(2).map(|v| [v, (v + 3) % 40]).collect();
+        let mut ends = || [(); 2].map(|()| lattice(&mut random, 40, 4));
+        let moving: [[Vec<[f32; 3]>; 2]; 6] = std::array::from_fn(|_| ends());
+        let mut truth = Scene::new();
+        // Bodies in `f64`: of these the device has positions that nobody has rounded.
+        let mut known = Scene::new();
+        let mut bodies = Vec::new();
+        for (ix, [start, end]) in moving.iter().enumerate() {
+            let wide = Vec::from_iter(start.iter().map(|p| p.map(f64::from)));
+            let [body, same] = match ix / 2 {
+                0 => [truth.add_points(start), known.add_points(&wide)],
+                1 => [
+                    truth.add_edges(&edges, start),
+                    known.add_edges(&edges, &wide),
+                ],
+                _ => [
+                    truth.add_triangles(&faces(40), start),
+                    known.add_triangles(&faces(40), &wide),
+                ],
+            };
+            let body = body.expect("good");
+            truth.set_end_positions(body, end).expect("good");
+            bodies.push((body, same.expect("good")));
+        }
+        let buffers = moving
+            .each_ref()
+            .map(|ends| ends.each_ref().map(|at| caller.upload(at)));
+        let at = |end: usize| {
+            let each = bodies.iter().zip(&buffers);
+            Vec::from_iter(each.map(|(&(_, body), ends)| (body, &ends[end])))
+        };
+        let step = Step::default();
+        let (_, pairs, _) = caller.pairs(&mut detector, &known, &step, [&at(0), &at(1)]);
+        // Numbers do not depend on the scene's precision.
+        let (found, by_host, _) = caller.pairs(&mut detector, &truth, &step, [&[], &[]]);
+        assert!(pairs == by_host, "{seed}");
+        let name = format!("bare {seed}");
+        assert!(assert_between(&name, &found, &pairs, &truth, &step, &Query::everything()) > 100);
+        for kind_of in KINDS {
+            let n = pairs
+                .keys()
+                .filter(|&&pair| kind(&found, pair) == kind_of)
+                .count();
+            assert!(n > 10, "{kind_of:?}: {n}");
+        }
+        let parts = found.layers.iter().map(|layer| layer.part);
+        let parts = Vec::from_iter(parts);
+        assert!(parts.is_sorted_by_key(|part| match part {
+            Part::Edges => 0,
+            Part::Vertices => 1,
+            _ => 2,
+        }));
+        // Positions that the host has rounded leave more pairs.
+        for ((_, body), [_, end]) in bodies.iter().zip(&moving) {
+            let wide = Vec::from_iter(end.iter().map(|p| p.map(f64::from)));
+            known.set_end_positions(*body, &wide).expect("good");
+        }
+        let (_, rounded, _) = caller.pairs(&mut detector, &known, &step, [&at(0), &[]]);
+        assert!(pairs.keys().all(|pair| rounded.contains_key(pair)));
+    }
+}
+
+#[test]
+fn lists_that_are_too_small_grow() {
+    let caller = Caller::new();
+    let mut random = Random::new(5);
+    let n = 600;
+    let mut scene = Scene::new();
+    let body = scene
+        .add(faces(n), lattice(&mut random, n, 9))
+        .expect("good");
+    let end = lattice(&mut random, n, 9);
+    scene.set_end_positions(body, &end).expect("good");
+    let (step, none): (_, [&[_]; 2]) = (Step::default(), [&[], &[]]);
+    let mut detector = caller.detector(Settings::default());
+    assert!(detector.make_room().expect("nothing was encoded"));
+    let (found, pairs, n_tries) = caller.pairs(&mut detector, &scene, &step, none);
+    assert!(
+        n_tries > 1 && pairs.len() > 1 << 14,
+        "{n_tries} {}",
+        pairs.len()
+    );
+    let query = Query::everything();
+    assert_between("web", &found, &pairs, &scene, &step, &query);
+    let (_, again, n_tries) = caller.pairs(&mut detector, &scene, &step, none);
+    assert_eq!(n_tries, 1, "it has grown");
+    assert!(again == pairs);
+    // A frame and a step in one submission.
+    let mut encoder = caller.encoder();
+    let frame = detector.encode(&scene, &query, &[], &mut encoder);
+    let found = detector.encode_step(&scene, &step, &[], &[], &mut encoder);
+    caller.queue.submit([encoder.finish()]);
+    assert!(detector.make_room().expect("room"));
+    let (frame, found) = (frame.expect("good"), found.expect("good"));
+    let n = caller.read(&found.counts)[found.n_pairs_offset as usize / 4] as usize;
+    assert_eq!(n, pairs.len());
+    let n = caller.read(&frame.counts)[frame.n_pairs_offset as usize / 4];
+    assert!(n > 100);
+    let small = Settings {
+        memory_budget: Some(100_000),
+        ..Settings::default()
+    };
+    let mut detector = caller.detector(small);
+    let mut encoder = caller.encoder();
+    let refused = detector.encode_step(&scene, &step, &[], &[], &mut encoder);
+    assert!(
+        matches!(refused, Err(Error::MemoryBudget { .. })),
+        "{refused:?}"
+    );
+}
+
+#[test]
+fn what_does_not_fit_is_refused_by_name() {
+    use wgpu::BufferUsages as Usage;
+    let caller = Caller::new();
+    let mut scene = Scene::new();
+    let triangle = [[0.0f32; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let body = scene.add_triangles(&[[0, 1, 2]], &triangle).expect("good");
+    let gone = scene.add_triangles(&[[0, 1, 2]], &triangle).expect("good");
+    scene.remove(gone).expect("known");
+    let good = caller.upload(&triangle);
+    let small = caller.buffer(32, Usage::COPY_SRC);
+    let useless = caller.buffer(36, Usage::COPY_DST);
+    let mut detector = caller.detector(Settings::default());
+    let mut refused = |step: &Step, starts: &[_], ends: &[_]| {
+        let mut encoder = caller.encoder();
+        let refused = detector.encode_step(&scene, step, starts, ends, &mut encoder);
+        refused.expect_err("refused").to_string()
+    };
+    let step = Step::default();
+    for (starts, ends, texts) in [
+        (
+            [(body, &small)],
+            [(body, &good)],
+            [
+                "its positions take 36 bytes, the buffer has 32",
+                &*body.to_string(),
+            ],
+        ),
+        (
+            [(body, &good)],
+            [(body, &small)],
+            [
+                "its end positions take 36 bytes, the buffer has 32",
+                &body.to_string(),
+            ],
+        ),
+        (
+            [(body, &useless)],
+            [(body, &good)],
+            [
+                "the buffer of its positions lacks the usage COPY_SRC",
+                &body.to_string(),
+            ],
+        ),
+        (
+            [(body, &good)],
+            [(body, &useless)],
+            [
+                "the buffer of its end positions lacks the usage COPY_SRC",
+                &body.to_string(),
+            ],
+        ),
+        ([(body, &good)], [(gone, &good)], [&*gone.to_string(), ""]),
+    ] {
+        let error = refused(&step, &starts, &ends);
+        assert!(texts.iter().all(|text| error.contains(text)), "{error}");
+    }
+    let apart = step.clone().separation(0.5);
+    let error = refused(&apart, &[], &[]);
+    assert!(
+        error.contains("separation") && error.contains("0.5"),
+        "{error}"
+    );
+    let cell = Query::everything().owned_by([0.0; 3], [1.0; 3]);
+    let error = refused(&Step::new(cell), &[], &[]);
+    assert!(error.contains("owned_by"), "{error}");
+    let mut cpu = Detector::new(Backend::Cpu).expect("settings");
+    let refused = cpu.encode_step(&scene, &step, &[], &[], &mut caller.encoder());
+    assert!(
+        matches!(refused, Err(Error::NoAdapter { .. })),
+        "{refused:?}"
+    );
+}
+
+#[test]
+fn damaged_names_are_noticed() {
+    let caller = Caller::new();
+    let (truth, _, _) = balls(600);
+    let step = Step::default();
+    let mut sound = caller.detector(Settings::default());
+    let (_, expected, _) = caller.pairs(&mut sound, &truth, &step, [&[], &[]]);
+    assert!(!expected.is_empty());
+    for (line, damaged) in [
+        ("if params.by_number == 0u {", "if params.by_number != 0u {"),
+        (
+            "UnsureKey(min(order[a], order[b]),",
+            "UnsureKey(min(a, order[b]),",
+        ),
+        ("max(order[a], order[b]));", "order[a]);"),
+    ] {
+        let (device, queue) = (caller.device.clone(), caller.queue.clone());
+        let damage = ("narrow_search", line, damaged);
+        let detector = Detector::with_damage(device, queue, Settings::default(), damage);
+        let mut encoder = caller.encoder();
+        let mut detector = detector.expect("a line");
+        let found = detector.encode_step(&truth, &step, &[], &[], &mut encoder);
+        caller.queue.submit([encoder.finish()]);
+        let found = found.expect("good");
+        let n = caller.read(&found.counts)[found.n_pairs_offset as usize / 4] as usize;
+        let words = caller.read(&found.pairs);
+        let pairs = BTreeSet::from_iter(words.as_chunks::<2>().0[..n].iter().copied());
+        assert!(!pairs.iter().eq(expected.keys()), "{damage:?}");
+    }
+}
