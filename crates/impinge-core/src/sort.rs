@@ -215,7 +215,9 @@ fn sort_runs(_: impl Simd, task: &mut Task<'_>) {
             continue;
         }
         let more_than_32 = (partners.len() - 1) / 32;
-        let batch = &mut batches[more_than_32.checked_ilog2().map_or(0, |log| log as usize + 1)];
+        let batch = &mut batches[more_than_32
+            .checked_ilog2()
+            .map_or(0, |log| log as usize + 1)];
         batch.add(lower, run.start, partners);
         if batch.n == LANES {
             batch.write(keys);

@@ -556,6 +556,7 @@ def _tiles_plan(
     chunk: int,
     weld: bool,
     step: bool,
+    separation: float,
     replace: bool,
     progress: _Progress | None,
 ) -> dict[str, Any]: ...
