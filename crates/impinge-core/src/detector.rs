@@ -257,7 +257,10 @@ impl Detector {
     ) -> Result<(), Error> {
         #[cfg(feature = "gpu")]
         if let Some(engine) = &mut self.gpu {
-            match self.frames.run(scene, query, control, wanted, engine).await {
+            let cpu = &mut self.cpu;
+            let mut finder = gpu::OnDevice { engine, cpu };
+            let found = self.frames.run(scene, query, control, wanted, &mut finder);
+            match found.await {
                 Err(Error::Gpu { .. }) if self.settings.backend == Backend::Auto => self.gpu = None,
                 result => return result,
             }
