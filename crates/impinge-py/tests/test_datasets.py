@@ -172,7 +172,7 @@ def test_tiles_of_a_step_keep_a_separation_and_weld(tmp_path):
     impinge.tiles.scatter(folder)
     impinge.tiles.run(folder, threads=1)
     merged = impinge.tiles.merge(folder)
-    assert merged["pairs"] == len(truth) > 100 and merged["hash"] == f"{truth.hash:016x}"
+    assert merged["pairs"] == len(truth) > 20 and merged["hash"] == f"{truth.hash:016x}"
     with pytest.raises(ValueError, match="^separation: 0.01 given, only 0 without a step"):
         impinge.tiles.plan(tmp_path / "still", paths, separation=0.01)
 

@@ -310,7 +310,7 @@ mod tests {
         clustering.find_rings();
         let mut answers = Vec::new();
         let single = positions.iter().map(|p| p.map(|x| x as f32)).collect();
-        for positions in [Positions::F64(positions.to_vec()), Positions::F32(single)] {
+        for positions in [Positions::from(positions.to_vec()), Positions::F32(single)] {
             let mut folds = Folds::default();
             folds.find(&Workers::new(1), &clustering, (&positions, 1));
             let mut folded: Vec<u32> = Place::up_to(faces.len())
