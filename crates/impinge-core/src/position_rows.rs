@@ -4,8 +4,6 @@ use std::any::Any;
 use std::ops::Deref;
 use std::sync::Arc;
 
-use crate::positions::Real;
-
 /// `(n, 3)` positions: an array of the body's own, or one that is shared with its owner and therefore only read.
 ///
 /// ```
@@ -17,7 +15,7 @@ use crate::positions::Real;
 /// assert_eq!(own, shared);
 /// assert!(std::ptr::eq(&shared[..], &simulated[..]));
 /// ```
-pub struct PositionRows<R: Real>(Held<R>);
+pub struct PositionRows<R>(Held<R>);
 
 enum Held<R> {
     Own(Vec<[R; 3]>),
@@ -30,13 +28,12 @@ struct Shared<R> {
     owner: Arc<dyn Any + Send + Sync>,
 }
 
-// SAFETY: a `Shared` is used like a reference to its rows. `Real` numbers are `Sync`, so it may be sent and shared; the owner is
-// `Send` and `Sync` itself.
-unsafe impl<R: Real> Send for Shared<R> {}
+// SAFETY: a `Shared` is used like a reference to its rows, which may be sent if `R` is `Sync`. The owner is `Send` and `Sync`.
+unsafe impl<R: Sync> Send for Shared<R> {}
 // SAFETY: as above.
-unsafe impl<R: Real> Sync for Shared<R> {}
+unsafe impl<R: Sync> Sync for Shared<R> {}
 
-impl<R: Real> PositionRows<R> {
+impl<R: Copy> PositionRows<R> {
     /// Shares the rows of an owner, without a copy. The owner lives at least as long as these rows and their clones.
     /// It is asked for its rows once.
     pub fn shared<O: AsRef<[[R; 3]]> + Send + Sync + 'static>(owner: Arc<O>) -> Self {
@@ -72,7 +69,7 @@ impl<R: Real> PositionRows<R> {
     }
 }
 
-impl<R: Real> Deref for PositionRows<R> {
+impl<R> Deref for PositionRows<R> {
     type Target = [[R; 3]];
 
     #[inline(always)]
@@ -87,7 +84,7 @@ impl<R: Real> Deref for PositionRows<R> {
 }
 
 /// Shared rows stay shared.
-impl<R: Real> Clone for PositionRows<R> {
+impl<R: Clone> Clone for PositionRows<R> {
     fn clone(&self) -> Self {
         PositionRows(match &self.0 {
             Held::Own(rows) => Held::Own(rows.clone()),
@@ -99,25 +96,25 @@ impl<R: Real> Clone for PositionRows<R> {
     }
 }
 
-impl<R: Real + std::fmt::Debug> std::fmt::Debug for PositionRows<R> {
+impl<R: std::fmt::Debug> std::fmt::Debug for PositionRows<R> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         (**self).fmt(f)
     }
 }
 
-impl<R: Real + PartialEq> PartialEq for PositionRows<R> {
+impl<R: PartialEq> PartialEq for PositionRows<R> {
     fn eq(&self, other: &Self) -> bool {
         **self == **other
     }
 }
 
-impl<R: Real> From<Vec<[R; 3]>> for PositionRows<R> {
+impl<R> From<Vec<[R; 3]>> for PositionRows<R> {
     fn from(rows: Vec<[R; 3]>) -> Self {
         PositionRows(Held::Own(rows))
     }
 }
 
-impl<R: Real> FromIterator<[R; 3]> for PositionRows<R> {
+impl<R> FromIterator<[R; 3]> for PositionRows<R> {
     fn from_iter<I: IntoIterator<Item = [R; 3]>>(rows: I) -> Self {
         rows.into_iter().collect::<Vec<_>>().into()
     }

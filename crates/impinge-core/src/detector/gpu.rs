@@ -106,8 +106,8 @@ pub(super) fn find_in_step(
 
 /// A device, and the CPU for frames of new bodies.
 ///
-/// Every method of the device works on clusters, which the host makes. That takes the host several times as long as the
-/// whole frame takes in its own grid. So `Auto` answers such a frame there, by the rule of the CPU backend.
+/// Every method of the device works on clusters, which the host makes. That takes the host about twice as long as the whole
+/// frame takes in its own grid. So `Auto` answers such a frame there, by the rule of the CPU backend.
 pub(super) struct OnDevice<'a> {
     pub engine: &'a mut Engine,
     pub cpu: &'a mut Cpu,
