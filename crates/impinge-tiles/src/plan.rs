@@ -35,7 +35,7 @@ pub struct PlanOptions {
     pub chunk: u64,
     /// Whether vertices of one file at exactly the same position are welded; formats without shared vertices (STL) need it. In a
     /// step, vertices must be at one position both at the start and at the end. Scattering such a body holds all its vertices, up to
-    /// 80 bytes each in f32 and 140 in f64.
+    /// 90 bytes each in f32 and 140 in f64.
     pub weld: bool,
     /// Whether the scene moves: a body is then two files with the same elements, its start and its end, and tiles find the
     /// first contacts between them.
