@@ -42,6 +42,7 @@ pub(crate) fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
     match positions {
         Positions::F32(positions) => of_vertices_f32(positions, vertices).0,
         Positions::F64(positions) => {
+            let positions = &positions[..];
             let mut min = [f64::INFINITY; 3];
             let mut max = [f64::NEG_INFINITY; 3];
             for &vertex in vertices {
@@ -204,6 +205,7 @@ fn of_elements<const N: usize>(
 ) {
     match positions {
         Positions::F32(positions) => {
+            let positions = &positions[..];
             let (fours, rest) = corners.as_chunks::<4>();
             for (four_ix, four) in fours.iter().enumerate() {
                 let [a, b, c, d] = four;

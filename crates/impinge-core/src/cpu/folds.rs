@@ -71,9 +71,13 @@ impl Folds {
             for (word, bits) in chunk(vertices, n_each, task) {
                 let folds = match positions {
                     Positions::F32(positions) => {
+                        let positions = &positions[..];
                         folds(rings, word, |vertex| positions[vertex].map(f64::from))
                     }
-                    Positions::F64(positions) => folds(rings, word, |vertex| positions[vertex]),
+                    Positions::F64(positions) => {
+                        let positions = &positions[..];
+                        folds(rings, word, |vertex| positions[vertex])
+                    }
                 };
                 bits.store(folds, Ordering::Relaxed);
             }
