@@ -11,6 +11,7 @@
 mod extent;
 mod pose;
 mod vec4;
+mod vec64;
 
 pub(crate) use extent::Extent;
 pub(crate) use pose::Pose;
@@ -42,17 +43,7 @@ pub(crate) fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
     match positions {
         Positions::F32(positions) => of_vertices_f32(positions, vertices).0,
         Positions::F64(positions) => {
-            let positions = &positions[..];
-            let mut min = [f64::INFINITY; 3];
-            let mut max = [f64::NEG_INFINITY; 3];
-            for &vertex in vertices {
-                let point = &positions[vertex as usize];
-                for axis in 0..3 {
-                    let x = point[axis];
-                    min[axis] = if x < min[axis] { x } else { min[axis] };
-                    max[axis] = if x > max[axis] { x } else { max[axis] };
-                }
-            }
+            let [min, max] = vec64::ends(positions, vertices);
             Bounds {
                 min: min.map(round_down),
                 max: max.map(round_up),
@@ -228,9 +219,24 @@ fn of_elements<const N: usize>(
                 lanes.put(lane, &Bounds { min, max });
             }
         }
-        Positions::F64(_) => {
+        Positions::F64(positions) => {
+            // Rounded when all ends are known: many at a time.
+            let mut ends = [[[0.0; GROUP]; 3]; 2];
             for (lane, corners) in corners.iter().enumerate() {
-                lanes.put(lane, &of_vertices(positions, corners));
+                let [min, max] = vec64::ends(positions, corners);
+                for axis in 0..3 {
+                    ends[0][axis][lane] = min[axis];
+                    ends[1][axis][lane] = max[axis];
+                }
+            }
+            let [min, max] = &ends;
+            for axis in 0..3 {
+                for (rounded, &x) in lanes.min[axis].iter_mut().zip(&min[axis]) {
+                    *rounded = round_down(x);
+                }
+                for (rounded, &x) in lanes.max[axis].iter_mut().zip(&max[axis]) {
+                    *rounded = round_up(x);
+                }
             }
         }
     }

@@ -106,6 +106,9 @@ thresholds! {
     most_cached: u64 = 128,
     /// A worker settles its candidates once there are this many.
     settle_from: usize = 1024,
+    /// The search for the earliest contact computes the boxes of elements again once contacts are sought only in this part of
+    /// the time that the boxes hold.
+    step_shorter_from: f64 = 0.5,
     /// With fewer keys, or fewer than half as many as numbers, one thread sorts them in place as fast.
     sort_from: usize = 1 << 15,
     /// `Auto`: from this many primitives of new bodies on, the grid is worth a try. With fewer, clusters are made in about a
@@ -141,6 +144,8 @@ pub struct Ways {
     pub n_evicted: u64,
     /// Times that a worker settled candidates because there were enough of them.
     pub n_full: u64,
+    /// Times that boxes of elements were dropped because contacts are sought in a shorter time.
+    pub n_shortened: u64,
     /// Times that keys were sorted by counting.
     pub n_counted: u64,
 }

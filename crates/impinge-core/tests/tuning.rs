@@ -447,7 +447,7 @@ impl Watched {
                 in_grid,
                 only_at_infinity,
             ),
-            "step_bounds_parallel_from" | "sort_from" => return None,
+            "step_bounds_parallel_from" | "step_shorter_from" | "sort_from" => return None,
             other => panic!("nothing shows that the code behind {other} is entered"),
         })
     }
@@ -521,4 +521,67 @@ fn the_code_behind_thresholds_of_steps_is_entered() {
         detector.impacts(&scene, &step).unwrap().stats().ways.n_full
     };
     assert!(tuned(ZERO) > 0 && tuned(INFINITY) == 0);
+    let shortened = |end: usize| {
+        let zero = Tuning::ENDS[ZERO];
+        let tuning = Tuning::ENDS[INFINITY].with("most_per_task", &zero);
+        let tuning = tuning.with("step_shorter_from", &Tuning::ENDS[end]);
+        let mut detector = detector(Method::Clusters, 2, tuning);
+        let step = Step::new(Query::all());
+        detector.earliest(&scene, &step).unwrap().expect("contacts");
+        detector.step_stats().ways.n_shortened
+    };
+    assert!(shortened(ZERO) == 0 && shortened(INFINITY) > 0);
+}
+
+/// Bodies that are apart at first. Every thread begins with the whole step and goes on with less of it, task by task.
+#[test]
+fn the_earliest_contact_is_found_however_early_boxes_end() {
+    let zero = Tuning::ENDS[ZERO];
+    let tuning = Tuning::ENDS[INFINITY].with("most_per_task", &zero);
+    let ball = surfaces::bumpy_ball(300, 0.2);
+    for ix in 0..24 {
+        let double = ix % 2 == 1;
+        let film = Film {
+            name: "approach",
+            bodies: vec![ball.clone(), ball.clone()],
+            double,
+            query: |bodies| Query::between(bodies[0], bodies[1]),
+            motion: twist,
+        };
+        let (mut scene, bodies) = film.scene();
+        // Contacts begin late, early, or in between.
+        let speed = [2.5, 8.0, 40.0][ix / 2 % 3];
+        let turn = 0.3 * ix as f32;
+        let aside = [0.1 * turn.sin(), 0.1 * turn.cos()];
+        let put = |body: usize, x: f32| -> Vec<[f32; 3]> {
+            let by = [x + 2.6 * body as f32, body as f32 * aside[0], aside[1]];
+            ball.translated(by).positions
+        };
+        for (body_ix, &body) in bodies.iter().enumerate() {
+            let ends = [put(body_ix, 0.0), put(body_ix, -speed * body_ix as f32)];
+            if double && body_ix == 0 {
+                scene.set_positions(body, &wide(&ends[0])).unwrap();
+                scene.set_end_positions(body, &wide(&ends[1])).unwrap();
+            } else {
+                scene.set_positions(body, &ends[0]).unwrap();
+                scene.set_end_positions(body, &ends[1]).unwrap();
+            }
+        }
+        let step = Step::new((film.query)(&bodies));
+        let mut first = None;
+        for threads in 1..3 {
+            let mut detector = detector(Method::Clusters, threads, tuning);
+            let expected = detector.impacts(&scene, &step).unwrap().earliest();
+            assert!(expected.is_some_and(|first| first.toi > 0.0), "scene {ix}");
+            assert_eq!(
+                detector.earliest(&scene, &step).unwrap(),
+                expected,
+                "scene {ix}"
+            );
+            if threads == 1 {
+                assert!(detector.step_stats().ways.n_shortened > 1, "scene {ix}");
+            }
+            assert_eq!(*first.get_or_insert(expected), expected);
+        }
+    }
 }

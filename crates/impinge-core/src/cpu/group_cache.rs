@@ -118,6 +118,11 @@ impl<G> GroupCache<G> {
         self.keys.resize(self.groups.len(), NOBODY);
     }
 
+    /// Forgets all clusters.
+    pub fn clear(&mut self) {
+        self.keys.fill(NOBODY);
+    }
+
     pub fn bytes(&self) -> usize {
         size_of::<u64>() * self.keys.capacity() + size_of::<G>() * self.groups.capacity()
     }

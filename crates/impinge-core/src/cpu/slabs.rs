@@ -102,6 +102,8 @@ pub(crate) struct Counts {
     pub n_evicted: u64,
     /// Times that there were enough candidates to settle them.
     pub n_full: u64,
+    /// Times that less of a step was examined from then on.
+    pub n_shortened: u64,
 }
 
 impl<'a> SlabStages for World<'a> {
@@ -166,6 +168,7 @@ impl<'a> SlabStages for World<'a> {
             n_unsure: settler.n_unsure,
             n_evicted: worker.n_evicted(),
             n_full: settler.n_full,
+            n_shortened: 0,
         }
     }
 }
@@ -282,6 +285,7 @@ impl<W: SlabStages> Slabs<'_, W> {
             stats.n_unsure += counts.n_unsure;
             stats.ways.n_evicted += counts.n_evicted;
             stats.ways.n_full += counts.n_full;
+            stats.ways.n_shortened += counts.n_shortened;
         }
         let narrow_ms = (busy_ms / self.scratches.len() as f64).min(self.ms);
         stats.add_ms("pairing", self.ms - narrow_ms);

@@ -74,18 +74,6 @@ impl StepMemory {
     }
 }
 
-/// Which part of a step was examined.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Examined {
-    /// All of it.
-    Whole,
-    /// As much as was asked for.
-    Asked,
-}
-
-/// The part of a step in which the earliest contact is sought first: fewer pairs are close that early.
-const FIRST_UNTIL: f64 = 1.0 / 8.0;
-
 impl Detector {
     /// All pairs of elements that touch during a step, each with the first time at which they do.
     ///
@@ -142,7 +130,7 @@ impl Detector {
             scene,
             step,
             Sought::All,
-            (Pose::WHOLE, f64::INFINITY),
+            Pose::WHOLE,
             self.settings.max_pairs,
             control,
         )?;
@@ -181,25 +169,9 @@ impl Detector {
     ) -> Result<Option<Impact>, Error> {
         let start = Instant::now();
         self.begin(scene, step)?;
-        let mut until = FIRST_UNTIL;
-        let mut first: Option<Impact> = None;
-        loop {
-            let pose = Pose {
-                until,
-                ..Pose::WHOLE
-            };
-            let latest = first.map_or(f64::INFINITY, |first| beyond(first.toi));
-            let sought = Sought::Earliest;
-            let part = self.find(scene, step, sought, (pose, latest), None, control)?;
-            let found = self.steps.named(step.toi);
-            first = found.chain(first).reduce(Impact::earlier);
-            // All contacts up to this time have been found, and maybe some later ones.
-            let bound = first.map_or(f64::INFINITY, |first| beyond(first.toi));
-            if bound <= until || until == 1.0 || part == Examined::Whole {
-                break;
-            }
-            until = bound.min(1.0);
-        }
+        self.find(scene, step, Sought::Earliest, Pose::WHOLE, None, control)?;
+        // The first contact and all whose times may round to the same time have been found, and some later ones.
+        let first = self.steps.named(step.toi).reduce(Impact::earlier);
         self.steps.impacts.stats_mut().total_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(first)
     }
@@ -220,16 +192,16 @@ impl Detector {
         Ok(())
     }
 
-    /// Finds what is sought, in any order. A device examines the whole step, whatever part is asked for.
+    /// Finds what is sought, in any order.
     fn find(
         &mut self,
         scene: &Scene,
         step: &Step,
         sought: Sought,
-        (pose, latest): (Pose, f64),
+        pose: Pose,
         max_pairs: Option<u64>,
         control: &Control<'_>,
-    ) -> Result<Examined, Error> {
+    ) -> Result<(), Error> {
         let StepMemory {
             frame,
             impacts,
@@ -263,7 +235,7 @@ impl Detector {
                 naive::run(&FirstContact, scene, frame, control, stats, emit)
             })?;
             (*found, _) = contacts.finish()?;
-            return Ok(Examined::Whole);
+            return Ok(());
         }
         let _shift = self.frames.workers().shift(frame.n_primitives());
         let job = Job {
@@ -276,7 +248,6 @@ impl Detector {
             sought,
             start: step.start,
             toi: step.toi,
-            latest,
         };
         let asked = (StepTest::Contacts(asked), pose);
         let answer = StepAnswer::Contacts(contacts);
@@ -291,21 +262,20 @@ impl Detector {
         #[cfg(not(feature = "gpu"))]
         let on_device = Ok(false);
         let result = match on_device {
-            Ok(true) => Ok(Examined::Whole),
+            Ok(true) => Ok(()),
             Ok(false) => {
                 contacts.forget();
-                let done = clusters.run(job, &self.settings, asked, answer, stats);
-                done.map(|()| Examined::Asked)
+                clusters.run(job, &self.settings, asked, answer, stats)
             }
             Err(error) => Err(error),
         };
         let finished = contacts.finish();
-        let examined = result?;
+        result?;
         (*found, _) = finished?;
         self.frames.workers().report(&mut stats.ways);
         let n: usize = found.iter().map(Vec::capacity).sum();
         stats.bytes_held += (size_of::<Found<Contact>>() * n) as u64;
-        Ok(examined)
+        Ok(())
     }
 
     /// Whether nothing touches during the step. With [`Start::Skip`], pairs that touch at its start do not count.
@@ -328,8 +298,7 @@ impl Detector {
     ) -> Result<bool, Error> {
         let start = Instant::now();
         self.begin(scene, step)?;
-        let whole = (Pose::WHOLE, f64::INFINITY);
-        self.find(scene, step, Sought::Any, whole, None, control)?;
+        self.find(scene, step, Sought::Any, Pose::WHOLE, None, control)?;
         self.steps.impacts.stats_mut().total_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(self.steps.found.iter().all(Vec::is_empty))
     }
@@ -421,8 +390,11 @@ impl Detector {
                     }
                 }
                 self.begin(&trial, &step)?;
-                let whole = (Pose::WHOLE, f64::INFINITY);
-                self.find(&trial, &step, Sought::All, whole, None, control)?;
+                let pose = Pose {
+                    is_swept: fraction <= Pose::NEARLY_STILL,
+                    ..Pose::WHOLE
+                };
+                self.find(&trial, &step, Sought::All, pose, None, control)?;
                 known.extend(self.steps.found().map(|(kind, found)| (kind, found.key)));
             }
             advance.n_tried += 1;
@@ -505,11 +477,6 @@ impl Detector {
     pub fn step_stats(&self) -> &Statistics {
         self.steps.impacts.stats()
     }
-}
-
-/// A time above all times that round down to this one, even in `f32`.
-fn beyond(toi: f64) -> f64 {
-    (toi * (1.0 + 2f64.powi(-20))).max(f64::from(f32::MIN_POSITIVE))
 }
 
 fn begin(stats: &mut Statistics, settings: &Settings, n_threads: usize) {

@@ -79,26 +79,28 @@ pub(crate) fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// The largest f32 that is at most `x`.
+/// The largest f32 that is at most `x`. Without a branch: half of all roundings would mispredict it.
 #[inline]
 pub(crate) fn round_down(x: f64) -> f32 {
     let nearest = x as f32;
-    if f64::from(nearest) > x {
-        nearest.next_down()
-    } else {
-        nearest
-    }
+    stepped(nearest, -i32::from(f64::from(nearest) > x))
 }
 
 /// The smallest f32 that is at least `x`.
 #[inline]
 pub(crate) fn round_up(x: f64) -> f32 {
     let nearest = x as f32;
-    if f64::from(nearest) < x {
-        nearest.next_up()
-    } else {
-        nearest
-    }
+    stepped(nearest, i32::from(f64::from(nearest) < x))
+}
+
+/// The number itself, or its neighbour above (1) or below (-1). Never steps from a zero across it: a number that rounds to
+/// zero leaves it its sign.
+#[inline]
+fn stepped(x: f32, by: i32) -> f32 {
+    let bits = x.to_bits().cast_signed();
+    // Bits of negative numbers descend: the sign is 0 or -1.
+    let sign = bits >> 31;
+    f32::from_bits((bits + ((by ^ sign) - sign)).cast_unsigned())
 }
 
 /// The boxes of one group, one per lane; lanes past the group's size hold empty boxes.
@@ -230,6 +232,43 @@ impl RawBoundsArray {
                 self.min[axis].add(ix).write(bounds.min[axis]);
                 self.max[axis].add(ix).write(bounds.max[axis]);
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn roundings_are_the_nearest_on_either_side() {
+        let mut state = 1u64;
+        let mut next = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            state
+        };
+        let of_any_size = (0..100_000).map(|_| f64::from_bits(next()));
+        let small = [0.0, f64::MIN_POSITIVE, 1e-300, 1e-45, 1e-46, 1.2e-38, 1e-40];
+        let large = [f64::from(f32::MAX), 3.5e38, f64::MAX, f64::INFINITY];
+        let near_one = [1.0, 1.0 + f64::EPSILON, 1.0 - f64::EPSILON, 1.5];
+        let chosen = small.into_iter().chain(large).chain(near_one);
+        for x in of_any_size.chain(chosen.flat_map(|x| [x, -x])) {
+            if x.is_nan() {
+                continue;
+            }
+            let (low, high) = (round_down(x), round_up(x));
+            assert!(f64::from(low) <= x && x <= f64::from(high), "{x:e}");
+            let is_exact = f64::from(low) == x;
+            assert!(
+                if is_exact {
+                    low == high
+                } else {
+                    low.next_up() == high
+                },
+                "{x:e}"
+            );
         }
     }
 }

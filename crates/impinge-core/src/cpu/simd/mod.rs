@@ -143,6 +143,45 @@ pub(crate) trait Simd: ReadVertices {
         }
     }
 
+    /// As [`overlaps_rows`](Simd::overlaps_rows), where boxes move: the lanes that each row [meets](Simd::meets_64).
+    #[inline(always)]
+    fn meets_rows(
+        self,
+        boxes: [&LaneBounds; 2],
+        among: u64,
+        [start, end]: [&LaneBounds; 2],
+        rows: u64,
+        masks: &mut Masks,
+    ) {
+        masks.0 = [0; GROUP];
+        for row in Lanes(rows) {
+            masks.0[row] = self.meets_64(boxes, &[start.at(row), end.at(row)], among);
+        }
+    }
+
+    /// As [`overlaps_within`](Simd::overlaps_within), where boxes move.
+    #[inline(always)]
+    fn meets_within(self, boxes: [&LaneBounds; 2], among: u64, masks: &mut Masks) {
+        masks.0 = [0; GROUP];
+        for row in Lanes(among) {
+            let query = boxes.map(|boxes| boxes.at(row));
+            masks.0[row] = self.meets_64(boxes, &query, among & !up_to(row));
+        }
+    }
+
+    /// The rows whose masks are not zero.
+    #[inline(always)]
+    fn rows_with_lanes(self, masks: &Masks) -> u64 {
+        let (eights, _) = masks.0.as_chunks::<8>();
+        let mut rows = 0;
+        for (eight_ix, eight) in eights.iter().enumerate() {
+            for (k, &mask) in eight.iter().enumerate() {
+                rows |= u64::from(mask != 0) << (8 * eight_ix + k);
+            }
+        }
+        rows
+    }
+
     /// Writes the lanes of a mask, lowest first; the rest of the list is arbitrary. Returns the number of lanes.
     #[inline(always)]
     fn list_lanes(self, mask: u64, list: &mut [u8; GROUP]) -> usize {

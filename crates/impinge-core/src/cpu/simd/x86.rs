@@ -553,6 +553,54 @@ unsafe fn chunk_overlaps(
     }
 }
 
+/// As [`chunk_overlaps`], where boxes move: the bits of lanes that are not beside a row on the same side of an axis at both
+/// ends.
+///
+/// # Safety
+/// The caller must be compiled for AVX-512.
+#[inline(always)]
+unsafe fn chunk_meets(
+    [start, end]: [&LaneBounds; 2],
+    chunk: usize,
+    among: u64,
+    [query_start, query_end]: [&LaneBounds; 2],
+    rows: u64,
+    masks: &mut Masks,
+) {
+    let among = (among >> (16 * chunk)) as __mmask16;
+    if among == 0 {
+        return;
+    }
+    // SAFETY: lanes 16 c .. 16 c + 16 of 64 lie within their array, which is aligned to 64 bytes.
+    unsafe {
+        let row = |axis: &[f32; GROUP]| _mm512_load_ps(axis.as_ptr().add(16 * chunk));
+        let axes = |[x, y, z]: &[[f32; GROUP]; 3]| [row(x), row(y), row(z)];
+        let (min_start, max_start) = (axes(&start.min), axes(&start.max));
+        let (min_end, max_end) = (axes(&end.min), axes(&end.max));
+        for row in Lanes(rows) {
+            let mut beside = 0;
+            for axis in 0..3 {
+                let all = |rows: &[[f32; GROUP]; 3]| _mm512_set1_ps(rows[axis][row]);
+                let above =
+                    _mm512_cmp_ps_mask::<_CMP_NLE_UQ>(min_start[axis], all(&query_start.max));
+                let below =
+                    _mm512_cmp_ps_mask::<_CMP_NGE_UQ>(max_start[axis], all(&query_start.min));
+                beside |= _mm512_mask_cmp_ps_mask::<_CMP_NLE_UQ>(
+                    above,
+                    min_end[axis],
+                    all(&query_end.max),
+                );
+                beside |= _mm512_mask_cmp_ps_mask::<_CMP_NGE_UQ>(
+                    below,
+                    max_end[axis],
+                    all(&query_end.min),
+                );
+            }
+            masks.0[row] |= u64::from(among & !beside) << (16 * chunk);
+        }
+    }
+}
+
 /// The number of each lane.
 #[repr(C, align(64))]
 struct Numbers([u8; GROUP]);
@@ -756,6 +804,51 @@ impl Simd for Avx512 {
         for (row, mask) in masks.0.iter_mut().enumerate() {
             *mask &= !up_to(row);
         }
+    }
+
+    #[inline(always)]
+    fn meets_rows(
+        self,
+        boxes: [&LaneBounds; 2],
+        among: u64,
+        queries: [&LaneBounds; 2],
+        rows: u64,
+        masks: &mut Masks,
+    ) {
+        masks.0 = [0; GROUP];
+        for chunk in 0..4 {
+            // SAFETY: `Avx512` exists only where the processor has it.
+            unsafe { chunk_meets(boxes, chunk, among, queries, rows, masks) };
+        }
+    }
+
+    #[inline(always)]
+    fn meets_within(self, boxes: [&LaneBounds; 2], among: u64, masks: &mut Masks) {
+        masks.0 = [0; GROUP];
+        for chunk in 0..4 {
+            // Rows past this chunk have no higher lanes in it.
+            let rows = among & up_to(16 * chunk + 15);
+            // SAFETY: `Avx512` exists only where the processor has it.
+            unsafe { chunk_meets(boxes, chunk, among, boxes, rows, masks) };
+        }
+        for (row, mask) in masks.0.iter_mut().enumerate() {
+            *mask &= !up_to(row);
+        }
+    }
+
+    #[inline(always)]
+    fn rows_with_lanes(self, masks: &Masks) -> u64 {
+        let (eights, _) = masks.0.as_chunks::<8>();
+        let mut rows = 0;
+        for (eight_ix, eight) in eights.iter().enumerate() {
+            // SAFETY: `Avx512` exists only where the processor has it; eight masks are 64 bytes.
+            let is = unsafe {
+                let masks = _mm512_loadu_si512(eight.as_ptr().cast());
+                _mm512_test_epi64_mask(masks, masks)
+            };
+            rows |= u64::from(is) << (8 * eight_ix);
+        }
+        rows
     }
 
     #[inline(always)]

@@ -7,6 +7,7 @@ use crate::cpu::simd::{LaneBounds, Lanes32, Simd};
 use crate::elements::with_corners;
 use crate::exact::filter::Moving64;
 use crate::grouping::GROUP;
+use crate::grouping::bounds::Bounds;
 use crate::hull::Extent;
 use crate::index::{ClusterIx, LayerIx};
 
@@ -19,6 +20,8 @@ pub(super) struct Group {
     /// The elements' boxes at the start and at the end; where boxes hold the whole path, only the first.
     pub start: LaneBounds,
     pub end: LaneBounds,
+    /// The cluster's own boxes.
+    pub ends: [Bounds; 2],
     /// The vertices of each corner; lists past an element's number of corners mean nothing.
     pub corners: [Lanes32; 3],
     pub n_corners: usize,
@@ -34,6 +37,7 @@ impl<'a> PerCluster<World<'a>> for Group {
     const EMPTY: Self = Group {
         start: LaneBounds::EMPTY,
         end: LaneBounds::EMPTY,
+        ends: [Bounds::EMPTY; 2],
         corners: [const { Lanes32([0; GROUP]) }; 3],
         n_corners: 0,
         numbers: Lanes32([0; GROUP]),
@@ -46,6 +50,7 @@ impl<'a> PerCluster<World<'a>> for Group {
     fn fill<S: Simd>(&mut self, simd: S, world: World<'a>, layer: LayerIx, cluster: ClusterIx) {
         let clustering = &world.cache(layer).clustering;
         self.size = clustering.size(cluster);
+        self.ends = world.ends(layer, cluster);
         let places = clustering.places(cluster);
         with_corners!(&clustering.corners, |elements| {
             let elements = &elements[places];

@@ -15,6 +15,7 @@ use crate::sink::Ending;
 
 use super::narrow::{Between, FirstContacts, Narrow};
 use super::pairing::Worker;
+use super::unsure;
 use super::world::World;
 
 /// Pairs per task.
@@ -72,6 +73,7 @@ impl Left<'_, '_> {
 
     /// Hands over the remaining contacts.
     pub fn end(self) -> Result<(), Error> {
+        unsure::settle(self.job, self.world, self.workers);
         for worker in self.workers {
             worker.end(self.answer);
         }

@@ -17,6 +17,7 @@ mod group;
 mod left;
 mod narrow;
 mod pairing;
+mod unsure;
 mod world;
 
 #[cfg(feature = "gpu")]
@@ -69,6 +70,19 @@ impl<'a> SlabStages for World<'a> {
         self.cache(layer).clustering.hubs()
     }
 
+    fn finish(
+        &self,
+        job: Job<'_>,
+        _: StepAnswer<'a>,
+        workers: &mut [Worker],
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        // Stages are listed in the order of their first times.
+        stats.add_ms("pairing", 0.0);
+        stats.time("narrow", |_| unsure::settle(job, *self, workers));
+        Ok(())
+    }
+
     fn end(worker: &mut Worker, answer: StepAnswer<'a>) {
         worker.end(answer);
     }
@@ -114,18 +128,20 @@ impl StepClusters {
         stats.time("clustering", |stats| self.cluster(job, stats))?;
         stats.time("bounds", |stats| self.refit(job, settings, pose, stats))?;
         for worker in &mut self.scratches {
-            worker.begin(stats.n_clusters, test, settings);
+            worker.begin(stats.n_clusters, (test, pose), settings);
         }
         let held = self.bytes_besides_room();
-        let known = Known::new(test);
+        let known = Known::new();
         let task = slabs::Task {
             isa: self.isa,
             job,
             answer,
             world: World {
+                isa: self.isa,
                 scene: job.scene,
                 frame: job.frame,
                 pose,
+                boxes: pose,
                 answer,
                 known: &known,
                 caches: &self.caches,
@@ -172,17 +188,19 @@ impl StepClusters {
         }
         self.scratches.resize_with(job.workers.n(), Worker::default);
         for worker in &mut self.scratches {
-            worker.begin(stats.n_clusters, test, settings);
+            worker.begin(stats.n_clusters, (test, pose), settings);
         }
         answer.share(self.bytes_besides_room() as u64);
-        let known = Known::new(test);
+        let known = Known::new();
         let mut left = left::Left {
             isa: self.isa,
             job,
             world: World {
+                isa: self.isa,
                 scene: job.scene,
                 frame: job.frame,
                 pose,
+                boxes: pose,
                 answer,
                 known: &known,
                 caches: &self.caches,

@@ -58,10 +58,17 @@ impl Settler {
         }
     }
 
-    /// Where contacts go that are left by a device.
-    #[cfg(feature = "gpu")]
+    /// The contacts of the step.
     pub fn contacts(&mut self) -> &mut FirstContacts {
         &mut self.contacts
+    }
+
+    /// Nothing later than this is wanted.
+    pub fn until(&self, world: World<'_>) -> f64 {
+        match self.asked {
+            StepTest::Contacts(_) => self.contacts.until(world),
+            StepTest::Overlap { .. } | StepTest::Within => world.pose.until,
+        }
     }
 
     /// Takes the candidates of a work item.

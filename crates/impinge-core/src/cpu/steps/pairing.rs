@@ -13,11 +13,12 @@ use crate::clock::Instant;
 use crate::cpu::group_cache::GroupCache;
 use crate::cpu::met::{Met, Side, WorkItem};
 use crate::cpu::pairing::full;
-use crate::cpu::simd::{Isa, LaneBounds, Lanes, Masks, Simd, up_to};
+use crate::cpu::simd::{Isa, LaneBounds, Lanes, Masks, Simd};
 use crate::cpu::slabs::{Counts, SlabStages};
 use crate::frame::TestId;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
+use crate::hull::Pose;
 use crate::impacts::StepAnswer;
 use crate::index::{ClusterIx, LayerIx, Number};
 use crate::settings::Settings;
@@ -34,6 +35,10 @@ const SAMPLED: u32 = 16;
 #[repr(align(128))]
 pub(crate) struct Worker {
     groups: GroupCache<Group>,
+    /// What of the step `groups` hold.
+    pose: Pose,
+    shorter_from: f64,
+    n_shortened: u64,
     met: Met,
     /// The boxes of one side's survivors at the start and at the end.
     survivors: Box<[LaneBounds; 2]>,
@@ -48,6 +53,9 @@ impl Default for Worker {
     fn default() -> Self {
         Worker {
             groups: GroupCache::default(),
+            pose: Pose::WHOLE,
+            shorter_from: 0.0,
+            n_shortened: 0,
             met: Met::default(),
             survivors: Box::new([LaneBounds::EMPTY, LaneBounds::EMPTY]),
             masks: Masks::default(),
@@ -60,15 +68,17 @@ impl Default for Worker {
 
 impl Worker {
     /// Prepares for a step of `n_clusters` clusters.
-    pub fn begin(&mut self, n_clusters: u64, test: StepTest, settings: &Settings) {
+    pub fn begin(&mut self, n_clusters: u64, (test, pose): (StepTest, Pose), settings: &Settings) {
         self.groups.begin::<World<'_>>(n_clusters, settings);
+        self.pose = pose;
+        self.shorter_from = settings.tuning.step_shorter_from;
+        self.n_shortened = 0;
         self.settler.begin(test, &settings.tuning);
         self.n_settled = 0;
         self.busy = Duration::ZERO;
     }
 
-    /// Where contacts go that were found elsewhere.
-    #[cfg(feature = "gpu")]
+    /// The contacts that the worker has found.
     pub fn contacts(&mut self) -> &mut super::narrow::FirstContacts {
         self.settler.contacts()
     }
@@ -76,6 +86,16 @@ impl Worker {
     /// Ends a step: hands over the remaining contacts.
     pub fn end(&mut self, answer: StepAnswer<'_>) {
         self.settler.end(answer);
+    }
+
+    /// Examines less of the step from now on, if a contact is known that is early enough.
+    fn shorten(&mut self, world: World<'_>) {
+        let until = self.settler.until(world);
+        if until < (self.shorter_from * self.pose.until).min(self.pose.until) {
+            self.pose = Pose::up_to(until);
+            self.groups.clear();
+            self.n_shortened += 1;
+        }
     }
 
     pub fn counts(&self) -> Counts {
@@ -86,6 +106,7 @@ impl Worker {
             n_unsure,
             n_evicted: self.groups.n_evicted,
             n_full,
+            n_shortened: self.n_shortened,
         }
     }
 
@@ -104,6 +125,11 @@ pub(super) fn run<S: Simd>(
     items: &[WorkItem],
     worker: &mut Worker,
 ) {
+    worker.shorten(world);
+    let world = World {
+        pose: worker.pose,
+        ..world
+    };
     for item in items {
         if world.is_over() {
             break;
@@ -173,8 +199,8 @@ fn pair<S: Simd>(
     met.clear();
     let sides = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
     let is_own = sides[0] == sides[1];
-    let ends = sides.map(|(layer, cluster)| world.cache(layer).ends(cluster));
-    if !is_own && !meet(&ends[0], &ends[1]) {
+    let boxes = sides.map(|(layer, cluster)| world.cache(layer).ends(cluster));
+    if !is_own && !meet(&boxes[0], &boxes[1]) {
         return None;
     }
     let wanted = match lower {
@@ -184,6 +210,7 @@ fn pair<S: Simd>(
     let place_a = groups.place(simd, world, sides[0], usize::MAX);
     let place_b = groups.place(simd, world, sides[1], place_a);
     let (a, b) = (groups.at(place_a), groups.at(place_b));
+    let ends = [&a.ends, &b.ends];
     let (mut lanes_a, mut lanes_b) = (full(a.size), full(b.size));
     let is_single = world.pose.is_single();
     if !is_own {
@@ -191,7 +218,7 @@ fn pair<S: Simd>(
         lanes_a = if is_single {
             simd.overlaps_64(&a.start, &ends[1][0], lanes_a)
         } else {
-            simd.meets_64([&a.start, &a.end], &ends[1], lanes_a)
+            simd.meets_64([&a.start, &a.end], ends[1], lanes_a)
         };
         if lanes_a == 0 {
             return None;
@@ -199,7 +226,7 @@ fn pair<S: Simd>(
         lanes_b = if is_single {
             simd.overlaps_64(&b.start, &ends[0][0], lanes_b)
         } else {
-            simd.meets_64([&b.start, &b.end], &ends[0], lanes_b)
+            simd.meets_64([&b.start, &b.end], ends[0], lanes_b)
         };
         if lanes_b == 0 {
             return None;
@@ -235,28 +262,15 @@ fn pair<S: Simd>(
         false => [&*start, &*end],
     };
     let among = full(n);
-    if is_single {
-        if is_own {
-            // All lanes of a cluster survive, each in its place.
-            simd.overlaps_within(boxes[0], among, masks);
-        } else {
-            simd.overlaps_rows(boxes[0], among, &own.start, rows, masks);
-        }
-        for row in Lanes(rows) {
-            let mask = masks.0[row];
-            if mask != 0 {
-                met.push_mapped_row(simd, (side, row), mask, &map);
-            }
-        }
-    } else {
-        for row in Lanes(rows) {
-            let query = [own.start.at(row), own.end.at(row)];
-            let among = if is_own { among & !up_to(row) } else { among };
-            let mask = simd.meets_64(boxes, &query, among);
-            if mask != 0 {
-                met.push_mapped_row(simd, (side, row), mask, &map);
-            }
-        }
+    // All lanes of a cluster that meets itself survive, each in its place.
+    match (is_single, is_own) {
+        (true, true) => simd.overlaps_within(boxes[0], among, masks),
+        (true, false) => simd.overlaps_rows(boxes[0], among, &own.start, rows, masks),
+        (false, true) => simd.meets_within(boxes, among, masks),
+        (false, false) => simd.meets_rows(boxes, among, [&own.start, &own.end], rows, masks),
+    }
+    for row in Lanes(simd.rows_with_lanes(masks)) {
+        met.push_mapped_row(simd, (side, row), masks.0[row], &map);
     }
     if same_body {
         let corners = [&a.corners[..a.n_corners], &b.corners[..b.n_corners]];

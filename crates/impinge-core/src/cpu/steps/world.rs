@@ -2,10 +2,12 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+use crate::cpu::simd::Isa;
 use crate::frame::Frame;
+use crate::grouping::bounds::Bounds;
 use crate::hull::{Hull, Pose};
 use crate::impacts::StepAnswer;
-use crate::index::LayerIx;
+use crate::index::{ClusterIx, LayerIx};
 use crate::scene::Scene;
 use crate::step::{Start, Toi};
 
@@ -29,12 +31,10 @@ pub(crate) struct Asked {
     pub sought: Sought,
     pub start: Start,
     pub toi: Toi,
-    /// Contacts later than this are not wanted.
-    pub latest: f64,
 }
 
 /// Which contacts to look for.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) enum Sought {
     /// Every contact.
     #[default]
@@ -54,13 +54,9 @@ pub(crate) struct Known {
 }
 
 impl Known {
-    pub fn new(test: StepTest) -> Self {
-        let latest = match test {
-            StepTest::Contacts(asked) => asked.latest,
-            StepTest::Overlap { .. } | StepTest::Within => f64::INFINITY,
-        };
+    pub fn new() -> Self {
         Known {
-            earliest: AtomicU64::new(latest.to_bits()),
+            earliest: AtomicU64::new(f64::INFINITY.to_bits()),
             is_over: AtomicBool::new(false),
         }
     }
@@ -90,9 +86,13 @@ impl Known {
 /// Read-only view shared by all stages of a step.
 #[derive(Clone, Copy)]
 pub(crate) struct World<'a> {
+    pub isa: Isa,
     pub scene: &'a Scene,
     pub frame: &'a Frame,
+    /// What of the step is examined: at most what the clusters' boxes hold.
     pub pose: Pose,
+    /// What the clusters' boxes hold.
+    pub(super) boxes: Pose,
     pub(super) answer: StepAnswer<'a>,
     pub(super) known: &'a Known,
     pub(super) caches: &'a Caches,
@@ -104,6 +104,21 @@ impl<'a> World<'a> {
     pub(super) fn hull(&self, layer: LayerIx) -> Hull<'a> {
         let body = self.frame.body(self.scene, layer);
         Hull::new(body, self.frame.pose(self.pose, layer))
+    }
+
+    /// The boxes of a cluster at the start and at the end.
+    #[inline(always)]
+    pub(super) fn ends(&self, layer: LayerIx, cluster: ClusterIx) -> [Bounds; 2] {
+        let ends = self.cache(layer).ends(cluster);
+        if self.pose == self.boxes {
+            return ends;
+        }
+        // They are inflated already.
+        let pose = Pose {
+            margin: 0.0,
+            ..self.pose
+        };
+        pose.close(ends)
     }
 
     /// The cache of a layer.

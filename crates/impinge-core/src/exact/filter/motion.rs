@@ -204,11 +204,15 @@ impl<T: Number> Motion<T> {
     }
 
     /// The lanes whose elements are certainly apart from t = 0 to `until`: the cheap first step, [`are_far`](Self::are_far)
-    /// and [`are_across`](Self::are_across).
+    /// and [`are_across`](Self::are_across), and for edges [`are_beside`](Self::are_beside).
     #[inline(always)]
     #[must_use]
     pub fn are_apart(&self, until: f64) -> T::Mask {
-        self.are_far(until) | self.are_across(until)
+        let apart = self.are_far(until) | self.are_across(until);
+        if self.n_corners == 3 {
+            return apart;
+        }
+        apart | self.are_beside(until)
     }
 
     /// The lanes whose elements are certainly apart from t = 0 to `until`: they are apart on an axis or along the sum of all
@@ -262,7 +266,36 @@ impl<T: Number> Motion<T> {
         (along | cubic.has_no_root()) & self.is_small
     }
 
-    /// The lanes whose elements are certainly apart from t = 0 to `until`: some w is negative.
+    /// The lanes whose edges are certainly apart from t = 0 to `until`: they are apart along the way from the line of the first
+    /// edge to the origin, at both ends of that time. Parallel edges have no normal, and all their w are zero.
+    #[inline(always)]
+    #[must_use]
+    pub fn are_beside(&self, until: f64) -> T::Mask {
+        let t = T::splat(until);
+        let [start, end] = self.corners_until(until);
+        let (edge, other) = (self.edges[0][0], self.edge_at(0, t));
+        let edge = [edge[0] + other[0], edge[1] + other[1], edge[2] + other[2]];
+        let corner = [
+            start[0][0] + end[0][0],
+            start[0][1] + end[0][1],
+            start[0][2] + end[0][2],
+        ];
+        let share = dot(&edge, &corner) / dot(&edge, &edge);
+        let way = [
+            corner[0] - edge[0] * share,
+            corner[1] - edge[1] * share,
+            corner[2] - edge[2] * share,
+        ];
+        let mut size = self.corner_sizes[0];
+        for ix in 1..self.n_corners {
+            size = size.larger(self.corner_sizes[ix]);
+        }
+        let (start, end) = (&start[..self.n_corners], &end[..self.n_corners]);
+        are_before(&way, start, end, size) & self.is_small
+    }
+
+    /// The lanes whose elements are certainly apart from t = 0 to `until`: some w is negative, or edges
+    /// [are beside](Self::are_beside) each other.
     #[inline(always)]
     #[must_use]
     pub fn are_aside(&self, until: f64) -> T::Mask {
@@ -277,6 +310,9 @@ impl<T: Number> Motion<T> {
         for ix in 0..self.n_corners {
             let corner = [self.corners[0][ix], self.corner_at(ix, t)];
             outside = outside | self.sides(&normal, &corner, &edges, ix, edges_size).1;
+        }
+        if self.n_corners == 4 {
+            outside = outside | self.are_beside(until);
         }
         outside & self.is_small
     }

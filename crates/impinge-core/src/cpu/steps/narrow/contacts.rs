@@ -1,6 +1,7 @@
 //! The contacts that one worker has found in a step, and the pairs whose contacts are still sought.
 
 use crate::cpu::narrow::room_to_wait;
+use crate::cpu::simd::Isa;
 use crate::exact::filter::{Search, time_between};
 use crate::exact::{Contact, ElementPair, first_within};
 use crate::impacts::{Found, FoundByKind, StepAnswer};
@@ -10,7 +11,10 @@ use crate::step::{Start, Toi};
 use crate::tuning::Tuning;
 
 use super::super::world::{Asked, Sought, World};
-use super::batch::{Between, NarrowCounts, Places, is_owned, key, points};
+use super::batch::{Between, Narrow, NarrowCounts, Places, is_owned, key, points};
+
+/// The most pairs of one worker that are settled last.
+const MOST_UNSURE: usize = 4096;
 
 /// A pair whose first contact is sought.
 #[derive(Debug, Clone, Copy)]
@@ -34,6 +38,10 @@ pub(crate) struct FirstContacts {
     pub(super) later: Vec<Open>,
     pub(super) single: Vec<Open>,
     pub(super) between: Option<Between>,
+    /// Pairs for exact arithmetic, which are settled last where one contact is sought.
+    unsure: Vec<(Between, Places)>,
+    /// Whether these are being settled.
+    is_last: bool,
     /// Whether the filter's first step is still to be taken, in `f64`.
     pub(super) is_first: bool,
 }
@@ -50,12 +58,15 @@ impl FirstContacts {
             list.reserve_exact(room_to_wait(tuning));
         }
         self.between = None;
+        self.unsure.clear();
+        self.is_last = false;
     }
 
     pub fn bytes(&self) -> usize {
         let found: usize = self.found.iter().map(Vec::capacity).sum();
         let lists = [&self.open, &self.later, &self.single];
         size_of::<Open>() * lists.iter().map(|list| list.capacity()).sum::<usize>()
+            + size_of::<(Between, Places)>() * self.unsure.capacity()
             + size_of::<Found<Contact>>() * found
     }
 
@@ -78,6 +89,40 @@ impl FirstContacts {
             }
             Sought::All | Sought::Any => 1.0,
         }
+    }
+
+    /// The pairs to be settled last.
+    pub fn unsure(&mut self) -> &mut Vec<(Between, Places)> {
+        &mut self.unsure
+    }
+
+    /// Settles a pair about which nothing is certain, now or last.
+    #[inline(always)]
+    pub(super) fn leave(
+        &mut self,
+        world: World<'_>,
+        between: Between,
+        pair: ElementPair,
+        places: Places,
+    ) {
+        let waits = self.asked.sought != Sought::All && !self.is_last;
+        if waits && self.unsure.len() < MOST_UNSURE {
+            self.unsure.push((between, places));
+        } else {
+            self.settle_exactly(world, between, pair, places);
+        }
+    }
+
+    /// Settles pairs of two layers that were left.
+    pub fn settle_unsure(&mut self, isa: Isa, world: World<'_>, pairs: &[(Between, Places)]) {
+        let until = self.until(world);
+        self.open.extend(pairs.iter().map(|&(_, places)| Open {
+            places,
+            search: Search::new(until),
+        }));
+        self.between = pairs.first().map(|(between, _)| *between);
+        (self.is_first, self.is_last) = (true, true);
+        self.settle(isa, world);
     }
 
     #[inline(never)]

@@ -90,7 +90,7 @@ impl FirstContacts {
                 Next::Look => later.push(open),
                 Next::Enclose => single.push(open),
                 Next::Contact | Next::Unsure => {
-                    self.settle_exactly(world, between, pair, open.places);
+                    self.leave(world, between, pair, open.places);
                 }
             }
         }
@@ -117,7 +117,7 @@ impl FirstContacts {
                     self.report_within(world, (between, pair), open.places, span);
                 }
                 Next::Enclose | Next::Unsure => {
-                    self.settle_exactly(world, between, pair, open.places);
+                    self.leave(world, between, pair, open.places);
                 }
             }
         }

@@ -1,0 +1,28 @@
+//! Pairs that filters have left to exact arithmetic, settled last where the answer is one contact.
+//!
+//! Reason: each costs as much as a thousand pairs in a filter. The search for the earliest contact ends with an earlier time than
+//! it had when a pair was found unsure; up to that time, the filter drops most of them. The search for any contact has mostly found one.
+
+use crate::run::Job;
+
+use super::pairing::Worker;
+use super::world::World;
+
+/// Pairs per task.
+const TASK: usize = 8;
+
+/// Settles the unsure pairs of all workers.
+pub(super) fn settle(job: Job<'_>, world: World<'_>, workers: &mut [Worker]) {
+    let mut unsure = Vec::new();
+    for worker in &mut *workers {
+        unsure.append(worker.contacts().unsure());
+    }
+    unsure.sort_unstable_by_key(|(between, places)| (between.a, between.b, *places));
+    let runs = unsure.chunk_by(|(between, _), (next, _)| between == next);
+    let tasks: Vec<_> = runs.flat_map(|run| run.chunks(TASK)).collect();
+    job.workers.for_each(workers, tasks.len(), |worker, ix| {
+        if !world.known.is_over() {
+            worker.contacts().settle_unsure(world.isa, world, tasks[ix]);
+        }
+    });
+}
