@@ -2,6 +2,7 @@
 
     python bench/near.py                     # all scenes whose meshes exist
     python bench/near.py --rounds 5 --json near.json --markdown near.md
+    python bench/near.py --only near         # elements alone, or distances alone
 
 It installs nothing, names missing peers, and looks for meshes in $IMPINGE_DATA or ../shared/data.
 
@@ -11,8 +12,10 @@ is the question of a rigid body. All distances must agree to single precision.
 
 Elements within a distance: a mesh with itself, vertices and faces, edges and edges. ipc-toolkit's `NormalCollisions.build`
 answers the same question in floating point, and reduces pairs whose nearest features are smaller to edge-vertex and
-vertex-vertex collisions, with their number as weight. So the sum of the weights must be the number of pairs here, except pairs at
-the distance itself within rounding.
+vertex-vertex collisions, with their number as weight. Edges that are nearly parallel stay edges with edges. So each pair here, reduced to
+its nearest features in the same way, is held against the collision with these elements, and the number of such pairs against its
+weight. Where they differ, the distance and the nearest features are decided again in fractions, and printed; a difference that
+rounding does not explain ends the run.
 
 Times are medians over rounds in which contestants take turns, wall clock and processor time of all threads.
 """
@@ -24,6 +27,7 @@ import pathlib
 import statistics
 import sys
 import time
+from fractions import Fraction
 
 import numpy as np
 
@@ -261,6 +265,7 @@ def near(name, vertices, faces, part, rounds, missing):
     """One mesh with itself, within a part of its size."""
     distance = float(part * np.linalg.norm(np.ptp(vertices, axis=0)))
     row = {"scene": name, "n_faces": len(faces), "distance": distance, "rows": {}}
+    plain = None
     for threads in [0, 1]:
         scene = impinge.Scene()
         body = scene.add(vertices, faces)
@@ -272,11 +277,17 @@ def near(name, vertices, faces, part, rounds, missing):
             times.append((wall, cpu))
         label = "impinge" + (", threads=1" if threads else "")
         row["pairs"] = len(found)
+        _, arrays, _ = clock(lambda: (found.kinds, found.elements, found.types))
+        # The set is that of the original, which is mirrored in every second round.
+        scene.set_positions(body, np.ascontiguousarray(vertices))
+        plain = detector.within_distance(scene, distance, within=body)
+        assert len(plain) == len(found), (len(plain), len(found))
         stats = found.stats
         row["rows"][label] = medians(times) | {
             "n_candidates": stats.n_candidates,
             "n_unsure": stats.n_unsure,
             "stages": dict(stats.stages),
+            "arrays": arrays,
         }
     try:
         import ipctk
@@ -296,8 +307,110 @@ def near(name, vertices, faces, part, rounds, missing):
             times.append((wall, cpu))
         weights = sum(collisions[ix].weight for ix in range(len(collisions)))
         row["rows"][f"ipc-toolkit, {broad}"] = medians(times) | {"pairs": weights}
-    print(f"{name}: {row['pairs']} pairs, ipc-toolkit {weights}", file=sys.stderr)
+    row["differences"] = compared(plain, collisions, vertices, faces, edges, distance)
+    n = len(row["differences"])
+    print(f"{name}: {row['pairs']} pairs, ipc-toolkit {weights}, {n} differences", file=sys.stderr)
+    for difference in row["differences"]:
+        print(f"  {difference}", file=sys.stderr)
     return row
+
+
+def compared(found, collisions, vertices, faces, edges, distance):
+    """Pairs reduced to their nearest features against ipc-toolkit's collisions, one by one. Explanations of all differences."""
+    numbers = {tuple(sorted(edge)): ix for ix, edge in enumerate(edges.tolist())}
+    # Edges here are numbered as unique pairs (low, high) in the order of (high, low).
+    ours_edges = sorted(numbers, key=lambda edge: (edge[1], edge[0]))
+    theirs = {
+        ("fv", pair.vertex_id, pair.face_id): pair.weight for pair in collisions.fv_collisions
+    }
+    for pair in collisions.ev_collisions:
+        theirs["ev", pair.edge_id, pair.vertex_id] = pair.weight
+    for pair in collisions.vv_collisions:
+        theirs["vv", *sorted((pair.vertex0_id, pair.vertex1_id))] = pair.weight
+    for pair in collisions.ee_collisions:
+        theirs["ee", *sorted((pair.edge0_id, pair.edge1_id))] = pair.weight
+    corners_of = faces.tolist()
+    ours, of_rows = {}, {}
+    for kind, (a, b), type_ in zip(
+        found.kinds.tolist(), found.elements.tolist(), found.types.tolist(), strict=True
+    ):
+        if kind == "vf":
+            if type_ == "P_T":
+                key = ("fv", a, b)
+            else:
+                ix = int(type_[3:])
+                corner, following = corners_of[b][ix], corners_of[b][(ix + 1) % 3]
+                if type_[2] == "E":
+                    key = ("ev", numbers[tuple(sorted((corner, following)))], a)
+                else:
+                    key = ("vv", *sorted((a, corner)))
+        else:
+            pair = [ours_edges[a], ours_edges[b]]
+            key = ("ee", *sorted(numbers[edge] for edge in pair))
+            if key not in theirs:
+                # Not nearly parallel, or not found there: the names say which ends are nearest.
+                ends = [
+                    part[2:] and pair[side][int(part[2:])]
+                    for side, part in enumerate(type_.split("_"))
+                ]
+                if all(end != "" for end in ends):
+                    key = ("vv", *sorted(ends))
+                elif ends[0] != "":
+                    key = ("ev", numbers[pair[1]], ends[0])
+                elif ends[1] != "":
+                    key = ("ev", numbers[pair[0]], ends[1])
+        ours[key] = ours.get(key, 0) + 1
+        of_rows.setdefault(key, []).append((kind, a, b))
+    differences = []
+    for key in ours.keys() | theirs.keys():
+        counts = ours.get(key, 0), theirs.get(key, 0)
+        if counts[0] != counts[1]:
+            rows = of_rows.get(key, [])
+            differences.append(explained(key, counts, rows, vertices, edges, faces, distance))
+    return sorted(differences)
+
+
+def explained(key, counts, rows, vertices, edges, faces, distance):
+    """One difference in words: the distance of the features, in fractions, beside the one asked for."""
+    kind, a, b = key
+    corners = {
+        "fv": lambda: ([a], faces[b]),
+        "ev": lambda: (edges[a], [b]),
+        "vv": lambda: ([a], [b]),
+        "ee": lambda: (edges[a], edges[b]),
+    }[kind]()
+    points = [[[Fraction(float(x)) for x in vertices[v]] for v in side] for side in corners]
+    ratio = float(square_of_distance(*points) / Fraction(distance) ** 2) ** 0.5
+    text = f"{kind} {a} {b}: {counts[0]} pairs {rows}, weight {counts[1]}, distance {ratio!r} of the one asked for"
+    # Rounding alone: the distance asked for itself, or nearest features that are a tie.
+    assert abs(ratio - 1) < 1e-12 or sum(counts) > 0 and ratio <= 1, text
+    return text
+
+
+def square_of_distance(a, b):
+    """The square of the distance of the lines, planes or points of two features: exact, in fractions."""
+
+    def minus(p, q):
+        return [x - y for x, y in zip(p, q, strict=True)]
+
+    def dot(p, q):
+        return sum(x * y for x, y in zip(p, q, strict=True))
+
+    # Take away the part along each direction, made orthogonal to those before.
+    way, directions = minus(b[0], a[0]), []
+    for side in (a, b):
+        directions += [minus(corner, side[0]) for corner in side[1:]]
+    orthogonal = []
+    for direction in directions:
+        for other in orthogonal:
+            share = dot(direction, other) / dot(other, other)
+            direction = [x - share * y for x, y in zip(direction, other, strict=True)]
+        if any(direction):
+            orthogonal.append(direction)
+    for direction in orthogonal:
+        share = dot(way, direction) / dot(direction, direction)
+        way = [x - share * y for x, y in zip(way, direction, strict=True)]
+    return dot(way, way)
 
 
 def medians(times):
@@ -320,22 +433,32 @@ def tables(record):
             cells += [f"{times[1] / ours[1]:,.1f}", f"{times[3] / ours[3]:,.1f}"]
             lines.append("| " + " | ".join(cells) + " |")
     lines += ["", "Ratios are of processor time.", ""]
+    lines = lines if record["distances"] else []
+    if not record["near"]:
+        return "\n".join(lines)
     lines += ["### Elements within a distance, milliseconds", ""]
-    lines += ["| scene | faces | distance | | pairs | wall | processor | processor / ours |"]
-    lines += ["|---|---:|---:|---|---:|---:|---:|---:|"]
+    lines += ["| scene | faces | distance | | pairs | wall | processor | wall / ours | processor / ours |"]
+    lines += ["|---|---:|---:|---|---:|---:|---:|---:|---:|"]
     for scene in record["near"]:
-        ours = scene["rows"]["impinge"]["cpu"]
+        ours = scene["rows"]["impinge"]
         for label, row in scene["rows"].items():
             cells = [scene["scene"], f"{scene['n_faces']:,}", f"{scene['distance']:.4g}", label]
             cells += [f"{row.get('pairs', scene['pairs']):,.0f}", milliseconds(row["wall"])]
-            cells += [milliseconds(row["cpu"]), f"{row['cpu'] / ours:,.1f}"]
+            cells += [milliseconds(row["cpu"])]
+            cells += [f"{row[key] / ours[key]:,.1f}" for key in ["wall", "cpu"]]
             lines.append("| " + " | ".join(cells) + " |")
+    lines += ["", "Pairs whose collisions in ipc-toolkit differ:", ""]
+    for scene in record["near"]:
+        differences = scene.get("differences", ["not compared"])
+        lines += [f"* {scene['scene']}, {scene['distance']:.4g}: {len(differences)}"]
+        lines += [f"  * {difference}" for difference in differences]
     return "\n".join(lines)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--only", choices=["near", "distances"], help="one of the two questions")
     parser.add_argument("--json", type=pathlib.Path, help="write all figures to this file")
     parser.add_argument("--markdown", type=pathlib.Path, help="write the tables to this file")
     arguments = parser.parse_args()
@@ -349,16 +472,12 @@ def main():
     _, rumba_faces = read_ply(data / "sequences" / "rumba.ply")
     rumba = read_frame(data / "sequences" / "rumba.pc2", 60)
     rounds = arguments.rounds
-    record = {
-        "machine": machine(),
-        "near": [
-            near("cloth-ball", cloth_vertices, cloth_faces, 1e-3, rounds, missing),
-            near("cloth-ball", cloth_vertices, cloth_faces, 2e-3, rounds, missing),
-            near("rumba", rumba, rumba_faces, 1e-3, rounds, missing),
-            near("rumba", rumba, rumba_faces, 2e-3, rounds, missing),
-        ],
-        "distances": distances(data, rounds, missing),
-    }
+    record = {"machine": machine(), "near": [], "distances": []}
+    if arguments.only != "distances":
+        meshes = [("cloth-ball", cloth_vertices, cloth_faces), ("rumba", rumba, rumba_faces)]
+        record["near"] = [near(*mesh, part, rounds, missing) for mesh in meshes for part in [1e-3, 2e-3]]
+    if arguments.only != "near":
+        record["distances"] = distances(data, rounds, missing)
     for error in sorted(missing):
         print(f"missing: {error}", file=sys.stderr)
     text = tables(record)

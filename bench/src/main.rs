@@ -16,6 +16,7 @@ mod embree;
 mod files;
 mod gpu;
 mod measure;
+mod near;
 mod once;
 mod ours;
 #[cfg(feature = "parry")]
@@ -56,6 +57,7 @@ commands:
   steps         contacts of moving cloth: all, the earliest, any, how far a step can be taken, pairs of boxes;
                 --scene cloth-ball|cloth-funnel
   step-sizes    the same questions about two layers of cloth of 10^3 to 10^6 faces: time and memory against size
+  near          elements within a distance, of a mesh with itself: --scene cloth-ball|rumba
   once          the first frame of a new detector, by each method: --scene ball|bunny|buddha|dragon
   gpu           the scenes of two-body and self on a GPU: stages on the device beside a lower bound
   device        prints the name of the GPU in a form for --record

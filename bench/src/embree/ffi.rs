@@ -9,6 +9,19 @@ pub type Geometry = *mut c_void;
 /// `RTC_GEOMETRY_TYPE_USER`
 pub const GEOMETRY_USER: c_int = 120;
 
+/// `RTC_GEOMETRY_TYPE_TRIANGLE`
+pub const GEOMETRY_TRIANGLE: c_int = 0;
+/// `RTC_INVALID_GEOMETRY_ID`
+pub const NO_GEOMETRY: c_uint = c_uint::MAX;
+
+/// `enum RTCBufferType`
+pub const BUFFER_INDEX: c_int = 0;
+pub const BUFFER_VERTEX: c_int = 1;
+
+/// `enum RTCFormat`
+pub const FORMAT_UINT3: c_int = 0x5003;
+pub const FORMAT_FLOAT3: c_int = 0x9003;
+
 /// `enum RTCBuildQuality`
 pub const QUALITY_LOW: c_int = 0;
 pub const QUALITY_MEDIUM: c_int = 1;
@@ -48,6 +61,36 @@ pub struct Collision {
     pub primitive1: c_uint,
 }
 
+/// `struct RTCPointQuery`
+#[repr(C, align(16))]
+pub struct PointQuery {
+    pub position: [f32; 3],
+    pub time: f32,
+    pub radius: f32,
+}
+
+/// `struct RTCPointQueryContext`, for one level of instances
+#[repr(C, align(16))]
+pub struct PointQueryContext {
+    pub world_to_instance: [f32; 16],
+    pub instance_to_world: [f32; 16],
+    pub instance: c_uint,
+    pub n_instances: c_uint,
+}
+
+/// `struct RTCPointQueryFunctionArguments`
+#[repr(C, align(16))]
+pub struct PointQueryArguments {
+    pub query: *mut PointQuery,
+    pub user: *mut c_void,
+    pub primitive: c_uint,
+    pub geometry: c_uint,
+    pub context: *mut PointQueryContext,
+    pub similarity_scale: f32,
+}
+
+/// `RTCPointQueryFunction`
+pub type PointQueryFunction = unsafe extern "C" fn(*mut PointQueryArguments) -> bool;
 /// `RTCBoundsFunction`
 pub type BoundsFunction = unsafe extern "C" fn(*const BoundsArguments);
 /// `RTCCollideFunc`
@@ -76,4 +119,22 @@ unsafe extern "C" {
         user: *mut c_void,
     );
     pub fn rtcCommitGeometry(geometry: Geometry);
+    pub fn rtcSetSharedGeometryBuffer(
+        geometry: Geometry,
+        kind: c_int,
+        slot: c_uint,
+        format: c_int,
+        data: *const c_void,
+        offset: usize,
+        stride: usize,
+        count: usize,
+    );
+    pub fn rtcUpdateGeometryBuffer(geometry: Geometry, kind: c_int, slot: c_uint);
+    pub fn rtcPointQuery(
+        scene: Scene,
+        query: *mut PointQuery,
+        context: *mut PointQueryContext,
+        function: Option<PointQueryFunction>,
+        user: *mut c_void,
+    ) -> bool;
 }

@@ -6,7 +6,7 @@
 //! The setting (build quality, scene flags, threads, whether candidates' boxes are compared first) is
 //! not fixed: [`tuned`] measures all sensible settings on the problem and keeps the fastest.
 
-mod ffi;
+pub mod ffi;
 
 use std::ffi::{CString, c_int, c_void};
 use std::fmt;
@@ -271,14 +271,32 @@ unsafe extern "C" fn collide<P: Corners, const RULE: u8, const BOXES: bool>(
 }
 
 /// A device and the objects that depend on it; released in reverse order.
-struct Handles {
-    device: ffi::Device,
-    scenes: Vec<ffi::Scene>,
-    geometries: Vec<ffi::Geometry>,
+pub struct Handles {
+    pub device: ffi::Device,
+    pub scenes: Vec<ffi::Scene>,
+    pub geometries: Vec<ffi::Geometry>,
 }
 
 impl Handles {
-    fn check(&self, doing: &str) -> Result<(), Failure> {
+    /// A device with so many threads; 0 means all.
+    pub fn new(n_threads: usize) -> Result<Self, Failure> {
+        let config = CString::new(match n_threads {
+            0 => String::new(),
+            n => format!("threads={n}"),
+        })?;
+        // SAFETY: a plain call of the C interface.
+        let device = unsafe { ffi::rtcNewDevice(config.as_ptr()) };
+        let handles = Handles {
+            device,
+            scenes: Vec::new(),
+            geometries: Vec::new(),
+        };
+        handles.check("making a device")?;
+        Ok(handles)
+    }
+
+    /// What Embree said last, if that is an error.
+    pub fn check(&self, doing: &str) -> Result<(), Failure> {
         // SAFETY: the device is alive as long as `self`; null is allowed and asks for the thread's
         // own error.
         match unsafe { ffi::rtcGetDeviceError(self.device) } {
@@ -290,7 +308,7 @@ impl Handles {
 
 impl Drop for Handles {
     fn drop(&mut self) {
-        // SAFETY: each handle was created once in `Embree::new` and is released once, here.
+        // SAFETY: each handle was created once, by whoever filled these lists, and is released once, here.
         unsafe {
             for &geometry in &self.geometries {
                 ffi::rtcReleaseGeometry(geometry);
@@ -321,7 +339,7 @@ impl<P: Corners> Embree<P> {
         let n_bodies = problem.bodies.len();
         let groups: Vec<Vec<usize>> = match problem.ask {
             Ask::Between => vec![vec![0], vec![1]],
-            Ask::Within | Ask::All => vec![(0..n_bodies).collect()],
+            Ask::Within | Ask::Resolved | Ask::All => vec![(0..n_bodies).collect()],
         };
         let mut sides = Vec::new();
         let mut layout = Vec::new();
@@ -342,24 +360,14 @@ impl<P: Corners> Embree<P> {
         let callback = match (problem.ask, setting.boxes) {
             (Ask::Between, false) => collide::<P, BETWEEN, false>,
             (Ask::Between, true) => collide::<P, BETWEEN, true>,
-            (Ask::Within, false) => collide::<P, WITHIN, false>,
-            (Ask::Within, true) => collide::<P, WITHIN, true>,
+            (Ask::Within | Ask::Resolved, false) => collide::<P, WITHIN, false>,
+            (Ask::Within | Ask::Resolved, true) => collide::<P, WITHIN, true>,
             (Ask::All, false) => collide::<P, ALL, false>,
             (Ask::All, true) => collide::<P, ALL, true> as ffi::CollideFunction,
         };
-        let mut handles = Handles {
-            device: std::ptr::null_mut(),
-            scenes: Vec::new(),
-            geometries: Vec::new(),
-        };
-        let config = CString::new(match setting.threads {
-            0 => String::new(),
-            n => format!("threads={n}"),
-        })?;
+        let mut handles = Handles::new(setting.threads)?;
         // SAFETY: plain calls of the C interface with live handles; counts match the sides.
         unsafe {
-            handles.device = ffi::rtcNewDevice(config.as_ptr());
-            handles.check("making a device")?;
             for side in &sides {
                 let scene = ffi::rtcNewScene(handles.device);
                 handles.scenes.push(scene);

@@ -328,6 +328,17 @@ impl Frame {
             .map_or(0, |last| u64::from(last.numbers().end.raw()))
     }
 
+    /// The numbers that the lower number of a pair of some kind may be: those of the elements that the kind names first. Parts follow
+    /// each other, so there are few others between them.
+    pub(crate) fn lower_numbers(&self, kind: PairKind) -> Range<Number> {
+        let of_part = |layer: &&Layer| layer.part == kind.parts()[0];
+        let layers = self.layers.iter().filter(of_part);
+        let ranges = layers.map(Layer::numbers);
+        ranges
+            .reduce(|all, own| all.start.min(own.start)..all.end.max(own.end))
+            .unwrap_or(Number::new(0)..Number::new(0))
+    }
+
     /// Asks about some kinds of candidates only, of those that the frame was resolved for.
     pub(crate) fn ask_for(&mut self, kinds: PairKinds) {
         self.ask = Ask::Candidates(kinds);

@@ -167,6 +167,25 @@ impl<'a> Hull<'a> {
         }
     }
 
+    /// The box of an element over the whole step, not rounded.
+    #[inline]
+    pub fn extent(&self, corners: &[u32]) -> Extent {
+        let ends = [self.start, self.end.unwrap_or(self.start)];
+        let [Positions::F64(start), Positions::F64(end)] = ends else {
+            let points = corners
+                .iter()
+                .flat_map(|&corner| ends.map(|positions| positions.point(corner as usize)));
+            return Extent::of(points);
+        };
+        let [start, end] = [start, end].map(|positions| {
+            let [min, max] = vec64::ends(positions, corners);
+            Extent { min, max }
+        });
+        let mut both = start;
+        both.join(&end);
+        both
+    }
+
     /// Makes the boxes to be tested from those of a group's elements at both ends: [`Pose::close_all`].
     #[inline(always)]
     pub fn close(&self, boxes: [&mut LaneBounds; 2], size: usize) {

@@ -1,18 +1,23 @@
 //! What is asked of elements that are near each other, and the answer.
 
+mod labels;
+
 use std::collections::BTreeMap;
 
 use crate::error::Error;
-use crate::exact::{Feature, NearestOfElements};
+use crate::exact::{ElementPair, Feature, NearestOfElements};
 use crate::frame::{Ask, Frame};
 use crate::ids::BodyId;
-use crate::impacts::{Numbering, row};
+use crate::impacts::{KeysByKind, Numbering, row};
 use crate::pair_kind::{PairKind, PairKinds};
 use crate::pairs::{Primitive, hash_row, mix};
 use crate::query::Query;
 use crate::scene::Scene;
+use crate::sink::reserve;
 use crate::stats::Statistics;
 use crate::step::check_distance;
+
+pub(crate) use labels::Labels;
 
 /// Which pairs of elements are near: of which bodies, of which kinds, and within which distance.
 ///
@@ -114,7 +119,6 @@ pub struct NearPair {
     /// Whether nearest points may not be the only ones: edges are parallel, or an element is degenerate, or faces are
     /// parallel.
     pub is_parallel: bool,
-    name: &'static str,
     /// Distance and nearest points, where [`NearQuery::closest_points`] asks for them.
     pub closest: Option<ClosestPoints>,
 }
@@ -141,90 +145,157 @@ impl NearPair {
     /// of edges; `P_E`, `P_E0`, `P_E1` of an edge and a vertex; `P_P` of vertices. Of an edge and a face, or of faces, the
     /// kinds of the features: `P_P`, `P_E`, `P_T`, `E_E`, and `E_T` where an edge passes through a face.
     pub fn name(&self) -> &'static str {
-        self.name
+        let pair = match self.kind {
+            PairKind::VertexFace => Some((ElementPair::VertexFace, false)),
+            PairKind::EdgeEdge => Some((ElementPair::EdgeEdge, false)),
+            // The edge is named first.
+            PairKind::EdgeVertex => Some((ElementPair::VertexEdge, true)),
+            PairKind::VertexVertex => Some((ElementPair::VertexVertex, false)),
+            PairKind::EdgeFace | PairKind::FaceFace => None,
+        };
+        let nearest = NearestOfElements {
+            features: self.features,
+            is_parallel: self.is_parallel,
+        };
+        nearest.name(pair)
     }
 }
 
 /// All pairs of elements that are near, sorted by `(kind, body_a, element_a, body_b, element_b)`.
 ///
-/// The same input gives the same bytes on every method, backend, thread count and budget.
+/// The same input gives the same bytes on every method, backend, thread count and budget. A pair takes nine bytes, and 56 more
+/// with its nearest points.
 #[derive(Debug, Clone, Default)]
 pub struct NearPairs {
     numbering: Numbering,
-    pairs: Vec<NearPair>,
+    keys: KeysByKind,
+    /// The features of each key, packed.
+    nearest: [Vec<u8>; PairKind::ALL.len()],
+    /// Of all pairs, kind after kind, if they were asked for.
+    closest: Vec<ClosestPoints>,
     stats: Statistics,
+}
+
+/// Some pairs of one kind whose features are not all known.
+pub(crate) struct Unnamed<'a> {
+    pub kind: PairKind,
+    keys: &'a mut [u64],
+    nearest: &'a mut [u8],
+    /// Empty, if they were not asked for.
+    closest: &'a mut [ClosestPoints],
 }
 
 impl NearPairs {
     /// Takes over the frame's numbering.
     pub(crate) fn begin(&mut self, frame: &Frame) {
         self.numbering.begin(frame);
-        self.pairs.clear();
+        self.keys.iter_mut().for_each(Vec::clear);
+        self.nearest.iter_mut().for_each(Vec::clear);
+        self.closest.clear();
         self.stats.clear();
+    }
+
+    /// The room of the last answer's keys.
+    pub(crate) fn take_room(&mut self) -> KeysByKind {
+        std::mem::take(&mut self.keys)
     }
 
     pub(crate) fn stats_mut(&mut self) -> &mut Statistics {
         &mut self.stats
     }
 
-    /// Names what was found of one kind, in the order of the keys; the elements' features follow. Kinds come in their
-    /// order.
-    pub(crate) fn extend(&mut self, kind: PairKind, keys: impl Iterator<Item = u64>) {
-        let numbering = &self.numbering;
-        self.pairs.extend(keys.map(|key| {
-            let (a, b) = numbering.pair(key);
-            NearPair {
-                kind,
-                a,
-                b,
-                features: [Feature::Face; 2],
-                is_parallel: false,
-                name: "",
-                closest: None,
+    /// Takes what was found: sorted keys with their [`Labels`]. Parts of about `n_each` pairs are to be
+    /// [named](Unnamed::name) next.
+    ///
+    /// # Errors
+    /// There is no memory for the features and nearest points.
+    pub(crate) fn fill(
+        &mut self,
+        keys: KeysByKind,
+        closest: bool,
+        n_each: usize,
+    ) -> Result<(Vec<Unnamed<'_>>, &Numbering), Error> {
+        const WHAT: &str = "nearest features";
+        const NONE: ClosestPoints = ClosestPoints {
+            distance: 0.0,
+            points: [[0.0; 3]; 2],
+        };
+        self.keys = keys;
+        for (nearest, keys) in self.nearest.iter_mut().zip(&self.keys) {
+            reserve(nearest, keys.len(), WHAT)?;
+            nearest.resize(keys.len(), 0);
+        }
+        if closest {
+            let n = self.keys.iter().map(Vec::len).sum();
+            reserve(&mut self.closest, n, "nearest points")?;
+            self.closest.resize(n, NONE);
+        }
+        let mut closest = &mut self.closest[..];
+        let mut unnamed = Vec::new();
+        let lists = self.keys.iter_mut().zip(&mut self.nearest);
+        for (kind, (keys, nearest)) in PairKind::ALL.into_iter().zip(lists) {
+            for (keys, nearest) in keys.chunks_mut(n_each).zip(nearest.chunks_mut(n_each)) {
+                let n = keys.len().min(closest.len());
+                let (own, rest) = std::mem::take(&mut closest).split_at_mut(n);
+                closest = rest;
+                unnamed.push(Unnamed {
+                    kind,
+                    keys,
+                    nearest,
+                    closest: own,
+                });
             }
-        }));
+        }
+        Ok((unnamed, &self.numbering))
     }
 
     /// Bytes of the answer.
     pub(crate) fn bytes(&self) -> u64 {
-        (size_of::<NearPair>() * self.pairs.capacity()) as u64
-    }
-
-    pub(crate) fn pairs_mut(&mut self) -> &mut [NearPair] {
-        &mut self.pairs
+        let keys: usize = self.keys.iter().map(Vec::capacity).sum();
+        let nearest: usize = self.nearest.iter().map(Vec::capacity).sum();
+        let closest = self.closest.capacity();
+        (size_of::<u64>() * keys + nearest + size_of::<ClosestPoints>() * closest) as u64
     }
 
     /// How many pairs are near.
     pub fn len(&self) -> usize {
-        self.pairs.len()
+        self.keys.iter().map(Vec::len).sum()
     }
 
     /// Whether no pair is.
     pub fn is_empty(&self) -> bool {
-        self.pairs.is_empty()
+        self.len() == 0
     }
 
     /// All of them, sorted.
-    pub fn as_slice(&self) -> &[NearPair] {
-        &self.pairs
-    }
-
-    /// All of them, sorted.
-    pub fn iter(&self) -> std::slice::Iter<'_, NearPair> {
-        self.pairs.iter()
+    pub fn iter(&self) -> impl Iterator<Item = NearPair> + '_ {
+        PairKind::ALL.into_iter().flat_map(|kind| self.of(kind))
     }
 
     /// Those of one kind.
-    pub fn of(&self, kind: PairKind) -> &[NearPair] {
-        let start = self.pairs.partition_point(|pair| pair.kind < kind);
-        let end = self.pairs.partition_point(|pair| pair.kind <= kind);
-        &self.pairs[start..end]
+    pub fn of(&self, kind: PairKind) -> impl ExactSizeIterator<Item = NearPair> + '_ {
+        let before: usize = self.keys[..kind as usize].iter().map(Vec::len).sum();
+        let lists = self.keys[kind as usize]
+            .iter()
+            .zip(&self.nearest[kind as usize]);
+        lists.enumerate().map(move |(ix, (&key, &nearest))| {
+            let (a, b) = self.numbering.pair(key);
+            let nearest = NearestOfElements::unpacked(nearest);
+            NearPair {
+                kind,
+                a,
+                b,
+                features: nearest.features,
+                is_parallel: nearest.is_parallel,
+                closest: self.closest.get(before + ix).copied(),
+            }
+        })
     }
 
     /// A hash of the set of pairs and their features that does not depend on their order: the wrapping sum of a mixed
     /// 64-bit word per pair. Distances and points are not part of it.
     pub fn hash(&self) -> u64 {
-        self.pairs.iter().fold(0, |sum, pair| {
+        self.iter().fold(0, |sum, pair| {
             let [a, b] = pair.features.map(|feature| match feature {
                 Feature::Vertex(ix) => u64::from(ix),
                 Feature::Edge(ix) => 8 + u64::from(ix),
@@ -241,19 +312,32 @@ impl NearPairs {
     }
 }
 
-impl NearPair {
-    pub(crate) fn set_nearest(&mut self, nearest: &NearestOfElements) {
-        self.features = nearest.features;
-        self.is_parallel = nearest.is_parallel;
-        self.name = nearest.name;
-    }
-}
-
-impl<'a> IntoIterator for &'a NearPairs {
-    type Item = &'a NearPair;
-    type IntoIter = std::slice::Iter<'a, NearPair>;
-
-    fn into_iter(self) -> Self::IntoIter {
-        self.iter()
+impl Unnamed<'_> {
+    /// Names the features of all pairs. Features that keys do not carry come from `find`, with nearest points where they were asked
+    /// for.
+    pub fn name(
+        &mut self,
+        labels: Labels,
+        pair: Option<ElementPair>,
+        mut find: impl FnMut(u64) -> (NearestOfElements, Option<ClosestPoints>),
+    ) {
+        let of_parts: [Option<u8>; 1 + Labels::UNKNOWN as usize] = std::array::from_fn(|part| {
+            NearestOfElements::of_part(pair?, part as u8).map(NearestOfElements::packed)
+        });
+        let has_closest = !self.closest.is_empty();
+        for (ix, (key, nearest)) in self.keys.iter_mut().zip(&mut *self.nearest).enumerate() {
+            let (own, part) = labels.split(*key);
+            *key = own;
+            let known = of_parts[usize::from(part) % of_parts.len()];
+            if let (Some(known), false) = (known, has_closest) {
+                *nearest = known;
+                continue;
+            }
+            let (found, closest) = find(own);
+            *nearest = found.packed();
+            if let (Some(to), Some(closest)) = (self.closest.get_mut(ix), closest) {
+                *to = closest;
+            }
+        }
     }
 }

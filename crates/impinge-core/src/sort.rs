@@ -13,13 +13,16 @@
 //!
 //! Memory, kept from answer to answer: four bytes per key, and per number and part.
 
+use std::ops::Range;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::cpu::simd::{Isa, Simd, dispatch};
 use crate::error::Error;
+use crate::frame::Frame;
 use crate::impacts::KeysByKind;
 use crate::index::{Number, lower_number, pair_numbers};
+use crate::pair_kind::PairKind;
 use crate::settings::Settings;
 use crate::sink;
 use crate::workers::Workers;
@@ -69,16 +72,20 @@ impl Sorter {
     }
 
     /// Sorts the keys of each kind. Returns how many kinds were counted.
-    pub fn sort_kinds(&mut self, keys: &mut KeysByKind, n_numbers: u64, workers: &Workers) -> u64 {
-        let counted = keys.iter_mut();
-        let counted = counted.map(|keys| u64::from(self.sort(keys, n_numbers, workers)));
+    pub fn sort_kinds(&mut self, keys: &mut KeysByKind, frame: &Frame, workers: &Workers) -> u64 {
+        let counted = PairKind::ALL.into_iter().zip(keys);
+        let counted = counted.map(|(kind, keys)| {
+            let numbers = frame.lower_numbers(kind);
+            u64::from(self.sort(keys, numbers, workers))
+        });
         counted.sum()
     }
 
-    /// Sorts keys of numbers below `n_numbers`. Returns whether they were counted: few keys, and keys without memory for
+    /// Sorts keys whose lower numbers are in a range. Returns whether they were counted: few keys, and keys without memory for
     /// that, are sorted in place.
-    fn sort(&mut self, keys: &mut [u64], n_numbers: u64, workers: &Workers) -> bool {
-        let n_numbers = n_numbers as usize;
+    fn sort(&mut self, keys: &mut [u64], numbers: Range<Number>, workers: &Workers) -> bool {
+        let first = numbers.start.index();
+        let n_numbers = numbers.end.index() - first;
         let is_worth =
             keys.len() >= self.from.max(n_numbers / 2) && u32::try_from(keys.len()).is_ok();
         let n_parts = workers.n().min(MOST_PARTS);
@@ -93,7 +100,7 @@ impl Sorter {
         let n_each = keys.len().div_ceil(n_parts);
         for_each_part(workers, parts, keys, n_each, |counts, keys| {
             for key in keys {
-                counts[lower_number(*key).index()] += 1;
+                counts[lower_number(*key).index() - first] += 1;
             }
         });
         let mut next = 0;
@@ -105,14 +112,14 @@ impl Sorter {
         for_each_part(workers, parts, keys, n_each, |places, keys| {
             for key in keys {
                 let [lower, partner] = pair_numbers(*key);
-                let place = &mut places[lower.index()];
+                let place = &mut places[lower.index() - first];
                 partners[*place as usize].store(partner.raw(), Ordering::Relaxed);
                 *place += 1;
             }
         });
         // The places of the last part are where runs end now.
         let ends = &parts[n_parts - 1];
-        let tasks = tasks(keys, partners, ends, workers.task(TASK));
+        let tasks = tasks(keys, partners, (first, ends), workers.task(TASK));
         let tasks: Vec<_> = tasks.map(Mutex::new).collect();
         let isa = self.isa;
         workers.for_each(&mut vec![(); workers.n()], tasks.len(), |(), ix| {
@@ -167,24 +174,24 @@ fn for_each_part(
 fn tasks<'a>(
     mut keys: &'a mut [u64],
     mut partners: &'a [AtomicU32],
-    ends: &'a [u32],
+    (mut first, mut ends): (usize, &'a [u32]),
     n_each: usize,
 ) -> impl Iterator<Item = Task<'a>> {
-    let (mut first, mut start) = (0, 0);
+    let mut start = 0;
     std::iter::from_fn(move || {
-        if first == ends.len() {
+        if ends.is_empty() {
             return None;
         }
-        let full = ends[first..].partition_point(|&end| (end as usize) < start + n_each);
-        let ends = &ends[first..ends.len().min(first + full + 1)];
-        let end = ends[ends.len() - 1] as usize;
+        let full = ends.partition_point(|&end| (end as usize) < start + n_each);
+        let own = ends.split_off(..ends.len().min(full + 1))?;
+        let end = own[own.len() - 1] as usize;
         let task = Task {
             keys: keys.split_off_mut(..end - start)?,
             partners: partners.split_off(..end - start)?,
             first,
-            ends,
+            ends: own,
         };
-        (first, start) = (first + ends.len(), end);
+        (first, start) = (first + own.len(), end);
         Some(task)
     })
 }
@@ -338,11 +345,13 @@ mod tests {
                 (from, 1),
                 (from, 100_000),
             ] {
-                let keys = (0..n_keys).map(|_| next(n_numbers) << 32 | next(1 << 30));
+                let first = Number::new(7);
+                let end = Number::new(7 + n_numbers as u32);
+                let keys = (0..n_keys).map(|_| (7 + next(n_numbers)) << 32 | next(1 << 30));
                 let mut keys: Vec<u64> = keys.collect();
                 let mut expected = keys.clone();
                 expected.sort_unstable();
-                sorter.sort(&mut keys, n_numbers, &workers);
+                sorter.sort(&mut keys, first..end, &workers);
                 assert_eq!(keys, expected, "{n_keys} keys of {n_numbers} numbers");
             }
         }

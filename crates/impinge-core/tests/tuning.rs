@@ -318,7 +318,7 @@ fn answers(detector: &mut Detector, scene: &Scene, query: &Query) -> Answers {
         impacts: detector.impacts(scene, &step).unwrap().as_slice().into(),
         earliest: detector.earliest(scene, &step).unwrap(),
         candidates: (detector.candidates(scene, &candidates).unwrap().iter()).collect(),
-        near: (detector.within_distance(scene, &near).unwrap().as_slice()).into(),
+        near: (detector.within_distance(scene, &near).unwrap().iter()).collect(),
     }
 }
 

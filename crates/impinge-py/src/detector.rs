@@ -787,9 +787,8 @@ impl Detector {
                       scene: &impinge::Scene,
                       query: &NearQuery,
                       control: &Control<'_>| {
-            detector
-                .within_distance_with(scene, query, control)
-                .cloned()
+            detector.within_distance_with(scene, query, control)?;
+            Ok(detector.take_near())
         };
         let watched = (scene, progress, cancel);
         let (pairs, ..) = Detector::watched(slf, watched, ask, answer)?;

@@ -1,7 +1,7 @@
 //! `impinge.NearPairs`: elements within a distance of each other.
 
+use impinge::PairKind;
 use impinge::exact::Feature;
-use impinge::{NearPair, PairKind};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -52,7 +52,7 @@ impl NearPairs {
     /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two bodies.
     #[getter]
     fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        let rows = self.inner.iter().map(NearPair::row);
+        let rows = self.inner.iter().map(|pair| pair.row());
         to_array(py, rows.map(|[a, _, b, _]| [a, b]).collect())
     }
 
@@ -60,7 +60,7 @@ impl NearPairs {
     /// `Impacts.elements`.
     #[getter]
     fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        let rows = self.inner.iter().map(NearPair::row);
+        let rows = self.inner.iter().map(|pair| pair.row());
         to_array(py, rows.map(|[_, a, _, b]| [a, b]).collect())
     }
 
@@ -69,7 +69,7 @@ impl NearPairs {
     /// faces, without numbers. Decided exactly.
     #[getter]
     fn types<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        strings(py, self.inner.iter().map(NearPair::name), 7)
+        strings(py, self.inner.iter().map(|pair| pair.name()), 7)
     }
 
     /// numpy.ndarray of str, shape (n, 2) : the nearest feature of either element: ``"v0"`` to ``"v2"``, ``"e0"``

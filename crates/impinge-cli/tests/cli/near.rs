@@ -34,7 +34,7 @@ fn expected(query: Query, kinds: &[PairKind]) -> (Vec<NearPair>, u64) {
     }
     let mut detector = Detector::new(Backend::Cpu).unwrap();
     let near = detector.within_distance(&scene, &query).unwrap();
-    (near.as_slice().to_vec(), near.hash())
+    (near.iter().collect(), near.hash())
 }
 
 #[test]

@@ -60,8 +60,8 @@ fn npy(to: &mut dyn Write, near: &NearPairs) -> io::Result<()> {
          ('distance', '<f8'), ('point_a', '<f8', (3,)), ('point_b', '<f8', (3,))]"
     );
     to.write_all(&npy_header(&fields, &format!("({},)", near.len())))?;
-    for pair in near {
-        let (distance, points) = measured(pair);
+    for pair in near.iter() {
+        let (distance, points) = measured(&pair);
         characters(to, pair.kind.name(), 2)?;
         to.write_all(pair.row().map(u32::to_le_bytes).as_flattened())?;
         characters(to, pair.name(), TYPE)?;
@@ -83,12 +83,12 @@ fn csv(to: &mut dyn Write, near: &NearPairs) -> io::Result<()> {
         to,
         "kind,body_a,element_a,body_b,element_b,type,feature_a,feature_b,parallel,distance,ax,ay,az,bx,by,bz"
     )?;
-    for pair in near {
+    for pair in near.iter() {
         let [body_a, a, body_b, b] = pair.row();
         let (kind, name) = (pair.kind.name(), pair.name());
         let [of_a, of_b] = pair.features.map(feature);
         let parallel = u8::from(pair.is_parallel);
-        let (distance, points) = measured(pair);
+        let (distance, points) = measured(&pair);
         write!(
             to,
             "{kind},{body_a},{a},{body_b},{b},{name},{of_a},{of_b},{parallel},{distance:?}"
@@ -102,9 +102,9 @@ fn csv(to: &mut dyn Write, near: &NearPairs) -> io::Result<()> {
 }
 
 fn jsonl(to: &mut dyn Write, near: &NearPairs) -> io::Result<()> {
-    for pair in near {
+    for pair in near.iter() {
         let [body_a, a, body_b, b] = pair.row();
-        let (distance, [point_a, point_b]) = measured(pair);
+        let (distance, [point_a, point_b]) = measured(&pair);
         let [of_a, of_b] = pair.features.map(feature);
         let object = json!({
             "kind": pair.kind.name(),

@@ -8,26 +8,26 @@ use crate::cpu::steps::StepTest;
 use crate::detector::Detector;
 use crate::elements::Part;
 use crate::error::Error;
-use crate::exact::{closest_of_elements, nearest_of_elements};
+use crate::exact::{NearestOfElements, closest_of_elements, nearest_of_elements};
 use crate::frame::TestId;
 use crate::hull::Pose;
 use crate::impacts::StepAnswer;
 use crate::index::ElementIx;
 use crate::naive;
-use crate::narrow::{Corners, Within};
-use crate::near::{ClosestPoints, NearPair, NearPairs, NearQuery};
+use crate::narrow::{Corners, Within, exact_kind};
+use crate::near::{ClosestPoints, Labels, NearPairs, NearQuery, Unnamed};
 use crate::pair_kind::PairKind;
 use crate::pairs::Primitive;
 use crate::progress::Control;
 use crate::run::Job;
 use crate::scene::Scene;
 use crate::settings::Method;
-use crate::sink::Wanted;
+use crate::sink::{Limits, Wanted};
 
 use super::{StepMemory, begin};
 
 /// Pairs whose features a task finds.
-const TASK: usize = 256;
+const TASK: usize = 1024;
 
 impl Detector {
     /// All pairs of elements whose distance is at most the one that the query says, at the positions that bodies have:
@@ -46,7 +46,8 @@ impl Detector {
     /// let mut detector = Detector::new(Backend::Cpu)?;
     /// let query = NearQuery::new(Query::all()).distance(0.5).closest_points();
     /// let near = detector.within_distance(&scene, &query)?;
-    /// let [pair] = near.as_slice() else { panic!("one pair") };
+    /// assert_eq!(near.len(), 1);
+    /// let pair = near.iter().next().expect("one pair");
     /// assert_eq!((pair.kind, pair.name()), (PairKind::VertexFace, "P_T"));
     /// let closest = pair.closest.expect("it was asked for");
     /// assert_eq!((closest.distance, closest.points[1]), (0.5, [1.0, 1.0, 0.0]));
@@ -87,17 +88,31 @@ impl Detector {
         query.resolve(scene, frame)?;
         near.begin(frame);
         frame.check(scene)?;
+        let rooms = near.take_room();
         let stats = near.stats_mut();
         begin(stats, &self.settings, workers.n());
         let _shift = workers.shift(frame.n_primitives());
-        answer.begin(self.settings.limits(), Wanted::Pairs, Default::default());
+        let labels = Labels::new(frame.n_primitives());
+        let of_closest = if query.closest {
+            size_of::<ClosestPoints>()
+        } else {
+            0
+        };
+        let limits = Limits {
+            besides: (1 + of_closest) as u64,
+            ..self.settings.limits()
+        };
+        answer.begin(limits, Wanted::Pairs, rooms);
         if self.settings.method == Method::Naive {
             stats.time("naive", |stats| {
                 naive::run(&Within, scene, frame, control, stats, |test, key, ()| {
                     if let TestId::Elements(kind) = test
                         && frame.is_owned(scene, key)
                     {
-                        answer.extend(kind as usize, [key].into_iter());
+                        answer.extend(
+                            kind as usize,
+                            [labels.put(key, Labels::UNKNOWN)].into_iter(),
+                        );
                     }
                     answer.check()
                 })
@@ -114,19 +129,13 @@ impl Detector {
         }
         let collect = Instant::now();
         let (mut keys, _) = answer.finish()?;
-        let n_counted = sorter.sort_kinds(&mut keys, frame.n_primitives(), workers);
-        for (kind, keys) in PairKind::ALL.into_iter().zip(keys) {
-            near.extend(kind, keys.into_iter());
-        }
-        let ms = collect.elapsed().as_secs_f64() * 1e3;
-        near.stats_mut().add_ms("collect", ms);
-        near.stats_mut().ways.n_counted = n_counted;
+        let n_counted = sorter.sort_kinds(&mut keys, frame, workers);
+        let stats = near.stats_mut();
+        stats.add_ms("collect", collect.elapsed().as_secs_f64() * 1e3);
+        stats.ways.n_counted = n_counted;
         let features = Instant::now();
-        let tasks: Vec<Mutex<&mut [NearPair]>> = near
-            .pairs_mut()
-            .chunks_mut(workers.task(TASK))
-            .map(Mutex::new)
-            .collect();
+        let (unnamed, numbering) = near.fill(keys, query.closest, workers.task(TASK))?;
+        let tasks: Vec<Mutex<Unnamed<'_>>> = unnamed.into_iter().map(Mutex::new).collect();
         let n_tasks = tasks.len();
         let is_stopped = AtomicBool::new(false);
         workers.for_each(&mut vec![(); workers.n()], n_tasks, |(), ix| {
@@ -136,10 +145,13 @@ impl Detector {
                 is_stopped.store(true, Ordering::Relaxed);
                 return;
             }
-            if let Ok(mut pairs) = tasks[ix].lock() {
-                pairs
-                    .iter_mut()
-                    .for_each(|pair| find_features(scene, pair, query.closest));
+            if let Ok(mut unnamed) = tasks[ix].lock() {
+                let kind = unnamed.kind;
+                let find = |key| {
+                    let (a, b) = numbering.pair(key);
+                    find_features(scene, kind, [a, b], query.closest)
+                };
+                unnamed.name(labels, exact_kind(TestId::Elements(kind)), find);
             }
         });
         drop(tasks);
@@ -152,22 +164,31 @@ impl Detector {
         stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(&self.steps.near)
     }
+
+    /// The near pairs that were found last, out of the detector without a copy. Until the next question it then holds none.
+    pub fn take_near(&mut self) -> NearPairs {
+        std::mem::take(&mut self.steps.near)
+    }
 }
 
-/// Finds which features of a pair are nearest, and where.
-fn find_features(scene: &Scene, pair: &mut NearPair, closest: bool) {
-    let parts = pair.kind.parts();
+/// Which features of a pair are nearest, and where if that is asked for.
+fn find_features(
+    scene: &Scene,
+    kind: PairKind,
+    pair: [Primitive; 2],
+    closest: bool,
+) -> (NearestOfElements, Option<ClosestPoints>) {
+    let parts = kind.parts();
     let corners = |Primitive { body, primitive }: Primitive, part: Part| {
         let body = scene.body_in(body.slot());
         let element = ElementIx::new(primitive);
         Corners::new(body.positions(), body.corners(part, &element))
     };
-    let (a, b) = (corners(pair.a, parts[0]), corners(pair.b, parts[1]));
+    let (a, b) = (corners(pair[0], parts[0]), corners(pair[1], parts[1]));
     if closest {
         let (nearest, distance, points) = closest_of_elements(a.points(), b.points());
-        pair.set_nearest(&nearest);
-        pair.closest = Some(ClosestPoints { distance, points });
+        (nearest, Some(ClosestPoints { distance, points }))
     } else {
-        pair.set_nearest(&nearest_of_elements(a.points(), b.points()));
+        (nearest_of_elements(a.points(), b.points()), None)
     }
 }

@@ -272,8 +272,7 @@ impl RunSearch<'_> {
         (*keys, n) = self.answer.finish()?;
         let collect = Instant::now();
         let workers = self.question.workers;
-        let n_numbers = self.frame.n_primitives();
-        let n_counted = self.sorter.sort_kinds(keys, n_numbers, workers);
+        let n_counted = self.sorter.sort_kinds(keys, self.frame, workers);
         let ms = collect.elapsed().as_secs_f64() * 1e3;
         let bytes = candidates.bytes() + self.sorter.bytes();
         let (_, stats) = candidates.parts_mut();

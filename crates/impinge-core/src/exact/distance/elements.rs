@@ -18,16 +18,75 @@ use crate::exact::{Point, triangles_intersect};
 /// The edges of a face as vertex numbers.
 const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 
-/// The features of two elements that are nearest, and the name of their kinds.
+/// The features of two elements that are nearest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct NearestOfElements {
     /// The feature of the first element, and of the second.
     pub features: [Feature; 2],
     /// Whether nearest points may not be the only ones.
     pub is_parallel: bool,
-    /// ipc-toolkit's name of the distance type. An edge and a face, or two faces, have the names of the kinds of the
-    /// features, without numbers.
-    pub name: &'static str,
+}
+
+impl NearestOfElements {
+    /// What a filter's number of a part stands for (`exact::filter::Near16`): none if the part is not known.
+    #[inline]
+    pub fn of_part(pair: ElementPair, number: u8) -> Option<Self> {
+        let nearest = PolygonPart::numbered(number)?.named(pair, false);
+        Some(Self {
+            features: [nearest.a, nearest.b],
+            is_parallel: nearest.is_parallel,
+        })
+    }
+
+    /// In one byte:
+    ///
+    /// ```text
+    ///   7     6      5   3 2   0
+    /// | 0 | parallel |  b  |  a  |   vertex i: i, the face: 3, edge i: 4 + i
+    /// ```
+    pub fn packed(self) -> u8 {
+        let [a, b] = self.features.map(|feature| match feature {
+            Feature::Vertex(ix) => ix,
+            Feature::Face => 3,
+            Feature::Edge(ix) => 4 + ix,
+        });
+        u8::from(self.is_parallel) << 6 | b << 3 | a
+    }
+
+    /// From the byte that [`packed`](Self::packed) makes.
+    #[inline]
+    pub fn unpacked(byte: u8) -> Self {
+        let features = [byte & 7, byte >> 3 & 7].map(|number| match number {
+            0..3 => Feature::Vertex(number),
+            3 => Feature::Face,
+            _ => Feature::Edge(number - 4),
+        });
+        Self {
+            features,
+            is_parallel: byte >> 6 == 1,
+        }
+    }
+
+    /// ipc-toolkit's name of the distance type, given which pair it is, and whether the second element comes first in that. An
+    /// edge and a face, or two faces, have the names of the kinds of the features, without numbers.
+    pub fn name(&self, pair: Option<(ElementPair, bool)>) -> &'static str {
+        let [a, b] = self.features;
+        if let Some((pair, is_swapped)) = pair {
+            let (a, b) = if is_swapped { (b, a) } else { (a, b) };
+            let is_parallel = self.is_parallel;
+            return NearestFeatures { a, b, is_parallel }.name(pair);
+        }
+        match (a, b) {
+            (Feature::Vertex(_), Feature::Vertex(_)) => "P_P",
+            (Feature::Vertex(_), Feature::Edge(_)) | (Feature::Edge(_), Feature::Vertex(_)) => {
+                "P_E"
+            }
+            (Feature::Vertex(_), _) | (_, Feature::Vertex(_)) => "P_T",
+            (Feature::Edge(_), Feature::Edge(_)) => "E_E",
+            // Where an edge passes through a face.
+            (Feature::Face, _) | (_, Feature::Face) => "E_T",
+        }
+    }
 }
 
 /// Whether the distance of two elements of one to three corners is at most a reach, if plain floats are certain to tell.
@@ -149,7 +208,6 @@ impl Simple {
         NearestOfElements {
             features: self.in_order([nearest.a, nearest.b]),
             is_parallel: nearest.is_parallel,
-            name: nearest.name(self.pair),
         }
     }
 }
@@ -271,7 +329,6 @@ impl Nearby {
                     features,
                     // Two faces that cross share a segment.
                     is_parallel: a.len() == b.len(),
-                    name: "E_T",
                 },
                 way: Way::Crossing(point),
             };
@@ -280,12 +337,6 @@ impl Nearby {
             nearest: NearestOfElements {
                 features: best.features.map(|(_, feature)| feature),
                 is_parallel: has_tie || best.is_flat,
-                name: match best.features.map(|(dimensions, _)| dimensions) {
-                    [0, 0] => "P_P",
-                    [0, 1] | [1, 0] => "P_E",
-                    [0, _] | [_, 0] => "P_T",
-                    _ => "E_E",
-                },
             },
             way: Way::Between(best.part.simple),
         }

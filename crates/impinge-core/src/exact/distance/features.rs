@@ -61,6 +61,18 @@ pub(super) enum PolygonPart {
 }
 
 impl PolygonPart {
+    /// The part with a number: corner i is i, edge i is 4 + i, the face is 8.
+    #[inline]
+    pub(super) fn numbered(number: u8) -> Option<Self> {
+        let ix = usize::from(number);
+        match ix {
+            0..4 => Some(Self::Corner(ix)),
+            4..8 => Some(Self::Edge(ix - 4)),
+            8 => Some(Self::Face),
+            _ => None,
+        }
+    }
+
     /// The features whose difference the part is.
     pub(super) fn named(self, pair: ElementPair, is_flat: bool) -> NearestFeatures {
         use Feature::{Edge, Face, Vertex};

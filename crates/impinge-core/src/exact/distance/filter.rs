@@ -4,12 +4,9 @@ use super::features::PolygonPart;
 use super::reach::Reach;
 use crate::exact::Point;
 use crate::exact::element_pair::ElementPair;
-use crate::exact::filter::motion::{cross, difference, dot, size};
+use crate::exact::filter::motion::{difference, dot, size};
 use crate::exact::filter::nearness::{Polygon, are_beyond, beyond, most, stay_beyond};
 use crate::exact::filter::number::Number;
-
-/// Polygons smaller than this are left to integers where products of four sizes are needed.
-const SMALLEST: f64 = 1e-60;
 
 /// Whether two elements are within a distance; `None` when unsure.
 ///
@@ -132,64 +129,17 @@ pub(crate) fn approach(
 ///
 /// As the exact decision goes by signs (`Polygon::nearest`), with none of them zero.
 pub(super) fn nearest_part(pair: ElementPair, points: &[Point; 4]) -> Option<PolygonPart> {
-    let polygon = Polygon::of_pair(pair, points);
-    if !(SMALLEST..f64::LARGEST).contains(&polygon.size()) {
-        return None;
+    let n = pair.corners().len();
+    let mut edges = [[0.0; 3]; 4];
+    for (ix, edge) in edges.iter_mut().enumerate().take(n) {
+        *edge = edge_of(pair, points, ix);
     }
-    let corners = polygon.corners();
-    let n = corners.len();
-    let edges: [Point; 4] = std::array::from_fn(|ix| edge_of(pair, points, ix % n));
-    // Whether corner . edge is positive.
-    let is_along = |corner: usize, ix: usize| {
-        let (corner, edge) = (&corners[corner % n], &edges[ix]);
-        is_positive(dot(corner, edge), size(corner) * size(edge))
-    };
-    match n {
-        1 => return Some(PolygonPart::Corner(0)),
-        2 => {
-            return match (is_along(0, 0)?, is_along(1, 0)?) {
-                (true, _) => Some(PolygonPart::Corner(0)),
-                (_, false) => Some(PolygonPart::Corner(1)),
-                (false, true) => Some(PolygonPart::Edge(0)),
-            };
-        }
-        _ => {}
-    }
-    let normal = cross(&edges[0], &edges[1]);
-    let scale = size(&edges[0]) * size(&edges[1]);
-    let mut is_inner = [true; 4];
-    for (ix, corner) in corners.iter().enumerate() {
-        let moment = cross(corner, &edges[ix]);
-        let moment_scale = size(corner) * size(&edges[ix]);
-        is_inner[ix] = is_positive(dot(&normal, &moment), 4.0 * scale * moment_scale)?;
-    }
-    if is_inner[..n].iter().all(|&is_inner| is_inner) {
-        return Some(PolygonPart::Face);
-    }
-    for (ix, is_inner) in is_inner[..n].iter().enumerate() {
-        if !is_inner && !is_along(ix, ix)? && is_along(ix + 1, ix)? {
-            return Some(PolygonPart::Edge(ix));
-        }
-    }
-    for ix in 0..n {
-        if is_along(ix, ix)? && !is_along(ix, (ix + n - 1) % n)? {
-            return Some(PolygonPart::Corner(ix));
-        }
-    }
-    None
-}
-
-/// Whether a value is positive or negative, where it is wrong by less than 64 unit roundoffs times a size; none where it may be
-/// zero. Only the last product can underflow.
-fn is_positive(value: f64, scale: f64) -> Option<bool> {
-    let bound = f64::BOUND * scale + f64::MIN_POSITIVE;
-    if value > bound {
-        Some(true)
-    } else if value < -bound {
-        Some(false)
-    } else {
-        None
-    }
+    let bits = Polygon::of_pair(pair, points).nearest_part(&edges);
+    PolygonPart::numbered(
+        bits.iter()
+            .rev()
+            .fold(0, |number, &bit| 2 * number + u8::from(bit)),
+    )
 }
 
 /// From a corner of the polygon to the next: a difference of two points, rounded once.

@@ -1,12 +1,13 @@
 //! The filters for distances compared with integers and exact roots, on troublesome input and every instruction set. Those are
 //! compared with an independent oracle in `tests/sweep`.
 
+use super::features::PolygonPart;
 use super::filter::{self, Approach};
 use super::moving::first_within_by_roots;
 use super::{Reach, closest_points, nearest};
 use crate::exact::filter::{
-    BATCH, Moving64, TABLE, Verdict16, are_within_in_tables, number, stay_beyond_in_tables,
-    time_between,
+    BATCH, Moving64, Near16, SWAPPED_PARTS, TABLE, are_within_in_tables, nearest_in_tables, number,
+    stay_beyond_in_tables, time_between,
 };
 use crate::exact::sweep::tests::{KINDS, Kind, PAIRS, Random, step};
 use crate::exact::{Contact, ElementPair, Point};
@@ -54,17 +55,23 @@ impl Asked {
     }
 
     #[inline(always)]
-    fn answer<V: number::Lookup>(&self) -> (Verdict16, u16) {
+    fn answer<V: number::Lookup>(&self) -> (Near16, u16) {
         let [a, b] = &self.tables;
         let (groups, places) = ([&**a, &**b], [&self.places; 2]);
         let within = are_within_in_tables::<V>(self.pair, groups, places, self.reach);
         let high = self.reach[1];
         let stay = stay_beyond_in_tables::<V>(self.pair, groups, places, self.until, high);
-        (within, stay)
+        let mut near = nearest_in_tables::<V>(self.pair, groups, places, self.reach);
+        assert_eq!(near.verdict, within);
+        // Parts of pairs that are not certainly near depend on the length of registers.
+        for bits in &mut near.parts {
+            *bits &= within.yes;
+        }
+        (near, stay)
     }
 
     /// The answer of all instruction sets of this processor, which must be the same.
-    fn answer_of_all(&self) -> (Verdict16, u16) {
+    fn answer_of_all(&self) -> (Near16, u16) {
         let answer = self.answer::<number::Portable32>();
         #[cfg(target_arch = "x86_64")]
         {
@@ -83,13 +90,13 @@ impl Asked {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn answer_avx2(asked: &Asked) -> (Verdict16, u16) {
+fn answer_avx2(asked: &Asked) -> (Near16, u16) {
     asked.answer::<number::Avx2F32>()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq")]
-fn answer_avx512(asked: &Asked) -> (Verdict16, u16) {
+fn answer_avx512(asked: &Asked) -> (Near16, u16) {
     asked.answer::<number::Avx512F32>()
 }
 
@@ -125,7 +132,8 @@ fn filters_never_contradict_integers_and_roots() {
                 let d = distance(pair, &steps, kind, &mut random);
                 let reach = Reach::from(d);
                 let asked = Asked::new(pair, &steps, until as f32, reach.enclosing_f32());
-                let (within, stay) = asked.answer_of_all();
+                let (near, stay) = asked.answer_of_all();
+                let within = near.verdict;
                 assert_eq!(within.yes & within.no, 0);
                 for (lane, [start, end]) in steps.iter().enumerate() {
                     let case = || format!("{kind:?} {pair:?} {until} {d:?} {:?}", steps[lane]);
@@ -186,6 +194,96 @@ fn filters_never_contradict_integers_and_roots() {
                     assert!(n_near > 0 && n_sure > 0 && n_open > 0, "{counts}");
                 }
                 Kind::Extreme => assert!(n_sure > 0, "{counts}"),
+            }
+        }
+    }
+}
+
+/// The nearest part in integers; none of flat polygons.
+fn exact_part(pair: ElementPair, points: &[Point; 4]) -> Option<PolygonPart> {
+    let polygon = nearest::Polygon::of_any_size(pair, points, &Reach::from(0.0));
+    (!polygon.is_flat()).then(|| polygon.nearest())
+}
+
+/// The points moved so that the first corner of the polygon is straight beside its first edge, but for rounding to `f32`: the origin is
+/// between the regions of both.
+fn beside_the_end(pair: ElementPair, mut points: [Point; 4]) -> [Point; 4] {
+    let [from, to, moved] = match pair {
+        ElementPair::EdgeEdge => [0, 1, 2],
+        _ => [1, 2, 0],
+    };
+    let difference = |p: &Point, q: &Point| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
+    let dot = |d: &Point, e: &Point| d[0] * e[0] + d[1] * e[1] + d[2] * e[2];
+    let along = difference(&points[to], &points[from]);
+    let corner = difference(&points[from], &points[moved]);
+    let share = dot(&corner, &along) / dot(&along, &along);
+    if share.is_finite() {
+        for axis in 0..3 {
+            let moved = &mut points[moved][axis];
+            *moved = f64::from((*moved + share * along[axis]) as f32);
+        }
+    }
+    points
+}
+
+#[test]
+fn nearest_parts_by_certain_signs_are_those_of_integers() {
+    let mut random = Random(7);
+    for kind in KINDS {
+        for pair in PAIRS {
+            let (mut n_known, mut n_unknown, mut n_in_f64) = (0, 0, 0);
+            let mut seen = [0; 9];
+            for round in 0..90 {
+                let mut steps = [(); BATCH].map(|()| step(kind, &mut random));
+                let is_tied = round % 3 == 0;
+                if is_tied {
+                    for [start, _] in &mut steps {
+                        *start = beside_the_end(pair, *start);
+                    }
+                }
+                // All pairs in range are near.
+                let asked = Asked::new(pair, &steps, 1.0, [1e4; 2]);
+                let (near, _) = asked.answer_of_all();
+                for (lane, [start, _]) in steps.iter().enumerate() {
+                    let case = || format!("{kind:?} {pair:?} {start:?}");
+                    let expected = exact_part(pair, start);
+                    if let Some(part) = filter::nearest_part(pair, start) {
+                        n_in_f64 += 1;
+                        assert_eq!(Some(part), expected, "{}", case());
+                    }
+                    if near.verdict.yes >> lane & 1 == 0 {
+                        continue;
+                    }
+                    let number = near.part(lane);
+                    let Some(part) = PolygonPart::numbered(number) else {
+                        n_unknown += u32::from(!is_tied);
+                        assert_eq!(number, 15, "{}", case());
+                        continue;
+                    };
+                    n_known += u32::from(!is_tied);
+                    seen[usize::from(number)] += 1;
+                    assert_eq!(Some(part), expected, "{}", case());
+                    if pair == ElementPair::EdgeEdge {
+                        let [p, q, r, s] = *start;
+                        let swapped = PolygonPart::numbered(SWAPPED_PARTS[usize::from(number)]);
+                        assert_eq!(swapped, exact_part(pair, &[r, s, p, q]), "{}", case());
+                    }
+                }
+            }
+            let counts =
+                format!("{kind:?} {pair:?} {n_known} {n_unknown} of f64 {n_in_f64} {seen:?}");
+            match kind {
+                Kind::Plain | Kind::Close => {
+                    assert!(n_known > 50 * n_unknown, "{counts}");
+                    let n = pair.corners().len();
+                    let (corners, edges) = (&seen[..n], &seen[4..4 + n]);
+                    assert!(corners.iter().chain(edges).all(|&n| n > 0), "{counts}");
+                    assert!(seen[8] > 0, "{counts}");
+                }
+                Kind::Lattice | Kind::NearlyTied => {
+                    assert!(n_known > 0 && n_unknown > 0, "{counts}");
+                }
+                Kind::Flat | Kind::Extreme => assert!(n_unknown > 0, "{counts}"),
             }
         }
     }
@@ -307,7 +405,8 @@ fn numbers_that_are_none_are_unsure() {
         });
         for pair in PAIRS {
             let asked = Asked::new(pair, &steps, 1.0, [0.1, 0.1]);
-            let (within, stay) = asked.answer_of_all();
+            let (near, stay) = asked.answer_of_all();
+            let within = near.verdict;
             assert_eq!(stay, 0, "{x} {pair:?}");
             // The elements of odd lanes are finite at the start.
             let at_start = (within.yes | within.no) & 0x5555;

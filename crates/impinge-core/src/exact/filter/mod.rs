@@ -39,7 +39,9 @@ pub use moving::{
     are_aside_in_tables, are_far_in_tables, enclose, look, time_between,
 };
 pub(super) use moving::{contact_answer, search_contact};
-pub use nearness::{are_within_in_tables, stay_beyond_in_tables};
+#[cfg(test)]
+pub use nearness::Near16;
+pub use nearness::{SWAPPED_PARTS, are_within_in_tables, nearest_in_tables, stay_beyond_in_tables};
 pub(super) use neighbours::{shared_edge, shared_vertex};
 pub(super) use projections::{angles_apart, apart_in_a_plane, sides_apart};
 pub(super) use tetrahedra::tetrahedra_answer;

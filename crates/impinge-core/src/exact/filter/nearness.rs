@@ -10,6 +10,9 @@
 //! so is the polygon. If the whole polygon lies beyond the plane through that point, or beyond a plane along the polygon, farther
 //! away than the distance, it is not. Neither answer depends on how good the nearest point is.
 //!
+//! Which part of the polygon is nearest follows from signs of V . E and w, if those of one region are certain
+//! ([`Polygon::nearest_part`]).
+//!
 //! Invariant: with |.| the largest coordinate and u the unit roundoff, n . V is wrong by less than 22 u |n| |V| for any known
 //! n and a corner V at any time of a step, and a blend of corners by less than 24 u |V| (`docs/exactness.md`, "Distances").
 //! NaN and overflow end as unsure.
@@ -21,6 +24,10 @@ use super::{BATCH, Moving64, Verdict16};
 use crate::exact::{ElementPair, Point};
 
 type Vector<T> = [T; 3];
+
+/// The number of a part of a polygon, bit after bit from the lowest: corner i is i, edge i is 4 + i, the face is 8. All bits are
+/// set where signs are not certain to tell.
+pub(in crate::exact) type PartBits<M> = [M; 4];
 
 /// The difference polygon of pairs of elements: a point, a segment, a triangle or a parallelogram.
 #[derive(Clone, Copy)]
@@ -183,6 +190,76 @@ impl<T: Number> Polygon<T> {
         (is_one & !is_negative, foot)
     }
 
+    /// The part with the nearest point in its inside, as the bits of its number ([`PartBits`]). Each edge is a difference of two input
+    /// points, rounded once.
+    ///
+    /// The regions of a polygon with a normal have no point in common, so the signs of one region are enough:
+    ///
+    /// ```text
+    /// face      every w_i > 0                                  the origin is above or below the inside
+    /// edge i    w_i < 0, V_i . E_i < 0 < V_{i+1} . E_i         beyond the edge, and between its ends
+    /// corner i  V_i . E_i > 0 > V_i . E_{i-1}, N != 0          both edges lead away from the origin
+    /// ```
+    ///
+    /// V . E is wrong by less than 16 u |V| |E|, a coordinate of N by less than 9 u |E_0| |E_1|, and w by less than
+    /// 133 u |E_0| |E_1| |V| |E| (`docs/exactness.md`, "Distances").
+    #[inline(always)]
+    pub(in crate::exact) fn nearest_part(&self, edges: &[Vector<T>; 4]) -> PartBits<T::Mask> {
+        let (zero, n) = (T::splat(0.0), self.n_corners);
+        let never = zero.gt(zero);
+        let size = self.size();
+        let sizes = [
+            self::size(&edges[0]),
+            self::size(&edges[1]),
+            self::size(&edges[2]),
+            self::size(&edges[3]),
+        ];
+        let is_small = T::splat(T::LARGEST).gt(self.total());
+        // Of each edge: the signs of V . E at its start and at its end. First whether it is positive, then negative.
+        let (mut starts, mut ends) = ([[never; 2]; 4], [[never; 2]; 4]);
+        for ix in 0..if n > 2 { n } else { n - 1 } {
+            let next = if ix + 1 == n { 0 } else { ix + 1 };
+            let bound = T::splat(T::BOUND) * (size * sizes[ix]) + T::splat(T::TINY[0]);
+            starts[ix] = signs(dot(&self.corners[ix], &edges[ix]), bound);
+            ends[ix] = signs(dot(&self.corners[next], &edges[ix]), bound);
+        }
+        let mut corners = [never; 4];
+        let mut borders = [never; 4];
+        let mut face = never;
+        match n {
+            1 => corners[0] = !never,
+            2 => {
+                corners = [starts[0][0], ends[0][1], never, never];
+                borders[0] = starts[0][1] & ends[0][0];
+            }
+            _ => {
+                let normal = cross(&edges[0], &edges[1]);
+                let scale = T::splat(T::BOUND) * (sizes[0] * sizes[1]);
+                let has_normal = self::size(&normal).gt(scale + T::splat(T::TINY[0]));
+                let scale = T::splat(4.0) * (scale * size);
+                face = !never;
+                for ix in 0..n {
+                    let before = if ix == 0 { n - 1 } else { ix - 1 };
+                    let w = dot(&self.corners[ix], &cross(&edges[ix], &normal));
+                    let [inner, outer] = signs(w, scale * sizes[ix] + T::splat(T::TINY[2]));
+                    face = face & inner;
+                    borders[ix] = outer & starts[ix][1] & ends[ix][0];
+                    corners[ix] = has_normal & starts[ix][0] & ends[before][1];
+                }
+            }
+        }
+        let odd = corners[1] | corners[3] | borders[1] | borders[3];
+        let upper = corners[2] | corners[3] | borders[2] | borders[3];
+        let border = borders[0] | borders[1] | borders[2] | borders[3];
+        let is_known = is_small & (corners[0] | odd | upper | border | face);
+        [
+            odd | !is_known,
+            upper | !is_known,
+            border | !is_known,
+            face | !is_known,
+        ]
+    }
+
     /// Which polygons are certainly within a distance of the origin, and which certainly are not. The distance is between two
     /// numbers.
     #[inline(always)]
@@ -195,6 +272,23 @@ impl<T: Number> Polygon<T> {
         let no =
             are_beyond(&near, &polygons, size, high) | are_beyond(&normal, &polygons, size, high);
         (is_small & low.gt(most(&near, size)), is_small & no)
+    }
+}
+
+/// The edges of the polygon of a vertex and a face or of two edges, each a difference of two input points. A triangle has no
+/// fourth edge.
+#[inline(always)]
+fn edges_of<T: Number>(are_edges: bool, [p, q, r, s]: &[Vector<T>; 4]) -> [Vector<T>; 4] {
+    if are_edges {
+        [
+            difference(q, p),
+            difference(r, s),
+            difference(p, q),
+            difference(s, r),
+        ]
+    } else {
+        let last = difference(q, s);
+        [difference(r, q), difference(s, r), last, last]
     }
 }
 
@@ -266,6 +360,12 @@ pub(in crate::exact) fn stay_beyond<T: Number>(
     stay & T::splat(T::LARGEST).gt(largest)
 }
 
+/// Whether values that are wrong by less than a bound are certainly positive, and whether certainly negative.
+#[inline(always)]
+fn signs<T: Number>(value: T, bound: T) -> [T::Mask; 2] {
+    [value.gt(bound), (T::splat(0.0) - bound).gt(value)]
+}
+
 #[inline(always)]
 fn select<T: Number>(mask: T::Mask, yes: &Vector<T>, no: &Vector<T>) -> Vector<T> {
     [
@@ -289,12 +389,75 @@ pub fn are_within_in_tables<V: Lookup>(
     let [low, high] = [V::splat(f64::from(reach[0])), V::splat(f64::from(reach[1]))];
     let mut verdict = Verdict16::default();
     for first in (0..BATCH).step_by(V::N) {
-        let polygon = look_up::<V>(pair, groups, places, first, 0);
-        let (yes, no) = polygon.verdict(low, high);
+        let (are_edges, points) = look_up::<V>(pair, groups, places, first, 0);
+        let (yes, no) = Polygon::new(are_edges, &points).verdict(low, high);
         verdict.yes |= V::bits(yes) << first;
         verdict.no |= V::bits(no) << first;
     }
     verdict
+}
+
+/// Which of sixteen pairs are within a distance, and which parts of their difference polygons are then nearest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Near16 {
+    /// Which are within the distance.
+    pub verdict: Verdict16,
+    /// Bit after bit, from the lowest, of the number of a part: corner i is i, edge i is 4 + i, the face is 8. All bits are
+    /// set where signs are not certain to tell, or no pair of the register is certainly near.
+    pub parts: [u16; 4],
+}
+
+impl Near16 {
+    /// The number of the nearest part of a lane.
+    #[inline(always)]
+    #[must_use]
+    pub fn part(&self, lane: usize) -> u8 {
+        let bit = |ix: usize| ((self.parts[ix] >> lane & 1) as u8) << ix;
+        bit(0) | bit(1) | bit(2) | bit(3)
+    }
+}
+
+/// The number of a part of the difference polygon of two edges, by its number where the edges change places.
+///
+/// ```text
+///  corner 3 (a0, b1) --- edge 2 (a, b1) --- corner 2 (a1, b1)
+///      |                                        |
+///  edge 3 (a0, b)                           edge 1 (a1, b)
+///      |                                        |
+///  corner 0 (a0, b0) --- edge 0 (a, b0) --- corner 1 (a1, b0)
+/// ```
+pub const SWAPPED_PARTS: [u8; 16] = [0, 3, 2, 1, 7, 6, 5, 4, 8, 9, 10, 11, 12, 13, 14, 15];
+
+/// As [`are_within_in_tables`], with the nearest parts of pairs that are certainly near.
+#[cfg_attr(target_family = "wasm", inline(never))]
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
+#[must_use]
+pub fn nearest_in_tables<V: Lookup>(
+    pair: ElementPair,
+    groups: [&Moving64; 2],
+    places: [&[u8; BATCH]; 2],
+    reach: [f32; 2],
+) -> Near16 {
+    let [low, high] = [V::splat(f64::from(reach[0])), V::splat(f64::from(reach[1]))];
+    let mut near = Near16::default();
+    for first in (0..BATCH).step_by(V::N) {
+        let (are_edges, points) = look_up::<V>(pair, groups, places, first, 0);
+        let polygon = Polygon::new(are_edges, &points);
+        let (yes, no) = polygon.verdict(low, high);
+        let yes = V::bits(yes);
+        near.verdict.yes |= yes << first;
+        near.verdict.no |= V::bits(no) << first;
+        let all = u16::MAX >> (BATCH - V::N);
+        let mut parts = [all; 4];
+        if yes != 0 {
+            let [odd, upper, border, face] = polygon.nearest_part(&edges_of(are_edges, &points));
+            parts = [V::bits(odd), V::bits(upper), V::bits(border), V::bits(face)];
+        }
+        for (bits, part) in near.parts.iter_mut().zip(parts) {
+            *bits |= part << first;
+        }
+    }
+    near
 }
 
 /// Which of sixteen pairs certainly stay farther apart than a distance from t = 0 to `until`. The elements are those of two
@@ -312,8 +475,10 @@ pub fn stay_beyond_in_tables<V: Lookup>(
     let (until, distance) = (V::splat(f64::from(until)), V::splat(f64::from(distance)));
     let mut stay = 0;
     for first in (0..BATCH).step_by(V::N) {
-        let start = look_up::<V>(pair, groups, places, first, 0);
-        let end = look_up::<V>(pair, groups, places, first, 1);
+        let (are_edges, start) = look_up::<V>(pair, groups, places, first, 0);
+        let (_, end) = look_up::<V>(pair, groups, places, first, 1);
+        let start = Polygon::new(are_edges, &start);
+        let end = Polygon::new(are_edges, &end);
         let last = start.at(&end, until);
         let largest = start.size().larger(end.size());
         stay |= V::bits(stay_beyond(&start, &last, largest, distance)) << first;
@@ -328,7 +493,7 @@ fn look_up<V: Lookup>(
     [places_a, places_b]: [&[u8; BATCH]; 2],
     first: usize,
     end: usize,
-) -> Polygon<V> {
+) -> (bool, [Vector<V>; 4]) {
     let (a, b) = (V::places(places_a, first), V::places(places_b, first));
     let are_edges = are_edges(pair);
     let points = if are_edges {
@@ -336,5 +501,5 @@ fn look_up<V: Lookup>(
     } else {
         vertex_and_face::<V>(&group_a[end], a, &group_b[end], b)
     };
-    Polygon::new(are_edges, &points)
+    (are_edges, points)
 }

@@ -5,7 +5,7 @@ use crate::cpu::simd::Isa;
 use crate::exact::{ElementPair, Point};
 use crate::frame::{TestId, pair_key};
 use crate::impacts::{KeysByKind, StepAnswer};
-use crate::index::{LayerIx, Place};
+use crate::index::{LayerIx, Number, Place};
 use crate::narrow::exact_kind;
 use crate::pair_kind::PairKind;
 use crate::positions::Positions;
@@ -133,6 +133,22 @@ pub(super) fn key(world: World<'_>, between: Between, places: Places) -> u64 {
         let element = world.cache(layer).clustering.primitive(place);
         world.frame.layer(layer).number(element)
     });
+    pair_key(a, b)
+}
+
+/// The numbers of a pair's elements, by its lanes in two groups.
+#[inline(always)]
+pub(super) fn numbers_in([a, b]: [&Group; 2], [lane_a, lane_b]: [u8; 2]) -> [Number; 2] {
+    [
+        Number::new(a.numbers.0[usize::from(lane_a)]),
+        Number::new(b.numbers.0[usize::from(lane_b)]),
+    ]
+}
+
+/// The key of a pair, by its lanes in two groups.
+#[inline(always)]
+pub(super) fn key_in(groups: [&Group; 2], lanes: [u8; 2]) -> u64 {
+    let [a, b] = numbers_in(groups, lanes);
     pair_key(a, b)
 }
 

@@ -1,18 +1,21 @@
 //! Whether elements are within a distance at the start of a step.
 //!
 //! In: candidates, whose boxes overlap when each reaches half as far. Sixteen pairs at a time are settled in `f32` from the tables
-//! (`exact::filter::nearness`); most others in `f64` with bounds (`exact::distance`), the rest in exact arithmetic.
+//! (`exact::filter::nearness`), with the nearest features of most; other pairs in `f64` with bounds (`exact::distance`), the rest in
+//! exact arithmetic. Features that are not known here are named when the pairs are sorted.
 
 use crate::cpu::simd::{Isa, Lanes, Simd, dispatch};
 use crate::elements::Elements;
 use crate::exact::filter::{self, BATCH};
 use crate::exact::{Reach, are_within_certainly, unsure_are_within};
 use crate::impacts::StepAnswer;
+use crate::index::pair_key;
 use crate::narrow::Corners;
+use crate::near::Labels;
 use crate::positions::Positions;
 
 use super::super::world::World;
-use super::batch::{Batch, Between, Keys, Narrow, NarrowCounts, Places, is_owned, key};
+use super::batch::{Batch, Between, Keys, Narrow, NarrowCounts, Places, numbers_in};
 
 /// The test of one worker.
 #[derive(Debug, Default)]
@@ -65,30 +68,38 @@ fn take<S: Simd>(_: S, near: &mut NearElements, world: World<'_>, batch: Batch<'
         let lanes = batch.met.batch(first);
         let n = (batch.met.len() - first).min(BATCH);
         let mut open = u16::MAX >> (BATCH - n);
-        let mut yes = 0;
         if let Some(pair) = pair {
-            let verdict = filter::are_within_in_tables::<S::F32>(pair, tables, lanes, reach);
-            yes = verdict.yes & open;
-            open &= !(verdict.yes | verdict.no);
-        }
-        for lane in Lanes(u64::from(yes)) {
-            near.put(world, between, batch.places(first + lane));
+            let found = filter::nearest_in_tables::<S::F32>(pair, tables, lanes, reach);
+            let yes = found.verdict.yes & open;
+            open &= !(found.verdict.yes | found.verdict.no);
+            for lane in Lanes(u64::from(yes)) {
+                near.put(world, &batch, first + lane, found.part(lane));
+            }
         }
         for lane in Lanes(u64::from(open)) {
-            let places = batch.places(first + lane);
-            if near.settle_open(&pairs, places) {
-                near.put(world, between, places);
+            if near.settle_open(&pairs, batch.places(first + lane)) {
+                near.put(world, &batch, first + lane, Labels::UNKNOWN);
             }
         }
     }
+    near.keys.hand_over(world, between.kind);
 }
 
 impl NearElements {
+    /// Adds a candidate to the answer, with the part that is nearest.
     #[inline(always)]
-    fn put(&mut self, world: World<'_>, between: Between, places: Places) {
-        if is_owned(world, between, places) {
-            self.keys.push(between.kind, key(world, between, places));
-            self.keys.hand_over(world, between.kind);
+    fn put(&mut self, world: World<'_>, batch: &Batch<'_>, ix: usize, part: u8) {
+        let numbers = numbers_in(batch.groups, batch.met.lanes(ix));
+        // Only edges meet others of the same layer, where the second may have the lower number.
+        let is_swapped = numbers[0] > numbers[1];
+        let part = match is_swapped {
+            true => filter::SWAPPED_PARTS[usize::from(part) % filter::SWAPPED_PARTS.len()],
+            false => part,
+        };
+        let key = pair_key(numbers[0], numbers[1]);
+        if !world.frame.has_cell() || world.frame.is_owned(world.scene, key) {
+            let labels = Labels::new(world.frame.n_primitives());
+            self.keys.push(batch.between.kind, labels.put(key, part));
         }
     }
 

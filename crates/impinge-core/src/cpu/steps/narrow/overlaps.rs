@@ -3,15 +3,14 @@
 //! Stage `pairing` has tested boxes in `f32` that were rounded outward; here they are tested as they are.
 
 use crate::cpu::simd::Isa;
-use crate::frame::pair_key;
-use crate::hull::Extent;
+use crate::elements::Elements;
+use crate::hull::{Extent, Hull};
 use crate::impacts::StepAnswer;
-use crate::index::{LayerIx, Number, Place};
+use crate::index::Place;
 use crate::narrow::are_near;
 
-use super::super::group::Group;
 use super::super::world::World;
-use super::batch::{Batch, Keys, Narrow, NarrowCounts, element};
+use super::batch::{Batch, Keys, Narrow, NarrowCounts, key_in};
 
 /// The test of one worker.
 #[derive(Debug, Default)]
@@ -46,13 +45,17 @@ impl Narrow for Overlaps {
             }
             return self.keys.hand_over(world, between.kind);
         }
+        let sides = [between.a, between.b].map(|layer| LayerSide {
+            elements: &world.cache(layer).clustering.corners,
+            hull: world.hull(layer),
+        });
         for ix in 0..batch.met.len() {
             let lanes = batch.met.lanes(ix);
             let [a, b] = if is_in_tables {
                 [0, 1].map(|side| batch.groups[side].extent(lanes[side].into()))
             } else {
                 let [a, b] = batch.places(ix);
-                [extent(world, between.a, a), extent(world, between.b, b)]
+                [sides[0].extent(a), sides[1].extent(b)]
             };
             let key = key_in(batch.groups, lanes);
             if are_near(&a, &b, distance) && world.frame.is_owned(world.scene, key) {
@@ -71,20 +74,16 @@ impl Narrow for Overlaps {
     }
 }
 
-/// The key of a pair, by its lanes in two groups.
-#[inline(always)]
-fn key_in([a, b]: [&Group; 2], [lane_a, lane_b]: [u8; 2]) -> u64 {
-    pair_key(
-        Number::new(a.numbers.0[usize::from(lane_a)]),
-        Number::new(b.numbers.0[usize::from(lane_b)]),
-    )
+/// The elements of a layer, and what makes their boxes.
+struct LayerSide<'a> {
+    elements: &'a Elements,
+    hull: Hull<'a>,
 }
 
-/// The extent of an element over the whole step.
-fn extent(world: World<'_>, layer: LayerIx, place: Place) -> Extent {
-    let (corners, ends) = element(world, layer, place);
-    let points = corners
-        .iter()
-        .flat_map(|&corner| ends.map(|positions| positions.point(corner as usize)));
-    Extent::of(points)
+impl LayerSide<'_> {
+    /// The box of an element over the whole step.
+    #[inline(always)]
+    fn extent(&self, place: Place) -> Extent {
+        self.hull.extent(self.elements.corners(place.index()))
+    }
 }
