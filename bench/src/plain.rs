@@ -215,6 +215,48 @@ fn faces(a: &[Point; 4], b: &[Point; 4]) -> Faces {
     Faces::Unknown
 }
 
+/// The square of the distance of a point and a triangle, by the regions of the triangle's nearest point: C. Ericson, Real-Time
+/// Collision Detection, 2005, section 5.1.5.
+#[inline]
+pub fn square_of_point_and_triangle(p: Point, [a, b, c]: [Point; 3]) -> f64 {
+    let along =
+        |from: Point, way: Point, share: f64| std::array::from_fn(|k| from[k] + share * way[k]);
+    let square = |q: Point| {
+        let way = sub(p, q);
+        dot(way, way)
+    };
+    let (ab, ac) = (sub(b, a), sub(c, a));
+    let (ap, bp, cp) = (sub(p, a), sub(p, b), sub(p, c));
+    let (d1, d2) = (dot(ab, ap), dot(ac, ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return square(a);
+    }
+    let (d3, d4) = (dot(ab, bp), dot(ac, bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return square(b);
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return square(along(a, ab, d1 / (d1 - d3)));
+    }
+    let (d5, d6) = (dot(ab, cp), dot(ac, cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return square(c);
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return square(along(a, ac, d2 / (d2 - d6)));
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+        let share = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return square(along(b, sub(c, b), share));
+    }
+    let normal = cross(ab, ac);
+    let height = dot(normal, ap);
+    height * height / dot(normal, normal)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -277,46 +319,4 @@ mod tests {
         }
         assert!(n_meet > 10_000, "{n_meet}");
     }
-}
-
-/// The square of the distance of a point and a triangle, by the regions of the triangle's nearest point: C. Ericson, Real-Time
-/// Collision Detection, 2005, section 5.1.5.
-#[inline]
-pub fn square_of_point_and_triangle(p: Point, [a, b, c]: [Point; 3]) -> f64 {
-    let along =
-        |from: Point, way: Point, share: f64| std::array::from_fn(|k| from[k] + share * way[k]);
-    let square = |q: Point| {
-        let way = sub(p, q);
-        dot(way, way)
-    };
-    let (ab, ac) = (sub(b, a), sub(c, a));
-    let (ap, bp, cp) = (sub(p, a), sub(p, b), sub(p, c));
-    let (d1, d2) = (dot(ab, ap), dot(ac, ap));
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return square(a);
-    }
-    let (d3, d4) = (dot(ab, bp), dot(ac, bp));
-    if d3 >= 0.0 && d4 <= d3 {
-        return square(b);
-    }
-    let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return square(along(a, ab, d1 / (d1 - d3)));
-    }
-    let (d5, d6) = (dot(ab, cp), dot(ac, cp));
-    if d6 >= 0.0 && d5 <= d6 {
-        return square(c);
-    }
-    let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return square(along(a, ac, d2 / (d2 - d6)));
-    }
-    let va = d3 * d6 - d5 * d4;
-    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
-        let share = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return square(along(b, sub(c, b), share));
-    }
-    let normal = cross(ab, ac);
-    let height = dot(normal, ap);
-    height * height / dot(normal, normal)
 }

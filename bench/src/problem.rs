@@ -180,7 +180,7 @@ pub fn models(built: BuiltScene) -> Result<Vec<Model>, Failure> {
             let body = built.scene.body(id)?;
             match body.positions() {
                 impinge::Positions::F32(positions) => Ok(Model {
-                    positions: positions.clone(),
+                    positions: positions.to_vec(),
                     elements: body.elements().clone(),
                 }),
                 impinge::Positions::F64(_) => Err("scenes are built in single precision".into()),

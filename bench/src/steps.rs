@@ -95,11 +95,11 @@ impl Moving {
         let (body, ends) = match (start.positions, end.positions) {
             (impinge_io::Positions::F32(start), impinge_io::Positions::F32(end)) => {
                 let body = scene.add(faces, start.clone())?;
-                (body, [Positions::F32(start), Positions::F32(end)])
+                (body, [start.into(), end.into()])
             }
             (impinge_io::Positions::F64(start), impinge_io::Positions::F64(end)) => {
                 let body = scene.add(faces, start.clone())?;
-                (body, [Positions::F64(start), Positions::F64(end)])
+                (body, [start.into(), end.into()])
             }
             _ => return Err(format!("{}: two precisions", known.name).into()),
         };

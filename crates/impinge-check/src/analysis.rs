@@ -7,6 +7,7 @@ use impinge::exact::{Point, orient2d, orient3d};
 use impinge::{Backend, Detector, Error, Query, Scene, Settings, SharedVertex};
 use impinge_io::{Elements, Mesh, Positions, weld};
 
+use crate::copies::Copies;
 use crate::facets::{Facet, facets, groups, is_simplex};
 use crate::marks::{Marks, Problem};
 use crate::row::Counts;
@@ -91,7 +92,8 @@ pub fn check_mesh(mut mesh: Mesh, options: &Options) -> Result<Checked, Error> {
     })
 }
 
-/// Counts and marks pairs that share more points than their common vertices, edge or face.
+/// Counts and marks pairs that share more points than their common vertices, edge or face, and primitives with the vertices of an
+/// earlier one.
 fn intersections(
     mesh: &Mesh,
     options: &Options,
@@ -108,6 +110,31 @@ fn intersections(
         Positions::F64(positions) => positions.clone().into(),
     };
     let body = scene.add(elements, positions)?;
+    // The scene has refused indices out of range.
+    let copies = match &mesh.elements {
+        Elements::Triangles(triangles) => Copies::new(triangles, mesh.n_vertices()),
+        Elements::Tetrahedra(tets) => Copies::new(tets, mesh.n_vertices()),
+    };
+    for &element in copies.sets().flat_map(|set| &set[1..]) {
+        counts.duplicates += 1;
+        marks[element as usize].add(Problem::Duplicate);
+    }
+    let few = copies.few(mesh.n_primitives());
+    if let Some(few) = &few {
+        let at = |kept: &u32| *kept as usize;
+        let elements: impinge::Elements = match &mesh.elements {
+            Elements::Triangles(triangles) => {
+                let kept = few.kept.iter().map(|kept| triangles[at(kept)]);
+                kept.collect::<Vec<_>>().into()
+            }
+            Elements::Tetrahedra(tets) => {
+                let kept = few.kept.iter().map(|kept| tets[at(kept)]);
+                kept.collect::<Vec<_>>().into()
+            }
+        };
+        let positions = scene.body(body)?.positions().clone();
+        scene.remesh(body, elements, positions)?;
+    }
     let mut detector = Detector::with_settings(Settings {
         backend: Backend::Cpu,
         threads: options.threads,
@@ -115,11 +142,27 @@ fn intersections(
     })?;
     let query = Query::within(body).shared_vertex(SharedVertex::Resolve);
     let pairs = detector.detect(&scene, &query)?;
-    counts.self_intersections = pairs.len() as u64;
-    counts.hash = pairs.hash();
-    for (a, b) in pairs.within(body) {
-        marks[a as usize].add(Problem::SelfIntersection);
-        marks[b as usize].add(Problem::SelfIntersection);
+    match &few {
+        None => {
+            counts.self_intersections = pairs.len() as u64;
+            counts.hash = Some(pairs.hash());
+            for primitive in pairs.within(body).flat_map(|(a, b)| [a, b]) {
+                marks[primitive as usize].add(Problem::SelfIntersection);
+            }
+        }
+        Some(few) => {
+            let found: Vec<(u32, u32)> = pairs.within(body).collect();
+            (counts.self_intersections, counts.hash) = few.count(found.iter().copied());
+            for side in found.iter().flat_map(|&pair| few.pairs(pair).sides()) {
+                // Either all of a side are marked or none.
+                let is_new = |first: &u32| !marks[*first as usize].has(Problem::SelfIntersection);
+                if side.first().is_some_and(is_new) {
+                    for &primitive in side {
+                        marks[primitive as usize].add(Problem::SelfIntersection);
+                    }
+                }
+            }
+        }
     }
     let is_marked = |marks: &&Marks| marks.has(Problem::SelfIntersection);
     counts.n_intersecting = marks.iter().filter(is_marked).count() as u64;
@@ -138,7 +181,6 @@ fn topology<const K: usize>(
         given: (elements.len() * K) as u64,
         limit: u64::from(u32::MAX),
     })?;
-    duplicates(elements, n_vertices, counts, marks);
     let mut corners = UnionFind::new(n_corners);
     let mut pieces = UnionFind::new(n_corners / K as u32);
     let mut borders = UnionFind::new(n_vertices as u32);
@@ -237,47 +279,6 @@ fn count_vertices<const K: usize>(
     let count = |sought: u8| states.iter().filter(|&&state| state == sought).count() as u64;
     counts.unused_vertices = count(UNUSED);
     counts.non_manifold_vertices = count(SEVERAL_FANS);
-}
-
-/// Counts and marks primitives with the vertices of an earlier one, in any order.
-fn duplicates<const K: usize>(
-    elements: &[[u32; K]],
-    n_vertices: usize,
-    counts: &mut Counts,
-    marks: &mut [Marks],
-) {
-    let sorted = |corners: &[u32; K]| {
-        let mut key = *corners;
-        key.sort_unstable();
-        key
-    };
-    let mut starts = vec![0usize; n_vertices + 1];
-    for corners in elements {
-        starts[sorted(corners)[0] as usize + 1] += 1;
-    }
-    for ix in 1..starts.len() {
-        starts[ix] += starts[ix - 1];
-    }
-    let mut next = starts.clone();
-    let mut by_first = vec![0u32; elements.len()];
-    for (element, corners) in (0u32..).zip(elements) {
-        let place = &mut next[sorted(corners)[0] as usize];
-        by_first[*place] = element;
-        *place += 1;
-    }
-    let mut run = Vec::new();
-    for bounds in starts.windows(2) {
-        run.clear();
-        let members = &by_first[bounds[0]..bounds[1]];
-        run.extend(members.iter().map(|&e| (sorted(&elements[e as usize]), e)));
-        run.sort_unstable();
-        for same in run.chunk_by(|a, b| a.0 == b.0) {
-            for &(_, element) in &same[1..] {
-                counts.duplicates += 1;
-                marks[element as usize].add(Problem::Duplicate);
-            }
-        }
-    }
 }
 
 fn degenerate<const K: usize>(

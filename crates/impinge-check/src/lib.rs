@@ -24,6 +24,7 @@
 //! ```
 
 mod analysis;
+mod copies;
 mod facets;
 mod file;
 mod limits;

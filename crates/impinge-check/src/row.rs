@@ -18,8 +18,9 @@ pub struct Counts {
     pub self_intersections: u64,
     /// Primitives in any such pair.
     pub n_intersecting: u64,
-    /// [`Pairs::hash`](impinge::Pairs::hash) of these pairs.
-    pub hash: u64,
+    /// [`Pairs::hash`](impinge::Pairs::hash) of these pairs. `None` if they are more than 2^32, and many of them of primitives with
+    /// the same vertices: such pairs are counted without being listed.
+    pub hash: Option<u64>,
     /// Primitives of exactly zero area, or volume.
     pub degenerate: u64,
     /// Primitives with the vertices of an earlier one, in any order.
@@ -149,7 +150,8 @@ impl Row {
             "intersecting_primitives",
             json!(number(|c| c.n_intersecting)),
         );
-        put("hash", json!(counts.map(|c| format!("{:016x}", c.hash))));
+        let hash = counts.and_then(|counts| counts.hash);
+        put("hash", json!(hash.map(|hash| format!("{hash:016x}"))));
         put("degenerate", json!(number(|c| c.degenerate)));
         put("duplicate_faces", json!(of_kind(false, |c| c.duplicates)));
         put(
@@ -229,7 +231,10 @@ fn counts(value: &Value) -> Option<Counts> {
         n_tetrahedra: number("tetrahedra")?,
         self_intersections: number("self_intersections")?,
         n_intersecting: number("intersecting_primitives")?,
-        hash: u64::from_str_radix(value.get("hash")?.as_str()?, 16).ok()?,
+        hash: match value.get("hash")? {
+            Value::Null => None,
+            hash => Some(u64::from_str_radix(hash.as_str()?, 16).ok()?),
+        },
         degenerate: number("degenerate")?,
         duplicates: either("duplicate_faces", "duplicate_tetrahedra")?,
         non_manifold_facets: either("non_manifold_edges", "non_manifold_faces")?,
@@ -257,7 +262,7 @@ mod tests {
                 n_tetrahedra,
                 self_intersections: 5,
                 n_intersecting: 6,
-                hash: u64::MAX - 6,
+                hash: (n_triangles > 3).then_some(u64::MAX - 6),
                 degenerate: 8,
                 duplicates: 9,
                 non_manifold_facets: 10,
@@ -275,7 +280,7 @@ mod tests {
     fn rows_survive_json() {
         let failed = Row::failed("x", false, ErrorKind::Memory, "too\n\n  much\n");
         assert_eq!(failed.result.as_ref().unwrap_err().message, "too; much");
-        for row in [counted(3, 0), counted(0, 3), failed] {
+        for row in [counted(3, 0), counted(4, 0), counted(0, 3), failed] {
             let text = row.to_json().to_string();
             assert!(!text.contains('\n'));
             let value = serde_json::from_str(&text).unwrap();

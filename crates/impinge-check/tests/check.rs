@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use impinge::{Backend, Detector, Method, Query, Scene, Settings, SharedVertex};
 use impinge_check::{Counts, ErrorKind, Options, Problem, check_file, check_mesh};
 use impinge_io::{Elements, Mesh, Positions};
 use impinge_scenes::data::test_file;
@@ -36,6 +37,7 @@ fn a_closed_surface_has_nothing() {
     let expected = Counts {
         n_vertices: 4,
         n_triangles: 4,
+        hash: Some(0),
         components: 1,
         ..Counts::default()
     };
@@ -346,4 +348,103 @@ fn files_that_cannot_be_read_are_rows() {
     assert_eq!(far.kind, ErrorKind::Refused, "{}", far.message);
     let missing = check_file("nowhere.ply".as_ref(), &Options::default());
     assert_eq!(missing.result.unwrap_err().kind, ErrorKind::File);
+}
+
+/// Corners on a lattice of so few points that most primitives have copies, with corners in another order.
+fn crowd<const K: usize>(seed: &mut u64, n: usize, n_vertices: u32) -> Vec<[u32; K]> {
+    let mut below = |n: u32| {
+        *seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (*seed >> 33) as u32 % n
+    };
+    let mut all: Vec<[u32; K]> = Vec::new();
+    while all.len() < n {
+        let mut corners = match below(3) {
+            0 => std::array::from_fn(|_| below(n_vertices)),
+            _ if all.is_empty() => continue,
+            _ => all[below(all.len() as u32) as usize],
+        };
+        corners.rotate_left(below(K as u32) as usize);
+        if below(2) == 0 {
+            corners.swap(0, 1);
+        }
+        all.push(corners);
+    }
+    all
+}
+
+#[test]
+fn copies_are_counted_as_if_each_were_tested() {
+    let (mut seed, mut n_duplicates, mut n_pairs) = (3, 0, 0);
+    for case in 0..120 {
+        let n_vertices = 5 + case % 9;
+        let at = |ix: u32, k: u32| f64::from((ix * 7 + k * k * 5 + ix * ix * k) % 4);
+        let positions = (0..n_vertices).map(|ix| [at(ix, 0), at(ix, 1), at(ix, 2)]);
+        let n = 4 + case as usize;
+        let mesh = Mesh {
+            positions: Positions::F64(positions.collect()),
+            elements: match case % 2 {
+                0 => Elements::Triangles(crowd(&mut seed, n, n_vertices)),
+                _ => Elements::Tetrahedra(crowd(&mut seed, n, n_vertices)),
+            },
+        };
+        let checked = check_mesh(mesh, &Options::default()).unwrap();
+        let mut scene = Scene::new();
+        let positions = checked.mesh.positions.to_f64();
+        let body = match &checked.mesh.elements {
+            Elements::Triangles(faces) => scene.add_triangles(faces, &positions),
+            Elements::Tetrahedra(tets) => scene.add_tetrahedra(tets, &positions),
+        };
+        let query = Query::within(body.unwrap()).shared_vertex(SharedVertex::Resolve);
+        let settings = Settings {
+            method: Method::Naive,
+            backend: Backend::Cpu,
+            ..Settings::default()
+        };
+        let mut naive = Detector::with_settings(settings).unwrap();
+        let pairs = naive.detect(&scene, &query).unwrap();
+        let counts = checked.counts;
+        assert_eq!(
+            (counts.self_intersections, counts.hash),
+            (pairs.len() as u64, Some(pairs.hash())),
+            "case {case}"
+        );
+        let in_pairs: BTreeSet<u32> = pairs.rows().flat_map(|row| [row[1], row[3]]).collect();
+        let marked = (0u32..).zip(&checked.marks);
+        let marked = marked.filter(|(_, marks)| marks.has(Problem::SelfIntersection));
+        assert_eq!(
+            marked.map(|(ix, _)| ix).collect::<BTreeSet<_>>(),
+            in_pairs,
+            "case {case}"
+        );
+        assert_eq!(counts.n_intersecting, in_pairs.len() as u64);
+        n_duplicates += counts.duplicates;
+        n_pairs += counts.self_intersections;
+    }
+    assert!(
+        n_duplicates > 2_000 && n_pairs > 50_000,
+        "{n_duplicates}, {n_pairs}"
+    );
+}
+
+#[test]
+fn a_million_equal_faces_are_counted() {
+    let positions = vec![
+        [0.0; 3],
+        [3.0, 0.0, 0.0],
+        [0.0, 3.0, 0.0],
+        [1.0, 1.0, -1.0],
+        [1.0, 1.0, 1.0],
+        [1.0, 2.0, 1.0],
+    ];
+    let n: u64 = 1_000_000;
+    let mut faces = vec![[0, 1, 2]; n as usize];
+    faces[7] = [2, 0, 1];
+    // One face goes through all of them.
+    faces.push([3, 4, 5]);
+    let counts = counts(triangles(positions, faces));
+    assert_eq!(counts.self_intersections, n * (n - 1) / 2 + n);
+    assert_eq!((counts.hash, counts.duplicates), (None, n - 1));
+    assert_eq!(counts.n_intersecting, n + 1);
 }

@@ -44,8 +44,8 @@ fn file_name(path: &str) -> &str {
 /// Converts positions of the library to those of mesh files.
 pub fn from_positions(positions: &Positions) -> impinge_io::Positions {
     match positions {
-        Positions::F32(positions) => impinge_io::Positions::F32(positions.clone()),
-        Positions::F64(positions) => impinge_io::Positions::F64(positions.clone()),
+        Positions::F32(positions) => impinge_io::Positions::F32(positions.to_vec()),
+        Positions::F64(positions) => impinge_io::Positions::F64(positions.to_vec()),
     }
 }
 

@@ -257,7 +257,11 @@ impl Detector {
     ) -> Result<(), Error> {
         #[cfg(feature = "gpu")]
         if let Some(engine) = &mut self.gpu {
-            match self.frames.run(scene, query, control, wanted, engine).await {
+            let may_choose = self.settings.backend == Backend::Auto;
+            let cpu = may_choose.then_some(&mut self.cpu);
+            let mut finder = gpu::OnDevice { engine, cpu };
+            let found = self.frames.run(scene, query, control, wanted, &mut finder);
+            match found.await {
                 Err(Error::Gpu { .. }) if self.settings.backend == Backend::Auto => self.gpu = None,
                 result => return result,
             }

@@ -215,6 +215,7 @@ fn of_elements<const N: usize>(
 ) {
     match positions {
         Positions::F32(positions) => {
+            let positions = &positions[..];
             let (fours, rest) = corners.as_chunks::<4>();
             for (four_ix, four) in fours.iter().enumerate() {
                 let [a, b, c, d] = four;

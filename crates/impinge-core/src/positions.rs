@@ -3,14 +3,15 @@
 use crate::error::Error;
 use crate::exact;
 use crate::ids::BodyId;
+use crate::position_rows::PositionRows;
 
 /// Vertex positions in the precision in which they were given.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Positions {
     /// `(n, 3)` single precision.
-    F32(Vec<[f32; 3]>),
+    F32(PositionRows<f32>),
     /// `(n, 3)` double precision.
-    F64(Vec<[f64; 3]>),
+    F64(PositionRows<f64>),
 }
 
 impl Positions {
@@ -60,7 +61,7 @@ impl Positions {
     pub(crate) fn blend(&self, end: &Positions, fraction: f64) -> Positions {
         match (self, end) {
             (Positions::F32(start), Positions::F32(end)) => {
-                let pairs = start.iter().zip(end);
+                let pairs = start.iter().zip(end.iter());
                 Positions::F32(pairs.map(|(x, y)| between(x, y, fraction)).collect())
             }
             _ => {
@@ -87,10 +88,11 @@ impl Positions {
         }
     }
 
+    /// Bytes of their own, without those that an owner shares.
     pub(crate) fn bytes(&self) -> usize {
         match self {
-            Positions::F32(positions) => size_of_val(&positions[..]),
-            Positions::F64(positions) => size_of_val(&positions[..]),
+            Positions::F32(positions) => positions.bytes(),
+            Positions::F64(positions) => positions.bytes(),
         }
     }
 }
@@ -108,15 +110,15 @@ fn between<R: Real>(start: &[R; 3], end: &[R; 3], fraction: f64) -> [R; 3] {
     })
 }
 
-impl From<Vec<[f32; 3]>> for Positions {
-    fn from(positions: Vec<[f32; 3]>) -> Self {
-        Positions::F32(positions)
+impl<R: Real> From<Vec<[R; 3]>> for Positions {
+    fn from(positions: Vec<[R; 3]>) -> Self {
+        R::held(positions.into())
     }
 }
 
-impl From<Vec<[f64; 3]>> for Positions {
-    fn from(positions: Vec<[f64; 3]>) -> Self {
-        Positions::F64(positions)
+impl<R: Real> From<PositionRows<R>> for Positions {
+    fn from(positions: PositionRows<R>) -> Self {
+        R::held(positions)
     }
 }
 
@@ -135,9 +137,13 @@ pub trait Real: sealed::Sealed + Copy + Send + Sync + 'static {
     #[doc(hidden)]
     fn round(x: f64) -> Self;
     #[doc(hidden)]
-    fn stored(positions: &mut Positions) -> Option<&mut Vec<[Self; 3]>>;
+    fn stored(positions: &mut Positions) -> Option<&mut PositionRows<Self>>;
     #[doc(hidden)]
-    fn store(positions: &[[Self; 3]]) -> Positions;
+    fn held(positions: PositionRows<Self>) -> Positions;
+    #[doc(hidden)]
+    fn store(positions: &[[Self; 3]]) -> Positions {
+        positions.to_vec().into()
+    }
 }
 
 impl Real for f32 {
@@ -161,14 +167,14 @@ impl Real for f32 {
     fn round(x: f64) -> f32 {
         x as f32
     }
-    fn stored(positions: &mut Positions) -> Option<&mut Vec<[f32; 3]>> {
+    fn stored(positions: &mut Positions) -> Option<&mut PositionRows<f32>> {
         match positions {
             Positions::F32(positions) => Some(positions),
             Positions::F64(_) => None,
         }
     }
-    fn store(positions: &[[f32; 3]]) -> Positions {
-        Positions::F32(positions.to_vec())
+    fn held(positions: PositionRows<f32>) -> Positions {
+        Positions::F32(positions)
     }
 }
 
@@ -194,14 +200,14 @@ impl Real for f64 {
     fn round(x: f64) -> f64 {
         x
     }
-    fn stored(positions: &mut Positions) -> Option<&mut Vec<[f64; 3]>> {
+    fn stored(positions: &mut Positions) -> Option<&mut PositionRows<f64>> {
         match positions {
             Positions::F64(positions) => Some(positions),
             Positions::F32(_) => None,
         }
     }
-    fn store(positions: &[[f64; 3]]) -> Positions {
-        Positions::F64(positions.to_vec())
+    fn held(positions: PositionRows<f64>) -> Positions {
+        Positions::F64(positions)
     }
 }
 /// Refuses positions that are not finite or outside the exact range; the error names the first.

@@ -9,6 +9,7 @@ use crate::error::Error;
 pub(crate) use crate::ids::BodyId;
 use crate::ids::new_stamp;
 use crate::index::ElementIx;
+use crate::position_rows::PositionRows;
 use crate::positions::Real;
 pub(crate) use crate::positions::{Positions, check_positions};
 use crate::transform::{Affine, RestPose};
@@ -154,6 +155,15 @@ impl Body {
                 expected,
             }),
         }
+    }
+
+    /// Sets checked positions at the end of a step.
+    fn set_end(&mut self, mut end: Positions) {
+        self.positions.widen_as(&end);
+        end.widen_as(&self.positions);
+        self.end = Some(end);
+        self.moves = true;
+        self.step_stamp = new_stamp();
     }
 
     fn has_moved(&mut self, checked: bool) {
@@ -361,10 +371,68 @@ impl Scene {
         target.check_number(body, positions.len())?;
         check_positions(body, positions)?;
         match R::stored(&mut target.positions) {
-            Some(stored) => stored.copy_from_slice(positions),
+            Some(stored) => stored.copy_from(positions),
             None => target.positions = R::store(positions),
         }
         target.has_moved(true);
+        Ok(())
+    }
+
+    /// Moves the vertices without a copy: takes over an array, or shares one with its owner ([`PositionRows::shared`]). As
+    /// [`set_positions`](Scene::set_positions) otherwise: they are checked now. The body drops a shared array when it gets
+    /// other positions or is removed. Two such arrays serve a simulation: write the one that the scene
+    /// has dropped (`Arc::get_mut`), lend it, and go on with the other.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use impinge_core::{PositionRows, Scene};
+    /// # fn main() -> Result<(), impinge_core::Error> {
+    /// let mut scene = Scene::new();
+    /// let body = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])?;
+    /// let mut frames = [vec![[0.0f32; 3]; 3], vec![[0.0f32; 3]; 3]].map(Arc::new);
+    /// for step in 0..10u8 {
+    ///     let next = Arc::get_mut(&mut frames[usize::from(step % 2)]).expect("dropped by the scene");
+    ///     next[1] = [1.0, 0.0, step.into()];
+    ///     scene.lend_positions(body, PositionRows::shared(Arc::clone(&frames[usize::from(step % 2)])))?;
+    /// }
+    /// assert_eq!(scene.body(body)?.positions().point(1), [1.0, 0.0, 9.0]);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// Where a body must write its positions ([`positions_mut`](Scene::positions_mut), [`swap_positions`](Scene::swap_positions),
+    /// [`set_transform`](Scene::set_transform)), it copies a shared array first.
+    ///
+    /// # Errors
+    /// As [`set_positions`](Scene::set_positions).
+    pub fn lend_positions(
+        &mut self,
+        body: BodyId,
+        positions: impl Into<Positions>,
+    ) -> Result<(), Error> {
+        let positions = positions.into();
+        let target = self.body_mut(body)?;
+        target.check_number(body, positions.len())?;
+        positions.check(body)?;
+        target.positions = positions;
+        target.has_moved(true);
+        Ok(())
+    }
+
+    /// Sets the positions at the end of a step without a copy, as [`lend_positions`](Scene::lend_positions) does for its start. If
+    /// start and end have different precisions, the single-precision one is copied to widen it.
+    ///
+    /// # Errors
+    /// As [`set_end_positions`](Scene::set_end_positions).
+    pub fn lend_end_positions(
+        &mut self,
+        body: BodyId,
+        positions: impl Into<Positions>,
+    ) -> Result<(), Error> {
+        let positions = positions.into();
+        let target = self.body_mut(body)?;
+        target.check_number(body, positions.len())?;
+        positions.check(body)?;
+        target.set_end(positions);
         Ok(())
     }
 
@@ -386,16 +454,12 @@ impl Scene {
         let target = self.body_mut(body)?;
         target.check_number(body, positions.len())?;
         check_positions(body, positions)?;
-        match target.end.as_mut().and_then(R::stored) {
-            Some(stored) => stored.copy_from_slice(positions),
-            None => target.end = Some(R::store(positions)),
+        let mut end = target.end.take().unwrap_or_else(|| R::store(&[]));
+        match R::stored(&mut end) {
+            Some(stored) if stored.len() == positions.len() => stored.copy_from(positions),
+            _ => end = R::store(positions),
         }
-        if let Some(end) = &mut target.end {
-            target.positions.widen_as(end);
-            end.widen_as(&target.positions);
-        }
-        target.moves = true;
-        target.step_stamp = new_stamp();
+        target.set_end(end);
         Ok(())
     }
 
@@ -419,7 +483,7 @@ impl Scene {
     pub fn positions_mut<R: Real>(&mut self, body: BodyId) -> Result<&mut [[R; 3]], Error> {
         let target = self.body_mut(body)?;
         target.has_moved(false);
-        stored(body, &mut target.positions).map(Vec::as_mut_slice)
+        stored(body, &mut target.positions).map(|stored| stored.own().as_mut_slice())
     }
 
     /// Exchanges the positions of a body that stores `R` with an array of the caller's, without a copy: the caller gets the
@@ -448,7 +512,7 @@ impl Scene {
     ) -> Result<(), Error> {
         let target = self.body_mut(body)?;
         target.check_number(body, positions.len())?;
-        std::mem::swap(stored(body, &mut target.positions)?, positions);
+        std::mem::swap(stored(body, &mut target.positions)?.own(), positions);
         target.has_moved(false);
         Ok(())
     }
@@ -577,7 +641,7 @@ impl Scene {
 }
 
 /// The positions, if they are of this precision.
-fn stored<R: Real>(body: BodyId, positions: &mut Positions) -> Result<&mut Vec<[R; 3]>, Error> {
+fn stored<R: Real>(body: BodyId, positions: &mut Positions) -> Result<&mut PositionRows<R>, Error> {
     let stored = positions.precision();
     R::stored(positions).ok_or(Error::WrongPrecision {
         body,

@@ -8,8 +8,11 @@ use crate::tuning::Tuning;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Method {
     /// `Cells` for a frame whose bodies are mostly new to the detector, if that is cheaper, and `Clusters` as soon as
-    /// they come back: their second frame makes the clusters. [`Statistics::method`](crate::Statistics::method) says which one answered. On a GPU, with a memory
+    /// they come back: their second frame makes the clusters. [`Statistics::method`](crate::Statistics::method) says which one answered. With a memory
     /// budget, and for steps and distances always `Clusters`.
+    ///
+    /// With `Backend::Auto`, a detector on a GPU answers such a first frame on the CPU, and [`Statistics::backend`](crate::Statistics::backend) says so: all methods of a device
+    /// work on clusters, and making them takes the CPU longer than the whole frame in its grid.
     #[default]
     Auto,
     /// Groups are fixed by topology; in each frame only their boxes move. The fastest method for bodies that are asked

@@ -55,7 +55,7 @@ impl Affine {
     fn map<R: Real>(&self, rest: &[[R; 3]], to: &mut Positions) {
         match R::stored(to) {
             Some(to) if to.len() == rest.len() => {
-                for (to, from) in to.iter_mut().zip(rest) {
+                for (to, from) in to.own().iter_mut().zip(rest) {
                     *to = self.apply(from);
                 }
             }

@@ -879,3 +879,98 @@ fn sizes_to_a_hundred_thousand_and_a_thousand_bodies() {
         compare(format!("{n} bodies"), built.scene, Query::everything());
     }
 }
+
+/// All choices left to the detector, on the device that tests use: by itself, `Auto` takes only hardware.
+fn on_any_device() -> Settings {
+    Settings {
+        backend: Backend::Auto,
+        device: Some(devices()[0].name.clone()),
+        ..gpu(Method::Auto)
+    }
+}
+
+/// Two balls of many triangles that meet.
+fn large_balls(scene: &mut Scene) -> [impinge_core::BodyId; 2] {
+    let ball = surfaces::ball(12_000);
+    let b = ball.translated([0.5, 0.1, 0.0]);
+    [ball, b].map(|model| model.add_to(scene).unwrap())
+}
+
+#[test]
+fn auto_meets_new_bodies_in_the_grid_of_the_host_and_known_ones_on_the_device() {
+    let mut scene = Scene::new();
+    let [a, b] = large_balls(&mut scene);
+    let mut auto = Detector::with_settings(on_any_device()).unwrap();
+    let mut clusters = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+    let mut ask = |scene: &Scene, query: &Query| {
+        let pairs = auto.detect(scene, query).unwrap();
+        let expected = clusters.detect(scene, query).unwrap();
+        assert!(!expected.is_empty() && pairs.same_as(expected));
+        let stats = pairs.stats();
+        assert_eq!(stats.method == "cells", stats.backend == "cpu");
+        assert_eq!(stats.method == "cells", stats.grid.is_some());
+        stats.method
+    };
+    let query = Query::between(a, b);
+    assert_eq!(ask(&scene, &query), "cells");
+    for frame in 1..3 {
+        let moved = surfaces::ball(12_000).translated([0.4, 0.1 * frame as f32, 0.0]);
+        scene.set_positions(b, &moved.positions).unwrap();
+        assert_eq!(ask(&scene, &query), "clusters");
+    }
+    let remeshed = surfaces::ball(30_000);
+    scene
+        .remesh(a, remeshed.elements.clone(), remeshed.positions.clone())
+        .unwrap();
+    assert_eq!(ask(&scene, &query), "cells", "most of it is new");
+    assert_eq!(ask(&scene, &query), "clusters");
+    // Also through what holds no pairs.
+    let [c, d] = large_balls(&mut scene);
+    let query = Query::between(c, d);
+    let n = clusters.count(&scene, &query).unwrap();
+    assert_eq!(auto.count(&scene, &query).unwrap(), n);
+    assert_eq!(auto.stats().backend, "cpu");
+    assert!(auto.any(&scene, &query).unwrap());
+    assert_ne!(auto.stats().backend, "cpu");
+    // A device that was asked for by name of the backend gets the first frame too.
+    let mut asked = Detector::with_settings(gpu(Method::Auto)).unwrap();
+    assert_eq!(asked.count(&scene, &query).unwrap(), n);
+    assert_ne!(asked.stats().backend, "cpu");
+    // What the grid does not look at is refused all the same.
+    let [e, f] = large_balls(&mut scene);
+    scene.positions_mut::<f32>(e).unwrap()[7] = [f32::NAN; 3];
+    let error = auto.detect(&scene, &Query::between(e, f)).unwrap_err();
+    assert!(error.to_string().contains("vertex 7"), "{error}");
+}
+
+#[test]
+fn auto_leaves_small_and_crowded_scenes_resolved_neighbours_and_budgets_to_the_device() {
+    let ask = |model: &impinge_scenes::Model, rule, memory_budget| {
+        let mut scene = Scene::new();
+        model.add_to(&mut scene).unwrap();
+        let query = Query::everything().shared_vertex(rule);
+        let mut auto = Detector::with_settings(Settings {
+            memory_budget,
+            ..on_any_device()
+        })
+        .unwrap();
+        let pairs = auto.detect(&scene, &query).unwrap();
+        let mut cells = Detector::with_settings(cpu(Method::Cells)).unwrap();
+        assert!(pairs.same_as(cells.detect(&scene, &query).unwrap()));
+        let stats = pairs.stats();
+        assert_eq!(stats.method == "cells", stats.backend == "cpu");
+        assert_eq!(stats.method == "cells", stats.grid.is_some());
+        stats.method
+    };
+    let knot = surfaces::torus_knot(20_000, Default::default());
+    assert_eq!(ask(&knot, SharedVertex::Skip, None), "cells");
+    assert_eq!(ask(&knot, SharedVertex::Resolve, None), "clusters");
+    assert_eq!(ask(&knot, SharedVertex::Skip, Some(1 << 28)), "clusters");
+    let small = surfaces::torus_knot(2_000, Default::default());
+    assert_eq!(ask(&small, SharedVertex::Skip, None), "clusters");
+    // Almost all triangles in a small part of the whole.
+    let mut crowded = knot.scaled(1.0 / 1024.0);
+    crowded.positions[0] = [1.0, 1.0, 1.0];
+    crowded.positions[1] = [-1.0, -1.0, -1.0];
+    assert_eq!(ask(&crowded, SharedVertex::Skip, None), "clusters");
+}

@@ -2,10 +2,12 @@
 
 mod common;
 
+use std::sync::Arc;
+
 use common::{agree, cases, check, naive, rows};
 use impinge_core::{
-    Backend, Detector, InstructionSet, Method, Placement, Positions, Query, Recluster, Scene,
-    Settings, SharedVertex, hash_rows,
+    Backend, Detector, InstructionSet, Method, Placement, PositionRows, Positions, Query,
+    Recluster, Scene, Settings, SharedVertex, hash_rows,
 };
 use impinge_scenes::deform::{self, Deform};
 use impinge_scenes::{soup, surfaces};
@@ -569,4 +571,122 @@ fn swapped_positions_are_those_of_the_body() {
     let mut bad = vec![[f32::NAN; 3]; before.len()];
     scene.swap_positions(b, &mut bad).unwrap();
     assert!(detector.detect(&scene, &query).is_err());
+}
+
+#[test]
+fn lent_positions_are_those_that_would_have_been_copied() {
+    let mut scene = Scene::new();
+    let [a, b] = large_balls(&mut scene);
+    let query = Query::between(a, b);
+    let mut detector = Detector::with_settings(cpu(Method::Clusters, 1)).unwrap();
+    detector.detect(&scene, &query).unwrap();
+    let ball = surfaces::ball(12_000);
+    let mut copied = scene.clone();
+    let mut last = None;
+    for frame in 1..4 {
+        let next = Arc::new(ball.translated([0.1 * frame as f32, 0.0, 0.2]).positions);
+        copied.set_positions(b, &next).unwrap();
+        scene
+            .lend_positions(b, PositionRows::shared(Arc::clone(&next)))
+            .unwrap();
+        let Positions::F32(held) = scene.body(b).unwrap().positions() else {
+            panic!("lent in single precision");
+        };
+        assert!(std::ptr::eq(&held[..], &next[..]));
+        let found = rows(detector.detect(&scene, &query).unwrap());
+        assert!(!found.is_empty());
+        assert_eq!(found, rows(detector.detect(&copied, &query).unwrap()));
+        // The scene has dropped the frame before.
+        if let Some(mut last) = last.replace(next) {
+            assert!(Arc::get_mut(&mut last).is_some());
+        }
+    }
+    // A clone shares what is shared; whoever writes copies first.
+    let mut lent = last.unwrap();
+    let before = lent.as_ref().clone();
+    let clone = scene.clone();
+    assert_eq!(Arc::strong_count(&lent), 3);
+    scene.positions_mut::<f32>(b).unwrap()[0] = [9.0; 3];
+    assert_eq!(
+        clone.body(b).unwrap().positions().point(0),
+        before[0].map(f64::from)
+    );
+    drop(clone);
+    assert_eq!(*Arc::get_mut(&mut lent).unwrap(), before);
+    let share = || PositionRows::shared(Arc::clone(&lent));
+    let mut other = vec![[0.5f32; 3]; before.len()];
+    scene.lend_positions(b, share()).unwrap();
+    scene.swap_positions(b, &mut other).unwrap();
+    assert_eq!(other, before);
+    scene.lend_positions(b, share()).unwrap();
+    let shift = |x: f64| {
+        let mut matrix = [[0.0; 4]; 4];
+        (0..4).for_each(|ix| matrix[ix][ix] = 1.0);
+        matrix[0][3] = x;
+        matrix
+    };
+    scene.set_transform(b, &shift(8.0)).unwrap();
+    assert_eq!(*lent, before);
+    assert_eq!(
+        *scene.body(b).unwrap().rest_positions(),
+        Positions::from(before.clone())
+    );
+    // A transform that is refused brings the shared positions back.
+    scene.lend_positions(b, share()).unwrap();
+    assert!(scene.set_transform(b, &shift(1e300)).is_err());
+    assert_eq!(
+        *scene.body(b).unwrap().positions(),
+        Positions::from(before.clone())
+    );
+    scene.set_positions(b, &other).unwrap();
+    assert_eq!(Arc::strong_count(&lent), 1);
+}
+
+#[test]
+fn lent_positions_are_checked_at_once() {
+    let mut scene = Scene::new();
+    let [_, b] = large_balls(&mut scene);
+    let before = scene.body(b).unwrap().positions().clone();
+    let n = before.len();
+    let mut bad = vec![[0.0f64; 3]; n];
+    bad[n - 1][2] = f64::INFINITY;
+    for refused in [vec![[0.0; 3]; n - 1], bad] {
+        let shared = || PositionRows::shared(Arc::new(refused.clone()));
+        let expected = scene.set_positions(b, &refused).unwrap_err().to_string();
+        let error = scene.lend_positions(b, shared()).unwrap_err();
+        assert_eq!(error.to_string(), expected);
+        let error = scene.lend_end_positions(b, shared()).unwrap_err();
+        assert_eq!(error.to_string(), expected);
+    }
+    assert_eq!(*scene.body(b).unwrap().positions(), before);
+    assert_eq!(scene.body(b).unwrap().end_positions(), None);
+}
+
+#[test]
+fn lent_ends_of_a_step_are_those_that_would_have_been_copied() {
+    let mut scene = Scene::new();
+    let [_, b] = large_balls(&mut scene);
+    let mut copied = scene.clone();
+    let mut detector = Detector::with_settings(cpu(Method::Clusters, 1)).unwrap();
+    let ball = surfaces::ball(12_000);
+    let ends = [0.9, 0.6].map(|x| ball.translated([x, 0.0, 0.2]));
+    // The second end is in double precision: the start is widened.
+    copied.set_end_positions(b, &ends[0].positions).unwrap();
+    scene
+        .lend_end_positions(b, PositionRows::shared(Arc::new(ends[0].positions.clone())))
+        .unwrap();
+    for wide in [false, true] {
+        if wide {
+            let end = ends[1].positions_f64();
+            copied.set_end_positions(b, &end).unwrap();
+            scene.lend_end_positions(b, end).unwrap();
+        }
+        let [lent, copy] = [&scene, &copied].map(|scene| scene.body(b).unwrap());
+        assert_eq!(lent.positions(), copy.positions());
+        assert_eq!(lent.end_positions(), copy.end_positions());
+        let step = Query::all().into();
+        let hash = detector.impacts(&copied, &step).unwrap().hash();
+        let impacts = detector.impacts(&scene, &step).unwrap();
+        assert!(!impacts.is_empty() && impacts.hash() == hash);
+    }
 }

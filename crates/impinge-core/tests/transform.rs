@@ -94,7 +94,7 @@ fn moved_positions_are_rounded_as_documented() {
         assert_eq!(points(&scene, narrow), rounded);
         assert_eq!(scene.body(wide).expect("known").transform(), Some(matrix));
         let rest = scene.body(narrow).expect("known").rest_positions();
-        assert_eq!(*rest, Positions::F32(single.clone()));
+        assert_eq!(*rest, Positions::F32(single.clone().into()));
     }
     // A transform starts from rest each time, and the unit matrix leads back there.
     scene.set_transform(wide, &IDENTITY).expect("good");

@@ -151,6 +151,7 @@ pub fn _tiles_plan<'py>(
     chunk: u64,
     weld: bool,
     step: bool,
+    separation: f64,
     replace: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
@@ -159,6 +160,7 @@ pub fn _tiles_plan<'py>(
         chunk,
         weld,
         step,
+        separation,
         cells: None,
         replace,
     };
@@ -185,6 +187,7 @@ fn describe<'py>(py: Python<'py>, plan: &Plan) -> PyResult<Bound<'py, PyDict>> {
     all.set_item("plan", format!("{:016x}", plan.id()))?;
     all.set_item("files", PyList::new(py, files)?)?;
     all.set_item("step", plan.is_step())?;
+    all.set_item("separation", plan.separation())?;
     all.set_item("primitives", n)?;
     all.set_item("tiles", plan.n_tiles())?;
     all.set_item("units", plan.n_units())?;

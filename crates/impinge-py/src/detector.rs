@@ -30,7 +30,7 @@ use crate::watch::{CancelToken, Watch};
 ///     come back. ``"cells"``: the two-level grid of the paper. ``"auto"``: cells for large bodies that are new,
 ///     clusters as soon as they come back. ``"naive"``: every box against every box, the oracle.
 /// backend : {"auto", "cpu", "gpu"}
-///     Where. ``"auto"`` takes a GPU where there is one.
+///     Where. ``"auto"`` takes a GPU where there is one. With the method "auto", large new bodies are first answered on the CPU.
 /// device : str, optional
 ///     Part of a GPU's name, to choose among several.
 /// threads : int, optional

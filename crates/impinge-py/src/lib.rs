@@ -11,6 +11,7 @@ mod detector;
 mod devices;
 mod errors;
 mod functions;
+mod lent;
 mod meshes;
 mod near;
 mod proximity;

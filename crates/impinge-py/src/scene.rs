@@ -9,6 +9,7 @@ use pyo3::types::{PyList, PyTuple};
 use crate::arrays::{self, PositionArray, RowKind, slice_rows};
 use crate::bodies::{Body, body_id, new_scene_number};
 use crate::errors::{Names, raise, refuse};
+use crate::lent;
 use crate::meshes;
 use crate::settings::{self, Argument, unsigned};
 
@@ -97,8 +98,8 @@ pub fn positions_array<'py>(py: Python<'py>, positions: &Positions) -> PyResult<
 
 fn stored(positions: &PositionArray<'_>) -> PyResult<Positions> {
     Ok(match positions {
-        PositionArray::F32(array) => Positions::F32(slice_rows(array)?.to_vec()),
-        PositionArray::F64(array) => Positions::F64(slice_rows(array)?.to_vec()),
+        PositionArray::F32(array) => Positions::F32(slice_rows(array)?.to_vec().into()),
+        PositionArray::F64(array) => Positions::F64(slice_rows(array)?.to_vec().into()),
     })
 }
 
@@ -321,6 +322,75 @@ impl Scene {
             PositionArray::F64(array) => scene.inner.set_positions::<f64>(id, slice_rows(array)?),
         }
         .map_err(|error| refuse(error, ARGUMENTS, &positions))
+    }
+
+    /// Moves the vertices of a body to those of a read-only array, which is neither copied nor let go of: the scene
+    /// reads it where it lies until the body gets other positions or is removed, or the scene is gone. As `set_positions` otherwise;
+    /// the positions are checked now.
+    ///
+    /// The array must not change while it is lent. Arrays that can be written, and views of such, are refused. That
+    /// is all that can be checked: whoever writes to the memory in another way, through a view made before or by making the
+    /// array writeable again, gets answers about no one pose, and may read torn numbers.
+    ///
+    /// Parameters
+    /// ----------
+    /// body : Body or int
+    /// vertices : numpy.ndarray of float32 or float64, shape (v, 3)
+    ///     In C order, with ``vertices.flags.writeable`` False, and so for the array that it is a view of.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     As `add`; an array that can be written or would have to be copied. The body keeps its old positions then.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np, impinge
+    /// >>> scene = impinge.Scene()
+    /// >>> corners = np.eye(3, dtype=np.float32)
+    /// >>> body = scene.add(corners, [[0, 1, 2]])
+    /// >>> frame = corners + np.float32(1)
+    /// >>> frame.flags.writeable = False
+    /// >>> scene.lend_positions(body, frame)
+    /// >>> scene.positions(body)[0].tolist()
+    /// [2.0, 1.0, 1.0]
+    fn lend_positions(
+        slf: &Bound<'_, Self>,
+        body: &Bound<'_, PyAny>,
+        vertices: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let mut scene = change(slf)?;
+        let id = scene.id(body, "body")?;
+        let positions = PositionArray::new(vertices, "vertices")?;
+        let lent = lent::positions(vertices, &positions, "vertices")?;
+        let lending = scene.inner.lend_positions(id, lent);
+        lending.map_err(|error| refuse(error, ARGUMENTS, &positions))
+    }
+
+    /// Says where the vertices of a body are at the end of a step, as `set_end_positions` does, by a read-only array that
+    /// is not copied, as for `lend_positions`. Where start and end come in different precisions, the single one is copied.
+    ///
+    /// Parameters
+    /// ----------
+    /// body : Body or int
+    /// vertices : numpy.ndarray of float32 or float64, shape (v, 3)
+    ///     As for `lend_positions`.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     As `lend_positions`; the body keeps its old end positions then.
+    fn lend_end_positions(
+        slf: &Bound<'_, Self>,
+        body: &Bound<'_, PyAny>,
+        vertices: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let mut scene = change(slf)?;
+        let id = scene.id(body, "body")?;
+        let positions = PositionArray::new(vertices, "vertices")?;
+        let lent = lent::positions(vertices, &positions, "vertices")?;
+        let lending = scene.inner.lend_end_positions(id, lent);
+        lending.map_err(|error| refuse(error, ARGUMENTS, &positions))
     }
 
     /// Says where the vertices of a body are at the end of a step: between its positions and these, each moves

@@ -153,6 +153,30 @@ def test_tiles_of_a_step_have_the_impacts_of_the_whole(tmp_path, toi):
         impinge.tiles.run(folder, shared_vertex="resolve")
 
 
+def test_tiles_of_a_step_keep_a_separation_and_weld(tmp_path):
+    corners, _ = soup(200, 0.1, 3)
+    # Each triangle twice, with corners of its own: without welding it touches itself.
+    both = np.concatenate([corners, corners]).astype(np.float32)
+    n = len(both)
+    ends = both + np.float32(0.05)
+    faces = np.arange(n).reshape(-1, 3)
+    paths = [write_obj(tmp_path / f"{pose}.obj", at, faces) for pose, at in enumerate((both, ends))]
+    scene = impinge.Scene()
+    welded = faces % (n // 2)
+    body = scene.add(both[: n // 2], welded)
+    scene.set_end_positions(body, ends[: n // 2])
+    truth = impinge.Detector(backend="cpu").impacts(scene, separation=0.01)
+    folder = tmp_path / "tiles"
+    plan = impinge.tiles.plan(folder, paths, cap=100, step=True, weld=True, separation=0.01)
+    assert plan["separation"] == 0.01 and plan["tiles"] > 2
+    impinge.tiles.scatter(folder)
+    impinge.tiles.run(folder, threads=1)
+    merged = impinge.tiles.merge(folder)
+    assert merged["pairs"] == len(truth) > 20 and merged["hash"] == f"{truth.hash:016x}"
+    with pytest.raises(ValueError, match="^separation: 0.01 given, only 0 without a step"):
+        impinge.tiles.plan(tmp_path / "still", paths, separation=0.01)
+
+
 def test_tiles_refuse_by_name(bodies, tmp_path):
     paths, _ = bodies
     with pytest.raises((OSError, ValueError), match="missing"):

@@ -1,5 +1,9 @@
 """Bodies: handles, changes, filters."""
 
+import gc
+import pickle
+import sys
+
 import numpy as np
 import pytest
 
@@ -105,6 +109,72 @@ def test_positions_are_copies(scene):
     vertices[:] = 9
     scene.positions(0)[:] = 9
     assert np.array_equal(scene.positions(0), TRIANGLE)
+
+
+def locked(array):
+    array.flags.writeable = False
+    return array
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_lent_positions_are_read_where_they_lie(scene, dtype):
+    frame = locked(TRIANGLE.astype(dtype) + dtype(0.5))
+    n_references = sys.getrefcount(frame)
+    scene.lend_positions(1, frame)
+    assert sys.getrefcount(frame) == n_references + 1
+    assert np.array_equal(scene.positions(1), frame) and scene.positions(1).dtype == dtype
+    # What the contract forbids shows that nothing was copied.
+    frame.flags.writeable = True
+    frame[0, 0] = 7
+    assert scene.positions(1)[0, 0] == 7
+    scene.set_positions(1, ACROSS)
+    assert sys.getrefcount(frame) == n_references
+    # The scene keeps a frame that nobody else knows any more.
+    across = np.ascontiguousarray(ACROSS, dtype)
+    scene.lend_positions(1, locked(across.copy()))
+    scene.lend_end_positions(1, locked(across + dtype(1)))
+    gc.collect()
+    other = impinge.Scene()
+    for vertices in (TRIANGLE, ACROSS):
+        other.add(vertices, FACE)
+    other.set_end_positions(1, ACROSS + 1)
+    detector = impinge.Detector(backend="cpu")
+    assert len(detector.detect(scene)) == 1 and detector.detect(scene).hash == detector.detect(other).hash
+    assert detector.impacts(scene).hash == detector.impacts(other).hash
+    assert np.array_equal(scene.end_positions(1), ACROSS + 1)
+    kept = pickle.loads(pickle.dumps(scene))
+    del scene
+    assert detector.detect(kept).hash == detector.detect(other).hash
+
+
+def test_views_of_read_only_arrays_are_lent(scene):
+    frames = locked(np.stack([TRIANGLE, ACROSS]).astype(np.float32))
+    scene.lend_positions(1, frames[1])
+    of_bytes = np.frombuffer(TRIANGLE.astype(np.float32).tobytes(), np.float32).reshape(-1, 3)
+    scene.lend_positions(0, of_bytes)
+    assert np.array_equal(scene.positions(0), TRIANGLE) and np.array_equal(scene.positions(1), ACROSS)
+    scene.remove(1)
+
+
+def test_arrays_that_can_be_written_are_not_lent(scene):
+    writable = np.ascontiguousarray(ACROSS, np.float32)
+    as_is = "^vertices: not an array that can be read as it is"
+    for array, words in [
+        (writable, "^vertices: the array can be written.* set array.flags.writeable = False"),
+        (locked(writable[:]), "^vertices: the array is a view of one that can be written: set array.base.flags"),
+        (locked(np.frombuffer(bytearray(36), np.float32)).reshape(-1, 3), "belongs to a (bytearray|memoryview), which may change"),
+        (locked(np.asfortranarray(ACROSS)), as_is),
+        (locked(ACROSS.astype(np.int32)), as_is),
+        (locked(ACROSS.astype(">f4")), as_is),
+        (ACROSS.tolist(), as_is),
+        (locked(writable[:2].copy()), "^vertices: 2 positions given, but body 1 has 3 vertices"),
+        (locked(np.full((3, 3), np.nan)), r"^vertices\[0, 0\] = nan: a position must be finite"),
+        (locked(np.zeros((3, 2))), r"^vertices: shape \(n, 3\) expected"),
+    ]:
+        for lend in (scene.lend_positions, scene.lend_end_positions):
+            with pytest.raises(ValueError, match=words):
+                lend(1, array)
+    assert np.array_equal(scene.positions(1), ACROSS) and scene.end_positions(1) is None
 
 
 def test_filters(scene):

@@ -7,6 +7,11 @@
 //! Then p lies in both boxes. Consider each cut on the way to the cell that holds p. If `p < c`, the lower corner of each box
 //! is at most p, so it is below c and the box goes low. If `p >= c`, the upper corner of each box is at least p, so the box
 //! goes high. So that cell gets both boxes. Cells are disjoint and fill space, so exactly one cell holds p.
+//!
+//! Where pairs within a distance d count, the box goes to the high side if `hi + d >= c`. Along an axis, boxes within d have a gap
+//! of at most d. There p is the lower corner of one of them, so p is at most the upper corner of either box plus d, as
+//! real numbers. Rounding to nearest keeps order and p is a floating-point number, so p is also at most the rounded sum. If `p >= c`,
+//! that sum is at least c, and the box goes high. The low side is unchanged: p is at least the lower corner of each box.
 
 use serde_json::{Value, json};
 
@@ -16,6 +21,10 @@ pub(crate) trait Rule {
     fn goes_low(lo: f64, cut: f64) -> bool;
     /// Whether a box with this upper coordinate goes to the high side.
     fn goes_high(hi: f64, cut: f64) -> bool;
+    /// The largest coordinate of an owner point of a box with this upper coordinate and a box within the separation.
+    fn reach(hi: f64, separation: f64) -> f64 {
+        hi + separation
+    }
     /// Whether a point with this coordinate lies on the low side.
     fn lies_low(x: f64, cut: f64) -> bool;
 }
@@ -110,7 +119,7 @@ impl Cells {
     /// The tiles that a box touches.
     pub fn touched(&self, lo: [f64; 3], hi: [f64; 3]) -> Vec<u32> {
         let mut tiles = Vec::new();
-        self.route::<HalfOpen>(&(lo, hi), |tile| tiles.push(tile));
+        self.route::<HalfOpen>(&(lo, hi), 0.0, |tile| tiles.push(tile));
         tiles.sort_unstable();
         tiles
     }
@@ -136,9 +145,16 @@ impl Cells {
         }
     }
 
-    /// Calls `found` for each tile that a box touches.
-    pub(crate) fn route<R: Rule>(&self, bounds: &Bounds, mut found: impl FnMut(u32)) {
-        self.descend::<R>(0, bounds, &mut found);
+    /// Calls `found` for each tile that may own a pair of this box and another one within the separation. With 0 these are the
+    /// tiles that the box touches.
+    pub(crate) fn route<R: Rule>(
+        &self,
+        bounds: &Bounds,
+        separation: f64,
+        mut found: impl FnMut(u32),
+    ) {
+        let reach = (bounds.0, bounds.1.map(|hi| R::reach(hi, separation)));
+        self.descend::<R>(0, &reach, &mut found);
     }
 
     fn descend<R: Rule>(&self, node: u32, bounds: &Bounds, found: &mut impl FnMut(u32)) {

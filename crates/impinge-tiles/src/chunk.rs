@@ -89,7 +89,7 @@ impl Chunk {
 }
 
 /// Converts an f32 that was widened to f64 back, exactly.
-fn back_to_f32(x: f64) -> f32 {
+pub fn back_to_f32(x: f64) -> f32 {
     x as f32
 }
 

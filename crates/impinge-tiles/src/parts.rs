@@ -80,7 +80,7 @@ impl Plan {
         let mut places: Vec<(u32, u32)> = Vec::with_capacity(chunk.vertices.len() / shape.corners);
         for (ix, bounds) in (0u32..).zip(chunk.bounds(shape)) {
             self.cells
-                .route::<HalfOpen>(&bounds, |tile| places.push((tile, ix)));
+                .route::<HalfOpen>(&bounds, self.separation, |tile| places.push((tile, ix)));
         }
         // Sorted by tile, then by primitive.
         places.sort_unstable();

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use impinge::CancelToken;
 use serde_json::{Map, Value, json};
 
-use crate::cells::{Bounds, Cells};
+use crate::cells::{Bounds, Cells, HalfOpen, Rule};
 use crate::chunk::Shape;
 use crate::cuts;
 use crate::disk;
@@ -33,11 +33,15 @@ pub struct PlanOptions {
     pub cap: u64,
     /// Primitives per unit of scattering; a thread reads, sorts and writes one unit at a time. 500,000 by default.
     pub chunk: u64,
-    /// Whether vertices of one file at exactly the same position are welded; formats without shared vertices (STL) need it.
+    /// Whether vertices of one file at exactly the same position are welded; formats without shared vertices (STL) need it. In a
+    /// step, vertices must be at one position both at the start and at the end. Scattering such a body holds all its vertices, up to
+    /// 90 bytes each in f32 and 140 in f64.
     pub weld: bool,
     /// Whether the scene moves: a body is then two files with the same elements, its start and its end, and tiles find the
-    /// first contacts between them. Vertices are not welded.
+    /// first contacts between them.
     pub step: bool,
+    /// In a step: the distance that elements must keep, as [`impinge::Step::separation`].
+    pub separation: f64,
     /// Cells to use instead of those that the plan would choose.
     pub cells: Option<Cells>,
     /// Whether to remove an existing plan in the folder, and all files made by it.
@@ -51,6 +55,7 @@ impl Default for PlanOptions {
             chunk: 500_000,
             weld: false,
             step: false,
+            separation: 0.0,
             cells: None,
             replace: false,
         }
@@ -81,6 +86,7 @@ pub struct Plan {
     pub(crate) cap: u64,
     pub(crate) chunk: u64,
     pub(crate) weld: bool,
+    pub(crate) separation: f64,
     pub(crate) files: Vec<File>,
     pub(crate) cells: Cells,
 }
@@ -117,11 +123,16 @@ impl Plan {
         };
         at_least_one("files", files.len() as u64)?;
         at_least_one("cap", options.cap)?;
-        if options.step && options.weld {
+        let allowed = match options.step {
+            true => (options.separation < 0.0 || !options.separation.is_finite())
+                .then_some("a finite number that is not below 0"),
+            false => (options.separation != 0.0).then_some("only 0 without a step"),
+        };
+        if let Some(allowed) = allowed {
             return Err(Error::Argument {
-                what: "weld",
-                given: "a step".to_owned(),
-                allowed: "only bodies that stand still".to_owned(),
+                what: "separation",
+                given: options.separation.to_string(),
+                allowed: allowed.to_owned(),
             });
         }
         let chunk = at_least_one("chunk", options.chunk)?;
@@ -140,6 +151,9 @@ impl Plan {
                 progress(done.min(total), total);
             })?;
         }
+        for (_, high) in &mut sample {
+            *high = high.map(|x| HalfOpen::reach(x, options.separation));
+        }
         let cells = match &options.cells {
             Some(cells) => cells.clone(),
             None => cuts::cells(&sample, step as f64, options.cap),
@@ -154,6 +168,7 @@ impl Plan {
             cap: options.cap,
             chunk,
             weld: options.weld,
+            separation: options.separation,
             files: files.collect::<Result<_, _>>()?,
             cells,
         };
@@ -239,6 +254,11 @@ impl Plan {
         self.files.iter().any(|file| file.end.is_some())
     }
 
+    /// The distance that elements must keep in a step.
+    pub fn separation(&self) -> f64 {
+        self.separation
+    }
+
     /// How many tiles there are.
     pub fn n_tiles(&self) -> u32 {
         self.cells.n_tiles()
@@ -290,6 +310,12 @@ impl Plan {
         object.insert("cap".to_owned(), json!(self.cap));
         object.insert("chunk".to_owned(), json!(self.chunk));
         object.insert("weld".to_owned(), json!(self.weld));
+        if self.separation != 0.0 {
+            // The bits are what counts: reading decimal digits may round.
+            let bits = format!("{:016x}", self.separation.to_bits());
+            object.insert("separation".to_owned(), json!(self.separation));
+            object.insert("separation_bits".to_owned(), json!(bits));
+        }
         object.insert("tiles".to_owned(), json!(self.n_tiles()));
         object.insert("units".to_owned(), json!(self.n_units()));
         object.insert("files".to_owned(), self.files.iter().map(file).collect());
@@ -332,6 +358,10 @@ impl Plan {
             cap: number(value, "cap")?,
             chunk: number(value, "chunk").filter(|&n| n > 0)?,
             weld: value.get("weld")?.as_bool()?,
+            separation: match value.get("separation_bits") {
+                None => 0.0,
+                Some(_) => f64::from_bits(hex(value, "separation_bits")?),
+            },
             files: value
                 .get("files")?
                 .as_array()?
@@ -355,8 +385,8 @@ impl File {
         self.n_primitives.div_ceil(chunk) as usize
     }
 
-    /// Opens the file, if it has not changed since the plan was made.
-    pub(crate) fn open(&self) -> Result<Box<dyn Source>, Error> {
+    /// Opens the file, if it has not changed since the plan was made. `weld` welds the vertices of a body of a step.
+    pub(crate) fn open(&self, weld: bool) -> Result<Box<dyn Source>, Error> {
         let changed = |path: &Path| Error::Changed {
             path: path.to_owned(),
         };
@@ -374,10 +404,10 @@ impl File {
         let source = body.open(&mut opened)?;
         let is_same = (source.shape(), source.n_primitives(), source.n_vertices())
             == (self.shape, self.n_primitives, self.n_vertices);
-        if is_same {
-            Ok(source)
-        } else {
-            Err(changed(&self.path))
+        match is_same {
+            false => Err(changed(&self.path)),
+            true if weld && self.end.is_some() => source::weld(source),
+            true => Ok(source),
         }
     }
 }

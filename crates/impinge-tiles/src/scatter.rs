@@ -71,7 +71,7 @@ impl Plan {
         };
         let done = AtomicU64::new(0);
         let mut scattered = Scattered::default();
-        // One file at a time, so that the vertices of only one file are in memory.
+        // One file at a time, so that the vertices of only one body are in memory.
         for units in mine.chunk_by(|a, b| a.1.file == b.1.file) {
             let todo: Vec<(usize, Unit)> = units
                 .iter()
@@ -84,7 +84,7 @@ impl Plan {
             let Some(&(_, Unit { file, .. })) = todo.first() else {
                 continue;
             };
-            let source = self.files[file].open()?;
+            let source = self.files[file].open(self.weld)?;
             let n_records = self.spread(&todo, source.as_ref(), threads, cancel, &|| {
                 progress(done.fetch_add(1, Ordering::Relaxed) + 1, mine.len() as u64);
             })?;

@@ -7,13 +7,16 @@ mod moving;
 mod npy;
 mod ply;
 mod stl;
+mod welded;
 mod whole;
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
-use crate::chunk::{Chunk, Shape};
+use impinge_io::{Positions, Weld};
+
+use crate::chunk::{Chunk, Shape, back_to_f32};
 use crate::error::Error;
 use crate::hash::checksum;
 
@@ -30,6 +33,23 @@ pub trait Source: Send + Sync {
     /// Primitives `first..first + n`, which must be in range; `None` if they are not triangles, so that the file must be read
     /// whole.
     fn read(&self, first: u64, n: usize) -> Result<Option<Chunk>, Error>;
+    /// Which vertices have the position of an earlier one. Unless overridden, vertices are the corners of primitives in order.
+    fn weld(&self) -> Result<Weld, Error> {
+        const BLOCK: u64 = 1 << 18;
+        let (mut narrow, mut wide) = (Vec::new(), Vec::new());
+        for first in (0..self.n_primitives()).step_by(BLOCK as usize) {
+            let n = BLOCK.min(self.n_primitives() - first) as usize;
+            let points = self.read(first, n)?.into_iter().flat_map(|c| c.positions);
+            match self.shape().width {
+                4 => narrow.extend(points.map(|point| point.map(back_to_f32))),
+                _ => wide.extend(points),
+            }
+        }
+        Ok(Weld::by_position(&match self.shape().width {
+            4 => Positions::F32(narrow),
+            _ => Positions::F64(wide),
+        }))
+    }
 }
 
 /// Opens a mesh file with the reader for its format.
@@ -65,6 +85,11 @@ pub fn open_step(
     let [start, end] = paths;
     let moving = moving::Moving::new(paths, [open(start)?, open(end)?])?;
     Ok(Box::new(moving))
+}
+
+/// Welds the vertices of a body of a step.
+pub fn weld(source: Box<dyn Source>) -> Result<Box<dyn Source>, Error> {
+    Ok(Box::new(welded::Welded::new(source)?))
 }
 
 /// Opens a file with the reader that a plan names.

@@ -81,7 +81,7 @@ impl Frames for Passing {
 fn passing() -> Content {
     let (scene, [_, body]) = balls(600, 0.0);
     let rest = match scene.body(body).expect("there").positions() {
-        Positions::F32(rest) => rest.clone(),
+        Positions::F32(rest) => rest.to_vec(),
         Positions::F64(_) => panic!("models are in single precision"),
     };
     Content {

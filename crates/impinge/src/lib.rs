@@ -87,9 +87,9 @@ pub use impinge_core::wgpu;
 pub use impinge_core::{
     Advance, Backend, Body, BodyId, CancelToken, CandidateQuery, Candidates, ClosestPoints,
     Control, Detector, Elements, Error, Filter, Impact, Impacts, InstructionSet, Kind, Method,
-    NearPair, NearPairs, NearQuery, PairKind, PairKinds, Pairs, Part, Placement, Positions,
-    Primitive, Progress, Query, Real, Recluster, Scene, Settings, SharedVertex, Stage, Start,
-    Statistics, Step, Toi, hash_impact_rows, hash_rows,
+    NearPair, NearPairs, NearQuery, PairKind, PairKinds, Pairs, Part, Placement, PositionRows,
+    Positions, Primitive, Progress, Query, Real, Recluster, Scene, Settings, SharedVertex, Stage,
+    Start, Statistics, Step, Toi, hash_impact_rows, hash_rows,
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{

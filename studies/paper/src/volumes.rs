@@ -87,7 +87,7 @@ impl Recorded {
 /// The positions of a body's vertices. The simulation's scene holds them in f32.
 fn positions(scene: &Scene, body: BodyId) -> Result<Vec<[f32; 3]>, Error> {
     match scene.body(body)?.positions() {
-        impinge::Positions::F32(positions) => Ok(positions.clone()),
+        impinge::Positions::F32(positions) => Ok(positions.to_vec()),
         impinge::Positions::F64(_) => Err(impinge::Error::WrongPrecision {
             body,
             stored: "f64",

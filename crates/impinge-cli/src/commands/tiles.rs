@@ -45,6 +45,7 @@ fn plan(args: &PlanArgs, cancel: &CancelToken) -> Result<(), Error> {
         chunk: args.chunk,
         weld: args.weld,
         step: args.step,
+        separation: args.separation,
         cells: None,
         replace: args.replace,
     };
@@ -220,6 +221,7 @@ fn merge(args: &MergeArgs) -> Result<(), Error> {
     let mut found = counted(merged.n_pairs, "pair");
     if let Some(step) = &merged.step {
         object["step"] = of_step(step);
+        object["step"]["separation"] = json!(plan.separation());
         let kinds = step
             .kinds
             .map(|(kind, n)| format!("{} {}", grouped(n), kind.name()));

@@ -1,6 +1,7 @@
 //! `impinge tiles`: gives the answer of the whole scene, in steps that may be killed.
 
-use impinge_scenes::{Model, soup};
+use impinge::Elements;
+use impinge_scenes::{Model, soup, surfaces};
 use serde_json::Value;
 
 use crate::harness::Folder;
@@ -144,6 +145,67 @@ fn a_step_gives_the_impacts_of_the_whole() {
     assert!(alone.misuse().contains("body0-0.ply without an end"));
     let resolve = folder.run(["tiles", "run", "big", "--shared-vertex", "resolve"]);
     assert!(resolve.misuse().contains("only skip in a plan of a step"));
+}
+
+#[test]
+fn a_step_with_a_separation_and_welded_vertices_gives_the_impacts_of_the_whole() {
+    let folder = Folder::new();
+    // Balls whose triangles have corners of their own: without welding each is near its neighbours.
+    let ball = surfaces::ball(1_000);
+    let Elements::Triangles(faces) = &ball.elements else {
+        panic!("a ball of triangles")
+    };
+    let corners = |offset: f32| Model {
+        positions: (faces.as_flattened().iter())
+            .map(|&v| ball.positions[v as usize].map(|x| x + offset))
+            .collect(),
+        elements: Elements::Triangles(
+            (0..faces.len() as u32)
+                .map(|ix| [3 * ix, 3 * ix + 1, 3 * ix + 2])
+                .collect(),
+        ),
+    };
+    let files = ["a0.ply", "a1.ply", "b0.ply", "b1.ply"];
+    for (file, offset) in files.iter().zip([0.0, 0.1, 2.0, 1.22]) {
+        folder.ply(file, &corners(offset));
+    }
+    let asked = ["--separation", "0.02", "--weld"];
+    let whole = [
+        &["step"],
+        &files[..],
+        &asked,
+        &["--json", "--impacts", "whole.npy"],
+    ]
+    .concat();
+    let expected = folder.run(whole).json();
+    assert!(expected["impacts"].as_u64().unwrap() > 10, "{expected}");
+    let plan = [
+        &["tiles", "plan", "big", "--step", "--cap", "100", "--json"],
+        &files[..],
+        &asked,
+    ];
+    let plan = folder.run(plan.concat()).json();
+    assert!(plan["tiles"].as_u64().unwrap() > 10, "{plan}");
+    for step in ["scatter", "run"] {
+        folder.run(["tiles", step, "big"]).printed();
+    }
+    let merged = folder.run(["tiles", "merge", "big", "--json"]).json();
+    assert_eq!(
+        (
+            &merged["pairs"],
+            &merged["hash"],
+            &merged["step"]["separation"]
+        ),
+        (
+            &expected["impacts"],
+            &expected["hash"],
+            &expected["separation"]
+        )
+    );
+    let read = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    assert_eq!(read("big/rows.npy"), read("whole.npy"));
+    let still = ["tiles", "plan", "odd", "a0.ply", "--separation", "0.02"];
+    assert!(folder.run(still).misuse().contains("--step"));
 }
 
 #[test]

@@ -71,9 +71,13 @@ impl Folds {
             for (word, bits) in chunk(vertices, n_each, task) {
                 let folds = match positions {
                     Positions::F32(positions) => {
+                        let positions = &positions[..];
                         folds(rings, word, |vertex| positions[vertex].map(f64::from))
                     }
-                    Positions::F64(positions) => folds(rings, word, |vertex| positions[vertex]),
+                    Positions::F64(positions) => {
+                        let positions = &positions[..];
+                        folds(rings, word, |vertex| positions[vertex])
+                    }
                 };
                 bits.store(folds, Ordering::Relaxed);
             }
@@ -310,7 +314,7 @@ mod tests {
         clustering.find_rings();
         let mut answers = Vec::new();
         let single = positions.iter().map(|p| p.map(|x| x as f32)).collect();
-        for positions in [Positions::F64(positions.to_vec()), Positions::F32(single)] {
+        for positions in [Positions::from(positions.to_vec()), Positions::F32(single)] {
             let mut folds = Folds::default();
             folds.find(&Workers::new(1), &clustering, (&positions, 1));
             let mut folded: Vec<u32> = Place::up_to(faces.len())

@@ -55,25 +55,29 @@ impl Cpu {
         }
     }
 
-    /// `Auto`: the grid if most bodies are new and it is not crowded, else clusters.
-    fn find_either_way(
+    /// Of `Auto`: answers the frame in the grid if most bodies are new and it is not crowded; otherwise returns false, and
+    /// clusters are to answer it.
+    pub fn find_as_new(
         &mut self,
         job: Job<'_>,
         answer: &Arc<Answer>,
         stats: &mut Statistics,
-    ) -> Result<(), Error> {
+    ) -> Result<bool, Error> {
         let tuning = &self.settings.tuning;
+        if self.settings.method != Method::Auto {
+            return Ok(false);
+        }
         let prefers_grid = self.acquaintances.prefer_grid(job.scene, job.frame, tuning);
         let has_room = self.settings.memory_budget.is_none();
         if prefers_grid && has_room && self.find_in_grid(job, answer, stats)? {
             stats.method = Method::Cells.name();
             self.clusters.forget_outdated(job.scene);
             stats.bytes_held = self.clusters.bytes();
-            return Ok(());
+            return Ok(true);
         }
         (stats.grid, stats.n_reruns) = (None, 0);
         stats.method = Method::Clusters.name();
-        self.clusters.run(job, answer, &self.settings, stats)
+        Ok(false)
     }
 
     /// Answers through a grid whose memory is freed after the frame; false if the grid is too crowded.
@@ -117,12 +121,14 @@ impl Finder for Cpu {
         answer: &Arc<Answer>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
+        if self.find_as_new(job, answer, stats)? {
+            return Ok(());
+        }
         let settings = &self.settings;
         match settings.method {
-            Method::Auto => self.find_either_way(job, answer, stats),
             Method::Naive => stats.time("naive", |stats| run_naive(job, answer, stats)),
             Method::Cells => self.cells.run(job, answer, settings, &cells::Owner, stats),
-            Method::Clusters => self.clusters.run(job, answer, settings, stats),
+            Method::Auto | Method::Clusters => self.clusters.run(job, answer, settings, stats),
         }
     }
 }

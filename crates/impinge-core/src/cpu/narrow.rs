@@ -520,6 +520,7 @@ fn put_all<S: Simd, const N: usize>(
             }
         }
         Positions::F64(positions) => {
+            let positions = &positions[..];
             for (lane, &place) in places.iter().enumerate() {
                 let corners = &corners[place.index()];
                 for k in 0..N {
@@ -541,11 +542,13 @@ fn put<const N: usize>(
     // The match is outside the loop: one predictable branch per primitive, not one per vertex.
     match positions {
         Positions::F32(positions) => {
+            let positions = &positions[..];
             for k in 0..N {
                 put_vertex(&mut side[k], lane, &positions[corners[k] as usize]);
             }
         }
         Positions::F64(positions) => {
+            let positions = &positions[..];
             for k in 0..N {
                 put_vertex(&mut side[k], lane, &positions[corners[k] as usize]);
             }

@@ -4,6 +4,7 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use super::{Backend, Detector, Settings};
+use crate::cpu::Cpu;
 use crate::cpu::steps::{StepClusters, StepTest};
 use crate::error::Error;
 use crate::gpu::{Capacities, Engine, Gpu, ResidentPairs, WantedAdapter};
@@ -12,9 +13,10 @@ use crate::ids::BodyId;
 use crate::impacts::StepAnswer;
 use crate::progress::Control;
 use crate::query::Query;
-use crate::run::Job;
+use crate::run::{Finder, Job};
 use crate::scene::Scene;
 use crate::settings::Method;
+use crate::sink::Answer;
 use crate::stats::Statistics;
 use crate::workers::is_forked;
 
@@ -100,6 +102,41 @@ pub(super) fn find_in_step(
     }
     *stats = before;
     Ok(false)
+}
+
+/// A device, and with `Backend::Auto` the CPU for frames of new bodies.
+///
+/// Every method of the device works on clusters, which the host makes. That takes the host about twice as long as the whole
+/// frame takes in its own grid. So `Method::Auto` answers such a frame there, by the rule of the CPU backend.
+pub(super) struct OnDevice<'a> {
+    pub engine: &'a mut Engine,
+    pub cpu: Option<&'a mut Cpu>,
+}
+
+impl Finder for OnDevice<'_> {
+    fn method(&self) -> &'static str {
+        self.engine.method()
+    }
+
+    fn backend(&self) -> &str {
+        self.engine.backend()
+    }
+
+    async fn find(
+        &mut self,
+        job: Job<'_>,
+        answer: &Arc<Answer>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        if let Some(cpu) = &mut self.cpu
+            && cpu.find_as_new(job, answer, stats)?
+        {
+            cpu.backend().clone_into(&mut stats.backend);
+            stats.bytes_held += self.engine.bytes();
+            return Ok(());
+        }
+        self.engine.find(job, answer, stats).await
+    }
 }
 
 impl Detector {

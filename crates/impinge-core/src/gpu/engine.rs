@@ -86,7 +86,7 @@ impl Plan {
 }
 
 impl Engine {
-    /// Creates an engine. A device answers `Auto` as `Clusters`.
+    /// Creates an engine. Of `Auto` it answers what `Clusters` are to answer.
     pub fn new(gpu: Arc<Gpu>, settings: &Settings, first: Capacities) -> Self {
         let settings = Settings {
             method: settings.method.in_the_long_run(),
@@ -272,7 +272,12 @@ impl Engine {
         if let Plan::Clusters(_) = &self.plan {
             stats.method = Method::Clusters.name();
         }
-        stats.bytes_held = self.world.bytes() + self.room.bytes();
+        stats.bytes_held = self.bytes();
+    }
+
+    /// Bytes held on the device.
+    pub fn bytes(&self) -> u64 {
+        self.world.bytes() + self.room.bytes()
     }
 
     /// Whether bodies are clustered again. Not in `Cells`, where clusters only show which primitives are out of reach.

@@ -31,6 +31,7 @@ def plan(
     chunk: int = 500_000,
     weld: bool = False,
     step: bool = False,
+    separation: float = 0.0,
     replace: bool = False,
     progress: _Progress | None = None,
 ) -> dict[str, Any]:
@@ -47,10 +48,12 @@ def plan(
     chunk : int
         Primitives per unit of scattering.
     weld : bool
-        Whether vertices of one file at exactly the same position become one.
+        Whether vertices of one file at exactly the same position become one; with `step`, those at one position both at the start
+        and at the end, and scattering such a body holds all its vertices in memory.
     step : bool
-        Whether bodies move from a start to an end. Tiles then find the first contacts, as `Detector.impacts` does. Vertices
-        are not welded.
+        Whether bodies move from a start to an end. Tiles then find the first contacts, as `Detector.impacts` does.
+    separation : float
+        In a step: the distance that elements must keep, as for `Detector.impacts`.
     replace : bool
         Whether another plan in the folder, and all that was made by it, is removed.
     progress : callable, optional
@@ -67,7 +70,8 @@ def plan(
         Files that cannot be read, coordinates that are refused, another plan in the folder.
     """
     names = [os.fspath(file) for file in files]
-    return _impinge._tiles_plan(os.fspath(folder), names, cap, chunk, weld, step, replace, progress)
+    options = (cap, chunk, weld, step, separation, replace, progress)
+    return _impinge._tiles_plan(os.fspath(folder), names, *options)
 
 
 def describe(folder: _Path) -> dict[str, Any]:
@@ -76,7 +80,7 @@ def describe(folder: _Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``plan`` (its name), ``files``, ``step`` (whether bodies move), ``primitives``, ``tiles``, ``units``.
+        ``plan`` (its name), ``files``, ``step`` (whether bodies move), ``separation``, ``primitives``, ``tiles``, ``units``.
     """
     return _impinge._tiles_describe(os.fspath(folder))
 

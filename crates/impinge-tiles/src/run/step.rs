@@ -29,7 +29,10 @@ impl Plan {
         let whole: Range<usize> = 0..n_faces;
         let whole = surfaces.scene(&[whole]).map_err(refused)?;
         let names = whole.to_number(is_mine).map_err(refused)?;
-        let step = Step::new(ask.query()).start(ask.start).toi(ask.toi);
+        let step = Step::new(ask.query())
+            .start(ask.start)
+            .toi(ask.toi)
+            .separation(self.separation);
         let (mut rows, mut n_elsewhere) = (Vec::new(), 0);
         let mut find = |part: &SurfaceScene<'_>| {
             let impacts = detector.impacts_with(&part.scene, &step, control)?;

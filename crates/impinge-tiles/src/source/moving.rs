@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use impinge_io::Weld;
+
 use super::Source;
 use crate::chunk::{Chunk, Shape};
 use crate::error::Error;
@@ -90,5 +92,10 @@ impl Source for Moving {
             positions: both.flat_map(|(a, b)| [a, b].concat()).collect(),
             vertices: start.vertices,
         }))
+    }
+
+    /// Of the vertices that are at one position at both ends.
+    fn weld(&self) -> Result<Weld, Error> {
+        Ok(self.start.weld()?.and(&self.end.weld()?))
     }
 }

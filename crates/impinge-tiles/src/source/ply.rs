@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use impinge_io::Positions;
+use impinge_io::{Positions, Weld};
 
 use super::{Source, check_count, head, length, read_at};
 use crate::chunk::{Chunk, Shape};
@@ -149,6 +149,10 @@ impl Source for Ply {
             vertices,
             positions,
         }))
+    }
+
+    fn weld(&self) -> Result<Weld, Error> {
+        Ok(Weld::by_position(&self.positions))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use impinge_io::{Elements, Mesh, Positions, ReadOptions, read};
+use impinge_io::{Elements, Mesh, Positions, ReadOptions, Weld, read};
 
 use super::{Source, check_count};
 use crate::chunk::{Chunk, Shape};
@@ -59,5 +59,9 @@ impl Source for Whole {
             positions: vertices.iter().map(position).collect(),
             vertices,
         }))
+    }
+
+    fn weld(&self) -> Result<Weld, Error> {
+        Ok(Weld::by_position(&self.mesh.positions))
     }
 }

@@ -124,8 +124,9 @@ fn a_pile_that_no_cut_parts_falls_apart_into_pieces() {
     assert_eq!((rows(&merged), merged.hash), (expected, hash));
 }
 
-/// For boxes on a lattice: how many pairs that meet the tiles of a rule miss, and how many pairs they find more than once.
-fn found<R: Rule>(seed: u64) -> (usize, usize) {
+/// For boxes on a lattice: how many pairs with gaps of at most the separation the tiles of a rule miss, and how many pairs they
+/// find more than once.
+fn found<R: Rule>(seed: u64, separation: f64) -> (usize, usize) {
     let mut random = Random(seed);
     let (mut n_lost, mut n_twice) = (0, 0);
     for _ in 0..40 {
@@ -138,7 +139,9 @@ fn found<R: Rule>(seed: u64) -> (usize, usize) {
             .collect();
         let mut tiles: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (ix, bounds) in boxes.iter().enumerate() {
-            cells.route::<R>(bounds, |tile| tiles.entry(tile).or_default().push(ix));
+            cells.route::<R>(bounds, separation, |tile| {
+                tiles.entry(tile).or_default().push(ix)
+            });
         }
         let mut times: BTreeMap<(usize, usize), usize> = BTreeMap::new();
         for (&tile, members) in &tiles {
@@ -153,7 +156,8 @@ fn found<R: Rule>(seed: u64) -> (usize, usize) {
         for a in 0..boxes.len() {
             for b in a + 1..boxes.len() {
                 let meet = (0..3).all(|axis| {
-                    boxes[a].0[axis] <= boxes[b].1[axis] && boxes[b].0[axis] <= boxes[a].1[axis]
+                    boxes[a].0[axis] - boxes[b].1[axis] <= separation
+                        && boxes[b].0[axis] - boxes[a].1[axis] <= separation
                 });
                 let n = times.get(&(a, b)).copied().unwrap_or(0);
                 n_lost += usize::from(meet && n == 0);
@@ -200,10 +204,83 @@ spoiled!(PointsOnCutsAreLow, lt, ge, le);
 #[test]
 fn every_pair_is_found_once_and_wrong_comparisons_are_noticed() {
     for seed in 10..20 {
-        assert_eq!(found::<HalfOpen>(seed), (0, 0));
-        assert!(found::<HighIsOpen>(seed).0 > 0);
-        assert!(found::<PointsOnCutsAreLow>(seed).0 > 0);
+        for separation in [0.0, 1.0, 2.5] {
+            assert_eq!(found::<HalfOpen>(seed, separation), (0, 0));
+            assert!(found::<HighIsOpen>(seed, separation).0 > 0 || separation.fract() > 0.0);
+            assert!(found::<PointsOnCutsAreLow>(seed, separation).0 > 0);
+        }
+        assert!(found::<NotInflated>(seed, 1.0).0 > 0);
+        assert!(found::<HalfInflated>(seed, 1.0).0 > 0);
     }
+}
+
+/// Boxes reach only as far as without a separation.
+struct NotInflated;
+
+impl Rule for NotInflated {
+    fn goes_low(lo: f64, cut: f64) -> bool {
+        lt(lo, cut)
+    }
+    fn goes_high(hi: f64, cut: f64) -> bool {
+        ge(hi, cut)
+    }
+    fn lies_low(x: f64, cut: f64) -> bool {
+        lt(x, cut)
+    }
+    fn reach(hi: f64, _: f64) -> f64 {
+        hi
+    }
+}
+
+/// As if both boxes were inflated by half the separation: then the owner point of the boxes as they are can lie outside.
+struct HalfInflated;
+
+impl Rule for HalfInflated {
+    fn goes_low(lo: f64, cut: f64) -> bool {
+        lt(lo, cut)
+    }
+    fn goes_high(hi: f64, cut: f64) -> bool {
+        ge(hi, cut)
+    }
+    fn lies_low(x: f64, cut: f64) -> bool {
+        lt(x, cut)
+    }
+    fn reach(hi: f64, separation: f64) -> f64 {
+        hi + separation / 2.0
+    }
+}
+
+#[test]
+fn a_sum_that_rounds_down_still_reaches_the_owner_point() {
+    // The boxes of two vertices whose distance is exactly the separation, or as near to it as numbers allow.
+    let mut random = Random(8);
+    let mut n_rounded = 0;
+    for _ in 0..100_000 {
+        let mut real = || (f64::from(random.below(1 << 30)) + 1.0).powi(3) * 1e-27;
+        let (hi, separation) = (real(), real());
+        // The largest number whose distance from `hi` is at most the separation, as real numbers.
+        let mut owner = (hi + separation).next_up();
+        while difference_exceeds(owner, hi, separation) {
+            owner = owner.next_down();
+        }
+        n_rounded += usize::from(owner != hi + separation);
+        let mut cells = Cells::whole();
+        let high = cells.cut(0, 0, owner);
+        let mut touched = Vec::new();
+        let bounds = ([0.0; 3], [hi, 0.0, 0.0]);
+        cells.route::<HalfOpen>(&bounds, separation, |tile| touched.push(tile));
+        assert!(touched.contains(&high), "{hi:e} {separation:e}");
+    }
+    assert!(n_rounded > 1_000, "{n_rounded}");
+}
+
+/// Whether `a - b` exceeds `c` as real numbers, all three positive and `a` the largest: `a - b` is split into a rounded
+/// difference and its error.
+fn difference_exceeds(a: f64, b: f64, c: f64) -> bool {
+    let difference = a - b;
+    let back = a - difference;
+    let error = (a - (difference + back)) + (back - b);
+    (difference - c) + error > 0.0
 }
 
 #[test]

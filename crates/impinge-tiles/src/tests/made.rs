@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use impinge::{CancelToken, Control, Detector, Impacts, Method, Query, Scene, Settings, Step};
-use impinge_io::{ColoredMesh, Elements, Mesh, Positions, write_ply};
+use impinge_io::{ColoredMesh, Elements, Mesh, Positions, Weld, write_ply};
 
 use crate::{Ask, Cells, Merged, Plan, PlanOptions, RunOptions, ScatterOptions};
 
@@ -176,17 +176,26 @@ pub fn oracle(meshes: &[Mesh], ask: Ask) -> (Vec<[u32; 4]>, u64) {
     (pairs.rows().collect(), pairs.hash())
 }
 
-/// What the oracle finds while bodies move from their first mesh to their second.
-pub fn step_oracle(bodies: &[[Mesh; 2]], ask: Ask) -> Impacts {
+/// What the oracle finds while bodies move from their first mesh to their second, welded and kept apart as a plan says.
+pub fn step_oracle(bodies: &[[Mesh; 2]], options: &PlanOptions, ask: Ask) -> Impacts {
     let mut scene = Scene::new();
     for [start, end] in bodies {
-        let id = add(&mut scene, start);
+        let (mut start, mut end) = (start.clone(), end.clone());
+        if options.weld {
+            let weld = Weld::by_position(&start.positions).and(&Weld::by_position(&end.positions));
+            weld.apply(&mut start);
+            weld.apply(&mut end);
+        }
+        let id = add(&mut scene, &start);
         match &end.positions {
             Positions::F32(end) => scene.set_end_positions(id, end).unwrap(),
             Positions::F64(end) => scene.set_end_positions(id, end).unwrap(),
         }
     }
-    let step = Step::new(query(ask)).start(ask.start).toi(ask.toi);
+    let step = Step::new(query(ask))
+        .start(ask.start)
+        .toi(ask.toi)
+        .separation(options.separation);
     naive().impacts(&scene, &step).unwrap().clone()
 }
 

@@ -268,7 +268,7 @@ fn a_nan_is_refused_by_plan_and_scatter() {
 }
 
 /// Triangles as an array `(n, 3, 3)` of `<f4`.
-fn npy(triangles: &[[[f32; 3]; 3]]) -> Vec<u8> {
+pub fn npy(triangles: &[[[f32; 3]; 3]]) -> Vec<u8> {
     let text = format!(
         "{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, 3, 3), }}\n",
         triangles.len()
@@ -287,7 +287,7 @@ fn npy(triangles: &[[[f32; 3]; 3]]) -> Vec<u8> {
 }
 
 /// The triangles of a mesh, each with corners of its own.
-fn soup(mesh: &Mesh) -> Vec<[[f32; 3]; 3]> {
+pub fn soup(mesh: &Mesh) -> Vec<[[f32; 3]; 3]> {
     let (Positions::F32(positions), impinge_io::Elements::Triangles(faces)) =
         (&mesh.positions, &mesh.elements)
     else {

@@ -37,7 +37,7 @@ fn stopped_at_each_write_and_run_again_the_bytes_are_the_same() {
     ];
     let hash = oracle(&meshes, Ask::default()).1;
     // A plan, parts, two files per tile, rows and answer: several steps each.
-    stop_everywhere(folder.path(), &meshes, false, hash, 40);
+    stop_everywhere(folder.path(), &meshes, PlanOptions::default(), hash, 40);
 }
 
 #[test]
@@ -46,12 +46,24 @@ fn a_step_stopped_at_each_write_and_run_again_has_the_same_bytes() {
     let mut random = Random(7);
     let start = lattice(&mut random, 24, false, false);
     let meshes = [moved(&mut random, &start), start];
-    let hash = step_oracle(std::slice::from_ref(&meshes), Ask::default()).hash();
-    stop_everywhere(folder.path(), &meshes, true, hash, 30);
+    let options = PlanOptions {
+        step: true,
+        weld: true,
+        separation: 0.25,
+        ..PlanOptions::default()
+    };
+    let hash = step_oracle(std::slice::from_ref(&meshes), &options, Ask::default()).hash();
+    stop_everywhere(folder.path(), &meshes, options, hash, 30);
 }
 
 /// Stops all steps at each of their writes, at least `n_least` of them.
-fn stop_everywhere(folder: &Path, meshes: &[Mesh; 2], step: bool, hash: u64, n_least: u32) {
+fn stop_everywhere(
+    folder: &Path,
+    meshes: &[Mesh; 2],
+    options: PlanOptions,
+    hash: u64,
+    n_least: u32,
+) {
     let files = [
         write(folder, "a", &meshes[0]),
         write(folder, "b", &meshes[1]),
@@ -59,8 +71,7 @@ fn stop_everywhere(folder: &Path, meshes: &[Mesh; 2], step: bool, hash: u64, n_l
     let options = PlanOptions {
         cap: 15,
         chunk: 20,
-        step,
-        ..PlanOptions::default()
+        ..options
     };
     let attempt = |name: &str| answer(&folder.join(name), &files, &options, Ask::default());
     let merged = attempt("whole").unwrap();

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use crate::args::{MethodArg, SharedVertexArg, StartArg, ToiArg};
-use crate::values::{bytes, count};
+use crate::values::{bytes, count, distance};
 
 /// Shown below the help.
 pub const TILES_EXAMPLES: &str = "\
@@ -63,15 +63,18 @@ pub struct PlanArgs {
     #[arg(value_name = "MESH", required = true)]
     pub meshes: Vec<PathBuf>,
     /// Plan a step: tiles then find what touches while bodies move from start to end, and when first
-    #[arg(long, conflicts_with = "weld")]
+    #[arg(long)]
     pub step: bool,
+    /// Of a step: the distance that elements must keep; tiles find the first time at which they are as near as that
+    #[arg(long, value_name = "D", default_value = "0", requires = "step", allow_negative_numbers = true, value_parser = distance)]
+    pub separation: f64,
     /// About how many primitives a tile may hold, such as 500k or 2M: about 300 bytes each
     #[arg(long, value_name = "N", value_parser = count, default_value = "2M")]
     pub cap: u64,
     /// The number of primitives that a thread scatters at a time: about 200 bytes each
     #[arg(long, value_name = "N", value_parser = count, default_value = "500k")]
     pub chunk: u64,
-    /// Weld vertices at the same position, within each file
+    /// Weld vertices at the same position, within each file; with --step, both at the start and at the end
     #[arg(long)]
     pub weld: bool,
     /// Replace another plan in this folder, and all files made by it

@@ -203,6 +203,7 @@ fn fill<S: Simd, const N: usize>(
             match positions {
                 Positions::F32(positions) => simd.put_vertices(positions, ids[k], rows),
                 Positions::F64(positions) => {
+                    let positions = &positions[..];
                     for (lane, &vertex) in ids[k].iter().enumerate() {
                         let point = &positions[vertex as usize];
                         for axis in 0..3 {

@@ -1,0 +1,165 @@
+//! Primitives with the same vertices, and what pairs of a few of them say about all of them.
+//!
+//! Whether a pair of primitives counts depends on their vertices alone, not on the order in which they name them. So of
+//! primitives with the same vertices only two are tested: their pair speaks for every pair of them, and the first one's pairs with
+//! other primitives for those of all. A million equal triangles are 5 · 10^11 pairs, which no memory holds.
+
+use std::ops::Range;
+
+/// More pairs than this are counted without their hash, which takes a nanosecond or two per pair.
+const MOST_HASHED: u64 = 1 << 32;
+
+/// The sets of primitives with the same vertices, in any order.
+#[derive(Debug, Default)]
+pub struct Copies {
+    /// The primitives of each set of several, ascending, set after set.
+    members: Vec<u32>,
+    sets: Vec<Range<usize>>,
+}
+
+impl Copies {
+    /// Finds them. Indices must be in range.
+    pub fn new<const K: usize>(elements: &[[u32; K]], n_vertices: usize) -> Self {
+        let sorted = |corners: &[u32; K]| {
+            let mut key = *corners;
+            key.sort_unstable();
+            key
+        };
+        let mut starts = vec![0usize; n_vertices + 1];
+        for corners in elements {
+            starts[sorted(corners)[0] as usize + 1] += 1;
+        }
+        for ix in 1..starts.len() {
+            starts[ix] += starts[ix - 1];
+        }
+        let mut next = starts.clone();
+        let mut by_first = vec![0u32; elements.len()];
+        for (element, corners) in (0u32..).zip(elements) {
+            let place = &mut next[sorted(corners)[0] as usize];
+            by_first[*place] = element;
+            *place += 1;
+        }
+        let mut copies = Copies::default();
+        let mut run = Vec::new();
+        for bounds in starts.windows(2) {
+            run.clear();
+            let members = &by_first[bounds[0]..bounds[1]];
+            run.extend(members.iter().map(|&e| (sorted(&elements[e as usize]), e)));
+            run.sort_unstable();
+            for same in run
+                .chunk_by(|a, b| a.0 == b.0)
+                .filter(|same| same.len() > 1)
+            {
+                let start = copies.members.len();
+                copies
+                    .members
+                    .extend(same.iter().map(|&(_, element)| element));
+                copies.sets.push(start..copies.members.len());
+            }
+        }
+        copies
+    }
+
+    /// The sets of at least two primitives, which are ascending in each.
+    pub fn sets(&self) -> impl Iterator<Item = &[u32]> {
+        self.sets.iter().map(|set| &self.members[set.clone()])
+    }
+
+    /// The tests of a mesh of `n` primitives; `None` if no test can be left out.
+    pub fn few(&self, n: usize) -> Option<Few<'_>> {
+        let large = || (0u32..).zip(self.sets()).filter(|(_, set)| set.len() > 2);
+        large().next()?;
+        let mut set_of = vec![ALONE; n];
+        let mut is_kept = vec![true; n];
+        for (ix, set) in large() {
+            for &member in set {
+                set_of[member as usize] = ix;
+            }
+            for &member in &set[2..] {
+                is_kept[member as usize] = false;
+            }
+        }
+        let kept = (0u32..).zip(is_kept).filter(|(_, kept)| *kept);
+        Some(Few {
+            copies: self,
+            kept: kept.map(|(primitive, _)| primitive).collect(),
+            set_of,
+        })
+    }
+}
+
+/// The set of a primitive that speaks for itself.
+const ALONE: u32 = u32::MAX;
+
+/// A mesh without the third and later primitives of each set.
+pub struct Few<'a> {
+    copies: &'a Copies,
+    /// The numbers of the primitives that are left, ascending.
+    pub kept: Vec<u32>,
+    set_of: Vec<u32>,
+}
+
+/// The pairs for which one pair speaks.
+pub enum Pairs<'a> {
+    /// Every two primitives of a set.
+    Within(&'a [u32]),
+    /// Every primitive of the one with every primitive of the other.
+    Between(&'a [u32], &'a [u32]),
+}
+
+impl Few<'_> {
+    /// The pairs for which a pair of [`kept`](Few::kept) places speaks.
+    pub fn pairs(&self, (a, b): (u32, u32)) -> Pairs<'_> {
+        let [a, b] = [a, b].map(|place| &self.kept[place as usize]);
+        let [set_a, set_b] = [a, b].map(|primitive| self.set_of[*primitive as usize]);
+        let set = |ix: u32| &self.copies.members[self.copies.sets[ix as usize].clone()];
+        if set_a == set_b && set_a != ALONE {
+            return Pairs::Within(set(set_a));
+        }
+        let side = |primitive, ix: u32| match ix {
+            ALONE => std::slice::from_ref(primitive),
+            _ if set(ix)[0] == *primitive => set(ix),
+            // The first one speaks for all.
+            _ => &[],
+        };
+        Pairs::Between(side(a, set_a), side(b, set_b))
+    }
+
+    /// How many pairs these pairs speak for, and the hash of those pairs unless they are too many.
+    pub fn count(&self, pairs: impl Iterator<Item = (u32, u32)> + Clone) -> (u64, Option<u64>) {
+        let n = pairs.clone().map(|pair| self.pairs(pair).len()).sum();
+        let hash = |pair| self.pairs(pair).hash();
+        let hashes = (n <= MOST_HASHED).then(|| pairs.map(hash).fold(0, u64::wrapping_add));
+        (n, hashes)
+    }
+}
+
+impl<'a> Pairs<'a> {
+    fn len(&self) -> u64 {
+        match self {
+            Pairs::Within(set) => set.len() as u64 * (set.len() as u64 - 1) / 2,
+            Pairs::Between(a, b) => a.len() as u64 * b.len() as u64,
+        }
+    }
+
+    fn hash(&self) -> u64 {
+        let row = |a: u32, b: u32| [0, a.min(b), 0, a.max(b)];
+        match self {
+            Pairs::Within(set) => impinge::hash_rows(
+                (1..set.len()).flat_map(|ix| set[..ix].iter().map(move |&a| row(a, set[ix]))),
+            ),
+            Pairs::Between(a, b) => {
+                impinge::hash_rows(a.iter().flat_map(|&a| b.iter().map(move |&b| row(a, b))))
+            }
+        }
+    }
+
+    /// The two sides whose primitives are in a pair: each wholly, or none.
+    pub fn sides(&self) -> [&'a [u32]; 2] {
+        match *self {
+            Pairs::Within(set) => [set, &[]],
+            Pairs::Between(a, b) if a.is_empty() || b.is_empty() => [&[], &[]],
+            Pairs::Between(a, b) => [a, b],
+        }
+    }
+}

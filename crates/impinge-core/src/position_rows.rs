@@ -1,0 +1,121 @@
+//! An array of positions, either a body's own or shared with its owner.
+
+use std::any::Any;
+use std::ops::Deref;
+use std::sync::Arc;
+
+/// `(n, 3)` positions: an array of the body's own, or one that is shared with its owner and therefore only read.
+///
+/// ```
+/// use std::sync::Arc;
+/// use impinge_core::PositionRows;
+/// let own = PositionRows::from(vec![[0.0f32; 3]; 8]);
+/// let simulated = Arc::new(vec![[0.0f32; 3]; 8]);
+/// let shared = PositionRows::shared(Arc::clone(&simulated));
+/// assert_eq!(own, shared);
+/// assert!(std::ptr::eq(&shared[..], &simulated[..]));
+/// ```
+pub struct PositionRows<R>(Held<R>);
+
+enum Held<R> {
+    Own(Vec<[R; 3]>),
+    Shared(Shared<R>),
+}
+
+/// A slice and the owner of its memory.
+struct Shared<R> {
+    rows: *const [[R; 3]],
+    owner: Arc<dyn Any + Send + Sync>,
+}
+
+// SAFETY: a `Shared` is used like a reference to its rows, which may be sent if `R` is `Sync`. The owner is `Send` and `Sync`.
+unsafe impl<R: Sync> Send for Shared<R> {}
+// SAFETY: as above.
+unsafe impl<R: Sync> Sync for Shared<R> {}
+
+impl<R: Copy> PositionRows<R> {
+    /// Shares the rows of an owner, without a copy. The owner lives at least as long as these rows and their clones.
+    /// It is asked for its rows once.
+    pub fn shared<O: AsRef<[[R; 3]]> + Send + Sync + 'static>(owner: Arc<O>) -> Self {
+        let rows: *const [[R; 3]] = (*owner).as_ref();
+        PositionRows(Held::Shared(Shared { rows, owner }))
+    }
+
+    /// The rows to be changed; shared ones are copied first.
+    pub(crate) fn own(&mut self) -> &mut Vec<[R; 3]> {
+        if let Held::Shared(_) = self.0 {
+            self.0 = Held::Own(self.to_vec());
+        }
+        match &mut self.0 {
+            Held::Own(rows) => rows,
+            Held::Shared(_) => unreachable!("copied above"),
+        }
+    }
+
+    /// Copies as many rows as there are. Memory of one's own is reused.
+    pub(crate) fn copy_from(&mut self, rows: &[[R; 3]]) {
+        match &mut self.0 {
+            Held::Own(own) => own.copy_from_slice(rows),
+            Held::Shared(_) => self.0 = Held::Own(rows.to_vec()),
+        }
+    }
+
+    /// Bytes of one's own.
+    pub(crate) fn bytes(&self) -> usize {
+        match &self.0 {
+            Held::Own(rows) => size_of_val(&rows[..]),
+            Held::Shared(_) => 0,
+        }
+    }
+}
+
+impl<R> Deref for PositionRows<R> {
+    type Target = [[R; 3]];
+
+    #[inline(always)]
+    fn deref(&self) -> &[[R; 3]] {
+        match &self.0 {
+            Held::Own(rows) => rows,
+            // SAFETY: `shared` got these rows from a reference to the owner. The `Arc` keeps the owner alive and in its place, and
+            // while it exists nobody gets a `&mut` to the owner. So the rows are borrowed as long as `self` is.
+            Held::Shared(shared) => unsafe { &*shared.rows },
+        }
+    }
+}
+
+/// Shared rows stay shared.
+impl<R: Clone> Clone for PositionRows<R> {
+    fn clone(&self) -> Self {
+        PositionRows(match &self.0 {
+            Held::Own(rows) => Held::Own(rows.clone()),
+            Held::Shared(Shared { rows, owner }) => Held::Shared(Shared {
+                rows: *rows,
+                owner: Arc::clone(owner),
+            }),
+        })
+    }
+}
+
+impl<R: std::fmt::Debug> std::fmt::Debug for PositionRows<R> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        (**self).fmt(f)
+    }
+}
+
+impl<R: PartialEq> PartialEq for PositionRows<R> {
+    fn eq(&self, other: &Self) -> bool {
+        **self == **other
+    }
+}
+
+impl<R> From<Vec<[R; 3]>> for PositionRows<R> {
+    fn from(rows: Vec<[R; 3]>) -> Self {
+        PositionRows(Held::Own(rows))
+    }
+}
+
+impl<R> FromIterator<[R; 3]> for PositionRows<R> {
+    fn from_iter<I: IntoIterator<Item = [R; 3]>>(rows: I) -> Self {
+        rows.into_iter().collect::<Vec<_>>().into()
+    }
+}
