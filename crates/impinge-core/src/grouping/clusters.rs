@@ -12,11 +12,8 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use rayon::prelude::*;
-
-use super::GROUP;
+use super::{GROUP, made_from};
 use super::adjacency::Adjacency;
-use super::bounds::Bounds;
 use super::hierarchy::{Entry, TreeShape};
 use super::hubs::{self, Hubs};
 use super::rings::Rings;
@@ -51,39 +48,28 @@ pub(crate) struct Clustering {
 pub(crate) type LocalFaces = LocalCorners<3>;
 
 impl Clustering {
-    /// Clusters primitives whose boxes in the current pose are given by `bounds`.
-    pub fn new(elements: &Elements, bounds: impl Fn(usize) -> Bounds + Sync) -> Self {
-        Self::make(elements, bounds, false)
+    /// Clusters primitives by the centres of their boxes in the current pose, which are given in the order of the primitives.
+    pub fn new(elements: &Elements, centers: Vec<Entry>) -> Self {
+        Self::make(elements, centers, false)
     }
 
     /// The same, with the local faces of each cluster, for kernels that look corners up in a table of its vertices.
-    pub fn with_local_faces(elements: &Elements, bounds: impl Fn(usize) -> Bounds + Sync) -> Self {
-        Self::make(elements, bounds, true)
+    pub fn with_local_faces(elements: &Elements, centers: Vec<Entry>) -> Self {
+        Self::make(elements, centers, true)
     }
 
-    fn make(
-        elements: &Elements,
-        bounds: impl Fn(usize) -> Bounds + Sync,
-        with_local_faces: bool,
-    ) -> Self {
+    fn make(elements: &Elements, mut entries: Vec<Entry>, with_local_faces: bool) -> Self {
         let n = elements.len();
         let shape = TreeShape::new(n.div_ceil(GROUP));
-        let mut entries: Vec<Entry> = (0..n)
-            .into_par_iter()
-            .with_min_len(4096)
-            .map(|primitive| Entry {
-                center: bounds(primitive).center(),
-                number: primitive as u32,
-            })
-            .collect();
         let counts = with_corners!(elements, |corners| hubs::counts(corners));
         let classes = with_corners!(elements, |corners| hubs::classes(corners, &counts));
         let classes = classes.as_deref();
         super::hierarchy::order(&shape, GROUP, classes, &mut entries);
-        let numbers = entries.iter().map(|entry| entry.number);
-        let order: Vec<ElementIx> = numbers.map(ElementIx::new).collect();
+        let order = made_from(&entries, |_, entry| ElementIx::new(entry.number));
         drop(entries);
-        let corners = with_corners!(elements, |corners| gather(corners, &order).into());
+        let corners = with_corners!(elements, |corners| {
+            made_from(&order, |_, primitive| corners[primitive.index()]).into()
+        });
         let (vertices, vertex_starts, local_faces) = match &corners {
             Elements::Triangles(faces) if with_local_faces => {
                 let unique = Unique::new(faces, true);
@@ -210,10 +196,3 @@ impl Clustering {
     }
 }
 
-fn gather<const N: usize>(elements: &[[u32; N]], order: &[ElementIx]) -> Vec<[u32; N]> {
-    order
-        .par_iter()
-        .with_min_len(16 * 1024)
-        .map(|primitive| elements[primitive.index()])
-        .collect()
-}

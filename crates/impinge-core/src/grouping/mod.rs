@@ -12,8 +12,29 @@ pub(crate) mod hubs;
 pub(crate) mod rings;
 mod unique;
 
+use rayon::prelude::*;
+
 pub use crate::index::GROUP;
 
 /// A cluster's vertices are padded to whole chunks of this many: a loop over them needs no remainder, and its end
 /// is easy to predict.
 pub(crate) const CHUNK: usize = 8;
+
+/// Entries that a thread makes at a time.
+const BLOCK: usize = 4096;
+
+/// A list made from another one, entry by entry, from its number too, on the threads of the pool at hand. Collecting from
+/// a parallel iterator takes four times as long: it counts entries one by one.
+pub(crate) fn made_from<A: Sync, B: Copy + Default + Send>(
+    from: &[A],
+    make: impl Fn(usize, &A) -> B + Sync,
+) -> Vec<B> {
+    let mut made = vec![B::default(); from.len()];
+    let blocks = made.par_chunks_mut(BLOCK).zip(from.par_chunks(BLOCK));
+    blocks.enumerate().for_each(|(block, (made, from))| {
+        for (ix, (made, from)) in made.iter_mut().zip(from).enumerate() {
+            *made = make(block * BLOCK + ix, from);
+        }
+    });
+    made
+}
