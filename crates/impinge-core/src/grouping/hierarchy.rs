@@ -97,7 +97,7 @@ impl TreeShape {
 }
 
 /// An entry to be ordered: a centre, and the number of what it stands for.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Entry {
     pub center: [f32; 3],
     pub number: u32,

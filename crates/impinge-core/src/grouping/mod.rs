@@ -10,7 +10,7 @@ pub mod grid;
 pub(crate) mod hierarchy;
 pub(crate) mod hubs;
 pub(crate) mod rings;
-mod unique;
+pub(crate) mod unique;
 
 use rayon::prelude::*;
 
@@ -25,16 +25,19 @@ const BLOCK: usize = 4096;
 
 /// A list made from another one, entry by entry, from its number too, on the threads of the pool at hand. Collecting from
 /// a parallel iterator takes four times as long: it counts entries one by one.
-pub(crate) fn made_from<A: Sync, B: Copy + Default + Send>(
+pub(crate) fn made_from<A: Sync, B: Copy + Send>(
     from: &[A],
     make: impl Fn(usize, &A) -> B + Sync,
 ) -> Vec<B> {
-    let mut made = vec![B::default(); from.len()];
-    let blocks = made.par_chunks_mut(BLOCK).zip(from.par_chunks(BLOCK));
-    blocks.enumerate().for_each(|(block, (made, from))| {
-        for (ix, (made, from)) in made.iter_mut().zip(from).enumerate() {
-            *made = make(block * BLOCK + ix, from);
+    let mut made = Vec::with_capacity(from.len());
+    let room = &mut made.spare_capacity_mut()[..from.len()];
+    let blocks = room.par_chunks_mut(BLOCK).zip(from.par_chunks(BLOCK));
+    blocks.enumerate().for_each(|(block, (room, from))| {
+        for (ix, (room, from)) in room.iter_mut().zip(from).enumerate() {
+            room.write(make(block * BLOCK + ix, from));
         }
     });
+    // SAFETY: the blocks are as many and as long as those of `from`, and each of their entries was written.
+    unsafe { made.set_len(from.len()) };
     made
 }
