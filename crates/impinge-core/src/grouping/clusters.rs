@@ -72,11 +72,11 @@ impl Clustering {
         });
         let (vertices, vertex_starts, local_faces) = match &corners {
             Elements::Triangles(faces) if with_local_faces => {
-                let unique = Unique::new(faces, true);
+                let unique = Unique::new(faces, counts.len(), true);
                 (unique.vertices, unique.starts, unique.corners)
             }
             corners => with_corners!(corners, |corners| {
-                let unique = Unique::new(corners, false);
+                let unique = Unique::new(corners, counts.len(), false);
                 (unique.vertices, unique.starts, Vec::new())
             }),
         };
