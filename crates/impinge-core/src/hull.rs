@@ -74,9 +74,8 @@ fn numbered<const N: usize>(
     elements: &[[u32; N]],
     center: impl Fn(&[u32; N]) -> [f32; 3] + Sync,
 ) -> Vec<Entry> {
-    made_from(elements, |number, corners| Entry {
-        center: center(corners),
-        number: number as u32,
+    made_from(elements, |number, corners| {
+        Entry::new(center(corners), number as u32)
     })
 }
 

@@ -303,11 +303,8 @@ mod tests {
     /// The triangles that have a fold.
     fn folded(faces: &[[u32; 3]], positions: &[[f64; 3]]) -> Vec<u32> {
         let elements = Elements::from(faces.to_vec());
-        let somewhere = |number| Entry {
-            center: [0.0; 3],
-            number,
-        };
-        let centers = (0..faces.len() as u32).map(somewhere).collect();
+        let numbers = 0..faces.len() as u32;
+        let centers = numbers.map(|number| Entry::new([0.0; 3], number)).collect();
         let clustering = Clustering::new(&elements, centers);
         clustering.find_rings();
         let mut answers = Vec::new();
