@@ -14,14 +14,14 @@ mod vec4;
 
 pub(crate) use extent::Extent;
 pub(crate) use pose::Pose;
-pub(crate) use vec4::{Vec4, of_vertices_f32};
 use vec4::center_f32;
+pub(crate) use vec4::{Vec4, of_vertices_f32};
 
 use crate::elements::{Elements, with_corners};
-use crate::grouping::{GROUP, made_from};
 use crate::grouping::bounds::{Bounds, LaneBounds, greater, lesser, round_down, round_up};
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::Entry;
+use crate::grouping::{GROUP, made_from};
 use crate::index::ClusterIx;
 use crate::positions::Positions;
 use crate::scene::Body;

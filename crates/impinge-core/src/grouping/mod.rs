@@ -10,7 +10,7 @@ pub mod grid;
 pub(crate) mod hierarchy;
 pub(crate) mod hubs;
 pub(crate) mod rings;
-pub(crate) mod unique;
+mod unique;
 
 use rayon::prelude::*;
 
