@@ -15,12 +15,14 @@ mod vec64;
 
 pub(crate) use extent::Extent;
 pub(crate) use pose::Pose;
+use vec4::center_f32;
 pub(crate) use vec4::{Vec4, of_vertices_f32};
 
 use crate::elements::{Elements, with_corners};
-use crate::grouping::GROUP;
 use crate::grouping::bounds::{Bounds, LaneBounds, greater, lesser, round_down, round_up};
 use crate::grouping::clusters::Clustering;
+use crate::grouping::hierarchy::Entry;
+use crate::grouping::{GROUP, made_from};
 use crate::index::ClusterIx;
 use crate::positions::Positions;
 use crate::scene::Body;
@@ -52,12 +54,21 @@ pub(crate) fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
     }
 }
 
-/// The box of each of some elements, by its number.
-pub(crate) fn of_each<'a>(
-    elements: &'a Elements,
-    positions: &'a Positions,
-) -> impl Fn(usize) -> Bounds + Sync + 'a {
-    |element| of_vertices(positions, elements.corners(element))
+/// The centres of the boxes of all elements, on the threads of the pool at hand.
+pub(crate) fn centers(elements: &Elements, positions: &Positions) -> Vec<Entry> {
+    with_corners!(elements, |corners| match positions {
+        Positions::F32(positions) => numbered(corners, |corners| center_f32(positions, corners)),
+        Positions::F64(_) => numbered(corners, |corners| of_vertices(positions, corners).center()),
+    })
+}
+
+fn numbered<const N: usize>(
+    elements: &[[u32; N]],
+    center: impl Fn(&[u32; N]) -> [f32; 3] + Sync,
+) -> Vec<Entry> {
+    made_from(elements, |number, corners| {
+        Entry::new(center(corners), number as u32)
+    })
 }
 
 /// The box of a cluster, and whether the positions that were read are certainly finite. (f64 positions are checked before.)

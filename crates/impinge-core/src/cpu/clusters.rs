@@ -175,10 +175,10 @@ impl BodyCache {
     /// Clusters a body in its current pose.
     pub fn new(body: &Body, isa: Isa, tuning: &Tuning) -> Self {
         let (elements, positions) = (body.elements(), body.positions());
-        let bounds_of = hull::of_each(elements, positions);
+        let centers = hull::centers(elements, positions);
         let clustering = match isa.looks_corners_up() {
-            true => Clustering::with_local_faces(elements, bounds_of),
-            false => Clustering::new(elements, bounds_of),
+            true => Clustering::with_local_faces(elements, centers),
+            false => Clustering::new(elements, centers),
         };
         let mut bounds = TreeBounds::default();
         bounds.resize(&clustering.shape);

@@ -301,16 +301,15 @@ fn is_below(axis: usize, arm: &[f64; 3]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grouping::bounds::Bounds;
+    use crate::grouping::hierarchy::Entry;
     use crate::index::Place;
 
     /// The triangles that have a fold.
     fn folded(faces: &[[u32; 3]], positions: &[[f64; 3]]) -> Vec<u32> {
         let elements = Elements::from(faces.to_vec());
-        let clustering = Clustering::new(&elements, |_| Bounds {
-            min: [0.0; 3],
-            max: [0.0; 3],
-        });
+        let numbers = 0..faces.len() as u32;
+        let centers = numbers.map(|number| Entry::new([0.0; 3], number)).collect();
+        let clustering = Clustering::new(&elements, centers);
         clustering.find_rings();
         let mut answers = Vec::new();
         let single = positions.iter().map(|p| p.map(|x| x as f32)).collect();

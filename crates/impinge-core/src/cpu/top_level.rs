@@ -61,10 +61,9 @@ impl TopLevel {
         self.refit_boxes(&root);
         if self.fit.is_stale(self.spread(), tuning) || is_new {
             self.entries.clear();
-            self.entries.extend(LayerIx::up_to(n).map(|layer| Entry {
-                center: root(layer).center(),
-                number: layer.raw(),
-            }));
+            self.entries.extend(
+                LayerIx::up_to(n).map(|layer| Entry::new(root(layer).center(), layer.raw())),
+            );
             order(&self.shape, 1, None, &mut self.entries);
             for (layer, entry) in self.order.iter_mut().zip(&self.entries) {
                 *layer = LayerIx::new(entry.number);

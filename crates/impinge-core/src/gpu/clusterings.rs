@@ -81,7 +81,7 @@ impl Clustered for Cached {
 impl Cached {
     fn new(body: &Body, number: u64) -> Self {
         let (elements, positions) = (body.elements(), body.positions());
-        let clustering = Clustering::new(elements, hull::of_each(elements, positions));
+        let clustering = Clustering::new(elements, hull::centers(elements, positions));
         let mut fit = Fit::UNKNOWN;
         fit.note(sampled_spread(&clustering, positions));
         Cached {

@@ -153,10 +153,8 @@ impl Forest {
         let first = self.first_gate as usize;
         for gate in first..first + self.n_gates as usize {
             let number = self.nodes[gate].first_child;
-            self.entries.push(Entry {
-                center: sample(LayerIx::new(number)),
-                number,
-            });
+            let center = sample(LayerIx::new(number));
+            self.entries.push(Entry::new(center, number));
         }
         let spread = self.spread();
         let is_new = self.best_spread == 0.0;
@@ -181,8 +179,8 @@ impl Forest {
                 let mut bounds = Bounds::EMPTY;
                 for entry in entries {
                     bounds.join(&Bounds {
-                        min: entry.center,
-                        max: entry.center,
+                        min: entry.center(),
+                        max: entry.center(),
                     });
                 }
                 bounds.half_area()

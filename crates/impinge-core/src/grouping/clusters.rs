@@ -12,15 +12,12 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use rayon::prelude::*;
-
-use super::GROUP;
 use super::adjacency::Adjacency;
-use super::bounds::Bounds;
 use super::hierarchy::{Entry, TreeShape};
 use super::hubs::{self, Hubs};
 use super::rings::Rings;
 use super::unique::{LocalCorners, Unique};
+use super::{GROUP, made_from};
 use crate::elements::{Elements, with_corners};
 use crate::index::{ClusterIx, ElementIx, Place};
 
@@ -51,46 +48,32 @@ pub(crate) struct Clustering {
 pub(crate) type LocalFaces = LocalCorners<3>;
 
 impl Clustering {
-    /// Clusters primitives whose boxes in the current pose are given by `bounds`.
-    pub fn new(elements: &Elements, bounds: impl Fn(usize) -> Bounds + Sync) -> Self {
-        Self::make(elements, bounds, false)
+    /// Clusters primitives by the centres of their boxes in the current pose, which are given in the order of the primitives.
+    pub fn new(elements: &Elements, centers: Vec<Entry>) -> Self {
+        Self::make(elements, centers, false)
     }
 
     /// The same, with the local faces of each cluster, for kernels that look corners up in a table of its vertices.
-    pub fn with_local_faces(elements: &Elements, bounds: impl Fn(usize) -> Bounds + Sync) -> Self {
-        Self::make(elements, bounds, true)
+    pub fn with_local_faces(elements: &Elements, centers: Vec<Entry>) -> Self {
+        Self::make(elements, centers, true)
     }
 
-    fn make(
-        elements: &Elements,
-        bounds: impl Fn(usize) -> Bounds + Sync,
-        with_local_faces: bool,
-    ) -> Self {
+    fn make(elements: &Elements, mut entries: Vec<Entry>, with_local_faces: bool) -> Self {
         let n = elements.len();
         let shape = TreeShape::new(n.div_ceil(GROUP));
-        let mut entries: Vec<Entry> = (0..n)
-            .into_par_iter()
-            .with_min_len(4096)
-            .map(|primitive| Entry {
-                center: bounds(primitive).center(),
-                number: primitive as u32,
-            })
-            .collect();
         let counts = with_corners!(elements, |corners| hubs::counts(corners));
         let classes = with_corners!(elements, |corners| hubs::classes(corners, &counts));
         let classes = classes.as_deref();
         super::hierarchy::order(&shape, GROUP, classes, &mut entries);
-        let numbers = entries.iter().map(|entry| entry.number);
-        let order: Vec<ElementIx> = numbers.map(ElementIx::new).collect();
-        drop(entries);
-        let corners = with_corners!(elements, |corners| gather(corners, &order).into());
+        let order = made_from(&entries, |_, entry| ElementIx::new(entry.number));
+        let corners = with_corners!(elements, |corners| gather(corners, entries).into());
         let (vertices, vertex_starts, local_faces) = match &corners {
             Elements::Triangles(faces) if with_local_faces => {
-                let unique = Unique::new(faces, true);
+                let unique = Unique::new(faces, counts.len(), true);
                 (unique.vertices, unique.starts, unique.corners)
             }
             corners => with_corners!(corners, |corners| {
-                let unique = Unique::new(corners, false);
+                let unique = Unique::new(corners, counts.len(), false);
                 (unique.vertices, unique.starts, Vec::new())
             }),
         };
@@ -210,10 +193,13 @@ impl Clustering {
     }
 }
 
-fn gather<const N: usize>(elements: &[[u32; N]], order: &[ElementIx]) -> Vec<[u32; N]> {
-    order
-        .par_iter()
-        .with_min_len(16 * 1024)
-        .map(|primitive| elements[primitive.index()])
-        .collect()
+/// The corners in the order of the entries, in their memory: the first use of new memory would take four times as long as
+/// this loop does.
+fn gather<const N: usize>(elements: &[[u32; N]], entries: Vec<Entry>) -> Vec<[u32; N]> {
+    let corners = entries
+        .into_iter()
+        .map(|entry| elements[entry.number as usize]);
+    let mut corners: Vec<[u32; N]> = corners.collect();
+    corners.shrink_to_fit();
+    corners
 }

@@ -1,10 +1,10 @@
 //! The vertices of each cluster, each once, and the corners of its primitives as numbers of those.
 //!
-//! A hash table finds what is new: of 192 corners of 64 triangles about 45 are. These are put in ascending order by
+//! A sparse set finds what is new: of 192 corners of 64 triangles about 45 are. These are put in ascending order by
 //! counting for each how many are lower, which needs no branch and is a few comparisons of whole registers.
 //! On the dragon this takes half the time of sorting, and of finding the corners by binary search.
 //!
-//! Cost: `O(n)` once per topology.
+//! Cost: `O(n)` once per topology; while it runs, one byte per vertex of the body and job of the pool.
 
 use std::hint::select_unpredictable;
 
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::{CHUNK, GROUP};
 
-/// Clusters that a thread takes at a time.
+/// Clusters that one of several threads takes at a time.
 const BLOCK: usize = 64;
 
 /// The corners of a cluster's primitives as numbers of its vertices: `[corner][place]`. Places past its size hold 0.
@@ -33,13 +33,25 @@ pub(crate) struct Unique<const N: usize> {
 }
 
 impl<const N: usize> Unique<N> {
-    /// From the corners in the order of the clusters; `with_corners`, if these are to be numbered too.
-    pub fn new(corners: &[[u32; N]], with_corners: bool) -> Self {
-        let blocks = corners.par_chunks(BLOCK * GROUP);
-        let blocks: Vec<Self> = blocks.map(|block| of_block(block, with_corners)).collect();
+    /// From the corners in the order of the clusters, which are all below `n_vertices`; `with_corners`, if these are to be
+    /// numbered too.
+    pub fn new(corners: &[[u32; N]], n_vertices: usize, with_corners: bool) -> Self {
+        // One block needs no copy.
+        let block = match rayon::current_num_threads() {
+            1 => corners.len().max(1),
+            _ => BLOCK * GROUP,
+        };
+        let blocks = corners.par_chunks(block);
+        let set = || VertexSet::new(n_vertices);
+        let of_block = |set: &mut VertexSet, block: &[_]| of_block(block, set, with_corners);
+        let mut blocks: Vec<Self> = blocks.map_init(set, of_block).collect();
+        if let [all] = &mut blocks[..] {
+            all.vertices.shrink_to_fit();
+            return blocks.swap_remove(0);
+        }
         let n_clusters = corners.len().div_ceil(GROUP);
-        let n_vertices = blocks.iter().map(|block| block.vertices.len()).sum();
-        let mut all = Self::with_capacity(n_clusters, n_vertices, with_corners);
+        let n_unique = blocks.iter().map(|block| block.vertices.len()).sum();
+        let mut all = Self::with_capacity(n_clusters, n_unique, with_corners);
         for block in blocks {
             let first = all.vertices.len() as u32;
             all.vertices.extend_from_slice(&block.vertices);
@@ -60,11 +72,11 @@ impl<const N: usize> Unique<N> {
         }
     }
 
-    fn push(&mut self, group: &[[u32; N]], table: &mut VertexTable, with_corners: bool) {
+    fn push(&mut self, group: &[[u32; N]], set: &mut VertexSet, with_corners: bool) {
         let mut local = [[0; GROUP]; N];
-        table.number(group, &mut local);
+        set.number(group, &mut local);
         let start = self.vertices.len();
-        let ranks = table.sort_into(&mut self.vertices);
+        let ranks = set.sort_into(&mut self.vertices);
         if with_corners {
             for of_corner in &mut local {
                 for number in &mut of_corner[..group.len()] {
@@ -78,43 +90,41 @@ impl<const N: usize> Unique<N> {
     }
 }
 
-fn of_block<const N: usize>(corners: &[[u32; N]], with_corners: bool) -> Unique<N> {
-    let mut table = VertexTable::default();
+fn of_block<const N: usize>(
+    corners: &[[u32; N]],
+    set: &mut VertexSet,
+    with_corners: bool,
+) -> Unique<N> {
     let n_clusters = corners.len().div_ceil(GROUP);
     let mut unique = Unique::with_capacity(n_clusters, n_clusters * GROUP, with_corners);
     for group in corners.chunks(GROUP) {
-        unique.push(group, &mut table, with_corners);
+        unique.push(group, set, with_corners);
     }
     unique
 }
 
-/// The vertices of a cluster seen so far, numbered as they come: a hash table with linear probing.
-struct VertexTable {
-    /// The vertex in each slot, or [`EMPTY`](VertexTable::EMPTY).
-    vertices: [u32; VertexTable::SLOTS],
-    /// Its number.
-    numbers: [u8; VertexTable::SLOTS],
-    /// The vertices by number. The highest bit is inverted: registers compare signed numbers.
+/// The vertices of a cluster seen so far, numbered as they come: a sparse set (Briggs, Torczon, An efficient
+/// representation for sparse sets, 1993). It never has to be cleared: a vertex is in the set if the number in its slot leads
+/// back to it.
+struct VertexSet {
+    /// For each vertex of the body its number, or what an earlier cluster left.
+    numbers: Vec<u8>,
+    /// The vertices by number, else [`NONE`](VertexSet::NONE). The highest bit is inverted: registers compare signed numbers.
     found: [i32; 4 * GROUP],
     n: usize,
 }
 
-impl Default for VertexTable {
-    fn default() -> Self {
-        VertexTable {
-            vertices: [VertexTable::EMPTY; VertexTable::SLOTS],
-            numbers: [0; VertexTable::SLOTS],
-            found: [0; 4 * GROUP],
+impl VertexSet {
+    /// No vertex: bodies have fewer.
+    const NONE: i32 = i32::MAX;
+
+    fn new(n_vertices: usize) -> Self {
+        VertexSet {
+            numbers: vec![0; n_vertices],
+            found: [VertexSet::NONE; 4 * GROUP],
             n: 0,
         }
     }
-}
-
-impl VertexTable {
-    /// At most half of them are taken: a cluster has up to four corners per primitive.
-    const SLOTS: usize = 2 * 4 * GROUP;
-    /// No vertex: bodies have fewer.
-    const EMPTY: u32 = u32::MAX;
 
     /// Numbers the vertices of a cluster as they come, and writes the number of each corner.
     ///
@@ -122,25 +132,16 @@ impl VertexTable {
     /// memory, each corner would wait for the one before it.
     #[inline(always)]
     fn number<const N: usize>(&mut self, group: &[[u32; N]], local: &mut LocalCorners<N>) {
-        self.vertices.fill(VertexTable::EMPTY);
+        self.found.fill(VertexSet::NONE);
         let mut n = 0;
         for (place, primitive) in group.iter().enumerate() {
             for (of_corner, &vertex) in local.iter_mut().zip(primitive) {
-                // Fibonacci hashing (Knuth, TAOCP 3, 6.4): the highest bits of the product with 2^32 over the golden
-                // ratio.
-                let hash =
-                    vertex.wrapping_mul(0x9E37_79B1) >> (u32::BITS - VertexTable::SLOTS.ilog2());
-                let mut slot = hash as usize;
-                let mut held = self.vertices[slot];
-                while (held != vertex) & (held != VertexTable::EMPTY) {
-                    slot = (slot + 1) % VertexTable::SLOTS;
-                    held = self.vertices[slot];
-                }
-                let is_new = held != vertex;
-                let number = select_unpredictable(is_new, n as u8, self.numbers[slot]);
-                self.vertices[slot] = vertex;
-                self.numbers[slot] = number;
-                self.found[n % (4 * GROUP)] = vertex as i32 ^ i32::MIN;
+                let slot = &mut self.numbers[vertex as usize];
+                let signed = vertex as i32 ^ i32::MIN;
+                let is_new = self.found[usize::from(*slot)] != signed;
+                let number = select_unpredictable(is_new, n as u8, *slot);
+                *slot = number;
+                self.found[n % (4 * GROUP)] = signed;
                 n += usize::from(is_new);
                 of_corner[place] = number;
             }
@@ -191,10 +192,27 @@ mod tests {
             .collect()
     }
 
-    /// The whole range of numbers, all different, all equal, and clusters and blocks that are not full.
+    /// Bodies with so many vertices need too much memory for a test.
+    #[test]
+    fn the_highest_numbers_are_sorted_too() {
+        let vertices = [u32::MAX - 1, 0, u32::MAX - 2, 1 << 31, (1 << 31) - 1, 7];
+        let mut set = VertexSet::new(0);
+        for (found, vertex) in set.found.iter_mut().zip(vertices) {
+            *found = vertex as i32 ^ i32::MIN;
+        }
+        set.n = vertices.len();
+        let mut sorted = Vec::new();
+        let ranks = set.sort_into(&mut sorted);
+        assert!(sorted.is_sorted() && sorted.len() == CHUNK);
+        for (vertex, rank) in vertices.into_iter().zip(ranks) {
+            assert_eq!(sorted[usize::from(rank)], vertex);
+        }
+    }
+
+    /// All different, all equal, and clusters and blocks that are not full; with one thread and with two.
     #[test]
     fn vertices_ascend_once_each_and_corners_name_them() {
-        let highest = vec![[u32::MAX - 1, 0, u32::MAX - 2], [1 << 31, (1 << 31) - 1, 7]];
+        let highest = vec![[1 << 20, 0, (1 << 20) - 1], [1, 1 << 19, 7]];
         let different: Vec<[u32; 3]> = (0..64).map(|k| [3 * k + 2, 3 * k, 3 * k + 1]).collect();
         let cases = [
             Vec::new(),
@@ -202,11 +220,14 @@ mod tests {
             different,
             vec![[5; 3]; 130],
             scattered(BLOCK * GROUP + 100, 60),
-            scattered(2 * BLOCK * GROUP + 1, u32::MAX - 1),
+            scattered(2 * BLOCK * GROUP + 1, 1 << 20),
         ];
         for faces in cases {
-            let unique = Unique::new(&faces, true);
-            let alone = Unique::new(&faces, false);
+            let [unique, alone] = [(1, true), (2, false)].map(|(n_threads, with_corners)| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads);
+                let make = || Unique::new(&faces, 1 + (1 << 20), with_corners);
+                pool.build().expect("threads").install(make)
+            });
             assert_eq!(alone.vertices, unique.vertices);
             assert!(alone.starts == unique.starts && alone.corners.is_empty());
             assert_eq!(unique.starts.len(), faces.len().div_ceil(GROUP) + 1);

@@ -51,6 +51,12 @@ impl Vec4 {
     }
 
     #[inline(always)]
+    fn half(self) -> Self {
+        // SAFETY: SSE2.
+        Vec4(unsafe { std::arch::x86_64::_mm_mul_ps(self.0, Self::splat(0.5).0) })
+    }
+
+    #[inline(always)]
     pub(crate) fn xyz(self) -> [f32; 3] {
         let mut out = [0.0f32; 4];
         // SAFETY: `out` holds 16 bytes.
@@ -110,6 +116,11 @@ impl Vec4 {
     }
 
     #[inline(always)]
+    fn half(self) -> Self {
+        Vec4(self.0.map(|x| 0.5 * x))
+    }
+
+    #[inline(always)]
     pub(crate) fn xyz(self) -> [f32; 3] {
         [self.0[0], self.0[1], self.0[2]]
     }
@@ -150,4 +161,17 @@ pub(crate) fn of_vertices_f32(positions: &[[f32; 3]], vertices: &[u32]) -> (Boun
     };
     let [x, y, z] = sum[0].add(sum[1]).add(sum[2].add(sum[3])).xyz();
     (bounds, (x + y + z).is_finite())
+}
+
+/// The middle of an element's box: the result of [`Bounds::center`].
+#[inline(always)]
+pub(crate) fn center_f32<const N: usize>(positions: &[[f32; 3]], corners: &[u32; N]) -> [f32; 3] {
+    let first = Vec4::load(positions, corners[0] as usize);
+    let (mut min, mut max) = (first, first);
+    for &vertex in &corners[1..] {
+        let vertex = Vec4::load(positions, vertex as usize);
+        min = min.min(vertex);
+        max = max.max(vertex);
+    }
+    min.half().add(max.half()).xyz()
 }

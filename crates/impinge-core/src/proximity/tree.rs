@@ -25,7 +25,7 @@ impl Tree {
         let mut tree = Tree {
             clustering: Clustering::new(
                 body.elements(),
-                hull::of_each(body.elements(), body.positions()),
+                hull::centers(body.elements(), body.positions()),
             ),
             topology_stamp: body.topology_stamp(),
             positions_stamp: 0,

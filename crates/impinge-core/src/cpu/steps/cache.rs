@@ -57,7 +57,7 @@ impl LayerCache {
     /// Clusters a part of a body in its pose at the start of the step.
     pub fn new(body: &Body, part: Part) -> Self {
         let (elements, positions) = (body.part(part), body.positions());
-        let mut clustering = Clustering::new(elements, hull::of_each(elements, positions));
+        let mut clustering = Clustering::new(elements, hull::centers(elements, positions));
         if let (Part::Vertices, Elements::Points(vertices)) = (part, &clustering.corners) {
             // Vertices are numbered as positions are.
             clustering.order = vertices.iter().map(|&[ix]| ElementIx::new(ix)).collect();

@@ -85,7 +85,7 @@ impl FirstContacts {
 
     /// Contacts later than this are not wanted.
     #[inline(always)]
-    pub(in super::super) fn until(&self, world: World<'_>) -> f64 {
+    pub fn until(&self, world: World<'_>) -> f64 {
         match self.asked.sought {
             // Contacts that are later by less than rounding are wanted, for their keys may be lower.
             Sought::Earliest => {
