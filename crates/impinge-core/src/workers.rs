@@ -102,6 +102,8 @@ impl Workers {
     /// As [`new`](Workers::new), with another placement of helpers and other thresholds.
     pub(crate) fn tuned(threads: usize, placement: Placement, tuning: Tuning) -> Self {
         let (pool, n) = match threads {
+            // One thread, without what a pool needs.
+            0 if cfg!(target_family = "wasm") => (OnceLock::new(), 1),
             0 if is_forked() => (OnceLock::new(), rayon::current_num_threads()),
             0 => (Pool::OfProcess.into(), rayon::current_num_threads()),
             n => (OnceLock::new(), n),

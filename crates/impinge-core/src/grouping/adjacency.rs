@@ -16,12 +16,10 @@
 //! Cost: `O(n · valence)` once per topology; about 8 bytes per primitive for the own masks and about as much
 //! for those of neighbours, at most `HUB` entries per corner.
 
-use rayon::prelude::*;
-
 use crate::index::{ClusterIx, Place};
 
-use super::GROUP;
 use super::hubs::{self, HUB};
+use super::{GROUP, parallel};
 
 /// The masks of one body's clusters.
 #[derive(Debug)]
@@ -54,11 +52,10 @@ impl Adjacency {
     pub fn new<const N: usize>(corners: &[[u32; N]]) -> Self {
         let incidence = ElementsAtVertices::new(corners);
         let n_clusters = corners.len().div_ceil(GROUP);
-        let parts: Vec<ClusterMasks> = (0..n_clusters)
-            .into_par_iter()
-            .with_min_len(32)
-            .map(|cluster| part(ClusterIx::from_usize(cluster), corners, &incidence))
-            .collect();
+        let of_cluster = |(): &mut (), cluster: usize| -> ClusterMasks {
+            part(ClusterIx::from_usize(cluster), corners, &incidence)
+        };
+        let parts = parallel::made(n_clusters, 32, || (), of_cluster);
         let mut adjacency = Adjacency {
             own: Vec::with_capacity(corners.len()),
             neighbors: Vec::new(),

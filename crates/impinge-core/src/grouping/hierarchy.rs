@@ -18,7 +18,7 @@
 
 use std::ops::Range;
 
-use rayon::join;
+use super::parallel::join;
 
 /// The most children of a node.
 pub(crate) const FANOUT: usize = 8;

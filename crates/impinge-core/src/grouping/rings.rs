@@ -14,9 +14,8 @@
 //!
 //! Cost: `O(n)` once per topology; 20 bytes per triangle.
 
-use rayon::prelude::*;
-
 use super::hubs::{self, HUB};
+use super::parallel;
 
 /// The vertices of one task while rings are ordered.
 const MIN_VERTICES: usize = 4096;
@@ -91,7 +90,7 @@ impl Rings {
                 rest_sides.split_at_mut((side_starts[end] - side_starts[first]) as usize);
             parts.push((first..end, part, part_sides));
         }
-        parts.into_par_iter().for_each(|(range, part, sides)| {
+        parallel::for_each(parts, |(range, part, sides)| {
             let (first, first_side) = (starts[range.start], side_starts[range.start]);
             for vertex in range {
                 let ring = (starts[vertex] - first) as usize..(starts[vertex + 1] - first) as usize;

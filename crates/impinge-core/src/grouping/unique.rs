@@ -8,9 +8,7 @@
 
 use std::hint::select_unpredictable;
 
-use rayon::prelude::*;
-
-use super::{CHUNK, GROUP};
+use super::{CHUNK, GROUP, parallel};
 
 /// Clusters that one of several threads takes at a time.
 const BLOCK: usize = 64;
@@ -37,14 +35,17 @@ impl<const N: usize> Unique<N> {
     /// numbered too.
     pub fn new(corners: &[[u32; N]], n_vertices: usize, with_corners: bool) -> Self {
         // One block needs no copy.
-        let block = match rayon::current_num_threads() {
+        let block = match parallel::n_threads() {
             1 => corners.len().max(1),
             _ => BLOCK * GROUP,
         };
-        let blocks = corners.par_chunks(block);
         let set = || VertexSet::new(n_vertices);
-        let of_block = |set: &mut VertexSet, block: &[_]| of_block(block, set, with_corners);
-        let mut blocks: Vec<Self> = blocks.map_init(set, of_block).collect();
+        let of_block = |set: &mut VertexSet, ix: usize| {
+            let corners = &corners[ix * block..];
+            of_block(&corners[..corners.len().min(block)], set, with_corners)
+        };
+        let n_blocks = corners.len().div_ceil(block);
+        let mut blocks: Vec<Self> = parallel::made(n_blocks, 1, set, of_block);
         if let [all] = &mut blocks[..] {
             all.vertices.shrink_to_fit();
             return blocks.swap_remove(0);

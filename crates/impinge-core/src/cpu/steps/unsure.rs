@@ -17,7 +17,7 @@ pub(super) fn settle(job: Job<'_>, world: World<'_>, workers: &mut [Worker]) {
     for worker in &mut *workers {
         unsure.append(worker.contacts().unsure());
     }
-    unsure.sort_unstable_by_key(|(between, places)| (between.a, between.b, *places));
+    // They come in runs of two layers, as workers find them.
     let runs = unsure.chunk_by(|(between, _), (next, _)| between == next);
     let tasks: Vec<_> = runs.flat_map(|run| run.chunks(TASK)).collect();
     job.workers.for_each(workers, tasks.len(), |worker, ix| {
