@@ -9,13 +9,13 @@ use crate::ours::{Feed, Ours};
 use crate::problem::{Ask, Problem, models, posed};
 use crate::report::{Report, figures, grouped};
 use crate::runner::Runner;
-use crate::{Failure, Options, files, gpu, near, once, step_sizes, steps};
+use crate::{Failure, Options, distance, files, gpu, near, once, step_sizes, steps};
 
 /// Runs a command by its name.
 pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
     let mut report = match command {
         "two-body" | "motion" | "self" | "tets" | "bodies" | "sizes" | "adversarial" | "gpu"
-        | "regular" | "steps" | "step-sizes" | "near" | "once" => Report::new(command),
+        | "regular" | "steps" | "step-sizes" | "near" | "distance" | "once" => Report::new(command),
         "device" => {
             println!("{}", gpu::slug(&gpu::device(options)?));
             return Ok(());
@@ -34,6 +34,7 @@ pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
         "steps" => steps::run(options, &mut report)?,
         "step-sizes" => step_sizes::run(options, &mut report)?,
         "near" => near::run(options, &mut report)?,
+        "distance" => distance::run(options, &mut report)?,
         "once" => once::run(options, &mut report)?,
         _ => adversarial_scenes(options, &mut report)?,
     }

@@ -11,6 +11,7 @@
 //! contest, and need not sort their answer.
 
 mod commands;
+mod distance;
 #[cfg(feature = "embree")]
 mod embree;
 mod files;
@@ -57,6 +58,7 @@ commands:
   steps         contacts of moving cloth: all, the earliest, any, how far a step can be taken, pairs of boxes;
                 --scene cloth-ball|cloth-funnel
   step-sizes    the same questions about two layers of cloth of 10^3 to 10^6 faces: time and memory against size
+  distance      the smallest distance of two bodies: --scene dragon|bunny
   near          elements within a distance, of a mesh with itself: --scene cloth-ball|rumba
   once          the first frame of a new detector, by each method: --scene ball|bunny|buddha|dragon
   gpu           the scenes of two-body and self on a GPU: stages on the device beside a lower bound

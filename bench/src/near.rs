@@ -88,8 +88,8 @@ struct Mesh<'a> {
 }
 
 #[cfg_attr(
-    not(any(feature = "embree", feature = "parry")),
-    allow(unused, reason = "no peers")
+    not(all(feature = "embree", feature = "parry")),
+    allow(unused, reason = "for peers")
 )]
 fn peers(mesh: &Mesh<'_>, n_threads: usize) -> Result<Peers, Failure> {
     let mut peers = Peers::new();

@@ -217,6 +217,7 @@ fn faces(a: &[Point; 4], b: &[Point; 4]) -> Faces {
 
 /// The square of the distance of a point and a triangle, by the regions of the triangle's nearest point: C. Ericson, Real-Time
 /// Collision Detection, 2005, section 5.1.5.
+#[cfg_attr(not(feature = "embree"), allow(dead_code, reason = "for peers"))]
 #[inline]
 pub fn square_of_point_and_triangle(p: Point, [a, b, c]: [Point; 3]) -> f64 {
     let along =
