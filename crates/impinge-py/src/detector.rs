@@ -15,7 +15,7 @@ use crate::question::{question, step_question};
 use crate::result::Answer;
 use crate::scene::Scene;
 use crate::settings::{self, Argument, Told, unexpected, unsigned};
-use crate::steps::{self, Advance, Candidates, Impact, Impacts};
+use crate::steps::{self, Advance, Candidates, Impact, Impacts, Spare};
 use crate::watch::{CancelToken, Watch};
 
 /// Finds intersecting pairs, frame after frame. Scratch memory lives here and is used again.
@@ -69,6 +69,8 @@ pub struct Detector {
     inner: impinge::Detector,
     /// The process that made it, whose threads a fork does not have.
     process: u32,
+    /// None under a memory budget.
+    spare: Option<Spare>,
 }
 
 #[pymethods]
@@ -113,11 +115,13 @@ impl Detector {
             placement,
         };
         let settings = told.settings()?;
+        let spare = settings.memory_budget.is_none().then(Spare::default);
         // Looking for a GPU and starting threads takes a while.
         let inner = py.detach(|| impinge::Detector::with_settings(settings));
         Ok(Detector {
             inner: inner.map_err(raise)?,
             process: std::process::id(),
+            spare,
         })
     }
 
@@ -573,17 +577,22 @@ impl Detector {
         cancel: Argument<'_, '_>,
     ) -> PyResult<Candidates> {
         let ask = candidate_question([between, within, ignore, owned_by], kinds, distance)?;
+        // A detector that is in use is refused below.
+        let detector = slf.try_borrow().ok();
+        let spare = detector.and_then(|detector| detector.spare.clone());
         let answer = |detector: &mut impinge::Detector,
                       scene: &impinge::Scene,
                       query: &CandidateQuery,
                       control: &Control<'_>| {
+            if let Some(candidates) = spare.as_ref().and_then(Spare::take) {
+                detector.reuse_candidates(candidates);
+            }
             detector.candidates_with(scene, query, control)?;
             Ok(detector.take_candidates())
         };
         let watched = (scene, progress, cancel);
-        Ok(Candidates::new(
-            Detector::watched(slf, watched, ask, answer)?.0,
-        ))
+        let (candidates, ..) = Detector::watched(slf, watched, ask, answer)?;
+        Ok(Candidates::new(candidates, spare.clone()))
     }
 
     /// All `candidates` in sorted runs, one after the other, so that memory need not hold all of them. Run after
@@ -661,7 +670,7 @@ impl Detector {
                       control: &Control<'_>| {
             // Called on the thread that called from Python.
             let hand_over = |run: impinge::Candidates| {
-                let called = Python::attach(|py| each.call1(py, (Candidates::new(run),)));
+                let called = Python::attach(|py| each.call1(py, (Candidates::new(run, None),)));
                 match called {
                     Ok(_) => ControlFlow::Continue(()),
                     Err(error) => ControlFlow::Break(error),

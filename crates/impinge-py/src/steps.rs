@@ -1,5 +1,7 @@
 //! `impinge.Impacts`, `Impact`, `Advance` and `Candidates`: the answers about a step.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use impinge::{PairKind, Primitive};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError};
@@ -340,11 +342,32 @@ impl Advance {
 #[pyclass(module = "impinge", frozen)]
 pub struct Candidates {
     inner: impinge::Candidates,
+    spare: Option<Spare>,
+}
+
+/// Candidates that are no longer needed. Their detector uses their memory again.
+#[derive(Clone, Default)]
+pub struct Spare(Arc<Mutex<Option<impinge::Candidates>>>);
+
+impl Spare {
+    pub fn take(&self) -> Option<impinge::Candidates> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+}
+
+impl Drop for Candidates {
+    fn drop(&mut self) {
+        if let Some(Spare(spare)) = &self.spare {
+            let mut spare = spare.lock().unwrap_or_else(PoisonError::into_inner);
+            spare.get_or_insert_with(|| std::mem::take(&mut self.inner));
+        }
+    }
 }
 
 impl Candidates {
-    pub fn new(inner: impinge::Candidates) -> Self {
-        Candidates { inner }
+    /// Candidates that go to `spare`, if there is one, when Python drops them.
+    pub fn new(inner: impinge::Candidates, spare: Option<Spare>) -> Self {
+        Candidates { inner, spare }
     }
 
     fn all(&self) -> impl Iterator<Item = (PairKind, [u32; 4])> + '_ {

@@ -252,6 +252,24 @@ def test_candidates(detector):
         detector.candidates(scene, kinds=3)
 
 
+@pytest.mark.parametrize("memory_budget", [None, 1 << 26])
+def test_memory_of_candidates_is_used_again_only_once_they_are_gone(memory_budget):
+    def listed(candidates):
+        return np.hstack([candidates.bodies, candidates.elements])
+
+    detector = impinge.Detector(backend="cpu", memory_budget=memory_budget)
+    scenes = [lattice_step(seed=seed) for seed in range(4)]
+    expected = [listed(impinge.Detector(backend="cpu").candidates(scene)) for scene in scenes]
+    kept = detector.candidates(scenes[0])
+    assert len({len(rows) for rows in expected}) > 1
+    for scene, rows in zip(scenes[1:], expected[1:]):
+        # Each is dropped when the next one has been found.
+        found = detector.candidates(scene)
+        assert np.array_equal(listed(found), rows)
+        assert len(found) == len(rows)
+    assert np.array_equal(listed(kept), expected[0])
+
+
 def test_candidates_in_runs(detector):
     scene = lattice_step(14, 3)
     question = {"kinds": ["vf", "ee", "ff"], "distance": 0.25}

@@ -474,6 +474,12 @@ impl Detector {
         std::mem::take(&mut self.steps.candidates)
     }
 
+    /// Takes back candidates that are no longer needed: the next answer uses their memory. New memory for millions of
+    /// candidates costs a tenth of the time to find them.
+    pub fn reuse_candidates(&mut self, candidates: Candidates) {
+        self.steps.candidates = candidates;
+    }
+
     /// Statistics of the last answer about a step: by [`impacts`](Detector::impacts),
     /// [`earliest`](Detector::earliest), [`is_free`](Detector::is_free) or [`advance`](Detector::advance).
     pub fn step_stats(&self) -> &Statistics {
