@@ -7,7 +7,6 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::cpu::simd::Isa;
 use crate::error::Error;
 use crate::frame::{TestId, owner_by_first};
 use crate::impacts::{LeftPair, StepAnswer};
@@ -27,7 +26,6 @@ const SOONEST: usize = 256;
 
 /// Settles pairs as they come.
 pub(super) struct Left<'a, 'b> {
-    pub isa: Isa,
     pub job: Job<'a>,
     pub world: World<'a>,
     pub answer: StepAnswer<'a>,
@@ -74,14 +72,13 @@ impl Left<'_, '_> {
     /// Settles pairs, run by run.
     fn settle_each(&mut self, pairs: &mut [LeftPair]) -> Result<bool, Error> {
         let Left {
-            isa,
             job,
             world,
             answer,
             workers,
             first_places,
         } = self;
-        let (isa, world, answer, job) = (*isa, *world, *answer, *job);
+        let (world, answer, job) = (*world, *answer, *job);
         let first_places = &first_places[..];
         let wrong = Mutex::new(None);
         let tasks: Vec<Mutex<&mut [LeftPair]>> = pairs.chunks_mut(TASK).map(Mutex::new).collect();
@@ -93,8 +90,7 @@ impl Left<'_, '_> {
                     return;
                 }
                 let mut pairs = tasks[ix].lock().unwrap_or_else(PoisonError::into_inner);
-                if let Err(error) = settle(isa, world, first_places, &mut pairs, worker.contacts())
-                {
+                if let Err(error) = settle(world, first_places, &mut pairs, worker.contacts()) {
                     *wrong.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
                 }
             });
@@ -118,7 +114,6 @@ impl Left<'_, '_> {
 
 /// Settles the pairs of one task.
 fn settle(
-    isa: Isa,
     world: World<'_>,
     first_places: &[u32],
     pairs: &mut [LeftPair],
@@ -145,9 +140,9 @@ fn settle(
         let places = run
             .iter()
             .map(|LeftPair { places: [p, q], .. }| [p - firsts[0], q - firsts[1]].map(Place::new));
-        contacts.take_left(isa, world, Between { a, b, kind }, places);
+        contacts.take_left(world.isa, world, Between { a, b, kind }, places);
     }
-    contacts.settle(isa, world);
+    contacts.settle(world.isa, world);
     Ok(())
 }
 

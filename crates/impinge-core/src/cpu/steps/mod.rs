@@ -188,7 +188,6 @@ impl StepClusters {
         answer.share(self.bytes_besides_room() as u64);
         let known = Known::new();
         let mut left = left::Left {
-            isa: self.isa,
             job,
             world: World {
                 isa: self.isa,
