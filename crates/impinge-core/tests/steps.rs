@@ -1,5 +1,7 @@
 //! Steps: what touches while bodies move, when first, and how far a step can be taken.
 
+mod common;
+
 use std::ops::ControlFlow;
 
 use impinge_core::exact::{ElementPair, first_contact};
@@ -157,30 +159,10 @@ fn a_step_that_is_advanced_is_free_to_its_rounded_end() {
 #[test]
 fn a_step_is_advanced_as_far_as_by_testing_all_pairs() {
     let mut n_backed_off = 0;
-    for seed in 0..60 {
+    for seed in 0..600 {
         let mut random = impinge_scenes::Random::new(seed);
         let (far, n) = ([3000.0, 40_000.0, 7.0][seed as usize % 3], 24);
-        let slope = |x: f32, y: f32| 0.37 * x + 0.21 * y;
-        let way = [random.range(-0.5, 0.5), random.range(-0.5, 0.5), -1.5];
-        let corners = [[-9.0, -8.0], [9.0, -7.0], [1.0, 9.0]];
-        let mut ends = [(); 2].map(|()| corners.map(|[x, y]| [x, y, slope(x, y)]).to_vec());
-        for _ in 0..n {
-            let (x, y) = (random.range(-2.0, 2.0), random.range(-2.0, 2.0));
-            let lowest = [x, y, slope(x, y) + random.range(1.0, 1.0 + 1e-6 * far)];
-            let triangle = [
-                lowest,
-                [x + random.range(-0.2, 0.2), y - 0.1, lowest[2] + 0.5],
-                [x + random.range(-0.2, 0.2), y + 0.1, lowest[2] + 0.5],
-            ];
-            let [start, end] = &mut ends;
-            start.extend(triangle);
-            end.extend(triangle.map(|[x, y, z]| [x + way[0], y + way[1], z + way[2]]));
-        }
-        let faces = Vec::from_iter((0..=n).map(|face| [0, 1, 2].map(|corner| 3 * face + corner)));
-        let [start, end] = ends.map(|points| {
-            let moved = points.iter().map(|point| point.map(|x| x + far));
-            moved.collect::<Vec<[f32; 3]>>()
-        });
+        let (faces, [start, end]) = common::landing(&mut random, n, 2.0, far);
         let step = Step::default().start(Start::Skip);
         for is_single in [true, false] {
             let mut scene = Scene::new();
@@ -209,45 +191,94 @@ fn a_step_is_advanced_as_far_as_by_testing_all_pairs() {
     assert!(n_backed_off > 20, "{n_backed_off}");
 }
 
-/// Sheets whose gap is below what rounding moves vertices: too many pairs are close for a list of them.
+/// Thousands of triangles that land within a last bit: too many pairs are close for the list of one thread.
 #[test]
-fn a_step_of_sheets_that_nearly_touch_is_free_to_its_rounded_end() {
-    const N: u32 = 60;
-    let at = |x: u32, y: u32| x + y * (N + 1);
-    let faces = Vec::from_iter((0..N * N).flat_map(|square| {
-        let (x, y) = (square % N, square / N);
-        let (p, q, r, s) = (at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1));
-        [[p, q, r], [q, s, r]]
-    }));
-    let sheet = |z: f32, tilt: f32| {
-        let points = (0..(N + 1) * (N + 1)).map(|ix| {
-            let (x, y) = ((ix % (N + 1)) as f32, (ix / (N + 1)) as f32);
-            [2000.0 + x, 2000.0 + y, 0.125 * z + tilt * x]
+fn a_step_is_advanced_freely_where_very_many_pairs_are_close() {
+    let mut n_backed_off = 0;
+    for seed in 0..8 {
+        let mut random = impinge_scenes::Random::new(seed);
+        let (faces, [start, end]) = common::landing(&mut random, 30_000, 400.0, 40_000.0);
+        let mut scene = Scene::new();
+        let body = scene.add_triangles(&faces, &start).expect("good");
+        scene.set_end_positions(body, &end).expect("good");
+        let step = Step::default().start(Start::Skip);
+        let advances = [1, 4].map(|threads| {
+            let settings = Settings {
+                backend: Backend::Cpu,
+                threads,
+                ..Settings::default()
+            };
+            let mut detector = Detector::with_settings(settings).expect("settings");
+            detector.advance(&scene, &step).expect("good")
         });
-        Vec::from_iter(points)
-    };
-    let mut scene = Scene::new();
-    let lower = scene.add_triangles(&faces, &sheet(0.0, 0.0));
-    let upper = scene.add_triangles(&faces, &sheet(2f32.powi(-12), 0.0));
-    let (lower, upper) = (lower.expect("good"), upper.expect("good"));
-    scene
-        .set_end_positions(lower, &sheet(3.0, 0.0))
-        .expect("good");
-    scene
-        .set_end_positions(upper, &sheet(3.0, -0.001))
-        .expect("good");
-    let mut detector = Detector::new(Backend::Cpu).expect("settings");
-    let step = Step::default();
-    let advance = detector.advance(&scene, &step).expect("good");
-    assert!(0.0 < advance.fraction && advance.fraction < 1.0);
-    let mut rounded = scene.clone();
-    for (body, positions) in &advance.positions {
-        let Positions::F32(positions) = positions else {
-            panic!("double precision")
-        };
-        rounded.set_end_positions(*body, positions).expect("good");
+        assert_eq!(advances[0], advances[1], "{seed}");
+        let advance = &advances[0];
+        n_backed_off += u32::from(advance.n_tried > 2);
+        for (body, positions) in &advance.positions {
+            let Positions::F32(positions) = positions else {
+                panic!("double precision")
+            };
+            scene.set_end_positions(*body, positions).expect("good");
+        }
+        let mut detector = Detector::new(Backend::Cpu).expect("settings");
+        assert!(detector.is_free(&scene, &step).expect("good"), "{seed}");
     }
-    assert!(detector.is_free(&rounded, &step).expect("good"));
+    assert!(n_backed_off > 1, "{n_backed_off}");
+}
+
+/// Elements that are nearer to a tie than single precision can tell: about half of them touch, or are within a distance, or have boxes that do.
+#[test]
+fn elements_in_double_precision_are_answered_as_pair_by_pair() {
+    let mut n_found = [0; 3];
+    let mut n_candidates = 0;
+    for seed in 0..40 {
+        let mut random = impinge_scenes::Random::new(seed);
+        let far = [3000.0, 40_000.0][seed as usize % 2];
+        let (faces, [start, end]) = common::landing(&mut random, 60, 3.0, far);
+        let tie = 1e-7 * f64::from(far);
+        // All land between 0.5 and 0.5 + 2 `tie`, and the step ends in the middle.
+        let at = |time: f64| {
+            let pairs = start.iter().zip(&end);
+            let points = pairs.map(|(x, y)| {
+                let way = |k: usize| (f64::from(y[k]) - f64::from(x[k])) * time;
+                std::array::from_fn(|k| (f64::from(x[k]) + way(k)) / 3.0)
+            });
+            points.collect::<Vec<[f64; 3]>>()
+        };
+        let mut scene = Scene::new();
+        let body = scene.add_triangles(&faces, &at(0.0)).expect("good");
+        scene.set_end_positions(body, &at(0.5 + tie)).expect("good");
+        let mut still = Scene::new();
+        still
+            .add_triangles(&faces, &at(0.5 - 2.0 * tie))
+            .expect("good");
+        let kinds = [PairKind::VertexFace, PairKind::EdgeEdge];
+        let near = NearQuery::new(Query::everything())
+            .distance(0.2 * tie)
+            .kinds(kinds);
+        let candidates = CandidateQuery::new(Query::everything()).distance(0.01);
+        let answers = Vec::from_iter(detectors().into_iter().map(|mut detector| {
+            let impacts = detector.impacts(&scene, &Step::default()).expect("good");
+            let impacts = (impacts.len(), impacts.hash());
+            let near = detector.within_distance(&still, &near).expect("good");
+            let near = (near.len(), near.hash());
+            let keep = (Step::default()).separation(0.1 * tie);
+            let kept = detector.impacts(&scene, &keep).expect("good");
+            let kept = (kept.len(), kept.hash());
+            let candidates = detector.candidates(&scene, &candidates).expect("good");
+            let candidates = (candidates.len(), candidates.hash());
+            [impacts, near, kept, candidates]
+        }));
+        assert_eq!(answers[0], answers[1], "{seed}");
+        for (n, (found, _)) in n_found.iter_mut().zip(&answers[0]) {
+            *n += found;
+        }
+        n_candidates += answers[0][3].0;
+    }
+    assert!(
+        n_found.iter().all(|&n| n > 100) && n_candidates > 1000,
+        "{n_found:?} {n_candidates}"
+    );
 }
 
 #[test]

@@ -324,13 +324,13 @@ impl Detector {
         Ok(self.steps.found.iter().all(Vec::is_empty))
     }
 
-    /// How far the step can be taken: the largest fraction of it, backed off as little as the precision of positions
-    /// allows, for which the straight way from the start to the *rounded* positions is free.
+    /// How far the step can be taken: a fraction of it, backed off from the first contact hardly more than the precision of positions
+    /// asks for, for which the straight way from the start to the *rounded* positions is free.
     ///
     /// Positions that are stored are rounded, and rounding alone may make elements touch that did not. So each fraction is
     /// tried: positions are rounded first, and the way to those is tested as by [`is_free`](Detector::is_free). A chain of such
     /// steps is free from the first to the last, whatever the rounding. The first fraction tried is that of the first
-    /// contact; then the back-off doubles, from the last bit on. Only pairs that come closer than rounding moves their vertices are tested.
+    /// contact; then the back-off doubles, from the last bit on, so it is less than twice what is needed. Only pairs that come closer than rounding moves their vertices are tested.
     ///
     /// Pairs that touch at the start allow no step at all under [`Start::Report`], and are not looked at under
     /// [`Start::Skip`].
@@ -498,12 +498,12 @@ impl Detector {
         Ok(&self.steps.candidates)
     }
 
-    /// The impacts that were found last, out of the detector without a copy. Until the next step it then holds none.
+    /// Moves the impacts found last out of the detector, without a copy. It holds none until the next question.
     pub fn take_impacts(&mut self) -> Impacts {
         std::mem::take(&mut self.steps.impacts)
     }
 
-    /// The candidates that were found last, out of the detector without a copy. Until the next query it then holds none.
+    /// Moves the candidates found last out of the detector, without a copy. It holds none until the next question.
     pub fn take_candidates(&mut self) -> Candidates {
         std::mem::take(&mut self.steps.candidates)
     }

@@ -5,7 +5,7 @@
 use impinge_core::{
     Backend, BodyId, Detector, Method, Pairs, Query, Scene, Settings, SharedVertex, hash_rows,
 };
-use impinge_scenes::{Model, adversarial, soup, surfaces};
+use impinge_scenes::{Model, Random, adversarial, soup, surfaces};
 
 /// A scene and a query.
 pub struct Case {
@@ -260,4 +260,40 @@ fn fan(n: u32) -> Model {
         positions,
         elements: faces.into(),
     }
+}
+
+/// Triangles at the start and at the end of a step in which `n` of them land on a slope, nearly at once, each on a way of its own. The slope
+/// is a triangle too, the first. They land where x and y are at most `half_width` from `far`.
+pub fn landing(
+    random: &mut Random,
+    n: u32,
+    half_width: f32,
+    far: f32,
+) -> (Vec<[u32; 3]>, [Vec<[f32; 3]>; 2]) {
+    let slope = |x: f32, y: f32| 0.37 * x + 0.21 * y;
+    let corners = [[-4.5, -4.0], [4.5, -3.5], [0.5, 4.5]].map(|corner| {
+        let [x, y] = corner.map(|x: f32| x * half_width);
+        [x, y, slope(x, y)]
+    });
+    let mut ends = [(); 2].map(|()| corners.to_vec());
+    for _ in 0..n {
+        let [x, y] = [(); 2].map(|()| random.range(-half_width, half_width));
+        let triangle = [
+            [x, y, slope(x, y)],
+            [x + random.range(-0.2, 0.2), y - 0.1, slope(x, y) + 0.5],
+            [x + random.range(-0.2, 0.2), y + 0.1, slope(x, y) + 0.5],
+        ];
+        let way = [(); 3].map(|()| random.range(-0.5, 0.5) - 0.5);
+        let at = random.range(0.5, 0.5 + 2e-7 * far);
+        for (end, time) in ends.iter_mut().zip([0.0, 1.0]) {
+            let moved = |point: [f32; 3]| std::array::from_fn(|k| point[k] + (time - at) * way[k]);
+            end.extend(triangle.map(moved));
+        }
+    }
+    let faces = (0..=n).map(|face| [0, 1, 2].map(|corner| 3 * face + corner));
+    let ends = ends.map(|points| {
+        let points = points.iter().map(|point| point.map(|x| x + far));
+        points.collect()
+    });
+    (faces.collect(), ends)
 }

@@ -17,6 +17,7 @@ use crate::grouping::clusters::LocalFaces;
 
 use super::runs::{self, Members, RUN, RunExtents};
 use crate::hull::{ReadVertices, of_vertices_f32};
+use crate::positions::Real;
 
 /// Lanes of a mask, lowest first.
 pub(crate) struct Lanes(pub u64);
@@ -274,12 +275,22 @@ pub(crate) trait Simd: ReadVertices {
         n: usize,
         into: &mut [[f32; GROUP]; 3],
     ) {
-        for lane in 0..n {
-            let point = &positions[vertices[lane] as usize];
-            for axis in 0..3 {
-                into[axis][lane] = point[axis];
-            }
-        }
+        put_points(positions, vertices, n, into);
+    }
+
+    /// As [`put_points`](Self::put_points), each coordinate rounded to nearest.
+    ///
+    /// # Panics
+    /// If there is no such vertex.
+    #[inline(always)]
+    fn put_rounded_points(
+        self,
+        positions: &[[f64; 3]],
+        vertices: &[u32; GROUP],
+        n: usize,
+        into: &mut [[f32; GROUP]; 3],
+    ) {
+        put_points(positions, vertices, n, into);
     }
 
     /// Eight vertices as rows of x, y and z in double precision.
@@ -292,6 +303,22 @@ pub(crate) trait Simd: ReadVertices {
         vertices: [u32; LANES],
         rows: &mut [[f64; LANES]; 3],
     );
+}
+
+/// One coordinate after the other, rounded to nearest.
+#[inline(always)]
+fn put_points<R: Real>(
+    positions: &[[R; 3]],
+    vertices: &[u32; GROUP],
+    n: usize,
+    into: &mut [[f32; GROUP]; 3],
+) {
+    for lane in 0..n {
+        let point = &positions[vertices[lane] as usize];
+        for axis in 0..3 {
+            into[axis][lane] = <f32 as Real>::round(point[axis].widen());
+        }
+    }
 }
 
 /// One coordinate after the other.

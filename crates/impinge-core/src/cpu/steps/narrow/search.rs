@@ -5,8 +5,8 @@
 //! enclose  eight candidates: contact or none, and when, nearly always to all bits of an f32
 //! ```
 //!
-//! The two alternate on lists of a thousand pairs, so that no lane waits for another pair's search. Where close pairs are wanted too, those
-//! that are not are dropped first, by looking with a margin.
+//! The two alternate on lists of a thousand pairs, so that no lane waits for another pair's search. If close pairs are wanted too,
+//! pairs that stay beyond the margin are dropped first.
 
 use crate::cpu::simd::{Lanes, Simd};
 use crate::exact::ElementPair;

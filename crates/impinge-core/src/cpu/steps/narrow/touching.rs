@@ -5,8 +5,8 @@
 //! ```text
 //! far     sixteen pairs at a time in f32, from the tables of the two groups: apart along a few directions
 //! across  those that are left, put side by side: apart along their normals, or never in one plane
-//! aside   those that are left: one is always beside the other
-//!         (if positions are f64: far and across, eight pairs at a time)
+//! aside   those that are left: one element always stays beside the other
+//!         (if positions are f64: with a margin for their rounding in the tables)
 //! search  those that are left, a thousand at a time
 //! ```
 //!
@@ -53,10 +53,18 @@ impl Narrow for FirstContacts {
             return;
         }
         let until = self.until(world);
-        self.is_first = !batch.is_in_tables();
-        if !self.is_first {
+        let rounded = batch.rounded();
+        if self.open.is_empty() {
+            self.is_first = false;
+        }
+        if rounded.is_infinite() {
+            self.is_first = true;
+        } else {
             let tables = batch.groups.map(|group| &group.points);
-            let (until, met) = ((round_up(until), self.margin(world)), &mut *batch.met);
+            let (until, met) = (
+                (round_up(until), self.margin(world) + 2.0 * rounded),
+                &mut *batch.met,
+            );
             match between.kind {
                 PairKind::VertexFace => dispatch!(isa, drop_vertices_and_faces, (
                     tables: [&Moving64; 2] = tables,
