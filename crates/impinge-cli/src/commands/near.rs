@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use crate::apart::Inputs;
 use crate::args::NearArgs;
-use crate::detection::detector;
+use crate::detection::{detector, hit, without};
 use crate::error::Error;
 use crate::json::{counters, rounded};
 use crate::load::{Bodies, Loading};
@@ -67,10 +67,7 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     } else {
         print(&mut out(), args, &bodies, near)?;
     }
-    match args.fail_on_hit && !near.is_empty() {
-        true => Err(Error::Hit),
-        false => Ok(()),
-    }
+    hit(args.fail_on_hit, !near.is_empty())
 }
 
 fn query(args: &NearArgs, bodies: &Bodies) -> Result<Query, Error> {
@@ -79,17 +76,7 @@ fn query(args: &NearArgs, bodies: &Bodies) -> Result<Query, Error> {
         (_, true) => Query::everything(),
         (_, false) => Query::all(),
     };
-    let body = |number: usize| {
-        bodies.ids.get(number).copied().ok_or_else(|| {
-            Error::Usage(format!(
-                "--ignore names body {number}, but {} bodies are given, numbered from 0",
-                bodies.ids.len()
-            ))
-        })
-    };
-    args.ignore
-        .iter()
-        .try_fold(asked, |asked, &(a, b)| Ok(asked.ignore(body(a)?, body(b)?)))
+    without(asked, &args.ignore, &bodies.ids)
 }
 
 /// The object that `docs/near.schema.json` describes.

@@ -8,6 +8,7 @@ use impinge_scenes::surfaces::{ball, cube};
 use serde_json::Value;
 
 use crate::harness::{Folder, keys};
+use crate::schema::{schema, wrong};
 
 /// Two bodies, each at the start and at the end of a step in which one runs into the other.
 fn crash() -> [(&'static str, Model); 4] {
@@ -141,6 +142,21 @@ fn the_json_holds_what_the_library_says() {
         (&Value::Bool(false), &Value::Null)
     );
 
+    let schema = schema("step");
+    let free = folder.run(["step", "a0.ply", "a1.ply", "--json"]).json();
+    for object in [&answer, &alone, &free] {
+        assert_eq!(wrong(&schema, object, "$"), [""; 0]);
+    }
+    for (key, value) in [
+        ("earliest", serde_json::json!({"toi": 0.5})),
+        ("hash", 7.into()),
+        ("new", 1.into()),
+    ] {
+        let mut object = answer.clone();
+        object[key] = value;
+        assert!(!wrong(&schema, &object, "$").is_empty(), "{key}");
+    }
+
     // The same as text.
     let printed = folder.run(["step"].iter().chain(&FILES)).printed();
     assert!(printed.starts_with("not free: "), "{printed}");
@@ -168,6 +184,32 @@ fn impacts_read_back_to_the_same_bits() {
             Toi::F64 => npy(&folder.path("impacts.npy"), f64::from_le_bytes),
         };
         assert_eq!(read, rows);
+    }
+}
+
+/// Rows on standard output leave the summary to standard error.
+#[test]
+fn rows_are_printed_alone() {
+    let folder = folder();
+    let ask = |to| folder.run(["step"].iter().chain(&FILES).chain(&["--impacts", to]));
+    let run = ask("-");
+    assert!(run.stderr.starts_with("not free: "), "{}", run.stderr);
+    assert!(run.stderr.contains(" impacts ("), "{}", run.stderr);
+    ask("impacts.csv").printed();
+    let file = std::fs::read_to_string(folder.path("impacts.csv")).unwrap();
+    assert_eq!(run.printed(), file);
+}
+
+#[test]
+fn a_check_fails_where_a_step_is_not_free() {
+    let folder = folder();
+    let ask = |args: &[&str]| folder.run(["step"].iter().chain(args).chain(&["--fail-on-hit"]));
+    for more in [&[][..], &["--earliest"], &["--json"], &["--impacts", "-"]] {
+        let run = ask(&[&FILES[..], more].concat());
+        assert_eq!(run.code, Some(3), "{}", run.stderr);
+        assert!(!run.stdout.is_empty());
+        let run = ask(&[&["b0.ply", "b1.ply"][..], more].concat());
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
     }
 }
 
@@ -437,11 +479,27 @@ fn a_sequence_is_followed_step_by_step() {
     assert_eq!(lines[1]["earliest"]["toi"], 1.0);
     assert_eq!(lines[1]["touching_at_start"], 0);
     assert!(lines[2]["touching_at_start"].as_u64() > Some(0));
-    let printed = folder.run(&arguments[..6]).printed();
+    let text = &arguments[..6];
+    let printed = folder.run(text).printed();
     assert!(
         printed.ends_with("3 steps, 1 free of contact\n"),
         "{printed}"
     );
+    for (more, code) in [(&[][..], 3), (&["--frames", "0..2"], 0)] {
+        let run = folder.run(text.iter().chain(&["--fail-on-hit"]).chain(more));
+        assert_eq!(run.code, Some(code), "{}", run.stderr);
+    }
+    let one = folder.run(text.iter().chain(&["--frames", "0..2"]));
+    assert!(one.printed().ends_with("1 step, 1 free of contact\n"));
+    // What a question does not answer is refused.
+    for more in [["--pairs", "rows.csv"], ["--out", "seen_%d.ply"]] {
+        let misuse = folder.run(text.iter().chain(&more)).misuse();
+        assert!(misuse.contains("cannot be used with"), "{misuse}");
+    }
+    for more in [["--toi", "f64"], ["--start", "skip"], ["--separation", "1"]] {
+        let misuse = folder.run(text[..5].iter().chain(&more)).misuse();
+        assert!(misuse.contains("--ccd"), "{misuse}");
+    }
 }
 
 /// With a distance to keep, what comes near is reported, and earlier.
