@@ -232,21 +232,39 @@ pub struct DetectorArgs {
     pub no_progress: bool,
 }
 
+/// Options of reading meshes.
+#[derive(Debug, Clone, Args)]
+pub struct ReadArgs {
+    /// Weld vertices at the same position, within each file [default if a body is checked against itself]
+    #[arg(long, overrides_with = "no_weld")]
+    weld: bool,
+    /// Do not weld vertices at the same position, except in STL files, where triangles share nothing else
+    #[arg(long, overrides_with = "weld")]
+    no_weld: bool,
+    /// The format of a mesh on standard input, which is named "-": ply, off, stl, …
+    #[arg(long, value_name = "EXT", value_parser = mesh_format)]
+    pub format: Option<impinge_io::Format>,
+}
+
+impl ReadArgs {
+    /// Whether to weld, if the options say so.
+    pub fn weld(&self) -> Option<bool> {
+        match (self.weld, self.no_weld) {
+            (true, _) => Some(true),
+            (_, true) => Some(false),
+            _ => None,
+        }
+    }
+}
+
 /// Options of reading meshes and of the query.
 #[derive(Debug, Clone, Args)]
 pub struct AskArgs {
     /// Which neighbours are reported: pairs of primitives of one body that share a vertex
     #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Resolve)]
     pub shared_vertex: SharedVertexArg,
-    /// Weld vertices at the same position, within each file [default if a body is checked against itself]
-    #[arg(long, overrides_with = "no_weld")]
-    pub weld: bool,
-    /// Do not weld vertices at the same position, except in STL files, where triangles share nothing else
-    #[arg(long, overrides_with = "weld")]
-    pub no_weld: bool,
-    /// The format of a mesh on standard input, which is named "-": ply, off, stl, …
-    #[arg(long, value_name = "EXT", value_parser = mesh_format)]
-    pub format: Option<impinge_io::Format>,
+    #[command(flatten)]
+    pub read: ReadArgs,
     /// Ignore the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
     #[arg(long, value_name = "A,B", value_parser = body_numbers)]
     pub ignore: Vec<(usize, usize)>,

@@ -31,12 +31,8 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
         return Err(Error::Usage(text.to_owned()));
     }
     let is_self = args.within || args.meshes.len() == 1;
-    let weld = match (args.weld, args.no_weld) {
-        (true, _) => Some(true),
-        (_, true) => Some(false),
-        _ => None,
-    };
-    let loading = Loading::as_they_are(!args.json, cancel).asked(weld, is_self, args.format);
+    let read = &args.read;
+    let loading = Loading::as_they_are(!args.json, cancel).asked(read.weld(), is_self, read.format);
     let bodies = Bodies::read(&args.meshes, loading)?;
     let mut detector = detector(&args.detector)?;
     let mut query = NearQuery::new(query(args, &bodies)?).distance(args.distance);
@@ -55,7 +51,7 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     }
     let near = detector.within_distance_with(&bodies.scene, &query, &control)?;
     drop(watch);
-    // Files come first: where one can't be written, no answer is printed that looks like success.
+    // Files are written first: if one can't be written, no answer is printed that looks like success.
     if let Some(file) = &rows_file {
         rows::write(file, near)?;
     }
