@@ -48,7 +48,8 @@ pub struct StepArgs {
     pub no_self: bool,
     #[command(flatten)]
     pub how: StepHow,
-    /// Weld vertices that are at the same position both at the start and at the end, within each body
+    /// Weld vertices that are at the same position both at the start and at the end, within each body; those of STL files, where
+    /// triangles share nothing else, always are
     #[arg(long)]
     pub weld: bool,
     /// Ignore the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)

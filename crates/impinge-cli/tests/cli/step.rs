@@ -447,6 +447,36 @@ fn welding_keeps_what_parts() {
         at_start("parted.obj", &[])
     );
     assert_eq!(at_start("start.obj", &["--start", "skip"]).0, Some(0));
+    // Whoever wonders about contact at the start is told of these vertices.
+    let noted = |more: &[&str]| {
+        let run = folder.run(["step", "start.obj", "start.obj"].iter().chain(more));
+        run.stderr
+    };
+    let told = "note: start.obj: vertices at the position of another, not welded to it: 1\n";
+    assert_eq!(noted(&[]), told);
+    assert!(noted(&["--weld"]).ends_with("welded to others: 1\n"));
+}
+
+/// The triangles of an STL file share nothing except positions.
+#[test]
+fn neighbours_in_an_stl_file_do_not_touch() {
+    let folder = Folder::new();
+    let facet = |[a, b, c]: [&str; 3]| {
+        format!(
+            "facet normal 0 0 1\nouter loop\nvertex {a}\nvertex {b}\nvertex {c}\nendloop\nendfacet\n"
+        )
+    };
+    let faces = [["0 0 0", "1 0 0", "0 1 0"], ["1 0 0", "1 1 0", "0 1 0"]];
+    let text = format!("solid s\n{}endsolid s\n", faces.map(facet).concat());
+    folder.text("start.stl", &text);
+    folder.text("end.stl", &text.replace(" 0\n", " 2\n"));
+    let run = folder.run(["step", "start.stl", "end.stl"]);
+    assert!(
+        run.stderr.ends_with("welded to others: 2\n"),
+        "{}",
+        run.stderr
+    );
+    assert!(run.printed().starts_with("free: "));
 }
 
 #[test]
