@@ -452,6 +452,9 @@ fn welding_keeps_what_parts() {
         let run = folder.run(["step", "start.obj", "start.obj"].iter().chain(more));
         run.stderr
     };
+    let run = folder.run(["step", "start.obj", "start.obj", "--earliest"]);
+    let first = "not free: vertex 0 and face 1 of start.obj touch first, at the start\n";
+    assert!(run.stdout.starts_with(first), "{}", run.stdout);
     let told = "note: start.obj: vertices at the position of another, not welded to it: 1\n";
     assert_eq!(noted(&[]), told);
     assert!(noted(&["--weld"]).ends_with("welded to others: 1\n"));

@@ -100,9 +100,12 @@ impl<'a> Found<'a> {
             None => writeln!(to, "free: nothing touches from start to end")?,
             Some(first) => writeln!(
                 to,
-                "not free: {} of {} and {} of {} {} first, {}",
+                "not free: {}{} and {} of {} {} first, {}",
                 element(first.kind, first.a.primitive, true),
-                name(first.a.body),
+                match first.a.body == first.b.body {
+                    true => String::new(),
+                    false => format!(" of {}", name(first.a.body)),
+                },
                 element(first.kind, first.b.primitive, false),
                 name(first.b.body),
                 match separation > 0.0 {
