@@ -153,6 +153,103 @@ fn a_step_that_is_advanced_is_free_to_its_rounded_end() {
     }
 }
 
+/// Triangles that land on a slope nearly at once: rounding makes others touch than the first. The naive method searches all pairs for every fraction.
+#[test]
+fn a_step_is_advanced_as_far_as_by_testing_all_pairs() {
+    let mut n_backed_off = 0;
+    for seed in 0..60 {
+        let mut random = impinge_scenes::Random::new(seed);
+        let (far, n) = ([3000.0, 40_000.0, 7.0][seed as usize % 3], 24);
+        let slope = |x: f32, y: f32| 0.37 * x + 0.21 * y;
+        let way = [random.range(-0.5, 0.5), random.range(-0.5, 0.5), -1.5];
+        let corners = [[-9.0, -8.0], [9.0, -7.0], [1.0, 9.0]];
+        let mut ends = [(); 2].map(|()| corners.map(|[x, y]| [x, y, slope(x, y)]).to_vec());
+        for _ in 0..n {
+            let (x, y) = (random.range(-2.0, 2.0), random.range(-2.0, 2.0));
+            let lowest = [x, y, slope(x, y) + random.range(1.0, 1.0 + 1e-6 * far)];
+            let triangle = [
+                lowest,
+                [x + random.range(-0.2, 0.2), y - 0.1, lowest[2] + 0.5],
+                [x + random.range(-0.2, 0.2), y + 0.1, lowest[2] + 0.5],
+            ];
+            let [start, end] = &mut ends;
+            start.extend(triangle);
+            end.extend(triangle.map(|[x, y, z]| [x + way[0], y + way[1], z + way[2]]));
+        }
+        let faces = Vec::from_iter((0..=n).map(|face| [0, 1, 2].map(|corner| 3 * face + corner)));
+        let [start, end] = ends.map(|points| {
+            let moved = points.iter().map(|point| point.map(|x| x + far));
+            moved.collect::<Vec<[f32; 3]>>()
+        });
+        let step = Step::default().start(Start::Skip);
+        for is_single in [true, false] {
+            let mut scene = Scene::new();
+            if is_single {
+                let body = scene.add_triangles(&faces, &start).expect("good");
+                scene.set_end_positions(body, &end).expect("good");
+            } else {
+                // Thirds, so that nothing is a short number.
+                let [start, end] = [&start, &end].map(|points| {
+                    let thirds = points.iter().map(|p| p.map(|x| f64::from(x) / 3.0));
+                    thirds.collect::<Vec<[f64; 3]>>()
+                });
+                let body = scene.add_triangles(&faces, &start).expect("good");
+                scene.set_end_positions(body, &end).expect("good");
+            }
+            let [found, expected] = <[_; 2]>::try_from(Vec::from_iter(
+                detectors()
+                    .iter_mut()
+                    .map(|detector| detector.advance(&scene, &step).expect("good")),
+            ))
+            .expect("two methods");
+            assert_eq!(found, expected, "{seed}");
+            n_backed_off += usize::from(found.n_tried > 2);
+        }
+    }
+    assert!(n_backed_off > 20, "{n_backed_off}");
+}
+
+/// Sheets whose gap is below what rounding moves vertices: too many pairs are close for a list of them.
+#[test]
+fn a_step_of_sheets_that_nearly_touch_is_free_to_its_rounded_end() {
+    const N: u32 = 60;
+    let at = |x: u32, y: u32| x + y * (N + 1);
+    let faces = Vec::from_iter((0..N * N).flat_map(|square| {
+        let (x, y) = (square % N, square / N);
+        let (p, q, r, s) = (at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1));
+        [[p, q, r], [q, s, r]]
+    }));
+    let sheet = |z: f32, tilt: f32| {
+        let points = (0..(N + 1) * (N + 1)).map(|ix| {
+            let (x, y) = ((ix % (N + 1)) as f32, (ix / (N + 1)) as f32);
+            [2000.0 + x, 2000.0 + y, 0.125 * z + tilt * x]
+        });
+        Vec::from_iter(points)
+    };
+    let mut scene = Scene::new();
+    let lower = scene.add_triangles(&faces, &sheet(0.0, 0.0));
+    let upper = scene.add_triangles(&faces, &sheet(2f32.powi(-12), 0.0));
+    let (lower, upper) = (lower.expect("good"), upper.expect("good"));
+    scene
+        .set_end_positions(lower, &sheet(3.0, 0.0))
+        .expect("good");
+    scene
+        .set_end_positions(upper, &sheet(3.0, -0.001))
+        .expect("good");
+    let mut detector = Detector::new(Backend::Cpu).expect("settings");
+    let step = Step::default();
+    let advance = detector.advance(&scene, &step).expect("good");
+    assert!(0.0 < advance.fraction && advance.fraction < 1.0);
+    let mut rounded = scene.clone();
+    for (body, positions) in &advance.positions {
+        let Positions::F32(positions) = positions else {
+            panic!("double precision")
+        };
+        rounded.set_end_positions(*body, positions).expect("good");
+    }
+    assert!(detector.is_free(&rounded, &step).expect("good"));
+}
+
 #[test]
 fn bad_end_positions_are_refused_by_name() {
     let (mut scene, _, other) = falling();
