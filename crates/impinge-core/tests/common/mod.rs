@@ -141,6 +141,19 @@ fn one(name: &str, model: &Model, rule: SharedVertex) -> Case {
     }
 }
 
+/// Two bodies, of which only the first may meet itself. It does so also where the second is not.
+fn one_meets_itself() -> Case {
+    let mut scene = Scene::new();
+    let mut add = |model: Model| scene.add(model.elements, model.positions).unwrap();
+    add(soup::triangles(900, 0.15, 7));
+    let ball = add(surfaces::ball(300).translated([1.5, 0.5, 0.5]));
+    Case {
+        name: "one of two meets itself".to_owned(),
+        scene,
+        query: Query::everything().ignore(ball, ball),
+    }
+}
+
 /// Cases of up to a few thousand primitives: every kind, every query, lattice troublemakers, and the
 /// adversarial scenes in small.
 pub fn cases() -> Vec<Case> {
@@ -196,6 +209,7 @@ pub fn cases() -> Vec<Case> {
     for (n, scale) in [(12, 1.0), (8, 1.0), (7, 1e-30), (6, 1e25)] {
         cases.push(many(n, scale));
     }
+    cases.push(one_meets_itself());
     for rule in rules {
         cases.push(one("soup", &soup::triangles(900, 0.15, 7), rule));
         cases.push(one("tetrahedra", &soup::tetrahedra(300, 0.2, 8), rule));
