@@ -165,15 +165,6 @@ impl<'a> Hull<'a> {
         [self.start, self.end.unwrap_or(self.start)]
     }
 
-    /// The same, with boxes that reach farther by a margin.
-    #[inline(always)]
-    pub fn with_margin(self, margin: f64) -> Self {
-        Hull {
-            pose: self.pose.with_margin(margin),
-            ..self
-        }
-    }
-
     /// Puts the boxes of a cluster's elements into lanes, by the corners of its elements; to be [closed](Self::close).
     pub fn fill(&self, clustering: &Clustering, cluster: ClusterIx, boxes: [&mut LaneBounds; 2]) {
         let [start, end] = boxes;

@@ -94,13 +94,12 @@ impl<'a> PerCluster<World<'a>> for Group {
             f64::INFINITY
         };
         if self.rounded.is_finite() {
+            // Rounding keeps the order of coordinates: boxes that are apart then are so of the points as they are.
             self.put_points(simd, ends);
-            let hull = hull.with_margin(self.rounded);
-            hull.close([&mut self.start, &mut self.end], self.size);
         } else {
             hull.fill(clustering, cluster, [&mut self.start, &mut self.end]);
-            hull.close([&mut self.start, &mut self.end], self.size);
         }
+        hull.close([&mut self.start, &mut self.end], self.size);
     }
 }
 

@@ -93,8 +93,8 @@ fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: World<'_>, batch: Batch<'
 
 /// By how much two boxes of groups together reach at most beyond the inflated boxes of elements, on one axis.
 ///
-/// An end is off by the rounding of points, at most 2^-24 of the largest coordinate, moved outward by that and by the distance, and then by
-/// 2^-20 of all, and 2^-126 (`hull::Pose`): less than 2^-19 of the largest coordinate and of the distance, and 2^-125.
+/// An end is off by the rounding of points, at most 2^-24 of the largest coordinate, and moved outward by the distance, 2^-20 of all, and
+/// 2^-126 (`hull::Pose`): less than 2^-19 of the largest coordinate and of the distance, and 2^-125.
 fn farther_out([a, b]: [&Group; 2], distance: f64) -> f32 {
     let largest = f64::max(a.largest, b.largest) + distance;
     round_up(largest * 2f64.powi(-18) + 2f64.powi(-120))
