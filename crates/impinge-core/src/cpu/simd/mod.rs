@@ -19,6 +19,12 @@ use super::runs::{self, Members, RUN, RunExtents};
 use crate::hull::{ReadVertices, of_vertices_f32};
 use crate::positions::Real;
 
+/// A coordinate of a vertex, as instruction sets read it.
+#[cfg(not(target_arch = "x86_64"))]
+pub(crate) use crate::positions::Real as Coordinate;
+#[cfg(target_arch = "x86_64")]
+pub(crate) use x86::Load4 as Coordinate;
+
 /// Lanes of a mask, lowest first.
 pub(crate) struct Lanes(pub u64);
 
@@ -263,29 +269,14 @@ pub(crate) trait Simd: ReadVertices {
         into: &mut Triangles64,
     );
 
-    /// The first `n` of some vertices as rows of x, y and z; the rest of the rows is arbitrary.
+    /// The first `n` of some vertices as rows of x, y and z, rounded to nearest; the rest of the rows is arbitrary.
     ///
     /// # Panics
     /// If there is no such vertex.
     #[inline(always)]
-    fn put_points(
+    fn put_points<R: Coordinate>(
         self,
-        positions: &[[f32; 3]],
-        vertices: &[u32; GROUP],
-        n: usize,
-        into: &mut [[f32; GROUP]; 3],
-    ) {
-        put_points(positions, vertices, n, into);
-    }
-
-    /// As [`put_points`](Self::put_points), each coordinate rounded to nearest.
-    ///
-    /// # Panics
-    /// If there is no such vertex.
-    #[inline(always)]
-    fn put_rounded_points(
-        self,
-        positions: &[[f64; 3]],
+        positions: &[[R; 3]],
         vertices: &[u32; GROUP],
         n: usize,
         into: &mut [[f32; GROUP]; 3],

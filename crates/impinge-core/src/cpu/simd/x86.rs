@@ -39,8 +39,8 @@ impl Avx512 {
     }
 }
 
-/// A coordinate of vertices that are read four numbers at a time.
-trait Load4: Real {
+/// A coordinate of vertices, which are read four numbers at a time.
+pub(crate) trait Load4: Real {
     /// Four numbers, rounded to nearest.
     ///
     /// # Safety
@@ -511,21 +511,9 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    fn put_points(
+    fn put_points<R: Load4>(
         self,
-        positions: &[[f32; 3]],
-        vertices: &[u32; GROUP],
-        n: usize,
-        into: &mut [[f32; GROUP]; 3],
-    ) {
-        // SAFETY: this set exists only where the processor has AVX2.
-        unsafe { put_points(positions, vertices, n, into) }
-    }
-
-    #[inline(always)]
-    fn put_rounded_points(
-        self,
-        positions: &[[f64; 3]],
+        positions: &[[R; 3]],
         vertices: &[u32; GROUP],
         n: usize,
         into: &mut [[f32; GROUP]; 3],
@@ -985,21 +973,9 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
-    fn put_points(
+    fn put_points<R: Load4>(
         self,
-        positions: &[[f32; 3]],
-        vertices: &[u32; GROUP],
-        n: usize,
-        into: &mut [[f32; GROUP]; 3],
-    ) {
-        // SAFETY: this set exists only where the processor has AVX2.
-        unsafe { put_points(positions, vertices, n, into) }
-    }
-
-    #[inline(always)]
-    fn put_rounded_points(
-        self,
-        positions: &[[f64; 3]],
+        positions: &[[R; 3]],
         vertices: &[u32; GROUP],
         n: usize,
         into: &mut [[f32; GROUP]; 3],

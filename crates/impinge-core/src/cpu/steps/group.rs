@@ -120,7 +120,7 @@ impl Group {
                         simd.put_points(positions, &vertices.0, self.size, point);
                     }
                     Positions::F64(positions) => {
-                        simd.put_rounded_points(positions, &vertices.0, self.size, point);
+                        simd.put_points(positions, &vertices.0, self.size, point);
                     }
                 }
             }
