@@ -39,12 +39,12 @@ pub(super) struct Settler {
 }
 
 impl Settler {
-    /// Prepares for a step.
-    pub fn begin(&mut self, test: StepTest, tuning: &Tuning) {
+    /// Prepares for a step of `n_clusters` clusters.
+    pub fn begin(&mut self, n_clusters: u64, test: StepTest, tuning: &Tuning) {
         self.asked = test;
         self.n_candidates = 0;
         match test {
-            StepTest::Contacts(asked) => self.contacts.begin(asked, tuning),
+            StepTest::Contacts(asked) => self.contacts.begin(n_clusters, asked, tuning),
             StepTest::Overlap { distance } => self.overlaps.begin(distance),
             StepTest::Within => self.near.begin(),
         }

@@ -73,7 +73,7 @@ impl Worker {
         self.pose = pose;
         self.shorter_from = settings.tuning.step_shorter_from;
         self.n_shortened = 0;
-        self.settler.begin(test, &settings.tuning);
+        self.settler.begin(n_clusters, test, &settings.tuning);
         self.n_settled = 0;
         self.busy = Duration::ZERO;
     }

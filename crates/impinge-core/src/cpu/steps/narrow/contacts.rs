@@ -15,7 +15,7 @@ use super::batch::{Between, Narrow, NarrowCounts, Places, is_owned, key, points}
 
 /// The most pairs of one worker that are settled last.
 const MOST_UNSURE: usize = 4096;
-/// The most close pairs of one worker that are remembered.
+/// So many close pairs of one worker are remembered, or as many as there are clusters: with more of them, a search of all pairs is as fast.
 const MOST_CLOSE: usize = 4096;
 
 /// A pair whose first contact is sought.
@@ -44,6 +44,8 @@ pub(crate) struct FirstContacts {
     unsure: Vec<(Between, Places)>,
     /// Whether these are being settled.
     is_last: bool,
+    /// How many close pairs are remembered at most.
+    most_close: usize,
     /// Pairs that are not certainly farther apart than [the margin](Self::margin), by kind and key; one more than allowed if some are
     /// missing.
     close: Vec<(PairKind, u64)>,
@@ -53,8 +55,9 @@ pub(crate) struct FirstContacts {
 
 impl FirstContacts {
     /// Prepares for a step.
-    pub fn begin(&mut self, asked: Asked, tuning: &Tuning) {
+    pub fn begin(&mut self, n_clusters: u64, asked: Asked, tuning: &Tuning) {
         self.asked = asked;
+        self.most_close = MOST_CLOSE.max(n_clusters as usize);
         self.full = tuning.settle_from;
         self.counts = NarrowCounts::default();
         self.found.iter_mut().for_each(Vec::clear);
@@ -116,14 +119,14 @@ impl FirstContacts {
 
     /// Remembers a pair that is not certainly farther apart than the margin.
     pub(super) fn remember_close(&mut self, world: World<'_>, between: Between, places: Places) {
-        if self.margin(world) > 0.0 && self.close.len() <= MOST_CLOSE {
+        if self.margin(world) > 0.0 && self.close.len() <= self.most_close {
             self.close.push((between.kind, key(world, between, places)));
         }
     }
 
     /// The close pairs that were remembered; `None` if there are too many.
     pub fn close(&self) -> Option<&[(PairKind, u64)]> {
-        (self.close.len() <= MOST_CLOSE).then_some(&self.close)
+        (self.close.len() <= self.most_close).then_some(&self.close)
     }
 
     /// The pairs to be settled last.
