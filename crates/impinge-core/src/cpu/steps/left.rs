@@ -1,15 +1,15 @@
 //! Stage `settle`: pairs that a device has not dropped, with their first contacts.
 //!
-//! In: places of two elements, in any order, and times until which they certainly do not touch. Out: contacts, as from stage `narrow`,
-//! whose lists and filters do the work. Runs of pairs are tasks; each is sorted first, so that pairs of two layers, and elements in
-//! memory, come together. Where the earliest contact is sought, pairs come in the order of their times, a few at first, up to the
-//! earliest contact found.
+//! In: places of two elements, in any order, and times until which they certainly do not touch; a time by which some pair certainly does.
+//! Out: contacts, as from stage `narrow`, whose lists and filters do the work. Runs of pairs are tasks; each is sorted first, so that
+//! pairs of two layers, and elements in memory, come together. Where the earliest contact is sought, pairs come in the order of their
+//! times, a few at first, up to the earliest contact found. Where any is sought, a pair that certainly touches ends the search.
 
 use std::sync::{Mutex, PoisonError};
 
 use crate::error::Error;
 use crate::frame::{TestId, owner_by_first};
-use crate::impacts::{LeftPair, StepAnswer};
+use crate::impacts::{Left, LeftPair, StepAnswer};
 use crate::index::{LayerIx, Place};
 use crate::run::Job;
 use crate::sink::Ending;
@@ -25,7 +25,7 @@ const TASK: usize = 2048;
 const SOONEST: usize = 256;
 
 /// Settles pairs as they come.
-pub(super) struct Left<'a, 'b> {
+pub(super) struct Settling<'a, 'b> {
     pub job: Job<'a>,
     pub world: World<'a>,
     pub answer: StepAnswer<'a>,
@@ -34,19 +34,33 @@ pub(super) struct Left<'a, 'b> {
     pub first_places: Vec<u32>,
 }
 
-impl Left<'_, '_> {
+impl Settling<'_, '_> {
     /// Settles some pairs. Returns whether more are wanted.
     ///
     /// # Errors
     /// Cancellation, those of the answer, and pairs that nobody asked for.
-    pub fn settle(&mut self, mut pairs: &mut [LeftPair]) -> Result<bool, Error> {
+    pub fn settle(&mut self, left: Left<'_>) -> Result<bool, Error> {
+        let Left { pairs, touches_by } = left;
+        if let Some(time) = touches_by {
+            self.workers[0].contacts().found_by(self.world, time);
+        }
         if !self.workers[0].contacts().seeks_earliest() {
             return self.settle_each(pairs);
         }
-        let mut n_soonest = SOONEST;
+        let (mut pairs, mut n_soonest) = (pairs, SOONEST);
         loop {
-            n_soonest = n_soonest.min(pairs.len());
-            if n_soonest < pairs.len() {
+            // All others touch after the earliest contact known, if at all.
+            let until = self.workers[0].contacts().until(self.world);
+            let mut n = 0;
+            for ix in 0..pairs.len() {
+                if f64::from(pairs[ix].free_until) <= until {
+                    pairs.swap(n, ix);
+                    n += 1;
+                }
+            }
+            pairs = &mut pairs[..n];
+            n_soonest = n_soonest.min(n);
+            if n_soonest < n {
                 let by_time = |a: &LeftPair, b: &LeftPair| a.free_until.total_cmp(&b.free_until);
                 pairs.select_nth_unstable_by(n_soonest, by_time);
             }
@@ -55,23 +69,14 @@ impl Left<'_, '_> {
             if !goes_on || later.is_empty() {
                 return Ok(goes_on);
             }
-            // The others touch after the earliest contact found, if at all.
-            let until = self.workers[0].contacts().until(self.world);
-            let mut n = 0;
-            for ix in 0..later.len() {
-                if f64::from(later[ix].free_until) <= until {
-                    later.swap(n, ix);
-                    n += 1;
-                }
-            }
-            pairs = &mut later[..n];
+            pairs = later;
             n_soonest *= 4;
         }
     }
 
     /// Settles pairs, run by run.
     fn settle_each(&mut self, pairs: &mut [LeftPair]) -> Result<bool, Error> {
-        let Left {
+        let Settling {
             job,
             world,
             answer,

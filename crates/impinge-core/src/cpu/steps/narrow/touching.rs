@@ -17,13 +17,13 @@ use crate::cpu::simd::{Isa, Simd, dispatch};
 use crate::exact::ElementPair;
 use crate::exact::filter::{self, BATCH, Moving64, Search};
 use crate::grouping::bounds::round_up;
+#[cfg(feature = "gpu")]
+use crate::impacts::Sought;
 use crate::impacts::StepAnswer;
 use crate::pair_kind::PairKind;
 #[cfg(feature = "gpu")]
 use crate::positions::Positions;
 
-#[cfg(feature = "gpu")]
-use super::super::world::Sought;
 use super::super::world::World;
 #[cfg(feature = "gpu")]
 use super::batch::Places;
