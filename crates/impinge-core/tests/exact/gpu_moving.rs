@@ -16,7 +16,6 @@ const MIDDLE: f32 = 16.0;
 const TICKS: u32 = 1 << 24;
 const TICK: f32 = 1.0 / 16_777_216.0;
 const SHORTEST: u32 = 1 << 14;
-const SHORTEST_OF_EARLIEST: u32 = 1 << 8;
 const N_INTERVALS: u32 = 32;
 
 #[cfg(feature = "gpu")]
@@ -31,7 +30,6 @@ fn constants_are_those_of_the_kernel() {
         format!("const N_INTERVALS: u32 = {N_INTERVALS}u;"),
         format!("const TICKS: u32 = {TICKS:#x}u;"),
         format!("const SHORTEST: u32 = {SHORTEST:#x}u;"),
-        format!("const SHORTEST_OF_EARLIEST: u32 = {SHORTEST_OF_EARLIEST:#x}u;"),
     ] {
         assert!(text.contains(&line), "{line}");
     }
@@ -394,8 +392,8 @@ struct Bracket {
     is_left: bool,
 }
 
-/// The search of the second kernel, down to intervals of a length. `end`: a time by which another pair touches.
-fn bracket(device: &mut Device<'_>, loaded: &Pair, shortest: u32, end: u32) -> Bracket {
+/// The search of the second kernel. `end`: a time by which another pair touches.
+fn bracket(device: &mut Device<'_>, loaded: &Pair, end: u32) -> Bracket {
     let mut found = Bracket {
         free_until: 0,
         touches_by: None,
@@ -421,7 +419,7 @@ fn bracket(device: &mut Device<'_>, loaded: &Pair, shortest: u32, end: u32) -> B
             Decided::Touches => found.touches_by = Some(high),
             Decided::Unclear => {}
         }
-        if high - low <= shortest {
+        if high - low <= SHORTEST {
             break;
         }
         length = (high - low) / 2;
@@ -558,13 +556,12 @@ fn what_is_dropped_never_touches_and_times_are_right() {
                         continue;
                     };
                     let of_step = decide(&values(&mut device, &loaded, None));
-                    let shortest = random.pick(&[SHORTEST, SHORTEST_OF_EARLIEST]);
                     let end = match random.below(2) {
                         0 => TICKS,
                         _ => 1 + random.below(u64::from(TICKS)) as u32,
                     };
                     let mut device = Device(&mut random);
-                    let found = bracket(&mut device, &loaded, shortest, end);
+                    let found = bracket(&mut device, &loaded, end);
                     let is_dropped = of_step == Decided::Free;
                     n_dropped += u32::from(is_dropped);
                     n_later += u32::from(!is_dropped && !found.is_left && end == TICKS);

@@ -9,7 +9,7 @@
 //
 //   [low, high] ── certainly free ────> go on behind it, with twice the length, to the end: dropped
 //        ├──────── certain contact ──> touches by `high`; half the length, to know it better
-//        └──────── unclear ──────────> half the length, down to the shortest: left, free until `low`
+//        └──────── unclear ──────────> half the length, down to SHORTEST: left, free until `low`
 //
 // Where the earliest contact is sought, the end is the least time by which any pair touches. So most pairs are dropped after one
 // interval. Where any contact is sought, all threads end once there is one.
@@ -19,9 +19,8 @@ const TICKS: u32 = 0x1000000u;
 const TICK: f32 = 0x1p-24f;
 // Twice the whole step: no time.
 const NONE: u32 = 2u * TICKS;
-// The shortest interval, in ticks; and where the earliest contact is sought.
+// The shortest interval: a 1024th of the step.
 const SHORTEST: u32 = 0x4000u;
-const SHORTEST_OF_EARLIEST: u32 = 0x100u;
 // The most intervals of a pair.
 const N_INTERVALS: u32 = 32u;
 
@@ -67,7 +66,6 @@ fn bracket_of(candidate: Candidate) -> Bracket {
         return found;
     }
     var sizes = pair.sizes;
-    let shortest = select(SHORTEST, SHORTEST_OF_EARLIEST, params.sought == SEEK_EARLIEST);
     var length = TICKS / 2u;
     for (var n = 0u; n < N_INTERVALS; n++) {
         // The first time by which any pair touches.
@@ -109,7 +107,7 @@ fn bracket_of(candidate: Candidate) -> Bracket {
                 break;
             }
         }
-        if high - low <= shortest {
+        if high - low <= SHORTEST {
             break;
         }
         length = (high - low) / 2u;
