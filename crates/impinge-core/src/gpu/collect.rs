@@ -14,7 +14,6 @@ use std::task::{Context, Poll, Waker};
 
 use super::layout::{Counter, Grid, N_COUNTERS, PairKey, PairTimes, UnsureKey};
 use super::open::Gpu;
-use super::passes::is_answered;
 use super::room::{PassCounts, Room};
 use crate::error::Error;
 use crate::impacts::{LeftPair, Sought};
@@ -186,9 +185,7 @@ impl Collector {
                 Some(_) => 0,
                 None => counts.needed.pairs.min(capacities.pairs),
             };
-            let is_answered = guess
-                .sought
-                .is_some_and(|sought| is_answered(sought, &counts));
+            let is_answered = guess.sought.is_some_and(|sought| counts.answer(sought));
             let n_unsure = match is_answered {
                 true => 0,
                 false => counts.needed.unsure.min(capacities.unsure),

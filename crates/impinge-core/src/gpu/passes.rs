@@ -16,7 +16,7 @@ use super::collect::{Collected, Guess};
 use super::device::Scopes;
 use super::engine::{Engine, Outcome, Plan};
 use super::layout::NodePair;
-use super::room::{Capacities, CellsWanted, NextPass, PassCounts};
+use super::room::{Capacities, CellsWanted, NextPass};
 use super::steps::Stages;
 use super::taker::Taker;
 use crate::error::Error;
@@ -73,7 +73,7 @@ impl Engine {
                 Sought::All => None,
                 Sought::Earliest | Sought::Any => collected.counts.touches_by,
             };
-            let next = match is_answered(self.sought, &collected.counts) {
+            let next = match collected.counts.answer(self.sought) {
                 true => NextPass::Complete,
                 false => collected.counts.judge(&self.gpu, capacities, room),
             };
@@ -373,11 +373,6 @@ fn quarters(part: CellRange, tile: Tile) -> Vec<Work> {
     quarters
         .map(|quarter| Work::Cells(part, Share::Tile(quarter)))
         .collect()
-}
-
-/// Whether a pass ends a step, however much room it had: any contact is sought, and there is one.
-pub(super) fn is_answered(sought: Sought, counts: &PassCounts) -> bool {
-    sought == Sought::Any && counts.touches_by.is_some()
 }
 
 /// Adds the counts of a complete pass to the statistics.

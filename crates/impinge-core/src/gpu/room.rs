@@ -13,6 +13,7 @@ use super::layout::{
 };
 use super::open::Gpu;
 use crate::error::Error;
+use crate::impacts::Sought;
 use crate::settings::Method;
 
 /// The number of elements that each buffer has room for. The answer never depends on it.
@@ -335,6 +336,11 @@ impl PassCounts {
                 .filter(|&time| time < NEVER),
             too_much: at(TOO_MUCH) != 0,
         }
+    }
+
+    /// Whether a pass ends a step, however much room it had: any contact is sought, and there is one.
+    pub(super) fn answer(&self, sought: Sought) -> bool {
+        sought == Sought::Any && self.touches_by.is_some()
     }
 
     /// Compares the counts with the room that the pass had. `bytes`: the most that these buffers may take together.
