@@ -2,7 +2,7 @@
 //!
 //! In: places of two elements, in any order, and times until which they certainly do not touch; a time by which some pair certainly does.
 //! Out: contacts, as from stage `narrow`, whose lists and filters do the work. Runs of pairs are tasks; each is sorted first, so that
-//! pairs of two layers, and elements in memory, come together. Where the earliest contact is sought, pairs come in the order of their
+//! pairs of two layers come together. Where the earliest contact is sought, pairs come in the order of their
 //! times, a few at first, up to the earliest contact found. Where any is sought, a pair that certainly touches ends the search.
 
 use std::sync::{Mutex, PoisonError};
@@ -75,7 +75,7 @@ impl Settling<'_, '_> {
     }
 
     /// Settles pairs, run by run.
-    fn settle_each(&mut self, pairs: &mut [LeftPair]) -> Result<bool, Error> {
+    fn settle_each(&mut self, pairs: &[LeftPair]) -> Result<bool, Error> {
         let Settling {
             job,
             world,
@@ -86,7 +86,7 @@ impl Settling<'_, '_> {
         let (world, answer, job) = (*world, *answer, *job);
         let first_places = &first_places[..];
         let wrong = Mutex::new(None);
-        let tasks: Vec<Mutex<&mut [LeftPair]>> = pairs.chunks_mut(TASK).map(Mutex::new).collect();
+        let tasks: Vec<&[LeftPair]> = pairs.chunks(TASK).collect();
         let n_workers = workers.len().min(tasks.len()).max(1);
         job.workers
             .for_each(&mut workers[..n_workers], tasks.len(), |worker, ix| {
@@ -94,8 +94,7 @@ impl Settling<'_, '_> {
                 if is_over || job.control.step(ix as u64, tasks.len() as u64).is_err() {
                     return;
                 }
-                let mut pairs = tasks[ix].lock().unwrap_or_else(PoisonError::into_inner);
-                if let Err(error) = settle(world, first_places, &mut pairs, worker.contacts()) {
+                if let Err(error) = settle(world, first_places, tasks[ix], worker.contacts()) {
                     *wrong.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
                 }
             });
@@ -117,34 +116,36 @@ impl Settling<'_, '_> {
     }
 }
 
-/// Settles the pairs of one task.
+/// Settles the pairs of one task. Those of two layers come together; within them the order is the device's, which lists pairs of two clusters
+/// next to each other.
 fn settle(
     world: World<'_>,
     first_places: &[u32],
-    pairs: &mut [LeftPair],
+    pairs: &[LeftPair],
     contacts: &mut FirstContacts,
 ) -> Result<(), Error> {
     let n_places = first_places.last().copied().unwrap_or(0);
-    for LeftPair { places, .. } in &mut *pairs {
-        places.sort_unstable();
-        if places[1] >= n_places {
-            return Err(not_asked(*places));
-        }
-    }
     let layer =
         |place: u32| LayerIx::from_usize(owner_by_first(first_places, place, |first| *first));
-    let layers = |pair: &LeftPair| pair.places.map(layer);
-    pairs.sort_unstable_by_key(|pair| (layers(pair), pair.places));
-    for run in pairs.chunk_by(|p, q| layers(p) == layers(q)) {
-        let [a, b] = layers(&run[0]);
-        let test = world.frame.test(a, b);
-        let Some(TestId::Elements(kind)) = test else {
-            return Err(not_asked(run[0].places));
+    let mut by_layers = Vec::with_capacity(pairs.len());
+    for pair in pairs {
+        let mut places = pair.places;
+        places.sort_unstable();
+        if places[1] >= n_places {
+            return Err(not_asked(places));
+        }
+        by_layers.push((places.map(layer), places));
+    }
+    by_layers.sort_unstable_by_key(|(layers, _)| *layers);
+    for run in by_layers.chunk_by(|(layers, _), (next, _)| layers == next) {
+        let ([a, b], first) = run[0];
+        let Some(TestId::Elements(kind)) = world.frame.test(a, b) else {
+            return Err(not_asked(first));
         };
         let firsts = [a, b].map(|layer| first_places[layer.index()]);
         let places = run
             .iter()
-            .map(|LeftPair { places: [p, q], .. }| [p - firsts[0], q - firsts[1]].map(Place::new));
+            .map(|(_, [p, q])| [p - firsts[0], q - firsts[1]].map(Place::new));
         contacts.take_left(world.isa, world, Between { a, b, kind }, places);
     }
     contacts.settle(world.isa, world);
