@@ -37,8 +37,10 @@ pub(crate) enum Sought {
 pub(crate) struct LeftPair {
     /// The places of its elements, those of all layers numbered consecutively.
     pub places: [u32; 2],
-    /// Until this time it certainly does not touch; 0 unless the earliest contact is sought.
+    /// Until this time it certainly does not touch.
     pub free_until: f32,
+    /// By this time it certainly touches, at one time only.
+    pub touches_by: Option<f32>,
 }
 
 /// What a device says about a step, or about a part of it.

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! counters | grid | times of the stages | pairs, a quarter more than last time | unsure pairs, likewise
-//!                                in a step:  unsure pairs, likewise | their times, if the earliest is sought
+//!                                in a step:  unsure pairs, likewise | their times, unless any contact will do
 //! ```
 //!
 //! If there are more than were copied, the rest follows in a second copy; no kernel runs again.
@@ -12,7 +12,7 @@ use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll, Waker};
 
-use super::layout::{Counter, Grid, N_COUNTERS, PairKey, PairTimes, UnsureKey};
+use super::layout::{Counter, Grid, N_COUNTERS, NEVER, PairKey, PairTimes, UnsureKey, time_by};
 use super::open::Gpu;
 use super::room::{PassCounts, Room};
 use crate::error::Error;
@@ -50,7 +50,7 @@ struct Times {
 pub struct Guess {
     pairs: u64,
     unsure: u64,
-    /// Of unsure pairs, where the earliest contact of a step is sought; else none.
+    /// Of unsure pairs in a step, unless any contact will do.
     times: u64,
     /// In a step: which contacts are sought.
     sought: Option<Sought>,
@@ -132,8 +132,8 @@ impl Collector {
             },
             unsure,
             times: match sought {
-                Some(Sought::Earliest) => unsure,
-                _ => 0,
+                Some(Sought::All | Sought::Earliest) => unsure,
+                Some(Sought::Any) | None => 0,
             },
             sought,
         };
@@ -170,7 +170,7 @@ impl Collector {
     ) -> Result<Collected, Error> {
         // Given back when all went well: a buffer that stays mapped is of no more use.
         let staging = self.staging.take().expect("encoded before");
-        let has_times = guess.sought == Some(Sought::Earliest);
+        let has_times = matches!(guess.sought, Some(Sought::All | Sought::Earliest));
         let (mut pairs, mut unsure) = (Vec::new(), Vec::<UnsureKey>::new());
         let mut until = Vec::<PairTimes>::new();
         let (counts, grid, ticks, n_pairs, n_unsure) = {
@@ -247,11 +247,15 @@ impl Collector {
         let mut left = Vec::new();
         if guess.sought.is_some() {
             reserve_all(&mut left, n_unsure)?;
-            let times = until.iter().map(|times| f32::from_bits(times.free_until));
-            let each = unsure.iter().zip(times.chain(std::iter::repeat(0.0)));
-            left.extend(each.map(|(pair, free_until)| LeftPair {
+            let nothing = PairTimes {
+                free_until: 0,
+                touches_by: NEVER.to_bits(),
+            };
+            let times = until.iter().chain(std::iter::repeat(&nothing));
+            left.extend(unsure.iter().zip(times).map(|(pair, times)| LeftPair {
                 places: [pair.low, pair.high],
-                free_until,
+                free_until: f32::from_bits(times.free_until),
+                touches_by: time_by(times.touches_by),
             }));
         }
         Ok(Collected {

@@ -135,11 +135,16 @@ pub const NO_ROOT: u32 = u32::MAX;
 pub const TOUCHES_BY: u32 = 42;
 /// The number of counters.
 pub const N_COUNTERS: u32 = 43;
-/// Says that no pair certainly touches.
+/// Says that contact is not certain.
 pub const NEVER: f32 = 2.0;
 /// Flags of candidates.
 #[cfg(test)]
 pub const FLAG: u32 = 0x8000_0000;
+
+/// A time by which there certainly is contact, if that is certain.
+pub fn time_by(bits: u32) -> Option<f32> {
+    Some(f32::from_bits(bits)).filter(|&time| time < NEVER)
+}
 
 impl Node {
     /// A node whose box is not known yet.

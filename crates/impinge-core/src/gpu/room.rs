@@ -9,7 +9,7 @@ use super::layout::{
     Arguments, Candidate, Cell, CellItem, Counter, Grid, Kept, ListEntry, N_BOX_TESTS,
     N_BOX_TESTS_HIGH, N_CANDIDATES, N_COUNTERS, N_ENTRIES, N_ITEMS, N_KEPT, N_PAIRS, N_SUBDIVIDED,
     N_TALLIES, N_UNSURE, NEVER, NodePair, PairKey, PairTimes, ROUNDS, Reach, Start, TOO_MUCH,
-    TOUCHES_BY, Tally, UnsureKey, WorkItem,
+    TOUCHES_BY, Tally, UnsureKey, WorkItem, time_by,
 };
 use super::open::Gpu;
 use crate::error::Error;
@@ -332,8 +332,7 @@ impl PassCounts {
             },
             n_subdivided: at(N_SUBDIVIDED),
             n_box_tests: at(N_BOX_TESTS_HIGH) << 32 | at(N_BOX_TESTS),
-            touches_by: Some(f32::from_bits(counters[TOUCHES_BY as usize].n))
-                .filter(|&time| time < NEVER),
+            touches_by: time_by(counters[TOUCHES_BY as usize].n),
             too_much: at(TOO_MUCH) != 0,
         }
     }

@@ -368,16 +368,15 @@ fn decide(values: &Values) -> Decided {
     let is_aside = |(along, bound): &(Vec<f32>, f32)| are_all(along.iter().map(|&x| (x, *bound)));
     let is_outside = |w: &[(f32, f32); 5]| w.iter().all(|(value, bound)| *value < -bound);
     let is_inside = |w: &[(f32, f32); 5]| w.iter().all(|(value, bound)| value > bound);
-    let [(f_0, bound), _, _, (f_3, _)] = values.cubic;
+    let [(f_0, bound), (f_1, inner), (f_2, _), (f_3, _)] = values.cubic;
+    let falls = f_0 > bound && f_3 < -bound && (f_1 > inner || f_2 < -inner);
+    let rises = f_0 < -bound && f_3 > bound && (f_1 < -inner || f_2 > inner);
     if values.along.iter().any(is_aside)
         || are_all(values.cubic.iter().copied())
         || values.quartics.iter().any(is_outside)
     {
         Decided::Free
-    } else if f32::min(f_0, f_3) < -bound
-        && f32::max(f_0, f_3) > bound
-        && values.quartics.iter().all(is_inside)
-    {
+    } else if (falls || rises) && values.quartics.iter().all(is_inside) {
         Decided::Touches
     } else {
         Decided::Unclear

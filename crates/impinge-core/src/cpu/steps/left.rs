@@ -134,19 +134,24 @@ fn settle(
         if places[1] >= n_places {
             return Err(not_asked(places));
         }
-        by_layers.push((places.map(layer), places));
+        by_layers.push((places.map(layer), places, pair));
     }
-    by_layers.sort_unstable_by_key(|(layers, _)| *layers);
-    for run in by_layers.chunk_by(|(layers, _), (next, _)| layers == next) {
-        let ([a, b], first) = run[0];
+    by_layers.sort_unstable_by_key(|(layers, ..)| *layers);
+    for run in by_layers.chunk_by(|(layers, ..), (next, ..)| layers == next) {
+        let ([a, b], first, _) = run[0];
         let Some(TestId::Elements(kind)) = world.frame.test(a, b) else {
             return Err(not_asked(first));
         };
         let firsts = [a, b].map(|layer| first_places[layer.index()]);
-        let places = run
-            .iter()
-            .map(|(_, [p, q])| [p - firsts[0], q - firsts[1]].map(Place::new));
-        contacts.take_left(world.isa, world, Between { a, b, kind }, places);
+        let pairs = run.iter().map(|(_, [p, q], pair)| {
+            let places = [p - firsts[0], q - firsts[1]].map(Place::new);
+            (
+                places,
+                pair.free_until.into(),
+                pair.touches_by.map(f64::from),
+            )
+        });
+        contacts.take_left(world.isa, world, Between { a, b, kind }, pairs);
     }
     contacts.settle(world.isa, world);
     Ok(())

@@ -161,7 +161,7 @@ fn scale_all(polygon: ptr<function, Polygon>, narrowing: f32) -> Sizes {
     return sizes;
 }
 
-// What is certain of two elements between the two ends of their polygon: nothing, that they do not touch, or that they do at some time
+// What is certain of two elements between the two ends of their polygon: nothing, that they do not touch, or that they do, at one time
 // strictly between.
 const UNCLEAR: u32 = 0u;
 const FREE: u32 = 1u;
@@ -206,8 +206,11 @@ fn decide(polygon: ptr<function, Polygon>, sizes: ptr<function, Sizes>, are_edge
         return FREE;
     }
 
-    // Free beyond one edge all the time. Contact where the sign of f changes and all edges are passed on the inner side all the time.
-    var touches = min(f_0, f_3) < -bound && max(f_0, f_3) > bound;
+    // Free beyond one edge all the time. Contact where the sign of f changes, and only once, and all edges are passed on the inner side
+    // all the time.
+    let falls = f_0 > bound && f_3 < -bound && (f_1 > inner || f_2 < -inner);
+    let rises = f_0 < -bound && f_3 > bound && (f_1 < -inner || f_2 > inner);
+    var touches = falls || rises;
     for (var k = 0u; k < 3u; k++) {
         let c = (*sizes).corners[k];
         let g = (*sizes).edges[k];
