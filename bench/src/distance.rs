@@ -8,12 +8,10 @@
 use std::time::Instant;
 
 use impinge::{Detector, Scene, Settings};
-use impinge_io::ReadOptions;
-use impinge_scenes::data;
 use serde_json::json;
 
 use crate::report::{Report, figures};
-use crate::{Failure, Options};
+use crate::{Failure, Options, surfaces};
 
 /// A scan: positions of unit size, and faces.
 type Scan = (Vec<[f32; 3]>, Vec<[u32; 3]>);
@@ -117,13 +115,8 @@ fn contestants(scans: [&Scan; 2], options: &Options) -> Result<Vec<Box<dyn Conte
 
 fn scan(name: &str) -> Result<Scan, Failure> {
     let file = format!("meshes/{name}.ply");
-    let path =
-        data::data_file(&file).ok_or_else(|| format!("{file} is not there: set IMPINGE_DATA"))?;
-    let mesh = impinge_io::read(&path, &ReadOptions::default())?;
-    let (impinge_io::Elements::Triangles(faces), impinge_io::Positions::F32(mut positions)) =
-        (mesh.elements, mesh.positions)
-    else {
-        return Err(format!("{file}: not a surface in single precision").into());
+    let (faces, impinge_io::Positions::F32(mut positions)) = surfaces::read(&file)? else {
+        return Err(format!("{file}: not in single precision").into());
     };
     let longest = (0..3)
         .map(|axis| length(&positions, axis))

@@ -29,6 +29,7 @@ mod report;
 mod runner;
 mod step_sizes;
 mod steps;
+mod surfaces;
 #[cfg_attr(not(any(feature = "embree", feature = "parry")), allow(dead_code))]
 mod tune;
 

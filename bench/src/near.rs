@@ -14,12 +14,10 @@ mod parry;
 use std::time::Instant;
 
 use impinge::{BodyId, Detector, NearPairs, NearQuery, PairKind, Query, Scene, Settings};
-use impinge_io::ReadOptions;
-use impinge_scenes::data;
 use serde_json::json;
 
 use crate::report::{Report, figures, grouped};
-use crate::{Failure, Options};
+use crate::{Failure, Options, surfaces};
 
 /// A mesh and a distance from the shared data, and what is known of them.
 struct Known {
@@ -108,43 +106,26 @@ fn peers(mesh: &Mesh<'_>, n_threads: usize) -> Result<Peers, Failure> {
 
 /// The scenes that the options name.
 pub fn run(options: &Options, report: &mut Report) -> Result<(), Failure> {
-    let wanted = |known: &&Known| {
-        options
-            .scene
-            .as_deref()
-            .is_none_or(|name| name == known.name)
-    };
-    let mut n_scenes = 0;
-    for known in KNOWN.iter().filter(wanted) {
-        n_scenes += 1;
-        measure(known, options, report)?;
-    }
-    if n_scenes == 0 {
-        return Err("no such scene: cloth-ball or rumba".into());
-    }
-    Ok(())
+    let name = |known: &Known| known.name;
+    surfaces::measure_each(&KNOWN, name, options, |known| {
+        measure(known, options, report)
+    })
 }
 
 /// Faces, and the positions of the pose and of its mirror image.
 type Poses = (Vec<[u32; 3]>, [Vec<[f32; 3]>; 2]);
 
 fn load(known: &Known) -> Result<Poses, Failure> {
-    let path = |file: &str| {
-        data::data_file(file).ok_or_else(|| format!("{file} is not there: set IMPINGE_DATA"))
-    };
     let file = match known.name {
         "rumba" => "sequences/rumba.ply",
         _ => "ccd/cloth-ball/frames/cloth_ball92.ply",
     };
-    let mesh = impinge_io::read(&path(file)?, &ReadOptions::default())?;
-    let impinge_io::Elements::Triangles(faces) = mesh.elements else {
-        return Err(format!("{}: not a surface", known.name).into());
-    };
+    let (faces, rest) = surfaces::read(file)?;
     let positions = if known.name == "rumba" {
-        let frames = impinge_io::Sequence::open(&path("sequences/rumba.pc2")?)?;
+        let frames = impinge_io::Sequence::open(&surfaces::file("sequences/rumba.pc2")?)?;
         frames.frame(60)?
     } else {
-        mesh.positions
+        rest
     };
     let positions: Vec<[f32; 3]> = match positions {
         impinge_io::Positions::F32(positions) => positions,

@@ -4,18 +4,15 @@
 //! Positions at both ends are rewritten before each frame. Every answer is held against what is known of the scene: how many
 //! pairs touch, the hash of all of them with their times, the earliest time.
 
-use std::path::PathBuf;
 use std::time::Instant;
 
 use impinge::{
     BodyId, CandidateQuery, Detector, Positions, Query, Scene, Settings, Statistics, Step,
 };
-use impinge_io::ReadOptions;
-use impinge_scenes::data;
 use serde_json::json;
 
 use crate::report::{Report, figures, grouped};
-use crate::{Failure, Options};
+use crate::{Failure, Options, surfaces};
 
 /// A step from the shared data, and what is known of it.
 struct Known {
@@ -55,21 +52,10 @@ const N_WARM: usize = 2;
 
 /// The scenes that the options name.
 pub fn run(options: &Options, report: &mut Report) -> Result<(), Failure> {
-    let wanted = |known: &&Known| {
-        options
-            .scene
-            .as_deref()
-            .is_none_or(|name| name == known.name)
-    };
-    let mut n_scenes = 0;
-    for known in KNOWN.iter().filter(wanted) {
-        n_scenes += 1;
-        measure(known, options, report)?;
-    }
-    if n_scenes == 0 {
-        return Err("no such step: cloth-ball or cloth-funnel".into());
-    }
-    Ok(())
+    let name = |known: &Known| known.name;
+    surfaces::measure_each(&KNOWN, name, options, |known| {
+        measure(known, options, report)
+    })
 }
 
 /// A body, and where it is at both ends.
@@ -81,18 +67,10 @@ struct Moving {
 
 impl Moving {
     fn load(known: &Known) -> Result<Self, Failure> {
-        let read = |frame: &str| -> Result<_, Failure> {
-            let file = format!("ccd/{}/frames/{frame}.ply", known.name);
-            let path: PathBuf = data::data_file(&file)
-                .ok_or_else(|| format!("{file} is not there: set IMPINGE_DATA"))?;
-            Ok(impinge_io::read(&path, &ReadOptions::default())?)
-        };
-        let (start, end) = (read(known.frames[0])?, read(known.frames[1])?);
-        let impinge_io::Elements::Triangles(faces) = start.elements else {
-            return Err(format!("{}: not a surface", known.name).into());
-        };
+        let read = |frame| surfaces::read(&format!("ccd/{}/frames/{frame}.ply", known.name));
+        let [(faces, start), (_, end)] = [read(known.frames[0])?, read(known.frames[1])?];
         let mut scene = Scene::new();
-        let (body, ends) = match (start.positions, end.positions) {
+        let (body, ends) = match (start, end) {
             (impinge_io::Positions::F32(start), impinge_io::Positions::F32(end)) => {
                 let body = scene.add(faces, start.clone())?;
                 (body, [start.into(), end.into()])

@@ -51,8 +51,8 @@ Examples:
   impinge step cloth_0.ply cloth_1.ply          does anything touch on the way, and when first
   impinge simulate blocks --out out/blocks      bodies that fall, deform and collide
 
-Exit codes: 0 done, 2 bad usage, 3 pairs were found and --fail-on-hit was given, 130 stopped by Ctrl-C
-(128 and the signal's number), 1 any other error (one line on stderr).
+Exit codes: 0 done, 2 bad usage, 3 pairs or contacts were found and --fail-on-hit was given, 130 stopped by
+Ctrl-C (128 and the signal's number), 1 any other error (one line on stderr).
 `impinge help COMMAND` explains a command.";
 
 #[derive(Debug, Subcommand)]
@@ -73,10 +73,18 @@ pub enum Command {
     #[command(after_help = near::NEAR_EXAMPLES)]
     Near(NearArgs),
     /// Find the pairs in every frame of a deforming mesh
-    #[command(after_help = SEQUENCE_EXAMPLES)]
+    #[command(
+        after_help = SEQUENCE_EXAMPLES,
+        mut_arg("toi", |toi| toi.requires("ccd")),
+        mut_arg("start", |start| start.requires("ccd")),
+        mut_arg("separation", |separation| separation.requires("ccd"))
+    )]
     Sequence(SequenceArgs),
     /// Find what touches while meshes move from one pose to another, and when first
-    #[command(after_help = step::STEP_EXAMPLES)]
+    #[command(
+        after_help = step::STEP_EXAMPLES,
+        override_usage = "impinge step [OPTIONS] <START> <END> [<START> <END>]..."
+    )]
     Step(StepArgs),
     /// Simulate an elastic body that drops on another one, and write every step
     #[command(after_help = SIMULATE_EXAMPLES)]
@@ -224,25 +232,43 @@ pub struct DetectorArgs {
     pub no_progress: bool,
 }
 
+/// Options of reading meshes.
+#[derive(Debug, Clone, Args)]
+pub struct ReadArgs {
+    /// Weld vertices at the same position, within each file [default if a body is checked against itself]
+    #[arg(long, overrides_with = "no_weld")]
+    weld: bool,
+    /// Do not weld vertices at the same position, except in STL files, where triangles share nothing else
+    #[arg(long, overrides_with = "weld")]
+    no_weld: bool,
+    /// The format of a mesh on standard input, which is named "-": ply, off, stl, …
+    #[arg(long, value_name = "EXT", value_parser = mesh_format)]
+    pub format: Option<impinge_io::Format>,
+}
+
+impl ReadArgs {
+    /// Whether to weld, if the options say so.
+    pub fn weld(&self) -> Option<bool> {
+        match (self.weld, self.no_weld) {
+            (true, _) => Some(true),
+            (_, true) => Some(false),
+            _ => None,
+        }
+    }
+}
+
 /// Options of reading meshes and of the query.
 #[derive(Debug, Clone, Args)]
 pub struct AskArgs {
     /// Which neighbours are reported: pairs of primitives of one body that share a vertex
     #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Resolve)]
     pub shared_vertex: SharedVertexArg,
-    /// Weld vertices at the same position, within each file [default if a body is checked against itself]
-    #[arg(long, overrides_with = "no_weld")]
-    pub weld: bool,
-    /// Do not weld vertices at the same position, except in STL files, where triangles share nothing else
-    #[arg(long, overrides_with = "weld")]
-    pub no_weld: bool,
-    /// The format of a mesh on standard input, which is named "-": ply, off, stl, …
-    #[arg(long, value_name = "EXT", value_parser = mesh_format)]
-    pub format: Option<impinge_io::Format>,
+    #[command(flatten)]
+    pub read: ReadArgs,
     /// Ignore the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
     #[arg(long, value_name = "A,B", value_parser = body_numbers)]
     pub ignore: Vec<(usize, usize)>,
-    /// End with exit code 3 if there is any pair
+    /// End with exit code 3 if anything is found
     #[arg(long)]
     pub fail_on_hit: bool,
     /// Also print the bodies, the time of each stage, counters and the hash of the answer
@@ -411,7 +437,8 @@ pub struct SequenceArgs {
     #[command(flatten)]
     pub picture: PictureArgs,
     /// Find what touches on the way from each frame to the next, and when first; vertices move on straight lines
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["pairs", "out"])]
+    #[cfg_attr(feature = "gpu", arg(conflicts_with = "png"))]
     pub ccd: bool,
     #[command(flatten)]
     pub step: StepHow,

@@ -61,18 +61,36 @@ fn may_have_gpu() -> bool {
 
 /// The query with its adjacency rule and the pairs of bodies to ignore.
 pub fn query(query: Query, args: &AskArgs, bodies: &[BodyId]) -> Result<Query, Error> {
+    let query = query.shared_vertex(args.shared_vertex.into());
+    without(query, &args.ignore, bodies)
+}
+
+/// The query without the pairs of bodies that `--ignore` names.
+pub fn without(
+    query: Query,
+    ignored: &[(usize, usize)],
+    bodies: &[BodyId],
+) -> Result<Query, Error> {
     let body = |number: usize| {
         bodies.get(number).copied().ok_or_else(|| {
-            Error::Usage(format!(
-                "--ignore names body {number}, but {} bodies are given, numbered from 0",
-                bodies.len()
-            ))
+            let given = match bodies.len() {
+                1 => "1 body is given, numbered 0".to_owned(),
+                n => format!("{n} bodies are given, numbered from 0"),
+            };
+            Error::Usage(format!("--ignore names body {number}, but {given}"))
         })
     };
-    args.ignore.iter().try_fold(
-        query.shared_vertex(args.shared_vertex.into()),
-        |query, &(a, b)| Ok(query.ignore(body(a)?, body(b)?)),
-    )
+    ignored
+        .iter()
+        .try_fold(query, |query, &(a, b)| Ok(query.ignore(body(a)?, body(b)?)))
+}
+
+/// Fails if anything was found and `--fail-on-hit` was given.
+pub fn hit(fail_on_hit: bool, is_found: bool) -> Result<(), Error> {
+    match fail_on_hit && is_found {
+        true => Err(Error::Hit),
+        false => Ok(()),
+    }
 }
 
 /// One detection, with progress and cancellation.

@@ -51,13 +51,9 @@ pub struct Loading<'a> {
 impl<'a> Loading<'a> {
     pub fn new(ask: &AskArgs, is_self: bool, cancel: &'a CancelToken) -> Self {
         Loading {
-            weld: match (ask.weld, ask.no_weld) {
-                (true, _) => Some(true),
-                (_, true) => Some(false),
-                _ => None,
-            },
+            weld: ask.read.weld(),
             is_self,
-            format: ask.format,
+            format: ask.read.format,
             notes: !ask.json,
             cancel,
         }

@@ -159,13 +159,10 @@ impl<'a> Hull<'a> {
         self.pose.close([start, end])
     }
 
-    /// The positions at the start and at the end, if both are in f32.
+    /// The positions at the start and at the end.
     #[inline(always)]
-    pub fn in_f32(&self) -> Option<[&'a [[f32; 3]]; 2]> {
-        match (self.start, self.end.unwrap_or(self.start)) {
-            (Positions::F32(start), Positions::F32(end)) => Some([start, end]),
-            _ => None,
-        }
+    pub fn ends(&self) -> [&'a Positions; 2] {
+        [self.start, self.end.unwrap_or(self.start)]
     }
 
     /// Puts the boxes of a cluster's elements into lanes, by the corners of its elements; to be [closed](Self::close).
@@ -181,7 +178,7 @@ impl<'a> Hull<'a> {
     /// The box of an element over the whole step, not rounded.
     #[inline]
     pub fn extent(&self, corners: &[u32]) -> Extent {
-        let ends = [self.start, self.end.unwrap_or(self.start)];
+        let ends = self.ends();
         let [Positions::F64(start), Positions::F64(end)] = ends else {
             let points = corners
                 .iter()

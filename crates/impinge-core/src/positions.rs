@@ -81,6 +81,33 @@ impl Positions {
         }
     }
 
+    /// The largest magnitude of a coordinate.
+    pub(crate) fn magnitude(&self) -> f64 {
+        // Magnitudes are ordered as their bits are, and compilers find the largest of many integers at once.
+        match self {
+            Positions::F32(positions) => {
+                let bits = positions.as_flattened().iter().map(|x| x.abs().to_bits());
+                f32::from_bits(bits.max().unwrap_or(0)).into()
+            }
+            Positions::F64(positions) => {
+                let bits = positions.as_flattened().iter().map(|x| x.abs().to_bits());
+                f64::from_bits(bits.max().unwrap_or(0))
+            }
+        }
+    }
+
+    /// How far rounding may move a coordinate of [`blend`](Positions::blend) from the way to the end.
+    pub(crate) fn most_rounded(&self, end: &Positions) -> f64 {
+        // Half a unit in the last place of an `f32`, after four roundings in `f64` of numbers up to twice as large.
+        let (share, least) = match (self, end) {
+            (Positions::F32(_), Positions::F32(_)) => {
+                (2f64.powi(-24) + 2f64.powi(-49), 2f64.powi(-149))
+            }
+            _ => (2f64.powi(-49), f64::MIN_POSITIVE),
+        };
+        share * self.magnitude().max(end.magnitude()) + least
+    }
+
     pub(crate) fn precision(&self) -> &'static str {
         match self {
             Positions::F32(_) => "f32",

@@ -1,5 +1,7 @@
 //! Steps: what touches while bodies move, when first, and how far a step can be taken.
 
+mod common;
+
 use std::ops::ControlFlow;
 
 use impinge_core::exact::{ElementPair, first_contact};
@@ -151,6 +153,132 @@ fn a_step_that_is_advanced_is_free_to_its_rounded_end() {
             &lifted(2.0).to_vec().into()
         );
     }
+}
+
+/// Triangles that land on a slope nearly at once: rounding makes others touch than the first. The naive method searches all pairs for every fraction.
+#[test]
+fn a_step_is_advanced_as_far_as_by_testing_all_pairs() {
+    let mut n_backed_off = 0;
+    for seed in 0..600 {
+        let mut random = impinge_scenes::Random::new(seed);
+        let (far, n) = ([3000.0, 40_000.0, 7.0][seed as usize % 3], 24);
+        let (faces, [start, end]) = common::landing(&mut random, n, 2.0, far);
+        let step = Step::default().start(Start::Skip);
+        for is_single in [true, false] {
+            let mut scene = Scene::new();
+            if is_single {
+                let body = scene.add_triangles(&faces, &start).expect("good");
+                scene.set_end_positions(body, &end).expect("good");
+            } else {
+                // Thirds, so that nothing is a short number.
+                let [start, end] = [&start, &end].map(|points| {
+                    let thirds = points.iter().map(|p| p.map(|x| f64::from(x) / 3.0));
+                    thirds.collect::<Vec<[f64; 3]>>()
+                });
+                let body = scene.add_triangles(&faces, &start).expect("good");
+                scene.set_end_positions(body, &end).expect("good");
+            }
+            let [found, expected] = <[_; 2]>::try_from(Vec::from_iter(
+                detectors()
+                    .iter_mut()
+                    .map(|detector| detector.advance(&scene, &step).expect("good")),
+            ))
+            .expect("two methods");
+            assert_eq!(found, expected, "{seed}");
+            n_backed_off += usize::from(found.n_tried > 2);
+        }
+    }
+    assert!(n_backed_off > 20, "{n_backed_off}");
+}
+
+/// Thousands of triangles that land within a last bit: too many pairs are close for the list of one thread.
+#[test]
+fn a_step_is_advanced_freely_where_very_many_pairs_are_close() {
+    let mut n_backed_off = 0;
+    for seed in 0..8 {
+        let mut random = impinge_scenes::Random::new(seed);
+        let (faces, [start, end]) = common::landing(&mut random, 30_000, 400.0, 40_000.0);
+        let mut scene = Scene::new();
+        let body = scene.add_triangles(&faces, &start).expect("good");
+        scene.set_end_positions(body, &end).expect("good");
+        let step = Step::default().start(Start::Skip);
+        let advances = [1, 4].map(|threads| {
+            let settings = Settings {
+                backend: Backend::Cpu,
+                threads,
+                ..Settings::default()
+            };
+            let mut detector = Detector::with_settings(settings).expect("settings");
+            detector.advance(&scene, &step).expect("good")
+        });
+        assert_eq!(advances[0], advances[1], "{seed}");
+        let advance = &advances[0];
+        n_backed_off += u32::from(advance.n_tried > 2);
+        for (body, positions) in &advance.positions {
+            let Positions::F32(positions) = positions else {
+                panic!("double precision")
+            };
+            scene.set_end_positions(*body, positions).expect("good");
+        }
+        let mut detector = Detector::new(Backend::Cpu).expect("settings");
+        assert!(detector.is_free(&scene, &step).expect("good"), "{seed}");
+    }
+    assert!(n_backed_off > 1, "{n_backed_off}");
+}
+
+/// Elements that are nearer to a tie than single precision can tell: about half of them touch, or are within a distance, or have boxes that do.
+#[test]
+fn elements_in_double_precision_are_answered_as_pair_by_pair() {
+    let mut n_found = [0; 3];
+    let mut n_candidates = 0;
+    for seed in 0..40 {
+        let mut random = impinge_scenes::Random::new(seed);
+        let far = [3000.0, 40_000.0][seed as usize % 2];
+        let (faces, [start, end]) = common::landing(&mut random, 60, 3.0, far);
+        let tie = 1e-7 * f64::from(far);
+        // All land between 0.5 and 0.5 + 2 `tie`, and the step ends in the middle.
+        let at = |time: f64| {
+            let pairs = start.iter().zip(&end);
+            let points = pairs.map(|(x, y)| {
+                let way = |k: usize| (f64::from(y[k]) - f64::from(x[k])) * time;
+                std::array::from_fn(|k| (f64::from(x[k]) + way(k)) / 3.0)
+            });
+            points.collect::<Vec<[f64; 3]>>()
+        };
+        let mut scene = Scene::new();
+        let body = scene.add_triangles(&faces, &at(0.0)).expect("good");
+        scene.set_end_positions(body, &at(0.5 + tie)).expect("good");
+        let mut still = Scene::new();
+        still
+            .add_triangles(&faces, &at(0.5 - 2.0 * tie))
+            .expect("good");
+        let kinds = [PairKind::VertexFace, PairKind::EdgeEdge];
+        let near = NearQuery::new(Query::everything())
+            .distance(0.2 * tie)
+            .kinds(kinds);
+        let candidates = CandidateQuery::new(Query::everything()).distance(0.01);
+        let answers = Vec::from_iter(detectors().into_iter().map(|mut detector| {
+            let impacts = detector.impacts(&scene, &Step::default()).expect("good");
+            let impacts = (impacts.len(), impacts.hash());
+            let near = detector.within_distance(&still, &near).expect("good");
+            let near = (near.len(), near.hash());
+            let keep = (Step::default()).separation(0.1 * tie);
+            let kept = detector.impacts(&scene, &keep).expect("good");
+            let kept = (kept.len(), kept.hash());
+            let candidates = detector.candidates(&scene, &candidates).expect("good");
+            let candidates = (candidates.len(), candidates.hash());
+            [impacts, near, kept, candidates]
+        }));
+        assert_eq!(answers[0], answers[1], "{seed}");
+        for (n, (found, _)) in n_found.iter_mut().zip(&answers[0]) {
+            *n += found;
+        }
+        n_candidates += answers[0][3].0;
+    }
+    assert!(
+        n_found.iter().all(|&n| n > 100) && n_candidates > 1000,
+        "{n_found:?} {n_candidates}"
+    );
 }
 
 #[test]

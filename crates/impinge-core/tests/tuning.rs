@@ -4,12 +4,12 @@ mod common;
 
 use std::time::Duration;
 
-use common::{agree, cases, check, leaves_out, naive, rows};
+use common::{agree, cases, check, landing, leaves_out, naive, rows};
 use impinge_core::{
     Backend, BodyId, CandidateQuery, Detector, Impact, Method, NearPair, NearQuery, PairKind,
     Pairs, Positions, Primitive, Query, Scene, Settings, SharedVertex, Statistics, Step, Tuning,
 };
-use impinge_scenes::{Model, solids, soup, surfaces};
+use impinge_scenes::{Model, Random, solids, soup, surfaces};
 
 const ZERO: usize = 0;
 const INFINITY: usize = 1;
@@ -584,4 +584,36 @@ fn the_earliest_contact_is_found_however_early_boxes_end() {
             assert_eq!(*first.get_or_insert(expected), expected);
         }
     }
+}
+
+/// Triangles that land nearly at once, where rounding makes others touch than the first: all close pairs are found however early boxes end.
+#[test]
+fn a_step_is_advanced_freely_however_early_boxes_end() {
+    let zero = Tuning::ENDS[ZERO];
+    let tuning = Tuning::ENDS[INFINITY].with("most_per_task", &zero);
+    let mut n_backed_off = 0;
+    for seed in 0..40 {
+        let mut random = Random::new(seed);
+        let (faces, [start, end]) = landing(&mut random, 400, 40.0, 3000.0);
+        let mut scene = Scene::new();
+        let body = scene.add_triangles(&faces, &start).unwrap();
+        scene.set_end_positions(body, &end).unwrap();
+        let step = Step::default();
+        let mut detector = detector(Method::Clusters, 1, tuning);
+        let advance = detector.advance(&scene, &step).unwrap();
+        assert!(advance.fraction > 0.0);
+        assert!(
+            detector.step_stats().ways.n_shortened > 1,
+            "seed {seed}: {advance:?}"
+        );
+        n_backed_off += u32::from(advance.n_tried > 2);
+        for (body, positions) in &advance.positions {
+            let Positions::F32(positions) = positions else {
+                panic!("double precision")
+            };
+            scene.set_end_positions(*body, positions).unwrap();
+        }
+        assert!(detector.is_free(&scene, &step).unwrap(), "seed {seed}");
+    }
+    assert!(n_backed_off > 5, "{n_backed_off}");
 }

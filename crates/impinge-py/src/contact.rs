@@ -6,8 +6,8 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::columns::strings;
 use crate::errors::raise;
-use crate::near::strings;
 use crate::result::{Answer, to_array};
 use crate::scene::Scene;
 use crate::settings::unexpected;
@@ -92,7 +92,7 @@ impl Contacts {
             Shape::Segment => "segment",
             Shape::Polygon => "polygon",
         });
-        strings(py, names, 7)
+        strings::<7>(py, self.inner.shapes().len(), names)
     }
 
     /// numpy.ndarray of float64, shape (p, 3) : the points of contact, each once.
@@ -134,7 +134,7 @@ impl Contacts {
             Feature::Edge(_) => "e",
             Feature::Face(_) => "f",
         });
-        strings(py, kinds, 1)?.call_method1("reshape", ((-1, 2),))
+        strings::<1>(py, 2 * self.inner.names().len(), kinds)?.call_method1("reshape", ((-1, 2),))
     }
 
     /// numpy.ndarray of uint32, shape (p, 2, 2) : the numbers of these features: the two vertices of an edge, the

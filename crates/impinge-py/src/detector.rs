@@ -486,8 +486,8 @@ impl Detector {
         Ok(Detector::watched(slf, watched, ask, answer)?.0)
     }
 
-    /// How far a step can be taken: the largest fraction of it, backed off as little as the precision of
-    /// positions allows, for which the straight way from the start to the *rounded* positions is free.
+    /// How far a step can be taken: a fraction of it, backed off from the first contact hardly more than the
+    /// precision of positions asks for, for which the straight way from the start to the *rounded* positions is free.
     ///
     /// Rounding alone may make elements touch that did not. So for each fraction that is tried positions are
     /// rounded first, and the way to those is asked about. A chain of such steps is free from the first to the

@@ -5,6 +5,7 @@
 
 mod arrays;
 mod bodies;
+mod columns;
 mod contact;
 mod datasets;
 mod detector;

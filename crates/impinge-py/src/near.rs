@@ -1,17 +1,16 @@
 //! `impinge.NearPairs`: elements within a distance of each other.
 
-use impinge::PairKind;
 use impinge::exact::Feature;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::result::to_array;
+use crate::columns;
+use crate::result::collect;
 use crate::scene::Scene;
 use crate::settings::{Argument, unexpected};
 use crate::statistics::Statistics;
-use crate::steps::kinds_array;
 
 /// All pairs of elements that are within the distance that was asked for, sorted by kind, then by bodies and
 /// elements. The same bytes on every method and thread count.
@@ -46,14 +45,15 @@ impl NearPairs {
     /// and a vertex), ``"vv"`` (two vertices), ``"ef"`` (an edge and a face) or ``"ff"`` (two faces).
     #[getter]
     fn kinds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        kinds_array(py, self.inner.iter().map(|pair| pair.kind))
+        let kinds = self.inner.iter().map(|pair| pair.kind);
+        columns::kinds(py, self.inner.len(), kinds)
     }
 
     /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two bodies.
     #[getter]
     fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let rows = self.inner.iter().map(|pair| pair.row());
-        to_array(py, rows.map(|[a, _, b, _]| [a, b]).collect())
+        columns::bodies(py, self.inner.len(), rows)
     }
 
     /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two elements in their bodies, as those of
@@ -61,7 +61,7 @@ impl NearPairs {
     #[getter]
     fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let rows = self.inner.iter().map(|pair| pair.row());
-        to_array(py, rows.map(|[_, a, _, b]| [a, b]).collect())
+        columns::elements(py, self.inner.len(), rows)
     }
 
     /// numpy.ndarray of str, shape (n,) : which features are nearest, with ipc-toolkit's names: ``"P_T"``,
@@ -69,7 +69,8 @@ impl NearPairs {
     /// faces, without numbers. Decided exactly.
     #[getter]
     fn types<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        strings(py, self.inner.iter().map(|pair| pair.name()), 7)
+        let names = self.inner.iter().map(|pair| pair.name());
+        columns::strings::<7>(py, self.inner.len(), names)
     }
 
     /// numpy.ndarray of str, shape (n, 2) : the nearest feature of either element: ``"v0"`` to ``"v2"``, ``"e0"``
@@ -80,14 +81,14 @@ impl NearPairs {
             .inner
             .iter()
             .flat_map(|pair| pair.features.map(feature));
-        strings(py, names, 2)?.call_method1("reshape", ((-1, 2),))
+        columns::strings::<2>(py, 2 * self.inner.len(), names)?.call_method1("reshape", ((-1, 2),))
     }
 
     /// numpy.ndarray of bool, shape (n,) : where nearest points may not be the only ones.
     #[getter]
-    fn parallel<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+    fn parallel<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let flags = self.inner.iter().map(|pair| pair.is_parallel);
-        PyArray1::from_vec(py, flags.collect())
+        Ok(PyArray1::from_vec(py, collect(self.inner.len(), flags)?))
     }
 
     /// numpy.ndarray of float64, shape (n,) : distances, rounded; the same bits on every machine. Only after
@@ -97,7 +98,10 @@ impl NearPairs {
         self.check_closest()?;
         let closest = self.inner.iter().filter_map(|pair| pair.closest);
         let distances = closest.map(|closest| closest.distance);
-        Ok(PyArray1::from_vec(py, distances.collect()))
+        Ok(PyArray1::from_vec(
+            py,
+            collect(self.inner.len(), distances)?,
+        ))
     }
 
     /// numpy.ndarray of float64, shape (n, 2, 3) : a nearest point of either element, rounded. Only after
@@ -106,7 +110,7 @@ impl NearPairs {
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         self.check_closest()?;
         let closest = self.inner.iter().filter_map(|pair| pair.closest);
-        let points: Vec<[[f64; 3]; 2]> = closest.map(|closest| closest.points).collect();
+        let points = collect(self.inner.len(), closest.map(|closest| closest.points))?;
         let flat = points.into_flattened().into_flattened();
         PyArray1::from_vec(py, flat).reshape([self.inner.len(), 2, 3])
     }
@@ -130,13 +134,7 @@ impl NearPairs {
     }
 
     fn __repr__(&self) -> String {
-        let counts = PairKind::ALL.map(|kind| (kind.name(), self.inner.of(kind).len()));
-        let counts: Vec<String> = counts
-            .iter()
-            .filter(|(_, n)| *n > 0)
-            .map(|(name, n)| format!("{name}: {n}"))
-            .collect();
-        format!("NearPairs({})", counts.join(", "))
+        columns::counted("NearPairs", |kind| self.inner.of(kind).len())
     }
 }
 
@@ -146,25 +144,6 @@ fn feature(feature: Feature) -> &'static str {
         Feature::Edge(ix) => ["e0", "e1", "e2"][usize::from(ix) % 3],
         Feature::Face => "f",
     }
-}
-
-/// Short names as NumPy holds them: one 32-bit number per letter, filled up with zeros.
-pub fn strings(
-    py: Python<'_>,
-    names: impl Iterator<Item = &'static str>,
-    width: usize,
-) -> PyResult<Bound<'_, PyAny>> {
-    let letters: Vec<u32> = names
-        .flat_map(|name| {
-            let letters = name.bytes().map(u32::from);
-            letters.chain(std::iter::repeat(0)).take(width)
-        })
-        .collect();
-    let dtype = format!("U{width}");
-    if letters.is_empty() {
-        return py.import("numpy")?.call_method1("empty", (0, dtype));
-    }
-    PyArray1::from_vec(py, letters).call_method1("view", (dtype,))
 }
 
 /// The thickness of bodies, from a dictionary.

@@ -10,6 +10,7 @@ use pyo3::types::PyString;
 
 use crate::arrays::from_end;
 use crate::bodies::Body;
+use crate::columns;
 use crate::errors::raise;
 use crate::result::{collect, to_array};
 use crate::scene::{Scene, positions_array};
@@ -121,17 +122,15 @@ impl Impacts {
     /// numpy.ndarray of str, shape (n,) : ``"vf"``, ``"ee"``, ``"ev"`` or ``"vv"``.
     #[getter]
     fn kinds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        kinds_array(py, self.inner.iter().map(|impact| impact.kind))
+        let kinds = self.inner.iter().map(|impact| impact.kind);
+        columns::kinds(py, self.inner.len(), kinds)
     }
 
     /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two bodies.
     #[getter]
     fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let rows = self.inner.iter().map(impinge::Impact::row);
-        to_array(
-            py,
-            collect(self.inner.len(), rows.map(|[a, _, b, _]| [a, b]))?,
-        )
+        columns::bodies(py, self.inner.len(), rows)
     }
 
     /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two elements in their bodies.
@@ -142,10 +141,7 @@ impl Impacts {
     #[getter]
     fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let rows = self.inner.iter().map(impinge::Impact::row);
-        to_array(
-            py,
-            collect(self.inner.len(), rows.map(|[_, a, _, b]| [a, b]))?,
-        )
+        columns::elements(py, self.inner.len(), rows)
     }
 
     /// numpy.ndarray of float32, or float64 after ``toi="f64"``, shape (n,) : first times in [0, 1], each
@@ -403,22 +399,20 @@ impl Candidates {
     /// numpy.ndarray of str, shape (n,) : the kind of each pair.
     #[getter]
     fn kinds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        kinds_array(py, self.all().map(|(kind, _)| kind))
+        columns::kinds(py, self.inner.len(), self.all().map(|(kind, _)| kind))
     }
 
     /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two bodies.
     #[getter]
     fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        let rows = self.all().map(|(_, [a, _, b, _])| [a, b]);
-        to_array(py, collect(self.inner.len(), rows)?)
+        columns::bodies(py, self.inner.len(), self.all().map(|(_, row)| row))
     }
 
     /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two elements in their bodies, as those of
     /// `Impacts.elements`.
     #[getter]
     fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        let rows = self.all().map(|(_, [_, a, _, b])| [a, b]);
-        to_array(py, collect(self.inner.len(), rows)?)
+        columns::elements(py, self.inner.len(), self.all().map(|(_, row)| row))
     }
 
     /// int : a 64-bit hash of the set that does not depend on its order.
@@ -446,13 +440,7 @@ impl Candidates {
     }
 
     fn __repr__(&self) -> String {
-        let counts = PairKind::ALL.map(|kind| (kind.name(), self.inner.of(kind).len()));
-        let counts: Vec<String> = counts
-            .iter()
-            .filter(|(_, n)| *n > 0)
-            .map(|(name, n)| format!("{name}: {n}"))
-            .collect();
-        format!("Candidates({})", counts.join(", "))
+        columns::counted("Candidates", |kind| self.inner.of(kind).len())
     }
 }
 
@@ -477,20 +465,6 @@ pub fn kinds(argument: Argument<'_, '_>) -> PyResult<Vec<PairKind>> {
         .enumerate()
         .map(|(ix, kind)| choose_one(&kind?, &format!("kinds[{ix}]"), &choices))
         .collect()
-}
-
-/// Names of two letters as NumPy holds them: one 32-bit number per letter.
-pub fn kinds_array(
-    py: Python<'_>,
-    kinds: impl Iterator<Item = PairKind>,
-) -> PyResult<Bound<'_, PyAny>> {
-    let letters: Vec<u32> = kinds
-        .flat_map(|kind| kind.name().bytes().map(u32::from))
-        .collect();
-    if letters.is_empty() {
-        return py.import("numpy")?.call_method1("empty", (0, "U2"));
-    }
-    PyArray1::from_vec(py, letters).call_method1("view", ("U2",))
 }
 
 /// A number that is a distance; `CandidateQuery` refuses what is not finite or below 0.

@@ -1,6 +1,8 @@
 """`impinge.ipc` beside ipc-toolkit itself, and against exact answers."""
 
+import gc
 import inspect
+import weakref
 
 import numpy as np
 import pytest
@@ -63,6 +65,17 @@ def test_the_step_is_the_earliest_impact(seed):
     assert impinge.Detector(backend="cpu").is_free(scene)
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_distance_is_kept(dtype):
+    mesh, start, end = falling(dtype)
+    # The upper triangle starts at a height of 1 and falls by 4.
+    assert ipc.is_step_collision_free(mesh, start, start + 0.125 * (end - start), 0.25)
+    assert not ipc.is_step_collision_free(mesh, start, start + 0.1875 * (end - start), 0.25)
+    step = ipc.compute_collision_free_stepsize(mesh, start, end, 0.25)
+    assert 0.1875 * (1 - 8 * np.finfo(dtype).eps) < step < 0.1875
+    assert ipc.compute_collision_free_stepsize(mesh, start, end, min_distance=1) == 0.0
+
+
 def test_loose_edges_and_points():
     # A triangle, an edge that hangs on it, an edge by itself, a point.
     rest = np.array([*FLOOR, [0, 0, 1], [9, 9, 0], [9, 9, 1], [1, 1, 2]])
@@ -93,8 +106,11 @@ def test_vertices_that_may_not_collide():
 def test_refusals():
     mesh, start, end = falling()
     for call in [ipc.is_step_collision_free, ipc.compute_collision_free_stepsize]:
-        with pytest.raises(NotImplementedError, match="^min_distance: 0.001 given, only 0"):
-            call(mesh, start, end, 1e-3)
+        for distance in [-1e-3, np.nan, np.inf]:
+            with pytest.raises(ValueError, match=f"^min_distance: {distance} given, a finite number"):
+                call(mesh, start, end, distance)
+        with pytest.raises(TypeError, match="^mesh: a CollisionMesh expected, dict given"):
+            call({}, start, end)
         with pytest.raises(ValueError, match=r"^vertices_t1: shape \(6, 3\) expected, as the mesh"):
             call(mesh, start, end[:4])
         bad = start.copy()
@@ -132,8 +148,28 @@ def test_names_are_those_of_ipc_toolkit():
     assert len(mine) == len(theirs)
 
 
+def test_meshes_of_ipc_toolkit_are_served():
+    ipctk = pytest.importorskip("ipctk", reason="ipctk is not installed: no comparison with it")
+    ipctk.set_logger_level(ipctk.LoggerLevel.off)
+    mine, start, end = falling()
+    theirs = ipctk.CollisionMesh(start, ipctk.edges(TWO.astype(np.int32)), TWO.astype(np.int32))
+    for _ in range(2):
+        step = ipc.compute_collision_free_stepsize(theirs, start, end)
+        assert step == ipc.compute_collision_free_stepsize(mine, start, end)
+        assert not ipc.is_step_collision_free(theirs, start, end)
+    theirs.can_collide = ipctk.CollisionFilter(lambda a, b: False)
+    assert ipc.compute_collision_free_stepsize(theirs, start, end) == 1.0
+    assert ipc.is_step_collision_free(theirs, start, end)
+    # Nothing keeps a mesh alive that is no longer used.
+    gone = weakref.ref(theirs)
+    del theirs
+    gc.collect()
+    assert gone() is None
+
+
 @pytest.mark.parametrize("seed", range(8))
-def test_side_by_side_with_ipc_toolkit(seed):
+@pytest.mark.parametrize("distance", [0.0, 1e-2])
+def test_side_by_side_with_ipc_toolkit(seed, distance):
     ipctk = pytest.importorskip("ipctk", reason="ipctk is not installed: no comparison with it")
     ipctk.set_logger_level(ipctk.LoggerLevel.off)
     faces, start, end = two_balls(seed)
@@ -141,16 +177,18 @@ def test_side_by_side_with_ipc_toolkit(seed):
 
     def ask(toolkit):
         mesh = toolkit.CollisionMesh(start, edges, faces)
-        step = toolkit.compute_collision_free_stepsize(mesh, start, end)
-        is_free = toolkit.is_step_collision_free(mesh, start, start + 0.9 * step * (end - start))
-        return step, toolkit.is_step_collision_free(mesh, start, end), is_free
+        step = toolkit.compute_collision_free_stepsize(mesh, start, end, distance)
+        near = start + 0.9 * step * (end - start)
+        is_free = [toolkit.is_step_collision_free(mesh, start, x, distance) for x in [end, near]]
+        return step, *is_free
 
     ours, theirs = ask(ipc), ask(ipctk)
     assert ours[1:] == theirs[1:] == (False, True)
     scene = impinge.Scene()
     scene.add(start, faces)
     scene.set_end_positions(0, end)
-    true = impinge.Detector("naive", backend="cpu").earliest(scene, toi="f64").toi
+    naive = impinge.Detector("naive", backend="cpu")
+    true = naive.earliest(scene, toi="f64", separation=distance).toi
     # Ours is never beyond the first contact; theirs is never beyond ours, and close to it.
     assert ours[0] <= true and theirs[0] <= ours[0]
     assert ours[0] - theirs[0] < 1e-3 + 0.25 * ours[0]

@@ -54,6 +54,33 @@
 //! }
 //! ```
 //!
+//! # Steps of a solver
+//!
+//! A solver wishes for positions, and takes the step as far as nothing touches. Each stored state is then reached from the one
+//! before on straight lines without contact, rounding included. So surfaces that do not intersect at first never do.
+//!
+//! ```
+//! use impinge::{Backend, Detector, Scene, Step};
+//! # fn main() -> Result<(), impinge::Error> {
+//! let mut scene = Scene::new();
+//! scene.add_triangles(&[[0, 1, 2]], &[[-4.0, -4.0, 0.0], [4.0, -4.0, 0.0], [0.0, 4.0, 0.0f32]])?;
+//! let strand = scene.add_edges(&[[0, 1]], &[[0.0, 0.0, 1.0], [0.5, 0.0, 1.0f32]])?; // hair; points are bodies too
+//! let mut detector = Detector::new(Backend::Cpu)?;
+//! let mut height = 1.0;
+//! for _ in 0..3 {
+//!     let wished = height - 0.75f32;
+//!     scene.set_end_positions(strand, &[[0.0, 0.0, wished], [0.5, 0.0, wished]])?;
+//!     let advance = detector.advance(&scene, &Step::default())?;
+//!     advance.apply(&mut scene)?;
+//!     height = scene.body(strand)?.positions().point(0)[2] as f32;
+//! }
+//! assert!(0.0 < height && height < 1e-6);
+//! # Ok(()) }
+//! ```
+//!
+//! [`Detector::impacts`] has all pairs that touch, for solvers that resolve contacts; [`Detector::candidates`] the pairs whose boxes
+//! overlap, for a test of one's own.
+//!
 //! # Positions of other libraries
 //!
 //! Positions are `&[[f32; 3]]` or `&[[f64; 3]]`. The vectors of glam and nalgebra have this layout, and with their feature

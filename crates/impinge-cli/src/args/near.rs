@@ -1,19 +1,19 @@
-//! `impinge near`: what may be said.
+//! The command line of `impinge near`.
 
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use impinge::PairKind;
 
-use super::DetectorArgs;
-use crate::values::{RowsFile, RowsFormat, body_numbers, distance, mesh_format};
+use super::{DetectorArgs, ReadArgs};
+use crate::values::{RowsFile, RowsFormat, body_numbers, distance};
 
 pub const NEAR_EXAMPLES: &str = "\
 Examples:
   impinge near a.obj b.obj --distance 0.01                which elements are within 0.01 of each other?
   impinge near cloth.ply --distance 0.002                 of one mesh: parts that do not share a vertex
   impinge near a.ply b.ply --distance 0.01 --pairs -      the pairs themselves, as CSV
-  impinge near a.stl b.stl --distance 0.5 --fail-on-hit   a check of clearance: exit code 3 where it is less
+  impinge near a.stl b.stl --distance 0.5 --fail-on-hit   a check of clearance: exit code 3 if it is less
   impinge near a.ply b.ply --distance 1 --kinds ff        pairs of faces
 
 Whether a distance is at most D is decided exactly; --distance is read as a double-precision number.
@@ -25,31 +25,24 @@ element), e0, e1 or e2 (edge k goes from vertex k to the next) or f. Distance an
 
 #[derive(Debug, Args)]
 pub struct NearArgs {
-    /// Mesh files, a body each; one alone is compared with itself
+    /// Mesh files, one per body; one alone is compared with itself
     #[arg(value_name = "MESH", required = true)]
     pub meshes: Vec<PathBuf>,
     /// The distance, in the unit of the meshes: 0 or more
     #[arg(long, value_name = "D", required = true, allow_negative_numbers = true, value_parser = distance)]
     pub distance: f64,
-    /// Find the pairs within each body as well
+    /// Also find the pairs within each body
     #[arg(long = "self")]
     pub within: bool,
     /// Which pairs: vertex-face, edge-edge, edge-vertex, vertex-vertex, edge-face, face-face [default: vf,ee]
     #[arg(long, value_enum, value_name = "KIND", value_delimiter = ',')]
     pub kinds: Vec<KindArg>,
-    /// Make vertices at the same position one, in each file by itself [default wherever a body may meet itself]
-    #[arg(long, overrides_with = "no_weld")]
-    pub weld: bool,
-    /// Keep vertices at the same position apart, but for STL files, whose triangles share nothing else
-    #[arg(long, overrides_with = "weld")]
-    pub no_weld: bool,
-    /// The format of the mesh that is read from standard input, named "-": ply, off, stl, …
-    #[arg(long, value_name = "EXT", value_parser = mesh_format)]
-    pub format: Option<impinge_io::Format>,
-    /// Leave out the pairs of bodies A and B, numbered from 0 as given (A,A: the pairs within A)
+    #[command(flatten)]
+    pub read: ReadArgs,
+    /// Ignore the pairs of bodies A and B, numbered from 0 as given (A,A: the pairs within A)
     #[arg(long, value_name = "A,B", value_parser = body_numbers)]
     pub ignore: Vec<(usize, usize)>,
-    /// End with exit code 3 where there is any pair
+    /// End with exit code 3 if anything is found
     #[arg(long)]
     pub fail_on_hit: bool,
     /// Print JSON and nothing else (see docs/cli.md)
@@ -58,7 +51,7 @@ pub struct NearArgs {
     /// Write the pairs (.csv, .jsonl or .npy; "-" is standard output, as CSV unless --pairs-format says otherwise)
     #[arg(long, value_name = "FILE")]
     pub pairs: Option<RowsFile>,
-    /// How pairs are written, whatever the file is called
+    /// The format of the pairs, whatever the name of the file
     #[arg(long, value_enum, value_name = "FORMAT", requires = "pairs")]
     pub pairs_format: Option<RowsFormat>,
     #[command(flatten)]
@@ -66,14 +59,14 @@ pub struct NearArgs {
 }
 
 impl NearArgs {
-    /// Where the pairs go, in the format that was asked for.
+    /// The file of the pairs, with the requested format.
     pub fn rows(&self) -> Option<RowsFile> {
         let file = self.pairs.clone()?;
         let format = self.pairs_format.unwrap_or(file.format);
         Some(RowsFile { format, ..file })
     }
 
-    /// The file to be written, with its option.
+    /// The output file, with its option.
     pub fn output(&self) -> Option<(&'static str, &Path)> {
         let file = self.pairs.as_ref().filter(|file| !file.is_stdout())?;
         Some(("--pairs", &file.path))

@@ -16,9 +16,10 @@ use crate::values::{MeshFile, RowsFile, at_least_one, body_numbers, distance};
 
 pub const STEP_EXAMPLES: &str = "\
 Examples:
-  impinge step cloth_0.ply cloth_1.ply             may the cloth move from one pose to the other?
-  impinge step a_0.obj a_1.obj b_0.obj b_1.obj     two bodies, each at the start and at the end
-  impinge step cloth_0.ply cloth_1.ply --earliest  only the first contact, which is faster
+  impinge step cloth_0.ply cloth_1.ply                may the cloth move from one pose to the other?
+  impinge step a_0.obj a_1.obj b_0.obj b_1.obj        two bodies, each at the start and at the end
+  impinge step cloth_0.ply cloth_1.ply --earliest     only the first contact, which is faster
+  impinge step cloth_0.ply cloth_1.ply --fail-on-hit  the same as a check: exit code 3 if anything touches
   impinge step cloth_0.ply cloth_1.ply --impacts impacts.csv --out impacts.glb
   impinge step cloth_0.ply cloth_1.ply --candidates boxes.npy --distance 0.001
 
@@ -27,7 +28,8 @@ Times are exact first times, rounded down: nothing touches earlier.
 
 Rows of --impacts are kind, body_a, element_a, body_b, element_b, toi, sorted. In a row of kind vf, a is the vertex
 and b the face. Vertices and faces are numbered as in the file; edges are the unique pairs (low, high) of vertices in
-the order of (high, low). Kinds ev and vv occur if a body has edges or points without faces.
+the order of (high, low). Mesh files hold faces, so kinds are vf and ee; ev and vv are of bodies of edges or points,
+which the library and the Python module have.
 
 Rows of --candidates are the same without toi. They are found and written run by run, so that memory need not hold
 all of them: see --memory-budget. In a .npy file they are a structured array.";
@@ -35,7 +37,7 @@ all of them: see --memory-budget. In a .npy file they are a structured array.";
 #[derive(Debug, Args)]
 pub struct StepArgs {
     /// Mesh files in pairs: a body at the start of the step, and the same body at its end
-    #[arg(value_name = "START END", required = true, num_args = 2..)]
+    #[arg(value_names = ["START", "END"], required = true, num_args = 2..)]
     pub meshes: Vec<PathBuf>,
     /// Find only the first contact
     #[arg(long, conflicts_with_all = ["impacts", "out", "candidates"])]
@@ -46,13 +48,17 @@ pub struct StepArgs {
     pub no_self: bool,
     #[command(flatten)]
     pub how: StepHow,
-    /// Weld vertices that are at the same position both at the start and at the end, within each body
+    /// Weld vertices that are at the same position both at the start and at the end, within each body; those of STL files, where
+    /// triangles share nothing else, always are
     #[arg(long)]
     pub weld: bool,
     /// Ignore the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
     #[arg(long, value_name = "A,B", value_parser = body_numbers)]
     pub ignore: Vec<(usize, usize)>,
-    /// Print JSON and nothing else
+    /// End with exit code 3 unless the step is free
+    #[arg(long, conflicts_with = "candidates")]
+    pub fail_on_hit: bool,
+    /// Print JSON and nothing else (see docs/cli.md)
     #[arg(long)]
     pub json: bool,
     /// Write all impacts (.csv, .jsonl or .npy; "-" is standard output, as CSV)

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::apart::Inputs;
 use crate::args::{AnswerArgs, AskArgs, DetectorArgs, PairsArgs, WithinArgs};
-use crate::detection::{any, count, query, repeat, settings};
+use crate::detection::{any, count, hit, query, repeat, settings};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
 #[cfg(feature = "gpu")]
@@ -119,7 +119,7 @@ fn answer(
             headline::write_count(&mut line, &scene, &bodies, &text)?;
             output::out().write_all(&line)?;
         }
-        return hit(ask, n_pairs as usize);
+        return hit(ask.fail_on_hit, n_pairs > 0);
     }
     let n_frames = answer.repeat.get();
     let (pairs, times) = repeat(&mut detector, &mut scene, &query, n_frames, cancel, &watch)?;
@@ -177,13 +177,5 @@ fn answer(
         let mut drawer = Drawer::new(&answer.picture, how.device.as_deref())?;
         drawer.write(&png.0, &scene, &bodies, pairs)?;
     }
-    hit(ask, pairs.len())
-}
-
-/// Fails if there are pairs and `--fail-on-hit` was given.
-pub fn hit(ask: &AskArgs, n_pairs: usize) -> Result<(), Error> {
-    match ask.fail_on_hit && n_pairs > 0 {
-        true => Err(Error::Hit),
-        false => Ok(()),
-    }
+    hit(ask.fail_on_hit, !pairs.is_empty())
 }

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use crate::apart::Inputs;
 use crate::args::NearArgs;
-use crate::detection::detector;
+use crate::detection::{detector, hit, without};
 use crate::error::Error;
 use crate::json::{counters, rounded};
 use crate::load::{Bodies, Loading};
@@ -31,12 +31,8 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
         return Err(Error::Usage(text.to_owned()));
     }
     let is_self = args.within || args.meshes.len() == 1;
-    let weld = match (args.weld, args.no_weld) {
-        (true, _) => Some(true),
-        (_, true) => Some(false),
-        _ => None,
-    };
-    let loading = Loading::as_they_are(!args.json, cancel).asked(weld, is_self, args.format);
+    let read = &args.read;
+    let loading = Loading::as_they_are(!args.json, cancel).asked(read.weld(), is_self, read.format);
     let bodies = Bodies::read(&args.meshes, loading)?;
     let mut detector = detector(&args.detector)?;
     let mut query = NearQuery::new(query(args, &bodies)?).distance(args.distance);
@@ -55,7 +51,7 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     }
     let near = detector.within_distance_with(&bodies.scene, &query, &control)?;
     drop(watch);
-    // Files come first: where one can't be written, no answer is printed that looks like success.
+    // Files are written first: if one can't be written, no answer is printed that looks like success.
     if let Some(file) = &rows_file {
         rows::write(file, near)?;
     }
@@ -67,10 +63,7 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     } else {
         print(&mut out(), args, &bodies, near)?;
     }
-    match args.fail_on_hit && !near.is_empty() {
-        true => Err(Error::Hit),
-        false => Ok(()),
-    }
+    hit(args.fail_on_hit, !near.is_empty())
 }
 
 fn query(args: &NearArgs, bodies: &Bodies) -> Result<Query, Error> {
@@ -79,17 +72,7 @@ fn query(args: &NearArgs, bodies: &Bodies) -> Result<Query, Error> {
         (_, true) => Query::everything(),
         (_, false) => Query::all(),
     };
-    let body = |number: usize| {
-        bodies.ids.get(number).copied().ok_or_else(|| {
-            Error::Usage(format!(
-                "--ignore names body {number}, but {} bodies are given, numbered from 0",
-                bodies.ids.len()
-            ))
-        })
-    };
-    args.ignore
-        .iter()
-        .try_fold(asked, |asked, &(a, b)| Ok(asked.ignore(body(a)?, body(b)?)))
+    without(asked, &args.ignore, &bodies.ids)
 }
 
 /// The object that `docs/near.schema.json` describes.

@@ -7,8 +7,7 @@ use serde_json::Value;
 
 use crate::apart::Inputs;
 use crate::args::RenderArgs;
-use crate::commands::answer::hit;
-use crate::detection::{detector, query, repeat};
+use crate::detection::{detector, hit, query, repeat};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
 use crate::output::{out, print_details};
@@ -58,5 +57,5 @@ pub fn render(args: &RenderArgs, cancel: &CancelToken) -> Result<(), Error> {
         }
         writeln!(to, "wrote {}", path.display())?;
     }
-    hit(&args.ask, pairs.len())
+    hit(args.ask.fail_on_hit, !pairs.is_empty())
 }

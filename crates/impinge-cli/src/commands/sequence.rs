@@ -10,8 +10,7 @@ use serde_json::{Map, Value};
 use super::step::{self, Frames as _, steps_of_sequence};
 use crate::apart::Inputs;
 use crate::args::SequenceArgs;
-use crate::commands::answer::hit;
-use crate::detection::{Times, detect, detector, query, set_positions};
+use crate::detection::{Times, detect, detector, hit, query, set_positions};
 use crate::error::Error;
 use crate::load::{Bodies, Loading, to_positions};
 use crate::output::out;
@@ -71,7 +70,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
             .start(args.step.start.into())
             .toi(args.step.toi.into())
             .separation(args.step.separation);
-        return steps_of_sequence(
+        let is_free = steps_of_sequence(
             (&mut detector, &mut scene, moving),
             &step,
             &frames,
@@ -79,7 +78,8 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
             args.ask.json,
             &Control::new().cancel(cancel),
             || watch.frame_done(),
-        );
+        )?;
+        return hit(args.ask.fail_on_hit, !is_free);
     }
     let still = Watch::detection(false, "");
     let mut lines = Lines::default();
@@ -117,7 +117,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     if prints {
         lines.end()?;
     }
-    hit(&args.ask, n_pairs)
+    hit(args.ask.fail_on_hit, n_pairs > 0)
 }
 
 /// The output files of each frame.

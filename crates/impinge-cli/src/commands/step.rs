@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use crate::apart::Inputs;
 use crate::args::StepArgs;
-use crate::detection::{Times, detector};
+use crate::detection::{Times, detector, hit, without};
 use crate::error::Error;
 use crate::output::out;
 #[cfg(feature = "gpu")]
@@ -85,7 +85,8 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
         let earliest = detector.earliest_with(&bodies.scene, &step, &control)?;
         drop(watch);
         let found = Found::first(earliest, detector.step_stats(), times);
-        return print(args, &bodies, &found);
+        print(args, &bodies, &found)?;
+        return hit(args.fail_on_hit, earliest.is_some());
     }
     let impacts = detector.impacts_with(&bodies.scene, &step, &control)?;
     drop(watch);
@@ -96,8 +97,12 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     if let Some(file) = &args.out {
         colors::write(file, &bodies, impacts)?;
     }
-    if !rows_on_stdout {
-        print(args, &bodies, &Found::all(impacts, times))?;
+    let found = Found::all(impacts, times);
+    if rows_on_stdout {
+        // If standard error is closed, nobody reads the summary.
+        let _ = found.print(&mut stderr(), &bodies, args.how.separation);
+    } else {
+        print(args, &bodies, &found)?;
     }
     #[cfg(feature = "gpu")]
     if let Some(png) = &args.png {
@@ -105,7 +110,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
         let device = args.detector.device.as_deref();
         Drawer::new(&args.picture, device)?.draw(&png.0, surfaces)?;
     }
-    Ok(())
+    hit(args.fail_on_hit, !impacts.is_empty())
 }
 
 fn query(args: &StepArgs, bodies: &Moving) -> Result<Query, Error> {
@@ -118,17 +123,7 @@ fn query(args: &StepArgs, bodies: &Moving) -> Result<Query, Error> {
         true => Query::all(),
         false => Query::everything(),
     };
-    let body = |number: usize| {
-        bodies.ids.get(number).copied().ok_or_else(|| {
-            Error::Usage(format!(
-                "--ignore names body {number}, but {} bodies are given, numbered from 0",
-                bodies.ids.len()
-            ))
-        })
-    };
-    args.ignore
-        .iter()
-        .try_fold(asked, |asked, &(a, b)| Ok(asked.ignore(body(a)?, body(b)?)))
+    without(asked, &args.ignore, &bodies.ids)
 }
 
 fn candidate_query(args: &StepArgs, bodies: &Moving) -> Result<CandidateQuery, Error> {
@@ -145,5 +140,5 @@ fn print(args: &StepArgs, bodies: &Moving, found: &Found<'_>) -> Result<(), Erro
         writeln!(out(), "{object}")?;
         return Ok(());
     }
-    found.print(bodies, args.how.separation)
+    Ok(found.print(&mut out(), bodies, args.how.separation)?)
 }

@@ -56,10 +56,8 @@ pub fn wrong(schema: &Value, value: &Value, at: &str) -> Vec<String> {
             }
             "required" => {
                 for key in told.as_array().unwrap() {
-                    say(
-                        value.get(key.as_str().unwrap()).is_some(),
-                        format!("{key} is missing"),
-                    );
+                    let has = value.get(key.as_str().unwrap()).is_some();
+                    say(has || !value.is_object(), format!("{key} is missing"));
                 }
             }
             "properties" => {

@@ -8,6 +8,7 @@ use impinge_scenes::surfaces::{ball, cube};
 use serde_json::Value;
 
 use crate::harness::{Folder, keys};
+use crate::schema::{schema, wrong};
 
 /// Two bodies, each at the start and at the end of a step in which one runs into the other.
 fn crash() -> [(&'static str, Model); 4] {
@@ -141,6 +142,21 @@ fn the_json_holds_what_the_library_says() {
         (&Value::Bool(false), &Value::Null)
     );
 
+    let schema = schema("step");
+    let free = folder.run(["step", "a0.ply", "a1.ply", "--json"]).json();
+    for object in [&answer, &alone, &free] {
+        assert_eq!(wrong(&schema, object, "$"), [""; 0]);
+    }
+    for (key, value) in [
+        ("earliest", serde_json::json!({"toi": 0.5})),
+        ("hash", 7.into()),
+        ("new", 1.into()),
+    ] {
+        let mut object = answer.clone();
+        object[key] = value;
+        assert!(!wrong(&schema, &object, "$").is_empty(), "{key}");
+    }
+
     // The same as text.
     let printed = folder.run(["step"].iter().chain(&FILES)).printed();
     assert!(printed.starts_with("not free: "), "{printed}");
@@ -168,6 +184,32 @@ fn impacts_read_back_to_the_same_bits() {
             Toi::F64 => npy(&folder.path("impacts.npy"), f64::from_le_bytes),
         };
         assert_eq!(read, rows);
+    }
+}
+
+/// Rows on standard output leave the summary to standard error.
+#[test]
+fn rows_are_printed_alone() {
+    let folder = folder();
+    let ask = |to| folder.run(["step"].iter().chain(&FILES).chain(&["--impacts", to]));
+    let run = ask("-");
+    assert!(run.stderr.starts_with("not free: "), "{}", run.stderr);
+    assert!(run.stderr.contains(" impacts ("), "{}", run.stderr);
+    ask("impacts.csv").printed();
+    let file = std::fs::read_to_string(folder.path("impacts.csv")).unwrap();
+    assert_eq!(run.printed(), file);
+}
+
+#[test]
+fn a_check_fails_where_a_step_is_not_free() {
+    let folder = folder();
+    let ask = |args: &[&str]| folder.run(["step"].iter().chain(args).chain(&["--fail-on-hit"]));
+    for more in [&[][..], &["--earliest"], &["--json"], &["--impacts", "-"]] {
+        let run = ask(&[&FILES[..], more].concat());
+        assert_eq!(run.code, Some(3), "{}", run.stderr);
+        assert!(!run.stdout.is_empty());
+        let run = ask(&[&["b0.ply", "b1.ply"][..], more].concat());
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
     }
 }
 
@@ -405,6 +447,39 @@ fn welding_keeps_what_parts() {
         at_start("parted.obj", &[])
     );
     assert_eq!(at_start("start.obj", &["--start", "skip"]).0, Some(0));
+    // Whoever wonders about contact at the start is told of these vertices.
+    let noted = |more: &[&str]| {
+        let run = folder.run(["step", "start.obj", "start.obj"].iter().chain(more));
+        run.stderr
+    };
+    let run = folder.run(["step", "start.obj", "start.obj", "--earliest"]);
+    let first = "not free: vertex 0 and face 1 of start.obj touch first, at the start\n";
+    assert!(run.stdout.starts_with(first), "{}", run.stdout);
+    let told = "note: start.obj: vertices at the position of another, not welded to it: 1\n";
+    assert_eq!(noted(&[]), told);
+    assert!(noted(&["--weld"]).ends_with("welded to others: 1\n"));
+}
+
+/// The triangles of an STL file share nothing except positions.
+#[test]
+fn neighbours_in_an_stl_file_do_not_touch() {
+    let folder = Folder::new();
+    let facet = |[a, b, c]: [&str; 3]| {
+        format!(
+            "facet normal 0 0 1\nouter loop\nvertex {a}\nvertex {b}\nvertex {c}\nendloop\nendfacet\n"
+        )
+    };
+    let faces = [["0 0 0", "1 0 0", "0 1 0"], ["1 0 0", "1 1 0", "0 1 0"]];
+    let text = format!("solid s\n{}endsolid s\n", faces.map(facet).concat());
+    folder.text("start.stl", &text);
+    folder.text("end.stl", &text.replace(" 0\n", " 2\n"));
+    let run = folder.run(["step", "start.stl", "end.stl"]);
+    assert!(
+        run.stderr.ends_with("welded to others: 2\n"),
+        "{}",
+        run.stderr
+    );
+    assert!(run.printed().starts_with("free: "));
 }
 
 #[test]
@@ -437,11 +512,27 @@ fn a_sequence_is_followed_step_by_step() {
     assert_eq!(lines[1]["earliest"]["toi"], 1.0);
     assert_eq!(lines[1]["touching_at_start"], 0);
     assert!(lines[2]["touching_at_start"].as_u64() > Some(0));
-    let printed = folder.run(&arguments[..6]).printed();
+    let text = &arguments[..6];
+    let printed = folder.run(text).printed();
     assert!(
         printed.ends_with("3 steps, 1 free of contact\n"),
         "{printed}"
     );
+    for (more, code) in [(&[][..], 3), (&["--frames", "0..2"], 0)] {
+        let run = folder.run(text.iter().chain(&["--fail-on-hit"]).chain(more));
+        assert_eq!(run.code, Some(code), "{}", run.stderr);
+    }
+    let one = folder.run(text.iter().chain(&["--frames", "0..2"]));
+    assert!(one.printed().ends_with("1 step, 1 free of contact\n"));
+    // What a question does not answer is refused.
+    for more in [["--pairs", "rows.csv"], ["--out", "seen_%d.ply"]] {
+        let misuse = folder.run(text.iter().chain(&more)).misuse();
+        assert!(misuse.contains("cannot be used with"), "{misuse}");
+    }
+    for more in [["--toi", "f64"], ["--start", "skip"], ["--separation", "1"]] {
+        let misuse = folder.run(text[..5].iter().chain(&more)).misuse();
+        assert!(misuse.contains("--ccd"), "{misuse}");
+    }
 }
 
 /// With a distance to keep, what comes near is reported, and earlier.

@@ -45,6 +45,8 @@ pub(super) struct StepMemory {
     contacts: ContactAnswer,
     keys: KeyAnswer,
     found: FoundByKind,
+    /// With a margin: the pairs that are not certainly farther apart up to the earliest contact, by kind and key, if known.
+    close: Option<Vec<(PairKind, u64)>>,
     sorter: Sorter,
 }
 
@@ -59,6 +61,7 @@ impl StepMemory {
             contacts: ContactAnswer::default(),
             keys: KeyAnswer::default(),
             found: FoundByKind::default(),
+            close: None,
             sorter: Sorter::new(settings),
         }
     }
@@ -169,9 +172,19 @@ impl Detector {
         step: &Step,
         control: &Control<'_>,
     ) -> Result<Option<Impact>, Error> {
+        self.earliest_in(scene, step, Pose::WHOLE, control)
+    }
+
+    fn earliest_in(
+        &mut self,
+        scene: &Scene,
+        step: &Step,
+        pose: Pose,
+        control: &Control<'_>,
+    ) -> Result<Option<Impact>, Error> {
         let start = Instant::now();
         self.begin(scene, step)?;
-        self.find(scene, step, Sought::Earliest, Pose::WHOLE, None, control)?;
+        self.find(scene, step, Sought::Earliest, pose, None, control)?;
         // The first contact and all whose times may round to the same time have been found, and some later ones.
         let first = self.steps.named(step.toi).reduce(Impact::earlier);
         self.steps.impacts.stats_mut().total_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -211,8 +224,10 @@ impl Detector {
             clusters,
             contacts,
             found,
+            close,
             ..
         } = &mut self.steps;
+        *close = None;
         let stats = impacts.stats_mut();
         let limits = Limits {
             max_pairs,
@@ -269,8 +284,11 @@ impl Detector {
             Ok(ByDevice::Touches) => Ok(true),
             Ok(ByDevice::Not) => {
                 contacts.forget();
-                let run = clusters.run(job, &self.settings, asked, answer, stats);
-                run.map(|()| false)
+                let result = clusters.run(job, &self.settings, asked, answer, stats);
+                if pose.margin > 0.0 {
+                    *close = clusters.close();
+                }
+                result.map(|()| false)
             }
             Err(error) => Err(error),
         };
@@ -308,13 +326,13 @@ impl Detector {
         Ok(!touches && self.steps.found.iter().all(Vec::is_empty))
     }
 
-    /// How far the step can be taken: the largest fraction of it, backed off as little as the precision of positions
-    /// allows, for which the straight way from the start to the *rounded* positions is free.
+    /// How far the step can be taken: a fraction of it, backed off from the first contact hardly more than the precision of positions
+    /// asks for, for which the straight way from the start to the *rounded* positions is free.
     ///
     /// Positions that are stored are rounded, and rounding alone may make elements touch that did not. So each fraction is
     /// tried: positions are rounded first, and the way to those is tested as by [`is_free`](Detector::is_free). A chain of such
     /// steps is free from the first to the last, whatever the rounding. The first fraction tried is that of the first
-    /// contact; then the back-off doubles, from the last bit on. Pairs that touched at a fraction tried before are tested first.
+    /// contact; then the back-off doubles, from the last bit on, so it is less than twice what is needed. Only pairs that come closer than rounding moves their vertices are tested.
     ///
     /// Pairs that touch at the start allow no step at all under [`Start::Report`], and are not looked at under
     /// [`Start::Skip`].
@@ -343,11 +361,19 @@ impl Detector {
             });
         }
         let step = step.clone().toi(Toi::F64);
-        let first = self.earliest_with(scene, &step, control)?;
         let moving = || {
             let bodies = scene.bodies();
             bodies.filter_map(|(id, body)| Some((id, body.positions(), body.end_positions()?)))
         };
+        let rounded = moving().map(|(_, start, end)| start.most_rounded(end));
+        let pose = Pose {
+            margin: match step.separation {
+                0.0 => rounded.fold(0.0, f64::max),
+                _ => 0.0,
+            },
+            ..Pose::WHOLE
+        };
+        let first = self.earliest_in(scene, &step, pose, control)?;
         let mut advance = Advance {
             fraction: 1.0,
             first,
@@ -360,7 +386,7 @@ impl Detector {
         };
         let single = moving().any(|(_, start, _)| matches!(start, Positions::F32(_)));
         let last_bit = f64::from(if single { f32::EPSILON } else { 0.0 }).max(f64::EPSILON);
-        // Pairs that touched on the way to positions tried before: they probably do again.
+        // Pairs that may touch on the way to rounded positions: at first the pair of the contact, which probably does.
         let same =
             |&(kind, found): &(_, &_)| self.steps.impacts.impact(kind, Toi::F64, found) == first;
         let mut known: Vec<(PairKind, u64)> = Vec::new();
@@ -370,9 +396,11 @@ impl Detector {
                 .filter(same)
                 .map(|(kind, found)| (kind, found.key)),
         );
+        let are_all_known = self.steps.close.is_some();
+        known.extend(self.steps.close.take().unwrap_or_default());
         // Times are not needed.
         let step = step.toi(Toi::F32);
-        let mut trial = scene.clone();
+        let mut trial = None;
         let mut back_off = 0.0;
         loop {
             let fraction = first.toi * (1.0 - back_off);
@@ -388,18 +416,23 @@ impl Detector {
                     advance.fraction = 0.0;
                     return Ok(advance);
                 }
+                if are_all_known {
+                    advance.n_tried += 1;
+                    return Ok(advance);
+                }
+                let trial = trial.get_or_insert_with(|| scene.clone());
                 for (id, positions) in &advance.positions {
                     match positions {
                         Positions::F32(positions) => trial.set_end_positions(*id, positions)?,
                         Positions::F64(positions) => trial.set_end_positions(*id, positions)?,
                     }
                 }
-                self.begin(&trial, &step)?;
+                self.begin(trial, &step)?;
                 let pose = Pose {
                     is_swept: fraction <= Pose::NEARLY_STILL,
                     ..Pose::WHOLE
                 };
-                self.find(&trial, &step, Sought::All, pose, None, control)?;
+                self.find(trial, &step, Sought::All, pose, None, control)?;
                 known.extend(self.steps.found().map(|(kind, found)| (kind, found.key)));
             }
             advance.n_tried += 1;
@@ -467,12 +500,12 @@ impl Detector {
         Ok(&self.steps.candidates)
     }
 
-    /// The impacts that were found last, out of the detector without a copy. Until the next step it then holds none.
+    /// Moves the impacts found last out of the detector, without a copy. It holds none until the next question.
     pub fn take_impacts(&mut self) -> Impacts {
         std::mem::take(&mut self.steps.impacts)
     }
 
-    /// The candidates that were found last, out of the detector without a copy. Until the next query it then holds none.
+    /// Moves the candidates found last out of the detector, without a copy. It holds none until the next question.
     pub fn take_candidates(&mut self) -> Candidates {
         std::mem::take(&mut self.steps.candidates)
     }

@@ -189,7 +189,8 @@ impl Pose {
     }
 }
 
-/// By how much boxes of elements are rounded outward, relative to their coordinates: 2^-20, sixteen unit roundoffs.
+/// By how much boxes of elements are rounded outward, relative to their coordinates: 2^-20, sixteen unit roundoffs. One of them is
+/// for coordinates in `f64` that were rounded.
 const SLACK: f32 = 1.0 / 1_048_576.0;
 
 #[allow(

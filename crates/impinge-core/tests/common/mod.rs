@@ -5,7 +5,7 @@
 use impinge_core::{
     Backend, BodyId, Detector, Method, Pairs, Query, Scene, Settings, SharedVertex, hash_rows,
 };
-use impinge_scenes::{Model, adversarial, soup, surfaces};
+use impinge_scenes::{Model, Random, adversarial, soup, surfaces};
 
 /// A scene and a query.
 pub struct Case {
@@ -141,6 +141,19 @@ fn one(name: &str, model: &Model, rule: SharedVertex) -> Case {
     }
 }
 
+/// Two bodies, of which only the first may meet itself. It does so also where the second is not.
+fn one_meets_itself() -> Case {
+    let mut scene = Scene::new();
+    let mut add = |model: Model| scene.add(model.elements, model.positions).unwrap();
+    add(soup::triangles(900, 0.15, 7));
+    let ball = add(surfaces::ball(300).translated([1.5, 0.5, 0.5]));
+    Case {
+        name: "one of two meets itself".to_owned(),
+        scene,
+        query: Query::everything().ignore(ball, ball),
+    }
+}
+
 /// Cases of up to a few thousand primitives: every kind, every query, lattice troublemakers, and the
 /// adversarial scenes in small.
 pub fn cases() -> Vec<Case> {
@@ -196,6 +209,7 @@ pub fn cases() -> Vec<Case> {
     for (n, scale) in [(12, 1.0), (8, 1.0), (7, 1e-30), (6, 1e25)] {
         cases.push(many(n, scale));
     }
+    cases.push(one_meets_itself());
     for rule in rules {
         cases.push(one("soup", &soup::triangles(900, 0.15, 7), rule));
         cases.push(one("tetrahedra", &soup::tetrahedra(300, 0.2, 8), rule));
@@ -260,4 +274,40 @@ fn fan(n: u32) -> Model {
         positions,
         elements: faces.into(),
     }
+}
+
+/// Triangles at the start and at the end of a step in which `n` of them land on a slope, nearly at once, each on a way of its own. The slope
+/// is a triangle too, the first. They land where x and y are at most `half_width` from `far`.
+pub fn landing(
+    random: &mut Random,
+    n: u32,
+    half_width: f32,
+    far: f32,
+) -> (Vec<[u32; 3]>, [Vec<[f32; 3]>; 2]) {
+    let slope = |x: f32, y: f32| 0.37 * x + 0.21 * y;
+    let corners = [[-4.5, -4.0], [4.5, -3.5], [0.5, 4.5]].map(|corner| {
+        let [x, y] = corner.map(|x: f32| x * half_width);
+        [x, y, slope(x, y)]
+    });
+    let mut ends = [(); 2].map(|()| corners.to_vec());
+    for _ in 0..n {
+        let [x, y] = [(); 2].map(|()| random.range(-half_width, half_width));
+        let triangle = [
+            [x, y, slope(x, y)],
+            [x + random.range(-0.2, 0.2), y - 0.1, slope(x, y) + 0.5],
+            [x + random.range(-0.2, 0.2), y + 0.1, slope(x, y) + 0.5],
+        ];
+        let way = [(); 3].map(|()| random.range(-0.5, 0.5) - 0.5);
+        let at = random.range(0.5, 0.5 + 2e-7 * far);
+        for (end, time) in ends.iter_mut().zip([0.0, 1.0]) {
+            let moved = |point: [f32; 3]| std::array::from_fn(|k| point[k] + (time - at) * way[k]);
+            end.extend(triangle.map(moved));
+        }
+    }
+    let faces = (0..=n).map(|face| [0, 1, 2].map(|corner| 3 * face + corner));
+    let ends = ends.map(|points| {
+        let points = points.iter().map(|point| point.map(|x| x + far));
+        points.collect()
+    });
+    (faces.collect(), ends)
 }

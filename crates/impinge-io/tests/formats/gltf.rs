@@ -21,6 +21,20 @@ fn gltf_transforms_multiply_down_the_tree() {
         }
     }
 
+    // Numbers are read as the nearest ones in f64.
+    let far = r#","translation":[1.2371344566345215,0,0]"#;
+    let mesh = read_bytes(
+        &glb_of(&gltf_json("", far), &gltf_buffer()),
+        Format::Gltf,
+        "g",
+        &ReadOptions::default(),
+    )
+    .or_show();
+    assert_eq!(
+        mesh.positions.get(0),
+        Some([1.237_134_456_634_521_5, 0.0, 0.0])
+    );
+
     // A parent that moves, children that use the mesh twice, once as a matrix.
     let json = gltf_json("", "").replace(
         r#"[{"mesh":0}]"#,

@@ -16,12 +16,17 @@ The names and the order of the arguments are those of ipctk 1.6. The answers are
 ipc-toolkit are conservative up to tolerances and numbers of iterations, so a step is often longer, and never
 too long: ``vertices_t0 + step * (vertices_t1 - vertices_t0)``, computed by NumPy as written here and rounded as
 NumPy rounds, can be reached on a straight line without contact.
+
+A mesh may also be one of ipc-toolkit itself, so that a solver can keep it for its potentials.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -36,6 +41,7 @@ __all__ = [
 ]
 
 _Array = Any
+_Mesh = Any  # A CollisionMesh of this module or of ipctk.
 
 
 def edges(faces: _Array) -> npt.NDArray[np.int32]:
@@ -184,20 +190,26 @@ class CollisionMesh:
             rows.append(self._points)
         return list(enumerate(rows))
 
-    def _first(self, scene: Scene) -> float | None:
-        """The first time at which elements touch that may collide and share no vertex."""
-        if self.can_collide is None and not self._is_mixed:
-            first = self._detector.earliest(scene, toi="f64")
+    def _first(self, scene: Scene, distance: float) -> float | None:
+        """The first time at which elements are within a distance that may collide and share no vertex."""
+        first = self._detector.earliest(scene, toi="f64", separation=distance)
+        if first is None or self._counts(scene, first):
             return None if first is None else first.toi
-        impacts = self._detector.impacts(scene, toi="f64")
+        impacts = self._detector.impacts(scene, toi="f64", separation=distance)
         return min((hit.toi for hit in impacts if self._counts(scene, hit)), default=None)
 
-    def _is_free(self, scene: Scene) -> bool:
-        if self.can_collide is None and not self._is_mixed:
-            return self._detector.is_free(scene)
-        return self._first(scene) is None
+    def _is_free(self, scene: Scene, distance: float) -> bool:
+        if self._counts_all:
+            return self._detector.is_free(scene, separation=distance)
+        return self._first(scene, distance) is None
+
+    @property
+    def _counts_all(self) -> bool:
+        return self.can_collide is None and not self._is_mixed
 
     def _counts(self, scene: Scene, impact: Impact) -> bool:
+        if self._counts_all:
+            return True
         a, b = (
             self._corners(scene, int(body), letter, element)
             for letter, body, element in zip(impact.kind, impact.bodies, impact.elements)
@@ -222,8 +234,33 @@ class CollisionMesh:
         return f"CollisionMesh({counts})"
 
 
+#: Meshes of ipc-toolkit that were asked about, each with the mesh that answers for it.
+_SERVED: WeakKeyDictionary[Any, CollisionMesh] = WeakKeyDictionary()
+
+
+@contextmanager
+def _served(mesh: Any) -> Iterator[CollisionMesh]:
+    """The mesh, or for one of ipc-toolkit the mesh that answers for it."""
+    if isinstance(mesh, CollisionMesh):
+        yield mesh
+        return
+    needed = ("rest_positions", "edges", "faces", "can_collide")
+    if not all(hasattr(mesh, name) for name in needed):
+        raise TypeError(f"mesh: a CollisionMesh expected, {type(mesh).__name__} given")
+    ours = _SERVED.get(mesh)
+    if ours is None:
+        # A copy: arrays that view its positions keep the mesh alive, and so does its filter, below.
+        rest = np.array(mesh.rest_positions)
+        ours = _SERVED[mesh] = CollisionMesh(rest, mesh.edges, mesh.faces)
+    ours.can_collide = mesh.can_collide
+    try:
+        yield ours
+    finally:
+        ours.can_collide = None
+
+
 def is_step_collision_free(
-    mesh: CollisionMesh,
+    mesh: _Mesh,
     vertices_t0: _Array,
     vertices_t1: _Array,
     min_distance: float = 0.0,
@@ -235,33 +272,34 @@ def is_step_collision_free(
     Parameters
     ----------
     mesh : CollisionMesh
+        Of this module, or of ipctk. One of ipctk is looked at once: its edges and faces must not change.
     vertices_t0, vertices_t1 : array_like, shape (v, 3)
         Positions at the start and at the end. Two arrays of float32 are answered as such, others as float64.
     min_distance : float
-        Only 0 is served.
+        The distance that elements must keep, 0 or more: Euclidean, and decided exactly. ipc-toolkit compares it axis by
+        axis, so its steps are shorter.
     broad_phase, narrow_phase_ccd : object
         Taken so that calls of ipc-toolkit work, and not used: there is one method, and it is exact.
 
     Returns
     -------
     bool
-        Exact. Touching counts, at the start too.
+        Exact. Touching counts (a distance of exactly `min_distance`), at the start too.
 
     Raises
     ------
     ValueError, TypeError
-        Positions of another shape than the mesh has, or that are not finite.
-    NotImplementedError
-        A `min_distance` other than 0.
+        Positions of another shape than the mesh has, or that are not finite; a `min_distance` below 0.
     """
-    start, end = _step(mesh, vertices_t0, vertices_t1, min_distance)
-    scene = mesh._scene(start)
-    mesh._move(scene, end)
-    return mesh._is_free(scene)
+    with _served(mesh) as ours:
+        start, end, distance = _step(ours, vertices_t0, vertices_t1, min_distance)
+        scene = ours._scene(start)
+        ours._move(scene, end)
+        return ours._is_free(scene, distance)
 
 
 def compute_collision_free_stepsize(
-    mesh: CollisionMesh,
+    mesh: _Mesh,
     vertices_t0: _Array,
     vertices_t1: _Array,
     min_distance: float = 0.0,
@@ -280,41 +318,44 @@ def compute_collision_free_stepsize(
     float
         The largest step in [0, 1], backed off as little as rounding asks for, such that the straight way from
         `vertices_t0` to ``vertices_t0 + step * (vertices_t1 - vertices_t0)``, rounded as NumPy rounds it, is free of
-        contact. 1 if the whole step is, 0 if elements touch at the start.
+        contact. 1 if the whole step is, 0 if elements touch at the start. With a `min_distance`, elements touch where
+        they are as near as that.
 
     Raises
     ------
-    ValueError, TypeError, NotImplementedError
+    ValueError, TypeError
         As `is_step_collision_free`.
     """
-    start, end = _step(mesh, vertices_t0, vertices_t1, min_distance)
-    scene = mesh._scene(start)
-    mesh._move(scene, end)
-    first = mesh._first(scene)
-    if first is None:
-        return 1.0
-    back_off = 0.0
-    while True:
-        step = first * (1.0 - back_off)
-        reached = start + step * (end - start)
-        if step == 0.0 or np.array_equal(reached, start):
-            return 0.0
-        mesh._move(scene, reached)
-        if mesh._is_free(scene):
-            return step
-        back_off = min(2.0 * back_off, 1.0) if back_off else float(np.finfo(start.dtype).eps)
+    with _served(mesh) as ours:
+        start, end, distance = _step(ours, vertices_t0, vertices_t1, min_distance)
+        scene = ours._scene(start)
+        ours._move(scene, end)
+        first = ours._first(scene, distance)
+        if first is None:
+            return 1.0
+        back_off = 0.0
+        while True:
+            step = first * (1.0 - back_off)
+            reached = start + step * (end - start)
+            if step == 0.0 or np.array_equal(reached, start):
+                return 0.0
+            ours._move(scene, reached)
+            if ours._is_free(scene, distance):
+                return step
+            back_off = min(2.0 * back_off, 1.0) if back_off else float(np.finfo(start.dtype).eps)
 
 
 def _step(
     mesh: CollisionMesh, vertices_t0: _Array, vertices_t1: _Array, min_distance: float
-) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    if min_distance != 0.0:
-        raise NotImplementedError(f"min_distance: {min_distance} given, only 0 is served")
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any], float]:
+    distance = float(min_distance)
+    if not (math.isfinite(distance) and distance >= 0):
+        raise ValueError(f"min_distance: {distance} given, a finite number of 0 or more allowed")
     start = _positions(mesh, vertices_t0, "vertices_t0")
     end = _positions(mesh, vertices_t1, "vertices_t1")
     if start.dtype != end.dtype:
         start, end = start.astype(np.float64), end.astype(np.float64)
-    return start, end
+    return start, end, distance
 
 
 def _positions(mesh: CollisionMesh, vertices: _Array, name: str) -> npt.NDArray[Any]:

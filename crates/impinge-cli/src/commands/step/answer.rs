@@ -1,13 +1,12 @@
 //! The answer about a step, as JSON and as text.
 
-use std::io::Write;
+use std::io::{self, Write};
 
 use impinge::{Error, Impact, Impacts, PairKind, Statistics};
 use serde_json::{Map, Value, json};
 
 use crate::detection::Times;
 use crate::json::{counters, rounded};
-use crate::output::out;
 use crate::text::{counted, grouped, hex};
 
 use super::load::Moving;
@@ -91,8 +90,7 @@ impl<'a> Found<'a> {
     }
 
     /// Prints the answer in the first line, then counts.
-    pub fn print(&self, bodies: &Moving, separation: f64) -> Result<(), crate::error::Error> {
-        let mut to = out();
+    pub fn print(&self, to: &mut impl Write, bodies: &Moving, separation: f64) -> io::Result<()> {
         let name = |body: impinge::BodyId| bodies.names[body.index()][0].as_str();
         match self.earliest {
             None if separation > 0.0 => writeln!(
@@ -102,9 +100,12 @@ impl<'a> Found<'a> {
             None => writeln!(to, "free: nothing touches from start to end")?,
             Some(first) => writeln!(
                 to,
-                "not free: {} of {} and {} of {} {} first, {}",
+                "not free: {}{} and {} of {} {} first, {}",
                 element(first.kind, first.a.primitive, true),
-                name(first.a.body),
+                match first.a.body == first.b.body {
+                    true => String::new(),
+                    false => format!(" of {}", name(first.a.body)),
+                },
                 element(first.kind, first.b.primitive, false),
                 name(first.b.body),
                 match separation > 0.0 {

@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 use crate::detection::{Times, set_positions};
 use crate::error::Error;
 use crate::output::out;
-use crate::text::grouped;
+use crate::text::{counted, grouped};
 
 use super::answer::Found;
 use super::load::set_end_positions;
@@ -22,7 +22,8 @@ pub trait Frames {
     fn refused(&self, frame_ix: usize, source: impinge::Error) -> Error;
 }
 
-/// Steps from each frame of a range to the next, the body `moving` in motion and all others at rest.
+/// Steps from each frame of a range to the next, the body `moving` in motion and all others at rest. Returns whether all
+/// steps are free.
 pub fn steps_of_sequence(
     (detector, scene, moving): (&mut Detector, &mut Scene, BodyId),
     step: &Step,
@@ -31,7 +32,7 @@ pub fn steps_of_sequence(
     is_json: bool,
     control: &Control<'_>,
     frame_done: impl Fn(),
-) -> Result<(), Error> {
+) -> Result<bool, Error> {
     if !is_json {
         writeln!(
             out(),
@@ -44,7 +45,7 @@ pub fn steps_of_sequence(
     }
     let (mut n_steps, mut n_free) = (0u64, 0u64);
     let mut start = match range.is_empty() {
-        true => return Ok(()),
+        true => return Ok(true),
         false => frames.read(range.start)?,
     };
     for frame_ix in range.start..range.end - 1 {
@@ -81,10 +82,10 @@ pub fn steps_of_sequence(
     if !is_json {
         writeln!(
             out(),
-            "{} steps, {} free of contact",
-            grouped(n_steps),
+            "{}, {} free of contact",
+            counted(n_steps, "step"),
             grouped(n_free)
         )?;
     }
-    Ok(())
+    Ok(n_free == n_steps)
 }

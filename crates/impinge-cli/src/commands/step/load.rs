@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use impinge::{BodyId, CancelToken, Positions, Scene};
-use impinge_io::{Mesh, ReadOptions, Weld, read_with_summary};
+use impinge_io::{Format, Mesh, ReadOptions, Weld, read_with_summary};
 
 use crate::args::StepArgs;
 use crate::detection::set_positions;
@@ -57,19 +57,21 @@ impl Moving {
         let (mut at_start, summary) = read_with_summary(start, &ReadOptions::default())?;
         let (mut at_end, _) = read_with_summary(end, &ReadOptions::default())?;
         same_elements(&names, &at_start, &at_end)?;
-        let mut n_welded = 0;
-        if args.weld {
+        let mut vertices = Vertices::default();
+        // Triangles of an STL file share nothing except positions.
+        let welds = args.weld || (!args.no_self && Format::from_path(start)? == Format::Stl);
+        if welds || !args.no_self {
             let weld =
                 Weld::by_position(&at_start.positions).and(&Weld::by_position(&at_end.positions));
-            n_welded = weld.n_welded();
-            weld.apply(&mut at_start);
-            weld.apply(&mut at_end);
+            if welds {
+                weld.apply(&mut at_start);
+                weld.apply(&mut at_end);
+                vertices.n_welded = weld.n_welded();
+            } else {
+                vertices.n_coincident = Some(weld.n_welded());
+            }
         }
         if !args.json {
-            let vertices = Vertices {
-                n_welded,
-                ..Vertices::default()
-            };
             note(&names[0], &summary, vertices);
         }
         // No coordinate changes its value; this halves the memory if all coordinates fit in f32.

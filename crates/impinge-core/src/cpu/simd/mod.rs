@@ -17,6 +17,13 @@ use crate::grouping::clusters::LocalFaces;
 
 use super::runs::{self, Members, RUN, RunExtents};
 use crate::hull::{ReadVertices, of_vertices_f32};
+use crate::positions::Real;
+
+/// A coordinate of a vertex, as instruction sets read it.
+#[cfg(not(target_arch = "x86_64"))]
+pub(crate) use crate::positions::Real as Coordinate;
+#[cfg(target_arch = "x86_64")]
+pub(crate) use x86::Load4 as Coordinate;
 
 /// Lanes of a mask, lowest first.
 pub(crate) struct Lanes(pub u64);
@@ -262,24 +269,19 @@ pub(crate) trait Simd: ReadVertices {
         into: &mut Triangles64,
     );
 
-    /// The first `n` of some vertices as rows of x, y and z; the rest of the rows is arbitrary.
+    /// The first `n` of some vertices as rows of x, y and z, rounded to nearest; the rest of the rows is arbitrary.
     ///
     /// # Panics
     /// If there is no such vertex.
     #[inline(always)]
-    fn put_points(
+    fn put_points<R: Coordinate>(
         self,
-        positions: &[[f32; 3]],
+        positions: &[[R; 3]],
         vertices: &[u32; GROUP],
         n: usize,
         into: &mut [[f32; GROUP]; 3],
     ) {
-        for lane in 0..n {
-            let point = &positions[vertices[lane] as usize];
-            for axis in 0..3 {
-                into[axis][lane] = point[axis];
-            }
-        }
+        put_points(positions, vertices, n, into);
     }
 
     /// Eight vertices as rows of x, y and z in double precision.
@@ -292,6 +294,22 @@ pub(crate) trait Simd: ReadVertices {
         vertices: [u32; LANES],
         rows: &mut [[f64; LANES]; 3],
     );
+}
+
+/// One coordinate after the other, rounded to nearest.
+#[inline(always)]
+fn put_points<R: Real>(
+    positions: &[[R; 3]],
+    vertices: &[u32; GROUP],
+    n: usize,
+    into: &mut [[f32; GROUP]; 3],
+) {
+    for lane in 0..n {
+        let point = &positions[vertices[lane] as usize];
+        for axis in 0..3 {
+            into[axis][lane] = <f32 as Real>::round(point[axis].widen());
+        }
+    }
 }
 
 /// One coordinate after the other.

@@ -12,6 +12,7 @@ use super::{
     put_corners, put_vertices, up_to,
 };
 use crate::hull::Vec4;
+use crate::positions::Real;
 
 /// 256-bit registers. Only created if `avx2` was detected.
 #[derive(Debug, Clone, Copy)]
@@ -38,13 +39,38 @@ impl Avx512 {
     }
 }
 
+/// A coordinate of vertices, which are read four numbers at a time.
+pub(crate) trait Load4: Real {
+    /// Four numbers, rounded to nearest.
+    ///
+    /// # Safety
+    /// They must be readable, and the caller compiled for AVX2.
+    unsafe fn load(numbers: *const Self) -> __m128;
+}
+
+impl Load4 for f32 {
+    #[inline(always)]
+    unsafe fn load(numbers: *const f32) -> __m128 {
+        // SAFETY: the caller's.
+        unsafe { _mm_loadu_ps(numbers) }
+    }
+}
+
+impl Load4 for f64 {
+    #[inline(always)]
+    unsafe fn load(numbers: *const f64) -> __m128 {
+        // SAFETY: the caller's.
+        unsafe { _mm256_cvtpd_ps(_mm256_loadu_pd(numbers)) }
+    }
+}
+
 /// Eight vertices as rows of x, y and z: two columns of four, transposed side by side. `None` if one
-/// of them is the last vertex or past it: a vertex is read as 16 bytes, four of which belong to its successor.
+/// of them is the last vertex or past it: a vertex is read as four numbers, one of which belongs to its successor.
 ///
 /// # Safety
 /// The caller must be compiled for AVX2.
 #[inline(always)]
-unsafe fn rows(positions: &[[f32; 3]], vertices: [u32; LANES]) -> Option<[__m256; 3]> {
+unsafe fn rows<R: Load4>(positions: &[[R; 3]], vertices: [u32; LANES]) -> Option<[__m256; 3]> {
     let end = positions.len().saturating_sub(1);
     let mut all_inside = true;
     for vertex in vertices {
@@ -54,17 +80,17 @@ unsafe fn rows(positions: &[[f32; 3]], vertices: [u32; LANES]) -> Option<[__m256
         return None;
     }
     let first = positions.as_ptr();
-    // SAFETY: all vertices have a successor, as just checked, so 16 bytes lie in the slice.
+    // SAFETY: all vertices have a successor, as just checked, so four numbers lie in the slice.
     unsafe {
         let load = [
-            _mm_loadu_ps(first.add(vertices[0] as usize).cast()),
-            _mm_loadu_ps(first.add(vertices[1] as usize).cast()),
-            _mm_loadu_ps(first.add(vertices[2] as usize).cast()),
-            _mm_loadu_ps(first.add(vertices[3] as usize).cast()),
-            _mm_loadu_ps(first.add(vertices[4] as usize).cast()),
-            _mm_loadu_ps(first.add(vertices[5] as usize).cast()),
-            _mm_loadu_ps(first.add(vertices[6] as usize).cast()),
-            _mm_loadu_ps(first.add(vertices[7] as usize).cast()),
+            R::load(first.add(vertices[0] as usize).cast()),
+            R::load(first.add(vertices[1] as usize).cast()),
+            R::load(first.add(vertices[2] as usize).cast()),
+            R::load(first.add(vertices[3] as usize).cast()),
+            R::load(first.add(vertices[4] as usize).cast()),
+            R::load(first.add(vertices[5] as usize).cast()),
+            R::load(first.add(vertices[6] as usize).cast()),
+            R::load(first.add(vertices[7] as usize).cast()),
         ];
         let a = _mm256_set_m128(load[4], load[0]);
         let b = _mm256_set_m128(load[5], load[1]);
@@ -128,8 +154,8 @@ unsafe fn put_corners_by_eights(
 /// # Safety
 /// The caller must be compiled for AVX2.
 #[inline(always)]
-unsafe fn put_points(
-    positions: &[[f32; 3]],
+unsafe fn put_points<R: Load4>(
+    positions: &[[R; 3]],
     vertices: &[u32; GROUP],
     n: usize,
     into: &mut [[f32; GROUP]; 3],
@@ -148,7 +174,7 @@ unsafe fn put_points(
         } else {
             for (place, vertex) in (first..).zip(eight) {
                 for (row, x) in into.iter_mut().zip(positions[vertex as usize]) {
-                    row[place] = x;
+                    row[place] = <f32 as Real>::round(x.widen());
                 }
             }
         }
@@ -485,9 +511,9 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    fn put_points(
+    fn put_points<R: Load4>(
         self,
-        positions: &[[f32; 3]],
+        positions: &[[R; 3]],
         vertices: &[u32; GROUP],
         n: usize,
         into: &mut [[f32; GROUP]; 3],
@@ -947,9 +973,9 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
-    fn put_points(
+    fn put_points<R: Load4>(
         self,
-        positions: &[[f32; 3]],
+        positions: &[[R; 3]],
         vertices: &[u32; GROUP],
         n: usize,
         into: &mut [[f32; GROUP]; 3],

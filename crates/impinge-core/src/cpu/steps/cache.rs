@@ -45,7 +45,7 @@ pub(super) struct LayerCache {
     sampled: Sampled,
 }
 
-/// How well some of the clusters have fitted the layer, and the stamp of the positions that were judged last.
+/// How well a sample of the clusters has fitted the layer, and the stamp of the positions that were judged last.
 #[cfg(feature = "gpu")]
 #[derive(Debug, Default)]
 struct Sampled {
@@ -80,7 +80,7 @@ impl LayerCache {
         }
     }
 
-    /// Whether the layer has flowed away from its clusters, judged by some of them: for a device that finds the boxes.
+    /// Whether the layer no longer fits its clusters, judged by a sample of them. For layers whose boxes a device computes.
     #[cfg(feature = "gpu")]
     pub fn is_stale(&mut self, body: &Body, tuning: &Tuning) -> bool {
         if self.sampled.stamp == body.positions_stamp() {

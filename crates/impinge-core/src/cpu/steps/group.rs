@@ -10,6 +10,7 @@ use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
 use crate::hull::Extent;
 use crate::index::{ClusterIx, LayerIx};
+use crate::positions::Positions;
 
 use super::world::World;
 
@@ -28,10 +29,17 @@ pub(super) struct Group {
     /// The elements' global numbers.
     pub numbers: Lanes32,
     pub size: usize,
-    /// The elements' points at the start and at the end, if `in_tables`: if positions are `f32`.
+    /// The elements' points at the start and at the end, rounded to `f32`.
     pub points: Moving64,
-    pub in_tables: bool,
+    /// The largest coordinate, or more.
+    pub largest: f64,
+    /// By how much coordinates of `points` are rounded at most: 0 if positions are `f32`. Infinite if `points` mean nothing, for coordinates
+    /// that are too large.
+    pub rounded: f64,
 }
+
+/// The largest coordinate that is rounded to `f32`.
+const LARGEST: f64 = (1u64 << 32) as f64;
 
 impl<'a> PerCluster<World<'a>> for Group {
     const EMPTY: Self = Group {
@@ -43,7 +51,8 @@ impl<'a> PerCluster<World<'a>> for Group {
         numbers: Lanes32([0; GROUP]),
         size: 0,
         points: [[[[0.0; GROUP]; 3]; 3]; 2],
-        in_tables: false,
+        largest: 0.0,
+        rounded: f64::INFINITY,
     };
 
     #[inline(always)]
@@ -71,11 +80,23 @@ impl<'a> PerCluster<World<'a>> for Group {
             *number = first.plus(element).raw();
         }
         let hull = world.hull(layer);
-        if let Some(ends) = hull.in_f32() {
-            self.in_tables = true;
+        let ends = hull.ends();
+        let are_single = ends.iter().all(|end| matches!(end, Positions::F32(_)));
+        let boxes = world.cache(layer).ends(cluster);
+        let largest = boxes.map(|bounds| Extent::from(&bounds).magnitude());
+        self.largest = f64::max(largest[0], largest[1]);
+        self.rounded = if are_single {
+            0.0
+        } else if self.largest <= LARGEST {
+            // Half a unit in the last place, or of the smallest number.
+            self.largest * 2f64.powi(-24) + 2f64.powi(-149)
+        } else {
+            f64::INFINITY
+        };
+        if self.rounded.is_finite() {
+            // Rounding keeps the order of coordinates: boxes that are apart then are so of the points as they are.
             self.put_points(simd, ends);
         } else {
-            self.in_tables = false;
             hull.fill(clustering, cluster, [&mut self.start, &mut self.end]);
         }
         hull.close([&mut self.start, &mut self.end], self.size);
@@ -83,17 +104,9 @@ impl<'a> PerCluster<World<'a>> for Group {
 }
 
 impl Group {
-    /// The extent of an element over the whole step, from the tables.
-    #[inline(always)]
-    pub fn extent(&self, lane: usize) -> Extent {
-        let tables = self.points.iter();
-        let corners = tables.flat_map(|points| &points[..self.n_corners]);
-        Extent::of(corners.map(|corner| [0, 1, 2].map(|axis| corner[axis][lane].into())))
-    }
-
     /// Fills the tables of points, and the boxes from those.
     #[inline(always)]
-    fn put_points<S: Simd>(&mut self, simd: S, ends: [&[[f32; 3]]; 2]) {
+    fn put_points<S: Simd>(&mut self, simd: S, ends: [&Positions; 2]) {
         let boxes = [&mut self.start, &mut self.end];
         for ((positions, points), boxes) in ends.into_iter().zip(&mut self.points).zip(boxes) {
             for (vertices, point) in self
@@ -102,7 +115,14 @@ impl Group {
                 .zip(points.iter_mut())
                 .take(self.n_corners)
             {
-                simd.put_points(positions, &vertices.0, self.size, point);
+                match positions {
+                    Positions::F32(positions) => {
+                        simd.put_points(positions, &vertices.0, self.size, point);
+                    }
+                    Positions::F64(positions) => {
+                        simd.put_points(positions, &vertices.0, self.size, point);
+                    }
+                }
             }
             let [p, q, r] = &*points;
             match self.n_corners {

@@ -35,6 +35,7 @@ use crate::ids::BodyId;
 use crate::impacts::Left;
 use crate::impacts::StepAnswer;
 use crate::index::LayerIx;
+use crate::pair_kind::PairKind;
 use crate::scene::Body;
 use crate::settings::InstructionSet;
 use crate::stats::Statistics;
@@ -168,6 +169,16 @@ impl StepClusters {
         self.room.run(task, stats)?;
         stats.bytes_held = (self.bytes_besides_room() + self.room.bytes()) as u64;
         Ok(())
+    }
+
+    /// The pairs that vertices may make touch if they are off their ways by the margin of the [`Pose`], up to the earliest contact, of the
+    /// last [`run`](Self::run), which looked for that: by kind and key, in any order. `None` if there are too many.
+    pub fn close(&mut self) -> Option<Vec<(PairKind, u64)>> {
+        let mut close = Vec::new();
+        for worker in &mut self.scratches {
+            close.extend_from_slice(worker.contacts().close()?);
+        }
+        Some(close)
     }
 
     /// As [`run`](Self::run), where a device finds the candidates: `find` gets the clusters of all layers and hands over the

@@ -1,4 +1,4 @@
-//! What a detector says of elements that are near each other.
+//! A detector's answers about elements within a distance of each other.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -30,12 +30,11 @@ use super::{StepMemory, begin};
 const TASK: usize = 1024;
 
 impl Detector {
-    /// All pairs of elements whose distance is at most the one that the query says, at the positions that bodies have:
-    /// end positions are not looked at. Each comes with the features that are nearest and, on request, with the distance and
-    /// nearest points.
+    /// All pairs of elements whose distance is at most that of the query, at the bodies' positions. End positions are ignored.
+    /// Each pair comes with its nearest features and, on request, with its distance and nearest points.
     ///
     /// The answer is exact: a pair is reported if and only if the distance of the two closed elements, as a real number,
-    /// is at most the distance asked for. Of tetrahedra the surface takes part.
+    /// is at most the distance asked for. A body of tetrahedra takes part with its surface.
     ///
     /// ```
     /// use impinge::{Backend, Detector, NearQuery, PairKind, Query, Scene};
@@ -165,13 +164,13 @@ impl Detector {
         Ok(&self.steps.near)
     }
 
-    /// The near pairs that were found last, out of the detector without a copy. Until the next question it then holds none.
+    /// Moves the near pairs that were found last out of the detector, without a copy. It holds none until the next question.
     pub fn take_near(&mut self) -> NearPairs {
         std::mem::take(&mut self.steps.near)
     }
 }
 
-/// Which features of a pair are nearest, and where if that is asked for.
+/// The nearest features of a pair, and on request the nearest points.
 fn find_features(
     scene: &Scene,
     kind: PairKind,

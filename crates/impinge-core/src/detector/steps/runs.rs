@@ -38,7 +38,7 @@ struct Question<'a> {
     workers: &'a Workers,
 }
 
-/// A question, and what searching for its candidates takes.
+/// A question, and what the search for its candidates needs.
 pub(super) struct RunSearch<'a> {
     question: Question<'a>,
     frame: &'a mut Frame,
@@ -84,7 +84,7 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// As [`candidates`](Detector::candidates); but a memory budget need not hold the whole answer. A `most` of 0.
+    /// As [`candidates`](Detector::candidates), except that a memory budget need not hold the whole answer; a `most` of 0.
     pub fn candidates_in_runs<B>(
         &mut self,
         scene: &Scene,
@@ -124,7 +124,7 @@ impl Detector {
             Ok(0) => return Ok(ControlFlow::Continue(0)),
             Ok(n) => return Ok(each(std::mem::take(candidates)).map_continue(|()| n)),
             Err(Error::TooManyPairs { limit, .. }) if limits.max_pairs != Some(limit) => {}
-            // Perhaps there is room for parts of the answer.
+            // There may be room for parts of the answer.
             Err(Error::MemoryBudget { .. }) => {}
             Err(error) => return Err(error),
         }

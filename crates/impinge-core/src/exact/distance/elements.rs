@@ -89,7 +89,7 @@ impl NearestOfElements {
     }
 }
 
-/// Whether the distance of two elements of one to three corners is at most a reach, if plain floats are certain to tell.
+/// Whether the distance of two elements of one to three corners is at most a reach, if plain floats can decide it.
 #[inline]
 pub(crate) fn are_within_certainly(a: &[Point], b: &[Point], reach: &Reach) -> Option<bool> {
     if let Some(simple) = Simple::new(a, b) {
@@ -104,13 +104,13 @@ pub(crate) fn are_within_certainly(a: &[Point], b: &[Point], reach: &Reach) -> O
         }
     }
     match all_apart {
-        // What crosses has edges and faces that do: it may be far from the border.
+        // Elements may also cross far from their borders, where all parts are apart.
         true => Some(share_a_point(a, b)),
         false => None,
     }
 }
 
-/// [`elements_are_within`] where [`are_within_certainly`] cannot tell.
+/// [`elements_are_within`] for elements that [`are_within_certainly`] cannot decide.
 pub(crate) fn unsure_are_within(a: &[Point], b: &[Point], reach: &Reach) -> bool {
     match Simple::new(a, b) {
         Some(Simple { pair, points, .. }) => nearest::are_within(pair, &points, reach),
@@ -398,8 +398,8 @@ fn share_a_point(a: &[Point], b: &[Point]) -> bool {
     }
 }
 
-/// An edge of one that passes the inside of a face of the other, and where, rounded. Only asked of elements whose borders
-/// do not touch each other or a face.
+/// An edge of one element that passes through the inside of a face of the other, and the rounded point where it does. The
+/// borders of the elements must touch neither each other nor a face.
 fn crossing(a: &[Point], b: &[Point]) -> Option<([Feature; 2], Point)> {
     if !share_a_point(a, b) {
         return None;

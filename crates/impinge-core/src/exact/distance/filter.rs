@@ -33,7 +33,7 @@ pub(super) fn bounds(pair: ElementPair, points: &[Point; 4]) -> Option<[f64; 2]>
     Some([low, most(&near, largest)])
 }
 
-/// A distance at which all corners are certainly, beyond a plane through the origin; 0 if that is not certain.
+/// A distance from a plane through the origin that all corners certainly have, all on one side; 0 if that is not certain.
 fn least_beyond(normal: &Point, polygon: &Polygon, largest: f64) -> f64 {
     if size(normal) <= f64::SHORTEST {
         return 0.0;
@@ -46,11 +46,11 @@ fn least_beyond(normal: &Point, polygon: &Polygon, largest: f64) -> f64 {
         highest = highest.max(height);
     }
     let length = dot(normal, normal).sqrt();
-    // The quotient has a few more roundings, as the bound covers many times.
+    // The quotient has a few more roundings; the bound covers them many times.
     ((lowest.max(-highest) - error) / length * (1.0 - f64::BOUND)).max(0.0)
 }
 
-/// When two moving elements are first within a distance, as far as plain floats are certain.
+/// When two moving elements are first within a distance, as far as plain floats can decide it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Approach {
     /// Not up to the time asked for.
@@ -125,7 +125,7 @@ pub(crate) fn approach(
     Approach::Unsure
 }
 
-/// The part of the polygon with the nearest point in its inside, if signs of rounded values are certain to tell.
+/// The part of the polygon with the nearest point in its inside, if signs of rounded values can decide it.
 ///
 /// As the exact decision goes by signs (`Polygon::nearest`), with none of them zero.
 pub(super) fn nearest_part(pair: ElementPair, points: &[Point; 4]) -> Option<PolygonPart> {

@@ -77,7 +77,7 @@ pub fn faces_are_within(a: &[Point; 3], b: &[Point; 3], distance: f64) -> bool {
         && (distance == f64::INFINITY || elements_are_within(a, b, &Reach::from(distance)))
 }
 
-/// Whether it is a number that is not below zero.
+/// Whether a distance is a number of at least zero.
 fn is_distance(distance: f64) -> bool {
     distance >= 0.0
 }

@@ -29,7 +29,7 @@ pub fn nearest_features(pair: ElementPair, points: &[Point; 4]) -> NearestFeatur
     nearest_features_exactly(pair, points)
 }
 
-/// Apart, so that the filter's stack stays small.
+/// A function of its own, so that the filter's stack frame stays small.
 #[inline(never)]
 fn nearest_features_exactly(pair: ElementPair, points: &[Point; 4]) -> NearestFeatures {
     let reach = Reach::from(0.0);
@@ -50,9 +50,9 @@ pub(super) fn are_within(pair: ElementPair, points: &[Point; 4], reach: &Reach) 
 /// The difference polygon at one moment, and a distance, as integers times one power of two.
 pub(super) struct Polygon<T: Coordinate> {
     n_corners: usize,
-    /// Where there are fewer than four, they begin again.
+    /// With fewer than four corners, the list repeats.
     corners: [Vector<T>; 4],
-    /// From each corner to the next: no edge counts of a single corner, one of a segment.
+    /// From each corner to the next. A single corner has no edge, a segment one.
     edges: [Vector<T>; 4],
     normal: Option<Vector<Two<T>>>,
     distance: T,
@@ -119,7 +119,7 @@ impl<T: Coordinate> Polygon<T> {
         &self.corners[..self.n_corners]
     }
 
-    /// From each corner to the next: no edge of a single corner, one of a segment.
+    /// From each corner to the next. A single corner has no edge, a segment one.
     pub(super) fn edges(&self) -> &[Vector<T>] {
         let n = self.n_corners;
         &self.edges[..if n > 2 { n } else { n - 1 }]

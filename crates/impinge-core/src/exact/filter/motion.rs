@@ -38,6 +38,8 @@ pub struct Motion<T: Number> {
     edge_sizes: [T; 3],
     /// The lanes in which all of this is within the range of the error bounds.
     is_small: T::Mask,
+    /// Whether coordinates may differ from these.
+    has_margin: bool,
 }
 
 /// The result of [`Motion::look`] for an interval.
@@ -181,6 +183,7 @@ impl<T: Number> Motion<T> {
             corner_sizes: [zero; 4],
             edge_sizes: [zero; 3],
             is_small: zero.gt(zero),
+            has_margin: false,
         };
         let mut largest = zero;
         for ix in 0..n_corners {
@@ -195,6 +198,30 @@ impl<T: Number> Motion<T> {
         }
         motion.is_small = T::splat(T::LARGEST).gt(largest);
         motion
+    }
+
+    /// The same elements, where at any time each coordinate of a corner and of an edge may differ from the given one by up to
+    /// `margin`: what is certainly apart is so for all of these.
+    #[inline(always)]
+    #[must_use]
+    pub fn with_margin(mut self, margin: f64) -> Self {
+        if margin == 0.0 {
+            return self;
+        }
+        let mut least = self.corner_sizes[0];
+        for ix in 1..self.n_corners {
+            least = smaller(least, self.corner_sizes[ix]);
+        }
+        for ix in 0..self.n_edges() {
+            least = smaller(least, self.edge_sizes[ix]);
+        }
+        // Every bound has the size of one corner as a factor. `BOUND` is 64 unit roundoffs.
+        let times = T::splat(1.0) + T::splat(16.0 * margin / T::BOUND) / least;
+        for size in &mut self.corner_sizes {
+            *size = *size * times;
+        }
+        self.has_margin = true;
+        self
     }
 
     /// The number of edges that are stored.
@@ -234,7 +261,7 @@ impl<T: Number> Motion<T> {
         }
         let (start, end) = (&start[..self.n_corners], &end[..self.n_corners]);
         // At t = 1 only differences are rounded, and their signs are right.
-        let bound = if until == 1.0 {
+        let bound = if until == 1.0 && !self.has_margin {
             T::splat(0.0)
         } else {
             T::splat(T::BOUND / 4.0) * size + T::splat(T::TINY[0])

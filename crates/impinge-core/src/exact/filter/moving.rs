@@ -181,25 +181,28 @@ pub fn time_between([low, high]: [f64; 2]) -> Option<f32> {
 }
 
 /// Which of eight pairs are certainly apart from t = 0 to `until`: the cheap first step. For pairs of a vertex and a
-/// face, or of two edges.
+/// face, or of two edges. With a margin, they are apart even if at any time coordinates of the difference polygon's corners and edges
+/// differ by up to that much.
 #[inline(always)]
 #[must_use]
-pub fn are_apart<V: Vector>(pair: ElementPair, steps: &Steps8, until: f64) -> u8 {
+pub fn are_apart<V: Vector>(pair: ElementPair, steps: &Steps8, until: f64, margin: f64) -> u8 {
     let mut no = 0;
     for first in (0..LANES).step_by(V::N) {
-        no |= V::bits(load::<V>(pair, steps, first).are_apart(until)) << first;
+        let motion = load::<V>(pair, steps, first).with_margin(margin);
+        no |= V::bits(motion.are_apart(until)) << first;
     }
     no
 }
 
-/// Tests one interval of each of eight pairs.
+/// Tests one interval of each of eight pairs, with a margin as in [`are_apart`].
 #[inline(always)]
 #[must_use]
-pub fn look<V: Vector>(pair: ElementPair, steps: &Steps8, spans: &Spans8) -> Look8 {
+pub fn look<V: Vector>(pair: ElementPair, steps: &Steps8, spans: &Spans8, margin: f64) -> Look8 {
     let mut seen = Look8::default();
     for first in (0..LANES).step_by(V::N) {
         let (low, high) = (V::load(&spans.low, first), V::load(&spans.high, first));
-        let look = load::<V>(pair, steps, first).look(low, high);
+        let motion = load::<V>(pair, steps, first).with_margin(margin);
+        let look = motion.look(low, high);
         seen.no |= V::bits(look.no) << first;
         seen.single |= V::bits(look.single) << first;
         seen.hopeless |= V::bits(look.hopeless) << first;
@@ -254,7 +257,7 @@ pub(super) fn are_edges(pair: ElementPair) -> bool {
 }
 
 /// Which of sixteen pairs are certainly apart from t = 0 to `until`, by the cheapest test. The elements are those of two
-/// groups, named by their places. In `f32`: for coordinates of any size, but differences above 2^16 are never certain.
+/// groups, named by their places, with a margin as in [`are_apart`]. In `f32`: for coordinates of any size, but differences above 2^16 are never certain.
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
@@ -262,11 +265,11 @@ pub fn are_far_in_tables<V: Lookup>(
     pair: ElementPair,
     groups: [&Moving64; 2],
     places: [&[u8; BATCH]; 2],
-    until: f32,
+    (until, margin): (f32, f64),
 ) -> u16 {
     let mut no = 0;
     for first in (0..BATCH).step_by(V::N) {
-        let motion = look_up_motion::<V>(pair, groups, places, first);
+        let motion = look_up_motion::<V>(pair, groups, places, first).with_margin(margin);
         no |= V::bits(motion.are_far(f64::from(until))) << first;
     }
     no
@@ -280,11 +283,11 @@ pub fn are_across_in_tables<V: Lookup>(
     pair: ElementPair,
     groups: [&Moving64; 2],
     places: [&[u8; BATCH]; 2],
-    until: f32,
+    (until, margin): (f32, f64),
 ) -> u16 {
     let mut no = 0;
     for first in (0..BATCH).step_by(V::N) {
-        let motion = look_up_motion::<V>(pair, groups, places, first);
+        let motion = look_up_motion::<V>(pair, groups, places, first).with_margin(margin);
         no |= V::bits(motion.are_across(f64::from(until))) << first;
     }
     no
@@ -298,11 +301,11 @@ pub fn are_aside_in_tables<V: Lookup>(
     pair: ElementPair,
     groups: [&Moving64; 2],
     places: [&[u8; BATCH]; 2],
-    until: f32,
+    (until, margin): (f32, f64),
 ) -> u16 {
     let mut no = 0;
     for first in (0..BATCH).step_by(V::N) {
-        let motion = look_up_motion::<V>(pair, groups, places, first);
+        let motion = look_up_motion::<V>(pair, groups, places, first).with_margin(margin);
         no |= V::bits(motion.are_aside(f64::from(until))) << first;
     }
     no

@@ -116,28 +116,38 @@ struct Outcome {
 /// The answer of an instruction set: pairs that are apart, and how searches end.
 type Answer = (u8, [Outcome; LANES]);
 
+/// The end of the time of interest, and the margin.
+type Within = (f64, f64);
+
 #[inline(always)]
-fn ask<V: number::Vector>(pair: ElementPair, steps: &Steps8, until: f64) -> Answer {
-    let apart = filter::are_apart::<V>(pair, steps, until);
+fn ask<V: number::Vector>(pair: ElementPair, steps: &Steps8, (until, margin): Within) -> Answer {
+    let apart = filter::are_apart::<V>(pair, steps, until, margin);
     let mut searches = [Search::new(until); LANES];
     let mut outcomes = [Outcome {
         next: Next::Look,
         span: [0.0, until],
     }; LANES];
-    let is_open = |outcome: &Outcome| matches!(outcome.next, Next::Look | Next::Enclose);
+    // With a margin, a search ends where there is a candidate.
+    let is_open = |outcome: &Outcome| match outcome.next {
+        Next::Look => true,
+        Next::Enclose => margin == 0.0,
+        _ => false,
+    };
     while outcomes.iter().any(is_open) {
         let mut spans = Spans8::default();
         for (lane, search) in searches.iter().enumerate() {
             [spans.low[lane], spans.high[lane]] = search.span();
         }
-        let seen = filter::look::<V>(pair, steps, &spans);
+        let seen = filter::look::<V>(pair, steps, &spans, margin);
         let found = filter::enclose::<V>(pair, steps, &spans);
         for lane in 0..LANES {
             let (search, outcome) = (&mut searches[lane], &mut outcomes[lane]);
+            if !is_open(outcome) {
+                continue;
+            }
             outcome.next = match outcome.next {
                 Next::Look => search.after_look(&seen, lane, until),
-                Next::Enclose => search.after_enclosing(&found, lane, until),
-                _ => continue,
+                _ => search.after_enclosing(&found, lane, until),
             };
             outcome.span = match outcome.next {
                 Next::Contact => [found.span.low[lane], found.span.high[lane]],
@@ -150,28 +160,28 @@ fn ask<V: number::Vector>(pair: ElementPair, steps: &Steps8, until: f64) -> Answ
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn ask_avx2(pair: ElementPair, steps: &Steps8, until: f64) -> Answer {
-    ask::<number::Avx2>(pair, steps, until)
+fn ask_avx2(pair: ElementPair, steps: &Steps8, within: Within) -> Answer {
+    ask::<number::Avx2>(pair, steps, within)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq")]
-fn ask_avx512(pair: ElementPair, steps: &Steps8, until: f64) -> Answer {
-    ask::<number::Avx512>(pair, steps, until)
+fn ask_avx512(pair: ElementPair, steps: &Steps8, within: Within) -> Answer {
+    ask::<number::Avx512>(pair, steps, within)
 }
 
 /// The answer of all instruction sets of this processor, which must be the same.
-fn ask_all(pair: ElementPair, steps: &Steps8, until: f64) -> Answer {
-    let answer = ask::<number::Portable>(pair, steps, until);
+fn ask_all(pair: ElementPair, steps: &Steps8, within: Within) -> Answer {
+    let answer = ask::<number::Portable>(pair, steps, within);
     #[cfg(target_arch = "x86_64")]
     {
         if is_x86_feature_detected!("avx2") {
             // SAFETY: just detected.
-            assert_eq!(answer, unsafe { ask_avx2(pair, steps, until) });
+            assert_eq!(answer, unsafe { ask_avx2(pair, steps, within) });
         }
         if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
             // SAFETY: just detected.
-            assert_eq!(answer, unsafe { ask_avx512(pair, steps, until) });
+            assert_eq!(answer, unsafe { ask_avx512(pair, steps, within) });
         }
     }
     answer
@@ -179,7 +189,11 @@ fn ask_all(pair: ElementPair, steps: &Steps8, until: f64) -> Answer {
 
 /// The same pairs in tables, in `f32`: which are apart.
 #[inline(always)]
-fn ask_tables<V: number::Lookup>(pair: ElementPair, steps: &[[[Point; 4]; 2]], until: f32) -> u16 {
+fn ask_tables<V: number::Lookup>(
+    pair: ElementPair,
+    steps: &[[[Point; 4]; 2]],
+    within: (f32, f64),
+) -> u16 {
     // Elements at odd places, in reverse.
     let place = |lane: usize| (2 * (BATCH - lane) - 1) as u8;
     let places: [u8; BATCH] = std::array::from_fn(place);
@@ -201,34 +215,34 @@ fn ask_tables<V: number::Lookup>(pair: ElementPair, steps: &[[[Point; 4]; 2]], u
         _ => [table(0..2), table(2..4)],
     };
     let (tables, places) = ([&a, &b], [&places, &places]);
-    filter::are_far_in_tables::<V>(pair, tables, places, until)
-        | filter::are_across_in_tables::<V>(pair, tables, places, until)
-        | filter::are_aside_in_tables::<V>(pair, tables, places, until)
+    filter::are_far_in_tables::<V>(pair, tables, places, within)
+        | filter::are_across_in_tables::<V>(pair, tables, places, within)
+        | filter::are_aside_in_tables::<V>(pair, tables, places, within)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn ask_tables_avx2(pair: ElementPair, steps: &[[[Point; 4]; 2]], until: f32) -> u16 {
-    ask_tables::<number::Avx2F32>(pair, steps, until)
+fn ask_tables_avx2(pair: ElementPair, steps: &[[[Point; 4]; 2]], within: (f32, f64)) -> u16 {
+    ask_tables::<number::Avx2F32>(pair, steps, within)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq")]
-fn ask_tables_avx512(pair: ElementPair, steps: &[[[Point; 4]; 2]], until: f32) -> u16 {
-    ask_tables::<number::Avx512F32>(pair, steps, until)
+fn ask_tables_avx512(pair: ElementPair, steps: &[[[Point; 4]; 2]], within: (f32, f64)) -> u16 {
+    ask_tables::<number::Avx512F32>(pair, steps, within)
 }
 
-fn ask_all_tables(pair: ElementPair, steps: &[[[Point; 4]; 2]], until: f32) -> u16 {
-    let answer = ask_tables::<number::Portable32>(pair, steps, until);
+fn ask_all_tables(pair: ElementPair, steps: &[[[Point; 4]; 2]], within: (f32, f64)) -> u16 {
+    let answer = ask_tables::<number::Portable32>(pair, steps, within);
     #[cfg(target_arch = "x86_64")]
     {
         if is_x86_feature_detected!("avx2") {
             // SAFETY: just detected.
-            assert_eq!(answer, unsafe { ask_tables_avx2(pair, steps, until) });
+            assert_eq!(answer, unsafe { ask_tables_avx2(pair, steps, within) });
         }
         if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
             // SAFETY: just detected.
-            assert_eq!(answer, unsafe { ask_tables_avx512(pair, steps, until) });
+            assert_eq!(answer, unsafe { ask_tables_avx512(pair, steps, within) });
         }
     }
     answer
@@ -249,7 +263,7 @@ fn filter_never_contradicts_exact_roots() {
                 let until = [1.0, 0.5, 0.328_125, 1e-3][round % 4];
                 let steps = [(); BATCH].map(|()| step(kind, &mut random));
                 let exact = steps.map(|[start, end]| first_contact_by_roots(pair, &start, &end));
-                let apart = ask_all_tables(pair, &steps, until as f32);
+                let apart = ask_all_tables(pair, &steps, (until as f32, 0.0));
                 for (lane, contact) in exact.iter().enumerate() {
                     let until = f64::from(until as f32);
                     let is_right = apart >> lane & 1 == 0 || !is_in_time(*contact, until);
@@ -260,7 +274,7 @@ fn filter_never_contradicts_exact_roots() {
                     for (lane, step) in steps.iter().enumerate() {
                         batch.set(lane, step);
                     }
-                    let (apart, found) = ask_all(pair, &batch, until);
+                    let (apart, found) = ask_all(pair, &batch, (until, 0.0));
                     for lane in 0..LANES {
                         let Outcome { next, span } = found[lane];
                         let case = || format!("{kind:?} {pair:?} {until} {:?}", steps[lane]);
@@ -312,6 +326,74 @@ fn filter_never_contradicts_exact_roots() {
     }
 }
 
+/// What is apart with a margin is apart for all elements whose vertices are off their ways by half of it; without the margin, some
+/// of those touch.
+#[test]
+fn a_margin_covers_elements_that_are_off_their_ways() {
+    let mut random = Random(8);
+    for kind in [Kind::Plain, Kind::Close, Kind::Lattice, Kind::NearlyTied] {
+        for pair in PAIRS {
+            // Pairs that touch when they are off their ways: apart without the margin, in tables and not, and by looking.
+            let mut n_missed = [0; 3];
+            let mut n_apart = [0; 3];
+            for round in 0..480 {
+                let until = [1.0, 0.5, 0.328_125][round % 3];
+                let off = 2f64.powi(-1 - (round % 20) as i32);
+                let margins = [0.0, 2.0 * off];
+                let steps = [(); BATCH].map(|()| step(kind, &mut random));
+                // Off by no more than half of the margin, as computed.
+                let moved = steps.map(|step| {
+                    step.map(|points| {
+                        points.map(|point| {
+                            point.map(|x| match random.below(2) {
+                                0 => (x - off).next_up(),
+                                _ => (x + off).next_down(),
+                            })
+                        })
+                    })
+                });
+                let touches = moved.map(|[start, end]| {
+                    let contact = first_contact_by_roots(pair, &start, &end);
+                    is_in_time(contact, f64::from(until as f32))
+                });
+                let mut seen = [[[false; BATCH]; 3]; 2];
+                for (seen, margin) in seen.iter_mut().zip(margins) {
+                    let apart = ask_all_tables(pair, &steps, (until as f32, margin));
+                    seen[0] = std::array::from_fn(|lane| apart >> lane & 1 == 1);
+                    for (n, steps) in steps.chunks(LANES).enumerate() {
+                        let mut batch = Steps8::default();
+                        for (lane, step) in steps.iter().enumerate() {
+                            batch.set(lane, step);
+                        }
+                        let (apart, found) = ask_all(pair, &batch, (until, margin));
+                        for lane in 0..LANES {
+                            seen[1][n * LANES + lane] = apart >> lane & 1 == 1;
+                            seen[2][n * LANES + lane] = found[lane].next == Next::Apart;
+                        }
+                    }
+                }
+                for test in 0..3 {
+                    for lane in 0..BATCH {
+                        let [without, with] = [0, 1].map(|which| seen[which][test][lane]);
+                        n_apart[test] += usize::from(with);
+                        n_missed[test] += usize::from(without && touches[lane]);
+                        assert!(
+                            !(with && touches[lane]),
+                            "{kind:?} {pair:?} {test} {until} {off} {:?} {:?}",
+                            steps[lane],
+                            moved[lane]
+                        );
+                    }
+                }
+            }
+            assert!(
+                n_missed.iter().all(|&n| n > 0) && n_apart.iter().all(|&n| n > 1000),
+                "{kind:?} {pair:?} {n_missed:?} {n_apart:?}"
+            );
+        }
+    }
+}
+
 /// Elements that meet at the border of a face or at an end of an edge: the area to one side is exactly zero at all times,
 /// and only its rounding error has a sign.
 #[test]
@@ -327,7 +409,7 @@ fn filter_does_not_trust_the_rounding_error_of_an_area() {
                 assert_eq!(contact.map(|contact| contact.time), Some(0.5), "{step:?}");
                 batch.set(lane, &step);
             }
-            let (apart, found) = ask_all(pair, &batch, 1.0);
+            let (apart, found) = ask_all(pair, &batch, (1.0, 0.0));
             assert_eq!(apart, 0);
             for outcome in found {
                 assert_ne!(outcome.next, Next::Apart, "{pair:?}");
@@ -382,7 +464,7 @@ fn numbers_that_are_none_are_unsure() {
             steps.set(lane, &points);
         }
         for pair in PAIRS {
-            let (apart, found) = ask::<number::Portable>(pair, &steps, 1.0);
+            let (apart, found) = ask::<number::Portable>(pair, &steps, (1.0, 0.0));
             assert_eq!(apart, 0, "{x} {pair:?}");
             for outcome in found {
                 assert_eq!(outcome.next, Next::Unsure, "{x} {pair:?}");

@@ -2,8 +2,9 @@
 
 use crate::cpu::met::{Met, WorkItem};
 use crate::cpu::simd::Isa;
-use crate::exact::{ElementPair, Point};
+use crate::exact::{ElementPair, Point, Reach};
 use crate::frame::{TestId, pair_key};
+use crate::grouping::bounds::{round_down, round_up};
 use crate::impacts::{KeysByKind, StepAnswer};
 use crate::index::{LayerIx, Number, Place};
 use crate::narrow::exact_kind;
@@ -58,21 +59,30 @@ impl Batch<'_> {
         [cluster_a.place(lane_a), cluster_b.place(lane_b)]
     }
 
-    /// Whether the corners of both groups are in tables.
+    /// By how much coordinates in the tables of either group are rounded at most; infinite if one has no tables.
     #[inline(always)]
-    pub fn is_in_tables(&self) -> bool {
-        self.groups.iter().all(|group| group.in_tables)
+    pub fn rounded(&self) -> f64 {
+        f64::max(self.groups[0].rounded, self.groups[1].rounded)
     }
 
-    /// The kind of the pairs, if a filter decides from tables whether such pairs are within a distance.
+    /// The kind of the pairs, and two numbers between which a distance is, if a filter decides from tables whether such pairs are
+    /// within the distance. Where tables are rounded, the numbers allow for that.
     #[inline(always)]
-    pub fn near_in_tables(&self) -> Option<ElementPair> {
+    pub fn near_in_tables(&self, reach: &Reach) -> Option<(ElementPair, [f32; 2])> {
         let pair = match self.between.kind {
-            PairKind::VertexFace => Some(ElementPair::VertexFace),
-            PairKind::EdgeEdge => Some(ElementPair::EdgeEdge),
-            _ => None,
+            PairKind::VertexFace => ElementPair::VertexFace,
+            PairKind::EdgeEdge => ElementPair::EdgeEdge,
+            _ => return None,
         };
-        pair.filter(|_| self.is_in_tables())
+        let [low, high] = reach.enclosing_f32();
+        let rounded = self.rounded();
+        if rounded == 0.0 {
+            return Some((pair, [low, high]));
+        }
+        // Two points are each off by that along three axes: their distance by at most 2 sqrt(3) times as much.
+        let off = 4.0 * rounded;
+        let low = f64::from(low) - off;
+        (low > 0.0).then(|| (pair, [round_down(low), round_up(f64::from(high) + off)]))
     }
 }
 

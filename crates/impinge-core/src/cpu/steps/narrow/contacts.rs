@@ -15,6 +15,8 @@ use super::batch::{Between, Narrow, NarrowCounts, Places, is_owned, key, points}
 
 /// The most pairs of one worker that are settled last.
 const MOST_UNSURE: usize = 4096;
+/// The most close pairs of one worker that are remembered.
+const MOST_CLOSE: usize = 4096;
 
 /// A pair whose first contact is sought.
 #[derive(Debug, Clone, Copy)]
@@ -42,6 +44,9 @@ pub(crate) struct FirstContacts {
     unsure: Vec<(Between, Places)>,
     /// Whether these are being settled.
     is_last: bool,
+    /// Pairs that are not certainly farther apart than [the margin](Self::margin), by kind and key; one more than allowed if some are
+    /// missing.
+    close: Vec<(PairKind, u64)>,
     /// Whether the filter's first step is still to be taken, in `f64`.
     pub(super) is_first: bool,
 }
@@ -59,6 +64,7 @@ impl FirstContacts {
         }
         self.between = None;
         self.unsure.clear();
+        self.close.clear();
         self.is_last = false;
     }
 
@@ -67,6 +73,7 @@ impl FirstContacts {
         let lists = [&self.open, &self.later, &self.single];
         size_of::<Open>() * lists.iter().map(|list| list.capacity()).sum::<usize>()
             + size_of::<(Between, Places)>() * self.unsure.capacity()
+            + size_of::<(PairKind, u64)>() * self.close.capacity()
             + size_of::<Found<Contact>>() * found
     }
 
@@ -101,6 +108,28 @@ impl FirstContacts {
             }
             Sought::All | Sought::Any => 1.0,
         }
+    }
+
+    /// How far two vertices may be from their relative place at any time, if the pairs that this may make touch are wanted, else 0.
+    #[inline(always)]
+    pub(super) fn margin(&self, world: World<'_>) -> f64 {
+        // Pairs that are settled last are remembered already.
+        if self.is_last {
+            return 0.0;
+        }
+        2.0 * world.pose.margin
+    }
+
+    /// Remembers a pair that is not certainly farther apart than the margin.
+    pub(super) fn remember_close(&mut self, world: World<'_>, between: Between, places: Places) {
+        if self.margin(world) > 0.0 && self.close.len() <= MOST_CLOSE {
+            self.close.push((between.kind, key(world, between, places)));
+        }
+    }
+
+    /// The close pairs that were remembered; `None` if there are too many.
+    pub fn close(&self) -> Option<&[(PairKind, u64)]> {
+        (self.close.len() <= MOST_CLOSE).then_some(&self.close)
     }
 
     /// The pairs to be settled last.

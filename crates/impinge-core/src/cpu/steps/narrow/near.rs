@@ -61,19 +61,24 @@ impl Narrow for NearElements {
 fn take<S: Simd>(_: S, near: &mut NearElements, world: World<'_>, batch: Batch<'_>) {
     let between = batch.between;
     let pairs = LayerPair::new(world, between);
-    let pair = batch.near_in_tables();
+    let in_tables = batch.near_in_tables(&pairs.reach);
+    let is_exact = batch.rounded() == 0.0;
     let tables = batch.groups.map(|group| &group.points);
-    let reach = pairs.reach.enclosing_f32();
     for first in (0..batch.met.len()).step_by(BATCH) {
         let lanes = batch.met.batch(first);
         let n = (batch.met.len() - first).min(BATCH);
         let mut open = u16::MAX >> (BATCH - n);
-        if let Some(pair) = pair {
+        if let Some((pair, reach)) = in_tables {
             let found = filter::nearest_in_tables::<S::F32>(pair, tables, lanes, reach);
             let yes = found.verdict.yes & open;
             open &= !(found.verdict.yes | found.verdict.no);
             for lane in Lanes(u64::from(yes)) {
-                near.put(world, &batch, first + lane, found.part(lane));
+                let part = if is_exact {
+                    found.part(lane)
+                } else {
+                    Labels::UNKNOWN
+                };
+                near.put(world, &batch, first + lane, part);
             }
         }
         for lane in Lanes(u64::from(open)) {

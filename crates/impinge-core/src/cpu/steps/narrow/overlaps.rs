@@ -1,14 +1,18 @@
 //! Whether the boxes of elements over the whole step, inflated, overlap.
 //!
-//! Stage `pairing` has tested boxes in `f32` that were rounded outward; here they are tested as they are.
+//! Stage `pairing` has tested boxes in `f32` that were rounded outward; here boxes are tested unrounded, where the rounded ones leave it open.
 
-use crate::cpu::simd::Isa;
+use crate::cpu::simd::{Isa, LaneBounds, Simd, dispatch};
 use crate::elements::Elements;
+use crate::exact::filter::BATCH;
+use crate::exact::filter::number::Lookup;
+use crate::grouping::bounds::round_up;
 use crate::hull::{Extent, Hull};
 use crate::impacts::StepAnswer;
 use crate::index::Place;
 use crate::narrow::are_near;
 
+use super::super::group::Group;
 use super::super::world::World;
 use super::batch::{Batch, Keys, Narrow, NarrowCounts, key_in};
 
@@ -33,36 +37,20 @@ impl Overlaps {
 }
 
 impl Narrow for Overlaps {
-    fn take(&mut self, _: Isa, world: World<'_>, batch: Batch<'_>) {
-        let (distance, between) = (self.distance, batch.between);
-        let is_in_tables = batch.is_in_tables();
-        let has_cell = world.frame.has_cell();
-        if is_in_tables && distance == 0.0 && !has_cell {
-            // The boxes of groups in tables are not rounded.
-            for ix in 0..batch.met.len() {
-                let key = key_in(batch.groups, batch.met.lanes(ix));
-                self.keys.push(between.kind, key);
-            }
-            return self.keys.hand_over(world, between.kind);
+    fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
+        if batch.rounded() > 0.0 || self.distance > 0.0 || world.frame.has_cell() {
+            return dispatch!(isa, take, (
+                overlaps: &mut Overlaps = self,
+                world: World<'_> = world,
+                batch: Batch<'_> = batch,
+            ));
         }
-        let sides = [between.a, between.b].map(|layer| LayerSide {
-            elements: &world.cache(layer).clustering.corners,
-            hull: world.hull(layer),
-        });
+        // The boxes of the groups are those of the elements.
         for ix in 0..batch.met.len() {
-            let lanes = batch.met.lanes(ix);
-            let [a, b] = if is_in_tables {
-                [0, 1].map(|side| batch.groups[side].extent(lanes[side].into()))
-            } else {
-                let [a, b] = batch.places(ix);
-                [sides[0].extent(a), sides[1].extent(b)]
-            };
-            let key = key_in(batch.groups, lanes);
-            if are_near(&a, &b, distance) && world.frame.is_owned(world.scene, key) {
-                self.keys.push(between.kind, key);
-            }
+            let key = key_in(batch.groups, batch.met.lanes(ix));
+            self.keys.push(batch.between.kind, key);
         }
-        self.keys.hand_over(world, between.kind);
+        self.keys.hand_over(world, batch.between.kind);
     }
 
     fn end(&mut self, answer: StepAnswer<'_>) {
@@ -72,6 +60,66 @@ impl Narrow for Overlaps {
     fn counts(&self) -> NarrowCounts {
         NarrowCounts::default()
     }
+}
+
+#[inline(always)]
+fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: World<'_>, batch: Batch<'_>) {
+    let (distance, between) = (overlaps.distance, batch.between);
+    let boxes = batch.groups.map(|group| &group.start);
+    let farther_out = farther_out(batch.groups, distance);
+    let sides = [between.a, between.b].map(|layer| LayerSide {
+        elements: &world.cache(layer).clustering.corners,
+        hull: world.hull(layer),
+    });
+    for first in (0..batch.met.len()).step_by(BATCH) {
+        let sure = overlap_by::<S::F32>(boxes, batch.met.batch(first), farther_out);
+        let n = (batch.met.len() - first).min(BATCH);
+        for lane in 0..n {
+            let ix = first + lane;
+            if sure >> lane & 1 == 0 {
+                let [a, b] = batch.places(ix);
+                if !are_near(&sides[0].extent(a), &sides[1].extent(b), distance) {
+                    continue;
+                }
+            }
+            let key = key_in(batch.groups, batch.met.lanes(ix));
+            if !world.frame.has_cell() || world.frame.is_owned(world.scene, key) {
+                overlaps.keys.push(between.kind, key);
+            }
+        }
+    }
+    overlaps.keys.hand_over(world, between.kind);
+}
+
+/// By how much two boxes of groups together reach at most beyond the inflated boxes of elements, on one axis.
+///
+/// An end is off by the rounding of points, at most 2^-24 of the largest coordinate, and moved outward by the distance, 2^-20 of all, and
+/// 2^-126 (`hull::Pose`): less than 2^-19 of the largest coordinate and of the distance, and 2^-125.
+fn farther_out([a, b]: [&Group; 2], distance: f64) -> f32 {
+    let largest = f64::max(a.largest, b.largest) + distance;
+    round_up(largest * 2f64.powi(-18) + 2f64.powi(-120))
+}
+
+/// Which of sixteen pairs of boxes of two groups overlap by so much that the inflated boxes of the elements certainly do.
+#[inline(always)]
+fn overlap_by<V: Lookup>(
+    [a, b]: [&LaneBounds; 2],
+    places: [&[u8; BATCH]; 2],
+    farther_out: f32,
+) -> u16 {
+    let bound = V::splat(farther_out.into());
+    let mut yes = 0;
+    for first in (0..BATCH).step_by(V::N) {
+        let (of_a, of_b) = (V::places(places[0], first), V::places(places[1], first));
+        let mut all = !bound.gt(bound);
+        for axis in 0..3 {
+            let before = V::look_up(&a.max[axis], of_a) - V::look_up(&b.min[axis], of_b);
+            let after = V::look_up(&b.max[axis], of_b) - V::look_up(&a.min[axis], of_a);
+            all = all & before.gt(bound) & after.gt(bound);
+        }
+        yes |= V::bits(all) << first;
+    }
+    yes
 }
 
 /// The elements of a layer, and what makes their boxes.

@@ -5,7 +5,8 @@
 //! enclose  eight candidates: contact or none, and when, nearly always to all bits of an f32
 //! ```
 //!
-//! The two alternate on lists of a thousand pairs, so that no lane waits for another pair's search.
+//! The two alternate on lists of a thousand pairs, so that no lane waits for another pair's search. If close pairs are wanted too,
+//! pairs that stay beyond the margin are dropped first.
 
 use crate::cpu::simd::{Lanes, Simd};
 use crate::exact::ElementPair;
@@ -31,11 +32,12 @@ pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: Worl
     let mut open = std::mem::take(&mut contacts.open);
     let mut later = std::mem::take(&mut contacts.later);
     let mut single = std::mem::take(&mut contacts.single);
+    let margin = contacts.margin(world);
     if contacts.is_first {
         let until = contacts.until(world);
         for chunk in open.chunks(LANES) {
             sides.fill(simd, chunk, &mut steps, &mut spans);
-            let no = filter::are_apart::<S::F64>(pair, &steps, until);
+            let no = filter::are_apart::<S::F64>(pair, &steps, until, margin);
             let among = u8::MAX >> (LANES - chunk.len());
             for lane in Lanes(u64::from(!no & among)) {
                 later.push(chunk[lane]);
@@ -44,10 +46,22 @@ pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: Worl
         open.clear();
         std::mem::swap(&mut open, &mut later);
     }
+    if margin > 0.0 {
+        while !open.is_empty() {
+            for chunk in open.chunks(LANES) {
+                sides.fill(simd, chunk, &mut steps, &mut spans);
+                let seen = filter::look::<S::F64>(pair, &steps, &spans, margin);
+                contacts.keep_close(world, between, chunk, &seen, (&mut later, &mut single));
+            }
+            open.clear();
+            std::mem::swap(&mut open, &mut later);
+        }
+        std::mem::swap(&mut open, &mut single);
+    }
     while !(open.is_empty() && single.is_empty()) {
         for chunk in open.chunks(LANES) {
             sides.fill(simd, chunk, &mut steps, &mut spans);
-            let seen = filter::look::<S::F64>(pair, &steps, &spans);
+            let seen = filter::look::<S::F64>(pair, &steps, &spans, 0.0);
             let among = u8::MAX >> (LANES - chunk.len());
             contacts.after_look(
                 world,
@@ -71,6 +85,30 @@ pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: Worl
 }
 
 impl FirstContacts {
+    /// Drops pairs that are farther apart than the margin at all times, and remembers all others, which are searched without it.
+    #[inline(always)]
+    fn keep_close(
+        &mut self,
+        world: World<'_>,
+        between: Between,
+        chunk: &[Open],
+        seen: &Look8,
+        (later, close): (&mut Vec<Open>, &mut Vec<Open>),
+    ) {
+        let until = self.until(world);
+        for (lane, &open) in chunk.iter().enumerate() {
+            let mut next = open;
+            match next.search.after_look(seen, lane, until) {
+                Next::Apart => {}
+                Next::Look => later.push(next),
+                Next::Enclose | Next::Contact | Next::Unsure => {
+                    self.remember_close(world, between, open.places);
+                    close.push(open);
+                }
+            }
+        }
+    }
+
     /// Sorts pairs by the results of looking at their intervals.
     #[inline(always)]
     fn after_look(

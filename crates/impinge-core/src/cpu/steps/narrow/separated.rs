@@ -24,15 +24,14 @@ pub(super) fn take<S: Simd>(
 ) {
     let between = batch.between;
     let reach = world.frame.reach(between.a, between.b);
-    let reach = reach.enclosing_f32();
-    let pair = batch.near_in_tables();
+    let in_tables = batch.near_in_tables(&reach);
     let tables = batch.groups.map(|group| &group.points);
     let until = round_up(contacts.until(world));
     for first in (0..batch.met.len()).step_by(BATCH) {
         let lanes = batch.met.batch(first);
         let n = (batch.met.len() - first).min(BATCH);
         let mut open = u16::MAX >> (BATCH - n);
-        if let Some(pair) = pair {
+        if let Some((pair, reach)) = in_tables {
             let verdict = filter::are_within_in_tables::<S::F32>(pair, tables, lanes, reach);
             for lane in Lanes(u64::from(verdict.yes & open)) {
                 let places = batch.places(first + lane);

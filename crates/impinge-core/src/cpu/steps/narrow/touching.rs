@@ -5,8 +5,8 @@
 //! ```text
 //! far     sixteen pairs at a time in f32, from the tables of the two groups: apart along a few directions
 //! across  those that are left, put side by side: apart along their normals, or never in one plane
-//! aside   those that are left: one is always beside the other
-//!         (if positions are f64: far and across, eight pairs at a time)
+//! aside   those that are left: one element always stays beside the other
+//!         (if positions are f64: with a margin for their rounding in the tables)
 //! search  those that are left, a thousand at a time
 //! ```
 //!
@@ -46,25 +46,34 @@ impl Narrow for FirstContacts {
         if !matches!(between.kind, PairKind::VertexFace | PairKind::EdgeEdge) {
             if let Some(pair) = exact_pair(between.kind) {
                 for ix in 0..batch.met.len() {
+                    self.remember_close(world, between, batch.places(ix));
                     self.settle_exactly(world, between, pair, batch.places(ix));
                 }
             }
             return;
         }
         let until = self.until(world);
-        self.is_first = !batch.is_in_tables();
-        if !self.is_first {
+        let rounded = batch.rounded();
+        if self.open.is_empty() {
+            self.is_first = false;
+        }
+        if rounded.is_infinite() {
+            self.is_first = true;
+        } else {
             let tables = batch.groups.map(|group| &group.points);
-            let (until, met) = (round_up(until), &mut *batch.met);
+            let (until, met) = (
+                (round_up(until), self.margin(world) + 2.0 * rounded),
+                &mut *batch.met,
+            );
             match between.kind {
                 PairKind::VertexFace => dispatch!(isa, drop_vertices_and_faces, (
                     tables: [&Moving64; 2] = tables,
-                    until: f32 = until,
+                    until: (f32, f64) = until,
                     met: &mut Met = met,
                 )),
                 _ => dispatch!(isa, drop_edges, (
                     tables: [&Moving64; 2] = tables,
-                    until: f32 = until,
+                    until: (f32, f64) = until,
                     met: &mut Met = met,
                 )),
             }
@@ -163,22 +172,27 @@ fn separated<S: Simd>(simd: S, contacts: &mut FirstContacts, world: World<'_>, b
 }
 
 #[inline(always)]
-fn drop_vertices_and_faces<S: Simd>(simd: S, tables: [&Moving64; 2], until: f32, met: &mut Met) {
+fn drop_vertices_and_faces<S: Simd>(
+    simd: S,
+    tables: [&Moving64; 2],
+    until: (f32, f64),
+    met: &mut Met,
+) {
     drop_apart(simd, ElementPair::VertexFace, tables, until, met);
 }
 
 #[inline(always)]
-fn drop_edges<S: Simd>(simd: S, tables: [&Moving64; 2], until: f32, met: &mut Met) {
+fn drop_edges<S: Simd>(simd: S, tables: [&Moving64; 2], until: (f32, f64), met: &mut Met) {
     drop_apart(simd, ElementPair::EdgeEdge, tables, until, met);
 }
 
-/// Drops the candidates that are certainly apart from t = 0 to `until`.
+/// Drops the candidates that are certainly apart from t = 0 to a time, by more than a margin.
 #[inline(always)]
 fn drop_apart<S: Simd>(
     simd: S,
     pair: ElementPair,
     tables: [&Moving64; 2],
-    until: f32,
+    until: (f32, f64),
     met: &mut Met,
 ) {
     let mut n_kept = 0;
