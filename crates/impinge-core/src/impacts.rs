@@ -19,6 +19,18 @@ pub(crate) struct Found<V> {
     pub value: V,
 }
 
+/// Which contacts to look for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) enum Sought {
+    /// Every contact.
+    #[default]
+    All,
+    /// The earliest contact, and all whose times may round to the same time.
+    Earliest,
+    /// Any contact.
+    Any,
+}
+
 /// A pair of a step that a device has not dropped.
 #[cfg(feature = "gpu")]
 #[derive(Debug, Clone, Copy)]
@@ -27,6 +39,19 @@ pub(crate) struct LeftPair {
     pub places: [u32; 2],
     /// Until this time it certainly does not touch.
     pub free_until: f32,
+    /// By this time it certainly touches, at one time only.
+    pub touches_by: Option<f32>,
+}
+
+/// What a device says about a step, or about a part of it.
+#[cfg(feature = "gpu")]
+#[derive(Debug)]
+pub(crate) struct Left<'a> {
+    /// Pairs that may touch, in any order. Where the earliest contact is sought, those that touch later than `touches_by` may be missing;
+    /// where any is sought, all may be missing if one certainly touches.
+    pub pairs: &'a mut [LeftPair],
+    /// The least time by which some pair certainly touches, after the start; none where all are sought.
+    pub touches_by: Option<f32>,
 }
 
 /// Contacts found, by kind of pair.

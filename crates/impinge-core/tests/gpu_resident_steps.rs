@@ -11,8 +11,8 @@ use impinge_core::{
 };
 use impinge_scenes::{Random, surfaces};
 
-/// Pairs, and until when each certainly does not touch.
-type Listed = BTreeMap<[u32; 2], f32>;
+/// Pairs, until when each certainly does not touch, and by when it certainly does.
+type Listed = BTreeMap<[u32; 2], [f32; 2]>;
 
 /// A device of the caller's.
 struct Caller {
@@ -95,11 +95,15 @@ impl Caller {
             let n = self.read(&found.counts)[found.n_pairs_offset as usize / 4] as usize;
             assert!(n as u64 <= found.pairs_capacity);
             let pairs = self.read(&found.pairs);
-            let times = self.read(&found.free_until);
-            let times = times.iter().map(|&bits| f32::from_bits(bits));
+            let times = self.read(&found.times);
+            let times = times.as_chunks::<2>().0.iter();
+            let times = times.map(|times| times.map(f32::from_bits));
             let each = pairs.as_chunks::<2>().0[..n].iter().copied();
             let pairs = Listed::from_iter(each.zip(times));
             assert_eq!(pairs.len(), n, "each pair is listed once");
+            let least = self.read(&found.counts)[found.touches_by_offset as usize / 4];
+            let times = pairs.values().map(|[_, touches_by]| *touches_by);
+            assert_eq!(f32::from_bits(least), times.fold(2.0, f32::min));
             return (found, pairs, n_tries);
         }
         panic!("there never is enough room");
@@ -153,21 +157,29 @@ fn assert_between(
 ) -> usize {
     let mut cpu = Detector::new(Backend::Cpu).expect("settings");
     let impacts = cpu.impacts(truth, step).expect(name).clone();
+    let mut n_certain = 0;
     for impact in &impacts {
         let elements = [impact.a, impact.b].map(|at| (at.body, at.primitive));
         let pair = numbers(found, impact.kind, elements);
-        let until = pairs.get(&pair);
-        let until = until.unwrap_or_else(|| panic!("{name}: {impact:?} is missing"));
-        assert!(
-            f64::from(*until) <= impact.toi,
-            "{name}: {until} {impact:?}"
-        );
-        assert!(
-            *until == 0.0 || !impact.at_start,
-            "{name}: {until} {impact:?}"
-        );
+        let times = pairs.get(&pair);
+        let [until, by] = *times.unwrap_or_else(|| panic!("{name}: {impact:?} is missing"));
+        let is_between = f64::from(until) <= impact.toi && impact.toi < f64::from(by);
+        assert!(is_between, "{name}: {until} {by} {impact:?}");
+        let is_later = until > 0.0 || by < 2.0;
+        assert!(!is_later || !impact.at_start, "{name}: {until} {impact:?}");
+        n_certain += usize::from(by <= 1.0);
         assert_eq!(kind(found, pair), impact.kind, "{name}");
     }
+    let mut certain = pairs.values().filter(|[_, by]| *by < 2.0);
+    assert!(
+        certain.all(|[until, by]| until < by && *by <= 1.0),
+        "{name}"
+    );
+    let n_listed = pairs.values().filter(|[_, by]| *by < 2.0).count();
+    assert_eq!(
+        n_listed, n_certain,
+        "{name}: only pairs that touch are certain to"
+    );
     let asked = CandidateQuery::new(query.clone()).kinds(KINDS);
     let candidates = cpu.candidates(truth, &asked).expect(name);
     let candidates = candidates
@@ -237,6 +249,8 @@ fn pairs_that_may_touch_stay_on_the_device() {
         let stats = impacts.stats();
         assert_ne!(stats.backend, "cpu");
         assert_eq!(stats.n_unsure, pairs.len() as u64, "{name}");
+        let n_certain = pairs.values().filter(|[_, by]| *by < 2.0).count();
+        assert!(n_certain >= n * 3 / 4, "{name}: {n_certain} of {n}");
         counts.push(n);
         // Some positions from the device and some from the host.
         let mut half = known.clone();
@@ -487,6 +501,9 @@ fn damaged_names_are_noticed() {
             "UnsureKey(min(a, order[b]),",
         ),
         ("max(order[a], order[b]));", "order[a]);"),
+        ("found.touches_by = high;", "found.touches_by = low;"),
+        ("time_of(bracket.touches_by)", "2.0"),
+        ("time_of(bracket.free_until)", "0.0"),
     ] {
         let (device, queue) = (caller.device.clone(), caller.queue.clone());
         let damage = ("narrow_search", line, damaged);
@@ -497,8 +514,10 @@ fn damaged_names_are_noticed() {
         caller.queue.submit([encoder.finish()]);
         let found = found.expect("good");
         let n = caller.read(&found.counts)[found.n_pairs_offset as usize / 4] as usize;
-        let words = caller.read(&found.pairs);
-        let pairs = BTreeSet::from_iter(words.as_chunks::<2>().0[..n].iter().copied());
-        assert!(!pairs.iter().eq(expected.keys()), "{damage:?}");
+        let [words, times] = [&found.pairs, &found.times].map(|list| caller.read(list));
+        let times = times.as_chunks::<2>().0.iter();
+        let times = times.map(|times| times.map(f32::from_bits));
+        let each = words.as_chunks::<2>().0[..n].iter().copied();
+        assert!(Listed::from_iter(each.zip(times)) != expected, "{damage:?}");
     }
 }

@@ -49,6 +49,7 @@ fn assert_alike(name: &str, device: &mut Detector, scene: &Scene, step: &Step) -
     assert_ne!(device.step_stats().backend, "cpu", "{name}");
     let is_free = device.is_free(scene, step).expect(name);
     assert_eq!(is_free, expected.is_empty(), "{name}");
+    assert_ne!(device.step_stats().backend, "cpu", "{name}");
     expected.len()
 }
 
@@ -273,6 +274,14 @@ fn surfaces_of_many_clusters_are_answered_alike() {
     assert_eq!(on_device.n_clusters, stats.n_clusters);
     let (n, n_left) = (on_device.n_candidates, on_device.n_unsure);
     assert!(n_left < n / 2, "{n_left} of {n} are left to the CPU");
+    // Most pairs touch later than one that certainly touches, or do not matter once one does.
+    let earliest = device.earliest(&scene, &Step::default()).expect("good");
+    assert!(earliest.is_some());
+    let n_first = device.step_stats().n_unsure;
+    assert!(n_first < n_left / 10, "{n_first} of {n_left} may be first");
+    assert!(!device.is_free(&scene, &Step::default()).expect("good"));
+    let n_any = device.step_stats().n_unsure;
+    assert!(n_any < n_left / 2, "{n_any} of {n_left} for any");
     for stage in ["clustering", "upload", "settle", "collect"] {
         assert!(
             on_device.stages.iter().any(|held| held.name == stage),
@@ -417,7 +426,8 @@ fn one_detector_answers_step_after_step() {
 fn rooms_that_are_too_small_grow() {
     let scene = balls(1500);
     let step = Step::default();
-    let expected = on_cpu().impacts(&scene, &step).expect("good").hash();
+    let expected = on_cpu().impacts(&scene, &step).expect("good").clone();
+    let (earliest, expected) = (expected.earliest(), expected.hash());
     type Shrink = fn(&mut Capacities);
     let shrunk: [(&str, Shrink); 5] = [
         ("queue", |room| room.queue = 512),
@@ -438,10 +448,144 @@ fn rooms_that_are_too_small_grow() {
         assert_eq!(impacts.hash(), expected, "{name}");
         let n_reruns = impacts.stats().n_reruns;
         assert!(n_reruns > 0 || name == "queue", "{name}: {n_reruns}");
+        let mut other = Detector::with_capacities(gpu(), capacities).expect("settings");
+        assert!(!other.is_free(&scene, &step).expect("good"), "{name}");
+        let mut other = Detector::with_capacities(gpu(), capacities).expect("settings");
+        let found = other.earliest(&scene, &step).expect("good");
+        assert_eq!(found, earliest, "{name}");
         let impacts = device.impacts(&scene, &step).expect("good");
         assert_eq!(impacts.hash(), expected, "{name}");
         assert_eq!(impacts.stats().n_reruns, 0, "{name} has grown");
     }
+}
+
+/// The scene with the positions to which it can be moved without contact: nearly to the first one.
+fn moved_until_contact(scene: &Scene, step: &Step) -> Scene {
+    let advance = on_cpu().advance(scene, step).expect("good");
+    let mut scene = scene.clone();
+    for (body, positions) in &advance.positions {
+        match positions {
+            impinge_core::Positions::F32(end) => scene.set_end_positions(*body, end),
+            impinge_core::Positions::F64(end) => scene.set_end_positions(*body, end),
+        }
+        .expect("known");
+    }
+    scene
+}
+
+#[test]
+fn certain_contacts_are_the_only_ones() {
+    let mut device = on_gpu();
+    let step = Step::default();
+    for scene in [passing_points(99), turning_edge()] {
+        assert_eq!(assert_alike("passing", &mut device, &scene, &step), 0);
+    }
+    let n = assert_alike("three times", &mut device, &three_contacts(), &step);
+    assert_eq!(n, 1, "the first of three");
+    for scene in [balls(400), balls(3000)] {
+        let free = moved_until_contact(&scene, &step);
+        assert_eq!(assert_alike("free", &mut device, &free, &step), 0);
+        assert!(device.step_stats().n_candidates > 10, "they come near");
+    }
+}
+
+/// A large triangle and points that move, half of them down and half of them up. `way` gives the height of each above the triangle, and how
+/// far the point is inside of an edge, at the start and at the end.
+fn triangle_and_points(n: usize, way: impl Fn(f32) -> [[f32; 2]; 2]) -> Scene {
+    let mut scene = Scene::new();
+    let triangle = [[0.0f32, 0.0, 0.0], [64.0, 0.0, 0.0], [0.0, 64.0, 0.0]];
+    scene.add_triangles(&[[0, 1, 2]], &triangle).expect("good");
+    let at = |end: usize| -> Vec<[f32; 3]> {
+        let each = (0..n).zip([1.0, -1.0].into_iter().cycle());
+        let points = each.map(|(ix, side)| {
+            let [z, y] = way(ix as f32 / n as f32)[end];
+            [0.125 * (ix + 1) as f32, y, side * z]
+        });
+        points.collect()
+    };
+    let points = scene.add_points(&at(0)).expect("good");
+    scene.set_end_positions(points, &at(1)).expect("good");
+    scene
+}
+
+/// Points that lie on a triangle, and leave it on either side.
+fn leaving_points(n: usize) -> Scene {
+    triangle_and_points(n, |_| [[0.0, 4.0], [8.0, 4.0]])
+}
+
+/// Points that come from above a triangle and pass its plane at many times, always a little outside of an edge.
+fn passing_points(n: usize) -> Scene {
+    triangle_and_points(n, |part| {
+        let time = 0.25 + 0.7 * part;
+        [[4.0, 4.0], [4.0 - 4.0 / time, 4.0 - 4.1 / time]]
+    })
+}
+
+/// A point that passes the plane of a triangle while it is outside of an edge that turns: at a quarter of the step. At the start and in the
+/// middle of the step it is inside of all edges.
+fn turning_edge() -> Scene {
+    let mut scene = Scene::new();
+    let start = [[-1.0f32, -1.0, 0.0], [10.0, 5.0, 0.0], [0.0, 1000.0, 0.0]];
+    let end = [[-19.0f32, 11.0, 0.0], [-8.0, -7.0, 0.0], [0.0, 1000.0, 0.0]];
+    let triangle = scene.add_triangles(&[[0, 1, 2]], &start).expect("good");
+    scene.set_end_positions(triangle, &end).expect("good");
+    let point = scene.add_points(&[[0.0f32, 0.0, 1.0]]).expect("good");
+    let end = [[0.0f32, 0.0, -3.0]];
+    scene.set_end_positions(point, &end).expect("good");
+    scene
+}
+
+/// A triangle that passes over a point three times in the first half of the step. Found by trying random ones.
+fn three_contacts() -> Scene {
+    let mut scene = Scene::new();
+    let start = [[14.0f32, 3.0, -6.0], [-10.0, 10.0, -2.0], [-9.0, -6.0, 6.0]];
+    let end = [[6.0f32, -5.0, 16.0], [4.0, 10.0, -2.0], [1.0, -14.0, -10.0]];
+    let triangle = scene.add_triangles(&[[0, 1, 2]], &start).expect("good");
+    scene.set_end_positions(triangle, &end).expect("good");
+    scene.add_points(&[[0.0f32; 3]]).expect("good");
+    scene
+}
+
+/// A pair that touches at the start has no time under `Start::Skip`, whatever it does later.
+#[test]
+fn pairs_that_touch_at_the_start_bound_no_time() {
+    let mut device = on_gpu();
+    let mut scene = leaving_points(200);
+    let skip = Step::default().start(Start::Skip);
+    assert_alike("reported", &mut device, &scene, &Step::default());
+    assert_eq!(assert_alike("skipped", &mut device, &scene, &skip), 0);
+    // One that does not touch at the start crosses the triangle late.
+    let late = scene.add_points(&[[20.0f32, 20.0, 7.0]]).expect("good");
+    let end = [[20.0f32, 20.0, -0.01]];
+    scene.set_end_positions(late, &end).expect("good");
+    assert_eq!(assert_alike("late", &mut device, &scene, &skip), 1);
+}
+
+/// A device does not know which cell owns a pair, so a pair that certainly touches says nothing about another cell.
+#[test]
+fn cells_are_answered_alike() {
+    let scene = balls(800);
+    let mut cpu = on_cpu();
+    let mut device = on_gpu();
+    let all = Step::new(Query::all());
+    let expected = cpu.impacts(&scene, &all).expect("good").clone();
+    let first = expected.earliest().expect("they touch");
+    let (mut n, mut n_later, mut n_free) = (0, 0, 0);
+    let cuts = [-10.0, -0.2, -0.1, 0.0, 0.1, 0.2, 10.0];
+    for x in cuts.windows(2) {
+        for y in cuts.windows(2) {
+            let (low, high) = ([x[0], y[0], -10.0], [x[1], y[1], 10.0]);
+            let step = Step::new(Query::all().owned_by(low, high));
+            let name = format!("{low:?} {high:?}");
+            n += assert_alike(&name, &mut device, &scene, &step);
+            match device.earliest(&scene, &step).expect("good") {
+                Some(earliest) => n_later += u32::from(earliest != first),
+                None => n_free += 1,
+            }
+        }
+    }
+    assert_eq!(n, expected.len());
+    assert!(n_later > 2 && n_free > 2, "{n_later} {n_free}");
 }
 
 #[test]
@@ -456,7 +600,8 @@ fn a_memory_budget_is_kept_in_slabs_or_by_the_cpu() {
     let body = scene.add(faces(n), start).expect("good");
     scene.set_end_positions(body, &end).expect("good");
     let step = Step::default();
-    let expected = on_cpu().impacts(&scene, &step).expect("good").hash();
+    let expected = on_cpu().impacts(&scene, &step).expect("good").clone();
+    let (earliest, expected) = (expected.earliest(), expected.hash());
     let mut backends = Vec::new();
     for budget in (4..80).step_by(3).map(|n| n * 100_000) {
         let settings = Settings {
@@ -470,6 +615,10 @@ fn a_memory_budget_is_kept_in_slabs_or_by_the_cpu() {
                 assert_eq!(impacts.hash(), expected, "{budget}");
                 let stats = impacts.stats();
                 backends.push((budget, stats.backend != "cpu", stats.n_slabs));
+                // Times that one part has proven hold for all.
+                let found = device.earliest(&scene, &step).expect("as before");
+                assert_eq!(found, earliest, "{budget}");
+                assert!(!device.is_free(&scene, &step).expect("as before"));
             }
             Err(Error::MemoryBudget { .. }) => assert!(budget < 2_500_000, "{budget}"),
             Err(error) => panic!("{error}"),
@@ -602,8 +751,8 @@ fn device() -> (wgpu::Device, wgpu::Queue) {
     pollster::block_on(adapter.request_device(&Default::default())).expect("a device")
 }
 
-/// The hash of a step's impacts, and the earliest one.
-type Answers = Result<(u64, Option<Impact>), Error>;
+/// The hash of a step's impacts, the earliest one, and whether there is none.
+type Answers = Result<(u64, Option<Impact>, bool), Error>;
 
 /// The answers about some steps, on a device one of whose kernels has one line replaced.
 fn damaged(steps: &[(Scene, Step)], damage: (&str, &str, &str)) -> Vec<Answers> {
@@ -616,7 +765,8 @@ fn damaged(steps: &[(Scene, Step)], damage: (&str, &str, &str)) -> Vec<Answers> 
 
 fn answers(detector: &mut Detector, scene: &Scene, step: &Step) -> Answers {
     let hash = detector.impacts(scene, step)?.hash();
-    Ok((hash, detector.earliest(scene, step)?))
+    let earliest = detector.earliest(scene, step)?;
+    Ok((hash, earliest, detector.is_free(scene, step)?))
 }
 
 #[test]
@@ -629,6 +779,14 @@ fn damaged_kernels_are_noticed() {
         (five_bodies().0, Step::default()),
         (many_edges(), Step::default()),
         (boxes, Step::new(some)),
+        (
+            moved_until_contact(&balls(3000), &Step::default()),
+            Step::default(),
+        ),
+        (leaving_points(100), Step::default().start(Start::Skip)),
+        (passing_points(100), Step::default()),
+        (turning_edge(), Step::default()),
+        (three_contacts(), Step::default()),
     ];
     let truth = scenes
         .each_ref()
@@ -638,10 +796,21 @@ fn damaged_kernels_are_noticed() {
         // A device that drops nothing is slow, not wrong.
         (
             "narrow_moving",
-            "return !never_touch(&polygon, &sizes, pair.are_edges);",
+            "return decide(&polygon, &sizes, pair.are_edges) != FREE;",
             "return true;",
         ),
         ("narrow_search", "n < N_INTERVALS;", "n < 0u;"),
+        // So is one that is certain of no contact, or that does not use what it is certain of.
+        (
+            "narrow_search",
+            "return select(UNCLEAR, TOUCHES, touches);",
+            "return UNCLEAR;",
+        ),
+        (
+            "narrow_search",
+            "if params.sought == SEEK_ALL && params.by_number == 0u {",
+            "if false {",
+        ),
     ] {
         assert_eq!(damaged(&scenes, harmless), truth, "{harmless:?}");
     }
@@ -701,35 +870,95 @@ fn damaged_kernels_are_noticed() {
         ),
         (
             "narrow_moving",
-            "first_left = reserve(N_PAIRS, atomicLoad(&n_left));",
-            "first_left = reserve(N_PAIRS, atomicLoad(&n_left) / 2u);",
+            "first_place = reserve(counter, atomicLoad(&n_entries));",
+            "first_place = reserve(counter, atomicLoad(&n_entries) / 2u);",
         ),
         (
             "narrow_search",
-            "d.start * (1.0 - time)",
-            "d.end * (1.0 - time)",
+            "d.start * time_of(TICKS - time)",
+            "d.end * time_of(TICKS - time)",
         ),
         (
             "narrow_search",
             "Moving(at(d, low), at(d, high))",
             "Moving(at(d, high), at(d, high))",
         ),
-        ("narrow_search", "if high == 1.0 {", "if high >= 0.5 {"),
-        ("narrow_search", "low = high;", "low = high + length;"),
         (
             "narrow_search",
-            "let is_left = time <= 1.0;",
-            "let is_left = time <= 0.25;",
+            "if high == end {",
+            "if high >= TICKS / 2u {",
         ),
         (
             "narrow_search",
-            "times[place] = time;",
-            "times[place] = time + 0.5;",
+            "found.free_until = high;",
+            "found.free_until = high + length;",
         ),
         (
             "narrow_search",
-            "first_unsure = reserve(N_UNSURE, atomicLoad(&n_unsure));",
-            "first_unsure = reserve(N_UNSURE, atomicLoad(&n_unsure) / 2u);",
+            "if bracket.is_left && place",
+            "if bracket.is_left && lane != 7u && place",
+        ),
+        (
+            "narrow_search",
+            "PairTimes(time_of(bracket.free_until),",
+            "PairTimes(time_of(bracket.free_until + TICKS / 2u),",
+        ),
+        (
+            "narrow_search",
+            "first_place = reserve(counter, atomicLoad(&n_entries));",
+            "first_place = reserve(counter, atomicLoad(&n_entries) / 2u);",
+        ),
+        // What is certain of contact: the sign of f changes, and all edges are passed on the inner side.
+        (
+            "narrow_search",
+            "var touches = falls || rises;",
+            "var touches = true;",
+        ),
+        (
+            "narrow_search",
+            "let rises = f_0 < -bound &&",
+            "let rises = f_0 <= 0.0 &&",
+        ),
+        (
+            "narrow_search",
+            "&& f_3 < -bound && (f_1 > inner || f_2 < -inner);",
+            "&& f_3 < -bound;",
+        ),
+        (
+            "narrow_search",
+            "touches = touches && side.is_inside;",
+            "touches = touches && !side.is_outside;",
+        ),
+        (
+            "narrow_search",
+            "let is_inside = min(w_0, w_4) > bound",
+            "let is_inside = max(w_0, w_4) > bound",
+        ),
+        (
+            "narrow_search",
+            "> bound && min(w_1, w_3) > next && w_2 > middle;",
+            "> bound;",
+        ),
+        // What follows from it.
+        (
+            "narrow_search",
+            "bitcast<u32>(time_of(high))",
+            "bitcast<u32>(time_of(low))",
+        ),
+        (
+            "narrow_search",
+            "select(found.touches_by, first, params.sought == SEEK_EARLIEST)",
+            "first",
+        ),
+        (
+            "narrow_search",
+            "if params.sought == SEEK_ANY && first != NONE {",
+            "if first != NONE {",
+        ),
+        (
+            "narrow_search",
+            "if params.sought == SEEK_ANY && first != NONE {",
+            "if params.sought == SEEK_ANY {",
         ),
         (
             "narrow_search",

@@ -133,8 +133,7 @@ fn every_pair_and_every_time_is_that_of_the_exact_prototype() {
     }
 }
 
-/// Fails where no adapter is found. A software driver is enough, but takes half a minute for the larger step: that is only
-/// asked for all impacts, and with enough room at once.
+/// Fails where no adapter is found. A software driver is enough, but takes seconds for the larger step, so there is enough room at once.
 #[cfg(feature = "gpu")]
 #[test]
 fn a_device_leaves_every_pair_that_touches() {
@@ -164,10 +163,14 @@ fn a_device_leaves_every_pair_that_touches() {
                 assert_eq!(found, expected, "{} {}", scenario.name, kind.name());
             }
         }
+        let earliest = device.earliest(&scene, &step).expect("good");
+        assert_eq!(earliest, impacts.earliest());
+        // Other pairs touch later than one that certainly touches.
+        let n_left = device.step_stats().n_unsure;
+        println!("{}: {n_left} may be the earliest", scenario.name);
+        assert!(n_left < 600, "{}: {n_left} of {n}", scenario.name);
+        assert!(!device.is_free(&scene, &step).expect("good"));
         if scenario.name == "cloth-funnel" {
-            let earliest = device.earliest(&scene, &step).expect("good");
-            assert_eq!(earliest, impacts.earliest());
-            assert!(!device.is_free(&scene, &step).expect("good"));
             let exact = device.impacts(&scene, &step.toi(Toi::F64)).expect("good");
             let found = rows(exact.of(PairKind::EdgeEdge));
             assert_eq!(found, scenario.expected(PairKind::EdgeEdge, Toi::F64));

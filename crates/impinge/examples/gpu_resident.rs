@@ -59,13 +59,14 @@ fn main(
 ";
 
 /// Counts the pairs of a step that may touch, by kind: vertices with faces, and edges with edges. The third number becomes the time
-/// until which nothing touches, as bits; those of numbers from 0 to 1 are ordered as the numbers are.
+/// until which nothing touches, as bits; those of numbers from 0 to 1 are ordered as the numbers are. The fourth becomes the time
+/// by which something touches.
 const COUNT: &str = "
 struct Pair { low: u32, high: u32 }
 @group(0) @binding(0) var<storage, read> pairs: array<Pair>;
-@group(0) @binding(1) var<storage, read> free_until: array<f32>;
+@group(0) @binding(1) var<storage, read> times: array<vec2<f32>>;
 @group(0) @binding(2) var<storage, read> counts: array<u32>;
-@group(0) @binding(3) var<storage, read_write> found: array<atomic<u32>, 3>;
+@group(0) @binding(3) var<storage, read_write> found: array<atomic<u32>, 4>;
 @group(0) @binding(4) var<uniform> told: vec4<u32>;
 
 @compute @workgroup_size(64)
@@ -75,11 +76,14 @@ fn main(
 ) {
     let n = min(counts[told.x], arrayLength(&pairs));
     let first_vertex = told.y;
+    if id.x == 0u {
+        atomicStore(&found[3], counts[told.z]);
+    }
     for (var ix = id.x; ix < n; ix += 64u * n_groups.x) {
         // Edges have the lowest numbers, faces the highest ones.
         let are_edges = pairs[ix].high < first_vertex;
         atomicAdd(&found[select(0u, 1u, are_edges)], 1u);
-        atomicMin(&found[2], bitcast<u32>(free_until[ix]));
+        atomicMin(&found[2], bitcast<u32>(times[ix].x));
     }
 }
 ";
@@ -119,11 +123,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         &words,
         Usage::COPY_SRC | Usage::COPY_DST,
     );
-    let nothing = [0, 0, 1f32.to_bits()].map(u32::to_le_bytes);
+    let nothing = [0, 0, 1f32.to_bits(), 0].map(u32::to_le_bytes);
     let nothing = buffer("nothing", nothing.as_flattened(), Usage::COPY_SRC);
     let of_step = buffer(
         "pairs of a step",
-        &[0; 12],
+        &[0; 16],
         Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST,
     );
     let time = buffer("time", &[0; 16], Usage::UNIFORM | Usage::COPY_DST);
@@ -171,10 +175,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let step = Step::new(query.clone());
         let (starts, ends) = ([(moving, &before)], [(moving, &positions)]);
         let found = detector.encode_step(&scene, &step, &starts, &ends, &mut encoder)?;
-        let words = [found.n_pairs_offset as u32 / 4, found.first_vertex, 0, 0];
+        let [n_pairs, touches_by] = [found.n_pairs_offset, found.touches_by_offset];
+        let words = [
+            n_pairs as u32 / 4,
+            found.first_vertex,
+            touches_by as u32 / 4,
+            0,
+        ];
         let words: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         let told = buffer("told", &words, Usage::UNIFORM);
-        let (pairs, times) = (&found.pairs, &found.free_until);
+        let (pairs, times) = (&found.pairs, &found.times);
         let buffers = [pairs, times, &found.counts, &of_step, &told];
         encoder.copy_buffer_to_buffer(&nothing, 0, &of_step, 0, nothing.size());
         run(&mut encoder, &count, &group(&device, &count, &buffers), 64);
@@ -210,10 +220,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "{n_hit} of {n_primitives} triangles hit, complete: {is_complete}, {ms:.2} ms per frame"
     );
     println!(
-        "on the way there {} pairs of a vertex and a face and {} pairs of edges may touch, none before t = {}",
+        "on the way there {} pairs of a vertex and a face and {} pairs of edges may touch, none before t = {}, and one certainly before t = {}",
         may_touch[0],
         may_touch[1],
-        f32::from_bits(may_touch[2])
+        f32::from_bits(may_touch[2]),
+        f32::from_bits(may_touch[3])
     );
     Ok(())
 }

@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use super::{Backend, Detector, Settings};
 use crate::cpu::Cpu;
-use crate::cpu::steps::{StepClusters, StepTest};
+use crate::cpu::steps::{ByDevice, StepClusters, StepTest};
 use crate::error::Error;
 use crate::gpu::{Capacities, Engine, Gpu, ResidentPairs, WantedAdapter};
 use crate::hull::Pose;
 use crate::ids::BodyId;
-use crate::impacts::StepAnswer;
+use crate::impacts::{Sought, StepAnswer};
 use crate::progress::Control;
 use crate::query::Query;
 use crate::run::{Finder, Job};
@@ -61,7 +61,7 @@ fn engine_of(
     }
 }
 
-/// Has the device find the pairs of a step that may touch, and settles them on the CPU. Returns false if there is no device,
+/// Has the device find the pairs of a step that may touch, and settles them on the CPU. Returns [`ByDevice::Not`] if there is no device,
 /// or if the CPU has to answer: steps with a separation, steps that the device cannot hold, any step in a browser, which
 /// cannot wait for a device here. With `Backend::Auto` the CPU takes over for good if the device fails.
 pub(super) fn find_in_step(
@@ -70,38 +70,48 @@ pub(super) fn find_in_step(
     (job, settings): (Job<'_>, &Settings),
     (asked, answer): ((StepTest, Pose), StepAnswer<'_>),
     stats: &mut Statistics,
-) -> Result<bool, Error> {
+) -> Result<ByDevice, Error> {
     if cfg!(target_family = "wasm") || job.frame.distance() > 0.0 {
-        return Ok(false);
+        return Ok(ByDevice::Not);
     }
     let Some(on_device) = engine else {
-        return Ok(false);
+        return Ok(ByDevice::Not);
+    };
+    let sought = match asked.0 {
+        // Which pairs a cell owns is not known on a device, so a pair that certainly touches may be another cell's.
+        StepTest::Contacts(asked) if !job.frame.has_cell() => asked.sought,
+        _ => Sought::All,
+    };
+    // A device knows no pairs that are merely close.
+    let pose = Pose {
+        margin: 0.0,
+        ..asked.1
     };
     let gpu = Arc::clone(on_device.gpu());
     let before = stats.clone();
     let found = clusters.run_on_device(
         job,
         settings,
-        asked,
+        (asked.0, pose),
         answer,
         stats,
         |clusterings, take, stats| {
             let engine = on_device.for_steps();
-            gpu.block_on(engine.find_left(job, clusterings, take, stats))
+            gpu.block_on(engine.find_left(job, clusterings, (sought, take), stats))
         },
     );
     match found {
-        Ok(true) => {
+        Ok(ByDevice::Not) => {}
+        Ok(done) => {
             stats.backend.clear();
             stats.backend.push_str(gpu.name());
-            return Ok(true);
+            return Ok(done);
         }
         Err(Error::Gpu { .. }) if settings.backend == Backend::Auto => *engine = None,
-        Ok(false) => {}
         Err(error) => return Err(error),
     }
     *stats = before;
-    Ok(false)
+    Ok(ByDevice::Not)
 }
 
 /// A device, and with `Backend::Auto` the CPU for frames of new bodies.

@@ -12,13 +12,13 @@ use crate::clock::Instant;
 
 use super::Detector;
 use crate::advance::Advance;
-use crate::cpu::steps::{Asked, Sought, StepClusters, StepTest};
+use crate::cpu::steps::{Asked, ByDevice, StepClusters, StepTest};
 use crate::error::Error;
 use crate::exact::Contact;
 use crate::frame::{Ask, Frame, TestId};
 use crate::hull::Pose;
 use crate::impacts::{
-    Candidates, ContactAnswer, Found, FoundByKind, Impact, Impacts, KeyAnswer, StepAnswer,
+    Candidates, ContactAnswer, Found, FoundByKind, Impact, Impacts, KeyAnswer, Sought, StepAnswer,
 };
 use crate::index::pair_numbers;
 use crate::naive;
@@ -207,7 +207,8 @@ impl Detector {
         Ok(())
     }
 
-    /// Finds what is sought, in any order.
+    /// Finds what is sought, in any order. Returns whether something touches that has no name: where any contact is sought, a device
+    /// may know no more.
     fn find(
         &mut self,
         scene: &Scene,
@@ -216,7 +217,7 @@ impl Detector {
         pose: Pose,
         max_pairs: Option<u64>,
         control: &Control<'_>,
-    ) -> Result<(), Error> {
+    ) -> Result<bool, Error> {
         let StepMemory {
             frame,
             impacts,
@@ -252,7 +253,7 @@ impl Detector {
                 naive::run(&FirstContact, scene, frame, control, stats, emit)
             })?;
             (*found, _) = contacts.finish()?;
-            return Ok(());
+            return Ok(false);
         }
         let _shift = self.frames.workers().shift(frame.n_primitives());
         let job = Job {
@@ -277,26 +278,27 @@ impl Detector {
             stats,
         );
         #[cfg(not(feature = "gpu"))]
-        let on_device = Ok(false);
+        let on_device = Ok(ByDevice::Not);
         let result = match on_device {
-            Ok(true) => Ok(()),
-            Ok(false) => {
+            Ok(ByDevice::Done) => Ok(false),
+            Ok(ByDevice::Touches) => Ok(true),
+            Ok(ByDevice::Not) => {
                 contacts.forget();
                 let result = clusters.run(job, &self.settings, asked, answer, stats);
                 if pose.margin > 0.0 {
                     *close = clusters.close();
                 }
-                result
+                result.map(|()| false)
             }
             Err(error) => Err(error),
         };
         let finished = contacts.finish();
-        result?;
+        let touches = result?;
         (*found, _) = finished?;
         self.frames.workers().report(&mut stats.ways);
         let n: usize = found.iter().map(Vec::capacity).sum();
         stats.bytes_held += (size_of::<Found<Contact>>() * n) as u64;
-        Ok(())
+        Ok(touches)
     }
 
     /// Whether nothing touches during the step. With [`Start::Skip`], pairs that touch at its start do not count.
@@ -319,9 +321,9 @@ impl Detector {
     ) -> Result<bool, Error> {
         let start = Instant::now();
         self.begin(scene, step)?;
-        self.find(scene, step, Sought::Any, Pose::WHOLE, None, control)?;
+        let touches = self.find(scene, step, Sought::Any, Pose::WHOLE, None, control)?;
         self.steps.impacts.stats_mut().total_ms = start.elapsed().as_secs_f64() * 1e3;
-        Ok(self.steps.found.iter().all(Vec::is_empty))
+        Ok(!touches && self.steps.found.iter().all(Vec::is_empty))
     }
 
     /// How far the step can be taken: a fraction of it, backed off from the first contact hardly more than the precision of positions

@@ -17,6 +17,7 @@ use super::room::Room;
 use super::steps::{Stages, Steps};
 use super::world::World;
 use crate::error::Error;
+use crate::impacts::Sought;
 
 /// The stages on the device, in order, by their timing labels.
 pub(crate) const STAGES: &[&str] = &["bounds", "dispatch", "pairing", "narrow"];
@@ -53,8 +54,8 @@ pub(crate) struct Told {
     pub n_rounds: u32,
     /// Whether pairs that share a vertex are resolved.
     pub resolve: bool,
-    /// Whether the pairs of a step are named by global numbers.
-    pub by_number: bool,
+    /// Which contacts of a step the host seeks; none if results stay on the device.
+    pub sought: Option<Sought>,
 }
 
 impl TreePlan {
@@ -111,7 +112,7 @@ impl TreePlan {
             steps.push(prepare(round, capacities.queue, round));
         }
         self.narrow = match world.is_moving() {
-            true => Settling::plan_step(steps, room, told.by_number),
+            true => Settling::plan_step(steps, room, told.sought),
             false => Settling::plan(steps, room),
         };
         if steps.send(gpu)? || self.launches.is_none() {

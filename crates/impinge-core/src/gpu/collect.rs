@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! counters | grid | times of the stages | pairs, a quarter more than last time | unsure pairs, likewise
-//!                                in a step:  unsure pairs, likewise | their times
+//!                                in a step:  unsure pairs, likewise | their times, unless any contact will do
 //! ```
 //!
 //! If there are more than were copied, the rest follows in a second copy; no kernel runs again.
@@ -12,12 +12,11 @@ use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll, Waker};
 
-use super::buffers::count;
-use super::layout::{Counter, Grid, N_COUNTERS, PairKey, Time, UnsureKey};
+use super::layout::{Counter, Grid, N_COUNTERS, NEVER, PairKey, PairTimes, UnsureKey, time_by};
 use super::open::Gpu;
 use super::room::{PassCounts, Room};
 use crate::error::Error;
-use crate::impacts::LeftPair;
+use crate::impacts::{LeftPair, Sought};
 
 const COUNTERS: u64 = N_COUNTERS as u64 * size_of::<Counter>() as u64;
 const GRID: u64 = size_of::<Grid>() as u64;
@@ -26,7 +25,7 @@ const MOST_STAGES: usize = 8;
 const TIMES: u64 = 2 * MOST_STAGES as u64 * size_of::<u64>() as u64;
 const HEADER: u64 = COUNTERS + GRID + TIMES;
 const KEY: u64 = size_of::<PairKey>() as u64;
-const TIME: u64 = size_of::<Time>() as u64;
+const TIMES_OF_PAIR: u64 = size_of::<PairTimes>() as u64;
 /// At least this many keys are copied.
 const LEAST: u64 = 1024;
 
@@ -51,13 +50,15 @@ struct Times {
 pub struct Guess {
     pairs: u64,
     unsure: u64,
-    /// Of unsure pairs in a step; else none.
+    /// Of unsure pairs in a step, unless any contact will do.
     times: u64,
+    /// In a step: which contacts are sought.
+    sought: Option<Sought>,
 }
 
 impl Guess {
     fn bytes(&self) -> u64 {
-        HEADER + KEY * (self.pairs + self.unsure) + TIME * self.times
+        HEADER + KEY * (self.pairs + self.unsure) + TIMES_OF_PAIR * self.times
     }
 }
 
@@ -71,7 +72,7 @@ pub struct Collected {
     pub stage_ms: Option<Vec<f64>>,
     pub pairs: Vec<PairKey>,
     pub unsure: Vec<UnsureKey>,
-    /// In a step: the unsure pairs with their times.
+    /// In a step: the unsure pairs with their times, none if the step is answered without them.
     pub left: Vec<LeftPair>,
 }
 
@@ -118,23 +119,23 @@ impl Collector {
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         room: &Room,
-        (n_stages, is_step): (u32, bool),
+        (n_stages, sought): (u32, Option<Sought>),
     ) -> Guess {
         let capacities = room.capacities();
         let guess = |last: u64, capacity: u64| (last + last / 4).max(LEAST).min(capacity);
         let unsure = guess(self.n_unsure, capacities.unsure);
-        let guess = match is_step {
+        let guess = Guess {
             // The pairs of a step go to its search, and no farther.
-            true => Guess {
-                pairs: 0,
-                unsure,
-                times: unsure,
+            pairs: match sought {
+                Some(_) => 0,
+                None => guess(self.n_pairs, capacities.pairs),
             },
-            false => Guess {
-                pairs: guess(self.n_pairs, capacities.pairs),
-                unsure,
-                times: 0,
+            unsure,
+            times: match sought {
+                Some(Sought::All | Sought::Earliest) => unsure,
+                Some(Sought::Any) | None => 0,
             },
+            sought,
         };
         let staging = self.reserve(gpu, guess.bytes());
         let mut copy = |from: &wgpu::Buffer, to: u64, size: u64| {
@@ -147,7 +148,7 @@ impl Collector {
         let unsure = pairs + KEY * guess.pairs;
         copy(room.unsure.buffer(), unsure, KEY * guess.unsure);
         let times = unsure + KEY * guess.unsure;
-        copy(room.times.buffer(), times, TIME * guess.times);
+        copy(room.times.buffer(), times, TIMES_OF_PAIR * guess.times);
         if let Some(times) = &self.times {
             encoder.resolve_query_set(&times.queries, 0..2 * n_stages, &times.resolved, 0);
             let to = COUNTERS + GRID;
@@ -169,9 +170,9 @@ impl Collector {
     ) -> Result<Collected, Error> {
         // Given back when all went well: a buffer that stays mapped is of no more use.
         let staging = self.staging.take().expect("encoded before");
-        let is_step = guess.times > 0;
+        let has_times = matches!(guess.sought, Some(Sought::All | Sought::Earliest));
         let (mut pairs, mut unsure) = (Vec::new(), Vec::<UnsureKey>::new());
-        let mut until = Vec::<Time>::new();
+        let mut until = Vec::<PairTimes>::new();
         let (counts, grid, ticks, n_pairs, n_unsure) = {
             let view = map(&staging, guess.bytes()).await?;
             let at = |from: u64, size: u64| &view[from as usize..(from + size) as usize];
@@ -180,21 +181,28 @@ impl Collector {
             let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(at(COUNTERS + GRID, TIMES));
             let counts = PassCounts::new(&counters);
             let capacities = room.capacities();
-            let n_pairs = match is_step {
-                true => 0,
-                false => counts.needed.pairs.min(capacities.pairs),
+            let n_pairs = match guess.sought {
+                Some(_) => 0,
+                None => counts.needed.pairs.min(capacities.pairs),
             };
-            let n_unsure = counts.needed.unsure.min(capacities.unsure);
+            let is_answered = guess.sought.is_some_and(|sought| counts.answer(sought));
+            let n_unsure = match is_answered {
+                true => 0,
+                false => counts.needed.unsure.min(capacities.unsure),
+            };
             let first = HEADER;
             reserve_all(&mut pairs, n_pairs)?;
             reserve_all(&mut unsure, n_unsure)?;
             append(&mut pairs, at(first, KEY * n_pairs.min(guess.pairs)));
             let first = first + KEY * guess.pairs;
             append(&mut unsure, at(first, KEY * n_unsure.min(guess.unsure)));
-            if is_step {
+            if has_times {
                 reserve_all(&mut until, n_unsure)?;
                 let first = first + KEY * guess.unsure;
-                append(&mut until, at(first, TIME * n_unsure.min(guess.times)));
+                append(
+                    &mut until,
+                    at(first, TIMES_OF_PAIR * n_unsure.min(guess.times)),
+                );
             }
             (counts, grid, ticks, n_pairs, n_unsure)
         };
@@ -203,10 +211,10 @@ impl Collector {
         (self.n_pairs, self.n_unsure) = (n_pairs, n_unsure);
         let more_pairs = n_pairs.saturating_sub(guess.pairs);
         let more_unsure = n_unsure.saturating_sub(guess.unsure);
-        let more_times = if is_step { more_unsure } else { 0 };
+        let more_times = if has_times { more_unsure } else { 0 };
         if more_pairs + more_unsure > 0 {
             let keys = KEY * (more_pairs + more_unsure);
-            let bytes = keys + TIME * more_times;
+            let bytes = keys + TIMES_OF_PAIR * more_times;
             let staging = self.reserve(gpu, bytes);
             let mut encoder = gpu
                 .device
@@ -218,7 +226,7 @@ impl Collector {
             copy(room.pairs.buffer(), KEY * guess.pairs, 0, of_pairs);
             let (first, size) = (KEY * guess.unsure, KEY * more_unsure);
             copy(room.unsure.buffer(), first, of_pairs, size);
-            let (first, size) = (TIME * guess.times, TIME * more_times);
+            let (first, size) = (TIMES_OF_PAIR * guess.times, TIMES_OF_PAIR * more_times);
             copy(room.times.buffer(), first, keys, size);
             gpu.queue.submit([encoder.finish()]);
             {
@@ -237,12 +245,19 @@ impl Collector {
             (0..n_stages).map(|stage| span(stage) as f64 * ms).collect()
         });
         let mut left = Vec::new();
-        reserve_all(&mut left, count(until.len()))?;
-        let each = unsure.iter().zip(&until);
-        left.extend(each.map(|(pair, time)| LeftPair {
-            places: [pair.low, pair.high],
-            free_until: f32::from_bits(time.bits),
-        }));
+        if guess.sought.is_some() {
+            reserve_all(&mut left, n_unsure)?;
+            let nothing = PairTimes {
+                free_until: 0,
+                touches_by: NEVER.to_bits(),
+            };
+            let times = until.iter().chain(std::iter::repeat(&nothing));
+            left.extend(unsure.iter().zip(times).map(|(pair, times)| LeftPair {
+                places: [pair.low, pair.high],
+                free_until: f32::from_bits(times.free_until),
+                touches_by: time_by(times.touches_by),
+            }));
+        }
         Ok(Collected {
             left,
             counts,

@@ -20,6 +20,7 @@ use super::world::World;
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::ids::BodyId;
+use crate::impacts::Sought;
 use crate::run::{Finder, Job};
 use crate::scene::Scene;
 use crate::settings::{Backend, Method, Recluster, Settings};
@@ -58,6 +59,9 @@ pub struct Engine {
     pub(super) collector: Collector,
     /// Keys that each worker has settled, until they are appended to the answer.
     pub(super) settled: Vec<Vec<u64>>,
+    /// Which contacts of a step the host seeks, and the least time by which some pair certainly touches, as far as passes have said.
+    pub(super) sought: Sought,
+    pub(super) touches_by: Option<f32>,
     /// The engine for steps, once there was one.
     pub(super) of_steps: Option<Box<Engine>>,
 }
@@ -127,6 +131,8 @@ impl Engine {
             complete: Vec::new(),
             collector: Collector::default(),
             settled: Vec::new(),
+            sought: Sought::All,
+            touches_by: None,
             of_steps: None,
         }
     }

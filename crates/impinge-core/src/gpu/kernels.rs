@@ -2,8 +2,8 @@
 
 use super::layout::{
     Arguments, Body, Candidate, Cell, CellItem, Cluster, ClusterVertex, Coordinate, Corners,
-    Counter, Grid, Kept, Level, ListEntry, Node, NodePair, Order, PairKey, Params, Reach, Start,
-    Tally, Time, UnsureKey, WorkItem,
+    Counter, Grid, Kept, Level, ListEntry, Node, NodePair, Order, PairKey, PairTimes, Params,
+    Reach, Start, Tally, UnsureKey, WorkItem,
 };
 use super::pipeline::{Kernel, Source, bindings, source};
 
@@ -107,7 +107,7 @@ bindings! {
         positions: Read<Coordinate>,
         order: Read<Order>,
         unsure: Write<UnsureKey>,
-        times: Write<Time>,
+        times: Write<PairTimes>,
         counters: Write<Counter>,
         params: Uniform<Params>,
     }
@@ -282,16 +282,16 @@ kernels! {
         from "pairing" as "pairing_moving"
         ("boxes", "moving", "moving_groups", "vertices", "ids", "reserve", "groups");
     narrow_moving: NarrowMoving = NARROW_MOVING []
-        from "narrow_moving" ("filter", "polygon", "pair", "reserve", "groups");
+        from "narrow_moving" ("filter", "polygon", "pair", "reserve", "places", "groups");
     narrow_search: NarrowSearch = NARROW_SEARCH []
-        from "narrow_search" ("filter", "polygon", "pair", "reserve", "groups");
+        from "narrow_search" ("filter", "polygon", "pair", "reserve", "places", "groups");
     narrow: Narrow = NARROW [("WITH_SOLIDS", 0.0)]
         from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "reserve", "groups");
     narrow_solids: Narrow = NARROW_SOLIDS [("WITH_SOLIDS", 1.0)]
         from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "reserve", "groups");
     bounds_reach: BoundsReach = BOUNDS_REACH [] from "bounds_reach" ("boxes", "filters", "meets", "groups");
     bounds_keep: BoundsKeep = BOUNDS_KEEP []
-        from "bounds_keep" ("boxes", "vertices", "reserve", "groups");
+        from "bounds_keep" ("boxes", "vertices", "reserve", "places", "groups");
     grid_resolution: GridResolution = GRID_RESOLUTION []
         from "grid_resolution" ("region", "arguments");
     grid_ranges: GridRanges = GRID_RANGES [] from "grid_ranges" ("region", "groups");

@@ -39,8 +39,8 @@ words! {
     PairKey { low: u32, high: u32 }
     /// Two global primitive numbers left to exact arithmetic; in a step that the host settles, two places.
     UnsureKey { low: u32, high: u32 }
-    /// A time of a step: the bits of an f32.
-    Time { bits: u32 }
+    /// Until when a pair of a step certainly does not touch, and by when it certainly does: the bits of two f32.
+    PairTimes { free_until: u32, touches_by: u32 }
     /// Parameters of one dispatch.
     Params {
         first: u32, count: u32,
@@ -48,7 +48,7 @@ words! {
         n_ignored: u32, resolve: u32,
         group_size: u32, lambda: u32, most_cells: u32, owner_rule: u32,
         lists_only: u32, n_entries: u32, tile_row: u32, tile_column: u32, tile_side: u32,
-        by_number: u32,
+        by_number: u32, sought: u32,
     }
     /// A primitive within its body's reach.
     Kept { low: [u32; 3], place: u32, high: [u32; 3], body: u32, range: [u32; 3], unused: u32 }
@@ -83,6 +83,10 @@ words! {
     Counter { n: u32 }
 }
 
+/// Which contacts of a step are sought, in `Params::sought`.
+pub const SEEK_ALL: u32 = 0;
+pub const SEEK_EARLIEST: u32 = 1;
+pub const SEEK_ANY: u32 = 2;
 /// Children of a node, in `Node::shape`.
 pub const CHILDREN: u32 = 15;
 /// Marks the entrance to a body, in `Node::shape`.
@@ -127,11 +131,20 @@ pub const OWN_LAYERS: u32 = 16;
 pub const BODY_SHIFT: u32 = 5;
 /// The root of a body without primitives, and the top if there is no tree over bodies.
 pub const NO_ROOT: u32 = u32::MAX;
+/// The least time by which some pair of a step certainly touches, the bits of an f32.
+pub const TOUCHES_BY: u32 = 42;
 /// The number of counters.
-pub const N_COUNTERS: u32 = 42;
+pub const N_COUNTERS: u32 = 43;
+/// Says that contact is not certain.
+pub const NEVER: f32 = 2.0;
 /// Flags of candidates.
 #[cfg(test)]
 pub const FLAG: u32 = 0x8000_0000;
+
+/// A time by which there certainly is contact, if that is certain.
+pub fn time_by(bits: u32) -> Option<f32> {
+    Some(f32::from_bits(bits)).filter(|&time| time < NEVER)
+}
 
 impl Node {
     /// A node whose box is not known yet.
@@ -162,14 +175,14 @@ impl Node {
 #[repr(C)]
 pub struct Step {
     pub params: Params,
-    padding: [u32; 46],
+    padding: [u32; 45],
 }
 
 impl From<Params> for Step {
     fn from(params: Params) -> Self {
         Step {
             params,
-            padding: [0; 46],
+            padding: [0; 45],
         }
     }
 }

@@ -15,6 +15,7 @@ use super::world::{ResidentEnds, weigh_moving};
 use crate::clock::Instant;
 use crate::error::Error;
 use crate::grouping::clusters::Clustering;
+use crate::impacts::Sought;
 use crate::run::Job;
 use crate::settings::{Method, Settings};
 use crate::stats::Statistics;
@@ -36,8 +37,8 @@ impl Engine {
         self.of_steps.as_mut().expect("just made")
     }
 
-    /// Hands over all pairs of a step that the device has not dropped. Returns false if the device, or the memory budget,
-    /// cannot hold the step; then nothing has been handed over.
+    /// Hands over all pairs of a step that the device has not dropped, as far as they matter for what is sought. Returns false if the
+    /// device, or the memory budget, cannot hold the step; then nothing has been handed over.
     ///
     /// # Errors
     /// Device errors, a budget too small for the smallest pass, cancellation, those of `take`.
@@ -45,10 +46,12 @@ impl Engine {
         &mut self,
         job: Job<'_>,
         clusterings: &[Arc<Clustering>],
-        take: &mut TakeLeft<'_>,
+        (sought, take): (Sought, &mut TakeLeft<'_>),
         stats: &mut Statistics,
     ) -> Result<bool, Error> {
-        let result = self.answer_step(job, clusterings, take, stats).await;
+        let result = self
+            .answer_step(job, clusterings, (sought, take), stats)
+            .await;
         if let Err(Error::Gpu { .. }) = result {
             self.begin_anew();
         }
@@ -59,11 +62,12 @@ impl Engine {
         &mut self,
         job: Job<'_>,
         clusterings: &[Arc<Clustering>],
-        take: &mut TakeLeft<'_>,
+        (sought, take): (Sought, &mut TakeLeft<'_>),
         stats: &mut Statistics,
     ) -> Result<bool, Error> {
         self.gpu.check_lost()?;
         self.complete.clear();
+        (self.sought, self.touches_by) = (sought, None);
         let start = Instant::now();
         let most = self.most();
         if !weigh_moving(job, clusterings).is_some_and(|weight| weight.fits(most)) {

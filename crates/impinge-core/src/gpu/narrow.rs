@@ -1,12 +1,13 @@
 //! Stage `narrow`: the filter over all candidates, for both methods and for steps.
 
 use super::kernels::{Narrow, NarrowMoving, NarrowSearch, Prepare};
-use super::layout::{N_CANDIDATES, N_PAIRS, Params, ROUNDS};
+use super::layout::{N_CANDIDATES, N_PAIRS, Params, ROUNDS, SEEK_ALL, SEEK_ANY, SEEK_EARLIEST};
 use super::open::Gpu;
 use super::pipeline::{Bound, Workgroups};
 use super::room::Room;
 use super::steps::Steps;
 use super::world::World;
+use crate::impacts::Sought;
 
 /// Candidates per workgroup.
 const GROUP: u32 = 64;
@@ -104,15 +105,21 @@ impl Settling {
         steps.push(of_candidates(room))
     }
 
-    /// Plans the stage for a step, and returns the first of its two dispatches. `by_number`: pairs are named by global numbers.
-    pub fn plan_step(steps: &mut Steps, room: &Room, by_number: bool) -> u32 {
+    /// Plans the stage for a step, and returns the first of its two dispatches. `sought`: which contacts the host seeks; none if
+    /// the results stay on the device, where pairs are named by global numbers.
+    pub(super) fn plan_step(steps: &mut Steps, room: &Room, sought: Option<Sought>) -> u32 {
         let first = steps.push(of_candidates(room));
         steps.push(Params {
             counter: N_PAIRS,
             // Capacities fit 32 bits.
             capacity: room.capacities().pairs as u32,
             slot: SLOT_OF_SEARCH,
-            by_number: u32::from(by_number),
+            by_number: u32::from(sought.is_none()),
+            sought: match sought {
+                None | Some(Sought::All) => SEEK_ALL,
+                Some(Sought::Earliest) => SEEK_EARLIEST,
+                Some(Sought::Any) => SEEK_ANY,
+            },
             ..of_candidates(room)
         });
         first

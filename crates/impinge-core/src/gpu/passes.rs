@@ -21,6 +21,7 @@ use super::steps::Stages;
 use super::taker::Taker;
 use crate::error::Error;
 use crate::frame::{Frame, pair_key};
+use crate::impacts::{Left, Sought};
 use crate::index::Number;
 use crate::narrow::settle;
 use crate::query::SharedVertex;
@@ -67,7 +68,16 @@ impl Engine {
             let mut collected = self.pass(frame, &work, capacities, cells, stats).await?;
             taker.foresee(collected.counts.needed.pairs)?;
             let room = self.budget_for_room();
-            match collected.counts.judge(&self.gpu, capacities, room) {
+            // Times are proven, whether all pairs had room or not.
+            self.touches_by = match self.sought {
+                Sought::All => None,
+                Sought::Earliest | Sought::Any => collected.counts.touches_by,
+            };
+            let next = match collected.counts.answer(self.sought) {
+                true => NextPass::Complete,
+                false => collected.counts.judge(&self.gpu, capacities, room),
+            };
+            match next {
                 NextPass::Complete => {
                     book(&collected, self.method, stats);
                     self.complete.push(collected.counts);
@@ -76,7 +86,10 @@ impl Engine {
                         Taker::Answer(answer) => {
                             settle_all(job, answer, &collected, settled).map(|()| true)
                         }
-                        Taker::Left(take) => take(&mut collected.left),
+                        Taker::Left(take) => take(Left {
+                            pairs: &mut collected.left,
+                            touches_by: self.touches_by,
+                        }),
                     })?;
                     if !goes_on {
                         return Ok(Outcome::Complete);
@@ -287,12 +300,10 @@ impl Engine {
         self.is_encoded = false;
         self.encode_pass(frame, Some(work), capacities, cells, times, &mut encoder)?;
         let (gpu, n_stages) = (&*self.gpu, self.stages().len() as u32);
-        let guess = self.collector.encode(
-            gpu,
-            &mut encoder,
-            &self.room,
-            (n_stages, self.world.is_moving()),
-        );
+        let seeks = self.world.is_moving().then_some(self.sought);
+        let guess = self
+            .collector
+            .encode(gpu, &mut encoder, &self.room, (n_stages, seeks));
         gpu.queue.submit([encoder.finish()]);
         Ok(guess)
     }
@@ -317,7 +328,10 @@ impl Engine {
         }
         let names = self.stages();
         let gpu = &*self.gpu;
-        self.room.encode_start(gpu, seeds, encoder)?;
+        // The caller's step begins with nothing known.
+        let sought = (!self.is_encoded).then_some(self.sought);
+        let touches_by = sought.and(self.touches_by);
+        self.room.encode_start(gpu, seeds, touches_by, encoder)?;
         let (world, room) = (&self.world, &self.room);
         let resolve = frame.shared_vertex == SharedVertex::Resolve;
         let mut stages = Stages {
@@ -331,7 +345,7 @@ impl Engine {
                 let told = clusters::Told {
                     n_rounds: world.forest().rounds(seeds),
                     resolve,
-                    by_number: self.is_encoded,
+                    sought,
                 };
                 plan.make(gpu, world, room, told)?;
                 plan.encode(&mut stages, world, room, count(seeds.len()));

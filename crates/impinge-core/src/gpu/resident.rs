@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::buffers::count;
 use super::collect::map;
 use super::engine::Engine;
-use super::layout::{Counter, N_COUNTERS, N_PAIRS, N_UNSURE};
+use super::layout::{Counter, N_COUNTERS, N_PAIRS, N_UNSURE, TOUCHES_BY};
 use super::room::{Capacities, NextPass, PassCounts};
 use super::world::{ResidentEnds, weigh_moving};
 use crate::elements::Part;
@@ -79,13 +79,17 @@ pub struct ResidentPairs {
 pub struct ResidentStep {
     /// Pairs that may touch. All others certainly do not.
     pub pairs: wgpu::Buffer,
-    /// Holds an `f32` per pair of the list, in the same order: until this time of the step, 0 to 1, the pair certainly does not
-    /// touch. So up to the least of them nothing does.
-    pub free_until: wgpu::Buffer,
-    /// Holds the count as a `u32`.
+    /// Holds two `f32` per pair of the list, in the same order, times of the step from 0 to 1. Until the first one the pair certainly does not
+    /// touch: so up to the least of them nothing does. By the second one it certainly touches, after the start; 2 if that is
+    /// not certain.
+    pub times: wgpu::Buffer,
+    /// Holds the count as a `u32`, and a time as an `f32`.
     pub counts: wgpu::Buffer,
     /// Byte offset of the number of pairs in `counts`.
     pub n_pairs_offset: u64,
+    /// Byte offset in `counts` of the least time by which some pair certainly touches; 2 if that is certain of none. The first contact
+    /// of the step is earlier than this, even if the list is too small.
+    pub touches_by_offset: u64,
     /// The number of pairs that the list has room for.
     pub pairs_capacity: u64,
     /// The number of the first vertex.
@@ -197,7 +201,8 @@ impl Engine {
         };
         Ok(ResidentStep {
             pairs: self.room.unsure.buffer().clone(),
-            free_until: self.room.times.buffer().clone(),
+            times: self.room.times.buffer().clone(),
+            touches_by_offset: u64::from(TOUCHES_BY) * COUNTER,
             counts: self.room.counters.buffer().clone(),
             n_pairs_offset: u64::from(N_UNSURE) * COUNTER,
             pairs_capacity: self.room.capacities().unsure,

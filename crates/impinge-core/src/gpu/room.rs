@@ -8,11 +8,12 @@ use super::buffers::Storage;
 use super::layout::{
     Arguments, Candidate, Cell, CellItem, Counter, Grid, Kept, ListEntry, N_BOX_TESTS,
     N_BOX_TESTS_HIGH, N_CANDIDATES, N_COUNTERS, N_ENTRIES, N_ITEMS, N_KEPT, N_PAIRS, N_SUBDIVIDED,
-    N_TALLIES, N_UNSURE, NodePair, PairKey, ROUNDS, Reach, Start, TOO_MUCH, Tally, Time, UnsureKey,
-    WorkItem,
+    N_TALLIES, N_UNSURE, NEVER, NodePair, PairKey, PairTimes, ROUNDS, Reach, Start, TOO_MUCH,
+    TOUCHES_BY, Tally, UnsureKey, WorkItem, time_by,
 };
 use super::open::Gpu;
 use crate::error::Error;
+use crate::impacts::Sought;
 use crate::settings::Method;
 
 /// The number of elements that each buffer has room for. The answer never depends on it.
@@ -95,7 +96,7 @@ impl Capacities {
             + self.entries * size_of::<ListEntry>() as u64
             + self.candidates * size_of::<Candidate>() as u64
             + 2 * self.pairs * size_of::<PairKey>() as u64
-            + 2 * self.unsure * (size_of::<UnsureKey>() + size_of::<Time>()) as u64
+            + 2 * self.unsure * (size_of::<UnsureKey>() + size_of::<PairTimes>()) as u64
     }
 
     fn zip(self, other: Self, pick: impl Fn(u64, u64) -> u64) -> Self {
@@ -145,7 +146,7 @@ pub struct Room {
     pub candidates: Storage<Candidate>,
     pub pairs: Storage<PairKey>,
     pub unsure: Storage<UnsureKey>,
-    pub times: Storage<Time>,
+    pub times: Storage<PairTimes>,
     pub counters: Storage<Counter>,
     pub arguments: Storage<Arguments>,
     pub cell_items: Storage<CellItem>,
@@ -159,7 +160,7 @@ pub struct Room {
     /// The initial counters and queue of a pass, copied by its encoder.
     start_counters: Storage<Counter>,
     start_queue: Storage<NodePair>,
-    started: Option<Vec<NodePair>>,
+    started: Option<(Vec<NodePair>, Option<f32>)>,
     sizes: Option<(Capacities, CellsWanted)>,
 }
 
@@ -241,7 +242,8 @@ impl Room {
         true
     }
 
-    /// Encodes the start of a pass: the seeds, which must fit the queue, and counters at zero except the number of seeds.
+    /// Encodes the start of a pass: the seeds, which must fit the queue, and counters at zero except the number of seeds and
+    /// the time by which some pair certainly touches, if there is one.
     ///
     /// # Errors
     /// As [`Storage::resize`].
@@ -249,15 +251,18 @@ impl Room {
         &mut self,
         gpu: &Gpu,
         seeds: &[NodePair],
+        touches_by: Option<f32>,
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), Error> {
-        if self.started.as_deref() != Some(seeds) {
+        let is_started = |(held, time): &(Vec<NodePair>, _)| held == seeds && *time == touches_by;
+        if !self.started.as_ref().is_some_and(is_started) {
             let mut counters = [Counter::default(); N_COUNTERS as usize];
             // Seeds fit a queue, which 32 bits can number.
             counters[0].n = seeds.len() as u32;
+            counters[TOUCHES_BY as usize].n = touches_by.unwrap_or(NEVER).to_bits();
             self.start_counters.upload(gpu, &counters)?;
             self.start_queue.upload(gpu, seeds)?;
-            self.started = Some(seeds.to_vec());
+            self.started = Some((seeds.to_vec(), touches_by));
         }
         let mut copy = |from: &wgpu::Buffer, to: &wgpu::Buffer, bytes: u64| {
             if bytes > 0 {
@@ -296,6 +301,8 @@ pub struct PassCounts {
     pub n_subdivided: u64,
     /// Box tests; only some methods count them.
     pub n_box_tests: u64,
+    /// The least time by which some pair of a step certainly touches, after the start.
+    pub touches_by: Option<f32>,
     too_much: bool,
 }
 
@@ -325,8 +332,14 @@ impl PassCounts {
             },
             n_subdivided: at(N_SUBDIVIDED),
             n_box_tests: at(N_BOX_TESTS_HIGH) << 32 | at(N_BOX_TESTS),
+            touches_by: time_by(counters[TOUCHES_BY as usize].n),
             too_much: at(TOO_MUCH) != 0,
         }
+    }
+
+    /// Whether a pass ends a step, however much room it had: any contact is sought, and there is one.
+    pub(super) fn answer(&self, sought: Sought) -> bool {
+        sought == Sought::Any && self.touches_by.is_some()
     }
 
     /// Compares the counts with the room that the pass had. `bytes`: the most that these buffers may take together.

@@ -1,11 +1,11 @@
 //! Where the results of passes go: pairs to the sink of a frame, the rest of a step's candidates to the host's stages.
 
 use crate::error::Error;
-use crate::impacts::LeftPair;
+use crate::impacts::Left;
 use crate::sink::Answer;
 
-/// Takes pairs that the device has left, in any order. Returns whether more are wanted.
-pub(crate) type TakeLeft<'a> = dyn FnMut(&mut [LeftPair]) -> Result<bool, Error> + 'a;
+/// Takes what the device says about a part of a step. Returns whether more is wanted.
+pub(crate) type TakeLeft<'a> = dyn FnMut(Left<'_>) -> Result<bool, Error> + 'a;
 
 /// Takes the results of complete passes.
 pub(super) enum Taker<'a, 'b> {

@@ -127,10 +127,11 @@ fn structs_are_laid_out_as_on_the_host() {
         Candidate { a, b }
         PairKey { low, high }
         UnsureKey { low, high }
+        PairTimes { free_until, touches_by }
         Params {
             first, count, counter, per_group, capacity, slot, n_ignored, resolve, group_size,
             lambda, most_cells, owner_rule, lists_only, n_entries, tile_row, tile_column, tile_side,
-            by_number
+            by_number, sought
         }
         Kept { low, place, high, body, range, unused }
         Grid { origin, shift, scale, n_cells, finest, unused, resolution, unused_too }
@@ -175,7 +176,11 @@ fn constants_are_those_of_the_host() {
         ("N_SUBDIVIDED", N_SUBDIVIDED),
         ("N_BOX_TESTS", N_BOX_TESTS),
         ("N_BOX_TESTS_HIGH", N_BOX_TESTS_HIGH),
+        ("TOUCHES_BY", TOUCHES_BY),
         ("N_COUNTERS", N_COUNTERS),
+        ("SEEK_ALL", SEEK_ALL),
+        ("SEEK_EARLIEST", SEEK_EARLIEST),
+        ("SEEK_ANY", SEEK_ANY),
         ("N_TALLIES", N_TALLIES),
         ("NO_ROOT", NO_ROOT),
         ("CHILDREN", CHILDREN),

@@ -1,6 +1,6 @@
 //! The filter of the GPU for moving elements, as `docs/exactness.md` specifies it, in the model of WGSL's arithmetic of
-//! `gpu_bound`. Signs that it calls certain must be right, for the whole step and for intervals of it, elements that it drops must not
-//! touch, and all others not before the time that it says.
+//! `gpu_bound`. Signs that it calls certain must be right, for the whole step and for intervals of it. Elements that it drops must not
+//! touch, all others not before the one time that it says, and certainly before the other one.
 
 use crate::generators::{Kind, Random};
 use crate::gpu_bound::{Device, LARGEST, NARROWING, SMALLEST};
@@ -13,7 +13,9 @@ const OF_SUM: f32 = 1.0 / 8192.0;
 const INNER: f32 = 5.0;
 const NEXT: f32 = 8.0;
 const MIDDLE: f32 = 16.0;
-const SHORTEST: f32 = 1.0 / 1024.0;
+const TICKS: u32 = 1 << 24;
+const TICK: f32 = 1.0 / 16_777_216.0;
+const SHORTEST: u32 = 1 << 14;
 const N_INTERVALS: u32 = 32;
 
 #[cfg(feature = "gpu")]
@@ -24,8 +26,13 @@ fn constants_are_those_of_the_kernel() {
     let (_, text) = shaders
         .find(|(name, _)| *name == "narrow_search")
         .expect("a kernel");
-    let line = format!("const N_INTERVALS: u32 = {N_INTERVALS}u;");
-    assert!(text.contains(&line), "{line}");
+    for line in [
+        format!("const N_INTERVALS: u32 = {N_INTERVALS}u;"),
+        format!("const TICKS: u32 = {TICKS:#x}u;"),
+        format!("const SHORTEST: u32 = {SHORTEST:#x}u;"),
+    ] {
+        assert!(text.contains(&line), "{line}");
+    }
     for (name, value, written) in [
         ("TINY", TINY, "0x1p-76f"),
         ("OF_CUBIC", OF_CUBIC, "0x1p-16f"),
@@ -34,7 +41,7 @@ fn constants_are_those_of_the_kernel() {
         ("INNER", INNER, "5.0"),
         ("NEXT", NEXT, "8.0"),
         ("MIDDLE", MIDDLE, "16.0"),
-        ("SHORTEST", SHORTEST, "0x1p-10f"),
+        ("TICK", TICK, "0x1p-24f"),
     ] {
         assert!(
             text.contains(&format!("const {name}: f32 = {written};")),
@@ -349,37 +356,74 @@ fn are_all(values: impl Iterator<Item = (f32, f32)> + Clone) -> bool {
         || values.clone().all(|(value, bound)| value < -bound)
 }
 
-/// The kernel's decision.
-fn never_touch(values: &Values) -> bool {
-    values
-        .along
-        .iter()
-        .any(|(along, bound)| are_all(along.iter().map(|&x| (x, *bound))))
-        || are_all(values.cubic.iter().copied())
-        || values
-            .quartics
-            .iter()
-            .any(|w| w.iter().all(|(value, bound)| *value < -bound))
+/// The kernel's decision: nothing is certain, or that elements do not touch, or that they do between the ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Decided {
+    Unclear,
+    Free,
+    Touches,
 }
 
-/// The search of the second kernel: the time until which the pair does not touch; `None` if it never does.
-fn free_until(device: &mut Device<'_>, loaded: &Pair) -> Option<f32> {
-    let (mut low, mut length) = (0.0, 0.5);
+fn decide(values: &Values) -> Decided {
+    let is_aside = |(along, bound): &(Vec<f32>, f32)| are_all(along.iter().map(|&x| (x, *bound)));
+    let is_outside = |w: &[(f32, f32); 5]| w.iter().all(|(value, bound)| *value < -bound);
+    let is_inside = |w: &[(f32, f32); 5]| w.iter().all(|(value, bound)| value > bound);
+    let [(f_0, bound), (f_1, inner), (f_2, _), (f_3, _)] = values.cubic;
+    let falls = f_0 > bound && f_3 < -bound && (f_1 > inner || f_2 < -inner);
+    let rises = f_0 < -bound && f_3 > bound && (f_1 < -inner || f_2 > inner);
+    if values.along.iter().any(is_aside)
+        || are_all(values.cubic.iter().copied())
+        || values.quartics.iter().any(is_outside)
+    {
+        Decided::Free
+    } else if (falls || rises) && values.quartics.iter().all(is_inside) {
+        Decided::Touches
+    } else {
+        Decided::Unclear
+    }
+}
+
+/// What the second kernel finds: times in ticks, and whether the pair is left.
+#[derive(Debug)]
+struct Bracket {
+    free_until: u32,
+    touches_by: Option<u32>,
+    is_left: bool,
+}
+
+/// The search of the second kernel. `end`: a time by which another pair touches.
+fn bracket(device: &mut Device<'_>, loaded: &Pair, end: u32) -> Bracket {
+    let mut found = Bracket {
+        free_until: 0,
+        touches_by: None,
+        is_left: true,
+    };
+    let mut length = TICKS / 2;
     for _ in 0..N_INTERVALS {
-        let high = f32::min(low + length, 1.0);
-        if never_touch(&values(device, loaded, Some([low, high]))) {
-            if high == 1.0 {
-                return None;
+        // The pair itself may touch before the other one.
+        let end = found.touches_by.map_or(end, |time| time.min(end));
+        let low = found.free_until;
+        let high = u32::min(low + length, end);
+        let interval = [low, high].map(|time| time as f32 * TICK);
+        match decide(&values(device, loaded, Some(interval))) {
+            Decided::Free => {
+                found.free_until = high;
+                length *= 2;
+                if high == end {
+                    found.is_left = false;
+                    break;
+                }
+                continue;
             }
-            low = high;
-            length *= 2.0;
-        } else if length > SHORTEST {
-            length *= 0.5;
-        } else {
+            Decided::Touches => found.touches_by = Some(high),
+            Decided::Unclear => {}
+        }
+        if high - low <= SHORTEST {
             break;
         }
+        length = (high - low) / 2;
     }
-    Some(low)
+    found
 }
 
 const PAIRS: [ElementPair; 2] = [ElementPair::VertexFace, ElementPair::EdgeEdge];
@@ -471,9 +515,10 @@ fn coefficients_are_right_where_they_are_sure() {
 }
 
 #[test]
-fn what_is_dropped_never_touches_and_others_not_too_early() {
+fn what_is_dropped_never_touches_and_times_are_right() {
     let mut random = Random::new(51);
     let (mut n, mut n_dropped, mut n_later, mut n_waiting) = (0, 0, 0, 0);
+    let (mut n_touching, mut n_after) = (0, 0);
     for kind in Kind::ALL {
         for is_narrowed in [false, true] {
             for scale in [1.0, 2f64.powi(-29), 2f64.powi(10)] {
@@ -509,23 +554,44 @@ fn what_is_dropped_never_touches_and_others_not_too_early() {
                     let Some(loaded) = load(&mut device, pair, &halves, narrowing) else {
                         continue;
                     };
-                    let is_dropped = never_touch(&values(&mut device, &loaded, None));
-                    let until = free_until(&mut device, &loaded);
+                    let of_step = decide(&values(&mut device, &loaded, None));
+                    let end = match random.below(2) {
+                        0 => TICKS,
+                        _ => 1 + random.below(u64::from(TICKS)) as u32,
+                    };
+                    let mut device = Device(&mut random);
+                    let found = bracket(&mut device, &loaded, end);
+                    let is_dropped = of_step == Decided::Free;
                     n_dropped += u32::from(is_dropped);
-                    n_later += u32::from(!is_dropped && until.is_none());
-                    if !is_dropped && until == Some(0.0) {
+                    n_later += u32::from(!is_dropped && !found.is_left && end == TICKS);
+                    let is_certain = is_dropped || !found.is_left || found.free_until > 0;
+                    if !is_certain && of_step != Decided::Touches && found.touches_by.is_none() {
                         continue;
                     }
-                    let [start, end] = [0, 4].map(|k| std::array::from_fn(|i| points[k + i]));
-                    let Some(contact) = first_contact(pair, &start, &end) else {
+                    let [start, end_points] =
+                        [0, 4].map(|k| std::array::from_fn(|i| points[k + i]));
+                    let contact = first_contact(pair, &start, &end_points);
+                    let what = format!("{pair:?} {kind:?}: {start:?} {end_points:?} {found:?}");
+                    let by = match of_step {
+                        Decided::Touches => Some(TICKS),
+                        _ => None,
+                    };
+                    for by in [by, found.touches_by].into_iter().flatten() {
+                        let contact = contact.as_ref().expect(&what);
+                        assert!(!contact.at_start, "{what}");
+                        assert!(contact.time < f64::from(by) * f64::from(TICK), "{what}");
+                        n_touching += 1;
+                    }
+                    let Some(contact) = contact else {
                         continue;
                     };
-                    let what = format!("{pair:?} {kind:?}: {start:?} {end:?}");
                     assert!(!is_dropped, "{what}");
-                    let until = until.expect(&what);
+                    assert!(found.is_left || end < TICKS, "{what}");
+                    let until = f64::from(found.free_until) * f64::from(TICK);
                     assert!(until == 0.0 || !contact.at_start, "{what}");
-                    assert!(f64::from(until) <= contact.time, "{until} {what}");
+                    assert!(until <= contact.time, "{what}");
                     n_waiting += u32::from(until > 0.0);
+                    n_after += u32::from(!found.is_left);
                 }
             }
         }
@@ -533,4 +599,9 @@ fn what_is_dropped_never_touches_and_others_not_too_early() {
     assert!(n_dropped > n / 8, "{n_dropped} of {n} are dropped");
     assert!(n_later > n / 40, "{n_later} of {n} by the search alone");
     assert!(n_waiting > n / 40, "{n_waiting} of {n} touch later");
+    assert!(n_touching > n / 40, "{n_touching} of {n} certainly touch");
+    assert!(
+        n_after > n / 100,
+        "{n_after} of {n} touch after another pair"
+    );
 }

@@ -1,15 +1,15 @@
 //! Stage `settle`: pairs that a device has not dropped, with their first contacts.
 //!
-//! In: places of two elements, in any order, and times until which they certainly do not touch. Out: contacts, as from stage `narrow`,
-//! whose lists and filters do the work. Runs of pairs are tasks; each is sorted first, so that pairs of two layers, and elements in
-//! memory, come together. Where the earliest contact is sought, pairs come in the order of their times, a few at first, up to the
-//! earliest contact found.
+//! In: places of two elements, in any order, and times until which they certainly do not touch; a time by which some pair certainly does.
+//! Out: contacts, as from stage `narrow`, whose lists and filters do the work. Runs of pairs are tasks; each is sorted first, so that
+//! pairs of two layers come together. Where the earliest contact is sought, pairs come in the order of their
+//! times, a few at first, up to the earliest contact found. Where any is sought, a pair that certainly touches ends the search.
 
 use std::sync::{Mutex, PoisonError};
 
 use crate::error::Error;
 use crate::frame::{TestId, owner_by_first};
-use crate::impacts::{LeftPair, StepAnswer};
+use crate::impacts::{Left, LeftPair, StepAnswer};
 use crate::index::{LayerIx, Place};
 use crate::run::Job;
 use crate::sink::Ending;
@@ -25,7 +25,7 @@ const TASK: usize = 2048;
 const SOONEST: usize = 256;
 
 /// Settles pairs as they come.
-pub(super) struct Left<'a, 'b> {
+pub(super) struct Settling<'a, 'b> {
     pub job: Job<'a>,
     pub world: World<'a>,
     pub answer: StepAnswer<'a>,
@@ -34,19 +34,33 @@ pub(super) struct Left<'a, 'b> {
     pub first_places: Vec<u32>,
 }
 
-impl Left<'_, '_> {
+impl Settling<'_, '_> {
     /// Settles some pairs. Returns whether more are wanted.
     ///
     /// # Errors
     /// Cancellation, those of the answer, and pairs that nobody asked for.
-    pub fn settle(&mut self, mut pairs: &mut [LeftPair]) -> Result<bool, Error> {
+    pub fn settle(&mut self, left: Left<'_>) -> Result<bool, Error> {
+        let Left { pairs, touches_by } = left;
+        if let Some(time) = touches_by {
+            self.workers[0].contacts().found_by(self.world, time);
+        }
         if !self.workers[0].contacts().seeks_earliest() {
             return self.settle_each(pairs);
         }
-        let mut n_soonest = SOONEST;
+        let (mut pairs, mut n_soonest) = (pairs, SOONEST);
         loop {
-            n_soonest = n_soonest.min(pairs.len());
-            if n_soonest < pairs.len() {
+            // All others touch after the earliest contact known, if at all.
+            let until = self.workers[0].contacts().until(self.world);
+            let mut n = 0;
+            for ix in 0..pairs.len() {
+                if f64::from(pairs[ix].free_until) <= until {
+                    pairs.swap(n, ix);
+                    n += 1;
+                }
+            }
+            pairs = &mut pairs[..n];
+            n_soonest = n_soonest.min(n);
+            if n_soonest < n {
                 let by_time = |a: &LeftPair, b: &LeftPair| a.free_until.total_cmp(&b.free_until);
                 pairs.select_nth_unstable_by(n_soonest, by_time);
             }
@@ -55,23 +69,14 @@ impl Left<'_, '_> {
             if !goes_on || later.is_empty() {
                 return Ok(goes_on);
             }
-            // The others touch after the earliest contact found, if at all.
-            let until = self.workers[0].contacts().until(self.world);
-            let mut n = 0;
-            for ix in 0..later.len() {
-                if f64::from(later[ix].free_until) <= until {
-                    later.swap(n, ix);
-                    n += 1;
-                }
-            }
-            pairs = &mut later[..n];
+            pairs = later;
             n_soonest *= 4;
         }
     }
 
     /// Settles pairs, run by run.
-    fn settle_each(&mut self, pairs: &mut [LeftPair]) -> Result<bool, Error> {
-        let Left {
+    fn settle_each(&mut self, pairs: &[LeftPair]) -> Result<bool, Error> {
+        let Settling {
             job,
             world,
             answer,
@@ -81,7 +86,7 @@ impl Left<'_, '_> {
         let (world, answer, job) = (*world, *answer, *job);
         let first_places = &first_places[..];
         let wrong = Mutex::new(None);
-        let tasks: Vec<Mutex<&mut [LeftPair]>> = pairs.chunks_mut(TASK).map(Mutex::new).collect();
+        let tasks: Vec<&[LeftPair]> = pairs.chunks(TASK).collect();
         let n_workers = workers.len().min(tasks.len()).max(1);
         job.workers
             .for_each(&mut workers[..n_workers], tasks.len(), |worker, ix| {
@@ -89,8 +94,7 @@ impl Left<'_, '_> {
                 if is_over || job.control.step(ix as u64, tasks.len() as u64).is_err() {
                     return;
                 }
-                let mut pairs = tasks[ix].lock().unwrap_or_else(PoisonError::into_inner);
-                if let Err(error) = settle(world, first_places, &mut pairs, worker.contacts()) {
+                if let Err(error) = settle(world, first_places, tasks[ix], worker.contacts()) {
                     *wrong.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
                 }
             });
@@ -112,35 +116,42 @@ impl Left<'_, '_> {
     }
 }
 
-/// Settles the pairs of one task.
+/// Settles the pairs of one task. Those of two layers come together; within them the order is the device's, which lists pairs of two clusters
+/// next to each other.
 fn settle(
     world: World<'_>,
     first_places: &[u32],
-    pairs: &mut [LeftPair],
+    pairs: &[LeftPair],
     contacts: &mut FirstContacts,
 ) -> Result<(), Error> {
     let n_places = first_places.last().copied().unwrap_or(0);
-    for LeftPair { places, .. } in &mut *pairs {
-        places.sort_unstable();
-        if places[1] >= n_places {
-            return Err(not_asked(*places));
-        }
-    }
     let layer =
         |place: u32| LayerIx::from_usize(owner_by_first(first_places, place, |first| *first));
-    let layers = |pair: &LeftPair| pair.places.map(layer);
-    pairs.sort_unstable_by_key(|pair| (layers(pair), pair.places));
-    for run in pairs.chunk_by(|p, q| layers(p) == layers(q)) {
-        let [a, b] = layers(&run[0]);
-        let test = world.frame.test(a, b);
-        let Some(TestId::Elements(kind)) = test else {
-            return Err(not_asked(run[0].places));
+    let mut by_layers = Vec::with_capacity(pairs.len());
+    for pair in pairs {
+        let mut places = pair.places;
+        places.sort_unstable();
+        if places[1] >= n_places {
+            return Err(not_asked(places));
+        }
+        by_layers.push((places.map(layer), places, pair));
+    }
+    by_layers.sort_unstable_by_key(|(layers, ..)| *layers);
+    for run in by_layers.chunk_by(|(layers, ..), (next, ..)| layers == next) {
+        let ([a, b], first, _) = run[0];
+        let Some(TestId::Elements(kind)) = world.frame.test(a, b) else {
+            return Err(not_asked(first));
         };
         let firsts = [a, b].map(|layer| first_places[layer.index()]);
-        let places = run
-            .iter()
-            .map(|LeftPair { places: [p, q], .. }| [p - firsts[0], q - firsts[1]].map(Place::new));
-        contacts.take_left(world.isa, world, Between { a, b, kind }, places);
+        let pairs = run.iter().map(|(_, [p, q], pair)| {
+            let places = [p - firsts[0], q - firsts[1]].map(Place::new);
+            (
+                places,
+                pair.free_until.into(),
+                pair.touches_by.map(f64::from),
+            )
+        });
+        contacts.take_left(world.isa, world, Between { a, b, kind }, pairs);
     }
     contacts.settle(world.isa, world);
     Ok(())

@@ -32,7 +32,7 @@ use crate::hull::Pose;
 #[cfg(feature = "gpu")]
 use crate::ids::BodyId;
 #[cfg(feature = "gpu")]
-use crate::impacts::LeftPair;
+use crate::impacts::Left;
 use crate::impacts::StepAnswer;
 use crate::index::LayerIx;
 use crate::pair_kind::PairKind;
@@ -53,7 +53,7 @@ use crate::sink::Ending;
 
 use cache::{Caches, LayerCache};
 use pairing::Worker;
-pub(crate) use world::{Asked, Sought, StepTest};
+pub(crate) use world::{Asked, StepTest};
 use world::{Known, World};
 
 impl<'a> SlabStages for World<'a> {
@@ -99,6 +99,17 @@ impl<'a> SlabStages for World<'a> {
     fn is_over(&self) -> bool {
         self.known.is_over()
     }
+}
+
+/// How a step was answered on a device.
+#[cfg_attr(not(feature = "gpu"), expect(dead_code))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ByDevice {
+    /// The device cannot hold it.
+    Not,
+    Done,
+    /// Any contact is sought, and there is one, whether it has a name or not.
+    Touches,
 }
 
 /// Caches and scratch of the method; kept from step to step.
@@ -171,7 +182,7 @@ impl StepClusters {
     }
 
     /// As [`run`](Self::run), where a device finds the candidates: `find` gets the clusters of all layers and hands over the
-    /// places of pairs that may touch. Returns whether it has done so.
+    /// places of pairs that may touch.
     #[cfg(feature = "gpu")]
     pub fn run_on_device(
         &mut self,
@@ -182,10 +193,10 @@ impl StepClusters {
         stats: &mut Statistics,
         find: impl FnOnce(
             &[Arc<Clustering>],
-            &mut dyn FnMut(&mut [LeftPair]) -> Result<bool, Error>,
+            &mut dyn FnMut(Left<'_>) -> Result<bool, Error>,
             &mut Statistics,
         ) -> Result<bool, Error>,
-    ) -> Result<bool, Error> {
+    ) -> Result<ByDevice, Error> {
         let clusterings = self.clusterings(job, settings, |_| false, stats)?;
         let mut first_places = vec![0];
         for clustering in &clusterings {
@@ -198,7 +209,7 @@ impl StepClusters {
         }
         answer.share(self.bytes_besides_room() as u64);
         let known = Known::new();
-        let mut left = left::Left {
+        let mut settling = left::Settling {
             job,
             world: World {
                 isa: self.isa,
@@ -214,10 +225,14 @@ impl StepClusters {
             workers: &mut self.scratches,
             first_places,
         };
-        let is_done = find(&clusterings, &mut |pairs| left.settle(pairs), stats)?;
-        left.end()?;
+        let is_done = find(&clusterings, &mut |left| settling.settle(left), stats)?;
+        settling.end()?;
         stats.bytes_held += self.bytes_besides_room() as u64;
-        Ok(is_done)
+        Ok(match is_done {
+            false => ByDevice::Not,
+            true if known.is_over() => ByDevice::Touches,
+            true => ByDevice::Done,
+        })
     }
 
     /// The clusters of all layers, for a device. The host does not know the pose of `resident` bodies, so it does not judge

@@ -6,7 +6,7 @@ use crate::cpu::simd::Isa;
 use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::hull::{Hull, Pose};
-use crate::impacts::StepAnswer;
+use crate::impacts::{Sought, StepAnswer};
 use crate::index::{ClusterIx, LayerIx};
 use crate::scene::Scene;
 use crate::step::{Start, Toi};
@@ -31,18 +31,6 @@ pub(crate) struct Asked {
     pub sought: Sought,
     pub start: Start,
     pub toi: Toi,
-}
-
-/// Which contacts to look for.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) enum Sought {
-    /// Every contact.
-    #[default]
-    All,
-    /// The earliest contact, and all whose times may round to the same time.
-    Earliest,
-    /// Any contact.
-    Any,
 }
 
 /// What is known of the answer while workers look for it.

@@ -91,9 +91,16 @@ impl Search {
     #[inline]
     #[must_use]
     pub fn new(until: f64) -> Self {
+        Search::within([0.0, until])
+    }
+
+    /// In an interval before which there is certainly no contact.
+    #[inline]
+    #[must_use]
+    pub fn within([low, high]: [f64; 2]) -> Self {
         Search {
-            low: 0.0,
-            high: until,
+            low,
+            high,
             n_steps: 0,
         }
     }

@@ -13,9 +13,6 @@
 @group(0) @binding(6) var<storage, read_write> kept: array<Kept>;
 @group(0) @binding(7) var<storage, read_write> counters: array<atomic<u32>>;
 
-var<workgroup> n_found: atomic<u32>;
-var<workgroup> first_found: u32;
-
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -28,28 +25,15 @@ fn main(
     }
     let cluster = clusters[cluster_ix];
     let reach = Box(reaches[cluster.body].low, reaches[cluster.body].high);
-    if lane == 0u {
-        atomicStore(&n_found, 0u);
-    }
-    workgroupBarrier();
     let is_near = overlap(box_of(nodes[cluster_ix]), reach);
     var own = empty_box();
-    var place = 0u;
     var is_kept = false;
     let slack = bodies[cluster.body].slack;
     if is_near && lane < (cluster.sizes & 0xffffu) {
         own = primitive_box(corners[cluster.first_place + lane], slack);
         is_kept = overlap(own, reach);
-        if is_kept {
-            place = atomicAdd(&n_found, 1u);
-        }
     }
-    workgroupBarrier();
-    if lane == 0u {
-        first_found = reserve(N_KEPT, atomicLoad(&n_found));
-    }
-    workgroupBarrier();
-    place += first_found;
+    let place = place_in(N_KEPT, is_kept, lane);
     if is_kept && place < arrayLength(&kept) {
         let rounded = select(0u, FLAG, slack != 0u);
         kept[place] = Kept(own.low, (cluster.first_place + lane) | rounded, own.high, cluster.body,

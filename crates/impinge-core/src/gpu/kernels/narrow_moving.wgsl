@@ -10,9 +10,6 @@
 @group(0) @binding(3) var<storage, read_write> pairs: array<PairKey>;
 @group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
 
-var<workgroup> n_left: atomic<u32>;
-var<workgroup> first_left: u32;
-
 // Whether the elements of a candidate may touch.
 fn may_touch(candidate: Candidate) -> bool {
     var pair: Pair;
@@ -22,7 +19,7 @@ fn may_touch(candidate: Candidate) -> bool {
     }
     var polygon = pair.polygon;
     var sizes = pair.sizes;
-    return !never_touch(&polygon, &sizes, pair.are_edges);
+    return decide(&polygon, &sizes, pair.are_edges) != FREE;
 }
 
 @compute @workgroup_size(64)
@@ -33,29 +30,14 @@ fn main(
 ) {
     let ix = group_number(group, n_groups) * 64u + lane;
     let n = min(atomicLoad(&counters[N_CANDIDATES]), arrayLength(&candidates));
-    if lane == 0u {
-        atomicStore(&n_left, 0u);
-    }
-    workgroupBarrier();
     var is_left = false;
     var candidate = Candidate(0u, 0u);
-    var place = 0u;
     if ix < n {
         candidate = candidates[ix];
         is_left = may_touch(candidate);
     }
-    if is_left {
-        place = atomicAdd(&n_left, 1u);
-    }
-    workgroupBarrier();
-    if lane == 0u {
-        first_left = reserve(N_PAIRS, atomicLoad(&n_left));
-    }
-    workgroupBarrier();
-    if is_left {
-        place += first_left;
-        if place < arrayLength(&pairs) {
-            pairs[place] = PairKey(candidate.a, candidate.b);
-        }
+    let place = place_in(N_PAIRS, is_left, lane);
+    if is_left && place < arrayLength(&pairs) {
+        pairs[place] = PairKey(candidate.a, candidate.b);
     }
 }

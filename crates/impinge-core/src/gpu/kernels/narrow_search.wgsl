@@ -1,16 +1,26 @@
-// Stage `narrow` of a step: which pairs certainly do not touch, by tests of intervals of time.
+// Stage `narrow` of a step: which pairs certainly do not touch, and which certainly do, by tests of intervals of time.
 //
 // In: pairs that `narrow_moving` has left. Out: all that may touch, by their places for the host, which settles them, or by global
-// numbers for the caller's shaders; and for each a time before which it certainly does not touch. One thread per pair.
+// numbers for the caller's shaders. For each a time until which it certainly does not touch, and one by which it certainly does, if
+// there is one. For the whole step the least of the latter. One thread per pair.
 // Cost: 32 bytes of corners and 96 of positions read; up to N_INTERVALS intervals tested.
-// Invariant: what is dropped is proven not to touch, and so is every pair before its time, whatever the device's rounding
-// (`docs/exactness.md`).
+// Invariant: what is dropped is proven not to touch, or to touch later than another pair; and so are the times, whatever
+// the device's rounding (`docs/exactness.md`).
 //
-//   [low, low + length] ── certainly free ──> go on behind it, with twice the length, to the end: dropped
-//            └──────────── unclear ─────────> half the length, down to SHORTEST: left, free before `low`
+//   [low, high] ── certainly free ────> go on behind it, with twice the length, to the end: dropped
+//        ├──────── certain contact ──> touches by `high`; half the length, to know it better
+//        └──────── unclear ──────────> half the length, down to SHORTEST: left, free until `low`
+//
+// Where the earliest contact is sought, the end is the least time by which any pair touches. So most pairs are dropped after one
+// interval. Where any contact is sought, all threads end once there is one.
 
-// Times are multiples of it, so a time and its difference to 1 are exact.
-const SHORTEST: f32 = 0x1p-10f;
+// PairTimes are whole numbers of ticks, so a time and its difference to 1 are exact.
+const TICKS: u32 = 0x1000000u;
+const TICK: f32 = 0x1p-24f;
+// Twice the whole step: no time.
+const NONE: u32 = 2u * TICKS;
+// The shortest interval: a 1024th of the step.
+const SHORTEST: u32 = 0x4000u;
 // The most intervals of a pair.
 const N_INTERVALS: u32 = 32u;
 
@@ -19,34 +29,58 @@ const N_INTERVALS: u32 = 32u;
 @group(0) @binding(2) var<storage, read> positions: array<u32>;
 @group(0) @binding(3) var<storage, read> order: array<u32>;
 @group(0) @binding(4) var<storage, read_write> unsure: array<UnsureKey>;
-@group(0) @binding(5) var<storage, read_write> times: array<f32>;
+@group(0) @binding(5) var<storage, read_write> times: array<PairTimes>;
 @group(0) @binding(6) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(7) var<uniform> params: Params;
 
-var<workgroup> n_unsure: atomic<u32>;
-var<workgroup> first_unsure: u32;
-
-// Not `mix`, which a device may compute in other ways.
-fn at(d: Moving, time: f32) -> vec3<f32> {
-    return d.start * (1.0 - time) + d.end * time;
+// A time as a part of the step, and the other way round; both are exact.
+fn time_of(ticks: u32) -> f32 {
+    return f32(ticks) * TICK;
 }
 
-fn over(d: Moving, low: f32, high: f32) -> Moving {
+fn ticks_of(bits: u32) -> u32 {
+    return u32(bitcast<f32>(bits) * f32(TICKS));
+}
+
+// Not `mix`, which a device may compute in other ways.
+fn at(d: Moving, time: u32) -> vec3<f32> {
+    return d.start * time_of(TICKS - time) + d.end * time_of(time);
+}
+
+fn over(d: Moving, low: u32, high: u32) -> Moving {
     return Moving(at(d, low), at(d, high));
 }
 
-// The time before which a pair certainly does not touch; 2 if it never does.
-fn free_until(candidate: Candidate) -> f32 {
+// The times of a pair, in ticks.
+struct Bracket {
+    free_until: u32,
+    touches_by: u32,
+    is_left: bool,
+}
+
+fn bracket_of(candidate: Candidate) -> Bracket {
+    var found = Bracket(0u, NONE, true);
     var pair: Pair;
     load_pair(candidate, &pair);
     if !pair.sizes.are_in_range {
-        return 0.0;
+        return found;
     }
     var sizes = pair.sizes;
-    var low = 0.0;
-    var length = 0.5;
+    var length = TICKS / 2u;
     for (var n = 0u; n < N_INTERVALS; n++) {
-        let high = min(low + length, 1.0);
+        // The first time by which any pair touches.
+        let first = ticks_of(atomicLoad(&counters[TOUCHES_BY]));
+        if params.sought == SEEK_ANY && first != NONE {
+            found.is_left = false;
+            break;
+        }
+        let end = min(TICKS, select(found.touches_by, first, params.sought == SEEK_EARLIEST));
+        let low = found.free_until;
+        if low >= end {
+            found.is_left = false;
+            break;
+        }
+        let high = min(low + length, end);
         var part: Polygon;
         for (var k = 0u; k < 4u; k++) {
             part.corners[k] = over(pair.polygon.corners[k], low, high);
@@ -54,19 +88,31 @@ fn free_until(candidate: Candidate) -> f32 {
         for (var k = 0u; k < 3u; k++) {
             part.edges[k] = over(pair.polygon.edges[k], low, high);
         }
-        if never_touch(&part, &sizes, pair.are_edges) {
-            if high == 1.0 {
-                return 2.0;
+        let decided = decide(&part, &sizes, pair.are_edges);
+        if decided == FREE {
+            found.free_until = high;
+            length = 2u * length;
+            if high == end {
+                found.is_left = false;
+                break;
             }
-            low = high;
-            length = 2.0 * length;
-        } else if length > SHORTEST {
-            length = 0.5 * length;
-        } else {
+            continue;
+        }
+        if decided == TOUCHES {
+            found.touches_by = high;
+            if high < first {
+                atomicMin(&counters[TOUCHES_BY], bitcast<u32>(time_of(high)));
+            }
+            if params.sought == SEEK_ALL && params.by_number == 0u {
+                break;
+            }
+        }
+        if high - low <= SHORTEST {
             break;
         }
+        length = (high - low) / 2u;
     }
-    return low;
+    return found;
 }
 
 fn name_of(pair: PairKey) -> UnsureKey {
@@ -86,31 +132,15 @@ fn main(
 ) {
     let ix = group_number(group, n_groups) * 64u + lane;
     let n = min(atomicLoad(&counters[N_PAIRS]), arrayLength(&pairs));
-    if lane == 0u {
-        atomicStore(&n_unsure, 0u);
-    }
-    workgroupBarrier();
-    var time = 2.0;
+    var bracket = Bracket(0u, NONE, false);
     var pair = PairKey(0u, 0u);
-    var place = 0u;
     if ix < n {
         pair = pairs[ix];
-        time = free_until(Candidate(pair.low, pair.high));
+        bracket = bracket_of(Candidate(pair.low, pair.high));
     }
-    let is_left = time <= 1.0;
-    if is_left {
-        place = atomicAdd(&n_unsure, 1u);
-    }
-    workgroupBarrier();
-    if lane == 0u {
-        first_unsure = reserve(N_UNSURE, atomicLoad(&n_unsure));
-    }
-    workgroupBarrier();
-    if is_left {
-        place += first_unsure;
-        if place < arrayLength(&unsure) {
-            unsure[place] = name_of(pair);
-            times[place] = time;
-        }
+    let place = place_in(N_UNSURE, bracket.is_left, lane);
+    if bracket.is_left && place < arrayLength(&unsure) {
+        unsure[place] = name_of(pair);
+        times[place] = PairTimes(time_of(bracket.free_until), time_of(bracket.touches_by));
     }
 }

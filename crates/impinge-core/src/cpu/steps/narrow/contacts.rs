@@ -4,13 +4,13 @@ use crate::cpu::narrow::room_to_wait;
 use crate::cpu::simd::Isa;
 use crate::exact::filter::{Search, time_between};
 use crate::exact::{Contact, ElementPair, first_within};
-use crate::impacts::{Found, FoundByKind, StepAnswer};
+use crate::impacts::{Found, FoundByKind, Sought, StepAnswer};
 use crate::pair_kind::PairKind;
 use crate::sink::BLOCK;
 use crate::step::{Start, Toi};
 use crate::tuning::Tuning;
 
-use super::super::world::{Asked, Sought, World};
+use super::super::world::{Asked, World};
 use super::batch::{Between, Narrow, NarrowCounts, Places, is_owned, key, points};
 
 /// The most pairs of one worker that are settled last.
@@ -91,6 +91,12 @@ impl FirstContacts {
     #[cfg(feature = "gpu")]
     pub fn seeks_earliest(&self) -> bool {
         matches!(self.asked.sought, Sought::Earliest)
+    }
+
+    /// To be told that some pair touches by a time, after the start.
+    #[cfg(feature = "gpu")]
+    pub fn found_by(&self, world: World<'_>, time: f32) {
+        world.known.found(self.asked.sought, f64::from(time));
     }
 
     /// Contacts later than this are not wanted.

@@ -58,7 +58,7 @@ pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: Worl
         }
         std::mem::swap(&mut open, &mut single);
     }
-    while !open.is_empty() {
+    while !(open.is_empty() && single.is_empty()) {
         for chunk in open.chunks(LANES) {
             sides.fill(simd, chunk, &mut steps, &mut spans);
             let seen = filter::look::<S::F64>(pair, &steps, &spans, 0.0);

@@ -17,13 +17,13 @@ use crate::cpu::simd::{Isa, Simd, dispatch};
 use crate::exact::ElementPair;
 use crate::exact::filter::{self, BATCH, Moving64, Search};
 use crate::grouping::bounds::round_up;
+#[cfg(feature = "gpu")]
+use crate::impacts::Sought;
 use crate::impacts::StepAnswer;
 use crate::pair_kind::PairKind;
 #[cfg(feature = "gpu")]
 use crate::positions::Positions;
 
-#[cfg(feature = "gpu")]
-use super::super::world::Sought;
 use super::super::world::World;
 #[cfg(feature = "gpu")]
 use super::batch::Places;
@@ -93,7 +93,7 @@ impl Narrow for FirstContacts {
     /// Searches the open pairs for first contacts.
     #[inline(never)]
     fn settle(&mut self, isa: Isa, world: World<'_>) {
-        if self.open.is_empty() {
+        if self.open.is_empty() && self.single.is_empty() {
             return;
         }
         dispatch!(isa, search, (contacts: &mut FirstContacts = self, world: World<'_> = world));
@@ -119,19 +119,20 @@ impl FirstContacts {
         }
     }
 
-    /// Takes pairs of two layers that a device has not dropped, by their places.
+    /// Takes pairs of two layers that a device has not dropped, by their places. Each comes with a time until which it certainly does not
+    /// touch, and a later one by which it certainly does, at one time only, if there is one.
     #[cfg(feature = "gpu")]
     pub fn take_left(
         &mut self,
         isa: Isa,
         world: World<'_>,
         between: Between,
-        pairs: impl Iterator<Item = Places>,
+        pairs: impl Iterator<Item = (Places, f64, Option<f64>)>,
     ) {
         self.go_to(isa, world, between);
         if !matches!(between.kind, PairKind::VertexFace | PairKind::EdgeEdge) {
             if let Some(pair) = exact_pair(between.kind) {
-                pairs.for_each(|places| self.settle_exactly(world, between, pair, places));
+                pairs.for_each(|(places, ..)| self.settle_exactly(world, between, pair, places));
             }
             return;
         }
@@ -141,12 +142,22 @@ impl FirstContacts {
         });
         // Over the whole step, the device has taken the filter's first step for positions in single precision.
         self.is_first = !are_single || matches!(self.asked.sought, Sought::Earliest);
-        for places in pairs {
-            self.open.push(Open {
+        for (places, free_until, touches_by) in pairs {
+            let until = self.until(world);
+            // Meanwhile another pair was found to touch before.
+            if free_until > until {
+                continue;
+            }
+            let list = match touches_by {
+                Some(_) => &mut self.single,
+                None => &mut self.open,
+            };
+            let high = touches_by.unwrap_or(until);
+            list.push(Open {
                 places,
-                search: Search::new(self.until(world)),
+                search: Search::within([free_until, high]),
             });
-            if self.open.len() >= self.full {
+            if self.open.len() + self.single.len() >= self.full {
                 self.settle(isa, world);
             }
         }

@@ -74,6 +74,9 @@ struct Candidate { a: u32, b: u32 }
 struct PairKey { low: u32, high: u32 }
 struct UnsureKey { low: u32, high: u32 }
 
+// Of a pair of a step: until when it certainly does not touch, and by when it certainly does; 2 if that is not certain.
+struct PairTimes { free_until: f32, touches_by: f32 }
+
 // Parameters of one dispatch.
 struct Params {
     // bounds: the nodes or levels to refit. dispatch: the round.
@@ -103,7 +106,13 @@ struct Params {
     tile_side: u32,
     // Steps: 1 when pairs are named by global numbers, 0 when by places.
     by_number: u32,
+    // Steps: which contacts are sought.
+    sought: u32,
 }
+
+const SEEK_ALL: u32 = 0u;
+const SEEK_EARLIEST: u32 = 1u;
+const SEEK_ANY: u32 = 2u;
 
 // A primitive within its body's reach: its box, its place (bit 31: rounded), its body, and the
 // fine cells that it touches:
@@ -176,7 +185,9 @@ const N_SUBDIVIDED: u32 = 39u;
 // Low and high word; only some methods count box tests.
 const N_BOX_TESTS: u32 = 40u;
 const N_BOX_TESTS_HIGH: u32 = 41u;
-const N_COUNTERS: u32 = 42u;
+// Steps: the least time by which some pair certainly touches, the bits of an f32; 2 if that is certain of none.
+const TOUCHES_BY: u32 = 42u;
+const N_COUNTERS: u32 = 43u;
 
 // Tallies: the region (three complements of its low end, then its high end), then the entries of the cell lists
 // for every shift, two words each, then a bit for each shift that is too fine.

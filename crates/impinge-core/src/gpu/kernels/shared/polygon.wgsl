@@ -98,15 +98,24 @@ fn are_aside(polygon: ptr<function, Polygon>, direction: vec3<f32>, bound: f32) 
     return least > bound || most < -bound;
 }
 
-// Whether all coefficients of w = N . (V x E) are certainly negative.
-fn is_outside(n: Crossed, corner: Moving, edge: Moving, bound: f32) -> bool {
+// What is certain of w = N . (V x E): that all its coefficients are negative, or that all are positive.
+struct Side {
+    is_outside: bool,
+    is_inside: bool,
+}
+
+fn side_of(n: Crossed, corner: Moving, edge: Moving, bound: f32) -> Side {
     let m = crossed(corner, edge);
+    let w_0 = dot3(n.first, m.first);
+    let w_1 = dot3(n.first, m.twice) + dot3(n.twice, m.first);
+    let w_2 = dot3(n.first, m.last) + dot3(n.twice, m.twice) + dot3(n.last, m.first);
+    let w_3 = dot3(n.twice, m.last) + dot3(n.last, m.twice);
+    let w_4 = dot3(n.last, m.last);
     let next = NEXT * bound;
-    return dot3(n.first, m.first) < -bound
-        && dot3(n.first, m.twice) + dot3(n.twice, m.first) < -next
-        && dot3(n.first, m.last) + dot3(n.twice, m.twice) + dot3(n.last, m.first) < -MIDDLE * bound
-        && dot3(n.twice, m.last) + dot3(n.last, m.twice) < -next
-        && dot3(n.last, m.last) < -bound;
+    let middle = MIDDLE * bound;
+    let is_outside = max(w_0, w_4) < -bound && max(w_1, w_3) < -next && w_2 < -middle;
+    let is_inside = min(w_0, w_4) > bound && min(w_1, w_3) > next && w_2 > middle;
+    return Side(is_outside, is_inside);
 }
 
 // Sizes of corners and edges over the whole step, after scaling, with what rounded positions add.
@@ -152,12 +161,17 @@ fn scale_all(polygon: ptr<function, Polygon>, narrowing: f32) -> Sizes {
     return sizes;
 }
 
-// Whether the elements certainly do not touch between the two ends of `polygon`.
-fn never_touch(polygon: ptr<function, Polygon>, sizes: ptr<function, Sizes>, are_edges: bool) -> bool {
+// What is certain of two elements between the two ends of their polygon: nothing, that they do not touch, or that they do, at one time
+// strictly between.
+const UNCLEAR: u32 = 0u;
+const FREE: u32 = 1u;
+const TOUCHES: u32 = 2u;
+
+fn decide(polygon: ptr<function, Polygon>, sizes: ptr<function, Sizes>, are_edges: bool) -> u32 {
     let slack = (*sizes).slack;
     let wide = (*sizes).wide;
 
-    // Along the sum of all corners.
+    // Free along the sum of all corners.
     var sum = vec3<f32>(0.0);
     for (var k = 0u; k < 3u; k++) {
         sum += (*polygon).corners[k].start + (*polygon).corners[k].end;
@@ -166,10 +180,10 @@ fn never_touch(polygon: ptr<function, Polygon>, sizes: ptr<function, Sizes>, are
         sum += (*polygon).corners[3].start + (*polygon).corners[3].end;
     }
     if are_aside(polygon, sum, wide * (OF_SUM * wide + 32.0 * slack) + TINY) {
-        return true;
+        return FREE;
     }
 
-    // Along the normal at either end, and by the sign of f = N . V_0.
+    // Free along the normal at either end, or by the sign of f = N . V_0.
     let first = (*polygon).edges[0];
     let second = (*polygon).edges[1];
     let n = crossed(first, second);
@@ -177,7 +191,7 @@ fn never_touch(polygon: ptr<function, Polygon>, sizes: ptr<function, Sizes>, are
     let e = (*sizes).edges[1];
     let bound = OF_CUBIC * (d * e * wide) + 4.0 * slack * (d * e + (d + e) * wide) + TINY;
     if are_aside(polygon, n.first, bound) || are_aside(polygon, n.last, bound) {
-        return true;
+        return FREE;
     }
     let v = (*polygon).corners[0];
     let f_0 = dot3(n.first, v.start);
@@ -186,27 +200,37 @@ fn never_touch(polygon: ptr<function, Polygon>, sizes: ptr<function, Sizes>, are
     let f_3 = dot3(n.last, v.end);
     let inner = INNER * bound;
     if min(f_0, f_3) > bound && min(f_1, f_2) > inner {
-        return true;
+        return FREE;
     }
     if max(f_0, f_3) < -bound && max(f_1, f_2) < -inner {
-        return true;
+        return FREE;
     }
 
-    // Beyond one edge all the time.
+    // Free beyond one edge all the time. Contact where the sign of f changes, and only once, and all edges are passed on the inner side
+    // all the time.
+    let falls = f_0 > bound && f_3 < -bound && (f_1 > inner || f_2 < -inner);
+    let rises = f_0 < -bound && f_3 > bound && (f_1 < -inner || f_2 > inner);
+    var touches = falls || rises;
     for (var k = 0u; k < 3u; k++) {
         let c = (*sizes).corners[k];
         let g = (*sizes).edges[k];
         let w_bound = OF_QUARTIC * (d * e * c * g)
             + 8.0 * slack * (d * e * (c + g) + c * g * (d + e)) + TINY;
-        if is_outside(n, (*polygon).corners[k], (*polygon).edges[k], w_bound) {
-            return true;
+        let side = side_of(n, (*polygon).corners[k], (*polygon).edges[k], w_bound);
+        if side.is_outside {
+            return FREE;
         }
+        touches = touches && side.is_inside;
     }
     if are_edges {
         // The last edge is the opposite of the second one.
         let c = (*sizes).corners[3];
         let w_bound = OF_QUARTIC * (d * e * c * e) + 8.0 * slack * (d * e * (c + e) + c * e * (d + e)) + TINY;
-        return is_outside(n, (*polygon).corners[3], opposite(second), w_bound);
+        let side = side_of(n, (*polygon).corners[3], opposite(second), w_bound);
+        if side.is_outside {
+            return FREE;
+        }
+        touches = touches && side.is_inside;
     }
-    return false;
+    return select(UNCLEAR, TOUCHES, touches);
 }
