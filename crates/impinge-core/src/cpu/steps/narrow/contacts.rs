@@ -15,7 +15,7 @@ use super::batch::{Between, Narrow, NarrowCounts, Places, is_owned, key, points}
 
 /// The most pairs of one worker that are settled last.
 const MOST_UNSURE: usize = 4096;
-/// So many close pairs of one worker are remembered, or as many as there are clusters: with more of them, a search of all pairs is as fast.
+/// So many close pairs of one worker are remembered, or two per cluster: with more of them, a search of all pairs is as fast.
 const MOST_CLOSE: usize = 4096;
 
 /// A pair whose first contact is sought.
@@ -57,7 +57,7 @@ impl FirstContacts {
     /// Prepares for a step.
     pub fn begin(&mut self, n_clusters: u64, asked: Asked, tuning: &Tuning) {
         self.asked = asked;
-        self.most_close = MOST_CLOSE.max(n_clusters as usize);
+        self.most_close = MOST_CLOSE.max(2 * n_clusters as usize);
         self.full = tuning.settle_from;
         self.counts = NarrowCounts::default();
         self.found.iter_mut().for_each(Vec::clear);
