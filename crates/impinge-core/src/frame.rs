@@ -51,6 +51,8 @@ pub struct Layer {
     filter: Filter,
     /// How thick the body is: what its elements add to the distance that is asked.
     radius: f64,
+    /// How far vertices may be from their ways, because positions on these are rounded.
+    rounded: f64,
 }
 
 impl Layer {
@@ -209,6 +211,7 @@ impl Frame {
         self.distance = distance;
         for layer in &mut self.layers {
             layer.radius = radii.get(&layer.id).copied().unwrap_or(0.0);
+            layer.rounded = 0.0;
         }
     }
 
@@ -233,10 +236,29 @@ impl Frame {
         }
     }
 
-    /// The pose of a layer: its boxes also reach by its [`margin`](Frame::margin).
+    /// Makes this a question about all ways that end at rounded positions, at any time of the step.
+    pub(crate) fn set_rounding(&mut self, scene: &Scene) {
+        for ix in 0..self.layers.len() {
+            let body = self.body(scene, LayerIx::from_usize(ix));
+            let end = body.end_positions();
+            self.layers[ix].rounded = end.map_or(0.0, |end| body.positions().most_rounded(end));
+        }
+    }
+
+    /// How far vertices of two layers may be from their ways, because positions on these are rounded.
+    pub(crate) fn rounded(&self, a: LayerIx, b: LayerIx) -> f64 {
+        f64::max(self.layer(a).rounded, self.layer(b).rounded)
+    }
+
+    /// Whether positions on the ways of vertices are rounded.
+    pub(crate) fn is_rounded(&self) -> bool {
+        self.layers.iter().any(|layer| layer.rounded > 0.0)
+    }
+
+    /// The pose of a layer: its boxes also reach by its [`margin`](Frame::margin), and as far as positions are rounded.
     #[inline(always)]
     pub(crate) fn pose(&self, pose: Pose, layer: LayerIx) -> Pose {
-        pose.with_margin(self.margin(layer))
+        pose.with_margin(self.margin(layer) + self.layer(layer).rounded)
     }
 
     fn push_part(&mut self, scene: &Scene, query: &Query, part: Part) -> Result<(), Error> {
@@ -317,6 +339,7 @@ impl Frame {
             within: within && !self.ignored.contains(&(id, id)),
             filter: filter.unwrap_or(body.filter()),
             radius: 0.0,
+            rounded: 0.0,
         });
         Ok(())
     }

@@ -6,7 +6,8 @@
 //! corners in tables   ->  boxes of a group       LaneBounds::hold, fill; Pose: what of a step they must hold
 //! ```
 //!
-//! Boxes of positions in f32 are exact, those of positions in f64 rounded outward.
+//! Boxes of positions in f32 are exact, those of positions in f64 rounded outward. Boxes of points in tables hold these as they are rounded:
+//! rounding keeps the order of coordinates, so boxes that are apart prove the elements apart.
 
 mod extent;
 mod pose;

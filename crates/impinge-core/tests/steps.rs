@@ -281,6 +281,30 @@ fn elements_in_double_precision_are_answered_as_pair_by_pair() {
     );
 }
 
+/// A vertex meets a face between corners on both sides of it; at the start, one corner is farther away than single precision can tell.
+#[test]
+fn differences_that_overflow_hide_no_contact() {
+    let vertex = [[-3e38f32, 1.0, 1.0], [0.0, 1.0, 1.0]];
+    let faces = [
+        [[3e38f32, 0.0, 0.0], [3e37, 8.0, 0.0], [3e37, 0.0, 8.0]],
+        [[-5.0, 0.0, 0.0], [10.0, 8.0, 0.0], [10.0, 0.0, 8.0]],
+    ];
+    // The other two corners of its triangle are aside.
+    let with_vertex = vertex.map(|[x, y, z]| [[x, y, z], [x, 1e6, 1e6], [x, 1e6, 2e6]]);
+    let mut scene = Scene::new();
+    for [start, end] in [with_vertex, faces] {
+        let body = scene.add_triangles(&FACE, &start).expect("good");
+        scene.set_end_positions(body, &end).expect("good");
+    }
+    let step = Step::default();
+    let found = Vec::from_iter(detectors().iter_mut().map(|detector| {
+        let impacts = detector.impacts(&scene, &step).expect("good");
+        (impacts.len(), impacts.hash())
+    }));
+    assert_eq!(found[0], found[1]);
+    assert!(found[0].0 > 0);
+}
+
 #[test]
 fn bad_end_positions_are_refused_by_name() {
     let (mut scene, _, other) = falling();

@@ -82,17 +82,12 @@ pub(super) fn find_in_step(
         StepTest::Contacts(asked) if !job.frame.has_cell() => asked.sought,
         _ => Sought::All,
     };
-    // A device knows no pairs that are merely close.
-    let pose = Pose {
-        margin: 0.0,
-        ..asked.1
-    };
     let gpu = Arc::clone(on_device.gpu());
     let before = stats.clone();
     let found = clusters.run_on_device(
         job,
         settings,
-        (asked.0, pose),
+        asked,
         answer,
         stats,
         |clusterings, take, stats| {

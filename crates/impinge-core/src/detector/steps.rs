@@ -45,7 +45,7 @@ pub(super) struct StepMemory {
     contacts: ContactAnswer,
     keys: KeyAnswer,
     found: FoundByKind,
-    /// With a margin: the pairs that are not certainly farther apart up to the earliest contact, by kind and key, if known.
+    /// The pairs that rounded positions may make touch, up to the earliest contact, by kind and key, if known.
     close: Option<Vec<(PairKind, u64)>>,
     sorter: Sorter,
 }
@@ -172,19 +172,20 @@ impl Detector {
         step: &Step,
         control: &Control<'_>,
     ) -> Result<Option<Impact>, Error> {
-        self.earliest_in(scene, step, Pose::WHOLE, control)
+        let start = Instant::now();
+        self.begin(scene, step)?;
+        self.find_earliest(scene, step, control, start)
     }
 
-    fn earliest_in(
+    /// The earliest impact of a step that was begun at `start`.
+    fn find_earliest(
         &mut self,
         scene: &Scene,
         step: &Step,
-        pose: Pose,
         control: &Control<'_>,
+        start: Instant,
     ) -> Result<Option<Impact>, Error> {
-        let start = Instant::now();
-        self.begin(scene, step)?;
-        self.find(scene, step, Sought::Earliest, pose, None, control)?;
+        self.find(scene, step, Sought::Earliest, Pose::WHOLE, None, control)?;
         // The first contact and all whose times may round to the same time have been found, and some later ones.
         let first = self.steps.named(step.toi).reduce(Impact::earlier);
         self.steps.impacts.stats_mut().total_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -207,8 +208,8 @@ impl Detector {
         Ok(())
     }
 
-    /// Finds what is sought, in any order. Returns whether something touches that has no name: where any contact is sought, a device
-    /// may know no more.
+    /// Finds what is sought, in any order. Returns whether a device has found that something touches; then the list of contacts may be
+    /// empty.
     fn find(
         &mut self,
         scene: &Scene,
@@ -285,7 +286,7 @@ impl Detector {
             Ok(ByDevice::Not) => {
                 contacts.forget();
                 let result = clusters.run(job, &self.settings, asked, answer, stats);
-                if pose.margin > 0.0 {
+                if frame.is_rounded() {
                     *close = clusters.close();
                 }
                 result.map(|()| false)
@@ -330,11 +331,14 @@ impl Detector {
     /// asks for, for which the straight way from the start to the *rounded* positions is free.
     ///
     /// Positions that are stored are rounded, and rounding alone may make elements touch that did not. So each fraction is
-    /// tried: positions are rounded first, and the way to those is tested as by [`is_free`](Detector::is_free). A chain of such
+    /// tried: positions are rounded first, and the way to those must be free in the sense of [`is_free`](Detector::is_free). A chain of such
     /// steps is free from the first to the last, whatever the rounding. The first fraction tried is that of the first
-    /// contact; then the back-off doubles, from the last bit on, so it is less than twice what is needed. Only pairs that come closer than rounding moves their vertices are tested.
+    /// contact; then the back-off doubles, from the last bit on, so it is less than twice what is needed.
     ///
-    /// Pairs that touch at the start allow no step at all under [`Start::Report`], and are not looked at under
+    /// On the CPU all pairs are searched once, and rounded positions are tested on the pairs that rounding may bring together. On a GPU, with
+    /// a separation or a memory budget, and where too many pairs are that close, all pairs are searched again for rounded positions.
+    ///
+    /// Pairs that touch at the start allow no step at all under [`Start::Report`], and are ignored under
     /// [`Start::Skip`].
     ///
     /// # Errors
@@ -365,15 +369,12 @@ impl Detector {
             let bodies = scene.bodies();
             bodies.filter_map(|(id, body)| Some((id, body.positions(), body.end_positions()?)))
         };
-        let rounded = moving().map(|(_, start, end)| start.most_rounded(end));
-        let pose = Pose {
-            margin: match step.separation {
-                0.0 => rounded.fold(0.0, f64::max),
-                _ => 0.0,
-            },
-            ..Pose::WHOLE
-        };
-        let first = self.earliest_in(scene, &step, pose, control)?;
+        let start = Instant::now();
+        self.begin(scene, &step)?;
+        if step.separation == 0.0 && self.lists_close_pairs() {
+            self.steps.frame.set_rounding(scene);
+        }
+        let first = self.find_earliest(scene, &step, control, start)?;
         let mut advance = Advance {
             fraction: 1.0,
             first,
@@ -445,6 +446,18 @@ impl Detector {
                 f64::min(2.0 * back_off, 1.0)
             };
         }
+    }
+
+    /// Whether the search for the earliest contact also lists the pairs that rounding may bring together.
+    fn lists_close_pairs(&self) -> bool {
+        #[cfg(feature = "gpu")]
+        let is_on_device = self.gpu.is_some();
+        #[cfg(not(feature = "gpu"))]
+        let is_on_device = false;
+        // The budget has no share for the list.
+        !is_on_device
+            && self.settings.memory_budget.is_none()
+            && self.settings.method != Method::Naive
     }
 
     /// Whether two elements touch on the way to the rounded positions at a fraction of the step; with [`Start::Skip`], not at

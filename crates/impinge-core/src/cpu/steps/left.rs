@@ -136,7 +136,7 @@ fn settle(
         }
         by_layers.push((places.map(layer), places, pair));
     }
-    by_layers.sort_unstable_by_key(|(layers, ..)| *layers);
+    by_layers.sort_by_key(|(layers, ..)| *layers);
     for run in by_layers.chunk_by(|(layers, ..), (next, ..)| layers == next) {
         let ([a, b], first, _) = run[0];
         let Some(TestId::Elements(kind)) = world.frame.test(a, b) else {

@@ -171,8 +171,8 @@ impl StepClusters {
         Ok(())
     }
 
-    /// The pairs that vertices may make touch if they are off their ways by the margin of the [`Pose`], up to the earliest contact, of the
-    /// last [`run`](Self::run), which looked for that: by kind and key, in any order. `None` if there are too many.
+    /// The pairs that rounded positions may make touch, up to the earliest contact, of the last [`run`](Self::run), which looked for that
+    /// in a frame [with rounding](crate::frame::Frame::set_rounding): by kind and key, in any order. `None` if there are too many.
     pub fn close(&mut self) -> Option<Vec<(PairKind, u64)>> {
         let mut close = Vec::new();
         for worker in &mut self.scratches {

@@ -92,10 +92,7 @@ impl Worker {
     fn shorten(&mut self, world: World<'_>) {
         let until = self.settler.until(world);
         if until < (self.shorter_from * self.pose.until).min(self.pose.until) {
-            self.pose = Pose {
-                margin: self.pose.margin,
-                ..Pose::up_to(until)
-            };
+            self.pose = Pose::up_to(until);
             self.groups.clear();
             self.n_shortened += 1;
         }

@@ -260,9 +260,9 @@ impl<T: Number> Motion<T> {
             }
         }
         let (start, end) = (&start[..self.n_corners], &end[..self.n_corners]);
-        // At t = 1 only differences are rounded, and their signs are right.
+        // At t = 1 only differences are rounded, and their signs are right; but infinite ones make others NaN, which minima lose.
         let bound = if until == 1.0 && !self.has_margin {
-            T::splat(0.0)
+            T::splat(0.0) * size
         } else {
             T::splat(T::BOUND / 4.0) * size + T::splat(T::TINY[0])
         };

@@ -15,7 +15,8 @@ use super::batch::{Between, Narrow, NarrowCounts, Places, is_owned, key, points}
 
 /// The most pairs of one worker that are settled last.
 const MOST_UNSURE: usize = 4096;
-/// So many close pairs of one worker are remembered, or two per cluster: with more of them, a search of all pairs is as fast.
+/// The most close pairs that one worker remembers: this many, or two per cluster if that is more. With more of them, a search of all
+/// pairs is as fast.
 const MOST_CLOSE: usize = 4096;
 
 /// A pair whose first contact is sought.
@@ -93,7 +94,7 @@ impl FirstContacts {
         matches!(self.asked.sought, Sought::Earliest)
     }
 
-    /// To be told that some pair touches by a time, after the start.
+    /// Notes that some pair touches after the start and before this time.
     #[cfg(feature = "gpu")]
     pub fn found_by(&self, world: World<'_>, time: f32) {
         world.known.found(self.asked.sought, f64::from(time));
@@ -113,19 +114,19 @@ impl FirstContacts {
         }
     }
 
-    /// How far two vertices may be from their relative place at any time, if the pairs that this may make touch are wanted, else 0.
+    /// By how much rounding may move two vertices relative to each other; 0 if close pairs are not wanted.
     #[inline(always)]
-    pub(super) fn margin(&self, world: World<'_>) -> f64 {
+    pub(super) fn margin(&self, world: World<'_>, between: Between) -> f64 {
         // Pairs that are settled last are remembered already.
         if self.is_last {
             return 0.0;
         }
-        2.0 * world.pose.margin
+        2.0 * world.frame.rounded(between.a, between.b)
     }
 
     /// Remembers a pair that is not certainly farther apart than the margin.
     pub(super) fn remember_close(&mut self, world: World<'_>, between: Between, places: Places) {
-        if self.margin(world) > 0.0 && self.close.len() <= self.most_close {
+        if self.margin(world, between) > 0.0 && self.close.len() <= self.most_close {
             self.close.push((between.kind, key(world, between, places)));
         }
     }

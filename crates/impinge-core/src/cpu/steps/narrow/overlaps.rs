@@ -1,6 +1,6 @@
 //! Whether the boxes of elements over the whole step, inflated, overlap.
 //!
-//! Stage `pairing` has tested boxes in `f32` that were rounded outward; here boxes are tested unrounded, where the rounded ones leave it open.
+//! Stage `pairing` has tested boxes of points rounded to `f32`. Pairs whose boxes overlap by less than rounding are tested again in `f64`.
 
 use crate::cpu::simd::{Isa, LaneBounds, Simd, dispatch};
 use crate::elements::Elements;
@@ -97,6 +97,10 @@ fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: World<'_>, batch: Batch<'
 /// 2^-126 (`hull::Pose`): less than 2^-19 of the largest coordinate and of the distance, and 2^-125.
 fn farther_out([a, b]: [&Group; 2], distance: f64) -> f32 {
     let largest = f64::max(a.largest, b.largest) + distance;
+    if largest * (1.0 + 2f64.powi(-18)) > f64::from(f32::MAX) {
+        // Boxes may have infinite ends.
+        return f32::INFINITY;
+    }
     round_up(largest * 2f64.powi(-18) + 2f64.powi(-120))
 }
 

@@ -32,7 +32,7 @@ pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: Worl
     let mut open = std::mem::take(&mut contacts.open);
     let mut later = std::mem::take(&mut contacts.later);
     let mut single = std::mem::take(&mut contacts.single);
-    let margin = contacts.margin(world);
+    let margin = contacts.margin(world, between);
     if contacts.is_first {
         let until = contacts.until(world);
         for chunk in open.chunks(LANES) {

@@ -57,23 +57,21 @@ impl Narrow for FirstContacts {
         if self.open.is_empty() {
             self.is_first = false;
         }
-        if rounded.is_infinite() {
-            self.is_first = true;
-        } else {
+        // Where rounding is large beside the elements, the tables leave what the first step in `f64` drops.
+        self.is_first |= rounded > 0.0;
+        if rounded.is_finite() {
             let tables = batch.groups.map(|group| &group.points);
-            let (until, met) = (
-                (round_up(until), self.margin(world) + 2.0 * rounded),
-                &mut *batch.met,
-            );
+            let margin = self.margin(world, between) + 2.0 * rounded;
+            let (limits, met) = ((round_up(until), margin), &mut *batch.met);
             match between.kind {
                 PairKind::VertexFace => dispatch!(isa, drop_vertices_and_faces, (
                     tables: [&Moving64; 2] = tables,
-                    until: (f32, f64) = until,
+                    limits: (f32, f64) = limits,
                     met: &mut Met = met,
                 )),
                 _ => dispatch!(isa, drop_edges, (
                     tables: [&Moving64; 2] = tables,
-                    until: (f32, f64) = until,
+                    limits: (f32, f64) = limits,
                     met: &mut Met = met,
                 )),
             }
@@ -175,41 +173,41 @@ fn separated<S: Simd>(simd: S, contacts: &mut FirstContacts, world: World<'_>, b
 fn drop_vertices_and_faces<S: Simd>(
     simd: S,
     tables: [&Moving64; 2],
-    until: (f32, f64),
+    limits: (f32, f64),
     met: &mut Met,
 ) {
-    drop_apart(simd, ElementPair::VertexFace, tables, until, met);
+    drop_apart(simd, ElementPair::VertexFace, tables, limits, met);
 }
 
 #[inline(always)]
-fn drop_edges<S: Simd>(simd: S, tables: [&Moving64; 2], until: (f32, f64), met: &mut Met) {
-    drop_apart(simd, ElementPair::EdgeEdge, tables, until, met);
+fn drop_edges<S: Simd>(simd: S, tables: [&Moving64; 2], limits: (f32, f64), met: &mut Met) {
+    drop_apart(simd, ElementPair::EdgeEdge, tables, limits, met);
 }
 
-/// Drops the candidates that are certainly apart from t = 0 to a time, by more than a margin.
+/// Drops the candidates that are certainly apart from t = 0 to a time, by more than a margin: the two limits.
 #[inline(always)]
 fn drop_apart<S: Simd>(
     simd: S,
     pair: ElementPair,
     tables: [&Moving64; 2],
-    until: (f32, f64),
+    limits: (f32, f64),
     met: &mut Met,
 ) {
     let mut n_kept = 0;
     for first in (0..met.len()).step_by(BATCH) {
-        let no = filter::are_far_in_tables::<S::F32>(pair, tables, met.batch(first), until);
+        let no = filter::are_far_in_tables::<S::F32>(pair, tables, met.batch(first), limits);
         n_kept = met.keep_batch(simd, first, !no, n_kept);
     }
     met.truncate(n_kept);
     let mut n_kept = 0;
     for first in (0..met.len()).step_by(BATCH) {
-        let no = filter::are_across_in_tables::<S::F32>(pair, tables, met.batch(first), until);
+        let no = filter::are_across_in_tables::<S::F32>(pair, tables, met.batch(first), limits);
         n_kept = met.keep_batch(simd, first, !no, n_kept);
     }
     met.truncate(n_kept);
     let mut n_kept = 0;
     for first in (0..met.len()).step_by(BATCH) {
-        let no = filter::are_aside_in_tables::<S::F32>(pair, tables, met.batch(first), until);
+        let no = filter::are_aside_in_tables::<S::F32>(pair, tables, met.batch(first), limits);
         n_kept = met.keep_batch(simd, first, !no, n_kept);
     }
     met.truncate(n_kept);
