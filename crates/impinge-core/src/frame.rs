@@ -238,10 +238,15 @@ impl Frame {
 
     /// Makes this a question about all ways that end at rounded positions, at any time of the step.
     pub(crate) fn set_rounding(&mut self, scene: &Scene) {
+        // The layers of a body share its positions.
+        let mut of_bodies = BTreeMap::new();
         for ix in 0..self.layers.len() {
             let body = self.body(scene, LayerIx::from_usize(ix));
-            let end = body.end_positions();
-            self.layers[ix].rounded = end.map_or(0.0, |end| body.positions().most_rounded(end));
+            let rounded = of_bodies.entry(self.layers[ix].id).or_insert_with(|| {
+                let end = body.end_positions();
+                end.map_or(0.0, |end| body.positions().most_rounded(end))
+            });
+            self.layers[ix].rounded = *rounded;
         }
     }
 

@@ -16,8 +16,8 @@ mod vec64;
 
 pub(crate) use extent::Extent;
 pub(crate) use pose::Pose;
-use vec4::center_f32;
 pub(crate) use vec4::{Vec4, of_vertices_f32};
+use vec4::{center_f32, extent};
 
 use crate::elements::{Elements, with_corners};
 use crate::grouping::bounds::{Bounds, LaneBounds, greater, lesser, round_down, round_up};
@@ -269,18 +269,6 @@ fn of_elements<const N: usize>(
         }
     }
     lanes.clear_from(corners.len());
-}
-
-#[inline(always)]
-fn extent<const N: usize>(positions: &[[f32; 3]], corners: &[u32; N]) -> (Vec4, Vec4) {
-    let first = Vec4::load(positions, corners[0] as usize);
-    let (mut min, mut max) = (first, first);
-    for &corner in &corners[1..] {
-        let vertex = Vec4::load(positions, corner as usize);
-        min = min.min(vertex);
-        max = max.max(vertex);
-    }
-    (min, max)
 }
 
 impl LaneBounds {

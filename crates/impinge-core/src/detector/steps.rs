@@ -417,10 +417,8 @@ impl Detector {
                     advance.fraction = 0.0;
                     return Ok(advance);
                 }
-                if are_all_known {
-                    advance.n_tried += 1;
-                    return Ok(advance);
-                }
+            }
+            if !touches && !are_all_known {
                 let trial = trial.get_or_insert_with(|| scene.clone());
                 for (id, positions) in &advance.positions {
                     match positions {

@@ -300,7 +300,8 @@ kernels! {
     dispatch_cells: DispatchCells = DISPATCH_CELLS [] from "dispatch_cells" ("reserve", "groups");
     dispatch_scatter: DispatchScatter = DISPATCH_SCATTER []
         from "dispatch_scatter" ("coarse", "groups");
-    dispatch_tile: DispatchTile = DISPATCH_TILE [] from "dispatch_tile" ("reserve", "groups");
+    dispatch_tile: DispatchTile = DISPATCH_TILE []
+        from "dispatch_tile" ("reserve", "places", "groups");
     pairing_cells: PairingCells = PAIRING_CELLS []
         from "pairing_cells" ("boxes", "filters", "meets", "ids", "reserve", "groups");
 }

@@ -163,15 +163,22 @@ pub(crate) fn of_vertices_f32(positions: &[[f32; 3]], vertices: &[u32]) -> (Boun
     (bounds, (x + y + z).is_finite())
 }
 
-/// The middle of an element's box: the result of [`Bounds::center`].
+/// The ends of an element's box.
 #[inline(always)]
-pub(crate) fn center_f32<const N: usize>(positions: &[[f32; 3]], corners: &[u32; N]) -> [f32; 3] {
+pub(super) fn extent<const N: usize>(positions: &[[f32; 3]], corners: &[u32; N]) -> (Vec4, Vec4) {
     let first = Vec4::load(positions, corners[0] as usize);
     let (mut min, mut max) = (first, first);
-    for &vertex in &corners[1..] {
-        let vertex = Vec4::load(positions, vertex as usize);
+    for &corner in &corners[1..] {
+        let vertex = Vec4::load(positions, corner as usize);
         min = min.min(vertex);
         max = max.max(vertex);
     }
+    (min, max)
+}
+
+/// The middle of an element's box: the result of [`Bounds::center`].
+#[inline(always)]
+pub(crate) fn center_f32<const N: usize>(positions: &[[f32; 3]], corners: &[u32; N]) -> [f32; 3] {
+    let (min, max) = extent(positions, corners);
     min.half().add(max.half()).xyz()
 }

@@ -16,9 +16,6 @@
 @group(0) @binding(2) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(3) var<uniform> params: Params;
 
-var<workgroup> n_items: atomic<u32>;
-var<workgroup> first_item: u32;
-
 // `params.first`: the cell.
 @compute @workgroup_size(64)
 fn main(
@@ -26,10 +23,6 @@ fn main(
     @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    if lane == 0u {
-        atomicStore(&n_items, 0u);
-    }
-    workgroupBarrier();
     let ix = group_number(group, n_groups) * 64u + lane;
     let side = params.tile_side;
     let size = params.group_size;
@@ -37,16 +30,7 @@ fn main(
     let column = params.tile_column + ix % side;
     let groups = params.n_entries / size + select(0u, 1u, params.n_entries % size != 0u);
     let is_item = ix < side * side && row <= column && column < groups;
-    var at = 0u;
-    if is_item {
-        at = atomicAdd(&n_items, 1u);
-    }
-    workgroupBarrier();
-    if lane == 0u {
-        first_item = reserve(N_ITEMS, atomicLoad(&n_items));
-    }
-    workgroupBarrier();
-    at += first_item;
+    let at = place_in(N_ITEMS, is_item, lane);
     if is_item && at < arrayLength(&items) {
         let cell = params.first;
         let x = cell % grid[0].resolution.x;

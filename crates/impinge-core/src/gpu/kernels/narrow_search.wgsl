@@ -14,7 +14,7 @@
 // Where the earliest contact is sought, the end is the least time by which any pair touches. So most pairs are dropped after one
 // interval. Where any contact is sought, all threads end once there is one.
 
-// PairTimes are whole numbers of ticks, so a time and its difference to 1 are exact.
+// Times are whole numbers of ticks, so a time and its difference to 1 are exact.
 const TICKS: u32 = 0x1000000u;
 const TICK: f32 = 0x1p-24f;
 // Twice the whole step: no time.

@@ -102,7 +102,7 @@ impl NearElements {
             false => part,
         };
         let key = pair_key(numbers[0], numbers[1]);
-        if !world.frame.has_cell() || world.frame.is_owned(world.scene, key) {
+        if world.frame.is_owned(world.scene, key) {
             let labels = Labels::new(world.frame.n_primitives());
             self.keys.push(batch.between.kind, labels.put(key, part));
         }

@@ -83,7 +83,7 @@ fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: World<'_>, batch: Batch<'
                 }
             }
             let key = key_in(batch.groups, batch.met.lanes(ix));
-            if !world.frame.has_cell() || world.frame.is_owned(world.scene, key) {
+            if world.frame.is_owned(world.scene, key) {
                 overlaps.keys.push(between.kind, key);
             }
         }
