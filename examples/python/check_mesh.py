@@ -50,8 +50,7 @@ def main():
     else:
         vertices, faces = knotted_tube()
     # Files such as STL repeat a vertex for every face; faces are neighbours by position.
-    vertices, welded = np.unique(vertices, axis=0, return_inverse=True)
-    faces = welded.reshape(-1)[faces]
+    vertices, faces, _ = impinge.weld(vertices, faces)
 
     pairs = impinge.self_pairs(vertices, faces, shared_vertex=arguments.shared_vertex)
     print(f"{len(vertices)} vertices, {len(faces)} faces: {len(pairs)} pairs of faces intersect")

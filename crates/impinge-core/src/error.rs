@@ -181,6 +181,9 @@ pub enum Error {
         /// The driver's message.
         what: String,
     },
+    /// Not as many positions as were welded. Weld each mesh by its own map.
+    #[error(transparent)]
+    Weld(#[from] impinge_weld::WrongNumber),
     /// The threads of the pool could not be started.
     #[error("thread pool: {0}")]
     Threads(String),

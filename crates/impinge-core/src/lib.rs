@@ -60,6 +60,7 @@ pub use gpu::Capacities;
 pub use gpu::{DeviceInfo, ResidentLayer, ResidentPairs, ResidentStep, devices, devices_async};
 pub use ids::BodyId;
 pub use impacts::{Candidates, Impact, Impacts, hash_impact_rows};
+pub use impinge_weld::{Coordinate, Weld, WrongNumber};
 pub use near::{ClosestPoints, NearPair, NearPairs, NearQuery};
 pub use pair_kind::{PairKind, PairKinds};
 pub use pairs::{Pairs, Primitive, hash_rows};

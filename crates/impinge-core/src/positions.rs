@@ -156,7 +156,7 @@ mod sealed {
 }
 
 /// `f32` or `f64`: both are stored as given, and answers are exact for both.
-pub trait Real: sealed::Sealed + Copy + Send + Sync + 'static {
+pub trait Real: sealed::Sealed + impinge_weld::Coordinate + Send + Sync + 'static {
     #[doc(hidden)]
     fn all_in_range(numbers: &[Self]) -> bool;
     #[doc(hidden)]

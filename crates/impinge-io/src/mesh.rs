@@ -1,8 +1,5 @@
 //! A mesh as plain arrays, and the welding of its vertices.
 
-use std::collections::HashMap;
-use std::hash::{BuildHasher, Hasher, RandomState};
-
 /// Vertex positions in the precision of their file: binary `float` stays f32; text is read as f64, so that no coordinate is
 /// silently rounded to f32.
 #[derive(Debug, Clone, PartialEq)]
@@ -146,49 +143,16 @@ impl Mesh {
 /// assert_eq!(weld.map(), [0, 1, 0]);
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Weld {
-    /// The welded vertex of each vertex.
-    map: Vec<u32>,
-    /// For each welded vertex the first vertex that it came from; ascending.
-    firsts: Vec<u32>,
-}
+pub struct Weld(impinge_weld::Weld);
 
 impl Weld {
     /// Welds vertices whose coordinates are all equal as numbers (-0.0 equals 0.0). Of equal vertices the first one stays, and
     /// the order of vertices is kept. NaN equals nothing, so a vertex with NaN is never welded.
     pub fn by_position(positions: &Positions) -> Self {
-        match positions {
-            Positions::F32(p) => Self::by_key(
-                p.iter()
-                    .map(|v| v.map(|c| (!c.is_nan()).then_some((c + 0.0).to_bits()))),
-            ),
-            Positions::F64(p) => Self::by_key(
-                p.iter()
-                    .map(|v| v.map(|c| (!c.is_nan()).then_some((c + 0.0).to_bits()))),
-            ),
-        }
-    }
-
-    /// The keys are the bits of `c + 0.0`, which turns -0.0 into 0.0 and nothing else; `None` equals nothing.
-    fn by_key<T: Copy + Eq + std::hash::Hash>(
-        keys: impl ExactSizeIterator<Item = [Option<T>; 3]>,
-    ) -> Self {
-        let mut seen: HashMap<[T; 3], u32, Seed> =
-            HashMap::with_capacity_and_hasher(keys.len(), Seed::random());
-        let mut map = Vec::with_capacity(keys.len());
-        let mut firsts: Vec<u32> = Vec::new();
-        for (ix, key) in (0u32..).zip(keys) {
-            let fresh = firsts.len() as u32;
-            let welded = match key {
-                [Some(x), Some(y), Some(z)] => *seen.entry([x, y, z]).or_insert(fresh),
-                _ => fresh,
-            };
-            if welded == fresh {
-                firsts.push(ix);
-            }
-            map.push(welded);
-        }
-        Weld { map, firsts }
+        Weld(match positions {
+            Positions::F32(p) => impinge_weld::Weld::by_position(p),
+            Positions::F64(p) => impinge_weld::Weld::by_position(p),
+        })
     }
 
     /// Welds only vertices that both weldings weld: given two poses of the same vertices, those that coincide in both.
@@ -196,19 +160,17 @@ impl Weld {
     /// # Panics
     /// If the two weldings have different numbers of vertices.
     pub fn and(&self, other: &Weld) -> Self {
-        assert_eq!(self.map.len(), other.map.len(), "of the same vertices");
-        let both = self.map.iter().zip(&other.map);
-        Self::by_key(both.map(|(&a, &b)| [Some(a), Some(b), Some(0)]))
+        Weld(self.0.and(&other.0))
     }
 
     /// How many vertices the welding removed.
     pub fn n_welded(&self) -> usize {
-        self.map.len() - self.firsts.len()
+        self.0.n_welded()
     }
 
     /// For each vertex before the welding, its index after it.
     pub fn map(&self) -> &[u32] {
-        &self.map
+        self.0.map()
     }
 
     /// Welds the mesh that this welding was computed from: its vertices, and the indices of its primitives.
@@ -219,10 +181,7 @@ impl Weld {
         if let Some(positions) = self.positions(&mesh.positions) {
             mesh.positions = positions;
             for ix in mesh.elements.indices_mut() {
-                // An index out of range stays out of range, because welding only removes vertices.
-                if let Some(&welded) = self.map.get(*ix as usize) {
-                    *ix = welded;
-                }
+                *ix = self.0.index(*ix);
             }
         }
     }
@@ -231,25 +190,17 @@ impl Weld {
     ///
     /// In a frame of a sequence this means that the mesh comes apart at a welded vertex.
     pub fn torn(&self, positions: &Positions) -> Option<[u32; 2]> {
-        (0u32..).zip(&self.map).find_map(|(ix, &welded)| {
-            let first = *self.firsts.get(welded as usize)?;
-            let (a, b) = (positions.get(first as usize)?, positions.get(ix as usize)?);
-            (a != b).then_some([first, ix])
-        })
+        match positions {
+            Positions::F32(p) => self.0.torn(p),
+            Positions::F64(p) => self.0.torn(p),
+        }
     }
 
     /// The positions of the welded vertices, taken from those of all vertices (of any frame); `None` if their number differs.
     pub fn positions(&self, positions: &Positions) -> Option<Positions> {
-        if positions.len() != self.map.len() {
-            return None;
-        }
         Some(match positions {
-            Positions::F32(p) => {
-                Positions::F32(self.firsts.iter().map(|&ix| p[ix as usize]).collect())
-            }
-            Positions::F64(p) => {
-                Positions::F64(self.firsts.iter().map(|&ix| p[ix as usize]).collect())
-            }
+            Positions::F32(p) => Positions::F32(self.0.positions(p).ok()?),
+            Positions::F64(p) => Positions::F64(self.0.positions(p).ok()?),
         })
     }
 }
@@ -262,52 +213,6 @@ pub fn weld(mesh: &mut Mesh) -> usize {
     let weld = Weld::by_position(&mesh.positions);
     weld.apply(mesh);
     weld.n_welded()
-}
-
-/// The seed of a [`Mix`], random for each weld, so that nobody can prepare a file whose vertices collide in the hash table. The
-/// result does not depend on it.
-struct Seed(u64);
-
-impl Seed {
-    fn random() -> Self {
-        Seed(RandomState::new().hash_one(0u64))
-    }
-}
-
-impl BuildHasher for Seed {
-    type Hasher = Mix;
-
-    fn build_hasher(&self) -> Mix {
-        Mix(self.0)
-    }
-}
-
-/// A short multiplicative hash of the bits of coordinates. The standard library's hash took most of the time of a weld.
-struct Mix(u64);
-
-impl Hasher for Mix {
-    fn write(&mut self, bytes: &[u8]) {
-        for chunk in bytes.chunks(8) {
-            let mut word = [0; 8];
-            word[..chunk.len()].copy_from_slice(chunk);
-            self.write_u64(u64::from_le_bytes(word));
-        }
-    }
-
-    fn write_u32(&mut self, word: u32) {
-        self.write_u64(u64::from(word));
-    }
-
-    fn write_u64(&mut self, word: u64) {
-        // A folded 128-bit product: every bit of the input affects the high and the low bits, which the hash table uses.
-        let product = u128::from(self.0 ^ word ^ 0x9E37_79B9_7F4A_7C15)
-            * u128::from(0xD6E8_FEB8_6659_FD93_u64);
-        self.0 = (product as u64) ^ ((product >> 64) as u64);
-    }
-
-    fn finish(&self) -> u64 {
-        self.0
-    }
 }
 
 #[cfg(test)]
@@ -336,19 +241,6 @@ mod tests {
             Elements::Triangles(vec![[0, 1, 2], [0, 1, 2], [1, 1, 0]])
         );
         assert_eq!(weld(&mut mesh), 0);
-    }
-
-    #[test]
-    fn weld_separates_what_differs_in_the_last_bit() {
-        let near = f64::from_bits(1.0f64.to_bits() + 1);
-        let weld = Weld::by_position(&Positions::F64(vec![
-            [1.0; 3],
-            [near, 1.0, 1.0],
-            [f64::NAN; 3],
-            [f64::NAN; 3],
-            [1.0; 3],
-        ]));
-        assert_eq!(weld.map(), [0, 1, 2, 3, 0]);
     }
 
     #[test]

@@ -99,13 +99,7 @@ pub fn elements(
     check_columns(&array, name, allowed)?;
     let indices = indices(&array, numbers, name)?;
     let n_columns = array.shape()[1];
-    if let Some(at) = indices.iter().position(|&ix| ix as usize >= n_vertices) {
-        let place = format!("{name}[{}, {}]", at / n_columns, at % n_columns);
-        return Err(PyValueError::new_err(format!(
-            "{place} = {}: there are {n_vertices} vertices",
-            indices[at]
-        )));
-    }
+    check_indices(&indices, n_columns, name, n_vertices)?;
     Ok(match (n_columns, kind) {
         (1, _) => Elements::Points(indices.as_chunks().0.to_vec()),
         (2, _) => Elements::Edges(indices.as_chunks().0.to_vec()),
@@ -226,6 +220,33 @@ pub fn rows(argument: &Bound<'_, PyAny>, name: &str, n_columns: usize) -> PyResu
     let numbers = NumberKind::of(&array, name)?;
     check_columns(&array, name, &[n_columns])?;
     indices(&array, numbers, name)
+}
+
+/// Rows `(n, k)` of vertex indices below `n_vertices`, row after row, and `k`.
+pub fn index_rows(
+    argument: &Bound<'_, PyAny>,
+    name: &str,
+    n_vertices: usize,
+) -> PyResult<(Vec<u32>, usize)> {
+    let array = as_array(argument, name)?;
+    let numbers = NumberKind::of(&array, name)?;
+    check_columns(&array, name, &[1, 2, 3, 4])?;
+    let n_columns = array.shape()[1];
+    let indices = indices(&array, numbers, name)?;
+    check_indices(&indices, n_columns, name, n_vertices)?;
+    Ok((indices, n_columns))
+}
+
+/// Refuses an index of a vertex that does not exist.
+fn check_indices(indices: &[u32], n_columns: usize, name: &str, n_vertices: usize) -> PyResult<()> {
+    let Some(at) = indices.iter().position(|&ix| ix as usize >= n_vertices) else {
+        return Ok(());
+    };
+    let place = format!("{name}[{}, {}]", at / n_columns, at % n_columns);
+    Err(PyValueError::new_err(format!(
+        "{place} = {}: there are {n_vertices} vertices",
+        indices[at]
+    )))
 }
 
 /// The contiguous rows of an array that [`in_c_order`] has made.

@@ -1,14 +1,15 @@
 //! The everyday case in one line.
 
-use numpy::PyArray2;
+use impinge::{Positions, Real, Weld};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays;
+use crate::arrays::{self, PositionArray};
 use crate::detector::Detector;
-use crate::errors::Names;
+use crate::errors::{Names, raise};
 use crate::result::Answer;
-use crate::scene::Scene;
+use crate::scene::{Scene, positions_array};
 use crate::settings::{self, Argument, kind};
 
 /// Which primitives of two meshes intersect.
@@ -86,7 +87,7 @@ pub fn pairs<'py>(
 /// shared_vertex : {"skip", "resolve"}
 ///     Primitives that share a vertex index are not reported, or reported when they share more points
 ///     than the vertices they have in common. Vertices at one position with different indices are not
-///     shared: weld them first (``numpy.unique(vertices, axis=0, return_inverse=True)``) to get the
+///     shared: weld them first (`weld`) to get the
 ///     answer of the program ``impinge self``, which welds and uses ``"resolve"``.
 /// **settings
 ///     As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given: waking a GPU
@@ -124,6 +125,79 @@ pub fn self_pairs<'py>(
     question.set_item("within", 0)?;
     question.set_item("shared_vertex", shared_vertex)?;
     ask(py, scene, &question, settings)
+}
+
+/// Makes one vertex of all vertices at the same position.
+///
+/// Files such as STL, and meshes of renderers, repeat a vertex along each seam. Faces on both sides of a seam
+/// then touch, but are no neighbours, because vertices are shared when their indices are equal.
+///
+/// Parameters
+/// ----------
+/// vertices : array_like, shape (v, 3)
+///     Positions, float32 or float64. They are compared as numbers, without a tolerance; of equal ones the
+///     first stays. NaN equals nothing.
+/// faces : array_like of int, shape (n, k), k from 1 to 4
+///     Elements of any kind as vertex indices.
+///
+/// Returns
+/// -------
+/// vertices : numpy.ndarray, shape (w, 3)
+///     The vertices that stay, in their order and precision.
+/// faces : numpy.ndarray of uint32, shape (n, k)
+///     The same elements in the same order, with the indices of the vertices that stay.
+/// map : numpy.ndarray of uint32, shape (v,)
+///     For each vertex its index among those that stay. The positions of a later frame are welded by
+///     ``positions[numpy.unique(map, return_index=True)[1]]``.
+///
+/// Raises
+/// ------
+/// ValueError, TypeError
+///     As `Scene.add`.
+///
+/// Examples
+/// --------
+/// >>> import impinge
+/// >>> soup = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+/// >>> vertices, faces, index = impinge.weld(soup, [[0, 1, 2], [3, 4, 5]])
+/// >>> faces
+/// array([[0, 1, 2],
+///        [1, 3, 2]], dtype=uint32)
+/// >>> index
+/// array([0, 1, 2, 1, 3, 2], dtype=uint32)
+#[pyfunction]
+pub fn weld<'py>(
+    py: Python<'py>,
+    vertices: &Bound<'py, PyAny>,
+    faces: &Bound<'py, PyAny>,
+) -> PyResult<(
+    Bound<'py, PyAny>,
+    Bound<'py, PyArray2<u32>>,
+    Bound<'py, PyArray1<u32>>,
+)> {
+    let positions = PositionArray::new(vertices, "vertices")?;
+    let (mut indices, n_columns) = arrays::index_rows(faces, "faces", positions.len())?;
+    let (weld, welded): (Weld, Positions) = match &positions {
+        PositionArray::F32(array) => welded(arrays::slice_rows::<f32, 3>(array)?)?,
+        PositionArray::F64(array) => welded(arrays::slice_rows::<f64, 3>(array)?)?,
+    };
+    for index in &mut indices {
+        *index = weld.index(*index);
+    }
+    let shape = [indices.len() / n_columns, n_columns];
+    Ok((
+        positions_array(py, &welded)?,
+        PyArray1::from_vec(py, indices).reshape(shape)?,
+        PyArray1::from_slice(py, weld.map()),
+    ))
+}
+
+fn welded<R: Real>(positions: &[[R; 3]]) -> PyResult<(Weld, Positions)> {
+    let weld = Weld::by_position(positions);
+    let welded = weld
+        .positions(positions)
+        .map_err(|error| raise(error.into()))?;
+    Ok((weld, welded.into()))
 }
 
 fn ask<'py>(

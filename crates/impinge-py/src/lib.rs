@@ -45,7 +45,7 @@ mod _impinge {
     #[pymodule_export]
     use super::errors::{Cancelled, TooManyPairs};
     #[pymodule_export]
-    use super::functions::{hash_rows, pairs, self_pairs};
+    use super::functions::{hash_rows, pairs, self_pairs, weld};
     #[pymodule_export]
     use super::near::NearPairs;
     #[pymodule_export]

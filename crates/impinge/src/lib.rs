@@ -116,7 +116,7 @@ pub use impinge_core::{
     Control, Detector, Elements, Error, Filter, Impact, Impacts, InstructionSet, Kind, Method,
     NearPair, NearPairs, NearQuery, PairKind, PairKinds, Pairs, Part, Placement, PositionRows,
     Positions, Primitive, Progress, Query, Real, Recluster, Scene, Settings, SharedVertex, Stage,
-    Start, Statistics, Step, Toi, hash_impact_rows, hash_rows,
+    Start, Statistics, Step, Toi, Weld, WrongNumber, hash_impact_rows, hash_rows,
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{

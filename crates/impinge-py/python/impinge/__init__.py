@@ -42,6 +42,7 @@ from ._impinge import (
     hash_rows,
     pairs,
     self_pairs,
+    weld,
 )
 from ._manager import CollisionManager
 
@@ -73,4 +74,5 @@ __all__ = [
     "ray",
     "self_pairs",
     "tiles",
+    "weld",
 ]

@@ -44,6 +44,7 @@ __all__ = [
     "hash_rows",
     "pairs",
     "self_pairs",
+    "weld",
 ]
 
 __version__: str
@@ -541,6 +542,9 @@ def self_pairs(
     kind: _RowKind | None = None,
     **settings: Unpack[_Settings],
 ) -> npt.NDArray[np.uint32]: ...
+def weld(
+    vertices: _Array, faces: _Array
+) -> tuple[npt.NDArray[Any], npt.NDArray[np.uint32], npt.NDArray[np.uint32]]: ...
 def hash_rows(rows: _Array) -> int: ...
 def _check(
     paths: list[str],
