@@ -162,7 +162,7 @@ impl Problem {
             .collect::<Result<Vec<_>, _>>()?;
         let query = match (self.ask, &ids[..]) {
             (Ask::Between, [a, b]) => Query::between(*a, *b),
-            (Ask::Within, [a]) => Query::within(*a),
+            (Ask::Within, [a]) => Query::within(*a).shared_vertex(SharedVertex::Skip),
             (Ask::Resolved, [a]) => Query::within(*a).shared_vertex(SharedVertex::Resolve),
             (Ask::All, _) => Query::all(),
             (ask, _) => return Err(format!("{ask:?} does not fit {} bodies", ids.len()).into()),

@@ -13,8 +13,8 @@ export interface Options {
   /** How candidates are found. All methods give the same pairs. `"auto"` by default: `"cells"` for large bodies that are new, else `"clusters"`. */
   method?: "auto" | "clusters" | "cells" | "naive";
   /**
-   * Self-collision of pairs that share a vertex: not reported (`"skip"`, the default), or reported if they meet in more
-   * than the parts that they share (`"resolve"`).
+   * Self-collision of pairs that share a vertex: reported if they meet in more than the parts that they share
+   * (`"resolve"`, the default), or not at all (`"skip"`).
    */
   sharedVertex?: "skip" | "resolve";
 }

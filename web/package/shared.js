@@ -52,7 +52,7 @@ export function bodies(...given) {
   return Uint32Array.from(given, body);
 }
 
-export function chosen({ method = "auto", sharedVertex = "skip" } = {}) {
+export function chosen({ method = "auto", sharedVertex = "resolve" } = {}) {
   return [String(method), String(sharedVertex)];
 }
 

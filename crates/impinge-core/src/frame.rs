@@ -349,6 +349,11 @@ impl Frame {
         Ok(())
     }
 
+    /// Whether pairs of one body that share a vertex are asked for.
+    pub fn resolves(&self) -> bool {
+        self.shared_vertex == SharedVertex::Resolve && self.layers.iter().any(|layer| layer.within)
+    }
+
     /// The number of elements of all layers together.
     pub fn n_primitives(&self) -> u64 {
         self.layers

@@ -8,13 +8,13 @@ use crate::ids::BodyId;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum SharedVertex {
     /// Pairs that share a vertex index are not reported.
-    #[default]
     Skip,
-    /// They are reported when they meet in more than the parts that they share. Triangles: sharing one
+    /// The default: they are reported when they meet in more than the parts that they share. Triangles: sharing one
     /// vertex, when the edge opposite it in one meets the other triangle; sharing an edge, when
     /// they are coplanar and fold to the same side; sharing all three, always. Tetrahedra: when
     /// the intersection is larger than the common vertex, edge or face. Edges and points of one body
     /// that share a vertex are not reported under either rule.
+    #[default]
     Resolve,
 }
 
@@ -46,7 +46,8 @@ impl Cell {
 ///
 /// ```
 /// use impinge::{Query, SharedVertex};
-/// let query = Query::everything().shared_vertex(SharedVertex::Resolve);
+/// let query = Query::everything().shared_vertex(SharedVertex::Skip);
+/// assert_ne!(query, Query::everything());
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Query {
@@ -100,7 +101,8 @@ impl Query {
         })
     }
 
-    /// The adjacency rule of self-collision.
+    /// The adjacency rule of self-collision: [`SharedVertex::Resolve`], unless it is said. Vertices are shared when their
+    /// indices are equal: positions that coincide count once they are welded.
     pub fn shared_vertex(mut self, rule: SharedVertex) -> Self {
         self.shared_vertex = rule;
         self

@@ -104,10 +104,10 @@ fn a_crowded_cell_is_worked_in_tiles() {
     let web = soup::lattice_web(290, 4, 9);
     let mut scene = Scene::new();
     let id = soup.add_to(&mut scene).unwrap();
-    let within = Query::within(id);
+    let within = Query::within(id).shared_vertex(SharedVertex::Skip);
     let mut both = scene.clone();
     web.add_to(&mut both).unwrap();
-    let everything = Query::everything().shared_vertex(SharedVertex::Resolve);
+    let everything = Query::everything();
     for (scene, query) in [
         (&scene, within),
         (&both, everything.clone()),
@@ -354,7 +354,10 @@ fn pieces_keep_to_filters_ignored_pairs_and_frames() {
         Query::all(),
         Query::all().ignore(a, b),
         Query::everything().shared_vertex(SharedVertex::Resolve),
-        Query::everything().ignore(c, c).ignore(b, a),
+        Query::everything()
+            .ignore(c, c)
+            .ignore(b, a)
+            .shared_vertex(SharedVertex::Skip),
         Query::between(c, d),
         Query::within(c).shared_vertex(SharedVertex::Resolve),
     ];

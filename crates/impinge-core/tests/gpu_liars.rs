@@ -194,8 +194,8 @@ fn questions() -> Vec<(Case, Vec<[u32; 4]>)> {
     let of_cubes = Query::everything().ignore(ids[0], ids[1]);
     let of_scene = [
         Query::between(a, b),
+        Query::everything().shared_vertex(SharedVertex::Skip),
         Query::everything(),
-        Query::everything().shared_vertex(SharedVertex::Resolve),
     ];
     let asked = of_scene.map(|query| (&scene, query)).into_iter();
     asked

@@ -140,9 +140,9 @@ impl Detector {
     ///     ``within=True`` go together.
     /// ignore : sequence of (Body, Body)
     ///     Bodies whose pairs are left out; a body named twice leaves out its self-collision.
-    /// shared_vertex : {"skip", "resolve"}
-    ///     Primitives of one body that share a vertex are not reported, or reported when they
-    ///     meet in more than what they share.
+    /// shared_vertex : {"resolve", "skip"}
+    ///     Primitives of one body that share a vertex are reported when they meet in more than
+    ///     what they share, or never.
     /// owned_by : (low, high), optional
     ///     Only the pairs that belong to the half-open box between these two corners, three numbers each: a pair belongs
     ///     to the cell that holds the larger of the lower corners of its two bounding boxes, axis by axis. For programs
@@ -180,7 +180,7 @@ impl Detector {
             progress=None, cancel=None, filter=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          shared_vertex=\"skip\", owned_by=None, progress=None, cancel=None, filter=None)"
+                          shared_vertex=\"resolve\", owned_by=None, progress=None, cancel=None, filter=None)"
     )]
     fn detect(
         slf: &Bound<'_, Self>,
@@ -240,7 +240,7 @@ impl Detector {
             progress=None, cancel=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          shared_vertex=\"skip\", owned_by=None, progress=None, cancel=None)"
+                          shared_vertex=\"resolve\", owned_by=None, progress=None, cancel=None)"
     )]
     fn count(
         slf: &Bound<'_, Self>,
@@ -283,7 +283,7 @@ impl Detector {
             progress=None, cancel=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          shared_vertex=\"skip\", owned_by=None, progress=None, cancel=None)"
+                          shared_vertex=\"resolve\", owned_by=None, progress=None, cancel=None)"
     )]
     fn any(
         slf: &Bound<'_, Self>,

@@ -84,11 +84,11 @@ pub fn pairs<'py>(
 ///     Triangles or tetrahedra as vertex indices.
 /// kind : {"points", "edges", "triangles", "tetrahedra", "quads"}, optional
 ///     What the rows of `faces` are, as for `Scene.add`.
-/// shared_vertex : {"skip", "resolve"}
-///     Primitives that share a vertex index are not reported, or reported when they share more points
-///     than the vertices they have in common. Vertices at one position with different indices are not
+/// shared_vertex : {"resolve", "skip"}
+///     Primitives that share a vertex index are reported when they share more points than the vertices
+///     they have in common, or never. Vertices at one position with different indices are not
 ///     shared: weld them first (`weld`) to get the
-///     answer of the program ``impinge self``, which welds and uses ``"resolve"``.
+///     answer of the program ``impinge self``.
 /// **settings
 ///     As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given: waking a GPU
 ///     does not pay for one question.
@@ -105,7 +105,7 @@ pub fn pairs<'py>(
 #[pyfunction]
 #[pyo3(
     signature = (vertices, faces, shared_vertex=None, *, kind=None, **settings),
-    text_signature = "(vertices, faces, shared_vertex=\"skip\", *, kind=None, **settings)"
+    text_signature = "(vertices, faces, shared_vertex=\"resolve\", *, kind=None, **settings)"
 )]
 pub fn self_pairs<'py>(
     py: Python<'py>,

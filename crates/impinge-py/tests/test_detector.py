@@ -40,7 +40,7 @@ def truth(scene, **question):
         {"between": (2, 1)},
         {"within": 3},
         {"within": True},
-        {"within": 3, "shared_vertex": "resolve"},
+        {"within": 3, "shared_vertex": "skip"},
         {"between": True, "within": True},
         {"between": True, "within": True, "ignore": [(1, 0), (3, 3)]},
         {"between": None, "within": False, "ignore": iter([(2, 1)])},
@@ -57,6 +57,21 @@ def test_questions(scene, question, method):
     assert len(result) > 0 and bool(result)
     assert np.array_equal(result.rows, expected.rows)
     assert result.hash == expected.hash == impinge.hash_rows(result.rows)
+
+
+def test_neighbours_are_resolved_unless_asked_otherwise():
+    # The second triangle folds back onto the first one, across their common edge.
+    vertices = np.array([[0, 0, 0], [2, 0, 0], [0, 2, 0], [1, 1.5, 0]], np.float32)
+    faces = [[0, 1, 2], [0, 1, 3]]
+    scene = impinge.Scene()
+    body = scene.add(vertices, faces)
+    detector = impinge.Detector()
+    for rule, expected in [({}, [[0, 1]]), ({"shared_vertex": "resolve"}, [[0, 1]]), ({"shared_vertex": "skip"}, [])]:
+        assert detector.detect(scene, within=body, **rule).pairs().tolist() == expected
+        assert detector.detect(scene, between=True, within=True, **rule).within(body).tolist() == expected
+        assert detector.count(scene, within=body, **rule) == len(expected)
+        assert detector.any(scene, within=body, **rule) == bool(expected)
+        assert impinge.self_pairs(vertices, faces, **rule).tolist() == expected
 
 
 def test_results(scene):

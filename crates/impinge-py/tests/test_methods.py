@@ -134,9 +134,9 @@ def test_self_intersections_agree_with_published_ones(data, name):
     mesh = trimesh.load(data / path, process=False)
     vertices, inverse = np.unique(np.asarray(mesh.vertices), axis=0, return_inverse=True)
     faces = inverse.reshape(-1)[mesh.faces]
-    skip = impinge.self_pairs(vertices, faces)
+    skip = impinge.self_pairs(vertices, faces, shared_vertex="skip")
     assert skip.tolist() == expected["pairs_noshared"]
-    resolve = impinge.self_pairs(vertices, faces, shared_vertex="resolve")
+    resolve = impinge.self_pairs(vertices, faces)
     hits = expected["hits_noshared"] + expected["hits_shared1"] + expected["hits_shared2"]
     assert len(resolve) == hits
 

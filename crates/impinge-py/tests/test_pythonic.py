@@ -246,7 +246,7 @@ def test_rows_of_four():
     across = ACROSS + np.float32([0, 0.25, 0])
     pairs = impinge.pairs(GRID, QUADS, across, FACE, kind_a="quads", kind_b="triangles")
     assert pairs.tolist() == [[0, 0], [1, 0]]
-    assert len(impinge.self_pairs(GRID, QUADS, kind="quads", shared_vertex="resolve")) == 0
+    assert len(impinge.self_pairs(GRID, QUADS, kind="quads")) == 0
     empty = scene.add(GRID, np.empty((0, 4), np.uint32))
     assert scene.n_primitives(empty) == 0
     # A mesh of tetrahedra of any size tells by its first rows.
@@ -332,7 +332,7 @@ def answers(shift):
     assert np.array_equal(pairs[0], pairs[1]) and np.array_equal(pairs[0], default)
     scene = impinge.Scene()
     scene.add(vertices, faces)
-    auto = len(impinge.Detector().detect(scene, within=True, shared_vertex="resolve"))
+    auto = len(impinge.Detector().detect(scene, within=True))
     return len(default), len(own), auto
 
 

@@ -26,7 +26,7 @@ pub struct Ask {
     pub between: bool,
     /// Pairs within each file.
     pub within: bool,
-    /// How pairs of one file that share a vertex are treated. In a step they are always skipped.
+    /// How pairs of one file that share a vertex are treated. In a step they never count.
     pub shared_vertex: SharedVertex,
     /// In a step: what happens to pairs that touch at its start.
     pub start: Start,
@@ -39,7 +39,7 @@ impl Default for Ask {
         Ask {
             between: true,
             within: true,
-            shared_vertex: SharedVertex::Skip,
+            shared_vertex: SharedVertex::default(),
             start: Start::Report,
             toi: Toi::F32,
         }
@@ -153,6 +153,11 @@ impl Plan {
         done: &mut dyn FnMut(&TileResult),
     ) -> Result<(), Error> {
         self.check_ask(options.ask)?;
+        let mut ask = options.ask;
+        if self.is_step() {
+            // The rule has no meaning there: results are for the same question whatever it is.
+            ask.shared_vertex = SharedVertex::Skip;
+        }
         let mut settings = options.settings.clone();
         if settings.backend == Backend::Auto {
             settings.backend = Backend::Cpu;
@@ -170,14 +175,14 @@ impl Plan {
                 });
             }
             let held = self.result(tile).ok().filter(|held| {
-                held.ask == options.ask.name() && !options.again && self.rows_path(tile).exists()
+                held.ask == ask.name() && !options.again && self.rows_path(tile).exists()
             });
             let result = match held {
                 Some(held) => TileResult {
                     was_kept: true,
                     ..held
                 },
-                None => self.run_tile(tile, options.ask, &mut detector, control)?,
+                None => self.run_tile(tile, ask, &mut detector, control)?,
             };
             done(&result);
         }
@@ -194,9 +199,6 @@ impl Plan {
             })
         };
         match self.is_step() {
-            true if ask.shared_vertex == SharedVertex::Resolve => {
-                refuse("shared_vertex", "resolve", "only skip in a plan of a step")
-            }
             false if ask.start == Start::Skip => {
                 refuse("start", "skip", "only report without a step")
             }

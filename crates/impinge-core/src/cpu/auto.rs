@@ -7,7 +7,6 @@
 //! resolved, which `Clusters` settles per vertex; and memory budgets, which the grid would need more of.
 
 use crate::frame::Frame;
-use crate::query::SharedVertex;
 use crate::scene::Scene;
 use crate::tuning::Tuning;
 
@@ -33,8 +32,6 @@ impl Acquaintances {
                 n_new += u64::from(layer.n_primitives);
             }
         }
-        let resolves = frame.shared_vertex == SharedVertex::Resolve
-            && frame.layers.iter().any(|layer| layer.within);
-        n_new >= tuning.auto_from && n_new > frame.n_primitives() / 2 && !resolves
+        n_new >= tuning.auto_from && n_new > frame.n_primitives() / 2 && !frame.resolves()
     }
 }

@@ -23,7 +23,6 @@ use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::hull;
 use crate::positions::Positions;
-use crate::query::SharedVertex;
 use crate::scene::{Body, Scene};
 use crate::settings::{InstructionSet, Settings};
 use crate::stats::Statistics;
@@ -80,7 +79,7 @@ impl Clusters {
             self.refit
                 .run(self.isa, job, settings, caches, scratches, stats)
         })?;
-        if job.frame.shared_vertex == SharedVertex::Resolve && settings.memory_budget.is_none() {
+        if job.frame.resolves() && settings.memory_budget.is_none() {
             stats.time("folds", |_| self.find_folds(job))?;
         }
         for worker in &mut self.scratches {

@@ -142,15 +142,15 @@ fn one(name: &str, model: &Model, rule: SharedVertex) -> Case {
 }
 
 /// Two bodies, of which only the first may meet itself. It does so also where the second is not.
-fn one_meets_itself() -> Case {
+fn one_meets_itself(rule: SharedVertex) -> Case {
     let mut scene = Scene::new();
     let mut add = |model: Model| scene.add(model.elements, model.positions).unwrap();
     add(soup::triangles(900, 0.15, 7));
     let ball = add(surfaces::ball(300).translated([1.5, 0.5, 0.5]));
     Case {
-        name: "one of two meets itself".to_owned(),
+        name: format!("one of two meets itself, {rule:?}"),
         scene,
-        query: Query::everything().ignore(ball, ball),
+        query: Query::everything().ignore(ball, ball).shared_vertex(rule),
     }
 }
 
@@ -209,8 +209,8 @@ pub fn cases() -> Vec<Case> {
     for (n, scale) in [(12, 1.0), (8, 1.0), (7, 1e-30), (6, 1e25)] {
         cases.push(many(n, scale));
     }
-    cases.push(one_meets_itself());
     for rule in rules {
+        cases.push(one_meets_itself(rule));
         cases.push(one("soup", &soup::triangles(900, 0.15, 7), rule));
         cases.push(one("tetrahedra", &soup::tetrahedra(300, 0.2, 8), rule));
         cases.push(one("torus", &torus, rule));
@@ -247,6 +247,7 @@ pub fn cases() -> Vec<Case> {
             built.query.clone(),
             Query::everything(),
             Query::all_within(),
+            Query::all_within().shared_vertex(SharedVertex::Skip),
         ] {
             cases.push(Case {
                 name: format!("{} {query:?}", built.name),

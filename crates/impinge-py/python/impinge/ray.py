@@ -106,7 +106,7 @@ def tiles(
     *,
     between: bool = True,
     within: bool = True,
-    shared_vertex: Literal["skip", "resolve"] = "skip",
+    shared_vertex: Literal["resolve", "skip"] = "resolve",
     start: Literal["report", "skip"] = "report",
     toi: Literal["f32", "f64"] = "f32",
     memory_budget: int | None = None,

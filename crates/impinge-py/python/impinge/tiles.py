@@ -125,7 +125,7 @@ def run(
     *,
     between: bool = True,
     within: bool = True,
-    shared_vertex: Literal["skip", "resolve"] = "skip",
+    shared_vertex: Literal["resolve", "skip"] = "resolve",
     start: Literal["report", "skip"] = "report",
     toi: Literal["f32", "f64"] = "f32",
     threads: int = 0,
@@ -143,8 +143,8 @@ def run(
         Which; by default all of them.
     between, within : bool
         Pairs of different files, pairs within each file. All tiles must be asked the same.
-    shared_vertex : {"skip", "resolve"}
-        As for `Detector.detect`. In a step they are always skipped.
+    shared_vertex : {"resolve", "skip"}
+        As for `Detector.detect`. In a step neighbours never count.
     start, toi
         In a step, as for `Detector.impacts`.
     threads : int

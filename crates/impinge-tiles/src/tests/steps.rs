@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use impinge::{PairKind, SharedVertex, Start, Toi};
+use impinge::{PairKind, Start, Toi};
 use impinge_io::{Elements, Mesh, Positions, Weld, write_impacts_npy};
 
 use super::made::{Random, answer, cells, lattice, moved, plan, run, scatter, step_oracle, write};
@@ -296,15 +296,6 @@ fn what_is_no_step_is_refused_by_name() {
         let expected = format!("separation: {separation} given, {allowed}");
         assert!(refused.starts_with(&expected), "{refused}");
     }
-    let resolve = Ask {
-        shared_vertex: SharedVertex::Resolve,
-        ..Ask::default()
-    };
-    assert!(
-        refusal(&files, &step, resolve)
-            .to_string()
-            .starts_with("shared_vertex: resolve")
-    );
     let still = PlanOptions {
         replace: true,
         ..PlanOptions::default()
