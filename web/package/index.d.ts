@@ -40,6 +40,8 @@ export interface Statistics {
 export interface StepOptions {
   /** Which bodies: none for all bodies and their self-collision (the default), one for its self-collision, two for pairs between them. */
   bodies?: readonly [] | readonly [Body] | readonly [Body, Body];
+  /** Without `bodies`: all pairs (`"all"`, the default), or those of different bodies alone (`"between"`). */
+  which?: "all" | "between";
   /** Pairs that touch at the start: reported with the time 0 (`"report"`, the default) or not at all (`"skip"`). */
   start?: "report" | "skip";
   /** The precision to which times are rounded down: `"f32"` by default. */
@@ -116,6 +118,8 @@ export declare class Detector {
   size(body: Body): { primitives: number; vertices: number };
   /** Pairs between two bodies: `[i0, j0, i1, j1, …]`, primitive i of `a` and j of `b`, sorted. */
   between(a: Body, b: Body): Uint32Array;
+  /** All pairs of different bodies: `[bodyA, i, bodyB, j, …]`, sorted. */
+  betweenAll(): Uint32Array;
   /** Self-collision of a body: `[i0, j0, i1, j1, …]`, sorted. */
   within(body: Body): Uint32Array;
   /** All pairs, self-collision included: `[bodyA, i, bodyB, j, …]`, sorted. */

@@ -39,15 +39,19 @@ export class Detector {
   }
 
   between(a, b) {
-    return this.#bodies.engine.detect(bodies(a, b));
+    return this.#bodies.engine.detect(bodies(a, b), true);
+  }
+
+  betweenAll() {
+    return this.#bodies.engine.detect(bodies(), false);
   }
 
   within(body) {
-    return this.#bodies.engine.detect(bodies(body));
+    return this.#bodies.engine.detect(bodies(body), true);
   }
 
   everything() {
-    return this.#bodies.engine.detect(bodies());
+    return this.#bodies.engine.detect(bodies(), true);
   }
 
   impacts(options) {

@@ -56,8 +56,11 @@ export function chosen({ method = "auto", sharedVertex = "resolve" } = {}) {
   return [String(method), String(sharedVertex)];
 }
 
-function step({ bodies: given = [], start = "report", toi = "f32", separation = 0 } = {}) {
-  return [bodies(...given), String(start), String(toi), Number(separation)];
+function step({ bodies: given = [], which = "all", start = "report", toi = "f32", separation = 0 } = {}) {
+  if (which !== "all" && which !== "between") {
+    throw new RangeError(`which: "${which}" given, "all" or "between" allowed`);
+  }
+  return [bodies(...given), which === "all", String(start), String(toi), Number(separation)];
 }
 
 function impact(impacts, ix) {

@@ -30,6 +30,8 @@ export declare class GpuDetector {
   size(body: Body): Promise<{ primitives: number; vertices: number }>;
   /** Pairs between two bodies: `[i0, j0, i1, j1, …]`. */
   between(a: Body, b: Body): Promise<Answer>;
+  /** All pairs of different bodies: `[bodyA, i, bodyB, j, …]`. */
+  betweenAll(): Promise<Answer>;
   /** Self-collision of a body: `[i0, j0, i1, j1, …]`. */
   within(body: Body): Promise<Answer>;
   /** All pairs, self-collision included: `[bodyA, i, bodyB, j, …]`. */
@@ -46,4 +48,13 @@ export function readMesh(
   name: string,
   bytes: Uint8Array,
   options?: { weld?: boolean },
-): { index: Uint32Array; positions: Float32Array | Float64Array; corners: 3 | 4 };
+): {
+  index: Uint32Array;
+  positions: Float32Array | Float64Array;
+  corners: 3 | 4;
+  /** For each vertex of the file, its number in the mesh: they differ if vertices were welded. */
+  map: Uint32Array;
+};
+
+/** Reads the frames of a point cache (`.pc2`, `.mdd`): the positions of all vertices, per frame. Needs no GPU. */
+export function readFrames(name: string, bytes: Uint8Array): Float32Array[];

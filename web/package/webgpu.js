@@ -1,6 +1,6 @@
 // impinge on WebGPU, asynchronous; and the readers of mesh files.
 
-import load, { Engine, MeshFile } from "./gpu/impinge.js";
+import load, { Engine, MeshFile, read_frames } from "./gpu/impinge.js";
 import { Bodies, bodies, chosen, loader } from "./shared.js";
 
 const [init, mustBeReady] = loader(load, new URL("./gpu/impinge_bg.wasm", import.meta.url));
@@ -57,20 +57,24 @@ export class GpuDetector {
   }
 
   between(a, b) {
-    return this.#answer(a, b);
+    return this.#answer([a, b]);
+  }
+
+  betweenAll() {
+    return this.#answer([], false);
   }
 
   within(body) {
-    return this.#answer(body);
+    return this.#answer([body]);
   }
 
   everything() {
-    return this.#answer();
+    return this.#answer([]);
   }
 
-  #answer(...which) {
+  #answer(which, withSelf = true) {
     return this.#turn(async (held) => ({
-      pairs: await held.engine.detect_async(bodies(...which)),
+      pairs: await held.engine.detect_async(bodies(...which), withSelf),
       hash: held.hash,
       statistics: held.statistics,
     }));
@@ -90,8 +94,13 @@ export function readMesh(name, bytes, { weld = false } = {}) {
   mustBeReady();
   const file = new MeshFile(String(name), bytes, Boolean(weld));
   try {
-    return { index: file.index(), positions: file.positions(), corners: file.corners() };
+    return { index: file.index(), positions: file.positions(), corners: file.corners(), map: file.map() };
   } finally {
     file.free();
   }
+}
+
+export function readFrames(name, bytes) {
+  mustBeReady();
+  return read_frames(String(name), bytes);
 }

@@ -1,327 +1,553 @@
-// The page: bodies that deform, and the answers of the CPU and of WebGPU about the same frames.
+// The page: bodies of a scene or of dropped files, and the exact answer about them as they are.
 
 import init, { Detector } from "impinge";
-import { STAGE, demo, waving } from "./shapes.js";
+import { bodiesOf, looksNumbered, mayBePoses, read } from "./files.js";
+import { Gpu, lookForAdapter, withReaders } from "./gpu.js";
+import { fromLink, toLink } from "./link.js";
+import { extentOf, pose } from "./motion.js";
+import * as panel from "./panel.js";
+import { ballAround, places as placesOf } from "./places.js";
+import { SCENES } from "./shapes.js";
+import { askStep, contactAt } from "./steps.js";
 import { View } from "./view.js";
 
-// Seconds from the first pose of the demo to its last.
+const { element, counted, grouped } = panel;
+
+// Seconds from the first pose of a scene to its last, and frames per second.
 const SECONDS = 7;
-const OPTIONS = { sharedVertex: "resolve" };
+const FRAME_RATE = 10;
+// While a scene plays, the places are listed this often, in milliseconds.
+const LIST_EVERY = 300;
+// A place fills this part of the picture, and is not seen from nearer than this part of the scene.
+const PLACE_SHARE = 0.4;
+const LEAST_PLACE = 0.02;
 
-const element = (id) => document.getElementById(id);
-const [play, time, size, method] = ["play", "time", "size", "method"].map(element);
-const [useGpu, files, demoButton, message] = ["use-gpu", "files", "demo", "message"].map(element);
+const [play, time, scene, size, as, self, method] = ["play", "time", "scene", "size", "as", "self", "method"].map(element);
+const useGpu = element("use-gpu");
 
-const view = new View(element("view"), drag, () => (mustDraw = true));
+// What is shown: `files` as they were read, or `null` for a scene of the page.
+let files = null;
 let bodies = [];
+// From coordinates to those that are drawn: subtract the centre, divide by the radius.
+let stage = { centre: [0, 0, 0], radius: 1 };
+// The last moment: 1 for a scene that changes steadily, the last frame's number for frames, 0 if nothing moves.
+let end = 0;
+let isFramed = false;
+let now = 0;
+let direction = 1;
+let isPlaying = false;
+
 let detector = null;
 let rows = new Uint32Array();
-let isPlaying = true;
+let places = [];
+let place = -1;
+let chosen = null;
+// The primitives of the contact that was gone to.
+let touching = [];
+let step = null;
 let isMoved = true;
 let mustDraw = true;
-let phase = 0;
 let before = null;
+let listed = 0;
 // Counts the frames that the CPU has answered.
-let frames = 0;
+let nAnswers = 0;
 
-function show(id, pairs, ms, hash) {
+const view = new View(element("view"), {
+  change: () => (mustDraw = true),
+  drag(ix, ...by) {
+    const { offset } = bodies[ix];
+    for (const axis of [0, 1, 2]) offset[axis] += by[axis] * stage.radius;
+    element("back").hidden = false;
+    isMoved = true;
+  },
+  click: (hit) => choose(hit),
+  hover(hit, { clientX, clientY }) {
+    const tip = element("tip");
+    tip.hidden = hit === null || isPlaying;
+    if (tip.hidden) return;
+    tip.textContent = panel.nameOf(bodies, hit.body, hit.primitive);
+    tip.style.left = `${Math.min(clientX + 14, window.innerWidth - tip.offsetWidth - 4)}px`;
+    tip.style.top = `${clientY + 14}px`;
+  },
+});
+
+const gpu = new Gpu({
+  answer(n, ms, hash, asked) {
+    show("gpu", n, ms, hash);
+    const isSame = hash === asked.hash;
+    gpuNote(isSame ? "The same hash on the same frame." : `The CPU's hash is ${asked.hash}.`, isSame ? "same" : "different");
+    // Without this, a scene that was paused meanwhile would keep the answer about an older frame.
+    if (asked.nAnswers !== nAnswers) isMoved = true;
+  },
+  note: (text, isBad) => gpuNote(text, isBad ? "different" : ""),
+  stale: () => (isMoved = true),
+});
+
+function gpuNote(text, className) {
+  Object.assign(element("gpu-note"), { textContent: text, className });
+}
+
+function show(id, n, ms, hash) {
   const row = element(id);
-  row.querySelector(".pairs").textContent = pairs.toLocaleString("en");
+  row.querySelector(".pairs").textContent = grouped(n);
   row.querySelector(".ms").textContent = ms.toFixed(ms < 10 ? 2 : 0);
   row.querySelector(".hash").textContent = hash;
 }
 
-function complain(error) {
-  message.textContent = error === null ? "" : String(error.message ?? error);
-  message.hidden = error === null;
+function say(id, text) {
+  element(id).textContent = text;
+  element(id).hidden = text === "";
 }
 
-// WebGPU answers when it can: always the latest frame, and never two at once.
-const gpu = {
-  module: null,
-  detector: null,
-  isBusy: false,
-  // Counts changes of the bodies. An answer about other bodies is not shown.
-  era: 0,
-  note(text, name = "") {
-    const note = element("gpu-note");
-    note.textContent = text;
-    note.className = name;
-  },
-};
+const complain = (text) => say("message", text);
+const options = () => ({ sharedVertex: "resolve", method: method.value });
+const withSelf = () => bodies.length === 1 || self.checked;
 
-// The build with WebGPU and the mesh readers is loaded when it is first needed.
-async function gpuModule() {
-  if (gpu.module === null) {
-    gpu.module = await import("impinge/webgpu");
-    await gpu.module.default();
-  }
-  return gpu.module;
-}
-
-async function openGpu() {
-  gpu.era += 1;
-  const era = gpu.era;
-  const previous = gpu.detector;
-  gpu.detector = null;
-  // At once: what the row shows is an answer of the detector that goes.
-  for (const cell of element("gpu").querySelectorAll("td")) cell.textContent = "";
-  if (!useGpu.checked) {
-    gpu.note(useGpu.disabled ? element("gpu-note").textContent : "WebGPU is off.");
-    await previous?.dispose();
-    return;
-  }
-  gpu.note("Compiling kernels …");
-  try {
-    await previous?.dispose();
-    const { GpuDetector } = await gpuModule();
-    const opened = await GpuDetector.open({ ...OPTIONS, method: method.value });
-    for (const [ix, body] of bodies.entries()) await addTo(opened, body, view.positions(ix));
-    if (era !== gpu.era) return void opened.dispose();
-    gpu.detector = opened;
-    isMoved = true;
-  } catch (error) {
-    if (era === gpu.era) gpu.note(`WebGPU failed: ${error.message}`, "different");
-  }
-}
-
-async function askGpu(cpuHash) {
-  const { detector: asked, era } = gpu;
-  const thisFrame = frames;
-  gpu.isBusy = true;
-  try {
-    for (const [ix] of bodies.entries()) void asked.setPositions(ix, view.positions(ix));
-    const { pairs, hash, statistics } = await asked.everything();
-    if (era !== gpu.era) return;
-    show("gpu", pairs.length / 4, statistics.totalMs, hash);
-    const isSame = hash === cpuHash;
-    gpu.note(
-      isSame ? "The same hash on the same frame." : `The hash of this frame on the CPU is ${cpuHash}`,
-      isSame ? "same" : "different",
-    );
-  } catch (error) {
-    if (era === gpu.era) {
-      gpu.detector = null;
-      gpu.note(`WebGPU failed: ${error.message}`, "different");
-    }
-  } finally {
-    gpu.isBusy = false;
-    // Without this, a scene that was paused meanwhile would keep the answer about an older frame.
-    if (thisFrame !== frames) isMoved = true;
-  }
-}
-
-function addTo(detector, { index, corners }, positions) {
-  return corners === 4 ? detector.addTetrahedra(index, positions) : detector.add(index, positions);
-}
-
-// New detectors for the bodies that there are.
-function openDetectors() {
+// Replaces the bodies. Throws, and changes nothing, if the detector refuses them.
+function setBodies(given, { centre, radius } = {}) {
+  const made = given.map((body) => {
+    const all = body.frames ?? [body.positions];
+    const isDouble = all.some((positions) => positions instanceof Float64Array);
+    const now = new (isDouble ? Float64Array : Float32Array)(body.positions.length);
+    return { corners: 3, ...body, offset: [0, 0, 0], now };
+  });
+  const opened = openDetector(made);
   detector?.dispose();
-  detector = new Detector({ ...OPTIONS, method: method.value });
-  for (const [ix, body] of bodies.entries()) addTo(detector, body, view.positions(ix));
+  detector = opened;
+  bodies = made;
+  isFramed = bodies.some(({ frames }) => frames?.length > 1);
+  end = isFramed ? Math.max(...bodies.map(({ frames }) => (frames?.length ?? 1) - 1)) : 0;
+  if (bodies.some(({ pose }) => pose)) end = 1;
+  now = 0;
+  direction = 1;
+  stage = centre ? { centre, radius } : ballAround(extentOf(bodies));
+  chosen = null;
+  touching = [];
+  step = null;
+  place = -1;
+  view.setBodies(bodies);
+  showMotion();
+  element("back").hidden = true;
+  self.disabled = bodies.length === 1;
+  if (self.disabled) self.checked = true;
+  panel.showBodies(bodies, (ix, isHidden) => view.hide(ix, isHidden));
+  panel.showChosen(null);
+  leaveRoom();
+  view.frame([0, 0, 0], 1);
   isMoved = true;
   void openGpu();
 }
 
-function setBodies(given, stage) {
-  bodies = given.map((body) => ({ ...body, offset: body.offset ?? [0, 0, 0] }));
-  view.setBodies(bodies);
-  pose();
-  const { centre, radius } = stage ?? bounds();
-  view.frame(centre, radius);
-  const n = bodies.reduce((sum, { index, corners = 3 }) => sum + index.length / corners, 0);
-  const names = bodies.map(({ name }) => name).join(", ");
-  const isSolid = bodies.some(({ corners }) => corners === 4);
-  const kind = isSolid ? "primitives" : "triangles";
-  element("scene-note").textContent = `${names}: ${n.toLocaleString("en")} ${kind}, with self-collision`;
-  openDetectors();
-}
-
-// The pose at the current time. It runs forwards, then backwards.
-function pose() {
-  const t = phase < 1 ? phase : 2 - phase;
-  for (const [ix, body] of bodies.entries()) {
-    const now = view.positions(ix);
-    body.pose(body.positions, t, now);
-    for (let at = 0; at < now.length; at += 1) now[at] += body.offset[at % 3];
-  }
-  time.value = String(t);
-}
-
-function bounds() {
-  const [low, high] = [
-    [Infinity, Infinity, Infinity],
-    [-Infinity, -Infinity, -Infinity],
-  ];
-  for (const [ix] of bodies.entries()) {
-    for (const [at, x] of view.positions(ix).entries()) {
-      low[at % 3] = Math.min(low[at % 3], x);
-      high[at % 3] = Math.max(high[at % 3], x);
+function openDetector(given) {
+  const opened = new Detector(options());
+  try {
+    for (const body of given) {
+      const at = pose(body, 0, body.now);
+      if (body.corners === 4) opened.addTetrahedra(body.index, at);
+      else opened.add(body.index, at);
     }
+    return opened;
+  } catch (error) {
+    opened.dispose();
+    throw error;
   }
-  const centre = low.map((x, axis) => (x + high[axis]) / 2);
-  const radius = Math.hypot(...low.map((x, axis) => high[axis] - x)) / 2;
-  return { centre, radius: radius > 0 && Number.isFinite(radius) ? radius : 1 };
 }
 
-function drag(ix, x, y, z) {
-  const { offset } = bodies[ix];
-  offset[0] += x;
-  offset[1] += y;
-  offset[2] += z;
+function openGpu() {
+  element("gpu").hidden = !useGpu.checked;
+  for (const cell of element("gpu").querySelectorAll("span, code")) cell.textContent = "";
+  return useGpu.checked ? gpu.open(options(), bodies) : gpu.close();
+}
+
+function showMotion() {
+  element("motion").hidden = end === 0;
+  for (const id of ["previous", "next"]) element(id).hidden = !isFramed;
+  time.max = String(end);
+  time.step = isFramed ? "1" : "0.001";
+  setPlaying(isPlaying && end > 0);
+}
+
+function setPlaying(value) {
+  // A frame that played stays as it is.
+  if (isFramed && isPlaying && !value) now = Math.min(end, Math.floor(now));
+  isPlaying = value;
+  play.textContent = isPlaying ? "Pause" : "Play";
   isMoved = true;
 }
 
-function frame(now) {
+function setTime(value) {
+  setPlaying(false);
+  touching = [];
+  now = Math.min(end, Math.max(0, value));
+}
+
+const nextFrame = (by) => setTime(by > 0 ? Math.floor(now) + 1 : Math.ceil(now) - 1);
+
+// What moves meanwhile: a scene runs forwards, then backwards; frames start again.
+function advance(seconds) {
+  if (isFramed) {
+    now += seconds * FRAME_RATE;
+    if (now >= end + 1) now = 0;
+    return;
+  }
+  now += (direction * seconds) / SECONDS;
+  if (now > 1 || now < 0) {
+    direction = -direction;
+    now = Math.min(1, Math.max(0, now));
+  }
+}
+
+function draw() {
+  // Frames are shown as they are while they play.
+  const at = isFramed && isPlaying ? Math.min(end, Math.floor(now)) : now;
+  for (const [ix, body] of bodies.entries()) {
+    pose(body, at, body.now);
+    const drawn = view.positions(ix);
+    const { centre, radius } = stage;
+    for (let k = 0; k < drawn.length; k += 1) drawn[k] = (body.now[k] - centre[k % 3]) / radius;
+  }
+  time.value = String(at);
+  element("time-text").textContent = isFramed ? `${Number(at.toFixed(3))} of ${end}` : at.toFixed(3);
+  const text = isFramed ? `frame ${at} of ${end}` : `${Math.round(100 * at)} %`;
+  time.setAttribute("aria-valuetext", text);
+}
+
+const pairs = () => (withSelf() ? detector.everything() : detector.betweenAll());
+
+function answer() {
+  const start = performance.now();
+  for (const [ix, body] of bodies.entries()) detector.setPositions(ix, body.now);
+  rows = pairs();
+  nAnswers += 1;
+  show("cpu", rows.length / 4, performance.now() - start, detector.hash);
+  showQuestion();
+  panel.showColliding(view.draw(rows));
+  if (gpu.isReady) void gpu.ask(bodies, withSelf(), { hash: detector.hash, nAnswers });
+}
+
+// What is asked, in words.
+function showQuestion() {
+  const what = bodies.some(({ corners }) => corners === 4) ? "primitives" : "triangles";
+  say("verdict", rows.length === 4 ? `pair of ${what} intersects` : `pairs of ${what} intersect`);
+  const n = bodies.reduce((sum, { index, corners }) => sum + index.length / corners, 0);
+  const names = bodies.map(({ name }) => name).join(", ");
+  const whom = bodies.length === 1 ? "with itself" : self.checked ? "with each other and themselves" : "with each other";
+  const notes = [`${names} ${whom}: ${grouped(n)} ${what}`];
+  const nWelded = bodies.reduce((sum, { map, positions }) => sum + (map ? map.length - positions.length / 3 : 0), 0);
+  if (nWelded > 0) notes.push(`${counted(nWelded, "vertex").replace(/vertexs$/, "vertices")} welded to others`);
+  if (!element("back").hidden) notes.push("moved by hand");
+  say("scene-note", notes.join("; "));
+}
+
+function list() {
+  places = placesOf(rows, bodies);
+  if (place >= places.length) place = -1;
+  panel.showPlaces(places, bodies, place, goTo);
+  const partners = panel.showChosen(chosen, rows, bodies, choose);
+  view.choose(chosen ? [[chosen.body, chosen.primitive], ...partners] : touching);
+}
+
+// To the coordinates that are drawn.
+const drawn = (point) => point.map((x, axis) => (x - stage.centre[axis]) / stage.radius);
+
+function flyTo({ centre, radius }) {
+  const near = Math.max(LEAST_PLACE, radius / stage.radius);
+  view.flyTo(drawn(centre), near / PLACE_SHARE);
+}
+
+function goTo(ix) {
+  setPlaying(false);
+  place = ix;
+  flyTo(ballAround(places[ix]));
+  const [body, primitive] = places[ix].first;
+  choose({ body, primitive });
+}
+
+function nextPlace(by) {
+  if (isPlaying) list();
+  if (places.length > 0) goTo((place + by + places.length + (place < 0 && by < 0 ? 1 : 0)) % places.length);
+}
+
+// Marks a primitive and its partners; `null` marks none.
+function choose(hit) {
+  chosen = hit;
+  touching = [];
+  if (hit !== null) setPlaying(false);
+  list();
+}
+
+// What touches on the way from a frame to the next. It is asked once per frame, when nothing plays.
+function showStep() {
+  const isAsked = isFramed && !isPlaying;
+  element("step").hidden = !isAsked;
+  if (!isAsked) return;
+  const from = Math.floor(now);
+  const key = JSON.stringify([from, withSelf(), bodies.map(({ offset }) => offset)]);
+  if (step?.key === key) return;
+  step = { key, from, first: null, text: "This is the last frame." };
+  if (from < end) Object.assign(step, askStep(detector, bodies, from, withSelf(), pairs));
+  say("step-text", step.text);
+  // A face of a tetrahedron has a number of its own, which the page does not know.
+  const isHere = step.first && [step.first.bodyA, step.first.bodyB].every((ix) => bodies[ix].corners === 3);
+  element("step-show").hidden = !isHere;
+}
+
+// Goes to the moment and the place of the step's first contact, and outlines a triangle of each side.
+function showContact() {
+  choose(null);
+  setTime(step.from + step.first.time);
+  draw();
+  const { box, triangles } = contactAt(step.first, bodies);
+  touching = triangles;
+  flyTo(ballAround(box));
+}
+
+function frame(clock) {
   requestAnimationFrame(frame);
-  const passed = before === null ? 0 : Math.min(0.1, (now - before) / 1000);
-  before = now;
+  const passed = before === null ? 0 : Math.min(0.1, (clock - before) / 1000);
+  before = clock;
+  const isFlying = view.fly(clock);
   if (isPlaying) {
-    phase = (phase + passed / SECONDS) % 2;
+    advance(passed);
     isMoved = true;
   }
   if (!isMoved) {
-    if (mustDraw) view.render();
+    if (mustDraw || isFlying) view.render();
+    if (mustDraw) linkSoon();
     mustDraw = false;
     return;
   }
   isMoved = false;
   mustDraw = false;
   try {
-    pose();
-    const start = performance.now();
-    for (const [ix] of bodies.entries()) detector.setPositions(ix, view.positions(ix));
-    rows = detector.everything();
-    frames += 1;
-    show("cpu", rows.length / 4, performance.now() - start, detector.hash);
-    view.draw(rows);
-    if (gpu.detector !== null && !gpu.isBusy) void askGpu(detector.hash);
+    draw();
+    answer();
+    if (!isPlaying || clock - listed > LIST_EVERY) {
+      listed = clock;
+      list();
+    }
+    showStep();
+    linkSoon();
   } catch (error) {
     setPlaying(false);
-    complain(error);
+    isMoved = false;
+    complain(String(error.message ?? error));
   }
 }
 
-function setPlaying(value) {
-  isPlaying = value;
-  play.textContent = isPlaying ? "Pause" : "Play";
+// Shows a scene of the page.
+function showScene(name, { triangles = Number(size.value), withSelf = SCENES[name].self, plays = true } = {}) {
+  complain("");
+  files = null;
+  showFileControls();
+  scene.value = name;
+  self.checked = withSelf;
+  isPlaying = plays;
+  const { make, centre, radius } = SCENES[name];
+  setBodies(make(triangles), { centre, radius });
 }
 
-function showDemo() {
-  complain(null);
-  demoButton.hidden = true;
-  size.disabled = false;
-  setBodies(demo(Number(size.value)), STAGE);
+function showFileControls() {
+  const isFiles = files !== null;
+  scene.querySelector('[value="files"]').hidden = !isFiles;
+  if (isFiles) scene.value = "files";
+  element("size-label").hidden = isFiles;
+  element("share").hidden = isFiles;
+  element("as-label").hidden = !isFiles || !mayBePoses(files);
+  document.body.classList.toggle("files", isFiles);
 }
 
-// One mesh meets a copy of itself; of more than two, the first two are taken.
+// Shows what was read from files. Nothing plays: the first answer is about the meshes as they are.
+function showFiles(given, arePoses) {
+  const { bodies: made, refused } = bodiesOf(given, arePoses);
+  isPlaying = false;
+  if (made.length > 1) self.checked = false;
+  setBodies(made);
+  files = given;
+  as.value = arePoses ? "poses" : "bodies";
+  showFileControls();
+  history.replaceState(null, "", location.pathname + location.search);
+  return refused;
+}
+
 async function open(list) {
+  if (list.length === 0) return;
+  complain("");
+  say("status", `Reading ${list.map(({ name }) => name).join(", ")} …`);
   try {
-    complain(null);
-    const { readMesh } = await gpuModule();
-    const meshes = [];
-    for (const file of list.slice(0, 2)) {
-      const mesh = readMesh(file.name, new Uint8Array(await file.arrayBuffer()), { weld: true });
-      // Drawing needs single precision, and the answer is about what is drawn.
-      mesh.positions = Float32Array.from(mesh.positions);
-      if (mesh.index.length === 0) throw new Error(`${file.name} has no triangles and no tetrahedra`);
-      meshes.push({ ...mesh, name: file.name });
+    const readers = await withReaders();
+    // Lets the browser show the line above.
+    await new Promise((done) => setTimeout(done));
+    const given = await read(readers, list);
+    // A point cache alone moves the meshes that are there.
+    if (given.meshes.length === 0 && given.caches.length > 0) given.meshes = files?.meshes ?? [];
+    if (given.meshes.length === 0) {
+      given.refused.push(...given.caches.map(({ name }) => `${name} moves a mesh: drop the mesh, too`));
+      return complain(given.refused.join("\n"));
     }
-    if (meshes.length === 0) return;
-    const sizes = meshes.map(({ positions }) => extent(positions));
-    const apart = 0.2 * Math.max(...sizes);
-    if (meshes.length === 1) {
-      meshes.push({ ...meshes[0], offset: [apart, apart / 2, apart / 4] });
-      sizes.push(sizes[0]);
-    }
-    const opened = meshes.map((mesh, ix) => ({ ...waving(mesh.name, mesh, sizes[ix]), offset: mesh.offset }));
+    const arePoses = looksNumbered(given);
     try {
-      setBodies(opened);
+      given.refused.push(...showFiles(given, arePoses));
     } catch (error) {
-      // The detector refuses what it cannot answer exactly, such as coordinates beyond its range.
-      showDemo();
-      throw error;
+      if (!arePoses) throw error;
+      given.refused.push(error.message, ...showFiles(given, false));
     }
-    demoButton.hidden = false;
-    size.disabled = true;
+    complain(given.refused.join("\n"));
   } catch (error) {
-    complain(error);
+    complain(String(error.message ?? error));
+  } finally {
+    say("status", "");
   }
 }
 
-// The diagonal of the box around positions.
-function extent(positions) {
-  const [low, high] = [
-    [Infinity, Infinity, Infinity],
-    [-Infinity, -Infinity, -Infinity],
-  ];
-  for (const [at, x] of positions.entries()) {
-    low[at % 3] = Math.min(low[at % 3], x);
-    high[at % 3] = Math.max(high[at % 3], x);
+// The link of what is seen.
+function link() {
+  const moved = bodies.map(({ offset }) => offset);
+  return toLink({ scene: scene.value, size: size.value, time: isPlaying ? null : now, self: self.checked, eye: view.eye, moved });
+}
+
+let linkTimer = null;
+function linkSoon() {
+  if (files !== null || isPlaying) return;
+  clearTimeout(linkTimer);
+  linkTimer = setTimeout(() => files === null && history.replaceState(null, "", link()), 400);
+}
+
+function followLink() {
+  const linked = fromLink(location.hash, SCENES);
+  const name = linked.scene ?? "ring";
+  if (linked.size !== null && [...size.options].some(({ value }) => value === String(linked.size))) size.value = String(linked.size);
+  showScene(name, { withSelf: linked.self ?? SCENES[name].self, plays: linked.time === null });
+  if (linked.time !== null) setTime(linked.time);
+  if (linked.moved?.length === 3 * bodies.length) {
+    for (const [ix, { offset }] of bodies.entries()) offset.splice(0, 3, ...linked.moved.slice(3 * ix, 3 * ix + 3));
+    element("back").hidden = linked.moved.every((x) => x === 0);
   }
-  const diagonal = Math.hypot(...low.map((x, axis) => high[axis] - x));
-  return diagonal > 0 && Number.isFinite(diagonal) ? diagonal : 1;
+  if (linked.eye) view.eye = linked.eye;
+}
+
+async function share() {
+  history.replaceState(null, "", link());
+  try {
+    await navigator.clipboard.writeText(location.href);
+    say("status", "The link is copied. It shows this scene as you see it.");
+  } catch {
+    say("status", "Copy the address of this page: it shows this scene as you see it.");
+  }
+  setTimeout(() => say("status", ""), 4000);
+}
+
+// Keeps the bodies out of the panels.
+function leaveRoom() {
+  const box = (id) => element(id).getBoundingClientRect();
+  const isNarrow = matchMedia("(max-width: 720px)").matches;
+  const bottom = window.innerHeight - box(isNarrow ? "bottom" : "controls").top;
+  document.documentElement.style.setProperty("--foot", `${bottom}px`);
+  const right = isNarrow ? 0 : window.innerWidth - box("side").left;
+  view.leaveRoom({ top: isNarrow ? box("answer").bottom : 0, right, bottom, left: 0 });
 }
 
 play.addEventListener("click", () => setPlaying(!isPlaying));
-time.addEventListener("input", () => {
-  setPlaying(false);
-  phase = Number(time.value);
+time.addEventListener("input", () => setTime(Number(time.value)));
+element("previous").addEventListener("click", () => nextFrame(-1));
+element("next").addEventListener("click", () => nextFrame(1));
+element("step-show").addEventListener("click", showContact);
+element("share").addEventListener("click", () => void share());
+scene.addEventListener("change", () => showScene(scene.value));
+size.addEventListener("change", () => showScene(scene.value, { withSelf: self.checked, plays: isPlaying }));
+self.addEventListener("change", () => (isMoved = true));
+as.addEventListener("change", () => {
+  try {
+    complain(showFiles(files, as.value === "poses").join("\n"));
+  } catch (error) {
+    as.value = "bodies";
+    complain(error.message);
+  }
+});
+element("back").addEventListener("click", () => {
+  for (const { offset } of bodies) offset.fill(0);
+  element("back").hidden = true;
   isMoved = true;
 });
-size.addEventListener("change", showDemo);
-demoButton.addEventListener("click", showDemo);
-method.addEventListener("change", openDetectors);
-useGpu.addEventListener("change", () => void openGpu());
-files.addEventListener("change", () => {
-  void open([...files.files]);
-  files.value = "";
+method.addEventListener("change", () => {
+  detector.dispose();
+  detector = openDetector(bodies);
+  step = null;
+  isMoved = true;
+  void openGpu();
 });
+useGpu.addEventListener("change", () => void openGpu());
+element("files").addEventListener("change", ({ target }) => {
+  void open([...target.files]);
+  target.value = "";
+});
+
+const KEYS = {
+  " ": () => end > 0 && setPlaying(!isPlaying),
+  j: () => nextPlace(1),
+  J: () => nextPlace(-1),
+  f: () => view.frame([0, 0, 0], 1),
+  Escape: () => choose(null),
+  ",": () => isFramed && nextFrame(-1),
+  ".": () => isFramed && nextFrame(1),
+};
+const VIEW_KEYS = {
+  ArrowLeft: () => view.turn(-0.1, 0),
+  ArrowRight: () => view.turn(0.1, 0),
+  ArrowUp: () => view.turn(0, 0.1),
+  ArrowDown: () => view.turn(0, -0.1),
+  "+": () => view.turn(0, 0, 0.9),
+  "=": () => view.turn(0, 0, 0.9),
+  "-": () => view.turn(0, 0, 1 / 0.9),
+};
 window.addEventListener("keydown", (event) => {
-  if (event.code !== "Space" || /^(BUTTON|INPUT|SELECT)$/.test(event.target.tagName)) return;
+  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  const { target, key } = event;
+  // Buttons, lists and switches take these keys themselves.
+  const isTaken = target.tagName === "SELECT" || (key === " " && /^(BUTTON|INPUT|SUMMARY)$/.test(target.tagName));
+  const act = target.id === "view" ? (VIEW_KEYS[key] ?? KEYS[key]) : KEYS[key];
+  if (isTaken || !act) return;
   event.preventDefault();
-  setPlaying(!isPlaying);
+  act();
 });
 window.addEventListener("dragover", (event) => {
   event.preventDefault();
   document.body.classList.add("dropping");
 });
-for (const end of ["dragleave", "drop"]) {
-  window.addEventListener(end, () => document.body.classList.remove("dropping"));
+for (const done of ["dragleave", "drop"]) {
+  window.addEventListener(done, () => document.body.classList.remove("dropping"));
 }
 window.addEventListener("drop", (event) => {
   event.preventDefault();
   void open([...event.dataTransfer.files]);
 });
-
-// WebGPU starts by itself on hardware. A software adapter is slower than the CPU build, so it waits for its switch.
-async function lookForGpu() {
-  const adapter = await navigator.gpu?.requestAdapter().catch(() => null);
-  if (!adapter) {
-    const why = !window.isSecureContext
-      ? "pages have it over https or from localhost only"
-      : navigator.gpu
-        ? "the browser finds no adapter"
-        : "this browser does not have it";
-    gpu.note(`No WebGPU: ${why}. The CPU answers alone, with the same pairs.`);
-    return;
-  }
-  useGpu.disabled = false;
-  const isSoftware = adapter.info?.isFallbackAdapter || /swiftshader|llvmpipe/i.test(adapter.info?.architecture ?? "");
-  useGpu.checked = !isSoftware;
-  if (isSoftware) gpu.note("WebGPU is here in software only, so it is off.");
-  else await openGpu();
+window.addEventListener("hashchange", followLink);
+if (matchMedia("(max-width: 720px)").matches) {
+  // All are closed, and of several with one name only one is open.
+  for (const details of document.querySelectorAll("details")) Object.assign(details, { open: false, name: "side" });
 }
 
 try {
   await init();
-  showDemo();
+  followLink();
+  const panels = new ResizeObserver(leaveRoom);
+  for (const id of ["answer", "side", "controls"]) panels.observe(element(id));
   requestAnimationFrame(frame);
-  await lookForGpu();
+  // WebGPU starts by itself on hardware. A software adapter is slower than the CPU build, so it waits for its switch.
+  const adapter = await lookForAdapter();
+  element("gpu-label").hidden = adapter === null;
+  useGpu.checked = adapter === "hardware";
+  if (useGpu.checked) void openGpu();
 } catch (error) {
-  complain(error);
+  complain(String(error.message ?? error));
 }
 
 // For tests, and for the console.
-window.page = { view, get bodies() { return bodies; }, get rows() { return rows; } };
+window.page = {
+  view,
+  goTo,
+  get bodies() { return bodies; },
+  get rows() { return rows; },
+  get places() { return places; },
+  get step() { return step; },
+};

@@ -1,4 +1,4 @@
-// Closed surfaces with one vertex per point, and the motions of the demo scene.
+// Surfaces with one vertex per point, and the scenes that the page shows before a file is dropped.
 //
 // Geometries of three.js repeat the vertices of their seams, because texture coordinates differ there. Self-collision
 // needs to know which triangles are neighbours, so these share them.
@@ -21,7 +21,7 @@ function closedGrid(n, m, point) {
 }
 
 // A sphere of about n triangles: rings between two poles.
-export function ball(n, radius) {
+function ball(n, radius) {
   const rings = Math.max(3, Math.round(Math.sqrt(n / 4)));
   const around = 2 * rings;
   const positions = [0, 0, radius];
@@ -88,12 +88,9 @@ function moved(at) {
   };
 }
 
-// Where the demo scene is.
-export const STAGE = { centre: [0.1, -0.05, 0.05], radius: 0.95 };
-
 // The scene of `impinge demo`: a worm bends into a ring until its head runs into its tail, a rippling knot sinks through
 // the ring, and a bumpy, twisting ball comes in from the side.
-export function demo(nTriangles) {
+function ring(nTriangles) {
   const n = nTriangles / 3;
   const length = 3;
   const worm = ball(n, 1);
@@ -139,16 +136,41 @@ export function demo(nTriangles) {
   ];
 }
 
-// A mesh from a file: a wave runs through it, a fiftieth of its size high.
-export function waving(name, { index, positions, corners }, size) {
-  return {
-    name,
-    index,
-    corners,
-    positions,
-    pose: moved((x, y, z, t) => {
-      const wave = 0.02 * size * Math.sin(TAU * ((4 * (x + y)) / size - 2 * t));
-      return [x, y, z + wave];
-    }),
-  };
+// A ball falls through a cloth. It is on one side in a frame and on the other in the next: no frame intersects, the steps do.
+function fall(nTriangles) {
+  const FRAMES = 7;
+  const cells = Math.max(4, Math.round(Math.sqrt(nTriangles / 3)));
+  const cloth = { index: [], positions: [] };
+  for (let i = 0; i <= cells; i += 1) {
+    for (let j = 0; j <= cells; j += 1) {
+      cloth.positions.push((1.6 * i) / cells - 0.8, (1.6 * j) / cells - 0.8, 0);
+      if (i === cells || j === cells) continue;
+      const [a, b] = [i * (cells + 1) + j, (i + 1) * (cells + 1) + j];
+      cloth.index.push(a, b, b + 1, a, b + 1, a + 1);
+    }
+  }
+  const falling = ball(nTriangles / 3, 0.13);
+  const frames = (positions, at) =>
+    Array.from({ length: FRAMES }, (_, frame) => {
+      const now = new Float32Array(positions.length);
+      at(positions, frame, now);
+      return now;
+    });
+  const flow = moved((x, y, z, t) => [x, y, z + 0.03 * Math.sin(5 * x + t) * Math.cos(4 * y - t)]);
+  const drop = moved((x, y, z, t) => [x + 0.1, y - 0.05, z + 0.95 - 0.045 * t * t]);
+  return [
+    {
+      name: "cloth",
+      index: Uint32Array.from(cloth.index),
+      positions: Float32Array.from(cloth.positions),
+      frames: frames(cloth.positions, flow),
+    },
+    { name: "ball", ...falling, frames: frames(falling.positions, drop) },
+  ];
 }
+
+// Scenes by name: bodies of about as many triangles as asked for, and the ball of space that they move in.
+export const SCENES = {
+  ring: { make: ring, centre: [0.1, -0.05, 0.05], radius: 0.95, self: true },
+  fall: { make: fall, centre: [0, 0, 0.12], radius: 1.2, self: false },
+};

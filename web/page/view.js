@@ -6,6 +6,15 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 const BODY = ["#aebccd", "#d8c8ae", "#b9cdb4", "#cbb6cf"];
 const COLLIDING = ["#e0312f", "#2263e6", "#ef9500", "#8a2be2"];
+// A press that moves less, in CSS pixels, is a click.
+const CLICK = 5;
+// More triangles are not searched for the one under a pointer that moves.
+const MOST_HOVERED = 400_000;
+
+// The colours of a body and of its colliding triangles.
+export function colors(ix) {
+  return [BODY[ix % BODY.length], COLLIDING[ix % COLLIDING.length]];
+}
 
 // The corners of the triangles that show a primitive: itself, or the faces of a tetrahedron.
 const CORNERS = { 3: [0, 1, 2], 4: [0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3] };
@@ -24,7 +33,7 @@ class Figure {
       const primitive = Math.floor(to / pattern.length);
       this.index[to] = index[primitive * corners + pattern[to % pattern.length]];
     }
-    this.positions = new THREE.BufferAttribute(new Float32Array(positions), 3);
+    this.positions = new THREE.BufferAttribute(new Float32Array(positions.length), 3);
     this.positions.setUsage(THREE.DynamicDrawUsage);
     const geometry = (elements) => {
       const made = new THREE.BufferGeometry();
@@ -38,8 +47,8 @@ class Figure {
     this.hits = geometry(this.colliding);
     this.hits.index.setUsage(THREE.DynamicDrawUsage);
     this.hits.setDrawRange(0, 0);
-    this.body = new THREE.Mesh(this.all, material(BODY[ix % BODY.length]));
-    const color = COLLIDING[ix % COLLIDING.length];
+    const [own, color] = colors(ix);
+    this.body = new THREE.Mesh(this.all, material(own));
     const over = new THREE.Mesh(this.hits, material(color));
     const through = new THREE.Mesh(
       this.hits,
@@ -57,7 +66,7 @@ class Figure {
     for (const mesh of this.meshes) mesh.frustumCulled = false;
   }
 
-  // Shows the primitives with a mark as colliding.
+  // Shows the primitives with a mark as colliding. Returns how many there are.
   show() {
     const n = CORNERS[this.corners].length;
     let end = 0;
@@ -73,6 +82,7 @@ class Figure {
     this.hits.index.addUpdateRange(0, end);
     this.hits.index.needsUpdate = end > 0;
     this.positions.needsUpdate = true;
+    return end / n;
   }
 
   dispose() {
@@ -85,10 +95,14 @@ class Figure {
 export class View {
   #figures = [];
   #drag = null;
+  #flight = null;
+  #chosen = [];
 
-  // `onDrag(body, dx, dy, dz)` is called while a body is dragged, `onChange` when the picture must be drawn again.
-  constructor(canvas, onDrag, onChange) {
+  // What the pointer does is told to `on`: `drag(body, dx, dy, dz)` moves a body, `click(hit)` and `hover(hit, event)` name the
+  // primitive there or `null`, `change()` says that the picture must be drawn again.
+  constructor(canvas, on) {
     this.canvas = canvas;
+    this.on = on;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(35, 1, 0.01, 100);
@@ -98,17 +112,24 @@ export class View {
     sun.position.set(-0.4, 0.3, 1);
     this.camera.add(sun);
     this.scene.add(this.camera);
+    const outline = new THREE.LineBasicMaterial({ color: "#111", depthTest: false, transparent: true });
+    this.outline = new THREE.LineSegments(new THREE.BufferGeometry(), outline);
+    this.outline.renderOrder = 3;
+    this.outline.frustumCulled = false;
+    this.scene.add(this.outline);
     // Before the controls, so that a body under the pointer is dragged and the view stays.
     canvas.addEventListener("pointerdown", (event) => this.#press(event), { capture: true });
-    canvas.addEventListener("pointermove", (event) => this.#move(event, onDrag));
+    canvas.addEventListener("pointermove", (event) => this.#move(event));
     for (const end of ["pointerup", "pointercancel"]) {
       canvas.addEventListener(end, (event) => this.#release(event));
     }
+    canvas.addEventListener("pointerleave", (event) => on.hover(null, event));
     this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.addEventListener("change", onChange);
+    this.controls.addEventListener("change", on.change);
+    this.controls.addEventListener("start", () => (this.#flight = null));
     new ResizeObserver(() => {
       this.#resize();
-      onChange();
+      on.change();
     }).observe(canvas);
     this.#resize();
   }
@@ -120,6 +141,23 @@ export class View {
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / clientHeight;
     this.camera.updateProjectionMatrix();
+    if (this.insets) this.leaveRoom(this.insets);
+  }
+
+  // Keeps the middle of the view out of the panels: CSS pixels at each edge of the canvas.
+  leaveRoom(insets) {
+    this.insets = insets;
+    const { top, right, bottom, left } = insets;
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    this.camera.setViewOffset(width, height, (right - left) / 2, (bottom - top) / 2, width, height);
+    this.on.change();
+  }
+
+  // The part of the canvas that no panel covers, as a share of its width and of its height.
+  #room() {
+    const { top, right, bottom, left } = this.insets ?? { top: 0, right: 0, bottom: 0, left: 0 };
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    return [1 - (left + right) / width, 1 - (top + bottom) / height].map((share) => Math.max(0.3, share));
   }
 
   // Replaces all bodies.
@@ -129,19 +167,76 @@ export class View {
       figure.dispose();
     }
     this.#drag = null;
+    this.choose([]);
     this.#figures = bodies.map((body, ix) => new Figure(body, ix));
     for (const figure of this.#figures) this.scene.add(...figure.meshes);
   }
 
   // Places the camera so that a ball around `centre` fills the picture.
   frame([x, y, z], radius) {
-    const half = Math.tan((this.camera.fov * Math.PI) / 360) * Math.min(1, this.camera.aspect);
-    const away = radius / Math.sin(Math.atan(half));
+    this.#flight = null;
+    const away = this.#distance(radius);
     this.controls.target.set(x, y, z);
     this.camera.position.set(x - 0.25 * away, y - 0.82 * away, z + 0.52 * away);
-    this.camera.near = away / 100;
+    this.camera.near = away / 1000;
     this.camera.far = away * 20;
     this.camera.updateProjectionMatrix();
+    this.controls.update();
+  }
+
+  // How far away the camera sees a ball as large as the room that it has.
+  #distance(radius) {
+    const [wide, high] = this.#room();
+    const half = Math.tan((this.camera.fov * Math.PI) / 360) * Math.min(high, this.camera.aspect * wide);
+    return radius / Math.sin(Math.atan(half));
+  }
+
+  // Moves the camera, in its direction, to where a ball around `centre` fills a part of the picture.
+  flyTo([x, y, z], radius) {
+    const target = new THREE.Vector3(x, y, z);
+    const direction = this.camera.position.clone().sub(this.controls.target).normalize();
+    const position = target.clone().addScaledVector(direction, this.#distance(radius));
+    this.#flight = { from: [this.camera.position.clone(), this.controls.target.clone()], to: [position, target], start: null };
+    if (matchMedia("(prefers-reduced-motion: reduce)").matches) this.#flight.start = -Infinity;
+    this.on.change();
+  }
+
+  // Whether the camera still flies after this step.
+  fly(now) {
+    if (this.#flight === null) return false;
+    this.#flight.start ??= now;
+    const { from, to, start } = this.#flight;
+    const done = Math.min(1, (now - start) / 500);
+    const share = done * done * (3 - 2 * done);
+    this.camera.position.lerpVectors(from[0], to[0], share);
+    this.controls.target.lerpVectors(from[1], to[1], share);
+    this.controls.update();
+    if (done === 1) this.#flight = null;
+    return true;
+  }
+
+  // Turns the camera about its target, by angles around the vertical axis and up, and changes its distance.
+  turn(around, up, nearer = 1) {
+    const away = this.camera.position.clone().sub(this.controls.target);
+    const at = new THREE.Spherical().setFromVector3(new THREE.Vector3(away.x, away.z, -away.y));
+    at.theta += around;
+    at.phi = Math.min(Math.PI - 0.01, Math.max(0.01, at.phi - up));
+    at.radius *= nearer;
+    const turned = new THREE.Vector3().setFromSpherical(at);
+    this.camera.position.copy(this.controls.target).add(new THREE.Vector3(turned.x, -turned.z, turned.y));
+    this.controls.update();
+    this.on.change();
+  }
+
+  // The camera and its target, six numbers.
+  get eye() {
+    return [...this.camera.position.toArray(), ...this.controls.target.toArray()];
+  }
+
+  set eye(numbers) {
+    this.#flight = null;
+    this.camera.position.fromArray(numbers);
+    this.controls.target.fromArray(numbers, 3);
     this.controls.update();
   }
 
@@ -150,12 +245,45 @@ export class View {
     return this.#figures[ix].positions.array;
   }
 
-  // Draws the bodies; `rows` are `[bodyA, i, bodyB, j]` per pair.
+  // Draws the bodies; `rows` are `[bodyA, i, bodyB, j]` per pair. Returns how many primitives of each body collide.
   draw(rows) {
     for (const figure of this.#figures) figure.marks.fill(0);
     for (let at = 0; at < rows.length; at += 2) this.#figures[rows[at]].marks[rows[at + 1]] = 1;
-    for (const figure of this.#figures) figure.show();
+    const counts = this.#figures.map((figure) => figure.show());
+    this.#outline();
     this.render();
+    return counts;
+  }
+
+  // Outlines these primitives, `[body, primitive]` each.
+  choose(primitives) {
+    this.#chosen = primitives;
+    this.#outline();
+    this.on.change();
+  }
+
+  #outline() {
+    const points = [];
+    for (const [ix, primitive] of this.#chosen) {
+      const { corners, index, positions } = this.#figures[ix];
+      const n = CORNERS[corners].length;
+      for (let face = primitive * n; face < (primitive + 1) * n; face += 3) {
+        for (const corner of [0, 1, 1, 2, 2, 0]) {
+          const at = 3 * index[face + corner];
+          points.push(...positions.array.subarray(at, at + 3));
+        }
+      }
+    }
+    this.outline.geometry.dispose();
+    this.outline.geometry = new THREE.BufferGeometry();
+    this.outline.geometry.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
+    this.outline.visible = points.length > 0;
+  }
+
+  // Hides a body, or shows it again.
+  hide(ix, isHidden) {
+    for (const mesh of this.#figures[ix].meshes) mesh.visible = !isHidden;
+    this.on.change();
   }
 
   render() {
@@ -185,40 +313,57 @@ export class View {
     return ray;
   }
 
-  // The body under the pointer, and where it is hit.
+  // The primitive under the pointer, and where it is hit.
   #hit(event) {
-    for (const { all } of this.#figures) {
+    const figures = this.#figures.filter(({ body }) => body.visible);
+    for (const { all } of figures) {
       all.computeBoundingSphere();
       all.boundingBox = null;
     }
-    const bodies = this.#figures.map((figure) => figure.body);
-    const [hit] = this.#ray(event).intersectObjects(bodies, false);
-    return hit && { body: bodies.indexOf(hit.object), point: hit.point };
+    const [hit] = this.#ray(event).intersectObjects(figures.map(({ body }) => body), false);
+    if (!hit) return null;
+    const body = this.#figures.findIndex((figure) => figure.body === hit.object);
+    const faces = CORNERS[this.#figures[body].corners].length / 3;
+    return { body, primitive: Math.floor(hit.faceIndex / faces), point: hit.point };
   }
 
   #press(event) {
+    this.#flight = null;
     if (!event.isPrimary || event.button !== 0) return;
     const hit = this.#hit(event);
-    if (!hit) return;
+    this.#drag = { hit, at: [event.clientX, event.clientY], id: event.pointerId, isClick: true };
+    // The only body is not moved: the view is turned.
+    if (!hit || this.#figures.length < 2) return;
     const ahead = this.camera.getWorldDirection(new THREE.Vector3());
-    const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(ahead, hit.point);
-    this.#drag = { body: hit.body, plane, last: hit.point, id: event.pointerId };
+    this.#drag.plane = new THREE.Plane().setFromNormalAndCoplanarPoint(ahead, hit.point);
+    this.#drag.last = hit.point;
     this.controls.enabled = false;
     this.canvas.setPointerCapture(event.pointerId);
   }
 
-  #move(event, onDrag) {
-    if (this.#drag?.id !== event.pointerId) return;
-    const now = this.#ray(event).ray.intersectPlane(this.#drag.plane, new THREE.Vector3());
+  #move(event) {
+    const drag = this.#drag;
+    if (drag === null) {
+      const n = this.#figures.reduce((sum, { marks }) => sum + marks.length, 0);
+      if (event.pointerType === "mouse" && event.buttons === 0 && n <= MOST_HOVERED) this.on.hover(this.#hit(event), event);
+      return;
+    }
+    if (drag.id !== event.pointerId) return;
+    const [x, y] = drag.at;
+    drag.isClick &&= Math.hypot(event.clientX - x, event.clientY - y) < CLICK;
+    if (drag.isClick || !drag.plane) return;
+    const now = this.#ray(event).ray.intersectPlane(drag.plane, new THREE.Vector3());
     if (!now) return;
-    const { x, y, z } = now.clone().sub(this.#drag.last);
-    this.#drag.last = now;
-    onDrag(this.#drag.body, x, y, z);
+    const by = now.clone().sub(drag.last);
+    drag.last = now;
+    this.on.drag(drag.hit.body, by.x, by.y, by.z);
   }
 
   #release(event) {
     if (this.#drag?.id !== event.pointerId) return;
+    const { isClick, hit } = this.#drag;
     this.#drag = null;
     this.controls.enabled = true;
+    if (isClick && event.type === "pointerup") this.on.click(hit);
   }
 }

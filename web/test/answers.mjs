@@ -4,6 +4,13 @@ function arrays({ index, positions }) {
   return [Uint32Array.from(index), Float32Array.from(positions)];
 }
 
+// `betweenAll` gives the rows of `everything` whose bodies differ.
+function mustBeDifferent(all, between) {
+  const rows = [];
+  for (let at = 0; at < all.length; at += 4) if (all[at] !== all[at + 2]) rows.push(...all.subarray(at, at + 4));
+  if (String(rows) !== String([...between])) throw new Error(`${between.length / 4} pairs of different bodies, not ${rows.length / 4}`);
+}
+
 export async function cpu(module, scenes) {
   const { default: init, Detector } = await import(module);
   await init();
@@ -18,8 +25,10 @@ export async function cpu(module, scenes) {
         else detector.add(...arrays(body));
         detector.setEndPositions(ix, Float32Array.from(body.end));
       }
-      const pairs = detector.everything().length / 4;
+      const all = detector.everything();
+      const pairs = all.length / 4;
       const { hash } = detector;
+      mustBeDifferent(all, detector.betweenAll());
       const impacts = detector.impacts();
       const impactsHash = detector.hash;
       const { kind, time } = [...impacts].find(({ atStart }) => !atStart);
@@ -45,6 +54,7 @@ export async function webgpu(module, scenes, method) {
     if (statistics.backend === "cpu" || statistics.method !== method) {
       throw new Error(`answered by ${statistics.backend} with ${statistics.method}`);
     }
+    mustBeDifferent(pairs, (await detector.betweenAll()).pairs);
     await detector.dispose();
     answers.push({ name, pairs: pairs.length / 4, hash });
   }
@@ -80,6 +90,7 @@ export async function refusals(module) {
   said.wrong = await refusal(() => detector.between(a, "b"));
   said.self = await refusal(() => detector.between(a, a));
   said.method = await refusal(() => new Detector({ method: "octree" }));
+  said.which = await refusal(() => detector.impacts({ which: "self" }));
   said.separation = await refusal(() => detector.impacts({ separation: NaN }));
   // The refused calls left it as it was.
   const b = detector.add(new Uint8Array([0, 1, 2]), Float32Array.from(triangle));
@@ -102,6 +113,7 @@ export const REFUSALS = {
   wrong: "RangeError: body: b given, a number that add() returned is needed",
   self: "Error: a query between body 0 and itself: ask for collisions within it instead",
   method: 'Error: method: "octree" given, "auto", "clusters", "cells" or "naive" allowed',
+  which: 'RangeError: which: "self" given, "all" or "between" allowed',
   separation: "Error: separation: NaN given, a finite number that is not below 0 allowed",
   pairs: [0, 0],
   apart: [],
@@ -113,11 +125,20 @@ if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
   const scenes = JSON.parse(await readFile("scenes.json", "utf8"));
   const said = await refusals("impinge");
   const answers = await cpu("impinge", scenes);
-  const { default: init, GpuDetector, readMesh } = await import("impinge/webgpu");
+  const { default: init, GpuDetector, readFrames, readMesh } = await import("impinge/webgpu");
   await init();
-  const mesh = readMesh("triangle.obj", new TextEncoder().encode("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
+  const text = "v 0 0 0\nv 1 0 0\nv 0 0 0\nv 0 1 0\nf 1 2 4\n";
+  const mesh = readMesh("triangle.obj", new TextEncoder().encode(text), { weld: true });
+  // Two frames of one vertex.
+  const mdd = new Uint8Array(40);
+  const view = new DataView(mdd.buffer);
+  for (const [at, n] of [[0, 2], [4, 1]]) view.setInt32(at, n);
+  for (const [ix, x] of [1, 2, 3, 4, 5, 6].entries()) view.setFloat32(16 + 4 * ix, x);
+  const frames = readFrames("run.mdd", mdd).map((frame) => [...frame]);
   const noGpu = await refusal(() => GpuDetector.open());
   const broken = await refusal(() => readMesh("a.txt", new Uint8Array()));
-  const read = { index: [...mesh.index], positions: [...mesh.positions], corners: mesh.corners, noGpu, broken };
+  const cut = await refusal(() => readFrames("cut.mdd", mdd.subarray(1)));
+  const { corners } = mesh;
+  const read = { index: [...mesh.index], positions: [...mesh.positions], corners, map: [...mesh.map], frames, noGpu, broken, cut };
   process.stdout.write(JSON.stringify({ said, answers, read }));
 }

@@ -50,10 +50,14 @@ try {
     index: [0, 1, 2],
     positions: [0, 0, 0, 1, 0, 0, 0, 1, 0],
     corners: 3,
+    map: [0, 1, 0, 2],
+    frames: [[1, 2, 3], [4, 5, 6]],
     noGpu: "Error: there is no WebGPU here",
     broken: read.broken,
+    cut: read.cut,
   });
   assert.match(read.broken, /^Error: .*a\.txt/);
+  assert.match(read.cut, /^Error: .*cut\.mdd/);
   compare("Node, CPU", answersInNode, withImpacts(scenes));
 
   const server = await serve(folder);

@@ -1,45 +1,55 @@
-// The page as a visitor uses it: node page.mjs FOLDER
+// The page as a visitor uses it: node page.mjs FOLDER PROGRAM [VISIT...], all visits by default
 //
-// FOLDER/site is served. Bodies are dragged, files dropped, buttons pressed, on a large screen, on a phone's screen with
-// touch, and in a browser without WebGPU. Screenshots are written to FOLDER/shots.
+// FOLDER/site is served. Files are dropped, and the answers compared with those of the program about the same files. Bodies are
+// dragged, buttons and keys pressed, on a large screen, on a phone's screen with touch, and in a browser without WebGPU.
+// Screenshots are written to FOLDER/shots.
 
 import assert from "node:assert/strict";
-import { mkdir } from "node:fs/promises";
-import { join } from "node:path";
+import { execFileSync } from "node:child_process";
+import { existsSync } from "node:fs";
+import { mkdir, mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+import { fromLink, toLink } from "../page/link.js";
 import { launch, serve } from "./browser.mjs";
 
-const [folder] = process.argv.slice(2);
+const [folder, program, ...only] = process.argv.slice(2);
 const shots = join(folder, "shots");
 await mkdir(shots, { recursive: true });
 const server = await serve(join(folder, "site"));
+const files = await mkdtemp(join(tmpdir(), "impinge-page-"));
+const data = process.env.IMPINGE_DATA ?? "../shared/data";
+const DESKTOP = { viewport: { width: 1200, height: 760 } };
+const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 2, hasTouch: true, isMobile: true };
 
 // A page and the problems that it had: errors, and files that were not there.
-async function open(browser, options) {
-  const context = await browser.newContext(options);
+async function open(browser, options, hash = "") {
+  const context = await browser.newContext({ permissions: ["clipboard-read", "clipboard-write"], ...options });
   const page = await context.newPage();
   const problems = [];
   page.on("pageerror", (error) => problems.push(String(error)));
   page.on("response", (response) => response.status() >= 400 && problems.push(response.url()));
   page.on("console", (text) => text.type() === "error" && problems.push(text.text()));
-  await page.goto(server.url);
+  await page.goto(server.url + hash);
   await page.waitForFunction(() => document.querySelector("#cpu .hash").textContent.length === 16);
   return { page, problems };
 }
 
-const hashOf = (page, id) => page.locator(`#${id} .hash`).textContent();
+const text = (page, selector) => page.locator(selector).textContent();
+const hashOf = (page, id) => text(page, `#${id} .hash`);
 const settled = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 
-// Pauses at a time between 0 and 1.
+// Pauses at a time.
 async function pauseAt(page, time) {
   await page.locator("#time").fill(String(time));
   await settled(page);
-  assert.equal(await page.locator("#play").textContent(), "Play");
+  assert.equal(await text(page, "#play"), "Play");
 }
 
 async function pairs(page) {
-  const text = await page.locator("#cpu .pairs").textContent();
+  const shown = await text(page, "#cpu .pairs");
   const counted = await page.evaluate(() => window.page.rows.length / 4);
-  assert.equal(Number(text.replaceAll(",", "")), counted);
+  assert.equal(Number(shown.replaceAll(",", "")), counted);
   return counted;
 }
 
@@ -60,17 +70,45 @@ async function sameHash(page) {
   );
 }
 
-// Drops files as a file manager does.
-async function drop(page, ...given) {
+// Drops files as a file manager does, and waits until they are read.
+async function drop(page, ...names) {
+  const given = [];
+  for (const name of names) {
+    const path = name.includes("/") ? name : join(files, name);
+    given.push({ name: path.split("/").at(-1), base64: (await readFile(path)).toString("base64") });
+  }
   const dropped = await page.evaluateHandle((given) => {
     const transfer = new DataTransfer();
-    for (const { name, text } of given) transfer.items.add(new File([text], name));
+    for (const { name, base64 } of given) {
+      const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+      transfer.items.add(new File([bytes], name));
+    }
     return transfer;
   }, given);
   await page.dispatchEvent("#view", "drop", { dataTransfer: dropped });
+  await page.waitForFunction(() => document.getElementById("status").hidden, null, { timeout: 60_000 });
+  await settled(page);
 }
 
-// A box from 0 to `size`, moved along x.
+// What the program prints about files.
+function native(command, ...args) {
+  const paths = args.map((arg) => (arg.includes("/") || !existsSync(join(files, arg)) ? arg : join(files, arg)));
+  return execFileSync(resolve(program), [command, ...paths], { encoding: "utf8", maxBuffer: 1 << 28, stdio: ["ignore", "pipe", "ignore"] });
+}
+
+// The page's answer about files is the program's: the rows and the hash.
+async function sameAsProgram(page, command, names, ...more) {
+  const paths = names.map((name) => (name.includes("/") ? name : join(files, name)));
+  const { hash, pairs: n } = JSON.parse(native(command, ...paths, ...more, "--json"));
+  const csv = native(command, ...paths, ...more, "--pairs", "-").trim().split("\n").slice(1);
+  const rows = csv.map((line) => line.split(",").map(Number)).flat();
+  assert.equal(await hashOf(page, "cpu"), hash, `${command} ${names}: the hash`);
+  assert.equal(await pairs(page), typeof n === "number" ? n : csv.length);
+  assert.deepEqual(await page.evaluate(() => [...window.page.rows]), rows, `${command} ${names}: the rows`);
+  return csv.length;
+}
+
+// A box from 0 to `size`, moved along x: vertices and faces of four corners.
 function box(size, moved) {
   const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((bits) => [bits & 1, (bits >> 1) & 1, bits >> 2].map((x) => x * size));
   const vertices = corners.map(([x, y, z]) => `v ${x + moved} ${y} ${z}`);
@@ -78,8 +116,250 @@ function box(size, moved) {
   return [...vertices, ...faces].join("\n");
 }
 
+function stl(...triangles) {
+  const facet = (corners) => corners.map((corner) => `vertex ${corner.join(" ")}`).join("\n");
+  const facets = triangles.map((corners) => `facet normal 0 0 1\nouter loop\n${facet(corners)}\nendloop\nendfacet`);
+  return ["solid made", ...facets, "endsolid made"].join("\n");
+}
+
+// A strip of eight triangles, bent by an angle per quad: it meets itself when bent far enough.
+function strip(angle) {
+  const points = [];
+  let [x, z] = [0, 0];
+  for (let ix = 0; ix <= 8; ix += 1) {
+    for (const y of [0, 1]) points.push([x, y, z]);
+    x += Math.cos(ix * angle);
+    z += Math.sin(ix * angle);
+  }
+  return points;
+}
+
+const stripFaces = [...Array(8).keys()].flatMap((ix) => {
+  const a = 2 * ix + 1;
+  return [`f ${a} ${a + 1} ${a + 3}`, `f ${a} ${a + 3} ${a + 2}`];
+});
+const stripObj = (angle) => [...strip(angle).map((point) => `v ${point.join(" ")}`), ...stripFaces].join("\n");
+
+function pc2(frames) {
+  const bytes = Buffer.alloc(32 + frames.length * frames[0].length * 12);
+  bytes.write("POINTCACHE2\0", "latin1");
+  for (const [at, value] of [[12, 1], [16, frames[0].length], [28, frames.length]]) bytes.writeInt32LE(value, at);
+  for (const [ix, x] of frames.flat(2).entries()) bytes.writeFloatLE(x, 32 + 4 * ix);
+  return bytes;
+}
+
+const ANGLES = [0, 0.35, 0.7, 0.88, 0.6];
+
+async function writeFiles() {
+  const tip = stl([[0.5, 0.5, 0.5], [3, 0.5, 0.5], [0.5, 3, 0.5]]);
+  // Without welding, neighbours of an STL file are strangers that touch.
+  const [a, b, c, d, e] = [[0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2], [0.25, 0.25, -1]];
+  const soup = stl([a, b, c], [a, b, d], [a, c, d], [b, c, d], [e, [0.5, 0.25, 3], [0.25, 0.5, 3]]);
+  // One part in 10^12 above the floor: in single precision it would stand on it.
+  const floor = "v 0 0 1\nv 4 0 1\nv 0 4 1\nf 1 2 3";
+  const above = "v 1 1 1.000000000001\nv 2 1 2\nv 1 2 2\nf 1 2 3";
+  const made = {
+    "box.obj": box(1, 0),
+    "tip.stl": tip,
+    "far.obj": box(1, 0.5),
+    "soup.stl": soup,
+    "floor.obj": floor,
+    "above.obj": above,
+    "broken.obj": "v 0 0\nf 1 2 3",
+    "notes.txt": "",
+    "bend.obj": stripObj(0),
+    "bend.pc2": pc2(ANGLES.map(strip)),
+    "short.pc2": pc2([[[0, 0, 0]]]),
+    "start.obj": stripObj(0.6),
+    "finish.obj": stripObj(1),
+  };
+  for (const [ix, angle] of ANGLES.entries()) made[`run_${ix + 8}.obj`] = stripObj(angle);
+  for (const [name, content] of Object.entries(made)) await writeFile(join(files, name), content);
+}
+
+async function dropped(browser) {
+  const { page, problems } = await open(browser, DESKTOP);
+  const note = () => text(page, "#scene-note");
+  const isShown = (id) => page.locator(`#${id}`).isVisible();
+
+  // One mesh: does it meet itself? It is there once, and as it is.
+  await drop(page, "soup.stl");
+  assert.equal(await sameAsProgram(page, "self", ["soup.stl"]), 2);
+  assert.match(await note(), /^soup\.stl with itself: 5 triangles; 8 vertices welded/);
+  assert.equal(await page.locator("#self").isChecked(), true);
+  assert.equal(await page.locator("#self").isDisabled(), true);
+  for (const id of ["motion", "share", "size", "as-label", "step"]) assert.equal(await isShown(id), false, `#${id} is hidden`);
+  const firstPose = await page.evaluate(() => [...window.page.bodies[0].now]);
+  assert.deepEqual(firstPose.slice(0, 9), [0, 0, 0, 2, 0, 0, 0, 2, 0]);
+  await page.keyboard.press("Space");
+  await settled(page);
+  await page.screenshot({ path: join(shots, "self.png") });
+  assert.deepEqual(await page.evaluate(() => [...window.page.bodies[0].now]), firstPose, "nothing bends it");
+  // The only body is not moved: a drag turns the view.
+  const [x, y] = await where(page, 0);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.mouse.move(x + 60, y + 20, { steps: 4 });
+  await page.mouse.up();
+  await settled(page);
+  await sameAsProgram(page, "self", ["soup.stl"]);
+
+  // Coordinates keep their precision.
+  await drop(page, "floor.obj", "above.obj");
+  assert.equal(await sameAsProgram(page, "pairs", ["floor.obj", "above.obj"]), 0);
+
+  // Two meshes, and three: all are there. Self-collision is asked for only if it is switched on.
+  await drop(page, "box.obj", "tip.stl");
+  assert.ok((await sameAsProgram(page, "pairs", ["box.obj", "tip.stl"])) > 1);
+  assert.equal(await page.locator("#self").isDisabled(), false);
+  await page.screenshot({ path: join(shots, "dropped.png") });
+  const three = ["box.obj", "tip.stl", "far.obj"];
+  await drop(page, ...three);
+  assert.match(await note(), /^box\.obj, tip\.stl, far\.obj with each other: 25 triangles/);
+  await sameAsProgram(page, "pairs", three);
+  const four = ["box.obj", "soup.stl", "tip.stl", "far.obj"];
+  await drop(page, ...four);
+  const between = await sameAsProgram(page, "pairs", four);
+  await page.locator("#self").check();
+  await settled(page);
+  assert.equal(await sameAsProgram(page, "pairs", four, "--self"), between + 2);
+  assert.match(await note(), /with each other and themselves/);
+  // The legend has a row per body, with the number of its triangles that collide.
+  const legend = await page.locator("#bodies li").allTextContents();
+  const found = await page.evaluate(() => [...window.page.rows]);
+  const colliding = new Set(found.filter((_, at) => at % 2 === 1 && found[at - 1] === 1));
+  assert.equal(legend.length, 4);
+  assert.equal(legend[1], ` soup.stl5 triangles, ${colliding.size} collide`.trim());
+  // WebGPU is asked the same.
+  await page.locator("#use-gpu").check();
+  await sameHash(page);
+  await page.locator("#self").uncheck();
+  await settled(page);
+  await sameHash(page);
+  await page.locator("#use-gpu").uncheck();
+
+  // Files that cannot be read are named, and the others shown; the scene stays if none can.
+  await drop(page, "broken.obj", "box.obj", "notes.txt");
+  assert.match(await text(page, "#message"), /broken\.obj[^]*notes\.txt/);
+  assert.match(await note(), /^box\.obj with itself: 12/);
+  await drop(page, "notes.txt");
+  assert.match(await note(), /^box\.obj with itself: 12/);
+  await page.screenshot({ path: join(shots, "refused.png") });
+  await drop(page, "box.obj", "short.pc2");
+  assert.match(await text(page, "#message"), /short\.pc2 has frames of 1 vertices/);
+  // The button for files takes the same way.
+  await page.locator("#files").setInputFiles(["box.obj", "far.obj"].map((name) => join(files, name)));
+  await page.waitForFunction(() => document.getElementById("scene-note").textContent.startsWith("box.obj, far.obj"));
+  await settled(page);
+  await sameAsProgram(page, "pairs", ["box.obj", "far.obj"]);
+  assert.deepEqual(problems, []);
+  console.log("dropped files: the program's pairs and hashes; bad files are named");
+  await page.context().close();
+}
+
+// Frames: the pairs of each, and the first contacts on the way to the next, as the program prints them.
+async function frames(browser) {
+  const { page, problems } = await open(browser, DESKTOP);
+  const lines = (...args) => native("sequence", ...args, "--json").trim().split("\n").map((line) => JSON.parse(line));
+  const compare = async (mesh, sequence) => {
+    const expected = lines(mesh, sequence);
+    const steps = lines(mesh, sequence, "--ccd");
+    assert.equal(expected.length, ANGLES.length);
+    for (const [ix, { hash, pairs: n }] of expected.entries()) {
+      await pauseAt(page, ix);
+      assert.deepEqual([await hashOf(page, "cpu"), await pairs(page)], [hash, n], `frame ${ix}`);
+      if (ix + 1 === expected.length) continue;
+      const { hash: stepHash, impacts, earliest } = steps[ix];
+      const step = await page.evaluate(() => window.page.step);
+      assert.deepEqual([step.hash, step.n], [stepHash, impacts], `the step from frame ${ix}`);
+      assert.equal(step.first?.time ?? null, earliest?.toi ?? null, `the first contact after frame ${ix}`);
+    }
+    return steps.filter(({ earliest }) => earliest !== null && earliest.toi > 0).length;
+  };
+  await drop(page, "bend.obj", "bend.pc2");
+  assert.match(await text(page, "#scene-note"), /^bend\.obj with bend\.pc2 with itself: 16 triangles/);
+  assert.ok((await compare("bend.obj", "bend.pc2")) > 0);
+  assert.match(await text(page, "#step-text"), /last frame/);
+
+  // It goes to the moment of the first contact, and on with the keys.
+  await pauseAt(page, 2);
+  assert.match(await text(page, "#step-text"), /^On the way to frame 3: \d+ contacts?\. First at 0\.\d+ of the way, (vertex|edge) \d+ and (face|edge) \d+\.$/);
+  await page.locator("#step-show").click();
+  await settled(page);
+  const { step, at } = await page.evaluate(() => ({ step: window.page.step, at: document.getElementById("time-text").textContent }));
+  assert.equal(at, `${Number((2 + step.first.time).toFixed(3))} of 4`);
+  await page.waitForTimeout(700);
+  await page.screenshot({ path: join(shots, "contact.png") });
+  await page.locator("#view").focus();
+  await page.keyboard.press(".");
+  await settled(page);
+  assert.equal(await text(page, "#time-text"), "3 of 4");
+  await page.locator("#previous").click();
+  await settled(page);
+  assert.equal(await text(page, "#time-text"), "2 of 4");
+
+  // A point cache alone moves the mesh that is there.
+  await drop(page, "bend.obj");
+  assert.equal(await page.locator("#motion").isVisible(), false);
+  await drop(page, "bend.pc2");
+  assert.equal(await text(page, "#time-text"), "0 of 4");
+
+  // Numbered files in any order are frames of one mesh.
+  await drop(page, ...[10, 8, 12, 9, 11].map((ix) => `run_${ix}.obj`));
+  assert.match(await text(page, "#scene-note"), /^run_8\.obj … run_12\.obj with itself/);
+  await compare("run_8.obj", join(files, "run_%d.obj"));
+  await page.locator("#as").selectOption("bodies");
+  await settled(page);
+  await sameAsProgram(page, "pairs", [10, 8, 12, 9, 11].map((ix) => `run_${ix}.obj`));
+
+  // Two poses are two bodies, until the visitor says that they are one.
+  await drop(page, "finish.obj", "start.obj");
+  await sameAsProgram(page, "pairs", ["finish.obj", "start.obj"]);
+  await page.locator("#as").selectOption("poses");
+  await settled(page);
+  assert.equal(await text(page, "#time-text"), "0 of 1");
+  const { hash, impacts } = JSON.parse(native("step", "finish.obj", "start.obj", "--json"));
+  const shown = await page.evaluate(() => window.page.step);
+  assert.deepEqual([shown.hash, shown.n], [hash, impacts]);
+  assert.deepEqual(problems, []);
+  console.log("frames: the program's pairs, contacts and first times; numbered files, point caches, two poses");
+  await page.context().close();
+}
+
+// Real meshes, where they are.
+async function real(browser) {
+  const path = (name) => resolve(data, "meshes", name);
+  if (process.env.IMPINGE_NO_DATA || !existsSync(path("cow.off"))) return console.log(`real meshes: skipped, ${data} has none`);
+  const { page, problems } = await open(browser, DESKTOP);
+  for (const name of ["cow.off", "camelhead.off", "bunny.ply"]) {
+    await drop(page, path(name));
+    console.log(`  ${name}: ${await sameAsProgram(page, "self", [path(name)])} pairs`);
+    await page.screenshot({ path: join(shots, `${name}.png`) });
+    if (name !== "cow.off") continue;
+    // Its places are the connected groups of its colliding triangles; one is gone to, and its triangle named.
+    const { places, n } = await page.evaluate(() => ({ places: window.page.places.length, n: window.page.places[0].n }));
+    assert.equal(Number(await text(page, "#n-places")), places);
+    const items = page.locator("#place-list button");
+    assert.equal(await items.count(), places);
+    assert.equal(await items.first().textContent(), `${n} triangles`);
+    const eye = await page.evaluate(() => window.page.view.eye);
+    await items.first().click();
+    await page.waitForTimeout(700);
+    assert.notDeepEqual(await page.evaluate(() => window.page.view.eye), eye);
+    assert.match(await text(page, "#chosen"), /^triangle [\d,]+ meets \d/);
+    await page.screenshot({ path: join(shots, "place.png") });
+  }
+  const all = ["cow.off", "camelhead.off", "bunny.ply"].map(path);
+  await drop(page, ...all);
+  console.log(`  all three: ${await sameAsProgram(page, "pairs", all)} pairs`);
+  await page.screenshot({ path: join(shots, "three.png") });
+  assert.deepEqual(problems, []);
+  console.log("real meshes: the program's pairs and hashes");
+  await page.context().close();
+}
+
 async function large(browser) {
-  const { page, problems } = await open(browser, { viewport: { width: 1200, height: 760 } });
+  const { page, problems } = await open(browser, DESKTOP);
   // It plays: the time changes by itself.
   const first = await page.locator("#time").inputValue();
   await page.waitForFunction((first) => document.getElementById("time").value !== first, first);
@@ -96,22 +376,19 @@ async function large(browser) {
   await pauseAt(page, 1);
   assert.equal(await hashOf(page, "cpu"), hashAtEnd);
 
-  // Both methods and both backends give one hash.
-  const gpuSwitch = page.locator("#use-gpu");
-  assert.equal(await gpuSwitch.isDisabled(), false);
-  await gpuSwitch.check();
+  // Both methods and both backends give one hash. There is no row of WebGPU before it is switched on.
+  assert.equal(await page.locator("#gpu").isVisible(), false);
+  await page.locator("#use-gpu").check();
   await sameHash(page);
-  await page.locator("#method").selectOption("cells");
-  await settled(page);
-  await sameHash(page);
-  assert.equal(await hashOf(page, "gpu"), hashAtEnd);
-  await page.locator("#method").selectOption("clusters");
-  await settled(page);
-  await sameHash(page);
-  assert.equal(await hashOf(page, "gpu"), hashAtEnd);
+  for (const method of ["cells", "clusters"]) {
+    await page.locator("#method").selectOption(method);
+    await settled(page);
+    await sameHash(page);
+    assert.equal(await hashOf(page, "gpu"), hashAtEnd);
+  }
   await page.screenshot({ path: join(shots, "end.png") });
 
-  // A body is dragged out of the others and back, and the pairs follow.
+  // A body is dragged out of the others, and the pairs follow.
   const [x, y] = await where(page, 2);
   await page.mouse.move(x, y);
   await page.mouse.down();
@@ -123,119 +400,208 @@ async function large(browser) {
   const movedBy = await page.evaluate(() => window.page.bodies.map(({ offset }) => Math.hypot(...offset)));
   assert.ok(movedBy[2] > 0 && movedBy[0] === 0 && movedBy[1] === 0, `moved by ${movedBy}`);
   await sameHash(page);
-  await page.screenshot({ path: join(shots, "dragged.png") });
   await page.mouse.up();
+  await page.locator("#use-gpu").uncheck();
+  await settled(page);
+  assert.equal(await page.locator("#gpu").isVisible(), false);
 
   // A drag beside the bodies turns the view, and moves nothing.
-  const before = await page.evaluate(() => window.page.view.camera.position.toArray());
+  const before = await page.evaluate(() => window.page.view.eye);
   const hash = await hashOf(page, "cpu");
-  await page.mouse.move(600, 640);
+  await page.mouse.move(500, 640);
   await page.mouse.down();
-  await page.mouse.move(700, 600, { steps: 4 });
+  await page.mouse.move(600, 600, { steps: 4 });
   await page.mouse.up();
-  const after = await page.evaluate(() => window.page.view.camera.position.toArray());
-  assert.notDeepEqual(after, before);
+  const eye = await page.evaluate(() => window.page.view.eye);
+  assert.notDeepEqual(eye, before);
   assert.equal(await hashOf(page, "cpu"), hash);
+  await page.screenshot({ path: join(shots, "dragged.png") });
 
+  // The link shows the same in another tab: bodies, moment, view, switches.
+  await page.locator("#share").click();
+  await page.waitForFunction(() => document.getElementById("status").textContent.startsWith("The link is copied"));
+  const link = await page.evaluate(() => navigator.clipboard.readText());
+  assert.equal(link, page.url());
+  const other = await open(browser, DESKTOP, new URL(link).hash);
+  const near = (a, b) => a.forEach((x, ix) => assert.ok(Math.abs(x - b[ix]) < 1e-3, `${a} and ${b}`));
+  await settled(other.page);
+  near(await other.page.evaluate(() => window.page.view.eye), eye);
+  near(await other.page.evaluate(() => window.page.bodies[2].offset), await page.evaluate(() => window.page.bodies[2].offset));
+  assert.equal(await text(other.page, "#play"), "Play");
+  assert.equal(await text(other.page, "#time-text"), "1.000");
+  assert.deepEqual(other.problems, []);
+  await other.page.context().close();
+  await page.locator("#back").click();
+  await settled(page);
+  assert.equal(await hashOf(page, "cpu"), hashAtEnd, "the bodies are back");
+
+  // A click names a triangle and its partners. Escape ends that.
+  await page.keyboard.press("f");
+  await page.keyboard.press("j");
+  await page.waitForTimeout(700);
+  assert.match(await text(page, "#chosen"), /^triangle [\d,]+ of (worm|knot|ball) meets \d+: /);
+  await page.screenshot({ path: join(shots, "chosen.png") });
+  await page.keyboard.press("Escape");
+  assert.equal(await page.locator("#chosen").isVisible(), false);
+  await page.keyboard.press("f");
+  const point = await where(page, 0);
+  await page.mouse.move(...point);
+  assert.match(await text(page, "#tip"), /^triangle [\d,]+ of worm$/);
+  await page.mouse.click(...point);
+  assert.match(await text(page, "#chosen"), /^triangle [\d,]+ of worm meets/);
+
+  // A scene of frames in which no frame collides, but steps do. A pause shows a frame, not a moment between two.
+  await page.locator("#scene").selectOption("fall");
+  await page.waitForFunction(() => document.getElementById("time").value === "1");
   await page.locator("#play").click();
-  assert.equal(await page.locator("#play").textContent(), "Pause");
-  await page.locator("#play").click();
+  await settled(page);
+  assert.match(await text(page, "#time-text"), /^[1-6] of 6$/);
+  let nContacts = 0;
+  for (let ix = 0; ix < 6; ix += 1) {
+    await pauseAt(page, ix);
+    assert.equal(await pairs(page), 0);
+    nContacts += await page.evaluate(() => window.page.step.n);
+  }
+  assert.ok(nContacts > 0);
   await page.locator("#size").selectOption("3000");
   await settled(page);
-  const note = await page.locator("#scene-note").textContent();
-  assert.match(note, /worm, knot, ball: [23],\d{3} triangles/);
-
-  // Two boxes that overlap, of two formats.
-  await pauseAt(page, 0);
-  const stl = [
-    "solid tip",
-    "facet normal 0 0 1\nouter loop\nvertex 0.5 0.5 0.5\nvertex 3 0.5 0.5\nvertex 0.5 3 0.5\nendloop\nendfacet",
-    "endsolid tip",
-  ].join("\n");
-  await drop(page, { name: "box.obj", text: box(1, 0) }, { name: "tip.stl", text: stl });
-  await page.waitForFunction(() => document.getElementById("scene-note").textContent.startsWith("box.obj, tip.stl: 13 "));
-  await pauseAt(page, 0);
-  // The triangle leaves the box through two sides of two triangles each, or through their common edge.
-  const crossed = await pairs(page);
-  assert.ok(crossed >= 2 && crossed <= 4, `${crossed} pairs`);
-  await sameHash(page);
-  await page.screenshot({ path: join(shots, "dropped.png") });
-
-  // One mesh meets its copy.
-  await drop(page, { name: "alone.obj", text: box(2, 5) });
-  await page.waitForFunction(() => document.getElementById("scene-note").textContent.startsWith("alone.obj, alone.obj: 24 "));
-  await settled(page);
-  assert.ok((await pairs(page)) > 0);
-
-  // The button for files takes the same way.
-  await page.locator("#files").setInputFiles([
-    { name: "chosen.obj", mimeType: "", buffer: Buffer.from(box(1, 0)) },
-    { name: "far.obj", mimeType: "", buffer: Buffer.from(box(1, 9)) },
-  ]);
-  await page.waitForFunction(() => document.getElementById("scene-note").textContent.startsWith("chosen.obj, far.obj: 24 "));
-  await settled(page);
-  assert.equal(await pairs(page), 0);
-
-  // Bad files are refused by name, and the scene stays.
-  const message = page.locator("#message");
-  await drop(page, { name: "broken.obj", text: "v 0 0\nf 1 2 3" });
-  await message.waitFor({ state: "visible" });
-  assert.match(await message.textContent(), /broken\.obj/);
-  await drop(page, { name: "notes.txt", text: "" });
-  await page.waitForFunction(() => document.getElementById("message").textContent.includes("notes.txt"));
-  assert.match(await page.locator("#scene-note").textContent(), /^chosen\.obj/);
-  await drop(page, { name: "huge.obj", text: "v 1e300 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3" });
-  await page.waitForFunction(() => /non-finite|outside|huge/.test(document.getElementById("message").textContent));
-  await page.screenshot({ path: join(shots, "refused.png") });
-  await page.locator("#time").fill("0.5");
-  const demo = page.locator("#demo");
-  if (await demo.isVisible()) await demo.click();
-  await settled(page);
-  assert.match(await page.locator("#scene-note").textContent(), /^worm, knot, ball/);
-
-  await gpuSwitch.uncheck();
-  await settled(page);
-  assert.equal(await hashOf(page, "gpu"), "");
+  assert.match(await text(page, "#scene-note"), /^cloth, ball with each other: [23],\d{3} triangles/);
   assert.deepEqual(problems, []);
-  console.log("a large screen: played, dragged, turned, dropped, refused; CPU and WebGPU give one hash");
+  console.log("a large screen: played, dragged, turned, linked, chosen; CPU and WebGPU give one hash");
+  await page.context().close();
+}
+
+// All that a visitor may press has a name, can be reached with Tab, and shows that it has the focus.
+async function keyboard(browser) {
+  const { page, problems } = await open(browser, DESKTOP);
+  await pauseAt(page, 1);
+  const unnamed = await page.evaluate(() => {
+    const name = (control) => control.ariaLabel || control.textContent.trim() || [...(control.labels ?? [])].map((label) => label.textContent.trim()).join("");
+    return [...document.querySelectorAll("button, input, select, canvas, summary")].filter((control) => !name(control)).map(({ outerHTML }) => outerHTML);
+  });
+  assert.deepEqual(unnamed, []);
+  const reached = new Set();
+  for (let ix = 0; ix < 60; ix += 1) {
+    await page.keyboard.press("Tab");
+    const [id, outline] = await page.evaluate(() => {
+      const { activeElement: active } = document;
+      const seen = active.closest(".button") ?? active;
+      return [active.id, getComputedStyle(seen).outlineStyle !== "none" || getComputedStyle(seen).boxShadow !== "none"];
+    });
+    if (id) reached.add(id);
+    if (id) assert.ok(outline, `#${id} shows the focus`);
+  }
+  for (const id of ["view", "play", "time", "files", "scene", "size", "self", "method", "use-gpu", "share"]) {
+    assert.ok(reached.has(id), `#${id} is reached with Tab`);
+  }
+  await page.locator("#view").focus();
+  const eye = await page.evaluate(() => window.page.view.eye);
+  for (const key of ["ArrowLeft", "ArrowUp", "+"]) {
+    const before = await page.evaluate(() => window.page.view.eye);
+    await page.keyboard.press(key);
+    assert.notDeepEqual(await page.evaluate(() => window.page.view.eye), before, key);
+  }
+  await page.keyboard.press("f");
+  assert.deepEqual(await page.evaluate(() => window.page.view.eye.map((x) => x.toFixed(6))), eye.map((x) => x.toFixed(6)));
+  await page.keyboard.press("Space");
+  assert.equal(await text(page, "#play"), "Pause");
+  await page.keyboard.press("Space");
+  assert.equal(await text(page, "#play"), "Play");
+  // Space on a button presses it, once.
+  await page.locator("#play").focus();
+  await page.keyboard.press("Space");
+  assert.equal(await text(page, "#play"), "Pause");
+  assert.deepEqual(problems, []);
+  console.log("the keyboard: everything has a name, is reached and shows it");
+  await page.context().close();
+}
+
+// Nothing is wider than the screen, nothing is cut, and all controls are on it.
+async function fits(page, ...ids) {
+  const { width, height } = page.viewportSize();
+  const [wide, high] = await page.evaluate(() => [document.documentElement.scrollWidth, document.documentElement.scrollHeight]);
+  assert.ok(wide <= width && high <= height, `the page has ${wide} by ${high} pixels`);
+  for (const id of ids) {
+    const { x, y, width: w, height: h } = await page.locator(`#${id}`).boundingBox();
+    assert.ok(x >= 0 && x + w <= width && y >= 0 && y + h <= height, `#${id} is on the screen`);
+  }
+  const cut = await page.evaluate(() => {
+    const panels = [...document.querySelectorAll("#answer, #controls, #side > *")].filter((panel) => panel.offsetParent !== null || panel.getClientRects().length > 0);
+    return panels.filter((panel) => panel.scrollWidth > panel.clientWidth + 1).map(({ id, className }) => id || className);
+  });
+  assert.deepEqual(cut, [], "panels that are cut");
+  // Enough is left for the bodies.
+  const [top, bottom] = await page.evaluate(() => [document.getElementById("answer").getBoundingClientRect().bottom, document.getElementById("bottom").getBoundingClientRect().top]);
+  return bottom - top;
 }
 
 async function phone(browser) {
-  const screen = { viewport: { width: 390, height: 780 }, deviceScaleFactor: 2, hasTouch: true, isMobile: true };
-  const { page, problems } = await open(browser, screen);
+  const { page, problems } = await open(browser, PHONE);
   await page.locator("#play").tap();
   await pauseAt(page, 1);
   const before = await pairs(page);
-  // Nothing is wider than the screen, and all buttons are on it.
-  const [width, height] = await page.evaluate(() => [document.documentElement.scrollWidth, window.innerHeight]);
-  assert.ok(width <= 390, `${width} pixels wide`);
-  for (const id of ["play", "time", "size", "method", "use-gpu"]) {
-    const { x, y, width: w, height: h } = await page.locator(`#${id}`).boundingBox();
-    assert.ok(x >= 0 && x + w <= 390 && y >= 0 && y + h <= height, `#${id} is on the screen`);
-  }
+  const room = await fits(page, "play", "time", "files", "scene", "size", "self", "share", "answer");
+  assert.ok(room > 350, `${room} pixels for the bodies`);
   await page.screenshot({ path: join(shots, "phone.png") });
+  for (const [ix, ids] of [["bodies"], ["place-list"], ["method", "use-gpu"]].entries()) {
+    await page.locator("#side summary").nth(ix).tap();
+    await fits(page, "play", "files", "share", ...ids);
+    await page.locator("#side summary").nth(ix).tap();
+  }
+  await settled(page);
   // A finger drags the ball.
   const [x, y] = await where(page, 2);
   const touch = await page.context().newCDPSession(page);
   const send = (type, at) => touch.send("Input.dispatchTouchEvent", { type, touchPoints: at ? [{ x: at[0], y: at[1] }] : [] });
   await send("touchStart", [x, y]);
-  for (let step = 1; step <= 5; step += 1) await send("touchMove", [x, y + 40 * step]);
+  for (let step = 1; step <= 5; step += 1) await send("touchMove", [x, y - 30 * step]);
   await send("touchEnd");
   await settled(page);
   assert.ok((await pairs(page)) < before, "the pairs follow the finger");
+  // A finger chooses a triangle, opens the list, and goes to a place.
+  await page.locator("#back").tap();
+  await settled(page);
+  await page.touchscreen.tap(...(await where(page, 0)));
+  await settled(page);
+  assert.match(await text(page, "#chosen"), /^triangle [\d,]+ of worm/);
+  await page.locator("#side summary").nth(1).tap();
+  await page.locator("#place-list button").first().tap();
+  await page.waitForTimeout(700);
+  await fits(page, "play", "time", "files", "share", "chosen");
+  await page.screenshot({ path: join(shots, "phone-places.png") });
+  await page.locator("#side summary").nth(1).tap();
+  await drop(page, "bend.obj", "bend.pc2");
+  await pauseAt(page, 2);
+  await fits(page, "play", "previous", "time", "next", "step-show", "files", "self");
+  await page.screenshot({ path: join(shots, "phone-frames.png") });
+  await drop(page, "broken.obj", "box.obj", "notes.txt", "tip.stl");
+  await fits(page, "files", "message");
   assert.deepEqual(problems, []);
-  console.log("a phone's screen: everything fits, a finger drags");
+  console.log("a phone's screen: everything fits; fingers drag, choose and go to places");
+  await page.context().close();
 }
 
 async function withoutGpu(browser) {
   const { page, problems } = await open(browser, { viewport: { width: 900, height: 600 } });
-  await page.waitForFunction(() => document.getElementById("gpu-note").textContent.startsWith("No WebGPU: "));
-  assert.equal(await page.locator("#use-gpu").isDisabled(), true);
+  await page.waitForTimeout(300);
+  for (const id of ["gpu", "gpu-label"]) assert.equal(await page.locator(`#${id}`).isVisible(), false, `#${id} is hidden`);
   await pauseAt(page, 1);
   assert.ok((await pairs(page)) > 100);
   await page.screenshot({ path: join(shots, "without-webgpu.png") });
   assert.deepEqual(problems, []);
-  console.log("without WebGPU: the page says so, and the CPU answers");
+  console.log("without WebGPU: nothing of it is shown, and the CPU answers");
+  await page.context().close();
+}
+
+// A link says what it was made from, and nonsense in it is ignored.
+function links() {
+  const state = { scene: "ring", size: "3000", time: 0.25, self: true, eye: [1, 2, 3, 4, 5, 6], moved: [[0, 0, 0], [0.5, 0, -1]] };
+  const scenes = { ring: {} };
+  assert.deepEqual(fromLink(toLink(state), scenes), { ...state, size: 3000, moved: state.moved.flat() });
+  const nothing = { scene: null, size: null, time: null, self: null, eye: null, moved: null };
+  for (const text of ["", "#", "#scene=toString&triangles=x&time=NaN&self=2&eye=1,2&moved=1e9,", "#%zz"]) {
+    assert.deepEqual(fromLink(text, scenes), nothing, text);
+  }
 }
 
 async function example(browser) {
@@ -253,14 +619,19 @@ async function example(browser) {
 }
 
 try {
-  for (const [options, visits] of [[{ gpu: true }, [large, phone, example]], [{ gpu: false }, [withoutGpu]]]) {
+  links();
+  await writeFiles();
+  const visits = [dropped, frames, real, large, keyboard, phone, example];
+  for (const [options, all] of [[{ gpu: true }, visits], [{ gpu: false }, [withoutGpu]]]) {
+    const those = all.filter(({ name }) => only.length === 0 || only.includes(name));
     const browser = await launch(options);
     try {
-      for (const visit of visits) await visit(browser);
+      for (const visit of those) await visit(browser);
     } finally {
       await browser.close();
     }
   }
 } finally {
   server.close();
+  await rm(files, { recursive: true });
 }

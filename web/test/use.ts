@@ -1,7 +1,7 @@
 // Uses all of the package's types; tsc checks it.
 
 import init, { Detector, type Body, type Impact, type Statistics } from "impinge";
-import initGpu, { GpuDetector, readMesh } from "impinge/webgpu";
+import initGpu, { GpuDetector, readFrames, readMesh } from "impinge/webgpu";
 
 await init();
 using detector = new Detector({ method: "cells", sharedVertex: "resolve" });
@@ -12,8 +12,9 @@ detector.setEndPositions(b, new Float64Array(12));
 const pairs: Uint32Array = detector.between(a, b);
 const own: Uint32Array = detector.within(a);
 const all: Uint32Array = detector.everything();
+const different: Uint32Array = detector.betweenAll();
 const first: Impact | null = detector.earliest({ bodies: [a, b], start: "skip", toi: "f64", separation: 0.5 });
-const times: number[] = [...detector.impacts({ bodies: [a] })].map(({ time }) => time);
+const times: number[] = [...detector.impacts({ which: "between" })].map(({ time }) => time);
 const kind: "vf" | undefined | string = detector.impacts().at(0)?.kind;
 const statistics: Statistics = detector.statistics;
 const told: string = `${detector.hash} ${statistics.totalMs} ${statistics.stages["pairing"]}`;
@@ -30,4 +31,6 @@ await initGpu(new URL("impinge_bg.wasm", "http://localhost/"));
 const gpu = await GpuDetector.open();
 const answer = await gpu.between(await gpu.add(new Uint8Array(3), new Float32Array(9)), 1);
 const mesh = readMesh("a.ply", new Uint8Array(), { weld: true });
-console.log(pairs, own, all, first, times, kind, told, primitives, vertices, answer.hash, answer.pairs, mesh.corners);
+const frames: Float32Array[] = readFrames("a.pc2", new Uint8Array());
+const map: Uint32Array = mesh.map;
+console.log(frames, map, different, await gpu.betweenAll(), pairs, own, all, first, times, kind, told, primitives, vertices, answer.hash, answer.pairs, mesh.corners);

@@ -105,9 +105,9 @@ impl Engine {
         Ok(vec![n_primitives as u32, n_vertices as u32])
     }
 
-    /// See [`World::detect`]; `bodies` as in [`Asked::of`].
-    pub fn detect(&mut self, bodies: &[u32]) -> Result<Vec<u32>, JsError> {
-        let asked = Asked::of(bodies).map_err(thrown)?;
+    /// See [`World::detect`]; `bodies` and `with_self` as in [`Asked::of`].
+    pub fn detect(&mut self, bodies: &[u32], with_self: bool) -> Result<Vec<u32>, JsError> {
+        let asked = Asked::of(bodies, with_self).map_err(thrown)?;
         let (numbers, pairs) = self.world.detect(asked).map_err(thrown)?;
         self.hash = pairs.hash();
         self.statistics = statistics(pairs.stats())?;
@@ -116,8 +116,12 @@ impl Engine {
 
     /// [`detect`](Engine::detect) without blocking.
     #[cfg(feature = "gpu")]
-    pub async fn detect_async(&mut self, bodies: Vec<u32>) -> Result<Vec<u32>, JsError> {
-        let asked = Asked::of(&bodies).map_err(thrown)?;
+    pub async fn detect_async(
+        &mut self,
+        bodies: Vec<u32>,
+        with_self: bool,
+    ) -> Result<Vec<u32>, JsError> {
+        let asked = Asked::of(&bodies, with_self).map_err(thrown)?;
         let (numbers, pairs) = self.world.detect_async(asked).await.map_err(thrown)?;
         self.hash = pairs.hash();
         self.statistics = statistics(pairs.stats())?;
@@ -128,11 +132,12 @@ impl Engine {
     pub fn impacts(
         &mut self,
         bodies: &[u32],
+        with_self: bool,
         start: &str,
         toi: &str,
         separation: f64,
     ) -> Result<Array, JsError> {
-        let asked = Asked::of(bodies).map_err(thrown)?;
+        let asked = Asked::of(bodies, with_self).map_err(thrown)?;
         let options = StepOptions::new(start, toi, separation).map_err(thrown)?;
         let (impacts, hash) = self.world.impacts(asked, options).map_err(thrown)?;
         self.hash = hash;
@@ -144,11 +149,12 @@ impl Engine {
     pub fn earliest(
         &mut self,
         bodies: &[u32],
+        with_self: bool,
         start: &str,
         toi: &str,
         separation: f64,
     ) -> Result<Array, JsError> {
-        let asked = Asked::of(bodies).map_err(thrown)?;
+        let asked = Asked::of(bodies, with_self).map_err(thrown)?;
         let options = StepOptions::new(start, toi, separation).map_err(thrown)?;
         let earliest = self.world.earliest(asked, options).map_err(thrown)?;
         self.statistics = statistics(self.world.step_stats())?;
@@ -228,15 +234,33 @@ impl MeshFile {
 
     /// x, y, z per vertex, as a `Float32Array` if the file is in single precision, else as a `Float64Array`.
     pub fn positions(&self) -> JsValue {
-        use impinge_io::Positions;
-        match &self.0.positions {
-            Positions::F32(rows) => js_sys::Float32Array::from(rows.as_flattened()).into(),
-            Positions::F64(rows) => Float64Array::from(rows.as_flattened()).into(),
-        }
+        coordinates(&self.0.positions)
+    }
+
+    /// For each vertex of the file, its number in the mesh.
+    pub fn map(&self) -> Vec<u32> {
+        self.0.map.clone()
     }
 
     /// 3 for triangles, 4 for tetrahedra.
     pub fn corners(&self) -> u32 {
         self.0.corners
+    }
+}
+
+/// The frames of a point cache; see [`read_frames`](crate::meshes::read_frames).
+#[cfg(feature = "io")]
+#[wasm_bindgen]
+pub fn read_frames(name: &str, bytes: Vec<u8>) -> Result<Array, JsError> {
+    let frames = crate::meshes::read_frames(name, bytes).map_err(thrown)?;
+    Ok(frames.iter().map(coordinates).collect())
+}
+
+#[cfg(feature = "io")]
+fn coordinates(positions: &impinge_io::Positions) -> JsValue {
+    use impinge_io::Positions;
+    match positions {
+        Positions::F32(rows) => js_sys::Float32Array::from(rows.as_flattened()).into(),
+        Positions::F64(rows) => Float64Array::from(rows.as_flattened()).into(),
     }
 }

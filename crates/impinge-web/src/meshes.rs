@@ -1,6 +1,8 @@
 //! Mesh files from the bytes that a page or a program has.
 
-use impinge_io::{Elements, Format, Positions, ReadOptions, read_bytes};
+use impinge_io::{
+    Elements, Format, Positions, ReadOptions, Sequence, SequenceFormat, Weld, read_bytes,
+};
 
 use crate::error::Error;
 
@@ -16,6 +18,8 @@ pub struct FileMesh {
     pub positions: Positions,
     /// 3 for triangles, 4 for tetrahedra.
     pub corners: u32,
+    /// For each vertex of the file, its number in the mesh: they differ if vertices were welded.
+    pub map: Vec<u32>,
 }
 
 /// Reads the bytes of a mesh file. The extension of its name is that of its format. With `weld`, vertices at the same
@@ -26,17 +30,42 @@ pub struct FileMesh {
 pub fn read(name: &str, bytes: &[u8], weld: bool) -> Result<FileMesh, Error> {
     let format = Format::from_path(name.as_ref())?;
     let options = ReadOptions {
-        weld,
         max_expanded_bytes: MAX_EXPANDED_BYTES,
         ..ReadOptions::default()
     };
-    let mesh = read_bytes(bytes, format, name, &options)?;
+    let mut mesh = read_bytes(bytes, format, name, &options)?;
+    // The reader's limit on vertices is 32 bits.
+    let mut map: Vec<u32> = (0..mesh.n_vertices() as u32).collect();
+    if weld {
+        let weld = Weld::by_position(&mesh.positions);
+        weld.apply(&mut mesh);
+        map.copy_from_slice(weld.map());
+    }
     Ok(FileMesh {
         index: mesh.elements.indices().to_vec(),
-        positions: mesh.positions,
         corners: match &mesh.elements {
             Elements::Triangles(_) => 3,
             Elements::Tetrahedra(_) => 4,
         },
+        positions: mesh.positions,
+        map,
     })
+}
+
+/// Reads the bytes of a point cache (`.pc2`, `.mdd`): the positions of each frame.
+///
+/// # Errors
+/// An unknown extension; files that the reader refuses.
+pub fn read_frames(name: &str, bytes: Vec<u8>) -> Result<Vec<Positions>, Error> {
+    let extension = name.rsplit('.').next().unwrap_or_default();
+    let Some(format) = SequenceFormat::from_extension(extension) else {
+        return Err(Error::Word {
+            what: "the extension of a point cache",
+            given: extension.to_owned(),
+            allowed: "\"pc2\" or \"mdd\"",
+        });
+    };
+    let sequence = Sequence::from_bytes(bytes, format, name)?;
+    let frames = (0..sequence.n_frames()).map(|frame| sequence.frame(frame));
+    Ok(frames.collect::<Result<_, _>>()?)
 }

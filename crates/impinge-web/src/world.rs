@@ -14,18 +14,21 @@ pub enum Asked {
     Between(u32, u32),
     /// Self-collision of one body.
     Within(u32),
+    /// Pairs of different bodies.
+    Different,
     /// Pairs of different bodies and self-collision of each.
     Everything,
 }
 
 impl Asked {
-    /// No body: everything. One: within it. Two: between them.
+    /// No body: everything, or without `with_self` the pairs of different bodies. One: within it. Two: between them.
     ///
     /// # Errors
     /// More than two bodies.
-    pub fn of(bodies: &[u32]) -> Result<Self, Error> {
+    pub fn of(bodies: &[u32], with_self: bool) -> Result<Self, Error> {
         match *bodies {
-            [] => Ok(Asked::Everything),
+            [] if with_self => Ok(Asked::Everything),
+            [] => Ok(Asked::Different),
             [body] => Ok(Asked::Within(body)),
             [a, b] => Ok(Asked::Between(a, b)),
             _ => Err(Error::Bodies {
@@ -164,7 +167,7 @@ impl World {
     }
 
     /// All pairs, sorted, as flat numbers. Two per pair: the primitives of the bodies asked for. For
-    /// [`Asked::Everything`] four: a body before each primitive.
+    /// [`Asked::Everything`] and [`Asked::Different`] four: a body before each primitive.
     ///
     /// # Errors
     /// No such body; those of [`Detector::detect`].
@@ -220,6 +223,7 @@ impl World {
         let query = match asked {
             Asked::Between(a, b) => Query::between(id(a)?, id(b)?),
             Asked::Within(body) => Query::within(id(body)?),
+            Asked::Different => Query::all(),
             Asked::Everything => Query::everything(),
         };
         Ok(query.shared_vertex(self.shared_vertex))
@@ -279,7 +283,7 @@ fn flat(bodies: &Bodies, asked: Asked, pairs: &Pairs) -> Result<Vec<u32>, Error>
             let pairs = pairs.within(bodies.id(body)?);
             pairs.flat_map(two).collect()
         }
-        Asked::Everything => {
+        Asked::Everything | Asked::Different => {
             let number = bodies.numbers();
             let rows = pairs.rows();
             rows.flat_map(|[body_a, a, body_b, b]| [number(body_a), a, number(body_b), b])

@@ -29,6 +29,15 @@ fn pairs_are_those_of_the_bodies_asked_for_in_the_order_asked() -> Result<(), Er
     assert_eq!(world.detect(Asked::Between(b, a))?.0, [0, 1]);
     assert_eq!(world.detect(Asked::Within(a))?.0, []);
     assert_eq!(world.detect(Asked::Everything)?.0, [a, 1, b, 0]);
+    assert_eq!(Asked::of(&[], true)?, Asked::Everything);
+    assert_eq!(Asked::of(&[], false)?, Asked::Different);
+    assert_eq!(world.detect(Asked::Different)?.0, [a, 1, b, 0]);
+    let upon = world.add(&[0, 1, 2, 3, 4, 5], &[TRIANGLE, ACROSS].concat(), 3)?;
+    let all = world.detect(Asked::Everything)?.0;
+    assert!(all.chunks(4).any(|row| row == [upon, 0, upon, 1]));
+    let different = all.chunks(4).filter(|row| row[0] != row[2]);
+    let different: Vec<u32> = different.flatten().copied().collect();
+    assert_eq!(world.detect(Asked::Different)?.0, different);
     world.set_positions(b, &ACROSS.map(|x| x + 8.0))?;
     assert_eq!(world.detect(Asked::Between(a, b))?.0, [0, 0]);
     Ok(())
@@ -131,7 +140,7 @@ fn bad_input_is_refused_by_name() -> Result<(), Error> {
     assert!(World::settings("slabs").is_err());
     assert!(World::new(Detector::new(Backend::Cpu)?, "").is_err());
     assert_eq!(
-        Asked::of(&[0, 1, 2]).expect_err("three").to_string(),
+        Asked::of(&[0, 1, 2], true).expect_err("three").to_string(),
         "bodies: 3 given, 0 (everything), 1 (within it) or 2 (between them) allowed"
     );
     assert_eq!(

@@ -1,0 +1,96 @@
+// Dropped files as bodies: meshes as they are, and the frames of bodies that move.
+
+// Three files are frames of one body if their names differ in numbers alone; two only if the visitor says so.
+const LEAST_NUMBERED = 3;
+
+const isCache = ({ name }) => /\.(pc2|mdd)$/i.test(name);
+const byName = new Intl.Collator("en", { numeric: true }).compare;
+
+// Reads files. Those that cannot be read are left out, and `refused` says why.
+export async function read({ readMesh, readFrames }, list) {
+  const [meshes, caches, refused] = [[], [], []];
+  for (const file of list) {
+    try {
+      const bytes = new Uint8Array(await file.arrayBuffer());
+      if (isCache(file)) {
+        caches.push({ name: file.name, frames: readFrames(file.name, bytes) });
+        continue;
+      }
+      // Vertices at one position become one, as for the program, and coordinates keep their precision.
+      const mesh = readMesh(file.name, bytes, { weld: true });
+      if (mesh.index.length === 0) throw new Error(`${file.name} has no triangles and no tetrahedra`);
+      meshes.push({ name: file.name, ...mesh });
+    } catch (error) {
+      refused.push(String(error.message ?? error));
+    }
+  }
+  return { meshes, caches, refused };
+}
+
+const isSameMesh = (a, b) => a.map.length === b.map.length && a.index.length === b.index.length;
+
+// Whether all meshes may be poses of one.
+export function mayBePoses({ meshes }) {
+  return meshes.length > 1 && meshes.every((mesh) => isSameMesh(mesh, meshes[0]));
+}
+
+// Whether meshes are taken for frames unless the visitor says otherwise.
+export function looksNumbered({ meshes }) {
+  const pattern = (name) => name.replace(/\d+/g, "#");
+  const first = meshes[0] && pattern(meshes[0].name);
+  return meshes.length >= LEAST_NUMBERED && mayBePoses({ meshes }) && meshes.every(({ name }) => pattern(name) === first);
+}
+
+// One body per mesh, or with `arePoses` one body whose frames are the meshes. A point cache moves the first mesh
+// that has as many vertices and does not move yet.
+export function bodiesOf({ meshes, caches }, arePoses) {
+  const refused = [];
+  const bodies = [];
+  if (arePoses) {
+    const poses = meshes.toSorted((a, b) => byName(a.name, b.name));
+    const [first] = poses;
+    const frames = poses.map((pose) => welded(first, vertices(pose), pose.name));
+    bodies.push({ ...first, name: `${first.name} … ${poses.at(-1).name}`, frames });
+  } else {
+    bodies.push(...meshes);
+  }
+  for (const { name, frames } of caches) {
+    const n = (frames[0]?.length ?? 0) / 3;
+    const at = bodies.findIndex((body) => body.frames === undefined && body.map.length === n);
+    if (at < 0) {
+      refused.push(`${name} has frames of ${n} vertices, but no mesh that does not move yet has as many`);
+      continue;
+    }
+    const still = bodies[at];
+    try {
+      const own = frames.map((frame, ix) => welded(still, frame, `${name}: frame ${ix}`));
+      bodies[at] = { ...still, name: `${still.name} with ${name}`, frames: own };
+    } catch (error) {
+      refused.push(error.message);
+    }
+  }
+  return { bodies, refused };
+}
+
+// The positions of a file's vertices, before the welding.
+function vertices({ positions, map }) {
+  const all = new positions.constructor(3 * map.length);
+  for (const [vertex, at] of map.entries()) all.set(positions.subarray(3 * at, 3 * at + 3), 3 * vertex);
+  return all;
+}
+
+// The positions of a frame, welded like the mesh.
+function welded({ map, positions }, frame, name) {
+  const now = new frame.constructor(positions.length);
+  const firsts = new Int32Array(positions.length / 3).fill(-1);
+  for (const [vertex, at] of map.entries()) {
+    if (firsts[at] < 0) {
+      firsts[at] = vertex;
+      now.set(frame.subarray(3 * vertex, 3 * vertex + 3), 3 * at);
+    } else if ([0, 1, 2].some((axis) => now[3 * at + axis] !== frame[3 * vertex + axis])) {
+      const two = `vertices ${firsts[at]} and ${vertex}`;
+      throw new Error(`${name}: ${two} are apart, but at one position in the mesh, where they were welded`);
+    }
+  }
+  return now;
+}

@@ -1,0 +1,79 @@
+// The same question for WebGPU: always about the latest frame, and never two at once.
+
+let loading = null;
+
+// The build with WebGPU and the readers of files is loaded when it is first needed.
+export function withReaders() {
+  loading ??= import("impinge/webgpu").then(async (module) => {
+    await module.default();
+    return module;
+  });
+  return loading;
+}
+
+// The browser's adapter: `"hardware"`, `"software"`, or `null` if there is none.
+export async function lookForAdapter() {
+  const adapter = await navigator.gpu?.requestAdapter().catch(() => null);
+  if (!adapter) return null;
+  const isSoftware = adapter.info?.isFallbackAdapter || /swiftshader|llvmpipe/i.test(adapter.info?.architecture ?? "");
+  return isSoftware ? "software" : "hardware";
+}
+
+export class Gpu {
+  #detector = null;
+  #isBusy = false;
+  // Counts changes of the bodies. An answer about other bodies is not shown.
+  #era = 0;
+
+  // `on.answer(n, ms, hash, asked)` shows an answer, `on.note(text)` what happens, `on.stale()` asks for another question.
+  constructor(on) {
+    this.on = on;
+  }
+
+  get isReady() {
+    return this.#detector !== null && !this.#isBusy;
+  }
+
+  async close() {
+    this.#era += 1;
+    const previous = this.#detector;
+    this.#detector = null;
+    await previous?.dispose();
+  }
+
+  async open(options, bodies) {
+    await this.close();
+    const era = this.#era;
+    this.on.note("WebGPU compiles its kernels …");
+    try {
+      const { GpuDetector } = await withReaders();
+      const opened = await GpuDetector.open(options);
+      for (const body of bodies) {
+        await (body.corners === 4 ? opened.addTetrahedra(body.index, body.now) : opened.add(body.index, body.now));
+      }
+      if (era !== this.#era) return void opened.dispose();
+      this.#detector = opened;
+      this.on.stale();
+    } catch (error) {
+      if (era === this.#era) this.on.note(`WebGPU failed: ${error.message}`, true);
+    }
+  }
+
+  // Asks about the bodies as they are. `asked` is handed back with the answer.
+  async ask(bodies, withSelf, asked) {
+    const [detector, era] = [this.#detector, this.#era];
+    this.#isBusy = true;
+    try {
+      for (const [ix, { now }] of bodies.entries()) void detector.setPositions(ix, now);
+      const { pairs, hash, statistics } = await (withSelf ? detector.everything() : detector.betweenAll());
+      if (era === this.#era) this.on.answer(pairs.length / 4, statistics.totalMs, hash, asked);
+    } catch (error) {
+      if (era === this.#era) {
+        this.#detector = null;
+        this.on.note(`WebGPU failed: ${error.message}`, true);
+      }
+    } finally {
+      this.#isBusy = false;
+    }
+  }
+}
