@@ -22,7 +22,8 @@ const LIST_EVERY = 300;
 const PLACE_SHARE = 0.4;
 const LEAST_PLACE = 0.02;
 
-const [play, time, scene, size, as, self, method] = ["play", "time", "scene", "size", "as", "self", "method"].map(element);
+const [play, time, scene, size, as] = ["play", "time", "scene", "size", "as"].map(element);
+const [self, method, up] = ["self", "method", "up"].map(element);
 const useGpu = element("use-gpu");
 
 // What is shown: `files` as they were read, or `null` for a scene of the page.
@@ -54,8 +55,9 @@ let nAnswers = 0;
 
 const view = new View(element("view"), {
   change: () => (mustDraw = true),
-  drag(ix, ...by) {
+  drag(ix, x, y, z) {
     const { offset } = bodies[ix];
+    const by = isYUp() ? [x, z, -y] : [x, y, z];
     for (const axis of [0, 1, 2]) offset[axis] += by[axis] * stage.radius;
     element("back").hidden = false;
     isMoved = true;
@@ -101,6 +103,8 @@ function say(id, text) {
 
 const complain = (text) => say("message", text);
 const options = () => ({ sharedVertex: "resolve", method: method.value });
+// Where files say nothing, y points up, as for the program. The scenes of the page, and the view, have z there.
+const isYUp = () => files !== null && up.value === "y";
 const withSelf = () => bodies.length === 1 || self.checked;
 
 // Replaces the bodies. Throws, and changes nothing, if the detector refuses them.
@@ -197,14 +201,24 @@ function advance(seconds) {
   }
 }
 
+// Writes the point whose coordinates begin at `at` as it is drawn.
+function drawn(positions, at, to) {
+  const { centre, radius } = stage;
+  const y = (positions[at + 1] - centre[1]) / radius;
+  const z = (positions[at + 2] - centre[2]) / radius;
+  to[at] = (positions[at] - centre[0]) / radius;
+  to[at + 1] = isYUp() ? -z : y;
+  to[at + 2] = isYUp() ? y : z;
+  return to;
+}
+
 function draw() {
   // Frames are shown as they are while they play.
   const at = isFramed && isPlaying ? Math.min(end, Math.floor(now)) : now;
   for (const [ix, body] of bodies.entries()) {
     pose(body, at, body.now);
-    const drawn = view.positions(ix);
-    const { centre, radius } = stage;
-    for (let k = 0; k < drawn.length; k += 1) drawn[k] = (body.now[k] - centre[k % 3]) / radius;
+    const to = view.positions(ix);
+    for (let k = 0; k < to.length; k += 3) drawn(body.now, k, to);
   }
   time.value = String(at);
   element("time-text").textContent = isFramed ? `${Number(at.toFixed(3))} of ${end}` : at.toFixed(3);
@@ -247,12 +261,9 @@ function list() {
   view.choose(chosen ? [[chosen.body, chosen.primitive], ...partners] : touching);
 }
 
-// To the coordinates that are drawn.
-const drawn = (point) => point.map((x, axis) => (x - stage.centre[axis]) / stage.radius);
-
 function flyTo({ centre, radius }) {
   const near = Math.max(LEAST_PLACE, radius / stage.radius);
-  view.flyTo(drawn(centre), near / PLACE_SHARE);
+  view.flyTo(drawn(centre, 0, []), near / PLACE_SHARE);
 }
 
 function goTo(ix) {
@@ -352,6 +363,7 @@ function showFileControls() {
   scene.querySelector('[value="files"]').hidden = !isFiles;
   if (isFiles) scene.value = "files";
   element("size-label").hidden = isFiles;
+  element("up-label").hidden = !isFiles;
   element("share").hidden = isFiles;
   element("as-label").hidden = !isFiles || !mayBePoses(files);
   document.body.classList.toggle("files", isFiles);
@@ -455,7 +467,7 @@ element("step-show").addEventListener("click", showContact);
 element("share").addEventListener("click", () => void share());
 scene.addEventListener("change", () => showScene(scene.value));
 size.addEventListener("change", () => showScene(scene.value, { withSelf: self.checked, plays: isPlaying }));
-self.addEventListener("change", () => (isMoved = true));
+for (const control of [self, up]) control.addEventListener("change", () => (isMoved = true));
 as.addEventListener("change", () => {
   try {
     complain(showFiles(files, as.value === "poses").join("\n"));

@@ -204,6 +204,16 @@ async function dropped(browser) {
   await settled(page);
   await sameAsProgram(page, "self", ["soup.stl"]);
 
+  // y points up on the screen, or z.
+  const height = () => page.evaluate(() => Math.max(...window.page.view.positions(0).filter((_, at) => at % 3 === 2)));
+  await drop(page, "tip.stl");
+  assert.ok((await height()) > 0.5, "y points up");
+  await page.locator("#up").selectOption("z");
+  await settled(page);
+  assert.ok((await height()) < 1e-6, "z points up");
+  await sameAsProgram(page, "self", ["tip.stl"]);
+  await page.locator("#up").selectOption("y");
+
   // Coordinates keep their precision.
   await drop(page, "floor.obj", "above.obj");
   assert.equal(await sameAsProgram(page, "pairs", ["floor.obj", "above.obj"]), 0);
