@@ -135,7 +135,11 @@ impl Frame {
         self.layers.clear();
         self.distance = 0.0;
         self.ask = ask;
-        self.shared_vertex = query.shared_vertex;
+        // Vertices, edges and faces that share a vertex never count.
+        self.shared_vertex = match ask {
+            Ask::Intersections => query.shared_vertex,
+            Ask::Impacts | Ask::Candidates(_) => SharedVertex::Skip,
+        };
         self.cell = query.cell;
         self.is_step = ask != Ask::Intersections;
         self.check_cell()?;
