@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use impinge::contact::{Contacts, Curves};
-use impinge::{BodyId, Pairs, Scene};
+use impinge::{Backend, BodyId, Detector, Pairs, Scene, Settings};
 use impinge_io::AtomicFile;
 use impinge_render::{Camera, Colors, Picture, Projection, Renderer, Surface};
 
@@ -16,16 +16,28 @@ use crate::palette;
 pub struct Drawer<'a> {
     args: &'a PictureArgs,
     renderer: Renderer,
+    /// For contacts.
+    detector: Detector,
 }
 
 impl<'a> Drawer<'a> {
-    /// Opens the first adapter, or the one whose name contains `device`.
-    pub fn new(args: &'a PictureArgs, device: Option<&str>) -> Result<Self, Error> {
+    /// Opens the first adapter, or the one whose name contains `device`. Contacts are found on so many threads; 0 for one per
+    /// core.
+    pub fn new(args: &'a PictureArgs, device: Option<&str>, threads: usize) -> Result<Self, Error> {
         let renderer = match device {
             None => Renderer::new()?,
             Some(name) => Renderer::on_device_named(name)?,
         };
-        Ok(Drawer { args, renderer })
+        let detector = Detector::with_settings(Settings {
+            backend: Backend::Cpu,
+            threads,
+            ..Settings::default()
+        })?;
+        Ok(Drawer {
+            args,
+            renderer,
+            detector,
+        })
     }
 
     /// Draws bodies in their current pose, with colliding primitives coloured.
@@ -37,7 +49,7 @@ impl<'a> Drawer<'a> {
         pairs: &Pairs,
     ) -> Result<(), Error> {
         let mut surfaces = surfaces(scene, bodies, pairs)?;
-        let contacts = Contacts::new(scene, pairs)?;
+        let contacts = self.detector.contacts(scene, pairs)?;
         surfaces.push(tubes(&contacts, &contacts.curves()?, diagonal(&surfaces)));
         self.draw(path, surfaces)
     }

@@ -7,7 +7,7 @@ use crate::positions::Positions;
 use crate::scene::Scene;
 
 /// How far a step can be taken.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub struct Advance {
     /// The part of the step that can be taken: 1 for all of it, 0 for none.
     pub fraction: f64,
@@ -18,6 +18,18 @@ pub struct Advance {
     pub positions: Vec<(BodyId, Positions)>,
     /// How many fractions were tried.
     pub n_tried: u32,
+}
+
+impl std::fmt::Debug for Advance {
+    /// Without the positions: these may be millions.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut short = f.debug_struct("Advance");
+        short.field("fraction", &self.fraction);
+        short.field("first", &self.first);
+        short.field("n_tried", &self.n_tried);
+        short.field("n_bodies", &self.positions.len());
+        short.finish_non_exhaustive()
+    }
 }
 
 impl Advance {

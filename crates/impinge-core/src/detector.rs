@@ -4,16 +4,18 @@
 mod gpu;
 mod steps;
 
+use crate::clock::Instant;
+use crate::contact::{Contacts, Penetration, Topologies, Work};
 use crate::cpu::Cpu;
 use crate::error::Error;
 use crate::ids::BodyId;
 use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::proximity::{Distances, Nearest};
-use crate::query::Query;
+use crate::query::{Query, Scope};
 use crate::run::{FrameLoop, ready};
 use crate::scene::Scene;
-use crate::settings::{Backend, Settings};
+use crate::settings::{Backend, Method, Settings};
 use crate::sink::Wanted;
 use crate::stats::Statistics;
 
@@ -37,6 +39,7 @@ pub struct Detector {
     cpu: Cpu,
     steps: steps::StepMemory,
     distances: Distances,
+    topologies: Topologies,
     #[cfg(feature = "gpu")]
     gpu: Option<crate::gpu::Engine>,
 }
@@ -98,7 +101,8 @@ impl Detector {
             ),
             cpu: Cpu::new(&settings),
             steps: steps::StepMemory::new(&settings),
-            distances: Distances::new(),
+            distances: Distances::default(),
+            topologies: Topologies::default(),
             settings,
         }
     }
@@ -175,8 +179,100 @@ impl Detector {
         query: &Query,
         control: &Control<'_>,
     ) -> Result<bool, Error> {
+        if let Some(any) = self.any_soon(scene, query, control)? {
+            return Ok(any);
+        }
         self.wait_for(scene, query, control, Wanted::Any)?;
         Ok(self.frames.n_pairs() > 0)
+    }
+
+    /// Whether any of many bodies meet, on the CPU, if that is soon known.
+    fn any_soon(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        control: &Control<'_>,
+    ) -> Result<Option<bool>, Error> {
+        let Settings {
+            method,
+            memory_budget,
+            ..
+        } = self.settings;
+        let is_about_many = matches!(
+            query.scope,
+            Scope::Across
+                | Scope::All {
+                    between: true,
+                    within: false
+                }
+        );
+        let may_choose = matches!(method, Method::Auto | Method::Clusters);
+        if !is_about_many || query.cell.is_some() || !may_choose || memory_budget.is_some() {
+            return Ok(None);
+        }
+        #[cfg(feature = "gpu")]
+        if self.gpu.is_some() {
+            return Ok(None);
+        }
+        let start = Instant::now();
+        control.step(0, 1)?;
+        let (frame, workers) = self.frames.resolve(scene, query)?;
+        if frame.layers.len() <= 2 {
+            return Ok(None);
+        }
+        let any = self.distances.any(scene, frame, workers, control)?;
+        if let Some(any) = any {
+            self.frames.note(u64::from(any), start);
+        }
+        Ok(any)
+    }
+
+    /// The two bodies that are nearest to each other of all that the query lets meet, and the pair of primitives that has their
+    /// [`distance`](Detector::distance); `None` if there are no two that have primitives. Of several pairs at the same computed
+    /// distance the lowest. Pairs of bodies whose boxes are farther apart than the nearest two are never looked at.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Query, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// let points = [0.0f32, 5.0, 7.0].map(|x| scene.add_points(&[[x, 0.0, 0.0]]));
+    /// let [_, b, c] = points.map(|body| body.expect("finite"));
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let nearest = detector.nearest(&scene, &Query::all())?.expect("there are three");
+    /// assert_eq!((nearest.distance, nearest.bodies), (2.0, [b, c]));
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// A stale id, bad positions that were written in place, a query for self-collision or for the pairs of a cell.
+    pub fn nearest(&mut self, scene: &Scene, query: &Query) -> Result<Option<Nearest>, Error> {
+        self.nearest_with(scene, query, &Control::new())
+    }
+
+    /// [`nearest`](Detector::nearest) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `nearest`, and [`Error::Cancelled`].
+    pub fn nearest_with(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        control: &Control<'_>,
+    ) -> Result<Option<Nearest>, Error> {
+        let refused = |setting, given: &str| Error::Setting {
+            setting,
+            given: given.to_owned(),
+            allowed: "pairs of different bodies, and all of space",
+        };
+        if query.cell.is_some() {
+            return Err(refused("owned_by", "a cell"));
+        }
+        control.step(0, 1)?;
+        let (frame, workers) = self.frames.resolve(scene, query)?;
+        if frame.layers.iter().any(|layer| layer.within) {
+            return Err(refused("query", "self-collision"));
+        }
+        self.distances.nearest(scene, frame, workers, control)
     }
 
     /// The smallest distance of two bodies at the positions that they have, and the pair of primitives that has it; `None` if one
@@ -207,7 +303,117 @@ impl Detector {
         a: BodyId,
         b: BodyId,
     ) -> Result<Option<Nearest>, Error> {
-        self.distances.between(scene, a, b)
+        self.distance_with(scene, a, b, &Control::new())
+    }
+
+    /// [`distance`](Detector::distance) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `distance`, and [`Error::Cancelled`].
+    pub fn distance_with(
+        &mut self,
+        scene: &Scene,
+        a: BodyId,
+        b: BodyId,
+        control: &Control<'_>,
+    ) -> Result<Option<Nearest>, Error> {
+        let workers = self.frames.workers();
+        self.distances.between(scene, [a, b], workers, control)
+    }
+
+    /// Where the triangles of each pair meet: points, segments and polygons. The scene must not have changed since the pairs
+    /// were found.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Query, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// let floor = [[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    /// let blade = [[1.0f32, 1.0, -1.0], [2.0, 1.0, -1.0], [1.0, 1.0, 1.0]];
+    /// scene.add_triangles(&[[0, 1, 2]], &floor)?;
+    /// scene.add_triangles(&[[0, 1, 2]], &blade)?;
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let pairs = detector.detect(&scene, &Query::all())?.clone();
+    /// let contacts = detector.contacts(&scene, &pairs)?;
+    /// assert_eq!(contacts.points(), [[1.0, 1.0, 0.0], [1.5, 1.0, 0.0]]);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// A body of the pairs is no longer in the scene, is of another kind or has too few primitives; positions written in
+    /// place since then are refused.
+    pub fn contacts(&mut self, scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> {
+        self.contacts_with(scene, pairs, &Control::new())
+    }
+
+    /// [`contacts`](Detector::contacts) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `contacts`, and [`Error::Cancelled`].
+    pub fn contacts_with(
+        &mut self,
+        scene: &Scene,
+        pairs: &Pairs,
+        control: &Control<'_>,
+    ) -> Result<Contacts, Error> {
+        let workers = self.frames.workers();
+        let _shift = workers.shift(pairs.len() as u64);
+        Contacts::new(scene, pairs, Work { workers, control })
+    }
+
+    /// How deep two closed bodies of triangles are in each other, from contacts among which are all of these two. The
+    /// bodies' topologies are kept, so that later calls cost less.
+    ///
+    /// A vertex is inside where the other surface's winding number around it is not 0; a vertex on the surface
+    /// is not inside. The body with the lower number is the first, whichever argument it is.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Query, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let tetrahedron = [[0u32, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    /// let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    /// let mut scene = Scene::new();
+    /// let a = scene.add_triangles(&tetrahedron, &corners)?;
+    /// let b = scene.add_triangles(&tetrahedron, &corners.map(|[x, y, z]| [x + 0.1, y + 0.125, z - 0.875]))?;
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let pairs = detector.detect(&scene, &Query::between(a, b))?.clone();
+    /// let contacts = detector.contacts(&scene, &pairs)?;
+    /// let penetration = detector.penetration(&scene, &contacts, a, b)?;
+    /// assert_eq!(penetration.inside[1], [3]); // The tip of b is in a.
+    /// let region = &penetration.regions[0];
+    /// assert!(region.depth.is_some_and(|depth| depth <= 0.125));
+    /// assert!(region.normal.is_some_and(|normal| normal[2] > 0.9)); // Push a up.
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// A body that is not in the scene, the same body twice, a body not made of triangles, a surface that is not closed.
+    pub fn penetration(
+        &mut self,
+        scene: &Scene,
+        contacts: &Contacts,
+        a: BodyId,
+        b: BodyId,
+    ) -> Result<Penetration, Error> {
+        self.penetration_with(scene, contacts, a, b, &Control::new())
+    }
+
+    /// [`penetration`](Detector::penetration) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `penetration`, and [`Error::Cancelled`].
+    pub fn penetration_with(
+        &mut self,
+        scene: &Scene,
+        contacts: &Contacts,
+        a: BodyId,
+        b: BodyId,
+        control: &Control<'_>,
+    ) -> Result<Penetration, Error> {
+        let workers = self.frames.workers();
+        let _shift = workers.shift(0);
+        let work = Work { workers, control };
+        self.topologies.penetration(scene, contacts, [a, b], work)
     }
 
     /// The pairs that [`detect`](Detector::detect) found last, out of the detector without a copy. Until the next

@@ -146,6 +146,9 @@ impl Frame {
         if self.ignored != query.ignored {
             self.ignored.clone_from(&query.ignored);
         }
+        for &id in &query.across {
+            scene.body(id)?;
+        }
         if let Scope::Between(a, b) = query.scope {
             scene.body(a)?;
             scene.body(b)?;
@@ -281,6 +284,17 @@ impl Frame {
             Scope::Within(body) => {
                 self.between = false;
                 self.push(scene, body, part, true, None)?;
+            }
+            Scope::Across => {
+                self.between = true;
+                for (id, _) in scene.bodies() {
+                    let (category, mask) = match query.across.contains(&id) {
+                        true => (1, 2),
+                        false => (2, 1),
+                    };
+                    let filter = Filter { category, mask };
+                    self.push(scene, id, part, false, Some(filter))?;
+                }
             }
             Scope::All { between, within } => {
                 self.between = between;

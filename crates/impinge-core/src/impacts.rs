@@ -239,11 +239,21 @@ pub fn hash_impact_rows(rows: impl IntoIterator<Item = (PairKind, [u32; 4], f64)
 /// All pairs of elements that touch during a step, sorted by `(kind, body_a, element_a, body_b, element_b)`.
 ///
 /// The same input gives the same bytes on every method, backend, thread count and budget.
-#[derive(Debug, Clone, Default)]
+#[derive(Clone, Default)]
 pub struct Impacts {
     numbering: Numbering,
     impacts: Vec<Impact>,
     stats: Statistics,
+}
+
+impl std::fmt::Debug for Impacts {
+    /// Their number and the first of them, however many there are.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut short = f.debug_struct("Impacts");
+        short.field("len", &self.len());
+        short.field("first", &self.iter().next());
+        short.finish_non_exhaustive()
+    }
 }
 
 impl Impacts {
@@ -348,11 +358,21 @@ impl<'a> IntoIterator for &'a Impacts {
 }
 
 /// Pairs of elements whose boxes overlap during a step, sorted by `(kind, body_a, element_a, body_b, element_b)`.
-#[derive(Debug, Clone, Default)]
+#[derive(Clone, Default)]
 pub struct Candidates {
     numbering: Numbering,
     keys: KeysByKind,
     stats: Statistics,
+}
+
+impl std::fmt::Debug for Candidates {
+    /// Their number and the first of them, however many there are.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut short = f.debug_struct("Candidates");
+        short.field("len", &self.len());
+        short.field("first", &self.iter().next());
+        short.finish_non_exhaustive()
+    }
 }
 
 impl Candidates {

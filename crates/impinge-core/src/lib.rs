@@ -4,6 +4,7 @@
 //! other crates, such as the baselines that impinge is compared with, are built on this crate. They share its
 //! frame, boxes, grid, threads, exact test and GPU engine, so that only the method differs.
 
+mod alone;
 pub mod clock;
 mod clusterings;
 // Types are documented; internal fields and small methods are self-explanatory.
@@ -61,7 +62,7 @@ pub use gpu::{DeviceInfo, ResidentLayer, ResidentPairs, ResidentStep, devices, d
 pub use ids::BodyId;
 pub use impacts::{Candidates, Impact, Impacts, hash_impact_rows};
 pub use impinge_weld::{Coordinate, Weld, WrongNumber};
-pub use near::{ClosestPoints, NearPair, NearPairs, NearQuery};
+pub use near::{ClosestPoints, NearIter, NearPair, NearPairs, NearQuery};
 pub use pair_kind::{PairKind, PairKinds};
 pub use pairs::{Pairs, Primitive, hash_rows};
 pub use position_rows::PositionRows;

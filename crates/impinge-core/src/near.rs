@@ -37,6 +37,7 @@ pub struct NearQuery {
     kinds: Option<PairKinds>,
     distance: f64,
     thickness: BTreeMap<BodyId, f64>,
+    pub(crate) distances: bool,
     pub(crate) closest: bool,
 }
 
@@ -48,6 +49,7 @@ impl NearQuery {
             kinds: None,
             distance: 0.0,
             thickness: BTreeMap::new(),
+            distances: false,
             closest: false,
         }
     }
@@ -72,9 +74,15 @@ impl NearQuery {
         self
     }
 
-    /// Asks for distances and nearest points as `f64`, too: [`NearPair::closest`].
+    /// Asks for distances as `f64`, too: [`NearPair::distance`], 8 bytes per pair.
+    pub fn distances(mut self) -> Self {
+        self.distances = true;
+        self
+    }
+
+    /// Asks for distances and nearest points as `f64`, too: [`NearPair::closest`], 56 bytes per pair.
     pub fn closest_points(mut self) -> Self {
-        self.closest = true;
+        (self.distances, self.closest) = (true, true);
         self
     }
 
@@ -119,6 +127,8 @@ pub struct NearPair {
     /// Whether nearest points may not be the only ones: edges are parallel, or an element is degenerate, or faces are
     /// parallel.
     pub is_parallel: bool,
+    /// The distance, where [`NearQuery::distances`] or [`NearQuery::closest_points`] asks for it: that of the nearest points.
+    pub distance: Option<f64>,
     /// Distance and nearest points, where [`NearQuery::closest_points`] asks for them.
     pub closest: Option<ClosestPoints>,
 }
@@ -163,16 +173,17 @@ impl NearPair {
 
 /// All pairs of elements that are near, sorted by `(kind, body_a, element_a, body_b, element_b)`.
 ///
-/// The same input gives the same bytes on every method, backend, thread count and budget. A pair takes nine bytes, and 56 more
-/// with its nearest points.
-#[derive(Debug, Clone, Default)]
+/// The same input gives the same bytes on every method, backend, thread count and budget. A pair takes nine bytes, 8 more
+/// with its distance, and 56 more with its nearest points.
+#[derive(Clone, Default)]
 pub struct NearPairs {
     numbering: Numbering,
     keys: KeysByKind,
     /// The features of each key, packed.
     nearest: [Vec<u8>; PairKind::ALL.len()],
     /// Of all pairs, kind after kind, if they were asked for.
-    closest: Vec<ClosestPoints>,
+    distances: Vec<f64>,
+    points: Vec<[[f64; 3]; 2]>,
     stats: Statistics,
 }
 
@@ -182,7 +193,8 @@ pub(crate) struct Unnamed<'a> {
     keys: &'a mut [u64],
     nearest: &'a mut [u8],
     /// Empty, if they were not asked for.
-    closest: &'a mut [ClosestPoints],
+    distances: &'a mut [f64],
+    points: &'a mut [[[f64; 3]; 2]],
 }
 
 impl NearPairs {
@@ -191,7 +203,8 @@ impl NearPairs {
         self.numbering.begin(frame);
         self.keys.iter_mut().for_each(Vec::clear);
         self.nearest.iter_mut().for_each(Vec::clear);
-        self.closest.clear();
+        self.distances.clear();
+        self.points.clear();
         self.stats.clear();
     }
 
@@ -212,37 +225,37 @@ impl NearPairs {
     pub(crate) fn fill(
         &mut self,
         keys: KeysByKind,
-        closest: bool,
+        query: &NearQuery,
         n_each: usize,
     ) -> Result<(Vec<Unnamed<'_>>, &Numbering), Error> {
         const WHAT: &str = "nearest features";
-        const NONE: ClosestPoints = ClosestPoints {
-            distance: 0.0,
-            points: [[0.0; 3]; 2],
-        };
         self.keys = keys;
         for (nearest, keys) in self.nearest.iter_mut().zip(&self.keys) {
             reserve(nearest, keys.len(), WHAT)?;
             nearest.resize(keys.len(), 0);
         }
-        if closest {
-            let n = self.keys.iter().map(Vec::len).sum();
-            reserve(&mut self.closest, n, "nearest points")?;
-            self.closest.resize(n, NONE);
+        let n = self.keys.iter().map(Vec::len).sum();
+        if query.distances {
+            reserve(&mut self.distances, n, "distances")?;
+            self.distances.resize(n, 0.0);
         }
-        let mut closest = &mut self.closest[..];
+        if query.closest {
+            reserve(&mut self.points, n, "nearest points")?;
+            self.points.resize(n, [[0.0; 3]; 2]);
+        }
+        let mut distances = &mut self.distances[..];
+        let mut points = &mut self.points[..];
         let mut unnamed = Vec::new();
         let lists = self.keys.iter_mut().zip(&mut self.nearest);
         for (kind, (keys, nearest)) in PairKind::ALL.into_iter().zip(lists) {
             for (keys, nearest) in keys.chunks_mut(n_each).zip(nearest.chunks_mut(n_each)) {
-                let n = keys.len().min(closest.len());
-                let (own, rest) = std::mem::take(&mut closest).split_at_mut(n);
-                closest = rest;
+                let n = keys.len();
                 unnamed.push(Unnamed {
                     kind,
                     keys,
                     nearest,
-                    closest: own,
+                    distances: first(&mut distances, n),
+                    points: first(&mut points, n),
                 });
             }
         }
@@ -253,8 +266,9 @@ impl NearPairs {
     pub(crate) fn bytes(&self) -> u64 {
         let keys: usize = self.keys.iter().map(Vec::capacity).sum();
         let nearest: usize = self.nearest.iter().map(Vec::capacity).sum();
-        let closest = self.closest.capacity();
-        (size_of::<u64>() * keys + nearest + size_of::<ClosestPoints>() * closest) as u64
+        let distances = size_of::<f64>() * self.distances.capacity();
+        let points = size_of::<[[f64; 3]; 2]>() * self.points.capacity();
+        (size_of::<u64>() * keys + nearest + distances + points) as u64
     }
 
     /// How many pairs are near.
@@ -268,34 +282,92 @@ impl NearPairs {
     }
 
     /// All of them, sorted.
-    pub fn iter(&self) -> impl Iterator<Item = NearPair> + '_ {
-        PairKind::ALL.into_iter().flat_map(|kind| self.of(kind))
+    pub fn iter(&self) -> NearIter<'_> {
+        NearIter {
+            pairs: self,
+            kinds: &PairKind::ALL,
+            ix: 0,
+            n_left: self.len(),
+        }
     }
 
     /// Those of one kind.
-    pub fn of(&self, kind: PairKind) -> impl ExactSizeIterator<Item = NearPair> + '_ {
+    pub fn of(&self, kind: PairKind) -> NearIter<'_> {
+        NearIter {
+            pairs: self,
+            kinds: &PairKind::ALL[kind as usize..=kind as usize],
+            ix: 0,
+            n_left: self.keys[kind as usize].len(),
+        }
+    }
+
+    /// One pair of a kind.
+    fn at(&self, kind: PairKind, ix: usize) -> Option<NearPair> {
+        let &key = self.keys[kind as usize].get(ix)?;
         let before: usize = self.keys[..kind as usize].iter().map(Vec::len).sum();
-        let lists = self.keys[kind as usize]
-            .iter()
-            .zip(&self.nearest[kind as usize]);
-        lists.enumerate().map(move |(ix, (&key, &nearest))| {
-            let (a, b) = self.numbering.pair(key);
-            let nearest = NearestOfElements::unpacked(nearest);
-            NearPair {
-                kind,
-                a,
-                b,
-                features: nearest.features,
-                is_parallel: nearest.is_parallel,
-                closest: self.closest.get(before + ix).copied(),
-            }
+        let (a, b) = self.numbering.pair(key);
+        let nearest = NearestOfElements::unpacked(self.nearest[kind as usize][ix]);
+        let distance = self.distances.get(before + ix).copied();
+        let points = self.points.get(before + ix).copied();
+        Some(NearPair {
+            kind,
+            a,
+            b,
+            features: nearest.features,
+            is_parallel: nearest.is_parallel,
+            distance,
+            closest: distance
+                .zip(points)
+                .map(|(distance, points)| ClosestPoints { distance, points }),
         })
     }
 
     /// A hash of the set of pairs and their features that does not depend on their order: the wrapping sum of a mixed
     /// 64-bit word per pair. Distances and points are not part of it.
     pub fn hash(&self) -> u64 {
-        self.iter().fold(0, |sum, pair| {
+        self.iter().hash()
+    }
+
+    /// How the answer was found.
+    pub fn stats(&self) -> &Statistics {
+        &self.stats
+    }
+}
+
+impl std::fmt::Debug for NearPairs {
+    /// Their number and the first of them, however many there are.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut short = f.debug_struct("NearPairs");
+        short.field("len", &self.len());
+        short.field("first", &self.iter().next());
+        short.finish_non_exhaustive()
+    }
+}
+
+impl<'a> IntoIterator for &'a NearPairs {
+    type Item = NearPair;
+    type IntoIter = NearIter<'a>;
+
+    fn into_iter(self) -> NearIter<'a> {
+        self.iter()
+    }
+}
+
+/// Goes through pairs that are near, in order: [`NearPairs::iter`], [`NearPairs::of`].
+#[derive(Debug, Clone)]
+pub struct NearIter<'a> {
+    pairs: &'a NearPairs,
+    /// The kind at hand, and those after it.
+    kinds: &'a [PairKind],
+    /// The next pair of the kind at hand.
+    ix: usize,
+    n_left: usize,
+}
+
+impl NearIter<'_> {
+    /// [`NearPairs::hash`] of the pairs that are left.
+    pub fn hash(self) -> u64 {
+        self.fold(0, |sum, pair| {
             let [a, b] = pair.features.map(|feature| match feature {
                 Feature::Vertex(ix) => u64::from(ix),
                 Feature::Edge(ix) => 8 + u64::from(ix),
@@ -305,11 +377,36 @@ impl NearPairs {
             sum.wrapping_add(mix(hash_row(pair.row()) ^ mix(word)))
         })
     }
+}
 
-    /// How the answer was found.
-    pub fn stats(&self) -> &Statistics {
-        &self.stats
+impl Iterator for NearIter<'_> {
+    type Item = NearPair;
+
+    fn next(&mut self) -> Option<NearPair> {
+        loop {
+            let (&kind, rest) = self.kinds.split_first()?;
+            if let Some(pair) = self.pairs.at(kind, self.ix) {
+                self.ix += 1;
+                self.n_left -= 1;
+                return Some(pair);
+            }
+            (self.kinds, self.ix) = (rest, 0);
+        }
     }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        (self.n_left, Some(self.n_left))
+    }
+}
+
+impl ExactSizeIterator for NearIter<'_> {}
+
+/// The first `n` of a list, or all if there are fewer; the list loses them.
+fn first<'a, T>(list: &mut &'a mut [T], n: usize) -> &'a mut [T] {
+    let all = std::mem::take(list);
+    let (own, rest) = all.split_at_mut(n.min(all.len()));
+    *list = rest;
+    own
 }
 
 impl Unnamed<'_> {
@@ -324,19 +421,25 @@ impl Unnamed<'_> {
         let of_parts: [Option<u8>; 1 + Labels::UNKNOWN as usize] = std::array::from_fn(|part| {
             NearestOfElements::of_part(pair?, part as u8).map(NearestOfElements::packed)
         });
-        let has_closest = !self.closest.is_empty();
+        let has_distances = !self.distances.is_empty();
         for (ix, (key, nearest)) in self.keys.iter_mut().zip(&mut *self.nearest).enumerate() {
             let (own, part) = labels.split(*key);
             *key = own;
             let known = of_parts[usize::from(part) % of_parts.len()];
-            if let (Some(known), false) = (known, has_closest) {
+            if let (Some(known), false) = (known, has_distances) {
                 *nearest = known;
                 continue;
             }
             let (found, closest) = find(own);
             *nearest = found.packed();
-            if let (Some(to), Some(closest)) = (self.closest.get_mut(ix), closest) {
-                *to = closest;
+            let Some(closest) = closest else {
+                continue;
+            };
+            if let Some(to) = self.distances.get_mut(ix) {
+                *to = closest.distance;
+            }
+            if let Some(to) = self.points.get_mut(ix) {
+                *to = closest.points;
             }
         }
     }

@@ -32,7 +32,7 @@ const NONE: Range<Number> = Number::new(0)..Number::new(0);
 /// `body_a < body_b`, or within one body `primitive_a < primitive_b`.
 ///
 /// The same input gives the same bytes on every method, backend, thread count and budget.
-#[derive(Debug, Clone, Default)]
+#[derive(Clone, Default)]
 pub struct Pairs {
     keys: Vec<u64>,
     bodies: Vec<PairBody>,
@@ -152,51 +152,44 @@ impl Pairs {
     /// Rows `[body_a, primitive_a, body_b, primitive_b]` with bodies by their
     /// [`index`](BodyId::index), sorted.
     pub fn rows(&self) -> impl ExactSizeIterator<Item = [u32; 4]> + '_ {
-        self.iter().map(|(a, b)| {
-            [
-                a.body.index() as u32,
-                a.primitive,
-                b.body.index() as u32,
-                b.primitive,
-            ]
-        })
+        self.keys.iter().map(|&key| self.row_of(key))
+    }
+
+    /// One row by its index.
+    pub(crate) fn row(&self, ix: usize) -> [u32; 4] {
+        self.row_of(self.keys[ix])
+    }
+
+    fn row_of(&self, key: u64) -> [u32; 4] {
+        let (a, b) = self.pair(key);
+        [
+            a.body.index() as u32,
+            a.primitive,
+            b.body.index() as u32,
+            b.primitive,
+        ]
     }
 
     /// The primitives of a body that take part in any pair: sorted, each once.
     pub fn colliding(&self, body: BodyId) -> Vec<u32> {
-        let Some(numbers) = self.numbers(body) else {
-            return Vec::new();
-        };
-        // One bit per primitive: pairs may be many more than primitives.
-        let mut words: Vec<u64> = Vec::new();
+        let numbers = self.numbers(body).unwrap_or(NONE);
+        let mut bits = Bits::default();
         for number in self.keys.iter().flat_map(|&key| pair_numbers(key)) {
             if numbers.contains(&number) {
-                let primitive = number.minus(numbers.start).index();
-                let word = primitive / 64;
-                if word >= words.len() {
-                    words.resize(word + 1, 0);
-                }
-                words[word] |= 1 << (primitive % 64);
+                bits.put(number.minus(numbers.start).raw());
             }
         }
-        let n: u32 = words.iter().map(|word| word.count_ones()).sum();
-        let mut colliding = Vec::with_capacity(n as usize);
-        for (first, mut word) in (0u32..).step_by(64).zip(words) {
-            while word != 0 {
-                colliding.push(first + word.trailing_zeros());
-                word &= word - 1;
-            }
-        }
-        colliding
+        bits.into_numbers()
     }
 
     /// The primitives of each body that take part in any pair, found in one pass: sorted, each once. Bodies come in order;
     /// bodies without such a primitive are left out.
     pub fn all_colliding(&self) -> Vec<(BodyId, Vec<u32>)> {
-        let numbers = self.keys.iter().flat_map(|&key| pair_numbers(key));
-        let mut colliding: Vec<Number> = numbers.collect();
-        colliding.sort_unstable();
-        colliding.dedup();
+        let mut bits = Bits::default();
+        for number in self.keys.iter().flat_map(|&key| pair_numbers(key)) {
+            bits.put(number.raw());
+        }
+        let colliding: Vec<Number> = bits.into_numbers().into_iter().map(Number::new).collect();
         colliding
             .chunk_by(|&a, &b| self.owner(a).id == self.owner(b).id)
             .map(|numbers| {
@@ -253,6 +246,43 @@ impl Pairs {
     /// Whether two answers have the same rows, whatever their scenes.
     pub fn same_as(&self, other: &Pairs) -> bool {
         self.keys.len() == other.keys.len() && self.rows().eq(other.rows())
+    }
+}
+
+impl std::fmt::Debug for Pairs {
+    /// Their number and the first of them, however many there are.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut short = f.debug_struct("Pairs");
+        short.field("len", &self.len());
+        short.field("first", &self.iter().next());
+        short.finish_non_exhaustive()
+    }
+}
+
+/// A set of numbers, one bit each: pairs may be many more than primitives.
+#[derive(Default)]
+struct Bits(Vec<u64>);
+
+impl Bits {
+    fn put(&mut self, number: u32) {
+        let word = number as usize / 64;
+        if word >= self.0.len() {
+            self.0.resize(word + 1, 0);
+        }
+        self.0[word] |= 1 << (number % 64);
+    }
+
+    /// The numbers, sorted.
+    fn into_numbers(self) -> Vec<u32> {
+        let n: u32 = self.0.iter().map(|word| word.count_ones()).sum();
+        let mut numbers = Vec::with_capacity(n as usize);
+        for (first, mut word) in (0u32..).step_by(64).zip(self.0) {
+            while word != 0 {
+                numbers.push(first + word.trailing_zeros());
+                word &= word - 1;
+            }
+        }
+        numbers
     }
 }
 

@@ -22,6 +22,8 @@ pub enum SharedVertex {
 pub(crate) enum Scope {
     Between(BodyId, BodyId),
     Within(BodyId),
+    /// Pairs of one of [`Query::across`] and another body.
+    Across,
     /// All bodies: pairs of different bodies, pairs within one, or both.
     All {
         between: bool,
@@ -55,6 +57,8 @@ pub struct Query {
     pub(crate) shared_vertex: SharedVertex,
     pub(crate) ignored: BTreeSet<(BodyId, BodyId)>,
     pub(crate) cell: Option<Cell>,
+    /// Only of [`Scope::Across`].
+    pub(crate) across: BTreeSet<BodyId>,
 }
 
 impl Query {
@@ -64,6 +68,7 @@ impl Query {
             shared_vertex: SharedVertex::default(),
             ignored: BTreeSet::new(),
             cell: None,
+            across: BTreeSet::new(),
         }
     }
 
@@ -99,6 +104,15 @@ impl Query {
             between: true,
             within: true,
         })
+    }
+
+    /// Pairs of one of some bodies and one that is not among them. As those of [`between`](Query::between), they meet whatever
+    /// their filters say.
+    pub fn across(bodies: impl IntoIterator<Item = BodyId>) -> Self {
+        Query {
+            across: bodies.into_iter().collect(),
+            ..Query::new(Scope::Across)
+        }
     }
 
     /// The adjacency rule of self-collision: [`SharedVertex::Resolve`], unless it is said. Vertices are shared when their

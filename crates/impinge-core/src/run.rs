@@ -14,7 +14,7 @@ use crate::pairs::Pairs;
 use crate::progress::Control;
 use crate::query::Query;
 use crate::scene::Scene;
-use crate::settings::Placement;
+use crate::settings::{Method, Placement};
 use crate::sink::{Answer, Limits, Wanted};
 use crate::stats::Statistics;
 use crate::tuning::Tuning;
@@ -168,6 +168,17 @@ impl FrameLoop {
     /// How many pairs the last frame had, if it had no error.
     pub fn n_pairs(&self) -> u64 {
         self.n_pairs
+    }
+
+    /// Takes note of an answer to the query that was [resolved](FrameLoop::resolve) last, found by one thread without this loop.
+    pub(crate) fn note(&mut self, n_pairs: u64, start: Instant) {
+        self.pairs.begin(&self.frame);
+        self.n_pairs = n_pairs;
+        let stats = self.pairs.stats_mut();
+        stats.method = Method::Clusters.name();
+        stats.backend.push_str("cpu");
+        stats.n_threads = 1;
+        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
     }
 
     /// The threads, for answers found without this loop.

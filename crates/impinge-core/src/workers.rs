@@ -21,6 +21,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use crate::alone::alone;
 use crate::error::Error;
 use crate::settings::Placement;
 use crate::tuning::{Tuning, Ways};
@@ -182,8 +183,8 @@ impl Workers {
         self.last.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Runs work that rayon parallelises, on as many threads as there are workers. Work on few primitives runs on this
-    /// thread, for going to a pool takes 70 µs.
+    /// Runs work that rayon parallelises, on as many threads as there are workers. With one worker, or few primitives, it runs on
+    /// this thread, for going to a pool takes 70 µs. Such work must ask [`is_alone`](crate::alone::is_alone) before it shares.
     ///
     /// Why a second pool beside the helpers: clustering splits a body recursively, which takes a work-stealing scheduler,
     /// while helpers only take equal tasks from a list. The pool works when a body is new or has flowed away from its
@@ -196,19 +197,9 @@ impl Workers {
         n_primitives: usize,
         work: impl FnOnce() -> T + Send,
     ) -> Result<T, Error> {
-        // No thread can be started there, and a pool of a given size is an error even with one thread.
-        if cfg!(target_family = "wasm") {
-            return Ok(work());
-        }
-        // Pools shared by the whole process do not work in a fork of it: there, a detector uses its own pool.
-        if !is_forked() {
-            if n_primitives < self.tuning.pool_from {
-                return Ok(work());
-            }
-            if self.n == 1 {
-                self.ways().n_pooled += 1;
-                return Ok(single()?.install(work));
-            }
+        // One worker is this thread; in a fork, the pools of the process that created the workers have no threads.
+        if self.n == 1 || n_primitives < self.tuning.pool_from || self.process != process() {
+            return Ok(alone(work));
         }
         let pool = match self.pool.get() {
             Some(pool) => pool,
@@ -390,17 +381,6 @@ fn build_pool(n_threads: usize) -> Result<rayon::ThreadPool, Error> {
         .thread_name(|ix| format!("impinge-pool-{ix}"))
         .build()
         .map_err(|error| Error::Threads(error.to_string()))
-}
-
-/// One thread shared by every detector with a single thread, so that work that rayon would parallelise
-/// (clustering) stays on one core.
-fn single() -> Result<&'static rayon::ThreadPool, Error> {
-    static POOL: OnceLock<rayon::ThreadPool> = OnceLock::new();
-    if let Some(pool) = POOL.get() {
-        return Ok(pool);
-    }
-    let pool = build_pool(1)?;
-    Ok(POOL.get_or_init(|| pool))
 }
 
 #[cfg(test)]

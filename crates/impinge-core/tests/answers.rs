@@ -10,7 +10,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use common::{agree, cases, naive, rows};
-use impinge_core::contact::Contacts;
 use impinge_core::{
     Backend, BodyId, CandidateQuery, Candidates, Detector, Error, Method, PairKind, Query, Scene,
     Settings, Step,
@@ -96,6 +95,13 @@ fn settings(method: Method) -> Settings {
 
 fn detector(settings: Settings) -> Detector {
     Detector::with_settings(settings).unwrap()
+}
+
+fn detector_on_one_thread() -> Detector {
+    detector(Settings {
+        threads: 1,
+        ..settings(Method::Clusters)
+    })
 }
 
 const METHODS: [Method; 3] = [Method::Clusters, Method::Cells, Method::Naive];
@@ -547,13 +553,13 @@ fn contacts_without_memory_are_an_error() {
         .detect(&scene, &Query::within(body))
         .unwrap()
         .clone();
-    // So that rayon's threads are there.
-    let (contacts, peak) = peak(|| Contacts::new(&scene, &pairs).unwrap());
+    let mut detector = detector_on_one_thread();
+    let (contacts, peak) = peak(|| detector.contacts(&scene, &pairs).unwrap());
     assert_eq!(contacts.len() as u64, n_pairs_of_pile(700));
     drop(contacts);
     for parts in 1..8 {
         match within_bytes(peak * parts / 8, || {
-            Contacts::new(&scene, &pairs).map(|_| ())
+            detector.contacts(&scene, &pairs).map(|_| ())
         }) {
             Err(Error::OutOfMemory { what, needed, .. }) => {
                 assert!(what.contains("contact") && needed > 0, "{what}");

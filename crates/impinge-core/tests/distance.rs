@@ -1,6 +1,6 @@
 //! Distances of bodies: compared with every pair of primitives, and their properties.
 
-use impinge_core::proximity::{Distances, Nearest};
+use impinge_core::proximity::Nearest;
 use impinge_core::{Backend, BodyId, Detector, Query, Scene};
 use impinge_scenes::{Model, solids, soup, surfaces};
 
@@ -10,9 +10,13 @@ fn scene(a: &Model, b: &Model) -> (Scene, [BodyId; 2]) {
     (scene, ids)
 }
 
+fn cpu() -> Detector {
+    Detector::new(Backend::Cpu).unwrap()
+}
+
 fn nearest(a: &Model, b: &Model) -> Nearest {
     let (scene, [a, b]) = scene(a, b);
-    Distances::new().between(&scene, a, b).unwrap().unwrap()
+    cpu().distance(&scene, a, b).unwrap().unwrap()
 }
 
 /// One primitive of a model as a model.
@@ -178,7 +182,7 @@ fn known_distances() {
 fn zero_means_that_they_touch() {
     let a = surfaces::bumpy_ball(1_500, 0.2);
     let mut detector = Detector::new(Backend::Cpu).unwrap();
-    let mut distances = Distances::new();
+    let mut distances = cpu();
     let (mut scene, [x, y]) = scene(&a, &a);
     let (mut n_touching, mut n_apart) = (0, 0);
     for step in 0..40 {
@@ -189,7 +193,7 @@ fn zero_means_that_they_touch() {
             .unwrap()
             .rows()
             .next();
-        let found = distances.between(&scene, x, y).unwrap().unwrap();
+        let found = distances.distance(&scene, x, y).unwrap().unwrap();
         match first {
             Some([_, a, _, b]) => {
                 assert_eq!((found.distance, found.primitives), (0.0, [a, b]));
@@ -219,17 +223,17 @@ fn bodies_without_primitives_and_wrong_questions() {
     let mut scene = Scene::new();
     let empty = scene.add_triangles::<f32>(&[], &[]).unwrap();
     let ball = surfaces::ball(20).add_to(&mut scene).unwrap();
-    let mut distances = Distances::new();
-    assert_eq!(distances.between(&scene, empty, ball).unwrap(), None);
-    assert!(distances.between(&scene, ball, ball).is_err());
+    let mut distances = cpu();
+    assert_eq!(distances.distance(&scene, empty, ball).unwrap(), None);
+    assert!(distances.distance(&scene, ball, ball).is_err());
     scene.positions_mut::<f32>(ball).unwrap()[3] = [f32::NAN; 3];
     let error = distances
-        .between(&scene, ball, empty)
+        .distance(&scene, ball, empty)
         .unwrap_err()
         .to_string();
     assert!(error.starts_with("body 1: vertex 3"), "{error}");
     scene.remove(ball).unwrap();
-    assert!(distances.between(&scene, ball, empty).is_err());
+    assert!(distances.distance(&scene, ball, empty).is_err());
 }
 
 /// A detector that has answered before says the same as one that has not, whatever has happened to the scene meanwhile.
@@ -255,7 +259,7 @@ fn earlier_calls_change_nothing() {
         }
         for (x, y) in [(a, b), (b, a)] {
             let found = kept.distance(&scene, x, y).unwrap().unwrap();
-            let anew = Distances::new().between(&scene, x, y).unwrap().unwrap();
+            let anew = cpu().distance(&scene, x, y).unwrap().unwrap();
             assert_eq!(found, anew, "step {step}");
             n_touching += u32::from(found.distance == 0.0);
             n_pairs.insert(found.primitives);
@@ -283,7 +287,7 @@ fn far_from_the_origin_in_double_precision() {
         let mut scene = Scene::new();
         let a = scene.add_triangles(&faces, &at(0.0, far)).unwrap();
         let b = scene.add_triangles(&faces, &at(1.25, far)).unwrap();
-        Distances::new().between(&scene, a, b).unwrap().unwrap()
+        cpu().distance(&scene, a, b).unwrap().unwrap()
     });
     assert!(found[0].distance > 0.1);
     assert!(

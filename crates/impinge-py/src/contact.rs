@@ -1,79 +1,50 @@
 //! `impinge.Contacts`: where the triangles of each pair meet.
 
-use impinge::contact::{Contacts as Inner, Curves, Feature, Region, Shape};
+use std::sync::OnceLock;
+
+use impinge::contact::{self, Contacts as Inner, Curves, Feature, Region, Shape};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::columns::strings;
 use crate::errors::raise;
-use crate::result::{Answer, to_array};
-use crate::scene::Scene;
-use crate::settings::unexpected;
+use crate::result::to_array;
 
 /// Where the triangles of each pair of a `Result` meet: points, segments, and polygons where both lie in one
-/// plane; and the curves in which surfaces cross.
+/// plane; and the curves in which surfaces cross. `Detector.contacts` finds them.
 ///
 /// Which features meet where, and which points are one, is exact. Coordinates are the exact numbers rounded: to
 /// float32 where both bodies hold float32, else to float64. Each access makes new arrays.
-///
-/// Parameters
-/// ----------
-/// scene : Scene
-///     As it was when the pairs were found.
-/// result : Result
-///
-/// Raises
-/// ------
-/// ValueError
-///     A result of another scene, or a body that is gone or has fewer primitives.
-///
-/// Examples
-/// --------
-/// >>> import impinge
-/// >>> scene = impinge.Scene()
-/// >>> floor = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]])
-/// >>> blade = scene.add([[1, 1, -1], [2, 1, -1], [1, 1, 1]], [[0, 1, 2]])
-/// >>> contacts = impinge.Contacts(scene, impinge.Detector(backend="cpu").detect(scene))
-/// >>> contacts.shapes.tolist(), contacts.points.tolist()
-/// (['segment'], [[1.0, 1.0, 0.0], [1.5, 1.0, 0.0]])
-/// >>> [curve.tolist() for curve in contacts.curves()]
-/// [[0, 1]]
 #[pyclass(module = "impinge", frozen)]
 pub struct Contacts {
-    inner: Inner,
-    curves: Curves,
+    pub inner: Inner,
+    /// The number of the scene.
+    pub scene: u64,
+    curves: OnceLock<Curves>,
+}
+
+impl Contacts {
+    pub fn new(inner: Inner, scene: u64) -> Self {
+        Contacts {
+            inner,
+            scene,
+            curves: OnceLock::new(),
+        }
+    }
+
+    /// The curves, found when they are first asked for.
+    fn found_curves(&self, py: Python<'_>) -> PyResult<&Curves> {
+        if let Some(curves) = self.curves.get() {
+            return Ok(curves);
+        }
+        let found = py.detach(|| self.inner.curves()).map_err(raise)?;
+        Ok(self.curves.get_or_init(|| found))
+    }
 }
 
 #[pymethods]
 impl Contacts {
-    #[new]
-    fn new(py: Python<'_>, scene: &Bound<'_, PyAny>, result: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let scene = scene
-            .cast::<Scene>()
-            .map_err(|_| unexpected(scene, "scene", "a Scene"))?;
-        let result = result
-            .cast::<Answer>()
-            .map_err(|_| unexpected(result, "result", "a Result"))?;
-        let scene = scene
-            .try_borrow()
-            .map_err(|_| PyRuntimeError::new_err("the scene is being changed by another thread"))?;
-        let (pairs, number) = result.get().parts();
-        if number != scene.number {
-            return Err(PyValueError::new_err("result: of another scene"));
-        }
-        let scene = &scene.inner;
-        let (inner, curves) = py
-            .detach(|| {
-                let contacts = Inner::new(scene, pairs)?;
-                let curves = contacts.curves()?;
-                Ok((contacts, curves))
-            })
-            .map_err(raise)?;
-        Ok(Contacts { inner, curves })
-    }
-
     /// numpy.ndarray of uint32, shape (n, 4) : the pairs: number of a body, its triangle, number of the other
     /// body, its triangle.
     #[getter]
@@ -157,23 +128,24 @@ impl Contacts {
     /// -------
     /// list of numpy.ndarray of uint32
     ///     The points of each curve in order, as rows of `points`. A loop ends with its first point.
-    fn curves<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyArray1<u32>>> {
-        (0..self.curves.len())
-            .map(|ix| {
-                let mut points = self.curves.points(ix).to_vec();
-                if self.curves.is_closed(ix) {
-                    points.extend(points.first().copied());
-                }
-                PyArray1::from_vec(py, points)
-            })
-            .collect()
+    fn curves<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArray1<u32>>>> {
+        let curves = self.found_curves(py)?;
+        let of_curve = |ix| {
+            let mut points = curves.points(ix).to_vec();
+            if curves.is_closed(ix) {
+                points.extend(points.first().copied());
+            }
+            PyArray1::from_vec(py, points)
+        };
+        Ok((0..curves.len()).map(of_curve).collect())
     }
 
     /// numpy.ndarray of float64 : the length of each curve, in the unit of the scene.
     #[getter]
-    fn lengths<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let lengths = (0..self.curves.len()).map(|ix| self.curves.length(ix));
-        PyArray1::from_vec(py, lengths.collect())
+    fn lengths<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let curves = self.found_curves(py)?;
+        let lengths = (0..curves.len()).map(|ix| curves.length(ix));
+        Ok(PyArray1::from_vec(py, lengths.collect()))
     }
 
     /// The connected regions of contact.
@@ -194,12 +166,61 @@ impl Contacts {
     }
 
     fn __repr__(&self) -> String {
-        format!(
-            "Contacts({} pairs, {} points, {} curves)",
-            self.inner.len(),
-            self.inner.points().len(),
-            self.curves.len()
-        )
+        let n_points = self.inner.points().len();
+        format!("Contacts({} pairs, {n_points} points)", self.inner.len())
+    }
+}
+
+/// How deep two closed bodies are in each other: `Detector.penetration`.
+#[pyclass(module = "impinge", frozen)]
+pub struct Penetration {
+    pub inner: contact::Penetration,
+}
+
+#[pymethods]
+impl Penetration {
+    /// tuple of two numpy.ndarray of uint32 : the vertices of the body with the lower number that are strictly inside the
+    /// other one, and those of the other one inside the first; sorted.
+    #[getter]
+    fn inside<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>) {
+        let [a, b] = &self.inner.inside;
+        (PyArray1::from_slice(py, a), PyArray1::from_slice(py, b))
+    }
+
+    /// float or None : the volume that both bodies have in common, in cubic units; ``None`` where it is unknown because they
+    /// meet other than by edges that cross faces.
+    #[getter]
+    fn volume(&self) -> Option<f64> {
+        self.inner.volume()
+    }
+
+    /// The connected regions of the overlap.
+    ///
+    /// Returns
+    /// -------
+    /// list of dict
+    ///     As of `Contacts.regions`, and ``inside`` (vertices of either body inside the other), ``depth`` (how far the region
+    ///     extends along its normal) and ``volume``; each may be ``None``.
+    fn regions<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let of_region = |region: &Region| {
+            let dict = to_dict(py, region)?;
+            let [a, b] = &region.inside;
+            let inside = [a, b].map(|vertices| PyArray1::from_slice(py, vertices));
+            dict.set_item("inside", inside)?;
+            dict.set_item("depth", region.depth)?;
+            dict.set_item("volume", region.volume)?;
+            Ok(dict)
+        };
+        self.inner.regions.iter().map(of_region).collect()
+    }
+
+    fn __repr__(&self) -> String {
+        let [a, b] = self.inner.inside.each_ref().map(Vec::len);
+        let n = self.inner.regions.len();
+        format!("Penetration({n} regions, {a} and {b} vertices inside)")
     }
 }
 

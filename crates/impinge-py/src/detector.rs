@@ -3,16 +3,17 @@
 use std::ops::ControlFlow;
 
 use impinge::{CandidateQuery, Control, NearQuery, Query, Step, Toi};
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use crate::arrays;
+use crate::contact::{Contacts, Penetration};
 use crate::errors::raise;
 use crate::near::{self, NearPairs};
 use crate::proximity::Nearest;
 use crate::question::{question, step_question};
-use crate::result::Answer;
+use crate::result::{Answer, Asked};
 use crate::scene::Scene;
 use crate::settings::{self, Argument, Told, unexpected, unsigned};
 use crate::steps::{self, Advance, Candidates, Impact, Impacts, Spare};
@@ -729,6 +730,8 @@ impl Detector {
     /// thickness : dict of Body to float, optional
     ///     How thick bodies are: what either body of a pair adds to the distance, of one body twice. The sum is not
     ///     rounded.
+    /// distances : bool
+    ///     Whether to find distances, too.
     /// closest_points : bool
     ///     Whether to find distances and nearest points, too.
     ///
@@ -750,17 +753,18 @@ impl Detector {
     /// >>> near = impinge.Detector(backend="cpu").within_distance(scene, 0.5, closest_points=True)
     /// >>> near
     /// NearPairs(vf: 1)
-    /// >>> str(near.types[0]), near.distances.tolist(), near.points.tolist()
+    /// >>> impinge.TYPES[near.types[0]], near.distances.tolist(), near.points.tolist()
     /// ('P_T', [0.5], [[[1.0, 1.0, 0.5], [1.0, 1.0, 0.0]]])
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     #[pyo3(
         signature = (
             scene, distance=None, *, between=None, within=None, ignore=None, kinds=None,
-            thickness=None, closest_points=false, owned_by=None, progress=None, cancel=None,
+            thickness=None, distances=false, closest_points=false, owned_by=None, progress=None,
+            cancel=None,
         ),
         text_signature = "($self, scene, distance=0.0, *, between=None, within=None, ignore=None, \
-                          kinds=None, thickness=None, closest_points=False, owned_by=None, progress=None, \
-                          cancel=None)"
+                          kinds=None, thickness=None, distances=False, closest_points=False, owned_by=None, \
+                          progress=None, cancel=None)"
     )]
     fn within_distance(
         slf: &Bound<'_, Self>,
@@ -771,6 +775,7 @@ impl Detector {
         ignore: Argument<'_, '_>,
         kinds: Argument<'_, '_>,
         thickness: Argument<'_, '_>,
+        distances: bool,
         closest_points: bool,
         owned_by: Argument<'_, '_>,
         progress: Argument<'_, '_>,
@@ -787,9 +792,10 @@ impl Detector {
             for (body, thickness) in near::thickness(scene, thickness)? {
                 query = query.thickness(body, thickness);
             }
-            Ok(match closest_points {
-                true => query.closest_points(),
-                false => query,
+            Ok(match (closest_points, distances) {
+                (true, _) => query.closest_points(),
+                (false, true) => query.distances(),
+                (false, false) => query,
             })
         };
         let answer = |detector: &mut impinge::Detector,
@@ -801,7 +807,11 @@ impl Detector {
         };
         let watched = (scene, progress, cancel);
         let (pairs, ..) = Detector::watched(slf, watched, ask, answer)?;
-        Ok(NearPairs::new(pairs, closest_points))
+        Ok(NearPairs::new(
+            pairs,
+            distances || closest_points,
+            closest_points,
+        ))
     }
 
     /// The smallest distance of two bodies at the positions that they have, and the pair of primitives that has it. Tetrahedra
@@ -811,6 +821,8 @@ impl Detector {
     /// ----------
     /// scene : Scene
     /// a, b : Body or int
+    /// progress, cancel
+    ///     As for `detect`.
     ///
     /// Returns
     /// -------
@@ -823,6 +835,8 @@ impl Detector {
     ///     A body that the scene does not have, twice the same body.
     /// RuntimeError
     ///     A scene or a detector that is busy in another thread.
+    /// Cancelled
+    ///     By `cancel`.
     ///
     /// Examples
     /// --------
@@ -832,19 +846,218 @@ impl Detector {
     /// >>> other = scene.add([[0, 0, 3], [4, 0, 3], [0, 4, 5]], [[0, 1, 2]])
     /// >>> impinge.Detector(backend="cpu").distance(scene, floor, other)
     /// Nearest(3.0, primitives (0, 0))
+    #[pyo3(signature = (scene, a, b, *, progress=None, cancel=None))]
     fn distance(
         slf: &Bound<'_, Self>,
         scene: &Bound<'_, PyAny>,
         a: &Bound<'_, PyAny>,
         b: &Bound<'_, PyAny>,
+        progress: Argument<'_, '_>,
+        cancel: Argument<'_, '_>,
     ) -> PyResult<Option<Nearest>> {
         let ask = |scene: &Scene| Ok([scene.id(a, "a")?, scene.id(b, "b")?]);
+        let answer =
+            |detector: &mut impinge::Detector,
+             scene: &impinge::Scene,
+             &[a, b]: &[impinge::BodyId; 2],
+             control: &Control<'_>| { detector.distance_with(scene, a, b, control) };
+        let watched = (scene, progress, cancel);
+        let (inner, _, number) = Detector::watched(slf, watched, ask, answer)?;
+        Ok(inner.map(|inner| Nearest::new(inner, number)))
+    }
+
+    /// The two bodies that are nearest to each other of all whose filters let them meet, and the pair of primitives that has
+    /// their distance. Pairs of bodies whose boxes are farther apart than the nearest two are never looked at.
+    ///
+    /// Parameters
+    /// ----------
+    /// scene : Scene
+    /// across : sequence of Body, optional
+    ///     Only pairs of one of these and one that is not among them, whatever their filters say.
+    /// progress, cancel
+    ///     As for `detect`.
+    ///
+    /// Returns
+    /// -------
+    /// Nearest or None
+    ///     ``None`` where there are no two bodies that have primitives. Of several pairs at one distance the lowest.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError, RuntimeError, Cancelled
+    ///     As `distance`.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import impinge
+    /// >>> scene = impinge.Scene()
+    /// >>> points = [scene.add_points([[x, 0, 0]]) for x in (0, 5, 7)]
+    /// >>> nearest = impinge.Detector(backend="cpu").nearest(scene)
+    /// >>> nearest.distance, nearest.bodies == (points[1], points[2])
+    /// (2.0, True)
+    #[pyo3(signature = (scene, *, across=None, progress=None, cancel=None))]
+    fn nearest(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        across: Argument<'_, '_>,
+        progress: Argument<'_, '_>,
+        cancel: Argument<'_, '_>,
+    ) -> PyResult<Option<Nearest>> {
+        let answer =
+            |detector: &mut impinge::Detector,
+             scene: &impinge::Scene,
+             query: &Query,
+             control: &Control<'_>| { detector.nearest_with(scene, query, control) };
+        let watched = (scene, progress, cancel);
+        let (inner, _, number) = Detector::watched(slf, watched, many(across), answer)?;
+        Ok(inner.map(|inner| Nearest::new(inner, number)))
+    }
+
+    /// Whether bodies meet, of all or across some; for `CollisionManager`.
+    #[pyo3(signature = (scene, across=None))]
+    fn _any(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        across: Argument<'_, '_>,
+    ) -> PyResult<bool> {
+        let answer =
+            |detector: &mut impinge::Detector,
+             scene: &impinge::Scene,
+             query: &Query,
+             control: &Control<'_>| { detector.any_with(scene, query, control) };
+        Ok(Detector::watched(slf, (scene, None, None), many(across), answer)?.0)
+    }
+
+    /// Pairs of all bodies or across some; for `CollisionManager`.
+    #[pyo3(signature = (scene, across=None))]
+    fn _detect(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        across: Argument<'_, '_>,
+    ) -> PyResult<Answer> {
+        let answer = |detector: &mut impinge::Detector,
+                      scene: &impinge::Scene,
+                      query: &Query,
+                      control: &Control<'_>| {
+            detector.detect_with(scene, query, control)?;
+            Ok(detector.take_pairs())
+        };
+        let watched = (scene, None, None);
+        let (pairs, _, number) = Detector::watched(slf, watched, many(across), answer)?;
+        Ok(Answer::new(pairs, number, Asked::Many))
+    }
+
+    /// Where the triangles of each pair meet: points, segments, polygons, and the curves in which surfaces cross.
+    ///
+    /// Parameters
+    /// ----------
+    /// scene : Scene
+    ///     As it was when the pairs were found.
+    /// pairs : Result
+    ///     Of `detect`.
+    /// progress, cancel
+    ///     As for `detect`.
+    ///
+    /// Returns
+    /// -------
+    /// Contacts
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     A result of another scene, or a body that is gone or has fewer primitives.
+    /// MemoryError, Cancelled, RuntimeError
+    ///     As `detect`.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import impinge
+    /// >>> scene = impinge.Scene()
+    /// >>> floor = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+    /// >>> blade = scene.add([[1, 1, -1], [2, 1, -1], [1, 1, 1]], [[0, 1, 2]])
+    /// >>> detector = impinge.Detector(backend="cpu")
+    /// >>> contacts = detector.contacts(scene, detector.detect(scene))
+    /// >>> contacts.shapes.tolist(), contacts.points.tolist()
+    /// (['segment'], [[1.0, 1.0, 0.0], [1.5, 1.0, 0.0]])
+    /// >>> [curve.tolist() for curve in contacts.curves()]
+    /// [[0, 1]]
+    #[pyo3(signature = (scene, pairs, *, progress=None, cancel=None))]
+    fn contacts(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        pairs: &Bound<'_, PyAny>,
+        progress: Argument<'_, '_>,
+        cancel: Argument<'_, '_>,
+    ) -> PyResult<Contacts> {
+        let result = pairs
+            .cast::<Answer>()
+            .map_err(|_| unexpected(pairs, "pairs", "a Result"))?;
+        let (pairs, of_scene) = result.get().parts();
+        let ask = |scene: &Scene| match of_scene == scene.number {
+            true => Ok(pairs),
+            false => Err(PyValueError::new_err("pairs: of another scene")),
+        };
+        let answer =
+            |detector: &mut impinge::Detector,
+             scene: &impinge::Scene,
+             pairs: &&impinge::Pairs,
+             control: &Control<'_>| { detector.contacts_with(scene, pairs, control) };
+        let watched = (scene, progress, cancel);
+        let (contacts, _, number) = Detector::watched(slf, watched, ask, answer)?;
+        Ok(Contacts::new(contacts, number))
+    }
+
+    /// How deep two closed bodies of triangles are in each other: vertices inside, and connected regions with normal, depth and
+    /// volume. The body with the lower number is the first, whichever argument it is.
+    ///
+    /// Parameters
+    /// ----------
+    /// scene : Scene
+    ///     As it was when the contacts were found.
+    /// contacts : Contacts
+    ///     Among them all of these two bodies.
+    /// a, b : Body or int
+    /// progress, cancel
+    ///     As for `detect`.
+    ///
+    /// Returns
+    /// -------
+    /// Penetration
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     A body that the scene does not have or that is not made of triangles, twice the same body, a surface that is not
+    ///     closed, contacts of another scene.
+    /// MemoryError, Cancelled, RuntimeError
+    ///     As `detect`.
+    #[pyo3(signature = (scene, contacts, a, b, *, progress=None, cancel=None))]
+    fn penetration(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        contacts: &Bound<'_, PyAny>,
+        a: &Bound<'_, PyAny>,
+        b: &Bound<'_, PyAny>,
+        progress: Argument<'_, '_>,
+        cancel: Argument<'_, '_>,
+    ) -> PyResult<Penetration> {
+        let contacts = contacts
+            .cast::<Contacts>()
+            .map_err(|_| unexpected(contacts, "contacts", "Contacts"))?
+            .get();
+        let ask = |scene: &Scene| match contacts.scene == scene.number {
+            true => Ok([scene.id(a, "a")?, scene.id(b, "b")?]),
+            false => Err(PyValueError::new_err("contacts: of another scene")),
+        };
         let answer = |detector: &mut impinge::Detector,
                       scene: &impinge::Scene,
                       &[a, b]: &[impinge::BodyId; 2],
-                      _: &Control<'_>| detector.distance(scene, a, b);
-        let (nearest, ..) = Detector::watched(slf, (scene, None, None), ask, answer)?;
-        Ok(nearest.map(Nearest::from))
+                      control: &Control<'_>| {
+            detector.penetration_with(scene, &contacts.inner, a, b, control)
+        };
+        let watched = (scene, progress, cancel);
+        let (inner, ..) = Detector::watched(slf, watched, ask, answer)?;
+        Ok(Penetration { inner })
     }
 
     fn __repr__(&self) -> String {
@@ -864,6 +1077,23 @@ impl Detector {
             words.push(format!("max_pairs={limit}"));
         }
         format!("Detector({})", words.join(", "))
+    }
+}
+
+/// Pairs of different bodies: of all, or across some.
+fn many<'a, 'py>(
+    across: Argument<'a, 'py>,
+) -> impl FnOnce(&Scene) -> PyResult<Query> + use<'a, 'py> {
+    move |scene: &Scene| {
+        let Some(bodies) = across else {
+            return Ok(Query::all());
+        };
+        let each = bodies
+            .try_iter()
+            .map_err(|_| unexpected(bodies, "across", "a sequence of bodies"))?;
+        let ids: PyResult<Vec<impinge::BodyId>> =
+            each.map(|body| scene.id(&body?, "across")).collect();
+        Ok(Query::across(ids?))
     }
 }
 

@@ -29,10 +29,16 @@ use pyo3::prelude::*;
 /// Exact, real-time collision detection for deforming meshes (compiled part).
 #[pymodule]
 mod _impinge {
+    use impinge::PairKind;
+    use pyo3::prelude::*;
+    use pyo3::types::{PyModule, PyTuple};
+
+    use super::near::{FEATURES, TYPES};
+
     #[pymodule_export]
     use super::bodies::Body;
     #[pymodule_export]
-    use super::contact::Contacts;
+    use super::contact::{Contacts, Penetration};
     #[pymodule_export]
     use super::datasets::{
         _check, _serve_check, _tiles_describe, _tiles_merge, _tiles_plan, _tiles_run,
@@ -49,7 +55,7 @@ mod _impinge {
     #[pymodule_export]
     use super::near::NearPairs;
     #[pymodule_export]
-    use super::proximity::{Distances, Nearest};
+    use super::proximity::Nearest;
     #[pymodule_export]
     use super::result::Answer;
     #[pymodule_export]
@@ -60,6 +66,15 @@ mod _impinge {
     use super::steps::{Advance, Candidates, Impact, Impacts};
     #[pymodule_export]
     use super::watch::CancelToken;
+
+    /// The names that numbers of columns stand for.
+    #[pymodule_init]
+    fn names(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        let names = |names: &[&str]| PyTuple::new(module.py(), names);
+        module.add("KINDS", names(&PairKind::ALL.map(PairKind::name))?)?;
+        module.add("TYPES", names(&TYPES)?)?;
+        module.add("FEATURES", names(&FEATURES)?)
+    }
 
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name that Python expects")]

@@ -1,23 +1,22 @@
-//! `impinge.Distances`: how near two bodies are.
+//! `impinge.Nearest`: how near two bodies are.
 
 use impinge::proximity;
 use numpy::PyArray2;
-use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-use crate::errors::raise;
-use crate::scene::Scene;
-use crate::settings::unexpected;
+use crate::bodies::Body;
 
 /// The pair of primitives of two bodies that are nearest to each other.
 #[pyclass(module = "impinge", frozen)]
 pub struct Nearest {
     inner: proximity::Nearest,
+    /// The number of the scene.
+    scene: u64,
 }
 
-impl From<proximity::Nearest> for Nearest {
-    fn from(inner: proximity::Nearest) -> Self {
-        Nearest { inner }
+impl Nearest {
+    pub fn new(inner: proximity::Nearest, scene: u64) -> Self {
+        Nearest { inner, scene }
     }
 }
 
@@ -28,6 +27,14 @@ impl Nearest {
     #[getter]
     fn distance(&self) -> f64 {
         self.inner.distance
+    }
+
+    /// tuple of two Body : the bodies as they were asked for; of many, the nearest two, the lower number first.
+    #[getter]
+    fn bodies(&self) -> (Body, Body) {
+        let scene = self.scene;
+        let [a, b] = self.inner.bodies.map(|id| Body { id, scene });
+        (a, b)
     }
 
     /// tuple of two int : the primitive of the first body, and of the second; of several pairs at the same computed
@@ -49,70 +56,5 @@ impl Nearest {
     fn __repr__(&self) -> String {
         let [a, b] = self.inner.primitives;
         format!("Nearest({:?}, primitives ({a}, {b}))", self.inner.distance)
-    }
-}
-
-/// Finds the smallest distance of two bodies. Trees of the bodies are kept, so that later frames cost less.
-///
-/// Examples
-/// --------
-/// >>> import numpy as np, impinge
-/// >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
-/// >>> scene = impinge.Scene()
-/// >>> a = scene.add(corners, [[0, 1, 2]])
-/// >>> b = scene.add(corners + np.float32([0, 0, 3]), [[0, 1, 2]])
-/// >>> impinge.Distances().between(scene, a, b).distance
-/// 3.0
-#[pyclass(module = "impinge")]
-#[derive(Default)]
-pub struct Distances {
-    inner: proximity::Distances,
-}
-
-#[pymethods]
-impl Distances {
-    #[new]
-    fn new() -> Self {
-        Distances::default()
-    }
-
-    /// The smallest distance of two bodies and the pair of primitives that has it. Tetrahedra are solid.
-    ///
-    /// Parameters
-    /// ----------
-    /// scene : Scene
-    /// a, b : Body or int
-    ///
-    /// Returns
-    /// -------
-    /// Nearest or None
-    ///     ``None`` where one of them has no primitive.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     A body that the scene does not have, twice the same body.
-    /// RuntimeError
-    ///     A scene or a `Distances` that is busy in another thread.
-    fn between(
-        slf: &Bound<'_, Self>,
-        scene: &Bound<'_, PyAny>,
-        a: &Bound<'_, PyAny>,
-        b: &Bound<'_, PyAny>,
-    ) -> PyResult<Option<Nearest>> {
-        let py = slf.py();
-        let scene = scene
-            .cast::<Scene>()
-            .map_err(|_| unexpected(scene, "scene", "a Scene"))?;
-        let mut distances = slf.try_borrow_mut().map_err(|_| {
-            PyRuntimeError::new_err("these Distances are busy: give each thread ones of its own")
-        })?;
-        let scene = scene
-            .try_borrow()
-            .map_err(|_| PyRuntimeError::new_err("the scene is being changed by another thread"))?;
-        let (a, b) = (scene.id(a, "a")?, scene.id(b, "b")?);
-        let (inner, bodies) = (&mut distances.inner, &scene.inner);
-        let nearest = py.detach(|| inner.between(bodies, a, b)).map_err(raise)?;
-        Ok(nearest.map(Nearest::from))
     }
 }

@@ -660,6 +660,25 @@ impl Scene {
         Ok(self.body(body)?.n_primitives())
     }
 
+    /// The shortest way that takes two convex bodies apart, for `CollisionManager`: its length, its direction for the second body,
+    /// and the vertex of the first that is farthest along it. ``None`` where they are flat.
+    fn _convex_overlap(
+        &self,
+        py: Python<'_>,
+        a: &Bound<'_, PyAny>,
+        b: &Bound<'_, PyAny>,
+    ) -> PyResult<Option<(f64, [f64; 3], usize)>> {
+        let bodies = [self.body(a)?, self.body(b)?];
+        let found = py.detach(|| {
+            let [a, b] = bodies.map(|body| -> Vec<[f64; 3]> {
+                let vertices = 0..body.n_vertices();
+                vertices.map(|ix| body.positions().point(ix)).collect()
+            });
+            impinge::contact::convex_overlap(&a, &b)
+        });
+        Ok(found.map(|found| (found.depth, found.normal, found.vertex)))
+    }
+
     /// How many vertices a body has.
     fn n_vertices(&self, body: &Bound<'_, PyAny>) -> PyResult<usize> {
         Ok(self.body(body)?.n_vertices())

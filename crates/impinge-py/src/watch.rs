@@ -64,10 +64,18 @@ struct State {
 impl Watch {
     /// For a detection that runs on this thread from now on.
     pub fn new(progress: Option<Py<PyAny>>, cancel: Option<impinge::CancelToken>) -> Self {
+        let stop = impinge::CancelToken::new();
+        // A question may look only once.
+        if cancel
+            .as_ref()
+            .is_some_and(impinge::CancelToken::is_cancelled)
+        {
+            stop.cancel();
+        }
         Watch {
             caller: std::thread::current().id(),
             progress,
-            stop: impinge::CancelToken::new(),
+            stop,
             cancel,
             state: Mutex::new(State {
                 looked: Instant::now(),

@@ -25,13 +25,17 @@ def two():
 
 def test_columns(detector, two):
     near = detector.within_distance(two, 3.0, between=True, closest_points=True)
-    assert near.kinds.tolist() == ["vf"] * 6 + ["ee"] * 9
+    assert [impinge.KINDS[kind] for kind in near.kinds] == ["vf"] * 6 + ["ee"] * 9
+    assert {near.kinds.dtype, near.types.dtype, near.features.dtype} == {np.dtype(np.uint8)}
+    assert np.array_equal(near.rows[:, ::2], near.bodies)
+    assert np.array_equal(near.rows[:, 1::2], near.elements)
     assert near.bodies.dtype == np.uint32 and near.bodies.shape == (15, 2)
     assert near.elements[:3].tolist() == [[0, 0], [1, 0], [2, 0]]
     assert near.bodies[:6].tolist() == [[0, 1]] * 3 + [[1, 0]] * 3
     # Each vertex is above a vertex of the face.
-    assert sorted(near.types[:3]) == ["P_T0", "P_T1", "P_T2"]
-    assert near.features.shape == (15, 2) and near.features[0].tolist() == ["v0", "v0"]
+    assert sorted(impinge.TYPES[ix] for ix in near.types[:3]) == ["P_T0", "P_T1", "P_T2"]
+    assert near.features.shape == (15, 2)
+    assert [impinge.FEATURES[ix] for ix in near.features[0]] == ["v0", "v0"]
     assert near.distances.tolist() == [3.0] * 15
     assert near.points.shape == (15, 2, 3)
     gaps = np.linalg.norm(near.points[:, 0] - near.points[:, 1], axis=1)
@@ -42,11 +46,43 @@ def test_columns(detector, two):
     below = detector.within_distance(two, np.nextafter(3.0, 0), between=True)
     assert len(below) == 0 and below.kinds.shape == (0,) and below.features.shape == (0, 2)
     assert below.hash != near.hash
+    # Distances alone.
+    only = detector.within_distance(two, 3.0, between=True, distances=True)
+    assert only.hash == near.hash and only.distances.tolist() == near.distances.tolist()
+    with pytest.raises(ValueError, match="^points were not asked for: pass closest_points=True"):
+        only.points  # noqa: B018
+
+
+def test_one_kind(detector, two):
+    near = detector.within_distance(two, 3.0, between=True, closest_points=True)
+    parts = [near.of(kind) for kind in impinge.KINDS]
+    assert [len(part) for part in parts] == [6, 9, 0, 0, 0, 0]
+    for name in ["rows", "kinds", "types", "features", "parallel", "distances", "points"]:
+        columns = [getattr(part, name) for part in parts]
+        assert np.array_equal(np.concatenate(columns), getattr(near, name)), name
+    assert sum(part.hash for part in parts) % 2**64 == near.hash
+    assert repr(near.of("ee")) == "NearPairs(ee: 9)" == repr(near.of("ee").of("ee"))
+    assert len(near.of("ee").of("vf")) == 0 and near.of("ee").of("vf").rows.shape == (0, 4)
+    with pytest.raises(ValueError, match='^kind: "xy" given'):
+        near.of("xy")
+
+
+def test_types_have_names(detector):
+    """Each name of a type that occurs on random elements is in the list."""
+    random = np.random.default_rng(5)
+    scene = impinge.Scene()
+    for _ in range(2):
+        scene.add(random.integers(0, 4, (90, 3)).astype(float), np.arange(90).reshape(-1, 3))
+    near = detector.within_distance(scene, 1.0, kinds=impinge.KINDS)
+    seen = {impinge.TYPES[ix] for ix in near.types}
+    assert {"P_P", "P_E", "P_T", "P_T0", "P_E2", "EA_EB", "EA1_EB", "EA0_EB1", "E_E"} <= seen
+    assert set(impinge.FEATURES) == {impinge.FEATURES[ix] for ix in near.features.flat}
 
 
 def test_kinds_and_thickness(detector, two):
     faces = detector.within_distance(two, 3.0, kinds=["ff"])
-    assert faces.kinds.tolist() == ["ff"] and faces.types.tolist() == ["P_P"]
+    assert [impinge.KINDS[ix] for ix in faces.kinds] == ["ff"]
+    assert [impinge.TYPES[ix] for ix in faces.types] == ["P_P"]
     a, b = two.bodies
     thick = dict(between=(a, b), kinds=["ff"])
     assert len(detector.within_distance(two, thickness={a: 1.0, b: 2.0}, **thick)) == 1
@@ -62,14 +98,16 @@ def test_kinds_and_thickness(detector, two):
 
 def test_refusals(detector, two):
     near = detector.within_distance(two, 3.0)
-    for name in ["distances", "points"]:
-        with pytest.raises(ValueError, match="pass closest_points=True"):
+    for name, keyword in [("distances", "distances"), ("points", "closest_points")]:
+        with pytest.raises(ValueError, match=f"^{name} were not asked for: pass {keyword}=True"):
             getattr(near, name)
     with pytest.raises(ValueError, match="distance"):
         detector.within_distance(two, -1.0)
     with pytest.raises(ValueError, match="thickness"):
         detector.within_distance(two, thickness={0: float("nan")})
-    with pytest.raises(TypeError, match="^thickness: a dictionary of bodies and numbers expected, list given"):
+    with pytest.raises(
+        TypeError, match="^thickness: a dictionary of bodies and numbers expected, list given"
+    ):
         detector.within_distance(two, thickness=[1.0])
     with pytest.raises(ValueError, match='^kinds\\[0\\]: "xy" given'):
         detector.within_distance(two, kinds=["xy"])
@@ -81,7 +119,7 @@ def test_contacts(detector):
     scene = impinge.Scene()
     scene.add(FLOOR, FACE)
     scene.add(np.array([[1, 1, -1], [2, 1, -1], [1, 1, 1]], np.float32), FACE)
-    contacts = impinge.Contacts(scene, detector.detect(scene))
+    contacts = detector.contacts(scene, detector.detect(scene))
     assert len(contacts) == 1 and contacts.rows.tolist() == [[0, 0, 1, 0]]
     assert contacts.shapes.tolist() == ["segment"]
     assert contacts.points[contacts.corners].tolist() == [[1, 1, 0], [1.5, 1, 0]]
@@ -105,14 +143,27 @@ def test_loops_end_where_they_start(detector):
     scene.add(vertices, faces)
     scene.add(vertices + np.array([0.7, 0.1, 0.05], vertices.dtype), faces)
     result = detector.detect(scene)
-    contacts = impinge.Contacts(scene, result)
+    contacts = detector.contacts(scene, result)
     assert len(contacts) == len(result) > 0
     curves = contacts.curves()
     assert curves and all(curve[0] == curve[-1] for curve in curves)
     for curve, length in zip(curves, contacts.lengths):
         steps = np.diff(contacts.points[curve], axis=0)
         assert np.linalg.norm(steps, axis=1).sum() == pytest.approx(length)
-    with pytest.raises(ValueError, match="^result: of another scene"):
-        impinge.Contacts(impinge.Scene(), result)
-    with pytest.raises(TypeError, match="^result: a Result expected"):
-        impinge.Contacts(scene, 3)
+    with pytest.raises(ValueError, match="^pairs: of another scene"):
+        detector.contacts(impinge.Scene(), result)
+    with pytest.raises(TypeError, match="^pairs: a Result expected"):
+        detector.contacts(scene, 3)
+    found = detector.penetration(scene, contacts, 1, 0)
+    [region] = found.regions()
+    assert region["depth"] > 0 and region["normal"][0] < -0.8
+    assert found.volume == pytest.approx(region["volume"]) and region["volume"] > 0
+    assert [len(inside) > 0 for inside in found.inside] == [True, True]
+    assert region["inside"][0].tolist() == found.inside[0].tolist()
+    assert repr(found).startswith("Penetration(1 regions, ")
+    with pytest.raises(ValueError, match="itself"):
+        detector.penetration(scene, contacts, 1, 1)
+    with pytest.raises(TypeError, match="^contacts: Contacts expected"):
+        detector.penetration(scene, result, 0, 1)
+    with pytest.raises(ValueError, match="^contacts: of another scene"):
+        detector.penetration(impinge.Scene(), contacts, 0, 1)

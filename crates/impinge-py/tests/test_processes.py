@@ -158,3 +158,103 @@ def test_placement_of_helper_threads():
             for thread in helpers(before):
                 assert len(everywhere - os.sched_getaffinity(thread)) == n_left_out
     assert len(answers) == 1
+
+
+# Every question, on enough that each would use threads.
+QUESTIONS = """
+import os, signal, sys, numpy as np, impinge
+random = np.random.default_rng(2)
+turn = np.linspace(0, 2 * np.pi, 120, endpoint=False)
+high = np.linspace(0, np.pi, 60)[1:-1]
+ring = np.stack([np.cos(turn), np.sin(turn)], 1)
+ball = np.concatenate([[[0, 0, 1.0]]] + [np.c_[np.sin(h) * ring, np.full(120, np.cos(h))] for h in high]
+                      + [[[0, 0, -1.0]]])
+n = len(high)
+faces = []
+for j in range(120):
+    k = (j + 1) % 120
+    faces.append([0, 1 + j, 1 + k])
+    faces.append([len(ball) - 1, 1 + (n - 1) * 120 + k, 1 + (n - 1) * 120 + j])
+    for i in range(n - 1):
+        a, b = 1 + i * 120, 1 + (i + 1) * 120
+        faces += [[a + j, b + j, b + k], [a + j, b + k, a + k]]
+scene = impinge.Scene()
+a, b, c = (scene.add(ball + [x, 0.03, 0], faces) for x in (0, 0.5, 5))
+for body, x in [(a, 0), (c, 5)]:
+    scene.set_end_positions(body, ball + [x + 0.02, 0.03, 0.01])
+
+def questions(detector):
+    pairs = detector.detect(scene)
+    contacts = detector.contacts(scene, pairs)
+    yield "detect", lambda **control: pairs.hash and detector.detect(scene, **control).hash
+    yield "count", lambda **control: detector.count(scene, **control)
+    yield "any", lambda **control: detector.any(scene, within=True, between=True, **control)
+    yield "impacts", lambda **control: detector.impacts(scene, between=(a, b), **control).hash
+    yield "earliest", lambda **control: detector.earliest(scene, **control).toi
+    yield "is_free", lambda **control: detector.is_free(scene, **control)
+    yield "advance", lambda **control: detector.advance(scene, between=(a, c), **control).fraction
+    yield "candidates", lambda **control: detector.candidates(scene, between=(a, b), **control).hash
+    yield "within_distance", lambda **control: detector.within_distance(
+        scene, 0.001, between=True, distances=True, **control).hash
+    yield "distance", lambda **control: detector.distance(scene, a, c, **control).distance
+    yield "nearest", lambda **control: detector.nearest(scene, across=[c], **control).distance
+    yield "contacts", lambda **control: detector.contacts(scene, pairs, **control).points.tobytes()
+    yield "penetration", lambda **control: detector.penetration(
+        scene, contacts, a, b, **control).volume
+
+def answers(threads):
+    return [ask() for _, ask in questions(impinge.Detector(backend="cpu", threads=threads))]
+"""
+
+
+def run(code):
+    out = subprocess.run(
+        [sys.executable, "-c", QUESTIONS + code], capture_output=True, text=True, timeout=120
+    )
+    assert (out.returncode, out.stdout) == (0, "good\n"), out
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="threads are counted on Linux only")
+def test_one_thread_is_one_thread():
+    run(
+        "before = len(os.listdir('/proc/self/task'))\n"
+        "answers(1)\n"
+        "assert len(os.listdir('/proc/self/task')) == before\n"
+        "print('good')\n"
+    )
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_every_question_in_a_fork():
+    run(
+        "expected = answers(None)\n"
+        "assert answers(2) == expected\n"
+        "child = os.fork()\n"
+        "if child == 0:\n"
+        "    signal.alarm(60)\n"
+        "    os._exit(0 if answers(None) == expected == answers(2) else 1)\n"
+        "assert os.waitpid(child, 0)[1] == 0\n"
+        "print('good')\n"
+    )
+
+
+def test_every_question_is_cancelled():
+    run(
+        "for name, ask in questions(impinge.Detector(backend='cpu', threads=2)):\n"
+        "    token = impinge.CancelToken()\n"
+        "    token.cancel()\n"
+        "    expected = ask()\n"
+        "    try:\n"
+        "        ask(cancel=token)\n"
+        "        assert False, name\n"
+        "    except impinge.Cancelled:\n"
+        "        assert ask() == expected, name\n"
+        "    def stop(done, total):\n"
+        "        raise KeyError(name)\n"
+        "    try:\n"
+        "        ask(progress=stop)\n"
+        "    except KeyError as error:\n"
+        "        assert error.args == (name,)\n"
+        "    assert ask() == expected, name\n"
+        "print('good')\n"
+    )

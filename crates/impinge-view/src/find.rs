@@ -2,7 +2,6 @@
 
 use std::time::Instant;
 
-use impinge::contact::Contacts;
 use impinge::{Detector, Method, NearQuery, PairKind, Pairs, Scene, Settings, Step};
 use impinge_render::wgpu;
 
@@ -134,7 +133,9 @@ pub(crate) fn step(question: &Question) -> Step {
 
 /// The intersection curves as segments.
 pub(crate) fn curves(scene: &Scene, pairs: &Pairs) -> Result<Vec<[[f64; 3]; 2]>, String> {
-    let contacts = Contacts::new(scene, pairs).map_err(|error| error.to_string())?;
+    let mut detector = quiet_detector().map_err(|error| error.to_string())?;
+    let contacts = detector.contacts(scene, pairs);
+    let contacts = contacts.map_err(|error| error.to_string())?;
     let curves = contacts.curves().map_err(|error| error.to_string())?;
     let segments = (0..curves.len()).flat_map(|curve| curves.segments(curve));
     Ok(segments

@@ -114,9 +114,10 @@ pub use impinge_core::wgpu;
 pub use impinge_core::{
     Advance, Backend, Body, BodyId, CancelToken, CandidateQuery, Candidates, ClosestPoints,
     Control, Detector, Elements, Error, Filter, Impact, Impacts, InstructionSet, Kind, Method,
-    NearPair, NearPairs, NearQuery, PairKind, PairKinds, Pairs, Part, Placement, PositionRows,
-    Positions, Primitive, Progress, Query, Real, Recluster, Scene, Settings, SharedVertex, Stage,
-    Start, Statistics, Step, Toi, Weld, WrongNumber, hash_impact_rows, hash_rows,
+    NearIter, NearPair, NearPairs, NearQuery, PairKind, PairKinds, Pairs, Part, Placement,
+    PositionRows, Positions, Primitive, Progress, Query, Real, Recluster, Scene, Settings,
+    SharedVertex, Stage, Start, Statistics, Step, Toi, Weld, WrongNumber, hash_impact_rows,
+    hash_rows,
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{

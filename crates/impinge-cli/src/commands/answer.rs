@@ -3,8 +3,7 @@
 use std::io::{Write, stderr};
 use std::path::PathBuf;
 
-use impinge::contact::Contacts;
-use impinge::{BodyId, CancelToken, Detector, Query};
+use impinge::{BodyId, CancelToken, Control, Detector, Query};
 use serde_json::Value;
 
 use crate::apart::Inputs;
@@ -92,6 +91,8 @@ fn answer(
         // Median times are of one method.
         settings.method = settings.method.in_the_long_run();
     }
+    #[cfg(feature = "gpu")]
+    let threads = settings.threads;
     let mut detector = Detector::with_settings(settings)?;
 
     let watch = Watch::detection(!how.no_progress, "detecting");
@@ -122,7 +123,8 @@ fn answer(
         return hit(ask.fail_on_hit, n_pairs > 0);
     }
     let n_frames = answer.repeat.get();
-    let (pairs, times) = repeat(&mut detector, &mut scene, &query, n_frames, cancel, &watch)?;
+    let (_, times) = repeat(&mut detector, &mut scene, &query, n_frames, cancel, &watch)?;
+    let pairs = &detector.take_pairs();
     drop(watch);
 
     // Files are written first: if one can't be written, no answer is printed that looks like success.
@@ -133,7 +135,8 @@ fn answer(
         meshes::write(file, &scene, &bodies, pairs)?;
     }
     let met = if answer.contacts.is_some() || answer.curves.is_some() {
-        let contacts = Contacts::new(&scene, pairs)?;
+        let control = Control::new().cancel(cancel);
+        let contacts = detector.contacts_with(&scene, pairs, &control)?;
         let curves = contacts.curves()?;
         Some((contacts, curves))
     } else {
@@ -174,7 +177,7 @@ fn answer(
     // The picture comes last, so that the answer is printed even without an adapter.
     #[cfg(feature = "gpu")]
     if let Some(png) = &answer.png {
-        let mut drawer = Drawer::new(&answer.picture, how.device.as_deref())?;
+        let mut drawer = Drawer::new(&answer.picture, how.device.as_deref(), threads)?;
         drawer.write(&png.0, &scene, &bodies, pairs)?;
     }
     hit(ask.fail_on_hit, !pairs.is_empty())

@@ -3,8 +3,8 @@
 use std::io::Write;
 use std::time::Instant;
 
-use impinge::CancelToken;
-use impinge::proximity::{Distances, Nearest};
+use impinge::proximity::Nearest;
+use impinge::{Backend, CancelToken, Control, Detector};
 use serde_json::json;
 
 use crate::args::DistanceArgs;
@@ -20,7 +20,9 @@ pub fn distance(args: &DistanceArgs, cancel: &CancelToken) -> Result<(), Error> 
         scene, ids, names, ..
     } = Bodies::read(&paths, loading)?;
     let start = Instant::now();
-    let nearest = Distances::new().between(&scene, ids[0], ids[1])?;
+    let mut detector = Detector::new(Backend::Cpu)?;
+    let control = Control::new().cancel(cancel);
+    let nearest = detector.distance_with(&scene, ids[0], ids[1], &control)?;
     let ms = start.elapsed().as_secs_f64() * 1e3;
     let Some(Nearest {
         distance,

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::apart::Inputs;
 use crate::args::RenderArgs;
-use crate::detection::{detector, hit, query, repeat};
+use crate::detection::{detector, hit, query, repeat, settings};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
 use crate::output::{out, print_details};
@@ -33,7 +33,8 @@ pub fn render(args: &RenderArgs, cancel: &CancelToken) -> Result<(), Error> {
     };
     let query = query(asked, &args.ask, &ids)?;
     // The drawer comes before detection: without an adapter there is no picture.
-    let mut drawer = Drawer::new(&args.picture, how.device.as_deref())?;
+    let threads = settings(how).threads;
+    let mut drawer = Drawer::new(&args.picture, how.device.as_deref(), threads)?;
     let mut detector = detector(how)?;
     let watch = Watch::detection(!how.no_progress, "detecting");
     let (pairs, times) = repeat(&mut detector, &mut scene, &query, 1, cancel, &watch)?;

@@ -14,12 +14,12 @@ use crate::detection::{Times, detect, detector, hit, query, set_positions};
 use crate::error::Error;
 use crate::load::{Bodies, Loading, to_positions};
 use crate::output::out;
-#[cfg(feature = "gpu")]
-use crate::picture::Drawer;
 use crate::rows::FrameRows;
 use crate::text::{counted, grouped, hash};
 use crate::values::RowsFile;
 use crate::watch::{Watch, go_on};
+#[cfg(feature = "gpu")]
+use crate::{detection::settings, picture::Drawer};
 use crate::{json, meshes, regions};
 
 /// `impinge sequence`.
@@ -144,7 +144,8 @@ impl<'a> Outputs<'a> {
             drawer: match args.png {
                 Some(_) => {
                     let device = args.detector.device.as_deref();
-                    Some(Drawer::new(&args.picture, device)?)
+                    let threads = settings(&args.detector).threads;
+                    Some(Drawer::new(&args.picture, device, threads)?)
                 }
                 None => None,
             },

@@ -108,7 +108,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     if let Some(png) = &args.png {
         let surfaces = colors::surfaces(&bodies, impacts)?;
         let device = args.detector.device.as_deref();
-        Drawer::new(&args.picture, device)?.draw(&png.0, surfaces)?;
+        Drawer::new(&args.picture, device, 1)?.draw(&png.0, surfaces)?;
     }
     hit(args.fail_on_hit, !impacts.is_empty())
 }

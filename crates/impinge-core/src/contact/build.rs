@@ -4,10 +4,10 @@
 //! signs and coordinates, `O(n log n)` for the names; both in parallel, in chunks whose results are
 //! concatenated in order.
 
-use rayon::prelude::*;
-
 use super::coordinates::{Definition, Precision};
 use super::meet::{Local, ends, meet};
+use super::parts::ByBodies;
+use super::work::{Equal, Work};
 use super::{Contacts, Doubles, Feature, PointName, Shape, lowest};
 use crate::elements::{Elements, Kind};
 use crate::error::Error;
@@ -21,6 +21,10 @@ use crate::sink::{self, grow, reserve};
 
 /// Pairs per task.
 const CHUNK: usize = 256;
+/// Chunks whose names are sorted by one task.
+const CHUNKS_PER_RUN: usize = 32;
+/// Vertices whose positions are sorted by one task.
+const VERTICES: usize = 16 * 1024;
 /// What memory is for.
 const WHAT: &str = "contacts";
 
@@ -29,26 +33,38 @@ fn room<T>(n: usize) -> Result<Vec<T>, Error> {
     sink::room(n, WHAT)
 }
 
-pub(super) fn contacts(scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> {
-    let bodies = Bodies::new(scene, pairs)?;
+pub(super) fn contacts(scene: &Scene, pairs: &Pairs, work: Work<'_>) -> Result<Contacts, Error> {
+    let bodies = Bodies::new(scene, pairs, work)?;
     let n = pairs.len();
-    let mut rows: Vec<[u32; 4]> = room(n)?;
-    rows.extend(pairs.rows());
+    let mut rows: Vec<[u32; 4]> = sink::filled([0; 4], n, WHAT)?;
     let n_chunks = n.div_ceil(CHUNK);
     let mut met: Vec<ChunkContacts> = room(n_chunks)?;
     met.resize_with(n_chunks, ChunkContacts::default);
-    rows.par_chunks(CHUNK)
-        .zip(&mut met)
-        .try_for_each(|(rows, met)| {
-            reserve(&mut met.contacts, rows.len(), WHAT)?;
-            rows.iter().try_for_each(|row| met.add(&bodies, row))
-        })?;
+    let mut chunks: Vec<(&mut [[u32; 4]], &mut ChunkContacts)> = room(n_chunks)?;
+    chunks.extend(rows.chunks_mut(CHUNK).zip(&mut met));
+    work.each(&mut chunks, |chunk, (rows, met)| {
+        reserve(&mut met.contacts, rows.len(), WHAT)?;
+        for (ix, row) in (chunk * CHUNK..).zip(rows.iter_mut()) {
+            *row = pairs.row(ix);
+            met.add(&bodies, row)?;
+        }
+        Ok(())
+    })?;
+    drop(chunks);
 
     let n_corners = met.iter().map(|met| met.names.len()).sum();
-    let mut names: Vec<PointName> = room(n_corners)?;
-    names.extend(met.iter().flat_map(|met| &met.names));
-    names.par_sort_unstable();
-    names.dedup();
+    let mut runs: Vec<Vec<PointName>> = room(n_chunks.div_ceil(CHUNKS_PER_RUN))?;
+    runs.resize_with(n_chunks.div_ceil(CHUNKS_PER_RUN), Vec::new);
+    work.each(&mut runs, |ix, run| {
+        let first = ix * CHUNKS_PER_RUN;
+        let of_run = &met[first..n_chunks.min(first + CHUNKS_PER_RUN)];
+        reserve(run, of_run.iter().map(|met| met.names.len()).sum(), WHAT)?;
+        run.extend(of_run.iter().flat_map(|met| &met.names));
+        run.sort_unstable();
+        run.dedup();
+        Ok(())
+    })?;
+    let names = work.merged(runs, Equal::Once, WHAT)?;
     if u32::try_from(names.len()).is_err() {
         return Err(Error::TooMany {
             what: "points of contact",
@@ -65,18 +81,23 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> 
         of_chunks.push((met, of_chunk));
         rest = others;
     }
-    of_chunks.into_par_iter().for_each(|(met, corners)| {
+    work.each(&mut of_chunks, |_, (met, corners)| {
         for (corner, name) in corners.iter_mut().zip(&met.names) {
             *corner = number(name);
         }
-    });
+        Ok(())
+    })?;
     let mut points: Vec<[f64; 3]> = sink::filled([0.0; 3], names.len(), WHAT)?;
-    let places = names.par_iter().zip(&mut points).with_min_len(CHUNK);
-    places.for_each(|(name, point)| {
-        *point = bodies
-            .definition(name)
-            .rounded(bodies.precision(name.bodies));
-    });
+    let mut of_chunks: Vec<(&[PointName], &mut [[f64; 3]])> = room(names.len().div_ceil(CHUNK))?;
+    of_chunks.extend(names.chunks(CHUNK).zip(points.chunks_mut(CHUNK)));
+    work.each(&mut of_chunks, |_, (names, points)| {
+        for (point, name) in points.iter_mut().zip(*names) {
+            let precision = bodies.precision(name.bodies);
+            *point = bodies.definition(name).rounded(precision);
+        }
+        Ok(())
+    })?;
+    drop(of_chunks);
 
     let mut contacts = Contacts {
         rows,
@@ -86,16 +107,21 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> 
         corners,
         names,
         points,
-        doubles: bodies.doubles(),
+        doubles: bodies.doubles().into(),
+        by_bodies: ByBodies::default(),
     };
     let mut start = 0;
     contacts.starts.push(0);
-    for found in met.iter().flat_map(|met| &met.contacts) {
-        start += found.n_corners;
-        contacts.starts.push(start);
-        contacts.shapes.push(found.shape);
-        contacts.directed.push(found.directed);
+    for met in &met {
+        work.step()?;
+        for found in &met.contacts {
+            start += found.n_corners;
+            contacts.starts.push(start);
+            contacts.shapes.push(found.shape);
+            contacts.directed.push(found.directed);
+        }
     }
+    contacts.by_bodies = ByBodies::new(&contacts.rows, work)?;
     Ok(contacts)
 }
 
@@ -187,16 +213,18 @@ struct Taking<'a> {
 }
 
 impl<'a> Bodies<'a> {
-    fn new(scene: &'a Scene, pairs: &Pairs) -> Result<Self, Error> {
+    fn new(scene: &'a Scene, pairs: &Pairs, work: Work<'_>) -> Result<Self, Error> {
         let mut bodies: Vec<Option<Taking<'a>>> = Vec::new();
+        let mut colliding = pairs.all_colliding().into_iter().peekable();
         for (id, kind) in pairs.bodies() {
             let body = scene.body(id)?;
-            let colliding = pairs.colliding(id);
-            check(id, body, kind, &colliding)?;
+            let own = colliding.next_if(|(of, _)| *of == id);
+            let own = own.map_or(Vec::new(), |(_, own)| own);
+            check(id, body, kind, &own)?;
             bodies.resize_with(bodies.len().max(id.index() + 1), || None);
             bodies[id.index()] = Some(Taking {
                 body,
-                doubles: doubles(body, &colliding),
+                doubles: doubles(body, &own, work)?,
             });
         }
         Ok(Bodies { bodies })
@@ -288,25 +316,38 @@ fn check(id: BodyId, body: &Body, kind: Kind, colliding: &[u32]) -> Result<(), E
 /// The vertices of some triangles that are not the lowest one at their position, each with the lowest.
 ///
 /// Meshes that repeat their vertices for each face would fall apart into single triangles otherwise.
-fn doubles(body: &Body, colliding: &[u32]) -> Doubles {
+fn doubles(body: &Body, colliding: &[u32], work: Work<'_>) -> Result<Doubles, Error> {
     let Elements::Triangles(faces) = body.elements() else {
-        return Vec::new();
+        return Ok(Vec::new());
     };
-    let named = colliding.iter().flat_map(|&face| faces[face as usize]);
-    let mut vertices: Vec<VertexIx> = named.map(VertexIx::new).collect();
-    vertices.sort_unstable();
-    vertices.dedup();
+    if colliding.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut is_named = sink::filled(false, body.n_vertices(), WHAT)?;
+    for vertex in colliding.iter().flat_map(|&face| faces[face as usize]) {
+        is_named[vertex as usize] = true;
+    }
     let bits = |vertex: VertexIx| {
         let point = body.positions().point(vertex.index());
         // Turns minus zero into zero.
         point.map(|x| (x + 0.0).to_bits())
     };
-    let mut at: Vec<([u64; 3], VertexIx)> = vertices.iter().map(|&v| (bits(v), v)).collect();
-    at.par_sort_unstable();
+    let mut runs: Vec<Vec<([u64; 3], VertexIx)>> = Vec::new();
+    runs.resize_with(is_named.len().div_ceil(VERTICES), Vec::new);
+    work.each(&mut runs, |ix, run| {
+        let first = ix * VERTICES;
+        let of_run = first..is_named.len().min(first + VERTICES);
+        let named = of_run.filter(|&vertex| is_named[vertex]);
+        let named = named.map(|vertex| VertexIx::new(vertex as u32));
+        run.extend(named.map(|vertex| (bits(vertex), vertex)));
+        run.sort_unstable();
+        Ok(())
+    })?;
+    let at = work.merged(runs, Equal::All, WHAT)?;
     let mut doubles: Doubles = at
         .chunk_by(|(x, _), (y, _)| x == y)
         .flat_map(|same| same[1..].iter().map(|&(_, vertex)| (vertex, same[0].1)))
         .collect();
     doubles.sort_unstable();
-    doubles
+    Ok(doubles)
 }

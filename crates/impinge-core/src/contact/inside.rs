@@ -10,12 +10,19 @@
 //!
 //! Cost: the vertices within the other's box, and per part with a ray the faces that its y value meets.
 
-use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
 
 use super::topology::EdgesAround;
+use super::work::Work;
+use crate::error::Error;
 use crate::exact::{Point, Sign, orient2d, orient3d};
 use crate::index::VertexIx;
 use crate::scene::{Body, Elements};
+
+/// Vertices between two looks at the control.
+const LOOK: usize = 1 << 14;
+/// Faces per task, and between two looks at the control.
+const FACES: usize = 1 << 13;
 
 /// The part of each vertex, and the winding number of each part.
 pub(super) struct ConnectedParts {
@@ -39,14 +46,17 @@ pub(super) struct Asked<'a> {
 
 impl ConnectedParts {
     /// The parts of a surface inside another body.
-    pub fn new(asked: &Asked<'_>, other: &Body) -> Self {
+    ///
+    /// # Errors
+    /// Cancellation.
+    pub fn new(asked: &Asked<'_>, other: &Body, work: Work<'_>) -> Result<Self, Error> {
         let n_vertices = asked.body.n_vertices();
         let mut parts = ConnectedParts {
             part_of: vec![NO_PART; n_vertices],
             winding: Vec::new(),
         };
         let Some(bounds) = bounds(other) else {
-            return parts;
+            return Ok(parts);
         };
         let position = |vertex: VertexIx| asked.body.positions().point(vertex.index());
         let is_near = |vertex: VertexIx| {
@@ -56,7 +66,12 @@ impl ConnectedParts {
         let mut seeds: Vec<(Point, u32)> = Vec::new();
         let mut members: Vec<VertexIx> = Vec::new();
         let mut is_seen = vec![false; n_vertices];
+        let mut n_looked = 0usize;
         for seed in VertexIx::up_to(n_vertices) {
+            n_looked += 1;
+            if n_looked.is_multiple_of(LOOK) {
+                work.step()?;
+            }
             if is_seen[seed.index()]
                 || asked.topology.neighbours(seed).is_empty()
                 || !is_near(seed)
@@ -72,6 +87,10 @@ impl ConnectedParts {
             let mut next = 0;
             while let Some(&vertex) = members.get(next) {
                 next += 1;
+                n_looked += 1;
+                if n_looked.is_multiple_of(LOOK) {
+                    work.step()?;
+                }
                 for &other in asked.topology.neighbours(vertex) {
                     if (asked.is_crossed)([vertex.min(other), vertex.max(other)])
                         || (asked.is_on)(other)
@@ -94,8 +113,8 @@ impl ConnectedParts {
                 }
             }
         }
-        parts.winding = windings(seeds, other);
-        parts
+        parts.winding = windings(seeds, other, work)?;
+        Ok(parts)
     }
 
     /// The part of a vertex; `None` unless it is inside.
@@ -131,16 +150,16 @@ fn bounds(body: &Body) -> Option<[Point; 2]> {
 }
 
 /// How often a closed surface winds around each point, none of which lies on it.
-fn windings(mut seeds: Vec<(Point, u32)>, body: &Body) -> Vec<i32> {
+fn windings(mut seeds: Vec<(Point, u32)>, body: &Body, work: Work<'_>) -> Result<Vec<i32>, Error> {
     let n = seeds.len();
     let Elements::Triangles(faces) = body.elements() else {
-        return vec![0; n];
+        return Ok(vec![0; n]);
     };
     if n == 0 {
-        return Vec::new();
+        return Ok(Vec::new());
     }
     seeds.sort_unstable_by(|(p, i), (q, j)| p[1].total_cmp(&q[1]).then(i.cmp(j)));
-    let add = |mut sums: Vec<i32>, face: &[u32; 3]| {
+    let add = |sums: &mut [i32], face: &[u32; 3]| {
         let corners = face.map(|vertex| body.positions().point(vertex as usize));
         let ys = corners.map(|corner| corner[1]);
         let (low, high) = (ys[0].min(ys[1]).min(ys[2]), ys[0].max(ys[1]).max(ys[2]));
@@ -151,15 +170,22 @@ fn windings(mut seeds: Vec<(Point, u32)>, body: &Body) -> Vec<i32> {
             }
             sums[*number as usize] += passes(point, &corners);
         }
-        sums
     };
-    faces
-        .par_chunks(8192)
-        .map(|faces| faces.iter().fold(vec![0; n], add))
-        .reduce(
-            || vec![0; n],
-            |x, y| x.into_iter().zip(y).map(|(x, y)| x + y).collect(),
-        )
+    // A task of few faces takes less than its list of sums if there are many seeds.
+    let n_each = FACES.max(n);
+    let mut tasks: Vec<&[[u32; 3]]> = faces.chunks(n_each).collect();
+    let all = Mutex::new(vec![0; n]);
+    work.each(&mut tasks, |_, faces| {
+        let mut sums = vec![0; n];
+        for some in faces.chunks(FACES) {
+            some.iter().for_each(|face| add(&mut sums, face));
+            work.step()?;
+        }
+        let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
+        all.iter_mut().zip(sums).for_each(|(all, sum)| *all += sum);
+        Ok(())
+    })?;
+    Ok(all.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
 /// 1 if the shifted ray from a point leaves through a face, -1 if it enters through it, else 0.

@@ -1,8 +1,9 @@
 //! Contact geometry: where triangles meet, the curves in which surfaces cross, how deep.
 //!
-//! [`Contacts`] turns the pairs of a detection into points, segments and polygons; [`Curves`] chains these
-//! into loops; [`Penetration`] finds which parts of two closed bodies lie inside the other, and a normal, a
-//! depth and a volume per connected region of contact. For solids of tetrahedra, [`SolidOverlap`] is what two of them have in
+//! [`Contacts`], which [`Detector::contacts`](crate::Detector::contacts) finds for the pairs of a detection, are points, segments
+//! and polygons; [`Curves`] chains these into loops; [`Penetration`], which
+//! [`Detector::penetration`](crate::Detector::penetration) finds, has the parts of two closed bodies that lie inside the other, and a
+//! normal, a depth and a volume per connected region of contact. For solids of tetrahedra, [`SolidOverlap`] is what two of them have in
 //! common, and [`solid_depths`] how deep vertices lie below the surface.
 //!
 //! **Exact combinatorics.** Which edge crosses which face, in which order, which points are one point,
@@ -13,7 +14,7 @@
 //! normals, depths and volumes are computed from rounded coordinates in `f64`, in a fixed order.
 //!
 //! ```
-//! use impinge_core::contact::{Contacts, Shape};
+//! use impinge_core::contact::Shape;
 //! use impinge_core::{Backend, Detector, Query, Scene};
 //! # fn main() -> Result<(), impinge_core::Error> {
 //! let mut scene = Scene::new();
@@ -22,8 +23,8 @@
 //! let a = scene.add_triangles(&[[0, 1, 2]], &floor)?;
 //! let b = scene.add_triangles(&[[0, 1, 2]], &blade)?;
 //! let mut detector = Detector::new(Backend::Cpu)?;
-//! let pairs = detector.detect(&scene, &Query::between(a, b))?;
-//! let contacts = Contacts::new(&scene, pairs)?;
+//! let pairs = detector.detect(&scene, &Query::between(a, b))?.clone();
+//! let contacts = detector.contacts(&scene, &pairs)?;
 //! assert_eq!(contacts.shape(0), Shape::Segment);
 //! let ends: Vec<_> = contacts.corners(0).iter().map(|&point| contacts.points()[point as usize]).collect();
 //! assert_eq!(ends, [[1.0, 1.0, 0.0], [1.5, 1.0, 0.0]]);
@@ -32,22 +33,30 @@
 //! ```
 
 mod build;
+mod convex;
 mod coordinates;
 mod curves;
 mod depths;
 mod double;
 mod inside;
 mod meet;
+mod parts;
 mod penetration;
 mod regions;
 mod solids;
 mod topology;
+mod work;
 
+pub use convex::{ConvexOverlap, convex_overlap};
 pub use curves::Curves;
 pub use depths::solid_depths;
-pub use penetration::{Overlap, Penetration};
+pub use penetration::Penetration;
+pub(crate) use penetration::Topologies;
 pub use regions::Region;
 pub use solids::SolidOverlap;
+pub(crate) use work::Work;
+
+use std::sync::Arc;
 
 use crate::error::Error;
 use crate::index::VertexIx;
@@ -100,7 +109,7 @@ pub struct PointName {
 /// beneath `b`'s surface lies to its left.
 ///
 /// Degenerate triangles are the segments or points that they are.
-#[derive(Debug, Clone, Default)]
+#[derive(Clone, Default)]
 pub struct Contacts {
     rows: Vec<[u32; 4]>,
     shapes: Vec<Shape>,
@@ -112,19 +121,24 @@ pub struct Contacts {
     names: Vec<PointName>,
     points: Vec<[f64; 3]>,
     /// For each body that has any: vertices that are not the lowest one at their position, each with the lowest.
-    doubles: Vec<(u32, Doubles)>,
+    doubles: Arc<[(u32, Doubles)]>,
+    by_bodies: parts::ByBodies,
+}
+
+impl std::fmt::Debug for Contacts {
+    /// Their number and that of their points, however many there are.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut short = f.debug_struct("Contacts");
+        short.field("len", &self.len());
+        short.field("n_points", &self.points.len());
+        short.finish_non_exhaustive()
+    }
 }
 
 impl Contacts {
-    /// The contacts of all pairs. The scene must not have changed since the pairs were found.
-    ///
-    /// Runs in rayon's current thread pool; the result does not depend on it.
-    ///
-    /// # Errors
-    /// A body of the pairs is no longer in the scene, is of another kind or has too few primitives; positions written in
-    /// place since then are refused.
-    pub fn new(scene: &Scene, pairs: &Pairs) -> Result<Self, Error> {
-        build::contacts(scene, pairs)
+    /// The contacts of all pairs.
+    pub(crate) fn new(scene: &Scene, pairs: &Pairs, work: Work<'_>) -> Result<Self, Error> {
+        build::contacts(scene, pairs, work)
     }
 
     /// The number of contacts, which is the number of pairs.
@@ -205,8 +219,8 @@ impl Contacts {
 
     /// The vertex that stands for this one in names: the lowest one at its position.
     fn lowest(&self, body: u32, vertex: VertexIx) -> VertexIx {
-        let doubles = self.doubles.iter().find(|(held, _)| *held == body);
-        doubles.map_or(vertex, |(_, doubles)| lowest(doubles, vertex))
+        let found = self.doubles.binary_search_by_key(&body, |held| held.0);
+        found.map_or(vertex, |ix| lowest(&self.doubles[ix].1, vertex))
     }
 }
 

@@ -20,6 +20,7 @@ use super::regions::{
     NO_REGION, Region, Sets, Vector, WHAT, add, cross, dot, join_contacts, regions, scaled, sub,
 };
 use super::topology::EdgesAround;
+use super::work::Work;
 use super::{Contacts, Feature, PointName, Shape};
 use crate::error::Error;
 use crate::exact::{Sign, orient3d};
@@ -27,37 +28,17 @@ use crate::index::VertexIx;
 use crate::scene::{Body, BodyId, Elements, Kind, Scene};
 use crate::sink::grow;
 
-/// Finds how deep closed bodies are in each other. Caches their topology from call to call.
-///
-/// ```
-/// use impinge_core::contact::{Contacts, Penetration};
-/// use impinge_core::{Backend, Detector, Query, Scene};
-/// # fn main() -> Result<(), impinge_core::Error> {
-/// let tetrahedron = [[0u32, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
-/// let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-/// let mut scene = Scene::new();
-/// let a = scene.add_triangles(&tetrahedron, &corners)?;
-/// let b = scene.add_triangles(&tetrahedron, &corners.map(|[x, y, z]| [x + 0.1, y + 0.125, z - 0.875]))?;
-/// let mut detector = Detector::new(Backend::Cpu)?;
-/// let pairs = detector.detect(&scene, &Query::between(a, b))?;
-/// let contacts = Contacts::new(&scene, pairs)?;
-/// let overlap = Penetration::new().between(&scene, &contacts, a, b)?;
-/// assert_eq!(overlap.inside[1], [3]); // The tip of b is in a.
-/// let region = &overlap.regions[0];
-/// assert!(region.depth.is_some_and(|depth| depth <= 0.125));
-/// assert!(region.normal.is_some_and(|normal| normal[2] > 0.9)); // Push a up.
-/// # Ok(()) }
-/// ```
+/// The topologies of closed bodies, from call to call.
 #[derive(Debug, Default)]
-pub struct Penetration {
+pub(crate) struct Topologies {
     /// By the number of the body; the first of the pair is the stamp of the topology.
-    topologies: HashMap<usize, (u64, EdgesAround)>,
+    edges: HashMap<usize, (u64, EdgesAround)>,
 }
 
-/// The overlap of two closed bodies.
+/// How deep two closed bodies are in each other: [`Detector::penetration`](crate::Detector::penetration).
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
-pub struct Overlap {
+pub struct Penetration {
     /// Vertices of the first body strictly inside the second, and of the second strictly inside the first: sorted.
     /// The body with the lower number comes first.
     pub inside: [Vec<u32>; 2],
@@ -66,49 +47,39 @@ pub struct Overlap {
     pub regions: Vec<Region>,
 }
 
-impl Overlap {
+impl Penetration {
     /// The volume of all regions together; `None` if the volume of any region is unknown.
     pub fn volume(&self) -> Option<f64> {
         self.regions.iter().map(|region| region.volume).sum()
     }
 }
 
-impl Penetration {
-    /// Starts with an empty cache.
-    pub fn new() -> Self {
-        Penetration::default()
-    }
-
-    /// The overlap of two closed bodies of triangles, from all contacts between them.
-    ///
-    /// A vertex is inside where the other surface's winding number around it is not 0; a vertex on the surface
-    /// is not inside. The body with the lower number is the first, whichever argument it is. Runs in rayon's current
-    /// thread pool; the result does not depend on it.
-    ///
-    /// # Errors
-    /// A body that is not in the scene, the same body twice, a body not made of triangles, a surface that is not closed.
-    pub fn between(
+impl Topologies {
+    /// The overlap of two closed bodies, from contacts among which are all of these two.
+    pub fn penetration(
         &mut self,
         scene: &Scene,
         contacts: &Contacts,
-        a: BodyId,
-        b: BodyId,
-    ) -> Result<Overlap, Error> {
+        [a, b]: [BodyId; 2],
+        work: Work<'_>,
+    ) -> Result<Penetration, Error> {
         if a == b {
             return Err(Error::SameBody { body: a });
         }
+        self.edges.retain(|&slot, _| scene.holds(slot));
         let ids = [a.min(b), a.max(b)];
         for id in ids {
-            self.know(scene, id)?;
+            self.know(scene, id, work)?;
         }
         let bodies = [scene.body(ids[0])?, scene.body(ids[1])?];
-        let topologies = ids.map(|id| &self.topologies[&id.index()].1);
+        let topologies = ids.map(|id| &self.edges[&id.index()].1);
         let numbers = ids.map(|id| id.index() as u32);
+        let (contacts, contact_numbers) = &contacts.part(numbers)?;
         let crossings = [
             Crossings::new(contacts, numbers, 0)?,
             Crossings::new(contacts, numbers, 1)?,
         ];
-        let parts = [0, 1].map(|side| {
+        let parts = |side: usize| {
             let crossings = &crossings[side];
             let asked = Asked {
                 body: bodies[side],
@@ -116,22 +87,32 @@ impl Penetration {
                 is_on: &|vertex| crossings.is_on(vertex),
                 is_crossed: &|edge| crossings.is_crossed(edge),
             };
-            ConnectedParts::new(&asked, bodies[1 - side])
-        });
-        let work = OverlapWork {
+            ConnectedParts::new(&asked, bodies[1 - side], work)
+        };
+        let parts = [parts(0)?, parts(1)?];
+        work.step()?;
+        let overlap = OverlapWork {
             contacts,
             bodies,
             crossings,
             parts,
         };
-        work.overlap()
+        let mut found = overlap.overlap(work)?;
+        for contact in found
+            .regions
+            .iter_mut()
+            .flat_map(|region| &mut region.contacts)
+        {
+            *contact = contact_numbers[*contact as usize];
+        }
+        Ok(found)
     }
 
     /// Caches the topology of a body.
-    fn know(&mut self, scene: &Scene, id: BodyId) -> Result<(), Error> {
+    fn know(&mut self, scene: &Scene, id: BodyId, work: Work<'_>) -> Result<(), Error> {
         let body = scene.body(id)?;
         let stamp = body.topology_stamp();
-        let known = self.topologies.get(&id.index());
+        let known = self.edges.get(&id.index());
         if known.is_some_and(|(known, _)| *known == stamp) {
             return Ok(());
         }
@@ -142,8 +123,8 @@ impl Penetration {
                 expected: Kind::Triangles.name(),
             });
         };
-        let topology = EdgesAround::new(id, faces, body.n_vertices())?;
-        self.topologies.insert(id.index(), (stamp, topology));
+        let edges = EdgesAround::new(id, faces, body.n_vertices(), work)?;
+        self.edges.insert(id.index(), (stamp, edges));
         Ok(())
     }
 }
@@ -257,13 +238,15 @@ struct OverlapWork<'a> {
 }
 
 impl OverlapWork<'_> {
-    fn overlap(&self) -> Result<Overlap, Error> {
+    fn overlap(&self, work: Work<'_>) -> Result<Penetration, Error> {
         let n_points = self.contacts.points().len();
         let n_parts = self.parts.each_ref().map(ConnectedParts::n_parts);
         let mut sets = Sets::new(n_points + n_parts[0] + n_parts[1])?;
         join_contacts(self.contacts, &mut sets);
         let pieces = [self.pieces(0, &mut sets)?, self.pieces(1, &mut sets)?];
+        work.step()?;
         let curves = Curves::new(self.contacts)?;
+        work.step()?;
         let (mut regions, mut region_of) = regions(self.contacts, &curves, &mut sets)?;
         let numbers = [0, 1].map(|side| self.crossings[side].body);
         let mut inside = [Vec::new(), Vec::new()];
@@ -285,6 +268,7 @@ impl OverlapWork<'_> {
                 region.cover(at);
             }
         }
+        work.step()?;
         let mut region = |node: u32| region_of[sets.find(node) as usize] as usize;
         let volumes = self.volumes(&regions, &pieces, &mut region);
         let is_asked = |region: &Region| region.bodies == numbers;
@@ -296,7 +280,7 @@ impl OverlapWork<'_> {
             }
         }
         regions.retain(is_asked);
-        Ok(Overlap { inside, regions })
+        Ok(Penetration { inside, regions })
     }
 
     /// The number, among the members of the sets, of a vertex that is inside.

@@ -5,11 +5,15 @@
 //!
 //! Cost: `O(n log n)` once per topology.
 
-use rayon::prelude::*;
-
+use super::work::{Equal, Work};
 use crate::error::Error;
 use crate::index::VertexIx;
 use crate::scene::BodyId;
+
+/// Faces whose edges are sorted by one task.
+const FACES: usize = 8 * 1024;
+/// What memory is for.
+const WHAT: &str = "edges of a closed surface";
 
 /// The edges at each vertex.
 #[derive(Debug)]
@@ -20,21 +24,29 @@ pub(super) struct EdgesAround {
 
 impl EdgesAround {
     /// # Errors
-    /// The surface is not closed; the error names an edge.
-    pub fn new(body: BodyId, faces: &[[u32; 3]], n_vertices: usize) -> Result<Self, Error> {
+    /// The surface is not closed; the error names an edge. Cancellation.
+    pub fn new(
+        body: BodyId,
+        faces: &[[u32; 3]],
+        n_vertices: usize,
+        work: Work<'_>,
+    ) -> Result<Self, Error> {
         // Low vertex, high vertex, direction: packed so that sorting puts an edge's faces next to each other.
-        let mut sides: Vec<(u64, bool)> = faces
-            .par_iter()
-            .flat_map_iter(|face| {
-                (0..3).filter_map(|k| {
-                    let (from, to) = (face[k], face[(k + 1) % 3]);
-                    let (low, high) = (from.min(to), from.max(to));
-                    // A face that names a vertex twice runs along one edge, there and back.
-                    (low != high).then_some((u64::from(low) << 32 | u64::from(high), from < to))
-                })
-            })
-            .collect();
-        sides.par_sort_unstable();
+        let side = |face: &[u32; 3], k: usize| {
+            let (from, to) = (face[k], face[(k + 1) % 3]);
+            let (low, high) = (from.min(to), from.max(to));
+            // A face that names a vertex twice runs along one edge, there and back.
+            (low != high).then_some((u64::from(low) << 32 | u64::from(high), from < to))
+        };
+        let mut runs: Vec<Vec<(u64, bool)>> = Vec::new();
+        runs.resize_with(faces.len().div_ceil(FACES), Vec::new);
+        work.each(&mut runs, |ix, run| {
+            let faces = faces[ix * FACES..].iter().take(FACES);
+            run.extend(faces.flat_map(|face| (0..3).filter_map(|k| side(face, k))));
+            run.sort_unstable();
+            Ok(())
+        })?;
+        let sides = work.merged(runs, Equal::All, WHAT)?;
         let mut edges: Vec<[u32; 2]> = Vec::with_capacity(sides.len() / 2);
         for edge in sides.chunk_by(|x, y| x.0 == y.0) {
             let ends = [(edge[0].0 >> 32) as u32, edge[0].0 as u32];
@@ -50,6 +62,7 @@ impl EdgesAround {
             }
             edges.push(ends);
         }
+        work.step()?;
         let mut starts = vec![0u32; n_vertices + 2];
         for end in edges.as_flattened() {
             starts[*end as usize + 2] += 1;

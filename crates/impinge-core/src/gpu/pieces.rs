@@ -20,14 +20,13 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::buffers::count;
 use super::topology::{DeviceClusters, Most, Weight, narrowed};
 use crate::error::Error;
 use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
+use crate::grouping::for_each;
 use crate::grouping::hierarchy::TreeShape;
 use crate::hull;
 use crate::index::{ClusterIx, LayerIx};
@@ -104,7 +103,7 @@ pub fn cut<'a>(
     };
     let n_primitives = frame.n_primitives() as usize;
     workers.install(n_primitives, || {
-        chunks.par_iter_mut().for_each(find_boxes);
+        for_each(chunks.iter_mut().collect(), find_boxes);
     })?;
     Ok(chunks)
 }

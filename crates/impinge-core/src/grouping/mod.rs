@@ -13,6 +13,8 @@ mod parallel;
 pub(crate) mod rings;
 mod unique;
 
+#[cfg(feature = "gpu")]
+pub(crate) use parallel::for_each;
 pub(crate) use parallel::made_from;
 
 pub use crate::index::GROUP;

@@ -1,19 +1,18 @@
-//! Loops on the threads of the rayon pool at hand. On wasm, which has one thread, they are plain loops: what a pool needs would be
-//! a tenth of the module.
+//! Loops on the threads of the rayon pool at hand; plain loops where the thread is [alone](crate::alone). On wasm, which has one
+//! thread, that is known to the compiler: what a pool needs would be a tenth of the module.
 
 use std::mem::MaybeUninit;
 
 use rayon::prelude::*;
 
-/// Whether the target has a single thread.
-const IS_SINGLE: bool = cfg!(target_family = "wasm");
+use crate::alone::is_alone;
 
 /// Entries that a thread makes at a time.
 const BLOCK: usize = 4096;
 
 /// The number of threads.
 pub(super) fn n_threads() -> usize {
-    if IS_SINGLE {
+    if is_alone() {
         1
     } else {
         rayon::current_num_threads()
@@ -22,7 +21,7 @@ pub(super) fn n_threads() -> usize {
 
 /// Does both.
 pub(super) fn join(a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
-    if IS_SINGLE {
+    if is_alone() {
         a();
         b();
     } else {
@@ -37,7 +36,7 @@ pub(super) fn made<S: Send, T: Send>(
     scratch: impl Fn() -> S + Sync + Send,
     make: impl Fn(&mut S, usize) -> T + Sync + Send,
 ) -> Vec<T> {
-    if IS_SINGLE {
+    if is_alone() {
         let mut scratch = scratch();
         return (0..n).map(|ix| make(&mut scratch, ix)).collect();
     }
@@ -46,8 +45,8 @@ pub(super) fn made<S: Send, T: Send>(
 }
 
 /// Does something with each item.
-pub(super) fn for_each<T: Send>(items: Vec<T>, work: impl Fn(T) + Sync + Send) {
-    if IS_SINGLE {
+pub(crate) fn for_each<T: Send>(items: Vec<T>, work: impl Fn(T) + Sync + Send) {
+    if is_alone() {
         items.into_iter().for_each(work);
     } else {
         items.into_par_iter().for_each(work);
@@ -67,7 +66,7 @@ pub(crate) fn made_from<A: Sync, B: Copy + Send>(
             room.write(make(block * BLOCK + ix, from));
         }
     };
-    if IS_SINGLE {
+    if is_alone() {
         fill(0, room, from);
     } else {
         let blocks = room.par_chunks_mut(BLOCK).zip(from.par_chunks(BLOCK));

@@ -16,36 +16,31 @@ use super::axes::{Axes, View};
 use super::features::{Gap, gap};
 use crate::hull::Extent;
 
-use super::tree::{Node, Tree, box_along, box_of};
+use super::many::{Allowance, Bodies, meet};
+use super::tree::{Node, Tree, box_along, box_of, corners};
 use crate::error::Error;
 use crate::exact::Point;
+use crate::frame::Frame;
 use crate::ids::BodyId;
-use crate::index::ElementIx;
+use crate::index::{ElementIx, LayerIx};
 use crate::narrow::intersect;
 use crate::positions::{Positions, check_positions};
+use crate::progress::Control;
 use crate::scene::{Body, Scene};
+use crate::workers::Workers;
 
-/// Finds distances; keeps the bodies' trees from call to call.
-///
-/// ```
-/// use impinge_core::Scene;
-/// use impinge_core::proximity::Distances;
-/// # fn main() -> Result<(), impinge_core::Error> {
-/// let mut scene = Scene::new();
-/// let triangle = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-/// let a = scene.add_triangles(&[[0, 1, 2]], &triangle)?;
-/// let b = scene.add_triangles(&[[0, 1, 2]], &triangle.map(|[x, y, z]| [x + 0.25, y + 0.25, z + 3.0]))?;
-/// let nearest = Distances::new().between(&scene, a, b)?.expect("both have primitives");
-/// assert_eq!(nearest.distance, 3.0);
-/// assert_eq!(nearest.primitives, [0, 0]);
-/// # Ok(()) }
-/// ```
+/// The trees of bodies and the pairs found last, from call to call.
 #[derive(Debug, Default)]
-pub struct Distances {
+pub(crate) struct Distances {
     /// By the number of the body.
     trees: HashMap<usize, Tree>,
     /// The pair found last, by the numbers of the bodies.
     last: HashMap<[usize; 2], [ElementIx; 2]>,
+    /// A tree over the bodies of the last question about many.
+    many: Bodies,
+    /// The bodies that were nearest to each other in it.
+    nearest: Option<[BodyId; 2]>,
+    stack: Vec<[Node; 2]>,
 }
 
 /// The nearest pair of primitives of two bodies.
@@ -56,6 +51,8 @@ pub struct Nearest {
     /// Otherwise rounded: it is computed in `f64` from two points of the primitives, with an error of a few units
     /// in the last place of the largest coordinate.
     pub distance: f64,
+    /// The bodies: those that were asked for, in this order, or the nearest two of many, the lower one first.
+    pub bodies: [BodyId; 2],
     /// The primitive of the first body, and of the second. Of several pairs at the same computed distance, the
     /// lowest by the first body's primitive and then by the second's.
     pub primitives: [u32; 2],
@@ -65,43 +62,163 @@ pub struct Nearest {
 }
 
 impl Distances {
-    /// Starts with an empty cache.
-    pub fn new() -> Self {
-        Distances::default()
-    }
-
     /// The smallest distance of two bodies and the pair of primitives that has it; `None` if one body has
-    /// no primitives. Tetrahedra are solid: a body inside one has distance 0.
+    /// no primitives.
     ///
     /// # Errors
-    /// A body that is not in the scene, the same body twice, bad positions that were written in place.
+    /// A body that is not in the scene, the same body twice, bad positions that were written in place; cancellation.
     pub fn between(
         &mut self,
         scene: &Scene,
-        a: BodyId,
-        b: BodyId,
+        [a, b]: [BodyId; 2],
+        workers: &Workers,
+        control: &Control<'_>,
     ) -> Result<Option<Nearest>, Error> {
         if a == b {
             return Err(Error::SameBody { body: a });
         }
         self.trees.retain(|&slot, _| scene.holds(slot));
         for id in [a, b] {
-            self.know(scene, id)?;
+            control.step(0, 1)?;
+            self.know(scene, id, workers)?;
         }
+        let found = self.search(scene, [a, b], f64::INFINITY, control)?;
+        Ok(found.map(|(_, nearest)| nearest))
+    }
+
+    /// The nearest elements of two bodies that are known, and the square of their distance, if that is at most `most`.
+    fn search(
+        &mut self,
+        scene: &Scene,
+        ids: [BodyId; 2],
+        most: f64,
+        control: &Control<'_>,
+    ) -> Result<Option<(f64, Nearest)>, Error> {
+        let [a, b] = ids;
         let search = DistanceSearch {
+            control,
+            ids,
             bodies: [scene.body(a)?, scene.body(b)?],
-            trees: [a, b].map(|id| &self.trees[&id.index()]),
+            trees: ids.map(|id| &self.trees[&id.index()]),
         };
-        let numbers = [a.index(), b.index()];
-        let nearest = search.nearest(self.last.get(&numbers).copied());
-        if let Some(nearest) = &nearest {
+        let numbers = ids.map(BodyId::index);
+        let found = search.nearest(self.last.get(&numbers).copied(), most)?;
+        if let Some((_, nearest)) = &found {
             let pair = nearest.primitives.map(ElementIx::new);
             self.last.insert(numbers, pair);
         }
+        Ok(found)
+    }
+
+    /// The two nearest of the bodies of a frame that may meet, and their nearest elements. Of several pairs at the same computed
+    /// distance the lowest.
+    ///
+    /// # Errors
+    /// Cancellation.
+    pub fn nearest(
+        &mut self,
+        scene: &Scene,
+        frame: &Frame,
+        workers: &Workers,
+        control: &Control<'_>,
+    ) -> Result<Option<Nearest>, Error> {
+        self.trees.retain(|&slot, _| scene.holds(slot));
+        let mut many = std::mem::take(&mut self.many);
+        many.update(scene, frame);
+        // The bodies that were nearest last are a good bound.
+        let likely = self
+            .nearest
+            .map(|ids| ids.map(|id| frame.layers.binary_search_by_key(&id, |layer| layer.id)));
+        let mut best: Option<(f64, Nearest)> = None;
+        let mut n_asked = 0;
+        let mut ask = |best: &mut Option<(f64, Nearest)>, [a, b]: [LayerIx; 2]| {
+            if frame.test(a, b).is_none() {
+                return Ok(());
+            }
+            let ids = [a, b].map(|layer| frame.layer(layer).id);
+            let most = best.map_or(f64::INFINITY, |(squared, _)| squared);
+            // Nothing is nearer than 0, and no lower pair of bodies is asked later.
+            if most == 0.0 && best.is_some_and(|(_, best)| best.bodies <= ids) {
+                return Ok(());
+            }
+            n_asked += 1;
+            control.step(n_asked, n_asked + 1)?;
+            for id in ids {
+                self.know(scene, id, workers)?;
+            }
+            if let Some(found) = self.search(scene, ids, most, control)?
+                && best.is_none_or(|(squared, best)| {
+                    found.0 < squared || (found.0 == squared && ids < best.bodies)
+                })
+            {
+                *best = Some(found);
+            }
+            Ok::<(), Error>(())
+        };
+        let found: Result<(), Error> = (|| {
+            if let Some([Ok(a), Ok(b)]) = likely {
+                ask(&mut best, [a, b].map(LayerIx::from_usize))?;
+            }
+            let mut overlapping = Vec::new();
+            many.overlapping(|pair| {
+                overlapping.push(pair);
+                Ok::<bool, Error>(false)
+            })?;
+            overlapping.sort_unstable();
+            for pair in overlapping {
+                ask(&mut best, pair)?;
+            }
+            let error = ROUNDING * many.magnitude();
+            let mut apart = many.apart();
+            while let Some(pair) = apart.next(best.map_or(f64::INFINITY, |(x, _)| limit(x, error)))
+            {
+                ask(&mut best, pair)?;
+            }
+            Ok(())
+        })();
+        self.many = many;
+        found?;
+        let nearest = best.map(|(_, nearest)| nearest);
+        self.nearest = nearest.map(|nearest| nearest.bodies);
         Ok(nearest)
     }
 
-    fn know(&mut self, scene: &Scene, id: BodyId) -> Result<(), Error> {
+    /// Whether any elements of bodies of a frame meet, if that is soon known. The frame must be about pairs of different bodies.
+    ///
+    /// # Errors
+    /// Cancellation.
+    pub fn any(
+        &mut self,
+        scene: &Scene,
+        frame: &Frame,
+        workers: &Workers,
+        control: &Control<'_>,
+    ) -> Result<Option<bool>, Error> {
+        self.trees.retain(|&slot, _| scene.holds(slot));
+        let mut many = std::mem::take(&mut self.many);
+        many.update(scene, frame);
+        let mut allowance = Allowance(ALLOWANCE);
+        let mut any = Some(false);
+        let found = many.overlapping(|pair| {
+            let [a, b] = pair;
+            if frame.test(a, b).is_none() {
+                return Ok(false);
+            }
+            control.step(0, 1)?;
+            let ids = pair.map(|layer| frame.layer(layer).id);
+            for id in ids {
+                self.know(scene, id, workers)?;
+            }
+            let bodies = pair.map(|layer| frame.body(scene, layer));
+            let trees = ids.map(|id| &self.trees[&id.index()]);
+            any = meet(bodies, trees, &mut allowance, &mut self.stack);
+            Ok(any != Some(false))
+        });
+        self.many = many;
+        found.map(|()| any)
+    }
+
+    fn know(&mut self, scene: &Scene, id: BodyId, workers: &Workers) -> Result<(), Error> {
         let body = scene.body(id)?;
         if !body.is_checked() {
             match body.positions() {
@@ -114,7 +231,8 @@ impl Distances {
             _ => {
                 self.last
                     .retain(|numbers, _| !numbers.contains(&id.index()));
-                self.trees.insert(id.index(), Tree::new(body));
+                let tree = workers.install(body.n_primitives(), || Tree::new(body))?;
+                self.trees.insert(id.index(), tree);
             }
         }
         Ok(())
@@ -153,6 +271,8 @@ struct ComparedPrimitive {
 }
 
 struct DistanceSearch<'a> {
+    control: &'a Control<'a>,
+    ids: [BodyId; 2],
     bodies: [&'a Body; 2],
     trees: [&'a Tree; 2],
 }
@@ -176,6 +296,12 @@ struct FoundDistance {
     lists: [Vec<ComparedPrimitive>; 2],
 }
 
+/// Stands for no element.
+const NONE: ElementIx = ElementIx::new(u32::MAX);
+/// How much work [`Distances::any`] does before it leaves a scene to the whole machinery: some 50 microseconds.
+const ALLOWANCE: u32 = 20_000;
+/// Pairs of nodes between two looks at the control: a few milliseconds, if all are clusters whose primitives are compared.
+const LOOK: u64 = 8;
 /// By how much, relative to the largest coordinate, rounding may make a computed distance smaller than the
 /// distance of the boxes.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
@@ -196,17 +322,24 @@ impl FoundDistance {
 }
 
 impl DistanceSearch<'_> {
-    /// The nearest pair; `likely` is one to compare first.
-    fn nearest(&self, likely: Option<[ElementIx; 2]>) -> Option<Nearest> {
+    /// The nearest pair and the square of its distance, if that is at most `most`; `likely` is one to compare first.
+    ///
+    /// # Errors
+    /// Cancellation.
+    fn nearest(
+        &self,
+        likely: Option<[ElementIx; 2]>,
+        most: f64,
+    ) -> Result<Option<(f64, Nearest)>, Error> {
         let (Some(a), Some(b)) = (self.trees[0].root(), self.trees[1].root()) else {
-            return None;
+            return Ok(None);
         };
         let magnitude = self.trees[0].bounds(a).magnitude();
         let magnitude = magnitude.max(self.trees[1].bounds(b).magnitude());
         let mut found = FoundDistance {
             best: Best {
-                squared: f64::INFINITY,
-                primitives: [ElementIx::new(u32::MAX); 2],
+                squared: most,
+                primitives: [NONE; 2],
                 points: None,
             },
             view: None,
@@ -220,7 +353,13 @@ impl DistanceSearch<'_> {
             self.look(&mut found);
         }
         let mut waiting = BinaryHeap::from([Reverse(self.waiting([a, b]))]);
+        let mut n_seen = 0u64;
         while let Some(Reverse(next)) = waiting.pop() {
+            n_seen += 1;
+            if n_seen.is_multiple_of(LOOK) {
+                let total = n_seen + waiting.len() as u64;
+                self.control.step(n_seen, total)?;
+            }
             if next.squared > found.limits()[0] {
                 break;
             }
@@ -253,11 +392,13 @@ impl DistanceSearch<'_> {
             }
         }
         let best = found.best;
-        Some(Nearest {
+        let nearest = Nearest {
             distance: best.squared.sqrt(),
+            bodies: self.ids,
             primitives: best.primitives.map(ElementIx::raw),
             points: best.points,
-        })
+        };
+        Ok((best.primitives != [NONE; 2]).then_some((best.squared, nearest)))
     }
 
     fn waiting(&self, nodes: [Node; 2]) -> WaitingNodes {
@@ -409,12 +550,6 @@ impl DistanceSearch<'_> {
             ..found
         }
     }
-}
-
-/// The corners of a primitive; one with fewer than four repeats its last.
-fn corners(body: &Body, primitive: ElementIx) -> [Point; 4] {
-    let vertices = body.elements().four_corners(primitive.index());
-    vertices.map(|vertex| body.positions().point(vertex as usize))
 }
 
 /// The largest squared distance of boxes that may hold a pair as near as the best.

@@ -3,6 +3,8 @@
 mod axes;
 mod distance;
 mod features;
+mod many;
 mod tree;
 
-pub use distance::{Distances, Nearest};
+pub(crate) use distance::Distances;
+pub use distance::Nearest;

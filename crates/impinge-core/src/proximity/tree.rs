@@ -79,7 +79,11 @@ impl Tree {
     }
 
     pub fn bounds(&self, node: Node) -> Extent {
-        Extent::from(&self.levels[node.level as usize][node.number as usize])
+        Extent::from(&self.bounds_f32(node))
+    }
+
+    pub fn bounds_f32(&self, node: Node) -> Bounds {
+        self.levels[node.level as usize][node.number as usize]
     }
 
     /// The children of a node that is not a cluster.
@@ -116,4 +120,10 @@ pub(super) fn box_of(body: &Body, primitive: usize) -> Extent {
 pub(super) fn box_along(body: &Body, primitive: usize, map: impl Fn(Point) -> Point) -> Extent {
     let corners = body.elements().corners(primitive).iter();
     Extent::of(corners.map(|&vertex| map(body.positions().point(vertex as usize))))
+}
+
+/// The corners of a primitive; one with fewer than four repeats its last.
+pub(super) fn corners(body: &Body, primitive: ElementIx) -> [Point; 4] {
+    let vertices = body.elements().four_corners(primitive.index());
+    vertices.map(|vertex| body.positions().point(vertex as usize))
 }

@@ -1,16 +1,16 @@
 //! Properties that curves must have for all bodies.
 
 use impinge_core::contact::{Contacts, Curves, Feature, Shape};
-use impinge_core::{Query, Scene, SharedVertex};
+use impinge_core::{Backend, Detector, Query, Scene, Settings, SharedVertex};
 use impinge_scenes::{Model, surfaces};
 
-use super::detect;
+use super::{contacts_of, detect};
 
 fn crossing(a: &Model, b: &Model) -> (Contacts, Curves) {
     let mut scene = Scene::new();
     let ids = [a, b].map(|model| model.add_to(&mut scene).unwrap());
     let pairs = detect(&scene, &Query::between(ids[0], ids[1]));
-    let contacts = Contacts::new(&scene, &pairs).unwrap();
+    let contacts = contacts_of(&scene, &pairs);
     let curves = contacts.curves().unwrap();
     (contacts, curves)
 }
@@ -200,7 +200,7 @@ fn a_body_that_runs_into_itself() {
     let id = scene.add_triangles(&faces, &positions).unwrap();
     for rule in [SharedVertex::Skip, SharedVertex::Resolve] {
         let pairs = detect(&scene, &Query::within(id).shared_vertex(rule));
-        let contacts = Contacts::new(&scene, &pairs).unwrap();
+        let contacts = contacts_of(&scene, &pairs);
         let curves = contacts.curves().unwrap();
         assert!(!curves.is_empty());
         assert_eq!(curves.n_closed(), curves.len());
@@ -216,25 +216,25 @@ fn threads_change_nothing() {
     let ids = [&a, &b].map(|model| model.add_to(&mut scene).unwrap());
     let pairs = detect(&scene, &Query::between(ids[0], ids[1]));
     let run = |n_threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(n_threads)
-            .build()
-            .unwrap();
-        pool.install(|| {
-            let contacts = Contacts::new(&scene, &pairs).unwrap();
-            let bits: Vec<[u64; 3]> = contacts
-                .points()
-                .iter()
-                .map(|p| p.map(f64::to_bits))
-                .collect();
-            let curves = contacts.curves().unwrap();
-            (
-                bits,
-                contacts.all_corners().to_vec(),
-                contacts.names().to_vec(),
-                curves.all_points().to_vec(),
-            )
+        let mut detector = Detector::with_settings(Settings {
+            backend: Backend::Cpu,
+            threads: n_threads,
+            ..Settings::default()
         })
+        .unwrap();
+        let contacts = detector.contacts(&scene, &pairs).unwrap();
+        let bits: Vec<[u64; 3]> = contacts
+            .points()
+            .iter()
+            .map(|p| p.map(f64::to_bits))
+            .collect();
+        let curves = contacts.curves().unwrap();
+        (
+            bits,
+            contacts.all_corners().to_vec(),
+            contacts.names().to_vec(),
+            curves.all_points().to_vec(),
+        )
     };
     let one = run(1);
     assert!(one.0.len() > 500);
@@ -253,7 +253,8 @@ fn pairs_of_another_scene_are_refused_by_name() {
     scene
         .remesh(b, vec![[0u32, 1, 2]], vec![[0.0f32; 3]; 3])
         .unwrap();
-    let error = Contacts::new(&scene, &pairs).unwrap_err().to_string();
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let error = detector.contacts(&scene, &pairs).unwrap_err().to_string();
     assert!(
         error.starts_with("body 1: a pair names primitive"),
         "{error}"
@@ -266,7 +267,7 @@ fn pairs_of_another_scene_are_refused_by_name() {
             vec![[50.0f32; 3]; ball.positions.len()],
         )
         .unwrap();
-    let contacts = Contacts::new(&scene, &pairs).unwrap();
+    let contacts = contacts_of(&scene, &pairs);
     assert!(contacts.shapes().iter().all(|&shape| shape == Shape::Apart));
     assert!(contacts.points().is_empty() && contacts.curves().unwrap().is_empty());
 }

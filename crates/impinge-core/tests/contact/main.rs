@@ -17,6 +17,12 @@ pub fn detect(scene: &Scene, query: &Query) -> Pairs {
     detector.detect(scene, query).unwrap().clone()
 }
 
+/// The contacts of pairs.
+pub fn contacts_of(scene: &Scene, pairs: &Pairs) -> Contacts {
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    detector.contacts(scene, pairs).unwrap()
+}
+
 fn corners_of(scene: &Scene, bodies: &[BodyId], body: u32, face: u32) -> [[f64; 3]; 3] {
     let body = scene.body(bodies[body as usize]).unwrap();
     let Elements::Triangles(faces) = body.elements() else {
@@ -38,7 +44,7 @@ struct Seen {
 /// promised order and direction.
 fn check(scene: &Scene, pairs: &Pairs, most: usize, seen: &mut Seen) {
     let bodies: Vec<BodyId> = scene.bodies().map(|(id, _)| id).collect();
-    let contacts = Contacts::new(scene, pairs).unwrap();
+    let contacts = contacts_of(scene, pairs);
     assert_eq!(contacts.len(), pairs.len());
     let step = pairs.len().div_ceil(most).max(1);
     for (ix, [body_a, a, body_b, b]) in pairs.rows().enumerate().step_by(step) {

@@ -1,24 +1,21 @@
 //! What lies inside, and the regions' normals, depths and volumes.
 
-use impinge_core::contact::{Contacts, Overlap, Penetration, Region};
-use impinge_core::{Query, Scene};
+use impinge_core::contact::{Penetration, Region};
+use impinge_core::{Backend, Detector, Query, Scene};
 use impinge_scenes::{Model, surfaces};
 
 use super::detect;
 
-fn overlap(a: &Model, b: &Model) -> Overlap {
+fn overlap(a: &Model, b: &Model) -> Penetration {
     let mut scene = Scene::new();
     let ids = [a, b].map(|model| model.add_to(&mut scene).unwrap());
     let pairs = detect(&scene, &Query::between(ids[0], ids[1]));
-    let contacts = Contacts::new(&scene, &pairs).unwrap();
-    let mut penetration = Penetration::new();
-    let found = penetration
-        .between(&scene, &contacts, ids[0], ids[1])
-        .unwrap();
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let contacts = detector.contacts(&scene, &pairs).unwrap();
+    let found = detector.penetration(&scene, &contacts, ids[0], ids[1]);
     // The same with the bodies in the other order, and with their topologies cached.
-    let again = penetration
-        .between(&scene, &contacts, ids[1], ids[0])
-        .unwrap();
+    let again = detector.penetration(&scene, &contacts, ids[1], ids[0]);
+    let (found, again) = (found.unwrap(), again.unwrap());
     assert_eq!(found, again);
     found
 }
@@ -295,14 +292,50 @@ fn open_surfaces_are_refused_by_name() {
     let sheet = surfaces::cloth(4, 4, 0.3).add_to(&mut scene).unwrap();
     let ball = surfaces::ball(100).add_to(&mut scene).unwrap();
     let pairs = detect(&scene, &Query::between(sheet, ball));
-    let contacts = Contacts::new(&scene, &pairs).unwrap();
-    let error = Penetration::new()
-        .between(&scene, &contacts, ball, sheet)
-        .unwrap_err();
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let contacts = detector.contacts(&scene, &pairs).unwrap();
+    let error = detector.penetration(&scene, &contacts, ball, sheet);
+    let error = error.unwrap_err();
     assert!(
         error
             .to_string()
             .starts_with("body 0: the surface is not closed"),
         "{error}"
     );
+}
+
+/// Each pair of many bodies is as if it were alone in the scene, but for the numbers of its contacts.
+#[test]
+fn pairs_of_bodies_among_many_are_as_if_alone() {
+    let ball = surfaces::bumpy_ball(300, 0.2);
+    let places = [[0.0; 3], [0.7, 0.1, 0.0], [0.3, 0.8, 0.2], [9.0, 0.0, 0.0]];
+    let models = places.map(|place| ball.translated(place));
+    let mut scene = Scene::new();
+    let ids = models.each_ref().map(|m| m.add_to(&mut scene).unwrap());
+    let pairs = detect(&scene, &Query::everything());
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let contacts = detector.contacts(&scene, &pairs).unwrap();
+    for [a, b] in [[0, 1], [0, 2], [1, 2], [0, 3]] {
+        let mut found = detector
+            .penetration(&scene, &contacts, ids[a], ids[b])
+            .unwrap();
+        let numbers = [ids[a], ids[b]].map(|id| id.index() as u32);
+        let own: Vec<u32> = (0..)
+            .zip(contacts.rows())
+            .filter(|(_, row)| [row[0], row[2]] == numbers)
+            .map(|(contact, _)| contact)
+            .collect();
+        let mut expected = overlap(&models[a], &models[b]);
+        for region in &mut expected.regions {
+            region
+                .contacts
+                .iter_mut()
+                .for_each(|contact| *contact = own[*contact as usize]);
+        }
+        for region in found.regions.iter_mut().chain(&mut expected.regions) {
+            region.bodies = [0; 2];
+        }
+        assert_eq!(found, expected, "{a} and {b}");
+        assert_eq!(found.regions.is_empty(), b == 3);
+    }
 }

@@ -20,6 +20,9 @@ those under the names of ipc-toolkit.
 from . import ipc, ray, tiles
 from ._check import check
 from ._impinge import (
+    FEATURES,
+    KINDS,
+    TYPES,
     Advance,
     Body,
     Cancelled,
@@ -28,11 +31,11 @@ from ._impinge import (
     Contacts,
     Detector,
     Device,
-    Distances,
     Impact,
     Impacts,
     Nearest,
     NearPairs,
+    Penetration,
     Result,
     Scene,
     Statistics,
@@ -47,6 +50,9 @@ from ._impinge import (
 from ._manager import CollisionManager
 
 __all__ = [
+    "FEATURES",
+    "KINDS",
+    "TYPES",
     "Advance",
     "Body",
     "CancelToken",
@@ -56,11 +62,11 @@ __all__ = [
     "Contacts",
     "Detector",
     "Device",
-    "Distances",
     "Impact",
     "Impacts",
     "Nearest",
     "NearPairs",
+    "Penetration",
     "Result",
     "Scene",
     "Statistics",

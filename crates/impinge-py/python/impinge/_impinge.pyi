@@ -15,6 +15,9 @@ import numpy.typing as npt
 from typing_extensions import TypeAlias, Unpack
 
 __all__ = [
+    "FEATURES",
+    "KINDS",
+    "TYPES",
     "Advance",
     "Body",
     "CancelToken",
@@ -23,11 +26,11 @@ __all__ = [
     "Contacts",
     "Detector",
     "Device",
-    "Distances",
     "Impact",
     "Impacts",
     "Nearest",
     "NearPairs",
+    "Penetration",
     "Result",
     "Scene",
     "Statistics",
@@ -48,6 +51,9 @@ __all__ = [
 ]
 
 __version__: str
+FEATURES: tuple[str, ...]
+KINDS: tuple[str, ...]
+TYPES: tuple[str, ...]
 
 _Array: TypeAlias = Any  # An array-like, or anything that speaks DLPack or the buffer protocol.
 _Body: TypeAlias = Body | SupportsIndex
@@ -161,6 +167,9 @@ class Scene:
     def kind(self, body: _Body) -> _Kind: ...
     def n_primitives(self, body: _Body) -> int: ...
     def n_vertices(self, body: _Body) -> int: ...
+    def _convex_overlap(
+        self, a: _Body, b: _Body
+    ) -> tuple[float, list[float], int] | None: ...
     @property
     def bodies(self) -> list[Body]: ...
     @property
@@ -316,25 +325,64 @@ class Detector:
         ignore: Iterable[_Pair] | None = None,
         kinds: Iterable[_PairKind] | None = None,
         thickness: dict[Body, float] | None = None,
+        distances: bool = False,
         closest_points: bool = False,
         owned_by: _Array | None = None,
         progress: _Progress | None = None,
         cancel: CancelToken | None = None,
     ) -> NearPairs: ...
-    def distance(self, scene: Scene, a: _Body, b: _Body) -> Nearest | None: ...
+    def distance(
+        self,
+        scene: Scene,
+        a: _Body,
+        b: _Body,
+        *,
+        progress: _Progress | None = None,
+        cancel: CancelToken | None = None,
+    ) -> Nearest | None: ...
+    def nearest(
+        self,
+        scene: Scene,
+        *,
+        across: Iterable[_Body] | None = None,
+        progress: _Progress | None = None,
+        cancel: CancelToken | None = None,
+    ) -> Nearest | None: ...
+    def contacts(
+        self,
+        scene: Scene,
+        pairs: Result,
+        *,
+        progress: _Progress | None = None,
+        cancel: CancelToken | None = None,
+    ) -> Contacts: ...
+    def penetration(
+        self,
+        scene: Scene,
+        contacts: Contacts,
+        a: _Body,
+        b: _Body,
+        *,
+        progress: _Progress | None = None,
+        cancel: CancelToken | None = None,
+    ) -> Penetration: ...
+    def _any(self, scene: Scene, across: Iterable[_Body] | None = None) -> bool: ...
+    def _detect(self, scene: Scene, across: Iterable[_Body] | None = None) -> Result: ...
 
 @final
 class NearPairs:
     @property
-    def kinds(self) -> npt.NDArray[np.str_]: ...
+    def rows(self) -> npt.NDArray[np.uint32]: ...
+    @property
+    def kinds(self) -> npt.NDArray[np.uint8]: ...
     @property
     def bodies(self) -> npt.NDArray[np.uint32]: ...
     @property
     def elements(self) -> npt.NDArray[np.uint32]: ...
     @property
-    def types(self) -> npt.NDArray[np.str_]: ...
+    def types(self) -> npt.NDArray[np.uint8]: ...
     @property
-    def features(self) -> npt.NDArray[np.str_]: ...
+    def features(self) -> npt.NDArray[np.uint8]: ...
     @property
     def parallel(self) -> npt.NDArray[np.bool_]: ...
     @property
@@ -345,11 +393,11 @@ class NearPairs:
     def hash(self) -> int: ...
     @property
     def stats(self) -> Statistics: ...
+    def of(self, kind: _PairKind) -> NearPairs: ...
     def __len__(self) -> int: ...
 
 @final
 class Contacts:
-    def __new__(cls, scene: Scene, result: Result) -> Contacts: ...
     @property
     def rows(self) -> npt.NDArray[np.uint32]: ...
     @property
@@ -377,14 +425,19 @@ class Nearest:
     @property
     def distance(self) -> float: ...
     @property
+    def bodies(self) -> tuple[Body, Body]: ...
+    @property
     def primitives(self) -> tuple[int, int]: ...
     @property
     def points(self) -> npt.NDArray[np.float64] | None: ...
 
 @final
-class Distances:
-    def __new__(cls) -> Distances: ...
-    def between(self, scene: Scene, a: _Body, b: _Body) -> Nearest | None: ...
+class Penetration:
+    @property
+    def inside(self) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32]]: ...
+    @property
+    def volume(self) -> float | None: ...
+    def regions(self) -> list[dict[str, Any]]: ...
 
 @final
 class Impact:

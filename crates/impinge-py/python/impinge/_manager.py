@@ -2,31 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ._impinge import Body, Detector, Distances, Nearest, Result, Scene
+from ._impinge import Body, Contacts, Detector, Scene
 
 __all__ = ["CollisionManager", "ContactData", "DistanceData"]
 
 _Array = Any
 _Name = Hashable
+_Vector = npt.NDArray[np.float64]
 
 
 class ContactData:
-    """Two faces that share a point.
+    """A contact of two objects.
 
     Attributes
     ----------
     names : set
         The names of the two objects.
+    point : numpy.ndarray, shape (3,)
+        Where they meet.
+    normal : numpy.ndarray, shape (3,)
+        The unit direction from the object that was added first (or is of this manager) to the other: pushed apart along it,
+        they overlap less.
+    depth : float
+        How far they must be pushed; 0 if that is unknown.
     """
 
-    def __init__(self, names: tuple[_Name, _Name], indices: tuple[int, int]) -> None:
+    def __init__(
+        self,
+        names: tuple[_Name, _Name],
+        indices: tuple[int, int],
+        point: _Vector,
+        normal: _Vector,
+        depth: float,
+    ) -> None:
         self.names = set(names)
+        self.point, self.normal, self.depth = point, normal, depth
         self._indices = dict(zip(names, indices))
 
     def index(self, name: _Name) -> int:
@@ -34,7 +50,7 @@ class ContactData:
         return self._indices[name]
 
     def __repr__(self) -> str:
-        return f"ContactData({self._indices})"
+        return f"ContactData({self._indices}, depth={self.depth:.3g})"
 
 
 class DistanceData:
@@ -45,22 +61,27 @@ class DistanceData:
     names : set
         The names of the two objects.
     distance : float
-        0 if and only if they share a point.
+        0 or less if and only if they share a point; less where they overlap and it is known by how much.
     """
 
-    def __init__(self, names: tuple[_Name, _Name], nearest: Nearest) -> None:
+    def __init__(
+        self,
+        names: tuple[_Name, _Name],
+        indices: tuple[int, int],
+        distance: float,
+        points: tuple[_Vector, _Vector] | None,
+    ) -> None:
         self.names = set(names)
-        self.distance = nearest.distance
-        self._indices = dict(zip(names, nearest.primitives))
-        points = nearest.points
+        self.distance = distance
+        self._indices = dict(zip(names, indices))
         self._points = {} if points is None else dict(zip(names, points))
 
     def index(self, name: _Name) -> int:
         """The face of the object of this name."""
         return self._indices[name]
 
-    def point(self, name: _Name) -> npt.NDArray[np.float64] | None:
-        """The point of this object that is nearest to the other, or `None` where they share points."""
+    def point(self, name: _Name) -> _Vector | None:
+        """The point of this object that is nearest to the other, or deepest in it; `None` where it is unknown."""
         return self._points.get(name)
 
     def __repr__(self) -> str:
@@ -72,6 +93,9 @@ class CollisionManager:
 
     Two objects collide if and only if two of their faces share a point where their moved vertices are, touching
     included; an object inside another one without touching it does not collide with it, as faces are surfaces.
+
+    How deep objects overlap: of two convex ones the shortest way that takes them apart, as FCL has it; of other closed ones how
+    far their deepest region of contact extends along its normal.
 
     Parameters
     ----------
@@ -98,8 +122,9 @@ class CollisionManager:
     def __init__(self, **settings: Any) -> None:
         self._scene = Scene()
         self._detector = Detector(**settings)
-        self._distances = Distances()
         self._bodies: dict[_Name, Body] = {}
+        #: By the numbers of bodies.
+        self._convex: dict[int, bool] = {}
 
     @property
     def names(self) -> list[_Name]:
@@ -145,7 +170,9 @@ class CollisionManager:
         ValueError
             No object has the name.
         """
-        self._scene.remove(self._body(name))
+        body = self._body(name)
+        self._scene.remove(body)
+        self._convex.pop(int(body), None)
         del self._bodies[name]
 
     def set_transform(self, name: _Name, transform: _Array) -> None:
@@ -175,19 +202,11 @@ class CollisionManager:
         -------
         bool
         set of (name, name)
-            Pairs of objects that collide, the name that was added first coming first. With `return_names`.
+            Pairs of objects that collide, each sorted. With `return_names`.
         list of ContactData
-            All pairs of faces that share a point. With `return_data`.
+            Of two convex objects the deepest contact, of others all pairs of faces that share a point. With `return_data`.
         """
-        result = self._detector.detect(self._scene)
-        names = {int(body): name for name, body in self._bodies.items()}
-        order = {name: ix for ix, name in enumerate(self._bodies)}
-
-        def pair(row: npt.NDArray[np.uint32]) -> tuple[_Name, _Name]:
-            a, b = names[int(row[0])], names[int(row[2])]
-            return (a, b) if order[a] < order[b] else (b, a)
-
-        return _answer(result, names, pair, return_names, return_data)
+        return self._collisions(None, _sorted, return_names, return_data)
 
     def in_collision_single(
         self,
@@ -211,17 +230,10 @@ class CollisionManager:
         set of name
             The objects that collide with the mesh. With `return_names`.
         list of ContactData
-            The mesh goes by the name ``"__external"``. With `return_data`.
+            As of `in_collision_internal`. The mesh goes by the name ``"__external"``. With `return_data`.
         """
-        with _Guest(self, mesh, transform) as guest:
-            result = self._with_guest(guest)
-            names = {int(body): name for name, body in self._bodies.items()}
-            names[int(guest)] = "__external"
-
-            def other(row: npt.NDArray[np.uint32]) -> _Name:
-                return names[int(row[0] if row[2] == int(guest) else row[2])]
-
-            return _answer(result, names, other, return_names, return_data)
+        with _Guests(self, [("__external", mesh, transform)]) as guests:
+            return self._collisions(guests, lambda a, _: a, return_names, return_data)
 
     def in_collision_other(
         self, other_manager: CollisionManager, return_names: bool = False, return_data: bool = False
@@ -240,46 +252,34 @@ class CollisionManager:
         set of (name, name)
             A name of this manager and one of the other. With `return_names`.
         list of ContactData
-            With `return_data`.
+            As of `in_collision_internal`. With `return_data`.
         """
-        pairs: set[tuple[_Name, _Name]] = set()
-        data: list[ContactData] = []
-        for theirs in other_manager._bodies.values():
-            name = next(key for key, body in other_manager._bodies.items() if body is theirs)
-            with _Guest(self, _mesh(other_manager._scene, theirs)) as guest:
-                result = self._with_guest(guest)
-                names = {int(body): mine for mine, body in self._bodies.items()}
-                names[int(guest)] = name
-                for row in _first_rows(result, not return_data):
-                    is_first = row[0] == int(guest)
-                    mine = names[int(row[2] if is_first else row[0])]
-                    pairs.add((mine, name))
-                    indices = (int(row[3]), int(row[1])) if is_first else (int(row[1]), int(row[3]))
-                    data.append(ContactData((mine, name), indices))
-        parts: list[Any] = [bool(pairs)]
-        parts += [pairs] if return_names else []
-        parts += [data] if return_data else []
-        return parts[0] if len(parts) == 1 else tuple(parts)
+        with _Guests(self, other_manager._meshes()) as guests:
+            return self._collisions(guests, lambda a, b: (a, b), return_names, return_data)
 
-    def min_distance_internal(self, return_names: bool = False, return_data: bool = False) -> Any:
+    def min_distance_internal(
+        self, name: _Name | None = None, return_names: bool = False, return_data: bool = False
+    ) -> Any:
         """The smallest distance of any two objects; infinite where there are fewer than two.
 
         Parameters
         ----------
+        name : hashable, optional
+            Only the distances of this object to the others.
         return_names, return_data : bool
             What is returned besides.
 
         Returns
         -------
         float
+            Less than 0 where objects overlap and it is known by how much.
         (name, name)
-            With `return_names`.
+            Sorted. With `return_names`.
         DistanceData
             With `return_data`.
         """
-        items = list(self._bodies.items())
-        pairs = [(a, b) for ix, a in enumerate(items) for b in items[ix + 1 :]]
-        return _nearest(self, pairs, lambda a, b: (a, b), return_names, return_data)
+        across = None if name is None else {name: self._body(name)}
+        return self._distance(across, _sorted, return_names, return_data)
 
     def min_distance_single(
         self,
@@ -300,14 +300,14 @@ class CollisionManager:
         Returns
         -------
         float
+            Less than 0 where they overlap and it is known by how much.
         name
             Of the nearest object. With `return_name`.
         DistanceData
             The mesh goes by the name ``"__external"``. With `return_data`.
         """
-        with _Guest(self, mesh, transform) as guest:
-            pairs = [(item, ("__external", guest)) for item in self._bodies.items()]
-            return _nearest(self, pairs, lambda a, _: a, return_name, return_data)
+        with _Guests(self, [("__external", mesh, transform)]) as guests:
+            return self._distance(guests, lambda a, _: a, return_name, return_data)
 
     def min_distance_other(
         self, other_manager: CollisionManager, return_names: bool = False, return_data: bool = False
@@ -323,33 +323,173 @@ class CollisionManager:
         Returns
         -------
         float
+            Less than 0 where they overlap and it is known by how much.
         (name, name)
             Of this manager and of the other. With `return_names`.
         DistanceData
             With `return_data`.
         """
-        guests = []
-        try:
-            for name, body in other_manager._bodies.items():
-                guests.append((name, _add(self._scene, _mesh(other_manager._scene, body), None)))
-            pairs = [(mine, theirs) for mine in self._bodies.items() for theirs in guests]
-            return _nearest(self, pairs, lambda a, b: (a, b), return_names, return_data)
-        finally:
-            for _, body in guests:
-                self._scene.remove(body)
+        with _Guests(self, other_manager._meshes()) as guests:
+            return self._distance(guests, lambda a, b: (a, b), return_names, return_data)
 
-    def _with_guest(self, guest: Body) -> Result:
-        """The pairs of a mesh that is in the scene for a moment, and of no other objects."""
-        mine = list(self._bodies.values())
+    def _meshes(self) -> list[tuple[_Name, Any, None]]:
+        scene = self._scene
+        return [
+            (name, (scene.positions(body), scene.elements(body), scene.kind(body)), None)
+            for name, body in self._bodies.items()
+        ]
+
+    def _sides(
+        self, across: dict[_Name, Body] | None
+    ) -> Callable[[int, int], tuple[_Name, _Name, bool]]:
+        """Names two bodies by their numbers, and says whether they come in the other order: those of `across` come last, else
+        that which was added later."""
+        names = {int(body): name for name, body in self._bodies.items()}
+        last = {int(body): name for name, body in (across or {}).items()}
+        order = {number: ix for ix, number in enumerate(names)}
+
+        def sides(a: int, b: int) -> tuple[_Name, _Name, bool]:
+            if last:
+                swapped = a in last
+                return (names[b], last[a], True) if swapped else (names[a], last[b], False)
+            swapped = order[a] > order[b]
+            return (names[b], names[a], True) if swapped else (names[a], names[b], False)
+
+        return sides
+
+    def _collisions(
+        self,
+        across: dict[_Name, Body] | None,
+        name: Callable[[_Name, _Name], Any],
+        return_names: bool,
+        return_data: bool,
+    ) -> Any:
+        bodies = None if across is None else list(across.values())
+        if not (return_names or return_data):
+            return self._detector._any(self._scene, bodies)
+        result = self._detector._detect(self._scene, bodies)
+        sides = self._sides(across)
+        parts: list[Any] = [len(result) > 0]
+        # The rows of each pair of bodies.
+        rows = result.rows
+        both, of_row = np.unique(rows[:, [0, 2]], axis=0, return_inverse=True)
+        if return_names:
+            parts.append({name(*sides(a, b)[:2]) for a, b in both.tolist()})
+        if return_data:
+            data: list[ContactData] = []
+            contacts = self._detector.contacts(self._scene, result) if len(result) else None
+            points = None if contacts is None else _points(self._scene, contacts)
+            for ix, (a, b) in enumerate(both.tolist()):
+                own = np.flatnonzero(of_row.reshape(-1) == ix)
+                first, second, swapped = sides(a, b)
+                for row, point, normal, depth in self._overlaps(contacts, points, a, b, own):
+                    faces = (int(rows[row, 1]), int(rows[row, 3]))
+                    if swapped:
+                        faces, normal = faces[::-1], -normal
+                    data.append(ContactData((first, second), faces, point, normal, depth))
+            parts.append(data)
+        return parts[0] if len(parts) == 1 else tuple(parts)
+
+    def _overlaps(
+        self, contacts: Any, points: Any, a: int, b: int, rows: npt.NDArray[np.intp]
+    ) -> Iterator[tuple[int, _Vector, _Vector, float]]:
+        """Of two bodies: a row of the pairs, the point, the normal from the first body to the second, the depth."""
+        scene = self._scene
+        if self._is_convex(a) and self._is_convex(b):
+            found = self._convex_overlap(a, b)
+            if found is not None:
+                depth, normal, deepest = found
+                yield int(rows[0]), deepest - 0.5 * depth * normal, normal, depth
+                return
         try:
-            # A guest is in the first group and meets the second, where everybody else is.
-            self._scene.set_filter(guest, category=1, mask=2)
-            for body in mine:
-                self._scene.set_filter(body, category=2, mask=1)
-            return self._detector.detect(self._scene)
-        finally:
-            for body in mine:
-                self._scene.set_filter(body)
+            regions = self._detector.penetration(scene, contacts, a, b).regions()
+        except (ValueError, TypeError):
+            # Not closed, or not made of triangles.
+            regions = [region for region in contacts.regions() if region["bodies"] == (a, b)]
+        known = {}
+        for region in regions:
+            for contact in region["contacts"].tolist():
+                known[contact] = (region["normal"], region.get("depth"))
+        vertices, elements = scene.positions(b), scene.elements(b)
+        for row in rows.tolist():
+            normal, depth = known.get(row, (None, None))
+            # A region's normal is the way of the first body.
+            if normal is not None:
+                normal = -normal
+            else:
+                normal = -_normal(vertices[elements[contacts.rows[row, 3]]])
+            yield row, points[row], normal, 0.0 if depth is None else depth
+
+    def _distance(
+        self,
+        across: dict[_Name, Body] | None,
+        name: Callable[[_Name, _Name], Any],
+        return_names: bool,
+        return_data: bool,
+    ) -> Any:
+        bodies = None if across is None else list(across.values())
+        nearest = self._detector.nearest(self._scene, across=bodies)
+        if nearest is None:
+            parts: list[Any] = [float("inf"), None, None]
+        else:
+            a, b = (int(body) for body in nearest.bodies)
+            distance, points = nearest.distance, nearest.points
+            if distance == 0:
+                distance, points = self._depth(a, b)
+            first, second, swapped = self._sides(across)(a, b)
+            step = -1 if swapped else 1
+            data = DistanceData(
+                (first, second),
+                nearest.primitives[::step],
+                distance,
+                None if points is None else (points[0], points[1])[::step],
+            )
+            parts = [distance, name(first, second), data]
+        chosen = [parts[0]]
+        chosen += [parts[1]] if return_names else []
+        chosen += [parts[2]] if return_data else []
+        return chosen[0] if len(chosen) == 1 else tuple(chosen)
+
+    def _depth(self, a: int, b: int) -> tuple[float, Any]:
+        """The distance of two bodies that share a point, less than 0 where they overlap, and the deepest points."""
+        scene, detector = self._scene, self._detector
+        if self._is_convex(a) and self._is_convex(b):
+            found = self._convex_overlap(a, b)
+            if found is None:
+                return 0.0, None
+            depth, normal, deepest = found
+            return (-depth if depth else 0.0), (deepest, deepest - depth * normal)
+        try:
+            contacts = detector.contacts(scene, detector.detect(scene, between=(a, b)))
+            regions = detector.penetration(scene, contacts, a, b).regions()
+        except (ValueError, TypeError):
+            return 0.0, None
+        depth, deepest = 0.0, None
+        for region in regions:
+            if region["depth"] is not None and region["depth"] > depth:
+                depth, deepest = region["depth"], region
+        if deepest is None:
+            return 0.0, None
+        middle, way = deepest["position"], 0.5 * depth * deepest["normal"]
+        return -depth, (middle - way, middle + way)
+
+    def _convex_overlap(self, a: int, b: int) -> tuple[float, _Vector, _Vector] | None:
+        """Depth, normal from the first body to the second, the deepest vertex of the first."""
+        found = self._scene._convex_overlap(a, b)
+        if found is None:
+            return None
+        depth, normal, vertex = found
+        return depth, np.array(normal), np.asarray(self._scene.positions(a)[vertex], np.float64)
+
+    def _is_convex(self, number: int) -> bool:
+        known = self._convex.get(number)
+        if known is None:
+            scene = self._scene
+            known = scene.kind(number) == "triangles" and _is_convex(
+                scene.positions(number), scene.elements(number)
+            )
+            self._convex[number] = known
+        return known
 
     def _body(self, name: _Name) -> Body:
         try:
@@ -358,25 +498,30 @@ class CollisionManager:
             raise ValueError(f"name: there is no object {name!r}") from None
 
 
-class _Guest:
-    """A mesh that is in a manager's scene while it is asked about."""
+class _Guests:
+    """Meshes that are in a manager's scene while it is asked about: pairs of (name, body)."""
 
-    def __init__(self, manager: CollisionManager, mesh: Any, transform: _Array | None = None) -> None:
-        self._scene = manager._scene
-        self._body = _add(self._scene, mesh, transform)
+    def __init__(self, manager: CollisionManager, meshes: list[tuple[_Name, Any, Any]]) -> None:
+        self._manager = manager
+        self._bodies: dict[_Name, Body] = {}
+        try:
+            for name, mesh, transform in meshes:
+                self._bodies[name] = _add(manager._scene, mesh, transform)
+        except BaseException:
+            self.__exit__()
+            raise
 
-    def __enter__(self) -> Body:
-        return self._body
+    def __enter__(self) -> dict[_Name, Body]:
+        return self._bodies
 
     def __exit__(self, *_: object) -> None:
-        self._scene.remove(self._body)
+        for body in self._bodies.values():
+            self._manager._scene.remove(body)
+            self._manager._convex.pop(int(body), None)
 
 
 def _add(scene: Scene, mesh: Any, transform: _Array | None) -> Body:
-    if isinstance(mesh, tuple):
-        body = scene.add(*mesh)
-    else:
-        body = scene.add(mesh)
+    body = scene.add(*mesh) if isinstance(mesh, tuple) else scene.add(mesh)
     if transform is not None:
         try:
             scene.set_transform(body, transform)
@@ -386,65 +531,63 @@ def _add(scene: Scene, mesh: Any, transform: _Array | None) -> Body:
     return body
 
 
-def _mesh(scene: Scene, body: Body) -> tuple[_Array, _Array, str]:
-    return scene.positions(body), scene.elements(body), scene.kind(body)
+def _sorted(a: _Name, b: _Name) -> tuple[_Name, _Name]:
+    """Two names in their order; of names that have none, by their text."""
+    try:
+        return (a, b) if a <= b else (b, a)  # type: ignore[operator]
+    except TypeError:
+        return (a, b) if repr(a) <= repr(b) else (b, a)
 
 
-def _first_rows(result: Result, once: bool) -> Iterator[npt.NDArray[np.uint32]]:
-    """All rows, or one per pair of bodies."""
-    rows = result.rows
-    if once and len(rows):
-        rows = rows[np.unique(rows[:, [0, 2]], axis=0, return_index=True)[1]]
-    return iter(rows)
+def _points(scene: Scene, contacts: Contacts) -> _Vector:
+    """The middle of each contact's corners; of a contact without corners, that of the first element's corners."""
+    starts = contacts.starts.astype(np.intp)
+    counts = np.diff(starts)
+    sums = np.zeros((len(counts), 3))
+    np.add.at(sums, np.repeat(np.arange(len(counts)), counts), contacts.points[contacts.corners])
+    middles = sums / np.maximum(counts, 1)[:, None]
+    for row in np.flatnonzero(counts == 0).tolist():
+        a, element = contacts.rows[row, :2].tolist()
+        middles[row] = scene.positions(a)[scene.elements(a)[element]].mean(0)
+    return middles
 
 
-def _answer(
-    result: Result, names: dict[int, _Name], of: Any, return_names: bool, return_data: bool
-) -> Any:
-    parts: list[Any] = [len(result) > 0]
-    if return_names:
-        parts.append({of(row) for row in _first_rows(result, True)})
-    if return_data:
-        rows = result.rows.tolist()
-        parts.append([ContactData((names[a], names[b]), (i, j)) for a, i, b, j in rows])
-    return parts[0] if len(parts) == 1 else tuple(parts)
+def _normal(corners: _Array) -> _Vector:
+    """The unit normal of a triangle; zeros if it is degenerate or something else."""
+    corners = np.asarray(corners, np.float64)
+    normal = (
+        np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        if len(corners) > 2
+        else np.zeros(3)
+    )
+    length = np.linalg.norm(normal)
+    return normal / length if length > 0 else normal
 
 
-def _nearest(
-    manager: CollisionManager, pairs: list[Any], name: Any, return_names: bool, return_data: bool
-) -> Any:
-    """The nearest of some pairs of (name, body). Pairs whose boxes are farther apart than the best are left out."""
-    boxes: dict[Body, tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]] = {}
+#: How far vertices of convex bodies may stand out of faces, as a part of their size: those of files are rounded.
+_FLAT = 1e-6
 
-    def box(body: Body) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        if body not in boxes:
-            positions = manager._scene.positions(body).astype(np.float64)
-            boxes[body] = (positions.min(0), positions.max(0))
-        return boxes[body]
 
-    def gap(pair: Any) -> float:
-        (_, a), (_, b) = pair
-        if not (manager._scene.n_vertices(a) and manager._scene.n_vertices(b)):
-            return np.inf
-        (low_a, high_a), (low_b, high_b) = box(a), box(b)
-        gaps = np.maximum(np.maximum(low_a - high_b, low_b - high_a), 0)
-        # Below the true distance of the boxes, whatever was rounded.
-        return float(np.sqrt((gaps**2).sum())) * (1 - 1e-12)
-
-    best: Any = None
-    for near, _, pair in sorted((gap(pair), ix, pair) for ix, pair in enumerate(pairs)):
-        if best is not None and near > best[0].distance:
-            break
-        (_, a), (_, b) = pair
-        nearest = manager._distances.between(manager._scene, a, b)
-        if nearest is not None and (best is None or nearest.distance < best[0].distance):
-            best = (nearest, pair)
-    if best is None:
-        parts: list[Any] = [float("inf"), None, None]
-    else:
-        nearest, ((a, _), (b, _)) = best
-        parts = [nearest.distance, name(a, b), DistanceData((a, b), nearest)]
-    chosen = [parts[0]]
-    chosen += [parts[1]] if return_names else []
-    chosen += [parts[2]] if return_data else []
-    return chosen[0] if len(chosen) == 1 else tuple(chosen)
+def _is_convex(vertices: _Array, faces: npt.NDArray[np.uint32]) -> bool:
+    """Whether triangles are one closed surface that bends outwards at each edge."""
+    n_sides = 3 * len(faces)
+    if len(faces) < 4 or n_sides % 2:
+        return False
+    sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    order = np.lexsort(sides.T)
+    sides = sides[order]
+    first, second = sides[::2], sides[1::2]
+    if (first != second).any() or (first[1:] == first[:-1]).all(1).any():
+        return False
+    if len(np.unique(faces)) - n_sides // 2 + len(faces) != 2:
+        return False
+    points = np.asarray(vertices, np.float64)
+    corners = points[faces]
+    p, q, r = corners.transpose(1, 0, 2)
+    normals = np.cross(q - p, r - p)
+    if np.einsum("ij,ij->", p - points.mean(0), normals) < 0:
+        normals = -normals
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
+    one, other = order[::2] // 3, order[1::2] // 3
+    heights = np.einsum("ijk,ik->ij", corners[other] - p[one][:, None], normals[one])
+    return bool(heights.max() <= _FLAT * np.ptp(points, axis=0).max())

@@ -125,5 +125,5 @@ pub fn draw(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
             normals,
         }
     });
-    crate::picture::Drawer::new(&args.picture, None)?.draw(path, surfaces.collect())
+    crate::picture::Drawer::new(&args.picture, None, 1)?.draw(path, surfaces.collect())
 }

@@ -92,13 +92,10 @@ impl Detector {
         begin(stats, &self.settings, workers.n());
         let _shift = workers.shift(frame.n_primitives());
         let labels = Labels::new(frame.n_primitives());
-        let of_closest = if query.closest {
-            size_of::<ClosestPoints>()
-        } else {
-            0
-        };
+        let of_distance = size_of::<f64>() * usize::from(query.distances);
+        let of_points = size_of::<[[f64; 3]; 2]>() * usize::from(query.closest);
         let limits = Limits {
-            besides: (1 + of_closest) as u64,
+            besides: (1 + of_distance + of_points) as u64,
             ..self.settings.limits()
         };
         answer.begin(limits, Wanted::Pairs, rooms);
@@ -133,7 +130,7 @@ impl Detector {
         stats.add_ms("collect", collect.elapsed().as_secs_f64() * 1e3);
         stats.ways.n_counted = n_counted;
         let features = Instant::now();
-        let (unnamed, numbering) = near.fill(keys, query.closest, workers.task(TASK))?;
+        let (unnamed, numbering) = near.fill(keys, query, workers.task(TASK))?;
         let tasks: Vec<Mutex<Unnamed<'_>>> = unnamed.into_iter().map(Mutex::new).collect();
         let n_tasks = tasks.len();
         let is_stopped = AtomicBool::new(false);
@@ -148,7 +145,7 @@ impl Detector {
                 let kind = unnamed.kind;
                 let find = |key| {
                     let (a, b) = numbering.pair(key);
-                    find_features(scene, kind, [a, b], query.closest)
+                    find_features(scene, kind, [a, b], query.distances)
                 };
                 unnamed.name(labels, exact_kind(TestId::Elements(kind)), find);
             }

@@ -1,0 +1,246 @@
+//! Every question of the detector: on one thread, in a forked process, stopped by a token.
+//!
+//! The threads of this process are counted, so this file holds one test alone.
+
+#![cfg(target_os = "linux")]
+
+use std::ops::ControlFlow;
+use std::os::unix::process::CommandExt;
+use std::process::{Command, exit};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use impinge_core::contact::Contacts;
+use impinge_core::{
+    Backend, BodyId, CancelToken, CandidateQuery, Control, Detector, Error, NearQuery, Pairs,
+    Query, Scene, Settings, Step,
+};
+use impinge_scenes::surfaces;
+
+/// Two balls that overlap, a third one beside them, and where they are at the end of a step.
+struct World {
+    scene: Scene,
+    bodies: [BodyId; 3],
+    pairs: Pairs,
+    contacts: Contacts,
+}
+
+fn detector(threads: usize) -> Detector {
+    Detector::with_settings(Settings {
+        backend: Backend::Cpu,
+        threads,
+        ..Settings::default()
+    })
+    .unwrap()
+}
+
+impl World {
+    fn new() -> Self {
+        let ball = surfaces::bumpy_ball(20_000, 0.2);
+        let mut scene = Scene::new();
+        let bodies = [0.0, 0.4, 4.0].map(|x| {
+            let at = ball.translated([x, 0.05, 0.0]);
+            let body = at.add_to(&mut scene).unwrap();
+            let end = at.translated([0.02, 0.0, 0.01]);
+            scene.set_end_positions(body, &end.positions).unwrap();
+            body
+        });
+        // One thread: the process has no others yet.
+        let mut detector = detector(1);
+        detector.detect(&scene, &Query::all()).unwrap();
+        let pairs = detector.take_pairs();
+        let contacts = detector.contacts(&scene, &pairs).unwrap();
+        World {
+            scene,
+            bodies,
+            pairs,
+            contacts,
+        }
+    }
+}
+
+/// A question, and a number that stands for its answer.
+type Ask = fn(&mut Detector, &World, &Control<'_>) -> Result<u64, Error>;
+
+fn bits(points: &[[f64; 3]]) -> u64 {
+    let bits = points.as_flattened().iter().map(|x| x.to_bits());
+    bits.fold(0, |sum, x| sum.rotate_left(5) ^ x)
+}
+
+const ALL: [(&str, Ask); 14] = [
+    ("detect", |d, w, c| {
+        Ok(d.detect_with(&w.scene, &Query::everything(), c)?.hash())
+    }),
+    ("count", |d, w, c| d.count_with(&w.scene, &Query::all(), c)),
+    ("any", |d, w, c| {
+        Ok(d.any_with(&w.scene, &Query::everything(), c)?.into())
+    }),
+    ("any of many", |d, w, c| {
+        Ok(d.any_with(&w.scene, &Query::all(), c)?.into())
+    }),
+    ("impacts", |d, w, c| {
+        let step = Step::new(Query::between(w.bodies[0], w.bodies[1]));
+        Ok(d.impacts_with(&w.scene, &step, c)?.hash())
+    }),
+    ("earliest", |d, w, c| {
+        let first = d.earliest_with(&w.scene, &Step::default(), c)?;
+        Ok(first.map_or(0, |first| first.toi.to_bits()))
+    }),
+    ("is_free", |d, w, c| {
+        Ok(d.is_free_with(&w.scene, &Step::default(), c)?.into())
+    }),
+    ("advance", |d, w, c| {
+        let step = Step::new(Query::between(w.bodies[0], w.bodies[2]));
+        Ok(d.advance_with(&w.scene, &step, c)?.fraction.to_bits())
+    }),
+    ("candidates", |d, w, c| {
+        let query = CandidateQuery::new(Query::between(w.bodies[0], w.bodies[1]));
+        Ok(d.candidates_with(&w.scene, &query, c)?.len() as u64)
+    }),
+    ("candidates in runs", |d, w, c| {
+        let query = CandidateQuery::new(Query::between(w.bodies[0], w.bodies[1]));
+        let each = |_| ControlFlow::<()>::Continue(());
+        match d.candidates_in_runs_with(&w.scene, &query, 100_000, each, c)? {
+            ControlFlow::Continue(n) => Ok(n),
+            ControlFlow::Break(()) => Ok(0),
+        }
+    }),
+    ("within_distance", |d, w, c| {
+        let query = NearQuery::new(Query::all()).distance(0.001);
+        Ok(d.within_distance_with(&w.scene, &query, c)?.hash())
+    }),
+    ("distance", |d, w, c| {
+        let [a, _, b] = w.bodies;
+        let nearest = d.distance_with(&w.scene, a, b, c)?.expect("elements");
+        Ok(nearest.distance.to_bits() ^ u64::from(nearest.primitives[0]))
+    }),
+    ("contacts", |d, w, c| {
+        Ok(bits(d.contacts_with(&w.scene, &w.pairs, c)?.points()))
+    }),
+    ("penetration", |d, w, c| {
+        let [a, b, _] = w.bodies;
+        let found = d.penetration_with(&w.scene, &w.contacts, a, b, c)?;
+        Ok(found.inside[0].len() as u64 + bits(&[found.regions[0].position]))
+    }),
+];
+
+/// How many threads this process has.
+fn n_threads() -> usize {
+    std::fs::read_dir("/proc/self/task").unwrap().count()
+}
+
+/// The answers of a new detector.
+fn answers(world: &World, threads: usize) -> Vec<u64> {
+    let mut detector = detector(threads);
+    ALL.iter()
+        .map(|(name, ask)| {
+            let answer = ask(&mut detector, world, &Control::new());
+            answer.unwrap_or_else(|error| panic!("{name}: {error}"))
+        })
+        .collect()
+}
+
+#[test]
+fn every_question() {
+    let before = n_threads();
+    let world = World::new();
+    let expected = answers(&world, 1);
+    assert_eq!(n_threads(), before, "one thread is one thread");
+
+    // Now this process has the threads of two pools, and a fork of it has none of them.
+    assert_eq!(answers(&world, 0), expected);
+    let mut kept = detector(2);
+    for (name, ask) in ALL {
+        let answer = ask(&mut kept, &world, &Control::new()).unwrap();
+        assert_eq!(Some(answer), at(name, &expected), "{name} on two threads");
+    }
+    in_fork(|| {
+        // A new detector, one of the parent's, and again.
+        let ask = |(_, ask): &(&str, Ask)| ask(&mut kept, &world, &Control::new()).ok();
+        answers(&world, 0) == expected
+            && answers(&world, 2) == expected
+            && ALL.iter().map(ask).eq(expected.iter().copied().map(Some))
+    });
+
+    for (name, ask) in ALL {
+        let token = CancelToken::new();
+        token.cancel();
+        let cancelled = ask(&mut kept, &world, &Control::new().cancel(&token));
+        assert!(
+            matches!(cancelled, Err(Error::Cancelled)),
+            "{name}: {cancelled:?}"
+        );
+        // What is long looks often: stopped at its third look.
+        let token = CancelToken::new();
+        let n_looks = AtomicU64::new(0);
+        let look = |_| {
+            if n_looks.fetch_add(1, Ordering::Relaxed) == 2 {
+                token.cancel();
+            }
+        };
+        let control = Control::new().cancel(&token).progress(&look);
+        let cancelled = ask(&mut detector(1), &world, &control);
+        let n_looks = n_looks.into_inner();
+        if n_looks > 3 || cancelled.is_err() {
+            assert!(matches!(cancelled, Err(Error::Cancelled)), "{name}");
+            assert_eq!(n_looks, 3, "{name} went on");
+        } else {
+            assert!(name.starts_with("any"), "{name} looks {n_looks} times");
+        }
+        let after = ask(&mut kept, &world, &Control::new()).ok();
+        assert_eq!(after, at(name, &expected), "{name} after it was cancelled");
+    }
+}
+
+fn at(name: &str, answers: &[u64]) -> Option<u64> {
+    let ix = ALL.iter().position(|(own, _)| *own == name)?;
+    answers.get(ix).copied()
+}
+
+/// Runs something in a fork of this process, and asserts that it returns true within a minute.
+fn in_fork(mut work: impl FnMut() -> bool) {
+    let code = || -> std::io::Result<()> {
+        // The parent would wait for ever.
+        std::thread::spawn(|| {
+            std::thread::sleep(Duration::from_secs(60));
+            exit(3);
+        });
+        exit(match work() {
+            true => 0,
+            false => 2,
+        });
+    };
+    let mut command = Command::new("/bin/false");
+    // SAFETY: not much: a fork of a process with threads may only call what is safe in a signal handler, and this allocates
+    // and starts threads. That is what Python's multiprocessing does, and what is tested.
+    unsafe { command.pre_exec(erase(code)) };
+    let status = command.spawn().and_then(|mut child| child.wait());
+    assert_eq!(
+        status.unwrap().code(),
+        Some(0),
+        "2: another answer, 3: it hangs"
+    );
+}
+
+/// Lets a closure live as long as the command wishes. It is dropped before what it borrows: `in_fork` ends after the child.
+fn erase<'a>(
+    code: impl FnMut() -> std::io::Result<()> + 'a,
+) -> impl FnMut() -> std::io::Result<()> + Send + Sync + 'static {
+    struct Shared(*mut (dyn FnMut() -> std::io::Result<()> + 'static));
+    // SAFETY: it is called in the fork alone, by one thread.
+    unsafe impl Send for Shared {}
+    unsafe impl Sync for Shared {}
+    let boxed: Box<dyn FnMut() -> std::io::Result<()> + 'a> = Box::new(code);
+    // SAFETY: only the lifetime changes.
+    let pointer = unsafe {
+        std::mem::transmute::<_, *mut (dyn FnMut() -> std::io::Result<()> + 'static)>(
+            Box::into_raw(boxed),
+        )
+    };
+    let shared = Shared(pointer);
+    move || {
+        let shared = &shared;
+        // SAFETY: the closure is never freed.
+        unsafe { (*shared.0)() }
+    }
+}
