@@ -99,12 +99,14 @@ function native(command, ...args) {
 // The page's answer about files is the program's: the rows and the hash.
 async function sameAsProgram(page, command, names, ...more) {
   const paths = names.map((name) => (name.includes("/") ? name : join(files, name)));
-  const { hash, pairs: n } = JSON.parse(native(command, ...paths, ...more, "--json"));
+  const { hash, pairs: n, n_regions: nRegions } = JSON.parse(native(command, ...paths, ...more, "--json"));
   const csv = native(command, ...paths, ...more, "--pairs", "-").trim().split("\n").slice(1);
   const rows = csv.map((line) => line.split(",").map(Number)).flat();
   assert.equal(await hashOf(page, "cpu"), hash, `${command} ${names}: the hash`);
   assert.equal(await pairs(page), typeof n === "number" ? n : csv.length);
   assert.deepEqual(await page.evaluate(() => [...window.page.rows]), rows, `${command} ${names}: the rows`);
+  // The program's regions belong to two bodies each. Those of one body are the page's places.
+  if (command === "self") assert.equal(await page.evaluate(() => window.page.places.length), nRegions, `${names}: the places`);
   return csv.length;
 }
 
@@ -165,6 +167,8 @@ async function writeFiles() {
     "soup.stl": soup,
     "floor.obj": floor,
     "above.obj": above,
+    // Two triangles that share an edge and lie on each other.
+    "folded.obj": "v 0 0 0\nv 2 0 0\nv 1 2 0\nv 1 1 0\nf 1 2 3\nf 2 1 4",
     "broken.obj": "v 0 0\nf 1 2 3",
     "notes.txt": "",
     "bend.obj": stripObj(0),
@@ -203,6 +207,10 @@ async function dropped(browser) {
   await page.mouse.up();
   await settled(page);
   await sameAsProgram(page, "self", ["soup.stl"]);
+
+  // Neighbours count if they meet in more than what they share.
+  await drop(page, "folded.obj");
+  assert.equal(await sameAsProgram(page, "self", ["folded.obj"]), 1);
 
   // y points up on the screen, or z.
   const height = () => page.evaluate(() => Math.max(...window.page.view.positions(0).filter((_, at) => at % 3 === 2)));
