@@ -77,7 +77,8 @@ pub enum Command {
         after_help = SEQUENCE_EXAMPLES,
         mut_arg("toi", |toi| toi.requires("ccd")),
         mut_arg("start", |start| start.requires("ccd")),
-        mut_arg("separation", |separation| separation.requires("ccd"))
+        mut_arg("separation", |separation| separation.requires("ccd")),
+        mut_arg("clearance", |clearance| clearance.requires("ccd"))
     )]
     Sequence(SequenceArgs),
     /// Find what touches while meshes move from one pose to another, and when first

@@ -9,9 +9,11 @@ use crate::scene::Scene;
 /// How far a step can be taken.
 #[derive(Clone, PartialEq)]
 pub struct Advance {
-    /// The part of the step that can be taken: 1 for all of it, 0 for none.
+    /// The part of the step that can be taken: 1 for all of it, 0 for none. With a [clearance](crate::Step::clearance) it holds for positions
+    /// that solvers compute, and for all smaller parts: see [`Detector::advance`](crate::Detector::advance).
     pub fraction: f64,
     /// The first contact of the whole step, its time rounded down to `f64`. `None` if the whole step is free.
+    /// With a clearance: the first time at which a pair is as near as it may come, rounding included, as an `f32`.
     pub first: Option<Impact>,
     /// The vertex positions of all moving bodies at that fraction, rounded to the precision in which they are stored. The
     /// straight path from the start to these rounded positions is free, except for pairs that touch at the start.

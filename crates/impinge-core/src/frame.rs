@@ -19,7 +19,7 @@ use std::ops::Range;
 
 use crate::elements::{Kind, Part};
 use crate::error::Error;
-use crate::exact::Reach;
+use crate::exact::{Contact, ElementPair, Keep, Point, Reach};
 use crate::hull::{Extent, Pose};
 use crate::ids::BodyId;
 pub use crate::index::pair_key;
@@ -28,6 +28,7 @@ use crate::pair_kind::{PairKind, PairKinds};
 use crate::positions::{Positions, check_positions};
 use crate::query::{Cell, Query, Scope, SharedVertex};
 use crate::scene::{Body, Filter, Scene};
+use crate::step::PairFilter;
 
 /// One part of one body that takes part in a frame.
 #[derive(Debug, Clone, Copy)]
@@ -122,6 +123,11 @@ pub struct Frame {
     is_step: bool,
     /// The distance within which elements are near, besides what their bodies add.
     distance: f64,
+    /// What the elements of a step keep, at most: the distance, and a clearance if there is one.
+    bound: f64,
+    keep: Keep,
+    /// Which pairs of a step count.
+    filter: Option<PairFilter>,
 }
 
 impl Frame {
@@ -134,6 +140,9 @@ impl Frame {
     pub fn resolve_for(&mut self, scene: &Scene, query: &Query, ask: Ask) -> Result<(), Error> {
         self.layers.clear();
         self.distance = 0.0;
+        self.bound = 0.0;
+        self.keep = Keep::default();
+        self.filter = None;
         self.ask = ask;
         // Vertices, edges and faces that share a vertex never count.
         self.shared_vertex = match ask {
@@ -216,6 +225,7 @@ impl Frame {
     /// Sets within which distance elements are near: the sum of `distance` and the radii of both bodies.
     pub(crate) fn set_reach(&mut self, distance: f64, radii: &BTreeMap<BodyId, f64>) {
         self.distance = distance;
+        self.bound = distance;
         for layer in &mut self.layers {
             layer.radius = radii.get(&layer.id).copied().unwrap_or(0.0);
             layer.rounded = 0.0;
@@ -225,6 +235,107 @@ impl Frame {
     /// The distance within which elements are near, besides what their bodies add.
     pub(crate) fn distance(&self) -> f64 {
         self.distance
+    }
+
+    /// Makes this a question about elements that keep a separation, and a clearance if there is one.
+    pub(crate) fn set_keep(&mut self, scene: &Scene, keep: Keep) {
+        self.set_reach(keep.separation, &BTreeMap::new());
+        self.keep = keep;
+        if keep.is_plain() {
+            return;
+        }
+        let (mut magnitude, mut unit) = (0.0, 0.0);
+        for (_, body) in scene.bodies() {
+            if let (true, Some(end)) = (keep.is_rounded, body.end_positions()) {
+                magnitude = body
+                    .positions()
+                    .magnitude()
+                    .max(end.magnitude())
+                    .max(magnitude);
+                unit = f64::max(unit, body.positions().unit_roundoff(end));
+            }
+        }
+        self.bound = keep.most(magnitude, unit);
+    }
+
+    /// Whether elements keep a clearance, so that a pair keeps what its distance at the start says.
+    pub(crate) fn has_clearance(&self) -> bool {
+        !self.keep.is_plain()
+    }
+
+    /// At least what any pair keeps.
+    pub(crate) fn bound(&self) -> f64 {
+        self.bound
+    }
+
+    /// What a pair of two layers keeps, by its points at both ends.
+    pub(crate) fn kept(
+        &self,
+        scene: &Scene,
+        layers: [LayerIx; 2],
+        pair: ElementPair,
+        ends: [&[Point; 4]; 2],
+    ) -> f64 {
+        self.keep
+            .distance(pair, ends, self.unit_roundoff(scene, layers))
+    }
+
+    /// When a pair of two layers is first as near as it may come.
+    pub(crate) fn first(
+        &self,
+        scene: &Scene,
+        layers: [LayerIx; 2],
+        pair: ElementPair,
+        ends: [&[Point; 4]; 2],
+    ) -> Option<Contact> {
+        self.keep
+            .first(pair, ends, self.unit_roundoff(scene, layers))
+    }
+
+    /// The contact of a pair that is as near as it may come from the start on.
+    pub(crate) fn at_start(&self, pair: ElementPair, start: &[Point; 4]) -> Contact {
+        self.keep.at_start(pair, start)
+    }
+
+    /// The unit roundoff of the positions of two layers that move; the larger one.
+    fn unit_roundoff(&self, scene: &Scene, layers: [LayerIx; 2]) -> f64 {
+        let units = layers.map(|layer| {
+            let body = self.body(scene, layer);
+            let end = body.end_positions();
+            end.map_or(0.0, |end| body.positions().unit_roundoff(end))
+        });
+        units[0].max(units[1])
+    }
+
+    /// Sets which pairs of a step count.
+    pub(crate) fn set_filter(&mut self, filter: Option<&PairFilter>) {
+        self.filter = filter.cloned();
+    }
+
+    /// Whether some pairs do not count, because of their elements.
+    pub(crate) fn has_filter(&self) -> bool {
+        self.filter.is_some()
+    }
+
+    /// Whether a pair counts: it belongs to the cell, if there is one, and the filter lets it pass.
+    #[inline(always)]
+    pub fn counts(&self, scene: &Scene, key: u64) -> bool {
+        self.is_owned(scene, key) && (self.filter.is_none() || self.passes(scene, key))
+    }
+
+    #[inline(never)]
+    fn passes(&self, scene: &Scene, key: u64) -> bool {
+        let Some(filter) = &self.filter else {
+            return true;
+        };
+        let [a, b] = pair_numbers(key).map(|number| self.locate(number));
+        let [a, b] = [&a, &b].map(|(layer, element)| {
+            let corners = self
+                .body(scene, *layer)
+                .corners(self.layer(*layer).part, element);
+            (self.layer(*layer).id, corners)
+        });
+        filter.passes([a, b])
     }
 
     /// Within which distance elements of two layers are near.
@@ -237,7 +348,7 @@ impl Frame {
     /// layers reach at least as far together as their elements may be apart.
     pub(crate) fn margin(&self, layer: LayerIx) -> f64 {
         let radius = self.layer(layer).radius;
-        match (self.distance, radius) {
+        match (self.bound, radius) {
             (0.0, radius) => radius,
             (distance, radius) => (radius + (distance / 2.0).next_up()).next_up(),
         }

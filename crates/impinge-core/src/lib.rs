@@ -72,7 +72,7 @@ pub use query::{Query, SharedVertex};
 pub use scene::{Body, Filter, Scene};
 pub use settings::{Backend, InstructionSet, Method, Placement, Recluster, Settings};
 pub use stats::{Stage, Statistics};
-pub use step::{CandidateQuery, Start, Step, Toi};
+pub use step::{CandidateQuery, Clearance, ElementVertices, PairFilter, Start, Step, Toi};
 pub use tuning::{Tuning, Ways};
 #[cfg(feature = "gpu")]
 pub use wgpu;

@@ -108,6 +108,14 @@ impl Positions {
         share * self.magnitude().max(end.magnitude()) + least
     }
 
+    /// The unit roundoff of positions on the way to others.
+    pub(crate) fn unit_roundoff(&self, end: &Positions) -> f64 {
+        match (self, end) {
+            (Positions::F64(_), Positions::F64(_)) => 2f64.powi(-53),
+            _ => 2f64.powi(-24),
+        }
+    }
+
     pub(crate) fn precision(&self) -> &'static str {
         match self {
             Positions::F32(_) => "f32",

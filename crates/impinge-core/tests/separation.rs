@@ -1,11 +1,12 @@
-//! Steps in which elements must keep a distance: against every pair by the exact test, and what must hold of any answer.
+//! Steps in which elements must keep a distance, or a clearance: against every pair by the exact test, and what must hold of any
+//! answer.
 
 use std::collections::BTreeMap;
 
-use impinge_core::exact::{ElementPair, first_within};
+use impinge_core::exact::{Contact, ElementPair, Point, are_within, closest_points, first_within};
 use impinge_core::{
-    Backend, Detector, Error, Impact, InstructionSet, Method, PairKind, Part, Query, Scene,
-    Settings, Start, Step, Toi,
+    Backend, BodyId, Clearance, Detector, Error, Impact, InstructionSet, Method, PairFilter,
+    PairKind, Part, Positions, Query, Scene, Settings, Start, Step, Toi,
 };
 use impinge_scenes::Random;
 
@@ -62,6 +63,45 @@ fn rows(impacts: &[Impact]) -> Vec<Row> {
 
 /// Pair by pair: the kinds of a step, with all bodies.
 fn expected(scene: &Scene, separation: f64) -> Vec<Row> {
+    contacts(scene, |pair, start, end| {
+        first_within(pair, start, end, separation)
+    })
+}
+
+/// When a pair is first as near as a clearance lets it come. For separations that a float with few bits holds.
+fn first_kept(
+    pair: ElementPair,
+    [start, end]: [&[Point; 4]; 2],
+    separation: f64,
+    (clearance, share): (f64, f64),
+) -> Option<Contact> {
+    if are_within(pair, start, separation) {
+        return first_within(pair, start, end, separation);
+    }
+    // The least number of 24 bits that is not less than what the pair is apart. A computed distance is wrong by less than 1e-12.
+    let apart = closest_points(pair, start).distance - separation;
+    let step = 2f64.powi(apart.log2().floor() as i32 - 23);
+    let short = (0..3)
+        .map(|k| ((apart * (1.0 - 1e-10) / step).floor() + f64::from(k)) * step)
+        .find(|&short| are_within(pair, start, separation + short))
+        .expect("one of three");
+    // The sum is rounded down, and the difference has no rounding here.
+    let beyond = f64::min(clearance, share * short);
+    let sum = separation + beyond;
+    let is_above = sum - separation > beyond;
+    first_within(
+        pair,
+        start,
+        end,
+        if is_above { sum.next_down() } else { sum },
+    )
+}
+
+/// Pair by pair: the kinds of a step, with all bodies.
+fn contacts(
+    scene: &Scene,
+    first: impl Fn(ElementPair, &[Point; 4], &[Point; 4]) -> Option<Contact>,
+) -> Vec<Row> {
     use Part::{Edges, Faces, Vertices};
     let bodies: Vec<_> = scene.bodies().collect();
     let mut expected = Vec::new();
@@ -130,7 +170,7 @@ fn expected(scene: &Scene, separation: f64) -> Vec<Row> {
                             }
                         }
                         let [start, end] = &ends;
-                        if let Some(contact) = first_within(pair, start, end, separation) {
+                        if let Some(contact) = first(pair, start, end) {
                             expected.push((kind, row, contact.time, contact.at_start));
                         }
                     }
@@ -185,6 +225,239 @@ fn more_separation_is_never_later() {
             last = now;
         }
         assert!(last.len() > without.len());
+    }
+}
+
+#[test]
+fn a_clearance_is_kept_pair_by_pair() {
+    for seed in 0..3 {
+        let scene = lattice(seed);
+        for (separation, clearance, share) in [
+            (0.0, 0.25, 0.2),
+            (0.0, 0.1, 0.5),
+            (0.0, 3.0, 0.9),
+            (0.5, 0.1, 0.2),
+            (0.5, 1.0, 0.75),
+        ] {
+            let expected = contacts(&scene, |pair, start, end| {
+                first_kept(pair, [start, end], separation, (clearance, share))
+            });
+            let step = Step::default()
+                .separation(separation)
+                .clearance(Clearance::new(clearance).share(share))
+                .toi(Toi::F64);
+            for mut detector in detectors() {
+                let found = impacts(&mut detector, &scene, &step);
+                assert_eq!(
+                    rows(&found),
+                    expected,
+                    "seed {seed}, {separation} {clearance}"
+                );
+                let first = detector.earliest(&scene, &step).expect("good");
+                let least = found.iter().map(|i| i.toi).reduce(f64::min);
+                assert_eq!(first.map(|i| i.toi), least);
+                assert!(!detector.is_free(&scene, &step).expect("good"));
+                let skip = step.clone().start(Start::Skip);
+                let later: Vec<Impact> = found.iter().filter(|i| !i.at_start).copied().collect();
+                assert_eq!(impacts(&mut detector, &scene, &skip), later);
+            }
+        }
+    }
+}
+
+/// Without a clearance, or with a share of 0, nothing changes; a larger one is never later.
+#[test]
+fn more_clearance_is_never_later() {
+    for seed in 10..13 {
+        let scene = lattice(seed);
+        let mut detector = detector(Method::Clusters);
+        let step = Step::default().separation(0.25).toi(Toi::F64);
+        let without = rows(&impacts(&mut detector, &scene, &step));
+        let mut last: BTreeMap<(PairKind, [u32; 4]), f64> = BTreeMap::new();
+        for (clearance, share) in [(0.0, 0.2), (1.0, 0.0), (1e-12, 0.2), (0.3, 0.2), (0.3, 0.5)] {
+            let step = (step.clone()).clearance(Clearance::new(clearance).share(share));
+            let found = rows(&impacts(&mut detector, &scene, &step));
+            if clearance * share == 0.0 {
+                assert_eq!(found, without);
+            }
+            let now: BTreeMap<_, _> = found.iter().map(|row| ((row.0, row.1), row.2)).collect();
+            for (pair, toi) in &last {
+                assert!(now[pair] <= *toi, "{pair:?} at {clearance}");
+            }
+            last = now;
+        }
+    }
+}
+
+/// Two soups of triangles that move apart from each other's places and into new ones.
+fn two_soups(is_double: bool) -> (Scene, [BodyId; 2]) {
+    let mut scene = Scene::new();
+    let bodies = [1, 3].map(|seed| {
+        let [start, end] = [0, 1].map(|k| impinge_scenes::soup::triangles(24, 0.2, seed + k));
+        if is_double {
+            let widened = |rows: &[[f32; 3]]| -> Vec<[f64; 3]> {
+                rows.iter()
+                    .map(|row| row.map(|x| f64::from(x) / 3.0))
+                    .collect()
+            };
+            let body = scene.add_triangles(&start_faces(&start), &widened(&start.positions));
+            let body = body.expect("good");
+            let end = widened(&end.positions);
+            scene.set_end_positions(body, &end).expect("good");
+            body
+        } else {
+            let body = start.add_to(&mut scene).expect("good");
+            scene.set_end_positions(body, &end.positions).expect("good");
+            body
+        }
+    });
+    (scene, bodies)
+}
+
+fn start_faces(mesh: &impinge_scenes::Model) -> Vec<[u32; 3]> {
+    match &mesh.elements {
+        impinge_core::Elements::Triangles(faces) => faces.to_vec(),
+        _ => panic!("triangles"),
+    }
+}
+
+/// Every position that a solver computes on the way, by either formula and for any smaller part, is reached on a straight line
+/// on which all pairs keep the clearance. A chain of steps goes on, however near elements are.
+#[test]
+fn every_part_of_an_advanced_step_keeps_the_clearance() {
+    for is_double in [false, true] {
+        let (mut scene, bodies) = two_soups(is_double);
+        let mut random = Random::new(5);
+        let mut detector = detector(Method::Clusters);
+        // What intersects at the start is none of this test's business.
+        let step = Step::default().clearance(1e-2).start(Start::Skip);
+        let mut fractions = Vec::new();
+        for _ in 0..8 {
+            let advance = detector.advance(&scene, &step).expect("good");
+            let first = advance.first.expect("they meet");
+            assert_eq!((advance.fraction, advance.n_tried), (first.toi, 1));
+            assert_eq!(f64::from(first.toi as f32), first.toi);
+            fractions.push(advance.fraction);
+            let mut trial = scene.clone();
+            let mut any = || f64::from(random.unit());
+            for part in [1.0, any(), any() / 16.0, 1e-6, 1e-12] {
+                let a = part * advance.fraction;
+                for adds in [false, true] {
+                    for &body in &bodies {
+                        let ends = scene.body(body).expect("there");
+                        let end = ends.end_positions().expect("it moves");
+                        match (ends.positions(), end) {
+                            (Positions::F32(start), Positions::F32(end)) => {
+                                let a = a as f32;
+                                let at = |(x, y): (&[f32; 3], &[f32; 3])| {
+                                    std::array::from_fn(|k| match adds {
+                                        false => x[k] + a * (y[k] - x[k]),
+                                        true => x[k] + a * added(x[k], y[k]),
+                                    })
+                                };
+                                let at: Vec<[f32; 3]> =
+                                    start.iter().zip(end.iter()).map(at).collect();
+                                trial.set_end_positions(body, &at).expect("good");
+                            }
+                            (Positions::F64(start), Positions::F64(end)) => {
+                                let at = |(x, y): (&[f64; 3], &[f64; 3])| {
+                                    std::array::from_fn(|k| x[k] + a * (y[k] - x[k]))
+                                };
+                                let at: Vec<[f64; 3]> =
+                                    start.iter().zip(end.iter()).map(at).collect();
+                                trial.set_end_positions(body, &at).expect("good");
+                            }
+                            _ => panic!("mixed"),
+                        }
+                    }
+                    assert!(detector.is_free(&trial, &step).expect("good"), "{part}");
+                }
+            }
+            advance.apply(&mut scene).expect("good");
+            for (seed, &body) in bodies.iter().enumerate() {
+                let end = impinge_scenes::soup::triangles(24, 0.2, 2 + 2 * seed as u64);
+                let third = |rows: &[[f32; 3]]| -> Vec<[f64; 3]> {
+                    rows.iter()
+                        .map(|row| row.map(|x| f64::from(x) / 3.0))
+                        .collect()
+                };
+                match is_double {
+                    true => scene.set_end_positions(body, &third(&end.positions)),
+                    false => scene.set_end_positions(body, &end.positions),
+                }
+                .expect("good");
+            }
+        }
+        assert!(
+            fractions.iter().all(|&fraction| fraction > 0.0),
+            "{fractions:?}"
+        );
+    }
+}
+
+/// A number whose rounded sum with x is y, if there is one near their difference.
+fn added(x: f32, y: f32) -> f32 {
+    let difference = y - x;
+    let near = [difference, difference.next_up(), difference.next_down()];
+    near.into_iter()
+        .rev()
+        .find(|dx| x + dx == y)
+        .unwrap_or(difference)
+}
+
+/// Elements that are nearer than rounding can move them allow no step, however short, but only if they move.
+#[test]
+fn elements_nearer_than_rounding_allow_no_step() {
+    for (gap, is_free) in [(2f64.powi(-22), false), (2f64.powi(-8), true)] {
+        let at = |z: f32| [[1.0f32, 0.0, z], [5.0, 0.0, z], [1.0, 4.0, z]];
+        let mut scene = Scene::new();
+        scene.add_triangles(&[[0, 1, 2]], &at(0.0)).expect("good");
+        let upper = scene
+            .add_triangles(&[[0, 1, 2]], &at(gap as f32))
+            .expect("good");
+        let step = Step::default().clearance(1e-4);
+        for mut detector in detectors() {
+            assert_eq!(detector.advance(&scene, &step).expect("good").fraction, 1.0);
+            scene.set_end_positions(upper, &at(1.0)).expect("good");
+            let fraction = detector.advance(&scene, &step).expect("good").fraction;
+            assert_eq!(fraction, f64::from(u8::from(is_free)));
+            // The way itself is free.
+            assert!(detector.is_free(&scene, &step).expect("good"));
+            scene.clear_end_positions(upper).expect("good");
+        }
+    }
+}
+
+#[test]
+fn a_filter_leaves_out_pairs() {
+    // By vertices of both elements and their bodies: about half of all pairs.
+    let filter = PairFilter::new(|[(a, of_a), (b, of_b)]| {
+        let sum: u32 = of_a.iter().chain(of_b).sum();
+        !(sum + (a.index() + b.index()) as u32).is_multiple_of(2)
+    });
+    assert_eq!(filter, filter.clone());
+    for seed in 0..3 {
+        let scene = lattice(seed);
+        for clearance in [0.0, 0.25] {
+            let step = Step::default().clearance(clearance).toi(Toi::F64);
+            let filtered = step.clone().filter(filter.clone());
+            let mut found = Vec::new();
+            for mut detector in detectors() {
+                let all = impacts(&mut detector, &scene, &step).len();
+                let some = impacts(&mut detector, &scene, &filtered);
+                assert!(some.len() < all && !some.is_empty());
+                let least = some.iter().map(|i| i.toi).reduce(f64::min);
+                let first = detector.earliest(&scene, &filtered).expect("good");
+                assert_eq!(first.map(|i| i.toi), least);
+                assert!(!detector.is_free(&scene, &filtered).expect("good"));
+                found.push(rows(&some));
+                let none = step.clone().filter(PairFilter::new(|_| false));
+                assert!(detector.is_free(&scene, &none).expect("good"));
+                let advance = detector.advance(&scene, &none).expect("good");
+                assert_eq!(advance.fraction, 1.0);
+            }
+            assert_eq!(found[0], found[1]);
+        }
     }
 }
 
@@ -264,8 +537,16 @@ fn the_answer_depends_on_the_input_alone() {
     let [a, b] = [1, 2].map(|seed| impinge_scenes::soup::triangles(24, 0.3, seed));
     let body = a.add_to(&mut scene).expect("good");
     scene.set_end_positions(body, &b.positions).expect("good");
-    let step = Step::default().separation(0.02);
-    let expected = rows(&impacts(&mut detector(Method::Naive), &scene, &step));
+    for step in [
+        Step::default().separation(0.02),
+        Step::default().clearance(0.02),
+    ] {
+        is_the_same_everywhere(&scene, &step);
+    }
+}
+
+fn is_the_same_everywhere(scene: &Scene, step: &Step) {
+    let expected = rows(&impacts(&mut detector(Method::Naive), scene, step));
     assert!(expected.len() > 50, "{}", expected.len());
     for (threads, instruction_set, memory_budget) in [
         (1, InstructionSet::Portable, None),
@@ -281,13 +562,38 @@ fn the_answer_depends_on_the_input_alone() {
         })
         .expect("settings");
         for _ in 0..2 {
-            assert_eq!(rows(&impacts(&mut detector, &scene, &step)), expected);
-            let all = impacts(&mut detector, &scene, &step);
-            let first = detector.earliest(&scene, &step).expect("good");
+            assert_eq!(rows(&impacts(&mut detector, scene, step)), expected);
+            let all = impacts(&mut detector, scene, step);
+            let first = detector.earliest(scene, step).expect("good");
             let least = all.iter().map(|i| i.toi).reduce(f64::min);
             assert_eq!(first.map(|i| i.toi), least);
         }
     }
+}
+
+#[test]
+fn bad_clearances_are_refused_by_name() {
+    let mut detector = detector(Method::Clusters);
+    let scene = falling(0.0);
+    let mut refused = |clearance: Clearance| match detector
+        .impacts(&scene, &Step::default().clearance(clearance))
+        .err()
+    {
+        Some(Error::Setting { setting, .. }) => Some(setting),
+        _ => None,
+    };
+    for bad in [-0.5, f64::NAN, f64::INFINITY] {
+        assert_eq!(refused(Clearance::new(bad)), Some("clearance"));
+        assert_eq!(
+            refused(Clearance::new(0.1).share(bad)),
+            Some("clearance_share")
+        );
+    }
+    assert_eq!(
+        refused(Clearance::new(0.1).share(1.0)),
+        Some("clearance_share")
+    );
+    assert_eq!(refused(Clearance::new(0.1).share(1.0f64.next_down())), None);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use impinge::{CandidateQuery, Control, NearQuery, Query, Step, Toi};
+use impinge::{CandidateQuery, Clearance, Control, NearQuery, Query, Step, Toi};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -17,6 +17,7 @@ use crate::result::{Answer, Asked};
 use crate::scene::Scene;
 use crate::settings::{self, Argument, Told, unexpected, unsigned};
 use crate::steps::{self, Advance, Candidates, Impact, Impacts, Spare};
+use crate::vertex_filter::VertexFilter;
 use crate::watch::{CancelToken, Watch};
 
 /// Finds intersecting pairs, frame after frame. Scratch memory lives here and is used again.
@@ -326,6 +327,10 @@ impl Detector {
     /// separation : float
     ///     The distance that elements must keep, 0 or more. A pair is then reported with the first time at which its
     ///     distance is at most `separation`, decided exactly; with 0, elements must touch.
+    /// clearance, clearance_share : float
+    ///     What the step leaves, a length: every pair keeps ``separation + min(clearance, clearance_share * (d - separation))``, with
+    ///     d its distance at the start. A pair is then reported with the first time at which its distance is at most that. With
+    ///     1e-4 and 0.2 this is ipc-toolkit's ``conservative_rescaling=0.8``.
     /// owned_by : (low, high), optional
     ///     As for `detect`, with boxes that hold their elements from the start to the end. If a distance is asked for as well, a
     ///     program needs the elements whose boxes touch its cell when inflated by it, by twice the distance of `candidates`.
@@ -339,7 +344,7 @@ impl Detector {
     /// Raises
     /// ------
     /// ValueError, TypeError, MemoryError, Cancelled, RuntimeError
-    ///     As `detect`; a separation that is negative or not finite.
+    ///     As `detect`; a separation or a clearance that is negative or not finite; a share that is not from 0 to less than 1.
     ///
     /// Examples
     /// --------
@@ -357,10 +362,11 @@ impl Detector {
     #[pyo3(
         signature = (
             scene, *, between=None, within=None, ignore=None, start=None, toi=None, separation=None,
-            owned_by=None, progress=None, cancel=None,
+            clearance=None, clearance_share=None, owned_by=None, progress=None, cancel=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          start=\"report\", toi=\"f32\", separation=0.0, owned_by=None, progress=None, cancel=None)"
+                          start=\"report\", toi=\"f32\", separation=0.0, clearance=0.0, clearance_share=0.2, \
+                          owned_by=None, progress=None, cancel=None)"
     )]
     fn impacts(
         slf: &Bound<'_, Self>,
@@ -371,12 +377,19 @@ impl Detector {
         start: Argument<'_, '_>,
         toi: Argument<'_, '_>,
         separation: Argument<'_, '_>,
+        clearance: Argument<'_, '_>,
+        clearance_share: Argument<'_, '_>,
         owned_by: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<Impacts> {
         let toi = settings::toi(toi)?;
-        let ask = step([between, within, ignore, owned_by], start, toi, separation)?;
+        let ask = step(
+            [between, within, ignore, owned_by],
+            start,
+            toi,
+            [separation, clearance, clearance_share],
+        )?;
         let answer = |detector: &mut impinge::Detector,
                       scene: &impinge::Scene,
                       step: &Step,
@@ -394,7 +407,7 @@ impl Detector {
     ///
     /// Parameters
     /// ----------
-    /// scene, between, within, ignore, start, toi, separation, owned_by, progress, cancel
+    /// scene, between, within, ignore, start, toi, separation, clearance, clearance_share, owned_by, progress, cancel
     ///     As for `impacts`.
     ///
     /// Returns
@@ -410,10 +423,11 @@ impl Detector {
     #[pyo3(
         signature = (
             scene, *, between=None, within=None, ignore=None, start=None, toi=None, separation=None,
-            owned_by=None, progress=None, cancel=None,
+            clearance=None, clearance_share=None, owned_by=None, progress=None, cancel=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          start=\"report\", toi=\"f32\", separation=0.0, owned_by=None, progress=None, cancel=None)"
+                          start=\"report\", toi=\"f32\", separation=0.0, clearance=0.0, clearance_share=0.2, \
+                          owned_by=None, progress=None, cancel=None)"
     )]
     fn earliest(
         slf: &Bound<'_, Self>,
@@ -424,6 +438,8 @@ impl Detector {
         start: Argument<'_, '_>,
         toi: Argument<'_, '_>,
         separation: Argument<'_, '_>,
+        clearance: Argument<'_, '_>,
+        clearance_share: Argument<'_, '_>,
         owned_by: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
@@ -432,7 +448,7 @@ impl Detector {
             [between, within, ignore, owned_by],
             start,
             settings::toi(toi)?,
-            separation,
+            [separation, clearance, clearance_share],
         )?;
         let watched = (scene, progress, cancel);
         let answer = impinge::Detector::earliest_with;
@@ -444,7 +460,7 @@ impl Detector {
     ///
     /// Parameters
     /// ----------
-    /// scene, between, within, ignore, start, separation, owned_by, progress, cancel
+    /// scene, between, within, ignore, start, separation, clearance, clearance_share, owned_by, progress, cancel
     ///     As for `impacts`.
     ///
     /// Returns
@@ -459,10 +475,11 @@ impl Detector {
     #[pyo3(
         signature = (
             scene, *, between=None, within=None, ignore=None, start=None, separation=None,
-            owned_by=None, progress=None, cancel=None,
+            clearance=None, clearance_share=None, owned_by=None, progress=None, cancel=None, _filter=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          start=\"report\", separation=0.0, owned_by=None, progress=None, cancel=None)"
+                          start=\"report\", separation=0.0, clearance=0.0, clearance_share=0.2, \
+                          owned_by=None, progress=None, cancel=None)"
     )]
     fn is_free(
         slf: &Bound<'_, Self>,
@@ -472,19 +489,24 @@ impl Detector {
         ignore: Argument<'_, '_>,
         start: Argument<'_, '_>,
         separation: Argument<'_, '_>,
+        clearance: Argument<'_, '_>,
+        clearance_share: Argument<'_, '_>,
         owned_by: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
+        _filter: Option<&Bound<'_, VertexFilter>>,
     ) -> PyResult<bool> {
         let ask = step(
             [between, within, ignore, owned_by],
             start,
             Toi::F32,
-            separation,
+            [separation, clearance, clearance_share],
         )?;
         let watched = (scene, progress, cancel);
         let answer = impinge::Detector::is_free_with;
-        Ok(Detector::watched(slf, watched, ask, answer)?.0)
+        let is_free = Detector::watched(slf, watched, filtered(ask, _filter), answer)?.0;
+        _filter.map_or(Ok(()), |filter| filter.get().check())?;
+        Ok(is_free)
     }
 
     /// How far a step can be taken: a fraction of it, backed off from the first contact hardly more than the
@@ -494,9 +516,13 @@ impl Detector {
     /// rounded first, and the way to those is asked about. A chain of such steps is free from the first to the
     /// last. Pairs that touch at the start allow no step at all, or are not looked at with ``start="skip"``.
     ///
+    /// With a `clearance`, the fraction holds for positions that you compute, too: by ``x0 + a * (x1 - x0)`` or by ``x0 + a * dx`` with
+    /// ``x1 = x0 + dx``, in the precision of the positions, for every ``a`` from 0 to the fraction, the straight way there is free and
+    /// keeps the clearance, rounding included. Without one, only `Advance.positions` are proven.
+    ///
     /// Parameters
     /// ----------
-    /// scene, between, within, ignore, start, separation, progress, cancel
+    /// scene, between, within, ignore, start, separation, clearance, clearance_share, progress, cancel
     ///     As for `impacts`.
     ///
     /// Returns
@@ -512,10 +538,11 @@ impl Detector {
     #[pyo3(
         signature = (
             scene, *, between=None, within=None, ignore=None, start=None, separation=None,
-            progress=None, cancel=None,
+            clearance=None, clearance_share=None, progress=None, cancel=None, _filter=None,
         ),
         text_signature = "($self, scene, *, between=None, within=None, ignore=None, \
-                          start=\"report\", separation=0.0, progress=None, cancel=None)"
+                          start=\"report\", separation=0.0, clearance=0.0, clearance_share=0.2, \
+                          progress=None, cancel=None)"
     )]
     fn advance(
         slf: &Bound<'_, Self>,
@@ -525,13 +552,23 @@ impl Detector {
         ignore: Argument<'_, '_>,
         start: Argument<'_, '_>,
         separation: Argument<'_, '_>,
+        clearance: Argument<'_, '_>,
+        clearance_share: Argument<'_, '_>,
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
+        _filter: Option<&Bound<'_, VertexFilter>>,
     ) -> PyResult<Advance> {
-        let ask = step([between, within, ignore, None], start, Toi::F64, separation)?;
+        let ask = step(
+            [between, within, ignore, None],
+            start,
+            Toi::F64,
+            [separation, clearance, clearance_share],
+        )?;
         let watched = (scene, progress, cancel);
         let answer = impinge::Detector::advance_with;
-        let (advance, _, number) = Detector::watched(slf, watched, ask, answer)?;
+        let asked = Detector::watched(slf, watched, filtered(ask, _filter), answer)?;
+        let (advance, _, number) = asked;
+        _filter.map_or(Ok(()), |filter| filter.get().check())?;
         Ok(Advance::new(advance, number))
     }
 
@@ -1097,20 +1134,40 @@ fn many<'a, 'py>(
     }
 }
 
-/// A step question as the keywords ask it: those of [`step_question`], what touches at the start, the precision of times, the separation.
+/// A step question as the keywords ask it: those of [`step_question`], what touches at the start, the precision of times, and the
+/// separation, the clearance and its share.
 fn step<'a, 'py>(
     bodies: [Argument<'a, 'py>; 4],
     start: Argument<'a, 'py>,
     toi: Toi,
-    separation: Argument<'_, '_>,
+    [separation, clearance, share]: [Argument<'_, '_>; 3],
 ) -> PyResult<impl FnOnce(&Scene) -> PyResult<Step>> {
     let start = settings::start(start)?;
     let separation = steps::distance(separation, "separation")?;
+    let mut kept = Clearance::new(steps::distance(clearance, "clearance")?);
+    if share.is_some() {
+        kept = kept.share(steps::distance(share, "clearance_share")?);
+    }
     Ok(move |scene: &Scene| {
         let query = step_question(scene, bodies)?;
         let step = Step::new(query).start(start).toi(toi);
-        Ok(step.separation(separation))
+        Ok(step.separation(separation).clearance(kept))
     })
+}
+
+/// The same question, of the pairs that a filter lets pass.
+fn filtered(
+    ask: impl FnOnce(&Scene) -> PyResult<Step>,
+    filter: Option<&Bound<'_, VertexFilter>>,
+) -> impl FnOnce(&Scene) -> PyResult<Step> {
+    let filter = filter.map(|filter| filter.get().inner.clone());
+    move |scene: &Scene| {
+        let step = ask(scene)?;
+        Ok(match filter {
+            Some(filter) => step.filter(filter),
+            None => step,
+        })
+    }
 }
 
 impl Detector {

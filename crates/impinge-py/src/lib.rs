@@ -22,6 +22,7 @@ mod scene;
 mod settings;
 mod statistics;
 mod steps;
+mod vertex_filter;
 mod watch;
 
 use pyo3::prelude::*;
@@ -64,6 +65,8 @@ mod _impinge {
     use super::statistics::Statistics;
     #[pymodule_export]
     use super::steps::{Advance, Candidates, Impact, Impacts};
+    #[pymodule_export]
+    use super::vertex_filter::VertexFilter;
     #[pymodule_export]
     use super::watch::CancelToken;
 

@@ -265,7 +265,8 @@ impl Advance {
 
 #[pymethods]
 impl Advance {
-    /// float : the part of the step that can be taken: 1 for all of it, 0 for none.
+    /// float : the part of the step that can be taken: 1 for all of it, 0 for none. With a clearance it holds for all smaller
+    /// parts, and for positions that you compute (see `Detector.advance`).
     #[getter]
     fn fraction(&self) -> f64 {
         self.inner.fraction

@@ -112,12 +112,12 @@
 #[cfg(feature = "gpu")]
 pub use impinge_core::wgpu;
 pub use impinge_core::{
-    Advance, Backend, Body, BodyId, CancelToken, CandidateQuery, Candidates, ClosestPoints,
-    Control, Detector, Elements, Error, Filter, Impact, Impacts, InstructionSet, Kind, Method,
-    NearIter, NearPair, NearPairs, NearQuery, PairKind, PairKinds, Pairs, Part, Placement,
-    PositionRows, Positions, Primitive, Progress, Query, Real, Recluster, Scene, Settings,
-    SharedVertex, Stage, Start, Statistics, Step, Toi, Weld, WrongNumber, hash_impact_rows,
-    hash_rows,
+    Advance, Backend, Body, BodyId, CancelToken, CandidateQuery, Candidates, Clearance,
+    ClosestPoints, Control, Detector, ElementVertices, Elements, Error, Filter, Impact, Impacts,
+    InstructionSet, Kind, Method, NearIter, NearPair, NearPairs, NearQuery, PairFilter, PairKind,
+    PairKinds, Pairs, Part, Placement, PositionRows, Positions, Primitive, Progress, Query, Real,
+    Recluster, Scene, Settings, SharedVertex, Stage, Start, Statistics, Step, Toi, Weld,
+    WrongNumber, hash_impact_rows, hash_rows,
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{

@@ -20,6 +20,8 @@ Examples:
   impinge step a_0.obj a_1.obj b_0.obj b_1.obj        two bodies, each at the start and at the end
   impinge step cloth_0.ply cloth_1.ply --earliest     only the first contact, which is faster
   impinge step cloth_0.ply cloth_1.ply --fail-on-hit  the same as a check: exit code 3 if anything touches
+  impinge step cloth_0.ply cloth_1.ply --clearance 1e-4 --earliest
+                                                      how far a solver can go that needs some distance
   impinge step cloth_0.ply cloth_1.ply --impacts impacts.csv --out impacts.glb
   impinge step cloth_0.ply cloth_1.ply --candidates boxes.npy --distance 0.001
 
@@ -66,7 +68,7 @@ pub struct StepArgs {
     pub impacts: Option<RowsFile>,
     /// Write the pairs whose boxes over the whole step overlap (.csv, .jsonl or .npy; "-" is standard output, as CSV), and
     /// find no impacts
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["impacts", "out", "repeat", "separation"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["impacts", "out", "repeat", "separation", "clearance"])]
     #[cfg_attr(feature = "gpu", arg(conflicts_with = "png"))]
     pub candidates: Option<RowsFile>,
     /// How far the boxes of --candidates are inflated on all sides: 0 or more
@@ -129,4 +131,8 @@ pub struct StepHow {
     /// The distance that elements must keep: report the first time at which they are as near as that
     #[arg(long, value_name = "D", default_value = "0", allow_negative_numbers = true, value_parser = distance)]
     pub separation: f64,
+    /// What the step leaves: every pair keeps C, but of pairs that are near at the start a fifth of their distance; report the first
+    /// time at which one is as near as that
+    #[arg(long, value_name = "C", default_value = "0", allow_negative_numbers = true, value_parser = distance)]
+    pub clearance: f64,
 }

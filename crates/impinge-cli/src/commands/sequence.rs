@@ -69,7 +69,8 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         let step = Step::new(query)
             .start(args.step.start.into())
             .toi(args.step.toi.into())
-            .separation(args.step.separation);
+            .separation(args.step.separation)
+            .clearance(args.step.clearance);
         let is_free = steps_of_sequence(
             (&mut detector, &mut scene, moving),
             &step,

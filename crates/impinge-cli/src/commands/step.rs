@@ -48,7 +48,8 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     let step = Step::new(query(args, &bodies)?)
         .start(args.how.start.into())
         .toi(args.how.toi.into())
-        .separation(args.how.separation);
+        .separation(args.how.separation)
+        .clearance(args.how.clearance);
 
     let watch = Watch::detection(!args.detector.no_progress, "detecting");
     let report = |progress| watch.report(progress);
@@ -100,7 +101,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     let found = Found::all(impacts, times);
     if rows_on_stdout {
         // If standard error is closed, nobody reads the summary.
-        let _ = found.print(&mut stderr(), &bodies, args.how.separation);
+        let _ = found.print(&mut stderr(), &bodies, &args.how);
     } else {
         print(args, &bodies, &found)?;
     }
@@ -136,9 +137,9 @@ fn candidate_query(args: &StepArgs, bodies: &Moving) -> Result<CandidateQuery, E
 
 fn print(args: &StepArgs, bodies: &Moving, found: &Found<'_>) -> Result<(), Error> {
     if args.json {
-        let object = Value::Object(found.json(bodies, args.how.separation)?);
+        let object = Value::Object(found.json(bodies, &args.how)?);
         writeln!(out(), "{object}")?;
         return Ok(());
     }
-    Ok(found.print(&mut out(), bodies, args.how.separation)?)
+    Ok(found.print(&mut out(), bodies, &args.how)?)
 }

@@ -106,6 +106,7 @@ fn the_json_holds_what_the_library_says() {
         "ms",
         "stats",
         "separation",
+        "clearance",
     ];
     assert_eq!(keys(&answer), names);
     let (impacts, hash) = expected(Toi::F32);
@@ -529,10 +530,49 @@ fn a_sequence_is_followed_step_by_step() {
         let misuse = folder.run(text.iter().chain(&more)).misuse();
         assert!(misuse.contains("cannot be used with"), "{misuse}");
     }
-    for more in [["--toi", "f64"], ["--start", "skip"], ["--separation", "1"]] {
+    for more in [
+        ["--toi", "f64"],
+        ["--start", "skip"],
+        ["--separation", "1"],
+        ["--clearance", "1"],
+    ] {
         let misuse = folder.run(text[..5].iter().chain(&more)).misuse();
         assert!(misuse.contains("--ccd"), "{misuse}");
     }
+}
+
+/// With a clearance, every pair keeps some of its distance, and the answer is that of the library.
+#[test]
+fn a_clearance_is_kept() {
+    let folder = folder();
+    let step = |more: &[&str]| folder.run(["step"].iter().chain(&FILES).chain(more));
+    let without = step(&["--json"]).json();
+    let with = step(&["--json", "--clearance", "0.0625"]).json();
+    assert_eq!(
+        (&without["clearance"], &with["clearance"]),
+        (&0.0.into(), &0.0625.into())
+    );
+    let first = |answer: &Value| answer["earliest"]["toi"].as_f64().unwrap();
+    assert!(first(&with) < first(&without) && first(&with) > 0.0);
+    assert_eq!(with["touching_at_start"], 0);
+    let [a0, a1, b0, b1] = crash().map(|(_, model)| model);
+    let mut scene = Scene::new();
+    for (start, end) in [(a0, a1), (b0, b1)] {
+        let id = start.add_to(&mut scene).unwrap();
+        scene.set_end_positions(id, &end.positions).unwrap();
+    }
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let asked = Step::default().clearance(0.0625);
+    let hash = detector.impacts(&scene, &asked).unwrap().hash();
+    assert_eq!(with["hash"], format!("{hash:016x}"));
+    let text = step(&["--clearance", "0.0625"]);
+    let printed = text.printed();
+    assert!(
+        printed.contains(" come as near as a clearance of 0.0625 lets them first, "),
+        "{printed}"
+    );
+    let misuse = step(&["--clearance", "-1"]).misuse();
+    assert!(misuse.contains("not below 0"));
 }
 
 /// With a distance to keep, what comes near is reported, and earlier.

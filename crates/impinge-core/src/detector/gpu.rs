@@ -62,7 +62,7 @@ fn engine_of(
 }
 
 /// Has the device find the pairs of a step that may touch, and settles them on the CPU. Returns [`ByDevice::Not`] if there is no device,
-/// or if the CPU has to answer: steps with a separation, steps that the device cannot hold, any step in a browser, which
+/// or if the CPU has to answer: steps with a separation, a clearance or a filter, steps that the device cannot hold, any step in a browser, which
 /// cannot wait for a device here. With `Backend::Auto` the CPU takes over for good if the device fails.
 pub(super) fn find_in_step(
     engine: &mut Option<Engine>,
@@ -71,7 +71,7 @@ pub(super) fn find_in_step(
     (asked, answer): ((StepTest, Pose), StepAnswer<'_>),
     stats: &mut Statistics,
 ) -> Result<ByDevice, Error> {
-    if cfg!(target_family = "wasm") || job.frame.distance() > 0.0 {
+    if cfg!(target_family = "wasm") || job.frame.bound() > 0.0 || job.frame.has_filter() {
         return Ok(ByDevice::Not);
     }
     let Some(on_device) = engine else {

@@ -6,15 +6,13 @@ mod near;
 mod resident;
 mod runs;
 
-use std::collections::BTreeMap;
-
 use crate::clock::Instant;
 
 use super::Detector;
 use crate::advance::Advance;
 use crate::cpu::steps::{Asked, ByDevice, StepClusters, StepTest};
 use crate::error::Error;
-use crate::exact::Contact;
+use crate::exact::{Contact, Keep};
 use crate::frame::{Ask, Frame, TestId};
 use crate::hull::Pose;
 use crate::impacts::{
@@ -90,10 +88,11 @@ impl Detector {
     ///
     /// The answer is exact: a pair is reported if and only if the two closed elements share a point at some time, and its
     /// time is that of the first contact, rounded down: `toi <= first < toi.next_up()`. With a
-    /// [separation](Step::separation), the same holds of the first time at which their distance is at most that.
+    /// [separation](Step::separation), the same holds of the first time at which their distance is at most that, and with a
+    /// [clearance](Step::clearance), of the first time at which a pair is as near as it may come.
     ///
     /// On a GPU the device finds the pairs that may touch, and the CPU finds their times, on all threads: the answer is the same to the
-    /// last bit. The CPU answers alone if there is a separation, or if the device or the memory budget cannot hold the step; in a
+    /// last bit. The CPU answers alone if there is a separation, a clearance or a filter, or if the device or the memory budget cannot hold the step; in a
     /// browser it always does. [`Statistics::backend`](crate::Statistics::backend) says who answered.
     ///
     /// ```
@@ -197,7 +196,8 @@ impl Detector {
         let StepMemory { frame, impacts, .. } = &mut self.steps;
         step.check()?;
         frame.resolve_for(scene, &step.query, Ask::Impacts)?;
-        frame.set_reach(step.separation, &BTreeMap::new());
+        frame.set_keep(scene, step.keep());
+        frame.set_filter(step.filter.as_ref());
         impacts.begin(frame);
         frame.check(scene)?;
         begin(
@@ -244,7 +244,7 @@ impl Detector {
                 let emit = |test, key, value: Contact| match test {
                     TestId::Elements(kind)
                         if !(step.start == Start::Skip && value.at_start)
-                            && frame.is_owned(scene, key) =>
+                            && frame.counts(scene, key) =>
                     {
                         contacts.extend(kind as usize, [Found { key, value }].into_iter());
                         contacts.check()
@@ -338,6 +338,13 @@ impl Detector {
     /// On the CPU all pairs are searched once, and rounded positions are tested on the pairs that rounding may bring together. On a GPU, with
     /// a separation or a memory budget, and where too many pairs are that close, all pairs are searched again for rounded positions.
     ///
+    /// With a [clearance](Step::clearance), every pair keeps what that says, and what floats can round besides. So the fraction holds for
+    /// solvers too, which compute positions themselves: as `x0 + a * (x1 - x0)` or `x0 + a * dx` with `x1 = x0 + dx`, in the precision
+    /// of the positions, for *every* `a` from 0 to the fraction, the straight way there is free and keeps the clearance. The fraction is
+    /// rounded down to an `f32`, and a single search is enough. It is 0 if moving elements are nearer at the start than rounding
+    /// can move them: about 25 unit roundoffs of their largest coordinate. Without a clearance, only the positions of the answer
+    /// are proven.
+    ///
     /// Pairs that touch at the start allow no step at all under [`Start::Report`], and are ignored under
     /// [`Start::Skip`].
     ///
@@ -364,14 +371,24 @@ impl Detector {
                 allowed: "all pairs; or let each process ask for its earliest contact, and take the least of them",
             });
         }
-        let step = step.clone().toi(Toi::F64);
+        let has_clearance = !step.keep().is_plain();
+        // With a clearance, a time in single precision is as good, and settled by filters.
+        let step = step
+            .clone()
+            .toi(if has_clearance { Toi::F32 } else { Toi::F64 });
         let moving = || {
             let bodies = scene.bodies();
             bodies.filter_map(|(id, body)| Some((id, body.positions(), body.end_positions()?)))
         };
         let start = Instant::now();
         self.begin(scene, &step)?;
-        if step.separation == 0.0 && self.lists_close_pairs() {
+        if has_clearance {
+            let keep = Keep {
+                is_rounded: true,
+                ..step.keep()
+            };
+            self.steps.frame.set_keep(scene, keep);
+        } else if step.separation == 0.0 && self.lists_close_pairs() {
             self.steps.frame.set_rounding(scene);
         }
         let first = self.find_earliest(scene, &step, control, start)?;
@@ -385,6 +402,13 @@ impl Detector {
             advance.positions = moving().map(|(id, _, end)| (id, end.clone())).collect();
             return Ok(advance);
         };
+        if has_clearance {
+            // Rounding is part of what the pairs keep.
+            let blended = moving().map(|(id, start, end)| (id, start.blend(end, first.toi)));
+            advance.positions = blended.collect();
+            advance.fraction = first.toi;
+            return Ok(advance);
+        }
         let single = moving().any(|(_, start, _)| matches!(start, Positions::F32(_)));
         let last_bit = f64::from(if single { f32::EPSILON } else { 0.0 }).max(f64::EPSILON);
         // Pairs that may touch on the way to rounded positions: at first the pair of the contact, which probably does.
@@ -468,6 +492,9 @@ impl Detector {
         fraction: f64,
     ) -> bool {
         let frame = &self.steps.frame;
+        if !frame.counts(scene, key) {
+            return false;
+        }
         let located = pair_numbers(key).map(|number| frame.locate(number));
         let [a, b] = located.each_ref().map(|(layer, element)| Element {
             scene,

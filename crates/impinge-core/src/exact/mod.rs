@@ -33,7 +33,7 @@ mod tests;
 
 pub(crate) use algebra::{Integer, unit_of};
 pub(crate) use distance::{
-    Approach, NearestOfElements, Reach, approach, are_within_certainly, closest_of_elements,
+    Approach, Keep, NearestOfElements, Reach, approach, are_within_certainly, closest_of_elements,
     elements_are_within, nearest_of_elements, unsure_are_within,
 };
 pub use distance::{

@@ -1,6 +1,6 @@
 //! Whether two elements touch during a step, and when first.
 
-use crate::exact::{Contact, ElementPair, Point, first_within};
+use crate::exact::{Contact, ElementPair, Point};
 use crate::frame::TestId;
 use crate::hull::Extent;
 use crate::pair_kind::PairKind;
@@ -51,7 +51,8 @@ impl FirstContact {
                 points[ix] = end;
             }
         }
-        first_within(pair, &points[0], &points[1], a.frame.distance())
+        let ends = points.each_ref();
+        a.frame.first(a.scene, [a.layer, b.layer], pair, ends)
     }
 }
 

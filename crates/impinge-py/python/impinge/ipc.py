@@ -1,44 +1,58 @@
-"""Stand-ins for the step questions of ipc-toolkit: a solver changes one import.
+"""The step questions of ipc-toolkit, exactly: beside ``ipctk``, for solvers that use its barrier.
 
 >>> import numpy as np
->>> from impinge import ipc                                  # instead of: import ipctk as ipc
+>>> from impinge import ipc
 >>> rest = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 1], [4, 0, 1], [0, 4, 1]], float)
 >>> faces = np.array([[0, 1, 2], [3, 4, 5]])
->>> mesh = ipc.CollisionMesh(rest, ipc.edges(faces), faces)
+>>> mesh = ipc.CollisionMesh(rest, ipc.edges(faces), faces)  # or an ipctk.CollisionMesh
 >>> moved = rest.copy()
 >>> moved[3:, 2] = -3                                        # one triangle falls through the other
 >>> ipc.is_step_collision_free(mesh, rest, moved)
 False
->>> 0.249999 < ipc.compute_collision_free_stepsize(mesh, rest, moved) < 0.25
+>>> step = ipc.compute_collision_free_stepsize(mesh, rest, moved)
+>>> 0.24997 < step < 0.25                                    # it stops 1e-4 above the other
 True
+>>> ipc.has_intersections(mesh, rest + step * (moved - rest))
+False
 
-The names and the order of the arguments are those of ipctk 1.6. The answers are exact where those of
-ipc-toolkit are conservative up to tolerances and numbers of iterations, so a step is often longer, and never
-too long: ``vertices_t0 + step * (vertices_t1 - vertices_t0)``, computed by NumPy as written here and rounded as
-NumPy rounds, can be reached on a straight line without contact.
+The names and the order of the arguments are those of ipctk 1.6. A solver keeps its ``ipctk.CollisionMesh`` for its candidates,
+collisions and potentials, and asks these functions about the same mesh. The mesh of this module is for programs without ipctk:
+ipctk's functions do not take it.
 
-A mesh may also be one of ipc-toolkit itself, so that a solver can keep it for its potentials.
+Like ipc-toolkit's, the step size leaves every pair a share of its distance: with ``conservative_rescaling`` of 0.8, a fifth, but at
+most 1e-4. It is decided exactly, so no tolerance and no number of iterations makes it shorter. What it promises is said in
+`compute_collision_free_stepsize`.
+
+Threads may share a mesh, and a forked process may go on with the mesh of its parent.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import os
+import threading
+from collections.abc import Callable
 from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
 
-from ._impinge import Detector, Impact, Scene
+from . import _impinge
+from ._impinge import Detector, Scene
 
 __all__ = [
     "CollisionMesh",
     "compute_collision_free_stepsize",
     "edges",
+    "has_intersections",
     "is_step_collision_free",
 ]
+
+#: The largest distance that a step leaves, as in ipc-toolkit.
+_CLEARANCE = 1e-4
+#: `conservative_rescaling` of ipctk's `TightInclusionCCD`.
+_RESCALING = 0.8
 
 _Array = Any
 _Mesh = Any  # A CollisionMesh of this module or of ipctk.
@@ -106,9 +120,7 @@ class CollisionMesh:
                 place = f"{name}[{row}, {column}]"
                 raise ValueError(f"{place} = {value}: there are {n_vertices} vertices")
         self.can_collide = None
-        self._detector = Detector(backend="cpu")
-        self._held = Scene()
-        self._parts: dict[tuple[int, str], npt.NDArray[np.uint32]] = {}
+        self._local = threading.local()
         of_faces = {tuple(edge) for edge in _edges_of(self._faces).tolist()}
         given = np.unique(np.sort(self._edges), axis=0).tolist()
         self._loose = np.array([edge for edge in given if tuple(edge) not in of_faces], np.int64)
@@ -160,27 +172,33 @@ class CollisionMesh:
         """numpy.ndarray of int64, shape (k,) : the vertices of no face and no edge."""
         return self._points
 
-    def _scene(self, vertices: npt.NDArray[Any]) -> Scene:
-        """The bodies at these positions. The scene is kept: a steady step adds no bodies."""
-        held = self._held
-        if len(held) == 0:
-            if len(self._faces):
-                held.add(vertices, self._faces)
-            if len(self._loose):
-                held.add_edges(vertices, self._loose)
-            if len(self._points):
-                held.add_points(vertices[self._points])
-        else:
-            for body, rows in self._rows():
-                held.set_positions(body, vertices if rows is None else vertices[rows])
+    def _held(self) -> _Held:
+        """What this thread of this process asks with."""
+        held: _Held | None = getattr(self._local, "held", None)
+        if held is not None and held.process != os.getpid():
+            # Its threads did not survive the fork, and its end would wait for them.
+            _OF_PARENTS.append(held)
+            held = None
+        if held is None:
+            held = self._local.held = _Held(self)
         return held
 
-    def _move(self, scene: Scene, vertices: npt.NDArray[Any]) -> None:
-        for body, rows in self._rows():
-            scene.set_end_positions(body, vertices if rows is None else vertices[rows])
+    def _filter(self, labels: _Array | None, may: Callable[[int, int], bool] | None) -> Any:
+        """Which pairs of elements collide; `None` if all do that share no vertex of a body."""
+        if labels is None and may is None and not self._is_mixed:
+            return None
+        if labels is not None:
+            given = np.asarray(labels)
+            if given.dtype.kind not in "iu" or given.shape != (self.num_vertices,):
+                shape = f"({self.num_vertices},)"
+                what = f"integers of shape {shape} expected, as the mesh has vertices"
+                raise ValueError(f"labels: {what}, {given.dtype} of shape {given.shape} given")
+            labels = np.ascontiguousarray(given, np.int64)
+        rows = [None if rows is None else rows.astype(np.uint32) for rows in self._rows()]
+        return getattr(_impinge, "_VertexFilter")(rows, labels, may)  # noqa: B009
 
-    def _rows(self) -> list[tuple[int, npt.NDArray[np.int64] | None]]:
-        """Each body with the vertices that it has; `None` for all."""
+    def _rows(self) -> list[npt.NDArray[np.int64] | None]:
+        """The vertices of each body; `None` for all."""
         rows: list[npt.NDArray[np.int64] | None] = []
         if len(self._faces):
             rows.append(None)
@@ -188,75 +206,67 @@ class CollisionMesh:
             rows.append(None)
         if len(self._points):
             rows.append(self._points)
-        return list(enumerate(rows))
-
-    def _first(self, scene: Scene, distance: float) -> float | None:
-        """The first time at which elements are within a distance that may collide and share no vertex."""
-        first = self._detector.earliest(scene, toi="f64", separation=distance)
-        if first is None or self._counts(scene, first):
-            return None if first is None else first.toi
-        impacts = self._detector.impacts(scene, toi="f64", separation=distance)
-        return min((hit.toi for hit in impacts if self._counts(scene, hit)), default=None)
-
-    def _is_free(self, scene: Scene, distance: float) -> bool:
-        if self._counts_all:
-            return self._detector.is_free(scene, separation=distance)
-        return self._first(scene, distance) is None
-
-    @property
-    def _counts_all(self) -> bool:
-        return self.can_collide is None and not self._is_mixed
-
-    def _counts(self, scene: Scene, impact: Impact) -> bool:
-        if self._counts_all:
-            return True
-        a, b = (
-            self._corners(scene, int(body), letter, element)
-            for letter, body, element in zip(impact.kind, impact.bodies, impact.elements)
-        )
-        if set(a) & set(b):
-            return False
-        may = self.can_collide
-        return may is None or any(may(x, y) for x in a for y in b)
-
-    def _corners(self, scene: Scene, body: int, letter: str, element: int) -> list[int]:
-        """The vertices of the mesh that an element of a body names: a vertex, an edge or a face."""
-        if letter == "v":
-            rows = self._rows()[body][1]
-            return [element if rows is None else int(rows[element])]
-        key = (body, letter)
-        if key not in self._parts:
-            self._parts[key] = scene.elements(body, "edges" if letter == "e" else "faces")
-        return [int(vertex) for vertex in self._parts[key][element]]
+        return rows
 
     def __repr__(self) -> str:
         counts = f"{self.num_vertices} vertices, {self.num_edges} edges, {self.num_faces} faces"
         return f"CollisionMesh({counts})"
 
 
+class _Held:
+    """A detector and a scene, which are kept: a steady step adds no bodies."""
+
+    def __init__(self, mesh: CollisionMesh) -> None:
+        self.process = os.getpid()
+        self.detector: Any = Detector(backend="cpu")
+        self.scene = Scene()
+        self.mesh_rows = mesh._rows()
+        self._parts = [
+            (kind, elements)
+            for kind, elements in [("f", mesh._faces), ("e", mesh._loose), ("p", mesh._points)]
+            if len(elements)
+        ]
+
+    def place(self, vertices: npt.NDArray[Any], end: npt.NDArray[Any] | None = None) -> Scene:
+        """The bodies at these positions, and where they move to."""
+        scene = self.scene
+        if len(scene) == 0:
+            for kind, elements in self._parts:
+                if kind == "f":
+                    scene.add(vertices, elements)
+                elif kind == "e":
+                    scene.add_edges(vertices, elements)
+                else:
+                    scene.add_points(vertices[elements])
+        for body, rows in enumerate(self.mesh_rows):
+            scene.set_positions(body, vertices if rows is None else vertices[rows])
+            if end is not None:
+                scene.set_end_positions(body, end if rows is None else end[rows])
+        return scene
+
+
+#: Detectors of the processes that this one was forked from.
+_OF_PARENTS: list[_Held] = []
+
 #: Meshes of ipc-toolkit that were asked about, each with the mesh that answers for it.
 _SERVED: WeakKeyDictionary[Any, CollisionMesh] = WeakKeyDictionary()
 
 
-@contextmanager
-def _served(mesh: Any) -> Iterator[CollisionMesh]:
+def _served(mesh: Any) -> CollisionMesh:
     """The mesh, or for one of ipc-toolkit the mesh that answers for it."""
     if isinstance(mesh, CollisionMesh):
-        yield mesh
-        return
+        return mesh
     needed = ("rest_positions", "edges", "faces", "can_collide")
     if not all(hasattr(mesh, name) for name in needed):
         raise TypeError(f"mesh: a CollisionMesh expected, {type(mesh).__name__} given")
+    if len(getattr(mesh, "planes", ())):
+        raise ValueError("mesh: planes are not served; give the mesh faces in their place")
     ours = _SERVED.get(mesh)
     if ours is None:
-        # A copy: arrays that view its positions keep the mesh alive, and so does its filter, below.
+        # A copy: arrays that view its positions keep the mesh alive.
         rest = np.array(mesh.rest_positions)
-        ours = _SERVED[mesh] = CollisionMesh(rest, mesh.edges, mesh.faces)
-    ours.can_collide = mesh.can_collide
-    try:
-        yield ours
-    finally:
-        ours.can_collide = None
+        ours = _SERVED.setdefault(mesh, CollisionMesh(rest, mesh.edges, mesh.faces))
+    return ours
 
 
 def is_step_collision_free(
@@ -266,20 +276,28 @@ def is_step_collision_free(
     min_distance: float = 0.0,
     broad_phase: object = None,
     narrow_phase_ccd: object = None,
+    *,
+    labels: _Array | None = None,
 ) -> bool:
     """Whether nothing touches while all vertices move on straight lines from one pose to another.
 
     Parameters
     ----------
     mesh : CollisionMesh
-        Of this module, or of ipctk. One of ipctk is looked at once: its edges and faces must not change.
+        Of ipctk, or of this module. One of ipctk is looked at once: its edges and faces must not change.
     vertices_t0, vertices_t1 : array_like, shape (v, 3)
-        Positions at the start and at the end. Two arrays of float32 are answered as such, others as float64.
+        Positions at the start and at the end. Two arrays of float32 are answered as such, others as float64. As in
+        ipc-toolkit, the start must be free of intersections: an edge that pierces a face touches neither a vertex nor an edge. Ask
+        `has_intersections` once.
     min_distance : float
         The distance that elements must keep, 0 or more: Euclidean, and decided exactly. ipc-toolkit compares it axis by
         axis, so its steps are shorter.
     broad_phase, narrow_phase_ccd : object
-        Taken so that calls of ipc-toolkit work, and not used: there is one method, and it is exact.
+        Taken so that calls of ipc-toolkit work. There is one method, and it is exact, so neither changes this answer.
+    labels : array_like of int, shape (v,), optional
+        One label per vertex: elements whose vertices all have the same do not collide. With it the mesh's `can_collide` is not asked.
+        Patches are labels as they are; static obstacles ``numpy.minimum(numpy.arange(v), n_dynamic)``; connected components what
+        ``scipy.sparse.csgraph.connected_components`` gives.
 
     Returns
     -------
@@ -289,13 +307,17 @@ def is_step_collision_free(
     Raises
     ------
     ValueError, TypeError
-        Positions of another shape than the mesh has, or that are not finite; a `min_distance` below 0.
+        Positions of another shape than the mesh has, or that are not finite; a `min_distance` below 0; a mesh with planes.
     """
-    with _served(mesh) as ours:
-        start, end, distance = _step(ours, vertices_t0, vertices_t1, min_distance)
-        scene = ours._scene(start)
-        ours._move(scene, end)
-        return ours._is_free(scene, distance)
+    ours = _served(mesh)
+    start, end, distance = _step(ours, vertices_t0, vertices_t1, min_distance)
+    held = ours._held()
+    scene = held.place(start, end)
+    may = mesh.can_collide if labels is None else None
+    free: bool = held.detector.is_free(
+        scene, separation=distance, _filter=ours._filter(labels, may)
+    )
+    return free
 
 
 def compute_collision_free_stepsize(
@@ -305,44 +327,114 @@ def compute_collision_free_stepsize(
     min_distance: float = 0.0,
     broad_phase: object = None,
     narrow_phase_ccd: object = None,
+    *,
+    labels: _Array | None = None,
 ) -> float:
     """How far all vertices can move on straight lines from one pose towards another.
 
     Parameters
     ----------
-    mesh, vertices_t0, vertices_t1, min_distance, broad_phase, narrow_phase_ccd
+    mesh, vertices_t0, vertices_t1, min_distance, broad_phase, labels
         As for `is_step_collision_free`.
+    narrow_phase_ccd : object, optional
+        Its `conservative_rescaling` counts, 0.8 without one. Tolerances and numbers of iterations mean nothing here.
 
     Returns
     -------
     float
-        The largest step in [0, 1], backed off as little as rounding asks for, such that the straight way from
-        `vertices_t0` to ``vertices_t0 + step * (vertices_t1 - vertices_t0)``, rounded as NumPy rounds it, is free of
-        contact. 1 if the whole step is, 0 if elements touch at the start. With a `min_distance`, elements touch where
-        they are as near as that.
+        The largest step in [0, 1], rounded down to 24 bits, for which every pair keeps
+        ``min_distance + min((1 - conservative_rescaling) * (d - min_distance), 1e-4)``, where d is its distance at the start. 1 if it
+        keeps that to the end. So a step never ends at contact, and the next one is never 0 for that reason.
+
+        This is proven for positions as solvers compute them, in the precision of the arrays and rounding included: by
+        ``vertices_t0 + a * (vertices_t1 - vertices_t0)`` or by ``vertices_t0 + a * dx`` with ``vertices_t1 = vertices_t0 + dx``, for
+        *every* ``a`` from 0 to the step, so also for all halves that a line search tries. The straight way from `vertices_t0` to these
+        positions is free.
+
+        0 if elements touch at the start, or are as near as `min_distance`; and if moving elements are apart by less than rounding
+        can move them, 25 unit roundoffs of their largest coordinate (3e-15 of it in float64).
 
     Raises
     ------
     ValueError, TypeError
         As `is_step_collision_free`.
     """
-    with _served(mesh) as ours:
-        start, end, distance = _step(ours, vertices_t0, vertices_t1, min_distance)
-        scene = ours._scene(start)
-        ours._move(scene, end)
-        first = ours._first(scene, distance)
-        if first is None:
-            return 1.0
-        back_off = 0.0
-        while True:
-            step = first * (1.0 - back_off)
-            reached = start + step * (end - start)
-            if step == 0.0 or np.array_equal(reached, start):
-                return 0.0
-            ours._move(scene, reached)
-            if ours._is_free(scene, distance):
-                return step
-            back_off = min(2.0 * back_off, 1.0) if back_off else float(np.finfo(start.dtype).eps)
+    ours = _served(mesh)
+    start, end, distance = _step(ours, vertices_t0, vertices_t1, min_distance)
+    rescaling = float(getattr(narrow_phase_ccd, "conservative_rescaling", _RESCALING))
+    if not 0 < rescaling <= 1:
+        raise ValueError(f"conservative_rescaling: {rescaling} given, above 0 and at most 1 allowed")
+    held = ours._held()
+    scene = held.place(start, end)
+    may = mesh.can_collide if labels is None else None
+    advance = held.detector.advance(
+        scene,
+        separation=distance,
+        clearance=_CLEARANCE,
+        # With all of its distance to lose, a pair still keeps what rounding moves.
+        clearance_share=max(1 - rescaling, 1e-9),
+        _filter=ours._filter(labels, may),
+    )
+    return float(advance.fraction)
+
+
+def has_intersections(
+    mesh: _Mesh, vertices: _Array, broad_phase: object = None, *, labels: _Array | None = None
+) -> bool:
+    """Whether elements of a mesh intersect: faces with faces, loose edges and points with all others.
+
+    Parameters
+    ----------
+    mesh, broad_phase, labels
+        As for `is_step_collision_free`.
+    vertices : array_like, shape (v, 3)
+        Positions.
+
+    Returns
+    -------
+    bool
+        Exact, and touching counts. Faces that share a vertex count where they meet in more than what they share
+        (``shared_vertex="resolve"``): ipc-toolkit does not look at these, and misses a face that is folded through its neighbour.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `is_step_collision_free`.
+    """
+    ours = _served(mesh)
+    held = ours._held()
+    scene = held.place(_positions(ours, vertices, "vertices"))
+    may = mesh.can_collide if labels is None else None
+    if labels is None and may is None and not ours._is_mixed:
+        any_pair: bool = held.detector.any(
+            scene, between=True, within=True, shared_vertex="resolve"
+        )
+        return any_pair
+    return _some_intersect(ours, held, labels, may)
+
+
+def _some_intersect(
+    mesh: CollisionMesh,
+    held: _Held,
+    labels: _Array | None,
+    may: Callable[[int, int], bool] | None,
+) -> bool:
+    """Whether any pairs intersect that may collide."""
+    pairs = held.detector.detect(held.scene, between=True, within=True, shared_vertex="resolve")
+    mesh._filter(labels, may)  # For its complaints.
+    of_body = []
+    for body, rows in enumerate(mesh._rows()):
+        elements = held.scene.elements(body)
+        of_body.append(elements if rows is None else rows[elements])
+    for body_a, a, body_b, b in pairs.rows.tolist():
+        of_a, of_b = of_body[body_a][a].tolist(), of_body[body_b][b].tolist()
+        if body_a != body_b and set(of_a) & set(of_b):
+            continue
+        if labels is not None and len({int(labels[vertex]) for vertex in of_a + of_b}) == 1:
+            continue
+        if may is None or any(may(x, y) for x in of_a for y in of_b):
+            return True
+    return False
 
 
 def _step(
@@ -365,9 +457,8 @@ def _positions(mesh: CollisionMesh, vertices: _Array, name: str) -> npt.NDArray[
     if positions.shape != (mesh.num_vertices, 3):
         expected = f"shape ({mesh.num_vertices}, 3) expected, as the mesh has"
         raise ValueError(f"{name}: {expected}, {positions.shape} given")
-    bad = np.argwhere(~np.isfinite(positions))
-    if len(bad):
-        row, column = (int(ix) for ix in bad[0])
+    if not np.isfinite(positions).all():
+        row, column = (int(ix) for ix in np.argwhere(~np.isfinite(positions))[0])
         raise ValueError(
             f"{name}[{row}, {column}] = {positions[row, column]}: a position must be finite"
         )

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use impinge::{Error, Impact, Impacts, PairKind, Statistics};
 use serde_json::{Map, Value, json};
 
+use crate::args::StepHow;
 use crate::detection::Times;
 use crate::json::{counters, rounded};
 use crate::text::{counted, grouped, hex};
@@ -47,14 +48,15 @@ impl<'a> Found<'a> {
         }
     }
 
-    /// `free`, `earliest`, `impacts`, `kinds`, `touching_at_start`, `hash`, `backend`, `bodies`, `ms`, `stats`, `separation`; counts and
-    /// the hash are null with `--earliest`.
-    pub fn json(&self, bodies: &Moving, separation: f64) -> Result<Map<String, Value>, Error> {
+    /// `free`, `earliest`, `impacts`, `kinds`, `touching_at_start`, `hash`, `backend`, `bodies`, `ms`, `stats`, `separation`, `clearance`;
+    /// counts and the hash are null with `--earliest`.
+    pub fn json(&self, bodies: &Moving, how: &StepHow) -> Result<Map<String, Value>, Error> {
         let mut object = self.numbers();
         object.insert("bodies".into(), described(bodies)?);
         object.insert("ms".into(), self.ms());
         object.insert("stats".into(), counters(self.stats));
-        object.insert("separation".into(), separation.into());
+        object.insert("separation".into(), how.separation.into());
+        object.insert("clearance".into(), how.clearance.into());
         Ok(object)
     }
 
@@ -90,9 +92,22 @@ impl<'a> Found<'a> {
     }
 
     /// Prints the answer in the first line, then counts.
-    pub fn print(&self, to: &mut impl Write, bodies: &Moving, separation: f64) -> io::Result<()> {
+    pub fn print(&self, to: &mut impl Write, bodies: &Moving, how: &StepHow) -> io::Result<()> {
+        let StepHow {
+            separation,
+            clearance,
+            ..
+        } = *how;
+        let besides = match separation > 0.0 {
+            true => format!(" besides {separation}"),
+            false => String::new(),
+        };
         let name = |body: impinge::BodyId| bodies.names[body.index()][0].as_str();
         match self.earliest {
+            None if clearance > 0.0 => writeln!(
+                to,
+                "free: every pair keeps its clearance of {clearance}{besides} from start to end, or a fifth of its distance"
+            )?,
             None if separation > 0.0 => writeln!(
                 to,
                 "free: nothing comes within {separation} from start to end"
@@ -108,9 +123,12 @@ impl<'a> Found<'a> {
                 },
                 element(first.kind, first.b.primitive, false),
                 name(first.b.body),
-                match separation > 0.0 {
-                    true => format!("come within {separation}"),
-                    false => "touch".to_owned(),
+                match (separation > 0.0, clearance > 0.0) {
+                    (_, true) if !first.at_start => {
+                        format!("come as near as a clearance of {clearance}{besides} lets them")
+                    }
+                    (true, _) => format!("come within {separation}"),
+                    (false, _) => "touch".to_owned(),
                 },
                 match first.at_start {
                     true => "at the start".to_owned(),

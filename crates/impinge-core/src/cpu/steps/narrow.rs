@@ -5,12 +5,14 @@
 //! ```text
 //! touching   FirstContact: whether two elements touch during the step, and when first (search: the times)
 //! separated  the same where a distance is asked for
+//! kept       the same where each pair keeps a clearance of its own
 //! overlaps   BoxOverlap: whether the boxes over the whole step overlap
 //! near       Within: whether two elements are within a distance at the start
 //! ```
 
 mod batch;
 mod contacts;
+mod kept;
 mod near;
 mod overlaps;
 mod search;

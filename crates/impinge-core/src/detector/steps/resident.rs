@@ -33,7 +33,7 @@ impl Detector {
     /// [`make_room`](Detector::make_room) then grows it.
     ///
     /// # Errors
-    /// A stale id, a buffer that is too small or lacks its usage, a step with a separation or for one cell, a step larger than the
+    /// A stale id, a buffer that is too small or lacks its usage, a step with a separation, a clearance or a filter, or for one cell, a step larger than the
     /// device or the memory budget can hold, a detector without a GPU. Device errors go to the device's owner, and so do those of
     /// kernels, which the first step compiles.
     pub fn encode_step(
@@ -50,6 +50,20 @@ impl Detector {
                 setting: "separation",
                 given: step.separation.to_string(),
                 allowed: "0 for a step that stays on a device",
+            });
+        }
+        if step.clearance.distance > 0.0 {
+            return Err(Error::Setting {
+                setting: "clearance",
+                given: step.clearance.distance.to_string(),
+                allowed: "0 for a step that stays on a device",
+            });
+        }
+        if step.filter.is_some() {
+            return Err(Error::Setting {
+                setting: "filter",
+                given: "a filter of pairs in a step that stays on a device".to_owned(),
+                allowed: "only steps that are read back",
             });
         }
         if step.query.cell.is_some() {

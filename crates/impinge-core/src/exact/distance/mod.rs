@@ -17,6 +17,7 @@
 mod elements;
 mod features;
 mod filter;
+mod keep;
 mod moving;
 mod nearest;
 mod reach;
@@ -31,6 +32,7 @@ pub(crate) use elements::{NearestOfElements, are_within_certainly, elements_are_
 pub(crate) use elements::{closest_of_elements, nearest_of_elements, unsure_are_within};
 pub use features::{Feature, NearestFeatures};
 pub(crate) use filter::{Approach, approach};
+pub(crate) use keep::Keep;
 pub use moving::first_within;
 pub use nearest::nearest_features;
 pub(crate) use reach::Reach;

@@ -162,10 +162,12 @@ pub(super) fn key_in(groups: [&Group; 2], lanes: [u8; 2]) -> u64 {
     pair_key(a, b)
 }
 
-/// Whether a pair belongs to the cell whose pairs are wanted, if only those of one are.
+/// Whether a pair counts: it belongs to the cell whose pairs are wanted, if only those of one are, and the filter lets it pass.
 #[inline(always)]
-pub(super) fn is_owned(world: World<'_>, between: Between, places: Places) -> bool {
-    !world.frame.has_cell() || (world.frame).is_owned(world.scene, key(world, between, places))
+pub(super) fn counts(world: World<'_>, between: Between, places: Places) -> bool {
+    let frame = world.frame;
+    !(frame.has_cell() || frame.has_filter())
+        || frame.counts(world.scene, key(world, between, places))
 }
 
 /// The points of a pair at the start and at the end, in the order of the exact test.

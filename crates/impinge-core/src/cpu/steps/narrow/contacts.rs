@@ -3,7 +3,7 @@
 use crate::cpu::narrow::room_to_wait;
 use crate::cpu::simd::Isa;
 use crate::exact::filter::{Search, time_between};
-use crate::exact::{Contact, ElementPair, first_within};
+use crate::exact::{Contact, ElementPair};
 use crate::impacts::{Found, FoundByKind, Sought, StepAnswer};
 use crate::pair_kind::PairKind;
 use crate::sink::BLOCK;
@@ -11,7 +11,7 @@ use crate::step::{Start, Toi};
 use crate::tuning::Tuning;
 
 use super::super::world::{Asked, World};
-use super::batch::{Between, Narrow, NarrowCounts, Places, is_owned, key, points};
+use super::batch::{Between, Narrow, NarrowCounts, Places, counts, key, points};
 
 /// The most pairs of one worker that are settled last.
 const MOST_UNSURE: usize = 4096;
@@ -161,6 +161,13 @@ impl FirstContacts {
     /// Settles pairs of two layers that were left.
     pub fn settle_unsure(&mut self, isa: Isa, world: World<'_>, pairs: &[(Between, Places)]) {
         let until = self.until(world);
+        if world.frame.has_clearance() {
+            self.is_last = true;
+            for &(between, places) in pairs {
+                self.settle_kept(world, between, places);
+            }
+            return;
+        }
         self.open.extend(pairs.iter().map(|&(_, places)| Open {
             places,
             search: Search::new(until),
@@ -178,9 +185,13 @@ impl FirstContacts {
         pair: ElementPair,
         places: Places,
     ) {
+        if world.frame.has_filter() && !counts(world, between, places) {
+            return;
+        }
         self.counts.n_unsure += 1;
-        let [start, end] = points(world, between, pair, places);
-        if let Some(contact) = first_within(pair, &start, &end, world.frame.distance()) {
+        let ends = points(world, between, pair, places);
+        let layers = [between.a, between.b];
+        if let Some(contact) = (world.frame).first(world.scene, layers, pair, ends.each_ref()) {
             self.report(world, between, places, contact);
         }
     }
@@ -197,10 +208,7 @@ impl FirstContacts {
         if self.asked.start == Start::Skip && contact.at_start {
             return;
         }
-        if !is_owned(world, between, places) {
-            return;
-        }
-        if contact.time > self.until(world) {
+        if contact.time > self.until(world) || !counts(world, between, places) {
             return;
         }
         world.known.found(self.asked.sought, contact.time);
@@ -228,15 +236,13 @@ impl FirstContacts {
         places: Places,
         span: [f64; 2],
     ) {
-        if !is_owned(world, between, places) {
+        if span[0] > self.until(world) || !counts(world, between, places) {
             return;
         }
         // Other pairs need not be searched beyond this time.
         world.known.found(self.asked.sought, span[1]);
         let time = match (self.asked.sought, self.asked.toi) {
             (Sought::Any, _) => Some(span[0]),
-            // This contact is not wanted.
-            (Sought::Earliest, _) if span[0] > self.until(world) => return,
             (_, Toi::F32) => time_between(span).map(f64::from),
             (_, Toi::F64) => None,
         };

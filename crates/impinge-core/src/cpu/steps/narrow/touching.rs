@@ -29,6 +29,7 @@ use super::super::world::World;
 use super::batch::Places;
 use super::batch::{Batch, Between, Narrow, NarrowCounts, exact_pair};
 use super::contacts::{FirstContacts, Open};
+use super::kept;
 use super::search::search;
 use super::separated;
 
@@ -36,7 +37,8 @@ impl Narrow for FirstContacts {
     fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
         let between = batch.between;
         self.go_to(isa, world, between);
-        if world.frame.distance() > 0.0 {
+        let has_clearance = world.frame.has_clearance();
+        if world.frame.distance() > 0.0 && !has_clearance {
             return dispatch!(isa, separated, (
                 contacts: &mut FirstContacts = self,
                 world: World<'_> = world,
@@ -44,7 +46,11 @@ impl Narrow for FirstContacts {
             ));
         }
         if !matches!(between.kind, PairKind::VertexFace | PairKind::EdgeEdge) {
-            if let Some(pair) = exact_pair(between.kind) {
+            if has_clearance {
+                for ix in 0..batch.met.len() {
+                    self.settle_kept(world, between, batch.places(ix));
+                }
+            } else if let Some(pair) = exact_pair(between.kind) {
                 for ix in 0..batch.met.len() {
                     self.remember_close(world, between, batch.places(ix));
                     self.settle_exactly(world, between, pair, batch.places(ix));
@@ -61,7 +67,14 @@ impl Narrow for FirstContacts {
         self.is_first |= rounded > 0.0;
         if rounded.is_finite() {
             let tables = batch.groups.map(|group| &group.points);
-            let margin = self.margin(world, between) + 2.0 * rounded;
+            // With a clearance, an element that is moved by what a pair keeps may be in contact: then coordinates of the
+            // polygon's corners, not of its edges, differ by up to that.
+            let kept = if has_clearance {
+                world.frame.bound()
+            } else {
+                0.0
+            };
+            let margin = self.margin(world, between) + kept + 2.0 * rounded;
             let (limits, met) = ((round_up(until), margin), &mut *batch.met);
             match between.kind {
                 PairKind::VertexFace => dispatch!(isa, drop_vertices_and_faces, (
@@ -75,6 +88,13 @@ impl Narrow for FirstContacts {
                     met: &mut Met = met,
                 )),
             }
+        }
+        if has_clearance {
+            return dispatch!(isa, kept, (
+                contacts: &mut FirstContacts = self,
+                world: World<'_> = world,
+                batch: Batch<'_> = batch,
+            ));
         }
         for ix in 0..batch.met.len() {
             self.open.push(Open {
@@ -167,6 +187,11 @@ impl FirstContacts {
 #[inline(always)]
 fn separated<S: Simd>(simd: S, contacts: &mut FirstContacts, world: World<'_>, batch: Batch<'_>) {
     separated::take(simd, contacts, world, batch);
+}
+
+#[inline(always)]
+fn kept<S: Simd>(simd: S, contacts: &mut FirstContacts, world: World<'_>, batch: Batch<'_>) {
+    kept::take(simd, contacts, world, batch);
 }
 
 #[inline(always)]

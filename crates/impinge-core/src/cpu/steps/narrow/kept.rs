@@ -1,0 +1,64 @@
+//! Whether elements come nearer than they may during a step with a clearance, and when first.
+//!
+//! ```text
+//! apart     sixteen pairs at a time in f32, as for contacts: by more than any pair keeps (`touching`)
+//! tables    the same by distances, for pairs that are near
+//! approach  one pair at a time in f64: what the pair keeps, and when it is that near
+//! ```
+//!
+//! Reason for each discard: no pair keeps more than the separation and the clearance, and what rounding moves.
+
+use crate::cpu::simd::{Lanes, Simd};
+use crate::exact::filter::{self, BATCH};
+use crate::exact::{Approach, Reach, approach};
+use crate::grouping::bounds::round_up;
+
+use super::super::world::World;
+use super::batch::{Batch, Between, Places, exact_pair, points};
+use super::contacts::FirstContacts;
+
+/// Settles the candidates of a work item that the filters for contacts have left.
+#[inline(always)]
+pub(super) fn take<S: Simd>(
+    _: S,
+    contacts: &mut FirstContacts,
+    world: World<'_>,
+    batch: Batch<'_>,
+) {
+    let between = batch.between;
+    let in_tables = batch.near_in_tables(&Reach::from(world.frame.bound()));
+    let tables = batch.groups.map(|group| &group.points);
+    let until = round_up(contacts.until(world));
+    for first in (0..batch.met.len()).step_by(BATCH) {
+        let lanes = batch.met.batch(first);
+        let n = (batch.met.len() - first).min(BATCH);
+        let mut open = u16::MAX >> (BATCH - n);
+        if let Some((pair, reach)) = in_tables {
+            open &= !filter::stay_beyond_in_tables::<S::F32>(pair, tables, lanes, until, reach[1]);
+        }
+        for lane in Lanes(u64::from(open)) {
+            contacts.settle_kept(world, between, batch.places(first + lane));
+        }
+    }
+}
+
+impl FirstContacts {
+    /// Settles a pair in `f64`, or leaves it.
+    #[inline(never)]
+    pub(super) fn settle_kept(&mut self, world: World<'_>, between: Between, places: Places) {
+        let Some(pair) = exact_pair(between.kind) else {
+            return;
+        };
+        let [start, end] = points(world, between, pair, places);
+        let layers = [between.a, between.b];
+        let kept = (world.frame).kept(world.scene, layers, pair, [&start, &end]);
+        match approach(pair, &start, &end, kept, self.until(world)) {
+            Approach::Apart => {}
+            Approach::AtStart => {
+                self.report(world, between, places, world.frame.at_start(pair, &start));
+            }
+            Approach::Between(span) => self.report_within(world, (between, pair), places, span),
+            Approach::Unsure => self.leave(world, between, pair, places),
+        }
+    }
+}
