@@ -282,7 +282,7 @@ mod tests {
             assert_eq!(of(keep(separation, clearance, share), z), expected, "{z}");
         }
         // Not above what is there, however little that is, and by the same bits as exact comparisons alone.
-        for z in [1e-9, 1e-12, 3e-17, 0.1, 1.0 / 3.0, 5e-5, 1e-30] {
+        for z in [1e-9_f64, 1e-12, 3e-17, 0.1, 1.0 / 3.0, 5e-5, 1e-30] {
             for separation in [0.0, 1e-3, 0.1 - 1e-17, z, z.next_down(), z / 2.0] {
                 for share in [0.2, 0.5, 1.0f64.next_down()] {
                     let keep = keep(separation, 1e-4, share);
