@@ -178,7 +178,9 @@ pub type ElementVertices<'a> = (BodyId, &'a [u32]);
 
 /// Which pairs of elements may collide, as a function of their vertices. Threads call it at the same time.
 #[derive(Clone)]
-pub struct PairFilter(Arc<dyn Fn([ElementVertices<'_>; 2]) -> bool + Send + Sync>);
+pub struct PairFilter(Arc<Passes>);
+
+type Passes = dyn Fn([ElementVertices<'_>; 2]) -> bool + Send + Sync;
 
 impl PairFilter {
     /// A filter that lets the pairs pass for which a function is true. For one pair it must always say the same. The first element is
