@@ -317,6 +317,11 @@ impl Frame {
         self.filter.is_some()
     }
 
+    /// Whether pairs that do not count are best left out early.
+    pub(crate) fn filters_early(&self) -> bool {
+        self.filter.as_ref().is_some_and(PairFilter::is_early)
+    }
+
     /// Whether a pair counts: it belongs to the cell, if there is one, and the filter lets it pass.
     #[inline(always)]
     pub fn counts(&self, scene: &Scene, key: u64) -> bool {

@@ -114,7 +114,8 @@ impl Step {
         self
     }
 
-    /// Leaves out the pairs that a filter refuses. It is asked about pairs that are in contact, or might be as far as floats can tell.
+    /// Leaves out the pairs that a filter refuses. It is asked about pairs that are in contact, or might be as far as floats can tell;
+    /// an [early](PairFilter::early) one sooner.
     pub fn filter(mut self, filter: PairFilter) -> Self {
         self.filter = Some(filter);
         self
@@ -178,7 +179,10 @@ pub type ElementVertices<'a> = (BodyId, &'a [u32]);
 
 /// Which pairs of elements may collide, as a function of their vertices. Threads call it at the same time.
 #[derive(Clone)]
-pub struct PairFilter(Arc<Passes>);
+pub struct PairFilter {
+    passes: Arc<Passes>,
+    is_early: bool,
+}
 
 type Passes = dyn Fn([ElementVertices<'_>; 2]) -> bool + Send + Sync;
 
@@ -186,11 +190,25 @@ impl PairFilter {
     /// A filter that lets the pairs pass for which a function is true. For one pair it must always say the same. The first element is
     /// the one that the [kind](PairKind) of the pair names first.
     pub fn new(passes: impl Fn([ElementVertices<'_>; 2]) -> bool + Send + Sync + 'static) -> Self {
-        PairFilter(Arc::new(passes))
+        PairFilter {
+            passes: Arc::new(passes),
+            is_early: false,
+        }
+    }
+
+    /// Says that the function costs little: it is then asked before distances and times, about all pairs that boxes and the first
+    /// filters leave.
+    pub fn early(mut self) -> Self {
+        self.is_early = true;
+        self
+    }
+
+    pub(crate) fn is_early(&self) -> bool {
+        self.is_early
     }
 
     pub(crate) fn passes(&self, pair: [ElementVertices<'_>; 2]) -> bool {
-        (self.0)(pair)
+        (self.passes)(pair)
     }
 }
 
@@ -203,7 +221,7 @@ impl fmt::Debug for PairFilter {
 /// Whether they are one filter, or clones of one.
 impl PartialEq for PairFilter {
     fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.0, &other.0)
+        Arc::ptr_eq(&self.passes, &other.passes)
     }
 }
 

@@ -40,6 +40,7 @@ impl VertexFilter {
             Some(labels) => Some(labels.as_slice()?.to_vec()),
             None => None,
         };
+        let is_early = may.is_none();
         let raised = Raised::default();
         let of_callback = Arc::clone(&raised);
         let inner = PairFilter::new(move |pair| {
@@ -57,7 +58,10 @@ impl VertexFilter {
             may.as_ref()
                 .is_none_or(|may| passes(may, &a, &b, &of_callback))
         });
-        Ok(VertexFilter { inner, raised })
+        Ok(VertexFilter {
+            inner: if is_early { inner.early() } else { inner },
+            raised,
+        })
     }
 }
 

@@ -14,7 +14,7 @@ use crate::exact::{Approach, Reach, approach};
 use crate::grouping::bounds::round_up;
 
 use super::super::world::World;
-use super::batch::{Batch, Between, Places, exact_pair, points};
+use super::batch::{Batch, Between, Places, counts, exact_pair, points};
 use super::contacts::FirstContacts;
 
 /// Settles the candidates of a work item that the filters for contacts have left.
@@ -49,6 +49,9 @@ impl FirstContacts {
         let Some(pair) = exact_pair(between.kind) else {
             return;
         };
+        if world.frame.filters_early() && !counts(world, between, places) {
+            return;
+        }
         let [start, end] = points(world, between, pair, places);
         let layers = [between.a, between.b];
         let kept = (world.frame).kept(world.scene, layers, pair, [&start, &end]);

@@ -11,7 +11,7 @@ use crate::exact::{Approach, Contact, approach};
 use crate::grouping::bounds::round_up;
 
 use super::super::world::World;
-use super::batch::{Batch, Between, Places, exact_pair, points};
+use super::batch::{Batch, Between, Places, counts, exact_pair, points};
 use super::contacts::FirstContacts;
 
 /// Settles the candidates of a work item.
@@ -56,6 +56,9 @@ impl FirstContacts {
         let Some(pair) = exact_pair(between.kind) else {
             return;
         };
+        if world.frame.filters_early() && !counts(world, between, places) {
+            return;
+        }
         let [start, end] = points(world, between, pair, places);
         let until = self.until(world);
         match approach(pair, &start, &end, world.frame.distance(), until) {

@@ -27,7 +27,7 @@ use crate::positions::Positions;
 use super::super::world::World;
 #[cfg(feature = "gpu")]
 use super::batch::Places;
-use super::batch::{Batch, Between, Narrow, NarrowCounts, exact_pair};
+use super::batch::{Batch, Between, Narrow, NarrowCounts, counts, exact_pair};
 use super::contacts::{FirstContacts, Open};
 use super::kept;
 use super::search::search;
@@ -96,7 +96,11 @@ impl Narrow for FirstContacts {
                 batch: Batch<'_> = batch,
             ));
         }
+        let filters_early = world.frame.filters_early();
         for ix in 0..batch.met.len() {
+            if filters_early && !counts(world, between, batch.places(ix)) {
+                continue;
+            }
             self.open.push(Open {
                 places: batch.places(ix),
                 search: Search::new(until),
