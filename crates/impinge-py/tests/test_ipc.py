@@ -164,7 +164,11 @@ def test_vertices_that_may_not_collide():
         with pytest.raises(KeyError, match="of the callback"):
             call(mesh, start, end)
     # With labels nothing is called.
-    for labels, is_free in [([0] * 6, True), ([0, 0, 0, 1, 1, 1], False), ([0, 0, 0, 0, 0, 1], False)]:
+    for labels, is_free in [
+        ([0] * 6, True),
+        ([0, 0, 0, 1, 1, 1], False),
+        ([0, 0, 0, 0, 0, 1], False),
+    ]:
         assert ipc.is_step_collision_free(mesh, start, end, labels=labels) == is_free
         step = ipc.compute_collision_free_stepsize(mesh, start, end, labels=np.array(labels))
         assert (step == 1.0) == is_free
@@ -263,7 +267,9 @@ def test_refusals():
     mesh, start, end = falling()
     for call in [ipc.is_step_collision_free, ipc.compute_collision_free_stepsize]:
         for distance in [-1e-3, np.nan, np.inf]:
-            with pytest.raises(ValueError, match=f"^min_distance: {distance} given, a finite number"):
+            with pytest.raises(
+                ValueError, match=f"^min_distance: {distance} given, a finite number"
+            ):
                 call(mesh, start, end, distance)
         with pytest.raises(TypeError, match="^mesh: a CollisionMesh expected, dict given"):
             call({}, start, end)
@@ -273,7 +279,9 @@ def test_refusals():
         bad[4, 1] = np.nan
         with pytest.raises(ValueError, match=r"^vertices_t0\[4, 1\] = nan"):
             call(mesh, bad, end)
-    with pytest.raises(ValueError, match=r"^rest_positions: shape \(n, 3\) expected, \(3, 2\) given"):
+    with pytest.raises(
+        ValueError, match=r"^rest_positions: shape \(n, 3\) expected, \(3, 2\) given"
+    ):
         ipc.CollisionMesh(FLOOR[:, :2], [], [[0, 1, 2]])
     with pytest.raises(ValueError, match=r"^faces\[0, 2\] = 3: there are 3 vertices"):
         ipc.CollisionMesh(FLOOR, [], [[0, 1, 3]])

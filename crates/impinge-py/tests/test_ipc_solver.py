@@ -1,6 +1,7 @@
-"""An implicit solver for cloth with ipc-toolkit's barrier: `impinge.ipc` decides how far its steps go.
+"""An implicit solver with ipc-toolkit's barrier: `impinge.ipc` decides how far its steps go.
 
-Barrier potential, gradient and Hessian are ipctk's; the rest is here. The same solver also runs with ipctk's step size.
+Barrier potential, gradient and Hessian are ipctk's; the rest is here. The same solver also runs
+with ipctk's step size.
 """
 
 import os
@@ -44,7 +45,7 @@ def octahedron(radius):
 
 
 class Cloth:
-    """A cloth of springs that falls on an octahedron, by implicit Euler and Newton's method with a line search."""
+    """A cloth of springs that falls on an octahedron, by implicit Euler and Newton's method."""
 
     def __init__(self, n, step_size):
         cloth, faces = grid(n, 1.0, 0.36)
@@ -60,7 +61,10 @@ class Cloth:
         springs = self.edges[(self.edges < self.n).all(axis=1)]
         # Every second vertex of a line as well: against bending.
         index = np.arange(self.n).reshape(n, n)
-        bends = [index[2:].ravel(), index[:-2].ravel()], [index[:, 2:].ravel(), index[:, :-2].ravel()]
+        bends = (
+            [index[2:].ravel(), index[:-2].ravel()],
+            [index[:, 2:].ravel(), index[:, :-2].ravel()],
+        )
         bends = np.concatenate([np.stack(bend, axis=1) for bend in bends])
         self.springs = np.concatenate([springs, bends])
         weights = np.concatenate([np.full(len(springs), 1.0), np.full(len(bends), 0.02)])
@@ -100,7 +104,9 @@ class Cloth:
             rows.append(np.broadcast_to(3 * a[:, None, None] + np.arange(3)[:, None], block.shape))
             columns.append(np.broadcast_to(3 * b[:, None, None] + np.arange(3), block.shape))
             values.append(sign * block)
-        triple = [np.concatenate([part.ravel() for part in parts]) for parts in (values, rows, columns)]
+        triple = [
+            np.concatenate([part.ravel() for part in parts]) for parts in (values, rows, columns)
+        ]
         hessian = sparse.csc_matrix((triple[0], (triple[1], triple[2])), shape=(x.size, x.size))
         collisions = self.collisions(x)
         gradient = gradient.ravel() + self.barrier.gradient(collisions, self.mesh, x)

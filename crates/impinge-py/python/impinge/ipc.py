@@ -15,12 +15,16 @@ True
 >>> ipc.has_intersections(mesh, rest + step * (moved - rest))
 False
 
-The names and the order of the arguments are those of ipctk 1.6. A solver keeps its ``ipctk.CollisionMesh`` for its candidates,
-collisions and potentials, and asks these functions about the same mesh. The mesh of this module is for programs without ipctk:
+The names and the order of the arguments are those of ipctk 1.6. A solver keeps its
+``ipctk.CollisionMesh`` for its candidates,
+collisions and potentials, and asks these functions about the same mesh. The mesh of this module is
+for programs without ipctk:
 ipctk's functions do not take it.
 
-Like ipc-toolkit's, the step size leaves every pair a share of its distance: with ``conservative_rescaling`` of 0.8, a fifth, but at
-most 1e-4. It is decided exactly, so no tolerance and no number of iterations makes it shorter. What it promises is said in
+Like ipc-toolkit's, the step size leaves every pair a share of its distance: with
+``conservative_rescaling`` of 0.8, a fifth, but at
+most 1e-4. It is decided exactly, so no tolerance and no number of iterations makes it shorter. What
+it promises is said in
 `compute_collision_free_stepsize`.
 
 Threads may share a mesh, and a forked process may go on with the mesh of its parent.
@@ -92,16 +96,19 @@ class CollisionMesh:
     faces : array_like of int, shape (n, 3), optional
         Triangles.
 
-    Vertices that neither a face nor an edge names are loose points: they meet faces, loose edges and each other.
+    Vertices that neither a face nor an edge names are loose points: they meet faces, loose edges
+    and each other.
 
     Raises
     ------
     ValueError, TypeError
-        Positions that are not ``(v, 3)`` (meshes in two dimensions are not served), an index out of range.
+        Positions that are not ``(v, 3)`` (meshes in two dimensions are not served), an index out of
+        range.
     """
 
     can_collide: Callable[[int, int], bool] | None
-    """callable or None : whether two vertices may collide, as in ipc-toolkit. Two elements that touch count when any
+    """callable or None : whether two vertices may collide, as in ipc-toolkit. Two elements that
+    touch count when any
     vertex of one may collide with any of the other. ``None`` (the default) lets all of them."""
 
     def __init__(self, rest_positions: _Array, edges: _Array = (), faces: _Array = ()) -> None:
@@ -284,19 +291,26 @@ def is_step_collision_free(
     Parameters
     ----------
     mesh : CollisionMesh
-        Of ipctk, or of this module. One of ipctk is looked at once: its edges and faces must not change.
+        Of ipctk, or of this module. One of ipctk is looked at once: its edges and faces must not
+        change.
     vertices_t0, vertices_t1 : array_like, shape (v, 3)
-        Positions at the start and at the end. Two arrays of float32 are answered as such, others as float64. As in
-        ipc-toolkit, the start must be free of intersections: an edge that pierces a face touches neither a vertex nor an edge. Ask
+        Positions at the start and at the end. Two arrays of float32 are answered as such, others as
+        float64. As in
+        ipc-toolkit, the start must be free of intersections: an edge that pierces a face touches
+        neither a vertex nor an edge. Ask
         `has_intersections` once.
     min_distance : float
-        The distance that elements must keep, 0 or more: Euclidean, and decided exactly. ipc-toolkit compares it axis by
+        The distance that elements must keep, 0 or more: Euclidean, and decided exactly. ipc-toolkit
+        compares it axis by
         axis, so its steps are shorter.
     broad_phase, narrow_phase_ccd : object
-        Taken so that calls of ipc-toolkit work. There is one method, and it is exact, so neither changes this answer.
+        Taken so that calls of ipc-toolkit work. There is one method, and it is exact, so neither
+        changes this answer.
     labels : array_like of int, shape (v,), optional
-        One label per vertex: elements whose vertices all have the same do not collide. With it the mesh's `can_collide` is not asked.
-        Patches are labels as they are; static obstacles ``numpy.minimum(numpy.arange(v), n_dynamic)``; connected components what
+        One label per vertex: elements whose vertices all have the same do not collide. With it the
+        mesh's `can_collide` is not asked.
+        Patches are labels as they are; static obstacles ``numpy.minimum(numpy.arange(v),
+        n_dynamic)``; connected components what
         ``scipy.sparse.csgraph.connected_components`` gives.
 
     Returns
@@ -307,7 +321,8 @@ def is_step_collision_free(
     Raises
     ------
     ValueError, TypeError
-        Positions of another shape than the mesh has, or that are not finite; a `min_distance` below 0; a mesh with planes.
+        Positions of another shape than the mesh has, or that are not finite; a `min_distance` below
+        0; a mesh with planes.
     """
     ours = _served(mesh)
     start, end, distance = _step(ours, vertices_t0, vertices_t1, min_distance)
@@ -337,21 +352,28 @@ def compute_collision_free_stepsize(
     mesh, vertices_t0, vertices_t1, min_distance, broad_phase, labels
         As for `is_step_collision_free`.
     narrow_phase_ccd : object, optional
-        Its `conservative_rescaling` counts, 0.8 without one. Tolerances and numbers of iterations mean nothing here.
+        Its `conservative_rescaling` counts, 0.8 without one. Tolerances and numbers of iterations
+        mean nothing here.
 
     Returns
     -------
     float
         The largest step in [0, 1], rounded down to 24 bits, for which every pair keeps
-        ``min_distance + min((1 - conservative_rescaling) * (d - min_distance), 1e-4)``, where d is its distance at the start. 1 if it
-        keeps that to the end. So a step never ends at contact, and the next one is never 0 for that reason.
+        ``min_distance + min((1 - conservative_rescaling) * (d - min_distance), 1e-4)``, where d is
+        its distance at the start. 1 if it
+        keeps that to the end. So a step never ends at contact, and the next one is never 0 for that
+        reason.
 
-        This is proven for positions as solvers compute them, in the precision of the arrays and rounding included: by
-        ``vertices_t0 + a * (vertices_t1 - vertices_t0)`` or by ``vertices_t0 + a * dx`` with ``vertices_t1 = vertices_t0 + dx``, for
-        *every* ``a`` from 0 to the step, so also for all halves that a line search tries. The straight way from `vertices_t0` to these
+        This is proven for positions as solvers compute them, in the precision of the arrays and
+        rounding included: by
+        ``vertices_t0 + a * (vertices_t1 - vertices_t0)`` or by ``vertices_t0 + a * dx`` with
+        ``vertices_t1 = vertices_t0 + dx``, for
+        *every* ``a`` from 0 to the step, so also for all halves that a line search tries. The
+        straight way from `vertices_t0` to these
         positions is free.
 
-        0 if elements touch at the start, or are as near as `min_distance`; and if moving elements are apart by less than rounding
+        0 if elements touch at the start, or are as near as `min_distance`; and if moving elements
+        are apart by less than rounding
         can move them, 25 unit roundoffs of their largest coordinate (3e-15 of it in float64).
 
     Raises
@@ -363,7 +385,9 @@ def compute_collision_free_stepsize(
     start, end, distance = _step(ours, vertices_t0, vertices_t1, min_distance)
     rescaling = float(getattr(narrow_phase_ccd, "conservative_rescaling", _RESCALING))
     if not 0 < rescaling <= 1:
-        raise ValueError(f"conservative_rescaling: {rescaling} given, above 0 and at most 1 allowed")
+        raise ValueError(
+            f"conservative_rescaling: {rescaling} given, above 0 and at most 1 allowed"
+        )
     held = ours._held()
     scene = held.place(start, end)
     may = mesh.can_collide if labels is None else None
@@ -393,8 +417,10 @@ def has_intersections(
     Returns
     -------
     bool
-        Exact, and touching counts. Faces that share a vertex count where they meet in more than what they share
-        (``shared_vertex="resolve"``): ipc-toolkit does not look at these, and misses a face that is folded through its neighbour.
+        Exact, and touching counts. Faces that share a vertex count where they meet in more than
+        what they share
+        (``shared_vertex="resolve"``): ipc-toolkit does not look at these, and misses a face that is
+        folded through its neighbour.
 
     Raises
     ------
