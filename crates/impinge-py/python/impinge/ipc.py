@@ -16,15 +16,13 @@ True
 False
 
 The names and the order of the arguments are those of ipctk 1.6. A solver keeps its
-``ipctk.CollisionMesh`` for its candidates,
-collisions and potentials, and asks these functions about the same mesh. The mesh of this module is
-for programs without ipctk:
-ipctk's functions do not take it.
+``ipctk.CollisionMesh`` for its candidates, collisions and potentials, and asks these functions
+about the same mesh. The mesh of this module is for programs without ipctk: ipctk's functions do not
+take it.
 
 Like ipc-toolkit's, the step size leaves every pair a share of its distance: with
-``conservative_rescaling`` of 0.8, a fifth, but at
-most 1e-4. It is decided exactly, so no tolerance and no number of iterations makes it shorter. What
-it promises is said in
+``conservative_rescaling`` of 0.8, a fifth, but at most 1e-4. It is decided exactly, so no tolerance
+and no number of iterations makes it shorter. What it promises is said in
 `compute_collision_free_stepsize`.
 
 Threads may share a mesh, and a forked process may go on with the mesh of its parent.
@@ -295,22 +293,18 @@ def is_step_collision_free(
         change.
     vertices_t0, vertices_t1 : array_like, shape (v, 3)
         Positions at the start and at the end. Two arrays of float32 are answered as such, others as
-        float64. As in
-        ipc-toolkit, the start must be free of intersections: an edge that pierces a face touches
-        neither a vertex nor an edge. Ask
-        `has_intersections` once.
+        float64. As in ipc-toolkit, the start must be free of intersections: an edge that pierces a
+        face touches neither a vertex nor an edge. Ask `has_intersections` once.
     min_distance : float
         The distance that elements must keep, 0 or more: Euclidean, and decided exactly. ipc-toolkit
-        compares it axis by
-        axis, so its steps are shorter.
+        compares it axis by axis, so its steps are shorter.
     broad_phase, narrow_phase_ccd : object
         Taken so that calls of ipc-toolkit work. There is one method, and it is exact, so neither
         changes this answer.
     labels : array_like of int, shape (v,), optional
         One label per vertex: elements whose vertices all have the same do not collide. With it the
-        mesh's `can_collide` is not asked.
-        Patches are labels as they are; static obstacles ``numpy.minimum(numpy.arange(v),
-        n_dynamic)``; connected components what
+        mesh's `can_collide` is not asked. Patches are labels as they are; static obstacles
+        ``numpy.minimum(numpy.arange(v), n_dynamic)``; connected components what
         ``scipy.sparse.csgraph.connected_components`` gives.
 
     Returns
@@ -360,21 +354,18 @@ def compute_collision_free_stepsize(
     float
         The largest step in [0, 1], rounded down to 24 bits, for which every pair keeps
         ``min_distance + min((1 - conservative_rescaling) * (d - min_distance), 1e-4)``, where d is
-        its distance at the start. 1 if it
-        keeps that to the end. So a step never ends at contact, and the next one is never 0 for that
-        reason.
+        its distance at the start. 1 if it keeps that to the end. So a step never ends at contact,
+        and the next one is never 0 for that reason.
 
         This is proven for positions as solvers compute them, in the precision of the arrays and
-        rounding included: by
-        ``vertices_t0 + a * (vertices_t1 - vertices_t0)`` or by ``vertices_t0 + a * dx`` with
-        ``vertices_t1 = vertices_t0 + dx``, for
-        *every* ``a`` from 0 to the step, so also for all halves that a line search tries. The
-        straight way from `vertices_t0` to these
+        rounding included: by ``vertices_t0 + a * (vertices_t1 - vertices_t0)`` or by ``vertices_t0
+        + a * dx`` with ``vertices_t1 = vertices_t0 + dx``, for *every* ``a`` from 0 to the step, so
+        also for all halves that a line search tries. The straight way from `vertices_t0` to these
         positions is free.
 
         0 if elements touch at the start, or are as near as `min_distance`; and if moving elements
-        are apart by less than rounding
-        can move them, 25 unit roundoffs of their largest coordinate (3e-15 of it in float64).
+        are apart by less than rounding can move them, 25 unit roundoffs of their largest coordinate
+        (3e-15 of it in float64).
 
     Raises
     ------
@@ -405,7 +396,7 @@ def compute_collision_free_stepsize(
 def has_intersections(
     mesh: _Mesh, vertices: _Array, broad_phase: object = None, *, labels: _Array | None = None
 ) -> bool:
-    """Whether elements of a mesh intersect: faces with faces, loose edges and points with all others.
+    """Whether elements of a mesh intersect: faces with faces, loose edges and points with all.
 
     Parameters
     ----------
@@ -418,9 +409,8 @@ def has_intersections(
     -------
     bool
         Exact, and touching counts. Faces that share a vertex count where they meet in more than
-        what they share
-        (``shared_vertex="resolve"``): ipc-toolkit does not look at these, and misses a face that is
-        folded through its neighbour.
+        what they share (``shared_vertex="resolve"``): ipc-toolkit does not look at these, and
+        misses a face that is folded through its neighbour.
 
     Raises
     ------
