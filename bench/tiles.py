@@ -87,9 +87,9 @@ def measure(program, mesh, folder, arguments):
     limit = arguments.limit << 20
     costs, tiles = {}, folder / "tiles"
     steps = [
-        ("plan", [mesh, "--cap", str(arguments.cap), "--chunk", "100k"]),
+        ("plan", [mesh, "--cap", str(arguments.cap), "--chunk", "100k", "--no-weld"]),
         ("scatter", ["--threads", "1"]),
-        ("run", ["--self", "--threads", "1"]),
+        ("run", ["--self", "--shared-vertex", "skip", "--threads", "1"]),
         ("merge", []),
     ]
     for step, options in steps:

@@ -40,21 +40,27 @@ export declare class GpuDetector {
   dispose(): Promise<void>;
 }
 
-/**
- * Reads a mesh file. The extension of its name is that of its format: obj, ply, stl, off, gltf, glb, msh, vtk, vtu or mesh.
- * With `weld`, vertices at the same position become one. Needs no GPU.
- */
-export function readMesh(
-  name: string,
-  bytes: Uint8Array,
-  options?: { weld?: boolean },
-): {
+/** A mesh from a file. `name` is that of the file, or of a node or a group in it. */
+export interface FileMesh {
+  name: string;
   index: Uint32Array;
   positions: Float32Array | Float64Array;
   corners: 3 | 4;
   /** For each vertex of the file, its number in the mesh: they differ if vertices were welded. */
   map: Uint32Array;
-};
+}
+
+/**
+ * Reads a mesh file. The extension of its name is that of its format: obj, ply, stl, off, gltf, glb, msh, vtk, vtu or mesh.
+ * Vertices at the same position become one, unless `weld` is false. Needs no GPU.
+ */
+export function readMesh(name: string, bytes: Uint8Array, options?: { weld?: boolean }): FileMesh;
+
+/**
+ * Reads the bodies of a mesh file, each as a mesh of its own: the nodes of a glTF file that have a mesh, the objects of an OBJ
+ * file, or its groups if it has no objects. Any other file is one body.
+ */
+export function readBodies(name: string, bytes: Uint8Array, options?: { weld?: boolean }): FileMesh[];
 
 /** Reads the frames of a point cache (`.pc2`, `.mdd`): the positions of all vertices, per frame. Needs no GPU. */
 export function readFrames(name: string, bytes: Uint8Array): Float32Array[];

@@ -90,14 +90,28 @@ function copy(array) {
   return ArrayBuffer.isView(array) ? array.slice() : array;
 }
 
-export function readMesh(name, bytes, { weld = false } = {}) {
-  mustBeReady();
-  const file = new MeshFile(String(name), bytes, Boolean(weld));
+function taken(file) {
   try {
-    return { index: file.index(), positions: file.positions(), corners: file.corners(), map: file.map() };
+    return {
+      name: file.name(),
+      index: file.index(),
+      positions: file.positions(),
+      corners: file.corners(),
+      map: file.map(),
+    };
   } finally {
     file.free();
   }
+}
+
+export function readMesh(name, bytes, { weld = true } = {}) {
+  mustBeReady();
+  return taken(new MeshFile(String(name), bytes, Boolean(weld)));
+}
+
+export function readBodies(name, bytes, { weld = true } = {}) {
+  mustBeReady();
+  return MeshFile.bodies(String(name), bytes, Boolean(weld)).map(taken);
 }
 
 export function readFrames(name, bytes) {

@@ -61,6 +61,16 @@ export async function webgpu(module, scenes, method) {
   return answers;
 }
 
+// Where a mesh from a file meets itself.
+function found(Detector, { index, positions, corners }) {
+  const detector = new Detector();
+  const body = corners === 4 ? detector.addTetrahedra(index, positions) : detector.add(index, positions);
+  const pairs = detector.within(body).length / 2;
+  const { hash } = detector;
+  detector.dispose();
+  return { pairs, hash };
+}
+
 // The text of the error that a call throws, or of its rejection.
 async function refusal(call) {
   try {
@@ -121,14 +131,23 @@ export const REFUSALS = {
 };
 
 if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
-  const { readFile } = await import("node:fs/promises");
+  const { readFile, readdir } = await import("node:fs/promises");
   const scenes = JSON.parse(await readFile("scenes.json", "utf8"));
   const said = await refusals("impinge");
   const answers = await cpu("impinge", scenes);
-  const { default: init, GpuDetector, readFrames, readMesh } = await import("impinge/webgpu");
+  const { default: init, GpuDetector, readBodies, readFrames, readMesh } = await import("impinge/webgpu");
+  const { Detector } = await import("impinge");
   await init();
+  const doors = {};
+  for (const name of await readdir("doors")) {
+    if (name.endsWith(".json")) continue;
+    const bytes = await readFile(`doors/${name}`);
+    doors[name] = found(Detector, readMesh(name, bytes));
+    const bodies = readBodies(name, bytes);
+    if (bodies.length > 1) doors[name].bodies = bodies.map((body) => body.name);
+  }
   const text = "v 0 0 0\nv 1 0 0\nv 0 0 0\nv 0 1 0\nf 1 2 4\n";
-  const mesh = readMesh("triangle.obj", new TextEncoder().encode(text), { weld: true });
+  const mesh = readMesh("triangle.obj", new TextEncoder().encode(text));
   // Two frames of one vertex.
   const mdd = new Uint8Array(40);
   const view = new DataView(mdd.buffer);
@@ -140,5 +159,5 @@ if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
   const cut = await refusal(() => readFrames("cut.mdd", mdd.subarray(1)));
   const { corners } = mesh;
   const read = { index: [...mesh.index], positions: [...mesh.positions], corners, map: [...mesh.map], frames, noGpu, broken, cut };
-  process.stdout.write(JSON.stringify({ said, answers, read }));
+  process.stdout.write(JSON.stringify({ said, answers, read, doors }));
 }

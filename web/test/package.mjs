@@ -28,6 +28,9 @@ try {
   for (const name of ["answers.mjs", "use.ts", "empty.html"]) {
     await cp(new URL(name, here), join(folder, name));
   }
+  // Files about which every door has the same answer.
+  const doors = new URL("../../crates/impinge-cli/tests/doors/", here).pathname;
+  await cp(doors, join(folder, "doors"), { recursive: true });
   const installed = join(folder, "node_modules/impinge");
   for (const [build, limit] of [["cpu", MOST_BROTLI], ["gpu", Infinity]]) {
     const bytes = await readFile(join(installed, build, "impinge_bg.wasm"));
@@ -44,7 +47,10 @@ try {
   const scenes = JSON.parse(await readFile(scenesFile, "utf8"));
   assert.equal(scenes.length, 4);
   const inNode = execFileSync("node", ["answers.mjs"], { cwd: folder, encoding: "utf8", maxBuffer: 1 << 28 });
-  const { said, answers: answersInNode, read } = JSON.parse(inNode);
+  const { said, answers: answersInNode, read, doors: found } = JSON.parse(inNode);
+  const expected = JSON.parse(await readFile(join(doors, "answers.json"), "utf8"));
+  for (const answer of Object.values(expected)) delete answer.between;
+  assert.deepEqual(found, expected);
   assert.deepEqual(said, REFUSALS);
   assert.deepEqual(read, {
     index: [0, 1, 2],

@@ -1,7 +1,7 @@
 // Uses all of the package's types; tsc checks it.
 
 import init, { Detector, type Body, type Impact, type Statistics } from "impinge";
-import initGpu, { GpuDetector, readFrames, readMesh } from "impinge/webgpu";
+import initGpu, { GpuDetector, readBodies, readFrames, readMesh, type FileMesh } from "impinge/webgpu";
 
 await init();
 using detector = new Detector({ method: "cells", sharedVertex: "resolve" });
@@ -31,6 +31,7 @@ await initGpu(new URL("impinge_bg.wasm", "http://localhost/"));
 const gpu = await GpuDetector.open();
 const answer = await gpu.between(await gpu.add(new Uint8Array(3), new Float32Array(9)), 1);
 const mesh = readMesh("a.ply", new Uint8Array(), { weld: true });
+const bodies: FileMesh[] = readBodies("a.glb", new Uint8Array());
 const frames: Float32Array[] = readFrames("a.pc2", new Uint8Array());
 const map: Uint32Array = mesh.map;
-console.log(frames, map, different, await gpu.betweenAll(), pairs, own, all, first, times, kind, told, primitives, vertices, answer.hash, answer.pairs, mesh.corners);
+console.log(bodies[0]?.name, frames, map, different, await gpu.betweenAll(), pairs, own, all, first, times, kind, told, primitives, vertices, answer.hash, answer.pairs, mesh.corners);

@@ -22,7 +22,7 @@ use crate::values::{
     bytes, lambda, mesh_format,
 };
 
-pub use choices::{BackendArg, MethodArg, SharedVertexArg, StartArg, ToiArg};
+pub use choices::{BackendArg, BodiesArg, MethodArg, SharedVertexArg, StartArg, ToiArg};
 pub use near::NearArgs;
 #[cfg(feature = "gpu")]
 pub use picture::PictureArgs;
@@ -126,7 +126,7 @@ const RENDER_EXAMPLES: &str = "\
 Examples:
   impinge render a.obj b.obj --png out.png
   impinge render a.ply b.msh --png out.png --size 1920x1080 --azimuth -60 --up z
-  impinge render cow.off --self --png cow.png --see-through 1
+  impinge render cow.off --png cow.png --see-through 1
   impinge pairs a.ply b.ply --png out.png           the answer and a picture
 
 Without a GPU, a software driver suffices. Colliding primitives of body 0 are red, those of body 1 blue,
@@ -150,6 +150,8 @@ Examples:
   impinge pairs a.ply b.ply --repeat 100 --threads 2
   impinge pairs a.ply b.ply c.ply --ignore 0,1 --out seen.glb
   impinge pairs a.ply b.ply --curves curves.obj --contacts contacts.csv
+  impinge pairs machine.glb                     the nodes of one file with each other
+  impinge pairs a.glb b.obj --bodies nodes      each node of a.glb, and all of b.obj
 
 Rows of --pairs are body_a, primitive_a, body_b, primitive_b (u32, sorted): bodies numbered
 from 0 as given, primitives as in the file. With `--pairs -` the summary goes to standard error.
@@ -188,7 +190,8 @@ Examples:
   impinge sequence body.ply run.pc2 --ccd       one line per step from a frame to the next
 
 FRAMES is a .pc2 or .mdd file, the first of numbered mesh files, or a pattern of their names.
-Without --other, the pairs within the body are found.";
+Without --other, the pairs within the body are found; with it, those between bodies, and with --self both. The last line
+says which.";
 
 const SIMULATE_EXAMPLES: &str = "\
 Examples:
@@ -236,7 +239,7 @@ pub struct DetectorArgs {
 /// Options of reading meshes.
 #[derive(Debug, Clone, Args)]
 pub struct ReadArgs {
-    /// Weld vertices at the same position, within each file [default if a body is checked against itself]
+    /// Weld vertices at the same position, within each file; this is the default
     #[arg(long, overrides_with = "no_weld")]
     weld: bool,
     /// Do not weld vertices at the same position, except in STL files, where triangles share nothing else
@@ -245,6 +248,9 @@ pub struct ReadArgs {
     /// The format of a mesh on standard input, which is named "-": ply, off, stl, …
     #[arg(long, value_name = "EXT", value_parser = mesh_format)]
     pub format: Option<impinge_io::Format>,
+    /// What becomes a body of its own [default: file; `pairs` of one file: nodes or groups]
+    #[arg(long, value_enum, value_name = "WHAT")]
+    pub bodies: Option<BodiesArg>,
 }
 
 impl ReadArgs {
@@ -354,7 +360,7 @@ pub struct RenderArgs {
     /// The picture (.png)
     #[arg(long, value_name = "FILE", required = true)]
     pub png: PngFile,
-    /// Also find the pairs within each body
+    /// Also find the pairs within each body; implied for one mesh
     #[arg(long = "self")]
     pub within: bool,
     #[command(flatten)]
@@ -367,8 +373,8 @@ pub struct RenderArgs {
 
 #[derive(Debug, Args)]
 pub struct PairsArgs {
-    /// Mesh files, one per body
-    #[arg(value_name = "MESH", required = true, num_args = 2..)]
+    /// Mesh files, one per body; of one file alone, the nodes (glTF) or groups (OBJ) are the bodies
+    #[arg(value_name = "MESH", required = true)]
     pub meshes: Vec<PathBuf>,
     /// Also find the pairs within each body
     #[arg(long = "self")]

@@ -6,6 +6,7 @@ use impinge::{
 };
 
 use crate::args::{AskArgs, BackendArg, DetectorArgs};
+use crate::asked::Asked;
 use crate::error::Error;
 use crate::watch::Watch;
 
@@ -59,10 +60,19 @@ fn may_have_gpu() -> bool {
             .any(|start| has("/dev", start))
 }
 
-/// The query with its adjacency rule and the pairs of bodies to ignore.
-pub fn query(query: Query, args: &AskArgs, bodies: &[BodyId]) -> Result<Query, Error> {
-    let query = query.shared_vertex(args.shared_vertex.into());
-    without(query, &args.ignore, bodies)
+/// What is asked of the pairs between bodies and within each.
+pub fn asked((between, within): (bool, bool), args: &AskArgs) -> Asked {
+    Asked {
+        between,
+        within,
+        shared_vertex: args.shared_vertex.into(),
+        ignores: !args.ignore.is_empty(),
+    }
+}
+
+/// The query without the pairs of bodies to ignore.
+pub fn query(asked: Asked, args: &AskArgs, bodies: &[BodyId]) -> Result<Query, Error> {
+    without(asked.query(), &args.ignore, bodies)
 }
 
 /// The query without the pairs of bodies that `--ignore` names.

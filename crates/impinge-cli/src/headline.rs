@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use impinge::{BodyId, Pairs, Scene};
 
 use crate::error::Error;
+use crate::load::Nouns;
 use crate::regions::Region;
 use crate::text::{counted, grouped};
 
@@ -15,12 +16,12 @@ const MOST_LINES: usize = 8;
 /// first line is the total, and one line per two bodies that meet follows.
 pub fn write(
     to: &mut impl Write,
-    scene: &Scene,
+    (scene, nouns): (&Scene, &Nouns),
     bodies: &[(BodyId, &str)],
     pairs: &Pairs,
     regions: Option<&[Region]>,
 ) -> Result<(), Error> {
-    let (subject, of) = of_whom(scene, bodies)?;
+    let (subject, of) = of_whom(scene, nouns, bodies)?;
     if pairs.is_empty() {
         writeln!(to, "{subject}: no pairs of {of}")?;
         return Ok(());
@@ -53,21 +54,26 @@ pub fn write(
 /// The one line of an answer that holds no pairs: `cow.off: 83 pairs of 5,804 triangles`.
 pub fn write_count(
     to: &mut impl Write,
-    scene: &Scene,
+    (scene, nouns): (&Scene, &Nouns),
     bodies: &[(BodyId, &str)],
     n_pairs: &str,
 ) -> Result<(), Error> {
-    let (subject, of) = of_whom(scene, bodies)?;
+    let (subject, of) = of_whom(scene, nouns, bodies)?;
     writeln!(to, "{subject}: {n_pairs} of {of}")?;
     Ok(())
 }
 
 /// Who was asked about, and how many primitives of each kind they have.
-fn of_whom(scene: &Scene, bodies: &[(BodyId, &str)]) -> Result<(String, String), Error> {
-    let subject = match bodies {
-        [(_, one)] => (*one).to_owned(),
-        [(_, a), (_, b)] => format!("{a} and {b}"),
-        many => format!("{} meshes", many.len()),
+fn of_whom(
+    scene: &Scene,
+    nouns: &Nouns,
+    bodies: &[(BodyId, &str)],
+) -> Result<(String, String), Error> {
+    let subject = match (&nouns.file, bodies) {
+        (Some(file), _) => file.clone(),
+        (None, [(_, one)]) => (*one).to_owned(),
+        (None, [(_, a), (_, b)]) => format!("{a} and {b}"),
+        (None, many) => format!("{} {}", many.len(), nouns.many),
     };
     let mut kinds: Vec<(&'static str, usize)> = Vec::new();
     for &(id, _) in bodies {

@@ -3,6 +3,7 @@
 use impinge::{BodyId, Error, Pairs, Scene, Statistics};
 use serde_json::{Map, Value, json};
 
+use crate::asked::Asked;
 use crate::detection::Times;
 use crate::load::Vertices;
 use crate::regions::Region;
@@ -13,7 +14,7 @@ const MOST_REGIONS: usize = 100;
 
 /// The object that `docs/answer.schema.json` describes, times as medians.
 pub fn answer(
-    scene: &Scene,
+    (asked, scene): (Asked, &Scene),
     bodies: &[(BodyId, &str)],
     vertices: &[Vertices],
     pairs: &Pairs,
@@ -45,6 +46,7 @@ pub fn answer(
     object.insert("hash".into(), hash(pairs).into());
     object.insert("backend".into(), pairs.stats().backend.as_str().into());
     object.insert("method".into(), pairs.stats().method.into());
+    object.insert("asked".into(), asked.json());
     object.insert("bodies".into(), described.into());
     object.insert(
         "ms".into(),
@@ -69,9 +71,14 @@ pub fn answer(
 }
 
 /// The object of an answer that holds no pairs: what was found, and how.
-pub fn without_pairs((name, found): (&str, Value), stats: &Statistics) -> Map<String, Value> {
+pub fn without_pairs(
+    asked: Asked,
+    (name, found): (&str, Value),
+    stats: &Statistics,
+) -> Map<String, Value> {
     let mut object = Map::new();
     object.insert(name.into(), found);
+    object.insert("asked".into(), asked.json());
     object.insert("backend".into(), stats.backend.as_str().into());
     object.insert("method".into(), stats.method.into());
     object.insert("ms".into(), json!({ "total": rounded(stats.total_ms) }));

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use impinge::{BodyId, CancelToken, Scene};
 use impinge_io::{
-    Format, Mesh, ReadOptions, Summary, Weld, read_bytes_with_summary, read_with_summary,
+    Format, Mesh, NamedMesh, ReadOptions, Summary, Weld, read_bodies, read_bodies_bytes,
+    read_bytes_with_summary, read_with_summary,
 };
 
-use crate::args::AskArgs;
+use crate::args::{AskArgs, BodiesArg};
 use crate::error::Error;
 use crate::text::grouped;
 use crate::watch::go_on;
@@ -23,11 +24,33 @@ pub struct Bodies {
     pub ids: Vec<BodyId>,
     pub names: Vec<String>,
     pub vertices: Vec<Vertices>,
+    pub nouns: Nouns,
+}
+
+/// What bodies are called.
+#[derive(Debug, Clone)]
+pub struct Nouns {
+    pub one: &'static str,
+    pub many: &'static str,
+    /// The file whose parts they are, if they are of one.
+    pub file: Option<String>,
+}
+
+impl Default for Nouns {
+    fn default() -> Self {
+        Nouns {
+            one: "mesh",
+            many: "meshes",
+            file: None,
+        }
+    }
 }
 
 /// Counts of a file's vertices that share their position.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Vertices {
+    /// Whether vertices at one position were welded.
+    pub welds: bool,
     /// How many were welded to another one.
     pub n_welded: usize,
     /// How many are at the position of another one, but not welded to it; `None` if this was not counted.
@@ -43,7 +66,11 @@ pub struct Loading<'a> {
     is_self: bool,
     /// The format of standard input.
     format: Option<Format>,
-    /// Whether to print on standard error what was fanned, skipped and welded.
+    /// What becomes a body of its own, if the user says so.
+    bodies: Option<BodiesArg>,
+    /// Whether the parts of a file are bodies if it is the only one.
+    splits_one: bool,
+    /// Whether to print on standard error what was fanned and skipped.
     notes: bool,
     cancel: &'a CancelToken,
 }
@@ -54,17 +81,48 @@ impl<'a> Loading<'a> {
             weld: ask.read.weld(),
             is_self,
             format: ask.read.format,
+            bodies: ask.read.bodies,
+            splits_one: false,
             notes: !ask.json,
             cancel,
         }
     }
 
-    /// Files without welding, for queries between bodies.
+    /// The parts of a file are bodies if it is the only one.
+    pub fn splitting_one(self) -> Self {
+        Loading {
+            splits_one: true,
+            ..self
+        }
+    }
+
+    /// What the user wants as bodies.
+    pub fn of_bodies(self, bodies: Option<BodiesArg>) -> Self {
+        Loading { bodies, ..self }
+    }
+
+    /// What the parts of a file of this format are called, if they are to be bodies. There are `n` files.
+    fn parts(&self, format: Format, n: usize) -> Option<[&'static str; 2]> {
+        let (kind, nouns) = match format {
+            Format::Gltf => (BodiesArg::Nodes, ["node", "nodes"]),
+            Format::Obj => (BodiesArg::Groups, ["group", "groups"]),
+            _ => return None,
+        };
+        let splits = match self.bodies {
+            Some(wanted) => wanted == kind,
+            None => self.splits_one && n == 1,
+        };
+        splits.then_some(nouns)
+    }
+
+    /// Files without welding, for answers that name no vertices.
     pub fn as_they_are(notes: bool, cancel: &'a CancelToken) -> Self {
         Loading {
-            weld: None,
+            weld: Some(false),
             is_self: false,
             format: None,
+            bodies: None,
+            splits_one: false,
             notes,
             cancel,
         }
@@ -84,21 +142,36 @@ impl<'a> Loading<'a> {
     /// Whether to weld vertices at one position. Triangles of an STL file share only positions.
     fn welds(&self, format: Format) -> bool {
         match self.weld {
-            Some(true) => true,
+            None | Some(true) => true,
             Some(false) => self.is_self && format == Format::Stl,
-            None => self.is_self,
         }
     }
 }
 
 impl Bodies {
-    /// Reads files, one per body.
+    /// Reads files, one per body, or one per node or group of a file.
     pub fn read(paths: &[PathBuf], loading: Loading<'_>) -> Result<Self, Error> {
         let mut bodies = Bodies::default();
+        let mut has_parts = false;
         for path in paths {
-            bodies.add(path, loading)?;
+            let format = bodies.format(path, loading)?;
+            let Some([one, many]) = loading.parts(format, paths.len()) else {
+                bodies.add(path, loading)?;
+                continue;
+            };
+            has_parts = true;
+            let file = bodies.add_parts(path, loading, paths.len() > 1)?;
+            if paths.len() == 1 && bodies.ids.len() > 1 {
+                let file = Some(file);
+                bodies.nouns = Nouns { one, many, file };
+            }
         }
-        Ok(bodies)
+        match loading.bodies {
+            Some(wanted) if wanted != BodiesArg::File && !has_parts => {
+                Err(Error::Usage(wanted.misfit()))
+            }
+            _ => Ok(bodies),
+        }
     }
 
     /// Reads a file as one more body; returns the welding, if any.
@@ -107,8 +180,47 @@ impl Bodies {
         path: &Path,
         loading: Loading<'_>,
     ) -> Result<(BodyId, Option<Weld>), Error> {
-        go_on(loading.cancel)?;
-        let (name, format, (mut mesh, summary)) = self.read_one(path, loading)?;
+        let format = self.format(path, loading)?;
+        let (name, (meshes, summary)) = self.read_one(path, format, false, loading)?;
+        let mut added = None;
+        for NamedMesh { mesh, .. } in meshes {
+            added = Some(self.add_mesh(name.clone(), format, mesh, &summary, loading)?);
+        }
+        // A file is one mesh, unless its parts are asked for.
+        added.ok_or_else(|| Error::Usage(format!("{name}: no mesh")))
+    }
+
+    /// Reads a file as one more body per part; returns the name of the file. The names of bodies begin with it if there are
+    /// `several` files.
+    fn add_parts(
+        &mut self,
+        path: &Path,
+        loading: Loading<'_>,
+        several: bool,
+    ) -> Result<String, Error> {
+        let format = self.format(path, loading)?;
+        let (file, (meshes, mut summary)) = self.read_one(path, format, true, loading)?;
+        for NamedMesh { name, mesh } in meshes {
+            let name = match name {
+                None => file.clone(),
+                Some(part) if several => format!("{file}#{part}"),
+                Some(part) => part,
+            };
+            self.add_mesh(name, format, mesh, &summary, loading)?;
+            // Notes on the file are printed once.
+            summary = Summary::default();
+        }
+        Ok(file)
+    }
+
+    fn add_mesh(
+        &mut self,
+        name: String,
+        format: Format,
+        mut mesh: Mesh,
+        summary: &Summary,
+        loading: Loading<'_>,
+    ) -> Result<(BodyId, Option<Weld>), Error> {
         let welds = loading.welds(format);
         let mut vertices = Vertices::default();
         let mut welding = None;
@@ -116,15 +228,23 @@ impl Bodies {
             let weld = Weld::by_position(&mesh.positions);
             if welds {
                 weld.apply(&mut mesh);
-                vertices.n_welded = weld.n_welded();
-                vertices.n_coincident = Some(0);
+                vertices = Vertices {
+                    welds,
+                    n_welded: weld.n_welded(),
+                    n_coincident: Some(0),
+                };
                 welding = Some(weld);
             } else {
                 vertices.n_coincident = Some(weld.n_welded());
             }
         }
         if loading.notes {
-            note(&name, &summary, vertices);
+            // The last line of the answer says how many were welded.
+            let told = Vertices {
+                n_welded: 0,
+                ..vertices
+            };
+            note(&name, summary, told);
         }
         // No coordinate changes its value; this halves the memory if all coordinates fit in f32.
         mesh.positions.narrow_if_exact();
@@ -145,23 +265,36 @@ impl Bodies {
         Ok((id, welding))
     }
 
-    /// Reads a file, or standard input, without changes.
+    /// The format of a file, or of standard input.
+    fn format(&self, path: &Path, loading: Loading<'_>) -> Result<Format, Error> {
+        if path != Path::new(STDIN) {
+            return Ok(Format::from_path(path)?);
+        }
+        loading.format.ok_or_else(|| {
+            let text = "a mesh from standard input needs its format, such as --format ply";
+            Error::Usage(text.to_owned())
+        })
+    }
+
+    /// Reads a file, or standard input, without changes: in one piece, or in its parts.
     fn read_one(
         &self,
         path: &Path,
+        format: Format,
+        in_parts: bool,
         loading: Loading<'_>,
-    ) -> Result<(String, Format, (Mesh, Summary)), Error> {
+    ) -> Result<(String, (Vec<NamedMesh>, Summary)), Error> {
+        go_on(loading.cancel)?;
         let options = ReadOptions::default();
+        let whole = |(mesh, summary)| (vec![NamedMesh { name: None, mesh }], summary);
         if path != Path::new(STDIN) {
-            let format = Format::from_path(path)?;
-            let read = read_with_summary(path, &options)?;
-            return Ok((path.display().to_string(), format, read));
+            let read = match in_parts {
+                true => read_bodies(path, &options)?,
+                false => whole(read_with_summary(path, &options)?),
+            };
+            return Ok((path.display().to_string(), read));
         }
         let name = "standard input";
-        let Some(format) = loading.format else {
-            let text = "a mesh from standard input needs its format, such as --format ply";
-            return Err(Error::Usage(text.to_owned()));
-        };
         if self.names.iter().any(|other| other == name) {
             let text = "only one mesh can come from standard input";
             return Err(Error::Usage(text.to_owned()));
@@ -179,8 +312,11 @@ impl Bodies {
         if bytes.len() as u64 > most {
             return Err(Error::Usage(format!("{name}: more than {most} bytes")));
         }
-        let read = read_bytes_with_summary(&bytes, format, name, &options)?;
-        Ok((name.to_owned(), format, read))
+        let read = match in_parts {
+            true => read_bodies_bytes(&bytes, format, name, &options)?,
+            false => whole(read_bytes_with_summary(&bytes, format, name, &options)?),
+        };
+        Ok((name.to_owned(), read))
     }
 }
 

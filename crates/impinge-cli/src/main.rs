@@ -2,6 +2,7 @@
 
 mod apart;
 mod args;
+mod asked;
 mod commands;
 mod contacts;
 mod detection;

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::bodies::{NamedMesh, Parts};
 use crate::error::{Error, Name, Place};
 use crate::mesh::{Elements, Mesh, Positions};
 use crate::options::{Prefer, ReadOptions, Summary};
@@ -21,6 +22,8 @@ pub(crate) struct Collector<'a> {
     pub n_points: u64,
     /// The corners of the current polygon or strip; its memory is reused.
     pub corners: Vec<u32>,
+    /// Which triangles belong to which node or group.
+    parts: Parts,
 }
 
 impl<'a> Collector<'a> {
@@ -34,7 +37,14 @@ impl<'a> Collector<'a> {
             n_lines: 0,
             n_points: 0,
             corners: Vec::new(),
+            parts: Parts::default(),
         }
+    }
+
+    /// The triangles that are added from now on belong to the part of this name, until another one begins. With `is_new`, a
+    /// part of the same name that began before is another one.
+    pub(crate) fn begin_part(&mut self, name: &str, is_new: bool) {
+        self.parts.begin(name, is_new, self.triangles.len());
     }
 
     pub(crate) fn n_vertices(&self) -> u64 {
@@ -82,6 +92,30 @@ impl<'a> Collector<'a> {
                     [t[1], t[0], t[2]]
                 }
             }));
+    }
+
+    /// All triangles so far belong to no part.
+    pub(crate) fn forget_parts(&mut self) {
+        self.parts = Parts::default();
+    }
+
+    /// As [`finish`](Self::finish), every part of the file as a mesh of its own.
+    pub(crate) fn finish_bodies(
+        mut self,
+        options: &ReadOptions,
+    ) -> Result<(Vec<NamedMesh>, Summary), Error> {
+        let parts = std::mem::take(&mut self.parts);
+        let whole = ReadOptions {
+            weld: false,
+            ..options.clone()
+        };
+        let (mesh, mut summary) = self.finish(&whole)?;
+        let mut bodies = parts.split(mesh);
+        if options.weld {
+            let welded = bodies.iter_mut().map(|body| crate::weld(&mut body.mesh));
+            summary.n_welded = welded.sum::<usize>() as u64;
+        }
+        Ok((bodies, summary))
     }
 
     /// Chooses the primitives that the options ask for, checks that there are some, and welds if the options say so.

@@ -38,6 +38,7 @@
 
 mod base64;
 mod binary;
+mod bodies;
 mod budget;
 mod collect;
 mod encoding;
@@ -54,12 +55,16 @@ mod sequence;
 mod text;
 mod write;
 
+pub use bodies::NamedMesh;
 pub use error::{Error, Location, Place};
 pub use format::Format;
 pub use mesh::{Elements, Mesh, Positions, Weld, weld};
 pub use npy::{npy_header, npy_header_in, write_impacts_npy};
 pub use options::{Prefer, ReadOptions, Summary};
-pub use read::{read, read_bytes, read_bytes_with_summary, read_tetgen_bytes, read_with_summary};
+pub use read::{
+    read, read_bodies, read_bodies_bytes, read_bytes, read_bytes_with_summary, read_tetgen_bytes,
+    read_with_summary,
+};
 pub use sequence::{Sequence, SequenceFormat};
 pub use write::{
     AtomicFile, ColoredMesh, GrowingPc2, Pc2Writer, Polylines, remove_temporary_files, write_glb,

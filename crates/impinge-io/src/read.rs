@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::bodies::NamedMesh;
 use crate::collect::Collector;
 use crate::encoding::check_encoding;
 use crate::error::{Error, Name, Place};
@@ -13,7 +14,7 @@ use crate::options::{ReadOptions, Summary};
 
 /// Reads the mesh at `path`; the extension decides the format ([`Format::from_path`]).
 ///
-/// All bodies, groups and nodes of a file become one mesh. `path` may be either of TetGen's two files; the other must lie
+/// All bodies, groups and nodes of a file become one mesh; [`read_bodies`] tells them apart. `path` may be either of TetGen's two files; the other must lie
 /// beside it. Only regular files are read. Files that belong to the mesh file must lie in its folder or below, after
 /// resolving links.
 ///
@@ -29,6 +30,31 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Mesh, Error> {
 /// As [`read`].
 pub fn read_with_summary(path: &Path, options: &ReadOptions) -> Result<(Mesh, Summary), Error> {
     collect_file(path, options, |parts| parts.finish(options))
+}
+
+/// Reads the bodies of the file at `path`, each as a mesh of its own: the nodes of a glTF file that have a mesh; the objects
+/// (`o`) of an OBJ file, or its groups (`g`) if it has no objects. Other files, files with tetrahedra and files with only one
+/// such part are one body.
+///
+/// The primitives of a body are numbered from 0, in the order of the file. Vertices that bodies share are in each of them.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_bodies(path: &Path, options: &ReadOptions) -> Result<(Vec<NamedMesh>, Summary), Error> {
+    collect_file(path, options, |parts| parts.finish_bodies(options))
+}
+
+/// Like [`read_bodies`], from the bytes of a file.
+///
+/// # Errors
+/// As [`read_bytes`].
+pub fn read_bodies_bytes(
+    bytes: &[u8],
+    format: Format,
+    name: &str,
+    options: &ReadOptions,
+) -> Result<(Vec<NamedMesh>, Summary), Error> {
+    collect_bytes(bytes, format, Name(name), None, options)?.finish_bodies(options)
 }
 
 /// Reads a mesh from the bytes of a file. Errors use `name` for the file.

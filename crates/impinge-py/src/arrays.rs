@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use impinge::{Elements, Kind};
+use impinge::{Elements, Kind, Positions};
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray2,
     PyUntypedArray, PyUntypedArrayMethods,
@@ -247,6 +247,19 @@ fn check_indices(indices: &[u32], n_columns: usize, name: &str, n_vertices: usiz
         "{place} = {}: there are {n_vertices} vertices",
         indices[at]
     )))
+}
+
+/// An `(n, 3)` array of the precision in which positions are held.
+pub fn positions_array<'py>(py: Python<'py>, positions: &Positions) -> PyResult<Bound<'py, PyAny>> {
+    let shape = [positions.len(), 3];
+    Ok(match positions {
+        Positions::F32(positions) => PyArray1::from_slice(py, positions.as_flattened())
+            .reshape(shape)?
+            .into_any(),
+        Positions::F64(positions) => PyArray1::from_slice(py, positions.as_flattened())
+            .reshape(shape)?
+            .into_any(),
+    })
 }
 
 /// The contiguous rows of an array that [`in_c_order`] has made.

@@ -1,15 +1,15 @@
 //! The everyday case in one line.
 
-use impinge::{Positions, Real, Weld};
+use impinge::{Positions, Weld};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{self, PositionArray};
+use crate::arrays::{self, PositionArray, positions_array};
 use crate::detector::Detector;
-use crate::errors::{Names, raise};
+use crate::errors::Names;
 use crate::result::Answer;
-use crate::scene::{Scene, positions_array};
+use crate::scene::{Scene, welded};
 use crate::settings::{self, Argument, kind};
 
 /// Which primitives of two meshes intersect.
@@ -20,6 +20,9 @@ use crate::settings::{self, Argument, kind};
 ///     Positions, float32 or float64.
 /// faces_a, faces_b : array_like of int, shape (n, 3) or (n, 4)
 ///     Triangles or tetrahedra as vertex indices.
+/// weld : bool
+///     Whether vertices of one mesh at the same position become one first. This does not change which primitives of two
+///     meshes intersect.
 /// kind_a, kind_b : {"points", "edges", "triangles", "tetrahedra", "quads"}, optional
 ///     What the rows of `faces_a` and `faces_b` are, as for `Scene.add`.
 /// **settings
@@ -46,7 +49,7 @@ use crate::settings::{self, Argument, kind};
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 #[pyo3(
-    signature = (vertices_a, faces_a, vertices_b, faces_b, *, kind_a=None, kind_b=None, **settings)
+    signature = (vertices_a, faces_a, vertices_b, faces_b, *, weld=false, kind_a=None, kind_b=None, **settings)
 )]
 pub fn pairs<'py>(
     py: Python<'py>,
@@ -54,6 +57,7 @@ pub fn pairs<'py>(
     faces_a: &Bound<'py, PyAny>,
     vertices_b: &Bound<'py, PyAny>,
     faces_b: &Bound<'py, PyAny>,
+    weld: bool,
     kind_a: Argument<'py, 'py>,
     kind_b: Argument<'py, 'py>,
     settings: Option<&Bound<'py, PyDict>>,
@@ -67,8 +71,8 @@ pub fn pairs<'py>(
         vertices: "vertices_b",
         elements: "faces_b",
     };
-    scene.add_named(vertices_a, faces_a, kind(kind_a)?, a)?;
-    scene.add_named(vertices_b, faces_b, kind(kind_b)?, b)?;
+    scene.add_welded(vertices_a, faces_a, kind(kind_a)?, a, weld)?;
+    scene.add_welded(vertices_b, faces_b, kind(kind_b)?, b, weld)?;
     let question = PyDict::new(py);
     question.set_item("between", (0, 1))?;
     ask(py, scene, &question, settings)
@@ -87,8 +91,10 @@ pub fn pairs<'py>(
 /// shared_vertex : {"resolve", "skip"}
 ///     Primitives that share a vertex index are reported when they share more points than the vertices
 ///     they have in common, or never. Vertices at one position with different indices are not
-///     shared: weld them first (`weld`) to get the
-///     answer of the program ``impinge self``.
+///     shared, unless they are welded.
+/// weld : bool
+///     Whether vertices at the same position become one first, as `weld` does. Rows of the answer stay those of
+///     `faces`; with it, the answer about the arrays of a file is that of the program ``impinge self``.
 /// **settings
 ///     As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given: waking a GPU
 ///     does not pay for one question.
@@ -104,14 +110,15 @@ pub fn pairs<'py>(
 ///     As `Scene.add` and `Detector`.
 #[pyfunction]
 #[pyo3(
-    signature = (vertices, faces, shared_vertex=None, *, kind=None, **settings),
-    text_signature = "(vertices, faces, shared_vertex=\"resolve\", *, kind=None, **settings)"
+    signature = (vertices, faces, shared_vertex=None, *, weld=false, kind=None, **settings),
+    text_signature = "(vertices, faces, shared_vertex=\"resolve\", *, weld=False, kind=None, **settings)"
 )]
 pub fn self_pairs<'py>(
     py: Python<'py>,
     vertices: &Bound<'py, PyAny>,
     faces: &Bound<'py, PyAny>,
     shared_vertex: Argument<'py, 'py>,
+    weld: bool,
     kind: Argument<'py, 'py>,
     settings: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<u32>>> {
@@ -120,12 +127,19 @@ pub fn self_pairs<'py>(
         vertices: "vertices",
         elements: "faces",
     };
-    scene.add_named(vertices, faces, settings::kind(kind)?, names)?;
+    scene.add_welded(vertices, faces, settings::kind(kind)?, names, weld)?;
     let question = PyDict::new(py);
     question.set_item("within", 0)?;
     question.set_item("shared_vertex", shared_vertex)?;
     ask(py, scene, &question, settings)
 }
+
+/// Vertices that stay, elements that name them, and the vertex that each vertex became.
+type Welded<'py> = (
+    Bound<'py, PyAny>,
+    Bound<'py, PyArray2<u32>>,
+    Bound<'py, PyArray1<u32>>,
+);
 
 /// Makes one vertex of all vertices at the same position.
 ///
@@ -170,11 +184,7 @@ pub fn weld<'py>(
     py: Python<'py>,
     vertices: &Bound<'py, PyAny>,
     faces: &Bound<'py, PyAny>,
-) -> PyResult<(
-    Bound<'py, PyAny>,
-    Bound<'py, PyArray2<u32>>,
-    Bound<'py, PyArray1<u32>>,
-)> {
+) -> PyResult<Welded<'py>> {
     let positions = PositionArray::new(vertices, "vertices")?;
     let (mut indices, n_columns) = arrays::index_rows(faces, "faces", positions.len())?;
     let (weld, welded): (Weld, Positions) = match &positions {
@@ -190,14 +200,6 @@ pub fn weld<'py>(
         PyArray1::from_vec(py, indices).reshape(shape)?,
         PyArray1::from_slice(py, weld.map()),
     ))
-}
-
-fn welded<R: Real>(positions: &[[R; 3]]) -> PyResult<(Weld, Positions)> {
-    let weld = Weld::by_position(positions);
-    let welded = weld
-        .positions(positions)
-        .map_err(|error| raise(error.into()))?;
-    Ok((weld, welded.into()))
 }
 
 fn ask<'py>(

@@ -11,6 +11,7 @@ mod datasets;
 mod detector;
 mod devices;
 mod errors;
+mod files;
 mod functions;
 mod lent;
 mod meshes;
@@ -51,6 +52,8 @@ mod _impinge {
     use super::devices::{Device, devices};
     #[pymodule_export]
     use super::errors::{Cancelled, TooManyPairs};
+    #[pymodule_export]
+    use super::files::{Mesh, read, read_bodies};
     #[pymodule_export]
     use super::functions::{hash_rows, pairs, self_pairs, weld};
     #[pymodule_export]

@@ -7,6 +7,7 @@ use pyo3::types::PyDict;
 
 use crate::arrays::RowKind;
 use crate::errors::Names;
+use crate::files::Mesh;
 
 /// What `Scene.add` takes from a mesh.
 pub struct Parts<'py> {
@@ -19,6 +20,9 @@ pub struct Parts<'py> {
 /// Takes a mesh apart: one with `vertices` and `faces` (trimesh) or `triangles` (Open3D), or with `points` and
 /// `cells_dict` (meshio).
 pub fn parts<'py>(mesh: &Bound<'py, PyAny>, kind: Option<RowKind>) -> PyResult<Parts<'py>> {
+    // Of a mesh that was read it is known what its rows are.
+    let known = mesh.cast::<Mesh>().ok().map(|mesh| mesh.get().kind());
+    let kind = kind.or(known);
     if mesh.hasattr("vertices")? {
         for (attribute, elements) in [("faces", "mesh.faces"), ("triangles", "mesh.triangles")] {
             if mesh.hasattr(attribute)? {

@@ -1,12 +1,12 @@
 //! `impinge.Scene`: bodies, their topology and positions.
 
-use impinge::{BodyId, Elements, Filter, Kind, Positions};
+use impinge::{BodyId, Elements, Filter, Kind, Positions, Real, Weld};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 
-use crate::arrays::{self, PositionArray, RowKind, slice_rows};
+use crate::arrays::{self, PositionArray, RowKind, positions_array, slice_rows};
 use crate::bodies::{Body, body_id, new_scene_number};
 use crate::errors::{Names, raise, refuse};
 use crate::lent;
@@ -75,25 +75,51 @@ impl Scene {
         kind: Option<RowKind>,
         names: Names<'_>,
     ) -> PyResult<BodyId> {
+        self.add_welded(vertices, elements, kind, names, false)
+    }
+
+    /// As [`add_named`](Self::add_named); with `weld`, vertices at the same position become one.
+    pub fn add_welded(
+        &mut self,
+        vertices: &Bound<'_, PyAny>,
+        elements: &Bound<'_, PyAny>,
+        kind: Option<RowKind>,
+        names: Names<'_>,
+        weld: bool,
+    ) -> PyResult<BodyId> {
         let positions = PositionArray::new(vertices, names.vertices)?;
-        let elements = arrays::elements(elements, names.elements, kind, positions.len())?;
+        let mut elements = arrays::elements(elements, names.elements, kind, positions.len())?;
+        let mut held = stored(&positions)?;
+        if weld {
+            let (weld, welded) = match &held {
+                Positions::F32(positions) => welded(&positions[..])?,
+                Positions::F64(positions) => welded(&positions[..])?,
+            };
+            (elements, held) = (apply(&weld, &elements), welded);
+        }
         self.inner
-            .add(elements, stored(&positions)?)
+            .add(elements, held)
             .map_err(|error| refuse(error, names, &positions))
     }
 }
 
-/// An `(n, 3)` array of the precision in which positions are held.
-pub fn positions_array<'py>(py: Python<'py>, positions: &Positions) -> PyResult<Bound<'py, PyAny>> {
-    let shape = [positions.len(), 3];
-    Ok(match positions {
-        Positions::F32(positions) => PyArray1::from_slice(py, positions.as_flattened())
-            .reshape(shape)?
-            .into_any(),
-        Positions::F64(positions) => PyArray1::from_slice(py, positions.as_flattened())
-            .reshape(shape)?
-            .into_any(),
-    })
+/// A welding of vertices at the same position, and the positions that stay.
+pub fn welded<R: Real>(positions: &[[R; 3]]) -> PyResult<(Weld, Positions)> {
+    let weld = Weld::by_position(positions);
+    let welded = weld
+        .positions(positions)
+        .map_err(|error| raise(error.into()))?;
+    Ok((weld, welded.into()))
+}
+
+/// Elements with the indices of welded vertices.
+fn apply(weld: &Weld, elements: &Elements) -> Elements {
+    match elements {
+        Elements::Points(points) => Elements::Points(weld.apply(points)),
+        Elements::Edges(edges) => Elements::Edges(weld.apply(edges)),
+        Elements::Triangles(faces) => Elements::Triangles(weld.apply(faces)),
+        Elements::Tetrahedra(tets) => Elements::Tetrahedra(weld.apply(tets)),
+    }
 }
 
 fn stored(positions: &PositionArray<'_>) -> PyResult<Positions> {

@@ -8,12 +8,12 @@ use pyo3::exceptions::{PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 
-use crate::arrays::from_end;
+use crate::arrays::{from_end, positions_array};
 use crate::bodies::Body;
 use crate::columns;
 use crate::errors::raise;
 use crate::result::{collect, to_array};
-use crate::scene::{Scene, positions_array};
+use crate::scene::Scene;
 use crate::settings::{Argument, choose_one, unexpected};
 use crate::statistics::Statistics;
 

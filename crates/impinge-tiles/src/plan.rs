@@ -33,7 +33,7 @@ pub struct PlanOptions {
     pub cap: u64,
     /// Primitives per unit of scattering; a thread reads, sorts and writes one unit at a time. 500,000 by default.
     pub chunk: u64,
-    /// Whether vertices of one file at exactly the same position are welded; formats without shared vertices (STL) need it. In a
+    /// Whether vertices of one file at exactly the same position are welded, as the program does. On by default. In a
     /// step, vertices must be at one position both at the start and at the end. Scattering such a body holds all its vertices, up to
     /// 90 bytes each in f32 and 140 in f64.
     pub weld: bool,
@@ -53,7 +53,7 @@ impl Default for PlanOptions {
         PlanOptions {
             cap: 2_000_000,
             chunk: 500_000,
-            weld: false,
+            weld: true,
             step: false,
             separation: 0.0,
             cells: None,
@@ -252,6 +252,11 @@ impl Plan {
     /// Whether the scene moves, so that tiles find first contacts.
     pub fn is_step(&self) -> bool {
         self.files.iter().any(|file| file.end.is_some())
+    }
+
+    /// Whether vertices of one file at the same position are welded.
+    pub fn welds(&self) -> bool {
+        self.weld
     }
 
     /// The distance that elements must keep in a step.

@@ -227,6 +227,17 @@ impl MeshFile {
         mesh.map(MeshFile).map_err(thrown)
     }
 
+    /// Reads the bodies of a file: nodes of glTF, objects or groups of OBJ.
+    pub fn bodies(name: &str, bytes: &[u8], weld: bool) -> Result<Vec<MeshFile>, JsError> {
+        let bodies = crate::meshes::read_bodies(name, bytes, weld).map_err(thrown)?;
+        Ok(bodies.into_iter().map(MeshFile).collect())
+    }
+
+    /// The name of the file, or of a node or a group in it.
+    pub fn name(&self) -> String {
+        self.0.name.clone()
+    }
+
     /// Vertex numbers, [`corners`](MeshFile::corners) per primitive.
     pub fn index(&self) -> Vec<u32> {
         self.0.index.clone()

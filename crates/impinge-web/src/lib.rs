@@ -14,6 +14,6 @@ mod world;
 
 pub use error::Error;
 #[cfg(feature = "io")]
-pub use meshes::{FileMesh, read, read_frames};
+pub use meshes::{FileMesh, read, read_bodies, read_frames};
 pub use step::{FlatImpacts, StepOptions};
 pub use world::{Asked, World};

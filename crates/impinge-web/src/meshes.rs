@@ -1,7 +1,8 @@
 //! Mesh files from the bytes that a page or a program has.
 
 use impinge_io::{
-    Elements, Format, Positions, ReadOptions, Sequence, SequenceFormat, Weld, read_bytes,
+    Elements, Format, Mesh, NamedMesh, Positions, ReadOptions, Sequence, SequenceFormat, Weld,
+    read_bodies_bytes, read_bytes,
 };
 
 use crate::error::Error;
@@ -12,6 +13,8 @@ const MAX_EXPANDED_BYTES: u64 = 1 << 30;
 /// A mesh as flat arrays.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileMesh {
+    /// The name of the file, or of a node or a group in it.
+    pub name: String,
     /// Vertex numbers, `corners` per primitive.
     pub index: Vec<u32>,
     /// One position per vertex, in the file's precision.
@@ -29,27 +32,52 @@ pub struct FileMesh {
 /// An unknown extension; files that the reader refuses.
 pub fn read(name: &str, bytes: &[u8], weld: bool) -> Result<FileMesh, Error> {
     let format = Format::from_path(name.as_ref())?;
-    let options = ReadOptions {
+    let mesh = read_bytes(bytes, format, name, &options())?;
+    Ok(FileMesh::new(name, mesh, weld))
+}
+
+/// Reads the bodies of a file, each as a mesh: the nodes of a glTF file, the objects or groups of an OBJ file. Their maps are of
+/// the vertices that their own primitives name.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_bodies(name: &str, bytes: &[u8], weld: bool) -> Result<Vec<FileMesh>, Error> {
+    let format = Format::from_path(name.as_ref())?;
+    let (bodies, _) = read_bodies_bytes(bytes, format, name, &options())?;
+    let bodies = bodies.into_iter().map(|body| {
+        let NamedMesh { name: own, mesh } = body;
+        FileMesh::new(own.as_deref().unwrap_or(name), mesh, weld)
+    });
+    Ok(bodies.collect())
+}
+
+fn options() -> ReadOptions {
+    ReadOptions {
         max_expanded_bytes: MAX_EXPANDED_BYTES,
         ..ReadOptions::default()
-    };
-    let mut mesh = read_bytes(bytes, format, name, &options)?;
-    // The reader's limit on vertices is 32 bits.
-    let mut map: Vec<u32> = (0..mesh.n_vertices() as u32).collect();
-    if weld {
-        let weld = Weld::by_position(&mesh.positions);
-        weld.apply(&mut mesh);
-        map.copy_from_slice(weld.map());
     }
-    Ok(FileMesh {
-        index: mesh.elements.indices().to_vec(),
-        corners: match &mesh.elements {
-            Elements::Triangles(_) => 3,
-            Elements::Tetrahedra(_) => 4,
-        },
-        positions: mesh.positions,
-        map,
-    })
+}
+
+impl FileMesh {
+    fn new(name: &str, mut mesh: Mesh, weld: bool) -> Self {
+        // The reader's limit on vertices is 32 bits.
+        let mut map: Vec<u32> = (0..mesh.n_vertices() as u32).collect();
+        if weld {
+            let weld = Weld::by_position(&mesh.positions);
+            weld.apply(&mut mesh);
+            map.copy_from_slice(weld.map());
+        }
+        FileMesh {
+            name: name.to_owned(),
+            index: mesh.elements.indices().to_vec(),
+            corners: match &mesh.elements {
+                Elements::Triangles(_) => 3,
+                Elements::Tetrahedra(_) => 4,
+            },
+            positions: mesh.positions,
+            map,
+        }
+    }
 }
 
 /// Reads the bytes of a point cache (`.pc2`, `.mdd`): the positions of each frame.

@@ -50,10 +50,12 @@ pub struct StepArgs {
     pub no_self: bool,
     #[command(flatten)]
     pub how: StepHow,
-    /// Weld vertices that are at the same position both at the start and at the end, within each body; those of STL files, where
-    /// triangles share nothing else, always are
-    #[arg(long)]
+    /// Weld vertices that are at the same position both at the start and at the end, within each body; this is the default
+    #[arg(long, overrides_with = "no_weld")]
     pub weld: bool,
+    /// Do not weld such vertices, except in STL files, where triangles share nothing else
+    #[arg(long, overrides_with = "weld")]
+    pub no_weld: bool,
     /// Ignore the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
     #[arg(long, value_name = "A,B", value_parser = body_numbers)]
     pub ignore: Vec<(usize, usize)>,

@@ -3,12 +3,13 @@
 use std::io::{Write, stderr};
 use std::path::PathBuf;
 
-use impinge::{BodyId, CancelToken, Control, Detector, Query};
+use impinge::{BodyId, CancelToken, Control, Detector};
 use serde_json::Value;
 
 use crate::apart::Inputs;
 use crate::args::{AnswerArgs, AskArgs, DetectorArgs, PairsArgs, WithinArgs};
-use crate::detection::{any, count, hit, query, repeat, settings};
+use crate::asked::Asked;
+use crate::detection::{any, asked, count, hit, query, repeat, settings};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
 #[cfg(feature = "gpu")]
@@ -20,13 +21,8 @@ use crate::{contacts, headline, json, meshes, output, regions, rows};
 
 /// `impinge pairs`.
 pub fn pairs(args: &PairsArgs, cancel: &CancelToken) -> Result<(), Error> {
-    let asked = if args.within {
-        Query::everything()
-    } else {
-        Query::all()
-    };
     answer(
-        (asked, args.within),
+        asked((true, args.within), &args.ask),
         &args.meshes,
         &args.ask,
         &args.answer,
@@ -38,7 +34,7 @@ pub fn pairs(args: &PairsArgs, cancel: &CancelToken) -> Result<(), Error> {
 /// `impinge self`.
 pub fn within(args: &WithinArgs, cancel: &CancelToken) -> Result<(), Error> {
     answer(
-        (Query::all_within(), true),
+        asked((false, true), &args.ask),
         &args.meshes,
         &args.ask,
         &args.answer,
@@ -48,7 +44,7 @@ pub fn within(args: &WithinArgs, cancel: &CancelToken) -> Result<(), Error> {
 }
 
 fn answer(
-    (asked, is_self): (Query, bool),
+    asked: Asked,
     paths: &[PathBuf],
     ask: &AskArgs,
     answer: &AnswerArgs,
@@ -78,12 +74,24 @@ fn answer(
         let text = format!("{option} holds no pairs: there is nothing to write, and one frame");
         return Err(Error::Usage(text));
     }
+    let mut loading = Loading::new(ask, asked.within, cancel);
+    if asked.between {
+        loading = loading.splitting_one();
+    }
     let Bodies {
         mut scene,
         ids,
         names,
         vertices,
-    } = Bodies::read(paths, Loading::new(ask, is_self, cancel))?;
+        nouns,
+    } = Bodies::read(paths, loading)?;
+    if ids.len() == 1 && !asked.within {
+        let text = format!(
+            "{}: one body meets no other: `impinge self` finds where it meets itself",
+            names[0]
+        );
+        return Err(Error::Usage(text));
+    }
     let query = query(asked, ask, &ids)?;
     // The detector comes last, because opening a GPU takes time and some drivers print messages.
     let mut settings = settings(how);
@@ -113,11 +121,12 @@ fn answer(
         };
         drop(watch);
         if ask.json {
-            let object = Value::Object(json::without_pairs(found, detector.stats()));
-            writeln!(output::out(), "{object}")?;
+            let object = json::without_pairs(asked, found, detector.stats());
+            writeln!(output::out(), "{}", Value::Object(object))?;
         } else {
             let mut line = Vec::new();
-            headline::write_count(&mut line, &scene, &bodies, &text)?;
+            headline::write_count(&mut line, (&scene, &nouns), &bodies, &text)?;
+            writeln!(line, "{}", asked.line(&vertices, &nouns))?;
             output::out().write_all(&line)?;
         }
         return hit(ask.fail_on_hit, n_pairs > 0);
@@ -153,20 +162,21 @@ fn answer(
     let regions = regions::regions(&scene, &bodies, pairs)?;
     let regions = regions.as_deref();
     if ask.json {
-        let mut object = json::answer(&scene, &bodies, &vertices, pairs, regions, &times)?;
+        let mut object = json::answer((asked, &scene), &bodies, &vertices, pairs, regions, &times)?;
         if let Some((found, curves)) = &met {
             object.insert("contacts".into(), contacts::object(found, curves));
         }
         writeln!(output::out(), "{}", Value::Object(object))?;
     } else {
         let mut text = Vec::new();
-        headline::write(&mut text, &scene, &bodies, pairs, regions)?;
+        headline::write(&mut text, (&scene, &nouns), &bodies, pairs, regions)?;
         if let Some((found, curves)) = &met {
             writeln!(text, "{}", contacts::summary(found, curves))?;
         }
         if ask.verbose {
             output::print_details(&mut text, &scene, &bodies, pairs, &times)?;
         }
+        writeln!(text, "{}", asked.line(&vertices, &nouns))?;
         if is_stdout_taken {
             // If standard error is closed, nobody reads the summary.
             let _ = stderr().write_all(&text);

@@ -4,11 +4,12 @@ mod rows;
 
 use std::io::{Write, stderr};
 
-use impinge::{CancelToken, Control, NearPairs, NearQuery, PairKind, Query};
+use impinge::{CancelToken, Control, NearPairs, NearQuery, PairKind, Query, SharedVertex};
 use serde_json::{Map, Value, json};
 
 use crate::apart::Inputs;
 use crate::args::NearArgs;
+use crate::asked::Asked;
 use crate::detection::{detector, hit, without};
 use crate::error::Error;
 use crate::json::{counters, rounded};
@@ -33,6 +34,7 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     let is_self = args.within || args.meshes.len() == 1;
     let read = &args.read;
     let loading = Loading::as_they_are(!args.json, cancel).asked(read.weld(), is_self, read.format);
+    let loading = loading.of_bodies(read.bodies);
     let bodies = Bodies::read(&args.meshes, loading)?;
     let mut detector = detector(&args.detector)?;
     let mut query = NearQuery::new(query(args, &bodies)?).distance(args.distance);
@@ -67,7 +69,7 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
 }
 
 fn query(args: &NearArgs, bodies: &Bodies) -> Result<Query, Error> {
-    let asked = match (args.meshes.len(), args.within) {
+    let asked = match (bodies.ids.len(), args.within) {
         (1, _) => Query::all_within(),
         (_, true) => Query::everything(),
         (_, false) => Query::all(),
@@ -122,10 +124,11 @@ fn print(
     bodies: &Bodies,
     near: &NearPairs,
 ) -> Result<(), Error> {
-    let subject = match &bodies.names[..] {
-        [one] => one.clone(),
-        [a, b] => format!("{a} and {b}"),
-        many => format!("{} meshes", many.len()),
+    let subject = match (&bodies.nouns.file, &bodies.names[..]) {
+        (Some(file), _) => file.clone(),
+        (None, [one]) => one.clone(),
+        (None, [a, b]) => format!("{a} and {b}"),
+        (None, many) => format!("{} meshes", many.len()),
     };
     let distance = args.distance;
     if near.is_empty() {
@@ -156,5 +159,12 @@ fn print(
         grouped(stats.n_unsure),
         stats.total_ms
     )?;
+    let asked = Asked {
+        between: true,
+        within: args.within || bodies.ids.len() == 1,
+        shared_vertex: SharedVertex::Skip,
+        ignores: !args.ignore.is_empty(),
+    };
+    writeln!(to, "{}", asked.line(&bodies.vertices, &bodies.nouns))?;
     Ok(())
 }

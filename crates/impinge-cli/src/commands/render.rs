@@ -2,12 +2,12 @@
 
 use std::io::Write;
 
-use impinge::{BodyId, CancelToken, Query};
+use impinge::{BodyId, CancelToken};
 use serde_json::Value;
 
 use crate::apart::Inputs;
 use crate::args::RenderArgs;
-use crate::detection::{detector, hit, query, repeat, settings};
+use crate::detection::{asked, detector, hit, query, repeat, settings};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
 use crate::output::{out, print_details};
@@ -19,18 +19,17 @@ use crate::{headline, json, regions};
 pub fn render(args: &RenderArgs, cancel: &CancelToken) -> Result<(), Error> {
     let how = &args.detector;
     let path = &args.png.0;
+    let is_self = args.within || args.meshes.len() == 1;
     Inputs::new(&args.meshes).check("--png", path)?;
     let Bodies {
         mut scene,
         ids,
         names,
         vertices,
-    } = Bodies::read(&args.meshes, Loading::new(&args.ask, args.within, cancel))?;
-    let asked = if args.within {
-        Query::everything()
-    } else {
-        Query::all()
-    };
+        nouns,
+    } = Bodies::read(&args.meshes, Loading::new(&args.ask, is_self, cancel))?;
+    // Of one body there is nothing else to ask.
+    let asked = asked((true, args.within || ids.len() == 1), &args.ask);
     let query = query(asked, &args.ask, &ids)?;
     // The drawer comes before detection: without an adapter there is no picture.
     let threads = settings(how).threads;
@@ -48,15 +47,16 @@ pub fn render(args: &RenderArgs, cancel: &CancelToken) -> Result<(), Error> {
     let regions = regions::regions(&scene, &bodies, pairs)?;
     let regions = regions.as_deref();
     if args.ask.json {
-        let answer = json::answer(&scene, &bodies, &vertices, pairs, regions, &times)?;
+        let answer = json::answer((asked, &scene), &bodies, &vertices, pairs, regions, &times)?;
         writeln!(out(), "{}", Value::Object(answer))?;
     } else {
         let mut to = out();
-        headline::write(&mut to, &scene, &bodies, pairs, regions)?;
+        headline::write(&mut to, (&scene, &nouns), &bodies, pairs, regions)?;
         if args.ask.verbose {
             print_details(&mut to, &scene, &bodies, pairs, &times)?;
         }
         writeln!(to, "wrote {}", path.display())?;
+        writeln!(to, "{}", asked.line(&vertices, &nouns))?;
     }
     hit(args.ask.fail_on_hit, !pairs.is_empty())
 }

@@ -3,14 +3,14 @@
 use std::io::{Write, stderr};
 use std::path::Path;
 
-use impinge::{BodyId, CancelToken, Control, Pairs, Query, Scene, Step};
+use impinge::{BodyId, CancelToken, Control, Pairs, Scene, Step};
 use impinge_io::{Sequence, Weld};
 use serde_json::{Map, Value};
 
 use super::step::{self, Frames as _, steps_of_sequence};
 use crate::apart::Inputs;
-use crate::args::SequenceArgs;
-use crate::detection::{Times, detect, detector, hit, query, set_positions};
+use crate::args::{BodiesArg, SequenceArgs};
+use crate::detection::{Times, asked, detect, detector, hit, query, set_positions};
 use crate::error::Error;
 use crate::load::{Bodies, Loading, to_positions};
 use crate::output::out;
@@ -29,13 +29,21 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         let text = "--json and --pairs - both write to standard output: give one of them a file";
         return Err(Error::Usage(text.to_owned()));
     }
-    let asked = match (args.within, args.others.is_empty()) {
-        (_, true) => Query::all_within(),
-        (true, false) => Query::everything(),
-        (false, false) => Query::all(),
-    };
-    let is_self = args.within || args.others.is_empty();
-    let loading = Loading::new(&args.ask, is_self, cancel);
+    if args
+        .ask
+        .read
+        .bodies
+        .is_some_and(|bodies| bodies != BodiesArg::File)
+    {
+        let text = "--bodies: the frames of a sequence are those of one body, which is a file";
+        return Err(Error::Usage(text.to_owned()));
+    }
+    let is_alone = args.others.is_empty();
+    let asked = asked((!is_alone, args.within || is_alone), &args.ask);
+    // Where nothing depends on welding, frames may come apart.
+    let weld = args.ask.read.weld().or((!asked.within).then_some(false));
+    let loading = Loading::new(&args.ask, asked.within, cancel);
+    let loading = loading.asked(weld, asked.within, args.ask.read.format);
     let mut bodies = Bodies::default();
     let (moving, weld) = bodies.add(&args.mesh, loading)?;
     let frames = Frames::open(&args.sequence, weld)?;
@@ -47,6 +55,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         ids,
         names,
         vertices,
+        nouns,
     } = bodies;
     let query = query(asked, &args.ask, &ids)?;
     let bodies: Vec<(BodyId, &str)> = ids
@@ -80,6 +89,9 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
             &Control::new().cancel(cancel),
             || watch.frame_done(),
         )?;
+        if !args.ask.json {
+            writeln!(out(), "{}", asked.line(&vertices, &nouns))?;
+        }
         return hit(args.ask.fail_on_hit, !is_free);
     }
     let still = Watch::detection(false, "");
@@ -103,7 +115,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
             let regions = regions.as_deref();
             let mut line = Map::new();
             line.insert("frame".into(), frame_ix.into());
-            let answer = json::answer(&scene, &bodies, &vertices, pairs, regions, &times)?;
+            let answer = json::answer((asked, &scene), &bodies, &vertices, pairs, regions, &times)?;
             line.extend(answer);
             let mut to = out();
             writeln!(to, "{}", Value::Object(line))?;
@@ -117,6 +129,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     outputs.finish()?;
     if prints {
         lines.end()?;
+        writeln!(out(), "{}", asked.line(&vertices, &nouns))?;
     }
     hit(args.ask.fail_on_hit, n_pairs > 0)
 }

@@ -43,7 +43,7 @@ fn plan(args: &PlanArgs, cancel: &CancelToken) -> Result<(), Error> {
     let options = PlanOptions {
         cap: args.cap,
         chunk: args.chunk,
-        weld: args.weld,
+        weld: args.weld || !args.no_weld,
         step: args.step,
         separation: args.separation,
         cells: None,
@@ -212,6 +212,7 @@ fn merge(args: &MergeArgs) -> Result<(), Error> {
         "pairs": merged.n_pairs,
         "hash": hex(merged.hash),
         "asked": merged.asked,
+        "welded": plan.welds(),
         "tiles": plan.n_tiles(),
         "records": merged.n_records,
         "uncut_tiles": merged.n_uncut,
@@ -233,9 +234,13 @@ fn merge(args: &MergeArgs) -> Result<(), Error> {
         );
     }
     let text = format!(
-        "{found}, hash {} ({}); rows in {}",
+        "{found}, hash {} ({}, {}); rows in {}",
         hex(merged.hash),
         merged.asked,
+        match plan.welds() {
+            true => "vertices welded",
+            false => "vertices as in the files",
+        },
         merged.rows.display(),
     );
     print(args.json, &object, &text)

@@ -1,6 +1,7 @@
 //! `impinge demo`.
 
 use impinge_io::{ReadOptions, read};
+use serde_json::json;
 
 use crate::harness::Folder;
 
@@ -35,6 +36,28 @@ fn a_small_demo_finds_checks_and_writes() {
             .collect();
         assert!(numbers.iter().all(|n| *n > 0), "{row}");
     }
+    // The file that was written has the answer that was printed: its nodes are the bodies.
+    let (most, _) = text
+        .lines()
+        .find_map(|line| line.split_once(" to ")?.1.split_once(" pairs per frame"))
+        .unwrap();
+    let most: u64 = most.replace(',', "").parse().unwrap();
+    let object = folder
+        .run(["pairs", "out/demo.glb", "--self", "--json"])
+        .json();
+    assert_eq!(object["pairs"], json!(most));
+    let bodies = object["bodies"].as_array().unwrap();
+    let names: Vec<_> = bodies.iter().map(|body| &body["name"]).collect();
+    assert_eq!(names, ["worm", "knot", "ball"]);
+    let text = folder.run(["pairs", "out/demo.glb"]).printed();
+    assert!(
+        text.starts_with("out/demo.glb: ") && text.contains(" pairs of 3,000 triangles"),
+        "{text}"
+    );
+    assert!(
+        text.contains("\nbetween 3 nodes of out/demo.glb, "),
+        "{text}"
+    );
 }
 
 #[test]

@@ -34,11 +34,13 @@ fn a_clean_mesh_is_clean_in_every_format() {
     folder.text("sphere.stl", &stl(&sphere));
     let run = folder.run(["self", "sphere.stl"]);
     let n_welded = 3 * 1_280 - sphere.n_vertices();
+    assert_eq!(run.stderr, "");
     assert_eq!(
-        run.stderr.replace(',', ""),
-        format!("note: sphere.stl: vertices welded to others: {n_welded}\n")
+        run.printed().replace(',', ""),
+        format!(
+            "sphere.stl: no pairs of 1280 triangles\nwithin 1 mesh {n_welded} vertices welded neighbours resolved\n"
+        )
     );
-    assert_eq!(run.printed(), "sphere.stl: no pairs of 1,280 triangles\n");
     // Triangles of an STL file share only positions, so they are always welded.
     for options in [&["--no-weld"][..], &[]] {
         let args = ["self", "sphere.stl", "--json"];
@@ -50,7 +52,10 @@ fn a_clean_mesh_is_clean_in_every_format() {
     }
     let text = folder.run(["self", "sphere.ply"]);
     assert_eq!(text.stderr, "");
-    assert_eq!(text.printed(), "sphere.ply: no pairs of 1,280 triangles\n");
+    assert_eq!(
+        text.printed(),
+        "sphere.ply: no pairs of 1,280 triangles\nwithin 1 mesh, 0 vertices welded, neighbours resolved\n"
+    );
 }
 
 #[test]
@@ -62,19 +67,23 @@ fn what_is_not_welded_is_counted() {
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 0 1 0\nv 1 1 0.5\nf 1 2 3\nf 4 6 5\n",
     );
     let run = folder.run(["self", "split.obj"]);
+    assert_eq!(run.stderr, "");
     assert_eq!(
-        run.stderr,
-        "note: split.obj: vertices welded to others: 2\n"
+        run.printed(),
+        "split.obj: no pairs of 2 triangles\nwithin 1 mesh, 2 vertices welded, neighbours resolved\n"
     );
-    assert_eq!(run.printed(), "split.obj: no pairs of 2 triangles\n");
     let run = folder.run(["self", "split.obj", "--no-weld"]);
     assert_eq!(
         run.stderr,
         "note: split.obj: vertices at the position of another, not welded to it: 2\n"
     );
+    let text = run.printed();
     assert!(
-        run.printed()
-            .starts_with("split.obj: 1 pair of 2 triangles in 1 place, near ")
+        text.starts_with("split.obj: 1 pair of 2 triangles in 1 place, near ")
+            && text.ends_with(
+                "\nwithin 1 mesh, coinciding vertices: 2 not welded (--no-weld), neighbours resolved\n"
+            ),
+        "{text}"
     );
     for (option, vertices, welded, coincident) in [("--no-weld", 6, 0, 2), ("--weld", 4, 2, 0)] {
         let object = folder.run(["self", "split.obj", option, "--json"]).json();
@@ -86,12 +95,19 @@ fn what_is_not_welded_is_counted() {
     }
     folder.text("one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     let text = folder.run(["self", "one.obj"]).printed();
-    assert_eq!(text, "one.obj: no pairs of 1 triangle\n");
-    // Between bodies it does not matter, so nothing is counted.
-    let object = folder
-        .run(["pairs", "split.obj", "split.obj", "--json"])
-        .json();
-    assert_eq!(object["bodies"][0]["coincident"], json!(null));
+    assert!(
+        text.starts_with("one.obj: no pairs of 1 triangle\n"),
+        "{text}"
+    );
+    // Between bodies it does not change the answer, so nothing is counted unless vertices are welded.
+    let pairs = ["pairs", "split.obj", "split.obj", "--json"];
+    for (more, counts) in [(&[][..], json!([2, 0])), (&["--no-weld"], json!([0, null]))] {
+        let object = folder.run(pairs.iter().chain(more)).json();
+        let body = &object["bodies"][0];
+        assert_eq!(json!([body["welded"], body["coincident"]]), counts);
+        let asked = json!({ "between": true, "self": false, "shared_vertex": "resolve" });
+        assert_eq!(object["asked"], asked);
+    }
 }
 
 /// Two cubes that cut through each other at two corners each, far apart, as one mesh.
@@ -133,7 +149,7 @@ fn the_first_line_is_the_answer_and_the_next_ones_say_where() {
         rows.len()
     );
     assert!(lines[0].starts_with(&start), "{text}");
-    assert_eq!(lines.len(), 3, "{text}");
+    assert_eq!(lines.len(), 4, "{text}");
     assert!(
         lines[1].starts_with("  near (") && lines[1].contains("such as "),
         "{text}"
@@ -182,7 +198,11 @@ fn the_first_line_is_the_answer_and_the_next_ones_say_where() {
     assert!(text.starts_with(&start), "{text}");
     let args = ["pairs", "boxes.ply", "far.ply"];
     let text = folder.run(args).printed();
-    assert_eq!(text, "boxes.ply and far.ply: no pairs of 68 triangles\n");
+    assert_eq!(
+        text,
+        "boxes.ply and far.ply: no pairs of 68 triangles\n\
+         between 2 meshes, 0 vertices welded, neighbours resolved; not asked: self-collision (--self)\n"
+    );
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod contacts;
 mod demo;
 #[cfg(feature = "gpu")]
 mod devices;
+mod doors;
 mod first_sight;
 mod harness;
 mod hostile;

@@ -76,10 +76,11 @@ fn what_meets_is_red_and_blue() {
             assert!(once != again(options), "{options:?}");
         }
     }
-    // A single body meets no other.
-    folder
+    // A single body meets no other, and this one does not meet itself.
+    let alone = folder
         .run(["render", "a.ply", "--png", "out.png", "--size", "64x64"])
         .printed();
+    assert!(alone.contains("\nwithin 1 mesh, "), "{alone}");
     let (_, seen) = pixels(&folder.path("out.png"));
     assert_eq!(red_and_blue(&seen), [0, 0]);
 }
@@ -107,6 +108,7 @@ fn answers_come_with_their_picture() {
     for args in [
         &["self", "cross.obj", "--png", "out.png"][..],
         &["render", "cross.obj", "--self", "--png", "out.png"],
+        &["render", "cross.obj", "--png", "out.png"],
     ] {
         folder
             .run(args.iter().chain(&["--size", "100x100"]))

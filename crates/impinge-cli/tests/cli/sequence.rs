@@ -88,6 +88,7 @@ fn every_frame_is_the_oracle_s() {
                         "hash",
                         "backend",
                         "method",
+                        "asked",
                         "bodies",
                         "ms",
                         "stats",
@@ -140,9 +141,32 @@ fn text_for_people() {
     write(&folder, 5);
     let text = folder.run(["sequence", "ball.ply", "run.pc2"]).printed();
     let lines: Vec<&str> = text.lines().collect();
-    assert_eq!(lines.len(), 7, "{text}");
+    assert_eq!(lines.len(), 8, "{text}");
     assert!(lines[0].contains("frame") && lines[0].contains("hash"));
     assert!(lines[6].starts_with("5 frames, 0 to "), "{text}");
+    assert_eq!(
+        lines[7],
+        "within 1 mesh, 0 vertices welded, neighbours resolved"
+    );
+    // Beside another mesh, self-collision is no longer asked for unless it is said, and the answer says so.
+    let args = ["sequence", "ball.ply", "run.pc2", "--other", "ring.ply"];
+    for (more, last) in [
+        (
+            &[][..],
+            "between 2 meshes, vertices as in the files, neighbours resolved; not asked: self-collision (--self)",
+        ),
+        (
+            &["--self"],
+            "between 2 meshes and within each, 0 vertices welded, neighbours resolved",
+        ),
+        (
+            &["--ccd"],
+            "between 2 meshes, vertices as in the files, neighbours resolved; not asked: self-collision (--self)",
+        ),
+    ] {
+        let text = folder.run(args.iter().chain(more)).printed();
+        assert_eq!(text.lines().last(), Some(last), "{text}");
+    }
 }
 
 #[test]

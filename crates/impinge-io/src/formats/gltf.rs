@@ -1,4 +1,4 @@
-//! glTF 2.0 and GLB: all triangles of the default scene, placed by their nodes, as one body.
+//! glTF 2.0 and GLB: all triangles of the default scene, placed by their nodes, as one body or as a body per node.
 //!
 //! Source: Khronos, "glTF 2.0 Specification". Triangles, strips and fans are read; points and lines are counted. Within a
 //! node, primitives that use the same positions share their vertices. Positions stay f32 if no node moves them; otherwise
@@ -213,6 +213,10 @@ impl<'a> Scene<'a, '_> {
                     .meshes
                     .get(mesh_ix)
                     .ok_or_else(|| index_error(name, "meshes", mesh_ix, root.meshes.len()))?;
+                let named = node.name.as_deref().or(mesh.name.as_deref());
+                let named = named.filter(|name| !name.is_empty());
+                let named = named.map_or_else(|| format!("node {node_ix}"), str::to_owned);
+                self.parts.begin_part(&named, true);
                 let mut bases = HashMap::new();
                 for primitive in &mesh.primitives {
                     self.add(primitive, transform, &mut bases)?;

@@ -1,6 +1,7 @@
-//! Wavefront OBJ: `v` and `f`; groups, materials, normals and texture coordinates are skipped.
+//! Wavefront OBJ: `v` and `f`, and the names of objects and groups; materials, normals and texture coordinates are skipped.
 //!
-//! Source: Wavefront, "Advanced Visualizer" manual, appendix B1. A file is read as one body, its groups in their order. A
+//! Source: Wavefront, "Advanced Visualizer" manual, appendix B1. A file is read as one body, its groups in their order, or as a
+//! body per object; per group if there are no objects, which often have groups of one material each. A
 //! face may name vertices that come later (positive indices); negative ones count back from the last vertex so far.
 
 use std::borrow::Cow;
@@ -15,6 +16,7 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
     let mut positions: Vec<[f64; 3]> = Vec::new();
     // The greatest index of all faces and its place: checked once all vertices are known.
     let mut greatest = (0, Place::File);
+    let mut has_objects = false;
     let mut text = Text::new(name, bytes);
     while let Some(line) = text.line() {
         let place = line.place();
@@ -63,6 +65,17 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
                     });
                 }
                 parts.polygon(place)?;
+            }
+            Some(word @ (b"o" | b"g")) => {
+                if word == b"o" && !has_objects {
+                    has_objects = true;
+                    parts.forget_parts();
+                }
+                if (word == b"o") == has_objects {
+                    let names: Vec<_> = words.map(String::from_utf8_lossy).collect();
+                    let name = names.join(" ");
+                    parts.begin_part(if name.is_empty() { "default" } else { &name }, false);
+                }
             }
             Some(b"l") => parts.n_lines += 1,
             Some(b"p") => parts.n_points += 1,

@@ -1,4 +1,5 @@
 from collections.abc import Callable, Iterable, Iterator
+from os import PathLike
 from typing import (
     Any,
     Literal,
@@ -28,6 +29,7 @@ __all__ = [
     "Device",
     "Impact",
     "Impacts",
+    "Mesh",
     "Nearest",
     "NearPairs",
     "Penetration",
@@ -46,6 +48,8 @@ __all__ = [
     "devices",
     "hash_rows",
     "pairs",
+    "read",
+    "read_bodies",
     "self_pairs",
     "weld",
 ]
@@ -71,6 +75,7 @@ _PairKind: TypeAlias = Literal["vf", "ee", "ev", "vv", "ef", "ff"]
 _Start: TypeAlias = Literal["report", "skip"]
 _Toi: TypeAlias = Literal["f32", "f64"]
 _Progress: TypeAlias = Callable[[int, int], object]
+_Path: TypeAlias = str | PathLike[str]
 
 class _Settings(TypedDict, total=False):
     method: _Method
@@ -591,15 +596,32 @@ def pairs(
     vertices_b: _Array,
     faces_b: _Array,
     *,
+    weld: bool = False,
     kind_a: _RowKind | None = None,
     kind_b: _RowKind | None = None,
     **settings: Unpack[_Settings],
 ) -> npt.NDArray[np.uint32]: ...
+@final
+class Mesh:
+    @property
+    def vertices(self) -> npt.NDArray[np.floating[Any]]: ...
+    @property
+    def faces(self) -> npt.NDArray[np.uint32]: ...
+    @property
+    def kind(self) -> Literal["triangles", "tetrahedra"]: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def n_welded(self) -> int: ...
+
+def read(path: _Path, *, weld: bool = True) -> Mesh: ...
+def read_bodies(path: _Path, *, weld: bool = True) -> list[Mesh]: ...
 def self_pairs(
     vertices: _Array,
     faces: _Array,
     shared_vertex: _SharedVertex = "resolve",
     *,
+    weld: bool = False,
     kind: _RowKind | None = None,
     **settings: Unpack[_Settings],
 ) -> npt.NDArray[np.uint32]: ...

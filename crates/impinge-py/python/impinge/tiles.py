@@ -29,7 +29,7 @@ def plan(
     *,
     cap: int = 2_000_000,
     chunk: int = 500_000,
-    weld: bool = False,
+    weld: bool = True,
     step: bool = False,
     separation: float = 0.0,
     replace: bool = False,

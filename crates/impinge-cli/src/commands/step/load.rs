@@ -59,7 +59,9 @@ impl Moving {
         same_elements(&names, &at_start, &at_end)?;
         let mut vertices = Vertices::default();
         // Triangles of an STL file share nothing except positions.
-        let welds = args.weld || (!args.no_self && Format::from_path(start)? == Format::Stl);
+        let welds = args.weld
+            || !args.no_weld
+            || (!args.no_self && Format::from_path(start)? == Format::Stl);
         if welds || !args.no_self {
             let weld =
                 Weld::by_position(&at_start.positions).and(&Weld::by_position(&at_end.positions));

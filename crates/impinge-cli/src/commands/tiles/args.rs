@@ -74,9 +74,12 @@ pub struct PlanArgs {
     /// The number of primitives that a thread scatters at a time: about 200 bytes each
     #[arg(long, value_name = "N", value_parser = count, default_value = "500k")]
     pub chunk: u64,
-    /// Weld vertices at the same position, within each file; with --step, both at the start and at the end
-    #[arg(long)]
+    /// Weld vertices at the same position, within each file; with --step, both at the start and at the end. This is the default
+    #[arg(long, overrides_with = "no_weld")]
     pub weld: bool,
+    /// Do not weld vertices at the same position
+    #[arg(long, overrides_with = "weld")]
+    pub no_weld: bool,
     /// Replace another plan in this folder, and all files made by it
     #[arg(long)]
     pub replace: bool,
@@ -123,7 +126,7 @@ pub struct RunArgs {
     #[arg(long)]
     pub between: bool,
     /// Which neighbours are reported: pairs of primitives of one body that share a vertex
-    #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Skip)]
+    #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Resolve)]
     pub shared_vertex: SharedVertexArg,
     /// Of a step: the precision to which times are rounded down
     #[arg(long, value_enum, value_name = "PRECISION", default_value_t = ToiArg::F32)]

@@ -40,6 +40,7 @@ pub(super) struct SceneNodes {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Node {
+    pub name: Option<String>,
     #[serde(default)]
     pub children: Vec<usize>,
     pub mesh: Option<usize>,
@@ -55,6 +56,7 @@ pub(super) struct Node {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Mesh {
+    pub name: Option<String>,
     pub primitives: Vec<Primitive>,
 }
 

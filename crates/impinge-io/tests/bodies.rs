@@ -1,0 +1,157 @@
+//! The bodies of a file: nodes of glTF, objects and groups of OBJ.
+
+use impinge_io::{
+    ColoredMesh, Elements, Format, Mesh, NamedMesh, Positions, ReadOptions, read, read_bodies,
+    read_bodies_bytes, read_bytes, write_glb,
+};
+
+fn obj(text: &str) -> Vec<NamedMesh> {
+    let options = ReadOptions::default();
+    let (bodies, _) = read_bodies_bytes(text.as_bytes(), Format::Obj, "a.obj", &options).unwrap();
+    bodies
+}
+
+/// The corners of each triangle, which no numbering of vertices changes.
+fn corners(mesh: &Mesh) -> Vec<[[f64; 3]; 3]> {
+    let Elements::Triangles(faces) = &mesh.elements else {
+        panic!("triangles expected");
+    };
+    faces
+        .iter()
+        .map(|face| face.map(|ix| mesh.positions.get(ix as usize).unwrap()))
+        .collect()
+}
+
+fn names(bodies: &[NamedMesh]) -> Vec<Option<&str>> {
+    bodies.iter().map(|body| body.name.as_deref()).collect()
+}
+
+const VERTICES: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 9 9 9\nv 0 0 1\n";
+
+#[test]
+fn groups_of_an_obj_are_bodies() {
+    let text = format!(
+        "{VERTICES}g left wing\nf 1 2 3 4\ng tail\nf 1 2 6\ng empty\ng left wing\nf 2 3 6\ng\nf 3 4 6\n"
+    );
+    let bodies = obj(&text);
+    assert_eq!(
+        names(&bodies),
+        [Some("left wing"), Some("tail"), Some("default")]
+    );
+    // The quad is cut into two; a group that begins again goes on. Vertices of no face of the body are left out.
+    let n: Vec<_> = bodies
+        .iter()
+        .map(|body| (body.mesh.n_primitives(), body.mesh.n_vertices()))
+        .collect();
+    assert_eq!(n, [(3, 5), (1, 3), (1, 3)]);
+    let whole = read_bytes(
+        text.as_bytes(),
+        Format::Obj,
+        "a.obj",
+        &ReadOptions::default(),
+    )
+    .unwrap();
+    let all = corners(&whole);
+    assert_eq!(corners(&bodies[0].mesh), [all[0], all[1], all[3]]);
+    assert_eq!(corners(&bodies[1].mesh), [all[2]]);
+    assert_eq!(corners(&bodies[2].mesh), [all[4]]);
+}
+
+#[test]
+fn objects_come_before_groups() {
+    let bodies = obj(&format!(
+        "{VERTICES}g loose\nf 1 2 3\no door\ng red\nf 1 2 6\ng blue\nf 2 3 6\no handle\nf 3 4 6\n"
+    ));
+    assert_eq!(
+        names(&bodies),
+        [Some("default"), Some("door"), Some("handle")]
+    );
+    assert_eq!(bodies[1].mesh.n_primitives(), 2);
+}
+
+#[test]
+fn what_has_no_parts_is_one_body() {
+    for text in ["f 1 2 3\nf 1 3 4\n", "g all\nf 1 2 3\nf 1 3 4\n"] {
+        let bodies = obj(&format!("{VERTICES}{text}"));
+        assert_eq!(names(&bodies), [None]);
+        // As it is, with the vertices of no face.
+        assert_eq!(
+            (bodies[0].mesh.n_primitives(), bodies[0].mesh.n_vertices()),
+            (2, 6)
+        );
+    }
+}
+
+#[test]
+fn bodies_are_welded_each_by_itself() {
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\n\
+                g a\nf 1 2 3\nf 4 6 5\ng b\nf 1 2 7\n";
+    let options = ReadOptions {
+        weld: true,
+        ..ReadOptions::default()
+    };
+    let (bodies, summary) =
+        read_bodies_bytes(text.as_bytes(), Format::Obj, "a.obj", &options).unwrap();
+    assert_eq!(summary.n_welded, 2);
+    assert_eq!(
+        bodies[0].mesh.elements,
+        Elements::Triangles(vec![[0, 1, 2], [1, 3, 2]])
+    );
+    assert_eq!(bodies[1].mesh.n_vertices(), 3);
+}
+
+#[test]
+fn nodes_of_a_glb_are_bodies() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    let positions = |z: f32| Positions::F32(vec![[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z]]);
+    let held = [positions(0.0), positions(1.0), positions(2.0)];
+    let elements = Elements::Triangles(vec![[0, 1, 2]]);
+    let meshes: Vec<_> = held
+        .iter()
+        .zip(["worm", "ball", "worm"])
+        .map(|(positions, name)| ColoredMesh {
+            positions,
+            elements: &elements,
+            primitive_colors: None,
+            colliding: None,
+            name,
+        })
+        .collect();
+    write_glb(&path, &meshes).unwrap();
+    let (bodies, _) = read_bodies(&path, &ReadOptions::default()).unwrap();
+    // Each node is a body, also of a name that another one has.
+    assert_eq!(
+        names(&bodies),
+        [Some("worm"), Some("ball"), Some("worm (2)")]
+    );
+    for (body, positions) in bodies.iter().zip(&held) {
+        assert_eq!(&body.mesh.positions, positions);
+    }
+    let whole = read(&path, &ReadOptions::default()).unwrap();
+    assert_eq!(whole.n_primitives(), 3);
+}
+
+#[test]
+fn nodes_are_placed_and_named() {
+    let json = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
+        "nodes":[{"children":[1,2,3]},{"mesh":0,"translation":[5,0,0]},{"mesh":0,"name":"right"},{"mesh":1}],
+        "meshes":[{"name":"part","primitives":[{"attributes":{"POSITION":0}}]},
+                  {"primitives":[{"attributes":{"POSITION":0}}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],
+        "bufferViews":[{"buffer":0,"byteLength":36}],
+        "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+    let (bodies, _) = read_bodies_bytes(
+        json.as_bytes(),
+        Format::Gltf,
+        "a.gltf",
+        &ReadOptions::default(),
+    )
+    .unwrap();
+    assert_eq!(
+        names(&bodies),
+        [Some("part"), Some("right"), Some("node 3")]
+    );
+    assert_eq!(bodies[0].mesh.positions.get(1), Some([6.0, 0.0, 0.0]));
+    assert_eq!(bodies[1].mesh.positions.get(1), Some([1.0, 0.0, 0.0]));
+}

@@ -1,0 +1,179 @@
+//! Meshes from files.
+
+use std::path::PathBuf;
+
+use impinge_io::{Elements, Error, NamedMesh, Positions, ReadOptions};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::prelude::*;
+
+use crate::arrays::{RowKind, positions_array};
+
+/// A mesh that was read from a file. `Scene.add` takes it as it is.
+#[pyclass(module = "impinge", frozen)]
+pub struct Mesh {
+    vertices: Py<PyAny>,
+    faces: Py<PyArray2<u32>>,
+    kind: impinge::Kind,
+    name: String,
+    n_welded: usize,
+}
+
+impl Mesh {
+    /// What the rows of its faces are.
+    pub fn kind(&self) -> RowKind {
+        RowKind::Of(self.kind)
+    }
+}
+
+#[pymethods]
+impl Mesh {
+    /// numpy.ndarray, shape (v, 3) : positions, in the precision of the file; numbers in text are float64.
+    #[getter]
+    fn vertices(&self, py: Python<'_>) -> Py<PyAny> {
+        self.vertices.clone_ref(py)
+    }
+
+    /// numpy.ndarray of uint32, shape (n, 3) or (n, 4) : triangles or tetrahedra as vertex indices, in the order of the file.
+    #[getter]
+    fn faces(&self, py: Python<'_>) -> Py<PyArray2<u32>> {
+        self.faces.clone_ref(py)
+    }
+
+    /// str : ``"triangles"`` or ``"tetrahedra"``.
+    #[getter(kind)]
+    fn kind_name(&self) -> &'static str {
+        self.kind.name()
+    }
+
+    /// str : the path as given, or the name of a node or a group.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// int : vertices that welding removed.
+    #[getter]
+    fn n_welded(&self) -> usize {
+        self.n_welded
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let n = |array: &Bound<'_, PyAny>| array.len();
+        Ok(format!(
+            "Mesh({:?}, {} vertices, {} {}, {} welded)",
+            self.name,
+            n(self.vertices.bind(py))?,
+            n(self.faces.bind(py))?,
+            self.kind.name(),
+            self.n_welded
+        ))
+    }
+}
+
+/// Reads a mesh file: OBJ, PLY, STL, OFF, glTF/GLB, MSH, VTK, VTU, Medit or TetGen.
+///
+/// All bodies, groups and nodes of a file become one mesh; `read_bodies` tells them apart.
+///
+/// Parameters
+/// ----------
+/// path : path
+///     Its extension says which format it is.
+/// weld : bool
+///     Whether vertices at the same position become one, as in the program. Many files repeat a vertex along
+///     each seam, so that neighbours share none.
+///
+/// Returns
+/// -------
+/// Mesh
+///     With ``vertices``, ``faces``, ``kind``, ``name`` and ``n_welded``.
+///
+/// Raises
+/// ------
+/// OSError, ValueError
+///     A file that cannot be read, or is refused: the message names the file, the line or byte, and both numbers.
+#[pyfunction]
+#[pyo3(signature = (path, *, weld=true))]
+pub fn read(py: Python<'_>, path: PathBuf, weld: bool) -> PyResult<Mesh> {
+    let read = py.detach(|| impinge_io::read_with_summary(&path, &options(weld)));
+    let (mesh, summary) = read.map_err(refuse)?;
+    let name = path.display().to_string();
+    let n_welded = usize::try_from(summary.n_welded).unwrap_or(usize::MAX);
+    to_python(py, NamedMesh { name: None, mesh }, &name, n_welded)
+}
+
+/// Reads the bodies of a file, each as a mesh of its own.
+///
+/// The bodies of a glTF file are its nodes that have a mesh; those of an OBJ file its objects (``o``), or its groups
+/// (``g``) if it has no objects. A file of another format, or with one body, is a list of one mesh.
+///
+/// Parameters
+/// ----------
+/// path : path
+///     As for `read`.
+/// weld : bool
+///     As for `read`, within each body.
+///
+/// Returns
+/// -------
+/// list of Mesh
+///     With the names of nodes or groups, in the order of the file. Rows of ``faces`` are numbered within each body.
+///
+/// Raises
+/// ------
+/// OSError, ValueError
+///     As `read`.
+#[pyfunction]
+#[pyo3(signature = (path, *, weld=true))]
+pub fn read_bodies(py: Python<'_>, path: PathBuf, weld: bool) -> PyResult<Vec<Mesh>> {
+    let read = py.detach(|| {
+        let (mut bodies, _) = impinge_io::read_bodies(&path, &options(false))?;
+        let n_welded = bodies.iter_mut().map(|body| match weld {
+            true => impinge_io::weld(&mut body.mesh),
+            false => 0,
+        });
+        let n_welded: Vec<usize> = n_welded.collect();
+        Ok((bodies, n_welded))
+    });
+    let (bodies, n_welded) = read.map_err(refuse)?;
+    let name = path.display().to_string();
+    let bodies = bodies.into_iter().zip(n_welded);
+    bodies
+        .map(|(body, n_welded)| to_python(py, body, &name, n_welded))
+        .collect()
+}
+
+fn options(weld: bool) -> ReadOptions {
+    ReadOptions {
+        weld,
+        ..ReadOptions::default()
+    }
+}
+
+fn refuse(error: Error) -> PyErr {
+    match error {
+        Error::Io { .. } => PyOSError::new_err(error.to_string()),
+        error => PyValueError::new_err(error.to_string()),
+    }
+}
+
+fn to_python(py: Python<'_>, body: NamedMesh, file: &str, n_welded: usize) -> PyResult<Mesh> {
+    let NamedMesh { name, mesh } = body;
+    let positions: impinge::Positions = match mesh.positions {
+        Positions::F32(positions) => positions.into(),
+        Positions::F64(positions) => positions.into(),
+    };
+    let (kind, n_columns) = match mesh.elements {
+        Elements::Triangles(_) => (impinge::Kind::Triangles, 3),
+        Elements::Tetrahedra(_) => (impinge::Kind::Tetrahedra, 4),
+    };
+    let indices = PyArray1::from_slice(py, mesh.elements.indices());
+    let faces = indices.reshape([mesh.elements.len(), n_columns])?;
+    Ok(Mesh {
+        vertices: positions_array(py, &positions)?.unbind(),
+        faces: faces.unbind(),
+        kind,
+        name: name.unwrap_or_else(|| file.to_owned()),
+        n_welded,
+    })
+}

@@ -1,0 +1,69 @@
+//! Files as a page reads them have the answers of every other door.
+
+#![cfg(feature = "io")]
+
+use std::fs;
+use std::path::Path;
+
+use impinge::{Backend, Detector, Settings};
+use impinge_io::Positions;
+use impinge_web::{Asked, FileMesh, World, read, read_bodies};
+
+fn add(world: &mut World, mesh: &FileMesh) -> u32 {
+    let (index, corners) = (&mesh.index, mesh.corners as usize);
+    match &mesh.positions {
+        Positions::F32(p) => world.add(index, p.as_flattened(), corners).unwrap(),
+        Positions::F64(p) => world.add(index, p.as_flattened(), corners).unwrap(),
+    }
+}
+
+fn world() -> World {
+    let settings = Settings {
+        backend: Backend::Cpu,
+        ..Settings::default()
+    };
+    World::new(Detector::with_settings(settings).unwrap(), "resolve").unwrap()
+}
+
+#[test]
+fn files_have_the_answers_of_the_program() {
+    let folder = Path::new(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../impinge-cli/tests/doors"
+    ));
+    let answers = fs::read_to_string(folder.join("answers.json")).unwrap();
+    let mut n_files = 0;
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap();
+        if name == "answers.json" {
+            continue;
+        }
+        n_files += 1;
+        let bytes = fs::read(&path).unwrap();
+        let mut world = world();
+        let body = add(&mut world, &read(name, &bytes, true).unwrap());
+        let (pairs, found) = world.detect(Asked::Within(body)).unwrap();
+        let (n_pairs, hash) = (pairs.len() / 2, found.hash());
+        // The file of answers is JSON of one form: no reader is needed for it.
+        let start = answers.find(&format!("\"{name}\": {{")).unwrap();
+        let answer = &answers[start..];
+        let answer = &answer[..answer.find("\n  }").unwrap()];
+        for part in [
+            format!("\n    \"hash\": \"{hash:016x}\""),
+            format!("\n    \"pairs\": {n_pairs}"),
+        ] {
+            assert!(answer.contains(&part), "{name}: {part} is not in {answer}");
+        }
+        let bodies = read_bodies(name, &bytes, true).unwrap();
+        assert_eq!(bodies.len() > 1, answer.contains("\"bodies\""), "{name}");
+        for body in bodies.iter().filter(|_| answer.contains("\"bodies\"")) {
+            assert!(
+                answer.contains(&format!("\"{}\"", body.name)),
+                "{}",
+                body.name
+            );
+        }
+    }
+    assert_eq!(n_files, 8);
+}
