@@ -43,6 +43,11 @@ impl Axes {
         Some(Axes([first, second, third]))
     }
 
+    /// The first direction.
+    pub fn way(&self) -> Point {
+        self.0[0]
+    }
+
     pub fn turn(&self, point: Point) -> Point {
         self.0.map(|axis| dot(axis, point))
     }

@@ -16,7 +16,7 @@ use super::axes::{Axes, View};
 use super::features::{Gap, gap};
 use crate::hull::Extent;
 
-use super::many::{Allowance, Bodies, meet};
+use super::many::{Allowance, Bodies, are_apart, meet};
 use super::tree::{Node, Tree, box_along, box_of, corners};
 use crate::error::Error;
 use crate::exact::Point;
@@ -130,8 +130,9 @@ impl Distances {
             .nearest
             .map(|ids| ids.map(|id| frame.layers.binary_search_by_key(&id, |layer| layer.id)));
         let mut best: Option<(f64, Nearest)> = None;
+        let error = ROUNDING_TURNED * many.magnitude();
         let mut n_asked = 0;
-        let mut ask = |best: &mut Option<(f64, Nearest)>, [a, b]: [LayerIx; 2]| {
+        let mut ask = |best: &mut Option<(f64, Nearest)>, boxes: &Bodies, [a, b]: [LayerIx; 2]| {
             if frame.test(a, b).is_none() {
                 return Ok(());
             }
@@ -139,6 +140,11 @@ impl Distances {
             let most = best.map_or(f64::INFINITY, |(squared, _)| squared);
             // Nothing is nearer than 0, and no lower pair of bodies is asked later.
             if most == 0.0 && best.is_some_and(|(_, best)| best.bodies <= ids) {
+                return Ok(());
+            }
+            let pair = [a, b];
+            let bodies = pair.map(|layer| frame.body(scene, layer));
+            if are_apart(bodies, boxes.boxes(pair), most.sqrt(), error) {
                 return Ok(());
             }
             n_asked += 1;
@@ -157,7 +163,7 @@ impl Distances {
         };
         let found: Result<(), Error> = (|| {
             if let Some([Ok(a), Ok(b)]) = likely {
-                ask(&mut best, [a, b].map(LayerIx::from_usize))?;
+                ask(&mut best, &many, [a, b].map(LayerIx::from_usize))?;
             }
             let mut overlapping = Vec::new();
             many.overlapping(|pair| {
@@ -166,13 +172,12 @@ impl Distances {
             })?;
             overlapping.sort_unstable();
             for pair in overlapping {
-                ask(&mut best, pair)?;
+                ask(&mut best, &many, pair)?;
             }
-            let error = ROUNDING * many.magnitude();
             let mut apart = many.apart();
             while let Some(pair) = apart.next(best.map_or(f64::INFINITY, |(x, _)| limit(x, error)))
             {
-                ask(&mut best, pair)?;
+                ask(&mut best, &many, pair)?;
             }
             Ok(())
         })();

@@ -19,6 +19,8 @@ use crate::index::LayerIx;
 use crate::narrow::intersect;
 use crate::scene::{Body, Scene};
 
+use super::axes::Axes;
+use super::features::dot;
 use super::tree::{Node, Tree, box_of, corners};
 
 /// A tree over the boxes of the bodies of a frame.
@@ -135,6 +137,11 @@ impl Bodies {
         [a.min(b), a.max(b)]
     }
 
+    /// The boxes of two layers' bodies.
+    pub fn boxes(&self, layers: [LayerIx; 2]) -> [&Bounds; 2] {
+        layers.map(|layer| &self.boxes[layer.index()])
+    }
+
     /// The largest magnitude of a coordinate.
     pub fn magnitude(&self) -> f64 {
         let root = self.root().map(|root| Extent::from(self.bounds(root)));
@@ -228,6 +235,37 @@ impl Apart<'_> {
         }
         None
     }
+}
+
+/// Bodies with more vertices are not looked at as a whole.
+const MOST_VERTICES: usize = 1024;
+
+/// Whether two bodies are farther apart than a distance, seen along the way between the middles of their boxes: all vertices
+/// of one are beyond all of the other's by more. Of many round bodies, most whose boxes are near are told apart so.
+///
+/// `error` is what rounding may do to heights along that way, and to a distance that is computed.
+pub(super) fn are_apart(
+    bodies: [&Body; 2],
+    boxes: [&Bounds; 2],
+    distance: f64,
+    error: f64,
+) -> bool {
+    if bodies.iter().any(|body| body.n_vertices() > MOST_VERTICES) {
+        return false;
+    }
+    let Some(axes) = Axes::along(boxes.map(|bounds| bounds.center().map(f64::from))) else {
+        return false;
+    };
+    let way = axes.way();
+    let heights = |side: usize| {
+        let body: &Body = bodies[side];
+        (0..body.n_vertices()).map(move |vertex| dot(way, body.positions().point(vertex)))
+    };
+    let (low, high) = (
+        heights(0).fold(f64::NEG_INFINITY, f64::max),
+        heights(1).fold(f64::INFINITY, f64::min),
+    );
+    high - low > distance + error
 }
 
 /// How much work a look at single elements may be, in tests of two boxes.
