@@ -377,12 +377,15 @@ class CollisionManager:
             parts.append({name(*sides(a, b)[:2]) for a, b in both.tolist()})
         if return_data:
             data: list[ContactData] = []
+            surfaces: dict[tuple[int, int], list[dict[str, Any]]] = {}
             contacts = self._detector.contacts(self._scene, result) if len(result) else None
             points = None if contacts is None else _points(self._scene, contacts)
             for ix, (a, b) in enumerate(both.tolist()):
                 own = np.flatnonzero(of_row.reshape(-1) == ix)
                 first, second, swapped = sides(a, b)
-                for row, point, normal, depth in self._overlaps(contacts, points, a, b, own):
+                for row, point, normal, depth in self._overlaps(
+                    contacts, points, surfaces, a, b, own
+                ):
                     faces = (int(rows[row, 1]), int(rows[row, 3]))
                     if swapped:
                         faces, normal = faces[::-1], -normal
@@ -391,9 +394,17 @@ class CollisionManager:
         return parts[0] if len(parts) == 1 else tuple(parts)
 
     def _overlaps(
-        self, contacts: Any, points: Any, a: int, b: int, rows: npt.NDArray[np.intp]
+        self,
+        contacts: Any,
+        points: Any,
+        surfaces: dict[tuple[int, int], list[dict[str, Any]]],
+        a: int,
+        b: int,
+        rows: npt.NDArray[np.intp],
     ) -> Iterator[tuple[int, _Vector, _Vector, float]]:
-        """Of two bodies: a row of the pairs, the point, the normal from the first body to the second, the depth."""
+        """Of two bodies: a row of the pairs, the point, the normal from the first body to the second, the depth.
+
+        `surfaces` keeps the regions of bodies without an inside, by bodies, from call to call."""
         scene = self._scene
         if self._is_convex(a) and self._is_convex(b):
             found = self._convex_overlap(a, b)
@@ -405,20 +416,21 @@ class CollisionManager:
             regions = self._detector.penetration(scene, contacts, a, b).regions()
         except (ValueError, TypeError):
             # Not closed, or not made of triangles.
-            regions = [region for region in contacts.regions() if region["bodies"] == (a, b)]
+            if not surfaces:
+                for region in contacts.regions():
+                    surfaces.setdefault(region["bodies"], []).append(region)
+            regions = surfaces.get((a, b), [])
         known = {}
         for region in regions:
             for contact in region["contacts"].tolist():
                 known[contact] = (region["normal"], region.get("depth"))
         vertices, elements = scene.positions(b), scene.elements(b)
         for row in rows.tolist():
-            normal, depth = known.get(row, (None, None))
             # A region's normal is the way of the first body.
-            if normal is not None:
-                normal = -normal
-            else:
-                normal = -_normal(vertices[elements[contacts.rows[row, 3]]])
-            yield row, points[row], normal, 0.0 if depth is None else depth
+            way, far = known.get(row, (None, None))
+            if way is None:
+                way = _normal(vertices[elements[contacts.rows[row, 3]]])
+            yield row, points[row], -way, 0.0 if far is None else far
 
     def _distance(
         self,
@@ -434,16 +446,15 @@ class CollisionManager:
         else:
             a, b = (int(body) for body in nearest.bodies)
             distance, points = nearest.distance, nearest.points
+            ends = None if points is None else (points[0], points[1])
             if distance == 0:
-                distance, points = self._depth(a, b)
+                distance, ends = self._depth(a, b)
             first, second, swapped = self._sides(across)(a, b)
-            step = -1 if swapped else 1
-            data = DistanceData(
-                (first, second),
-                nearest.primitives[::step],
-                distance,
-                None if points is None else (points[0], points[1])[::step],
-            )
+            i, j = nearest.primitives
+            if swapped:
+                i, j = j, i
+                ends = None if ends is None else (ends[1], ends[0])
+            data = DistanceData((first, second), (i, j), distance, ends)
             parts = [distance, name(first, second), data]
         chosen = [parts[0]]
         chosen += [parts[1]] if return_names else []
@@ -464,14 +475,12 @@ class CollisionManager:
             regions = detector.penetration(scene, contacts, a, b).regions()
         except (ValueError, TypeError):
             return 0.0, None
-        depth, deepest = 0.0, None
-        for region in regions:
-            if region["depth"] is not None and region["depth"] > depth:
-                depth, deepest = region["depth"], region
-        if deepest is None:
+        deep = [region for region in regions if region["depth"]]
+        if not deep:
             return 0.0, None
-        middle, way = deepest["position"], 0.5 * depth * deepest["normal"]
-        return -depth, (middle - way, middle + way)
+        region = max(deep, key=lambda region: float(region["depth"]))
+        way = 0.5 * region["depth"] * region["normal"]
+        return -region["depth"], (region["position"] - way, region["position"] + way)
 
     def _convex_overlap(self, a: int, b: int) -> tuple[float, _Vector, _Vector] | None:
         """Depth, normal from the first body to the second, the deepest vertex of the first."""
