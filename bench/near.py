@@ -334,6 +334,7 @@ def compared(found, collisions, vertices, faces, edges, distance):
     for kind, (a, b), type_ in zip(
         found.kinds.tolist(), found.elements.tolist(), found.types.tolist(), strict=True
     ):
+        kind, type_ = impinge.KINDS[kind], impinge.TYPES[type_]
         if kind == "vf":
             if type_ == "P_T":
                 key = ("fv", a, b)
