@@ -4,10 +4,12 @@
 const LEAST_NUMBERED = 3;
 
 const isCache = ({ name }) => /\.(pc2|mdd)$/i.test(name);
+// Files that may name their parts.
+const mayHaveParts = ({ name }) => /\.(obj|gltf|glb)$/i.test(name);
 const byName = new Intl.Collator("en", { numeric: true }).compare;
 
 // Reads files. Those that cannot be read are left out, and `refused` says why.
-export async function read({ readMesh, readFrames }, list) {
+export async function read({ readMesh, readBodies, readFrames }, list) {
   const [meshes, caches, refused] = [[], [], []];
   for (const file of list) {
     try {
@@ -19,7 +21,8 @@ export async function read({ readMesh, readFrames }, list) {
       // Vertices at one position become one, as for the program, and coordinates keep their precision.
       const mesh = readMesh(file.name, bytes, { weld: true });
       if (mesh.index.length === 0) throw new Error(`${file.name} has no triangles and no tetrahedra`);
-      meshes.push({ name: file.name, ...mesh });
+      const parts = mayHaveParts(file) ? readBodies(file.name, bytes, { weld: true }) : [];
+      meshes.push({ ...mesh, name: file.name, parts });
     } catch (error) {
       refused.push(String(error.message ?? error));
     }
@@ -41,16 +44,23 @@ export function looksNumbered({ meshes }) {
   return meshes.length >= LEAST_NUMBERED && mayBePoses({ meshes }) && meshes.every(({ name }) => pattern(name) === first);
 }
 
-// One body per mesh, or with `arePoses` one body whose frames are the meshes. A point cache moves the first mesh
-// that has as many vertices and does not move yet.
-export function bodiesOf({ meshes, caches }, arePoses) {
+// Whether a file has several nodes or groups.
+export function hasParts({ meshes }) {
+  return meshes.some(({ parts }) => parts.length > 1);
+}
+
+// The bodies of files. `how` is `"bodies"`: one per mesh; `"poses"`: one whose frames are the meshes; `"parts"`: one per node or
+// group. A point cache moves the first body that has as many vertices and does not move yet.
+export function bodiesOf({ meshes, caches }, how) {
   const refused = [];
   const bodies = [];
-  if (arePoses) {
+  if (how === "poses") {
     const poses = meshes.toSorted((a, b) => byName(a.name, b.name));
     const [first] = poses;
     const frames = poses.map((pose) => welded(first, vertices(pose), pose.name));
     bodies.push({ ...first, name: `${first.name} … ${poses.at(-1).name}`, frames });
+  } else if (how === "parts") {
+    bodies.push(...meshes.flatMap((mesh) => (mesh.parts.length > 1 ? mesh.parts : [mesh])));
   } else {
     bodies.push(...meshes);
   }

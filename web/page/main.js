@@ -1,7 +1,7 @@
 // The page: bodies of a scene or of dropped files, and the exact answer about them as they are.
 
 import init, { Detector } from "impinge";
-import { bodiesOf, looksNumbered, mayBePoses, read } from "./files.js";
+import { bodiesOf, hasParts, looksNumbered, mayBePoses, read } from "./files.js";
 import { Gpu, lookForAdapter, withReaders } from "./gpu.js";
 import { fromLink, toLink } from "./link.js";
 import { extentOf, pose } from "./motion.js";
@@ -365,18 +365,20 @@ function showFileControls() {
   element("size-label").hidden = isFiles;
   element("up-label").hidden = !isFiles;
   element("share").hidden = isFiles;
-  element("as-label").hidden = !isFiles || !mayBePoses(files);
+  const ways = { poses: isFiles && mayBePoses(files), parts: isFiles && hasParts(files) };
+  element("as-label").hidden = !ways.poses && !ways.parts;
+  for (const [way, isThere] of Object.entries(ways)) as.querySelector(`[value="${way}"]`).hidden = !isThere;
   document.body.classList.toggle("files", isFiles);
 }
 
 // Shows what was read from files. Nothing plays: the first answer is about the meshes as they are.
-function showFiles(given, arePoses) {
-  const { bodies: made, refused } = bodiesOf(given, arePoses);
+function showFiles(given, how) {
+  const { bodies: made, refused } = bodiesOf(given, how);
   isPlaying = false;
   if (made.length > 1) self.checked = false;
   setBodies(made);
   files = given;
-  as.value = arePoses ? "poses" : "bodies";
+  as.value = how;
   showFileControls();
   history.replaceState(null, "", location.pathname + location.search);
   return refused;
@@ -397,12 +399,12 @@ async function open(list) {
       given.refused.push(...given.caches.map(({ name }) => `${name} moves a mesh: drop the mesh, too`));
       return complain(given.refused.join("\n"));
     }
-    const arePoses = looksNumbered(given);
+    const how = looksNumbered(given) ? "poses" : "bodies";
     try {
-      given.refused.push(...showFiles(given, arePoses));
+      given.refused.push(...showFiles(given, how));
     } catch (error) {
-      if (!arePoses) throw error;
-      given.refused.push(error.message, ...showFiles(given, false));
+      if (how === "bodies") throw error;
+      given.refused.push(error.message, ...showFiles(given, "bodies"));
     }
     complain(given.refused.join("\n"));
   } catch (error) {
@@ -470,7 +472,7 @@ size.addEventListener("change", () => showScene(scene.value, { withSelf: self.ch
 for (const control of [self, up]) control.addEventListener("change", () => (isMoved = true));
 as.addEventListener("change", () => {
   try {
-    complain(showFiles(files, as.value === "poses").join("\n"));
+    complain(showFiles(files, as.value).join("\n"));
   } catch (error) {
     as.value = "bodies";
     complain(error.message);

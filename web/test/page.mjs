@@ -169,6 +169,7 @@ async function writeFiles() {
     "above.obj": above,
     // Two triangles that share an edge and lie on each other.
     "folded.obj": "v 0 0 0\nv 2 0 0\nv 1 2 0\nv 1 1 0\nf 1 2 3\nf 2 1 4",
+    "groups.obj": "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 1 1 -1\nv 2 1 1\nv 1 2 1\nv 4 4 0\ng low\nf 1 2 3\nf 2 7 3\ng high\nf 4 5 6",
     "broken.obj": "v 0 0\nf 1 2 3",
     "notes.txt": "",
     "bend.obj": stripObj(0),
@@ -255,6 +256,14 @@ async function dropped(browser) {
   await settled(page);
   await sameHash(page);
   await page.locator("#use-gpu").uncheck();
+
+  // A file of two groups is one mesh, until the visitor says that its groups are bodies.
+  await drop(page, "groups.obj");
+  await sameAsProgram(page, "self", ["groups.obj"]);
+  await page.locator("#as").selectOption("parts");
+  await settled(page);
+  assert.match(await note(), /^low, high with each other: 3 triangles/);
+  assert.ok((await sameAsProgram(page, "pairs", ["groups.obj"], "--bodies", "groups")) > 0);
 
   // Files that cannot be read are named, and the others shown; the scene stays if none can.
   await drop(page, "broken.obj", "box.obj", "notes.txt");
