@@ -5,7 +5,7 @@
 // Screenshots are written to FOLDER/shots.
 
 import assert from "node:assert/strict";
-import { execFileSync } from "node:child_process";
+import { spawnSync } from "node:child_process";
 import { existsSync } from "node:fs";
 import { mkdir, mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
@@ -90,10 +90,12 @@ async function drop(page, ...names) {
   await settled(page);
 }
 
-// What the program prints about files.
+// What the program prints about files. A step whose start intersects has an exit code of its own.
 function native(command, ...args) {
   const paths = args.map((arg) => (arg.includes("/") || !existsSync(join(files, arg)) ? arg : join(files, arg)));
-  return execFileSync(resolve(program), [command, ...paths], { encoding: "utf8", maxBuffer: 1 << 28, stdio: ["ignore", "pipe", "ignore"] });
+  const { stdout, stderr, error } = spawnSync(resolve(program), [command, ...paths], { encoding: "utf8", maxBuffer: 1 << 28 });
+  assert.ok(error === undefined && stdout.length > 0, `${command} ${args}: ${error ?? stderr}`);
+  return stdout;
 }
 
 // The page's answer about files is the program's: the rows and the hash.
