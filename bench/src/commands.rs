@@ -133,7 +133,7 @@ fn contest(
 fn two_body(options: &Options, report: &mut Report) -> Result<(), Failure> {
     let scenes = match &options.scene {
         Some(scene) => vec![scene.as_str()],
-        None => vec!["ball", "bunny", "buddha", "dragon"],
+        None => vec!["ball", "bunny", "buddha", "dragon", "parts"],
     };
     for scene in scenes {
         let problem = files::two_body(scene)?.by_oracle()?;

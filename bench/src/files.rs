@@ -4,10 +4,10 @@ use std::path::Path;
 
 use impinge::Elements;
 use impinge_io::ReadOptions;
-use impinge_scenes::{Model, data, solids, surfaces};
+use impinge_scenes::{Model, adversarial, data, solids, surfaces};
 
 use crate::Failure;
-use crate::problem::{Ask, Problem};
+use crate::problem::{Ask, Problem, models};
 
 /// The offset of the second ball. The balls have a diameter of 1.
 const BALL_OFFSET: [f32; 3] = [0.9, 0.01, 0.02];
@@ -89,17 +89,29 @@ fn twice(scene: &str) -> Result<(Vec<Model>, Option<u64>, String), Failure> {
             }
         }
         _ => {
-            return Err(
-                format!("no scene `{scene}`: ball15k, ball, bunny, buddha or dragon").into(),
-            );
+            return Err(format!(
+                "no scene `{scene}`: ball15k, ball, bunny, buddha, dragon or parts"
+            )
+            .into());
         }
     };
     let moved = model.translated(offset);
     Ok((vec![model, moved], expected, about))
 }
 
-/// Two copies of a body, in place.
+/// Triangles of the two machine parts.
+const N_PARTS: usize = 60_000;
+
+/// Two copies of a body, in place; or, as `parts`, two generated parts of a machine.
 pub fn two_body(scene: &str) -> Result<Problem, Failure> {
+    if scene == "parts" {
+        let models = models(adversarial::machine_parts(N_PARTS)?)?;
+        return Ok(
+            Problem::mirrored(scene, models, Ask::Between).about(format!(
+                "generated: slivers, fans and fillets, turned in space; {MIRRORED}"
+            )),
+        );
+    }
     let (models, expected, about) = twice(scene)?;
     Ok(Problem::mirrored(scene, models, Ask::Between)
         .about(format!("{about}; {MIRRORED}"))

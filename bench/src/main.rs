@@ -47,7 +47,8 @@ Benchmarks of impinge, peers measured in the same run.
 usage: impinge-bench COMMAND [options]
 
 commands:
-  two-body      two copies of a mesh: --scene ball15k|ball|bunny|buddha|dragon, or all but ball15k
+  two-body      two copies of a mesh: --scene ball15k|ball|bunny|buddha|dragon, two parts of a machine: parts;
+                or all but ball15k
   motion        the same, the second copy passing by at four speeds: --scene (default dragon)
   self          self-collision of one mesh: --scene ball|bunny|buddha|dragon|cow|camelhead
                 (default dragon)

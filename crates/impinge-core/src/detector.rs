@@ -1,5 +1,6 @@
 //! The detector that users hold. It picks the backend; the frame loop does the rest.
 
+mod distance;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod steps;
@@ -38,6 +39,7 @@ pub struct Detector {
     frames: FrameLoop,
     cpu: Cpu,
     steps: steps::StepMemory,
+    touching: distance::Touching,
     distances: Distances,
     topologies: Topologies,
     #[cfg(feature = "gpu")]
@@ -101,6 +103,7 @@ impl Detector {
             ),
             cpu: Cpu::new(&settings),
             steps: steps::StepMemory::new(&settings),
+            touching: distance::Touching::default(),
             distances: Distances::default(),
             topologies: Topologies::default(),
             settings,
@@ -317,8 +320,18 @@ impl Detector {
         b: BodyId,
         control: &Control<'_>,
     ) -> Result<Option<Nearest>, Error> {
-        let workers = self.frames.workers();
-        self.distances.between(scene, [a, b], workers, control)
+        let Detector {
+            touching,
+            distances,
+            frames,
+            cpu,
+            settings,
+            ..
+        } = self;
+        let workers = frames.workers();
+        distances.between(scene, [a, b], workers, control, || {
+            touching.lowest(scene, [a, b], (workers, control), cpu, settings)
+        })
     }
 
     /// Where the triangles of each pair meet: points, segments and polygons. The scene must not have changed since the pairs

@@ -21,7 +21,7 @@ use vec4::{center_f32, extent};
 
 use crate::elements::{Elements, with_corners};
 use crate::grouping::bounds::{Bounds, LaneBounds, greater, lesser, round_down, round_up};
-use crate::grouping::clusters::Clustering;
+use crate::grouping::clusters::{Clustering, ToOrder};
 use crate::grouping::hierarchy::Entry;
 use crate::grouping::{GROUP, made_from};
 use crate::index::ClusterIx;
@@ -55,12 +55,55 @@ pub(crate) fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
     }
 }
 
-/// The centres of the boxes of all elements, on the threads of the pool at hand.
-pub(crate) fn centers(elements: &Elements, positions: &Positions) -> Vec<Entry> {
-    with_corners!(elements, |corners| match positions {
+/// What the order of a body's clusters follows: the centres of the boxes of all elements, on the threads of the pool at hand, and the
+/// elements' sizes if these differ much.
+pub(crate) fn centers(elements: &Elements, positions: &Positions) -> ToOrder {
+    let centers = with_corners!(elements, |corners| match positions {
         Positions::F32(positions) => numbered(corners, |corners| center_f32(positions, corners)),
         Positions::F64(_) => numbered(corners, |corners| of_vertices(positions, corners).center()),
-    })
+    });
+    ToOrder {
+        centers,
+        sizes: sizes(elements, positions),
+    }
+}
+
+/// How many elements are looked at to see whether sizes differ.
+const SAMPLE: usize = 256;
+/// An element is long if its box is more than so many times as long as that of the middle one.
+const LONG: f32 = 8.0;
+/// The share of long elements from which they are set apart: one in so many.
+const ONE_IN: usize = 32;
+
+/// The class of each element by the length of its box: 0, or how many fourfold lengths it is longer than the middle one's [`LONG`], and 1.
+/// `None` where hardly any element is long.
+///
+/// A long element makes the box of its cluster as long as itself. In clusters of their own, they leave those of short elements as
+/// small as these.
+fn sizes(elements: &Elements, positions: &Positions) -> Option<Vec<u8>> {
+    let length = |element: usize| {
+        let bounds = of_vertices(positions, elements.corners(element));
+        let [x, y, z] = [0, 1, 2].map(|axis| bounds.max[axis] - bounds.min[axis]);
+        greater(greater(x, y), z)
+    };
+    let n = elements.len();
+    if n < GROUP * 2 {
+        return None;
+    }
+    let sample = (0..n).step_by(n.div_ceil(SAMPLE));
+    let mut lengths: Vec<f32> = sample.map(length).collect();
+    lengths.sort_unstable_by(f32::total_cmp);
+    let long = LONG * lengths[lengths.len() / 2];
+    let n_long = lengths.iter().filter(|&&length| length > long).count();
+    if long == 0.0 || n_long * ONE_IN < lengths.len() {
+        return None;
+    }
+    let class = |length: f32| match length > long {
+        // Two binary orders per class.
+        true => 1 + ((length.to_bits() >> 23) - (long.to_bits() >> 23)) as u8 / 2,
+        false => 0,
+    };
+    Some((0..n).map(|element| class(length(element))).collect())
 }
 
 fn numbered<const N: usize>(

@@ -10,10 +10,11 @@
 //! Memory: the answer, and once more the answer while chunks are joined. Every allocation here may fail: what does not
 //! fit is an error by name, and all pairs are dropped before it is reported.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::error::Error;
+use crate::index::Number;
 
 /// Pairs that a worker gathers before it hands them over.
 pub const BLOCK: usize = 1024;
@@ -32,6 +33,11 @@ pub enum Wanted {
     Count,
     /// Whether there is any.
     Any,
+    /// The pair that comes first, by its element of one of two layers and then by that of the other.
+    Lowest {
+        /// Whether the element of the second layer comes first.
+        by_second: bool,
+    },
 }
 
 /// What an answer may be.
@@ -102,6 +108,8 @@ fn no_room<T>(n: usize, n_more: usize, what: &'static str) -> Error {
 #[derive(Debug)]
 pub struct Answer<T = u64, const LISTS: usize = 1> {
     is_over: AtomicBool,
+    /// The lowest key found, if that is wanted: the number that comes first in its upper half.
+    lowest: AtomicU64,
     state: Mutex<State<T, LISTS>>,
 }
 
@@ -136,6 +144,7 @@ impl<T, const LISTS: usize> Default for Answer<T, LISTS> {
     fn default() -> Self {
         Answer {
             is_over: AtomicBool::new(false),
+            lowest: AtomicU64::new(u64::MAX),
             state: Mutex::new(State::new(Limits::default(), Wanted::Pairs)),
         }
     }
@@ -145,6 +154,7 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
     /// Makes ready for a frame. `rooms` is memory to use, see [`finish`](Answer::finish).
     pub fn begin(&self, limits: Limits, wanted: Wanted, rooms: [Vec<T>; LISTS]) {
         self.is_over.store(false, Ordering::Relaxed);
+        self.lowest.store(u64::MAX, Ordering::Relaxed);
         let state = &mut *self.state();
         *state = State::new(limits, wanted);
         // Under a budget the room of an earlier answer is no gift: it counts beside that of this one.
@@ -156,16 +166,16 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
     /// How many pairs make a block: one where one is enough.
     pub fn block(&self) -> usize {
         match self.state().wanted {
-            Wanted::Any => 1,
+            Wanted::Any | Wanted::Lowest { .. } => 1,
             Wanted::Pairs | Wanted::Count => BLOCK,
         }
     }
 
     /// How many work items are gathered before they are paired, when there is room for so many: few where the first
-    /// pair ends the search.
+    /// pair ends the search, or narrows it.
     pub fn most_items(&self, room: usize) -> usize {
         match self.state().wanted {
-            Wanted::Any => room.min(BLOCK),
+            Wanted::Any | Wanted::Lowest { .. } => room.min(BLOCK),
             Wanted::Pairs | Wanted::Count => room,
         }
     }
@@ -179,7 +189,7 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
         let result = state.count(block.len() as u64);
         let result = result.and_then(|()| match state.wanted {
             Wanted::Pairs => state.put(list, block),
-            Wanted::Count | Wanted::Any => Ok(()),
+            Wanted::Count | Wanted::Any | Wanted::Lowest { .. } => Ok(()),
         });
         self.note(result, state);
     }
@@ -229,7 +239,7 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
         let state = &mut *self.state();
         let result = match state.wanted {
             Wanted::Pairs => state.foresee(n_more).and_then(|()| state.has_room(n_more)),
-            Wanted::Count | Wanted::Any => state.count(n_more),
+            Wanted::Count | Wanted::Any | Wanted::Lowest { .. } => state.count(n_more),
         };
         self.note(result, state);
         state.wanted == Wanted::Pairs && !self.is_over()
@@ -323,8 +333,38 @@ impl Ending for &Arc<Answer> {
 impl Answer {
     /// Takes all keys of a block; it is empty afterwards and keeps its memory.
     pub fn take(&self, block: &mut Vec<u64>) {
+        if let Some(by_second) = self.seeks_lowest() {
+            let keys = block.iter().map(|&key| turned(key, by_second));
+            let lowest = keys.min().unwrap_or(u64::MAX);
+            self.lowest.fetch_min(lowest, Ordering::Relaxed);
+        }
         self.extend(0, block.drain(..));
     }
+
+    /// Whether the lowest pair is wanted, and then whether by its second element.
+    pub fn seeks_lowest(&self) -> Option<bool> {
+        match self.state().wanted {
+            Wanted::Lowest { by_second } => Some(by_second),
+            Wanted::Pairs | Wanted::Count | Wanted::Any => None,
+        }
+    }
+
+    /// The number, in the upper half of the lowest key found, that no lower pair exceeds; the highest before there is one.
+    pub fn up_to(&self) -> Number {
+        Number::new((self.lowest.load(Ordering::Relaxed) >> 32) as u32)
+    }
+
+    /// The lowest key found, its lower number in the upper half as in every key.
+    pub fn lowest(&self) -> Option<u64> {
+        let lowest = self.lowest.load(Ordering::Relaxed);
+        let by_second = self.seeks_lowest()?;
+        (lowest != u64::MAX).then(|| turned(lowest, by_second))
+    }
+}
+
+/// A key whose number that comes first is in its upper half, and back.
+fn turned(key: u64, by_second: bool) -> u64 {
+    key.rotate_left(if by_second { 32 } else { 0 })
 }
 
 impl<T, const LISTS: usize> State<T, LISTS> {

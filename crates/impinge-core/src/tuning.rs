@@ -106,6 +106,9 @@ thresholds! {
     most_cached: u64 = 128,
     /// A worker settles its candidates once there are this many.
     settle_from: usize = 1024,
+    /// With fewer pairs of boxes of two clusters that overlap, directions of their elements are not tested: `narrow` takes
+    /// the pairs as fast.
+    directions_from: usize = 512,
     /// The search for the earliest contact computes the boxes of elements again once contacts are sought only in this part of
     /// the time that the boxes hold.
     step_shorter_from: f64 = 0.5,
@@ -146,6 +149,8 @@ pub struct Ways {
     pub n_full: u64,
     /// Times that boxes of elements were dropped because contacts are sought in a shorter time.
     pub n_shortened: u64,
+    /// Candidates that directions of elements told apart, because very many boxes overlapped.
+    pub n_parted: u64,
     /// Times that keys were sorted by counting.
     pub n_counted: u64,
 }

@@ -1,8 +1,8 @@
 //! Distances of bodies: compared with every pair of primitives, and their properties.
 
 use impinge_core::proximity::Nearest;
-use impinge_core::{Backend, BodyId, Detector, Query, Scene};
-use impinge_scenes::{Model, solids, soup, surfaces};
+use impinge_core::{Backend, BodyId, Detector, Query, Scene, Settings};
+use impinge_scenes::{Model, adversarial, solids, soup, surfaces};
 
 fn scene(a: &Model, b: &Model) -> (Scene, [BodyId; 2]) {
     let mut scene = Scene::new();
@@ -294,4 +294,45 @@ fn far_from_the_origin_in_double_precision() {
         (found[0].distance - found[1].distance).abs() < 1e-7,
         "{found:?}"
     );
+}
+
+/// Bodies that touch have the lowest pair that does, by the first body's primitives and then by the second's, whichever body was added
+/// first and however many threads search.
+#[test]
+fn touching_bodies_have_their_lowest_pair() {
+    let parts = adversarial::machine_parts(6_000).unwrap();
+    let [a, b] = [0, 1].map(|ix| parts.bodies[ix]);
+    let ball = surfaces::ball(3_000);
+    let mut scenes = vec![(parts.scene, [a, b])];
+    for (a, b) in [
+        (ball.clone(), ball.translated([0.3, 0.2, 0.1])),
+        (soup::triangles(500, 0.3, 5), soup::triangles(400, 0.3, 6)),
+        (
+            soup::lattice_triangles(300, 3, 1),
+            soup::lattice_triangles(300, 3, 2),
+        ),
+        (solids::solid_cube(1_000), soup::triangles(300, 0.5, 7)),
+    ] {
+        let (scene, bodies) = scene(&a, &b);
+        scenes.push((scene, bodies));
+    }
+    for (scene, [a, b]) in scenes {
+        for threads in [1, 2] {
+            let mut detector = Detector::with_settings(Settings {
+                backend: Backend::Cpu,
+                threads,
+                ..Settings::default()
+            })
+            .unwrap();
+            for [first, second] in [[a, b], [b, a]] {
+                let pairs = detector.detect(&scene, &Query::between(a, b)).unwrap();
+                let lowest = pairs.between(first, second).min().expect("they meet");
+                let nearest = detector.distance(&scene, first, second).unwrap().unwrap();
+                assert_eq!(nearest.distance, 0.0);
+                assert_eq!(nearest.primitives, [lowest.0, lowest.1]);
+                // The answer of the last frame is still there.
+                assert!(!detector.take_pairs().is_empty());
+            }
+        }
+    }
 }

@@ -293,6 +293,7 @@ fn adversarial_scenes_hold_memory_in_proportion() {
         adversarial::boxes(1_500, 1),
         adversarial::mixed_sizes(20_000),
         adversarial::slivers(2_000),
+        adversarial::machine_parts(20_000),
         adversarial::stacked_cubes(1_000),
     ] {
         let built = built.unwrap();
@@ -309,6 +310,16 @@ fn adversarial_scenes_hold_memory_in_proportion() {
             );
         }
     }
+}
+
+/// Boxes of long elements hold far more than these. Directions tell many of their pairs apart.
+#[test]
+fn directions_tell_long_elements_apart() {
+    let built = adversarial::machine_parts(20_000).unwrap();
+    let mut detector = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+    let pairs = detector.detect(&built.scene, &built.query).unwrap();
+    let (n, n_parted) = (pairs.stats().n_candidates, pairs.stats().ways.n_parted);
+    assert!(4 * n_parted > n, "{n_parted} of {n} candidates");
 }
 
 #[test]

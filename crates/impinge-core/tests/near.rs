@@ -8,7 +8,7 @@ use impinge_core::{
     Backend, BodyId, Control, Detector, Elements, Error, InstructionSet, Kind, Method, NearPair,
     NearPairs, NearQuery, PairKind, Part, Query, Scene, Settings,
 };
-use impinge_scenes::{Random, soup, surfaces};
+use impinge_scenes::{Random, adversarial, soup, surfaces};
 
 type Point = [f64; 3];
 
@@ -584,5 +584,27 @@ fn solids_and_numbers_of_any_size() {
         assert_eq!(faces(1e-70), [2]);
         assert_eq!(faces(1.0), [1, 2]);
         assert_eq!(faces(1e71), [0, 1, 2]);
+    }
+}
+
+/// Long elements of machine parts, in both precisions, at distances below and above what single precision tells.
+#[test]
+fn long_elements_are_near_as_the_oracle_says() {
+    let built = adversarial::machine_parts(1_200).unwrap();
+    let mut double = Scene::new();
+    for (_, body) in built.scene.bodies() {
+        let points = (0..body.n_vertices()).map(|ix| body.positions().point(ix));
+        let far: Vec<[f64; 3]> = points.map(|p| p.map(|x| x + 20_000.1)).collect();
+        double.add(body.elements().clone(), far).unwrap();
+    }
+    for scene in [&built.scene, &double] {
+        for distance in [0.0, 0.001, 0.05] {
+            let query = NearQuery::new(Query::everything()).distance(distance);
+            let [expected, found] = [Method::Naive, Method::Clusters].map(|method| {
+                let mut detector = detector(method);
+                rows(detector.within_distance(scene, &query).unwrap())
+            });
+            assert_eq!(expected, found, "{distance}");
+        }
     }
 }

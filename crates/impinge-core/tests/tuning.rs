@@ -438,6 +438,7 @@ impl Watched {
             ),
             "pairing_parallel_from" => new(clusters, &[], n_shared, only_at_zero),
             "most_cached" => new(clusters, &[], |stats| stats.ways.n_evicted, more_at_zero),
+            "directions_from" => new(clusters, &[], |stats| stats.ways.n_parted, only_at_zero),
             "settle_from" => new(cells, &[], |stats| stats.ways.n_full, only_at_zero),
             "auto_from" => new(auto, &["auto_body_from"], in_grid, only_at_zero),
             "auto_body_from" => new(auto, &["auto_from"], in_grid, only_at_zero),

@@ -8,7 +8,7 @@
 use impinge::Error;
 
 use crate::built::BuiltScene;
-use crate::model::{MAX_PRIMITIVES, Mesh, Model, add, count, real, to_f32};
+use crate::model::{MAX_PRIMITIVES, Mesh, Model, add, count, index, real, to_f32};
 use crate::random::Random;
 use crate::surfaces::{cloth, cube, stand_in};
 
@@ -93,6 +93,12 @@ pub const SCENES: &[Adversarial] = &[
         probes: "nearly empty boxes: memory stays bounded although nearly all boxes overlap",
         max_n: 1 << 13,
         build: slivers,
+    },
+    Adversarial {
+        name: "machine-parts",
+        probes: "parts of a machine, turned in space: long walls and fans of slivers beside fine fillets",
+        max_n: 1 << 20,
+        build: machine_parts,
     },
     Adversarial {
         name: "stacked-cubes",
@@ -366,6 +372,88 @@ pub fn slivers(n: usize) -> Result<BuiltScene, Error> {
     }
     let [a, b] = bodies.map(Mesh::model);
     BuiltScene::between("slivers", a, b)
+}
+
+/// Segments around a tube of [`machine_parts`].
+const AROUND: usize = 24;
+/// Rings of a fillet at either end of a tube.
+const RINGS: usize = 8;
+
+/// Two parts of a machine as programs for CAD export them: tubes of 860 triangles, whose walls are slivers 200 times as long
+/// as wide, whose ends are fans across, and whose fillets are cut finely. The tubes of one part run along one direction, those of
+/// the other along another one, and none along an axis of coordinates; each tube crosses about two of the other part. One triangle
+/// in ten is long. Probes that the cost of long elements is not that of their boxes.
+///
+/// # Errors
+/// As [`plain`].
+pub fn machine_parts(n: usize) -> Result<BuiltScene, Error> {
+    let per_tube = 2 * AROUND + 2 * (AROUND - 2) + 4 * AROUND * RINGS;
+    let n_tubes = (n / 2).min(MAX_PRIMITIVES).div_ceil(per_tube);
+    let width = (0.1 * real(n_tubes)) as f32;
+    let mut random = Random::new(11);
+    let mut parts = [Mesh::default(), Mesh::default()];
+    for part in 0..2 {
+        let n_faces = n / 2;
+        for _ in 0..n_tubes {
+            let at = [random.range(-width, width), random.range(-1.0, 1.0)];
+            let tube = tube(at, part == 1);
+            let left = n_faces - parts[part].faces.len().min(n_faces);
+            let faces = tube.faces[..tube.faces.len().min(left)].to_vec();
+            parts[part].append(&Mesh { faces, ..tube });
+        }
+    }
+    let [a, b] = parts.map(Mesh::model);
+    BuiltScene::between("machine-parts", a, b)
+}
+
+/// A tube of length 4 and radius 0.08 along z, or across it, turned in space: its wall, its ends, and fillets around these. A point
+/// of its middle is given by two coordinates.
+fn tube([x, y]: [f32; 2], is_across: bool) -> Mesh {
+    let mut mesh = Mesh::default();
+    let radius = |ring: usize| 0.08 * (1.0 - 0.04 * real(ring) * real(ring) / real(RINGS));
+    // Rings from one end to the other; the wall is between the middle two.
+    let rings = (0..=RINGS)
+        .rev()
+        .map(|ring| (-2.0 - 0.01 * real(ring), radius(ring)))
+        .chain((0..=RINGS).map(|ring| (2.0 + 0.01 * real(ring), radius(ring))));
+    for (along, radius) in rings {
+        for step in 0..AROUND {
+            let angle = std::f64::consts::TAU * real(step) / real(AROUND);
+            let (across, up) = (radius * angle.cos(), radius * angle.sin());
+            let [x, y] = [f64::from(x) + across, f64::from(y) + up];
+            let point = match is_across {
+                false => [x, y, along],
+                true => [x, along, y],
+            };
+            mesh.positions.push(to_f32(turned_in_space(point)));
+        }
+    }
+    let vertex = |ring: usize, step: usize| index(ring * AROUND + step % AROUND);
+    // The wall first: whatever part of the faces is taken has long ones.
+    let order = std::iter::once(RINGS).chain((0..2 * RINGS + 1).filter(|&ring| ring != RINGS));
+    let mut faces = Vec::new();
+    for ring in order {
+        for step in 0..AROUND {
+            let [a, b] = [vertex(ring, step), vertex(ring, step + 1)];
+            let [c, d] = [vertex(ring + 1, step), vertex(ring + 1, step + 1)];
+            faces.extend([[a, b, d], [a, d, c]]);
+        }
+        if ring == RINGS {
+            for end in [0, 2 * RINGS + 1] {
+                let fan = 1..AROUND - 1;
+                faces.extend(fan.map(|k| [vertex(end, 0), vertex(end, k), vertex(end, k + 1)]));
+            }
+        }
+    }
+    mesh.faces = faces;
+    mesh
+}
+
+/// A rotation about no axis of coordinates, by 1 in the angle of each of two axes.
+fn turned_in_space([x, y, z]: [f64; 3]) -> [f64; 3] {
+    let (sine, cosine) = 1f64.sin_cos();
+    let [x, y] = [cosine * x - sine * y, sine * x + cosine * y];
+    [x, cosine * y - sine * z, sine * y + cosine * z]
 }
 
 /// Positions of unit cubes stacked without gaps: the largest cube number up to `n_cubes` of them.

@@ -163,7 +163,10 @@ impl Clusters {
         for (ix, layer) in job.frame.numbered_layers() {
             if layer.within {
                 let body = job.frame.body(job.scene, ix);
-                self.caches.at_mut(layer).find_folds(body, job.workers)?;
+                let isa = self.isa;
+                self.caches
+                    .at_mut(layer)
+                    .find_folds(isa, body, job.workers)?;
             }
         }
         Ok(())
@@ -209,7 +212,7 @@ impl BodyCache {
     }
 
     /// Finds the triangles that may meet a neighbour in the body's current pose.
-    fn find_folds(&mut self, body: &Body, workers: &Workers) -> Result<(), Error> {
+    fn find_folds(&mut self, isa: Isa, body: &Body, workers: &Workers) -> Result<(), Error> {
         if body.kind() != Kind::Triangles {
             return Ok(());
         }
@@ -219,7 +222,7 @@ impl BodyCache {
         }
         let pose = (body.positions(), body.positions_stamp());
         let folds = self.folds.get_or_insert_default();
-        folds.find(workers, clustering, pose);
+        folds.find(isa, workers, clustering, pose);
         Ok(())
     }
 

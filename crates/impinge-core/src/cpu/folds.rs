@@ -6,19 +6,28 @@
 //!
 //! Seen along an axis, the triangles around a vertex are sectors of a plane. If they all turn the same way and together
 //! go around the vertex no more than once, no two sectors overlap, so no two triangles meet anywhere but in the simplex
-//! that they share. On a smooth surface nearly every vertex passes, also where neighbours lie in one plane: two exact
-//! comparisons and three products per triangle corner replace six pairs per triangle.
+//! that they share. On a smooth surface nearly every vertex passes, also where neighbours lie in one plane.
+//!
+//! 1. Of each triangle in single precision: which way it turns, and which lines through its corners its far sides cross
+//!    (`exact::filter::turns`), a register of triangles at a time.
+//! 2. Of each vertex: whether all of its triangles turn the same way, and how many lines they cross. Where that leaves it open, its
+//!    ring is gone along in `f64`, along the axes and then along the sum of its normals.
+//! 3. Of each cluster: which triangles have a vertex with a fold.
 //!
 //! Reason for each discard: sectors that do not overlap. `docs/exactness.md`, "Folds", has the proof and the bound.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::elements::Elements;
+use crate::exact::filter;
+use crate::grouping::GROUP;
 use crate::grouping::clusters::Clustering;
-use crate::grouping::rings::{Ring, Rings};
+use crate::grouping::rings::{CornerAt, Ring, Rings};
 use crate::index::ClusterIx;
 use crate::positions::Positions;
 use crate::workers::Workers;
+
+use super::simd::{ClusterFaces, Isa, Simd, dispatch};
 
 /// Words of 64 vertices, or clusters of 64 triangles, per task.
 const TASK: usize = 32;
@@ -32,11 +41,14 @@ pub(crate) struct Folds {
     vertices: Vec<AtomicU64>,
     /// One bit per triangle.
     lanes: Vec<AtomicU64>,
+    /// Four words of triangles each, by place; empty if positions are not in single precision.
+    turns: Vec<AtomicU64>,
 }
 
 impl Folds {
     pub fn bytes(&self) -> usize {
-        size_of::<AtomicU64>() * (self.vertices.capacity() + self.lanes.capacity())
+        let words = self.vertices.capacity() + self.lanes.capacity() + self.turns.capacity();
+        size_of::<AtomicU64>() * words
     }
 
     /// The triangles of a cluster that have a fold.
@@ -48,6 +60,7 @@ impl Folds {
     /// Finds the folds of a pose, unless they are known.
     pub fn find(
         &mut self,
+        isa: Isa,
         workers: &Workers,
         clustering: &Clustering,
         (positions, stamp): (&Positions, u64),
@@ -64,19 +77,39 @@ impl Folds {
         self.vertices.resize_with(n_words, AtomicU64::default);
         self.lanes
             .resize_with(clustering.n_clusters(), AtomicU64::default);
-        let (vertices, lanes) = (&self.vertices, &self.lanes);
+        let n_turns = match positions {
+            Positions::F32(_) => clustering.n_clusters() * WORDS,
+            Positions::F64(_) => 0,
+        };
+        self.turns.resize_with(n_turns, AtomicU64::default);
+        let (vertices, lanes, turns) = (&self.vertices, &self.lanes, &self.turns);
         let no_scratch = &mut vec![(); workers.n()][..];
         let n_each = workers.task(TASK);
+        if let Positions::F32(positions) = positions {
+            let n_words = n_each * WORDS;
+            workers.for_each(no_scratch, turns.len().div_ceil(n_words), |(), task| {
+                let clusters = task * n_each;
+                let words = &turns[clusters * WORDS..turns.len().min((clusters + n_each) * WORDS)];
+                dispatch!(isa, put_turns, (
+                    clustering: &Clustering = clustering,
+                    positions: &[[f32; 3]] = positions,
+                    first: usize = clusters,
+                    words: &[AtomicU64] = words,
+                ));
+            });
+        }
         workers.for_each(no_scratch, n_words.div_ceil(n_each), |(), task| {
             for (word, bits) in chunk(vertices, n_each, task) {
                 let folds = match positions {
                     Positions::F32(positions) => {
                         let positions = &positions[..];
-                        folds(rings, word, |vertex| positions[vertex].map(f64::from))
+                        folds(rings, word, turns, |vertex| {
+                            positions[vertex].map(f64::from)
+                        })
                     }
                     Positions::F64(positions) => {
                         let positions = &positions[..];
-                        folds(rings, word, |vertex| positions[vertex])
+                        folds(rings, word, turns, |vertex| positions[vertex])
                     }
                 };
                 bits.store(folds, Ordering::Relaxed);
@@ -88,6 +121,15 @@ impl Folds {
         workers.for_each(no_scratch, lanes.len().div_ceil(n_each), |(), task| {
             for (cluster, bits) in chunk(lanes, n_each, task) {
                 let cluster = ClusterIx::from_usize(cluster);
+                let of_cluster = clustering.vertices(cluster);
+                if of_cluster
+                    .iter()
+                    .fold(0, |any, &vertex| any | is_fold(vertex))
+                    == 0
+                {
+                    bits.store(0, Ordering::Relaxed);
+                    continue;
+                }
                 let faces = &faces[clustering.places(cluster)];
                 let folded = (0..).zip(faces).fold(0, |folded, (lane, &[a, b, c])| {
                     folded | (is_fold(a) | is_fold(b) | is_fold(c)) << lane
@@ -108,11 +150,68 @@ fn chunk(
     (first..).zip(&words[first..words.len().min(first + n_each)])
 }
 
+/// Words of triangles in one number.
+const PER_NUMBER: usize = 4;
+/// Numbers of words per cluster.
+const WORDS: usize = GROUP / PER_NUMBER;
+
+/// Writes the words of the triangles of some clusters.
+#[inline(always)]
+fn put_turns<S: Simd>(
+    simd: S,
+    clustering: &Clustering,
+    positions: &[[f32; 3]],
+    first: usize,
+    words: &[AtomicU64],
+) {
+    let Elements::Triangles(faces) = &clustering.corners else {
+        return;
+    };
+    let mut corners = [[[0.0; GROUP]; 3]; 3];
+    let mut turns = [0; GROUP];
+    for (cluster, numbers) in (first..).zip(words.chunks_exact(WORDS)) {
+        let cluster = ClusterIx::from_usize(cluster);
+        let of_cluster = ClusterFaces {
+            faces: &faces[clustering.places(cluster)],
+            vertices: clustering.vertices(cluster),
+            local: clustering.local_faces(cluster),
+        };
+        simd.put_corners(positions, &of_cluster, &mut corners);
+        filter::turns::<S::F32>(&corners, &mut turns);
+        let (fours, _) = turns.as_chunks::<PER_NUMBER>();
+        for (number, [a, b, c, d]) in numbers.iter().zip(fours) {
+            let [a, b, c, d] = [*a, *b, *c, *d].map(u64::from);
+            number.store(a | b << 16 | c << 32 | d << 48, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Whether the triangles around a vertex with a closed ring certainly do not overlap, seen along an axis.
+#[inline(always)]
+fn are_side_by_side(turns: &[AtomicU64], corners: impl Iterator<Item = CornerAt>) -> bool {
+    let (mut all, mut n_crossings) = (filter::TURNS, 0);
+    for CornerAt { place, corner } in corners {
+        let number = turns[place / PER_NUMBER].load(Ordering::Relaxed);
+        let word = (number >> (16 * (place % PER_NUMBER))) as u32 & 0xffff;
+        all &= word;
+        // One byte per axis: a ring has at most 96 triangles.
+        let crosses = filter::crossings(word, corner);
+        n_crossings += (crosses | crosses << 7 | crosses << 14) & 0x01_01_01;
+    }
+    (0..3).any(|axis| all >> (2 * axis) & 0b11 != 0 && n_crossings >> (8 * axis) & 0xff == 2)
+}
+
 /// Bit `k`: vertex `64 word + k` is a fold.
-fn folds(rings: &Rings, word: usize, at: impl Fn(usize) -> [f64; 3]) -> u64 {
+fn folds(rings: &Rings, word: usize, turns: &[AtomicU64], at: impl Fn(usize) -> [f64; 3]) -> u64 {
     let first = 64 * word;
     let end = rings.n_vertices().min(first + 64);
     (first..end).fold(0, |folds, vertex| {
+        if !turns.is_empty()
+            && let Some(corners) = rings.corners(vertex)
+            && are_side_by_side(turns, corners)
+        {
+            return folds;
+        }
         let is_fold = match rings.of(vertex) {
             Ring::None => false,
             Ring::Irregular => true,
@@ -303,19 +402,21 @@ mod tests {
     use super::*;
     use crate::grouping::hierarchy::Entry;
     use crate::index::Place;
+    use crate::settings::InstructionSet;
 
     /// The triangles that have a fold.
     fn folded(faces: &[[u32; 3]], positions: &[[f64; 3]]) -> Vec<u32> {
         let elements = Elements::from(faces.to_vec());
         let numbers = 0..faces.len() as u32;
-        let centers = numbers.map(|number| Entry::new([0.0; 3], number)).collect();
+        let centers: Vec<Entry> = numbers.map(|number| Entry::new([0.0; 3], number)).collect();
         let clustering = Clustering::new(&elements, centers);
         clustering.find_rings();
         let mut answers = Vec::new();
         let single = positions.iter().map(|p| p.map(|x| x as f32)).collect();
         for positions in [Positions::from(positions.to_vec()), Positions::F32(single)] {
             let mut folds = Folds::default();
-            folds.find(&Workers::new(1), &clustering, (&positions, 1));
+            let isa = Isa::detect(InstructionSet::default());
+            folds.find(isa, &Workers::new(1), &clustering, (&positions, 1));
             let mut folded: Vec<u32> = Place::up_to(faces.len())
                 .filter(|place| folds.of(place.cluster()) >> place.lane() & 1 == 1)
                 .map(|place| clustering.primitive(place).raw())

@@ -105,17 +105,34 @@ impl<G> GroupCache<G> {
     where
         G: PerCluster<W>,
     {
+        self.n_evicted = 0;
+        self.reset(Self::room(n_clusters, settings));
+    }
+
+    /// How many clusters are kept in a frame of `n_clusters`.
+    pub fn room(n_clusters: u64, settings: &Settings) -> usize {
         let most = match settings.memory_budget {
             Some(_) => MOST_IN_BUDGET,
             None => settings.tuning.most_cached.max(2),
         };
-        let n = n_clusters.max(4).min(most).next_power_of_two() as usize;
-        self.n_evicted = 0;
+        n_clusters.max(4).min(most).next_power_of_two() as usize
+    }
+
+    /// Forgets all clusters and makes room for `n`, at least.
+    pub fn reset<W>(&mut self, n: usize)
+    where
+        G: PerCluster<W>,
+    {
         if self.groups.len() < n {
             self.groups.resize(n, G::EMPTY);
         }
         self.keys.clear();
         self.keys.resize(self.groups.len(), NOBODY);
+    }
+
+    /// Whether there is no room for any cluster.
+    pub fn is_empty(&self) -> bool {
+        self.groups.is_empty()
     }
 
     /// Forgets all clusters.

@@ -5,6 +5,7 @@ pub(crate) mod bounds;
 pub mod cells;
 pub(crate) mod clusters;
 pub(crate) mod cull;
+mod directions;
 pub(crate) mod dispatch;
 mod folds;
 mod group_cache;
@@ -53,6 +54,11 @@ impl Cpu {
             acquaintances: Acquaintances::default(),
             settings: settings.clone(),
         }
+    }
+
+    /// The clusters, for questions that need them whatever the method is.
+    pub fn clusters(&mut self) -> &mut Clusters {
+        &mut self.clusters
     }
 
     /// Of `Auto`: answers the frame in the grid if most bodies are new and it is not crowded; otherwise returns false, and

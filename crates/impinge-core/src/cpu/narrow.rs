@@ -16,14 +16,14 @@ use crate::exact::filter::{
 };
 use crate::frame::pair_key;
 use crate::grouping::GROUP;
-use crate::index::{LayerIx, Place};
+use crate::index::{LayerIx, Number, Place};
 use crate::narrow::{intersect, intersect_shared};
 use crate::positions::Positions;
 use crate::sink::{Answer, BLOCK};
 use crate::tuning::Tuning;
 
 use super::group_cache::Group;
-use super::met::{Met, WorkItem};
+use super::met::{Met, Side, WorkItem};
 use super::simd::{Isa, Lanes, Simd, dispatch};
 use super::world::{BodyRef, World};
 
@@ -55,6 +55,8 @@ pub struct Settler {
     answer: Option<Arc<Answer>>,
     /// Keys per block.
     block: usize,
+    /// Whether only the lowest pair is wanted, and then whether by its second element.
+    seeks_lowest: Option<bool>,
     /// Candidates that were settled.
     pub n_candidates: u64,
     /// Candidates left to exact arithmetic.
@@ -79,6 +81,7 @@ impl Settler {
         self.n_full = 0;
         self.answer = Some(Arc::clone(answer));
         self.block = answer.block();
+        self.seeks_lowest = answer.seeks_lowest();
         self.keys.clear();
         let most = room_to_wait(tuning);
         // A block less one, plus the keys of a work item, plus those of the waiting candidates.
@@ -118,6 +121,16 @@ impl Settler {
     #[inline(always)]
     pub fn is_over(&self) -> bool {
         self.answer.as_ref().is_some_and(|answer| answer.is_over())
+    }
+
+    /// Where only the lowest pair is wanted: of which side's elements only those up to a number still matter.
+    #[inline(always)]
+    pub(super) fn up_to(&self) -> Option<(Side, Number)> {
+        let side = match self.seeks_lowest? {
+            false => Side::A,
+            true => Side::B,
+        };
+        Some((side, self.answer.as_ref()?.up_to()))
     }
 
     /// Bytes held.

@@ -9,6 +9,7 @@
 //!    drop out, for a partner's box lies in its cluster's box.
 //! 2. Each survivor of the smaller side is tested against the survivors of the other, 16 (or 8)
 //!    lanes at a time: one 64-bit mask per primitive.
+//!    Where these are very many, `directions` clears most of them.
 //! 3. Within one body the adjacency masks clear the lanes that share a vertex, or set apart those that `folds` leaves
 //!    open. Pairs that share a hub are cleared under any rule: `hubs` settles them.
 //!
@@ -20,11 +21,12 @@ use std::sync::Arc;
 
 use crate::grouping::GROUP;
 use crate::grouping::hubs::Hubs;
-use crate::index::ClusterIx;
+use crate::index::{ClusterIx, LayerIx, Number};
 use crate::query::SharedVertex;
 use crate::settings::Settings;
 use crate::sink::Answer;
 
+use super::directions::Directions;
 use super::group_cache::{Group, GroupCache};
 use super::hubs::HubScratch;
 use super::met::{Met, Side, WorkItem};
@@ -43,6 +45,7 @@ pub(crate) struct Worker {
     /// Scratch for pairs that share a hub.
     pub(super) around: HubScratch,
     groups: GroupCache<Group>,
+    directions: Directions,
     met: Met,
     masks: Masks,
     /// The number of work items whose candidates were settled.
@@ -55,6 +58,12 @@ impl Worker {
         self.settler.begin(answer, &settings.tuning);
         self.n_settled = 0;
         self.groups.begin::<World<'_>>(n_clusters, settings);
+        self.directions.begin::<World<'_>>(n_clusters, settings);
+    }
+
+    /// Pairs that directions told apart, in this frame.
+    pub fn n_parted(&self) -> u64 {
+        self.directions.n_parted
     }
 
     /// Clusters that took the place of others in the cache, in this frame.
@@ -63,7 +72,11 @@ impl Worker {
     }
 
     pub fn bytes(&self) -> usize {
-        self.settler.bytes() + self.groups.bytes() + self.around.bytes() + Met::BYTES
+        self.settler.bytes()
+            + self.groups.bytes()
+            + self.directions.bytes()
+            + self.around.bytes()
+            + Met::BYTES
     }
 }
 
@@ -85,6 +98,7 @@ pub(crate) fn run<S: Simd>(
     let Worker {
         settler,
         groups,
+        directions,
         met,
         masks,
         n_settled,
@@ -94,15 +108,27 @@ pub(crate) fn run<S: Simd>(
         if settler.is_over() {
             break;
         }
-        let Some(Culled { places, lanes }) = cull(simd, world, item, groups) else {
+        let wanted = match settler.up_to() {
+            None => [u64::MAX; 2],
+            Some((Side::A, to)) => [lanes_up_to(world, item.a, item.cluster_a, to), u64::MAX],
+            Some((Side::B, to)) => [u64::MAX, lanes_up_to(world, item.b, item.cluster_b, to)],
+        };
+        let Some(Culled { places, lanes }) = cull(simd, world, item, wanted, groups) else {
             continue;
         };
         let groups = places.map(|place| groups.at(place));
         met.clear();
+        let (side, rows) = overlap(simd, item, (groups, lanes), masks);
+        if directions.may_pay(lanes) {
+            // Their boxes overlap: they count as candidates.
+            settler.n_candidates += directions.thin(simd, world, item, (side, rows), 0.0, masks);
+        }
         if item.a == item.b {
-            within_body(simd, world, item, (groups, lanes), masks, met, settler);
+            within_body(simd, world, item, (side, rows), masks, met, settler);
         } else {
-            between_bodies(simd, (groups, lanes), masks, met);
+            for row in Lanes(rows) {
+                met.push_row(simd, side, row, masks.0[row]);
+            }
         }
         if met.len() > 0 {
             *n_settled += 1;
@@ -124,12 +150,23 @@ struct Culled {
     lanes: [u64; 2],
 }
 
-/// `None` if one side has no lane that meets the intersection of the two clusters' boxes.
+/// The lanes of a cluster whose elements have numbers up to one.
+#[inline(never)]
+fn lanes_up_to(world: World<'_>, layer: LayerIx, cluster: ClusterIx, to: Number) -> u64 {
+    let elements = world.cache(layer).clustering.primitives(cluster);
+    let layer = world.frame.layer(layer);
+    (0..).zip(elements).fold(0, |lanes, (lane, &element)| {
+        lanes | u64::from(layer.number(element) <= to) << lane
+    })
+}
+
+/// Only the lanes in `wanted` matter. `None` if one side has no lane that meets the intersection of the two clusters' boxes.
 #[inline(always)]
 fn cull<S: Simd>(
     simd: S,
     world: World<'_>,
     item: &WorkItem,
+    wanted: [u64; 2],
     groups: &mut GroupCache<Group>,
 ) -> Option<Culled> {
     const NOWHERE: usize = usize::MAX;
@@ -140,11 +177,14 @@ fn cull<S: Simd>(
     let both = leaf(0).intersection(&leaf(1));
     let mut places = [NOWHERE; 2];
     let mut lanes = [0; 2];
+    if wanted[0] == 0 || wanted[1] == 0 {
+        return None;
+    }
     // Test a cached group first: if no lane of it is left, the other group need not be computed.
     let first = usize::from(!groups.holds(sides[0]) && groups.holds(sides[1]));
     for side in [first, 1 - first] {
         places[side] = groups.place(simd, world, sides[side], places[1 - side]);
-        let all = full(size(side));
+        let all = full(size(side)) & wanted[side];
         if sides[0] == sides[1] {
             places = [places[side]; 2];
             lanes = [all; 2];
@@ -158,40 +198,45 @@ fn cull<S: Simd>(
     Some(Culled { places, lanes })
 }
 
+/// Finds the pairs of lanes whose boxes overlap: one mask per row, which is a lane of the side that is returned.
 #[inline(always)]
-fn between_bodies<S: Simd>(
+fn overlap<S: Simd>(
     simd: S,
+    item: &WorkItem,
     ([group_a, group_b], [lanes_a, lanes_b]): ([&Group; 2], [u64; 2]),
     masks: &mut Masks,
-    met: &mut Met,
-) {
+) -> (Side, u64) {
     let (boxes_a, boxes_b) = (&group_a.boxes, &group_b.boxes);
-    let (side, rows) = if lanes_a.count_ones() <= lanes_b.count_ones() {
+    let [n_a, n_b] = [lanes_a, lanes_b].map(u64::count_ones);
+    let is_same_body = item.a == item.b;
+    if is_same_body && item.cluster_a == item.cluster_b {
+        simd.overlaps_within(boxes_a, lanes_a, masks);
+        return (Side::A, lanes_a);
+    }
+    // Adjacency is stored by lanes of a: transposing it costs more than a few more rows.
+    let n_b = if is_same_body { 2 * n_b } else { n_b };
+    if n_a <= n_b {
         simd.overlaps_rows(boxes_b, lanes_b, boxes_a, lanes_a, masks);
         (Side::A, lanes_a)
     } else {
         simd.overlaps_rows(boxes_a, lanes_a, boxes_b, lanes_b, masks);
         (Side::B, lanes_b)
-    };
-    for row in Lanes(rows) {
-        met.push_row(simd, side, row, masks.0[row]);
     }
 }
 
+/// Makes candidates of the pairs of one body.
 #[inline(always)]
 fn within_body<S: Simd>(
     simd: S,
     world: World<'_>,
     item: &WorkItem,
-    ([group_a, group_b], [lanes_a, lanes_b]): ([&Group; 2], [u64; 2]),
+    (side, rows): (Side, u64),
     masks: &mut Masks,
     met: &mut Met,
     settler: &mut Settler,
 ) {
-    let (boxes_a, boxes_b) = (&group_a.boxes, &group_b.boxes);
     let cache = world.cache(item.a);
     let adjacency = cache.clustering.adjacency();
-    let hubs = cache.clustering.hubs();
     let (cluster_a, cluster_b) = (item.cluster_a, item.cluster_b);
     let rule = VertexRule {
         body: world.body(item.a),
@@ -203,35 +248,29 @@ fn within_body<S: Simd>(
             folds.map_or(u64::MAX, |folds| folds.of(cluster))
         }),
     };
+    if let Some(hubs) = cache.clustering.hubs() {
+        clear_hubs(hubs, item, side, masks);
+    }
     if cluster_a == cluster_b {
-        simd.overlaps_within(boxes_a, lanes_a, masks);
-        if let Some(hubs) = hubs {
-            clear_hubs(hubs, item, Side::A, masks);
-        }
         for (lane, &shared) in adjacency.own(cluster_a).iter().enumerate() {
             rule.put_row(simd, Side::A, lane, masks.0[lane], shared, met, settler);
         }
         return;
     }
     let mut shared = [0u64; GROUP];
-    // Adjacency is stored by lanes of a: transposing it costs more than a few more rows.
-    let (side, rows) = if lanes_a.count_ones() <= 2 * lanes_b.count_ones() {
-        for (lane, mask) in adjacency.between(cluster_a, cluster_b) {
-            shared[lane] = mask;
-        }
-        simd.overlaps_rows(boxes_b, lanes_b, boxes_a, lanes_a, masks);
-        (Side::A, lanes_a)
-    } else {
-        for (lane, mask) in adjacency.between(cluster_a, cluster_b) {
-            for lane_b in Lanes(mask & lanes_b) {
-                shared[lane_b] |= 1 << lane;
+    match side {
+        Side::A => {
+            for (lane, mask) in adjacency.between(cluster_a, cluster_b) {
+                shared[lane] = mask;
             }
         }
-        simd.overlaps_rows(boxes_a, lanes_a, boxes_b, lanes_b, masks);
-        (Side::B, lanes_b)
-    };
-    if let Some(hubs) = hubs {
-        clear_hubs(hubs, item, side, masks);
+        Side::B => {
+            for (lane, mask) in adjacency.between(cluster_a, cluster_b) {
+                for lane_b in Lanes(mask & rows) {
+                    shared[lane_b] |= 1 << lane;
+                }
+            }
+        }
     }
     for row in Lanes(rows) {
         rule.put_row(simd, side, row, masks.0[row], shared[row], met, settler);

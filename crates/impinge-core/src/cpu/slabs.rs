@@ -104,6 +104,8 @@ pub(crate) struct Counts {
     pub n_full: u64,
     /// Times that less of a step was examined from then on.
     pub n_shortened: u64,
+    /// Candidates that directions of elements told apart before `narrow`.
+    pub n_parted: u64,
 }
 
 impl<'a> SlabStages for World<'a> {
@@ -169,6 +171,7 @@ impl<'a> SlabStages for World<'a> {
             n_evicted: worker.n_evicted(),
             n_full: settler.n_full,
             n_shortened: 0,
+            n_parted: worker.n_parted(),
         }
     }
 }
@@ -286,6 +289,7 @@ impl<W: SlabStages> Slabs<'_, W> {
             stats.ways.n_evicted += counts.n_evicted;
             stats.ways.n_full += counts.n_full;
             stats.ways.n_shortened += counts.n_shortened;
+            stats.ways.n_parted += counts.n_parted;
         }
         let narrow_ms = (busy_ms / self.scratches.len() as f64).min(self.ms);
         stats.add_ms("pairing", self.ms - narrow_ms);

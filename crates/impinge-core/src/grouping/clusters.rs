@@ -44,27 +44,51 @@ pub(crate) struct Clustering {
     rings: OnceLock<Rings>,
 }
 
+/// What the order of the clusters follows: by element.
+#[derive(Debug)]
+pub(crate) struct ToOrder {
+    /// The centres of the elements' boxes.
+    pub centers: Vec<Entry>,
+    /// Classes of sizes, if these differ much.
+    pub sizes: Option<Vec<u8>>,
+}
+
+impl From<Vec<Entry>> for ToOrder {
+    fn from(centers: Vec<Entry>) -> Self {
+        ToOrder {
+            centers,
+            sizes: None,
+        }
+    }
+}
+
 /// The corners of a cluster's triangles as numbers of its vertices.
 pub(crate) type LocalFaces = LocalCorners<3>;
 
 impl Clustering {
-    /// Clusters primitives by the centres of their boxes in the current pose, which are given in the order of the primitives.
-    pub fn new(elements: &Elements, centers: Vec<Entry>) -> Self {
-        Self::make(elements, centers, false)
+    /// Clusters primitives by the centres of their boxes in the current pose, which are given in the order of the primitives. Those
+    /// of one class of sizes follow each other.
+    pub fn new(elements: &Elements, to_order: impl Into<ToOrder>) -> Self {
+        Self::make(elements, to_order.into(), false)
     }
 
     /// The same, with the local faces of each cluster, for kernels that look corners up in a table of its vertices.
-    pub fn with_local_faces(elements: &Elements, centers: Vec<Entry>) -> Self {
-        Self::make(elements, centers, true)
+    pub fn with_local_faces(elements: &Elements, to_order: ToOrder) -> Self {
+        Self::make(elements, to_order, true)
     }
 
-    fn make(elements: &Elements, mut entries: Vec<Entry>, with_local_faces: bool) -> Self {
+    fn make(elements: &Elements, to_order: ToOrder, with_local_faces: bool) -> Self {
+        let ToOrder {
+            centers: mut entries,
+            sizes,
+        } = to_order;
         let n = elements.len();
         let shape = TreeShape::new(n.div_ceil(GROUP));
         let counts = with_corners!(elements, |corners| hubs::counts(corners));
-        let classes = with_corners!(elements, |corners| hubs::classes(corners, &counts));
-        let classes = classes.as_deref();
-        super::hierarchy::order(&shape, GROUP, classes, &mut entries);
+        let of_hubs = with_corners!(elements, |corners| hubs::classes(corners, &counts));
+        let has_hubs = of_hubs.is_some();
+        let classes = with_sizes(of_hubs, sizes);
+        super::hierarchy::order(&shape, GROUP, classes.as_deref(), &mut entries);
         let order = made_from(&entries, |_, entry| ElementIx::new(entry.number));
         let corners = with_corners!(elements, |corners| gather(corners, entries).into());
         let (vertices, vertex_starts, local_faces) = match &corners {
@@ -77,8 +101,7 @@ impl Clustering {
                 (unique.vertices, unique.starts, Vec::new())
             }),
         };
-        let hubs = classes
-            .is_some()
+        let hubs = has_hubs
             .then(|| with_corners!(&corners, |corners| Hubs::new(corners, &counts, &shape)));
         Clustering {
             n_vertices_covered: counts
@@ -191,6 +214,22 @@ impl Clustering {
             + self.rings.get().map_or(0, Rings::bytes)
             + size_of_val(&self.local_faces[..])
     }
+}
+
+/// The classes of primitives: by their hubs, if they have any, and else by their sizes. Vertices have lower numbers than sizes.
+fn with_sizes(
+    of_hubs: Option<Vec<Option<u32>>>,
+    sizes: Option<Vec<u8>>,
+) -> Option<Vec<Option<u32>>> {
+    let Some(sizes) = sizes else {
+        return of_hubs;
+    };
+    let of_size = |size: u8| (size > 0).then(|| u32::MAX - u32::from(u8::MAX - size));
+    let mut classes = of_hubs.unwrap_or_else(|| vec![None; sizes.len()]);
+    for (class, size) in classes.iter_mut().zip(sizes) {
+        *class = class.or(of_size(size));
+    }
+    Some(classes)
 }
 
 /// The corners in the order of the entries, in their memory: the first use of new memory would take four times as long as

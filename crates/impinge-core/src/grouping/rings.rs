@@ -12,7 +12,7 @@
 //! Vertices whose triangles form neither one closed ring nor one open ring are *irregular*. Hubs are irregular too:
 //! `hubs` settles their pairs. A vertex of a single triangle has no ring, for no pair shares it.
 //!
-//! Cost: `O(n)` once per topology; 20 bytes per triangle.
+//! Cost: `O(n)` once per topology; 32 bytes per triangle.
 
 use super::hubs::{self, HUB};
 use super::parallel;
@@ -27,6 +27,16 @@ pub(crate) struct Rings {
     starts: Vec<u32>,
     /// Ring after ring; a closed one ends with its first vertex.
     vertices: Vec<u32>,
+    /// The corners at each vertex with a closed ring of triangles of one sense, one less than its ring has vertices; else
+    /// [`IRREGULAR`].
+    corners: Vec<u32>,
+}
+
+/// A corner of a triangle, by the place of the triangle.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct CornerAt {
+    pub place: usize,
+    pub corner: u32,
 }
 
 /// What is known of the triangles around a vertex.
@@ -68,11 +78,15 @@ impl Rings {
         }
         let mut next = side_starts.clone();
         let mut sides = vec![[0u32; 2]; start as usize];
-        for face in faces {
+        let mut corners = vec![IRREGULAR; *starts.last().expect("never empty") as usize];
+        for (place, face) in faces.iter().enumerate() {
             for corner in 0..3 {
                 let vertex = face[corner] as usize;
                 if (2..=HUB).contains(&counts[vertex]) {
-                    sides[next[vertex] as usize] = [face[(corner + 1) % 3], face[(corner + 2) % 3]];
+                    let side = next[vertex];
+                    sides[side as usize] = [face[(corner + 1) % 3], face[(corner + 2) % 3]];
+                    let at = starts[vertex] + (side - side_starts[vertex]);
+                    corners[at as usize] = packed(place, corner);
                     next[vertex] += 1;
                 }
             }
@@ -101,7 +115,39 @@ impl Rings {
                 }
             }
         });
-        Rings { starts, vertices }
+        let mut rings = Rings {
+            starts,
+            vertices,
+            corners,
+        };
+        for vertex in 0..rings.n_vertices() {
+            let is_closed = match rings.of(vertex) {
+                Ring::None => continue,
+                Ring::Irregular => false,
+                Ring::Regular(ring) => ring.first() == ring.last(),
+            };
+            let start = rings.starts[vertex] as usize;
+            let end = rings.starts[vertex + 1] as usize - 1;
+            if !(is_closed && are_alike(faces, &rings.corners[start..end])) {
+                rings.corners[start] = IRREGULAR;
+            }
+        }
+        rings
+    }
+
+    /// The corners at a vertex, in any order, if its ring is closed and all triangles turn around it in the sense in which they name
+    /// their corners, or all in the other one.
+    #[inline(always)]
+    pub fn corners(&self, vertex: usize) -> Option<impl Iterator<Item = CornerAt> + '_> {
+        let of = self.starts[vertex] as usize..self.starts[vertex + 1] as usize;
+        let (_, corners) = self.corners[of].split_last()?;
+        let first = corners.first()?;
+        (*first != IRREGULAR).then(|| {
+            corners.iter().map(|&packed| CornerAt {
+                place: (packed >> 2) as usize,
+                corner: packed & 3,
+            })
+        })
     }
 
     /// One more than the highest vertex that a triangle names.
@@ -120,7 +166,29 @@ impl Rings {
     }
 
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.starts[..]) + size_of_val(&self.vertices[..])
+        size_of_val(&self.starts[..])
+            + size_of_val(&self.vertices[..])
+            + size_of_val(&self.corners[..])
+    }
+}
+
+/// Whether all triangles of a closed ring name its vertices in the same sense: then each vertex of the ring follows the middle once.
+fn are_alike(faces: &[[u32; 3]], corners: &[u32]) -> bool {
+    let next = |packed: u32| {
+        let face = faces.get((packed >> 2) as usize)?;
+        Some(face[((packed & 3) as usize + 1) % 3])
+    };
+    (corners.iter().enumerate()).all(|(ix, &corner)| {
+        let next_here = next(corner);
+        next_here.is_some() && corners[..ix].iter().all(|&other| next(other) != next_here)
+    })
+}
+
+/// A corner in 32 bits; [`IRREGULAR`] if its place has more than 30.
+fn packed(place: usize, corner: usize) -> u32 {
+    match place < 1 << 30 {
+        true => (place << 2 | corner) as u32,
+        false => IRREGULAR,
     }
 }
 

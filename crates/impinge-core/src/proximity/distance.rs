@@ -18,9 +18,13 @@ use crate::hull::Extent;
 
 use super::many::{Allowance, Bodies, are_apart, meet};
 use super::tree::{Node, Tree, box_along, box_of, corners};
+use crate::elements::Kind;
 use crate::error::Error;
 use crate::exact::Point;
+use crate::exact::filter::Directions64;
+use crate::exact::filter::number::Portable32;
 use crate::frame::Frame;
+use crate::grouping::bounds::round_up;
 use crate::ids::BodyId;
 use crate::index::{ElementIx, LayerIx};
 use crate::narrow::intersect;
@@ -66,13 +70,16 @@ impl Distances {
     /// no primitives.
     ///
     /// # Errors
-    /// A body that is not in the scene, the same body twice, bad positions that were written in place; cancellation.
+    /// A body that is not in the scene, the same body twice, bad positions that were written in place; cancellation; errors of
+    /// `touching`, which is asked for the lowest pair that touches where boxes of many clusters overlap: it may settle by pairs of clusters
+    /// what this search would settle one by one.
     pub fn between(
         &mut self,
         scene: &Scene,
         [a, b]: [BodyId; 2],
         workers: &Workers,
         control: &Control<'_>,
+        touching: impl FnOnce() -> Result<Option<[u32; 2]>, Error>,
     ) -> Result<Option<Nearest>, Error> {
         if a == b {
             return Err(Error::SameBody { body: a });
@@ -82,18 +89,36 @@ impl Distances {
             control.step(0, 1)?;
             self.know(scene, id, workers)?;
         }
-        let found = self.search(scene, [a, b], f64::INFINITY, control)?;
+        let most = f64::INFINITY;
+        let found = match self.search(scene, [a, b], most, MOST_OVERLAPPING, control)? {
+            Some(found) => found,
+            None => match touching()? {
+                Some(primitives) => {
+                    return Ok(Some(Nearest {
+                        distance: 0.0,
+                        bodies: [a, b],
+                        primitives,
+                        points: None,
+                    }));
+                }
+                None => self
+                    .search(scene, [a, b], most, u64::MAX, control)?
+                    .flatten(),
+            },
+        };
         Ok(found.map(|(_, nearest)| nearest))
     }
 
-    /// The nearest elements of two bodies that are known, and the square of their distance, if that is at most `most`.
+    /// The nearest elements of two bodies that are known, and the square of their distance, if that is at most `most`. `None` if more
+    /// pairs of clusters would have to be compared whose boxes overlap than `most_overlapping`.
     fn search(
         &mut self,
         scene: &Scene,
         ids: [BodyId; 2],
         most: f64,
+        most_overlapping: u64,
         control: &Control<'_>,
-    ) -> Result<Option<(f64, Nearest)>, Error> {
+    ) -> Result<Option<Found>, Error> {
         let [a, b] = ids;
         let search = DistanceSearch {
             control,
@@ -102,8 +127,9 @@ impl Distances {
             trees: ids.map(|id| &self.trees[&id.index()]),
         };
         let numbers = ids.map(BodyId::index);
-        let found = search.nearest(self.last.get(&numbers).copied(), most)?;
-        if let Some((_, nearest)) = &found {
+        let likely = self.last.get(&numbers).copied();
+        let found = search.nearest(likely, most, most_overlapping)?;
+        if let Some(Some((_, nearest))) = &found {
             let pair = nearest.primitives.map(ElementIx::new);
             self.last.insert(numbers, pair);
         }
@@ -152,7 +178,8 @@ impl Distances {
             for id in ids {
                 self.know(scene, id, workers)?;
             }
-            if let Some(found) = self.search(scene, ids, most, control)?
+            let found = self.search(scene, ids, most, u64::MAX, control)?;
+            if let Some(found) = found.flatten()
                 && best.is_none_or(|(squared, best)| {
                     found.0 < squared || (found.0 == squared && ids < best.bodies)
                 })
@@ -299,7 +326,16 @@ struct FoundDistance {
     /// What rounding may do to distances of boxes: along coordinate axes, and along others.
     errors: [f64; 2],
     lists: [Vec<ComparedPrimitive>; 2],
+    directions: Box<[Directions64; 2]>,
 }
+
+/// The square of the smallest distance, and who has it; `None` if nothing is as near as was asked for.
+type Found = Option<(f64, Nearest)>;
+
+/// With more pairs of clusters whose boxes overlap, it pays to ask first whether the bodies touch.
+const MOST_OVERLAPPING: u64 = 8;
+/// From this many pairs of triangles of two clusters on, their normals are tested first.
+const DIRECTIONS_FROM: usize = 256;
 
 /// Stands for no element.
 const NONE: ElementIx = ElementIx::new(u32::MAX);
@@ -327,7 +363,8 @@ impl FoundDistance {
 }
 
 impl DistanceSearch<'_> {
-    /// The nearest pair and the square of its distance, if that is at most `most`; `likely` is one to compare first.
+    /// The nearest pair and the square of its distance, if that is at most `most`; `likely` is one to compare first. `None` if more pairs
+    /// of clusters would have to be compared whose boxes overlap than `most_overlapping`.
     ///
     /// # Errors
     /// Cancellation.
@@ -335,9 +372,10 @@ impl DistanceSearch<'_> {
         &self,
         likely: Option<[ElementIx; 2]>,
         most: f64,
-    ) -> Result<Option<(f64, Nearest)>, Error> {
+        most_overlapping: u64,
+    ) -> Result<Option<Found>, Error> {
         let (Some(a), Some(b)) = (self.trees[0].root(), self.trees[1].root()) else {
-            return Ok(None);
+            return Ok(Some(None));
         };
         let magnitude = self.trees[0].bounds(a).magnitude();
         let magnitude = magnitude.max(self.trees[1].bounds(b).magnitude());
@@ -351,6 +389,7 @@ impl DistanceSearch<'_> {
             is_newer: false,
             errors: [ROUNDING, ROUNDING_TURNED].map(|rounding| rounding * magnitude),
             lists: Default::default(),
+            directions: Box::new([const { Directions64::EMPTY }; 2]),
         };
         if let Some(pair) = likely {
             let boxes = [0, 1].map(|side| box_of(self.bodies[side], pair[side].index()));
@@ -358,7 +397,7 @@ impl DistanceSearch<'_> {
             self.look(&mut found);
         }
         let mut waiting = BinaryHeap::from([Reverse(self.waiting([a, b]))]);
-        let mut n_seen = 0u64;
+        let (mut n_seen, mut n_overlapping) = (0u64, 0u64);
         while let Some(Reverse(next)) = waiting.pop() {
             n_seen += 1;
             if n_seen.is_multiple_of(LOOK) {
@@ -372,6 +411,10 @@ impl DistanceSearch<'_> {
                 continue;
             }
             if next.nodes.iter().all(|node| node.level == 0) {
+                n_overlapping += u64::from(next.squared == 0.0);
+                if n_overlapping > most_overlapping {
+                    return Ok(None);
+                }
                 self.compare(next.nodes, &mut found);
                 self.look(&mut found);
                 continue;
@@ -403,7 +446,8 @@ impl DistanceSearch<'_> {
             primitives: best.primitives.map(ElementIx::raw),
             points: best.points,
         };
-        Ok((best.primitives != [NONE; 2]).then_some((best.squared, nearest)))
+        let is_found = best.primitives != [NONE; 2];
+        Ok(Some(is_found.then_some((best.squared, nearest))))
     }
 
     fn waiting(&self, nodes: [Node; 2]) -> WaitingNodes {
@@ -481,12 +525,22 @@ impl DistanceSearch<'_> {
                 });
             }
         }
+        let has_directions = self.put_directions(&lists, &mut found.directions);
         let mut limits = found.limits();
-        for a in &lists[0] {
+        for (row, a) in lists[0].iter().enumerate() {
             if a.bounds.squared_distance(&whole[1]) > limits[0] {
                 continue;
             }
-            for b in &lists[1] {
+            let mut far = 0;
+            if has_directions {
+                let [of_a, of_b] = &*found.directions;
+                let distance = round_up(limits[0].sqrt() * (1.0 + f64::EPSILON));
+                far = of_b.beyond::<Portable32>(u64::MAX, (of_a, row), distance);
+            }
+            for (lane, b) in lists[1].iter().enumerate() {
+                if far >> lane & 1 == 1 {
+                    continue;
+                }
                 if a.bounds.squared_distance(&b.bounds) > limits[0]
                     || a.turned.squared_distance(&b.turned) > limits[1]
                 {
@@ -501,6 +555,30 @@ impl DistanceSearch<'_> {
             }
         }
         found.lists = lists;
+    }
+
+    /// Puts the triangles of two clusters that are left side by side, to be told apart along their normals, if they are many: boxes
+    /// of long ones overlap although they are far from each other.
+    fn put_directions(
+        &self,
+        lists: &[Vec<ComparedPrimitive>; 2],
+        directions: &mut [Directions64; 2],
+    ) -> bool {
+        let are_triangles = self
+            .bodies
+            .iter()
+            .all(|body| body.kind() == Kind::Triangles);
+        if !are_triangles || lists[0].len() * lists[1].len() < DIRECTIONS_FROM {
+            return false;
+        }
+        for side in 0..2 {
+            directions[side].begin(3);
+            for (lane, compared) in lists[side].iter().enumerate() {
+                let [p, q, r, _] = corners(self.bodies[side], compared.primitive);
+                directions[side].put(lane, &[p, q, r]);
+            }
+        }
+        directions[0].can_part(&directions[1])
     }
 
     /// Takes a first pair of two clusters that is likely to be near: what is nearest to a box, to that, and to that again.

@@ -239,6 +239,7 @@ pub fn cases() -> Vec<Case> {
         adversarial::boxes(60, 3),
         adversarial::mixed_sizes(1500),
         adversarial::slivers(300),
+        adversarial::machine_parts(1_200),
         adversarial::stacked_cubes(60),
         adversarial::chessboard(60),
     ] {

@@ -217,7 +217,7 @@ unsafe fn put_corners_by_vertices(
         for (batch_ix, batch) in batches.iter().enumerate() {
             let places = number::Avx512F32::places(batch, 0);
             for (table, row) in points.0.iter().zip(&mut *corner) {
-                number::Avx512F32::look_up(table, places).store(row, BATCH * batch_ix);
+                number::Avx512F32::look_up(table, places).put(row, BATCH * batch_ix);
             }
         }
     }

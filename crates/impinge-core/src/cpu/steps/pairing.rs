@@ -10,6 +10,7 @@
 use std::time::Duration;
 
 use crate::clock::Instant;
+use crate::cpu::directions::Directions;
 use crate::cpu::group_cache::GroupCache;
 use crate::cpu::met::{Met, Side, WorkItem};
 use crate::cpu::pairing::full;
@@ -35,6 +36,9 @@ const SAMPLED: u32 = 16;
 #[repr(align(128))]
 pub(crate) struct Worker {
     groups: GroupCache<Group>,
+    directions: Directions,
+    /// Whether only the start is asked about, so that directions at the start tell.
+    is_still: bool,
     /// What of the step `groups` hold.
     pose: Pose,
     shorter_from: f64,
@@ -53,6 +57,8 @@ impl Default for Worker {
     fn default() -> Self {
         Worker {
             groups: GroupCache::default(),
+            directions: Directions::default(),
+            is_still: false,
             pose: Pose::WHOLE,
             shorter_from: 0.0,
             n_shortened: 0,
@@ -70,6 +76,8 @@ impl Worker {
     /// Prepares for a step of `n_clusters` clusters.
     pub fn begin(&mut self, n_clusters: u64, (test, pose): (StepTest, Pose), settings: &Settings) {
         self.groups.begin::<World<'_>>(n_clusters, settings);
+        self.directions.begin::<World<'_>>(n_clusters, settings);
+        self.is_still = matches!(test, StepTest::Within);
         self.pose = pose;
         self.shorter_from = settings.tuning.step_shorter_from;
         self.n_shortened = 0;
@@ -107,12 +115,17 @@ impl Worker {
             n_evicted: self.groups.n_evicted,
             n_full,
             n_shortened: self.n_shortened,
+            n_parted: self.directions.n_parted,
         }
     }
 
     pub fn bytes(&self) -> usize {
         let survivors = size_of::<[LaneBounds; 2]>();
-        self.groups.bytes() + self.settler.bytes() + Met::BYTES + survivors
+        self.groups.bytes()
+            + self.directions.bytes()
+            + self.settler.bytes()
+            + Met::BYTES
+            + survivors
     }
 }
 
@@ -191,9 +204,12 @@ fn pair<S: Simd>(
 ) -> Option<[usize; 2]> {
     let Worker {
         groups,
+        directions,
+        is_still,
         met,
         survivors,
         masks,
+        settler,
         ..
     } = worker;
     met.clear();
@@ -250,18 +266,19 @@ fn pair<S: Simd>(
     let mut map = [0; GROUP];
     let [start, end] = &mut **survivors;
     let n = simd.list_lanes(lanes, &mut map);
-    let is_full = lanes == u64::MAX;
-    if !is_full {
+    let may_part = *is_still && is_single && directions.may_pay([rows, lanes]);
+    // Directions are tested lane by lane.
+    let is_whole = lanes == u64::MAX || may_part;
+    if !is_whole {
         simd.put_survivors(&other.start, lanes, start);
         if !is_single {
             simd.put_survivors(&other.end, lanes, end);
         }
     }
-    let boxes = match is_full {
-        true => [&other.start, &other.end],
-        false => [&*start, &*end],
+    let (boxes, among) = match is_whole {
+        true => ([&other.start, &other.end], lanes),
+        false => ([&*start, &*end], full(n)),
     };
-    let among = full(n);
     // All lanes of a cluster that meets itself survive, each in its place.
     match (is_single, is_own) {
         (true, true) => simd.overlaps_within(boxes[0], among, masks),
@@ -269,8 +286,15 @@ fn pair<S: Simd>(
         (false, true) => simd.meets_within(boxes, among, masks),
         (false, false) => simd.meets_rows(boxes, among, [&own.start, &own.end], rows, masks),
     }
+    if may_part {
+        let reach = world.frame.reach(item.a, item.b).enclosing_f32();
+        settler.n_candidates += directions.thin(simd, world, item, (side, rows), reach[1], masks);
+    }
     for row in Lanes(simd.rows_with_lanes(masks)) {
-        met.push_mapped_row(simd, (side, row), masks.0[row], &map);
+        match is_whole {
+            true => met.push_row(simd, side, row, masks.0[row]),
+            false => met.push_mapped_row(simd, (side, row), masks.0[row], &map),
+        }
     }
     if same_body {
         let corners = [&a.corners[..a.n_corners], &b.corners[..b.n_corners]];

@@ -2,12 +2,15 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+use crate::cpu::directions::Placed;
 use crate::cpu::simd::Isa;
 use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
+use crate::grouping::clusters::Clustering;
 use crate::hull::{Hull, Pose};
 use crate::impacts::{Sought, StepAnswer};
 use crate::index::{ClusterIx, LayerIx};
+use crate::positions::Positions;
 use crate::scene::Scene;
 use crate::step::{Start, Toi};
 
@@ -84,6 +87,14 @@ pub(crate) struct World<'a> {
     pub(super) answer: StepAnswer<'a>,
     pub(super) known: &'a Known,
     pub(super) caches: &'a Caches,
+}
+
+impl Placed for World<'_> {
+    #[inline(always)]
+    fn placed(&self, layer: LayerIx) -> (&Clustering, &Positions) {
+        let body = self.frame.body(self.scene, layer);
+        (&self.cache(layer).clustering, body.positions())
+    }
 }
 
 impl<'a> World<'a> {

@@ -23,6 +23,7 @@
 //! filter"). NaN and overflow make comparisons fail, and so end as unsure.
 
 mod determinant;
+mod directions;
 pub(super) mod motion;
 mod moving;
 pub(super) mod nearness;
@@ -31,9 +32,11 @@ pub mod number;
 mod projections;
 mod tetrahedra;
 mod triangles;
+mod turns;
 
 use super::Point;
 
+pub use directions::Directions64;
 pub use moving::{
     Enclosed8, Look8, Moving64, Next, Search, Spans8, Steps8, are_across_in_tables, are_apart,
     are_aside_in_tables, are_far_in_tables, enclose, look, time_between,
@@ -48,6 +51,7 @@ pub(super) use tetrahedra::tetrahedra_answer;
 pub use tetrahedra::{classify_by_faces, classify_tetrahedra};
 pub(super) use triangles::triangles_answer;
 pub use triangles::{classify, classify_in_tables, reject_by_planes};
+pub use turns::{TURNS, crossings, turns};
 
 /// How many pairs a batch has.
 pub const LANES: usize = 8;

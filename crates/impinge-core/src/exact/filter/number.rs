@@ -90,6 +90,10 @@ pub trait Lookup: Number {
     fn places(places: &[u8; BATCH], first: usize) -> Self::Places;
     /// The numbers at some places.
     fn look_up(table: &[f32; TABLE], places: Self::Places) -> Self;
+    /// `N` numbers of a table, from place `first` on.
+    fn row(table: &[f32; TABLE], first: usize) -> Self;
+    /// Writes the numbers into a table, from place `first` on.
+    fn put(self, table: &mut [f32; TABLE], first: usize);
     /// Bit k for number k.
     fn bits(mask: Self::Mask) -> u16;
 }
@@ -340,6 +344,15 @@ impl Lookup for Portable32 {
         let [a, b, c, d] = places;
         let at = |place: u8| table[place as usize % TABLE];
         Portable32([at(a), at(b), at(c), at(d)])
+    }
+    #[inline(always)]
+    fn row(table: &[f32; TABLE], first: usize) -> Self {
+        let four: &[f32; PORTABLE_F32] = table[first..].first_chunk().expect("four places");
+        Portable32(*four)
+    }
+    #[inline(always)]
+    fn put(self, table: &mut [f32; TABLE], first: usize) {
+        table[first..][..PORTABLE_F32].copy_from_slice(&self.0);
     }
     #[inline(always)]
     fn bits(mask: Portable32Mask) -> u16 {
@@ -593,19 +606,21 @@ mod x86 {
             Avx2F32(unsafe { _mm256_i32gather_ps::<4>(table.as_ptr(), places) })
         }
         #[inline(always)]
+        fn row(table: &[f32; TABLE], first: usize) -> Self {
+            let eight: &[f32; 8] = table[first..].first_chunk().expect("eight places");
+            // SAFETY: see above; one load of eight.
+            Avx2F32(unsafe { _mm256_loadu_ps(eight.as_ptr()) })
+        }
+        #[inline(always)]
+        fn put(self, table: &mut [f32; TABLE], first: usize) {
+            let eight: &mut [f32; 8] = table[first..].first_chunk_mut().expect("eight places");
+            // SAFETY: see above; one store of eight.
+            unsafe { _mm256_storeu_ps(eight.as_mut_ptr(), self.0) }
+        }
+        #[inline(always)]
         fn bits(mask: Avx2F32Mask) -> u16 {
             // SAFETY: see above.
             unsafe { _mm256_movemask_ps(mask.0) as u16 }
-        }
-    }
-
-    impl Avx512F32 {
-        /// Writes the numbers into a table from `first` on.
-        #[inline(always)]
-        pub fn store(self, table: &mut [f32; TABLE], first: usize) {
-            let sixteen: &mut [f32; 16] = table[first..].first_chunk_mut().expect("sixteen places");
-            // SAFETY: see above; one store of sixteen.
-            unsafe { _mm512_storeu_ps(sixteen.as_mut_ptr(), self.0) };
         }
     }
 
@@ -640,6 +655,19 @@ mod x86 {
                 let is_high = _mm512_test_epi32_mask(places, _mm512_set1_epi32(32));
                 Avx512F32(_mm512_mask_blend_ps(is_high, low, high))
             }
+        }
+        #[inline(always)]
+        fn row(table: &[f32; TABLE], first: usize) -> Self {
+            let sixteen: &[f32; BATCH] = table[first..].first_chunk().expect("sixteen places");
+            // SAFETY: see above; one load of sixteen.
+            Avx512F32(unsafe { _mm512_loadu_ps(sixteen.as_ptr()) })
+        }
+        #[inline(always)]
+        fn put(self, table: &mut [f32; TABLE], first: usize) {
+            let sixteen: &mut [f32; BATCH] =
+                table[first..].first_chunk_mut().expect("sixteen places");
+            // SAFETY: see above; one store of sixteen.
+            unsafe { _mm512_storeu_ps(sixteen.as_mut_ptr(), self.0) }
         }
         #[inline(always)]
         fn bits(mask: Avx512F32Mask) -> u16 {

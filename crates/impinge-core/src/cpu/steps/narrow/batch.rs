@@ -81,8 +81,11 @@ impl Batch<'_> {
         }
         // Two points are each off by that along three axes: their distance by at most 2 sqrt(3) times as much.
         let off = 4.0 * rounded;
-        let low = f64::from(low) - off;
-        (low > 0.0).then(|| (pair, [round_down(low), round_up(f64::from(high) + off)]))
+        let [low, high] = [f64::from(low) - off, f64::from(high) + off];
+        // Where rounding is larger than the distance, the tables only tell that elements are farther apart.
+        rounded
+            .is_finite()
+            .then(|| (pair, [round_down(low.max(0.0)), round_up(high)]))
     }
 }
 

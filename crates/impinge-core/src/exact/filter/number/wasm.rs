@@ -126,6 +126,18 @@ impl Lookup for WasmF32 {
         WasmF32(f32x4(at(a), at(b), at(c), at(d)))
     }
     #[inline(always)]
+    fn row(table: &[f32; TABLE], first: usize) -> Self {
+        let four: &[f32; 4] = table[first..].first_chunk().expect("four places");
+        // SAFETY: the four numbers are 16 readable bytes; loads need no alignment.
+        WasmF32(unsafe { v128_load(four.as_ptr().cast()) })
+    }
+    #[inline(always)]
+    fn put(self, table: &mut [f32; TABLE], first: usize) {
+        let four: &mut [f32; 4] = table[first..].first_chunk_mut().expect("four places");
+        // SAFETY: the four numbers are 16 writable bytes; stores need no alignment.
+        unsafe { v128_store(four.as_mut_ptr().cast(), self.0) }
+    }
+    #[inline(always)]
     fn bits(mask: WasmF32Mask) -> u16 {
         i32x4_bitmask(mask.0).into()
     }

@@ -1,0 +1,377 @@
+//! One element against a whole group: apart along a direction of either, 64 pairs at a time.
+//!
+//! What it does: a long triangle or edge that lies aslant has a box that holds far more than the element. Where the boxes of many
+//! pairs of two groups overlap, the plane of a triangle, and the directions across two edges, tell most of these pairs apart.
+//!
+//! In: for each element of a group its points in `f32`, the unit normal of a triangle or the unit direction of an edge, and the
+//! span of a triangle along its normal, computed in `f64` ([`Directions64`]). Out: bit masks. Cost: 30 operations for a register
+//! of pairs, without a table look-up: a fifth of what a pair costs in [`classify_in_tables`](super::classify_in_tables).
+//!
+//! Method: any direction separates two elements whose spans along it are apart, so directions need not be accurate.
+//! A triangle is tested along its normal; two edges along the cross product of their directions, and along the way from the line
+//! of the one to an end of the other.
+//!
+//! Invariant: with L the largest coordinate of both groups and n a direction, a computed n . p is wrong by less than
+//! 2^-20 L |n| + 2^-121, the rounding of p included. So spans that are farther apart than a distance d along n, by more than
+//! 2^-19 L |n| + 2^-119, belong to elements that are farther apart than d (`docs/exactness.md`, "Directions").
+
+use super::TABLE;
+use super::motion::{cross, difference, dot, size};
+use super::number::{Lookup, Number};
+use crate::exact::Point;
+
+/// The elements of a group, and a direction of each: of triangles the normal, of edges their own.
+#[derive(Clone, Debug, PartialEq)]
+#[repr(C, align(64))]
+pub struct Directions64 {
+    /// Corners per element: 1 to 3. Lists of points past them mean nothing.
+    n_corners: usize,
+    /// Rounded to nearest: `[corner][axis][lane]`.
+    points: [[[f32; TABLE]; 3]; 3],
+    /// Of length 1, but for rounding; zero if the element has none.
+    directions: [[f32; TABLE]; 3],
+    /// Triangles only: the lowest and the highest n . p of their corners, rounded to nearest.
+    spans: [[f32; TABLE]; 2],
+    /// The largest coordinate.
+    largest: f64,
+}
+
+/// The largest coordinate for which the bounds hold: nothing overflows.
+const LARGEST: f64 = (1u64 << 32) as f64;
+/// 2^-19.
+const RELATIVE: f64 = 1.0 / (1u64 << 19) as f64;
+/// 2^-119.
+const ABSOLUTE: f64 = f64::from_bits((1023 - 119) << 52);
+/// Lengths of directions are wrong by less than this, relative to themselves.
+const LONGER: f64 = 1.0 + 1.0 / (1u64 << 18) as f64;
+
+impl Directions64 {
+    /// A group without elements.
+    pub const EMPTY: Self = Directions64 {
+        n_corners: 0,
+        points: [[[0.0; TABLE]; 3]; 3],
+        directions: [[0.0; TABLE]; 3],
+        spans: [[0.0; TABLE]; 2],
+        largest: f64::INFINITY,
+    };
+
+    /// Prepares for elements of so many corners.
+    pub fn begin(&mut self, n_corners: usize) {
+        self.n_corners = n_corners;
+        self.largest = 0.0;
+    }
+
+    /// Puts an element into a lane. Elements of four corners and more have no directions.
+    #[inline(always)]
+    pub fn put<const N: usize>(&mut self, lane: usize, corners: &[Point; N]) {
+        if N > 3 {
+            self.largest = f64::INFINITY;
+            return;
+        }
+        for (rows, corner) in self.points.iter_mut().zip(corners) {
+            for (row, &x) in rows.iter_mut().zip(corner) {
+                row[lane] = x as f32;
+                self.largest = self.largest.max(x.abs());
+            }
+        }
+        let direction = match N {
+            2 => difference(&corners[1], &corners[0]),
+            3 => cross(
+                &difference(&corners[1], &corners[0]),
+                &difference(&corners[2], &corners[0]),
+            ),
+            _ => return,
+        };
+        let length = dot(&direction, &direction).sqrt();
+        let unit = match length > 0.0 && length < f64::INFINITY {
+            true => direction.map(|x| (x / length) as f32),
+            false => [0.0; 3],
+        };
+        let mut span = [f64::INFINITY, f64::NEG_INFINITY];
+        for corner in corners {
+            let along = dot(&unit.map(f64::from), corner);
+            span = [span[0].min(along), span[1].max(along)];
+        }
+        for (row, x) in self.directions.iter_mut().zip(unit) {
+            row[lane] = x;
+        }
+        for (row, x) in self.spans.iter_mut().zip(span) {
+            row[lane] = x as f32;
+        }
+    }
+
+    /// Whether the elements of two groups can be told apart: one group has triangles, or both have edges.
+    #[inline(always)]
+    #[must_use]
+    pub fn can_part(&self, other: &Self) -> bool {
+        let n_corners = [self.n_corners, other.n_corners];
+        let have_directions = n_corners == [2, 2] || n_corners.contains(&3);
+        have_directions && self.largest <= LARGEST && other.largest <= LARGEST
+    }
+
+    /// Which lanes of `among` are certainly farther than a distance from the element in lane `row` of another group. The two
+    /// [can be told apart](Self::can_part).
+    #[inline(always)]
+    #[must_use]
+    pub fn beyond<V: Lookup>(&self, among: u64, row: (&Self, usize), distance: f32) -> u64 {
+        let (other, lane) = row;
+        let largest = f64::max(self.largest, other.largest);
+        let reach = above(f64::from(distance) + RELATIVE * largest);
+        let mut apart = 0;
+        for first in (0..TABLE).step_by(V::N) {
+            if among >> first & (u64::MAX >> (TABLE - V::N)) == 0 {
+                continue;
+            }
+            let is_apart = match (self.n_corners, other.n_corners) {
+                (2, 2) => self.edges_beyond::<V>(first, other, lane, reach),
+                (_, 3) if self.n_corners < 3 => self.points_beyond::<V>(first, other, lane, reach),
+                (3, n) if n < 3 => self.planes_beyond::<V>(first, other, lane, reach),
+                _ => {
+                    self.points_beyond::<V>(first, other, lane, reach)
+                        | self.planes_beyond::<V>(first, other, lane, reach)
+                }
+            };
+            apart |= u64::from(V::bits(is_apart)) << first;
+        }
+        apart & among
+    }
+
+    /// Which elements lie beyond the plane of a triangle of another group.
+    #[inline(always)]
+    fn points_beyond<V: Lookup>(
+        &self,
+        first: usize,
+        other: &Self,
+        lane: usize,
+        reach: f32,
+    ) -> V::Mask {
+        let (normal, span) = (other.direction::<V>(lane), other.span::<V>(lane));
+        let [low, high] = widened(span, reach);
+        let (mut above, mut below) = all::<V>();
+        for corner in 0..self.n_corners {
+            let along = dot(&normal, &self.points_at::<V>(corner, first));
+            above = above & along.gt(high);
+            below = below & low.gt(along);
+        }
+        above | below
+    }
+
+    /// Beyond the planes of which triangles the element of another group lies.
+    #[inline(always)]
+    fn planes_beyond<V: Lookup>(
+        &self,
+        first: usize,
+        other: &Self,
+        lane: usize,
+        reach: f32,
+    ) -> V::Mask {
+        let [x, y, z] = &self.directions;
+        let normals = [V::row(x, first), V::row(y, first), V::row(z, first)];
+        let [low, high] = &self.spans;
+        let [low, high] = widened([V::row(low, first), V::row(high, first)], reach);
+        let (mut above, mut below) = all::<V>();
+        for corner in 0..other.n_corners {
+            let along = dot(&normals, &other.point::<V>(corner, lane));
+            above = above & along.gt(high);
+            below = below & low.gt(along);
+        }
+        above | below
+    }
+
+    /// Which edges are apart from an edge of another group, along two directions across that one.
+    #[inline(always)]
+    fn edges_beyond<V: Lookup>(
+        &self,
+        first: usize,
+        other: &Self,
+        lane: usize,
+        reach: f32,
+    ) -> V::Mask {
+        let [x, y, z] = &self.directions;
+        let own = [V::row(x, first), V::row(y, first), V::row(z, first)];
+        let ends = [self.points_at::<V>(0, first), self.points_at::<V>(1, first)];
+        let others = [other.point::<V>(0, lane), other.point::<V>(1, lane)];
+        let direction = other.direction::<V>(lane);
+        let way = difference(&ends[0], &others[0]);
+        let along = dot(&way, &direction);
+        let across = [
+            way[0] - along * direction[0],
+            way[1] - along * direction[1],
+            way[2] - along * direction[2],
+        ];
+        are_apart_along(&cross(&direction, &own), &ends, &others, reach)
+            | are_apart_along(&across, &ends, &others, reach)
+    }
+
+    #[inline(always)]
+    fn points_at<V: Lookup>(&self, corner: usize, first: usize) -> [V; 3] {
+        let [x, y, z] = &self.points[corner];
+        [V::row(x, first), V::row(y, first), V::row(z, first)]
+    }
+
+    #[inline(always)]
+    fn point<V: Lookup>(&self, corner: usize, lane: usize) -> [V; 3] {
+        let [x, y, z] = &self.points[corner];
+        [splat(x[lane]), splat(y[lane]), splat(z[lane])]
+    }
+
+    #[inline(always)]
+    fn direction<V: Lookup>(&self, lane: usize) -> [V; 3] {
+        let [x, y, z] = &self.directions;
+        [splat(x[lane]), splat(y[lane]), splat(z[lane])]
+    }
+
+    #[inline(always)]
+    fn span<V: Lookup>(&self, lane: usize) -> [V; 2] {
+        [splat(self.spans[0][lane]), splat(self.spans[1][lane])]
+    }
+}
+
+#[inline(always)]
+fn splat<V: Number>(x: f32) -> V {
+    V::splat(f64::from(x))
+}
+
+/// A number in `f32` that is not below.
+#[inline(always)]
+fn above(x: f64) -> f32 {
+    ((x + ABSOLUTE) * LONGER) as f32
+}
+
+#[inline(always)]
+fn widened<V: Number>([low, high]: [V; 2], reach: f32) -> [V; 2] {
+    [low - splat(reach), high + splat(reach)]
+}
+
+#[inline(always)]
+fn all<V: Number>() -> (V::Mask, V::Mask) {
+    let zero = V::splat(0.0);
+    (!zero.gt(zero), !zero.gt(zero))
+}
+
+/// Whether the spans of two edges along some direction are farther apart than `reach`.
+#[inline(always)]
+fn are_apart_along<V: Number>(
+    direction: &[V; 3],
+    a: &[[V; 3]; 2],
+    b: &[[V; 3]; 2],
+    reach: f32,
+) -> V::Mask {
+    let length = dot(direction, direction).sqrt() * V::splat(LONGER);
+    let bound = splat::<V>(reach) * length + V::splat(ABSOLUTE);
+    let of_a = [dot(direction, &a[0]), dot(direction, &a[1])];
+    let of_b = [dot(direction, &b[0]), dot(direction, &b[1])];
+    let before = of_b[0].smaller(of_b[1]) - of_a[0].larger(of_a[1]);
+    let after = of_a[0].smaller(of_a[1]) - of_b[0].larger(of_b[1]);
+    // The squares of shorter ones underflow.
+    size(direction).gt(V::splat(V::SHORTEST)) & (before.gt(bound) | after.gt(bound))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::number::Portable32;
+    use super::*;
+    use crate::exact::{Reach, elements_are_within, triangles_intersect};
+    use impinge_scenes::Random;
+
+    /// Long elements of so many corners, some of them degenerate, in a space of some size.
+    fn group<const N: usize>(random: &mut Random, size: f64, far: f64) -> Vec<[Point; N]> {
+        (0..TABLE)
+            .map(|lane| {
+                let mut point = || random.point(-1.0, 1.0).map(|x| far + size * f64::from(x));
+                let (start, way) = (point(), point());
+                // Slivers: the last corner is near the line of the others.
+                let mut corners = [start; N];
+                for (k, corner) in corners.iter_mut().enumerate().skip(1) {
+                    let near = point();
+                    let width = [0.0, 1e-7, 1e-3, 0.3][lane % 4];
+                    let share = if k == 1 { 1.0 } else { 0.6 };
+                    for axis in 0..3 {
+                        corner[axis] = start[axis]
+                            + share * (way[axis] - start[axis])
+                            + width * (near[axis] - far);
+                    }
+                }
+                corners
+            })
+            .collect()
+    }
+
+    fn filled<const N: usize>(elements: &[[Point; N]]) -> Directions64 {
+        let mut group = Directions64::EMPTY;
+        group.begin(N);
+        for (lane, corners) in elements.iter().enumerate() {
+            group.put(lane, corners);
+        }
+        group
+    }
+
+    /// Compares each verdict with an exact one. Returns how many of all pairs were told apart, and how many are.
+    fn compare<const N: usize, const M: usize>(
+        seed: u64,
+        (size, far): (f64, f64),
+        distance: f32,
+        is_near: impl Fn(&[Point; N], &[Point; M]) -> bool,
+    ) -> [u32; 2] {
+        let mut random = Random::new(seed);
+        let (a, b) = (
+            group::<N>(&mut random, size, far),
+            group::<M>(&mut random, size, far),
+        );
+        let (of_a, of_b) = (filled(&a), filled(&b));
+        assert!(of_a.can_part(&of_b) && of_b.can_part(&of_a));
+        let mut counts = [0; 2];
+        for (row, element) in a.iter().enumerate() {
+            let beyond = of_b.beyond::<Portable32>(u64::MAX, (&of_a, row), distance);
+            for (lane, other) in b.iter().enumerate() {
+                let is_apart = !is_near(element, other);
+                let is_beyond = beyond >> lane & 1 == 1;
+                assert!(!is_beyond || is_apart, "{element:?} {other:?} {distance}");
+                counts[0] += u32::from(is_beyond);
+                counts[1] += u32::from(is_apart);
+            }
+        }
+        counts
+    }
+
+    #[test]
+    fn pairs_beyond_a_distance_are_farther_apart() {
+        // Of coordinates that are small, as large as the distances between elements, and much larger.
+        for (seed, place) in [(1.0, 0.0), (1e-30, 0.0), (1e3, 2e4), (1.0, 1e6)]
+            .into_iter()
+            .enumerate()
+        {
+            let seed = seed as u64;
+            let triangles = compare::<3, 3>(seed, place, 0.0, triangles_intersect);
+            for share in [0.0, 1e-3, 0.2] {
+                let distance = (share * place.0) as f32;
+                let reach = Reach::from(f64::from(distance));
+                let edges = compare::<2, 2>(seed + 9, place, distance, |a, b| {
+                    elements_are_within(a, b, &reach)
+                });
+                let vertices = compare::<1, 3>(seed + 18, place, distance, |a, b| {
+                    elements_are_within(a, b, &reach)
+                });
+                let faces = compare::<3, 1>(seed + 27, place, distance, |a, b| {
+                    elements_are_within(a, b, &reach)
+                });
+                if place == (1.0, 0.0) {
+                    for [beyond, apart] in [triangles, edges, vertices, faces] {
+                        assert!(4 * beyond > 3 * apart, "{beyond} of {apart}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn coordinates_out_of_range_are_not_told_apart() {
+        let near = filled(&[[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]);
+        let far = filled(&[[[1e10; 3], [1e11, 0.0, 0.0], [0.0, 1e11, 0.0]]]);
+        assert!(near.can_part(&near) && !near.can_part(&far) && !far.can_part(&near));
+        let points = filled(&[[[0.0; 3]]]);
+        let edges = filled(&[[[0.0; 3], [1.0; 3]]]);
+        assert!(!points.can_part(&edges) && !points.can_part(&points));
+        assert!(edges.can_part(&edges) && near.can_part(&points));
+    }
+}
