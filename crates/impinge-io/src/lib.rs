@@ -22,7 +22,8 @@
 //!   type a header declares; [`Positions::narrow_if_exact`] converts them to f32 if nothing is lost.
 //! - **Order.** Vertices and primitives keep the order of the file. A polygon of n corners becomes n - 2 triangles
 //!   in its place: the fan around its first corner, which covers a convex polygon exactly. If the polygon is concave and its fan
-//!   overlaps itself, as seen along its normal, its ears are clipped instead (up to 256 corners). A strip becomes its triangles.
+//!   overlaps itself, as seen along its normal, or if it has more than 256 corners, its ears are clipped instead, in `O(n log n)`. A strip
+//!   becomes its triangles.
 //! - **Everything that can collide.** Points and lines are counted and skipped. If a file has tetrahedra, its triangles are
 //!   skipped too, unless [`ReadOptions::prefer`] says otherwise; see [`Summary`]. Hexahedra, prisms, pyramids and
 //!   curved (higher-order) cells are refused with an error: skipping them would lose collisions silently.

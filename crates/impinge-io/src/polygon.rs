@@ -1,23 +1,39 @@
 //! Polygons as triangles.
 
-/// Polygons with more corners than this stay fans whatever their shape: clipping ears takes the square of their number.
-const MOST_CLIPPED: usize = 256;
+mod inner;
 
-/// Replaces the fan of a polygon around its first corner by other triangles of the same corners, as many, if a triangle of the
-/// fan is turned over, as seen along the polygon's normal (Newell's). That happens only where the polygon is concave, and the
-/// fan then overlaps itself. Ears are clipped one after the other (Meisters 1975). A polygon that runs out of ears,
+use std::collections::VecDeque;
+
+use inner::{InnerCorners, turn};
+
+/// Polygons with more corners than this are cut by [`clip_many_ears`], and smaller ones as they always were.
+const FEW: usize = 256;
+
+/// Replaces the fan of a polygon around its first corner by other triangles of the same corners, as many, as seen along the
+/// polygon's normal (Newell's). Ears are clipped one after the other (Meisters 1975). A polygon that runs out of ears,
 /// because it crosses itself, stays a fan.
+///
+/// A small polygon is cut only if a triangle of the fan is turned over. That happens only where the polygon is concave, and the fan then
+/// overlaps itself. A large one is always cut: the triangles of its fan would be long and all meet at one corner, so their boxes
+/// overlap.
 pub(crate) fn mend(fan: &mut [[u32; 3]], position: impl Fn(u32) -> [f64; 3]) {
-    if !(2..=MOST_CLIPPED - 2).contains(&fan.len()) {
+    if fan.len() < 2 {
         return;
     }
     let rest = fan.iter().map(|triangle| triangle[2]);
     let corners: Vec<u32> = fan[0][..2].iter().copied().chain(rest).collect();
     let points = flatten(&corners, position);
-    let is_turned = |edge: &[[f64; 2]]| turn(points[0], edge[0], edge[1]) < 0.0;
     let mut triangles = Vec::with_capacity(fan.len());
-    if points[1..].windows(2).any(is_turned) && clip_ears(&corners, &points, &mut triangles) {
-        fan.copy_from_slice(&triangles);
+    let is_cut = if corners.len() > FEW {
+        clip_many_ears(&points, &mut triangles).is_some()
+    } else {
+        let is_turned = |edge: &[[f64; 2]]| turn(points[0], edge[0], edge[1]) < 0.0;
+        points[1..].windows(2).any(is_turned) && clip_ears(&points, &mut triangles)
+    };
+    if is_cut {
+        for (to, triangle) in fan.iter_mut().zip(triangles) {
+            *to = triangle.map(|corner| corners[corner]);
+        }
     }
 }
 
@@ -46,14 +62,10 @@ fn flatten(corners: &[u32], position: impl Fn(u32) -> [f64; 3]) -> Vec<[f64; 2]>
     points.iter().map(|p| [p[u], p[v]]).collect()
 }
 
-/// Twice the area of a triangle; positive if it is anticlockwise.
-fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
-    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-}
-
-/// Returns false if some corner is left without an ear.
-fn clip_ears(corners: &[u32], points: &[[f64; 2]], triangles: &mut Vec<[u32; 3]>) -> bool {
-    let mut left: Vec<usize> = (0..corners.len()).collect();
+/// Clips the first ear again and again: as many looks as the square of the number of corners. Returns false if some corner is left
+/// without an ear.
+fn clip_ears(points: &[[f64; 2]], triangles: &mut Vec<[usize; 3]>) -> bool {
+    let mut left: Vec<usize> = (0..points.len()).collect();
     while left.len() > 3 {
         let n = left.len();
         let ear = |ix: usize| [left[(ix + n - 1) % n], left[ix], left[(ix + 1) % n]];
@@ -67,12 +79,146 @@ fn clip_ears(corners: &[u32], points: &[[f64; 2]], triangles: &mut Vec<[u32; 3]>
         let Some(ix) = (0..n).find(is_ear) else {
             return false;
         };
-        triangles.push(ear(ix).map(|corner| corners[corner]));
+        triangles.push(ear(ix));
         left.remove(ix);
     }
-    triangles.push([left[0], left[1], left[2]].map(|corner| corners[corner]));
+    triangles.push([left[0], left[1], left[2]]);
     turn(points[left[0]], points[left[1]], points[left[2]]) > 0.0
 }
+
+/// The same for many corners. Corners wait in a queue. A corner whose neighbour was clipped goes to its end, so a run of ears is
+/// halved again and again, and triangles stay small. A corner whose ear is not free waits for the corner that lies in it. Returns how many
+/// nodes and corners it looked at; `None` if some corner is left without an ear, or after far more looks than a polygon needs that does
+/// not cross itself.
+fn clip_many_ears(points: &[[f64; 2]], triangles: &mut Vec<[usize; 3]>) -> Option<u64> {
+    let n = points.len();
+    let mut ring = Ring::new(points);
+    let inner = (0..n).filter(|&corner| !ring.is_convex(corner));
+    let mut inner = InnerCorners::new(points, inner.map(|corner| corner as u32).collect());
+    let mut waiting: Vec<Vec<usize>> = vec![Vec::new(); n];
+    let mut queue = Queue {
+        corners: VecDeque::new(),
+        tickets: vec![0; n],
+        last: 0,
+    };
+    (0..n).for_each(|corner| queue.push(corner));
+    let most = LOOKS * n as u64 * u64::from(n.ilog2() + 1);
+    let mut n_left = n;
+    while n_left > 3 {
+        inner.n_looks += 1;
+        if inner.n_looks > most {
+            return None;
+        }
+        let corner = queue.pop()?;
+        if !ring.is_convex(corner) {
+            continue;
+        }
+        let ear = ring.around(corner);
+        if let Some(blocking) = inner.find_in(points, ear) {
+            waiting[blocking].push(corner);
+            continue;
+        }
+        triangles.push(ear);
+        ring.remove(corner);
+        queue.withdraw(corner);
+        n_left -= 1;
+        let [from, _, to] = ear;
+        for corner in [corner, from, to] {
+            let is_left = corner == from || corner == to;
+            if is_left {
+                queue.push(corner);
+            }
+            if !is_left || ring.is_convex(corner) {
+                inner.remove(corner);
+                for other in std::mem::take(&mut waiting[corner]) {
+                    if !queue.is_withdrawn(other) {
+                        queue.push(other);
+                    }
+                }
+            }
+        }
+        queue.last = from;
+    }
+    let last = ring.around(queue.last);
+    triangles.push(last);
+    (turn_of(points, last) > 0.0).then_some(inner.n_looks)
+}
+
+fn turn_of(points: &[[f64; 2]], [a, b, c]: [usize; 3]) -> f64 {
+    turn(points[a], points[b], points[c])
+}
+
+/// The corners that are left, in a circle.
+struct Ring<'a> {
+    points: &'a [[f64; 2]],
+    next: Vec<usize>,
+    before: Vec<usize>,
+}
+
+impl<'a> Ring<'a> {
+    fn new(points: &'a [[f64; 2]]) -> Self {
+        let n = points.len();
+        Ring {
+            points,
+            next: (1..n).chain([0]).collect(),
+            before: [n - 1].into_iter().chain(0..n - 1).collect(),
+        }
+    }
+
+    /// A corner between its neighbours.
+    fn around(&self, corner: usize) -> [usize; 3] {
+        [self.before[corner], corner, self.next[corner]]
+    }
+
+    /// Whether the polygon bends outward at a corner. False where that can't be said.
+    fn is_convex(&self, corner: usize) -> bool {
+        turn_of(self.points, self.around(corner)) > 0.0
+    }
+
+    fn remove(&mut self, corner: usize) {
+        let [before, _, next] = self.around(corner);
+        (self.next[before], self.before[next]) = (next, before);
+    }
+}
+
+/// Corners that may have an ear.
+struct Queue {
+    /// With the number of times that each had been put there before: only the last time counts.
+    corners: VecDeque<(usize, u32)>,
+    tickets: Vec<u32>,
+    /// A corner that is left.
+    last: usize,
+}
+
+/// The ticket of a corner that was clipped.
+const WITHDRAWN: u32 = u32::MAX;
+
+impl Queue {
+    fn push(&mut self, corner: usize) {
+        self.tickets[corner] += 1;
+        self.corners.push_back((corner, self.tickets[corner]));
+    }
+
+    fn pop(&mut self) -> Option<usize> {
+        loop {
+            let (corner, ticket) = self.corners.pop_front()?;
+            if self.tickets[corner] == ticket {
+                return Some(corner);
+            }
+        }
+    }
+
+    fn withdraw(&mut self, corner: usize) {
+        self.tickets[corner] = WITHDRAWN;
+    }
+
+    fn is_withdrawn(&self, corner: usize) -> bool {
+        self.tickets[corner] == WITHDRAWN
+    }
+}
+
+/// So many looks per corner, and per halving of their number, are allowed.
+const LOOKS: u64 = 64;
 
 #[cfg(test)]
 mod tests {
@@ -160,15 +306,107 @@ mod tests {
     fn polygons_that_cannot_be_cut_are_fanned() {
         let bow = [[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 3.0]];
         assert_eq!(cut(&bow), [[0, 1, 2], [0, 2, 3]]);
-        let star: Vec<[f64; 2]> = (0..2 * MOST_CLIPPED)
-            .map(|ix| {
-                let angle = ix as f64 * std::f64::consts::PI / MOST_CLIPPED as f64;
-                let radius = if ix % 2 == 0 { 2.0 } else { 1.0 };
-                [radius * angle.cos(), radius * angle.sin()]
-            })
+        // Rows of a grid, one after the other: the way back crosses them.
+        let rows: Vec<[f64; 2]> = (0..900)
+            .map(|ix| [f64::from(ix % 30), f64::from(ix / 30)])
             .collect();
-        assert_eq!(cut(&star)[0], [0, 1, 2]);
+        assert_eq!(cut(&rows)[..2], [[0, 1, 2], [0, 2, 3]]);
         let huge = [[0.0, 0.0], [1e300, 0.0], [1e299, 1e299], [0.0, 1e300]];
         assert_eq!(cut(&huge)[0], [0, 1, 2]);
+    }
+
+    /// A polygon with a name, and its area.
+    fn large(n: u32) -> [(&'static str, Vec<[f64; 2]>); 6] {
+        let full = f64::from(n);
+        let at = |radius: f64, share: f64| {
+            let angle = share * std::f64::consts::TAU;
+            [radius * angle.cos(), radius * angle.sin()]
+        };
+        let corners = |f: &dyn Fn(f64) -> [f64; 2]| (0..n).map(|ix| f(f64::from(ix))).collect();
+        // There along the floor, back over the teeth.
+        let zigzag = corners(&|ix| match ix {
+            0.0 => [0.0, -1.0],
+            1.0 => [full, -1.0],
+            _ => [full - ix, if ix % 2.0 == 0.0 { 0.0 } else { 1.0 }],
+        });
+        // A band that winds outward 32 times: out along its outer side, back along the inner one.
+        let half = full / 2.0;
+        let spiral = corners(&|ix| {
+            let (share, width) = if ix < half {
+                (ix / half, 0.5)
+            } else {
+                ((full - 1.0 - ix) / half, 0.0)
+            };
+            at(1.0 + width + 32.0 * share, 32.0 * share)
+        });
+        // Sides with corners along them.
+        let square = corners(&|ix| {
+            let (side, along) = ((4.0 * ix / full).floor(), (4.0 * ix % full) / full);
+            match side {
+                0.0 => [along, 0.0],
+                1.0 => [1.0, along],
+                2.0 => [1.0 - along, 1.0],
+                _ => [0.0, 1.0 - along],
+            }
+        });
+        [
+            ("circle", corners(&|ix| at(1.0, ix / full))),
+            ("star", corners(&|ix| at(1.0 + ix % 2.0, ix / full))),
+            // Teeth that nearly meet in the middle.
+            ("wheel", corners(&|ix| at(0.001 + ix % 2.0, ix / full))),
+            ("zigzag", zigzag),
+            ("spiral", spiral),
+            ("square", square),
+        ]
+    }
+
+    #[test]
+    fn large_polygons_are_covered() {
+        for (name, polygon) in large(2_048) {
+            for polygon in [polygon.clone(), polygon.into_iter().rev().collect()] {
+                let areas = areas(&polygon, &cut(&polygon));
+                let whole = area(&polygon);
+                assert!(areas.iter().all(|area| area * whole > 0.0), "{name}");
+                let sum: f64 = areas.iter().sum();
+                assert!((sum - whole).abs() < 1e-9 * whole.abs(), "{name}");
+            }
+        }
+    }
+
+    /// Work, not time: so many looks per corner.
+    #[test]
+    fn a_million_corners_take_about_as_much_work_each_as_a_thousand() {
+        for ix in 0..large(8).len() {
+            let of = |n: u32| large(n)[ix].clone();
+            let (name, small) = of(1 << 10);
+            // All kinds, but only two of them with a million: the test is not optimised.
+            let is_largest = ["circle", "zigzag"].contains(&name);
+            let (_, polygon) = of(if is_largest { 1 << 20 } else { 1 << 16 });
+            let [looks, of_small] = [&polygon, &small].map(|polygon| {
+                let mut triangles = Vec::new();
+                let n_looks = clip_many_ears(polygon, &mut triangles).expect(name);
+                assert_eq!(triangles.len(), polygon.len() - 2);
+                n_looks as f64 / polygon.len() as f64
+            });
+            assert!(looks < 100.0 + 3.0 * of_small, "{name}: {looks} {of_small}");
+        }
+    }
+
+    /// A large convex polygon is cut into small triangles, so that their boxes overlap little: half of all edges are those of
+    /// the polygon, and each halving of the corners left makes edges twice as long.
+    #[test]
+    fn a_large_circle_has_short_edges() {
+        let [(_, circle), ..] = large(1 << 14);
+        let length: f64 = (cut(&circle).iter())
+            .map(|triangle| {
+                let [a, b, c] = triangle.map(|corner| circle[corner as usize]);
+                [[a, b], [b, c], [c, a]]
+                    .map(|[p, q]| (p[0] - q[0]).hypot(p[1] - q[1]))
+                    .iter()
+                    .sum::<f64>()
+            })
+            .sum();
+        // A fan would have 16384 times 2 or so.
+        assert!(length < 250.0, "{length}");
     }
 }
