@@ -38,6 +38,9 @@ pub(crate) fn chunks(
     mut take: impl FnMut(&[Corner]),
 ) {
     let mut chunk = Vec::new();
+    let hidden = hidden_faces(picture, frame, &wanted);
+    let mut hidden = hidden.iter().peekable();
+    let mut number = 0u32;
     for surface in &picture.surfaces {
         if !surface.faces.iter().any(&wanted) {
             continue;
@@ -47,6 +50,10 @@ pub(crate) fn chunks(
             Normals::Smooth => vertex_normals(surface, frame),
         };
         for face in surface.faces.iter().filter(|face| wanted(face)) {
+            number += 1;
+            if hidden.next_if_eq(&&number).is_some() {
+                continue;
+            }
             let points = surface.points(face).map(|point| frame.place(point));
             let flat = normal(points);
             for (ix, point) in face.corners.into_iter().zip(points) {
@@ -70,6 +77,43 @@ pub(crate) fn chunks(
     if !chunk.is_empty() {
         take(&chunk);
     }
+}
+
+/// The numbers, from 1, ascending, of wanted faces that a later one with the same corners hides. Very many coincident faces, each of
+/// which covers many pixels, would otherwise take forever.
+fn hidden_faces(picture: &Picture, frame: &Frame, wanted: &impl Fn(&Face) -> bool) -> Vec<u32> {
+    let faces = || {
+        let surfaces = picture.surfaces.iter();
+        surfaces.flat_map(|surface| {
+            let faces = surface.faces.iter().filter(|face| wanted(face));
+            faces.map(|face| {
+                let mut points = surface.points(face);
+                points
+                    .sort_unstable_by(|p, q| p.partial_cmp(q).unwrap_or(std::cmp::Ordering::Equal));
+                points.map(|point| frame.place(point).map(|x| (x as f32).to_bits()))
+            })
+        })
+    };
+    let mut numbered: Vec<(u64, u32)> = faces().map(|key| hash(&key)).zip(1..).collect();
+    numbered.sort_unstable();
+    if !numbered.windows(2).any(|pair| pair[0].0 == pair[1].0) {
+        return Vec::new();
+    }
+    // Different faces may have one hash.
+    let keys: Vec<[[u32; 3]; 3]> = faces().collect();
+    let key = |number: u32| &keys[number as usize - 1];
+    numbered.sort_unstable_by(|x, y| key(x.1).cmp(key(y.1)).then(x.1.cmp(&y.1)));
+    let pairs = numbered.windows(2);
+    let hidden = pairs.filter(|pair| key(pair[0].1) == key(pair[1].1));
+    let mut hidden: Vec<u32> = hidden.map(|pair| pair[0].1).collect();
+    hidden.sort_unstable();
+    hidden
+}
+
+fn hash(key: &[[u32; 3]; 3]) -> u64 {
+    key.as_flattened().iter().fold(0, |sum: u64, &bits| {
+        (sum.rotate_left(5) ^ u64::from(bits)).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+    })
 }
 
 /// Unit normals of vertices: the mean normal of the faces around a vertex, weighted by their angles there.
@@ -121,4 +165,47 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// A number of -1 to 1 in 32767ths.
 fn snorm(x: f64) -> i16 {
     (x * f64::from(i16::MAX)).round() as i16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Work, not time: of many coincident faces only the last is drawn, whatever order its corners have.
+    #[test]
+    fn of_coincident_faces_the_last_is_drawn() {
+        const N: u32 = 300_000;
+        let face = |corners: [u32; 3], ix: u32| Face {
+            corners,
+            color: [(ix % 251) as u8, 0, 0],
+            shows_through: ix % 3 == 0,
+        };
+        let orders = [[0, 1, 2], [2, 0, 1], [1, 0, 2]];
+        let mut faces: Vec<Face> = (0..N).map(|ix| face(orders[ix as usize % 3], ix)).collect();
+        faces.insert(7, face([0, 1, 3], 9));
+        let surface = Surface {
+            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 2.0, 0.0]],
+            faces,
+            normals: Normals::Smooth,
+        };
+        // The same triangle once more, in another surface.
+        let mut other = surface.clone();
+        other.faces = vec![face([1, 2, 0], 100)];
+        let picture = Picture {
+            surfaces: vec![surface, other],
+            ..Picture::default()
+        };
+        let frame = Frame::of(&picture);
+        for (shown, expected) in [
+            (false, [9, 100]),
+            (true, [9, ((N - 1) / 3 * 3 % 251) as u8]),
+        ] {
+            let mut colors = Vec::new();
+            let wanted = |face: &Face| !shown || face.shows_through;
+            chunks(&picture, &frame, 1000, wanted, |corners| {
+                colors.extend(corners.chunks(3).map(|face| face[0].color[0]));
+            });
+            assert_eq!(colors, expected);
+        }
+    }
 }
