@@ -51,8 +51,9 @@ Examples:
   impinge step cloth_0.ply cloth_1.ply          does anything touch on the way, and when first
   impinge simulate blocks --out out/blocks      bodies that fall, deform and collide
 
-Exit codes: 0 done, 2 bad usage, 3 pairs or contacts were found and --fail-on-hit was given, 130 stopped by
-Ctrl-C (128 and the signal's number), 1 any other error (one line on stderr).
+Exit codes: 0 done, 2 bad usage, 3 pairs or contacts were found and --fail-on-hit was given,
+4 the start of a step already intersects, 130 stopped by Ctrl-C (128 and the signal's number), 1 any other error
+(one line on stderr).
 `impinge help COMMAND` explains a command.";
 
 #[derive(Debug, Subcommand)]

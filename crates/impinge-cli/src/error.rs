@@ -63,6 +63,9 @@ pub enum Error {
     /// Pairs were found, and `--fail-on-hit` was given.
     #[error("pairs were found")]
     Hit,
+    /// The start of a step already intersects; the answer has said so.
+    #[error("the start of the step already intersects")]
+    StartIntersects,
     /// Standard output could not be written.
     #[error("standard output: {0}")]
     Output(#[from] io::Error),
@@ -106,7 +109,8 @@ impl Error {
         )
     }
 
-    /// 128 plus the signal's number if a signal ended the program, 2 for bad usage, 3 for `--fail-on-hit` and `--fail-on`, 0 if the reader of
+    /// 128 plus the signal's number if a signal ended the program, 2 for bad usage, 3 for `--fail-on-hit` and `--fail-on`, 4 if the start of a step
+    /// already intersects, 0 if the reader of
     /// standard output has closed it (it has what it wanted), else 1.
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -115,6 +119,7 @@ impl Error {
             | Error::Tiles(impinge_tiles::Error::Argument { .. })
             | Error::Detection(impinge::Error::Setting { .. }) => 2,
             Error::Hit | Error::CheckFailed(_) => 3,
+            Error::StartIntersects => 4,
             Error::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
             _ => 1,
         }
@@ -122,7 +127,7 @@ impl Error {
 
     /// Whether nothing is printed on standard error.
     pub fn is_silent(&self) -> bool {
-        matches!(self, Error::Hit) || self.exit_code() == 0
+        matches!(self, Error::Hit | Error::StartIntersects) || self.exit_code() == 0
     }
 
     /// The message on one line.

@@ -108,6 +108,23 @@ pub enum Error {
         /// How many faces run the other way.
         n_backward: usize,
     },
+    /// Elements of one body touch at the start of a step at vertices that are at one position but not shared, as along the
+    /// seams of a mesh that was not welded. No part of such a step could ever be taken. Weld the mesh
+    /// ([`Weld`](crate::Weld)), or skip what touches at the start ([`Start::Skip`](crate::Start::Skip)).
+    #[error(
+        "body {body}: vertices {} and {} are at one position but not shared, so what they belong to touches at the start, and no \
+         step can be taken: weld the mesh ({n_coincident} of its vertices lie at positions of others), or skip pairs that touch at \
+         the start",
+        vertices[0], vertices[1]
+    )]
+    Seam {
+        /// The body.
+        body: BodyId,
+        /// Two vertices at one position, of elements that touch.
+        vertices: [u32; 2],
+        /// How many vertices of the body lie at positions of others: as many as welding would remove.
+        n_coincident: usize,
+    },
     /// A body of the other kind is needed here.
     #[error("body {body} is made of {kind}, where {expected} are needed")]
     WrongKind {

@@ -83,6 +83,8 @@ pub enum Ask {
     Intersections,
     /// Whether and when vertices, edges and faces touch during a step.
     Impacts,
+    /// Which vertices, edges and faces are near each other: the kinds of [`Impacts`](Ask::Impacts), and edges that meet faces.
+    Near,
     /// Which vertices, edges and faces have boxes that overlap during a step.
     Candidates(PairKinds),
 }
@@ -93,7 +95,9 @@ impl Ask {
     fn parts(self) -> &'static [Part] {
         match self {
             Ask::Intersections => &[Part::Given],
-            Ask::Impacts | Ask::Candidates(_) => &[Part::Edges, Part::Vertices, Part::Faces],
+            Ask::Impacts | Ask::Near | Ask::Candidates(_) => {
+                &[Part::Edges, Part::Vertices, Part::Faces]
+            }
         }
     }
 }
@@ -147,7 +151,7 @@ impl Frame {
         // Vertices, edges and faces that share a vertex never count.
         self.shared_vertex = match ask {
             Ask::Intersections => query.shared_vertex,
-            Ask::Impacts | Ask::Candidates(_) => SharedVertex::Skip,
+            Ask::Impacts | Ask::Near | Ask::Candidates(_) => SharedVertex::Skip,
         };
         self.cell = query.cell;
         self.is_step = ask != Ask::Intersections;
@@ -540,7 +544,8 @@ impl Frame {
                 PairKind::VertexFace | PairKind::EdgeEdge => true,
                 PairKind::EdgeVertex => a.is_bare && b.is_bare,
                 PairKind::VertexVertex => a.is_points && b.is_points,
-                PairKind::EdgeFace | PairKind::FaceFace => false,
+                PairKind::EdgeFace => self.ask == Ask::Near,
+                PairKind::FaceFace => false,
             },
         };
         is_asked.then_some(TestId::Elements(kind))

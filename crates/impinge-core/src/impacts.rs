@@ -243,6 +243,7 @@ pub fn hash_impact_rows(rows: impl IntoIterator<Item = (PairKind, [u32; 4], f64)
 pub struct Impacts {
     numbering: Numbering,
     impacts: Vec<Impact>,
+    start_intersects: Option<bool>,
     stats: Statistics,
 }
 
@@ -261,7 +262,12 @@ impl Impacts {
     pub(crate) fn begin(&mut self, frame: &Frame) {
         self.numbering.begin(frame);
         self.impacts.clear();
+        self.start_intersects = None;
         self.stats.clear();
+    }
+
+    pub(crate) fn set_start_intersects(&mut self, start_intersects: Option<bool>) {
+        self.start_intersects = start_intersects;
     }
 
     pub(crate) fn stats_mut(&mut self) -> &mut Statistics {
@@ -299,9 +305,15 @@ impl Impacts {
         self.impacts.len()
     }
 
-    /// Whether the step is free of contact.
+    /// Whether nothing touches during the step.
     pub fn is_empty(&self) -> bool {
         self.impacts.is_empty()
+    }
+
+    /// Whether elements intersect at the start of the step. `None` if nobody asked: only
+    /// [`Start::Verify`](crate::Start::Verify) does.
+    pub fn start_intersects(&self) -> Option<bool> {
+        self.start_intersects
     }
 
     /// All of them, sorted.

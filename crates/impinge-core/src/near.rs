@@ -25,6 +25,10 @@ pub(crate) use labels::Labels;
 /// elements of one body, twice its thickness. The sum is that of real numbers: nothing is rounded. Pairs of one body that
 /// share a vertex are left out.
 ///
+/// An edge and a face ([`PairKind::EdgeFace`]) are reported if and only if they meet, whatever the distance: their distance is 0. If
+/// they do not meet but are near, then so are the edge and an edge of the face, or an end of the edge and the face, and these pairs
+/// say it: with each of them repeated, answers would have three times as many pairs.
+///
 /// ```
 /// use impinge::{NearQuery, PairKind, Query};
 /// let query = NearQuery::new(Query::everything()).distance(0.01).closest_points();
@@ -54,9 +58,11 @@ impl NearQuery {
         }
     }
 
-    /// Which kinds of pairs. If this is not said: vertices and faces, edges and edges; where bodies are made of edges or
-    /// points alone also edges and vertices, vertices and vertices. Any two elements that are near have such a pair among
-    /// their parts, unless an edge passes through the inside of a face.
+    /// Which kinds of pairs. If this is not said: vertices and faces, edges and edges, edges that meet faces; where bodies are made
+    /// of edges or points alone also edges and vertices, vertices and vertices. Any two elements that are near have such a pair among
+    /// their parts, so bodies are at least the distance apart if there are none, and neighbours that fold onto each other have one too.
+    /// Only faces with the same three vertices, and a body inside tetrahedra, have none: [`Detector::any`](crate::Detector::any)
+    /// finds these.
     pub fn kinds(mut self, kinds: impl IntoIterator<Item = PairKind>) -> Self {
         self.kinds = Some(kinds.into_iter().collect());
         self
@@ -97,7 +103,7 @@ impl NearQuery {
         }
         let ask = match self.kinds {
             Some(kinds) => Ask::Candidates(kinds),
-            None => Ask::Impacts,
+            None => Ask::Near,
         };
         frame.resolve_for(scene, &self.query, ask)?;
         frame.stand_still();

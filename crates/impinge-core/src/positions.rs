@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::exact;
 use crate::ids::BodyId;
 use crate::position_rows::PositionRows;
+use impinge_weld::Weld;
 
 /// Vertex positions in the precision in which they were given.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,6 +80,15 @@ impl Positions {
             }
             _ => between(&self.point(vertex), &end.point(vertex), fraction),
         }
+    }
+
+    /// How many vertices lie at the positions of others: as many as welding would remove.
+    pub(crate) fn n_coincident(&self) -> usize {
+        let weld = match self {
+            Positions::F32(positions) => Weld::by_position(positions),
+            Positions::F64(positions) => Weld::by_position(positions),
+        };
+        weld.n_welded()
     }
 
     /// The largest magnitude of a coordinate.

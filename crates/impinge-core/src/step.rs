@@ -9,14 +9,21 @@ use crate::ids::BodyId;
 use crate::pair_kind::{PairKind, PairKinds};
 use crate::query::Query;
 
-/// What happens to pairs that touch at the start of a step.
+/// What happens to pairs that touch at the start of a step, and whether the start is asked for intersections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Start {
-    /// They are reported with the time 0.
+    /// They are reported with the time 0. Surfaces that already pass through each other need not touch at all: an edge inside
+    /// a face, or a body inside another, has no contact until it comes to a border.
     #[default]
     Report,
     /// They are not reported, whatever they do later in the step.
     Skip,
+    /// As `Report`, and the start is asked for intersections: [`Detector::any`](crate::Detector::any) of the same bodies, with
+    /// [`SharedVertex::Resolve`](crate::SharedVertex::Resolve). If there are any, [`is_free`](crate::Detector::is_free) is false
+    /// and [`advance`](crate::Detector::advance) allows no step; [`Impacts::start_intersects`](crate::Impacts::start_intersects)
+    /// and [`Advance::start_intersects`](crate::Advance::start_intersects) say so.
+    /// [`earliest`](crate::Detector::earliest) cannot say it, so there the start is not asked.
+    Verify,
 }
 
 /// The precision to which times are rounded down.

@@ -91,7 +91,8 @@ fn settle(kind: PairKind, a: &[Point], b: &[Point], distance: f64) -> Option<Opt
         PairKind::EdgeVertex => simple(ElementPair::VertexEdge, four(&[b, a]), true),
         PairKind::VertexVertex => simple(ElementPair::VertexVertex, four(&[a, b]), false),
         PairKind::EdgeFace => {
-            edge_face_are_within(&[a[0], a[1]], &[b[0], b[1], b[2]], distance).then_some(None)
+            // They meet, whatever the distance.
+            edge_face_are_within(&[a[0], a[1]], &[b[0], b[1], b[2]], 0.0).then_some(None)
         }
         PairKind::FaceFace => {
             let [a, b] = [a, b].map(|face| [face[0], face[1], face[2]]);
@@ -232,8 +233,8 @@ fn a_distance_that_occurs_counts_and_one_below_does_not() {
             PairKind::ALL.map(|kind| near.of(kind).len())
         };
         assert_eq!(count(3.0_f64.next_down()), [0; 6]);
-        // Each vertex is over the other face; each edge is over itself and both neighbours.
-        assert_eq!(count(3.0), [6, 9, 12, 3, 6, 1]);
+        // Each vertex is over the other face; each edge is over itself and both neighbours. No edge meets a face.
+        assert_eq!(count(3.0), [6, 9, 12, 3, 0, 1]);
     }
 }
 

@@ -320,8 +320,11 @@ impl Detector {
     /// scene : Scene
     /// between, within, ignore
     ///     As for `detect`, but for the default, which is all pairs of all bodies, those within a body included.
-    /// start : {"report", "skip"}
-    ///     Pairs that touch at the start: reported with the time 0, or left out whatever they do later.
+    /// start : {"report", "skip", "verify"}
+    ///     Pairs that touch at the start: reported with the time 0, or left out whatever they do later. ``"verify"``
+    ///     reports them and asks whether elements intersect at the start, neighbours resolved: an edge inside a face
+    ///     touches nothing until it comes to a border. Then ``start_intersects`` says so, `is_free` is false, and
+    ///     `advance` allows no step.
     /// toi : {"f32", "f64"}
     ///     To which precision times are rounded down.
     /// separation : float
@@ -413,7 +416,7 @@ impl Detector {
     /// Returns
     /// -------
     /// Impact or None
-    ///     ``None`` where the step is free.
+    ///     ``None`` where nothing touches.
     ///
     /// Raises
     /// ------
@@ -456,7 +459,8 @@ impl Detector {
         Ok(first.map(|impact| Impact::new(impact, number)))
     }
 
-    /// Whether nothing touches during a step; with ``start="skip"``, but for pairs that touch at its start.
+    /// Whether nothing touches during a step; with ``start="skip"``, but for pairs that touch at its start. If the start was
+    /// free of intersections, so is each moment of a free step; ``start="verify"`` asks that, too.
     ///
     /// Parameters
     /// ----------
@@ -514,7 +518,9 @@ impl Detector {
     ///
     /// Rounding alone may make elements touch that did not. So for each fraction that is tried positions are
     /// rounded first, and the way to those is asked about. A chain of such steps is free from the first to the
-    /// last. Pairs that touch at the start allow no step at all, or are not looked at with ``start="skip"``.
+    /// last, if its start was free of intersections, which ``start="verify"`` asks. Pairs that touch at the start allow
+    /// no step at all, or are not looked at with ``start="skip"``. The seams of a mesh that was not welded are refused by
+    /// name: weld it (`weld`), or skip them.
     ///
     /// With a `clearance`, the fraction holds for positions that you compute, too: by ``x0 + a * (x1 - x0)`` or by ``x0 + a * dx`` with
     /// ``x1 = x0 + dx``, in the precision of the positions, for every ``a`` from 0 to the fraction, the straight way there is free and
@@ -533,7 +539,7 @@ impl Detector {
     /// Raises
     /// ------
     /// ValueError, TypeError, MemoryError, Cancelled, RuntimeError
-    ///     As `detect`.
+    ///     As `detect`; vertices of one body at one position that are not shared.
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     #[pyo3(
         signature = (
@@ -762,8 +768,9 @@ impl Detector {
     /// distance : float
     ///     The distance in the unit of the scene, 0 or more.
     /// kinds : sequence of {"vf", "ee", "ev", "vv", "ef", "ff"}, optional
-    ///     Which kinds of pairs; by default vertices and faces, edges and edges, and where bodies are made of edges
-    ///     or points alone also edges and vertices, vertices and vertices.
+    ///     Which kinds of pairs; by default vertices and faces, edges and edges, edges that meet faces, and where bodies
+    ///     are made of edges or points alone also edges and vertices, vertices and vertices. An edge and a face
+    ///     (``"ef"``) are reported if they meet, whatever the distance: else pairs of their parts say that they are near.
     /// thickness : dict of Body to float, optional
     ///     How thick bodies are: what either body of a pair adds to the distance, of one body twice. The sum is not
     ///     rounded.

@@ -87,7 +87,11 @@ pub fn shared_vertex(argument: Argument<'_, '_>) -> PyResult<SharedVertex> {
 
 /// What becomes of pairs that touch at the start of a step.
 pub fn start(argument: Argument<'_, '_>) -> PyResult<Start> {
-    let choices = [("report", Start::Report), ("skip", Start::Skip)];
+    let choices = [
+        ("report", Start::Report),
+        ("skip", Start::Skip),
+        ("verify", Start::Verify),
+    ];
     choose(argument, "start", &choices)
 }
 

@@ -170,12 +170,19 @@ impl Impacts {
         Ok(PyArray1::from_vec(py, collect(self.inner.len(), at_start)?))
     }
 
+    /// bool or None : whether elements intersect at the start of the step; ``None`` if nobody asked, which only
+    /// ``start="verify"`` does.
+    #[getter]
+    fn start_intersects(&self) -> Option<bool> {
+        self.inner.start_intersects()
+    }
+
     /// The impact with the least time; of several, the first row.
     ///
     /// Returns
     /// -------
     /// Impact or None
-    ///     ``None`` where the step is free.
+    ///     ``None`` where nothing touches.
     fn earliest(&self) -> Option<Impact> {
         let earliest = self.inner.earliest();
         earliest.map(|impact| Impact::new(impact, self.scene))
@@ -219,7 +226,10 @@ impl Impacts {
 
     fn __repr__(&self) -> String {
         match self.inner.earliest() {
-            None => "Impacts(0, the step is free)".into(),
+            None if self.inner.start_intersects() == Some(true) => {
+                "Impacts(0, the start intersects)".into()
+            }
+            None => "Impacts(0, nothing touches)".into(),
             Some(first) => format!(
                 "Impacts({}, the first at {:?})",
                 self.inner.len(),
@@ -272,8 +282,15 @@ impl Advance {
         self.inner.fraction
     }
 
+    /// bool or None : whether elements intersect at the start, so that no part of the step can be taken; ``None`` if nobody
+    /// asked, which only ``start="verify"`` does.
+    #[getter]
+    fn start_intersects(&self) -> Option<bool> {
+        self.inner.start_intersects
+    }
+
     /// Impact or None : the first contact of the whole step, its time rounded down to float64; ``None`` where
-    /// the whole step is free.
+    /// nothing touches.
     #[getter]
     fn first(&self) -> Option<Impact> {
         let first = self.inner.first;
@@ -288,7 +305,7 @@ impl Advance {
 
     /// list of (Body, numpy.ndarray of shape (v, 3)) : where the vertices of all bodies that move are then,
     /// rounded to the precision in which they are held. The straight way from the start to these rounded
-    /// positions is free, but for what touches at the start.
+    /// positions is free, if the start was free of intersections, and but for what touches at the start.
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Vec<(Body, Bound<'py, PyAny>)>> {
         let scene = self.scene;

@@ -66,7 +66,7 @@ def test_a_triangle_falls_through_another(detector, falling):
     free = detector.impacts(falling)
     assert len(free) == 0 and free.earliest() is None and free.kinds.shape == (0,)
     assert free.kinds.dtype == impacts.kinds.dtype and free.elements.shape == (0, 2)
-    assert repr(free) == "Impacts(0, the step is free)"
+    assert repr(free) == "Impacts(0, nothing touches)"
 
 
 def test_edges_are_numbered_as_the_scene_lists_them(detector, falling):

@@ -199,6 +199,11 @@ impl Plan {
             })
         };
         match self.is_step() {
+            _ if ask.start == Start::Verify => refuse(
+                "start",
+                "verify",
+                "report or skip: no tile sees all of the start",
+            ),
             false if ask.start == Start::Skip => {
                 refuse("start", "skip", "only report without a step")
             }

@@ -78,6 +78,27 @@
 //! # Ok(()) }
 //! ```
 //!
+//! This holds if the start is free of intersections: bodies that already pass through each other need not touch on the way.
+//! [`Start::Verify`] asks that, too. And neighbours must share their vertices: the two sides of a seam, along which vertices are
+//! repeated, touch for ever. [`Weld`] makes one vertex of those at the same position.
+//!
+//! ```
+//! use impinge::{Backend, Detector, Scene, Start, Step, Weld};
+//! # fn main() -> Result<(), impinge::Error> {
+//! // Two triangles of a renderer: the vertices of their common edge are there twice.
+//! let positions = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+//! let faces = [[0, 1, 2], [3, 4, 5]];
+//! let weld = Weld::by_position(&positions);
+//! let mut scene = Scene::new();
+//! let cloth = scene.add_triangles(&weld.apply(&faces), &weld.positions(&positions)?)?;
+//! let wished = positions.map(|[x, y, z]| [x, y, z - 1.0]);
+//! scene.set_end_positions(cloth, &weld.positions(&wished)?)?; // every frame is welded alike
+//! let step = Step::default().start(Start::Verify);
+//! let advance = Detector::new(Backend::Cpu)?.advance(&scene, &step)?;
+//! assert_eq!((advance.fraction, advance.start_intersects), (1.0, Some(false)));
+//! # Ok(()) }
+//! ```
+//!
 //! [`Detector::impacts`] has all pairs that touch, for solvers that resolve contacts; [`Detector::candidates`] the pairs whose boxes
 //! overlap, for a test of one's own.
 //!

@@ -86,6 +86,8 @@ impl From<ToiArg> for impinge::Toi {
 /// [`impinge::Start`] as an option.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum StartArg {
+    /// Reported with the time 0, and the start is asked for intersections
+    Verify,
     /// Reported with the time 0
     Report,
     /// Ignored, whatever they do later in the step
@@ -95,6 +97,7 @@ pub enum StartArg {
 impl From<StartArg> for impinge::Start {
     fn from(start: StartArg) -> Self {
         match start {
+            StartArg::Verify => impinge::Start::Verify,
             StartArg::Report => impinge::Start::Report,
             StartArg::Skip => impinge::Start::Skip,
         }

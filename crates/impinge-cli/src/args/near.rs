@@ -16,7 +16,9 @@ Examples:
   impinge near a.stl b.stl --distance 0.5 --fail-on-hit   a check of clearance: exit code 3 if it is less
   impinge near a.ply b.ply --distance 1 --kinds ff        pairs of faces
 
-Whether a distance is at most D is decided exactly; --distance is read as a double-precision number.
+Whether a distance is at most D is decided exactly; --distance is read as a double-precision number. An edge and a face (ef) are
+reported if they meet, whatever D: else their vertices and edges say that they are near. The program also asks whether anything
+intersects, such as equal faces or a body inside tetrahedra; with --fail-on-hit both count.
 
 Rows of --pairs are kind, body_a, element_a, body_b, element_b, type, feature_a, feature_b, parallel, distance and the
 nearest points ax, ay, az, bx, by, bz, sorted. Kinds and numbers of elements are those of `impinge step`. The type says
@@ -34,7 +36,7 @@ pub struct NearArgs {
     /// Also find the pairs within each body
     #[arg(long = "self")]
     pub within: bool,
-    /// Which pairs: vertex-face, edge-edge, edge-vertex, vertex-vertex, edge-face, face-face [default: vf,ee]
+    /// Which pairs: vertex-face, edge-edge, edge-vertex, vertex-vertex, edge-face, face-face [default: vf,ee,ef]
     #[arg(long, value_enum, value_name = "KIND", value_delimiter = ',')]
     pub kinds: Vec<KindArg>,
     #[command(flatten)]

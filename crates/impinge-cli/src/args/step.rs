@@ -59,7 +59,7 @@ pub struct StepArgs {
     /// Ignore the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
     #[arg(long, value_name = "A,B", value_parser = body_numbers)]
     pub ignore: Vec<(usize, usize)>,
-    /// End with exit code 3 unless the step is free
+    /// End with exit code 3 unless the step is free (4 if the start intersects, with or without this option)
     #[arg(long, conflicts_with = "candidates")]
     pub fail_on_hit: bool,
     /// Print JSON and nothing else (see docs/cli.md)
@@ -127,8 +127,8 @@ pub struct StepHow {
     /// The precision to which times are rounded down
     #[arg(long, value_enum, value_name = "PRECISION", default_value_t = ToiArg::F32)]
     pub toi: ToiArg,
-    /// Pairs that touch at the start: reported with the time 0, or ignored
-    #[arg(long, value_enum, value_name = "RULE", default_value_t = StartArg::Report)]
+    /// Pairs that touch at the start: reported with the time 0, or ignored; and whether the start is asked for intersections
+    #[arg(long, value_enum, value_name = "RULE", default_value_t = StartArg::Verify)]
     pub start: StartArg,
     /// The distance that elements must keep: report the first time at which they are as near as that
     #[arg(long, value_name = "D", default_value = "0", allow_negative_numbers = true, value_parser = distance)]

@@ -37,7 +37,8 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     let loading = loading.of_bodies(read.bodies);
     let bodies = Bodies::read(&args.meshes, loading)?;
     let mut detector = detector(&args.detector)?;
-    let mut query = NearQuery::new(query(args, &bodies)?).distance(args.distance);
+    let asked = query(args, &bodies)?;
+    let mut query = NearQuery::new(asked.clone()).distance(args.distance);
     if !args.kinds.is_empty() {
         query = query.kinds(args.kinds.iter().copied().map(PairKind::from));
     }
@@ -51,21 +52,28 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     if watch.is_shown() {
         control = control.progress(&report);
     }
-    let near = detector.within_distance_with(&bodies.scene, &query, &control)?;
+    detector.within_distance_with(&bodies.scene, &query, &control)?;
+    let near = &detector.take_near();
+    // Faces with the same three vertices have no near pair, and neither has a body inside tetrahedra.
+    let meets = near.of(PairKind::EdgeFace).len() > 0;
+    let intersects = meets || {
+        let resolved = asked.shared_vertex(SharedVertex::Resolve);
+        detector.any_with(&bodies.scene, &resolved, &control)?
+    };
     drop(watch);
     // Files are written first: if one can't be written, no answer is printed that looks like success.
     if let Some(file) = &rows_file {
         rows::write(file, near)?;
     }
     if args.json {
-        let object = Value::Object(answer(args, &bodies, near)?);
+        let object = Value::Object(answer(args, &bodies, near, intersects)?);
         writeln!(out(), "{object}")?;
     } else if rows_on_stdout {
-        print(&mut stderr(), args, &bodies, near)?;
+        print(&mut stderr(), args, &bodies, near, intersects)?;
     } else {
-        print(&mut out(), args, &bodies, near)?;
+        print(&mut out(), args, &bodies, near, intersects)?;
     }
-    hit(args.fail_on_hit, !near.is_empty())
+    hit(args.fail_on_hit, !near.is_empty() || intersects)
 }
 
 fn query(args: &NearArgs, bodies: &Bodies) -> Result<Query, Error> {
@@ -78,7 +86,12 @@ fn query(args: &NearArgs, bodies: &Bodies) -> Result<Query, Error> {
 }
 
 /// The object that `docs/near.schema.json` describes.
-fn answer(args: &NearArgs, bodies: &Bodies, near: &NearPairs) -> Result<Map<String, Value>, Error> {
+fn answer(
+    args: &NearArgs,
+    bodies: &Bodies,
+    near: &NearPairs,
+    intersects: bool,
+) -> Result<Map<String, Value>, Error> {
     let described: Vec<Value> = (0..bodies.ids.len())
         .map(|ix| {
             let body = bodies.scene.body(bodies.ids[ix])?;
@@ -105,6 +118,7 @@ fn answer(args: &NearArgs, bodies: &Bodies, near: &NearPairs) -> Result<Map<Stri
     object.insert("distance".into(), args.distance.into());
     object.insert("pairs".into(), near.len().into());
     object.insert("kinds".into(), kinds.into());
+    object.insert("intersects".into(), intersects.into());
     object.insert("hash".into(), hex(near.hash()).into());
     object.insert("backend".into(), stats.backend.as_str().into());
     object.insert("method".into(), stats.method.into());
@@ -123,6 +137,7 @@ fn print(
     args: &NearArgs,
     bodies: &Bodies,
     near: &NearPairs,
+    intersects: bool,
 ) -> Result<(), Error> {
     let subject = match (&bodies.nouns.file, &bodies.names[..]) {
         (Some(file), _) => file.clone(),
@@ -147,6 +162,13 @@ fn print(
             counts.join(", "),
             hex(near.hash())
         )?;
+    }
+    match intersects {
+        true => writeln!(
+            to,
+            "they intersect, neighbours resolved: `impinge pairs --self` shows where"
+        )?,
+        false => writeln!(to, "nothing intersects, neighbours resolved")?,
     }
     let stats = near.stats();
     writeln!(

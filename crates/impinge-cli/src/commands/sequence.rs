@@ -80,7 +80,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
             .toi(args.step.toi.into())
             .separation(args.step.separation)
             .clearance(args.step.clearance);
-        let is_free = steps_of_sequence(
+        let steps = steps_of_sequence(
             (&mut detector, &mut scene, moving),
             &step,
             &frames,
@@ -92,7 +92,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         if !args.ask.json {
             writeln!(out(), "{}", asked.line(&vertices, &nouns))?;
         }
-        return hit(args.ask.fail_on_hit, !is_free);
+        return steps.end(args.ask.fail_on_hit);
     }
     let still = Watch::detection(false, "");
     let mut lines = Lines::default();

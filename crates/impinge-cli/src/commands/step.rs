@@ -9,12 +9,12 @@ mod rows;
 
 use std::io::{Write, stderr};
 
-use impinge::{CancelToken, CandidateQuery, Control, Query, Step};
+use impinge::{CancelToken, CandidateQuery, Control, Query, SharedVertex, Step};
 use serde_json::Value;
 
 use crate::apart::Inputs;
-use crate::args::StepArgs;
-use crate::detection::{Times, detector, hit, without};
+use crate::args::{StartArg, StepArgs};
+use crate::detection::{Times, detector, without};
 use crate::error::Error;
 use crate::output::out;
 #[cfg(feature = "gpu")]
@@ -84,10 +84,17 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     }
     if args.earliest {
         let earliest = detector.earliest_with(&bodies.scene, &step, &control)?;
+        let start_intersects = match args.how.start {
+            StartArg::Verify => {
+                let query = query(args, &bodies)?.shared_vertex(SharedVertex::Resolve);
+                Some(detector.any_with(&bodies.scene, &query, &control)?)
+            }
+            _ => None,
+        };
         drop(watch);
-        let found = Found::first(earliest, detector.step_stats(), times);
+        let found = Found::first(earliest, start_intersects, detector.step_stats(), times);
         print(args, &bodies, &found)?;
-        return hit(args.fail_on_hit, earliest.is_some());
+        return found.end(args.fail_on_hit);
     }
     let impacts = detector.impacts_with(&bodies.scene, &step, &control)?;
     drop(watch);
@@ -111,7 +118,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
         let device = args.detector.device.as_deref();
         Drawer::new(&args.picture, device, 1)?.draw(&png.0, surfaces)?;
     }
-    hit(args.fail_on_hit, !impacts.is_empty())
+    found.end(args.fail_on_hit)
 }
 
 fn query(args: &StepArgs, bodies: &Moving) -> Result<Query, Error> {

@@ -206,3 +206,23 @@ pub fn keys(value: &Value) -> Vec<&str> {
         .map(String::as_str)
         .collect()
 }
+
+/// A plate of two triangles, a thin rod through the inside of one of them, and the rod after a step along itself.
+pub fn rod_and_plate() -> Folder {
+    let folder = Folder::new();
+    folder.text(
+        "plate.obj",
+        "v -100 -100 0\nv 100 -100 0\nv 100 100 0\nv -100 100 0\nf 1 2 3\nf 1 3 4\n",
+    );
+    let rod = |low: i32, high: i32| {
+        let ring = |z| format!("v 20 -20 {z}\nv 22 -20 {z}\nv 22 -22 {z}\nv 20 -22 {z}\n");
+        let sides = (0..4).map(|i| {
+            let [a, b, c, d] = [1 + i, 1 + (i + 1) % 4, 5 + (i + 1) % 4, 5 + i];
+            format!("f {a} {b} {c}\nf {a} {c} {d}\n")
+        });
+        ring(low) + &ring(high) + &sides.collect::<String>()
+    };
+    folder.text("rod.obj", &rod(-50, 50));
+    folder.text("moved.obj", &rod(-49, 51));
+    folder
+}

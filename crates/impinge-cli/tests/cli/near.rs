@@ -5,7 +5,7 @@ use impinge_scenes::Model;
 use impinge_scenes::surfaces::{ball, cube};
 use serde_json::json;
 
-use crate::harness::Folder;
+use crate::harness::{Folder, rod_and_plate};
 use crate::schema::{schema, wrong};
 
 const DISTANCE: f64 = 1.25;
@@ -47,9 +47,13 @@ fn the_json_holds_what_the_library_says() {
         (&["--self"], Query::everything(), &[]),
         (&["--method", "naive"], Query::all(), &[]),
         (
-            &["--kinds", "ef,ff"],
+            &["--kinds", "vv,ef,ff"],
             Query::all(),
-            &[PairKind::EdgeFace, PairKind::FaceFace],
+            &[
+                PairKind::VertexVertex,
+                PairKind::EdgeFace,
+                PairKind::FaceFace,
+            ],
         ),
     ] {
         let answer = folder.run(near.iter().chain(more)).json();
@@ -57,6 +61,7 @@ fn the_json_holds_what_the_library_says() {
         let (pairs, hash) = expected(query, kinds);
         assert!(pairs.len() > 10);
         assert_eq!(answer["pairs"], pairs.len());
+        assert_eq!(answer["intersects"], false);
         assert_eq!(answer["hash"], format!("{hash:016x}"));
         for kind in PairKind::ALL {
             let n = pairs.iter().filter(|pair| pair.kind == kind).count();
@@ -223,4 +228,69 @@ fn misuse_is_named() {
         ])
         .error();
     assert!(error.contains("a.ply.csv/x.csv"), "{error}");
+}
+
+/// A check of clearance sees what passes through, and faces that share all their vertices.
+#[test]
+fn what_intersects_is_never_clear() {
+    let folder = rod_and_plate();
+    let schema = schema("near");
+    let near = ["near", "plate.obj", "rod.obj", "--distance", "2"];
+    let run = folder.run(near.iter().chain(&["--fail-on-hit"]));
+    assert_eq!(run.code, Some(3), "{}", run.stdout);
+    let first = "plate.obj and rod.obj: 8 pairs of elements within 2 (8 ef), hash ";
+    assert!(run.stdout.starts_with(first), "{}", run.stdout);
+    assert!(run.stdout.contains("\nthey intersect"), "{}", run.stdout);
+    let answer = folder.run(near.iter().chain(&["--json"])).json();
+    assert_eq!(wrong(&schema, &answer, "$"), [""; 0]);
+    assert_eq!(
+        (&answer["kinds"]["ef"], &answer["intersects"]),
+        (&8.into(), &true.into())
+    );
+    let rows = folder.run(near.iter().chain(&["--pairs", "-"])).printed();
+    for row in rows.lines().skip(1) {
+        let fields: Vec<&str> = row.split(',').collect();
+        assert_eq!(
+            [fields[0], fields[5], fields[9]],
+            ["ef", "E_T", "0.0"],
+            "{row}"
+        );
+    }
+    // Even if only other kinds are listed.
+    let run = folder.run(near.iter().chain(&["--kinds", "vf,ee", "--fail-on-hit"]));
+    assert_eq!(run.code, Some(3), "{}", run.stdout);
+    assert!(
+        run.stdout
+            .contains("no pairs of elements within 2\nthey intersect"),
+        "{}",
+        run.stdout
+    );
+
+    // A face through its neighbour, and two equal faces.
+    let corners = "v 0 0 0\nv 4 0 0\nv 0 4 0\n";
+    folder.text(
+        "fold.obj",
+        &format!("{corners}v 1 1 -1\nv 1 1 1\nf 1 2 3\nf 1 4 5\n"),
+    );
+    folder.text("equal.obj", &format!("{corners}f 1 2 3\nf 2 1 3\n"));
+    for (file, said) in [
+        ("fold.obj", "1 pair of elements"),
+        ("equal.obj", "no pairs of elements"),
+    ] {
+        let run = folder.run(["near", file, "--distance", "0.01", "--fail-on-hit"]);
+        assert_eq!(run.code, Some(3), "{}", run.stdout);
+        assert!(
+            run.stdout.starts_with(&format!("{file}: {said}")),
+            "{}",
+            run.stdout
+        );
+        assert!(run.stdout.contains("\nthey intersect"), "{}", run.stdout);
+    }
+    folder.text(
+        "open.obj",
+        "v 0 0 0\nv 1 0 0\nv .5 1 0\nv .5 -.75 0\nf 1 2 3\nf 2 1 4\n",
+    );
+    let run = folder.run(["near", "open.obj", "--distance", "0.01", "--fail-on-hit"]);
+    assert_eq!(run.code, Some(0), "{}", run.stdout);
+    assert!(run.stdout.contains("nothing intersects"), "{}", run.stdout);
 }

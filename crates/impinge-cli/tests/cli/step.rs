@@ -7,7 +7,7 @@ use impinge_scenes::Model;
 use impinge_scenes::surfaces::{ball, cube};
 use serde_json::Value;
 
-use crate::harness::{Folder, keys};
+use crate::harness::{Folder, keys, rod_and_plate};
 use crate::schema::{schema, wrong};
 
 /// Two bodies, each at the start and at the end of a step in which one runs into the other.
@@ -99,6 +99,7 @@ fn the_json_holds_what_the_library_says() {
         "impacts",
         "kinds",
         "touching_at_start",
+        "start_intersects",
         "hash",
         "backend",
         "method",
@@ -434,7 +435,10 @@ fn welding_keeps_what_parts() {
     folder.text("parted.obj", &format!("{parted}{faces}"));
     let at_start = |end: &str, more: &[&str]| {
         let run = folder.run(["step", "start.obj", end, "--json"].iter().chain(more));
-        let answer = run.json();
+        let answer: Value = serde_json::from_str(&run.stdout).unwrap();
+        let intersects = answer["start_intersects"] == true;
+        assert_eq!(run.code, Some(if intersects { 4 } else { 0 }));
+        assert_eq!(intersects, answer["touching_at_start"] != 0);
         (
             answer["touching_at_start"].as_u64(),
             answer["bodies"][0]["vertices"].as_u64(),
@@ -517,13 +521,27 @@ fn a_sequence_is_followed_step_by_step() {
     assert_eq!(lines[1]["earliest"]["toi"], 1.0);
     assert_eq!(lines[1]["touching_at_start"], 0);
     assert!(lines[2]["touching_at_start"].as_u64() > Some(0));
+    assert_eq!(lines[2]["start_intersects"], true);
+    // The last step starts in contact.
     let text = &arguments[..6];
-    let printed = folder.run(text).printed();
+    let run = folder.run(text);
+    assert_eq!(run.code, Some(4));
     assert!(
-        printed.contains("\n3 steps, 1 free of contact\nbetween 2 meshes, "),
-        "{printed}"
+        run.stdout.contains(
+            "\n3 steps, 1 free of contact, 1 intersecting at the start\nbetween 2 meshes, "
+        ),
+        "{}",
+        run.stdout
     );
-    for (more, code) in [(&[][..], 3), (&["--frames", "0..2"], 0)] {
+    let report = folder.run(text.iter().chain(&["--start", "report"]));
+    let said = "3 steps, 1 free of contact if their starts are, which was not asked\n";
+    assert!(report.printed().contains(said));
+    for (more, code) in [
+        (&[][..], 4),
+        (&["--frames", "0..3"], 3),
+        (&["--frames", "0..2"], 0),
+        (&["--start", "report"], 3),
+    ] {
         let run = folder.run(text.iter().chain(&["--fail-on-hit"]).chain(more));
         assert_eq!(run.code, Some(code), "{}", run.stderr);
     }
@@ -614,4 +632,58 @@ fn a_separation_is_kept() {
     assert!(text.printed().contains(" come within 0.0625 first, "));
     let misuse = folder.run(["step"].iter().chain(&FILES).chain(&["--separation", "-1"]));
     assert!(misuse.misuse().contains("not below 0"));
+}
+
+/// Edges of a rod pass through the inside of a plate: nothing touches, and nothing is free.
+#[test]
+fn a_start_that_intersects_is_never_free() {
+    let folder = rod_and_plate();
+    let schema = schema("step");
+    let files = ["plate.obj", "plate.obj", "rod.obj", "moved.obj"];
+    for more in [
+        &[][..],
+        &["--fail-on-hit"],
+        &["--earliest"],
+        &["--method", "naive"],
+    ] {
+        let run = folder.run(["step"].iter().chain(&files).chain(more));
+        assert_eq!(run.code, Some(4), "{more:?}: {}", run.stderr);
+        let first = "not free: elements intersect at the start\n";
+        assert!(run.stdout.starts_with(first), "{}", run.stdout);
+        assert!(!run.stdout.contains("nothing touches"));
+        let run = folder.run(["step"].iter().chain(&files).chain(&["--json"]).chain(more));
+        assert_eq!(run.code, Some(4), "{more:?}: {}", run.stderr);
+        let answer: Value = serde_json::from_str(&run.stdout).unwrap();
+        assert_eq!(wrong(&schema, &answer, "$"), [""; 0]);
+        assert_eq!(
+            (&answer["free"], &answer["start_intersects"]),
+            (&false.into(), &true.into())
+        );
+        assert_eq!(answer["earliest"], Value::Null);
+    }
+    // Who does not ask is told so.
+    for start in ["report", "skip"] {
+        let run =
+            folder.run(
+                ["step"]
+                    .iter()
+                    .chain(&files)
+                    .chain(&["--start", start, "--fail-on-hit"]),
+            );
+        let text = "free if the start is, which was not asked: nothing touches from start to end\n";
+        assert!(run.printed().starts_with(text));
+        let run = folder.run(
+            ["step"]
+                .iter()
+                .chain(&files)
+                .chain(&["--start", start, "--json"]),
+        );
+        assert_eq!(run.json()["start_intersects"], Value::Null);
+    }
+    // A face through its neighbour.
+    let faces = "f 1 2 3\nf 1 4 5\n";
+    let vertices = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 1 1 -1\nv 1 1 1\n";
+    folder.text("fold.obj", &format!("{vertices}{faces}"));
+    let run = folder.run(["step", "fold.obj", "fold.obj", "--fail-on-hit"]);
+    assert_eq!(run.code, Some(4), "{}", run.stdout);
 }

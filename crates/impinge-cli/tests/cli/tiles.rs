@@ -101,7 +101,14 @@ fn a_step_gives_the_impacts_of_the_whole() {
     }
     let files: Vec<&str> = files.iter().map(String::as_str).collect();
     let expected = folder
-        .run([&["step"], &files[..], &["--json", "--impacts", "whole.npy"]].concat())
+        .run(
+            [
+                &["step", "--start", "report"],
+                &files[..],
+                &["--json", "--impacts", "whole.npy"],
+            ]
+            .concat(),
+        )
         .json();
     let plan = [
         &["tiles", "plan", "big", "--step", "--cap", "300", "--json"],

@@ -25,6 +25,7 @@ use crate::near::NearPairs;
 use crate::pair_kind::PairKind;
 use crate::positions::Positions;
 use crate::progress::Control;
+use crate::query::SharedVertex;
 use crate::run::Job;
 use crate::scene::Scene;
 use crate::settings::{Method, Settings};
@@ -130,6 +131,7 @@ impl Detector {
     ) -> Result<&Impacts, Error> {
         let start = Instant::now();
         self.begin(scene, step)?;
+        self.verify(scene, step, control)?;
         self.find(
             scene,
             step,
@@ -206,6 +208,26 @@ impl Detector {
             self.frames.workers().n(),
         );
         Ok(())
+    }
+
+    /// Asks whether elements intersect at the start of a step that was begun, if it says so. The answer stands in the impacts.
+    fn verify(
+        &mut self,
+        scene: &Scene,
+        step: &Step,
+        control: &Control<'_>,
+    ) -> Result<Option<bool>, Error> {
+        if step.start != Start::Verify {
+            return Ok(None);
+        }
+        let start = Instant::now();
+        let query = step.query.clone().shared_vertex(SharedVertex::Resolve);
+        let intersects = Some(self.any_with(scene, &query, control)?);
+        let impacts = &mut self.steps.impacts;
+        impacts.set_start_intersects(intersects);
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        impacts.stats_mut().add_ms("start", ms);
+        Ok(intersects)
     }
 
     /// Finds what is sought, in any order. Returns whether a device has found that something touches; then the list of contacts may be
@@ -304,6 +326,9 @@ impl Detector {
 
     /// Whether nothing touches during the step. With [`Start::Skip`], pairs that touch at its start do not count.
     ///
+    /// If the start was free of intersections, so is each moment of a free step. Of bodies that already pass through each other it
+    /// says nothing, unless [`Start::Verify`] asks: then a step whose start intersects is not free.
+    ///
     /// # Errors
     /// As [`impacts`](Detector::impacts).
     pub fn is_free(&mut self, scene: &Scene, step: &Step) -> Result<bool, Error> {
@@ -322,9 +347,12 @@ impl Detector {
     ) -> Result<bool, Error> {
         let start = Instant::now();
         self.begin(scene, step)?;
-        let touches = self.find(scene, step, Sought::Any, Pose::WHOLE, None, control)?;
+        let is_free = self.verify(scene, step, control)? != Some(true) && {
+            let touches = self.find(scene, step, Sought::Any, Pose::WHOLE, None, control)?;
+            !touches && self.steps.found.iter().all(Vec::is_empty)
+        };
         self.steps.impacts.stats_mut().total_ms = start.elapsed().as_secs_f64() * 1e3;
-        Ok(!touches && self.steps.found.iter().all(Vec::is_empty))
+        Ok(is_free)
     }
 
     /// How far the step can be taken: a fraction of it, backed off from the first contact hardly more than the precision of positions
@@ -332,7 +360,8 @@ impl Detector {
     ///
     /// Positions that are stored are rounded, and rounding alone may make elements touch that did not. So each fraction is
     /// tried: positions are rounded first, and the way to those must be free in the sense of [`is_free`](Detector::is_free). A chain of such
-    /// steps is free from the first to the last, whatever the rounding. The first fraction tried is that of the first
+    /// steps is free from the first to the last, whatever the rounding, if its start was free of intersections; [`Start::Verify`] asks
+    /// that, and allows no step if it was not. The first fraction tried is that of the first
     /// contact; then the back-off doubles, from the last bit on, so it is less than twice what is needed.
     ///
     /// On the CPU all pairs are searched once, and rounded positions are tested on the pairs that rounding may bring together. On a GPU, with
@@ -346,10 +375,11 @@ impl Detector {
     /// are proven.
     ///
     /// Pairs that touch at the start allow no step at all under [`Start::Report`], and are ignored under
-    /// [`Start::Skip`].
+    /// [`Start::Skip`]. The seams of a mesh that was not welded are such pairs: they are refused by name, because no step would ever be
+    /// possible. Weld the mesh ([`Weld`](crate::Weld)), or skip what touches at the start.
     ///
     /// # Errors
-    /// As [`impacts`](Detector::impacts).
+    /// As [`impacts`](Detector::impacts), and [`Error::Seam`].
     pub fn advance(&mut self, scene: &Scene, step: &Step) -> Result<Advance, Error> {
         self.advance_with(scene, step, &Control::new())
     }
@@ -382,6 +412,7 @@ impl Detector {
         };
         let start = Instant::now();
         self.begin(scene, &step)?;
+        let start_intersects = self.verify(scene, &step, control)?;
         if has_clearance {
             let keep = Keep {
                 is_rounded: true,
@@ -392,12 +423,19 @@ impl Detector {
             self.steps.frame.set_rounding(scene);
         }
         let first = self.find_earliest(scene, &step, control, start)?;
+        self.refuse_seams(scene)?;
         let mut advance = Advance {
             fraction: 1.0,
             first,
+            start_intersects,
             positions: Vec::new(),
             n_tried: 1,
         };
+        if start_intersects == Some(true) {
+            advance.fraction = 0.0;
+            advance.positions = moving().map(|(id, at, _)| (id, at.clone())).collect();
+            return Ok(advance);
+        }
         let Some(first) = first else {
             advance.positions = moving().map(|(id, _, end)| (id, end.clone())).collect();
             return Ok(advance);
@@ -468,6 +506,36 @@ impl Detector {
                 f64::min(2.0 * back_off, 1.0)
             };
         }
+    }
+
+    /// Refuses elements of one body, among the contacts found, that touch at the start at vertices with equal positions.
+    fn refuse_seams(&self, scene: &Scene) -> Result<(), Error> {
+        let StepMemory { frame, .. } = &self.steps;
+        let at_start = self.steps.found().filter(|(_, found)| found.value.at_start);
+        let seams = at_start.filter_map(|(kind, found)| {
+            let [a, b] = pair_numbers(found.key).map(|number| frame.locate(number));
+            let [of_a, of_b] = [a.0, b.0].map(|layer| frame.layer(layer));
+            if of_a.id != of_b.id {
+                return None;
+            }
+            let body = frame.body(scene, a.0);
+            let at = body.positions();
+            let [a, b] = [(of_a.part, a.1), (of_b.part, b.1)]
+                .map(|(part, element)| body.corners(part, &element).to_vec());
+            let both = a.iter().flat_map(|&a| b.iter().map(move |&b| [a, b]));
+            let coincide = |&[a, b]: &[u32; 2]| at.point(a as usize) == at.point(b as usize);
+            let vertices = both.filter(coincide).min()?;
+            Some(((kind, found.key), of_a.id, vertices))
+        });
+        // Contacts come in any order.
+        let Some((_, body, vertices)) = seams.min_by_key(|(pair, ..)| *pair) else {
+            return Ok(());
+        };
+        Err(Error::Seam {
+            body,
+            vertices,
+            n_coincident: scene.body(body)?.positions().n_coincident(),
+        })
     }
 
     /// Whether the search for the earliest contact also lists the pairs that rounding may bring together.

@@ -34,7 +34,7 @@ mod tests;
 pub(crate) use algebra::{Integer, unit_of};
 pub(crate) use distance::{
     Approach, Keep, NearestOfElements, Reach, approach, are_within_certainly, closest_of_elements,
-    elements_are_within, nearest_of_elements, unsure_are_within,
+    elements_are_within, elements_meet, nearest_of_elements, unsure_are_within,
 };
 pub use distance::{
     Closest, Feature, NearestFeatures, are_within, closest_points, edge_face_are_within,

@@ -102,6 +102,16 @@ pub(super) fn segment_meets_triangle(p: &Point, q: &Point, triangle: &[Point; 3]
     segment_meets_triangle_with_sides(p, q, p_side, q_side, triangle)
 }
 
+/// Whether the open segment pq passes through the inside of the triangle, so that no border of one touches the other.
+pub(super) fn passes_inside(p: &Point, q: &Point, triangle: &[Point; 3]) -> bool {
+    let [a, b, c] = triangle;
+    if !orient3d(a, b, c, p).strictly_opposite(orient3d(a, b, c, q)) {
+        return false;
+    }
+    let side = orient3d(p, q, a, b);
+    side.strictly_same(orient3d(p, q, b, c)) && side.strictly_same(orient3d(p, q, c, a))
+}
+
 /// [`segment_meets_triangle`] when it is known on which side of the triangle's plane p and q lie.
 fn segment_meets_triangle_with_sides(
     p: &Point,

@@ -1,8 +1,9 @@
 //! Whether two elements are within a distance, at the positions that their bodies have.
 
-use crate::exact::{Point, elements_are_within};
+use crate::exact::{Point, elements_are_within, elements_meet};
 use crate::frame::TestId;
 use crate::hull::Extent;
+use crate::pair_kind::PairKind;
 use crate::positions::Positions;
 
 use super::{Element, Test};
@@ -18,13 +19,18 @@ impl Test for Within {
         extent.inflated(element.frame.margin(element.layer))
     }
 
-    fn settle(&self, _: TestId, a: Element<'_>, b: Element<'_>) -> Option<()> {
+    fn settle(&self, test: TestId, a: Element<'_>, b: Element<'_>) -> Option<()> {
         if a.shares_vertex(&b) {
             return None;
         }
         let reach = a.frame.reach(a.layer, b.layer);
         let (a, b) = (a.corners(), b.corners());
-        elements_are_within(a.points(), b.points(), &reach).then_some(())
+        match test {
+            // What else is near has vertices and edges that are.
+            TestId::Elements(PairKind::EdgeFace) => elements_meet(a.points(), b.points()),
+            _ => elements_are_within(a.points(), b.points(), &reach),
+        }
+        .then_some(())
     }
 }
 

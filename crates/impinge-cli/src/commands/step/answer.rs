@@ -6,7 +6,7 @@ use impinge::{Error, Impact, Impacts, PairKind, Statistics};
 use serde_json::{Map, Value, json};
 
 use crate::args::StepHow;
-use crate::detection::Times;
+use crate::detection::{Times, hit};
 use crate::json::{counters, rounded};
 use crate::text::{counted, grouped, hex};
 
@@ -23,6 +23,8 @@ const KINDS: [PairKind; 4] = [
 /// The answer: all impacts, or only the first one.
 pub struct Found<'a> {
     earliest: Option<Impact>,
+    /// Whether elements intersect at the start, if that was asked.
+    start_intersects: Option<bool>,
     all: Option<&'a Impacts>,
     stats: &'a Statistics,
     times: Times,
@@ -33,23 +35,43 @@ impl<'a> Found<'a> {
     pub fn all(impacts: &'a Impacts, earlier: Times) -> Self {
         Found {
             earliest: impacts.earliest(),
+            start_intersects: impacts.start_intersects(),
             all: Some(impacts),
             stats: impacts.stats(),
             times: earlier.and(impacts.stats()),
         }
     }
 
-    pub fn first(earliest: Option<Impact>, stats: &'a Statistics, earlier: Times) -> Self {
+    pub fn first(
+        earliest: Option<Impact>,
+        start_intersects: Option<bool>,
+        stats: &'a Statistics,
+        earlier: Times,
+    ) -> Self {
         Found {
             earliest,
+            start_intersects,
             all: None,
             stats,
             times: earlier.and(stats),
         }
     }
 
-    /// `free`, `earliest`, `impacts`, `kinds`, `touching_at_start`, `hash`, `backend`, `bodies`, `ms`, `stats`, `separation`, `clearance`;
-    /// counts and the hash are null with `--earliest`.
+    /// Whether nothing touches on the way, and nothing was found to intersect at the start.
+    pub fn is_free(&self) -> bool {
+        self.earliest.is_none() && self.start_intersects != Some(true)
+    }
+
+    /// What the program ends with: the start counts more than what is found later.
+    pub fn end(&self, fail_on_hit: bool) -> Result<(), crate::error::Error> {
+        match self.start_intersects {
+            Some(true) => Err(crate::error::Error::StartIntersects),
+            _ => hit(fail_on_hit, !self.is_free()),
+        }
+    }
+
+    /// `free`, `earliest`, `impacts`, `kinds`, `touching_at_start`, `start_intersects`, `hash`, `backend`, `bodies`, `ms`, `stats`, `separation`,
+    /// `clearance`; counts and the hash are null with `--earliest`.
     pub fn json(&self, bodies: &Moving, how: &StepHow) -> Result<Map<String, Value>, Error> {
         let mut object = self.numbers();
         object.insert("bodies".into(), described(bodies)?);
@@ -67,7 +89,7 @@ impl<'a> Found<'a> {
             Value::Object(counted.into_iter().collect())
         };
         let mut object = Map::new();
-        object.insert("free".into(), self.earliest.is_none().into());
+        object.insert("free".into(), self.is_free().into());
         object.insert("earliest".into(), self.earliest.map_or(Value::Null, impact));
         object.insert("impacts".into(), json!(self.all.map(Impacts::len)));
         object.insert("kinds".into(), self.all.map_or(Value::Null, kinds));
@@ -75,6 +97,7 @@ impl<'a> Found<'a> {
             "touching_at_start".into(),
             json!(self.all.map(Impacts::touching_at_start)),
         );
+        object.insert("start_intersects".into(), json!(self.start_intersects));
         object.insert("hash".into(), json!(self.all.map(|all| hex(all.hash()))));
         object.insert("backend".into(), self.stats.backend.as_str().into());
         object.insert("method".into(), self.stats.method.into());
@@ -103,16 +126,25 @@ impl<'a> Found<'a> {
             false => String::new(),
         };
         let name = |body: impinge::BodyId| bodies.names[body.index()][0].as_str();
+        let nothing = if clearance > 0.0 {
+            format!(
+                "every pair keeps its clearance of {clearance}{besides} from start to end, or a fifth of its distance"
+            )
+        } else if separation > 0.0 {
+            format!("nothing comes within {separation} from start to end")
+        } else {
+            "nothing touches from start to end".to_owned()
+        };
         match self.earliest {
-            None if clearance > 0.0 => writeln!(
+            None => writeln!(
                 to,
-                "free: every pair keeps its clearance of {clearance}{besides} from start to end, or a fifth of its distance"
+                "{}",
+                match self.start_intersects {
+                    Some(true) => "not free: elements intersect at the start".to_owned(),
+                    Some(false) => format!("free: {nothing}"),
+                    None => format!("free if the start is, which was not asked: {nothing}"),
+                }
             )?,
-            None if separation > 0.0 => writeln!(
-                to,
-                "free: nothing comes within {separation} from start to end"
-            )?,
-            None => writeln!(to, "free: nothing touches from start to end")?,
             Some(first) => writeln!(
                 to,
                 "not free: {}{} and {} of {} {} first, {}",
@@ -135,6 +167,9 @@ impl<'a> Found<'a> {
                     false => format!("at time {:?}", first.toi),
                 }
             )?,
+        }
+        if self.earliest.is_some() && self.start_intersects == Some(true) {
+            writeln!(to, "elements intersect at the start")?;
         }
         if let Some(all) = self.all.filter(|all| !all.is_empty()) {
             let counts: Vec<String> = KINDS

@@ -6,13 +6,33 @@ use std::ops::Range;
 use impinge::{BodyId, Control, Detector, Positions, Scene, Step};
 use serde_json::{Map, Value};
 
-use crate::detection::{Times, set_positions};
+use crate::detection::{Times, hit, set_positions};
 use crate::error::Error;
 use crate::output::out;
 use crate::text::{counted, grouped};
 
 use super::answer::Found;
 use super::load::set_end_positions;
+
+/// How many steps there are, how many of them are free, and how many start with an intersection.
+#[derive(Default)]
+pub struct Steps {
+    n: u64,
+    n_free: u64,
+    /// Those whose start was asked for intersections.
+    n_asked: u64,
+    n_intersecting: u64,
+}
+
+impl Steps {
+    /// What the program ends with.
+    pub fn end(&self, fail_on_hit: bool) -> Result<(), Error> {
+        match self.n_intersecting {
+            0 => hit(fail_on_hit, self.n_free < self.n),
+            _ => Err(Error::StartIntersects),
+        }
+    }
+}
 
 /// A source of frames.
 pub trait Frames {
@@ -22,8 +42,7 @@ pub trait Frames {
     fn refused(&self, frame_ix: usize, source: impinge::Error) -> Error;
 }
 
-/// Steps from each frame of a range to the next, the body `moving` in motion and all others at rest. Returns whether all
-/// steps are free.
+/// Steps from each frame of a range to the next, the body `moving` in motion and all others at rest.
 pub fn steps_of_sequence(
     (detector, scene, moving): (&mut Detector, &mut Scene, BodyId),
     step: &Step,
@@ -32,7 +51,7 @@ pub fn steps_of_sequence(
     is_json: bool,
     control: &Control<'_>,
     frame_done: impl Fn(),
-) -> Result<bool, Error> {
+) -> Result<Steps, Error> {
     if !is_json {
         writeln!(
             out(),
@@ -43,9 +62,9 @@ pub fn steps_of_sequence(
             "ms"
         )?;
     }
-    let (mut n_steps, mut n_free) = (0u64, 0u64);
+    let mut steps = Steps::default();
     let mut start = match range.is_empty() {
-        true => return Ok(true),
+        true => return Ok(steps),
         false => frames.read(range.start)?,
     };
     for frame_ix in range.start..range.end - 1 {
@@ -54,9 +73,12 @@ pub fn steps_of_sequence(
         set_end_positions(scene, moving, &end)
             .map_err(|source| frames.refused(frame_ix + 1, source))?;
         let impacts = detector.impacts_with(scene, step, control)?;
-        n_steps += 1;
-        n_free += u64::from(impacts.is_empty());
         let found = Found::all(impacts, Times::default());
+        steps.n += 1;
+        steps.n_free += u64::from(found.is_free());
+        let intersects = impacts.start_intersects() == Some(true);
+        steps.n_asked += u64::from(impacts.start_intersects().is_some());
+        steps.n_intersecting += u64::from(intersects);
         if is_json {
             let mut line = Map::new();
             line.insert("frame".into(), frame_ix.into());
@@ -70,7 +92,11 @@ pub fn steps_of_sequence(
                 "{:>13} {:>11} {:>23} {:>11.3}  {:016x}",
                 format!("{frame_ix} to {}", frame_ix + 1),
                 grouped(impacts.len() as u64),
-                first.map_or("free".to_owned(), |first| format!("{:?}", first.toi)),
+                match first {
+                    _ if intersects => "start intersects".to_owned(),
+                    None => "free".to_owned(),
+                    Some(first) => format!("{:?}", first.toi),
+                },
                 impacts.stats().total_ms,
                 impacts.hash()
             )?;
@@ -82,10 +108,16 @@ pub fn steps_of_sequence(
     if !is_json {
         writeln!(
             out(),
-            "{}, {} free of contact",
-            counted(n_steps, "step"),
-            grouped(n_free)
+            "{}, {} free of contact{}",
+            counted(steps.n, "step"),
+            grouped(steps.n_free),
+            match steps.n_intersecting {
+                0 if steps.n_asked < steps.n =>
+                    " if their starts are, which was not asked".to_owned(),
+                0 => String::new(),
+                n => format!(", {} intersecting at the start", grouped(n)),
+            }
         )?;
     }
-    Ok(n_free == n_steps)
+    Ok(steps)
 }

@@ -12,7 +12,7 @@ use super::rounded::{self, between, quotient};
 use super::{Feature, NearestFeatures, filter, nearest};
 use crate::exact::algebra::Integer;
 use crate::exact::element_pair::ElementPair;
-use crate::exact::triangle::segment_meets_triangle;
+use crate::exact::triangle::{passes_inside, segment_meets_triangle};
 use crate::exact::{Point, triangles_intersect};
 
 /// The edges of a face as vertex numbers.
@@ -105,7 +105,7 @@ pub(crate) fn are_within_certainly(a: &[Point], b: &[Point], reach: &Reach) -> O
     }
     match all_apart {
         // Elements may also cross far from their borders, where all parts are apart.
-        true => Some(share_a_point(a, b)),
+        true => Some(elements_meet(a, b)),
         false => None,
     }
 }
@@ -123,7 +123,7 @@ pub(crate) fn elements_are_within(a: &[Point], b: &[Point], reach: &Reach) -> bo
     match Simple::new(a, b) {
         Some(Simple { pair, points, .. }) => super::are_within_reach(pair, &points, reach),
         None => {
-            share_a_point(a, b)
+            elements_meet(a, b)
                 || parts(a, b).any(|part| {
                     let Simple { pair, points, .. } = part.simple;
                     super::are_within_reach(pair, &points, reach)
@@ -138,7 +138,22 @@ pub(crate) fn elements_are_within(a: &[Point], b: &[Point], reach: &Reach) -> bo
 pub(crate) fn nearest_of_elements(a: &[Point], b: &[Point]) -> NearestOfElements {
     match Simple::new(a, b) {
         Some(simple) => simple.named(&super::nearest_features(simple.pair, &simple.points)),
+        None if edge_passes_inside(a, b) => EDGE_THROUGH_FACE,
         None => Nearby::new(a, b).nearest,
+    }
+}
+
+/// What is nearest where an edge passes through the inside of a face.
+const EDGE_THROUGH_FACE: NearestOfElements = NearestOfElements {
+    features: [Feature::Edge(0), Feature::Face],
+    is_parallel: false,
+};
+
+/// Whether the elements are an edge and a face, and the open edge passes through the inside of the face.
+fn edge_passes_inside(a: &[Point], b: &[Point]) -> bool {
+    match (a, b) {
+        ([p, q], [r, s, t]) => passes_inside(p, q, &[*r, *s, *t]),
+        _ => false,
     }
 }
 
@@ -152,6 +167,10 @@ pub(crate) fn closest_of_elements(
         let closest = super::closest_points(simple.pair, &simple.points);
         let points = simple.in_order(closest.points);
         return (simple.named(&closest.nearest), closest.distance, points);
+    }
+    if edge_passes_inside(a, b) {
+        let point = where_crossed(&a[0], &a[1], &[b[0], b[1], b[2]]);
+        return (EDGE_THROUGH_FACE, 0.0, [point, point]);
     }
     let nearby = Nearby::new(a, b);
     match nearby.way {
@@ -390,7 +409,8 @@ impl<'a> Measured<'a> {
     }
 }
 
-fn share_a_point(a: &[Point], b: &[Point]) -> bool {
+/// Whether an edge and a face, or two faces, share a point. Exact.
+pub(crate) fn elements_meet(a: &[Point], b: &[Point]) -> bool {
     match (a, b) {
         ([p, q], [r, s, t]) | ([r, s, t], [p, q]) => segment_meets_triangle(p, q, &[*r, *s, *t]),
         ([p, q, r], [s, t, u]) => triangles_intersect(&[*p, *q, *r], &[*s, *t, *u]),
@@ -401,7 +421,7 @@ fn share_a_point(a: &[Point], b: &[Point]) -> bool {
 /// An edge of one element that passes through the inside of a face of the other, and the rounded point where it does. The
 /// borders of the elements must touch neither each other nor a face.
 fn crossing(a: &[Point], b: &[Point]) -> Option<([Feature; 2], Point)> {
-    if !share_a_point(a, b) {
+    if !elements_meet(a, b) {
         return None;
     }
     let through = |edges: &[Point], face: &[Point]| -> Option<(Feature, Point)> {

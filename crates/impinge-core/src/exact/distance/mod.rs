@@ -29,7 +29,9 @@ use super::Point;
 use super::algebra::fixed::{Vector, cross, difference, dot};
 use super::element_pair::ElementPair;
 pub(crate) use elements::{NearestOfElements, are_within_certainly, elements_are_within};
-pub(crate) use elements::{closest_of_elements, nearest_of_elements, unsure_are_within};
+pub(crate) use elements::{
+    closest_of_elements, elements_meet, nearest_of_elements, unsure_are_within,
+};
 pub use features::{Feature, NearestFeatures};
 pub(crate) use filter::{Approach, approach};
 pub(crate) use keep::Keep;

@@ -355,7 +355,7 @@ pub(super) fn two_edges<V: Lookup>(
 }
 
 #[inline(always)]
-fn look_up<V: Lookup>([x, y, z]: &[[f32; TABLE]; 3], places: V::Places) -> [V; 3] {
+pub(super) fn look_up<V: Lookup>([x, y, z]: &[[f32; TABLE]; 3], places: V::Places) -> [V; 3] {
     [
         V::look_up(x, places),
         V::look_up(y, places),

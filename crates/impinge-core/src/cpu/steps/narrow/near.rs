@@ -2,16 +2,17 @@
 //!
 //! In: candidates, whose boxes overlap when each reaches half as far. Sixteen pairs at a time are settled in `f32` from the tables
 //! (`exact::filter::nearness`), with the nearest features of most; other pairs in `f64` with bounds (`exact::distance`), the rest in
-//! exact arithmetic. Features that are not known here are named when the pairs are sorted.
+//! exact arithmetic. Features that are not known here are named when the pairs are sorted. Edges and faces are tested for a common point alone.
 
 use crate::cpu::simd::{Isa, Lanes, Simd, dispatch};
 use crate::elements::Elements;
-use crate::exact::filter::{self, BATCH};
-use crate::exact::{Reach, are_within_certainly, unsure_are_within};
+use crate::exact::filter::{self, BATCH, LARGEST_F32};
+use crate::exact::{Reach, are_within_certainly, elements_meet, unsure_are_within};
 use crate::impacts::StepAnswer;
 use crate::index::pair_key;
 use crate::narrow::Corners;
 use crate::near::Labels;
+use crate::pair_kind::PairKind;
 use crate::positions::Positions;
 
 use super::super::world::World;
@@ -60,6 +61,10 @@ impl Narrow for NearElements {
 #[inline(always)]
 fn take<S: Simd>(_: S, near: &mut NearElements, world: World<'_>, batch: Batch<'_>) {
     let between = batch.between;
+    if between.kind == PairKind::EdgeFace {
+        take_edges_and_faces::<S>(near, world, &batch);
+        return;
+    }
     let pairs = LayerPair::new(world, between);
     let in_tables = batch.near_in_tables(&pairs.reach);
     let is_exact = batch.rounded() == 0.0;
@@ -90,6 +95,34 @@ fn take<S: Simd>(_: S, near: &mut NearElements, world: World<'_>, batch: Batch<'
     near.keys.hand_over(world, between.kind);
 }
 
+/// An edge and a face are in the answer if they meet, whatever the distance.
+#[inline(always)]
+fn take_edges_and_faces<S: Simd>(near: &mut NearElements, world: World<'_>, batch: &Batch<'_>) {
+    let pairs = LayerPair::new(world, batch.between);
+    let largest = f64::max(batch.groups[0].largest, batch.groups[1].largest);
+    let in_tables = batch.rounded() == 0.0 && largest <= f64::from(LARGEST_F32);
+    let tables = batch.groups.map(|group| &group.points[0]);
+    for first in (0..batch.met.len()).step_by(BATCH) {
+        let lanes = batch.met.batch(first);
+        let n = (batch.met.len() - first).min(BATCH);
+        let mut open = u16::MAX >> (BATCH - n);
+        if in_tables {
+            let verdict = filter::meet_in_tables::<S::F32>(tables, lanes);
+            let yes = verdict.yes & open;
+            open &= !(verdict.yes | verdict.no);
+            for lane in Lanes(u64::from(yes)) {
+                near.put(world, batch, first + lane, Labels::UNKNOWN);
+            }
+        }
+        for lane in Lanes(u64::from(open)) {
+            if near.settle_meeting(&pairs, batch.places(first + lane)) {
+                near.put(world, batch, first + lane, Labels::UNKNOWN);
+            }
+        }
+    }
+    near.keys.hand_over(world, batch.between.kind);
+}
+
 impl NearElements {
     /// Adds a candidate to the answer, with the part that is nearest.
     #[inline(always)]
@@ -106,6 +139,14 @@ impl NearElements {
             let labels = Labels::new(world.frame.n_primitives());
             self.keys.push(batch.between.kind, labels.put(key, part));
         }
+    }
+
+    /// Whether an edge and a face at two places meet, exactly.
+    #[inline(never)]
+    fn settle_meeting(&mut self, pairs: &LayerPair<'_>, places: Places) -> bool {
+        let [edge, face] = pairs.corners(places);
+        self.n_unsure += 1;
+        elements_meet(edge.points(), face.points())
     }
 
     /// Whether the elements at two places are near, in `f64` or exactly.
