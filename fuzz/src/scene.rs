@@ -59,9 +59,7 @@ fn accepted<T>(result: Result<T, Error>) -> Option<T> {
     match result {
         Ok(value) => Some(value),
         Err(
-            Error::NonFinitePosition { .. }
-            | Error::CoordinateOutOfRange { .. }
-            | Error::VertexIndexOutOfRange { .. },
+            Error::NonFinitePosition { .. } | Error::VertexIndexOutOfRange { .. },
         ) => None,
         Err(error) => panic!("{error}"),
     }

@@ -46,7 +46,7 @@ pub struct Checked {
 /// Checks a mesh. Its indices must be in range; positions may be anything.
 ///
 /// # Errors
-/// Positions or indices that [`Scene::add`] refuses (NaN, infinities, coordinates outside the exact range), and more
+/// Positions or indices that [`Scene::add`] refuses (NaN, infinities), and more
 /// corners than 32 bits can number.
 pub fn check_mesh(mut mesh: Mesh, options: &Options) -> Result<Checked, Error> {
     let n_vertices = mesh.n_vertices();

@@ -48,7 +48,7 @@ pub enum ErrorKind {
     File,
     /// A coordinate is NaN or infinite.
     NotFinite,
-    /// The library refuses the content, such as coordinates outside the exact range.
+    /// The library refuses the content.
     Refused,
     /// The time limit was reached.
     Timeout,

@@ -14,21 +14,6 @@ pub enum Error {
         /// The position as given.
         value: [f64; 3],
     },
-    /// A coordinate lies outside the range in which the predicates are exact
-    /// (see [`exact::in_range`](crate::exact::in_range)). Rescale the scene.
-    #[error(
-        "body {body}: vertex {vertex} has the coordinate {value:e}, outside the exact range (0, or {:e} to {:e} in magnitude)",
-        crate::exact::MIN_MAGNITUDE,
-        crate::exact::MAX_MAGNITUDE
-    )]
-    CoordinateOutOfRange {
-        /// The body, or the one that was about to be added.
-        body: BodyId,
-        /// Index of the vertex within the body.
-        vertex: usize,
-        /// The offending coordinate.
-        value: f64,
-    },
     /// A primitive names a vertex that does not exist. Check the index buffer's base.
     #[error(
         "body {body}: primitive {primitive} names vertex {index}, but there are {n_vertices} vertices"

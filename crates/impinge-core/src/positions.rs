@@ -1,7 +1,6 @@
 //! Vertex positions: single or double precision, checked once.
 
 use crate::error::Error;
-use crate::exact;
 use crate::ids::BodyId;
 use crate::position_rows::PositionRows;
 use impinge_weld::Weld;
@@ -49,7 +48,7 @@ impl Positions {
         }
     }
 
-    /// Refuses the first that is not finite or outside the exact range.
+    /// Refuses the first that is not finite.
     pub(crate) fn check(&self, body: BodyId) -> Result<(), Error> {
         match self {
             Positions::F32(positions) => check_positions(body, positions),
@@ -150,8 +149,14 @@ fn between<R: Real>(start: &[R; 3], end: &[R; 3], fraction: f64) -> [R; 3] {
     }
     std::array::from_fn(|axis| {
         let (x, y) = (start[axis].widen(), end[axis].widen());
+        let way = y - x;
+        let at = if way.is_finite() {
+            x + fraction * way
+        } else {
+            (1.0 - fraction) * x + fraction * y
+        };
         // Rounding must not move it beyond the ends.
-        R::round((x + fraction * (y - x)).clamp(x.min(y), x.max(y)))
+        R::round(at.clamp(x.min(y), x.max(y)))
     })
 }
 
@@ -176,7 +181,7 @@ mod sealed {
 /// `f32` or `f64`: both are stored as given, and answers are exact for both.
 pub trait Real: sealed::Sealed + impinge_weld::Coordinate + Send + Sync + 'static {
     #[doc(hidden)]
-    fn all_in_range(numbers: &[Self]) -> bool;
+    fn all_finite(numbers: &[Self]) -> bool;
     #[doc(hidden)]
     fn widen(self) -> f64;
     #[doc(hidden)]
@@ -195,7 +200,7 @@ impl Real for f32 {
     /// Adding one to an exponent of all ones carries into the sign bit, so any infinity or NaN sets that bit. The
     /// compiler vectorises this, but not `is_finite`.
     #[inline]
-    fn all_in_range(numbers: &[f32]) -> bool {
+    fn all_finite(numbers: &[f32]) -> bool {
         const EXPONENT: u32 = 0x7f80_0000;
         const ONE: u32 = 0x0080_0000;
         let bad = numbers
@@ -224,18 +229,15 @@ impl Real for f32 {
 }
 
 impl Real for f64 {
+    /// As for `f32`.
     #[inline]
-    #[allow(
-        clippy::manual_range_contains,
-        reason = "a loop without branches becomes vectors"
-    )]
-    fn all_in_range(numbers: &[f64]) -> bool {
-        let bad = numbers.iter().fold(0, |bad, x| {
-            let size = x.abs();
-            let normal = (size >= exact::MIN_MAGNITUDE) & (size <= exact::MAX_MAGNITUDE);
-            bad | u64::from(!(normal | (size == 0.0)))
-        });
-        bad == 0
+    fn all_finite(numbers: &[f64]) -> bool {
+        const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
+        const ONE: u64 = 0x0010_0000_0000_0000;
+        let bad = numbers
+            .iter()
+            .fold(0, |bad, x| bad | ((x.to_bits() & EXPONENT) + ONE));
+        bad >> 63 == 0
     }
     #[inline(always)]
     fn widen(self) -> f64 {
@@ -255,11 +257,12 @@ impl Real for f64 {
         Positions::F64(positions)
     }
 }
-/// Refuses positions that are not finite or outside the exact range; the error names the first.
+
+/// Refuses positions that are not finite; the error names the first.
 pub(crate) fn check_positions<R: Real>(body: BodyId, positions: &[[R; 3]]) -> Result<(), Error> {
     // One branch per chunk keeps the common case, all positions good, at memory speed.
     for (chunk_ix, chunk) in positions.chunks(1024).enumerate() {
-        if R::all_in_range(chunk.as_flattened()) {
+        if R::all_finite(chunk.as_flattened()) {
             continue;
         }
         for (vertex, position) in chunk.iter().enumerate() {
@@ -267,13 +270,6 @@ pub(crate) fn check_positions<R: Real>(body: BodyId, positions: &[[R; 3]]) -> Re
             let value = position.map(R::widen);
             if value.iter().any(|x| !x.is_finite()) {
                 return Err(Error::NonFinitePosition {
-                    body,
-                    vertex,
-                    value,
-                });
-            }
-            if let Some(&value) = value.iter().find(|&&x| !exact::in_range(x)) {
-                return Err(Error::CoordinateOutOfRange {
                     body,
                     vertex,
                     value,

@@ -204,7 +204,7 @@ impl Scene {
     /// Adds a body of triangles: `faces` is `(n, 3)` vertex indices, `positions` `(v, 3)`.
     ///
     /// # Errors
-    /// An index out of range, a position that is not finite or outside the exact range.
+    /// An index out of range, a position that is not finite.
     pub fn add_triangles<R: Real>(
         &mut self,
         faces: &[[u32; 3]],

@@ -74,6 +74,60 @@ fn the_search_loses_nothing() {
     }
 }
 
+/// Bodies of any size: the distance scales with them, and is never 0 between bodies that do not meet.
+#[test]
+fn distances_of_numbers_of_any_size() {
+    let of = |a: &Model, b: &Model, exponents: [i32; 3]| {
+        let mut scene = Scene::new();
+        let ids = [a, b].map(|model| {
+            let points = model.positions.iter().map(|point| {
+                let point = point.map(|x| f64::from((x * 1024.0).round()));
+                std::array::from_fn(|k| times_power(point[k], exponents[k]))
+            });
+            let points: Vec<[f64; 3]> = points.collect();
+            scene.add(model.elements.clone(), points).unwrap()
+        });
+        cpu().distance(&scene, ids[0], ids[1]).unwrap().unwrap()
+    };
+    let a = soup::triangles(30, 0.3, 1);
+    for b in [
+        soup::triangles(40, 0.3, 2).translated([1.5, 0.2, 0.1]),
+        soup::triangles(40, 0.3, 2),
+    ] {
+        let plain = of(&a, &b, [0; 3]);
+        for exponent in [-1074, -600, -130, 120, 500, 1000] {
+            let scaled = of(&a, &b, [exponent; 3]);
+            assert_eq!(scaled.primitives, plain.primitives, "{exponent}");
+            let expected = times_power(plain.distance, exponent);
+            assert_eq!(scaled.distance, expected, "{exponent}");
+        }
+        // Along x, everything is as good as at one place.
+        let flat = of(&a, &b, [-1074, 0, 0]);
+        let huge = of(&a, &b, [0, 0, 1000]);
+        assert_eq!(flat.distance > 0.0, flat.points.is_some());
+        assert!(huge.distance.is_finite());
+    }
+    // Two points that are as near as numbers can tell, beside others far away.
+    let mut scene = Scene::new();
+    let least = f64::from_bits(1);
+    let ids = [0.0, least].map(|x| {
+        scene
+            .add_triangles(
+                &[[0, 1, 2]],
+                &[[x, 0.0, 0.0], [x, 1e300, 0.0], [x, 0.0, 1e300]],
+            )
+            .unwrap()
+    });
+    let nearest = cpu().distance(&scene, ids[0], ids[1]).unwrap();
+    let distance = nearest.unwrap().distance;
+    assert!(distance > 0.0 && distance < 1e290, "{distance:e}");
+}
+
+fn times_power(x: f64, exponent: i32) -> f64 {
+    let half = exponent / 2;
+    x * 2f64.powi(half) * 2f64.powi(exponent - half)
+}
+
 /// The box of each primitive.
 fn boxes(model: &Model) -> Vec<[[f32; 3]; 2]> {
     let elements = 0..model.elements.len();

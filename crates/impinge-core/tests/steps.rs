@@ -305,6 +305,126 @@ fn differences_that_overflow_hide_no_contact() {
     assert!(found[0].0 > 0);
 }
 
+/// Steps, distances and boxes of numbers from one end of the range to the other.
+#[test]
+fn numbers_of_any_size_are_answered_as_pair_by_pair() {
+    let mut n_found = [0; 4];
+    for (seed, size) in (1..).zip(common::Size::ALL) {
+        let mut random = impinge_scenes::Random::new(seed);
+        let mut points = |n: u32| {
+            let points = (0..n).map(|_| [(); 3].map(|()| random.below(5) as f32));
+            points.collect::<Vec<_>>()
+        };
+        let faces: Vec<[u32; 3]> = (0..3)
+            .map(|f| [3 * f, 3 * f + 1, (3 * f + 5) % 9])
+            .collect();
+        let mut scene = Scene::new();
+        let body = scene
+            .add_triangles(&faces, &size.points(&points(9), seed))
+            .expect("good");
+        let end = size.points(&points(9), seed + 10);
+        scene.set_end_positions(body, &end).expect("good");
+        let edges = size.points(&points(4), seed + 20);
+        let body = scene.add_edges(&[[0, 1], [2, 3]], &edges).expect("good");
+        let end = size.points(&points(4), seed + 30);
+        scene.set_end_positions(body, &end).expect("good");
+        let unit = match size {
+            common::Size::Axes([exponent, ..]) => common::times_power(1.0, exponent),
+            _ => 1.0,
+        };
+        let step = Step::default();
+        let answers = Vec::from_iter(detectors().into_iter().map(|mut detector| {
+            let impacts = detector.impacts(&scene, &step).expect("good");
+            let impacts = (impacts.len(), impacts.hash());
+            let query = NearQuery::new(Query::everything())
+                .distance(unit)
+                .kinds(PairKind::ALL)
+                .closest_points();
+            let near = detector.within_distance(&scene, &query).expect("good");
+            for pair in near.iter() {
+                let closest = pair.closest.expect("asked for");
+                assert!(closest.points.as_flattened().iter().all(|x| x.is_finite()));
+            }
+            let near = (near.len(), near.hash());
+            let keep = Step::default().separation(unit);
+            let kept = detector.impacts(&scene, &keep).expect("good");
+            let kept = (kept.len(), kept.hash());
+            let query = CandidateQuery::new(Query::everything()).distance(unit);
+            let candidates = detector.candidates(&scene, &query).expect("good");
+            let candidates = (candidates.len(), candidates.hash());
+            let earliest = detector.earliest(&scene, &step).expect("good");
+            let skip = Step::default().start(Start::Skip);
+            let is_free = detector.is_free(&scene, &skip).expect("good");
+            // What is left of the way is free, to the rounded positions.
+            let advance = detector.advance(&scene, &skip).expect("good");
+            let mut advanced = scene.clone();
+            for (body, positions) in &advance.positions {
+                assert!(
+                    (0..positions.len())
+                        .all(|ix| positions.point(ix).iter().all(|x| x.is_finite()))
+                );
+                match positions {
+                    Positions::F64(rows) => advanced.set_end_positions(*body, rows).expect("good"),
+                    Positions::F32(_) => unreachable!("given as f64"),
+                }
+            }
+            assert!(
+                detector.is_free(&advanced, &skip).expect("good"),
+                "{size:?}"
+            );
+            let rest = (earliest, is_free, advance.fraction, advance.positions);
+            ([impacts, near, kept, candidates], rest)
+        }));
+        assert_eq!(answers[0], answers[1], "{size:?} {seed}");
+        for (n, (found, _)) in n_found.iter_mut().zip(&answers[0].0) {
+            *n += found;
+        }
+    }
+    assert!(n_found.iter().all(|&n| n > 100), "{n_found:?}");
+}
+
+/// A damped motion: every coordinate of one body shrinks in each frame, to the smallest numbers that there are.
+#[test]
+fn a_motion_that_dies_away_goes_on() {
+    let mut random = impinge_scenes::Random::new(5);
+    let mut points = |n: usize| -> Vec<[f64; 3]> {
+        let mut x = || f64::from(random.range(-1.0, 1.0));
+        (0..n).map(|_| [x(), x(), x()]).collect()
+    };
+    let faces: Vec<[u32; 3]> = (0..8).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+    let (mut shrinking, still) = (points(24), points(24));
+    let mut scene = Scene::new();
+    let body = scene.add_triangles(&faces, &shrinking).expect("good");
+    scene.add_triangles(&faces, &still).expect("good");
+    let mut detectors = detectors();
+    let [detector, naive] = &mut detectors[..] else {
+        unreachable!("there are two")
+    };
+    let mut hashes = std::collections::BTreeSet::new();
+    for frame in 0..10_000 {
+        shrinking
+            .as_flattened_mut()
+            .iter_mut()
+            .for_each(|x| *x *= 0.9);
+        scene
+            .set_positions(body, &shrinking)
+            .expect("every finite number is taken");
+        let hash = detector
+            .detect(&scene, &Query::everything())
+            .expect("good")
+            .hash();
+        hashes.insert(hash);
+        if frame % 500 == 0 || frame == 1_622 {
+            let expected = naive
+                .detect(&scene, &Query::everything())
+                .expect("good")
+                .hash();
+            assert_eq!(hash, expected, "{frame}");
+        }
+    }
+    assert!(hashes.len() > 3);
+}
+
 #[test]
 fn bad_end_positions_are_refused_by_name() {
     let (mut scene, _, other) = falling();

@@ -56,20 +56,6 @@ impl<'py> PositionArray<'py> {
             PositionArray::F64(array) => array.shape()[0],
         }
     }
-
-    /// The axis along which a vertex has a coordinate; 0 where none has it.
-    pub fn axis_of(&self, vertex: usize, value: f64) -> usize {
-        (0..3)
-            .find(|&axis| {
-                let at = [vertex, axis];
-                value
-                    == match self {
-                        PositionArray::F32(array) => array.get(at).map_or(f64::NAN, |&x| x.into()),
-                        PositionArray::F64(array) => array.get(at).map_or(f64::NAN, |&x| x),
-                    }
-            })
-            .unwrap_or(0)
-    }
 }
 
 /// What the rows of an index array are.

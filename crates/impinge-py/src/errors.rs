@@ -5,7 +5,7 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{PositionArray, number};
+use crate::arrays::number;
 
 create_exception!(
     impinge,
@@ -46,22 +46,13 @@ pub fn raise(error: Error) -> PyErr {
 }
 
 /// An error of a call that took arrays: positions are named by the index into the argument.
-pub fn refuse(error: Error, names: Names<'_>, positions: &PositionArray<'_>) -> PyErr {
+pub fn refuse(error: Error, names: Names<'_>) -> PyErr {
     let Names { vertices, elements } = names;
     let message = match &error {
         Error::NonFinitePosition { vertex, value, .. } => {
             let axis = value.iter().position(|x| !x.is_finite()).unwrap_or(0);
             let value = number(value[axis]);
             format!("{vertices}[{vertex}, {axis}] = {value}: a position must be finite")
-        }
-        Error::CoordinateOutOfRange { vertex, value, .. } => {
-            let axis = positions.axis_of(*vertex, *value);
-            format!(
-                "{vertices}[{vertex}, {axis}] = {value:e}: outside the range in which answers are \
-                 exact (0, or {:e} to {:e} in magnitude)",
-                impinge::exact::MIN_MAGNITUDE,
-                impinge::exact::MAX_MAGNITUDE
-            )
         }
         Error::WrongNumberOfPositions {
             body,

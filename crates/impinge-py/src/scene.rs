@@ -99,7 +99,7 @@ impl Scene {
         }
         self.inner
             .add(elements, held)
-            .map_err(|error| refuse(error, names, &positions))
+            .map_err(|error| refuse(error, names))
     }
 }
 
@@ -318,7 +318,7 @@ impl Scene {
             PositionArray::F32(array) => scene.inner.add_points::<f32>(slice_rows(array)?),
             PositionArray::F64(array) => scene.inner.add_points::<f64>(slice_rows(array)?),
         }
-        .map_err(|error| refuse(error, ARGUMENTS, &positions))?;
+        .map_err(|error| refuse(error, ARGUMENTS))?;
         Ok(scene.handle(id))
     }
 
@@ -347,7 +347,7 @@ impl Scene {
             PositionArray::F32(array) => scene.inner.set_positions::<f32>(id, slice_rows(array)?),
             PositionArray::F64(array) => scene.inner.set_positions::<f64>(id, slice_rows(array)?),
         }
-        .map_err(|error| refuse(error, ARGUMENTS, &positions))
+        .map_err(|error| refuse(error, ARGUMENTS))
     }
 
     /// Moves the vertices of a body to those of a read-only array, which is neither copied nor let go of: the scene
@@ -390,7 +390,7 @@ impl Scene {
         let positions = PositionArray::new(vertices, "vertices")?;
         let lent = lent::positions(vertices, &positions, "vertices")?;
         let lending = scene.inner.lend_positions(id, lent);
-        lending.map_err(|error| refuse(error, ARGUMENTS, &positions))
+        lending.map_err(|error| refuse(error, ARGUMENTS))
     }
 
     /// Says where the vertices of a body are at the end of a step, as `set_end_positions` does, by a read-only array that
@@ -416,7 +416,7 @@ impl Scene {
         let positions = PositionArray::new(vertices, "vertices")?;
         let lent = lent::positions(vertices, &positions, "vertices")?;
         let lending = scene.inner.lend_end_positions(id, lent);
-        lending.map_err(|error| refuse(error, ARGUMENTS, &positions))
+        lending.map_err(|error| refuse(error, ARGUMENTS))
     }
 
     /// Says where the vertices of a body are at the end of a step: between its positions and these, each moves
@@ -448,7 +448,7 @@ impl Scene {
             PositionArray::F32(array) => inner.set_end_positions::<f32>(id, slice_rows(array)?),
             PositionArray::F64(array) => inner.set_end_positions::<f64>(id, slice_rows(array)?),
         }
-        .map_err(|error| refuse(error, ARGUMENTS, &positions))
+        .map_err(|error| refuse(error, ARGUMENTS))
     }
 
     /// Forgets where a body is at the end of a step: it stands still.
@@ -490,7 +490,7 @@ impl Scene {
         scene
             .inner
             .remesh(id, elements, stored(&positions)?)
-            .map_err(|error| refuse(error, ARGUMENTS, &positions))
+            .map_err(|error| refuse(error, ARGUMENTS))
     }
 
     /// Moves a body by an affine matrix, such as a rigid motion, without its vertices being given again.

@@ -238,8 +238,6 @@ def test_faces_refused(faces, message):
         (vertices_with(np.nan), r"vertices\[21, 1\] = nan: a position must be finite"),
         (vertices_with(-np.inf, "f4"), r"vertices\[21, 1\] = -inf: a position must be finite"),
         (vertices_with(np.inf, "g"), r"vertices\[21, 1\] = inf: a position must be finite"),
-        (vertices_with(1e200), r"vertices\[21, 1\] = 1e200: outside the range"),
-        (vertices_with(-1e-200), r"vertices\[21, 1\] = -1e-200: outside the range"),
         (vertices_with(2**53 + 1, "i8"), r"vertices\[21, 1\] = 9007199254740993: not repr"),
         (vertices_with(-(2**60) - 1, "i8"), r"vertices\[21, 1\] = -1152921504606846977: "),
         (vertices_with(2**64 - 1, "u8"), r"vertices\[21, 1\] = 18446744073709551615: "),

@@ -30,8 +30,8 @@ pub enum Error {
     /// The caller cancelled the step. Finished work is kept.
     #[error("cancelled")]
     Cancelled,
-    /// A coordinate that is not finite, or outside the range of exact answers. Its box would lie in no tile.
-    #[error("{}: primitive {primitive} has the coordinate {value:e}: {why}", .path.display())]
+    /// A coordinate that is not finite. Its box would lie in no tile.
+    #[error("{}: primitive {primitive} has the coordinate {value:e}: not a finite number", .path.display())]
     Coordinate {
         /// The mesh file.
         path: PathBuf,
@@ -39,8 +39,6 @@ pub enum Error {
         primitive: u64,
         /// The coordinate.
         value: f64,
-        /// What is wrong with it.
-        why: &'static str,
     },
     /// A primitive names a vertex that the file does not have.
     #[error("{}: primitive {primitive} names vertex {index}, but there are {n_vertices} vertices", .path.display())]

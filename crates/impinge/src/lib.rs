@@ -136,8 +136,8 @@ pub use impinge_core::{
     Advance, Backend, Body, BodyId, CancelToken, CandidateQuery, Candidates, Clearance,
     ClosestPoints, Control, Detector, ElementVertices, Elements, Error, Filter, Impact, Impacts,
     InstructionSet, Kind, Method, NearIter, NearPair, NearPairs, NearQuery, PairFilter, PairKind,
-    PairKinds, Pairs, Part, Placement, PositionRows, Positions, Primitive, Progress, Query, Real,
-    Recluster, Scene, Settings, SharedVertex, Stage, Start, Statistics, Step, Toi, Weld,
+    PairKinds, Pairs, Part, Place, Placement, PositionRows, Positions, Primitive, Progress, Query,
+    Real, Recluster, Scene, Settings, SharedVertex, Stage, Start, Statistics, Step, Toi, Weld,
     WrongNumber, hash_impact_rows, hash_rows,
 };
 #[cfg(feature = "gpu")]

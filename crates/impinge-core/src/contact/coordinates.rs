@@ -120,6 +120,19 @@ impl Offset {
         }
     }
 
+    /// The largest magnitude of a coordinate.
+    fn size(&self) -> f64 {
+        let of = |coordinates: &[f64]| {
+            coordinates
+                .iter()
+                .fold(0.0, |size: f64, x| size.max(x.abs()))
+        };
+        match self {
+            Offset::Plane(d, plane) => of(d).max(of(plane.as_flattened())),
+            Offset::Line(p, line) => of(p).max(of(line.as_flattened())),
+        }
+    }
+
     fn coordinates(&self) -> Vec<f64> {
         match self {
             Offset::Plane(d, plane) => [&d[..], plane.as_flattened()].concat(),
@@ -156,8 +169,13 @@ fn crossing(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) -> Po
         .unwrap_or_else(|| in_integers(ends, offsets, precision))
 }
 
-/// Beyond these sizes a product's rounding error may underflow, or a sum overflow.
+/// Beyond these sizes of the larger permanent a product's rounding error may underflow, or a sum overflow: with coordinates up to
+/// `LARGEST`, what underflows is below 2^-1073 times that. Positions in single precision are all within.
 const SAFE: std::ops::Range<f64> = 1e-200..1e200;
+/// The same for positions in double precision.
+const SAFE_DOUBLE: std::ops::Range<f64> = 1e-120..1e200;
+/// The largest coordinate.
+const LARGEST: f64 = 1e80;
 
 /// More than the relative error of any one operation in `f64`, and more than Shewchuk's 7 + 56 u for the
 /// determinant.
@@ -170,7 +188,7 @@ fn in_single(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) -> O
     if precision != Precision::Single {
         return None;
     }
-    let permanent = greatest(offsets)?;
+    let permanent = greatest(offsets, precision)?;
     let [p, q] = offsets.map(|offset| offset.value::<f64>().abs());
     let sum = p + q;
     let weight = p / sum;
@@ -190,7 +208,7 @@ fn in_single(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) -> O
 fn in_double(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) -> Option<Point> {
     // Each determinant has a depth of eight operations.
     const ERROR: f64 = 16.0 * double::ERROR;
-    let permanent = greatest(offsets)?;
+    let permanent = greatest(offsets, precision)?;
     let [p, q] = offsets.map(|offset| offset.value::<Double>().abs());
     let sum = p + q;
     let weight = p / sum;
@@ -214,11 +232,17 @@ fn in_double(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) -> O
     Some(point)
 }
 
-/// The larger permanent; `None` unless its size is safe.
-fn greatest(offsets: [Offset; 2]) -> Option<f64> {
+/// The larger permanent; `None` unless sizes are safe.
+fn greatest(offsets: [Offset; 2], precision: Precision) -> Option<f64> {
     let [p, q] = offsets.map(|offset| offset.permanent());
     let greatest = p.max(q);
-    SAFE.contains(&greatest).then_some(greatest)
+    let is_safe = match precision {
+        Precision::Single => SAFE.contains(&greatest),
+        Precision::Double => {
+            SAFE_DOUBLE.contains(&greatest) && offsets.iter().all(|offset| offset.size() <= LARGEST)
+        }
+    };
+    is_safe.then_some(greatest)
 }
 
 /// The single-precision number to which all numbers from `below` to `above` round; `None` if there are several.

@@ -348,6 +348,9 @@ const RELATIVE: f64 = f64::from_bits((1023 - 50) << 52);
 /// 2^-1000, far above what is lost when a product underflows.
 const ABSOLUTE: f64 = f64::from_bits((1023 - 1000) << 52);
 
+/// 2^-900: with `RELATIVE` it is still far above that.
+const UNDERFLOW: f64 = f64::from_bits((1023 - 900) << 52);
+
 /// The two products of each coordinate of the cross product of two arms.
 #[inline(always)]
 fn cross(from: &[f64; 3], to: &[f64; 3]) -> [(f64, f64); 3] {
@@ -372,7 +375,8 @@ fn turn_along(direction: &[f64; 3], from: &[f64; 3], to: &[f64; 3]) -> [bool; 2]
     let (mut turn, mut size) = (0.0, 0.0);
     for (along, (up, down)) in direction.iter().zip(cross(from, to)) {
         turn += along * (up - down);
-        size += along.abs() * (up.abs() + down.abs());
+        // What is lost where a product underflows grows with `along`.
+        size += along.abs() * (up.abs() + down.abs() + UNDERFLOW);
     }
     let bound = 2.0 * RELATIVE * size + ABSOLUTE;
     [turn > bound, turn < -bound]

@@ -304,7 +304,10 @@ fn seen(body: &BodyRef<'_>, shared: &[u32], place: Place) -> SeenFrom {
             cone.add(difference(&p, &u));
             continue;
         };
-        let (along, to) = (difference(&v, &u), difference(&p, &u));
+        let (along, to) = (
+            of_length_one(difference(&v, &u)),
+            of_length_one(difference(&p, &u)),
+        );
         let normal = cross(&along, &to);
         if size(&normal) > SHORTEST * (size(&along) * size(&to)) {
             cone.add(normal);
@@ -384,8 +387,21 @@ impl Cone {
     }
 }
 
+/// Half of the difference where the difference overflows: only its direction matters.
 fn difference(p: &Point, q: &Point) -> Point {
-    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
+    let whole: Point = std::array::from_fn(|k| p[k] - q[k]);
+    if whole.iter().all(|x| x.is_finite()) {
+        return whole;
+    }
+    std::array::from_fn(|k| 0.5 * p[k] - 0.5 * q[k])
+}
+
+/// A vector divided by its size, so that products neither overflow nor underflow; zero stays zero.
+fn of_length_one(d: Point) -> Point {
+    match size(&d) {
+        0.0 => d,
+        size => d.map(|x| x / size),
+    }
 }
 
 fn cross(d: &Point, e: &Point) -> Point {

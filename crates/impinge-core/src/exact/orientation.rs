@@ -1,73 +1,9 @@
 //! The two determinants that everything else is made of, with exact signs.
 
-use std::cmp::Ordering;
-
 use super::Point;
+use super::algebra::{Integer, common_integers};
+use super::sign::Sign;
 use robust::{Coord, Coord3D};
-
-/// The sign of an exactly known number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[repr(i8)]
-pub enum Sign {
-    /// Less than zero.
-    Negative = -1,
-    /// Zero.
-    Zero = 0,
-    /// Greater than zero.
-    Positive = 1,
-}
-
-impl Sign {
-    /// The sign of a floating-point number; NaN counts as zero.
-    #[inline]
-    pub(super) fn of(x: f64) -> Self {
-        if x > 0.0 {
-            Self::Positive
-        } else if x < 0.0 {
-            Self::Negative
-        } else {
-            Self::Zero
-        }
-    }
-
-    /// How the number compares with zero.
-    #[inline]
-    pub(super) fn order(self) -> Ordering {
-        (self as i8).cmp(&0)
-    }
-
-    /// Whether the number is zero.
-    #[inline]
-    #[must_use]
-    pub fn is_zero(self) -> bool {
-        self == Self::Zero
-    }
-
-    /// Whether both numbers are nonzero and of the same sign: two points strictly on the same side.
-    #[inline]
-    pub(crate) fn strictly_same(self, other: Self) -> bool {
-        self as i8 * other as i8 > 0
-    }
-
-    /// Whether the numbers are nonzero and of different signs: two points strictly apart.
-    #[inline]
-    pub(crate) fn strictly_opposite(self, other: Self) -> bool {
-        (self as i8) * (other as i8) < 0
-    }
-}
-
-impl std::ops::Neg for Sign {
-    type Output = Self;
-
-    #[inline]
-    fn neg(self) -> Self {
-        match self {
-            Self::Negative => Self::Positive,
-            Self::Zero => Self::Zero,
-            Self::Positive => Self::Negative,
-        }
-    }
-}
 
 /// Whether no two of the signs are strictly opposite: all at least zero, or all at most zero.
 #[inline]
@@ -84,7 +20,7 @@ pub(super) fn strictly_on_one_side(signs: &[Sign]) -> bool {
 /// The exact sign of `|a-c  b-c|` in the plane: [`Sign::Positive`] when a, b, c turn to the left,
 /// [`Sign::Zero`] when they lie on one line (or coincide).
 ///
-/// Coordinates must be [`in_range`](super::in_range).
+/// Exact for all finite coordinates.
 ///
 /// ```
 /// use impinge::exact::{Sign, orient2d};
@@ -94,12 +30,60 @@ pub(super) fn strictly_on_one_side(signs: &[Sign]) -> bool {
 #[inline]
 #[must_use]
 pub fn orient2d(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Sign {
+    let [[ax, ay], [bx, by]] = [a, b].map(|p| [p[0] - c[0], p[1] - c[1]]);
+    let (left, right) = (ax * by, ay * bx);
+    let (det, bound) = (
+        left - right,
+        ORIENT2D_BOUND * (left.abs() + right.abs()) + UNDERFLOW,
+    );
+    if det > bound {
+        return Sign::Positive;
+    }
+    if -det > bound {
+        return Sign::Negative;
+    }
+    orient2d_adaptive(a, b, c)
+}
+
+/// The stages of growing precision behind [`orient2d`].
+#[inline(never)]
+fn orient2d_adaptive(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Sign {
     if a == b || b == c || c == a {
         return Sign::Zero;
+    }
+    if !are_moderate([a, b, c].as_flattened()) {
+        return orient2d_in_integers(a, b, c);
     }
     let coord = |p: [f64; 2]| Coord { x: p[0], y: p[1] };
     Sign::of(robust::orient2d(coord(a), coord(b), coord(c)))
 }
+
+#[cold]
+#[inline(never)]
+fn orient2d_in_integers(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Sign {
+    let ([ax, ay, bx, by, cx, cy], _) = common_integers([a[0], a[1], b[0], b[1], c[0], c[1]]);
+    let left = &(&ax - &cx) * &(&by - &cy);
+    let right = &(&ay - &cy) * &(&bx - &cx);
+    (&left - &right).sign()
+}
+
+/// Whether all coordinates are zero or between 2^-250 and 2^250 in magnitude. Then no product, error term or bound of the
+/// adaptive stages underflows or overflows (`docs/exactness.md`, "Range"). False for NaN.
+#[inline]
+fn are_moderate(coordinates: &[f64]) -> bool {
+    const SMALLEST: f64 = f64::from_bits((1023 - 250) << 52);
+    const LARGEST: f64 = f64::from_bits((1023 + 250) << 52);
+    coordinates.iter().fold(true, |all, x| {
+        let size = x.abs();
+        all & ((size == 0.0) | (SMALLEST..=LARGEST).contains(&size))
+    })
+}
+
+/// More than 3 + 16 half-ulps, Shewchuk's bound for the first stage of `orient2d`.
+const ORIENT2D_BOUND: f64 = 4.0 * HALF_ULP;
+
+/// 2^-1000, far above what is lost where a product underflows.
+const UNDERFLOW: f64 = f64::from_bits((1023 - 1000) << 52);
 
 /// 7 + 56 half-ulps, Shewchuk's bound for the first stage of `orient3d`, rounded up.
 const ORIENT3D_BOUND: f64 = 7.0 * HALF_ULP + 64.0 * HALF_ULP * HALF_ULP;
@@ -111,7 +95,7 @@ const HALF_ULP: f64 = f64::EPSILON / 2.0;
 /// a, b, c the point d lies.
 ///
 /// [`Sign::Positive`] when a, b, c appear clockwise as seen from d, [`Sign::Zero`] when all four
-/// lie in one plane. Coordinates must be [`in_range`](super::in_range).
+/// lie in one plane. Exact for all finite coordinates.
 ///
 /// ```
 /// use impinge::exact::{Sign, orient3d};
@@ -133,19 +117,15 @@ pub fn orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
     let permanent = az.abs() * (bc.abs() + cb.abs())
         + bz.abs() * (ca.abs() + ac.abs())
         + cz.abs() * (ab.abs() + ba.abs());
-    let bound = ORIENT3D_BOUND * permanent;
+    // A product of two differences that underflows is wrong by less than 2^-1074, and that times the third.
+    let bound = ORIENT3D_BOUND * permanent + UNDERFLOW * (az.abs() + bz.abs() + cz.abs() + 1.0);
     if det > bound {
         return Sign::Positive;
     }
     if -det > bound {
         return Sign::Negative;
     }
-    // A computed difference is zero only if the exact one is, and nothing underflows in range. So a
-    // zero permanent means that all six products are zero. Axis-aligned input often ends here.
-    if permanent == 0.0 {
-        return Sign::Zero;
-    }
-    orient3d_adaptive(a, b, c, d)
+    orient3d_adaptive(a, b, c, d, permanent)
 }
 
 /// The stages of growing precision behind [`orient3d`], out of line because they are rare.
@@ -154,7 +134,15 @@ pub fn orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
 /// welded), which would need the last stage.
 #[cold]
 #[inline(never)]
-fn orient3d_adaptive(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
+fn orient3d_adaptive(a: &Point, b: &Point, c: &Point, d: &Point, permanent: f64) -> Sign {
+    if !are_moderate([*a, *b, *c, *d].as_flattened()) {
+        return orient3d_in_integers(a, b, c, d);
+    }
+    // A computed difference is zero only if the exact one is, and nothing underflows. So a
+    // zero permanent means that all six products are zero. Axis-aligned input often ends here.
+    if permanent == 0.0 {
+        return Sign::Zero;
+    }
     if a == b || a == c || a == d || b == c || b == d || c == d {
         return Sign::Zero;
     }
@@ -164,6 +152,25 @@ fn orient3d_adaptive(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
         z: p[2],
     };
     Sign::of(robust::orient3d(coord(a), coord(b), coord(c), coord(d)))
+}
+
+/// [`orient3d`] for coordinates that are very small, very large, or both.
+#[cold]
+#[inline(never)]
+fn orient3d_in_integers(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
+    if a == b || a == c || a == d || b == c || b == d || c == d {
+        return Sign::Zero;
+    }
+    let points = [a, b, c, d];
+    let numbers: [f64; 12] = std::array::from_fn(|ix| points[ix / 3][ix % 3]);
+    let (integers, _) = common_integers(numbers);
+    let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = [0, 3, 6]
+        .map(|first| [0, 1, 2].map(|axis: usize| &integers[first + axis] - &integers[9 + axis]));
+    let minor = |x: &Integer, v: &Integer, u: &Integer, y: &Integer| &(x * v) - &(u * y);
+    let det = &az * &minor(&bx, &cy, &cx, &by);
+    let det = &det + &(&bz * &minor(&cx, &ay, &ax, &cy));
+    let det = &det + &(&cz * &minor(&ax, &by, &bx, &ay));
+    det.sign()
 }
 
 /// A projection onto a coordinate plane: the axis that is dropped, as the two that stay.

@@ -17,8 +17,9 @@
 
 use super::Point;
 use super::filter::{angles_apart, shared_edge, shared_vertex, sides_apart};
-use super::orientation::{Projection, Sign, collinear, orient3d};
+use super::orientation::{Projection, collinear, orient3d};
 use super::segment::{same, segments_intersect, strictly_between};
+use super::sign::Sign;
 use super::tetrahedron::{tetrahedra_intersect, triangle_tetrahedron_intersect};
 use super::triangle::{segment_meets_triangle, triangles_intersect};
 

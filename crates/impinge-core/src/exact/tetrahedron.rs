@@ -2,7 +2,8 @@
 
 use super::Point;
 use super::filter::tetrahedra_answer;
-use super::orientation::{Sign, orient3d};
+use super::orientation::orient3d;
+use super::sign::Sign;
 use super::triangle::{have_common_point, triangles_intersect};
 
 /// The faces of a tetrahedron as vertex numbers; face k leaves out vertex k, and
@@ -24,7 +25,7 @@ fn orientation(k: &[Point; 4]) -> Sign {
 /// Whether two closed tetrahedra (with their inside) share a point.
 ///
 /// Touching counts; a flat tetrahedron is the polygon, segment or point that it is. Exact for
-/// coordinates [`in_range`](super::in_range); never panics. Orientation does not matter.
+/// finite coordinates; never panics. Orientation does not matter.
 ///
 /// ```
 /// use impinge::exact::tetrahedra_intersect;
@@ -60,8 +61,8 @@ pub(super) fn tetrahedra_intersect_by_signs(a: &[Point; 4], b: &[Point; 4]) -> b
 
 /// Whether a closed triangle and a closed tetrahedron (with its inside) share a point.
 ///
-/// Touching counts; degenerate primitives are what they are. Exact for coordinates
-/// [`in_range`](super::in_range); never panics.
+/// Touching counts; degenerate primitives are what they are. Exact for finite coordinates;
+/// never panics.
 ///
 /// ```
 /// use impinge::exact::triangle_tetrahedron_intersect;

@@ -2,8 +2,9 @@
 
 use super::Point;
 use super::filter::{apart_in_a_plane, triangles_answer};
-use super::orientation::{Projection, Sign, on_one_side, orient2d, orient3d, strictly_on_one_side};
+use super::orientation::{Projection, on_one_side, orient2d, orient3d, strictly_on_one_side};
 use super::segment::{segments_intersect, segments_intersect_2d};
+use super::sign::Sign;
 
 /// The edges of a triangle as vertex numbers.
 const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
@@ -11,7 +12,7 @@ const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 /// Whether two closed triangles share a point.
 ///
 /// Touching and coplanar overlap count; a degenerate triangle is the segment or the point that
-/// it is. Exact for coordinates [`in_range`](super::in_range); never panics.
+/// it is. Exact for finite coordinates; never panics.
 ///
 /// Most pairs are settled by a filter in plain `f64`, the rest by exact signs.
 ///

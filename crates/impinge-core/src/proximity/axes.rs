@@ -12,6 +12,7 @@
 use super::features::dot;
 use crate::hull::Extent;
 
+use super::scale::Scale;
 use super::tree::{Node, Tree};
 use crate::exact::Point;
 use crate::index::ClusterIx;
@@ -99,16 +100,21 @@ impl View {
     }
 
     /// The box of a node of the first or the second body: of a cluster from its vertices, of others from their boxes.
-    pub fn bounds(&mut self, side: usize, body: &Body, tree: &Tree, node: Node) -> Extent {
+    pub fn bounds(
+        &mut self,
+        side: usize,
+        (body, tree, node): (&Body, &Tree, Node),
+        scale: Scale,
+    ) -> Extent {
         if node.level > 0 {
-            return self.axes.turn_box(&tree.bounds(node));
+            return self.axes.turn_box(&scale.extent(&tree.bounds(node)));
         }
         let ix = &mut self.box_ixs[side][node.number as usize];
         if *ix == UNKNOWN {
             *ix = self.boxes.len() as u32;
             let vertices = tree.clustering.vertices(ClusterIx::new(node.number)).iter();
             let points = vertices.map(|&vertex| body.positions().point(vertex as usize));
-            let turned = points.map(|point| self.axes.turn(point));
+            let turned = points.map(|point| self.axes.turn(scale.point(point)));
             self.boxes.push(Extent::of(turned));
         }
         self.boxes[*ix as usize]

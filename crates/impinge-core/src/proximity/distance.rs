@@ -14,10 +14,11 @@ use std::collections::{BinaryHeap, HashMap};
 
 use super::axes::{Axes, View};
 use super::features::{Gap, gap};
+use super::scale::Scale;
 use crate::hull::Extent;
 
 use super::many::{Allowance, Bodies, are_apart, meet};
-use super::tree::{Node, Tree, box_along, box_of, corners};
+use super::tree::{Node, Tree, box_along, corners};
 use crate::elements::Kind;
 use crate::error::Error;
 use crate::exact::Point;
@@ -89,7 +90,18 @@ impl Distances {
             control.step(0, 1)?;
             self.know(scene, id, workers)?;
         }
-        let most = f64::INFINITY;
+        let bodies = [scene.body(a)?, scene.body(b)?];
+        let boxed = [a, b].into_iter().map(|id| {
+            let tree = &self.trees[&id.index()];
+            tree.root()
+                .map_or(0.0, |root| tree.bounds(root).magnitude())
+        });
+        let exact = || {
+            let of_bodies = bodies.map(|body| body.positions().magnitude());
+            of_bodies[0].max(of_bodies[1])
+        };
+        let scale = Scale::of(boxed.fold(0.0, f64::max), exact);
+        let most = (scale, f64::INFINITY);
         let found = match self.search(scene, [a, b], most, MOST_OVERLAPPING, control)? {
             Some(found) => found,
             None => match touching()? {
@@ -109,13 +121,13 @@ impl Distances {
         Ok(found.map(|(_, nearest)| nearest))
     }
 
-    /// The nearest elements of two bodies that are known, and the square of their distance, if that is at most `most`. `None` if more
-    /// pairs of clusters would have to be compared whose boxes overlap than `most_overlapping`.
+    /// The nearest elements of two bodies that are known, and the square of their distance in a scale, if that is at most `most`. `None` if
+    /// more pairs of clusters would have to be compared whose boxes overlap than `most_overlapping`.
     fn search(
         &mut self,
         scene: &Scene,
         ids: [BodyId; 2],
-        most: f64,
+        (scale, most): (Scale, f64),
         most_overlapping: u64,
         control: &Control<'_>,
     ) -> Result<Option<Found>, Error> {
@@ -125,6 +137,7 @@ impl Distances {
             ids,
             bodies: [scene.body(a)?, scene.body(b)?],
             trees: ids.map(|id| &self.trees[&id.index()]),
+            scale,
         };
         let numbers = ids.map(BodyId::index);
         let likely = self.last.get(&numbers).copied();
@@ -155,6 +168,14 @@ impl Distances {
         let likely = self
             .nearest
             .map(|ids| ids.map(|id| frame.layers.binary_search_by_key(&id, |layer| layer.id)));
+        let scale = Scale::of(many.magnitude(), || {
+            let bodies = frame
+                .layers
+                .iter()
+                .filter_map(|layer| scene.body(layer.id).ok());
+            bodies.fold(0.0, |most, body| body.positions().magnitude().max(most))
+        });
+        // Squares of distances are in this scale.
         let mut best: Option<(f64, Nearest)> = None;
         let error = ROUNDING_TURNED * many.magnitude();
         let mut n_asked = 0;
@@ -170,7 +191,7 @@ impl Distances {
             }
             let pair = [a, b];
             let bodies = pair.map(|layer| frame.body(scene, layer));
-            if are_apart(bodies, boxes.boxes(pair), most.sqrt(), error) {
+            if scale.is_one() && are_apart(bodies, boxes.boxes(pair), most.sqrt(), error) {
                 return Ok(());
             }
             n_asked += 1;
@@ -178,7 +199,7 @@ impl Distances {
             for id in ids {
                 self.know(scene, id, workers)?;
             }
-            let found = self.search(scene, ids, most, u64::MAX, control)?;
+            let found = self.search(scene, ids, (scale, most), u64::MAX, control)?;
             if let Some(found) = found.flatten()
                 && best.is_none_or(|(squared, best)| {
                     found.0 < squared || (found.0 == squared && ids < best.bodies)
@@ -202,8 +223,12 @@ impl Distances {
                 ask(&mut best, &many, pair)?;
             }
             let mut apart = many.apart();
-            while let Some(pair) = apart.next(best.map_or(f64::INFINITY, |(x, _)| limit(x, error)))
-            {
+            let most = |best: Option<(f64, Nearest)>| match best {
+                None => f64::INFINITY,
+                // A square that underflows is far below that of the error.
+                Some((squared, _)) => limit(scale.length_back(squared.sqrt()).powi(2), error),
+            };
+            while let Some(pair) = apart.next(most(best)) {
                 ask(&mut best, &many, pair)?;
             }
             Ok(())
@@ -307,6 +332,8 @@ struct DistanceSearch<'a> {
     ids: [BodyId; 2],
     bodies: [&'a Body; 2],
     trees: [&'a Tree; 2],
+    /// All lengths of the search are in this scale.
+    scale: Scale,
 }
 
 /// The best pair so far.
@@ -377,8 +404,8 @@ impl DistanceSearch<'_> {
         let (Some(a), Some(b)) = (self.trees[0].root(), self.trees[1].root()) else {
             return Ok(Some(None));
         };
-        let magnitude = self.trees[0].bounds(a).magnitude();
-        let magnitude = magnitude.max(self.trees[1].bounds(b).magnitude());
+        let magnitude = self.bounds(0, a).magnitude();
+        let magnitude = magnitude.max(self.bounds(1, b).magnitude());
         let mut found = FoundDistance {
             best: Best {
                 squared: most,
@@ -392,7 +419,7 @@ impl DistanceSearch<'_> {
             directions: Box::new([const { Directions64::EMPTY }; 2]),
         };
         if let Some(pair) = likely {
-            let boxes = [0, 1].map(|side| box_of(self.bodies[side], pair[side].index()));
+            let boxes = [0, 1].map(|side| self.box_of(side, pair[side]));
             self.improve(&mut found, pair, boxes);
             self.look(&mut found);
         }
@@ -422,7 +449,7 @@ impl DistanceSearch<'_> {
             // The node of higher level is opened; at equal levels, the larger one.
             let [x, y] = next.nodes;
             let sizes = [0, 1].map(|side| {
-                let bounds = self.trees[side].bounds(next.nodes[side]);
+                let bounds = self.bounds(side, next.nodes[side]);
                 bounds.squared_diagonal()
             });
             let side = match x.level.cmp(&y.level) {
@@ -441,17 +468,27 @@ impl DistanceSearch<'_> {
         }
         let best = found.best;
         let nearest = Nearest {
-            distance: best.squared.sqrt(),
+            distance: self.scale.length_back(best.squared.sqrt()),
             bodies: self.ids,
             primitives: best.primitives.map(ElementIx::raw),
-            points: best.points,
+            points: (best.points).map(|points| points.map(|point| self.scale.point_back(point))),
         };
         let is_found = best.primitives != [NONE; 2];
         Ok(Some(is_found.then_some((best.squared, nearest))))
     }
 
+    /// The box of a node of the first or the second body.
+    fn bounds(&self, side: usize, node: Node) -> Extent {
+        self.scale.extent(&self.trees[side].bounds(node))
+    }
+
+    fn box_of(&self, side: usize, primitive: ElementIx) -> Extent {
+        let body = self.bodies[side];
+        box_along(body, primitive.index(), |point| self.scale.point(point))
+    }
+
     fn waiting(&self, nodes: [Node; 2]) -> WaitingNodes {
-        let [x, y] = [0, 1].map(|side| self.trees[side].bounds(nodes[side]));
+        let [x, y] = [0, 1].map(|side| self.bounds(side, nodes[side]));
         WaitingNodes {
             squared: x.squared_distance(&y),
             nodes,
@@ -477,7 +514,10 @@ impl DistanceSearch<'_> {
     /// The boxes of two nodes in the view, if there is one.
     fn turned(&self, view: &mut Option<View>, nodes: [Node; 2]) -> Option<[Extent; 2]> {
         let view = view.as_mut()?;
-        Some([0, 1].map(|side| view.bounds(side, self.bodies[side], self.trees[side], nodes[side])))
+        Some([0, 1].map(|side| {
+            let of_node = (self.bodies[side], self.trees[side], nodes[side]);
+            view.bounds(side, of_node, self.scale)
+        }))
     }
 
     /// Whether two nodes are seen to be farther apart than the best pair.
@@ -496,21 +536,23 @@ impl DistanceSearch<'_> {
             self.look(found);
         }
         let mut lists = std::mem::take(&mut found.lists);
-        let whole = [0, 1].map(|side| self.trees[side].bounds(nodes[side]));
+        let whole = [0, 1].map(|side| self.bounds(side, nodes[side]));
         let turned = self.turned(&mut found.view, nodes);
         let limits = found.limits();
         let axes = found.view.as_ref().map(|view| view.axes);
         for side in 0..2 {
             lists[side].clear();
             for &primitive in self.trees[side].primitives(nodes[side]) {
-                let bounds = box_of(self.bodies[side], primitive.index());
+                let bounds = self.box_of(side, primitive);
                 if bounds.squared_distance(&whole[1 - side]) > limits[0] {
                     continue;
                 }
                 let turned = match (&axes, &turned) {
                     (Some(axes), Some(others)) => {
                         let body = self.bodies[side];
-                        let turned = box_along(body, primitive.index(), |p| axes.turn(p));
+                        let turned = box_along(body, primitive.index(), |point| {
+                            axes.turn(self.scale.point(point))
+                        });
                         if turned.squared_distance(&others[1 - side]) > limits[1] {
                             continue;
                         }
@@ -525,7 +567,9 @@ impl DistanceSearch<'_> {
                 });
             }
         }
-        let has_directions = self.put_directions(&lists, &mut found.directions);
+        // Directions are of coordinates as they are.
+        let has_directions =
+            self.scale.is_one() && self.put_directions(&lists, &mut found.directions);
         let mut limits = found.limits();
         for (row, a) in lists[0].iter().enumerate() {
             if a.bounds.squared_distance(&whole[1]) > limits[0] {
@@ -583,11 +627,11 @@ impl DistanceSearch<'_> {
 
     /// Takes a first pair of two clusters that is likely to be near: what is nearest to a box, to that, and to that again.
     fn guess(&self, nodes: [Node; 2], found: &mut FoundDistance) {
-        let mut boxes = [0, 1].map(|side| self.trees[side].bounds(nodes[side]));
+        let mut boxes = [0, 1].map(|side| self.bounds(side, nodes[side]));
         let mut pair = [ElementIx::new(0); 2];
         for side in [0, 1, 0] {
             let near = |&primitive: &ElementIx| {
-                let bounds = box_of(self.bodies[side], primitive.index());
+                let bounds = self.box_of(side, primitive);
                 (bounds.squared_distance(&boxes[1 - side]), primitive, bounds)
             };
             let all = self.trees[side].primitives(nodes[side]).iter().map(near);
@@ -625,6 +669,7 @@ impl DistanceSearch<'_> {
                 points: [a[0], b[0]],
             };
         }
+        let [a, b] = [a, b].map(|corners| corners.map(|point| self.scale.point(point)));
         // Points and edges are triangles that repeat their last corner.
         let [n_a, n_b] = [body_a, body_b].map(|body| body.kind().n_corners().max(3));
         let found = gap(&a[..n_a], &b[..n_b]);

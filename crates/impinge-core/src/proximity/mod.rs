@@ -4,6 +4,7 @@ mod axes;
 mod distance;
 mod features;
 mod many;
+mod scale;
 mod tree;
 
 pub(crate) use distance::Distances;

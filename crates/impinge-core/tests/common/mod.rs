@@ -257,6 +257,105 @@ pub fn cases() -> Vec<Case> {
             });
         }
     }
+    cases.extend(of_any_size());
+    cases
+}
+
+/// A number times a power of two, which may itself be out of range.
+pub fn times_power(x: f64, exponent: i32) -> f64 {
+    let half = exponent / 2;
+    x * 2.0_f64.powi(half) * 2.0_f64.powi(exponent - half)
+}
+
+/// A way to leave the range in which products of three coordinates are doubles, for points of small numbers. The answer stays the same
+/// for the first ones, which are linear maps.
+#[derive(Debug, Clone, Copy)]
+pub enum Size {
+    /// Each axis times a power of two.
+    Axes([i32; 3]),
+    /// Some coordinates have shrunk to nearly nothing, as those of a damped motion do.
+    Decayed,
+    /// Some vertices are as far out as numbers go.
+    Flung,
+}
+
+impl Size {
+    pub const ALL: [Self; 8] = [
+        Self::Axes([-1074; 3]),
+        Self::Axes([-420; 3]),
+        Self::Axes([-1074, 0, 1020]),
+        Self::Axes([0, -1060, 0]),
+        Self::Axes([300, -300, 0]),
+        Self::Axes([1020; 3]),
+        Self::Decayed,
+        Self::Flung,
+    ];
+
+    pub fn points(self, points: &[[f32; 3]], seed: u64) -> Vec<[f64; 3]> {
+        let mut random = Random::new(seed);
+        let least = f64::from_bits(1);
+        let shrunk = [0.0, least, -least, 1e-320, 5e-76, -1e-200, 1e-60];
+        let far = [f64::MAX, -f64::MAX, 1e300, -1e155, 1e80];
+        let points = points.iter().map(|point| {
+            let point = point.map(f64::from);
+            match self {
+                Size::Axes(exponents) => {
+                    std::array::from_fn(|axis| times_power(point[axis], exponents[axis]))
+                }
+                Size::Decayed => point.map(|x| match random.below(3) {
+                    0 => x,
+                    _ => shrunk[random.below(shrunk.len() as u32) as usize],
+                }),
+                Size::Flung => {
+                    let axis = random.below(3) as usize;
+                    let by = far[random.below(far.len() as u32) as usize];
+                    let is_flung = random.below(4) == 0;
+                    std::array::from_fn(|k| if is_flung && k == axis { by } else { point[k] })
+                }
+            }
+        });
+        points.collect()
+    }
+}
+
+/// Scenes in double precision with numbers from one end of the range to the other.
+fn of_any_size() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for size in Size::ALL {
+        let mut scene = Scene::new();
+        let mut add = |model: Model, seed: u64| {
+            let points = size.points(&model.positions, seed);
+            scene.add(model.elements, points).unwrap()
+        };
+        let ids = [
+            add(soup::lattice_triangles(14, 3, 1), 1),
+            add(soup::lattice_web(24, 3, 2), 2),
+            add(soup::lattice_tetrahedra(6, 3, 3), 3),
+            add(soup::lattice_web_tetrahedra(8, 3, 4), 4),
+        ];
+        for query in [
+            Query::between(ids[0], ids[1]),
+            Query::everything().shared_vertex(SharedVertex::Skip),
+            Query::all_within().shared_vertex(SharedVertex::Resolve),
+        ] {
+            cases.push(Case {
+                name: format!("{size:?} {query:?}"),
+                scene: scene.clone(),
+                query,
+            });
+        }
+        if let Size::Flung | Size::Axes([300, ..]) = size {
+            let mut scene = Scene::new();
+            let fan = fan(100);
+            let points = size.points(&fan.positions, 5);
+            let id = scene.add(fan.elements, points).unwrap();
+            cases.push(Case {
+                name: format!("fan, {size:?}"),
+                scene,
+                query: Query::within(id).shared_vertex(SharedVertex::Resolve),
+            });
+        }
+    }
     cases
 }
 

@@ -188,6 +188,32 @@ fn random_triangles_meet_as_the_oracle_says() {
     assert!(seen.directed > 500, "{seen:?}");
 }
 
+/// Coordinates from one end of the range of doubles to the other.
+#[test]
+fn triangles_of_any_size_meet_as_the_oracle_says() {
+    let mut seen = Seen::default();
+    for exponents in [[-1074; 3], [-1070, 0, 900], [1000; 3], [-400, 0, 0]] {
+        let mut scene = Scene::new();
+        let ids = [1, 2].map(|seed| {
+            let model = soup::triangles(60, 0.6, seed);
+            let positions: Vec<[f64; 3]> = (model.positions.iter())
+                .map(|point| {
+                    std::array::from_fn(|k| {
+                        // Multiples of 2^-5, so that few bits are lost to the lowest power.
+                        let x = f64::from((point[k] * 32.0).round());
+                        let half = exponents[k] / 2;
+                        x * 2f64.powi(half) * 2f64.powi(exponents[k] - half)
+                    })
+                })
+                .collect();
+            scene.add(model.elements, positions).unwrap()
+        });
+        let pairs = detect(&scene, &Query::between(ids[0], ids[1]));
+        check(&scene, &pairs, 100, &mut seen);
+    }
+    assert!(seen.directed > 100, "{seen:?}");
+}
+
 /// Coordinates of very different sizes: results that cancel almost to zero, often beyond both rounding
 /// stages.
 #[test]

@@ -219,8 +219,9 @@ pub fn is_nearest(
     if here == IBig::ZERO {
         return true;
     }
-    // At the sizes tried here, zero is the nearest only to zero itself.
-    x != 0.0
+    // Unless numbers are tiny, zero is the nearest only to zero itself.
+    let may_be_zero = scale.unit <= -1074;
+    (x != 0.0 || may_be_zero)
         && neighbours.into_iter().all(|other| {
             let there = far(other);
             here < there || (here == there && is_even(x))

@@ -69,12 +69,18 @@ pub enum Kind {
     NearlyTouching,
     /// As `NearlyTouching`, in `f64`.
     NearlyTouching64,
-    /// `f64` numbers over the whole stated range.
+    /// `f64` numbers of any exponent.
     WideF64,
+    /// A few `f64` from both ends of the range and from between.
+    Ends,
+    /// Lattice points, each axis times a power of two of its own, from one end of the range to the other.
+    Stretched(u64),
+    /// As `NearlyTouching64`, times a power of two near one end of the range.
+    NearlyTouchingAtEnds,
 }
 
 impl Kind {
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 13] = [
         Self::Lattice(2),
         Self::Lattice(3),
         Self::Skewed(2),
@@ -85,7 +91,18 @@ impl Kind {
         Self::NearlyTouching,
         Self::NearlyTouching64,
         Self::WideF64,
+        Self::Ends,
+        Self::Stretched(2),
+        Self::NearlyTouchingAtEnds,
     ];
+
+    /// Whether coordinates leave the range in which doubles decide: big integers make the tests slow.
+    pub fn is_wide(self) -> bool {
+        matches!(
+            self,
+            Self::WideF64 | Self::Ends | Self::Stretched(_) | Self::NearlyTouchingAtEnds
+        )
+    }
 
     /// N points of this kind.
     pub fn points<const N: usize>(self, random: &mut Random) -> [[f64; 3]; N] {
@@ -128,14 +145,55 @@ impl Kind {
             }),
             Self::WideF64 => [(); N].map(|()| {
                 [(); 3].map(|()| {
-                    let exponent = random.below(500) as i32 - 250;
-                    (1.0 + random.unit().abs()).min(1.999)
-                        * 2.0_f64.powi(exponent)
-                        * random.pick(&[-1.0, 1.0])
+                    let exponent = random.below(1023 + 1075) as i32 - 1074;
+                    let mantissa = (1.0 + random.unit().abs()).min(1.999);
+                    scaled(mantissa, exponent) * random.pick(&[-1.0, 1.0])
                 })
             }),
+            Self::Ends => {
+                let least = f64::from_bits(1);
+                let values = [
+                    0.0,
+                    -0.0,
+                    least,
+                    -3.0 * least,
+                    1e-320,
+                    f64::MIN_POSITIVE,
+                    5e-76,
+                    -1e-160,
+                    1.0,
+                    -1.0,
+                    1.0_f64.next_up(),
+                    1e160,
+                    -f64::MAX / 4.0,
+                    f64::MAX,
+                    -f64::MAX,
+                ];
+                [(); N].map(|()| [(); 3].map(|()| random.pick(&values)))
+            }
+            Self::Stretched(n) => {
+                let exponents = [(); 3].map(|()| random.pick(&[-1074, -1030, -700, 0, 700, 1022]));
+                [(); N].map(|()| exponents.map(|by| scaled(random.below(n + 1) as f64 * 0.99, by)))
+            }
+            Self::NearlyTouchingAtEnds => {
+                let exponent = random.pick(&[-1060, -1000, -300, 300, 1020]);
+                nearly_touching(random, |x, steps| {
+                    let x = scaled(x, exponent);
+                    match steps {
+                        1 => x.next_up(),
+                        2 => x.next_down(),
+                        _ => x,
+                    }
+                })
+            }
         }
     }
+}
+
+/// A number times a power of two, which may itself be out of range.
+fn scaled(x: f64, exponent: i32) -> f64 {
+    let half = exponent / 2;
+    x * 2.0_f64.powi(half) * 2.0_f64.powi(exponent - half)
 }
 
 /// N points of {0..n}^3, with an n for each axis, under a random linear map with 24-bit entries.
@@ -159,8 +217,8 @@ fn nearly_touching<const N: usize>(
         let corners = [(); 3].map(|()| random.pick(&common));
         std::array::from_fn(|axis| {
             let blend: f64 = (0..3).map(|k| weights[k] * corners[k][axis]).sum();
-            round(blend / sum, random.below(6))
+            let at = blend / sum;
+            round(if at.abs() < 1e-30 { 0.0 } else { at }, random.below(6))
         })
-        .map(|x: f64| if x.abs() < 1e-30 { 0.0 } else { x })
     })
 }

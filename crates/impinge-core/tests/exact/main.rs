@@ -9,16 +9,16 @@ mod published;
 
 use generators::{Kind, Random};
 use impinge_core::exact::{
-    MAX_MAGNITUDE, MIN_MAGNITUDE, Sign, in_range, orient2d, orient3d, tetrahedra_intersect,
-    tetrahedra_intersect_beyond_shared, triangle_tetrahedron_intersect,
-    triangle_tetrahedron_intersect_beyond_shared, triangles_intersect,
-    triangles_intersect_beyond_shared,
+    Sign, orient2d, orient3d, tetrahedra_intersect, tetrahedra_intersect_beyond_shared,
+    triangle_tetrahedron_intersect, triangle_tetrahedron_intersect_beyond_shared,
+    triangles_intersect, triangles_intersect_beyond_shared,
 };
 
 /// How many cases of a kind a test tries; big integers make the wide kinds slow.
 fn n_cases(kind: Kind, n: usize) -> usize {
     match kind {
         Kind::Lattice(_) => 6 * n,
+        _ if kind.is_wide() => n / 3,
         _ => n,
     }
 }
@@ -386,7 +386,7 @@ fn neighbouring_triangles_follow_the_usual_rules() {
 }
 
 /// Answers do not change when all coordinates are scaled by one power of two, to the very ends
-/// of the stated range.
+/// of the range of doubles.
 #[test]
 fn scaling_to_the_ends_of_the_range_changes_nothing() {
     let mut random = Random::new(9);
@@ -402,14 +402,15 @@ fn scaling_to_the_ends_of_the_range_changes_nothing() {
             };
             let largest = magnitudes().fold(1.0, f64::max);
             let smallest = magnitudes().fold(1.0, f64::min);
-            let up = 2.0_f64.powi((MAX_MAGNITUDE / largest).log2() as i32 - 1);
-            let down = 2.0_f64.powi((MIN_MAGNITUDE / smallest).log2() as i32 + 1);
+            // No bit is lost: the lowest of a coordinate is 2^-52 of it or more.
+            let up = 2.0_f64.powi((f64::MAX / largest).log2() as i32 - 1);
+            let down = 2.0_f64.powi((f64::MIN_POSITIVE / smallest).log2() as i32 + 1);
             let (a, b) = cut::<4, 4>(&points);
             let (t, s) = cut::<3, 3>(&points);
             for scale in [up, down] {
                 let scaled = points.map(|point| point.map(|x| x * scale));
                 assert!(
-                    scaled.iter().flatten().all(|&x| in_range(x)),
+                    scaled.iter().flatten().all(|x| x.is_finite()),
                     "{kind:?} by {scale:e}"
                 );
                 let (a_scaled, b_scaled) = cut::<4, 4>(&scaled);
@@ -429,28 +430,9 @@ fn scaling_to_the_ends_of_the_range_changes_nothing() {
     }
 }
 
-#[test]
-fn every_finite_f32_is_in_range() {
-    for x in [0.0, f32::from_bits(1), f32::MIN_POSITIVE, 1.0, f32::MAX] {
-        assert!(in_range(f64::from(x)) && in_range(f64::from(-x)), "{x:e}");
-    }
-    assert!(in_range(MIN_MAGNITUDE) && in_range(MAX_MAGNITUDE) && in_range(-MAX_MAGNITUDE));
-    for x in [
-        f64::NAN,
-        f64::INFINITY,
-        MAX_MAGNITUDE.next_up(),
-        MIN_MAGNITUDE.next_down(),
-        5e-324,
-    ] {
-        assert!(!in_range(x) && !in_range(-x), "{x:e}");
-    }
-    assert_eq!(MAX_MAGNITUDE, 2.0_f64.powi(250));
-    assert_eq!(MIN_MAGNITUDE, 2.0_f64.powi(-250));
-}
-
 /// Input that callers should refuse gives some answer, not a panic.
 #[test]
-fn numbers_out_of_range_do_not_panic() {
+fn numbers_that_are_not_finite_do_not_panic() {
     let mut random = Random::new(10);
     let values = [
         f64::NAN,

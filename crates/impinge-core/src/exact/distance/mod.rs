@@ -43,7 +43,7 @@ pub use rounded::{Closest, closest_points};
 /// Whether the distance of two elements is at most `distance`.
 ///
 /// The points and their order are those of the [`ElementPair`]. Closed: a distance of exactly `distance` counts, and with 0 the
-/// elements must touch. Exact for coordinates and distances [`in_range`](super::in_range). False for a distance below zero or NaN, true for
+/// elements must touch. Exact for finite coordinates. False for a distance below zero or NaN, true for
 /// infinity.
 ///
 /// ```

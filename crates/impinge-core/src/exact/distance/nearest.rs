@@ -12,7 +12,7 @@ use crate::exact::{Point, Sign};
 
 /// The nearest features of two elements.
 ///
-/// The points and their order are those of the [`ElementPair`]. Exact for coordinates [`in_range`](crate::exact::in_range).
+/// The points and their order are those of the [`ElementPair`]. Exact for finite coordinates.
 ///
 /// ```
 /// use impinge::exact::{ElementPair, Feature, nearest_features};

@@ -67,9 +67,16 @@ pub(super) fn closest_of<T: Coordinate>(
         }
         (_, PolygonPart::Face) => {
             let [first, second] = face_shares(polygon);
-            let foot =
+            let foot: Point =
                 std::array::from_fn(|k| q[k] + (r[k] - q[k]) * first + (s[k] - r[k]) * second);
-            [*p, foot]
+            if foot.iter().all(|x| x.is_finite()) {
+                [*p, foot]
+            } else {
+                // A difference overflows: weights of the corners instead.
+                let weights = [1.0 - first, first - second, second];
+                let blend = |k: usize| weights[0] * q[k] + weights[1] * r[k] + weights[2] * s[k];
+                [*p, std::array::from_fn(blend)]
+            }
         }
         (_, PolygonPart::Edge(ix)) => {
             let next = points[1 + (ix + 1) % polygon.corners().len()];
@@ -127,7 +134,14 @@ fn times_power(x: f64, exponent: i64) -> f64 {
 }
 
 pub(super) fn between(from: &Point, to: &Point, share: f64) -> Point {
-    std::array::from_fn(|k| from[k] + (to[k] - from[k]) * share)
+    std::array::from_fn(|k| {
+        let way = to[k] - from[k];
+        if way.is_finite() {
+            from[k] + way * share
+        } else {
+            from[k] * (1.0 - share) + to[k] * share
+        }
+    })
 }
 
 /// How high two points are over the plane of a face, in a common unit.

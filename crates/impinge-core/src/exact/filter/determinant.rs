@@ -55,6 +55,10 @@ impl<T: Number> Determinant<T> {
 }
 
 /// A vector d x e, with [`BOUND`](Number::BOUND) |d| |e|.
+///
+/// In `f64` coordinates may have any size, so products may underflow or overflow. An underflow in d x e grows with f: it is
+/// part of the bound that is multiplied by |f|. Where (d x e) . f might overflow, 8 |d| |e| |f| does, and with it the bound: so it
+/// is computed with a factor of [`HEADROOM`](Number::HEADROOM), which the last step takes away.
 #[derive(Clone, Copy)]
 pub(super) struct Normal<T: Number = f64> {
     vector: [T; 3],
@@ -70,7 +74,7 @@ impl<T: Number> Normal<T> {
                 d[2] * e[0] - d[0] * e[2],
                 d[0] * e[1] - d[1] * e[0],
             ],
-            bound: T::splat(T::BOUND) * (size(d) * size(e)),
+            bound: bound_of_normal(size(d) * size(e)),
         }
     }
 
@@ -79,8 +83,27 @@ impl<T: Number> Normal<T> {
     pub(super) fn dot(&self, f: &[T; 3]) -> Determinant<T> {
         Determinant {
             value: self.vector[0] * f[0] + self.vector[1] * f[1] + self.vector[2] * f[2],
-            bound: (self.bound * size(f)).with_underflow(),
+            bound: bound_of_determinant(self.bound * size(f)),
         }
+    }
+}
+
+#[inline(always)]
+fn bound_of_normal<T: Number>(sizes: T) -> T {
+    let bound = T::splat(T::BOUND * T::HEADROOM) * sizes;
+    if T::UNDERFLOW_PER_SIZE > 0.0 {
+        bound + T::splat(T::UNDERFLOW_PER_SIZE)
+    } else {
+        bound
+    }
+}
+
+#[inline(always)]
+fn bound_of_determinant<T: Number>(bound: T) -> T {
+    if T::HEADROOM > 1.0 {
+        (bound * T::splat(1.0 / T::HEADROOM)).with_underflow()
+    } else {
+        bound.with_underflow()
     }
 }
 

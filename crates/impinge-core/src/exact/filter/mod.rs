@@ -18,9 +18,9 @@
 //!
 //! Invariant: every determinant here is a sum of the six products of three vectors d, e, f, each a
 //! difference of two input points. Its computed value is wrong by less than
-//! 2^-47 |d| |e| |f| in `f64`, 2^-18 |d| |e| |f| + 2^-69 in `f32`, with |.| the largest coordinate, whatever the order of
-//! operations and whether or not products and sums are fused (`docs/exactness.md`, "The batch
-//! filter"). NaN and overflow make comparisons fail, and so end as unsure.
+//! 2^-47 |d| |e| |f| + 2^-950 |f| + 2^-1000 in `f64`, 2^-18 |d| |e| |f| + 2^-69 in `f32`, with |.| the largest coordinate, whatever the
+//! order of operations and whether or not products and sums are fused (`docs/exactness.md`, "The batch
+//! filter"). NaN and overflow make comparisons fail, and so end as unsure. In `f64` that holds for all finite coordinates.
 
 mod determinant;
 mod directions;

@@ -27,9 +27,14 @@ pub trait Number:
     /// 64 unit roundoffs: the error of a determinant, relative to the product of its vectors' sizes. The derivation
     /// needs a little more than 60.
     const BOUND: f64;
-    /// The error that underflow may add: none for `f64` within the range that a scene admits, 2^-69 for `f32` with
-    /// coordinates up to 2^24, even where the processor flushes subnormal numbers to zero.
+    /// The error that underflow may add: 2^-1000 for `f64`, 2^-69 for `f32` with coordinates up to 2^24, there even where the
+    /// processor flushes subnormal numbers to zero.
     const UNDERFLOW: f64;
+    /// For `f64`, whose coordinates have any size: what underflow may add to a vector's product, per size of the other vector.
+    /// 0 for `f32`.
+    const UNDERFLOW_PER_SIZE: f64;
+    /// For `f64`: a bound is computed so many times larger, so that it overflows before a determinant does. 1 for `f32`.
+    const HEADROOM: f64;
 
     /// The largest coordinate difference that the filter for moving elements accepts; see `motion`.
     const LARGEST: f64;
@@ -42,11 +47,7 @@ pub trait Number:
     /// A bound plus the error that underflow may add.
     #[inline(always)]
     fn with_underflow(self) -> Self {
-        if Self::UNDERFLOW > 0.0 {
-            self + Self::splat(Self::UNDERFLOW)
-        } else {
-            self
-        }
+        self + Self::splat(Self::UNDERFLOW)
     }
     /// One number in every lane, rounded to `f32` where the lanes are `f32`.
     fn splat(x: f64) -> Self;
@@ -127,8 +128,14 @@ mod sealed {
 const BOUND_F64: f64 = f64::from_bits((1023 - 47) << 52);
 /// 2^-18.
 const BOUND_F32: f64 = f64::from_bits((1023 - 18) << 52);
+/// 2^-1000.
+const UNDERFLOW_F64: f64 = f64::from_bits((1023 - 1000) << 52);
 /// 2^-69.
 const UNDERFLOW_F32: f64 = f64::from_bits((1023 - 69) << 52);
+/// `UNDERFLOW_PER_SIZE` and `HEADROOM`: see `determinant`.
+const ANY_SIZE_F64: [f64; 2] = [power(-900), power(50)];
+/// Coordinates are known to be small.
+const ANY_SIZE_F32: [f64; 2] = [0.0, 1.0];
 
 /// A power of two.
 const fn power(exponent: i64) -> f64 {
@@ -145,7 +152,9 @@ const SHORTEST_F32: f64 = power(-49);
 impl Number for f64 {
     type Mask = bool;
     const BOUND: f64 = BOUND_F64;
-    const UNDERFLOW: f64 = 0.0;
+    const UNDERFLOW: f64 = UNDERFLOW_F64;
+    const UNDERFLOW_PER_SIZE: f64 = ANY_SIZE_F64[0];
+    const HEADROOM: f64 = ANY_SIZE_F64[1];
     const LARGEST: f64 = LARGEST_DIFFERENCE_F64;
     const TINY: [f64; 3] = TINY_F64;
     const SHORTEST: f64 = SHORTEST_F64;
@@ -194,7 +203,7 @@ macro_rules! operator {
 /// Every operation names its lanes: loops over them, thousands in one function, took the compiler minutes.
 macro_rules! portable {
     (
-        $type:ident, $mask:ident, $number:ty, $bits:ty, $n:expr, [$($k:literal),*], $bound:expr, $underflow:expr,
+        $type:ident, $mask:ident, $number:ty, $bits:ty, $n:expr, [$($k:literal),*], $bound:expr, $underflow:expr, $any_size:expr,
         $largest:expr, $tiny:expr, $shortest:expr
     ) => {
         #[doc = concat!("Some `", stringify!($number), "` in 128 bits, which SSE2 and NEON have.")]
@@ -247,6 +256,8 @@ macro_rules! portable {
             type Mask = $mask;
             const BOUND: f64 = $bound;
             const UNDERFLOW: f64 = $underflow;
+            const UNDERFLOW_PER_SIZE: f64 = $any_size[0];
+            const HEADROOM: f64 = $any_size[1];
             const LARGEST: f64 = $largest;
             const TINY: [f64; 3] = $tiny;
             const SHORTEST: f64 = $shortest;
@@ -294,7 +305,8 @@ portable!(
     PORTABLE,
     [0, 1],
     BOUND_F64,
-    0.0,
+    UNDERFLOW_F64,
+    ANY_SIZE_F64,
     LARGEST_DIFFERENCE_F64,
     TINY_F64,
     SHORTEST_F64
@@ -308,6 +320,7 @@ portable!(
     [0, 1, 2, 3],
     BOUND_F32,
     UNDERFLOW_F32,
+    ANY_SIZE_F32,
     LARGEST_DIFFERENCE_F32,
     TINY_F32,
     SHORTEST_F32
@@ -382,7 +395,7 @@ mod x86 {
     macro_rules! register {
         (
             $(#[$doc:meta])* $type:ident($register:ty), $mask:ident($bits:ty),
-            $bound:expr, $underflow:expr, $largest:expr, $tiny:expr, $shortest:expr,
+            $bound:expr, $underflow:expr, $any_size:expr, $largest:expr, $tiny:expr, $shortest:expr,
             add $add:ident, sub $sub:ident, mul $mul:ident, div $div:ident, max $max:ident, splat |$x:ident| $splat:expr,
             abs |$y:ident| $abs:expr, sqrt $sqrt:ident, gt |$a:ident, $b:ident| $gt:expr,
             select |$m:ident, $yes:ident, $no:ident| $select:expr,
@@ -451,6 +464,8 @@ mod x86 {
                 type Mask = $mask;
                 const BOUND: f64 = $bound;
                 const UNDERFLOW: f64 = $underflow;
+                const UNDERFLOW_PER_SIZE: f64 = $any_size[0];
+                const HEADROOM: f64 = $any_size[1];
                 const LARGEST: f64 = $largest;
                 const TINY: [f64; 3] = $tiny;
                 const SHORTEST: f64 = $shortest;
@@ -494,7 +509,7 @@ mod x86 {
 
     register! {
         /// Four numbers in a 256-bit register. To be used where `avx2` was detected.
-        Avx2(__m256d), Avx2Mask(__m256d), BOUND_F64, 0.0, LARGEST_DIFFERENCE_F64, TINY_F64, SHORTEST_F64,
+        Avx2(__m256d), Avx2Mask(__m256d), BOUND_F64, UNDERFLOW_F64, ANY_SIZE_F64, LARGEST_DIFFERENCE_F64, TINY_F64, SHORTEST_F64,
         add _mm256_add_pd, sub _mm256_sub_pd, mul _mm256_mul_pd, div _mm256_div_pd, max _mm256_max_pd,
         splat |x| _mm256_set1_pd(x),
         abs |x| _mm256_andnot_pd(_mm256_set1_pd(-0.0), x),
@@ -509,7 +524,7 @@ mod x86 {
 
     register! {
         /// Eight `f32` in a 256-bit register. To be used where `avx2` was detected.
-        Avx2F32(__m256), Avx2F32Mask(__m256), BOUND_F32, UNDERFLOW_F32, LARGEST_DIFFERENCE_F32, TINY_F32, SHORTEST_F32,
+        Avx2F32(__m256), Avx2F32Mask(__m256), BOUND_F32, UNDERFLOW_F32, ANY_SIZE_F32, LARGEST_DIFFERENCE_F32, TINY_F32, SHORTEST_F32,
         add _mm256_add_ps, sub _mm256_sub_ps, mul _mm256_mul_ps, div _mm256_div_ps, max _mm256_max_ps,
         splat |x| _mm256_set1_ps(x as f32),
         abs |x| _mm256_andnot_ps(_mm256_set1_ps(-0.0), x),
@@ -524,7 +539,7 @@ mod x86 {
 
     register! {
         /// Eight numbers in a 512-bit register. To be used where `avx512f` and `avx512dq` were detected.
-        Avx512(__m512d), Avx512Mask(__mmask8), BOUND_F64, 0.0, LARGEST_DIFFERENCE_F64, TINY_F64, SHORTEST_F64,
+        Avx512(__m512d), Avx512Mask(__mmask8), BOUND_F64, UNDERFLOW_F64, ANY_SIZE_F64, LARGEST_DIFFERENCE_F64, TINY_F64, SHORTEST_F64,
         add _mm512_add_pd, sub _mm512_sub_pd, mul _mm512_mul_pd, div _mm512_div_pd, max _mm512_max_pd,
         splat |x| _mm512_set1_pd(x),
         abs |x| _mm512_abs_pd(x),
@@ -536,7 +551,7 @@ mod x86 {
 
     register! {
         /// Sixteen `f32` in a 512-bit register. To be used where `avx512f` and `avx512dq` were detected.
-        Avx512F32(__m512), Avx512F32Mask(__mmask16), BOUND_F32, UNDERFLOW_F32, LARGEST_DIFFERENCE_F32, TINY_F32, SHORTEST_F32,
+        Avx512F32(__m512), Avx512F32Mask(__mmask16), BOUND_F32, UNDERFLOW_F32, ANY_SIZE_F32, LARGEST_DIFFERENCE_F32, TINY_F32, SHORTEST_F32,
         add _mm512_add_ps, sub _mm512_sub_ps, mul _mm512_mul_ps, div _mm512_div_ps, max _mm512_max_ps,
         splat |x| _mm512_set1_ps(x as f32),
         abs |x| _mm512_abs_ps(x),

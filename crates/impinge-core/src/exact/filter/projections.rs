@@ -121,7 +121,7 @@ pub(in super::super) fn angles_apart(v: &Point, a: [&Point; 2], b: [&Point; 2]) 
         .as_flattened()
         .iter()
         .fold(0.0, |size: f64, x| size.max(x.abs()));
-    let bound = 0.5 * f64::BOUND * (size * size);
+    let bound = (0.5 * f64::BOUND * (size * size)).with_underflow();
     PLANES.iter().any(|&[i, j]| {
         let (a, b) = (a.map(|d| [d[i], d[j]]), b.map(|d| [d[i], d[j]]));
         let across = a.map(|d| b.map(|e| cross(&d, &e)));
@@ -152,7 +152,7 @@ pub(in super::super) fn sides_apart(u: &Point, v: &Point, p: &Point, q: &Point) 
         .as_flattened()
         .iter()
         .fold(0.0, |size: f64, x| size.max(x.abs()));
-    let bound = 0.5 * f64::BOUND * (size * size);
+    let bound = (0.5 * f64::BOUND * (size * size)).with_underflow();
     PLANES.iter().any(|&[i, j]| {
         let side = |d: &Point| cross(&[e[i], e[j]], &[d[i], d[j]]);
         let (p, q) = (side(&p), side(&q));

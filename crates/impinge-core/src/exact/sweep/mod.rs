@@ -78,7 +78,7 @@ impl Contact {
 /// The first time at which two elements share a point while their points move from `start` to `end` on straight lines.
 ///
 /// `None` if they share no point at any time in [0, 1]. The points and their order are those of the [`ElementPair`]. Exact
-/// for coordinates [`in_range`](super::in_range); unspecified for others, but never a panic.
+/// for finite coordinates; unspecified for others, but never a panic.
 ///
 /// ```
 /// use impinge::exact::{ElementPair, first_contact};
@@ -131,8 +131,7 @@ pub fn touch_during(pair: ElementPair, start: &[Point; 4], end: &[Point; 4]) -> 
 
 /// Whether two elements share a point at one moment.
 ///
-/// The points and their order are those of the [`ElementPair`]. Exact for coordinates
-/// [`in_range`](super::in_range).
+/// The points and their order are those of the [`ElementPair`]. Exact for finite coordinates.
 #[must_use]
 pub fn touch(pair: ElementPair, points: &[Point; 4]) -> bool {
     let [p, q, r, s] = points;

@@ -10,7 +10,7 @@ use super::*;
 macro_rules! register {
     (
         $(#[$doc:meta])* $type:ident, $mask:ident,
-        $bound:expr, $underflow:expr, $largest:expr, $tiny:expr, $shortest:expr,
+        $bound:expr, $underflow:expr, $any_size:expr, $largest:expr, $tiny:expr, $shortest:expr,
         add $add:ident, sub $sub:ident, mul $mul:ident, div $div:ident, pmax $pmax:ident, splat |$x:ident| $splat:expr,
         abs $abs:ident, sqrt $sqrt:ident, gt $gt:ident $(,)?
     ) => {
@@ -42,6 +42,8 @@ macro_rules! register {
             type Mask = $mask;
             const BOUND: f64 = $bound;
             const UNDERFLOW: f64 = $underflow;
+            const UNDERFLOW_PER_SIZE: f64 = $any_size[0];
+            const HEADROOM: f64 = $any_size[1];
             const LARGEST: f64 = $largest;
             const TINY: [f64; 3] = $tiny;
             const SHORTEST: f64 = $shortest;
@@ -77,14 +79,14 @@ macro_rules! register {
 
 register! {
     /// Two numbers in a register of WebAssembly.
-    Wasm, WasmMask, BOUND_F64, 0.0, LARGEST_DIFFERENCE_F64, TINY_F64, SHORTEST_F64,
+    Wasm, WasmMask, BOUND_F64, UNDERFLOW_F64, ANY_SIZE_F64, LARGEST_DIFFERENCE_F64, TINY_F64, SHORTEST_F64,
     add f64x2_add, sub f64x2_sub, mul f64x2_mul, div f64x2_div, pmax f64x2_pmax, splat |x| f64x2_splat(x),
     abs f64x2_abs, sqrt f64x2_sqrt, gt f64x2_gt,
 }
 
 register! {
     /// Four `f32` in a register of WebAssembly.
-    WasmF32, WasmF32Mask, BOUND_F32, UNDERFLOW_F32, LARGEST_DIFFERENCE_F32, TINY_F32, SHORTEST_F32,
+    WasmF32, WasmF32Mask, BOUND_F32, UNDERFLOW_F32, ANY_SIZE_F32, LARGEST_DIFFERENCE_F32, TINY_F32, SHORTEST_F32,
     add f32x4_add, sub f32x4_sub, mul f32x4_mul, div f32x4_div, pmax f32x4_pmax, splat |x| f32x4_splat(x as f32),
     abs f32x4_abs, sqrt f32x4_sqrt, gt f32x4_gt,
 }
