@@ -226,17 +226,16 @@ fn in_fork(mut work: impl FnMut() -> bool) {
 fn erase<'a>(
     code: impl FnMut() -> std::io::Result<()> + 'a,
 ) -> impl FnMut() -> std::io::Result<()> + Send + Sync + 'static {
-    struct Shared(*mut (dyn FnMut() -> std::io::Result<()> + 'static));
+    type Code<'a> = dyn FnMut() -> std::io::Result<()> + 'a;
+    struct Shared(*mut Code<'static>);
     // SAFETY: it is called in the fork alone, by one thread.
     unsafe impl Send for Shared {}
+    // SAFETY: as for `Send`.
     unsafe impl Sync for Shared {}
-    let boxed: Box<dyn FnMut() -> std::io::Result<()> + 'a> = Box::new(code);
+    let boxed: Box<Code<'a>> = Box::new(code);
     // SAFETY: only the lifetime changes.
-    let pointer = unsafe {
-        std::mem::transmute::<_, *mut (dyn FnMut() -> std::io::Result<()> + 'static)>(
-            Box::into_raw(boxed),
-        )
-    };
+    let pointer =
+        unsafe { std::mem::transmute::<*mut Code<'a>, *mut Code<'static>>(Box::into_raw(boxed)) };
     let shared = Shared(pointer);
     move || {
         let shared = &shared;

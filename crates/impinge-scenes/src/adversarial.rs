@@ -392,14 +392,14 @@ pub fn machine_parts(n: usize) -> Result<BuiltScene, Error> {
     let width = (0.1 * real(n_tubes)) as f32;
     let mut random = Random::new(11);
     let mut parts = [Mesh::default(), Mesh::default()];
-    for part in 0..2 {
-        let n_faces = n / 2;
+    let n_faces = n / 2;
+    for (part, is_across) in parts.iter_mut().zip([false, true]) {
         for _ in 0..n_tubes {
             let at = [random.range(-width, width), random.range(-1.0, 1.0)];
-            let tube = tube(at, part == 1);
-            let left = n_faces - parts[part].faces.len().min(n_faces);
+            let tube = tube(at, is_across);
+            let left = n_faces - part.faces.len().min(n_faces);
             let faces = tube.faces[..tube.faces.len().min(left)].to_vec();
-            parts[part].append(&Mesh { faces, ..tube });
+            part.append(&Mesh { faces, ..tube });
         }
     }
     let [a, b] = parts.map(Mesh::model);
