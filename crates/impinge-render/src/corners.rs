@@ -178,7 +178,7 @@ mod tests {
         let face = |corners: [u32; 3], ix: u32| Face {
             corners,
             color: [(ix % 251) as u8, 0, 0],
-            shows_through: ix % 3 == 0,
+            shows_through: ix.is_multiple_of(3),
         };
         let orders = [[0, 1, 2], [2, 0, 1], [1, 0, 2]];
         let mut faces: Vec<Face> = (0..N).map(|ix| face(orders[ix as usize % 3], ix)).collect();
