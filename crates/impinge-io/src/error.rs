@@ -3,6 +3,23 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+/// The name of a file as text for a terminal or a log: control characters, such as line breaks and the start of escape
+/// sequences, are escaped.
+///
+/// ```
+/// assert_eq!(impinge_io::printable("a\n\u{1b}[2J.ply"), r"a\n\u{1b}[2J.ply");
+/// ```
+pub fn printable(name: impl AsRef<Path>) -> String {
+    let mut text = String::new();
+    for c in name.as_ref().to_string_lossy().chars() {
+        match c.is_control() {
+            true => text.extend(c.escape_default()),
+            false => text.push(c),
+        }
+    }
+    text
+}
+
 /// A place in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
@@ -25,10 +42,11 @@ pub struct Location {
 
 impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let file = printable(&self.file);
         match self.place {
-            Place::File => write!(f, "{}", self.file),
-            Place::Line(line) => write!(f, "{}:{line}", self.file),
-            Place::Byte(offset) => write!(f, "{}: byte {offset}", self.file),
+            Place::File => write!(f, "{file}"),
+            Place::Line(line) => write!(f, "{file}:{line}"),
+            Place::Byte(offset) => write!(f, "{file}: byte {offset}"),
         }
     }
 }
@@ -39,7 +57,7 @@ impl fmt::Display for Location {
 pub enum Error {
     /// The operating system reported an error. Check that the file exists, that it may be read or written, and that the disk has
     /// room.
-    #[error("{}: cannot {action}: {source}", .path.display())]
+    #[error("{}: cannot {action}: {source}", crate::printable(.path))]
     Io {
         /// The file or folder.
         path: PathBuf,
@@ -49,7 +67,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// The path is not a regular file but a pipe, a device, a socket or a folder. Check the name, or copy its content to a file.
-    #[error("{}: is {what}, not a regular file", .path.display())]
+    #[error("{}: is {what}, not a regular file", crate::printable(.path))]
     NotAFile {
         /// The path.
         path: PathBuf,
@@ -58,7 +76,7 @@ pub enum Error {
     },
     /// A mesh file or a pattern names a file in another folder, perhaps through a link. Check that you trust the mesh, or put
     /// the file beside it.
-    #[error("{}: is not in {}; only files in the folder of the mesh or below it are read", .path.display(), .folder.display())]
+    #[error("{}: is not in {}; only files in the folder of the mesh or below it are read", crate::printable(.path), crate::printable(.folder))]
     Outside {
         /// The file that was named.
         path: PathBuf,
@@ -66,7 +84,7 @@ pub enum Error {
         folder: PathBuf,
     },
     /// The format is chosen by the file's extension, and this extension is not known. Check the name.
-    #[error("{}: no mesh format has the extension '{extension}' (known: {known})", .path.display())]
+    #[error("{}: no mesh format has the extension '{extension}' (known: {known})", crate::printable(.path))]
     UnknownFormat {
         /// The file.
         path: PathBuf,
@@ -143,7 +161,8 @@ pub enum Error {
     },
     /// The file has no primitive of the wanted kind. Check that it is a surface or a volume, not points or curves.
     #[error(
-        "{file}: no {wanted} in this file (vertices: {n_vertices}, triangles: {n_triangles}, tetrahedra: {n_tetrahedra}, lines: {n_lines}, points: {n_points})"
+        "{}: no {wanted} in this file (vertices: {n_vertices}, triangles: {n_triangles}, tetrahedra: {n_tetrahedra}, lines: {n_lines}, points: {n_points})",
+        crate::printable(.file)
     )]
     NoPrimitives {
         /// The file.
@@ -183,7 +202,7 @@ pub enum Error {
         needed: u64,
     },
     /// The arguments of a call to a writer or a sequence do not fit together. Check the call.
-    #[error("{file}: {what}: expected {expected}, found {found}")]
+    #[error("{}: {what}: expected {expected}, found {found}", crate::printable(.file))]
     Mismatch {
         /// The file written or read.
         file: String,

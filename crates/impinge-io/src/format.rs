@@ -14,7 +14,7 @@ pub enum Format {
     Ply,
     /// Stereolithography, ascii or binary (`.stl`).
     Stl,
-    /// Geomview OFF, text (`.off`, `.coff`, `.noff`).
+    /// Geomview OFF, text and binary (`.off`, `.coff`, `.noff`).
     Off,
     /// glTF 2.0, JSON or binary container (`.gltf`, `.glb`).
     Gltf,

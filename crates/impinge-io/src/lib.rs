@@ -57,7 +57,7 @@ mod text;
 mod write;
 
 pub use bodies::NamedMesh;
-pub use error::{Error, Location, Place};
+pub use error::{Error, Location, Place, printable};
 pub use format::Format;
 pub use mesh::{Elements, Mesh, Positions, Weld, weld};
 pub use npy::{npy_header, npy_header_in, write_impacts_npy};

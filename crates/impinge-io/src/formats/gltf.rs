@@ -16,7 +16,7 @@ use self::json::{Node, Primitive, Root, index_error};
 use crate::binary::{Cursor, Endian, Scalar};
 use crate::budget::Budget;
 use crate::collect::{Collector, check_n_vertices, finite, vertex_ix};
-use crate::error::{Error, Name, Place, shown};
+use crate::error::{Error, Name, Place, printable, shown};
 use crate::mesh::Positions;
 use crate::options::ReadOptions;
 
@@ -138,10 +138,20 @@ fn parse((json, start): Json, name: Name) -> Result<Root, Error> {
         .iter()
         .find(|extension| !HARMLESS.iter().any(|start| extension.starts_with(start)))
     {
-        return Err(name.unsupported(
-            Place::File,
-            format!("the extension {}", shown(extension.as_bytes())),
-        ));
+        let advice = match extension.as_str() {
+            "KHR_draco_mesh_compression"
+            | "EXT_meshopt_compression"
+            | "KHR_meshopt_compression" => {
+                " (a compressed mesh: export it again without compression)"
+            }
+            _ => "",
+        };
+        // Names of extensions are short; a hostile one is cut.
+        let extension = match extension.len() <= 64 {
+            true => format!("'{}'", printable(extension)),
+            false => shown(extension.as_bytes()),
+        };
+        return Err(name.unsupported(Place::File, format!("the extension {extension}{advice}")));
     }
     Ok(root)
 }

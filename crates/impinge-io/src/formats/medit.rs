@@ -19,8 +19,10 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
     }
     text.number::<u32>("a version")?;
     loop {
-        // The end mark is required: without it, a file cut off between two sections would look complete.
-        let keyword = text.need_word("a keyword, at last 'End'")?;
+        // Many programs write no 'End'.
+        let Some(keyword) = text.word() else {
+            break;
+        };
         let place = text.place();
         match keyword {
             b"End" => break,

@@ -2,7 +2,8 @@
 //!
 //! Source: Wavefront, "Advanced Visualizer" manual, appendix B1. A file is read as one body, its groups in their order, or as a
 //! body per object; per group if there are no objects, which often have groups of one material each. A
-//! face may name vertices that come later (positive indices); negative ones count back from the last vertex so far.
+//! face may name vertices that come later (positive indices); negative ones count back from the last vertex so far. Faces of one
+//! or two corners, which some programs write for points and segments, are counted and skipped.
 
 use std::borrow::Cow;
 
@@ -64,7 +65,11 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
                         }
                     });
                 }
-                parts.polygon(place)?;
+                match parts.corners.len() {
+                    1 => parts.n_points += 1,
+                    2 => parts.n_lines += 1,
+                    _ => parts.polygon(place)?,
+                }
             }
             Some(word @ (b"o" | b"g")) => {
                 if word == b"o" && !has_objects {

@@ -1,10 +1,12 @@
-//! Geomview OFF, text: `OFF`, `COFF`, `NOFF`, `STOFF` and mixtures; normals, colours and texture coordinates are skipped.
+//! Geomview OFF, text and binary: `OFF`, `COFF`, `NOFF`, `STOFF` and mixtures; normals, colours and texture coordinates are
+//! skipped. Numbers of a binary file have 32 bits, the most significant byte first.
 //!
 //! Source: Geomview manual, "OFF Files". The keyword and the number of edges may be missing. Faces of one or two corners,
 //! which OFF uses for points and segments, are counted and skipped.
 
+use crate::binary::{Cursor, Endian, Scalar};
 use crate::collect::{Collector, check_n_vertices, finite};
-use crate::error::{Error, Name, shown};
+use crate::error::{Error, Name, Place, shown};
 use crate::mesh::Positions;
 use crate::text::{Line, Text, number};
 
@@ -16,6 +18,9 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
     let first = header.words().next().unwrap_or_default();
     if first.ends_with(b"OFF") {
         check_keyword(name, header, first)?;
+        if header.words().nth(1) == Some(b"BINARY") {
+            return read_binary(bytes, text.offset(), name, first);
+        }
         let start = header
             .bytes
             .windows(3)
@@ -86,10 +91,57 @@ fn check_keyword(name: Name, header: Line, keyword: &[u8]) -> Result<(), Error> 
             shown(keyword),
         ));
     }
-    if header.words().nth(1) == Some(b"BINARY") {
-        return Err(name.unsupported(header.place(), "binary OFF (supported: text)"));
-    }
     Ok(())
+}
+
+/// Reads binary data that starts at `offset`, after a line with this keyword.
+fn read_binary<'a>(
+    bytes: &[u8],
+    offset: usize,
+    name: Name<'a>,
+    keyword: &[u8],
+) -> Result<Collector<'a>, Error> {
+    let mut parts = Collector::new(name);
+    let mut from = Cursor::new(name, bytes, offset, Endian::Big);
+    let place = from.place();
+    let n_vertices = from.count(Scalar::I32, "the number of vertices")?;
+    let n_faces = from.count(Scalar::I32, "the number of faces")?;
+    from.count(Scalar::I32, "the number of edges")?;
+    check_n_vertices(name, place, n_vertices)?;
+
+    // A vertex is its position, then a normal, a colour and texture coordinates where the keyword says so.
+    let has = |letter| keyword.contains(&letter);
+    let n_floats =
+        3 + 3 * usize::from(has(b'N')) + 4 * usize::from(has(b'C')) + 2 * usize::from(has(b'S'));
+    let start = from.offset();
+    let table = from.take(n_vertices, 4 * n_floats, "vertices")?;
+    let mut positions = Vec::with_capacity(table.len() / (4 * n_floats));
+    for (ix, vertex) in table.chunks_exact(4 * n_floats).enumerate() {
+        let position = [0, 4, 8].map(|at| Scalar::F32.narrow(&vertex[at..], Endian::Big));
+        let place = Place::Byte((start + 4 * n_floats * ix) as u64);
+        finite(name, place, ix, position.map(f64::from))?;
+        positions.push(position);
+    }
+    parts.positions = Positions::F32(positions);
+
+    parts
+        .triangles
+        .reserve(n_faces.min(from.left() as u64 / 16) as usize);
+    for _ in 0..n_faces {
+        let place = from.place();
+        let n_corners = from.count(Scalar::I32, "the number of corners")?;
+        let corners = from.take(n_corners, 4, "corners")?;
+        parts.corners.clear();
+        for corner in corners.chunks_exact(4) {
+            let index = Scalar::I32.integer(corner, Endian::Big);
+            let corner = parts.vertex(index, 0, place)?;
+            parts.corners.push(corner);
+        }
+        add(&mut parts, place)?;
+        let n_colors = from.count(Scalar::I32, "the number of colour components")?;
+        from.take(n_colors, 4, "a colour")?;
+    }
+    Ok(parts)
 }
 
 /// A line `n i_1 … i_n`, perhaps with a colour after it.
@@ -110,7 +162,12 @@ fn face(parts: &mut Collector, line: Line) -> Result<(), Error> {
         let corner = parts.vertex(number(name, place, word, "a vertex index")?, 0, place)?;
         parts.corners.push(corner);
     }
-    match n_corners {
+    add(parts, place)
+}
+
+/// Adds the face whose corners were read last.
+fn add(parts: &mut Collector, place: Place) -> Result<(), Error> {
+    match parts.corners.len() {
         1 => parts.n_points += 1,
         2 => parts.n_lines += 1,
         _ => parts.polygon(place)?,

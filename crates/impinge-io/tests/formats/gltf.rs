@@ -164,7 +164,12 @@ fn gltf_errors() {
         (
             r#""asset""#,
             r#""extensionsRequired":["KHR_draco_mesh_compression"],"asset""#,
-            "file: the extension 'KHR_draco_mesh_compressi…' is not supported",
+            "file: the extension 'KHR_draco_mesh_compression' (a compressed mesh: export it again without compression) is not supported",
+        ),
+        (
+            r#""asset""#,
+            r#""extensionsRequired":["a\nb"],"asset""#,
+            r"file: the extension 'a\nb' is not supported",
         ),
         (
             r#""byteLength":18"#,

@@ -75,8 +75,12 @@ fn obj_errors_name_the_line_and_both_numbers() {
             "file:1: vertex 0 has the coordinate NaN, which is not a finite number",
         ),
         (
+            "v 0 0 0\nf\n",
+            "file:2: expected 3 corners of a polygon, or more, found 0",
+        ),
+        (
             "v 0 0 0\nf 1 1\n",
-            "file:2: expected 3 corners of a polygon, or more, found 2",
+            "file: no triangles or tetrahedra in this file (vertices: 1, triangles: 0, tetrahedra: 0, lines: 1, points: 0)",
         ),
         (
             "v 0 0 0\nf 1 x 1\n",
@@ -104,6 +108,101 @@ fn byte_order_marks_hide_no_vertex() {
 }
 
 #[test]
+fn obj_faces_of_one_or_two_corners_are_counted_and_skipped() {
+    let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\nf 1 2 3\nf 3\nf -1/1 -2/1\n";
+    let options = ReadOptions::default();
+    let (mesh, summary) =
+        read_bytes_with_summary(obj.as_bytes(), Format::Obj, "file", &options).or_show();
+    assert_eq!(triangles(&mesh), [[0, 1, 2]]);
+    assert_eq!((summary.n_lines_skipped, summary.n_points_skipped), (2, 1));
+    // Their vertices must exist.
+    assert_eq!(
+        message(Format::Obj, "v 0 0 0\nf 1 2\n"),
+        "file:2: vertex index 2 is out of range; vertices: 1, numbered from 1"
+    );
+}
+
+/// A binary OFF file: numbers of 32 bits, the most significant byte first.
+fn binary_off(keyword: &str, vertices: &[&[f32]], faces: &[(&[i32], &[f32])]) -> Vec<u8> {
+    let mut bytes = format!("{keyword} BINARY\n").into_bytes();
+    let int = |bytes: &mut Vec<u8>, n: i32| bytes.extend(n.to_be_bytes());
+    let floats = |bytes: &mut Vec<u8>, all: &[f32]| {
+        bytes.extend(all.iter().flat_map(|x| x.to_be_bytes()));
+    };
+    for n in [vertices.len(), faces.len(), 0] {
+        int(&mut bytes, n as i32);
+    }
+    for vertex in vertices {
+        floats(&mut bytes, vertex);
+    }
+    for (corners, color) in faces {
+        int(&mut bytes, corners.len() as i32);
+        for &corner in *corners {
+            int(&mut bytes, corner);
+        }
+        int(&mut bytes, color.len() as i32);
+        floats(&mut bytes, color);
+    }
+    bytes
+}
+
+#[test]
+fn off_binary() {
+    let read =
+        |bytes: &[u8]| read_bytes_with_summary(bytes, Format::Off, "file", &ReadOptions::default());
+    let (a, b, c) = ([0.5, -0.0, 0.0], [1.0, 0.0, 1e-40], [0.0, 1.0, 3e38]);
+    let faces: [(&[i32], &[f32]); 3] = [
+        (&[0, 1, 2], &[0.5; 4]),
+        (&[0, 2], &[]),
+        (&[0, 1, 2, 1], &[]),
+    ];
+    let with = |extra: usize| [a, b, c].map(|p| [&p[..], &vec![9.0; extra][..]].concat());
+    for (keyword, extra) in [("OFF", 0), ("NOFF", 3), ("COFF", 4), ("STCNOFF", 9)] {
+        let vertices = with(extra);
+        let vertices: Vec<&[f32]> = vertices.iter().map(Vec::as_slice).collect();
+        let bytes = binary_off(keyword, &vertices, &faces);
+        let (mesh, summary) = read(&bytes).or_show();
+        assert_eq!(mesh.positions, Positions::F32(vec![a, b, c]), "{keyword}");
+        assert_eq!(
+            triangles(&mesh),
+            [[0, 1, 2], [0, 1, 2], [0, 2, 1]],
+            "{keyword}"
+        );
+        assert_eq!(summary.n_lines_skipped, 1);
+        // Cut off anywhere it is an error.
+        for n in 0..bytes.len() {
+            read(&bytes[..n]).unwrap_err();
+        }
+    }
+    let vertices: [&[f32]; 3] = [&a, &b, &c];
+    let error = |faces: &[(&[i32], &[f32])], vertices: &[&[f32]]| {
+        read(&binary_off("OFF", vertices, faces))
+            .unwrap_err()
+            .to_string()
+    };
+    assert_eq!(
+        error(&[(&[0, 1, 3], &[])], &vertices),
+        "file: byte 59: vertex index 3 is out of range; vertices: 3, numbered from 0"
+    );
+    assert_eq!(
+        error(&[(&[], &[])], &vertices),
+        "file: byte 59: expected 3 corners of a polygon, or more, found 0"
+    );
+    assert_eq!(
+        error(&[], &[&a, &[0.0, f32::NAN, 0.0]]),
+        "file: byte 35: vertex 1 has the coordinate NaN, which is not a finite number"
+    );
+    let mut hostile = b"OFF BINARY\n".to_vec();
+    hostile.extend([i32::MAX, i32::MAX, 0].iter().flat_map(|n| n.to_be_bytes()));
+    assert!(
+        read(&hostile)
+            .unwrap_err()
+            .to_string()
+            .contains("vertices: 25769803764 bytes")
+    );
+}
+
+#[test]
 fn off_variants() {
     for off in [
         "OFF # comment\n# more\n3 1\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
@@ -127,7 +226,7 @@ fn off_variants() {
         ),
         (
             "OFF BINARY\n",
-            "file:1: binary OFF (supported: text) is not supported",
+            "file: byte 11: the number of vertices: 4 bytes are needed, but 0 are left",
         ),
         (
             "OFF\n3 1 0\n0 0 0\n1 0 0\n",

@@ -268,6 +268,9 @@ fn medit_errors_and_sections() {
     ] {
         assert_eq!(message(Format::Medit, &format!("{start}{more}")), expected);
     }
+    // Without 'End'.
+    let mesh = load(Format::Medit, &format!("{start}Triangles 1\n1 2 3 0\n")).or_show();
+    assert_eq!(triangles(&mesh), [[0, 1, 2]]);
     assert_eq!(
         message(Format::Medit, "MeshVersionFormatted 1\nDimension 2\n"),
         "file:2: dimension 2 (supported: 3) is not supported"
