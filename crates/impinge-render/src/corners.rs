@@ -1,29 +1,43 @@
-//! Faces in the form that the GPU draws: three corners each, with normals.
+//! Faces in the form that is drawn: three corners each, with normals.
 
-use bytemuck::{Pod, Zeroable};
-
+#[cfg(feature = "gpu")]
 use impinge::wgpu;
 
 use crate::picture::{Face, Normals, Picture, Surface};
 use crate::view::Frame;
 
-/// A corner of a face, the input of the vertex shader.
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+/// A corner of a face, the input of the vertex shader and of the renderer on the CPU.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "gpu", derive(bytemuck::Pod, bytemuck::Zeroable))]
 #[repr(C)]
 pub(crate) struct Corner {
     /// In the coordinates of a [`Frame`].
-    position: [f32; 3],
+    pub position: [f32; 3],
     /// In 32767ths; the last one is not used.
     normal: [i16; 4],
     /// sRGB; the last one is not used.
     color: [u8; 4],
 }
 
+impl Corner {
+    /// The unit normal, as a device reads it.
+    pub fn normal(&self) -> [f64; 3] {
+        [0, 1, 2].map(|k| f64::from(self.normal[k]) / f64::from(i16::MAX))
+    }
+
+    /// sRGB, 0 to 1.
+    pub fn color(&self) -> [f32; 3] {
+        [0, 1, 2].map(|k| f32::from(self.color[k]) / 255.0)
+    }
+}
+
 /// The layout of [`Corner`].
+#[cfg(feature = "gpu")]
 pub(crate) const CORNER: [wgpu::VertexAttribute; 3] =
     wgpu::vertex_attr_array![0 => Float32x3, 1 => Snorm16x4, 2 => Unorm8x4];
 
 /// Bytes per face.
+#[cfg(feature = "gpu")]
 pub(crate) const FACE_BYTES: u64 = 3 * size_of::<Corner>() as u64;
 
 /// Cosine of the sharpest edge that still looks smooth: 50 degrees.

@@ -1,8 +1,7 @@
-//! Pictures of meshes and their colliding primitives, drawn off screen with `wgpu` on any GPU, or on a
-//! software driver if there is none.
+//! Pictures of meshes and their colliding primitives, drawn off screen: on the CPU, or with `wgpu` on any GPU.
 //!
-//! A [`Picture`] is plain data: [`Surface`]s with one colour per face, a [`Camera`] and a size. A
-//! [`Renderer`] turns it into an [`Image`]. Unless the picture has a [`Focus`], the camera distance is chosen so that everything is visible.
+//! A [`Picture`] is plain data: [`Surface`]s with one colour per face, a [`Camera`] and a size. [`Picture::draw`] turns it into
+//! an [`Image`] on the CPU; with the feature `gpu` a `Renderer` does so on a GPU, with the same light. Unless the picture has a [`Focus`], the camera distance is chosen so that everything is visible.
 //!
 //! ```no_run
 //! use impinge::{Backend, Detector, Query, Scene};
@@ -21,7 +20,7 @@
 //!     let colliding = pairs.colliding(body);
 //!     picture.surfaces.push(Surface::of_body(scene.body(body)?, &colliding, colors)?);
 //! }
-//! Renderer::new()?.render(&picture)?.write_png("collision.png")?;
+//! picture.draw()?.write_png("collision.png")?; // or Renderer::new()?.render(&picture)?
 //! # Ok(()) }
 //! ```
 //!
@@ -32,24 +31,31 @@
 //! tetrahedra.
 //!
 //! # Live
-//! [`Live`] draws bodies that move into a texture of the caller's, such as a window's, many times per second. It is simpler
+//! `Live` (feature `gpu`) draws bodies that move into a texture of the caller's, such as a window's, many times per second. It is simpler
 //! (flat faces, no darkened hollows) and never waits for the device.
 //!
 //! # What it costs
-//! A picture is drawn in tiles, and faces are uploaded in chunks. So device memory beyond the faces themselves
+//! A picture is drawn in tiles, and faces are uploaded in chunks. So memory beyond the faces themselves
 //! (72 bytes each) is bounded, whatever the size of the picture. The same picture on the same device gives the
 //! same bytes; different devices may differ in the last bits.
 
 mod body;
 mod camera;
 mod corners;
+#[cfg(feature = "gpu")]
 mod device;
 mod error;
 mod image;
+#[cfg(feature = "gpu")]
 mod live;
+mod orbit;
 mod picture;
+#[cfg(feature = "gpu")]
 mod pipelines;
+#[cfg(feature = "gpu")]
 mod renderer;
+mod software;
+#[cfg(feature = "gpu")]
 mod targets;
 mod tubes;
 mod view;
@@ -59,9 +65,14 @@ pub use camera::{Camera, Focus, Projection, UpAxis};
 pub use error::Error;
 pub use image::Image;
 /// The GPU interface of [`Renderer::with_device`] and [`Live`].
+#[cfg(feature = "gpu")]
 pub use impinge::wgpu;
-pub use live::{Faces, Live, Look, Orbit};
+#[cfg(feature = "gpu")]
+pub use live::{Faces, Live, Look};
+pub use orbit::Orbit;
 pub use picture::{Face, Normals, Picture, Surface};
 #[doc(hidden)]
+#[cfg(feature = "gpu")]
 pub use pipelines::shaders;
+#[cfg(feature = "gpu")]
 pub use renderer::Renderer;

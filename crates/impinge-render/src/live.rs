@@ -1,7 +1,6 @@
 //! Bodies drawn again and again while they move.
 
 mod faces;
-mod orbit;
 mod pipelines;
 
 use impinge::{Positions, wgpu};
@@ -11,11 +10,10 @@ use crate::camera::Projection;
 use crate::error::Error;
 
 pub use faces::Faces;
-pub use orbit::Orbit;
 pub(crate) use pipelines::SHADERS;
 use pipelines::{BodyUniform, DEPTH, N_STORAGE_BUFFERS, Pipelines, ViewUniform};
 
-use orbit::dot;
+use crate::orbit::{Orbit, dot};
 
 /// [`BodyUniform::place`] of positions that are in place.
 const IN_PLACE: [f32; 4] = [0.0, 0.0, 0.0, 1.0];

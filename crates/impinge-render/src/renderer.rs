@@ -8,6 +8,7 @@ use crate::error::Error;
 use crate::image::Image;
 use crate::picture::Picture;
 use crate::pipelines::{FrameUniform, Pipelines};
+use crate::software::{BLUR, REACH, REACH_PIXELS};
 use crate::targets::{Chunks, Targets};
 use crate::view::{Frame, View};
 
@@ -27,12 +28,6 @@ pub struct Renderer {
 const CHUNK: u64 = 64 << 20;
 /// Width and height of a tile. With its margins it takes up to 300 MB of textures.
 const TILE: u32 = 1536;
-/// The largest distance between a hollow and a face that darkens it: as a share of the scene's longest half extent, and in
-/// pixels.
-const REACH: f32 = 0.16;
-const REACH_PIXELS: u32 = 254;
-/// The radius of the blur of occlusion, in pixels.
-const BLUR: u32 = 2;
 
 impl Renderer {
     /// A renderer on the first GPU, or on a software driver if there is none.

@@ -1,7 +1,7 @@
 //! Fits a camera to the content of a picture.
 
 use crate::camera::{Axes, Focus, Projection};
-use crate::live::Orbit;
+use crate::orbit::Orbit;
 use crate::picture::Picture;
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {

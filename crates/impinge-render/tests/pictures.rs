@@ -1,4 +1,5 @@
-//! Pictures on the first adapter. The tests fail if there is none; a software driver suffices.
+//! Pictures on the first adapter, and on the CPU, which must look alike. The tests fail if there is no adapter; a software driver
+//! suffices.
 
 use impinge::{Backend, Detector, Query, Scene};
 use impinge_render::{
@@ -12,6 +13,21 @@ const GREY: [u8; 3] = [200, 200, 200];
 
 fn renderer() -> Renderer {
     Renderer::new().expect("a GPU or a software driver is needed")
+}
+
+/// The picture by the device, which the CPU draws alike.
+#[track_caller]
+fn render(picture: &Picture) -> Image {
+    let image = renderer().render(picture).unwrap();
+    let by_cpu = picture.draw().unwrap();
+    let n_pixels = image.pixels().len();
+    // Samples at the edges of faces are rounded differently.
+    let n_alike = n_pixels - n_differing(&image, &by_cpu, 6);
+    assert!(
+        n_alike * 200 >= n_pixels * 199,
+        "{n_alike} of {n_pixels} are alike"
+    );
+    image
 }
 
 /// Looks along -z at a triangle or more; y is up.
@@ -87,9 +103,7 @@ fn a_triangle_covers_its_pixels_and_no_others() {
             // Both sides look the same.
             surface.faces[0].corners = [0, 2, 1];
         }
-        let image = renderer()
-            .render(&plain(vec![surface], [100, 100]))
-            .unwrap();
+        let image = render(&plain(vec![surface], [100, 100]));
         assert_eq!((image.width(), image.height()), (100, 100));
         for y in 0..100 {
             for x in 0..100 {
@@ -112,7 +126,7 @@ fn the_nearer_face_hides_the_other_whatever_their_order() {
     for (red_z, blue_z, expected) in [(0.1, 0.0, RED), (0.0, 0.1, BLUE)] {
         let (red, blue) = (at_depth(red_z, RED), at_depth(blue_z, BLUE));
         for surfaces in [vec![red.clone(), blue.clone()], vec![blue, red]] {
-            let image = renderer().render(&plain(surfaces, [64, 64])).unwrap();
+            let image = render(&plain(surfaces, [64, 64]));
             assert_near(at(&image, 20, 44), expected);
         }
     }
@@ -135,7 +149,7 @@ fn a_face_that_shows_through_wins_against_one_in_the_same_place() {
     over.positions.iter_mut().for_each(|point| point[2] += 0.01);
     let n_red = |surfaces: [&Surface; 2]| {
         let picture = plain(surfaces.map(Surface::clone).to_vec(), [200, 200]);
-        count(&renderer().render(&picture).unwrap(), is_red)
+        count(&render(&picture), is_red)
     };
     let expected = n_red([&grey, &over]);
     assert!(expected > 1_000);
@@ -155,7 +169,7 @@ fn a_hidden_face_that_shows_through_is_seen_as_far_as_asked() {
             see_through,
             ..plain(vec![near.clone(), far.clone()], [64, 64])
         };
-        let image = renderer().render(&picture).unwrap();
+        let image = render(&picture);
         let [r, g, _] = at(&image, 16, 47);
         redness.push(i32::from(r) - i32::from(g));
         // The rest stays as it is.
@@ -211,7 +225,7 @@ fn the_viewer_stands_where_the_angles_say() {
                 up,
                 projection,
             };
-            let image = renderer().render(&picture).unwrap();
+            let image = render(&picture);
             assert_near(at(&image, 30, 30), expected);
         }
     }
@@ -246,7 +260,7 @@ fn everything_is_in_the_picture_and_fills_it() {
                 up: UpAxis::Z,
                 projection,
             };
-            let image = renderer().render(&picture).unwrap();
+            let image = render(&picture);
             let [width, height] = size;
             let covered = |x: u32, y: u32| at(&image, x, y) != [0; 3];
             let (mut first, mut last) = ([u32::MAX; 2], [0; 2]);
@@ -313,7 +327,7 @@ fn what_collides_is_red_and_blue() {
         [solid_ball(3_000), solid_ball(3_000).translated(apart)],
     ] {
         let mut picture = colliding(models);
-        let image = renderer().render(&picture).unwrap();
+        let image = render(&picture);
         assert!(count(&image, is_red) > 100, "{}", count(&image, is_red));
         assert!(count(&image, is_blue) > 100, "{}", count(&image, is_blue));
         for face in picture
@@ -323,7 +337,7 @@ fn what_collides_is_red_and_blue() {
         {
             face.color = GREY;
         }
-        let grey = renderer().render(&picture).unwrap();
+        let grey = render(&picture);
         assert_eq!((count(&grey, is_red), count(&grey, is_blue)), (0, 0));
     }
 }
@@ -347,7 +361,7 @@ fn runs_and_chunks_change_no_byte_and_tiles_no_picture() {
     let mut one = renderer();
     let image = one.render(&picture).unwrap();
     assert_eq!(image, one.render(&picture).unwrap());
-    assert_eq!(image, renderer().render(&picture).unwrap());
+    assert_eq!(image, render(&picture));
     for (tile, n_faces) in [(1536, 100), (1536, 1), (100, 100_000), (37, 700)] {
         let image_of_parts = renderer()
             .with_room(tile, n_faces)
@@ -364,6 +378,13 @@ fn runs_and_chunks_change_no_byte_and_tiles_no_picture() {
             n_differing(&image, &image_of_parts, 0) < 50,
             "{tile} {n_faces}"
         );
+    }
+    // So it is on the CPU.
+    let by_cpu = picture.draw().unwrap();
+    assert_eq!(by_cpu, picture.draw().unwrap());
+    for tile in [100, 37] {
+        let of_parts = picture.draw_in_tiles(tile).unwrap();
+        assert_eq!(n_differing(&by_cpu, &of_parts, 0), 0, "{tile}");
     }
     // Shows that the comparison can fail: another picture has other bytes.
     picture.camera.azimuth += 1.0;
@@ -392,9 +413,9 @@ fn hollows_are_darker() {
     ];
     let mut picture = plain(surfaces, [200, 200]);
     picture.camera.elevation = 45.0;
-    let flat = renderer().render(&picture).unwrap();
+    let flat = render(&picture);
     picture.occlusion = 1.0;
-    let shaded = renderer().render(&picture).unwrap();
+    let shaded = render(&picture);
     // The edge between floor and wall lies in the middle of the picture's height.
     let edge = (50..150).max_by_key(|&y| at(&flat, 100, y)[0].abs_diff(at(&shaded, 100, y)[0]));
     let edge = edge.unwrap();
@@ -409,7 +430,7 @@ fn an_empty_picture_is_its_background() {
         size: [7, 5],
         ..Picture::default()
     };
-    let image = renderer().render(&picture).unwrap();
+    let image = render(&picture);
     assert_eq!(image.pixels(), [[10, 20, 30, 255]; 35]);
     // A point and a needle are invisible and do no harm.
     let point = triangle([[1.0; 3]; 3], RED);
@@ -421,7 +442,7 @@ fn an_empty_picture_is_its_background() {
         ] {
             let mut picture = plain(vec![surface.clone()], [8, 8]);
             picture.camera.projection = projection;
-            let image = renderer().render(&picture).unwrap();
+            let image = render(&picture);
             assert!(image.pixels().iter().all(|p| *p == [0, 0, 0, 255]));
         }
     }
@@ -518,7 +539,7 @@ fn files_hold_the_pixels() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.png");
     let surface = triangle([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], RED);
-    let image = renderer().render(&plain(vec![surface], [50, 20])).unwrap();
+    let image = render(&plain(vec![surface], [50, 20]));
     image.write_png(&path).unwrap();
     let file = std::io::BufReader::new(std::fs::File::open(&path).unwrap());
     let mut reader = png::Decoder::new(file).read_info().unwrap();

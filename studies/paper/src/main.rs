@@ -14,6 +14,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::args::Args;
 
 fn main() -> ExitCode {
+    #[cfg(all(feature = "gpu", target_os = "linux"))]
+    keep_mesa_quiet();
     let args = Args::parse();
     match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
@@ -21,6 +23,16 @@ fn main() -> ExitCode {
             eprintln!("impinge-paper: {failure}");
             ExitCode::from(failure.exit_code())
         }
+    }
+}
+
+/// As in the program `impinge`: without a desktop session, a Vulkan layer of Mesa complains on standard error each time
+/// that a GPU is searched for. The program chooses the GPU itself, so the layer is switched off.
+#[cfg(all(feature = "gpu", target_os = "linux"))]
+fn keep_mesa_quiet() {
+    if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+        // SAFETY: the program has just started, so no other thread can read the environment.
+        unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
     }
 }
 
