@@ -5,10 +5,12 @@
 //! its batch is in progress, so it always holds complete lines only. Batch b belongs to the process whose rank is
 //! b modulo the number of processes, so no two processes write one file. `cat rows-*.jsonl` gives all rows.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+
+use impinge_io::AtomicFile;
 
 use crate::row::Row;
 
@@ -20,7 +22,7 @@ const WAIT: Duration = Duration::from_secs(1);
 #[non_exhaustive]
 pub enum StoreError {
     /// The operating system reported an error. Check the folder and the free space on its disk.
-    #[error("{}: cannot {action}: {source}", .path.display())]
+    #[error("{}: cannot {action}: {source}", impinge_io::printable(.path))]
     Io {
         /// The file or folder.
         path: PathBuf,
@@ -29,8 +31,11 @@ pub enum StoreError {
         /// The system's error.
         source: io::Error,
     },
+    /// A file of rows could not be written. Check the free space on its disk.
+    #[error(transparent)]
+    Write(#[from] impinge_io::Error),
     /// A line is not a row of this program. Remove the file, and its meshes are checked again.
-    #[error("{}:{line}: not a row; remove the file to check its meshes again", .path.display())]
+    #[error("{}:{line}: not a row; remove the file to check its meshes again", impinge_io::printable(.path))]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -38,7 +43,7 @@ pub enum StoreError {
         line: usize,
     },
     /// The folder holds rows of another list, batch length or welding. Use a new folder.
-    #[error("{}:{line}: the row of '{found}' is not of this run: {why}", .path.display())]
+    #[error("{}:{line}: the row of '{}' is not of this run: {why}", impinge_io::printable(.path), impinge_io::printable(.found))]
     OtherRun {
         /// The file.
         path: PathBuf,
@@ -93,6 +98,8 @@ impl RowStore {
         fs::create_dir_all(folder).map_err(io_error("create the folder"))?;
         let batch_len = batch_len.max(1);
         let world_size = world_size.max(1);
+        remove_leftovers(folder, |batch| batch % world_size == rank)
+            .map_err(io_error("remove temporary files from the folder"))?;
         let mut batches = Vec::new();
         for (number, meshes) in paths.chunks(batch_len).enumerate() {
             if number % world_size == rank {
@@ -222,26 +229,35 @@ fn read_batch(
 /// Writes the rows of a batch to a temporary file and renames it.
 fn write_batch(folder: &Path, batch: &mut Batch) -> Result<(), StoreError> {
     let path = file(folder, batch.number);
-    let part = folder.join(format!(
-        ".rows-{:08}.{}.part",
-        batch.number,
-        std::process::id()
-    ));
     let mut text = String::new();
     for row in batch.rows.iter().flatten() {
         text += &row.to_json().to_string();
         text.push('\n');
     }
-    let written = File::create(&part).and_then(|mut to| {
-        to.write_all(text.as_bytes())?;
-        to.sync_data()
-    });
-    let renamed = written.and_then(|()| fs::rename(&part, &path));
-    renamed.map_err(|source| StoreError::Io {
+    let mut to = AtomicFile::create(&path)?;
+    let written = to.write_all(text.as_bytes()).and_then(|()| to.sync());
+    written.map_err(|source| StoreError::Io {
         path,
         action: "write",
         source,
     })?;
+    to.finish()?;
     batch.waiting = None;
+    Ok(())
+}
+
+/// Removes temporary files that a killed process left in this process's batches. No other process writes these batches.
+fn remove_leftovers(folder: &Path, is_mine: impl Fn(usize) -> bool) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let batch = name
+            .to_str()
+            .and_then(|name| name.strip_prefix(".rows-")?.strip_suffix(".part"))
+            .and_then(|rest| rest.split('.').next()?.parse().ok());
+        if batch.is_some_and(&is_mine) {
+            fs::remove_file(entry.path())?;
+        }
+    }
     Ok(())
 }

@@ -126,3 +126,35 @@ fn rows_of_another_run_and_damaged_ones_are_named() {
         "{error}"
     );
 }
+
+#[test]
+fn no_temporary_file_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = meshes(3);
+    // Left by killed processes: of this rank, and of another one that may be at work.
+    for name in [
+        ".rows-00000000.jsonl.77-0.part",
+        ".rows-00000002.77.part",
+        ".rows-00000001.jsonl.78-0.part",
+    ] {
+        std::fs::write(folder.path().join(name), "{").unwrap();
+    }
+    let mut store = RowStore::open(folder.path(), &list, true, 1, (0, 2), false).unwrap();
+    // A file that can't be replaced.
+    std::fs::create_dir(folder.path().join("rows-00000002.jsonl")).unwrap();
+    store.put(0, row(&list[0])).unwrap();
+    store.put(2, row(&list[2])).unwrap_err();
+    let mut names: Vec<String> = std::fs::read_dir(folder.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    assert_eq!(
+        names,
+        [
+            ".rows-00000001.jsonl.78-0.part",
+            "rows-00000000.jsonl",
+            "rows-00000002.jsonl"
+        ]
+    );
+}

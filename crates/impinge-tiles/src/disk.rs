@@ -1,31 +1,32 @@
 //! Files that exist whole or not at all.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
+
+use impinge_io::AtomicFile;
 
 use crate::error::Error;
 
 /// Writes a temporary file and renames it, so that readers see either the old file or the new one. A process that is
-/// killed leaves a `.part` file behind. No step reads it, and the next process with the same process id replaces it.
+/// killed leaves a `.part` file behind, which no step reads.
 pub fn replace(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), Error> {
-    let attempt = || {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let part = path.with_file_name(format!(".{name}.{}.part", std::process::id()));
-        step()?;
-        let mut to = BufWriter::with_capacity(1 << 18, Stepped(File::create(&part)?));
-        write(&mut to)?;
-        to.flush()?;
-        step()?;
-        to.get_ref().0.sync_data()?;
-        step()?;
-        fs::rename(&part, path)
-    };
-    attempt().map_err(|source| Error::io(path, "write", source))?;
-    step().map_err(|source| Error::io(path, "write", source))
+    let error = |source| Error::io(path, "write", source);
+    step().map_err(error)?;
+    let mut file = AtomicFile::create(path)?;
+    let mut to = BufWriter::with_capacity(1 << 18, Stepped(&mut file));
+    let written = write(&mut to).and_then(|()| to.flush());
+    drop(to);
+    let synced = written
+        .and_then(|()| step())
+        .and_then(|()| file.sync())
+        .and_then(|()| step());
+    synced.map_err(error)?;
+    file.finish()?;
+    step().map_err(error)
 }
 
 /// Creates a folder, unless it exists.
@@ -34,9 +35,9 @@ pub fn folder(path: &Path) -> Result<(), Error> {
 }
 
 /// A file in which every write is a step at which a test may stop.
-struct Stepped(File);
+struct Stepped<'a>(&'a mut AtomicFile);
 
-impl Write for Stepped {
+impl Write for Stepped<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if step().is_err() {
             // Like a process that is killed in the middle of a write: half of the bytes are on the disk.

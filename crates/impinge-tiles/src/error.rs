@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum Error {
     /// The operating system reported an error. Check the path, and the free space on its disk.
-    #[error("{}: cannot {action}: {source}", .path.display())]
+    #[error("{}: cannot {action}: {source}", impinge_io::printable(.path))]
     Io {
         /// The file or folder.
         path: PathBuf,
@@ -16,7 +16,7 @@ pub enum Error {
         /// The system's error.
         source: std::io::Error,
     },
-    /// A mesh file that can't be read.
+    /// A mesh file that can't be read, or a file that can't be written.
     #[error(transparent)]
     Mesh(#[from] impinge_io::Error),
     /// The detection in a tile failed or was cancelled.
@@ -31,7 +31,7 @@ pub enum Error {
     #[error("cancelled")]
     Cancelled,
     /// A coordinate that is not finite. Its box would lie in no tile.
-    #[error("{}: primitive {primitive} has the coordinate {value:e}: not a finite number", .path.display())]
+    #[error("{}: primitive {primitive} has the coordinate {value:e}: not a finite number", impinge_io::printable(.path))]
     Coordinate {
         /// The mesh file.
         path: PathBuf,
@@ -41,7 +41,7 @@ pub enum Error {
         value: f64,
     },
     /// A primitive names a vertex that the file does not have.
-    #[error("{}: primitive {primitive} names vertex {index}, but there are {n_vertices} vertices", .path.display())]
+    #[error("{}: primitive {primitive} names vertex {index}, but there are {n_vertices} vertices", impinge_io::printable(.path))]
     VertexIndex {
         /// The mesh file.
         path: PathBuf,
@@ -53,7 +53,7 @@ pub enum Error {
         n_vertices: u64,
     },
     /// More elements than 32-bit numbers can name. Split the file.
-    #[error("{}: {given} {what}, at most {limit} can be numbered", .path.display())]
+    #[error("{}: {given} {what}, at most {limit} can be numbered", impinge_io::printable(.path))]
     TooMany {
         /// The mesh file.
         path: PathBuf,
@@ -65,7 +65,7 @@ pub enum Error {
         limit: u64,
     },
     /// The two files of a body in a step have different elements.
-    #[error("{}: the end of the step must have the elements of {}: {what}", .end.display(), .start.display())]
+    #[error("{}: the end of the step must have the elements of {}: {what}", impinge_io::printable(.end), impinge_io::printable(.start))]
     Ends {
         /// The file of the start.
         start: PathBuf,
@@ -75,19 +75,19 @@ pub enum Error {
         what: String,
     },
     /// A mesh file has changed since the plan was made. Make a new plan.
-    #[error("{}: changed since the plan was made", .path.display())]
+    #[error("{}: changed since the plan was made", impinge_io::printable(.path))]
     Changed {
         /// The mesh file.
         path: PathBuf,
     },
     /// The folder holds another plan. Use a new folder, or replace the plan.
-    #[error("{}: there is another plan in this folder", .path.display())]
+    #[error("{}: there is another plan in this folder", impinge_io::printable(.path))]
     OtherPlan {
         /// The plan's file.
         path: PathBuf,
     },
     /// A file of this folder is damaged. Remove it, and run the step that writes it again.
-    #[error("{}: damaged ({what}); remove it and run `{step}` again", .path.display())]
+    #[error("{}: damaged ({what}); remove it and run `{step}` again", impinge_io::printable(.path))]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -97,7 +97,7 @@ pub enum Error {
         step: &'static str,
     },
     /// A file of this folder was made by another plan. Run the step that writes it again.
-    #[error("{}: stale, made by another plan; run `{step}` again", .path.display())]
+    #[error("{}: stale, made by another plan; run `{step}` again", impinge_io::printable(.path))]
     Stale {
         /// The file.
         path: PathBuf,
@@ -105,7 +105,7 @@ pub enum Error {
         step: &'static str,
     },
     /// A step is not complete.
-    #[error("{}: missing; run `{step}` first ({n_missing} of {n} are missing)", .path.display())]
+    #[error("{}: missing; run `{step}` first ({n_missing} of {n} are missing)", impinge_io::printable(.path))]
     Missing {
         /// The first file that is missing.
         path: PathBuf,
