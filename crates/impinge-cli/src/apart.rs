@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use impinge_io::printable;
+
 use crate::error::Error;
 
 /// The input files.
@@ -23,8 +25,8 @@ impl Inputs {
             None => Ok(()),
             Some((input, _)) => Err(Error::Usage(format!(
                 "{option} {} is the input {}, which would be lost: choose another name",
-                output.display(),
-                input.display()
+                printable(output),
+                printable(input)
             ))),
         }
     }

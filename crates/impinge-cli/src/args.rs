@@ -1,8 +1,8 @@
 //! The command line and its help.
 
 mod choices;
+mod help;
 mod near;
-#[cfg(feature = "gpu")]
 mod picture;
 mod step;
 #[cfg(feature = "view")]
@@ -15,7 +15,6 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use impinge_fem::scenes::SceneName;
 
 use crate::commands::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, TILES_EXAMPLES, TilesArgs};
-#[cfg(feature = "gpu")]
 use crate::values::PngFile;
 use crate::values::{
     CurvesFile, FrameRange, FramesFile, MeshFile, RowsFile, RowsFormat, at_least_one, body_numbers,
@@ -23,8 +22,8 @@ use crate::values::{
 };
 
 pub use choices::{BackendArg, BodiesArg, MethodArg, SharedVertexArg, StartArg, ToiArg};
+pub use help::parse;
 pub use near::NearArgs;
-#[cfg(feature = "gpu")]
 pub use picture::PictureArgs;
 pub use step::{StepArgs, StepHow};
 #[cfg(feature = "view")]
@@ -54,7 +53,8 @@ Examples:
 Exit codes: 0 done, 2 bad usage, 3 pairs or contacts were found and --fail-on-hit was given,
 4 the start of a step already intersects, 130 stopped by Ctrl-C (128 and the signal's number), 1 any other error
 (one line on stderr).
-`impinge help COMMAND` explains a command.";
+`impinge COMMAND --help` lists the options of a command, `impinge help COMMAND` also explains their values.
+`impinge help detection`, `help rows` and `help picture` explain the options that many commands share.";
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
@@ -101,16 +101,30 @@ pub enum Command {
     #[command(hide = true)]
     CheckWorker(CheckWorkerArgs),
     /// Draw meshes with colliding primitives in red and blue
-    #[cfg(feature = "gpu")]
     #[command(after_help = RENDER_EXAMPLES)]
     Render(RenderArgs),
     /// Show meshes and what collides in them in a window, live; without a mesh, the built-in scene
     #[cfg(feature = "view")]
     #[command(after_help = view::VIEW_EXAMPLES)]
     View(ViewArgs),
+    /// Show meshes and what collides in them in a window: not in this build, see --features view
+    #[cfg(not(feature = "view"))]
+    View(AbsentArgs),
     /// List GPUs and software drivers, for --device
     #[cfg(feature = "gpu")]
     Devices(DevicesArgs),
+    /// List GPUs and software drivers: not in this build, see --features gpu
+    #[cfg(not(feature = "gpu"))]
+    Devices(AbsentArgs),
+}
+
+/// Arguments of a command that this build has not: any.
+#[cfg(not(feature = "view"))]
+#[derive(Debug, Clone, Args)]
+#[command(disable_help_flag = true)]
+pub struct AbsentArgs {
+    #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
+    _any: Vec<std::ffi::OsString>,
 }
 
 /// Arguments of `impinge devices`.
@@ -122,16 +136,12 @@ pub struct DevicesArgs {
     pub json: bool,
 }
 
-#[cfg(feature = "gpu")]
 const RENDER_EXAMPLES: &str = "\
 Examples:
   impinge render a.obj b.obj --png out.png
   impinge render a.ply b.msh --png out.png --size 1920x1080 --azimuth -60 --up z
   impinge render cow.off --png cow.png --see-through 1
-  impinge pairs a.ply b.ply --png out.png           the answer and a picture
-
-Without a GPU, a software driver suffices. Colliding primitives of body 0 are red, those of body 1 blue,
-then green, orange, …; hidden ones show through faintly.";
+  impinge pairs a.ply b.ply --png out.png           the answer and a picture";
 
 const DEMO_EXAMPLES: &str = "\
 Examples:
@@ -139,7 +149,7 @@ Examples:
   impinge demo --triangles 1000000 --frames 100
   impinge demo --threads 1 --out frame.ply
 
-The written mesh shows the frame with the most pairs. Colliding triangles have one colour per body.";
+The written mesh and the picture show the frame with the most pairs. Colliding triangles have one colour per body.";
 
 const PAIRS_EXAMPLES: &str = "\
 Examples:
@@ -152,14 +162,7 @@ Examples:
   impinge pairs a.ply b.ply c.ply --ignore 0,1 --out seen.glb
   impinge pairs a.ply b.ply --curves curves.obj --contacts contacts.csv
   impinge pairs machine.glb                     the nodes of one file with each other
-  impinge pairs a.glb b.obj --bodies nodes      each node of a.glb, and all of b.obj
-
-Rows of --pairs are body_a, primitive_a, body_b, primitive_b (u32, sorted): bodies numbered
-from 0 as given, primitives as in the file. With `--pairs -` the summary goes to standard error.
-
---contacts has one row per corner of the intersection of two triangles: a point, the two ends of a segment,
-or the corners of a polygon if both triangles lie in one plane. feature_a and feature_b say where the corner
-lies in each triangle: on vertex 7 (v7), edge 7-9 (e7-9) or face 3 (f3).";
+  impinge pairs a.glb b.obj --bodies nodes      each node of a.glb, and all of b.obj";
 
 const DISTANCE_EXAMPLES: &str = "\
 Examples:
@@ -217,7 +220,7 @@ pub struct DetectorArgs {
     /// A part of the GPU's name, to choose among several (`impinge devices` lists them)
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
-    /// CPU threads [default: one per core]
+    /// CPU threads, 1 to 1024 [default: one per core]
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     pub threads: Option<NonZeroUsize>,
     /// Density coefficient of the grid of `--method cells`
@@ -315,10 +318,8 @@ pub struct AnswerArgs {
     #[arg(long, value_name = "FILE")]
     pub out: Option<MeshFile>,
     /// Draw the meshes with colliding primitives coloured (.png)
-    #[cfg(feature = "gpu")]
     #[arg(long, value_name = "FILE")]
     pub png: Option<PngFile>,
-    #[cfg(feature = "gpu")]
     #[command(flatten)]
     pub picture: PictureArgs,
 }
@@ -333,10 +334,7 @@ impl AnswerArgs {
         let curves = self.curves.as_ref();
         let curves = curves.map(|file| ("--curves", file.path.as_path()));
         let out = self.out.as_ref().map(|file| ("--out", file.path.as_path()));
-        #[cfg(feature = "gpu")]
         let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
-        #[cfg(not(feature = "gpu"))]
-        let png = None;
         [pairs, contacts, curves, out, png]
             .into_iter()
             .flatten()
@@ -352,7 +350,6 @@ impl AnswerArgs {
 }
 
 /// Arguments of `impinge render`.
-#[cfg(feature = "gpu")]
 #[derive(Debug, Args)]
 pub struct RenderArgs {
     /// Mesh files, one per body
@@ -438,15 +435,13 @@ pub struct SequenceArgs {
     #[arg(long, value_name = "FILE")]
     pub out: Option<FramesFile<MeshFile>>,
     /// Draw each frame (seen_%04d.png)
-    #[cfg(feature = "gpu")]
     #[arg(long, value_name = "FILE")]
     pub png: Option<FramesFile<PngFile>>,
-    #[cfg(feature = "gpu")]
     #[command(flatten)]
     pub picture: PictureArgs,
     /// Find what touches on the way from each frame to the next, and when first; vertices move on straight lines
     #[arg(long, conflicts_with_all = ["pairs", "out"])]
-    #[cfg_attr(feature = "gpu", arg(conflicts_with = "png"))]
+    #[arg(conflicts_with = "png")]
     pub ccd: bool,
     #[command(flatten)]
     pub step: StepHow,
@@ -530,16 +525,17 @@ pub struct DemoArgs {
     /// Where to write the coloured mesh (.ply, .glb or .vtu)
     #[arg(long, value_name = "FILE", default_value = "out/demo.glb")]
     pub out: MeshFile,
+    /// Where to draw the picture (.png) [default: beside the mesh]
+    #[arg(long, value_name = "FILE")]
+    pub png: Option<PngFile>,
     #[command(flatten)]
     pub detector: DetectorArgs,
 }
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     #[test]
     fn the_command_line_is_consistent() {
-        super::Cli::command().debug_assert();
+        super::help::command().debug_assert();
     }
 }

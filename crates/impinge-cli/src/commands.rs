@@ -9,7 +9,6 @@ mod devices;
 mod distance;
 mod near;
 mod record;
-#[cfg(feature = "gpu")]
 mod render;
 mod sequence;
 mod simulate;
@@ -25,7 +24,6 @@ pub use demo::demo;
 pub use devices::devices;
 pub use distance::distance;
 pub use near::near;
-#[cfg(feature = "gpu")]
 pub use render::render;
 pub use sequence::sequence;
 pub use simulate::simulate;

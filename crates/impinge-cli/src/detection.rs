@@ -43,7 +43,7 @@ fn backend(args: &DetectorArgs) -> Backend {
 /// Whether this machine may have a hardware GPU. Searching for one loads every driver, and some software drivers then write to
 /// standard error. On Linux a GPU has a file in `/dev`, made by the kernel's graphics drivers, by NVIDIA's driver, by WSL
 /// or by a phone's driver.
-fn may_have_gpu() -> bool {
+pub fn may_have_gpu() -> bool {
     if !cfg!(target_os = "linux") {
         return true;
     }

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::PathBuf;
 
+use impinge_io::printable;
+
 use crate::stop;
 
 /// An error that ends the program.
@@ -12,7 +14,6 @@ pub enum Error {
     #[error("{0}")]
     Usage(String),
     /// A picture could not be drawn or written.
-    #[cfg(feature = "gpu")]
     #[error(transparent)]
     Picture(#[from] impinge_render::Error),
     /// A window could not be opened.
@@ -27,7 +28,7 @@ pub enum Error {
     #[error(transparent)]
     File(#[from] impinge_io::Error),
     /// A file whose content the library refuses; `what` names it.
-    #[error("{what}: {source}")]
+    #[error("{}: {source}", printable(.what))]
     Refused {
         what: String,
         source: impinge::Error,
@@ -42,23 +43,23 @@ pub enum Error {
     #[error(transparent)]
     Simulation(#[from] impinge_fem::Error),
     /// A saved state that is damaged or belongs to another simulation.
-    #[error("{}: {source}", .path.display())]
+    #[error("{}: {source}", printable(.path))]
     SavedState {
         path: PathBuf,
         source: impinge_fem::Error,
     },
     /// A simulation was stopped, and has saved its state.
-    #[error("stopped after step {step} of {n_steps}; --resume continues in {}", .folder.display())]
+    #[error("stopped after step {step} of {n_steps}; --resume continues in {}", printable(.folder))]
     Stopped {
         step: u64,
         n_steps: u64,
         folder: PathBuf,
     },
     /// A file of an earlier run could not be read.
-    #[error("{}: cannot read: {source}", .path.display())]
+    #[error("{}: cannot read: {source}", printable(.path))]
     Read { path: PathBuf, source: io::Error },
     /// Rows of pairs, or the folder of an output file, could not be written.
-    #[error("{}: cannot write: {source}", .path.display())]
+    #[error("{}: cannot write: {source}", printable(.path))]
     Write { path: PathBuf, source: io::Error },
     /// Pairs were found, and `--fail-on-hit` was given.
     #[error("pairs were found")]
@@ -84,6 +85,16 @@ pub enum Error {
     /// Meshes have what `--fail-on` names.
     #[error("{0}")]
     CheckFailed(String),
+    /// Some files could not be read or checked. All others were.
+    #[error("{0}")]
+    Unread(String),
+    /// A part that this program was built without: its name, its feature, and what else it needs.
+    #[cfg(not(feature = "view"))]
+    #[error(
+        "this impinge was built without {0}: build it with --features {1}{2}, such as `cargo install --git \
+         https://github.com/impinge-rs/impinge impinge-cli --features {1}`"
+    )]
+    NotBuilt(&'static str, &'static str, &'static str),
     /// Two methods gave different answers: a defect of the library.
     #[error(
         "frame {frame}: {n_found} pairs by {method}, {n_expected} by {reference}, and the sets differ: please report this"
@@ -130,7 +141,7 @@ impl Error {
         matches!(self, Error::Hit | Error::StartIntersects) || self.exit_code() == 0
     }
 
-    /// The message on one line.
+    /// The message on one line. Names of files are escaped in it; what a driver says may have several lines.
     pub fn line(&self) -> String {
         let text = self.to_string();
         let lines: Vec<&str> = text

@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 
 use impinge::{BodyId, Pairs, Scene};
+use impinge_io::printable;
 
 use crate::error::Error;
 use crate::load::Nouns;
@@ -39,10 +40,9 @@ pub fn write(
         "{subject}: {n_pairs} of {of} in {}{near}",
         counted(regions.len() as u64, "place")
     )?;
-    if regions
-        .iter()
-        .any(|region| region.bodies != regions[0].bodies)
-    {
+    // Whose pairs they are, unless the subject says so.
+    let all = [0, bodies.len().saturating_sub(1)];
+    if bodies.len() > 2 || regions.iter().any(|region| region.bodies != all) {
         meetings(to, bodies, regions)?;
     }
     if regions.len() > 1 {
@@ -69,14 +69,21 @@ fn of_whom(
     nouns: &Nouns,
     bodies: &[(BodyId, &str)],
 ) -> Result<(String, String), Error> {
-    let subject = match (&nouns.file, bodies) {
-        (Some(file), _) => file.clone(),
-        (None, [(_, one)]) => (*one).to_owned(),
-        (None, [(_, a), (_, b)]) => format!("{a} and {b}"),
+    // A file that could not be read is a body without primitives.
+    let mut read = Vec::with_capacity(bodies.len());
+    for &(id, name) in bodies {
+        if scene.body(id)?.n_primitives() > 0 {
+            read.push((id, name));
+        }
+    }
+    let subject = match (&nouns.file, &read[..]) {
+        (Some(file), _) => printable(file),
+        (None, [(_, one)]) => printable(one),
+        (None, [(_, a), (_, b)]) => format!("{} and {}", printable(a), printable(b)),
         (None, many) => format!("{} {}", many.len(), nouns.many),
     };
     let mut kinds: Vec<(&'static str, usize)> = Vec::new();
-    for &(id, _) in bodies {
+    for &(id, _) in &read {
         let body = scene.body(id)?;
         let kind = body.kind().name();
         match kinds.iter_mut().find(|(name, _)| *name == kind) {
@@ -149,8 +156,8 @@ fn more(to: &mut impl Write, n: usize) -> io::Result<()> {
 
 fn who(bodies: &[(BodyId, &str)], [a, b]: [usize; 2]) -> String {
     match a == b {
-        true => format!("{} with itself", bodies[a].1),
-        false => format!("{} and {}", bodies[a].1, bodies[b].1),
+        true => format!("{} with itself", printable(bodies[a].1)),
+        false => format!("{} and {}", printable(bodies[a].1), printable(bodies[b].1)),
     }
 }
 

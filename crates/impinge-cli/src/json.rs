@@ -86,6 +86,17 @@ pub fn without_pairs(
     object
 }
 
+/// Adds the files that could not be read, if there are any.
+pub fn add_unread(object: &mut Map<String, Value>, unread: &[(usize, String)], names: &[String]) {
+    if unread.is_empty() {
+        return;
+    }
+    let described = unread
+        .iter()
+        .map(|(body, why)| json!({ "body": body, "name": names[*body], "error": why }));
+    object.insert("unread".into(), described.collect());
+}
+
 /// Milliseconds, rounded to whole nanoseconds, which is the resolution of the clock.
 pub fn rounded(ms: f64) -> f64 {
     (ms * 1e6).round() / 1e6

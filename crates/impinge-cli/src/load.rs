@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use impinge::{BodyId, CancelToken, Scene};
 use impinge_io::{
-    Format, Mesh, NamedMesh, ReadOptions, Summary, Weld, read_bodies, read_bodies_bytes,
+    Format, Mesh, NamedMesh, ReadOptions, Summary, Weld, printable, read_bodies, read_bodies_bytes,
     read_bytes_with_summary, read_with_summary,
 };
 
@@ -25,6 +25,8 @@ pub struct Bodies {
     pub names: Vec<String>,
     pub vertices: Vec<Vertices>,
     pub nouns: Nouns,
+    /// Files that could not be read: the number of the body, and why. Such a body has no primitives.
+    pub unread: Vec<(usize, String)>,
 }
 
 /// What bodies are called.
@@ -151,20 +153,34 @@ impl<'a> Loading<'a> {
 impl Bodies {
     /// Reads files, one per body, or one per node or group of a file.
     pub fn read(paths: &[PathBuf], loading: Loading<'_>) -> Result<Self, Error> {
+        Bodies::read_all(paths, loading, false)
+    }
+
+    /// Like [`read`](Self::read), but a file that can't be read becomes a body without primitives, so that all others
+    /// keep their numbers. Fails if no file can be read.
+    pub fn read_readable(paths: &[PathBuf], loading: Loading<'_>) -> Result<Self, Error> {
+        Bodies::read_all(paths, loading, paths.len() > 1)
+    }
+
+    fn read_all(
+        paths: &[PathBuf],
+        loading: Loading<'_>,
+        passes_over: bool,
+    ) -> Result<Self, Error> {
         let mut bodies = Bodies::default();
         let mut has_parts = false;
         for path in paths {
-            let format = bodies.format(path, loading)?;
-            let Some([one, many]) = loading.parts(format, paths.len()) else {
-                bodies.add(path, loading)?;
-                continue;
-            };
-            has_parts = true;
-            let file = bodies.add_parts(path, loading, paths.len() > 1)?;
-            if paths.len() == 1 && bodies.ids.len() > 1 {
-                let file = Some(file);
-                bodies.nouns = Nouns { one, many, file };
+            match bodies.add_file(path, loading, paths.len()) {
+                Ok(is_cut) => has_parts |= is_cut,
+                Err(error @ (Error::File(_) | Error::Refused { .. })) if passes_over => {
+                    bodies.add_unread(path, &error, loading)?;
+                }
+                Err(error) => return Err(error),
             }
+        }
+        if passes_over && bodies.unread.len() == paths.len() {
+            let text = format!("none of {} meshes could be read", paths.len());
+            return Err(Error::Unread(text));
         }
         match loading.bodies {
             Some(wanted) if wanted != BodiesArg::File && !has_parts => {
@@ -172,6 +188,46 @@ impl Bodies {
             }
             _ => Ok(bodies),
         }
+    }
+
+    /// Adds one of `n_files` files; returns whether its parts are the bodies.
+    fn add_file(
+        &mut self,
+        path: &Path,
+        loading: Loading<'_>,
+        n_files: usize,
+    ) -> Result<bool, Error> {
+        let format = self.format(path, loading)?;
+        let Some([one, many]) = loading.parts(format, n_files) else {
+            self.add(path, loading)?;
+            return Ok(false);
+        };
+        let file = self.add_parts(path, loading, n_files > 1)?;
+        if n_files == 1 && self.ids.len() > 1 {
+            let file = Some(file);
+            self.nouns = Nouns { one, many, file };
+        }
+        Ok(true)
+    }
+
+    fn add_unread(
+        &mut self,
+        path: &Path,
+        error: &Error,
+        loading: Loading<'_>,
+    ) -> Result<(), Error> {
+        let why = error.line();
+        if loading.notes {
+            // A note that nobody can read does no harm.
+            let _ = writeln!(stderr(), "not read: {why}");
+        }
+        let nothing = impinge::Elements::Triangles(Vec::new());
+        let id = self.scene.add(nothing, Vec::<[f32; 3]>::new())?;
+        self.unread.push((self.ids.len(), why));
+        self.ids.push(id);
+        self.names.push(path.display().to_string());
+        self.vertices.push(Vertices::default());
+        Ok(())
     }
 
     /// Reads a file as one more body; returns the welding, if any.
@@ -331,6 +387,10 @@ pub fn note(name: &str, summary: &Summary, vertices: Vertices) {
             summary.n_triangles_skipped,
             "triangles skipped, because the file has tetrahedra",
         ),
+        (
+            summary.n_lines_skipped,
+            "lines skipped, which are edges or faces of two corners",
+        ),
         (vertices.n_welded as u64, "vertices welded to others"),
         (
             vertices.n_coincident.unwrap_or(0) as u64,
@@ -339,7 +399,12 @@ pub fn note(name: &str, summary: &Summary, vertices: Vertices) {
     ] {
         if n > 0 {
             // A note that nobody can read does no harm.
-            let _ = writeln!(stderr(), "note: {name}: {what}: {}", grouped(n));
+            let _ = writeln!(
+                stderr(),
+                "note: {}: {what}: {}",
+                printable(name),
+                grouped(n)
+            );
         }
     }
 }

@@ -15,7 +15,6 @@ mod load;
 mod meshes;
 mod output;
 mod palette;
-#[cfg(feature = "gpu")]
 mod picture;
 mod regions;
 mod rows;
@@ -27,15 +26,13 @@ mod watch;
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
-use crate::args::{Cli, Command};
+use crate::args::Command;
 use crate::error::Error;
 
 fn main() -> ExitCode {
     #[cfg(all(feature = "gpu", target_os = "linux"))]
     keep_mesa_quiet();
-    let cli = Cli::parse();
+    let cli = args::parse();
     let listening = stop::cancel_on_signal().map_err(Error::Signal);
     let result = listening.and_then(|cancel| match cli.command {
         Command::Demo(args) => commands::demo(&args, &cancel),
@@ -49,12 +46,15 @@ fn main() -> ExitCode {
         Command::Check(args) => commands::check(&args, &cancel),
         Command::CheckWorker(args) => commands::check_worker(&args),
         Command::Tiles(args) => commands::tiles(&args, &cancel),
-        #[cfg(feature = "gpu")]
         Command::Render(args) => commands::render(&args, &cancel),
         #[cfg(feature = "view")]
         Command::View(args) => commands::view(&args, &cancel),
         #[cfg(feature = "gpu")]
         Command::Devices(args) => commands::devices(&args),
+        #[cfg(not(feature = "view"))]
+        Command::View(_) => Err(Error::NotBuilt("the window", "view", ", with Rust 1.95")),
+        #[cfg(not(feature = "gpu"))]
+        Command::Devices(_) => Err(Error::NotBuilt("the GPU backend", "gpu", "")),
     });
     match result {
         Ok(()) => ExitCode::SUCCESS,

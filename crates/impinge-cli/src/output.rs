@@ -4,6 +4,7 @@ use std::io::{self, StdoutLock, Write, stdout};
 
 use comfy_table::{CellAlignment, Table, presets};
 use impinge::{BodyId, Pairs, Scene};
+use impinge_io::printable;
 
 use crate::detection::Times;
 use crate::error::Error;
@@ -58,7 +59,7 @@ pub fn body_table(
         let body = scene.body(id)?;
         rows.push(vec![
             ix.to_string(),
-            name.to_owned(),
+            printable(name),
             body.kind().name().to_owned(),
             grouped(body.n_primitives() as u64),
             grouped(body.n_vertices() as u64),

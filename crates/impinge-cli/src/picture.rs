@@ -6,7 +6,9 @@ use std::path::Path;
 use impinge::contact::{Contacts, Curves};
 use impinge::{Backend, BodyId, Detector, Pairs, Scene, Settings};
 use impinge_io::AtomicFile;
-use impinge_render::{Camera, Colors, Picture, Projection, Renderer, Surface};
+#[cfg(feature = "gpu")]
+use impinge_render::Renderer;
+use impinge_render::{Camera, Colors, Image, Picture, Projection, Surface};
 
 use crate::args::PictureArgs;
 use crate::error::Error;
@@ -15,18 +17,35 @@ use crate::palette;
 /// Draws pictures, all with the same options.
 pub struct Drawer<'a> {
     args: &'a PictureArgs,
-    renderer: Renderer,
+    /// Without one, pictures are drawn on the CPU.
+    #[cfg(feature = "gpu")]
+    renderer: Option<Renderer>,
     /// For contacts.
     detector: Detector,
 }
 
 impl<'a> Drawer<'a> {
-    /// Opens the first adapter, or the one whose name contains `device`. Contacts are found on so many threads; 0 for one per
-    /// core.
-    pub fn new(args: &'a PictureArgs, device: Option<&str>, threads: usize) -> Result<Self, Error> {
+    /// Opens the adapter whose name contains `device`; without a name, a GPU if there may be one. Pictures are drawn on the CPU
+    /// rather than by a software driver: that is faster, and needs no driver. Contacts are found on so many threads; 0 for one
+    /// per core.
+    pub fn new(
+        args: &'a PictureArgs,
+        device: Option<&str>,
+        threads: usize,
+    ) -> Result<Self, Error> {
+        #[cfg(not(feature = "gpu"))]
+        if device.is_some() {
+            return Err(Error::NotBuilt("the GPU backend", "gpu", ""));
+        }
+        #[cfg(feature = "gpu")]
         let renderer = match device {
-            None => Renderer::new()?,
-            Some(name) => Renderer::on_device_named(name)?,
+            Some(name) => Some(Renderer::on_device_named(name)?),
+            None if !crate::detection::may_have_gpu() => None,
+            None => match Renderer::new() {
+                Ok(renderer) => Some(renderer),
+                Err(impinge_render::Error::NoAdapter { .. }) => None,
+                Err(error) => return Err(error.into()),
+            },
         };
         let detector = Detector::with_settings(Settings {
             backend: Backend::Cpu,
@@ -35,6 +54,7 @@ impl<'a> Drawer<'a> {
         })?;
         Ok(Drawer {
             args,
+            #[cfg(feature = "gpu")]
             renderer,
             detector,
         })
@@ -56,8 +76,28 @@ impl<'a> Drawer<'a> {
 
     /// Draws surfaces.
     pub fn draw(&mut self, path: &Path, surfaces: Vec<Surface>) -> Result<(), Error> {
+        let picture = self.picture(surfaces);
+        let failed = |source| Error::Write {
+            path: path.to_owned(),
+            source,
+        };
+        let png = self.image(&picture)?.to_png().map_err(failed)?;
+        let mut to = AtomicFile::create(path)?;
+        to.write_all(&png).map_err(failed)?;
+        Ok(to.finish()?)
+    }
+
+    fn image(&mut self, picture: &Picture) -> Result<Image, Error> {
+        #[cfg(feature = "gpu")]
+        if let Some(renderer) = &mut self.renderer {
+            return Ok(renderer.render(picture)?);
+        }
+        Ok(picture.draw()?)
+    }
+
+    fn picture(&self, surfaces: Vec<Surface>) -> Picture {
         let args = self.args;
-        let picture = Picture {
+        Picture {
             surfaces,
             camera: Camera {
                 azimuth: args.azimuth,
@@ -72,15 +112,7 @@ impl<'a> Drawer<'a> {
             size: args.size,
             see_through: args.see_through,
             ..Picture::default()
-        };
-        let failed = |source| Error::Write {
-            path: path.to_owned(),
-            source,
-        };
-        let png = self.renderer.render(&picture)?.to_png().map_err(failed)?;
-        let mut to = AtomicFile::create(path)?;
-        to.write_all(&png).map_err(failed)?;
-        Ok(to.finish()?)
+        }
     }
 }
 

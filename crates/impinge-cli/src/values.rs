@@ -224,11 +224,9 @@ impl FromStr for FrameRange {
 }
 
 /// A file for a picture.
-#[cfg(feature = "gpu")]
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PngFile(pub PathBuf);
 
-#[cfg(feature = "gpu")]
 impl FromStr for PngFile {
     type Err = String;
 
@@ -241,7 +239,6 @@ impl FromStr for PngFile {
 }
 
 /// Width and height in pixels with an `x` between them.
-#[cfg(feature = "gpu")]
 pub fn size(text: &str) -> Result<[u32; 2], String> {
     text.split_once('x')
         .and_then(|(width, height)| Some([width.parse().ok()?, height.parse().ok()?]))
@@ -250,14 +247,12 @@ pub fn size(text: &str) -> Result<[u32; 2], String> {
 }
 
 /// An angle in degrees.
-#[cfg(feature = "gpu")]
 pub fn azimuth(text: &str) -> Result<f64, String> {
     let angle = text.parse::<f64>().ok().filter(|angle| angle.is_finite());
     angle.ok_or_else(|| "expected an angle in degrees".to_owned())
 }
 
 /// An angle above the ground in degrees.
-#[cfg(feature = "gpu")]
 pub fn elevation(text: &str) -> Result<f64, String> {
     let angle = text.parse::<f64>().ok();
     let angle = angle.filter(|angle| (-90.0..=90.0).contains(angle));
@@ -265,7 +260,6 @@ pub fn elevation(text: &str) -> Result<f64, String> {
 }
 
 /// A part of the whole.
-#[cfg(feature = "gpu")]
 pub fn part(text: &str) -> Result<f32, String> {
     let part = text.parse::<f32>().ok();
     let part = part.filter(|part| (0.0..=1.0).contains(part));
@@ -487,7 +481,6 @@ mod tests {
         assert!("ply".parse::<MeshFile>().is_err());
     }
 
-    #[cfg(feature = "gpu")]
     #[test]
     fn pictures() {
         assert_eq!(size("1280x960"), Ok([1280, 960]));

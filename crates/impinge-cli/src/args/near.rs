@@ -18,12 +18,7 @@ Examples:
 
 Whether a distance is at most D is decided exactly; --distance is read as a double-precision number. An edge and a face (ef) are
 reported if they meet, whatever D: else their vertices and edges say that they are near. The program also asks whether anything
-intersects, such as equal faces or a body inside tetrahedra; with --fail-on-hit both count.
-
-Rows of --pairs are kind, body_a, element_a, body_b, element_b, type, feature_a, feature_b, parallel, distance and the
-nearest points ax, ay, az, bx, by, bz, sorted. Kinds and numbers of elements are those of `impinge step`. The type says
-which features are nearest, with ipc-toolkit's names: P_T, P_E0, EA_EB, ... A feature is v0, v1 or v2 (a vertex of the
-element), e0, e1 or e2 (edge k goes from vertex k to the next) or f. Distance and points are rounded.";
+intersects, such as equal faces or a body inside tetrahedra; with --fail-on-hit both count.";
 
 #[derive(Debug, Args)]
 pub struct NearArgs {

@@ -42,6 +42,19 @@ pub struct PictureArgs {
     pub orthographic: bool,
 }
 
+impl Default for PictureArgs {
+    fn default() -> Self {
+        PictureArgs {
+            size: [1280, 960],
+            azimuth: -25.0,
+            elevation: 20.0,
+            up: UpArg::Y,
+            see_through: 0.5,
+            orthographic: false,
+        }
+    }
+}
+
 /// [`impinge_render::UpAxis`] as an option.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum UpArg {

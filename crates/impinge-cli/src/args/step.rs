@@ -6,11 +6,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::DetectorArgs;
-#[cfg(feature = "gpu")]
 use super::PictureArgs;
 use super::choices::{StartArg, ToiArg};
 use super::near::KindArg;
-#[cfg(feature = "gpu")]
 use crate::values::PngFile;
 use crate::values::{MeshFile, RowsFile, at_least_one, body_numbers, distance};
 
@@ -26,15 +24,7 @@ Examples:
   impinge step cloth_0.ply cloth_1.ply --candidates boxes.npy --distance 0.001
 
 Every vertex moves on a straight line from time 0 to time 1. The two files of a body must have the same elements.
-Times are exact first times, rounded down: nothing touches earlier.
-
-Rows of --impacts are kind, body_a, element_a, body_b, element_b, toi, sorted. In a row of kind vf, a is the vertex
-and b the face. Vertices and faces are numbered as in the file; edges are the unique pairs (low, high) of vertices in
-the order of (high, low). Mesh files hold faces, so kinds are vf and ee; ev and vv are of bodies of edges or points,
-which the library and the Python module have.
-
-Rows of --candidates are the same without toi. They are found and written run by run, so that memory need not hold
-all of them: see --memory-budget. In a .npy file they are a structured array.";
+Times are exact first times, rounded down: nothing touches earlier.";
 
 #[derive(Debug, Args)]
 pub struct StepArgs {
@@ -43,7 +33,7 @@ pub struct StepArgs {
     pub meshes: Vec<PathBuf>,
     /// Find only the first contact
     #[arg(long, conflicts_with_all = ["impacts", "out", "candidates"])]
-    #[cfg_attr(feature = "gpu", arg(conflicts_with = "png"))]
+    #[arg(conflicts_with = "png")]
     pub earliest: bool,
     /// Ignore the pairs within each body
     #[arg(long)]
@@ -70,8 +60,7 @@ pub struct StepArgs {
     pub impacts: Option<RowsFile>,
     /// Write the pairs whose boxes over the whole step overlap (.csv, .jsonl or .npy; "-" is standard output, as CSV), and
     /// find no impacts
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["impacts", "out", "repeat", "separation", "clearance"])]
-    #[cfg_attr(feature = "gpu", arg(conflicts_with = "png"))]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["impacts", "out", "repeat", "separation", "clearance", "png"])]
     pub candidates: Option<RowsFile>,
     /// How far the boxes of --candidates are inflated on all sides: 0 or more
     #[arg(long, value_name = "D", default_value = "0", requires = "candidates", allow_negative_numbers = true, value_parser = distance)]
@@ -92,10 +81,8 @@ pub struct StepArgs {
     #[arg(long, value_name = "FILE")]
     pub out: Option<MeshFile>,
     /// Draw the meshes at the start of the step, coloured by the time of contact (.png)
-    #[cfg(feature = "gpu")]
     #[arg(long, value_name = "FILE")]
     pub png: Option<PngFile>,
-    #[cfg(feature = "gpu")]
     #[command(flatten)]
     pub picture: PictureArgs,
     #[command(flatten)]
@@ -108,10 +95,7 @@ impl StepArgs {
         let impacts = self.impacts.as_ref();
         let impacts = impacts.map(|file| ("--impacts", file.path.as_path()));
         let out = self.out.as_ref().map(|file| ("--out", file.path.as_path()));
-        #[cfg(feature = "gpu")]
         let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
-        #[cfg(not(feature = "gpu"))]
-        let png = None;
         let candidates = self.candidates.as_ref().filter(|file| !file.is_stdout());
         let candidates = candidates.map(|file| ("--candidates", file.path.as_path()));
         [impacts, out, png, candidates]

@@ -4,6 +4,7 @@ use std::io::{Write, stderr};
 use std::path::PathBuf;
 
 use impinge::{BodyId, CancelToken, Control, Detector};
+use impinge_io::printable;
 use serde_json::Value;
 
 use crate::apart::Inputs;
@@ -12,7 +13,6 @@ use crate::asked::Asked;
 use crate::detection::{any, asked, count, hit, query, repeat, settings};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
-#[cfg(feature = "gpu")]
 use crate::picture::Drawer;
 use crate::text::counted;
 use crate::values::{RowsFile, RowsFormat};
@@ -22,6 +22,7 @@ use crate::{contacts, headline, json, meshes, output, regions, rows};
 /// `impinge pairs`.
 pub fn pairs(args: &PairsArgs, cancel: &CancelToken) -> Result<(), Error> {
     answer(
+        Bodies::read,
         asked((true, args.within), &args.ask),
         &args.meshes,
         &args.ask,
@@ -33,7 +34,9 @@ pub fn pairs(args: &PairsArgs, cancel: &CancelToken) -> Result<(), Error> {
 
 /// `impinge self`.
 pub fn within(args: &WithinArgs, cancel: &CancelToken) -> Result<(), Error> {
+    // The answer about one mesh does not depend on the others.
     answer(
+        Bodies::read_readable,
         asked((false, true), &args.ask),
         &args.meshes,
         &args.ask,
@@ -44,6 +47,7 @@ pub fn within(args: &WithinArgs, cancel: &CancelToken) -> Result<(), Error> {
 }
 
 fn answer(
+    read: fn(&[PathBuf], Loading<'_>) -> Result<Bodies, Error>,
     asked: Asked,
     paths: &[PathBuf],
     ask: &AskArgs,
@@ -84,11 +88,12 @@ fn answer(
         names,
         vertices,
         nouns,
-    } = Bodies::read(paths, loading)?;
+        unread,
+    } = read(paths, loading)?;
     if ids.len() == 1 && !asked.within {
         let text = format!(
             "{}: one body meets no other: `impinge self` finds where it meets itself",
-            names[0]
+            printable(&names[0])
         );
         return Err(Error::Usage(text));
     }
@@ -99,7 +104,6 @@ fn answer(
         // Median times are of one method.
         settings.method = settings.method.in_the_long_run();
     }
-    #[cfg(feature = "gpu")]
     let threads = settings.threads;
     let mut detector = Detector::with_settings(settings)?;
 
@@ -121,7 +125,8 @@ fn answer(
         };
         drop(watch);
         if ask.json {
-            let object = json::without_pairs(asked, found, detector.stats());
+            let mut object = json::without_pairs(asked, found, detector.stats());
+            json::add_unread(&mut object, &unread, &names);
             writeln!(output::out(), "{}", Value::Object(object))?;
         } else {
             let mut line = Vec::new();
@@ -129,7 +134,7 @@ fn answer(
             writeln!(line, "{}", asked.line(&vertices, &nouns))?;
             output::out().write_all(&line)?;
         }
-        return hit(ask.fail_on_hit, n_pairs > 0);
+        return end(ask, n_pairs > 0, &unread, paths.len());
     }
     let n_frames = answer.repeat.get();
     let (_, times) = repeat(&mut detector, &mut scene, &query, n_frames, cancel, &watch)?;
@@ -166,6 +171,7 @@ fn answer(
         if let Some((found, curves)) = &met {
             object.insert("contacts".into(), contacts::object(found, curves));
         }
+        json::add_unread(&mut object, &unread, &names);
         writeln!(output::out(), "{}", Value::Object(object))?;
     } else {
         let mut text = Vec::new();
@@ -185,10 +191,26 @@ fn answer(
         }
     }
     // The picture comes last, so that the answer is printed even without an adapter.
-    #[cfg(feature = "gpu")]
     if let Some(png) = &answer.png {
         let mut drawer = Drawer::new(&answer.picture, how.device.as_deref(), threads)?;
         drawer.write(&png.0, &scene, &bodies, pairs)?;
     }
-    hit(ask.fail_on_hit, !pairs.is_empty())
+    end(ask, !pairs.is_empty(), &unread, paths.len())
+}
+
+/// Fails if anything was found and that is to fail, or if files could not be read.
+fn end(
+    ask: &AskArgs,
+    is_found: bool,
+    unread: &[(usize, String)],
+    n_files: usize,
+) -> Result<(), Error> {
+    if unread.is_empty() {
+        return hit(ask.fail_on_hit, is_found);
+    }
+    let what = format!("{} of {n_files} meshes could not be read", unread.len());
+    match ask.fail_on_hit && is_found {
+        true => Err(Error::CheckFailed(format!("pairs were found; {what}"))),
+        false => Err(Error::Unread(what)),
+    }
 }

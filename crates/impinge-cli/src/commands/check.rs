@@ -45,11 +45,10 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
         }
     }
     // The picture comes last, so that the answer is printed even without an adapter.
-    #[cfg(feature = "gpu")]
     if let Some(png) = &args.png {
         shown::draw(&png.0, &rows, args)?;
     }
-    table::fail_on(&rows, &args.fail_on)
+    table::fail(&rows, &args.fail_on)
 }
 
 /// `impinge check-worker`.
@@ -82,7 +81,8 @@ fn paths(args: &CheckArgs) -> Result<Vec<PathBuf>, Error> {
         for line in lines.lines() {
             let line = line.map_err(read)?;
             let line = line.strip_suffix('\r').unwrap_or(&line);
-            if !line.is_empty() {
+            let is_comment = line.trim_start().starts_with('#');
+            if !is_comment && !line.trim().is_empty() {
                 paths.push(line.into());
             }
         }

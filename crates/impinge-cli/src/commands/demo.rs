@@ -7,12 +7,15 @@ use std::time::{Duration, Instant};
 
 use impinge::{BodyId, CancelToken, Detector, Method, Pairs, Query, Scene, Settings};
 
-use crate::args::DemoArgs;
+use impinge_io::printable;
+
+use crate::args::{DemoArgs, PictureArgs};
 use crate::commands::demo_scene::DemoScene;
 use crate::detection::{Times, detect, detector, settings};
 use crate::error::Error;
 use crate::meshes;
 use crate::output::{body_table, out, stage_table, table};
+use crate::picture::Drawer;
 use crate::text::{counted, grouped};
 use crate::watch::{Watch, go_on};
 
@@ -59,14 +62,31 @@ pub fn demo(args: &DemoArgs, cancel: &CancelToken) -> Result<(), Error> {
     )?;
     check(args, &demo, fullest, pairs, cancel)?;
 
-    if let Some(folder) = args.out.path.parent() {
+    let png = match &args.png {
+        Some(file) => file.0.clone(),
+        None => args.out.path.with_extension("png"),
+    };
+    for folder in [&args.out.path, &png]
+        .into_iter()
+        .filter_map(|file| file.parent())
+    {
         make_folder(folder)?;
     }
     meshes::write(&args.out, demo.scene(), &bodies, pairs)?;
+    let picture = PictureArgs::default();
+    let threads = args.detector.threads.map_or(0, Into::into);
+    let mut drawer = Drawer::new(&picture, args.detector.device.as_deref(), threads)?;
+    drawer.write(&png, demo.scene(), &bodies, pairs)?;
     writeln!(
         out(),
-        "wrote {}: colliding triangles red (worm), blue (knot), green (ball)",
-        args.out.path.display()
+        "wrote {}, a mesh, and {}, its picture: colliding triangles red (worm), blue (knot), green (ball)",
+        printable(&args.out.path),
+        printable(&png)
+    )?;
+    writeln!(
+        out(),
+        "Look at {}, then ask about meshes of your own: impinge pairs a.obj b.obj",
+        printable(&png)
     )?;
     Ok(())
 }
@@ -104,21 +124,24 @@ fn check(
             n_expected: rows.len(),
         });
     }
-    writeln!(
-        out(),
-        "checked: {} finds the same {} {} in {:.0} ms{}",
-        reference.name(),
-        counted(rows.len() as u64, "pair"),
-        match sample.n_triangles == demo.n_triangles() {
-            true => "of all triangles".to_owned(),
-            false => format!("among {} triangles", grouped(sample.n_triangles as u64)),
-        },
-        expected.stats().total_ms,
-        match reference {
-            Method::Naive => ", every box against every box",
-            Method::Auto | Method::Clusters | Method::Cells => "",
-        }
-    )?;
+    let by = match reference {
+        Method::Naive => "naive (every box against every box)",
+        Method::Auto | Method::Clusters | Method::Cells => reference.name(),
+    };
+    let n_pairs = counted(rows.len() as u64, "pair");
+    let ms = expected.stats().total_ms;
+    match sample.n_triangles == demo.n_triangles() {
+        true => writeln!(
+            out(),
+            "checked: {by} finds the same {n_pairs} in {ms:.0} ms"
+        )?,
+        false => writeln!(
+            out(),
+            "checked on a sample: {} of the triangles have {n_pairs} among themselves, and {by} finds the same ones in \
+             {ms:.0} ms",
+            grouped(sample.n_triangles as u64)
+        )?,
+    }
     Ok(())
 }
 

@@ -5,6 +5,7 @@ mod rows;
 use std::io::{Write, stderr};
 
 use impinge::{CancelToken, Control, NearPairs, NearQuery, PairKind, Query, SharedVertex};
+use impinge_io::printable;
 use serde_json::{Map, Value, json};
 
 use crate::apart::Inputs;
@@ -101,6 +102,7 @@ fn answer(
                 "primitives": body.n_primitives(),
                 "vertices": body.n_vertices(),
                 "welded": bodies.vertices[ix].n_welded,
+                "coincident": bodies.vertices[ix].n_coincident,
             }))
         })
         .collect::<Result<_, impinge::Error>>()?;
@@ -140,9 +142,9 @@ fn print(
     intersects: bool,
 ) -> Result<(), Error> {
     let subject = match (&bodies.nouns.file, &bodies.names[..]) {
-        (Some(file), _) => file.clone(),
-        (None, [one]) => one.clone(),
-        (None, [a, b]) => format!("{a} and {b}"),
+        (Some(file), _) => printable(file),
+        (None, [one]) => printable(one),
+        (None, [a, b]) => format!("{} and {}", printable(a), printable(b)),
         (None, many) => format!("{} meshes", many.len()),
     };
     let distance = args.distance;

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use impinge::{BodyId, Pairs, Positions, Scene};
 use impinge_fem::{Simulation, State, StepReport};
-use impinge_io::{AtomicFile, GrowingPc2};
+use impinge_io::{AtomicFile, GrowingPc2, printable};
 
 use crate::args::{SequenceFormatArg, SimulateArgs};
 use crate::error::Error;
@@ -124,7 +124,7 @@ impl Record {
         if n_rows != n_done {
             return Err(Error::Usage(format!(
                 "{}: {n_rows} rows, but the saved state comes after {n_done} steps",
-                record.steps.path.display()
+                printable(&record.steps.path)
             )));
         }
         if let (Frames::Numbered(format), Some(last)) = (&record.frames, n_done.checked_sub(1)) {
@@ -132,7 +132,7 @@ impl Record {
             if !path.is_file() {
                 return Err(Error::Usage(format!(
                     "{} does not exist: continue with the --format of the first run",
-                    path.display()
+                    printable(&path)
                 )));
             }
         }
@@ -213,14 +213,14 @@ impl Record {
         match self.frames {
             Frames::Cache { .. } => format!(
                 "{}, its positions in {} and colliding primitives in {}",
-                path.with_extension("ply").display(),
-                path.with_extension("pc2").display(),
-                self.folder.join("colliding.csv").display()
+                printable(&path.with_extension("ply")),
+                printable(&path.with_extension("pc2")),
+                printable(&self.folder.join("colliding.csv"))
             ),
             Frames::Numbered(format) => {
                 format!(
                     "{} and the following files",
-                    self.numbered_path(format, 0).display()
+                    printable(self.numbered_path(format, 0))
                 )
             }
         }

@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use impinge::{BodyId, CancelToken};
+use impinge_io::printable;
 use serde_json::Value;
 
 use crate::apart::Inputs;
@@ -27,6 +28,7 @@ pub fn render(args: &RenderArgs, cancel: &CancelToken) -> Result<(), Error> {
         names,
         vertices,
         nouns,
+        ..
     } = Bodies::read(&args.meshes, Loading::new(&args.ask, is_self, cancel))?;
     // Of one body there is nothing else to ask.
     let asked = asked((true, args.within || ids.len() == 1), &args.ask);
@@ -55,7 +57,7 @@ pub fn render(args: &RenderArgs, cancel: &CancelToken) -> Result<(), Error> {
         if args.ask.verbose {
             print_details(&mut to, &scene, &bodies, pairs, &times)?;
         }
-        writeln!(to, "wrote {}", path.display())?;
+        writeln!(to, "wrote {}", printable(path))?;
         writeln!(to, "{}", asked.line(&vertices, &nouns))?;
     }
     hit(args.ask.fail_on_hit, !pairs.is_empty())

@@ -4,22 +4,21 @@ use std::io::{Write, stderr};
 use std::path::Path;
 
 use impinge::{BodyId, CancelToken, Control, Pairs, Scene, Step};
-use impinge_io::{Sequence, Weld};
+use impinge_io::{Sequence, Weld, printable};
 use serde_json::{Map, Value};
 
 use super::step::{self, Frames as _, steps_of_sequence};
 use crate::apart::Inputs;
 use crate::args::{BodiesArg, SequenceArgs};
-use crate::detection::{Times, asked, detect, detector, hit, query, set_positions};
+use crate::detection::{Times, asked, detect, detector, hit, query, set_positions, settings};
 use crate::error::Error;
 use crate::load::{Bodies, Loading, to_positions};
 use crate::output::out;
+use crate::picture::Drawer;
 use crate::rows::FrameRows;
 use crate::text::{counted, grouped, hash};
 use crate::values::RowsFile;
 use crate::watch::{Watch, go_on};
-#[cfg(feature = "gpu")]
-use crate::{detection::settings, picture::Drawer};
 use crate::{json, meshes, regions};
 
 /// `impinge sequence`.
@@ -56,6 +55,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         names,
         vertices,
         nouns,
+        ..
     } = bodies;
     let query = query(asked, &args.ask, &ids)?;
     let bodies: Vec<(BodyId, &str)> = ids
@@ -67,7 +67,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         Error::Usage(format!(
             "--frames reaches beyond the {} of {}",
             counted(frames.n_frames() as u64, "frame"),
-            frames.name
+            printable(&frames.name)
         ))
     })?;
     let mut detector = detector(&args.detector)?;
@@ -139,7 +139,6 @@ struct Outputs<'a> {
     args: &'a SequenceArgs,
     inputs: Inputs,
     rows: Option<FrameRows>,
-    #[cfg(feature = "gpu")]
     drawer: Option<Drawer<'a>>,
 }
 
@@ -154,7 +153,6 @@ impl<'a> Outputs<'a> {
             args,
             inputs,
             rows: args.pairs.as_ref().map(FrameRows::create).transpose()?,
-            #[cfg(feature = "gpu")]
             drawer: match args.png {
                 Some(_) => {
                     let device = args.detector.device.as_deref();
@@ -181,7 +179,6 @@ impl<'a> Outputs<'a> {
             self.inputs.check("--out", &file.path)?;
             meshes::write(&file, scene, bodies, pairs)?;
         }
-        #[cfg(feature = "gpu")]
         if let (Some(files), Some(drawer)) = (&self.args.png, &mut self.drawer) {
             let file = files.frame(frame_ix).map_err(Error::Usage)?;
             self.inputs.check("--png", &file.0)?;
@@ -210,8 +207,8 @@ impl Frames {
             let _ = writeln!(
                 stderr(),
                 "note: no frame between {} and {}",
-                before.display(),
-                after.display()
+                printable(before),
+                printable(after)
             );
         }
         Ok(Frames {
@@ -240,8 +237,9 @@ pub(super) fn welded(
         Some(weld) => {
             if let Some([a, b]) = weld.torn(&positions) {
                 return Err(Error::Usage(format!(
-                    "{name}: frame {frame_ix}: vertices {a} and {b} are apart, but welded since they are at one position in the \
-                     mesh: use --no-weld"
+                    "{}: frame {frame_ix}: vertices {a} and {b} are apart, but welded since they are at one position in the \
+                     mesh: use --no-weld",
+                    printable(name)
                 )));
             }
             weld.positions(&positions)

@@ -6,6 +6,7 @@ use std::io::Write;
 use impinge::{BodyId, CancelToken, Control, Detector, Pairs};
 use impinge_fem::scenes::{DropScene, drop_scene};
 use impinge_fem::{Simulation, State, StepReport};
+use impinge_io::printable;
 
 use crate::args::SimulateArgs;
 use crate::commands::record::{Found, Record};
@@ -45,7 +46,7 @@ pub fn simulate(args: &SimulateArgs, cancel: &CancelToken) -> Result<(), Error> 
             if simulation.n_steps() > n_steps {
                 return Err(Error::Usage(format!(
                     "{} holds {} already, more than --steps {n_steps}",
-                    args.out.display(),
+                    printable(&args.out),
                     counted(simulation.n_steps(), "step")
                 )));
             }
@@ -54,7 +55,7 @@ pub fn simulate(args: &SimulateArgs, cancel: &CancelToken) -> Result<(), Error> 
         (false, Some((path, _))) => {
             return Err(Error::Usage(format!(
                 "{} exists: continue from it with --resume, or choose another folder",
-                path.display()
+                printable(&path)
             )));
         }
         (_, None) => Record::create(args, &simulation)?,

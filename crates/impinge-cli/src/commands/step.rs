@@ -17,7 +17,6 @@ use crate::args::{StartArg, StepArgs};
 use crate::detection::{Times, detector, without};
 use crate::error::Error;
 use crate::output::out;
-#[cfg(feature = "gpu")]
 use crate::picture::Drawer;
 use crate::values::RowsFile;
 use crate::watch::Watch;
@@ -112,7 +111,6 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     } else {
         print(args, &bodies, &found)?;
     }
-    #[cfg(feature = "gpu")]
     if let Some(png) = &args.png {
         let surfaces = colors::surfaces(&bodies, impacts)?;
         let device = args.detector.device.as_deref();

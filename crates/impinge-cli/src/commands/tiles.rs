@@ -5,6 +5,7 @@ mod args;
 use std::io::Write;
 
 use impinge::{Backend, CancelToken, Control, Settings};
+use impinge_io::printable;
 use impinge_tiles::{Ask, MergedStep, Plan, PlanOptions, RunOptions, ScatterOptions, TileResult};
 use serde_json::{Value, json};
 
@@ -241,7 +242,7 @@ fn merge(args: &MergeArgs) -> Result<(), Error> {
             true => "vertices welded",
             false => "vertices as in the files",
         },
-        merged.rows.display(),
+        printable(&merged.rows),
     );
     print(args.json, &object, &text)
 }

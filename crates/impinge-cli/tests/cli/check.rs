@@ -2,7 +2,8 @@
 
 use serde_json::Value;
 
-use crate::harness::{Folder, Run, keys};
+use crate::harness::{Folder, Run, csv_rows, keys};
+use crate::schema::{schema, wrong};
 
 /// A closed tetrahedron as OBJ, to which tests append.
 const CLOSED: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
@@ -18,12 +19,24 @@ fn meshes() -> Folder {
     folder
 }
 
+/// The rows of a run in which every mesh could be checked.
 fn rows(run: Run) -> Vec<Value> {
     assert_eq!(run.stderr, "");
-    let text = run.printed();
+    parsed(&run.printed())
+}
+
+fn parsed(text: &str) -> Vec<Value> {
     text.lines()
         .map(|line| serde_json::from_str(line).unwrap())
         .collect()
+}
+
+/// What was printed by a run in which `n_unchecked` meshes could not be checked.
+#[track_caller]
+fn failed(run: Run, n_unchecked: usize, n: usize) -> String {
+    let said = format!("impinge: {n_unchecked} of {n} meshes could not be checked\n");
+    assert_eq!((run.code, run.stderr.as_str()), (Some(1), said.as_str()));
+    run.stdout
 }
 
 #[test]
@@ -37,7 +50,8 @@ fn a_line_per_mesh_in_their_order() {
         "nan.obj",
         "broken.obj",
     ];
-    let rows = rows(folder.run([&["check", "--json"], &names[..]].concat()));
+    let run = folder.run([&["check", "--json"], &names[..]].concat());
+    let rows = parsed(&failed(run, 3, 6));
     assert_eq!(
         rows.iter()
             .map(|row| row["path"].as_str().unwrap())
@@ -81,9 +95,8 @@ fn a_line_per_mesh_in_their_order() {
 #[test]
 fn a_table_and_what_it_sums_up_to() {
     let folder = meshes();
-    let text = folder
-        .run(["check", "closed.obj", "pierced.obj", "nan.obj"])
-        .printed();
+    let run = folder.run(["check", "closed.obj", "pierced.obj", "nan.obj"]);
+    let text = failed(run, 1, 3);
     assert!(
         text.contains("pierced.obj") && text.contains("self-int."),
         "{text}"
@@ -94,13 +107,22 @@ fn a_table_and_what_it_sums_up_to() {
         "3 meshes: 1 without any finding, 1 with self-intersections, 1 with an open border, \
          1 with coordinates that are not finite, 1 with an error"
     );
+    for (names, last) in [
+        (&["closed.obj"][..], "1 mesh: clean"),
+        (&["closed.obj", "closed.obj"], "2 meshes: all clean"),
+    ] {
+        let text = folder.run([&["check"], names].concat()).printed();
+        assert_eq!(text.lines().last(), Some(last));
+    }
 }
 
 #[test]
 fn exit_codes_are_chosen() {
     let folder = meshes();
     let code = |args: &[&str]| folder.run([&["check"], args].concat()).code;
-    assert_eq!(code(&["pierced.obj", "missing.ply"]), Some(0));
+    assert_eq!(code(&["pierced.obj"]), Some(0));
+    assert_eq!(code(&["pierced.obj", "missing.ply"]), Some(1));
+    assert_eq!(code(&["closed.obj", "missing.ply", "broken.obj"]), Some(1));
     assert_eq!(code(&["closed.obj", "--fail-on", "any"]), Some(0));
     assert_eq!(
         code(&["open.obj", "--fail-on", "self-intersections,degenerate"]),
@@ -111,7 +133,7 @@ fn exit_codes_are_chosen() {
         Some(3)
     );
     assert_eq!(code(&["nan.obj", "--fail-on", "nan"]), Some(3));
-    assert_eq!(code(&["missing.ply", "--fail-on", "nan"]), Some(0));
+    assert_eq!(code(&["missing.ply", "--fail-on", "nan"]), Some(1));
     assert_eq!(code(&["missing.ply", "--fail-on", "error"]), Some(3));
     assert_eq!(
         code(&["closed.obj", "--rank", "2", "--world-size", "2"]),
@@ -121,6 +143,31 @@ fn exit_codes_are_chosen() {
     let run = folder.run(["check", "pierced.obj", "--fail-on", "any"]);
     let said = "impinge: 1 of 1 meshes failed: 1 with self-intersections, 1 with an open border\n";
     assert_eq!(run.stderr, said);
+    let args = [
+        "check",
+        "pierced.obj",
+        "missing.ply",
+        "closed.obj",
+        "--fail-on",
+        "boundary",
+    ];
+    let run = folder.run(args);
+    let said = "impinge: 2 of 3 meshes failed: 1 with an open border, 1 could not be checked\n";
+    assert_eq!((run.code, run.stderr.as_str()), (Some(3), said));
+}
+
+#[test]
+fn a_list_may_have_comments() {
+    let folder = meshes();
+    let list =
+        "# parts of the machine\n\nclosed.obj\r\n  # not this one: missing.ply\n \t\nopen.obj\n";
+    folder.text("list.txt", list);
+    let rows = rows(folder.run(["check", "--json", "--list", "list.txt"]));
+    let paths: Vec<&str> = rows
+        .iter()
+        .map(|row| row["path"].as_str().unwrap())
+        .collect();
+    assert_eq!(paths, ["closed.obj", "open.obj"]);
 }
 
 #[test]
@@ -157,21 +204,19 @@ fn ranks_make_the_rows_of_one_process_and_a_run_goes_on() {
         "nan.obj",
     ];
     folder.text("list.txt", &(names.join("\n") + "\n"));
-    let one = folder
-        .run(["check", "--json", "--list", "list.txt", "--out", "one"])
-        .printed();
+    // Two of the five meshes can't be checked.
+    let args = ["check", "--json", "--list", "list.txt", "--out", "one"];
+    let one = failed(folder.run(args), 2, 5);
     assert_eq!(read(&folder, "one/rows-00000000.jsonl"), one);
     let mut all = String::new();
-    for rank in ["0", "1"] {
+    // The two that can't be checked are of rank 0.
+    for (rank, code) in [("0", 1), ("1", 0)] {
         let args = [
             "check", "--json", "--list", "list.txt", "--out", "two", "--batch", "2",
         ];
-        folder
-            .run(
-                args.into_iter()
-                    .chain(["--rank", rank, "--world-size", "2"]),
-            )
-            .printed();
+        let of_rank = ["--rank", rank, "--world-size", "2"];
+        let run = folder.run(args.into_iter().chain(of_rank));
+        assert_eq!(run.code, Some(code), "{}", run.stderr);
     }
     for batch in 0..3 {
         all += &read(&folder, &format!("two/rows-{batch:08}.jsonl"));
@@ -179,15 +224,14 @@ fn ranks_make_the_rows_of_one_process_and_a_run_goes_on() {
     assert_eq!(all, one);
     // Existing rows are not made again: this mesh would have another row now.
     folder.text("open.obj", CLOSED);
-    let args = ["check", "--json", "--list", "list.txt", "--out", "one"];
-    assert_eq!(folder.run(args).printed(), one);
+    assert_eq!(failed(folder.run(args), 2, 5), one);
     let first_two: String = one
         .lines()
         .take(2)
         .map(|line| format!("{line}\n"))
         .collect();
     folder.text("one/rows-00000000.jsonl", &first_two);
-    assert_ne!(folder.run(args).printed(), one);
+    assert_ne!(failed(folder.run(args), 2, 5), one);
     // Rows of another list are refused.
     let error = folder.run(["check", "pierced.obj", "--out", "one"]).error();
     assert!(
@@ -222,14 +266,15 @@ fn what_is_wrong_is_shown_in_colours() {
 fn a_mesh_that_takes_too_long_is_a_row() {
     let folder = meshes();
     // No child answers in a microsecond.
-    let rows = rows(folder.run([
+    let run = folder.run([
         "check",
         "--json",
         "closed.obj",
         "open.obj",
         "--timeout",
         "0.000001",
-    ]));
+    ]);
+    let rows = parsed(&failed(run, 2, 2));
     assert_eq!(rows[0]["error_kind"], "timeout");
     assert_eq!(rows[1]["error"], "took longer than 0.000001 s");
 }
@@ -251,7 +296,7 @@ fn a_mesh_that_is_too_large_is_a_row() {
         "--jobs",
         "1",
     ];
-    let rows = rows(folder.run(args));
+    let rows = parsed(&failed(folder.run(args), 1, 2));
     assert_eq!(rows[0]["error_kind"], "memory", "{}", rows[0]);
     assert_eq!(rows[1]["error"], Value::Null);
 }
@@ -278,4 +323,62 @@ fn a_child_answers_until_its_input_ends() {
     assert_eq!(row["error_kind"], "file");
     drop(input);
     assert!(child.wait().unwrap().success());
+}
+
+#[test]
+fn one_bad_file_of_many_does_not_keep_the_others_from_an_answer() {
+    let folder = meshes();
+    let names = ["closed.obj", "broken.obj", "pierced.obj"];
+    let run = folder.run([&["self", "--fail-on-hit"], &names[..]].concat());
+    assert_eq!(run.code, Some(3));
+    assert!(
+        run.stdout
+            .starts_with("closed.obj and pierced.obj: 2 pairs of 9 triangles"),
+        "{}",
+        run.stdout
+    );
+    assert!(
+        run.stdout.contains("pierced.obj with itself"),
+        "{}",
+        run.stdout
+    );
+    assert!(
+        run.stderr.contains("not read: broken.obj"),
+        "{}",
+        run.stderr
+    );
+    let last = "impinge: pairs were found; 1 of 3 meshes could not be read";
+    assert_eq!(run.stderr.lines().last(), Some(last));
+
+    // Bodies keep their numbers.
+    let run = folder.run([&["self", "--json", "--pairs", "rows.csv"], &names[..]].concat());
+    assert_eq!(run.code, Some(1));
+    let object: Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!(wrong(&schema("answer"), &object, "$"), [""; 0]);
+    assert_eq!(object["unread"][0]["body"], 1);
+    assert_eq!(object["regions"][0]["bodies"], serde_json::json!([2, 2]));
+    let rows = csv_rows(&folder.path("rows.csv"));
+    assert!(rows.len() == 2 && rows.iter().all(|row| row[0] == 2 && row[2] == 2));
+
+    for how in ["--count", "--any"] {
+        let run = folder.run([&["self", how, "--json"], &names[..]].concat());
+        assert_eq!(run.code, Some(1));
+        let object: Value = serde_json::from_str(&run.stdout).unwrap();
+        assert_eq!(object["unread"][0]["name"], "broken.obj");
+    }
+    // The pairs between meshes are an answer about all of them.
+    assert!(
+        folder
+            .run(["pairs", "closed.obj", "broken.obj", "pierced.obj"])
+            .error()
+            .contains("broken.obj")
+    );
+    let run = folder.run(["self", "broken.obj", "missing.ply", "--json"]);
+    assert!(run.error().contains("none of 2 meshes could be read"));
+    assert!(
+        folder
+            .run(["self", "missing.ply"])
+            .error()
+            .contains("missing.ply")
+    );
 }

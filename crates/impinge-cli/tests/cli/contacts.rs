@@ -78,12 +78,30 @@ fn distances_are_told() {
     assert_eq!(object["distance"], json!(2.0));
     assert_eq!(object["points"][0][0], json!(0.5));
     assert_eq!(object["points"][1][0], json!(2.5));
-    // They touch: exactly 0, and no points.
+    // They touch: exactly 0, and where.
     let object = folder.run(["distance", "a.ply", "c.ply", "--json"]).json();
-    assert_eq!(
-        (&object["distance"], &object["points"]),
-        (&json!(0.0), &json!(null))
-    );
+    assert_eq!(object["distance"], json!(0.0));
+    assert_eq!(object["points"][0], object["points"][1]);
+    assert_eq!(object["points"][0][0], json!(0.5));
+    // A tetrahedron in another one: a corner of the inner one.
+    let medit = |scale: u32| {
+        format!(
+            "MeshVersionFormatted 2\nDimension 3\nVertices 4\n1 1 1 0\n{0} 1 1 0\n1 {0} 1 0\n1 1 {0} 0\nTetrahedra 1\n1 2 3 4 0\n",
+            1 + scale
+        )
+    };
+    folder.text("outer.mesh", &medit(8).replace("1 1 1 0\n", "-1 -1 -1 0\n"));
+    folder.text("inner.mesh", &medit(1));
+    for [a, b] in [["outer.mesh", "inner.mesh"], ["inner.mesh", "outer.mesh"]] {
+        let object = folder.run(["distance", a, b, "--json"]).json();
+        assert_eq!(object["distance"], json!(0.0));
+        assert_eq!(object["points"], json!([[1.0, 1.0, 1.0], [1.0, 1.0, 1.0]]));
+        let printed = folder.run(["distance", a, b]).printed();
+        assert_eq!(
+            printed,
+            format!("distance 0\nprimitive 0 of {a} at 1 1 1\nprimitive 0 of {b} at 1 1 1\n")
+        );
+    }
     let printed = folder.run(["distance", "a.ply", "b.ply"]).printed();
     assert!(printed.starts_with("distance 2\nprimitive "), "{printed}");
 }

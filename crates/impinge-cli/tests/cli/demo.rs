@@ -4,6 +4,7 @@ use impinge_io::{ReadOptions, read};
 use serde_json::json;
 
 use crate::harness::Folder;
+use crate::render::{pixels, red_and_blue};
 
 #[test]
 fn a_small_demo_finds_checks_and_writes() {
@@ -15,11 +16,17 @@ fn a_small_demo_finds_checks_and_writes() {
         "3 deforming bodies, 3,000 triangles, 12 frames",
         "worm with itself",
         "frames per second",
-        "checked: naive finds the same",
-        "wrote out/demo.glb",
+        "checked: naive (every box against every box) finds the same",
+        "wrote out/demo.glb, a mesh, and out/demo.png, its picture",
     ] {
         assert!(text.contains(word), "{word}: {text}");
     }
+    let last = "Look at out/demo.png, then ask about meshes of your own: impinge pairs a.obj b.obj";
+    assert_eq!(text.lines().last(), Some(last));
+    let (size, pixels) = pixels(&folder.path("out/demo.png"));
+    assert_eq!(size, [1280, 960]);
+    let [red, blue] = red_and_blue(&pixels);
+    assert!(red > 1_000 && blue > 1_000, "{red} {blue}");
     let mesh = read(&folder.path("out/demo.glb"), &ReadOptions::default()).unwrap();
     assert_eq!(mesh.n_primitives(), 3_000);
     // All bodies meet, and the worm meets itself: otherwise the demo would show nothing.
@@ -64,9 +71,9 @@ fn a_small_demo_finds_checks_and_writes() {
 fn every_method_is_checked_by_another_one() {
     let folder = Folder::new();
     for (method, by) in [
-        ("auto", "naive"),
-        ("clusters", "naive"),
-        ("cells", "naive"),
+        ("auto", "naive (every box against every box)"),
+        ("clusters", "naive (every box against every box)"),
+        ("cells", "naive (every box against every box)"),
         ("naive", "clusters"),
     ] {
         let text = folder
@@ -86,6 +93,23 @@ fn every_method_is_checked_by_another_one() {
             text.contains(&format!("checked: {by} finds the same")),
             "{text}"
         );
-        assert!(folder.path("seen.ply").is_file());
+        assert!(folder.path("seen.ply").is_file() && folder.path("seen.png").is_file());
     }
+}
+
+/// More triangles than the oracle gets: the sample is said to be one.
+#[test]
+fn a_sample_is_not_mistaken_for_the_answer() {
+    let folder = Folder::new();
+    let text = folder
+        .run(["demo", "--triangles", "20000", "--frames", "2"])
+        .printed();
+    let line = text
+        .lines()
+        .find(|line| line.starts_with("checked"))
+        .unwrap();
+    assert!(
+        line.starts_with("checked on a sample: ") && line.contains(" finds the same ones in "),
+        "{line}"
+    );
 }

@@ -181,3 +181,47 @@ fn a_mesh_of_the_current_folder_names_files_beside_it() {
         assert!(!folder.path("inner/seen.ply").exists());
     }
 }
+
+/// What a terminal would obey is printed as text: file names may hold line breaks and escape sequences.
+#[test]
+fn names_of_files_are_escaped() {
+    let folder = Folder::new();
+    let name = |end: &str| format!("a\n\u{1b}[31mred\u{7}{end}");
+    let (mesh, moved, broken) = (name(".ply"), name("1.ply"), name(".obj"));
+    folder.ply(&mesh, &ball(200));
+    folder.ply(&moved, &ball(200).translated([0.3, 0.0, 0.0]));
+    folder.text(&broken, "v 0 0 0\nf 1 2 3\n");
+    let missing = name("no.ply");
+    for args in [
+        &["pairs", &mesh, &moved][..],
+        &["pairs", &mesh, &moved, &mesh, "-v"],
+        &["self", &mesh],
+        &["self", &mesh, &broken],
+        &["self", &broken],
+        &["self", &missing],
+        &["near", &mesh, &moved, "--distance", "0.1"],
+        &["distance", &mesh, &moved],
+        &["step", &mesh, &moved],
+        &["step", &mesh, &moved, &mesh, &mesh],
+        &["step", &mesh],
+        &["check", &mesh, &broken, &missing],
+        &["sequence", &mesh, &missing],
+        &[
+            "render",
+            &mesh,
+            &moved,
+            "--png",
+            &name(".png"),
+            "--size",
+            "20x20",
+        ],
+        &["tiles", "plan", "folder", &mesh, &broken],
+        &["pairs", &mesh, &moved, "--out", &mesh],
+    ] {
+        let run = folder.run(args);
+        let text = run.stdout + &run.stderr;
+        let obeyed = text.chars().find(|c| c.is_control() && *c != '\n');
+        assert_eq!(obeyed, None, "{args:?}: {text:?}");
+        assert!(!text.contains("a\n"), "{args:?}: {text:?}");
+    }
+}

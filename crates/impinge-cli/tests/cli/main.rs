@@ -11,7 +11,6 @@ mod first_sight;
 mod harness;
 mod hostile;
 mod near;
-#[cfg(feature = "gpu")]
 mod render;
 mod schema;
 mod sequence;

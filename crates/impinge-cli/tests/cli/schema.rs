@@ -1,4 +1,4 @@
-//! `docs/answer.schema.json` describes what `--json` prints, and nothing else.
+//! `docs/*.schema.json` describe what `--json` prints, and nothing else.
 
 use impinge_io::Pc2Writer;
 use impinge_scenes::solids::solid_ball;
@@ -163,5 +163,142 @@ fn the_description_refuses_what_is_not_an_answer() {
         let mut object = right.clone();
         object.as_object_mut().unwrap().remove(key);
         assert!(!wrong(&schema, &object, "$").is_empty(), "{key}");
+    }
+}
+
+/// All commands in a help text.
+fn commands(help: &str) -> Vec<&str> {
+    let (_, list) = help.split_once("Commands:\n").unwrap_or(("", ""));
+    list.lines()
+        .take_while(|line| !line.is_empty())
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|name| *name != "help")
+        .collect()
+}
+
+#[test]
+fn every_command_that_prints_json_has_a_schema() {
+    let folder = Folder::new();
+    let (a, b) = (ball(320), ball(500).translated([0.7, 0.1, 0.0]));
+    folder.ply("a.ply", &a);
+    folder.ply("a1.ply", &a.translated([0.2, 0.0, 0.0]));
+    folder.ply("b.ply", &b);
+    folder.ply("far.ply", &a.translated([5.0, 0.0, 0.0]));
+    folder.medit("c.mesh", &solid_ball(100));
+    folder.text(
+        "soup.obj",
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nf 1 2 3\nf 4 3 2\n",
+    );
+    folder.text("broken.obj", "v 0 0 0\nf 1 2 3\n");
+    let mut cache = Pc2Writer::create(&folder.path("run.pc2"), a.n_vertices(), 0.0, 1.0).unwrap();
+    cache.append(&a.positions).unwrap();
+    cache
+        .append(&a.translated([0.1, 0.0, 0.0]).positions)
+        .unwrap();
+    cache.finish().unwrap();
+    let cases: &[(&str, &str)] = &[
+        ("answer", "pairs a.ply b.ply"),
+        ("answer", "pairs a.ply far.ply"),
+        (
+            "answer",
+            "pairs a.ply b.ply c.mesh --self --contacts rows.csv",
+        ),
+        ("answer", "self a.ply broken.obj b.ply"),
+        ("answer", "self soup.obj --no-weld"),
+        ("answer", "render a.ply b.ply --png out.png --size 64x64"),
+        ("answer", "sequence a.ply run.pc2 --other b.ply"),
+        (
+            "sequence-step",
+            "sequence a.ply run.pc2 --other b.ply --ccd",
+        ),
+        ("sequence-step", "sequence a.ply run.pc2 --ccd"),
+        ("count", "pairs a.ply b.ply --count"),
+        ("count", "pairs a.ply b.ply --any"),
+        ("count", "self a.ply broken.obj --count"),
+        ("distance", "distance a.ply far.ply"),
+        ("distance", "distance a.ply b.ply"),
+        ("distance", "distance a.ply c.mesh"),
+        ("near", "near a.ply b.ply --distance 0.01"),
+        ("near", "near a.ply far.ply --distance 0"),
+        ("near", "near soup.obj --distance 0.1 --no-weld"),
+        ("step", "step a.ply a1.ply b.ply b.ply"),
+        ("step", "step a.ply a1.ply far.ply far.ply --no-self"),
+        ("step", "step a.ply a1.ply b.ply b.ply --earliest"),
+        ("step", "step soup.obj soup.obj --weld"),
+        (
+            "candidates",
+            "step a.ply a1.ply b.ply b.ply --candidates boxes.csv",
+        ),
+        (
+            "candidates",
+            "step a.ply a1.ply --candidates boxes.csv --kinds ff",
+        ),
+        (
+            "check",
+            "check a.ply c.mesh broken.obj missing.ply soup.obj",
+        ),
+        ("tiles-plan", "tiles plan still a.ply b.ply --cap 200"),
+        ("tiles-scatter", "tiles scatter still"),
+        ("tiles-run", "tiles run still"),
+        ("tiles-merge", "tiles merge still"),
+        (
+            "tiles-plan",
+            "tiles plan moving a.ply a1.ply b.ply b.ply --step --cap 200",
+        ),
+        ("tiles-scatter", "tiles scatter moving"),
+        ("tiles-run", "tiles run moving"),
+        ("tiles-merge", "tiles merge moving"),
+        #[cfg(feature = "gpu")]
+        ("devices", "devices"),
+    ];
+    for (name, words) in cases {
+        let schema = schema(name);
+        let args: Vec<&str> = words.split(' ').chain(["--json"]).collect();
+        let run = folder.run(&args);
+        assert!(!run.stdout.is_empty(), "{words}: {}", run.stderr);
+        for line in run.stdout.lines() {
+            let value = serde_json::from_str(line).unwrap();
+            assert_eq!(wrong(&schema, &value, "$"), [""; 0], "{words}");
+            // Keys that are not described are refused, so the schema is not empty.
+            let mut other = if let Value::Array(list) = &value {
+                list[0].clone()
+            } else {
+                value
+            };
+            other["unknown"] = json!(0);
+            let schema = schema.get("items").unwrap_or(&schema);
+            assert_eq!(wrong(schema, &other, "$").len(), 1, "{words}");
+        }
+    }
+    // No command is forgotten, and no description.
+    let top = folder.run(["--help"]).printed();
+    for command in commands(&top) {
+        let help = folder.run([command, "--help"]).stdout;
+        let below = commands(&help);
+        let all = match below.is_empty() {
+            true => vec![(command.to_owned(), help.clone())],
+            false => below
+                .iter()
+                .map(|sub| {
+                    let help = folder.run([command, sub, "--help"]).stdout;
+                    (format!("{command} {sub}"), help)
+                })
+                .collect(),
+        };
+        for (command, help) in all {
+            let is_here = cases
+                .iter()
+                .any(|(_, words)| words.starts_with(&format!("{command} ")) || *words == command);
+            assert_eq!(help.contains("--json"), is_here, "{command}");
+        }
+    }
+    let docs = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs")).unwrap();
+    for entry in docs {
+        let file = entry.unwrap().file_name().into_string().unwrap();
+        if let Some(name) = file.strip_suffix(".schema.json") {
+            let is_known = cases.iter().any(|(known, _)| *known == name);
+            assert!(is_known || name == "devices", "{file}");
+        }
     }
 }

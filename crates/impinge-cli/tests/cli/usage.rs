@@ -64,7 +64,6 @@ fn help_shows_every_command_with_examples() {
             assert!(help.contains(word), "{command}: {word}");
         }
     }
-    #[cfg(feature = "gpu")]
     for (command, words) in [
         (
             "render",
@@ -88,6 +87,68 @@ fn help_shows_every_command_with_examples() {
     }
     let version = folder.run(["--version"]).printed();
     assert_eq!(version, format!("impinge {}\n", env!("CARGO_PKG_VERSION")));
+}
+
+/// A command's help is short: its own options first, one line per topic for those that many commands share.
+#[test]
+fn shared_options_are_explained_once() {
+    let folder = Folder::new();
+    let topics = [
+        ("detection", "--memory-budget <BYTES>", "--threads"),
+        ("picture", "--azimuth <D>", "--see-through"),
+        ("rows", "--candidates of `step`", ""),
+    ];
+    for (topic, text, _) in topics {
+        let help = folder.run(["help", topic]).printed();
+        assert!(help.contains(text), "{topic}: {help}");
+        assert_eq!(folder.run([topic]).printed(), help);
+    }
+    for command in [
+        "pairs", "self", "near", "sequence", "step", "check", "render", "simulate",
+    ] {
+        for help in [folder.run([command, "--help"]), folder.run([command, "-h"])] {
+            let help = help.printed();
+            assert!(help.lines().count() < 70, "{command}: {help}");
+            for (topic, text, option) in topics {
+                assert!(!help.contains(text), "{command}: {topic}");
+                let line = help
+                    .lines()
+                    .find(|line| line.starts_with(&format!("  impinge help {topic} ")));
+                if let Some(line) = line {
+                    assert!(line.contains(option), "{line}");
+                }
+            }
+        }
+        // The values of its own options are explained.
+        let long = folder.run(["help", command]).printed();
+        assert!(long.contains("Usage: impinge "), "{long}");
+    }
+    let help = folder.run(["step", "--help"]).printed();
+    assert!(help.contains("impinge help detection") && help.contains("impinge help rows"));
+    let own = help.find("--earliest").unwrap();
+    assert!(own < help.find("--method").unwrap() && own < help.find("--size").unwrap());
+    assert!(folder.run(["help", "step"]).printed().contains("- skip:"));
+}
+
+#[cfg(not(feature = "view"))]
+#[test]
+fn a_part_that_was_not_built_says_how_to_get_it() {
+    let folder = Folder::new();
+    for args in [
+        &["view"][..],
+        &["view", "a.obj", "--frame", "3"],
+        &["view", "--help"],
+    ] {
+        let line = folder.run(args).error();
+        assert!(
+            line.contains("without the window") && line.contains("--features view"),
+            "{line}"
+        );
+    }
+    if cfg!(not(feature = "gpu")) {
+        let line = folder.run(["devices", "--json"]).error();
+        assert!(line.contains("--features gpu"), "{line}");
+    }
 }
 
 #[test]
@@ -143,7 +204,7 @@ fn other_errors_are_code_1_and_one_line() {
     ] {
         for args in [
             ["pairs", "good.ply", file, "--json"],
-            ["self", "good.ply", file, "--no-progress"],
+            ["self", file, "--shared-vertex", "skip"],
         ] {
             let line = folder.run(args).error();
             for word in words {

@@ -6,9 +6,7 @@ use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 
-#[cfg(feature = "gpu")]
 use crate::args::PictureArgs;
-#[cfg(feature = "gpu")]
 use crate::values::PngFile;
 use crate::values::{MeshFile, bytes};
 
@@ -27,16 +25,16 @@ Self-intersections are pairs that also meet outside their common vertices, edge 
 degenerate faces have exactly zero area. For tetrahedra, faces are counted instead of edges.
 
 Each mesh is checked in a child process. A mesh that can't be read, takes too long or runs out
-of memory gets a row with its `error`, and the run continues. The exit code is 0, or 3 if
-a mesh has a problem that --fail-on names. Run the same command again to continue an interrupted run
-in --out.";
+of memory gets a row with its `error`, and the run continues. The exit code is 3 if a mesh has a
+problem that --fail-on names, else 1 if a mesh could not be checked, else 0. Run the same command
+again to continue an interrupted run in --out.";
 
 #[derive(Debug, Args)]
 pub struct CheckArgs {
     /// Mesh files
     #[arg(value_name = "MESH", required_unless_present = "list")]
     pub meshes: Vec<PathBuf>,
-    /// A file with one path per line (- for standard input)
+    /// A file with one path per line (- for standard input); empty lines and lines that start with # are ignored
     #[arg(long, value_name = "FILE")]
     pub list: Option<PathBuf>,
     /// Print one line of JSON per mesh and nothing else
@@ -45,7 +43,7 @@ pub struct CheckArgs {
     /// A folder for rows, in which an interrupted run can continue; or a mesh file that shows the problems (.glb, .ply, .vtu)
     #[arg(long, value_name = "DIR|MESH")]
     pub out: Option<Out>,
-    /// Exit with code 3 if any mesh has one of these problems (comma-separated)
+    /// Exit with code 3 if any mesh has one of these problems (comma-separated); a mesh that could not be checked always fails
     #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',')]
     pub fail_on: Vec<FailOn>,
     /// Do not weld vertices at the same position
@@ -91,10 +89,8 @@ pub struct CheckArgs {
     #[arg(long, help_heading = "Many meshes")]
     pub retry: bool,
     /// Draw the problems as a picture (.png)
-    #[cfg(feature = "gpu")]
     #[arg(long, value_name = "FILE")]
     pub png: Option<PngFile>,
-    #[cfg(feature = "gpu")]
     #[command(flatten)]
     pub picture: PictureArgs,
 }

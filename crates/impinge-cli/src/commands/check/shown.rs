@@ -93,7 +93,6 @@ pub fn print_legend() -> Result<(), Error> {
 }
 
 /// Draws the meshes in the same colours. Primitives with a problem show through faces that hide them.
-#[cfg(feature = "gpu")]
 pub fn draw(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
     use impinge_io::Elements;
     use impinge_render::{Face, Normals, Surface};

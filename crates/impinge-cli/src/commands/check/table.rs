@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use impinge_check::{Counts, ErrorKind, Row};
+use impinge_io::printable;
 
 use super::args::FailOn;
 use crate::error::Error;
@@ -97,10 +98,11 @@ pub fn print(rows: &[Row]) -> Result<(), Error> {
     for row in listed.iter().take(LISTED) {
         if let Err(failure) = &row.result {
             // Most messages about files already name the file.
-            if failure.message.starts_with(&row.path) {
+            let name = printable(&row.path);
+            if failure.message.starts_with(&name) {
                 writeln!(to, "{}", failure.message)?;
             } else {
-                writeln!(to, "{}: {}", row.path, failure.message)?;
+                writeln!(to, "{name}: {}", failure.message)?;
             }
         }
     }
@@ -109,6 +111,11 @@ pub fn print(rows: &[Row]) -> Result<(), Error> {
         writeln!(to, "… and {} more: see --json or --out DIR", meshes(n))?;
     }
     let n_clean = rows.iter().filter(|row| !FailOn::Any.is_in(row)).count();
+    if n_clean == rows.len() && n_clean > 0 {
+        let all = if n_clean == 1 { "clean" } else { "all clean" };
+        writeln!(to, "{}: {all}", meshes(n_clean as u64))?;
+        return Ok(());
+    }
     let mut parts = vec![format!("{} without any finding", grouped(n_clean as u64))];
     for what in FailOn::EACH {
         let n = rows.iter().filter(|row| what.is_in(row)).count();
@@ -135,31 +142,42 @@ fn line(row: &Row, counts: &Counts) -> Vec<String> {
         counts.boundary_facets,
         counts.components,
     ];
-    let mut line = vec![row.path.clone()];
+    let mut line = vec![printable(&row.path)];
     line.extend(numbers.map(grouped));
     line
 }
 
-/// Fails if any mesh has one of the named problems.
-pub fn fail_on(rows: &[Row], named: &[FailOn]) -> Result<(), Error> {
-    let n_failed = rows
-        .iter()
-        .filter(|row| named.iter().any(|what| what.is_in(row)))
-        .count();
-    if n_failed == 0 {
-        return Ok(());
+/// Fails if any mesh has one of the named problems, or could not be checked.
+pub fn fail(rows: &[Row], named: &[FailOn]) -> Result<(), Error> {
+    let n_with = |what: &dyn Fn(&Row) -> bool| {
+        let n = rows.iter().filter(|row| what(row)).count();
+        grouped(n as u64)
+    };
+    let is_unchecked = |row: &Row| row.result.is_err();
+    let is_named = |row: &Row| named.iter().any(|what| what.is_in(row));
+    let unchecked = format!("{} could not be checked", n_with(&is_unchecked));
+    let n = grouped(rows.len() as u64);
+    if !rows.iter().any(is_named) {
+        return match rows.iter().any(is_unchecked) {
+            false => Ok(()),
+            true => Err(Error::Unread(format!(
+                "{} of {n} meshes could not be checked",
+                n_with(&is_unchecked)
+            ))),
+        };
     }
-    let each = FailOn::EACH
+    let asked = |what: FailOn| named.contains(&what) || named.contains(&FailOn::Any);
+    let mut found: Vec<String> = FailOn::EACH
         .into_iter()
-        .filter(|what| named.contains(what) || named.contains(&FailOn::Any));
-    let found = each.filter_map(|what| {
-        let n = rows.iter().filter(|row| what.is_in(row)).count() as u64;
-        (n > 0).then(|| format!("{} with {}", grouped(n), what.words()))
-    });
+        .filter(|&what| asked(what) && rows.iter().any(|row| what.is_in(row)))
+        .map(|what| format!("{} with {}", n_with(&|row| what.is_in(row)), what.words()))
+        .collect();
+    if rows.iter().any(is_unchecked) && !asked(FailOn::Error) {
+        found.push(unchecked);
+    }
+    let n_failed = n_with(&|row| is_named(row) || is_unchecked(row));
+    let found = found.join(", ");
     Err(Error::CheckFailed(format!(
-        "{} of {} meshes failed: {}",
-        grouped(n_failed as u64),
-        grouped(rows.len() as u64),
-        found.collect::<Vec<_>>().join(", ")
+        "{n_failed} of {n} meshes failed: {found}"
     )))
 }

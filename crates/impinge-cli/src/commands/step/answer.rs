@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 
 use impinge::{Error, Impact, Impacts, PairKind, Statistics};
+use impinge_io::printable;
 use serde_json::{Map, Value, json};
 
 use crate::args::StepHow;
@@ -125,7 +126,7 @@ impl<'a> Found<'a> {
             true => format!(" besides {separation}"),
             false => String::new(),
         };
-        let name = |body: impinge::BodyId| bodies.names[body.index()][0].as_str();
+        let name = |body: impinge::BodyId| printable(&bodies.names[body.index()][0]);
         let nothing = if clearance > 0.0 {
             format!(
                 "every pair keeps its clearance of {clearance}{besides} from start to end, or a fifth of its distance"
@@ -207,8 +208,8 @@ impl<'a> Found<'a> {
 
 /// The bodies as JSON objects.
 pub fn described(bodies: &Moving) -> Result<Value, Error> {
-    let all = bodies.ids.iter().zip(&bodies.names);
-    all.map(|(&id, [start, end])| {
+    let all = bodies.ids.iter().zip(&bodies.names).zip(&bodies.vertices);
+    all.map(|((&id, [start, end]), vertices)| {
         let body = bodies.scene.body(id)?;
         Ok(json!({
             "name": start,
@@ -216,6 +217,8 @@ pub fn described(bodies: &Moving) -> Result<Value, Error> {
             "kind": body.kind().name(),
             "primitives": body.n_primitives(),
             "vertices": body.n_vertices(),
+            "welded": vertices.n_welded,
+            "coincident": vertices.n_coincident,
         }))
     })
     .collect()

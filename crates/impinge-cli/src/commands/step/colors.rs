@@ -2,11 +2,9 @@
 
 use std::collections::HashMap;
 
-#[cfg(feature = "gpu")]
 use impinge::Elements;
 use impinge::{Body, BodyId, Impacts, Part};
 use impinge_io::ColoredMesh;
-#[cfg(feature = "gpu")]
 use impinge_render::{Face, Normals, Surface};
 
 use crate::error::Error;
@@ -121,7 +119,6 @@ pub fn write(file: &MeshFile, bodies: &Moving, impacts: &Impacts) -> Result<(), 
 }
 
 /// The bodies' surfaces at the start of the step.
-#[cfg(feature = "gpu")]
 pub fn surfaces(bodies: &Moving, impacts: &Impacts) -> Result<Vec<Surface>, Error> {
     let surface = |(ix, &id): (usize, &BodyId)| {
         let body = bodies.scene.body(id)?;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use impinge::{BodyId, CancelToken, Positions, Scene};
-use impinge_io::{Format, Mesh, ReadOptions, Weld, read_with_summary};
+use impinge_io::{Format, Mesh, ReadOptions, Weld, printable, read_with_summary};
 
 use crate::args::StepArgs;
 use crate::detection::set_positions;
@@ -18,6 +18,8 @@ pub struct Moving {
     pub ids: Vec<BodyId>,
     /// The files of each body's start and end.
     pub names: Vec<[String; 2]>,
+    /// Vertices that share their position with another one at both ends.
+    pub vertices: Vec<Vertices>,
 }
 
 impl Moving {
@@ -27,7 +29,7 @@ impl Moving {
         if let [alone] = rest {
             return Err(Error::Usage(format!(
                 "a body is two files, its start and its end: {} has no end ({} files are given)",
-                alone.display(),
+                printable(alone),
                 args.meshes.len()
             )));
         }
@@ -69,6 +71,7 @@ impl Moving {
                 weld.apply(&mut at_start);
                 weld.apply(&mut at_end);
                 vertices.n_welded = weld.n_welded();
+                vertices.n_coincident = Some(0);
             } else {
                 vertices.n_coincident = Some(weld.n_welded());
             }
@@ -95,6 +98,7 @@ impl Moving {
             .map_err(refused(&names[1]))?;
         self.ids.push(id);
         self.names.push(names);
+        self.vertices.push(vertices);
         Ok(())
     }
 }
@@ -115,8 +119,11 @@ pub fn set_end_positions(
 fn same_elements(names: &[String; 2], start: &Mesh, end: &Mesh) -> Result<(), Error> {
     let [name, other] = names;
     let differ = |what: String| {
-        let message =
-            format!("{other}: the end of the step must have the elements of {name}: {what}");
+        let message = format!(
+            "{}: the end of the step must have the elements of {}: {what}",
+            printable(other),
+            printable(name)
+        );
         Err(Error::Ends(message))
     };
     if start.n_vertices() != end.n_vertices() {

@@ -98,7 +98,7 @@ pub struct ScatterArgs {
     pub folder: PathBuf,
     #[command(flatten)]
     pub share: ShareArgs,
-    /// CPU threads [default: one per core]
+    /// CPU threads, 1 to 1024 [default: one per core]
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
     /// Print JSON and nothing else
@@ -137,7 +137,7 @@ pub struct RunArgs {
     /// The method that finds candidates; all methods give the same pairs
     #[arg(long, value_enum, default_value_t = MethodArg::Auto)]
     pub method: MethodArg,
-    /// CPU threads [default: one per core]
+    /// CPU threads, 1 to 1024 [default: one per core]
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
     /// Memory for the detector without the answer, such as 512M [default: no limit]

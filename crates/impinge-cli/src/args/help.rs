@@ -1,0 +1,162 @@
+//! The help. Options that many commands share are shown once, by `impinge help detection`, `help rows` and `help picture`;
+//! the help of a command names them in one line per topic.
+
+use clap::{Arg, ArgAction, Args as _, Command, CommandFactory, FromArgMatches};
+
+use super::{Cli, DetectorArgs, PictureArgs};
+
+/// Options that many commands share.
+struct Topic {
+    /// The word after `impinge help`.
+    name: &'static str,
+    about: &'static str,
+    /// The options, in an empty command.
+    options: fn(Command) -> Command,
+    text: &'static str,
+}
+
+const TOPICS: [Topic; 3] = [
+    Topic {
+        name: "detection",
+        about: "How pairs are found: options that change the time, never the answer",
+        options: DetectorArgs::augment_args,
+        text: "",
+    },
+    Topic {
+        name: "picture",
+        about: "Options of pictures: --png FILE of most commands",
+        options: |command| {
+            let png = Arg::new("png").long("png").value_name("FILE");
+            PictureArgs::augment_args(command.arg(png.help("The picture (.png)")))
+        },
+        text: "\
+Pictures are drawn on a GPU if there is one, else on the CPU; they look alike. Colliding primitives of body 0 are red,
+those of body 1 blue, then green, orange, …; hidden ones show through faintly.",
+    },
+    Topic {
+        name: "rows",
+        about: "Files of rows, one per pair: --pairs, --impacts, --candidates, --contacts",
+        options: |command| command,
+        text: "\
+The name of the file decides the format: .csv, .jsonl or .npy. \"-\" is standard output, as CSV unless
+--pairs-format says otherwise; the summary then goes to standard error. Rows are sorted. Bodies are
+numbered from 0 as given, primitives, vertices and faces as in the file; edges are the unique pairs
+(low, high) of vertices in the order of (high, low).
+
+--pairs of `pairs` and `self`: body_a, primitive_a, body_b, primitive_b (u32)
+--pairs of `sequence`: the same, after the number of the frame
+--pairs of `near`: kind, body_a, element_a, body_b, element_b, type, feature_a, feature_b, parallel,
+  distance, ax, ay, az, bx, by, bz. The kind names the elements: vf a vertex and a face, ee two edges, and so
+  on. The type says which features are nearest, with ipc-toolkit's names: P_T, P_E0, EA_EB, ... A feature
+  is v0, v1 or v2 (a vertex of the element), e0, e1 or e2 (edge k goes from vertex k to the next) or f.
+  Distance and points are rounded.
+--impacts of `step`: kind, body_a, element_a, body_b, element_b, toi. Of kind vf, a is the vertex and b the
+  face. Mesh files hold faces, so kinds are vf and ee; ev and vv are of bodies of edges or points, which
+  the library and the Python module have.
+--candidates of `step`: the same without toi, written run by run, so that memory need not hold all of them:
+  see --memory-budget. In a .npy file they are a structured array.
+--contacts of `pairs` and `self` (.npy or .csv): one row per corner of the intersection of two triangles, which
+  is a point, the two ends of a segment, or the corners of a polygon if both lie in one plane. feature_a
+  and feature_b say where the corner lies in each triangle: on vertex 7 (v7), edge 7-9 (e7-9) or face 3 (f3).",
+    },
+];
+
+/// Options that write rows, whichever command has them.
+const ROWS: [&str; 5] = ["pairs", "pairs_format", "impacts", "candidates", "contacts"];
+
+/// Reads the command line. Prints help, or an error of usage, and ends the program if that is all there is to do.
+pub fn parse() -> Cli {
+    let matches = command().get_matches();
+    if let Some(topic) = matches
+        .subcommand_name()
+        .and_then(|name| TOPICS.iter().find(|topic| topic.name == name))
+    {
+        // As for `--help`, a closed pipe is no error.
+        let _ = topic.command().print_long_help();
+        std::process::exit(0);
+    }
+    Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+}
+
+/// The command line, with the topics as hidden commands, so that `impinge help TOPIC` finds them.
+pub fn command() -> Command {
+    let with_commands = Cli::command().mut_subcommands(shortened);
+    with_help(with_commands).subcommands(TOPICS.iter().map(Topic::command))
+}
+
+impl Topic {
+    fn command(&self) -> Command {
+        (self.options)(Command::new(self.name))
+            .about(self.about)
+            .after_help(self.text)
+            .override_usage("impinge COMMAND … [OPTIONS]")
+            .disable_help_flag(true)
+            .disable_version_flag(true)
+            .hide(true)
+    }
+
+    /// Whether an option of a command belongs to this topic.
+    fn has(&self, arg: &Arg) -> bool {
+        let id = arg.get_id().as_str();
+        match self.name {
+            "rows" => ROWS.contains(&id),
+            _ => (self.options)(Command::new(self.name))
+                .get_arguments()
+                .any(|own| {
+                    own.get_help_heading().is_some()
+                        && own.get_id() == arg.get_id()
+                        && own.get_help_heading() == arg.get_help_heading()
+                }),
+        }
+    }
+}
+
+/// The command without the options of the topics in its help, which names them in one line per topic.
+fn shortened(command: Command) -> Command {
+    let mut more = String::new();
+    for topic in &TOPICS {
+        let of_topic = command.get_arguments().filter(|arg| topic.has(arg));
+        let names: Vec<String> = of_topic
+            .filter_map(|arg| Some(format!("--{}", arg.get_long()?)))
+            .collect();
+        if !names.is_empty() {
+            let start = if more.is_empty() { "More:\n" } else { "" };
+            let call = format!("impinge help {}", topic.name);
+            more += &format!("{start}  {call:<24}{}\n", names.join(" "));
+        }
+    }
+    let examples = command.get_after_help().map(ToString::to_string);
+    let after = [Some(more).filter(|more| !more.is_empty()), examples];
+    let after: Vec<String> = after.into_iter().flatten().collect();
+    // A row's file stays among the command's own options, because its help says what is written.
+    let shared = |arg: &Arg| {
+        TOPICS
+            .iter()
+            .any(|topic| topic.name != "rows" && topic.has(arg))
+    };
+    let short = command
+        .mut_args(|arg| match shared(&arg) {
+            true => arg.hide(true),
+            false => arg,
+        })
+        .mut_subcommands(shortened);
+    with_help(match after.is_empty() {
+        true => short,
+        false => short.after_help(after.join("\n")),
+    })
+}
+
+/// `--help` prints one line per option; `impinge help COMMAND` also says what each of its values means.
+fn with_help(command: Command) -> Command {
+    if command.is_disable_help_flag_set() {
+        return command;
+    }
+    command.disable_help_flag(true).arg(
+        Arg::new("help")
+            .short('h')
+            .long("help")
+            .help_heading(None)
+            .help("Print help; `impinge help COMMAND` explains the values of options")
+            .action(ArgAction::HelpShort),
+    )
+}
