@@ -101,7 +101,7 @@ fn shared_options_are_explained_once() {
     for (topic, text, _) in topics {
         let help = folder.run(["help", topic]).printed();
         assert!(help.contains(text), "{topic}: {help}");
-        assert_eq!(folder.run([topic]).printed(), help);
+        assert!(folder.run([topic]).printed().contains(text), "{topic}");
     }
     for command in [
         "pairs", "self", "near", "sequence", "step", "check", "render", "simulate",
