@@ -213,9 +213,9 @@ impl Record {
         match self.frames {
             Frames::Cache { .. } => format!(
                 "{}, its positions in {} and colliding primitives in {}",
-                printable(&path.with_extension("ply")),
-                printable(&path.with_extension("pc2")),
-                printable(&self.folder.join("colliding.csv"))
+                printable(path.with_extension("ply")),
+                printable(path.with_extension("pc2")),
+                printable(self.folder.join("colliding.csv"))
             ),
             Frames::Numbered(format) => {
                 format!(

@@ -18,11 +18,8 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
         return Err(name.syntax(text.place(), "'MeshVersionFormatted'", shown(first)));
     }
     text.number::<u32>("a version")?;
-    loop {
-        // Many programs write no 'End'.
-        let Some(keyword) = text.word() else {
-            break;
-        };
+    // Many programs write no 'End'.
+    while let Some(keyword) = text.word() {
         let place = text.place();
         match keyword {
             b"End" => break,
