@@ -3,7 +3,7 @@
 //! `cargo run --release -p impinge-render --example collision -- docs/images/collision.png`
 
 use impinge::{Backend, Detector, Query, Scene};
-use impinge_render::{Camera, Colors, Picture, Renderer, Surface, UpAxis};
+use impinge_render::{Camera, Colors, Picture, Surface, UpAxis};
 use impinge_scenes::surfaces::{Knot, torus, torus_knot};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let surface = Surface::of_body(scene.body(body)?, &pairs.colliding(body), colors)?;
         picture.surfaces.push(surface);
     }
-    Renderer::new()?.render(&picture)?.write_png(&path)?;
+    picture.draw()?.write_png(&path)?;
     println!("{path}: {} pairs", pairs.len());
     Ok(())
 }
