@@ -92,7 +92,11 @@ fn shared_point(
     let n = corners.each_ref().map(Vec::len);
     let (small, crossing) = pairs(detector, n.map(faces))?;
     if !crossing.is_empty() {
-        return Ok(detector.contacts(&small, &crossing)?.points().first().copied());
+        return Ok(detector
+            .contacts(&small, &crossing)?
+            .points()
+            .first()
+            .copied());
     }
     // A corner as a triangle, and the whole of the other one.
     let corner = Elements::Triangles(vec![[0; 3]]);
