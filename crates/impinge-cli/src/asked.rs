@@ -33,9 +33,9 @@ impl Asked {
     pub fn line(self, vertices: &[Vertices], nouns: &Nouns) -> String {
         let Nouns { one, many, file } = nouns;
         let n = grouped(vertices.len() as u64);
-        let of = file
-            .as_ref()
-            .map_or(String::new(), |file| format!(" of {file}"));
+        let of = file.as_ref().map_or(String::new(), |file| {
+            format!(" of {}", impinge_io::printable(file))
+        });
         let whom = match (vertices.len(), self.between, self.within) {
             (1, _, true) => format!("within 1 {one}"),
             (1, _, false) => format!("1 {one}"),

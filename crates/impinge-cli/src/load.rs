@@ -162,11 +162,7 @@ impl Bodies {
         Bodies::read_all(paths, loading, paths.len() > 1)
     }
 
-    fn read_all(
-        paths: &[PathBuf],
-        loading: Loading<'_>,
-        passes_over: bool,
-    ) -> Result<Self, Error> {
+    fn read_all(paths: &[PathBuf], loading: Loading<'_>, passes_over: bool) -> Result<Self, Error> {
         let mut bodies = Bodies::default();
         let mut has_parts = false;
         for path in paths {
