@@ -21,6 +21,14 @@ create_exception!(
     "More pairs were found than `max_pairs` allows. The detector stays usable."
 );
 
+create_exception!(
+    impinge,
+    Seam,
+    PyValueError,
+    "Elements of one body touch at the start of a step at vertices that are at one position but not shared. Weld the mesh \
+     (`weld`), or skip pairs that touch at the start."
+);
+
 /// What the arguments of the failing call are called.
 #[derive(Clone, Copy)]
 pub struct Names<'a> {
@@ -37,6 +45,7 @@ pub fn raise(error: Error) -> PyErr {
             PyMemoryError::new_err(error.to_string())
         }
         Error::TooManyPairs { .. } => TooManyPairs::new_err(error.to_string()),
+        Error::Seam { .. } => Seam::new_err(error.to_string()),
         Error::Cancelled => Cancelled::new_err("the detection was cancelled"),
         Error::NoAdapter { .. } | Error::Gpu { .. } | Error::Threads(_) => {
             PyRuntimeError::new_err(error.to_string())

@@ -51,7 +51,7 @@ mod _impinge {
     #[pymodule_export]
     use super::devices::{Device, devices};
     #[pymodule_export]
-    use super::errors::{Cancelled, TooManyPairs};
+    use super::errors::{Cancelled, Seam, TooManyPairs};
     #[pymodule_export]
     use super::files::{Mesh, read, read_bodies};
     #[pymodule_export]

@@ -21,7 +21,7 @@ def scene():
 
 
 def test_a_rod_through_a_plate_is_near_it(scene):
-    near = impinge.Detector("cpu").within_distance(scene, 2.0, distances=True, closest_points=True)
+    near = impinge.Detector(backend="cpu").within_distance(scene, 2.0, between=True, distances=True, closest_points=True)
     assert len(near.of("ef")) == len(near) == 8
     assert not near.distances.any()
     assert {impinge.TYPES[number] for number in near.types} == {"E_T"}
@@ -29,7 +29,7 @@ def test_a_rod_through_a_plate_is_near_it(scene):
 
 
 def test_a_start_that_intersects_is_not_free_if_asked(scene):
-    detector = impinge.Detector("cpu")
+    detector = impinge.Detector(backend="cpu")
     assert detector.is_free(scene)
     assert not detector.is_free(scene, start="verify")
     impacts = detector.impacts(scene)
@@ -48,12 +48,15 @@ def test_a_start_that_intersects_is_not_free_if_asked(scene):
 def test_seams_are_refused_by_name():
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
     faces = [[0, 1, 2], [3, 4, 5]]
-    detector = impinge.Detector("cpu")
+    detector = impinge.Detector(backend="cpu")
     scene = impinge.Scene()
     scene.set_end_positions(scene.add(vertices, faces), vertices + [0, 0, 1])
-    with pytest.raises(ValueError, match="vertices 1 and 3 are at one position but not shared.*weld"):
+    with pytest.raises(impinge.Seam, match="vertices 1 and 3 are at one position but not shared.*weld"):
         detector.advance(scene)
     assert detector.advance(scene, start="skip").fraction == 1.0
+    mesh = impinge.ipc.CollisionMesh(vertices, impinge.ipc.edges(np.array(faces)), np.array(faces))
+    with pytest.raises(impinge.Seam):
+        impinge.ipc.compute_collision_free_stepsize(mesh, vertices, vertices + [0, 0, 1])
     vertices, faces, _ = impinge.weld(vertices, faces)
     scene = impinge.Scene()
     scene.set_end_positions(scene.add(vertices, faces), vertices + [0, 0, 1])

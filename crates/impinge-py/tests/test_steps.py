@@ -337,7 +337,7 @@ def test_bad_questions_are_refused_by_name(detector, falling, name):
     with pytest.raises(TypeError, match="^scene: a Scene expected, NoneType given"):
         ask(None)
     if name != "candidates":
-        with pytest.raises(ValueError, match='^start: "leave" given, "report", "skip" allowed'):
+        with pytest.raises(ValueError, match='^start: "leave" given, "report", "skip", "verify" allowed'):
             ask(falling, start="leave")
     if name in ("impacts", "earliest"):
         with pytest.raises(ValueError, match='^toi: "f16" given, "f32", "f64" allowed'):

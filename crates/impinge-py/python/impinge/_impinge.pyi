@@ -35,6 +35,7 @@ __all__ = [
     "Penetration",
     "Result",
     "Scene",
+    "Seam",
     "Statistics",
     "TooManyPairs",
     "__version__",
@@ -91,6 +92,7 @@ class _Settings(TypedDict, total=False):
     placement: _Placement
 
 class Cancelled(Exception): ...
+class Seam(ValueError): ...
 class TooManyPairs(Exception): ...
 
 @final

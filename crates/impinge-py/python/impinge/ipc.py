@@ -41,7 +41,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _impinge
-from ._impinge import Detector, Scene
+from ._impinge import Detector, Scene, Seam
 
 __all__ = [
     "CollisionMesh",
@@ -370,7 +370,8 @@ def compute_collision_free_stepsize(
     Raises
     ------
     ValueError, TypeError
-        As `is_step_collision_free`.
+        As `is_step_collision_free`; a mesh with seams, whose vertices at one position are not
+        shared, where they touch at the start (`Seam`): every step would be 0.
     """
     ours = _served(mesh)
     start, end, distance = _step(ours, vertices_t0, vertices_t1, min_distance)
@@ -382,14 +383,21 @@ def compute_collision_free_stepsize(
     held = ours._held()
     scene = held.place(start, end)
     may = mesh.can_collide if labels is None else None
-    advance = held.detector.advance(
-        scene,
-        separation=distance,
-        clearance=_CLEARANCE,
-        # With all of its distance to lose, a pair still keeps what rounding moves.
-        clearance_share=max(1 - rescaling, 1e-9),
-        _filter=ours._filter(labels, may),
-    )
+    try:
+        advance = held.detector.advance(
+            scene,
+            separation=distance,
+            clearance=_CLEARANCE,
+            # With all of its distance to lose, a pair still keeps what rounding moves.
+            clearance_share=max(1 - rescaling, 1e-9),
+            _filter=ours._filter(labels, may),
+        )
+    except Seam:
+        # Parts that have come to touch at a vertex are no seam: there is no step, as for all that
+        # touches.
+        if len(np.unique(ours._rest, axis=0)) < len(ours._rest):
+            raise
+        return 0.0
     return float(advance.fraction)
 
 
