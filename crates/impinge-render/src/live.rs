@@ -103,6 +103,7 @@ struct BodyOnDevice {
     colors: wgpu::Buffer,
     colored: Vec<u32>,
     group: wgpu::BindGroup,
+    is_hidden: bool,
 }
 
 /// Segments, and how many of them the buffer holds.
@@ -271,6 +272,7 @@ impl Live {
             colors: colors_buffer,
             colored: Vec::new(),
             group,
+            is_hidden: false,
             faces,
         };
         body.write_uniform(&self.queue);
@@ -287,6 +289,16 @@ impl Live {
     /// The faces of a body, or `None` if there is no such body.
     pub fn faces(&self, body: usize) -> Option<&Faces> {
         self.bodies.get(body).map(|body| &body.faces)
+    }
+
+    /// Hides a body, or shows it again.
+    ///
+    /// # Errors
+    /// No such body.
+    pub fn hide(&mut self, body: usize, is_hidden: bool) -> Result<(), Error> {
+        self.body(body)?;
+        self.bodies[body].is_hidden = is_hidden;
+        Ok(())
     }
 
     /// Sends the positions of a body's vertices.
@@ -531,7 +543,7 @@ impl Live {
         pass.set_pipeline(pipeline);
         for body in &self.bodies {
             let has_marks = || body.marked.iter().any(|&word| word != 0);
-            if body.faces.is_empty() || only_with_marks && !has_marks() {
+            if body.is_hidden || body.faces.is_empty() || only_with_marks && !has_marks() {
                 continue;
             }
             pass.set_bind_group(1, &body.group, &[]);

@@ -85,5 +85,6 @@ fn content(n_triangles: usize) -> Result<Content, String> {
         scene,
         bodies,
         frames: Some(Arc::new(frames)),
+        missing: None,
     })
 }

@@ -1,5 +1,6 @@
 //! The app: loads a content, then lets a session show it.
 
+use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -9,7 +10,7 @@ use egui_wgpu::RenderState;
 use impinge_render::{Camera, Orbit};
 
 use crate::content::Content;
-use crate::options::Options;
+use crate::options::{Command, Opener, Options};
 use crate::session::Session;
 use crate::timeline::Count;
 use crate::{input, panel, view};
@@ -17,6 +18,8 @@ use crate::{input, panel, view};
 /// The app in the window. [`show`](crate::show) opens one; tests run it without a window.
 pub struct Viewer {
     state: State,
+    /// The files to open, as the user edits their paths.
+    opening: Option<String>,
     options: Options,
     render: Option<RenderState>,
     last: Option<Instant>,
@@ -29,6 +32,21 @@ enum State {
     /// It cannot be shown.
     Failed(String),
     Shown(Box<Session>),
+}
+
+impl State {
+    fn loading(load: impl FnOnce() -> Result<Content, String> + Send + 'static) -> Self {
+        let (to, content) = channel();
+        let thread = thread::Builder::new().name("load".to_owned());
+        let spawned = thread.spawn(move || {
+            // If the window was closed meanwhile, nobody waits for the content.
+            let _ = to.send(load());
+        });
+        match spawned {
+            Err(error) => State::Failed(format!("no thread can be started: {error}")),
+            Ok(_) => State::Loading(content),
+        }
+    }
 }
 
 /// Frames shown so far, for [`Options::measure`].
@@ -51,19 +69,13 @@ impl Viewer {
         load: impl FnOnce() -> Result<Content, String> + Send + 'static,
         options: Options,
     ) -> Self {
-        let (to, content) = channel();
-        let thread = thread::Builder::new().name("load".to_owned());
-        let spawned = thread.spawn(move || {
-            // If the window was closed meanwhile, nobody waits for the content.
-            let _ = to.send(load());
-        });
-        let state = match (spawned, &render) {
-            (Err(error), _) => State::Failed(format!("no thread can be started: {error}")),
-            (_, None) => State::Failed("the window has no graphics device".to_owned()),
-            (Ok(_), Some(_)) => State::Loading(content),
+        let state = match &render {
+            None => State::Failed("the window has no graphics device".to_owned()),
+            Some(_) => State::loading(load),
         };
         Viewer {
             state,
+            opening: None,
             options,
             render,
             last: None,
@@ -82,6 +94,87 @@ impl Viewer {
             State::Loading(_) => None,
             State::Failed(text) => Some(text),
             State::Shown(session) => session.message.as_deref(),
+        }
+    }
+
+    /// The places of collision in the frame that is shown: the numbers of their bodies, and of their pairs.
+    pub fn places(&mut self) -> Vec<([usize; 2], usize)> {
+        let State::Shown(session) = &mut self.state else {
+            return Vec::new();
+        };
+        let places = session.places().iter();
+        places.map(|place| (place.bodies, place.n_pairs)).collect()
+    }
+
+    /// The number of the place to which the camera has flown, from 0.
+    pub fn place(&self) -> Option<usize> {
+        self.session()?.place.map(|(ix, _)| ix)
+    }
+
+    /// The names of the bodies.
+    pub fn names(&self) -> Vec<&str> {
+        let bodies = self
+            .session()
+            .map_or(&[][..], |session| &session.stage.content.bodies);
+        bodies.iter().map(|shown| shown.name.as_str()).collect()
+    }
+
+    /// Reads files and shows them in the place of what is shown.
+    fn open(&mut self, paths: Vec<PathBuf>) {
+        let Some(Opener(open)) = self.options.opener.clone() else {
+            return;
+        };
+        if paths.is_empty() || self.render.is_none() {
+            return;
+        }
+        let words = paths.iter().map(|path| path.display().to_string());
+        let words = ["impinge", "view"]
+            .map(str::to_owned)
+            .into_iter()
+            .chain(words);
+        self.options = Options {
+            command: Command(words.collect()),
+            frame: None,
+            focus: None,
+            moves: Vec::new(),
+            ..self.options.clone()
+        };
+        self.opening = None;
+        self.state = State::loading(move || open(&paths));
+    }
+
+    /// The field for the paths of files to open.
+    fn opener(&mut self, ui: &mut egui::Ui) {
+        if self.options.opener.is_none() {
+            return;
+        }
+        let Some(text) = &mut self.opening else {
+            let button = ui.button("Open files");
+            if button
+                .on_hover_text("Or drop them onto the window")
+                .clicked()
+            {
+                self.opening = Some(String::new());
+            }
+            return;
+        };
+        let label = ui.label("Files to open, one per line");
+        ui.add(egui::TextEdit::multiline(text).desired_rows(2))
+            .labelled_by(label.id);
+        let mut chosen = None;
+        let mut is_over = false;
+        ui.horizontal(|ui| {
+            if ui.button("Open").clicked() {
+                let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+                chosen = Some(lines.map(PathBuf::from).collect());
+            }
+            is_over = ui.button("Close").clicked();
+        });
+        if is_over {
+            self.opening = None;
+        }
+        if let Some(paths) = chosen {
+            self.open(paths);
         }
     }
 
@@ -222,6 +315,11 @@ impl Viewer {
             .map_or(0.0, |last| now.duration_since(last).as_secs_f64());
         self.last = Some(now);
         self.load(&ctx);
+        let dropped = ctx.input_mut(|input| std::mem::take(&mut input.raw.dropped_files));
+        self.open(dropped.iter().map(|file| file.path().to_owned()).collect());
+        if self.options.opener.is_some() && !self.is_loading() {
+            egui::Panel::top("open").show(ui, |ui| self.opener(ui));
+        }
         match &mut self.state {
             State::Loading(_) => {
                 egui::CentralPanel::default().show(ui, |ui| {

@@ -25,6 +25,8 @@ pub struct Content {
     pub bodies: Vec<Shown>,
     /// The frames; `None` if nothing moves by itself.
     pub frames: Option<Arc<dyn Frames>>,
+    /// What could not be loaded: a message for the user, who sees the rest.
+    pub missing: Option<String>,
 }
 
 /// Where bodies are in each frame. Two threads read frames at the same time, in any order.

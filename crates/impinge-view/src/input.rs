@@ -18,8 +18,8 @@ pub(crate) const KEYS: [(&str, &str); 14] = [
     ("F", "see everything"),
     (".", "see the selected triangle"),
     ("Ctrl+Z", "undo a move"),
-    ("S", "save a picture"),
-    ("Escape", "select nothing"),
+    ("S", "save a picture: asks where"),
+    ("Escape", "select nothing; save no picture"),
 ];
 
 /// Does what the keys say that were pressed since the last frame, unless a text is being edited.
@@ -39,7 +39,7 @@ pub(crate) fn keys(ctx: &Context, session: &mut Session) {
         session.next_place(1);
     }
     if pressed(Key::Space) && session.n_frames() > 1 {
-        session.player.plays = !session.player.plays;
+        session.play_or_pause();
     }
     if pressed(Key::ArrowRight) {
         session.step(1);
@@ -87,10 +87,11 @@ pub(crate) fn keys(ctx: &Context, session: &mut Session) {
         session.frame_selected();
     }
     if pressed(Key::S) {
-        session.save();
+        session.ask_where();
     }
     if pressed(Key::Escape) {
         session.select(None);
         session.message = None;
+        session.saving = None;
     }
 }

@@ -10,7 +10,7 @@
 //!     let id = scene.add_triangles(&faces, &positions).map_err(|error| error.to_string())?;
 //!     let colors = impinge_render::Colors { colliding: [214, 39, 40], other: [200; 3] };
 //!     let shown = vec![Shown { id, name: "cloth".to_owned(), colors }];
-//!     Ok(Content { scene, bodies: shown, frames: None })
+//!     Ok(Content { scene, bodies: shown, frames: None, missing: None })
 //! };
 //! impinge_view::show(load, Options::default())
 //! # }
@@ -41,7 +41,7 @@ mod window;
 
 pub use app::Viewer;
 pub use content::{Content, Frames, Shown};
-pub use options::{Backend, Command, Options, Shows};
+pub use options::{Backend, Command, Opener, Options, Shows};
 pub use picture::{draw_png, write_png};
 pub use timeline::Count;
 pub use window::{Error, show};

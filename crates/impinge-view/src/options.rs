@@ -1,9 +1,12 @@
 //! How a window begins, and what is asked of a scene.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use impinge::{Method, Query, SharedVertex};
 use impinge_render::{Camera, Focus};
+
+use crate::content::Content;
 
 /// Where detection runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -49,9 +52,9 @@ pub struct Options {
     pub method: Method,
     /// Where detection runs; the pairs are the same.
     pub backend: Backend,
-    /// The first frame to show.
-    pub frame: usize,
-    /// Whether frames play from the beginning.
+    /// The first frame to show. `None`: the first one with a collision, as soon as it is known; without any, the first.
+    pub frame: Option<usize>,
+    /// Whether frames play from the beginning, unless a frame with a collision is shown.
     pub plays: bool,
     /// The direction from which the scene is seen.
     pub camera: Camera,
@@ -65,12 +68,27 @@ pub struct Options {
     pub moves: Vec<(usize, [[f64; 4]; 4])>,
     /// Width and height of the window in points, and of saved pictures in pixels.
     pub size: [u32; 2],
-    /// The folder in which pictures are saved.
+    /// The folder that is suggested for pictures.
     pub folder: PathBuf,
     /// The command that opened the window.
     pub command: Command,
+    /// Reads the files that the user opens or drops. `None`: that is not possible.
+    pub opener: Option<Opener>,
     /// Shows so many frames as fast as it can, prints how many there were per second, and closes the window.
     pub measure: Option<u32>,
+}
+
+/// Makes a content of files, on a thread of its own.
+#[derive(Clone)]
+pub struct Opener(pub Arc<Open>);
+
+/// What an [`Opener`] calls. The error is a message for the user.
+type Open = dyn Fn(&[PathBuf]) -> Result<Content, String> + Send + Sync;
+
+impl std::fmt::Debug for Opener {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Opener")
+    }
 }
 
 /// The words of a command that opens this window, without options that the window knows.
@@ -84,7 +102,7 @@ impl Default for Options {
             shared_vertex: SharedVertex::Resolve,
             method: Method::Clusters,
             backend: Backend::default(),
-            frame: 0,
+            frame: None,
             plays: true,
             camera: Camera::default(),
             focus: None,
@@ -94,6 +112,7 @@ impl Default for Options {
             size: [1280, 800],
             folder: PathBuf::from("."),
             command: Command::default(),
+            opener: None,
             measure: None,
         }
     }

@@ -5,8 +5,10 @@ use impinge::{Method, SharedVertex};
 
 use crate::input::KEYS;
 use crate::options::{Backend, Shows};
-use crate::session::Session;
+use crate::picture::CURVE;
+use crate::session::{self, Session};
 use crate::timeline::Count;
+use crate::times::color;
 
 /// The colour of messages, and of the first collision.
 pub(crate) const RED: Color32 = Color32::from_rgb(190, 30, 45);
@@ -15,6 +17,10 @@ const CURSOR: Color32 = Color32::from_rgb(27, 95, 217);
 const IMPACT: Color32 = Color32::from_rgb(240, 160, 30);
 /// The most partners that are listed.
 const MAX_PARTNERS: usize = 12;
+/// The most places that are listed.
+const MAX_PLACES: usize = 100;
+/// The most bodies in the legend.
+const MAX_LEGEND: usize = 8;
 
 /// The panel at the side.
 pub(crate) fn side(ui: &mut Ui, session: &mut Session) {
@@ -24,13 +30,15 @@ pub(crate) fn side(ui: &mut Ui, session: &mut Session) {
         .show(ui, |ui| {
             egui::ScrollArea::vertical().show(ui, |ui| {
                 answer(ui, session);
+                bodies(ui, session);
                 ui.separator();
-                questions(ui, session);
+                places(ui, session);
+                selection(ui, session);
+                actions(ui, session);
                 ui.separator();
                 shown(ui, session);
                 ui.separator();
-                selection(ui, session);
-                actions(ui, session);
+                questions(ui, session);
                 ui.collapsing("Keys and mouse", help);
             });
         });
@@ -41,28 +49,141 @@ fn answer(ui: &mut Ui, session: &Session) {
         ui.heading("no answer");
         return;
     };
-    ui.heading(counted(answer.pairs.len(), "pair"));
-    ui.label(RichText::new(format!("hash {:016x}", answer.pairs.hash())).monospace());
-    ui.label(format!("{:.3} ms, {}", answer.ms, answer.how));
-    for (shown, colliding) in session.stage.content.bodies.iter().zip(&answer.colliding) {
-        let [r, g, b] = shown.colors.colliding;
-        let n = session
-            .stage
-            .scene()
-            .body(shown.id)
-            .map_or(0, |body| body.n_primitives());
-        let name = short(&shown.name);
-        let text = format!(
-            "{name}: {} of {} collide",
-            grouped(colliding.len()),
-            grouped(n)
+    ui.heading(counted(answer.pairs.len(), "pair"))
+        .on_hover_text(
+            "Pairs of triangles (or tetrahedra) that share a point, in the frame that is shown",
         );
-        ui.label(RichText::new(text).color(Color32::from_rgb(r, g, b)))
-            .on_hover_text(&shown.name);
-    }
+    ui.label(RichText::new(format!("hash {:016x}", answer.pairs.hash())).monospace())
+        .on_hover_text("A number made from all pairs: the same wherever the same pairs are found");
+    ui.label(format!("{:.3} ms, {}", answer.ms, answer.how))
+        .on_hover_text("How long the pairs took to find, by which method, and where");
     if session.player.plays || session.options.measure.is_some() {
         let fps = 1e3 / session.frame_ms.max(1e-3);
         ui.weak(format!("{fps:.0} frames per second"));
+    }
+}
+
+/// The bodies by name and colour, each with a switch.
+fn bodies(ui: &mut Ui, session: &mut Session) {
+    for ix in 0..session.stage.content.bodies.len() {
+        let shown = &session.stage.content.bodies[ix];
+        let [r, g, b] = shown.colors.colliding;
+        let held = session.stage.scene().body(shown.id);
+        let n = held.map_or(0, |body| body.n_primitives());
+        let n_colliding = match &session.answer {
+            Some(answer) => answer.colliding.get(ix).map_or(0, Vec::len),
+            None => 0,
+        };
+        let (name, whole_name) = (short(&shown.name).to_owned(), shown.name.clone());
+        let text = format!("{name}: {} of {} collide", grouped(n_colliding), grouped(n));
+        let mut is_shown = !session.is_hidden(ix);
+        let text = RichText::new(text).color(Color32::from_rgb(r, g, b));
+        let switch = ui.checkbox(&mut is_shown, text);
+        if switch.changed() {
+            session.hide(ix, !is_shown);
+        }
+        switch.on_hover_text(format!(
+            "{whole_name}\nWithout the tick the body is hidden. It collides in any case."
+        ));
+    }
+}
+
+/// The places of collision, to click.
+fn places(ui: &mut Ui, session: &mut Session) {
+    if session.player.plays {
+        return;
+    }
+    let current = session.place.map(|(ix, _)| ix);
+    let places = session.places();
+    let n = places.len();
+    if n == 0 {
+        return;
+    }
+    let listed = places.iter().take(MAX_PLACES);
+    let listed: Vec<([usize; 2], usize)> =
+        listed.map(|place| (place.bodies, place.n_pairs)).collect();
+    ui.label(counted(n, "place"))
+        .on_hover_text("Groups of pairs that hang together, those with the most pairs first: as `impinge pairs --json` lists them");
+    let mut chosen = None;
+    let area = egui::ScrollArea::vertical()
+        .id_salt("places")
+        .max_height(132.0);
+    area.show(ui, |ui| {
+        for (ix, &(bodies, n_pairs)) in listed.iter().enumerate() {
+            let names = bodies.map(|body| {
+                let shown = session.stage.content.bodies.get(body);
+                shown.map_or("", |shown| short(&shown.name))
+            });
+            let who = match bodies[0] == bodies[1] {
+                true => names[0].to_owned(),
+                false => format!("{}, {}", names[0], names[1]),
+            };
+            let text = format!("{}. {}: {who}", ix + 1, counted(n_pairs, "pair"));
+            if ui.selectable_label(current == Some(ix), text).clicked() {
+                chosen = Some(ix);
+            }
+        }
+        if n > MAX_PLACES {
+            ui.weak(format!("and {} more", grouped(n - MAX_PLACES)));
+        }
+    });
+    if let Some(ix) = chosen {
+        session.go_to_place(ix);
+    }
+    ui.separator();
+}
+
+/// What colours mean, over the bodies.
+pub(crate) fn legend(ui: &mut Ui, session: &Session) {
+    let line = |ui: &mut Ui, [r, g, b]: [u8; 3], text: &str| {
+        ui.horizontal(|ui| {
+            let (rect, _) = ui.allocate_exact_size(egui::vec2(10.0, 10.0), Sense::hover());
+            ui.painter()
+                .rect_filled(rect, 2.0, Color32::from_rgb(r, g, b));
+            ui.add(egui::Label::new(RichText::new(text).small()).selectable(false));
+        });
+    };
+    if session.shows_curves || session.shows == Shows::Curves {
+        line(ui, CURVE, "where surfaces cross");
+    }
+    if session.shows == Shows::Curves {
+        return;
+    }
+    for (ix, shown) in session
+        .stage
+        .content
+        .bodies
+        .iter()
+        .enumerate()
+        .take(MAX_LEGEND)
+    {
+        if !session.is_hidden(ix) {
+            let name = short(&shown.name);
+            line(
+                ui,
+                shown.colors.colliding,
+                &format!("{name} where it collides"),
+            );
+        }
+    }
+    if session.stage.content.bodies.len() > MAX_LEGEND {
+        ui.label(RichText::new("…").small());
+    }
+    if session.shows == Shows::Everything
+        && let Some(shown) = session.stage.content.bodies.first()
+    {
+        line(ui, shown.colors.other, "collides with nothing");
+    }
+    if session.shows_near {
+        line(ui, session::NEAR, "within the distance");
+    }
+    if session.shows_impacts {
+        line(ui, color(0.0), "touches soon after this frame");
+        line(ui, color(1.0), "touches just before the next");
+    }
+    if session.selected.is_some() {
+        line(ui, session::SELECTED, "selected");
+        line(ui, session::PARTNER, "collides with the selected one");
     }
 }
 
@@ -70,9 +191,12 @@ fn answer(ui: &mut Ui, session: &Session) {
 fn questions(ui: &mut Ui, session: &mut Session) {
     let before = session.question;
     let question = &mut session.question;
-    ui.checkbox(&mut question.within, "Self-collision");
+    ui.checkbox(&mut question.within, "Self-collision")
+        .on_hover_text("Also pairs within one body");
     ui.horizontal(|ui| {
-        ui.label("Neighbours");
+        ui.label("Neighbours").on_hover_text(
+            "Triangles of one body that share vertices. Resolve: a pair if they also meet elsewhere. Skip: never a pair.",
+        );
         ui.radio_value(
             &mut question.shared_vertex,
             SharedVertex::Resolve,
@@ -81,13 +205,15 @@ fn questions(ui: &mut Ui, session: &mut Session) {
         ui.radio_value(&mut question.shared_vertex, SharedVertex::Skip, "skip");
     });
     ui.horizontal(|ui| {
-        ui.label("Method");
+        ui.label("Method")
+            .on_hover_text("How pairs are found. All methods find the same ones.");
         ui.radio_value(&mut question.method, Method::Clusters, "clusters");
         ui.radio_value(&mut question.method, Method::Cells, "cells");
         ui.radio_value(&mut question.method, Method::Naive, "naive");
     });
     ui.horizontal(|ui| {
-        ui.label("On the");
+        ui.label("On the")
+            .on_hover_text("Where pairs are found. They are the same ones.");
         ui.radio_value(&mut question.backend, Backend::Cpu, "CPU");
         ui.add_enabled_ui(question.method != Method::Naive, |ui| {
             ui.radio_value(&mut question.backend, Backend::Gpu, "GPU");
@@ -101,7 +227,8 @@ fn shown(ui: &mut Ui, session: &mut Session) {
     let before = session.shows;
     ui.radio_value(&mut session.shows, Shows::Everything, "Everything");
     ui.radio_value(&mut session.shows, Shows::Colliding, "Only what collides");
-    ui.radio_value(&mut session.shows, Shows::Curves, "Only curves");
+    ui.radio_value(&mut session.shows, Shows::Curves, "Only curves")
+        .on_hover_text("The lines in which surfaces cross");
     let mut changed = before != session.shows;
     changed |= ui
         .checkbox(&mut session.shows_curves, "Intersection curves")
@@ -113,7 +240,11 @@ fn shown(ui: &mut Ui, session: &mut Session) {
             .changed();
     }
     ui.horizontal(|ui| {
-        let label = ui.checkbox(&mut session.shows_near, "Within");
+        let label = ui
+            .checkbox(&mut session.shows_near, "Within")
+            .on_hover_text(
+                "Colours the faces that are at most so far from others, in the unit of the files",
+            );
         changed |= label.changed();
         let speed = 0.02 * session.distance.max(1e-9);
         let range = 0.0..=f64::MAX;
@@ -185,18 +316,30 @@ fn kind(kind: impinge::Kind) -> &'static str {
 
 fn actions(ui: &mut Ui, session: &mut Session) {
     ui.horizontal_wrapped(|ui| {
-        if ui.button("Next place").clicked() {
+        let next = ui
+            .button("Next place")
+            .on_hover_text("Fly to the next place of collision (J)");
+        if next.clicked() {
             session.next_place(1);
         }
-        if ui.button("See all").clicked() {
+        if ui
+            .button("See all")
+            .on_hover_text("Fly to where all bodies are seen (F)")
+            .clicked()
+        {
             session.frame_all();
         }
-        if ui.button("Save picture").clicked() {
-            session.save();
+        if ui
+            .button("Save picture")
+            .on_hover_text("Asks where (S)")
+            .clicked()
+        {
+            session.ask_where();
         }
         let is_moved = session.is_moved();
         if ui
             .add_enabled(is_moved, egui::Button::new("Put bodies back"))
+            .on_hover_text("Undo all moves: bodies are where their files have them")
             .clicked()
         {
             session.put_back();
@@ -204,6 +347,21 @@ fn actions(ui: &mut Ui, session: &mut Session) {
     });
     if let Some((ix, n)) = session.place {
         ui.label(format!("place {} of {n}", ix + 1));
+    }
+    if let Some(path) = &mut session.saving {
+        let label = ui.label("Save the picture as");
+        let text = ui.text_edit_singleline(path).labelled_by(label.id);
+        if !text.lost_focus() && !text.has_focus() {
+            text.request_focus();
+        }
+        let is_entered = text.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        ui.horizontal(|ui| {
+            if ui.button("Save").clicked() || is_entered {
+                session.save();
+            } else if ui.button("Cancel").clicked() {
+                session.saving = None;
+            }
+        });
     }
     if let Some(saved) = session.saved.clone() {
         ui.label(format!("saved {}; again by:", saved.path.display()));
@@ -243,8 +401,8 @@ pub(crate) fn bottom(ui: &mut Ui, session: &mut Session) {
                 } else {
                     "Play"
                 };
-                if ui.button(text).clicked() {
-                    session.player.plays = !session.player.plays;
+                if ui.button(text).on_hover_text("Space").clicked() {
+                    session.play_or_pause();
                 }
                 ui.label(format!(
                     "frame {} of {}",
@@ -318,14 +476,20 @@ fn curve(ui: &Ui, room: Rect, session: &Session) {
     let most = counts.iter().map(pairs).max().unwrap_or(0).max(1);
     let n_columns = n_frames.min(room.width() as usize).max(1);
     let width = room.width() / n_columns as f32;
+    // Bars begin and end between pixels, each where the one before ends: rounded apart, they would have stripes between them.
+    let scale = ui.ctx().pixels_per_point();
+    let edge = |column: usize| {
+        let x = room.min.x + column as f32 * width;
+        (x * scale).round() / scale
+    };
     for column in 0..n_columns {
         let begin = column * n_frames / n_columns;
         let end = ((column + 1) * n_frames / n_columns).max(begin + 1);
         let frames = &counts[begin..end.min(n_frames)];
         let x = room.min.x + column as f32 * width;
         let bar = |height: f32, color: Color32| {
-            let min = Pos2::new(x, room.max.y - height);
-            let max = Pos2::new(x + (width - 0.5).max(0.5), room.max.y);
+            let min = Pos2::new(edge(column), room.max.y - height);
+            let max = Pos2::new(edge(column + 1), room.max.y);
             painter.rect_filled(Rect::from_min_max(min, max), 0.0, color);
         };
         if frames.iter().any(|count| matches!(count, Count::Failed(_))) {

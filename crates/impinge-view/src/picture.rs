@@ -19,20 +19,24 @@ pub(crate) struct Saved {
 }
 
 /// The colour of intersection curves.
-const CURVE: [u8; 3] = [20, 20, 20];
+pub(crate) const CURVE: [u8; 3] = [20, 20, 20];
 
-/// Saves what the options show as `impinge-N.png` in the folder of the options, with the first number that no file has.
+/// The path that is suggested for a picture: `impinge-N.png` in the folder of the options, with the first number that no file has.
+pub(crate) fn suggested(options: &Options) -> PathBuf {
+    let path = |number: u32| options.folder.join(format!("impinge-{number}.png"));
+    let mut paths = (1..10_000).map(path);
+    paths.find(|path| !path.exists()).unwrap_or_else(|| path(0))
+}
+
+/// Saves what the options show.
 pub(crate) fn save(
     stage: &Stage,
     answer: Option<&Answer>,
     options: &Options,
     question: &Question,
     (device, queue): (wgpu::Device, wgpu::Queue),
+    path: PathBuf,
 ) -> Result<Saved, String> {
-    let path = (1..)
-        .map(|number: u32| options.folder.join(format!("impinge-{number}.png")))
-        .find(|path| !path.exists())
-        .ok_or("there are too many pictures in this folder")?;
     let renderer = Renderer::with_device(device, queue).map_err(|error| error.to_string())?;
     draw(stage, answer, options, renderer, &path)?;
     let more = command_options(stage, options, question, &path);
@@ -174,14 +178,14 @@ pub fn draw_png(
     path: &Path,
 ) -> Result<(), String> {
     let n_frames = content.n_frames();
-    if options.frame >= n_frames {
+    let frame = options.frame.unwrap_or(0);
+    if frame >= n_frames {
         return Err(format!(
-            "frame {} was requested, there are {n_frames} frames, counted from 0",
-            options.frame
+            "frame {frame} was requested, there are {n_frames} frames, counted from 0"
         ));
     }
     let mut stage = Stage::new(content);
-    stage.pose(options.frame)?;
+    stage.pose(frame)?;
     for &(body, matrix) in &options.moves {
         stage.place(body, matrix)?;
     }

@@ -1,5 +1,7 @@
 //! Everything that is known while a content is shown: where its bodies are, what collides, what is seen and how.
 
+use std::path::PathBuf;
+
 use eframe::egui;
 use egui_wgpu::RenderState;
 use impinge::{Method, Primitive};
@@ -20,9 +22,11 @@ use crate::timeline::{NEWS, Timeline};
 use crate::times::{color, first_times};
 
 /// The colour of primitives within the distance, of the one that is selected, and of its partners.
-const NEAR: [u8; 3] = [255, 165, 60];
-const SELECTED: [u8; 3] = [255, 225, 0];
-const PARTNER: [u8; 3] = [0, 170, 120];
+pub(crate) const NEAR: [u8; 3] = [255, 165, 60];
+pub(crate) const SELECTED: [u8; 3] = [255, 225, 0];
+pub(crate) const PARTNER: [u8; 3] = [0, 170, 120];
+/// The most pairs of which places are told apart.
+const MOST_PAIRS: usize = 500_000;
 /// The most states that are kept for undoing.
 const MAX_UNDO: usize = 100;
 
@@ -60,7 +64,13 @@ pub(crate) struct Session {
     pub selected: Option<(usize, u32)>,
     pub message: Option<String>,
     pub saved: Option<Saved>,
+    /// The path of the picture that is about to be saved, as the user edits it.
+    pub saving: Option<String>,
     pub drag: Option<Drag>,
+    /// The bodies that are not drawn.
+    hidden: Vec<bool>,
+    /// Whether the first frame with a collision is to be shown as soon as it is known.
+    seeks: bool,
     screen: Screen,
     finder: Finder,
     scratch: Stage,
@@ -87,7 +97,11 @@ impl Session {
     ) -> Result<Self, String> {
         let mut stage = Stage::new(content);
         let n_frames = stage.content.n_frames();
-        let mut message = stage.pose(options.frame.min(n_frames - 1)).err();
+        let mut message = stage.content.missing.take();
+        let frame_ix = options.frame.unwrap_or(0).min(n_frames - 1);
+        if let Err(text) = stage.pose(frame_ix) {
+            message = Some(text);
+        }
         for &(body, matrix) in &options.moves {
             stage.place(body, matrix)?;
         }
@@ -112,8 +126,8 @@ impl Session {
                 _ => options.backend,
             },
         };
-        let mut scratch = stage.clone();
-        let bounds = whole_bounds(&stage, &mut scratch);
+        let scratch = stage.clone();
+        let bounds = stage.bounds(None).unwrap_or([[-1.0; 3], [1.0; 3]]);
         let diagonal = length(bounds);
         let timeline = start_timeline(&stage, question, false, ctx);
         let (orbit, bounds) = match options.focus {
@@ -125,9 +139,10 @@ impl Session {
             orbit,
             bounds,
             aspect: 1.0,
-            stage,
             question,
-            player: Player::new(options.plays && n_frames > 1),
+            player: Player::new(options.plays && n_frames > 1 && options.frame.is_some()),
+            seeks: options.frame.is_none() && options.measure.is_none() && n_frames > 1,
+            hidden: vec![false; stage.content.bodies.len()],
             options: options.clone(),
             shows: options.shows,
             shows_curves: options.curves,
@@ -141,7 +156,9 @@ impl Session {
             selected: None,
             message,
             saved: None,
+            saving: None,
             drag: None,
+            stage,
             screen,
             finder: Finder::default(),
             flight: None,
@@ -173,8 +190,15 @@ impl Session {
         self.changed.positions = true;
     }
 
+    /// Plays, or stops.
+    pub fn play_or_pause(&mut self) {
+        self.seeks = false;
+        self.player.plays = !self.player.plays;
+    }
+
     /// Stops, and shows the frame so many frames away.
     pub fn step(&mut self, by: isize) {
+        self.seeks = false;
         self.player.plays = false;
         let n_frames = self.n_frames();
         let frame_ix = self.stage.frame_ix().checked_add_signed(by);
@@ -183,6 +207,7 @@ impl Session {
 
     /// Stops, and shows a frame, if there is one; otherwise says so.
     pub fn jump(&mut self, frame_ix: Option<usize>) {
+        self.seeks = false;
         self.player.plays = false;
         match frame_ix {
             Some(frame_ix) => self.go_to(frame_ix),
@@ -214,6 +239,19 @@ impl Session {
 
     /// To be called after the view was changed.
     pub fn viewed(&mut self) {
+        self.changed.view = true;
+    }
+
+    pub fn is_hidden(&self, body: usize) -> bool {
+        self.hidden.get(body).copied().unwrap_or(false)
+    }
+
+    /// Hides a body, or shows it again. It collides in any case.
+    pub fn hide(&mut self, body: usize, is_hidden: bool) {
+        match self.screen.live.hide(body, is_hidden) {
+            Ok(()) => self.hidden[body] = is_hidden,
+            Err(error) => self.message = Some(error.to_string()),
+        }
         self.changed.view = true;
     }
 
@@ -273,7 +311,10 @@ impl Session {
             Shows::Colliding => self.answer.as_ref().map(|answer| &answer.colliding[..]),
             Shows::Curves => return None,
         };
-        let faces = |body| self.screen.live.faces(body);
+        let faces = |body| match self.is_hidden(body) {
+            true => None,
+            false => self.screen.live.faces(body),
+        };
         pick(&self.stage, faces, self.orbit.ray(aspect, at), only)
     }
 
@@ -307,28 +348,52 @@ impl Session {
         answer.pairs.iter().filter_map(other).collect()
     }
 
+    /// The places of collision, as the program numbers them. None while frames play, and where there are too many pairs.
+    pub fn places(&mut self) -> &[Place] {
+        let answer = match &self.answer {
+            Some(answer) if answer.pairs.len() <= MOST_PAIRS => answer,
+            _ => return &[],
+        };
+        if self.places.is_none() {
+            match places(&self.stage, answer) {
+                Ok(found) => self.places = Some(found),
+                Err(text) => self.message = Some(text),
+            }
+        }
+        self.places.as_deref().unwrap_or_default()
+    }
+
     /// Flies to the next place of collision, or to the one before.
     pub fn next_place(&mut self, by: isize) {
-        let Some(answer) = &self.answer else {
-            return;
-        };
-        let places = self
-            .places
-            .get_or_insert_with(|| places(&self.stage, answer));
-        if places.is_empty() {
+        let n = self.places().len();
+        if n == 0 {
             self.place = None;
-            self.message = Some("nothing collides in this frame".to_owned());
+            self.message = Some(match &self.answer {
+                Some(answer) if answer.pairs.len() > MOST_PAIRS => {
+                    "there are too many pairs to tell places apart".to_owned()
+                }
+                _ => "nothing collides in this frame".to_owned(),
+            });
             return;
         }
-        self.player.plays = false;
-        let n = places.len();
         let next = match self.place {
             None if by < 0 => n - 1,
             None => 0,
             Some((ix, _)) => (ix % n + n).saturating_add_signed(by) % n,
         };
-        let bounds = places[next].bounds;
-        self.place = Some((next, n));
+        self.go_to_place(next);
+    }
+
+    /// Flies to a place of collision.
+    pub fn go_to_place(&mut self, number: usize) {
+        let places = self.places();
+        let Some(place) = places.get(number) else {
+            return;
+        };
+        let (bounds, n) = (place.bounds, places.len());
+        self.seeks = false;
+        self.player.plays = false;
+        self.place = Some((number, n));
         self.fly(bounds, 2.5);
     }
 
@@ -398,6 +463,7 @@ impl Session {
         self.timeline
             .set_busy(self.player.plays || self.drag.is_some());
         self.frame_ms += 0.1 * (1e3 * seconds - self.frame_ms);
+        self.seek();
         if self.options.measure.is_some() {
             self.go_to((self.stage.frame_ix() + 1) % self.n_frames());
             self.changed.positions = true;
@@ -416,6 +482,29 @@ impl Session {
             self.changed.view = true;
         }
         self.player.plays || self.flight.is_some()
+    }
+
+    /// Shows the first frame with a collision as soon as it is known. If there is none, frames play.
+    fn seek(&mut self) {
+        if !self.seeks || self.drag.is_some() {
+            return;
+        }
+        if let Some(frame_ix) = self.timeline.first_collision_for_certain() {
+            self.seeks = false;
+            self.go_to(frame_ix);
+            if self.options.focus.is_none()
+                && let Some(bounds) = self.stage.bounds(None)
+            {
+                match &mut self.bounds {
+                    Some(held) => *held = bounds,
+                    None => self.orbit = Orbit::around(self.orbit.camera, bounds, self.aspect),
+                }
+                self.changed.view = true;
+            }
+        } else if self.timeline.is_counted() {
+            self.seeks = false;
+            self.player.plays = self.options.plays;
+        }
     }
 
     /// Brings answer, marks and timeline up to date.
@@ -565,8 +654,22 @@ impl Session {
         }
     }
 
-    /// Saves a picture in the folder of the options.
+    /// Asks where a picture is to be saved.
+    pub fn ask_where(&mut self) {
+        let path = picture::suggested(&self.options);
+        self.saving = Some(path.display().to_string());
+    }
+
+    /// Saves a picture where the user says.
     pub fn save(&mut self) {
+        let Some(path) = self.saving.take() else {
+            return;
+        };
+        let path = PathBuf::from(path.trim());
+        // The next one is suggested for the same folder.
+        if let Some(folder) = path.parent() {
+            self.options.folder = folder.to_owned();
+        }
         let options = Options {
             camera: self.orbit.camera,
             focus: Some(Focus {
@@ -578,7 +681,7 @@ impl Session {
             ..self.options.clone()
         };
         let (answer, device) = (self.answer.as_ref(), self.screen.device());
-        match picture::save(&self.stage, answer, &options, &self.question, device) {
+        match picture::save(&self.stage, answer, &options, &self.question, device, path) {
             Ok(saved) => self.saved = Some(saved),
             Err(text) => self.message = Some(text),
         }
@@ -594,27 +697,6 @@ fn start_timeline(
     let ctx = ctx.clone();
     let wake = move || ctx.request_repaint_after(NEWS);
     Timeline::start(stage, question, with_earliest, wake)
-}
-
-/// A box around the bodies in the first, the middle and the last frame, and in that of the stage.
-fn whole_bounds(stage: &Stage, scratch: &mut Stage) -> [[f64; 3]; 2] {
-    let mut whole = stage.bounds(None);
-    let n_frames = stage.content.n_frames();
-    if n_frames > 1 {
-        for frame_ix in [0, n_frames / 2, n_frames - 1] {
-            // A frame that cannot be read shows its message when it is looked at.
-            if scratch.pose(frame_ix).is_err() {
-                continue;
-            }
-            if let (Some(whole), Some([low, high])) = (&mut whole, scratch.bounds(None)) {
-                for k in 0..3 {
-                    whole[0][k] = whole[0][k].min(low[k]);
-                    whole[1][k] = whole[1][k].max(high[k]);
-                }
-            }
-        }
-    }
-    whole.unwrap_or([[-1.0; 3], [1.0; 3]])
 }
 
 /// The diagonal of a box.

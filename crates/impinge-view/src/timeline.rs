@@ -126,6 +126,13 @@ impl Timeline {
         before.rev().find(|&frame_ix| self.collides(frame_ix))
     }
 
+    /// The first frame that has pairs, once all frames before it are counted.
+    pub fn first_collision_for_certain(&self) -> Option<usize> {
+        let is_open = |count: &Count| !matches!(count, Count::Pairs(0) | Count::Failed(_));
+        let frame_ix = self.counts.iter().position(is_open)?;
+        self.collides(frame_ix).then_some(frame_ix)
+    }
+
     /// The first frame that has pairs.
     pub fn first_collision(&self) -> Option<usize> {
         (0..self.counts.len()).find(|&frame_ix| self.collides(frame_ix))

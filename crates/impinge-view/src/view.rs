@@ -29,6 +29,7 @@ pub(crate) fn show(ui: &mut Ui, session: &mut Session) {
             ui.painter().image(id, rect, whole, egui::Color32::WHITE);
         }
         overlay(ui, rect, session);
+        legend(ui, rect, session);
     });
 }
 
@@ -177,6 +178,23 @@ fn zoom(session: &mut Session, rect: Rect, at: Pos2, factor: f64) {
     }
     orbit.distance = distance;
     session.viewed();
+}
+
+/// The legend, in the lower left corner. The pointer goes through it.
+fn legend(ui: &Ui, rect: Rect, session: &Session) {
+    if !(rect.width() > 200.0 && rect.height() > 200.0) {
+        return;
+    }
+    let area = egui::Area::new(egui::Id::unique("legend"))
+        .order(egui::Order::Middle)
+        .constrain_to(rect)
+        .anchor(egui::Align2::LEFT_BOTTOM, [10.0, -10.0])
+        .interactable(false);
+    area.show(ui.ctx(), |ui| {
+        let fill = egui::Color32::from_white_alpha(200);
+        let frame = egui::Frame::new().fill(fill).inner_margin(6.0);
+        frame.show(ui, |ui| panel::legend(ui, session));
+    });
 }
 
 /// Texts over the bodies.

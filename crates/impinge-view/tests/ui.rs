@@ -88,6 +88,7 @@ fn passing() -> Content {
         bodies: shown(&scene),
         scene,
         frames: Some(Arc::new(Passing { body, rest })),
+        missing: None,
     }
 }
 
@@ -97,12 +98,14 @@ fn still(n_triangles: usize, offset: f32) -> Content {
         bodies: shown(&scene),
         scene,
         frames: None,
+        missing: None,
     }
 }
 
 fn paused() -> Options {
     Options {
         plays: false,
+        frame: Some(0),
         command: Command(vec!["impinge".to_owned(), "view".to_owned()]),
         ..Options::default()
     }
@@ -331,6 +334,7 @@ fn self_collision_and_neighbours_change_the_answer_as_the_library_says() {
         bodies: shown(&scene),
         scene: scene.clone(),
         frames: None,
+        missing: None,
     };
     let mut harness = open_content(content);
     // One body alone is asked for itself.
@@ -481,6 +485,7 @@ fn a_sequence_from_files_gives_the_same_counts() {
     let sequence = Sequence::open(&file).expect("a sequence");
     let content = Content {
         frames: Some(Arc::new(Read(sequence, id))),
+        missing: None,
         ..content
     };
     let mut harness = open_content(content);
@@ -543,6 +548,7 @@ fn bad_frames_are_messages_and_marks_on_the_timeline() {
         bodies: shown(&scene),
         scene,
         frames: Some(Arc::new(Broken(id, positions, AtomicUsize::new(0)))),
+        missing: None,
     };
     let mut harness = open_content(content);
     wait(&mut harness, is_counted);
@@ -575,6 +581,7 @@ fn an_empty_mesh_is_a_message() {
         bodies: shown(&scene),
         scene,
         frames: None,
+        missing: None,
     };
     let mut harness = open_content(content);
     let text = harness.state().message().expect("a message").to_owned();
@@ -647,11 +654,12 @@ fn keep(png: &[u8], name: &str) {
 fn n_pixels(harness: &mut Harness<'static, Viewer>, is: impl Fn([u8; 3]) -> bool) -> usize {
     harness.run_steps(2);
     let image = harness.render().expect("a picture");
-    // Beside the panels.
+    // Beside the panels and the legend.
+    let has_legend = |x: u32, y: u32| x < 250 && y > SIZE[1] as u32 - 300;
     image
         .enumerate_pixels()
         .filter(|(x, y, pixel)| {
-            *x < (SIZE[0] - 252.0) as u32 && *y < SIZE[1] as u32 - 104 && {
+            *x < (SIZE[0] - 252.0) as u32 && *y < SIZE[1] as u32 - 104 && !has_legend(*x, *y) && {
                 let [r, g, b, _] = pixel.0;
                 is([r, g, b])
             }
@@ -792,6 +800,8 @@ fn a_saved_picture_is_made_again_by_what_its_command_says() {
     fly(&mut harness);
     press(&mut harness, Key::I);
     press(&mut harness, Key::S);
+    // The next free name is suggested.
+    click(&mut harness, "Save");
     assert_eq!(harness.state().message(), None);
     let (path, command) = harness.state().saved().expect("a picture");
     let path = path.to_owned();
@@ -814,7 +824,7 @@ fn a_saved_picture_is_made_again_by_what_its_command_says() {
     assert!(command.ends_with(" --curves"), "{command}");
     let again = folder.path().join("again.png");
     let all = Options {
-        frame,
+        frame: Some(frame),
         camera,
         ..options.clone()
     };
@@ -864,6 +874,7 @@ fn a_saved_picture_is_made_again_by_what_its_command_says() {
     for (shows, word) in [(Shows::Colliding, "colliding"), (Shows::Curves, "curves")] {
         press(&mut harness, Key::C);
         press(&mut harness, Key::S);
+        click(&mut harness, "Save");
         let (path, command) = harness.state().saved().expect("a picture");
         assert!(command.contains(&format!(" --show {word} ")), "{command}");
         let png = draw(&Options {
@@ -887,6 +898,260 @@ fn a_saved_picture_is_made_again_by_what_its_command_says() {
     assert_eq!(same.state().orbit(), Some(orbit));
     // The next one has another name.
     press(&mut harness, Key::S);
+    click(&mut harness, "Save");
     let (path, _) = harness.state().saved().expect("a picture");
     assert!(path.ends_with("impinge-4.png"), "{path:?}");
+}
+
+#[test]
+fn the_window_begins_at_the_first_collision() {
+    let content = passing();
+    let expected = expected(&content);
+    let first = expected
+        .iter()
+        .position(|&(n, _)| n > 0)
+        .expect("they pass");
+    assert!(first > 0);
+    let options = Options {
+        plays: true,
+        frame: None,
+        ..paused()
+    };
+    let begins_at = |frame| {
+        let options = Options {
+            frame: Some(frame),
+            ..options.clone()
+        };
+        let content = content.clone();
+        let harness = open(
+            move || Ok(content),
+            Options {
+                plays: false,
+                ..options
+            },
+        );
+        harness.state().orbit().expect("a viewpoint")
+    };
+    let mut harness = {
+        let content = content.clone();
+        open(move || Ok(content), options.clone())
+    };
+    wait(&mut harness, |viewer| viewer.frame() == Some(first));
+    harness.run_steps(3);
+    assert_eq!(harness.state().frame(), Some(first));
+    assert_eq!(harness.state().n_pairs(), Some(expected[first].0 as usize));
+    // The bodies are seen as they are there, not those of all frames.
+    let orbit = harness.state().orbit().expect("a viewpoint");
+    let there = begins_at(first);
+    assert_eq!(
+        (orbit.target, orbit.distance),
+        (there.target, there.distance)
+    );
+    assert_ne!(orbit.distance, begins_at(0).distance);
+    look(&mut harness, "first-collision");
+}
+
+#[test]
+fn bodies_have_names_and_a_legend_and_can_be_hidden() {
+    let mut harness = open_content(still(600, 0.5));
+    let n_pairs = harness.state().n_pairs();
+    harness.get_by_label("first where it collides");
+    harness.get_by_label("collides with nothing");
+    let both = n_pixels(&mut harness, is_body);
+    let label = harness.get_by_label_contains("second: ");
+    label.click();
+    harness.run_steps(2);
+    let one = n_pixels(&mut harness, is_body);
+    assert!(4 * one < 3 * both, "{one} {both}");
+    assert!(harness.query_by_label("second where it collides").is_none());
+    // It collides in any case.
+    assert_eq!(harness.state().n_pairs(), n_pairs);
+    look(&mut harness, "hidden");
+    harness.get_by_label_contains("second: ").click();
+    harness.run_steps(2);
+    assert_eq!(n_pixels(&mut harness, is_body), both);
+}
+
+#[test]
+fn places_are_listed_as_the_program_numbers_them_and_can_be_clicked() {
+    // Three small balls in a large one's surface: the places have different numbers of pairs.
+    let mut scene = Scene::new();
+    ball(2_000).add_to(&mut scene).expect("a ball");
+    let (mut faces, mut positions) = (Vec::new(), Vec::new());
+    for (n, at) in [
+        (100, [0.5, 0.0, 0.0]),
+        (900, [0.0, 0.5, 0.0]),
+        (300, [0.0, 0.0, 0.5]),
+    ] {
+        let model = ball(n).scaled(0.2).translated(at);
+        let impinge::Elements::Triangles(own) = &model.elements else {
+            panic!("a ball has triangles");
+        };
+        let first = positions.len() as u32;
+        faces.extend(own.iter().map(|face| face.map(|vertex| first + vertex)));
+        positions.extend_from_slice(&model.positions);
+    }
+    scene.add_triangles(&faces, &positions).expect("balls");
+    let mut detector = Detector::new(Backend::Cpu).expect("a detector");
+    let pairs = detector.detect(&scene, &Query::all()).expect("an answer");
+    let expected: Vec<usize> = pairs
+        .places(&scene)
+        .expect("places")
+        .iter()
+        .map(|place| place.n_pairs)
+        .collect();
+    assert_eq!(expected.len(), 3);
+    assert!(
+        expected[0] > expected[1] && expected[1] > expected[2],
+        "{expected:?}"
+    );
+    let mut harness = open_content(Content {
+        bodies: shown(&scene),
+        scene,
+        frames: None,
+        missing: None,
+    });
+    let listed = harness.state_mut().places();
+    assert_eq!(
+        listed,
+        Vec::from_iter(expected.iter().map(|&n| ([0, 1], n)))
+    );
+    let before = harness.state().orbit().expect("a viewpoint");
+    harness.get_by_label_contains("2. ").click();
+    harness.run_steps(2);
+    fly(&mut harness);
+    assert_eq!(harness.state().place(), Some(1));
+    assert_ne!(
+        harness.state().orbit().expect("a viewpoint").target,
+        before.target
+    );
+    look(&mut harness, "places");
+}
+
+#[derive(Debug)]
+struct Dropped(std::path::PathBuf);
+
+impl eframe::egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        Err("only its path counts".to_owned())
+    }
+}
+
+#[test]
+fn files_can_be_opened_and_dropped() {
+    let opener = impinge_view::Opener(Arc::new(|paths: &[std::path::PathBuf]| {
+        if paths.iter().any(|path| path.ends_with("bad.obj")) {
+            return Err("bad.obj: not a mesh".to_owned());
+        }
+        let mut content = still(600, 0.5);
+        content.bodies[0].name = paths[0].display().to_string();
+        content.missing = (paths.len() > 1).then(|| "b.obj: no such file".to_owned());
+        Ok(content)
+    }));
+    let options = Options {
+        opener: Some(opener),
+        ..paused()
+    };
+    let mut harness = open(|| Ok(still(600, 9.0)), options);
+    assert_eq!(harness.state().n_pairs(), Some(0));
+    let drop = |harness: &mut Harness<'static, Viewer>, names: &[&str]| {
+        let files = names
+            .iter()
+            .map(|name| Arc::new(Dropped(name.into())) as eframe::egui::DroppedFileHandle);
+        harness.input_mut().dropped_files.extend(files);
+        harness.step();
+        wait(harness, |viewer| !viewer.is_loading());
+        harness.run_steps(2);
+    };
+    drop(&mut harness, &["dropped.obj"]);
+    assert_eq!(harness.state().names()[0], "dropped.obj");
+    assert!(harness.state().n_pairs() > Some(0));
+    // One bad file of two: a message, and the other.
+    drop(&mut harness, &["a.obj", "b.obj"]);
+    assert_eq!(harness.state().message(), Some("b.obj: no such file"));
+    assert_eq!(harness.state().names()[0], "a.obj");
+    drop(&mut harness, &["bad.obj"]);
+    harness.get_by_label("bad.obj: not a mesh");
+    // From there others can be opened.
+    click(&mut harness, "Open files");
+    let field = harness.get_by_label("Files to open, one per line");
+    field.focus();
+    harness.step();
+    harness
+        .get_by_label("Files to open, one per line")
+        .type_text("typed.obj");
+    harness.run_steps(2);
+    click(&mut harness, "Open");
+    wait(&mut harness, |viewer| {
+        !viewer.is_loading() && viewer.names().len() == 2
+    });
+    assert_eq!(harness.state().names()[0], "typed.obj");
+}
+
+#[test]
+fn a_picture_is_saved_where_the_user_says() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let options = Options {
+        folder: folder.path().to_owned(),
+        size: [64, 48],
+        ..paused()
+    };
+    let mut harness = open(|| Ok(still(600, 0.5)), options);
+    press(&mut harness, Key::S);
+    assert!(harness.state().saved().is_none(), "it asks first");
+    let field = harness.get_by_label("Save the picture as");
+    field.focus();
+    harness.step();
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    harness.step();
+    let path = folder.path().join("mine.png");
+    harness
+        .get_by_label("Save the picture as")
+        .type_text(path.to_str().expect("a name"));
+    harness.run_steps(2);
+    click(&mut harness, "Save");
+    assert_eq!(
+        harness.state().saved().map(|(path, _)| path),
+        Some(path.as_path())
+    );
+    assert!(path.exists());
+}
+
+/// Every frame collides: the timeline is one area, whatever the width of a frame.
+#[test]
+fn the_timeline_has_no_stripes() {
+    struct Resting(usize);
+    impl Frames for Resting {
+        fn n_frames(&self) -> usize {
+            self.0
+        }
+        fn read(&self, _: usize) -> Result<Vec<(BodyId, Positions)>, String> {
+            Ok(Vec::new())
+        }
+    }
+    for n_frames in [37, 411] {
+        let mut content = still(300, 0.5);
+        content.frames = Some(Arc::new(Resting(n_frames)));
+        let mut harness = open_content(content);
+        wait(&mut harness, is_counted);
+        harness.run_steps(2);
+        let image = harness.render().expect("a picture");
+        let row = SIZE[1] as u32 - 20;
+        let at = |x: u32| {
+            let [r, g, b, _] = image.get_pixel(x, row).0;
+            [r, g, b]
+        };
+        let width = (SIZE[0] - 252.0) as u32;
+        let reds = (0..width).filter(|&x| is_red(at(x)));
+        let reds: Vec<u32> = reds.collect();
+        let (first, last) = (reds[0], reds[reds.len() - 1]);
+        assert!(last - first > width - 60, "{first} {last}");
+        // The cursor is blue.
+        let others = (first..=last).filter(|&x| !is_red(at(x)));
+        assert!(others.count() <= 4, "{n_frames}");
+    }
 }

@@ -51,9 +51,9 @@ pub struct ViewArgs {
     /// The number of triangles of the built-in scene
     #[arg(long, value_name = "N", default_value = "60000", value_parser = clap::value_parser!(u32).range(1_000..=100_000_000))]
     pub triangles: u32,
-    /// The frame to begin with, counted from 0
-    #[arg(long, value_name = "N", default_value = "0")]
-    pub frame: usize,
+    /// The frame to begin with, counted from 0 [default: the first one with a collision; for --png 0]
+    #[arg(long, value_name = "N")]
+    pub frame: Option<usize>,
     /// Do not play at the beginning
     #[arg(long)]
     pub paused: bool,

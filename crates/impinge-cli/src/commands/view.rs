@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use impinge::{BodyId, CancelToken, Positions};
 use impinge_io::{ReadOptions, Weld};
 use impinge_render::{Camera, Colors, Focus, Projection};
-use impinge_view::{Command, Content, Options, Shown, show, write_png};
+use impinge_view::{Command, Content, Opener, Options, Shown, show, write_png};
 
 use super::sequence::{Frames, welded};
 use super::step::Frames as _;
@@ -17,19 +17,33 @@ use crate::error::Error;
 use crate::files::{Files, FrameFiles};
 use crate::load::{Bodies, Loading};
 use crate::palette;
+use crate::watch::go_on;
 
 /// Frames of the built-in scene.
 const DEMO_FRAMES: u32 = 300;
 
 /// `impinge view`.
 pub fn view(args: &ViewArgs, cancel: &CancelToken) -> Result<(), Error> {
-    let options = options(args);
+    let mut options = options(args);
     if let Some(file) = &args.png {
         Inputs::new(&args.meshes).check("--png", &file.0)?;
         let content = content(args, cancel)?;
+        if let Some(missing) = content.missing {
+            return Err(Error::View(missing));
+        }
         return write_png(content, &options, &file.0).map_err(Error::View);
     }
     let (args, cancel) = (args.clone(), cancel.clone());
+    let (again, token) = (args.clone(), cancel.clone());
+    options.opener = Some(Opener(Arc::new(move |paths: &[PathBuf]| {
+        let args = ViewArgs {
+            meshes: paths.to_vec(),
+            sequence: false,
+            bodies: false,
+            ..again.clone()
+        };
+        content(&args, &token).map_err(|error| error.line())
+    })));
     let load = move || content(&args, &cancel).map_err(|error| error.line());
     Ok(show(load, options)?)
 }
@@ -61,6 +75,7 @@ fn options(args: &ViewArgs) -> Options {
         size: args.size,
         folder: PathBuf::from(""),
         command: command(args),
+        opener: None,
         measure: args.measure.map(Into::into),
     }
 }
@@ -93,20 +108,32 @@ fn content(args: &ViewArgs, cancel: &CancelToken) -> Result<Content, Error> {
     let loading =
         Loading::as_they_are(true, cancel).asked(args.no_weld.then_some(false), true, None);
     let mut bodies = Bodies::default();
-    let (moving, weld) = bodies.add(files.mesh, loading)?;
-    let frames: Option<Arc<dyn impinge_view::Frames>> = match files.frames {
-        FrameFiles::None => None,
-        FrameFiles::Sequence(path) => Some(Arc::new(Moving {
-            body: moving,
-            source: Source::Sequence(Frames::open(path, weld)?),
-        })),
-        FrameFiles::Each(paths) => Some(Arc::new(Moving {
-            body: moving,
-            source: Source::Files(paths.to_vec(), weld),
-        })),
-    };
+    // One bad file does not hide the others.
+    let mut missing = Vec::new();
+    let mut frames: Option<Arc<dyn impinge_view::Frames>> = None;
+    let mesh = bodies.add(files.mesh, loading);
+    match (files.frames, mesh) {
+        (FrameFiles::None, Ok(_)) => {}
+        (FrameFiles::None, Err(error)) => missing.push(error.line()),
+        (FrameFiles::Sequence(path), mesh) => {
+            let (body, weld) = mesh?;
+            let source = Source::Sequence(Frames::open(path, weld)?);
+            frames = Some(Arc::new(Moving { body, source }));
+        }
+        (FrameFiles::Each(paths), mesh) => {
+            let (body, weld) = mesh?;
+            let source = Source::Files(paths.to_vec(), weld);
+            frames = Some(Arc::new(Moving { body, source }));
+        }
+    }
     for other in files.others {
-        bodies.add(other, loading)?;
+        if let Err(error) = bodies.add(other, loading) {
+            missing.push(error.line());
+        }
+    }
+    go_on(cancel)?;
+    if bodies.ids.is_empty() {
+        return Err(Error::View(missing.join("\n")));
     }
     let shown = bodies
         .ids
@@ -118,6 +145,7 @@ fn content(args: &ViewArgs, cancel: &CancelToken) -> Result<Content, Error> {
         bodies: shown.collect(),
         scene: bodies.scene,
         frames,
+        missing: (!missing.is_empty()).then(|| missing.join("\n")),
     })
 }
 
@@ -181,6 +209,7 @@ fn demo(args: &ViewArgs) -> Result<Content, Error> {
         scene: demo.scene().clone(),
         bodies,
         frames: Some(Arc::new(Demo(Mutex::new(demo)))),
+        missing: None,
     })
 }
 
