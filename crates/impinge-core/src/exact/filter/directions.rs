@@ -42,6 +42,8 @@ const LARGEST: f64 = (1u64 << 32) as f64;
 const RELATIVE: f64 = 1.0 / (1u64 << 19) as f64;
 /// 2^-119.
 const ABSOLUTE: f64 = f64::from_bits((1023 - 119) << 52);
+/// The squares of what is shorter lose digits to underflow, so that its length is not known.
+const SHORTEST: f64 = f64::from_bits((1023 - 500) << 52);
 /// Lengths of directions are wrong by less than this, relative to themselves.
 const LONGER: f64 = 1.0 + 1.0 / (1u64 << 18) as f64;
 
@@ -83,7 +85,7 @@ impl Directions64 {
             _ => return,
         };
         let length = dot(&direction, &direction).sqrt();
-        let unit = match length > 0.0 && length < f64::INFINITY {
+        let unit = match length > SHORTEST && length < f64::INFINITY {
             true => direction.map(|x| (x / length) as f32),
             false => [0.0; 3],
         };
@@ -361,6 +363,20 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn directions_whose_squares_underflow_tell_nothing_apart() {
+        // The computed length of the normal would be 0.7 of the true one, and a unit normal 1.4 long.
+        let (y, z) = (1.5716e-162, 2.72e-162);
+        let triangle = filled(&[[[0.0; 3], [1.0, 0.0, 0.0], [0.5, y, z]]]);
+        let length = f64::hypot(y / z, 1.0);
+        let near = [[0.5, -0.9 / length, 0.9 * (y / z) / length]];
+        for point in [near, near.map(|p| p.map(|x| -x))] {
+            let point = filled(&[point]);
+            assert_eq!(triangle.beyond::<Portable32>(1, (&point, 0), 1.0), 0);
+            assert_eq!(point.beyond::<Portable32>(1, (&triangle, 0), 1.0), 0);
         }
     }
 
