@@ -206,9 +206,9 @@ mod tests {
             assert!(dot(found.normal, normal) > 1.0 - 1e-9, "{by:?}: {found:?}");
         }
         let ball = surfaces::icosphere(3);
-        let found = convex_overlap(&points(&ball, [0.0; 3]), &points(&ball, [1.0, 0.5, 0.2]));
+        let found = convex_overlap(&points(&ball, [0.0; 3]), &points(&ball, [0.5, 0.25, 0.1]));
         let radius = dot(points(&ball, [0.0; 3])[0], points(&ball, [0.0; 3])[0]).sqrt();
-        let exact = 2.0 * radius - (1.0f64 + 0.25 + 0.04).sqrt();
+        let exact = 2.0 * radius - (0.25f64 + 0.0625 + 0.01).sqrt();
         assert!(
             (found.unwrap().depth - exact).abs() < 0.02 * radius,
             "{found:?} {exact}"
