@@ -38,6 +38,7 @@ __all__ = [
     "Seam",
     "Statistics",
     "TooManyPairs",
+    "_VertexFilter",
     "__version__",
     "_check",
     "_serve_check",
@@ -101,6 +102,15 @@ class CancelToken:
     def cancel(self) -> None: ...
     @property
     def cancelled(self) -> bool: ...
+
+@final
+class _VertexFilter:
+    def __new__(
+        cls,
+        rows: list[npt.NDArray[np.uint32] | None],
+        labels: npt.NDArray[np.int64] | None,
+        may: Callable[[int, int], object] | None,
+    ) -> _VertexFilter: ...
 
 @final
 class Body:

@@ -200,7 +200,7 @@ class CollisionMesh:
                 raise ValueError(f"labels: {what}, {given.dtype} of shape {given.shape} given")
             labels = np.ascontiguousarray(given, np.int64)
         rows = [None if rows is None else rows.astype(np.uint32) for rows in self._rows()]
-        return getattr(_impinge, "_VertexFilter")(rows, labels, may)  # noqa: B009
+        return _impinge._VertexFilter(rows, labels, may)
 
     def _rows(self) -> list[npt.NDArray[np.int64] | None]:
         """The vertices of each body; `None` for all."""
