@@ -184,7 +184,7 @@ impl Workers {
     }
 
     /// Runs work that rayon parallelises, on as many threads as there are workers. With one worker, or few primitives, it runs on
-    /// this thread, for going to a pool takes 70 µs. Such work must ask [`is_alone`](crate::alone::is_alone) before it shares.
+    /// this thread, for going to a pool takes 70 µs. Such work must ask `alone::is_alone` before it shares.
     ///
     /// Why a second pool beside the helpers: clustering splits a body recursively, which takes a work-stealing scheduler,
     /// while helpers only take equal tasks from a list. The pool works when a body is new or has flowed away from its
