@@ -147,15 +147,14 @@ impl Directions64 {
         lane: usize,
         reach: f32,
     ) -> V::Mask {
-        let (normal, span) = (other.direction::<V>(lane), other.span::<V>(lane));
-        let [low, high] = widened(span, reach);
-        let (mut above, mut below) = all::<V>();
-        for corner in 0..self.n_corners {
-            let along = dot(&normal, &self.points_at::<V>(corner, first));
-            above = above & along.gt(high);
-            below = below & low.gt(along);
-        }
-        above | below
+        let span = widened(other.span::<V>(lane), reach);
+        let points = [
+            self.points_at::<V>(0, first),
+            self.points_at::<V>(1, first),
+            self.points_at::<V>(2, first),
+        ];
+        let points = &points[..self.n_corners];
+        are_outside(&other.direction::<V>(lane), span, points)
     }
 
     /// Beyond the planes of which triangles the element of another group lies.
@@ -170,14 +169,13 @@ impl Directions64 {
         let [x, y, z] = &self.directions;
         let normals = [V::row(x, first), V::row(y, first), V::row(z, first)];
         let [low, high] = &self.spans;
-        let [low, high] = widened([V::row(low, first), V::row(high, first)], reach);
-        let (mut above, mut below) = all::<V>();
-        for corner in 0..other.n_corners {
-            let along = dot(&normals, &other.point::<V>(corner, lane));
-            above = above & along.gt(high);
-            below = below & low.gt(along);
-        }
-        above | below
+        let span = widened([V::row(low, first), V::row(high, first)], reach);
+        let points = [
+            other.point::<V>(0, lane),
+            other.point::<V>(1, lane),
+            other.point::<V>(2, lane),
+        ];
+        are_outside(&normals, span, &points[..other.n_corners])
     }
 
     /// Which edges are apart from an edge of another group, along two directions across that one.
@@ -245,10 +243,17 @@ fn widened<V: Number>([low, high]: [V; 2], reach: f32) -> [V; 2] {
     [low - splat(reach), high + splat(reach)]
 }
 
+/// Whether all of some points lie above a span along a direction, or all below it.
 #[inline(always)]
-fn all<V: Number>() -> (V::Mask, V::Mask) {
+fn are_outside<V: Number>(direction: &[V; 3], [low, high]: [V; 2], points: &[[V; 3]]) -> V::Mask {
     let zero = V::splat(0.0);
-    (!zero.gt(zero), !zero.gt(zero))
+    let (mut above, mut below) = (!zero.gt(zero), !zero.gt(zero));
+    for point in points {
+        let along = dot(direction, point);
+        above = above & along.gt(high);
+        below = below & low.gt(along);
+    }
+    above | below
 }
 
 /// Whether the spans of two edges along some direction are farther apart than `reach`.
