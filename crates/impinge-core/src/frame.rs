@@ -236,11 +236,6 @@ impl Frame {
         }
     }
 
-    /// The distance within which elements are near, besides what their bodies add.
-    pub(crate) fn distance(&self) -> f64 {
-        self.distance
-    }
-
     /// Makes this a question about elements that keep a separation, and a clearance if there is one.
     pub(crate) fn set_keep(&mut self, scene: &Scene, keep: Keep) {
         self.set_reach(keep.separation, &BTreeMap::new());
@@ -265,6 +260,11 @@ impl Frame {
     /// Whether elements keep a clearance, so that a pair keeps what its distance at the start says.
     pub(crate) fn has_clearance(&self) -> bool {
         !self.keep.is_plain()
+    }
+
+    /// Whether elements of a step keep a separation or a clearance.
+    pub(crate) fn keeps_distance(&self) -> bool {
+        self.bound > 0.0
     }
 
     /// At least what any pair keeps.

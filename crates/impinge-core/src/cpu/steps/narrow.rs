@@ -4,8 +4,7 @@
 //!
 //! ```text
 //! touching   FirstContact: whether two elements touch during the step, and when first (search: the times)
-//! separated  the same where a distance is asked for
-//! kept       the same where each pair keeps a clearance of its own
+//! kept       the same where elements keep a separation, or each pair a clearance of its own
 //! overlaps   BoxOverlap: whether the boxes over the whole step overlap
 //! near       Within: whether two elements are within a distance at the start
 //! ```
@@ -16,7 +15,6 @@ mod kept;
 mod near;
 mod overlaps;
 mod search;
-mod separated;
 mod touching;
 
 use crate::cpu::simd::Isa;

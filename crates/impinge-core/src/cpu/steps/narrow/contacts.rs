@@ -161,7 +161,7 @@ impl FirstContacts {
     /// Settles pairs of two layers that were left.
     pub fn settle_unsure(&mut self, isa: Isa, world: World<'_>, pairs: &[(Between, Places)]) {
         let until = self.until(world);
-        if world.frame.has_clearance() {
+        if world.frame.keeps_distance() {
             self.is_last = true;
             for &(between, places) in pairs {
                 self.settle_kept(world, between, places);

@@ -1,23 +1,22 @@
-//! Whether elements come nearer than they may during a step with a clearance, and when first.
+//! Whether elements come nearer than they may during a step, by a separation or a clearance, and when first.
 //!
 //! ```text
-//! apart     sixteen pairs at a time in f32, as for contacts: by more than any pair keeps (`touching`)
-//! tables    the same by distances, for pairs that are near
-//! approach  one pair at a time in f64: what the pair keeps, and when it is that near
+//! tables    sixteen pairs at a time in f32: certainly near at the start, or apart until the end
+//! approach  one pair at a time in f64: what the pair keeps, and when it is that near, nearly always to all bits of an f32
 //! ```
 //!
-//! Reason for each discard: no pair keeps more than the separation and the clearance, and what rounding moves.
+//! Reason for each discard: no pair keeps more than the bound of the frame (`Frame::bound`).
 
 use crate::cpu::simd::{Lanes, Simd};
 use crate::exact::filter::{self, BATCH};
-use crate::exact::{Approach, Reach, approach};
+use crate::exact::{Approach, Contact, Reach, approach};
 use crate::grouping::bounds::round_up;
 
 use super::super::world::World;
 use super::batch::{Batch, Between, Places, counts, exact_pair, points};
 use super::contacts::FirstContacts;
 
-/// Settles the candidates of a work item that the filters for contacts have left.
+/// Settles the candidates of a work item.
 #[inline(always)]
 pub(super) fn take<S: Simd>(
     _: S,
@@ -29,12 +28,25 @@ pub(super) fn take<S: Simd>(
     let in_tables = batch.near_in_tables(&Reach::from(world.frame.bound()));
     let tables = batch.groups.map(|group| &group.points);
     let until = round_up(contacts.until(world));
+    // With a clearance, what a pair keeps is less than the bound.
+    let is_at_bound = !world.frame.has_clearance();
     for first in (0..batch.met.len()).step_by(BATCH) {
         let lanes = batch.met.batch(first);
         let n = (batch.met.len() - first).min(BATCH);
         let mut open = u16::MAX >> (BATCH - n);
         if let Some((pair, reach)) = in_tables {
-            open &= !filter::stay_beyond_in_tables::<S::F32>(pair, tables, lanes, until, reach[1]);
+            if is_at_bound {
+                let verdict = filter::are_within_in_tables::<S::F32>(pair, tables, lanes, reach);
+                for lane in Lanes(u64::from(verdict.yes & open)) {
+                    let places = batch.places(first + lane);
+                    contacts.report(world, between, places, Contact::AT_START);
+                }
+                open &= !verdict.yes;
+            }
+            if open != 0 {
+                open &=
+                    !filter::stay_beyond_in_tables::<S::F32>(pair, tables, lanes, until, reach[1]);
+            }
         }
         for lane in Lanes(u64::from(open)) {
             contacts.settle_kept(world, between, batch.places(first + lane));

@@ -31,15 +31,14 @@ use super::batch::{Batch, Between, Narrow, NarrowCounts, counts, exact_pair};
 use super::contacts::{FirstContacts, Open};
 use super::kept;
 use super::search::search;
-use super::separated;
 
 impl Narrow for FirstContacts {
     fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
         let between = batch.between;
         self.go_to(isa, world, between);
         let has_clearance = world.frame.has_clearance();
-        if world.frame.distance() > 0.0 && !has_clearance {
-            return dispatch!(isa, separated, (
+        if world.frame.keeps_distance() && !has_clearance {
+            return dispatch!(isa, kept, (
                 contacts: &mut FirstContacts = self,
                 world: World<'_> = world,
                 batch: Batch<'_> = batch,
@@ -187,11 +186,6 @@ impl FirstContacts {
 }
 
 // Kernels of their own: without optimisation, one for all of them would need more stack than a thread has.
-
-#[inline(always)]
-fn separated<S: Simd>(simd: S, contacts: &mut FirstContacts, world: World<'_>, batch: Batch<'_>) {
-    separated::take(simd, contacts, world, batch);
-}
 
 #[inline(always)]
 fn kept<S: Simd>(simd: S, contacts: &mut FirstContacts, world: World<'_>, batch: Batch<'_>) {
