@@ -41,6 +41,7 @@ mod query;
 #[allow(missing_docs)]
 pub mod run;
 mod scene;
+mod sets;
 mod settings;
 #[allow(missing_docs)]
 pub mod sink;

@@ -2,11 +2,14 @@
 
 use std::cmp::Reverse;
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use crate::error::Error;
+use crate::hull::Extent;
 use crate::ids::BodyId;
 use crate::pairs::Pairs;
 use crate::scene::{Body, Scene};
+use crate::sets::Sets;
 
 /// Pairs of two bodies, or of one body with itself, that are connected by shared primitives or vertices.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,15 +52,18 @@ impl Pairs {
     pub fn places(&self, scene: &Scene) -> Result<Vec<Place>, Error> {
         // One node per vertex of a colliding primitive, separately for each pair of bodies: (body, other body, vertex).
         let mut sets = Sets::default();
-        let mut nodes: HashMap<(usize, usize, u32), usize> = HashMap::new();
+        let mut nodes: HashMap<(usize, usize, u32), u32> = HashMap::new();
         let mut of_pairs = Vec::with_capacity(self.len());
         for (a, b) in self.iter() {
-            let mut last: Option<usize> = None;
+            let mut last = None;
             for (own, other) in [(a, b), (b, a)] {
                 let body = scene.body(own.body)?;
                 for &vertex in body.elements().corners(own.primitive as usize) {
                     let key = (own.body.index(), other.body.index(), vertex);
-                    let node = *nodes.entry(key).or_insert_with(|| sets.add());
+                    let node = match nodes.entry(key) {
+                        Entry::Occupied(known) => *known.get(),
+                        Entry::Vacant(new) => *new.insert(sets.add("places")?),
+                    };
                     if let Some(last) = last {
                         sets.join(last, node);
                     }
@@ -67,13 +73,9 @@ impl Pairs {
             of_pairs.push(last.unwrap_or_default());
         }
         let mut places: Vec<Place> = Vec::new();
-        let mut of_roots: HashMap<usize, usize> = HashMap::new();
+        let mut of_roots: HashMap<u32, usize> = HashMap::new();
         for ((a, b), node) in self.iter().zip(of_pairs) {
-            let boxes = [
-                extent(scene.body(a.body)?, a.primitive),
-                extent(scene.body(b.body)?, b.primitive),
-            ];
-            let place = *of_roots.entry(sets.root(node)).or_insert_with(|| {
+            let place = *of_roots.entry(sets.find(node)).or_insert_with(|| {
                 places.push(Place {
                     bodies: [a.body, b.body],
                     n_pairs: 0,
@@ -85,10 +87,11 @@ impl Pairs {
             });
             let place = &mut places[place];
             place.n_pairs += 1;
-            let [[low_a, high_a], [low_b, high_b]] = boxes;
+            let a = extent(scene.body(a.body)?, a.primitive);
+            let b = extent(scene.body(b.body)?, b.primitive);
             for axis in 0..3 {
-                place.low[axis] = place.low[axis].min(low_a[axis].max(low_b[axis]));
-                place.high[axis] = place.high[axis].max(high_a[axis].min(high_b[axis]));
+                place.low[axis] = place.low[axis].min(a.min[axis].max(b.min[axis]));
+                place.high[axis] = place.high[axis].max(a.max[axis].min(b.max[axis]));
             }
         }
         // The sort is stable.
@@ -98,43 +101,7 @@ impl Pairs {
 }
 
 /// The box of a primitive.
-fn extent(body: &Body, primitive: u32) -> [[f64; 3]; 2] {
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for &vertex in body.elements().corners(primitive as usize) {
-        let point = body.positions().point(vertex as usize);
-        for axis in 0..3 {
-            low[axis] = low[axis].min(point[axis]);
-            high[axis] = high[axis].max(point[axis]);
-        }
-    }
-    [low, high]
-}
-
-/// Disjoint sets (Tarjan 1975, with path halving).
-#[derive(Default)]
-struct Sets {
-    parents: Vec<usize>,
-}
-
-impl Sets {
-    /// Adds a set of one node and returns the node.
-    fn add(&mut self) -> usize {
-        let node = self.parents.len();
-        self.parents.push(node);
-        node
-    }
-
-    fn root(&mut self, mut node: usize) -> usize {
-        while self.parents[node] != node {
-            let above = self.parents[self.parents[node]];
-            self.parents[node] = above;
-            node = above;
-        }
-        node
-    }
-
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parents[a.max(b)] = a.min(b);
-    }
+fn extent(body: &Body, primitive: u32) -> Extent {
+    let corners = body.elements().corners(primitive as usize).iter();
+    Extent::of(corners.map(|&vertex| body.positions().point(vertex as usize)))
 }

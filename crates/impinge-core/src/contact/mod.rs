@@ -62,6 +62,7 @@ use crate::error::Error;
 use crate::index::VertexIx;
 use crate::pairs::Pairs;
 use crate::scene::Scene;
+use crate::sets::Sets;
 
 /// The vertex, edge or face of a body in whose relative interior a point of contact lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -211,7 +212,7 @@ impl Contacts {
     /// # Errors
     /// [`Error::OutOfMemory`].
     pub fn regions(&self) -> Result<Vec<Region>, Error> {
-        let mut sets = regions::Sets::new(self.points.len())?;
+        let mut sets = Sets::new(self.points.len(), regions::WHAT)?;
         regions::join_contacts(self, &mut sets);
         let (regions, _) = regions::regions(self, &self.curves()?, &mut sets)?;
         Ok(regions)

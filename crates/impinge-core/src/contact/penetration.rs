@@ -17,7 +17,7 @@ use std::collections::HashMap;
 use super::curves::Curves;
 use super::inside::{Asked, ConnectedParts};
 use super::regions::{
-    NO_REGION, Region, Sets, Vector, WHAT, add, cross, dot, join_contacts, regions, scaled, sub,
+    NO_REGION, Region, Vector, WHAT, add, cross, dot, join_contacts, regions, scaled, sub,
 };
 use super::topology::EdgesAround;
 use super::work::Work;
@@ -26,6 +26,7 @@ use crate::error::Error;
 use crate::exact::{Sign, orient3d};
 use crate::index::VertexIx;
 use crate::scene::{Body, BodyId, Elements, Kind, Scene};
+use crate::sets::Sets;
 use crate::sink::grow;
 
 /// The topologies of closed bodies, from call to call.
@@ -241,7 +242,7 @@ impl OverlapWork<'_> {
     fn overlap(&self, work: Work<'_>) -> Result<Penetration, Error> {
         let n_points = self.contacts.points().len();
         let n_parts = self.parts.each_ref().map(ConnectedParts::n_parts);
-        let mut sets = Sets::new(n_points + n_parts[0] + n_parts[1])?;
+        let mut sets = Sets::new(n_points + n_parts[0] + n_parts[1], WHAT)?;
         join_contacts(self.contacts, &mut sets);
         let pieces = [self.pieces(0, &mut sets)?, self.pieces(1, &mut sets)?];
         work.step()?;

@@ -12,7 +12,8 @@
 use super::curves::{Curves, distance};
 use super::{Contacts, Shape};
 use crate::error::Error;
-use crate::sink::{filled, grow, room};
+use crate::sets::Sets;
+use crate::sink::{filled, grow};
 
 /// What memory is for.
 pub(super) const WHAT: &str = "regions of contact";
@@ -51,32 +52,6 @@ pub struct Region {
     /// is a region of negative volume. `None` unless [`Penetration`](super::Penetration) found the region. Also `None` if
     /// the bodies meet other than by edges that cross faces (vertices on faces, edges on edges, common planes).
     pub volume: Option<f64>,
-}
-
-/// Disjoint sets of numbers (union-find). The lowest number of a set stands for it.
-#[derive(Debug, Clone)]
-pub(super) struct Sets(Vec<u32>);
-
-impl Sets {
-    pub fn new(n: usize) -> Result<Self, Error> {
-        let mut sets = room(n, WHAT)?;
-        sets.extend((0u32..).take(n));
-        Ok(Sets(sets))
-    }
-
-    pub fn find(&mut self, mut x: u32) -> u32 {
-        while self.0[x as usize] != x {
-            let above = self.0[self.0[x as usize] as usize];
-            self.0[x as usize] = above;
-            x = above;
-        }
-        x
-    }
-
-    pub fn join(&mut self, x: u32, y: u32) {
-        let (x, y) = (self.find(x), self.find(y));
-        self.0[x.max(y) as usize] = x.min(y);
-    }
 }
 
 /// Joins the points of each contact.
@@ -120,7 +95,7 @@ pub(super) fn regions(
     curves: &Curves,
     sets: &mut Sets,
 ) -> Result<(Vec<Region>, Vec<u32>), Error> {
-    let mut region_of = filled(NO_REGION, sets.0.len(), WHAT)?;
+    let mut region_of = filled(NO_REGION, sets.len(), WHAT)?;
     let mut regions: Vec<Region> = Vec::new();
     let mut middles: Vec<Middles> = Vec::new();
     for contact in 0..contacts.len() {
