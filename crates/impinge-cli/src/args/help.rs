@@ -80,7 +80,9 @@ pub fn parse() -> Cli {
 
 /// The command line, with the topics as hidden commands, so that `impinge help TOPIC` finds them.
 pub fn command() -> Command {
-    let with_commands = Cli::command().mut_subcommands(shortened);
+    // Once: every argument of every command is looked for in them.
+    let options = TOPICS.each_ref().map(Topic::own_options);
+    let with_commands = Cli::command().mut_subcommands(|command| shortened(command, &options));
     with_help(with_commands).subcommands(TOPICS.iter().map(Topic::command))
 }
 
@@ -95,27 +97,31 @@ impl Topic {
             .hide(true)
     }
 
-    /// Whether an option of a command belongs to this topic.
-    fn has(&self, arg: &Arg) -> bool {
-        let id = arg.get_id().as_str();
+    /// Its options that have a heading.
+    fn own_options(&self) -> Vec<Arg> {
+        let command = (self.options)(Command::new(self.name));
+        let own = command.get_arguments();
+        own.filter(|own| own.get_help_heading().is_some())
+            .cloned()
+            .collect()
+    }
+
+    /// Whether an option of a command belongs to this topic, which has these options.
+    fn has(&self, own: &[Arg], arg: &Arg) -> bool {
         match self.name {
-            "rows" => ROWS.contains(&id),
-            _ => (self.options)(Command::new(self.name))
-                .get_arguments()
-                .any(|own| {
-                    own.get_help_heading().is_some()
-                        && own.get_id() == arg.get_id()
-                        && own.get_help_heading() == arg.get_help_heading()
-                }),
+            "rows" => ROWS.contains(&arg.get_id().as_str()),
+            _ => own.iter().any(|own| {
+                own.get_id() == arg.get_id() && own.get_help_heading() == arg.get_help_heading()
+            }),
         }
     }
 }
 
 /// The command without the options of the topics in its help, which names them in one line per topic.
-fn shortened(command: Command) -> Command {
+fn shortened(command: Command, options: &[Vec<Arg>; TOPICS.len()]) -> Command {
     let mut more = String::new();
-    for topic in &TOPICS {
-        let of_topic = command.get_arguments().filter(|arg| topic.has(arg));
+    for (topic, own) in TOPICS.iter().zip(options) {
+        let of_topic = command.get_arguments().filter(|arg| topic.has(own, arg));
         let names: Vec<String> = of_topic
             .filter_map(|arg| Some(format!("--{}", arg.get_long()?)))
             .collect();
@@ -132,14 +138,15 @@ fn shortened(command: Command) -> Command {
     let shared = |arg: &Arg| {
         TOPICS
             .iter()
-            .any(|topic| topic.name != "rows" && topic.has(arg))
+            .zip(options)
+            .any(|(topic, own)| topic.name != "rows" && topic.has(own, arg))
     };
     let short = command
         .mut_args(|arg| match shared(&arg) {
             true => arg.hide(true),
             false => arg,
         })
-        .mut_subcommands(shortened);
+        .mut_subcommands(|command| shortened(command, options));
     with_help(match after.is_empty() {
         true => short,
         false => short.after_help(after.join("\n")),
