@@ -437,8 +437,6 @@ pub struct SequenceArgs {
     /// Draw each frame (seen_%04d.png)
     #[arg(long, value_name = "FILE")]
     pub png: Option<FramesFile<PngFile>>,
-    #[command(flatten)]
-    pub picture: PictureArgs,
     /// Find what touches on the way from each frame to the next, and when first; vertices move on straight lines
     #[arg(long, conflicts_with_all = ["pairs", "out"])]
     #[arg(conflicts_with = "png")]
@@ -447,6 +445,9 @@ pub struct SequenceArgs {
     pub step: StepHow,
     #[command(flatten)]
     pub ask: AskArgs,
+    // These come last: their headings would hold for what follows.
+    #[command(flatten)]
+    pub picture: PictureArgs,
     #[command(flatten)]
     pub detector: DetectorArgs,
 }
