@@ -63,6 +63,16 @@ pub fn write_count(
     Ok(())
 }
 
+/// Who was asked about, by the names of the bodies.
+pub fn subject(nouns: &Nouns, names: &[impl AsRef<str>]) -> String {
+    match (&nouns.file, names) {
+        (Some(file), _) => printable(file),
+        (None, [one]) => printable(one.as_ref()),
+        (None, [a, b]) => format!("{} and {}", printable(a.as_ref()), printable(b.as_ref())),
+        (None, many) => format!("{} {}", many.len(), nouns.many),
+    }
+}
+
 /// Who was asked about, and how many primitives of each kind they have.
 fn of_whom(
     scene: &Scene,
@@ -76,12 +86,8 @@ fn of_whom(
             read.push((id, name));
         }
     }
-    let subject = match (&nouns.file, &read[..]) {
-        (Some(file), _) => printable(file),
-        (None, [(_, one)]) => printable(one),
-        (None, [(_, a), (_, b)]) => format!("{} and {}", printable(a), printable(b)),
-        (None, many) => format!("{} {}", many.len(), nouns.many),
-    };
+    let names: Vec<&str> = read.iter().map(|&(_, name)| name).collect();
+    let subject = subject(nouns, &names);
     let mut kinds: Vec<(&'static str, usize)> = Vec::new();
     for &(id, _) in &read {
         let body = scene.body(id)?;

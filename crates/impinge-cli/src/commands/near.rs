@@ -5,7 +5,6 @@ mod rows;
 use std::io::{Write, stderr};
 
 use impinge::{CancelToken, Control, NearPairs, NearQuery, PairKind, Query, SharedVertex};
-use impinge_io::printable;
 use serde_json::{Map, Value, json};
 
 use crate::apart::Inputs;
@@ -13,6 +12,7 @@ use crate::args::NearArgs;
 use crate::asked::Asked;
 use crate::detection::{detector, hit, without};
 use crate::error::Error;
+use crate::headline;
 use crate::json::{counters, rounded};
 use crate::load::{Bodies, Loading};
 use crate::output::out;
@@ -141,12 +141,7 @@ fn print(
     near: &NearPairs,
     intersects: bool,
 ) -> Result<(), Error> {
-    let subject = match (&bodies.nouns.file, &bodies.names[..]) {
-        (Some(file), _) => printable(file),
-        (None, [one]) => printable(one),
-        (None, [a, b]) => format!("{} and {}", printable(a), printable(b)),
-        (None, many) => format!("{} meshes", many.len()),
-    };
+    let subject = headline::subject(&bodies.nouns, &bodies.names);
     let distance = args.distance;
     if near.is_empty() {
         writeln!(to, "{subject}: no pairs of elements within {distance}")?;
@@ -165,10 +160,15 @@ fn print(
             hex(near.hash())
         )?;
     }
+    let command = match (bodies.ids.len(), args.within) {
+        (1, _) => "self",
+        (_, true) => "pairs --self",
+        (_, false) => "pairs",
+    };
     match intersects {
         true => writeln!(
             to,
-            "they intersect, neighbours resolved: `impinge pairs --self` shows where"
+            "they intersect, neighbours resolved: `impinge {command}` shows where"
         )?,
         false => writeln!(to, "nothing intersects, neighbours resolved")?,
     }
