@@ -35,7 +35,7 @@ impl Parts {
             }
         };
         // A part without triangles leaves nothing behind.
-        while self.runs.last().is_some_and(|&(begun, _)| begun == first) {
+        if self.runs.last().is_some_and(|&(begun, _)| begun == first) {
             self.runs.pop();
         }
         self.runs.push((first, part));

@@ -56,6 +56,16 @@ impl<'a> Collector<'a> {
         vertex_ix(self.name, index, first, self.n_vertices(), place)
     }
 
+    /// Adds the face in [`corners`](Self::corners): a polygon, unless it has the one corner of a point or the two of a line.
+    pub(crate) fn face(&mut self, place: Place) -> Result<(), Error> {
+        match self.corners.len() {
+            1 => self.n_points += 1,
+            2 => self.n_lines += 1,
+            _ => self.polygon(place)?,
+        }
+        Ok(())
+    }
+
     /// Adds the polygon in [`corners`](Self::corners) as a fan around its first corner.
     pub(crate) fn polygon(&mut self, place: Place) -> Result<(), Error> {
         let [_, rest @ ..] = self.corners.as_slice() else {

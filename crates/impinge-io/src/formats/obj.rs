@@ -65,11 +65,7 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
                         }
                     });
                 }
-                match parts.corners.len() {
-                    1 => parts.n_points += 1,
-                    2 => parts.n_lines += 1,
-                    _ => parts.polygon(place)?,
-                }
+                parts.face(place)?;
             }
             Some(word @ (b"o" | b"g")) => {
                 if word == b"o" && !has_objects {

@@ -137,7 +137,7 @@ fn read_binary<'a>(
             let corner = parts.vertex(index, 0, place)?;
             parts.corners.push(corner);
         }
-        add(&mut parts, place)?;
+        parts.face(place)?;
         let n_colors = from.count(Scalar::I32, "the number of colour components")?;
         from.take(n_colors, 4, "a colour")?;
     }
@@ -162,15 +162,5 @@ fn face(parts: &mut Collector, line: Line) -> Result<(), Error> {
         let corner = parts.vertex(number(name, place, word, "a vertex index")?, 0, place)?;
         parts.corners.push(corner);
     }
-    add(parts, place)
-}
-
-/// Adds the face whose corners were read last.
-fn add(parts: &mut Collector, place: Place) -> Result<(), Error> {
-    match parts.corners.len() {
-        1 => parts.n_points += 1,
-        2 => parts.n_lines += 1,
-        _ => parts.polygon(place)?,
-    }
-    Ok(())
+    parts.face(place)
 }
