@@ -49,12 +49,7 @@ impl Keep {
         } else {
             0.0
         };
-        let kept = (self.separation + self.clearance).next_up();
-        if rounded > 0.0 {
-            (kept + rounded).next_up()
-        } else {
-            kept
-        }
+        sum_above((self.separation + self.clearance).next_up(), rounded)
     }
 
     /// What a pair keeps, positions as they are computed included. `unit` is the unit roundoff of the positions' precision.
@@ -62,17 +57,12 @@ impl Keep {
         if self.is_plain() {
             return self.separation;
         }
-        let kept = self.beyond(pair, start);
         let rounded = if self.is_rounded {
             rounded_of(pair, [start, end], unit)
         } else {
             0.0
         };
-        if rounded > 0.0 {
-            (kept + rounded).next_up()
-        } else {
-            kept
-        }
+        sum_above(self.beyond(pair, start), rounded)
     }
 
     /// The first time at which two elements are as near as they may come. Only elements within the separation are in contact
@@ -111,7 +101,7 @@ impl Keep {
         sum_below(self.separation, share.min(self.clearance))
     }
 
-    /// d - s rounded up to 24 bits; `None` if it is not above 0.
+    /// d - s rounded up to 24 bits, or the largest such number if it is larger; `None` if it is not above 0.
     fn excess(
         &self,
         pair: ElementPair,
@@ -138,6 +128,9 @@ impl Keep {
         let (mut below, mut above) = (Short::ZERO, Short::not_below(high.max(0.0)));
         let mut stride = 1;
         while !reaches(above) {
+            if above == Short::LARGEST {
+                return Some(above);
+            }
             below = above;
             above = above.later(stride);
             stride *= 2;
@@ -193,6 +186,15 @@ impl Short {
 fn sum_below(a: f64, b: f64) -> f64 {
     let [sum, error] = two_sum(a, b);
     if error < 0.0 { sum.next_down() } else { sum }
+}
+
+/// A float that is not below the sum of a number and another one; the number itself if that is 0.
+fn sum_above(kept: f64, rounded: f64) -> f64 {
+    if rounded > 0.0 {
+        (kept + rounded).next_up()
+    } else {
+        kept
+    }
 }
 
 /// A distance by which rounding moves two elements towards each other certainly less, where vertices stand at
@@ -300,6 +302,22 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    /// No number of 24 bits reaches elements that are farther apart than the largest of them.
+    #[test]
+    fn elements_may_be_farther_apart_than_any_number() {
+        let pair = ElementPair::VertexVertex;
+        let points = [
+            [-1.7e308, 0.0, 0.0],
+            [1.7e308, 0.0, 0.0],
+            [0.0; 3],
+            [0.0; 3],
+        ];
+        for separation in [0.0, 1.0, 1e308] {
+            let kept = keep(separation, 1e-4, 0.2).beyond(pair, &points);
+            assert_eq!(kept, sum_below(separation, 1e-4));
         }
     }
 
