@@ -94,45 +94,44 @@ impl Rings {
         drop(next);
         let mut vertices = vec![IRREGULAR; *starts.last().expect("never empty") as usize];
         let mut parts = Vec::new();
-        let (mut rest, mut rest_sides) = (&mut vertices[..], &mut sides[..]);
+        let (mut rest, mut rest_corners) = (&mut vertices[..], &mut corners[..]);
+        let mut rest_sides = &mut sides[..];
         for first in (0..counts.len()).step_by(MIN_VERTICES) {
             let end = counts.len().min(first + MIN_VERTICES);
-            let part;
-            (part, rest) = rest.split_at_mut((starts[end] - starts[first]) as usize);
+            let n_part = (starts[end] - starts[first]) as usize;
+            let (part, part_corners);
+            (part, rest) = rest.split_at_mut(n_part);
+            (part_corners, rest_corners) = rest_corners.split_at_mut(n_part);
             let part_sides;
             (part_sides, rest_sides) =
                 rest_sides.split_at_mut((side_starts[end] - side_starts[first]) as usize);
-            parts.push((first..end, part, part_sides));
+            parts.push((first..end, [part, part_corners], part_sides));
         }
-        parallel::for_each(parts, |(range, part, sides)| {
+        parallel::for_each(parts, |(range, [part, corners], sides)| {
             let (first, first_side) = (starts[range.start], side_starts[range.start]);
             for vertex in range {
                 let ring = (starts[vertex] - first) as usize..(starts[vertex + 1] - first) as usize;
                 let own = (side_starts[vertex] - first_side) as usize
                     ..(side_starts[vertex + 1] - first_side) as usize;
-                if !own.is_empty() && !put_in_order(&mut sides[own], &mut part[ring.clone()]) {
-                    part[ring].fill(IRREGULAR);
+                if own.is_empty() {
+                    continue;
+                }
+                let (ring, corners) = (&mut part[ring.clone()], &mut corners[ring]);
+                let is_ring = put_in_order(&mut sides[own], ring);
+                if !is_ring {
+                    ring.fill(IRREGULAR);
+                }
+                let is_closed = is_ring && ring.first() == ring.last();
+                if !(is_closed && are_alike(faces, &corners[..corners.len() - 1])) {
+                    corners[0] = IRREGULAR;
                 }
             }
         });
-        let mut rings = Rings {
+        Rings {
             starts,
             vertices,
             corners,
-        };
-        for vertex in 0..rings.n_vertices() {
-            let is_closed = match rings.of(vertex) {
-                Ring::None => continue,
-                Ring::Irregular => false,
-                Ring::Regular(ring) => ring.first() == ring.last(),
-            };
-            let start = rings.starts[vertex] as usize;
-            let end = rings.starts[vertex + 1] as usize - 1;
-            if !(is_closed && are_alike(faces, &rings.corners[start..end])) {
-                rings.corners[start] = IRREGULAR;
-            }
         }
-        rings
     }
 
     /// The corners at a vertex, in any order, if its ring is closed and all triangles turn around it in the sense in which they name
@@ -175,6 +174,9 @@ impl Rings {
 /// Whether all triangles of a closed ring name its vertices in the same sense: then each vertex of the ring follows the middle once.
 fn are_alike(faces: &[[u32; 3]], corners: &[u32]) -> bool {
     let next = |packed: u32| {
+        if packed == IRREGULAR {
+            return None;
+        }
         let face = faces.get((packed >> 2) as usize)?;
         Some(face[((packed & 3) as usize + 1) % 3])
     };
