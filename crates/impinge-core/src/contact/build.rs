@@ -23,8 +23,8 @@ use crate::sink::{self, grow, reserve};
 const CHUNK: usize = 256;
 /// Chunks whose names are sorted by one task.
 const CHUNKS_PER_RUN: usize = 32;
-/// Vertices whose positions are sorted by one task.
-const VERTICES: usize = 16 * 1024;
+/// Faces whose vertices are sorted by position by one task.
+const FACES: usize = 8 * 1024;
 /// What memory is for.
 const WHAT: &str = "contacts";
 
@@ -320,30 +320,23 @@ fn doubles(body: &Body, colliding: &[u32], work: Work<'_>) -> Result<Doubles, Er
     let Elements::Triangles(faces) = body.elements() else {
         return Ok(Vec::new());
     };
-    if colliding.is_empty() {
-        return Ok(Vec::new());
-    }
-    let mut is_named = sink::filled(false, body.n_vertices(), WHAT)?;
-    for vertex in colliding.iter().flat_map(|&face| faces[face as usize]) {
-        is_named[vertex as usize] = true;
-    }
     let bits = |vertex: VertexIx| {
         let point = body.positions().point(vertex.index());
         // Turns minus zero into zero.
         point.map(|x| (x + 0.0).to_bits())
     };
     let mut runs: Vec<Vec<([u64; 3], VertexIx)>> = Vec::new();
-    runs.resize_with(is_named.len().div_ceil(VERTICES), Vec::new);
+    runs.resize_with(colliding.len().div_ceil(FACES), Vec::new);
     work.each(&mut runs, |ix, run| {
-        let first = ix * VERTICES;
-        let of_run = first..is_named.len().min(first + VERTICES);
-        let named = of_run.filter(|&vertex| is_named[vertex]);
-        let named = named.map(|vertex| VertexIx::new(vertex as u32));
+        let of_run = colliding.chunks(FACES).nth(ix).unwrap_or_default();
+        let named = of_run.iter().flat_map(|&face| faces[face as usize]);
+        let named = named.map(VertexIx::new);
         run.extend(named.map(|vertex| (bits(vertex), vertex)));
         run.sort_unstable();
+        run.dedup();
         Ok(())
     })?;
-    let at = work.merged(runs, Equal::All, WHAT)?;
+    let at = work.merged(runs, Equal::Once, WHAT)?;
     let mut doubles: Doubles = at
         .chunk_by(|(x, _), (y, _)| x == y)
         .flat_map(|same| same[1..].iter().map(|&(_, vertex)| (vertex, same[0].1)))
