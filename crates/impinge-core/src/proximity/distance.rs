@@ -570,6 +570,7 @@ impl DistanceSearch<'_> {
         // Directions are of coordinates as they are.
         let has_directions =
             self.scale.is_one() && self.put_directions(&lists, &mut found.directions);
+        let all = u64::MAX >> 64usize.saturating_sub(lists[1].len()).min(63);
         let mut limits = found.limits();
         for (row, a) in lists[0].iter().enumerate() {
             if a.bounds.squared_distance(&whole[1]) > limits[0] {
@@ -579,7 +580,7 @@ impl DistanceSearch<'_> {
             if has_directions {
                 let [of_a, of_b] = &*found.directions;
                 let distance = round_up(limits[0].sqrt() * (1.0 + f64::EPSILON));
-                far = of_b.beyond::<Portable32>(u64::MAX, (of_a, row), distance);
+                far = of_b.beyond::<Portable32>(all, (of_a, row), distance);
             }
             for (lane, b) in lists[1].iter().enumerate() {
                 if far >> lane & 1 == 1 {
