@@ -566,53 +566,34 @@ fn a_sequence_is_followed_step_by_step() {
 /// With a clearance, every pair keeps some of its distance, and the answer is that of the library.
 #[test]
 fn a_clearance_is_kept() {
-    let folder = folder();
-    let step = |more: &[&str]| folder.run(["step"].iter().chain(&FILES).chain(more));
-    let without = step(&["--json"]).json();
-    let with = step(&["--json", "--clearance", "0.0625"]).json();
-    assert_eq!(
-        (&without["clearance"], &with["clearance"]),
-        (&0.0.into(), &0.0625.into())
-    );
-    let first = |answer: &Value| answer["earliest"]["toi"].as_f64().unwrap();
-    assert!(first(&with) < first(&without) && first(&with) > 0.0);
+    let said = " come as near as a clearance of 0.0625 lets them first, ";
+    let [_, with] = keeps("clearance", Step::default().clearance(0.0625), said);
+    assert!(with["earliest"]["toi"].as_f64() > Some(0.0));
     assert_eq!(with["touching_at_start"], 0);
-    let [a0, a1, b0, b1] = crash().map(|(_, model)| model);
-    let mut scene = Scene::new();
-    for (start, end) in [(a0, a1), (b0, b1)] {
-        let id = start.add_to(&mut scene).unwrap();
-        scene.set_end_positions(id, &end.positions).unwrap();
-    }
-    let mut detector = Detector::new(Backend::Cpu).unwrap();
-    let asked = Step::default().clearance(0.0625);
-    let hash = detector.impacts(&scene, &asked).unwrap().hash();
-    assert_eq!(with["hash"], format!("{hash:016x}"));
-    let text = step(&["--clearance", "0.0625"]);
-    let printed = text.printed();
-    assert!(
-        printed.contains(" come as near as a clearance of 0.0625 lets them first, "),
-        "{printed}"
-    );
-    let misuse = step(&["--clearance", "-1"]).misuse();
-    assert!(misuse.contains("not below 0"));
 }
 
 /// With a distance to keep, what comes near is reported, and earlier.
 #[test]
 fn a_separation_is_kept() {
+    let said = " come within 0.0625 first, ";
+    let [without, with] = keeps("separation", Step::default().separation(0.0625), said);
+    assert!(with["impacts"].as_u64() > without["impacts"].as_u64());
+}
+
+/// Asks about a crash without and with an option that makes elements keep 0.0625, compares it with the library, and returns both
+/// answers.
+fn keeps(option: &str, asked: Step, said: &str) -> [Value; 2] {
     let folder = folder();
-    let step = |more: &[&str]| {
-        let args = ["step"].iter().chain(&FILES).chain(&["--json"]).chain(more);
-        folder.run(args).json()
-    };
-    let (without, with) = (step(&[]), step(&["--separation", "0.0625"]));
+    let step = |more: &[&str]| folder.run(["step"].iter().chain(&FILES).chain(more));
+    let flag = &format!("--{option}")[..];
+    let without = step(&["--json"]).json();
+    let with = step(&["--json", flag, "0.0625"]).json();
     assert_eq!(
-        (&without["separation"], &with["separation"]),
+        (&without[option], &with[option]),
         (&0.0.into(), &0.0625.into())
     );
     let first = |answer: &Value| answer["earliest"]["toi"].as_f64().unwrap();
     assert!(first(&with) < first(&without));
-    assert!(with["impacts"].as_u64() > without["impacts"].as_u64());
     let [a0, a1, b0, b1] = crash().map(|(_, model)| model);
     let mut scene = Scene::new();
     for (start, end) in [(a0, a1), (b0, b1)] {
@@ -620,18 +601,14 @@ fn a_separation_is_kept() {
         scene.set_end_positions(id, &end.positions).unwrap();
     }
     let mut detector = Detector::new(Backend::Cpu).unwrap();
-    let asked = Step::default().separation(0.0625);
     let hash = detector.impacts(&scene, &asked).unwrap().hash();
     assert_eq!(with["hash"], format!("{hash:016x}"));
-    let text = folder.run(
-        ["step"]
-            .iter()
-            .chain(&FILES)
-            .chain(&["--separation", "0.0625"]),
-    );
-    assert!(text.printed().contains(" come within 0.0625 first, "));
-    let misuse = folder.run(["step"].iter().chain(&FILES).chain(&["--separation", "-1"]));
-    assert!(misuse.misuse().contains("not below 0"));
+    let text = step(&[flag, "0.0625"]);
+    let printed = text.printed();
+    assert!(printed.contains(said), "{printed}");
+    let misuse = step(&[flag, "-1"]).misuse();
+    assert!(misuse.contains("not below 0"));
+    [without, with]
 }
 
 /// Edges of a rod pass through the inside of a plate: nothing touches, and nothing is free.
