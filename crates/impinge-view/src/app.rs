@@ -26,16 +26,19 @@ pub struct Viewer {
     measured: Measured,
 }
 
+/// A content, and the command that opens a window with it.
+type Loaded = Result<(Content, Command), String>;
+
 enum State {
     /// The content is being read.
-    Loading(Receiver<Result<Content, String>>),
+    Loading(Receiver<Loaded>),
     /// It cannot be shown.
     Failed(String),
     Shown(Box<Session>),
 }
 
 impl State {
-    fn loading(load: impl FnOnce() -> Result<Content, String> + Send + 'static) -> Self {
+    fn loading(load: impl FnOnce() -> Loaded + Send + 'static) -> Self {
         let (to, content) = channel();
         let thread = thread::Builder::new().name("load".to_owned());
         let spawned = thread.spawn(move || {
@@ -69,9 +72,10 @@ impl Viewer {
         load: impl FnOnce() -> Result<Content, String> + Send + 'static,
         options: Options,
     ) -> Self {
+        let command = options.command.clone();
         let state = match &render {
             None => State::Failed("the window has no graphics device".to_owned()),
-            Some(_) => State::loading(load),
+            Some(_) => State::loading(move || Ok((load()?, command))),
         };
         Viewer {
             state,
@@ -127,13 +131,7 @@ impl Viewer {
         if paths.is_empty() || self.render.is_none() {
             return;
         }
-        let words = paths.iter().map(|path| path.display().to_string());
-        let words = ["impinge", "view"]
-            .map(str::to_owned)
-            .into_iter()
-            .chain(words);
         self.options = Options {
-            command: Command(words.collect()),
             frame: None,
             focus: None,
             moves: Vec::new(),
@@ -255,7 +253,10 @@ impl Viewer {
         let Some(render) = self.render.clone() else {
             return;
         };
-        let session = loaded.and_then(|content| Session::new(content, &self.options, render, ctx));
+        let session = loaded.and_then(|(content, command)| {
+            self.options.command = command;
+            Session::new(content, &self.options, render, ctx)
+        });
         self.state = match session {
             Ok(session) => State::Shown(Box::new(session)),
             Err(text) => State::Failed(text),

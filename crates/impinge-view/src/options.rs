@@ -78,12 +78,12 @@ pub struct Options {
     pub measure: Option<u32>,
 }
 
-/// Makes a content of files, on a thread of its own.
+/// Makes a content of files, on a thread of its own, and the command that opens a window with them.
 #[derive(Clone)]
 pub struct Opener(pub Arc<Open>);
 
 /// What an [`Opener`] calls. The error is a message for the user.
-type Open = dyn Fn(&[PathBuf]) -> Result<Content, String> + Send + Sync;
+type Open = dyn Fn(&[PathBuf]) -> Result<(Content, Command), String> + Send + Sync;
 
 impl std::fmt::Debug for Opener {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -1050,10 +1050,16 @@ fn files_can_be_opened_and_dropped() {
         let mut content = still(600, 0.5);
         content.bodies[0].name = paths[0].display().to_string();
         content.missing = (paths.len() > 1).then(|| "b.obj: no such file".to_owned());
-        Ok(content)
+        let mut words = vec!["impinge".to_owned(), "view".to_owned()];
+        words.extend(paths.iter().map(|path| path.display().to_string()));
+        words.push("--no-weld".to_owned());
+        Ok((content, Command(words)))
     }));
+    let folder = tempfile::tempdir().expect("a folder");
     let options = Options {
         opener: Some(opener),
+        folder: folder.path().to_owned(),
+        size: [64, 48],
         ..paused()
     };
     let mut harness = open(|| Ok(still(600, 9.0)), options);
@@ -1090,6 +1096,12 @@ fn files_can_be_opened_and_dropped() {
         !viewer.is_loading() && viewer.names().len() == 2
     });
     assert_eq!(harness.state().names()[0], "typed.obj");
+    // The command that makes a picture again is that of these files, with what else the opener says.
+    press(&mut harness, Key::S);
+    click(&mut harness, "Save");
+    let (_, command) = harness.state().saved().expect("a picture");
+    let begin = "impinge view typed.obj --no-weld --azimuth ";
+    assert!(command.starts_with(begin), "{command}");
 }
 
 #[test]

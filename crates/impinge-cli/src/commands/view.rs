@@ -42,7 +42,8 @@ pub fn view(args: &ViewArgs, cancel: &CancelToken) -> Result<(), Error> {
             bodies: false,
             ..again.clone()
         };
-        content(&args, &token).map_err(|error| error.line())
+        let content = content(&args, &token).map_err(|error| error.line())?;
+        Ok((content, command(&args)))
     })));
     let load = move || content(&args, &cancel).map_err(|error| error.line());
     Ok(show(load, options)?)
