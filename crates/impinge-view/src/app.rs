@@ -92,12 +92,12 @@ impl Viewer {
         matches!(self.state, State::Loading(_))
     }
 
-    /// The message that is shown, if there is one.
+    /// The message that is shown, if there is one: of several, the last that came up.
     pub fn message(&self) -> Option<&str> {
         match &self.state {
             State::Loading(_) => None,
             State::Failed(text) => Some(text),
-            State::Shown(session) => session.message.as_deref(),
+            State::Shown(session) => session.messages().next(),
         }
     }
 

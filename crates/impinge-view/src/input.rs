@@ -91,7 +91,7 @@ pub(crate) fn keys(ctx: &Context, session: &mut Session) {
     }
     if pressed(Key::Escape) {
         session.select(None);
-        session.message = None;
+        session.dismiss();
         session.saving = None;
     }
 }

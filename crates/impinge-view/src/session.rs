@@ -63,6 +63,8 @@ pub(crate) struct Session {
     pub timeline: Timeline,
     pub selected: Option<(usize, u32)>,
     pub message: Option<String>,
+    /// What could not be loaded: shown until the user dismisses it.
+    missing: Option<String>,
     pub saved: Option<Saved>,
     /// The path of the picture that is about to be saved, as the user edits it.
     pub saving: Option<String>,
@@ -97,11 +99,9 @@ impl Session {
     ) -> Result<Self, String> {
         let mut stage = Stage::new(content);
         let n_frames = stage.content.n_frames();
-        let mut message = stage.content.missing.take();
+        let missing = stage.content.missing.take();
         let frame_ix = options.frame.unwrap_or(0).min(n_frames - 1);
-        if let Err(text) = stage.pose(frame_ix) {
-            message = Some(text);
-        }
+        let mut message = stage.pose(frame_ix).err();
         for &(body, matrix) in &options.moves {
             stage.place(body, matrix)?;
         }
@@ -155,6 +155,7 @@ impl Session {
             timeline,
             selected: None,
             message,
+            missing,
             saved: None,
             saving: None,
             drag: None,
@@ -171,6 +172,18 @@ impl Session {
             },
             frame_ms: 0.0,
         })
+    }
+
+    /// All that the user is to be told, the last message first.
+    pub fn messages(&self) -> impl Iterator<Item = &str> {
+        let texts = [&self.message, &self.missing].into_iter();
+        texts.filter_map(|text| text.as_deref())
+    }
+
+    /// Shows no message.
+    pub fn dismiss(&mut self) {
+        self.message = None;
+        self.missing = None;
     }
 
     pub fn n_frames(&self) -> usize {

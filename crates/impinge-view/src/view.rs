@@ -199,9 +199,10 @@ fn legend(ui: &Ui, rect: Rect, session: &Session) {
 
 /// Texts over the bodies.
 fn overlay(ui: &mut Ui, rect: Rect, session: &mut Session) {
-    let Some(text) = session.message.clone() else {
+    let text = session.messages().collect::<Vec<_>>().join("\n");
+    if text.is_empty() {
         return;
-    };
+    }
     let width = (rect.width() - 20.0).max(1.0);
     let room = Rect::from_min_size(rect.min + egui::vec2(10.0, 10.0), egui::vec2(width, 60.0));
     ui.scope_builder(egui::UiBuilder::new().max_rect(room), |ui| {
@@ -209,7 +210,7 @@ fn overlay(ui: &mut Ui, rect: Rect, session: &mut Session) {
             ui.horizontal_wrapped(|ui| {
                 ui.label(egui::RichText::new(text).color(panel::RED));
                 if ui.small_button("Dismiss").clicked() {
-                    session.message = None;
+                    session.dismiss();
                 }
             });
         });

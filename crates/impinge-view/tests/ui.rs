@@ -572,6 +572,31 @@ fn bad_frames_are_messages_and_marks_on_the_timeline() {
 }
 
 #[test]
+fn what_could_not_be_loaded_stays_a_message_until_it_is_dismissed() {
+    let (scene, [id, _]) = balls(100, 0.5);
+    let positions = scene.body(id).expect("there").positions().clone();
+    let content = Content {
+        bodies: shown(&scene),
+        scene,
+        frames: Some(Arc::new(Broken(id, positions, AtomicUsize::new(0)))),
+        missing: Some("b.obj: no such file".to_owned()),
+    };
+    // The frame that is shown first is bad, too.
+    let options = Options {
+        frame: Some(2),
+        ..paused()
+    };
+    let mut harness = open(|| Ok(content), options);
+    harness.get_by_label_contains("b.obj: no such file");
+    harness.get_by_label_contains("run_2.obj: no such file");
+    press(&mut harness, Key::End);
+    assert_eq!(harness.state().message(), Some("b.obj: no such file"));
+    harness.get_by_label("b.obj: no such file");
+    click(&mut harness, "Dismiss");
+    assert_eq!(harness.state().message(), None);
+}
+
+#[test]
 fn an_empty_mesh_is_a_message() {
     let mut scene = Scene::new();
     scene
