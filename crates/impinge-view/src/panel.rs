@@ -88,9 +88,9 @@ fn bodies(ui: &mut Ui, session: &mut Session) {
     }
 }
 
-/// The places of collision, to click.
+/// The places of collision, to click. They are not sought while frames play or a body is dragged.
 fn places(ui: &mut Ui, session: &mut Session) {
-    if session.player.plays {
+    if session.player.plays || session.drags_body() {
         return;
     }
     let current = session.place.map(|(ix, _)| ix);

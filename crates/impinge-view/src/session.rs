@@ -304,6 +304,11 @@ impl Session {
         self.changed.timeline = true;
     }
 
+    /// Whether a drag moves or turns a body.
+    pub fn drags_body(&self) -> bool {
+        matches!(self.drag, Some(Drag::Move { .. } | Drag::Spin { .. }))
+    }
+
     /// Moves a body; a matrix that is refused changes nothing.
     pub fn place(&mut self, body: usize, matrix: Matrix) {
         if let Err(text) = self.stage.place(body, matrix) {
@@ -361,17 +366,19 @@ impl Session {
         answer.pairs.iter().filter_map(other).collect()
     }
 
-    /// The places of collision, as the program numbers them. None while frames play, and where there are too many pairs.
+    /// The places of collision, as the program numbers them. None where there are too many pairs, or where they cannot be told:
+    /// then there is a message. They are found when they are first asked for after the answer has changed.
     pub fn places(&mut self) -> &[Place] {
         let answer = match &self.answer {
             Some(answer) if answer.pairs.len() <= MOST_PAIRS => answer,
             _ => return &[],
         };
         if self.places.is_none() {
-            match places(&self.stage, answer) {
-                Ok(found) => self.places = Some(found),
-                Err(text) => self.message = Some(text),
-            }
+            let found = places(&self.stage, answer).unwrap_or_else(|text| {
+                self.message = Some(text);
+                Vec::new()
+            });
+            self.places = Some(found);
         }
         self.places.as_deref().unwrap_or_default()
     }

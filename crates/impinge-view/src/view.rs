@@ -70,7 +70,7 @@ fn pointer(response: &Response, rect: Rect, session: &mut Session) {
         );
     }
     if response.drag_stopped() {
-        if let Some(Drag::Move { .. } | Drag::Spin { .. }) = session.drag {
+        if session.drags_body() {
             session.released();
         }
         session.drag = None;

@@ -1053,6 +1053,29 @@ fn places_are_listed_as_the_program_numbers_them_and_can_be_clicked() {
     look(&mut harness, "places");
 }
 
+#[test]
+fn places_are_not_listed_while_a_body_is_dragged() {
+    let mut harness = open_content(still(600, 0.5));
+    let is_listed =
+        |harness: &Harness<'static, Viewer>| harness.query_by_label("1 place").is_some();
+    assert!(is_listed(&harness));
+    // Beside the bodies a drag turns the view, and in the middle it moves a body.
+    for (from, stays) in [(Pos2::new(15.0, 780.0), true), (middle(false), false)] {
+        harness.hover_at(from);
+        harness.step();
+        harness.drag_at(from);
+        harness.step();
+        for part in 1..=4 {
+            harness.hover_at(Pos2::new(from.x + 5.0 * part as f32, from.y));
+            harness.step();
+        }
+        assert_eq!(is_listed(&harness), stays);
+        harness.drop_at(Pos2::new(from.x + 20.0, from.y));
+        harness.run_steps(2);
+        assert!(is_listed(&harness));
+    }
+}
+
 #[derive(Debug)]
 struct Dropped(std::path::PathBuf);
 
