@@ -83,7 +83,12 @@ impl Stage {
         if next >= self.content.n_frames() {
             return Ok(false);
         }
-        scratch.moves.clone_from(&self.moves);
+        // Frames place only the bodies that they have.
+        for (body, &matrix) in self.moves.iter().enumerate() {
+            if scratch.moves[body] != matrix {
+                scratch.place(body, matrix)?;
+            }
+        }
         scratch.pose(next)?;
         let ids: Vec<BodyId> = self.content.bodies.iter().map(|shown| shown.id).collect();
         for id in ids {

@@ -784,6 +784,31 @@ fn impacts_and_near_faces_have_colors() {
     );
 }
 
+/// Where a point of the scene is in the window.
+fn in_window(harness: &Harness<'static, Viewer>, point: [f64; 3], has_timeline: bool) -> Pos2 {
+    let center = middle(has_timeline);
+    let orbit = harness.state().orbit().expect("a viewpoint");
+    let aspect = f64::from(center.x / center.y);
+    let ([x, y], _) = orbit.project(aspect, point).expect("it is in view");
+    Pos2::new(center.x * (1.0 + x as f32), center.y * (1.0 - y as f32))
+}
+
+#[test]
+fn a_body_that_no_frame_moves_stays_where_it_was_dragged_during_a_step() {
+    let mut harness = open_content(passing());
+    wait(&mut harness, is_counted);
+    press(&mut harness, Key::B);
+    press(&mut harness, Key::ArrowLeft);
+    press(&mut harness, Key::F);
+    fly(&mut harness);
+    click(&mut harness, "Impacts by time");
+    harness.get_by_label_contains("impacts, the earliest at");
+    let from = in_window(&harness, [0.0; 3], true);
+    drag(&mut harness, from, [0.0, -500.0]);
+    assert_eq!(harness.state().message(), None);
+    harness.get_by_label("nothing touches before the next frame");
+}
+
 #[test]
 fn j_flies_from_place_to_place_and_f_back() {
     // A small contact.
