@@ -75,7 +75,8 @@ pub(crate) struct Session {
     seeks: bool,
     screen: Screen,
     finder: Finder,
-    scratch: Stage,
+    /// For the next frame, once impacts were asked for.
+    scratch: Option<Stage>,
     flight: Option<Flight>,
     /// The box to see completely as soon as the shape of the view is known.
     bounds: Option<[[f64; 3]; 2]>,
@@ -126,7 +127,6 @@ impl Session {
                 _ => options.backend,
             },
         };
-        let scratch = stage.clone();
         let bounds = stage.bounds(None).unwrap_or([[-1.0; 3], [1.0; 3]]);
         let diagonal = length(bounds);
         let timeline = start_timeline(&stage, question, false, ctx);
@@ -135,7 +135,7 @@ impl Session {
             None => (Orbit::around(options.camera, bounds, 1.0), Some(bounds)),
         };
         Ok(Session {
-            scratch,
+            scratch: None,
             orbit,
             bounds,
             aspect: 1.0,
@@ -622,7 +622,8 @@ impl Session {
         marks: &mut [Vec<u32>],
         colors: &mut [Vec<(u32, [u8; 3])>],
     ) -> Result<String, String> {
-        if !self.stage.set_ends(&mut self.scratch)? {
+        let scratch = self.scratch.get_or_insert_with(|| self.stage.clone());
+        if !self.stage.set_ends(scratch)? {
             return Ok("no frame follows: nothing moves".to_owned());
         }
         let mut detector = quiet_detector().map_err(|error| error.to_string())?;
