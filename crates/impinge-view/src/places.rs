@@ -1,7 +1,11 @@
 //! Where bodies collide.
 
+use std::collections::HashMap;
+
+use impinge::BodyId;
+
 use crate::find::Answer;
-use crate::stage::Stage;
+use crate::stage::{Stage, include};
 
 /// A group of pairs that are connected by shared primitives or vertices.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,25 +20,21 @@ pub(crate) struct Place {
 /// The places of an answer, in the order in which the program numbers them.
 pub(crate) fn places(stage: &Stage, answer: &Answer) -> Result<Vec<Place>, String> {
     let found = answer.pairs.places(stage.scene());
-    let bodies = &stage.content.bodies;
-    let number = |id| bodies.iter().position(|shown| shown.id == id).unwrap_or(0);
+    let ids = stage.content.bodies.iter().map(|shown| shown.id);
+    let numbers: HashMap<BodyId, usize> = ids.zip(0..).collect();
+    let number = |id| numbers.get(&id).copied().unwrap_or(0);
     let found = found.map_err(|error| error.to_string())?.into_iter();
     let places = found.map(|place| {
         let mut bounds = [place.low, place.high];
-        for (id, primitive) in place.bodies.into_iter().zip(place.first) {
-            let Ok(body) = stage.scene().body(id) else {
-                continue;
-            };
-            for &vertex in body.elements().corners(primitive as usize) {
-                let point = body.positions().point(vertex as usize);
-                for (k, x) in point.into_iter().enumerate() {
-                    bounds[0][k] = bounds[0][k].min(x);
-                    bounds[1][k] = bounds[1][k].max(x);
-                }
+        let bodies = place.bodies.map(number);
+        for (body, primitive) in bodies.into_iter().zip(place.first) {
+            let corners = stage.primitive_bounds(body, primitive);
+            for point in corners.into_iter().flatten() {
+                include(&mut bounds, point);
             }
         }
         Place {
-            bodies: place.bodies.map(number),
+            bodies,
             n_pairs: place.n_pairs,
             bounds,
         }

@@ -429,22 +429,9 @@ impl Session {
         let Some((body, primitive)) = self.selected else {
             return;
         };
-        let held = self
-            .stage
-            .id(body)
-            .and_then(|id| self.stage.scene().body(id).ok());
-        let Some(held) = held else {
-            return;
-        };
-        let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-        for &vertex in held.elements().corners(primitive as usize) {
-            let point = held.positions().point(vertex as usize);
-            for k in 0..3 {
-                bounds[0][k] = bounds[0][k].min(point[k]);
-                bounds[1][k] = bounds[1][k].max(point[k]);
-            }
+        if let Some(bounds) = self.stage.primitive_bounds(body, primitive) {
+            self.fly(bounds, 6.0);
         }
-        self.fly(bounds, 6.0);
     }
 
     /// Flies to a box, seen from so many times the distance at which it fills the view.

@@ -107,9 +107,19 @@ impl Stage {
         Ok(true)
     }
 
+    /// The lowest and highest coordinates of the corners of a primitive; `None` without such a body.
+    pub fn primitive_bounds(&self, body: usize, primitive: u32) -> Option<[[f64; 3]; 2]> {
+        let body = self.scene().body(self.id(body)?).ok()?;
+        let mut bounds = NOTHING;
+        for &vertex in body.elements().corners(primitive as usize) {
+            include(&mut bounds, body.positions().point(vertex as usize));
+        }
+        Some(bounds)
+    }
+
     /// The lowest and highest coordinates of the vertices of a body, or of all of them; `None` without any.
     pub fn bounds(&self, only: Option<usize>) -> Option<[[f64; 3]; 2]> {
-        let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        let mut bounds = NOTHING;
         for (ix, shown) in self.content.bodies.iter().enumerate() {
             if only.is_some_and(|only| only != ix) {
                 continue;
@@ -118,14 +128,21 @@ impl Stage {
                 continue;
             };
             for vertex in 0..body.n_vertices() {
-                let point = body.positions().point(vertex);
-                for k in 0..3 {
-                    bounds[0][k] = bounds[0][k].min(point[k]);
-                    bounds[1][k] = bounds[1][k].max(point[k]);
-                }
+                include(&mut bounds, body.positions().point(vertex));
             }
         }
         (bounds[0][0] <= bounds[1][0]).then_some(bounds)
+    }
+}
+
+/// The box of no points.
+const NOTHING: [[f64; 3]; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+
+/// Extends a box to a point.
+pub(crate) fn include(bounds: &mut [[f64; 3]; 2], point: [f64; 3]) {
+    for k in 0..3 {
+        bounds[0][k] = bounds[0][k].min(point[k]);
+        bounds[1][k] = bounds[1][k].max(point[k]);
     }
 }
 
