@@ -301,6 +301,11 @@ impl Live {
         Ok(())
     }
 
+    /// Whether a body is hidden; one that does not exist is not.
+    pub fn is_hidden(&self, body: usize) -> bool {
+        self.bodies.get(body).is_some_and(|body| body.is_hidden)
+    }
+
     /// Sends the positions of a body's vertices.
     ///
     /// # Errors

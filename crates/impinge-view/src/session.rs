@@ -69,8 +69,6 @@ pub(crate) struct Session {
     /// The path of the picture that is about to be saved, as the user edits it.
     pub saving: Option<String>,
     pub drag: Option<Drag>,
-    /// The bodies that are not drawn.
-    hidden: Vec<bool>,
     /// Whether the first frame with a collision is to be shown as soon as it is known.
     seeks: bool,
     screen: Screen,
@@ -142,7 +140,6 @@ impl Session {
             question,
             player: Player::new(options.plays && n_frames > 1 && options.frame.is_some()),
             seeks: options.frame.is_none() && options.measure.is_none() && n_frames > 1,
-            hidden: vec![false; stage.content.bodies.len()],
             options: options.clone(),
             shows: options.shows,
             shows_curves: options.curves,
@@ -256,14 +253,13 @@ impl Session {
     }
 
     pub fn is_hidden(&self, body: usize) -> bool {
-        self.hidden.get(body).copied().unwrap_or(false)
+        self.screen.live.is_hidden(body)
     }
 
     /// Hides a body, or shows it again. It collides in any case.
     pub fn hide(&mut self, body: usize, is_hidden: bool) {
-        match self.screen.live.hide(body, is_hidden) {
-            Ok(()) => self.hidden[body] = is_hidden,
-            Err(error) => self.message = Some(error.to_string()),
+        if let Err(error) = self.screen.live.hide(body, is_hidden) {
+            self.message = Some(error.to_string());
         }
         self.changed.view = true;
     }
