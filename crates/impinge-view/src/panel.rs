@@ -331,7 +331,9 @@ fn actions(ui: &mut Ui, session: &mut Session) {
         }
         if ui
             .button("Save picture")
-            .on_hover_text("Asks where (S)")
+            .on_hover_text(
+                "Asks where (S). Hidden bodies are in it: the command that makes it again has no option for them.",
+            )
             .clicked()
         {
             session.ask_where();
