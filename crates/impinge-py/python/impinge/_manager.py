@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ._impinge import Body, Contacts, Detector, Scene
+from ._impinge import Body, Contacts, Detector, Result, Scene
 
 __all__ = ["CollisionManager", "ContactData", "DistanceData"]
 
@@ -377,15 +378,11 @@ class CollisionManager:
             parts.append({name(*sides(a, b)[:2]) for a, b in both.tolist()})
         if return_data:
             data: list[ContactData] = []
-            surfaces: dict[tuple[int, int], list[dict[str, Any]]] = {}
-            contacts = self._detector.contacts(self._scene, result) if len(result) else None
-            points = None if contacts is None else _points(self._scene, contacts)
+            touching = _Touching(self._detector, self._scene, result)
             for ix, (a, b) in enumerate(both.tolist()):
                 own = np.flatnonzero(of_row.reshape(-1) == ix)
                 first, second, swapped = sides(a, b)
-                for row, point, normal, depth in self._overlaps(
-                    contacts, points, surfaces, a, b, own
-                ):
+                for row, point, normal, depth in self._overlaps(touching, a, b, own):
                     faces = (int(rows[row, 1]), int(rows[row, 3]))
                     if swapped:
                         faces, normal = faces[::-1], -normal
@@ -394,17 +391,9 @@ class CollisionManager:
         return parts[0] if len(parts) == 1 else tuple(parts)
 
     def _overlaps(
-        self,
-        contacts: Any,
-        points: Any,
-        surfaces: dict[tuple[int, int], list[dict[str, Any]]],
-        a: int,
-        b: int,
-        rows: npt.NDArray[np.intp],
+        self, touching: _Touching, a: int, b: int, rows: npt.NDArray[np.intp]
     ) -> Iterator[tuple[int, _Vector, _Vector, float]]:
-        """Of two bodies: a row of the pairs, the point, the normal from the first body to the second, the depth.
-
-        `surfaces` keeps the regions of bodies without an inside, by bodies, from call to call."""
+        """Of two bodies: a row of the pairs, the point, the normal from the first body to the second, the depth."""
         scene = self._scene
         if self._is_convex(a) and self._is_convex(b):
             found = self._convex_overlap(a, b)
@@ -412,14 +401,12 @@ class CollisionManager:
                 depth, normal, deepest = found
                 yield int(rows[0]), deepest - 0.5 * depth * normal, normal, depth
                 return
+        contacts, points = touching.contacts, touching.points
         try:
             regions = self._detector.penetration(scene, contacts, a, b).regions()
         except (ValueError, TypeError):
             # Not closed, or not made of triangles.
-            if not surfaces:
-                for region in contacts.regions():
-                    surfaces.setdefault(region["bodies"], []).append(region)
-            regions = surfaces.get((a, b), [])
+            regions = touching.surfaces.get((a, b), [])
         known = {}
         for region in regions:
             for contact in region["contacts"].tolist():
@@ -529,6 +516,40 @@ class _Guests:
             self._manager._convex.pop(int(body), None)
 
 
+class _Touching:
+    """Where the pairs of a result meet. It is found when it is first asked for: convex bodies need none of it."""
+
+    def __init__(self, detector: Detector, scene: Scene, result: Result) -> None:
+        self._detector, self._scene, self._result = detector, scene, result
+
+    @cached_property
+    def contacts(self) -> Contacts:
+        return self._detector.contacts(self._scene, self._result)
+
+    @cached_property
+    def points(self) -> _Vector:
+        """The middle of each contact's corners; of a contact without corners, that of the first element's corners."""
+        scene, contacts = self._scene, self.contacts
+        starts = contacts.starts.astype(np.intp)
+        counts = np.diff(starts)
+        sums = np.zeros((len(counts), 3))
+        of_corner = np.repeat(np.arange(len(counts)), counts)
+        np.add.at(sums, of_corner, contacts.points[contacts.corners])
+        middles: _Vector = sums / np.maximum(counts, 1)[:, None]
+        for row in np.flatnonzero(counts == 0).tolist():
+            a, element = contacts.rows[row, :2].tolist()
+            middles[row] = scene.positions(a)[scene.elements(a)[element]].mean(0)
+        return middles
+
+    @cached_property
+    def surfaces(self) -> dict[tuple[int, int], list[dict[str, Any]]]:
+        """The regions of bodies without an inside, by bodies."""
+        surfaces: dict[tuple[int, int], list[dict[str, Any]]] = {}
+        for region in self.contacts.regions():
+            surfaces.setdefault(region["bodies"], []).append(region)
+        return surfaces
+
+
 def _add(scene: Scene, mesh: Any, transform: _Array | None) -> Body:
     body = scene.add(*mesh) if isinstance(mesh, tuple) else scene.add(mesh)
     if transform is not None:
@@ -546,19 +567,6 @@ def _sorted(a: _Name, b: _Name) -> tuple[_Name, _Name]:
         return (a, b) if a <= b else (b, a)  # type: ignore[operator]
     except TypeError:
         return (a, b) if repr(a) <= repr(b) else (b, a)
-
-
-def _points(scene: Scene, contacts: Contacts) -> _Vector:
-    """The middle of each contact's corners; of a contact without corners, that of the first element's corners."""
-    starts = contacts.starts.astype(np.intp)
-    counts = np.diff(starts)
-    sums = np.zeros((len(counts), 3))
-    np.add.at(sums, np.repeat(np.arange(len(counts)), counts), contacts.points[contacts.corners])
-    middles = sums / np.maximum(counts, 1)[:, None]
-    for row in np.flatnonzero(counts == 0).tolist():
-        a, element = contacts.rows[row, :2].tolist()
-        middles[row] = scene.positions(a)[scene.elements(a)[element]].mean(0)
-    return middles
 
 
 def _normal(corners: _Array) -> _Vector:
