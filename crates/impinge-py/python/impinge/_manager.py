@@ -371,14 +371,14 @@ class CollisionManager:
         result = self._detector._detect(self._scene, bodies)
         sides = self._sides(across)
         parts: list[Any] = [len(result) > 0]
+        touching = _Touching(self._detector, self._scene, result)
         # The rows of each pair of bodies.
-        rows = result.rows
+        rows = touching.rows
         both, of_row = np.unique(rows[:, [0, 2]], axis=0, return_inverse=True)
         if return_names:
             parts.append({name(*sides(a, b)[:2]) for a, b in both.tolist()})
         if return_data:
             data: list[ContactData] = []
-            touching = _Touching(self._detector, self._scene, result)
             for ix, (a, b) in enumerate(both.tolist()):
                 own = np.flatnonzero(of_row.reshape(-1) == ix)
                 first, second, swapped = sides(a, b)
@@ -394,7 +394,6 @@ class CollisionManager:
         self, touching: _Touching, a: int, b: int, rows: npt.NDArray[np.intp]
     ) -> Iterator[tuple[int, _Vector, _Vector, float]]:
         """Of two bodies: a row of the pairs, the point, the normal from the first body to the second, the depth."""
-        scene = self._scene
         if self._is_convex(a) and self._is_convex(b):
             found = self._convex_overlap(a, b)
             if found is not None:
@@ -403,7 +402,7 @@ class CollisionManager:
                 return
         contacts, points = touching.contacts, touching.points
         try:
-            regions = self._detector.penetration(scene, contacts, a, b).regions()
+            regions = self._detector.penetration(self._scene, contacts, a, b).regions()
         except (ValueError, TypeError):
             # Not closed, or not made of triangles.
             regions = touching.surfaces.get((a, b), [])
@@ -411,12 +410,11 @@ class CollisionManager:
         for region in regions:
             for contact in region["contacts"].tolist():
                 known[contact] = (region["normal"], region.get("depth"))
-        vertices, elements = scene.positions(b), scene.elements(b)
         for row in rows.tolist():
             # A region's normal is the way of the first body.
             way, far = known.get(row, (None, None))
             if way is None:
-                way = _normal(vertices[elements[contacts.rows[row, 3]]])
+                way = _normal(touching.corners(b, touching.rows[row, 3]))
             yield row, points[row], -way, 0.0 if far is None else far
 
     def _distance(
@@ -521,6 +519,10 @@ class _Touching:
 
     def __init__(self, detector: Detector, scene: Scene, result: Result) -> None:
         self._detector, self._scene, self._result = detector, scene, result
+        #: Those of the contacts, too. Each access to either makes a new array.
+        self.rows = result.rows
+        #: Positions and elements, by the numbers of bodies: copies, too.
+        self._meshes: dict[int, tuple[_Array, npt.NDArray[np.uint32]]] = {}
 
     @cached_property
     def contacts(self) -> Contacts:
@@ -529,7 +531,7 @@ class _Touching:
     @cached_property
     def points(self) -> _Vector:
         """The middle of each contact's corners; of a contact without corners, that of the first element's corners."""
-        scene, contacts = self._scene, self.contacts
+        contacts = self.contacts
         starts = contacts.starts.astype(np.intp)
         counts = np.diff(starts)
         sums = np.zeros((len(counts), 3))
@@ -537,8 +539,8 @@ class _Touching:
         np.add.at(sums, of_corner, contacts.points[contacts.corners])
         middles: _Vector = sums / np.maximum(counts, 1)[:, None]
         for row in np.flatnonzero(counts == 0).tolist():
-            a, element = contacts.rows[row, :2].tolist()
-            middles[row] = scene.positions(a)[scene.elements(a)[element]].mean(0)
+            a, element = self.rows[row, :2].tolist()
+            middles[row] = self.corners(a, element).mean(0)
         return middles
 
     @cached_property
@@ -548,6 +550,15 @@ class _Touching:
         for region in self.contacts.regions():
             surfaces.setdefault(region["bodies"], []).append(region)
         return surfaces
+
+    def corners(self, body: int, element: int) -> _Array:
+        """The positions of an element's corners."""
+        mesh = self._meshes.get(body)
+        if mesh is None:
+            mesh = self._scene.positions(body), self._scene.elements(body)
+            self._meshes[body] = mesh
+        positions, elements = mesh
+        return positions[elements[element]]
 
 
 def _add(scene: Scene, mesh: Any, transform: _Array | None) -> Body:
