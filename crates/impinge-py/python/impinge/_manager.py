@@ -372,15 +372,18 @@ class CollisionManager:
         sides = self._sides(across)
         parts: list[Any] = [len(result) > 0]
         touching = _Touching(self._detector, self._scene, result)
-        # The rows of each pair of bodies.
         rows = touching.rows
-        both, of_row = np.unique(rows[:, [0, 2]], axis=0, return_inverse=True)
+        both, of_row, counts = np.unique(
+            rows[:, [0, 2]], axis=0, return_inverse=True, return_counts=True
+        )
         if return_names:
             parts.append({name(*sides(a, b)[:2]) for a, b in both.tolist()})
         if return_data:
             data: list[ContactData] = []
-            for ix, (a, b) in enumerate(both.tolist()):
-                own = np.flatnonzero(of_row.reshape(-1) == ix)
+            # The rows of each pair of bodies.
+            order = np.argsort(of_row.reshape(-1), kind="stable")
+            groups = np.split(order, np.cumsum(counts)[:-1])
+            for (a, b), own in zip(both.tolist(), groups):
                 first, second, swapped = sides(a, b)
                 for row, point, normal, depth in self._overlaps(touching, a, b, own):
                     faces = (int(rows[row, 1]), int(rows[row, 3]))
