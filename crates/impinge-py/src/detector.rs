@@ -947,11 +947,7 @@ impl Detector {
         progress: Argument<'_, '_>,
         cancel: Argument<'_, '_>,
     ) -> PyResult<Option<Nearest>> {
-        let answer =
-            |detector: &mut impinge::Detector,
-             scene: &impinge::Scene,
-             query: &Query,
-             control: &Control<'_>| { detector.nearest_with(scene, query, control) };
+        let answer = impinge::Detector::nearest_with;
         let watched = (scene, progress, cancel);
         let (inner, _, number) = Detector::watched(slf, watched, many(across), answer)?;
         Ok(inner.map(|inner| Nearest::new(inner, number)))
@@ -964,11 +960,7 @@ impl Detector {
         scene: &Bound<'_, PyAny>,
         across: Argument<'_, '_>,
     ) -> PyResult<bool> {
-        let answer =
-            |detector: &mut impinge::Detector,
-             scene: &impinge::Scene,
-             query: &Query,
-             control: &Control<'_>| { detector.any_with(scene, query, control) };
+        let answer = impinge::Detector::any_with;
         Ok(Detector::watched(slf, (scene, None, None), many(across), answer)?.0)
     }
 
