@@ -129,6 +129,9 @@ fn stored(positions: &PositionArray<'_>) -> PyResult<Positions> {
     })
 }
 
+/// How deep two convex bodies overlap, which way, and where.
+type Overlap = (f64, [f64; 3], [f64; 3]);
+
 /// Borrows a scene to change it; a detection in another thread may be reading it.
 fn change<'py>(scene: &Bound<'py, Scene>) -> PyResult<PyRefMut<'py, Scene>> {
     scene.try_borrow_mut().map_err(|_| {
@@ -687,22 +690,22 @@ impl Scene {
     }
 
     /// The shortest way that takes two convex bodies apart, for `CollisionManager`: its length, its direction for the second body,
-    /// and the vertex of the first that is farthest along it. ``None`` where they are flat.
+    /// and the position of the vertex of the first that is farthest along it. ``None`` where they are flat.
     fn _convex_overlap(
         &self,
         py: Python<'_>,
         a: &Bound<'_, PyAny>,
         b: &Bound<'_, PyAny>,
-    ) -> PyResult<Option<(f64, [f64; 3], usize)>> {
+    ) -> PyResult<Option<Overlap>> {
         let bodies = [self.body(a)?, self.body(b)?];
-        let found = py.detach(|| {
+        Ok(py.detach(|| {
             let [a, b] = bodies.map(|body| -> Vec<[f64; 3]> {
                 let vertices = 0..body.n_vertices();
                 vertices.map(|ix| body.positions().point(ix)).collect()
             });
-            impinge::contact::convex_overlap(&a, &b)
-        });
-        Ok(found.map(|found| (found.depth, found.normal, found.vertex)))
+            let found = impinge::contact::convex_overlap(&a, &b)?;
+            Some((found.depth, found.normal, a[found.vertex]))
+        }))
     }
 
     /// How many vertices a body has.

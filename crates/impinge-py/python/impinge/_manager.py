@@ -475,8 +475,8 @@ class CollisionManager:
         found = self._scene._convex_overlap(a, b)
         if found is None:
             return None
-        depth, normal, vertex = found
-        return depth, np.array(normal), np.asarray(self._scene.positions(a)[vertex], np.float64)
+        depth, normal, deepest = found
+        return depth, np.array(normal), np.array(deepest)
 
     def _is_convex(self, number: int) -> bool:
         known = self._convex.get(number)
