@@ -1,6 +1,5 @@
 //! The everyday case in one line.
 
-use impinge::{Positions, Weld};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -187,10 +186,7 @@ pub fn weld<'py>(
 ) -> PyResult<Welded<'py>> {
     let positions = PositionArray::new(vertices, "vertices")?;
     let (mut indices, n_columns) = arrays::index_rows(faces, "faces", positions.len())?;
-    let (weld, welded): (Weld, Positions) = match &positions {
-        PositionArray::F32(array) => welded(arrays::slice_rows::<f32, 3>(array)?)?,
-        PositionArray::F64(array) => welded(arrays::slice_rows::<f64, 3>(array)?)?,
-    };
+    let (weld, welded) = welded(&positions)?;
     for index in &mut indices {
         *index = weld.index(*index);
     }

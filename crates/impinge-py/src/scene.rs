@@ -89,14 +89,13 @@ impl Scene {
     ) -> PyResult<BodyId> {
         let positions = PositionArray::new(vertices, names.vertices)?;
         let mut elements = arrays::elements(elements, names.elements, kind, positions.len())?;
-        let mut held = stored(&positions)?;
-        if weld {
-            let (weld, welded) = match &held {
-                Positions::F32(positions) => welded(&positions[..])?,
-                Positions::F64(positions) => welded(&positions[..])?,
-            };
-            (elements, held) = (apply(&weld, &elements), welded);
-        }
+        let held = if weld {
+            let (weld, welded) = welded(&positions)?;
+            elements = apply(&weld, &elements);
+            welded
+        } else {
+            stored(&positions)?
+        };
         self.inner
             .add(elements, held)
             .map_err(|error| refuse(error, names))
@@ -104,12 +103,18 @@ impl Scene {
 }
 
 /// A welding of vertices at the same position, and the positions that stay.
-pub fn welded<R: Real>(positions: &[[R; 3]]) -> PyResult<(Weld, Positions)> {
-    let weld = Weld::by_position(positions);
-    let welded = weld
-        .positions(positions)
-        .map_err(|error| raise(error.into()))?;
-    Ok((weld, welded.into()))
+pub fn welded(positions: &PositionArray<'_>) -> PyResult<(Weld, Positions)> {
+    fn welded<R: Real>(positions: &[[R; 3]]) -> PyResult<(Weld, Positions)> {
+        let weld = Weld::by_position(positions);
+        let welded = weld
+            .positions(positions)
+            .map_err(|error| raise(error.into()))?;
+        Ok((weld, welded.into()))
+    }
+    match positions {
+        PositionArray::F32(array) => welded::<f32>(slice_rows(array)?),
+        PositionArray::F64(array) => welded::<f64>(slice_rows(array)?),
+    }
 }
 
 /// Elements with the indices of welded vertices.
