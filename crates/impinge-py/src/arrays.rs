@@ -73,8 +73,6 @@ pub fn elements(
     kind: Option<RowKind>,
     n_vertices: usize,
 ) -> PyResult<Elements> {
-    let array = as_array(argument, name)?;
-    let numbers = NumberKind::of(&array, name)?;
     let allowed: &[usize] = match kind {
         None => &[3, 4],
         Some(RowKind::Of(Kind::Points)) => &[1],
@@ -82,10 +80,7 @@ pub fn elements(
         Some(RowKind::Of(Kind::Triangles)) => &[3],
         Some(RowKind::Of(Kind::Tetrahedra) | RowKind::Quads) => &[4],
     };
-    check_columns(&array, name, allowed)?;
-    let indices = indices(&array, numbers, name)?;
-    let n_columns = array.shape()[1];
-    check_indices(&indices, n_columns, name, n_vertices)?;
+    let (indices, n_columns) = index_rows(argument, name, allowed, n_vertices)?;
     Ok(match (n_columns, kind) {
         (1, _) => Elements::Points(indices.as_chunks().0.to_vec()),
         (2, _) => Elements::Edges(indices.as_chunks().0.to_vec()),
@@ -208,15 +203,16 @@ pub fn rows(argument: &Bound<'_, PyAny>, name: &str, n_columns: usize) -> PyResu
     indices(&array, numbers, name)
 }
 
-/// Rows `(n, k)` of vertex indices below `n_vertices`, row after row, and `k`.
+/// Rows `(n, k)` of vertex indices below `n_vertices`, row after row, and `k`, which is one of those allowed.
 pub fn index_rows(
     argument: &Bound<'_, PyAny>,
     name: &str,
+    allowed: &[usize],
     n_vertices: usize,
 ) -> PyResult<(Vec<u32>, usize)> {
     let array = as_array(argument, name)?;
     let numbers = NumberKind::of(&array, name)?;
-    check_columns(&array, name, &[1, 2, 3, 4])?;
+    check_columns(&array, name, allowed)?;
     let n_columns = array.shape()[1];
     let indices = indices(&array, numbers, name)?;
     check_indices(&indices, n_columns, name, n_vertices)?;

@@ -185,7 +185,8 @@ pub fn weld<'py>(
     faces: &Bound<'py, PyAny>,
 ) -> PyResult<Welded<'py>> {
     let positions = PositionArray::new(vertices, "vertices")?;
-    let (mut indices, n_columns) = arrays::index_rows(faces, "faces", positions.len())?;
+    let (mut indices, n_columns) =
+        arrays::index_rows(faces, "faces", &[1, 2, 3, 4], positions.len())?;
     let (weld, welded) = welded(&positions)?;
     for index in &mut indices {
         *index = weld.index(*index);
