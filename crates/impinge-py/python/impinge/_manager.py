@@ -347,14 +347,13 @@ class CollisionManager:
         that which was added later."""
         names = {int(body): name for name, body in self._bodies.items()}
         last = {int(body): name for name, body in (across or {}).items()}
+        seconds = last or names
         order = {number: ix for ix, number in enumerate(names)}
 
         def sides(a: int, b: int) -> tuple[_Name, _Name, bool]:
-            if last:
-                swapped = a in last
-                return (names[b], last[a], True) if swapped else (names[a], last[b], False)
-            swapped = order[a] > order[b]
-            return (names[b], names[a], True) if swapped else (names[a], names[b], False)
+            swapped = a in last if last else order[a] > order[b]
+            first, second = (b, a) if swapped else (a, b)
+            return names[first], seconds[second], swapped
 
         return sides
 
@@ -365,7 +364,7 @@ class CollisionManager:
         return_names: bool,
         return_data: bool,
     ) -> Any:
-        bodies = None if across is None else list(across.values())
+        bodies = _bodies(across)
         if not (return_names or return_data):
             return self._detector._any(self._scene, bodies)
         result = self._detector._detect(self._scene, bodies)
@@ -391,7 +390,7 @@ class CollisionManager:
                         faces, normal = faces[::-1], -normal
                     data.append(ContactData((first, second), faces, point, normal, depth))
             parts.append(data)
-        return parts[0] if len(parts) == 1 else tuple(parts)
+        return _answer(parts)
 
     def _overlaps(
         self, touching: _Touching, a: int, b: int, rows: npt.NDArray[np.intp]
@@ -427,8 +426,7 @@ class CollisionManager:
         return_names: bool,
         return_data: bool,
     ) -> Any:
-        bodies = None if across is None else list(across.values())
-        nearest = self._detector.nearest(self._scene, across=bodies)
+        nearest = self._detector.nearest(self._scene, across=_bodies(across))
         if nearest is None:
             parts: list[Any] = [float("inf"), None, None]
         else:
@@ -444,10 +442,8 @@ class CollisionManager:
                 ends = None if ends is None else (ends[1], ends[0])
             data = DistanceData((first, second), (i, j), distance, ends)
             parts = [distance, name(first, second), data]
-        chosen = [parts[0]]
-        chosen += [parts[1]] if return_names else []
-        chosen += [parts[2]] if return_data else []
-        return chosen[0] if len(chosen) == 1 else tuple(chosen)
+        wanted = [True, return_names, return_data]
+        return _answer([part for part, is_wanted in zip(parts, wanted) if is_wanted])
 
     def _depth(self, a: int, b: int) -> tuple[float, Any]:
         """The distance of two bodies that share a point, less than 0 where they overlap, and the deepest points."""
@@ -573,6 +569,16 @@ def _add(scene: Scene, mesh: Any, transform: _Array | None) -> Body:
             scene.remove(body)
             raise
     return body
+
+
+def _bodies(across: dict[_Name, Body] | None) -> list[Body] | None:
+    """The bodies across which is asked; `None` for all, which none at all does not mean."""
+    return None if across is None else list(across.values())
+
+
+def _answer(parts: list[Any]) -> Any:
+    """What a method returns: its one part, or all as a tuple."""
+    return parts[0] if len(parts) == 1 else tuple(parts)
 
 
 def _sorted(a: _Name, b: _Name) -> tuple[_Name, _Name]:
