@@ -34,7 +34,7 @@ import math
 import os
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Optional
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -58,6 +58,9 @@ _RESCALING = 0.8
 
 _Array = Any
 _Mesh = Any  # A CollisionMesh of this module or of ipctk.
+#: A body of a mesh: what adds it to a scene, its elements, and its vertices in the mesh; `None` for
+#: all.
+_Part = tuple[Callable[..., object], npt.NDArray[np.int64], Optional[npt.NDArray[np.uint32]]]
 
 
 def edges(faces: _Array) -> npt.NDArray[np.int32]:
@@ -134,6 +137,12 @@ class CollisionMesh:
         named[self._faces.ravel()] = True
         named[self._loose.ravel()] = True
         self._points = np.flatnonzero(~named)
+        parts: list[_Part] = [
+            (Scene.add, self._faces, None),
+            (Scene.add_edges, self._loose, None),
+            (_add_points, self._points, self._points.astype(np.uint32)),
+        ]
+        self._parts = [part for part in parts if len(part[1])]
         # Elements of two bodies that name one vertex touch there at all times: they do not count.
         self._is_mixed = bool(np.isin(self._loose, self._faces).any())
 
@@ -192,26 +201,19 @@ class CollisionMesh:
         """Which pairs of elements collide; `None` if all do that share no vertex of a body."""
         if labels is None and may is None and not self._is_mixed:
             return None
-        if labels is not None:
-            given = np.asarray(labels)
-            if given.dtype.kind not in "iu" or given.shape != (self.num_vertices,):
-                shape = f"({self.num_vertices},)"
-                what = f"integers of shape {shape} expected, as the mesh has vertices"
-                raise ValueError(f"labels: {what}, {given.dtype} of shape {given.shape} given")
-            labels = np.ascontiguousarray(given, np.int64)
-        rows = [None if rows is None else rows.astype(np.uint32) for rows in self._rows()]
-        return _impinge._VertexFilter(rows, labels, may)
+        rows = [rows for _, _, rows in self._parts]
+        return _impinge._VertexFilter(rows, self._labels(labels), may)
 
-    def _rows(self) -> list[npt.NDArray[np.int64] | None]:
-        """The vertices of each body; `None` for all."""
-        rows: list[npt.NDArray[np.int64] | None] = []
-        if len(self._faces):
-            rows.append(None)
-        if len(self._loose):
-            rows.append(None)
-        if len(self._points):
-            rows.append(self._points)
-        return rows
+    def _labels(self, labels: _Array | None) -> npt.NDArray[np.int64] | None:
+        """Labels of vertices, which are checked."""
+        if labels is None:
+            return None
+        given = np.asarray(labels)
+        if given.dtype.kind not in "iu" or given.shape != (self.num_vertices,):
+            shape = f"({self.num_vertices},)"
+            what = f"integers of shape {shape} expected, as the mesh has vertices"
+            raise ValueError(f"labels: {what}, {given.dtype} of shape {given.shape} given")
+        return np.ascontiguousarray(given, np.int64)
 
     def __repr__(self) -> str:
         counts = f"{self.num_vertices} vertices, {self.num_edges} edges, {self.num_faces} faces"
@@ -225,29 +227,26 @@ class _Held:
         self.process = os.getpid()
         self.detector: Any = Detector(backend="cpu")
         self.scene = Scene()
-        self.mesh_rows = mesh._rows()
-        self._parts = [
-            (kind, elements)
-            for kind, elements in [("f", mesh._faces), ("e", mesh._loose), ("p", mesh._points)]
-            if len(elements)
-        ]
+        self._parts = mesh._parts
 
     def place(self, vertices: npt.NDArray[Any], end: npt.NDArray[Any] | None = None) -> Scene:
         """The bodies at these positions, and where they move to."""
         scene = self.scene
+        # All are added before an end is set, which may be refused: a later call finds them there.
         if len(scene) == 0:
-            for kind, elements in self._parts:
-                if kind == "f":
-                    scene.add(vertices, elements)
-                elif kind == "e":
-                    scene.add_edges(vertices, elements)
-                else:
-                    scene.add_points(vertices[elements])
-        for body, rows in enumerate(self.mesh_rows):
-            scene.set_positions(body, vertices if rows is None else vertices[rows])
-            if end is not None:
+            for add, elements, rows in self._parts:
+                add(scene, vertices if rows is None else vertices[rows], elements)
+        else:
+            for body, (_, _, rows) in enumerate(self._parts):
+                scene.set_positions(body, vertices if rows is None else vertices[rows])
+        if end is not None:
+            for body, (_, _, rows) in enumerate(self._parts):
                 scene.set_end_positions(body, end if rows is None else end[rows])
         return scene
+
+
+def _add_points(scene: Scene, vertices: npt.NDArray[Any], _: object) -> None:
+    scene.add_points(vertices)
 
 
 #: Detectors of the processes that this one was forked from.
@@ -322,9 +321,8 @@ def is_step_collision_free(
     start, end, distance = _step(ours, vertices_t0, vertices_t1, min_distance)
     held = ours._held()
     scene = held.place(start, end)
-    may = mesh.can_collide if labels is None else None
     free: bool = held.detector.is_free(
-        scene, separation=distance, _filter=ours._filter(labels, may)
+        scene, separation=distance, _filter=ours._filter(labels, _may(mesh, labels))
     )
     return free
 
@@ -382,7 +380,6 @@ def compute_collision_free_stepsize(
         )
     held = ours._held()
     scene = held.place(start, end)
-    may = mesh.can_collide if labels is None else None
     try:
         advance = held.detector.advance(
             scene,
@@ -390,7 +387,7 @@ def compute_collision_free_stepsize(
             clearance=_CLEARANCE,
             # With all of its distance to lose, a pair still keeps what rounding moves.
             clearance_share=max(1 - rescaling, 1e-9),
-            _filter=ours._filter(labels, may),
+            _filter=ours._filter(labels, _may(mesh, labels)),
         )
     except Seam:
         # Parts that have come to touch at a vertex are no seam: there is no step, as for all that
@@ -428,13 +425,18 @@ def has_intersections(
     ours = _served(mesh)
     held = ours._held()
     scene = held.place(_positions(ours, vertices, "vertices"))
-    may = mesh.can_collide if labels is None else None
+    may = _may(mesh, labels)
     if labels is None and may is None and not ours._is_mixed:
         any_pair: bool = held.detector.any(
             scene, between=True, within=True, shared_vertex="resolve"
         )
         return any_pair
     return _some_intersect(ours, held, labels, may)
+
+
+def _may(mesh: _Mesh, labels: _Array | None) -> Callable[[int, int], bool] | None:
+    """Whether vertices may collide, as the mesh says; labels take its place."""
+    return mesh.can_collide if labels is None else None
 
 
 def _some_intersect(
@@ -445,16 +447,16 @@ def _some_intersect(
 ) -> bool:
     """Whether any pairs intersect that may collide."""
     pairs = held.detector.detect(held.scene, between=True, within=True, shared_vertex="resolve")
-    mesh._filter(labels, may)  # For its complaints.
+    label_of = mesh._labels(labels)
     of_body = []
-    for body, rows in enumerate(mesh._rows()):
+    for body, (_, _, rows) in enumerate(mesh._parts):
         elements = held.scene.elements(body)
         of_body.append(elements if rows is None else rows[elements])
     for body_a, a, body_b, b in pairs.rows.tolist():
         of_a, of_b = of_body[body_a][a].tolist(), of_body[body_b][b].tolist()
         if body_a != body_b and set(of_a) & set(of_b):
             continue
-        if labels is not None and len({int(labels[vertex]) for vertex in of_a + of_b}) == 1:
+        if label_of is not None and len(set(label_of[of_a + of_b].tolist())) == 1:
             continue
         if may is None or any(may(x, y) for x in of_a for y in of_b):
             return True
