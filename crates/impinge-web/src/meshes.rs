@@ -60,13 +60,14 @@ fn options() -> ReadOptions {
 
 impl FileMesh {
     fn new(name: &str, mut mesh: Mesh, weld: bool) -> Self {
-        // The reader's limit on vertices is 32 bits.
-        let mut map: Vec<u32> = (0..mesh.n_vertices() as u32).collect();
-        if weld {
+        let map = if weld {
             let weld = Weld::by_position(&mesh.positions);
             weld.apply(&mut mesh);
-            map.copy_from_slice(weld.map());
-        }
+            weld.map().to_vec()
+        } else {
+            // The reader's limit on vertices is 32 bits.
+            (0..mesh.n_vertices() as u32).collect()
+        };
         FileMesh {
             name: name.to_owned(),
             index: mesh.elements.indices().to_vec(),
