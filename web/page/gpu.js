@@ -19,15 +19,22 @@ export async function lookForAdapter() {
   return isSoftware ? "software" : "hardware";
 }
 
+// Frees a detector that nobody waits for. One that has failed may fail at this, too: that is no news.
+function letGo(detector) {
+  detector?.dispose().catch(() => undefined);
+}
+
 export class Gpu {
   #detector = null;
   #isBusy = false;
   // Counts changes of the bodies. An answer about other bodies is not shown.
   #era = 0;
 
-  // `on.answer(n, ms, hash, asked)` shows an answer, `on.note(text)` what happens, `on.stale()` asks for another question.
-  constructor(on) {
+  // `on.answer(n, ms, hash, asked)` shows an answer, `on.note(text)` what happens, `on.stale()` asks for another question. `load`
+  // gives the build with WebGPU; tests give another.
+  constructor(on, load = withReaders) {
     this.on = on;
+    this.load = load;
   }
 
   get isReady() {
@@ -42,19 +49,24 @@ export class Gpu {
   }
 
   async open(options, bodies) {
-    await this.close();
+    const closing = this.close();
+    // The era of this call, not that of a later one that begins while the previous detector is let go.
     const era = this.#era;
+    await closing;
+    if (era !== this.#era) return;
     this.on.note("WebGPU compiles its kernels …");
+    let opened = null;
     try {
-      const { GpuDetector } = await withReaders();
-      const opened = await GpuDetector.open(options);
+      const { GpuDetector } = await this.load();
+      opened = await GpuDetector.open(options);
       for (const body of bodies) {
         await (body.corners === 4 ? opened.addTetrahedra(body.index, body.now) : opened.add(body.index, body.now));
       }
-      if (era !== this.#era) return void opened.dispose();
+      if (era !== this.#era) return letGo(opened);
       this.#detector = opened;
       this.on.stale();
     } catch (error) {
+      letGo(opened);
       if (era === this.#era) this.on.note(`WebGPU failed: ${error.message}`, true);
     }
   }
@@ -70,6 +82,7 @@ export class Gpu {
     } catch (error) {
       if (era === this.#era) {
         this.#detector = null;
+        letGo(detector);
         this.on.note(`WebGPU failed: ${error.message}`, true);
       }
     } finally {

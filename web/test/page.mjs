@@ -10,6 +10,7 @@ import { existsSync } from "node:fs";
 import { mkdir, mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
+import { Gpu } from "../page/gpu.js";
 import { fromLink, toLink } from "../page/link.js";
 import { launch, serve } from "./browser.mjs";
 
@@ -633,6 +634,54 @@ function links() {
   }
 }
 
+// Whatever is opened meanwhile, and however long a detector takes to go, the last one asked for stays, and no other one is held.
+async function latest() {
+  const made = [];
+  class GpuDetector {
+    bodies = [];
+    isDisposed = false;
+    slow = new Promise((done) => (this.finish = done));
+    static async open() {
+      made.push(new GpuDetector());
+      return made.at(-1);
+    }
+    async add(index) {
+      if (index === "refused") throw new Error("a bad body");
+      this.bodies.push(index);
+    }
+    async setPositions() {}
+    async betweenAll() {
+      if (this.bodies.includes("lost")) throw new Error("a lost device");
+      return { pairs: [], hash: this.bodies.join(), statistics: {} };
+    }
+    async dispose() {
+      this.isDisposed = true;
+      await this.slow;
+    }
+  }
+  const said = [];
+  const on = { answer: (n, ms, hash) => said.push(hash), note: (text, isBad) => isBad && said.push(text), stale() {} };
+  const gpu = new Gpu(on, async () => ({ GpuDetector }));
+  const body = (index) => [{ index, corners: 3 }];
+  const held = () => made.filter(({ isDisposed }) => !isDisposed).map(({ bodies }) => bodies.join());
+
+  await gpu.open({}, body("first"));
+  // The second waits for the first one to go, and the third does not.
+  const both = [gpu.open({}, body("second")), gpu.open({}, body("third"))];
+  await both[1];
+  made[0].finish();
+  await both[0];
+  await gpu.ask([], false);
+  assert.deepEqual([said, held()], [["third"], ["third"]]);
+
+  for (const { finish } of made) finish();
+  await gpu.open({}, body("refused"));
+  assert.deepEqual([said.pop(), held(), gpu.isReady], ["WebGPU failed: a bad body", [], false]);
+  await gpu.open({}, body("lost"));
+  await gpu.ask([], false);
+  assert.deepEqual([said.pop(), held(), gpu.isReady], ["WebGPU failed: a lost device", [], false]);
+}
+
 async function example(browser) {
   const page = await browser.newPage();
   const problems = [];
@@ -649,6 +698,7 @@ async function example(browser) {
 
 try {
   links();
+  await latest();
   await writeFiles();
   const visits = [dropped, frames, real, large, keyboard, phone, example];
   for (const [options, all] of [[{ gpu: true }, visits], [{ gpu: false }, [withoutGpu]]]) {
