@@ -201,24 +201,25 @@ function advance(seconds) {
   }
 }
 
-// Writes the point whose coordinates begin at `at` as it is drawn.
-function drawn(positions, at, to) {
+// Writes the point whose coordinates begin at `at` as it is drawn: `isTurned` if y points up.
+function drawn(positions, at, to, isTurned) {
   const { centre, radius } = stage;
   const y = (positions[at + 1] - centre[1]) / radius;
   const z = (positions[at + 2] - centre[2]) / radius;
   to[at] = (positions[at] - centre[0]) / radius;
-  to[at + 1] = isYUp() ? -z : y;
-  to[at + 2] = isYUp() ? y : z;
+  to[at + 1] = isTurned ? -z : y;
+  to[at + 2] = isTurned ? y : z;
   return to;
 }
 
 function draw() {
   // Frames are shown as they are while they play.
   const at = isFramed && isPlaying ? Math.min(end, Math.floor(now)) : now;
+  const isTurned = isYUp();
   for (const [ix, body] of bodies.entries()) {
     pose(body, at, body.now);
     const to = view.positions(ix);
-    for (let k = 0; k < to.length; k += 3) drawn(body.now, k, to);
+    for (let k = 0; k < to.length; k += 3) drawn(body.now, k, to, isTurned);
   }
   time.value = String(at);
   element("time-text").textContent = isFramed ? `${Number(at.toFixed(3))} of ${end}` : at.toFixed(3);
@@ -263,7 +264,7 @@ function list() {
 
 function flyTo({ centre, radius }) {
   const near = Math.max(LEAST_PLACE, radius / stage.radius);
-  view.flyTo(drawn(centre, 0, []), near / PLACE_SHARE);
+  view.flyTo(drawn(centre, 0, [], isYUp()), near / PLACE_SHARE);
 }
 
 function goTo(ix) {
