@@ -174,15 +174,16 @@ function showMotion() {
 function setPlaying(value) {
   // A frame that played stays as it is.
   if (isFramed && isPlaying && !value) now = Math.min(end, Math.floor(now));
+  if (value !== isPlaying) isMoved = true;
   isPlaying = value;
   play.textContent = isPlaying ? "Pause" : "Play";
-  isMoved = true;
 }
 
 function setTime(value) {
   setPlaying(false);
   touching = [];
   now = Math.min(end, Math.max(0, value));
+  isMoved = true;
 }
 
 const nextFrame = (by) => setTime(by > 0 ? Math.floor(now) + 1 : Math.ceil(now) - 1);
@@ -254,10 +255,17 @@ function showQuestion() {
   say("scene-note", notes.join("; "));
 }
 
+// Finds and lists the places of the last answer.
 function list() {
   places = placesOf(rows, bodies);
   if (place >= places.length) place = -1;
-  panel.showPlaces(places, bodies, place, goTo);
+  panel.showPlaces(places, bodies, goTo);
+  mark();
+}
+
+// Marks the place and the primitive that were chosen, with its partners.
+function mark() {
+  panel.markPlace(place);
   const partners = panel.showChosen(chosen, rows, bodies, choose);
   view.choose(chosen ? [[chosen.body, chosen.primitive], ...partners] : touching);
 }
@@ -285,7 +293,7 @@ function choose(hit) {
   chosen = hit;
   touching = [];
   if (hit !== null) setPlaying(false);
-  list();
+  mark();
 }
 
 // What touches on the way from a frame to the next. It is asked once per frame, when nothing plays.

@@ -49,15 +49,14 @@ export function showColliding(counts) {
   for (const [ix, n] of counts.entries()) cells[ix].textContent = grouped(n);
 }
 
-// The places: a button each. The chosen one is marked.
-export function showPlaces(places, bodies, chosen, go) {
+// The places: a button each.
+export function showPlaces(places, bodies, go) {
   element("n-places").textContent = grouped(places.length);
   const items = places.slice(0, MOST_PLACES).map(({ n, bodies: which }, ix) => {
     const names = [...which].map((body) => bodies[body].name);
     const word = [...which].some((body) => bodies[body].corners === 4) ? "primitive" : "triangle";
     const where = bodies.length > 1 ? ` of ${names.join(" and ")}` : "";
     const button = make("button", { type: "button" }, `${counted(n, word)}${where}`);
-    if (ix === chosen) button.setAttribute("aria-current", "true");
     button.addEventListener("click", () => go(ix));
     return make("li", {}, button);
   });
@@ -65,6 +64,14 @@ export function showPlaces(places, bodies, chosen, go) {
   if (more > 0) items.push(make("li", { className: "more" }, `and ${counted(more, "smaller place")}`));
   if (places.length === 0) items.push(make("li", { className: "more" }, "Nothing collides here."));
   element("place-list").replaceChildren(...items);
+}
+
+// Marks the button of one place, or of none.
+export function markPlace(chosen) {
+  for (const [ix, button] of element("place-list").querySelectorAll("button").entries()) {
+    if (ix === chosen) button.setAttribute("aria-current", "true");
+    else button.removeAttribute("aria-current");
+  }
 }
 
 // The chosen primitive and its partners in `rows`; a button per partner goes there.
