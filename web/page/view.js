@@ -44,6 +44,9 @@ class Figure {
     this.colliding = new Uint32Array(this.index.length);
     this.marks = new Uint8Array(index.length / corners);
     this.all = geometry(this.index);
+    // Whether vertices may have moved since the ball around them was computed, which the search under the pointer needs. An old
+    // ball stays until then: without one, the renderer would compute it in every frame.
+    this.isBallOld = true;
     this.hits = geometry(this.colliding);
     this.hits.index.setUsage(THREE.DynamicDrawUsage);
     this.hits.setDrawRange(0, 0);
@@ -242,7 +245,9 @@ export class View {
 
   // The vertices of a body, to be written in place.
   positions(ix) {
-    return this.#figures[ix].positions.array;
+    const figure = this.#figures[ix];
+    figure.isBallOld = true;
+    return figure.positions.array;
   }
 
   // Draws the bodies; `rows` are `[bodyA, i, bodyB, j]` per pair. Returns how many primitives of each body collide.
@@ -263,6 +268,8 @@ export class View {
   }
 
   #outline() {
+    this.outline.visible = this.#chosen.length > 0;
+    if (!this.outline.visible) return;
     const points = [];
     for (const [ix, primitive] of this.#chosen) {
       const { corners, index, positions } = this.#figures[ix];
@@ -277,7 +284,6 @@ export class View {
     this.outline.geometry.dispose();
     this.outline.geometry = new THREE.BufferGeometry();
     this.outline.geometry.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
-    this.outline.visible = points.length > 0;
   }
 
   // Hides a body, or shows it again.
@@ -316,9 +322,9 @@ export class View {
   // The primitive under the pointer, and where it is hit.
   #hit(event) {
     const figures = this.#figures.filter(({ body }) => body.visible);
-    for (const { all } of figures) {
-      all.computeBoundingSphere();
-      all.boundingBox = null;
+    for (const figure of figures) {
+      if (figure.isBallOld) figure.all.computeBoundingSphere();
+      figure.isBallOld = false;
     }
     const [hit] = this.#ray(event).intersectObjects(figures.map(({ body }) => body), false);
     if (!hit) return null;
