@@ -383,9 +383,10 @@ function showFileControls() {
 // Shows what was read from files. Nothing plays: the first answer is about the meshes as they are.
 function showFiles(given, how) {
   const { bodies: made, refused } = bodiesOf(given, how);
-  isPlaying = false;
-  if (made.length > 1) self.checked = false;
+  // First what may throw: whatever is shown then goes on.
   setBodies(made);
+  setPlaying(false);
+  if (made.length > 1) self.checked = false;
   files = given;
   as.value = how;
   showFileControls();

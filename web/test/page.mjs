@@ -306,6 +306,25 @@ async function frames(browser) {
     }
     return steps.filter(({ earliest }) => earliest !== null && earliest.toi > 0).length;
   };
+  // Bodies that the detector refuses leave the scene as it is, and playing. No small file is refused by it alone.
+  await page.locator("#self").check();
+  await page.evaluate(async () => {
+    const { prototype } = (await import("impinge")).Detector;
+    const { add } = prototype;
+    prototype.add = () => {
+      prototype.add = add;
+      throw new Error("too much");
+    };
+  });
+  await drop(page, "box.obj", "bend.obj");
+  assert.equal(await text(page, "#message"), "too much");
+  assert.match(await text(page, "#scene-note"), /with each other and themselves/);
+  assert.equal(await page.locator("#self").isChecked(), true);
+  assert.equal(await text(page, "#play"), "Pause");
+  const before = await page.locator("#time").inputValue();
+  await page.waitForFunction((before) => document.getElementById("time").value !== before, before);
+  await page.locator("#self").uncheck();
+
   await drop(page, "bend.obj", "bend.pc2");
   assert.match(await text(page, "#scene-note"), /^bend\.obj with bend\.pc2 with itself: 16 triangles/);
   assert.ok((await compare("bend.obj", "bend.pc2")) > 0);
