@@ -26,7 +26,7 @@ function swatch(color) {
   return made;
 }
 
-export const kindOf = ({ corners }) => (corners === 4 ? "tetrahedron" : "triangle");
+const kindOf = ({ corners }) => (corners === 4 ? "tetrahedron" : "triangle");
 const plural = (body) => (body.corners === 4 ? "tetrahedra" : "triangles");
 
 // The legend: a row per body, with its colours and a switch that hides it.
@@ -99,7 +99,7 @@ export function nameOf(bodies, body, primitive) {
   return `${kindOf(bodies[body])} ${grouped(primitive)}${of}`;
 }
 
-export function partnersOf({ body, primitive }, rows) {
+function partnersOf({ body, primitive }, rows) {
   const partners = [];
   for (let at = 0; at < rows.length; at += 4) {
     if (rows[at] === body && rows[at + 1] === primitive) partners.push([rows[at + 2], rows[at + 3]]);
