@@ -52,11 +52,19 @@ export function bodies(...given) {
   return Uint32Array.from(given, body);
 }
 
-export function chosen({ method = "auto", sharedVertex = "resolve" } = {}) {
+// Refuses options that do not exist. Without them, the answer would be another than the one that was asked for.
+export function mustBeNone(others, allowed) {
+  const [unknown] = Object.keys(others);
+  if (unknown !== undefined) throw new TypeError(`options: "${unknown}" given, ${allowed} allowed`);
+}
+
+export function chosen({ method = "auto", sharedVertex = "resolve", ...others } = {}) {
+  mustBeNone(others, '"method" or "sharedVertex"');
   return [String(method), String(sharedVertex)];
 }
 
-function step({ bodies: given = [], which = "all", start = "report", toi = "f32", separation = 0 } = {}) {
+function step({ bodies: given = [], which = "all", start = "report", toi = "f32", separation = 0, ...others } = {}) {
+  mustBeNone(others, '"bodies", "which", "start", "toi" or "separation"');
   if (which !== "all" && which !== "between") {
     throw new RangeError(`which: "${which}" given, "all" or "between" allowed`);
   }

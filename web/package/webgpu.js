@@ -1,7 +1,7 @@
 // impinge on WebGPU, asynchronous; and the readers of mesh files.
 
 import load, { Engine, MeshFile, read_frames } from "./gpu/impinge.js";
-import { Bodies, bodies, chosen, loader } from "./shared.js";
+import { Bodies, bodies, chosen, loader, mustBeNone } from "./shared.js";
 
 const [init, mustBeReady] = loader(load, new URL("./gpu/impinge_bg.wasm", import.meta.url));
 export default init;
@@ -104,13 +104,15 @@ function taken(file) {
   }
 }
 
-export function readMesh(name, bytes, { weld = true } = {}) {
+export function readMesh(name, bytes, { weld = true, ...others } = {}) {
   mustBeReady();
+  mustBeNone(others, '"weld"');
   return taken(new MeshFile(String(name), bytes, Boolean(weld)));
 }
 
-export function readBodies(name, bytes, { weld = true } = {}) {
+export function readBodies(name, bytes, { weld = true, ...others } = {}) {
   mustBeReady();
+  mustBeNone(others, '"weld"');
   return MeshFile.bodies(String(name), bytes, Boolean(weld)).map(taken);
 }
 

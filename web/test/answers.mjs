@@ -100,6 +100,9 @@ export async function refusals(module) {
   said.wrong = await refusal(() => detector.between(a, "b"));
   said.self = await refusal(() => detector.between(a, a));
   said.method = await refusal(() => new Detector({ method: "octree" }));
+  said.option = await refusal(() => new Detector({ metod: "cells" }));
+  said.clearance = await refusal(() => detector.impacts({ clearance: 0.1 }));
+  said.earliest = await refusal(() => detector.earliest({ bodies: [a], seperation: 5 }));
   said.which = await refusal(() => detector.impacts({ which: "self" }));
   said.separation = await refusal(() => detector.impacts({ separation: NaN }));
   // The refused calls left it as it was.
@@ -123,6 +126,9 @@ export const REFUSALS = {
   wrong: "RangeError: body: b given, a number that add() returned is needed",
   self: "Error: a query between body 0 and itself: ask for collisions within it instead",
   method: 'Error: method: "octree" given, "auto", "clusters", "cells" or "naive" allowed',
+  option: 'TypeError: options: "metod" given, "method" or "sharedVertex" allowed',
+  clearance: 'TypeError: options: "clearance" given, "bodies", "which", "start", "toi" or "separation" allowed',
+  earliest: 'TypeError: options: "seperation" given, "bodies", "which", "start", "toi" or "separation" allowed',
   which: 'RangeError: which: "self" given, "all" or "between" allowed',
   separation: "Error: separation: NaN given, a finite number that is not below 0 allowed",
   pairs: [0, 0],
@@ -157,7 +163,9 @@ if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
   const noGpu = await refusal(() => GpuDetector.open());
   const broken = await refusal(() => readMesh("a.txt", new Uint8Array()));
   const cut = await refusal(() => readFrames("cut.mdd", mdd.subarray(1)));
+  const misspelt = [readMesh, readBodies].map((read) => refusal(() => read("triangle.obj", new TextEncoder().encode(text), { wield: false })));
+  const options = await Promise.all(misspelt);
   const { corners } = mesh;
-  const read = { index: [...mesh.index], positions: [...mesh.positions], corners, map: [...mesh.map], frames, noGpu, broken, cut };
+  const read = { index: [...mesh.index], positions: [...mesh.positions], corners, map: [...mesh.map], frames, noGpu, broken, cut, options };
   process.stdout.write(JSON.stringify({ said, answers, read, doors }));
 }

@@ -61,6 +61,7 @@ try {
     noGpu: "Error: there is no WebGPU here",
     broken: read.broken,
     cut: read.cut,
+    options: Array(2).fill('TypeError: options: "wield" given, "weld" allowed'),
   });
   assert.match(read.broken, /^Error: .*a\.txt/);
   assert.match(read.cut, /^Error: .*cut\.mdd/);
