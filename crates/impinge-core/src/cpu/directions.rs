@@ -9,6 +9,7 @@
 
 use crate::elements::with_corners;
 use crate::exact::filter::Directions64;
+use crate::grouping::GROUP;
 use crate::grouping::clusters::Clustering;
 use crate::index::{ClusterIx, LayerIx};
 use crate::positions::Positions;
@@ -91,9 +92,11 @@ impl Directions {
         a * b >= self.from
     }
 
-    /// Clears pairs that are certainly farther apart than a distance, if there are many pairs, and returns how many. Bits of masks are the
-    /// lanes of the side that does not have the rows.
+    /// Clears pairs that are certainly farther apart than a distance, if there are many pairs, and
+    /// returns how many. Bits of masks are the lanes of the side that does not have the rows. Pairs
+    /// in `aside`, which others decide, are neither counted nor cleared.
     #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "a stage between two others")]
     pub fn thin<S: Simd, W: Placed>(
         &mut self,
         simd: S,
@@ -101,10 +104,14 @@ impl Directions {
         item: &WorkItem,
         (side, rows): (Side, u64),
         distance: f32,
+        aside: &[u64; GROUP],
         masks: &mut Masks,
     ) -> u64 {
-        let n_pairs: u32 = masks.0.iter().map(|mask| mask.count_ones()).sum();
-        if (n_pairs as usize) < self.from {
+        let mut n_pairs = 0;
+        for (mask, aside) in masks.0.iter().zip(aside) {
+            n_pairs += (mask & !aside).count_ones() as usize;
+        }
+        if n_pairs < self.from {
             return 0;
         }
         if self.groups.is_empty() {
@@ -126,7 +133,8 @@ impl Directions {
         }
         let mut n_parted = 0;
         for row in Lanes(rows) {
-            let beyond = of_lanes.beyond::<S::F32>(masks.0[row], (of_rows, row), distance);
+            let open = masks.0[row] & !aside[row];
+            let beyond = of_lanes.beyond::<S::F32>(open, (of_rows, row), distance);
             masks.0[row] &= !beyond;
             n_parted += u64::from(beyond.count_ones());
         }

@@ -32,7 +32,7 @@ use super::hubs::HubScratch;
 use super::met::{Met, Side, WorkItem};
 use super::narrow::Settler;
 use super::simd::{Isa, Lanes, Masks, Simd};
-use super::world::{BodyRef, World};
+use super::world::{BodyCache, BodyRef, World};
 
 /// The narrow stage is timed for one work item in this many: reading the clock takes longer than some items.
 const SAMPLED: u32 = 16;
@@ -48,6 +48,8 @@ pub(crate) struct Worker {
     directions: Directions,
     met: Met,
     masks: Masks,
+    /// For each row of `masks` in one body, the lanes that share a vertex with it.
+    shared: Masks,
     /// The number of work items whose candidates were settled.
     n_settled: u32,
 }
@@ -101,6 +103,7 @@ pub(crate) fn run<S: Simd>(
         directions,
         met,
         masks,
+        shared,
         n_settled,
         ..
     } = worker;
@@ -119,12 +122,32 @@ pub(crate) fn run<S: Simd>(
         let groups = places.map(|place| groups.at(place));
         met.clear();
         let (side, rows) = overlap(simd, item, (groups, lanes), masks);
-        if directions.may_pay(lanes) {
-            // Their boxes overlap: they count as candidates.
-            settler.n_candidates += directions.thin(simd, world, item, (side, rows), 0.0, masks);
+        let is_same_body = item.a == item.b;
+        if is_same_body {
+            put_shared(
+                world.cache(item.a),
+                item,
+                (side, rows),
+                masks,
+                &mut shared.0,
+            );
         }
-        if item.a == item.b {
-            within_body(simd, world, item, (side, rows), masks, met, settler);
+        if directions.may_pay(lanes) {
+            let aside = if is_same_body { &shared.0 } else { &[0; GROUP] };
+            let rows = (side, rows);
+            // Their boxes overlap: they count as candidates.
+            settler.n_candidates += directions.thin(simd, world, item, rows, 0.0, aside, masks);
+        }
+        if is_same_body {
+            within_body(
+                simd,
+                world,
+                item,
+                (side, rows),
+                (masks, &shared.0),
+                met,
+                settler,
+            );
         } else {
             for row in Lanes(rows) {
                 met.push_row(simd, side, row, masks.0[row]);
@@ -231,12 +254,11 @@ fn within_body<S: Simd>(
     world: World<'_>,
     item: &WorkItem,
     (side, rows): (Side, u64),
-    masks: &mut Masks,
+    (masks, shared): (&Masks, &[u64; GROUP]),
     met: &mut Met,
     settler: &mut Settler,
 ) {
     let cache = world.cache(item.a);
-    let adjacency = cache.clustering.adjacency();
     let (cluster_a, cluster_b) = (item.cluster_a, item.cluster_b);
     let rule = VertexRule {
         body: world.body(item.a),
@@ -248,32 +270,36 @@ fn within_body<S: Simd>(
             folds.map_or(u64::MAX, |folds| folds.of(cluster))
         }),
     };
+    for row in Lanes(rows) {
+        rule.put_row(simd, side, row, masks.0[row], shared[row], met, settler);
+    }
+}
+
+/// Clears the pairs of one body that share a hub, and lists for each row the lanes that share another vertex with it.
+#[inline(always)]
+fn put_shared(
+    cache: &BodyCache,
+    item: &WorkItem,
+    (side, rows): (Side, u64),
+    masks: &mut Masks,
+    shared: &mut [u64; GROUP],
+) {
+    let (cluster_a, cluster_b) = (item.cluster_a, item.cluster_b);
     if let Some(hubs) = cache.clustering.hubs() {
         clear_hubs(hubs, item, side, masks);
     }
+    let adjacency = cache.clustering.adjacency();
     if cluster_a == cluster_b {
-        for (lane, &shared) in adjacency.own(cluster_a).iter().enumerate() {
-            rule.put_row(simd, Side::A, lane, masks.0[lane], shared, met, settler);
-        }
+        let own = adjacency.own(cluster_a);
+        shared[..own.len()].copy_from_slice(own);
         return;
     }
-    let mut shared = [0u64; GROUP];
-    match side {
-        Side::A => {
-            for (lane, mask) in adjacency.between(cluster_a, cluster_b) {
-                shared[lane] = mask;
-            }
+    shared.fill(0);
+    for (lane, mask) in adjacency.between(cluster_a, cluster_b) {
+        match side {
+            Side::A => shared[lane] = mask,
+            Side::B => Lanes(mask & rows).for_each(|lane_b| shared[lane_b] |= 1 << lane),
         }
-        Side::B => {
-            for (lane, mask) in adjacency.between(cluster_a, cluster_b) {
-                for lane_b in Lanes(mask & rows) {
-                    shared[lane_b] |= 1 << lane;
-                }
-            }
-        }
-    }
-    for row in Lanes(rows) {
-        rule.put_row(simd, side, row, masks.0[row], shared[row], met, settler);
     }
 }
 

@@ -288,7 +288,15 @@ fn pair<S: Simd>(
     }
     if may_part {
         let reach = world.frame.reach(item.a, item.b).enclosing_f32();
-        settler.n_candidates += directions.thin(simd, world, item, (side, rows), reach[1], masks);
+        settler.n_candidates += directions.thin(
+            simd,
+            world,
+            item,
+            (side, rows),
+            reach[1],
+            &[0; GROUP],
+            masks,
+        );
     }
     for row in Lanes(simd.rows_with_lanes(masks)) {
         match is_whole {
