@@ -149,7 +149,7 @@ def partners_of(pairs):
 def classified(peer, side, judged, reading):
     """The class of a pair that only one of the two has, or of a face, whose pairs are all in `judged`."""
     kinds = [kind for is_true, kind in judged if is_true]
-    # The plainest of the pairs that the peer's definition includes, else of all.
+    # The simplest kind among pairs that the peer's definition includes; if it includes none, among all pairs.
     counted = [kind for kind in kinds if kind not in peer.leaves_out]
     kind = min(counted or kinds, key=check_truth.KINDS.index) if kinds else None
     if side == "only theirs" and kinds:

@@ -1,4 +1,4 @@
-//! What is asked of elements that are near each other, and the answer.
+//! The query for pairs within a distance (`NearQuery`) and its answer (`NearPairs`).
 
 mod labels;
 

@@ -156,7 +156,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// What an answer may be.
+    /// Limits on the size of an answer.
     pub(crate) fn limits(&self) -> Limits {
         Limits {
             max_pairs: self.max_pairs,

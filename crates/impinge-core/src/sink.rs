@@ -3,12 +3,12 @@
 //! ```text
 //! workers   block  block  block       about a thousand pairs each, kept from frame to frame
 //!               \    |    /
-//! held      | ............... |       the room that the last answer took
-//! overflow  | chunk | chunk | …       what is more; joined to `held` in the end
+//! held      | ............... |       the memory of the last answer, used again
+//! overflow  | chunk | chunk | …       pairs that do not fit there; joined to `held` in the end
 //! ```
 //!
-//! Memory: the answer, and once more the answer while chunks are joined. Every allocation here may fail: what does not
-//! fit is an error by name, and all pairs are dropped before it is reported.
+//! Memory: the answer, and once more the answer while chunks are joined. Every allocation here may fail. Then all pairs
+//! are dropped, and the error names what did not fit.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -40,7 +40,7 @@ pub enum Wanted {
     },
 }
 
-/// What an answer may be.
+/// Limits on the size of an answer.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Limits {
     /// Pairs at most.
@@ -51,7 +51,7 @@ pub struct Limits {
     pub besides: u64,
 }
 
-/// Makes room for so many more, where as many are there already as the list has.
+/// Reserves space for `n_more` more items. The error names `what` and how many items the list holds.
 ///
 /// # Errors
 /// There is no memory for them.
@@ -65,7 +65,7 @@ pub(crate) fn reserve<T>(
     reserved.map_err(|_| no_room::<T>(n, n_more, what))
 }
 
-/// An empty list with room for so many.
+/// An empty list with space for `n` items.
 ///
 /// # Errors
 /// There is no memory for them.
@@ -75,7 +75,7 @@ pub(crate) fn room<T>(n: usize, what: &'static str) -> Result<Vec<T>, Error> {
     Ok(list)
 }
 
-/// A list of so many equal values.
+/// A list of `n` equal values.
 ///
 /// # Errors
 /// There is no memory for them.
@@ -85,7 +85,7 @@ pub(crate) fn filled<T: Clone>(value: T, n: usize, what: &'static str) -> Result
     Ok(list)
 }
 
-/// Makes room for so many more in a list that grows often: whenever it is full, it doubles.
+/// Reserves space for `n_more` more items in a list that grows often. A full list doubles.
 ///
 /// # Errors
 /// There is no memory for them.
@@ -151,19 +151,20 @@ impl<T, const LISTS: usize> Default for Answer<T, LISTS> {
 }
 
 impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
-    /// Makes ready for a frame. `rooms` is memory to use, see [`finish`](Answer::finish).
+    /// Starts an answer. `rooms` is memory that it may use: the lists of an earlier [`finish`](Answer::finish).
     pub fn begin(&self, limits: Limits, wanted: Wanted, rooms: [Vec<T>; LISTS]) {
         self.is_over.store(false, Ordering::Relaxed);
         self.lowest.store(u64::MAX, Ordering::Relaxed);
         let state = &mut *self.state();
         *state = State::new(limits, wanted);
-        // Under a budget the room of an earlier answer is no gift: it counts beside that of this one.
+        // With a memory budget, the last answer's memory is not used again: its capacity would count
+        // beside that of this answer.
         if limits.memory_budget.is_none() {
             state.lists = rooms.map(List::in_room);
         }
     }
 
-    /// How many pairs make a block: one where one is enough.
+    /// Pairs per block; 1 where the first pair ends or narrows the search.
     pub fn block(&self) -> usize {
         match self.state().wanted {
             Wanted::Any | Wanted::Lowest { .. } => 1,
@@ -171,8 +172,8 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
         }
     }
 
-    /// How many work items are gathered before they are paired, when there is room for so many: few where the first
-    /// pair ends the search, or narrows it.
+    /// How many work items are gathered before they are paired, at most `room`. They are few where the first pair ends
+    /// or narrows the search.
     pub fn most_items(&self, room: usize) -> usize {
         match self.state().wanted {
             Wanted::Any | Wanted::Lowest { .. } => room.min(BLOCK),
@@ -217,7 +218,7 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
         }
     }
 
-    /// As [`check`](Answer::check) when so many more pairs are certain, though they have not been handed over.
+    /// As [`check`](Answer::check), when `n_more` pairs are certain but not yet handed over.
     ///
     /// # Errors
     /// Those of `check`.
@@ -230,8 +231,8 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
         self.check()
     }
 
-    /// To be called before so many certain pairs are handed over: if they are more than allowed, or than memory holds, the
-    /// answer is over at once. Returns whether the pairs are still wanted, which they are not if only their number is.
+    /// Call this before delivering `n_more` certain pairs. Ends the search at once if they exceed the limit or the
+    /// available memory. Returns whether the pairs should be delivered: not if the search is over or only counts.
     pub fn announce(&self, n_more: u64) -> bool {
         if self.is_over() {
             return false;
@@ -245,7 +246,7 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
         state.wanted == Wanted::Pairs && !self.is_over()
     }
 
-    /// Forgets all pairs, for they will be found again in another way.
+    /// Forgets all pairs. They will be found again by another method.
     pub fn forget(&self) {
         let state = &mut *self.state();
         for list in &mut state.lists {
@@ -284,7 +285,7 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
 
     fn note(&self, result: Result<(), Error>, state: &mut State<T, LISTS>) {
         if let Err(error) = result {
-            // Room for whoever reports it.
+            // Free the pairs first, so that the error can be reported without running out of memory again.
             state.drop_pairs();
             state.error = Some(error);
             self.is_over.store(true, Ordering::Relaxed);
@@ -349,7 +350,8 @@ impl Answer {
         }
     }
 
-    /// The number, in the upper half of the lowest key found, that no lower pair exceeds; the highest before there is one.
+    /// The number in the upper half of the lowest key found; the highest number before a key is found. No pair with a
+    /// higher number can be the lowest.
     pub fn up_to(&self) -> Number {
         Number::new((self.lowest.load(Ordering::Relaxed) >> 32) as u32)
     }
@@ -443,7 +445,7 @@ impl<T: Copy, const LISTS: usize> State<T, LISTS> {
         self.keep_budget()
     }
 
-    /// Whether so many more pairs fit into the budget, and whether there is memory for them.
+    /// Whether `n_more` more pairs fit into the budget, and whether there is memory for them.
     fn has_room(&self, n_more: u64) -> Result<(), Error> {
         let needed = n_more.saturating_mul(size_of::<T>() as u64 + self.limits.besides);
         if let Some(budget) = self.limits.memory_budget
@@ -479,7 +481,7 @@ impl<T: Copy, const LISTS: usize> State<T, LISTS> {
         Ok(())
     }
 
-    /// Chunks need their room again when they are joined.
+    /// Fails if the answer and the finder exceed the budget. Chunks count twice: joining them copies them.
     fn keep_budget(&self) -> Result<(), Error> {
         let Some(budget) = self.limits.memory_budget else {
             return Ok(());

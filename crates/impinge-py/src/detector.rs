@@ -36,7 +36,7 @@ use crate::watch::{CancelToken, Watch};
 /// device : str, optional
 ///     Part of a GPU's name, to choose among several.
 /// threads : int, optional
-///     CPU threads; by default one a core.
+///     CPU threads; by default one per core.
 /// memory_budget : int, optional
 ///     Bytes that the detector may hold, the answer included; by default as many as it takes.
 /// max_pairs : int, optional

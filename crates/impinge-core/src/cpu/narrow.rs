@@ -61,9 +61,9 @@ pub struct Settler {
     pub n_candidates: u64,
     /// Candidates left to exact arithmetic.
     pub n_unsure: u64,
-    /// Times that there were enough candidates to settle them.
+    /// How often a full batch of candidates was settled.
     pub n_full: u64,
-    /// That many are enough.
+    /// Number of waiting candidates that triggers a batch.
     full: usize,
     /// Time spent here, for the statistics.
     pub busy: Duration,

@@ -50,7 +50,7 @@ const MOST_BODIES: usize = 8;
 pub(super) enum Needed {
     /// No more than are known.
     None,
-    /// Those of the clusters that are near, in so many nodes; and positions must be read, in so many runs.
+    /// Boxes of near clusters only, in `n_nodes` nodes of the tree. All positions are still read once, in `n_runs` runs.
     Near { n_nodes: usize, n_runs: usize },
     /// Those of all clusters.
     All,

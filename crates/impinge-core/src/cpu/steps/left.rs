@@ -1,9 +1,11 @@
-//! Stage `settle`: pairs that a device has not dropped, with their first contacts.
+//! Stage `settle`: finds the first contacts of pairs that the device could not rule out.
 //!
-//! In: places of two elements, in any order, and times until which they certainly do not touch; a time by which some pair certainly does.
-//! Out: contacts, as from stage `narrow`, whose lists and filters do the work. Runs of pairs are tasks; each is sorted first, so that
-//! pairs of two layers come together. Where the earliest contact is sought, pairs come in the order of their
-//! times, a few at first, up to the earliest contact found. Where any is sought, a pair that certainly touches ends the search.
+//! In: pairs of elements by their places in cluster order, in any order. Each pair has a time before which it has no
+//! contact. Besides, an upper bound on the earliest contact of all pairs.
+//! Out: contacts, as from stage `narrow`, whose lists and filters do the work. A task is a run of pairs. It is sorted
+//! first, so that pairs of the same two layers come together. Where the earliest contact is sought, pairs are taken in
+//! the order of their times, a few at first, up to the earliest contact found. Where any contact is sought, a pair that
+//! certainly touches ends the search.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -21,7 +23,8 @@ use super::world::World;
 
 /// Pairs per task.
 const TASK: usize = 2048;
-/// Where the earliest contact is sought: how many pairs are settled before the time of each other pair is compared with it.
+/// Where the earliest contact is sought: pairs settled first. The times of the other pairs are then compared with the
+/// earliest contact found.
 const SOONEST: usize = 256;
 
 /// Settles pairs as they come.
@@ -30,7 +33,7 @@ pub(super) struct Settling<'a, 'b> {
     pub world: World<'a>,
     pub answer: StepAnswer<'a>,
     pub workers: &'b mut [Worker],
-    /// Layers are numbered by their places: the first of each, then the end of the last.
+    /// The first place of each layer, then the end of the last layer.
     pub first_places: Vec<u32>,
 }
 
@@ -49,7 +52,7 @@ impl Settling<'_, '_> {
         }
         let (mut pairs, mut n_soonest) = (pairs, SOONEST);
         loop {
-            // All others touch after the earliest contact known, if at all.
+            // The pairs that are dropped here touch after the earliest contact known, if at all.
             let until = self.workers[0].contacts().until(self.world);
             let mut n = 0;
             for ix in 0..pairs.len() {
@@ -116,8 +119,8 @@ impl Settling<'_, '_> {
     }
 }
 
-/// Settles the pairs of one task. Those of two layers come together; within them the order is the device's, which lists pairs of two clusters
-/// next to each other.
+/// Settles the pairs of one task, sorted by their two layers. Pairs of the same two layers stay in the order of the
+/// device, which lists pairs of two clusters next to each other.
 fn settle(
     world: World<'_>,
     first_places: &[u32],

@@ -63,7 +63,7 @@ impl Settler {
         &mut self.contacts
     }
 
-    /// Nothing later than this is wanted.
+    /// Contacts after this time cannot change the answer.
     pub fn until(&self, world: World<'_>) -> f64 {
         match self.asked {
             StepTest::Contacts(_) => self.contacts.until(world),

@@ -39,7 +39,7 @@ pub(crate) struct Worker {
     directions: Directions,
     /// Whether only the start is asked about, so that directions at the start tell.
     is_still: bool,
-    /// What of the step `groups` hold.
+    /// The part of the step that the cached boxes in `groups` cover.
     pose: Pose,
     shorter_from: f64,
     n_shortened: u64,

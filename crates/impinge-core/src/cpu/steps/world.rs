@@ -80,9 +80,9 @@ pub(crate) struct World<'a> {
     pub isa: Isa,
     pub scene: &'a Scene,
     pub frame: &'a Frame,
-    /// What of the step is examined: at most what the clusters' boxes hold.
+    /// The part of the step that is examined. Never longer than the part that the clusters' boxes cover.
     pub pose: Pose,
-    /// What the clusters' boxes hold.
+    /// The part of the step that the clusters' boxes cover.
     pub(super) boxes: Pose,
     pub(super) answer: StepAnswer<'a>,
     pub(super) known: &'a Known,

@@ -33,19 +33,20 @@ pub(crate) struct FirstContacts {
     /// Contacts found, handed over in blocks.
     found: FoundByKind,
     pub(super) counts: NarrowCounts,
-    /// That many open pairs are enough.
+    /// Number of open pairs that triggers a search.
     pub(super) full: usize,
-    /// Pairs of the current layers that the filter's first step has left: to be looked at.
+    /// Pairs of the current two layers that wait for root isolation; if `is_first`, for the separation tests before it.
     pub(super) open: Vec<Open>,
-    /// Pairs to be looked at in the next round, and pairs with one candidate for a contact.
+    /// Pairs that wait for the next round of root isolation.
     pub(super) later: Vec<Open>,
+    /// Pairs with one candidate for a contact.
     pub(super) single: Vec<Open>,
     pub(super) between: Option<Between>,
     /// Pairs for exact arithmetic, which are settled last where one contact is sought.
     unsure: Vec<(Between, Places)>,
-    /// Whether these are being settled.
+    /// Whether the pairs of `unsure` are being settled.
     is_last: bool,
-    /// How many close pairs are remembered at most.
+    /// Most pairs in `close`.
     most_close: usize,
     /// Pairs that are not certainly farther apart than [the margin](Self::margin), by kind and key; one more than allowed if some are
     /// missing.
