@@ -194,7 +194,7 @@ impl Rates {
         })
     }
 
-    /// The time of the bytes that must move, at full bandwidth, plus the launches of one pass, as counted in docs/gpu.md.
+    /// The time of the bytes that must move, at full bandwidth, plus the launches of one pass, as counted in docs/lab/gpu.md.
     fn floor_ms(&self, problem: &Problem, stats: &Statistics) -> f64 {
         const CLUSTER: u64 = 45 * (4 + 12);
         const BOX: u64 = 2 * 24;

@@ -14,7 +14,7 @@
 //!    open. Pairs that share a hub are cleared under any rule: `hubs` settles them.
 //!
 //! Invariant: a pair of primitives lies in one work item only, so no candidate comes twice.
-//! On a CPU these box tests beat the 4x4x4 sub-cell masks of the paper, see `docs/performance.md`.
+//! On a CPU these box tests beat the 4x4x4 sub-cell masks of the paper, see `docs/lab/intersections.md`.
 
 use crate::clock::Instant;
 use std::sync::Arc;

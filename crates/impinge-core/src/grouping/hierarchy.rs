@@ -12,7 +12,7 @@
 //!
 //! The order comes from splitting at medians of the box centres along the axis on which they vary most, at
 //! the boundaries that the shape prescribes (a balanced k-d order; median splits made 5 times fewer
-//! cluster pairs than blocks along a Morton curve on the dragon, see `docs/performance.md`).
+//! cluster pairs than blocks along a Morton curve on the dragon, see `docs/lab/intersections.md`).
 //!
 //! Cost: `O(n log n)` once per topology. Invariant: an order is a permutation, whatever the input.
 
