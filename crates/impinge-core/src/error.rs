@@ -1,3 +1,5 @@
+//! What can go wrong, and what to check then.
+
 use crate::ids::BodyId;
 
 /// All errors. Each names the body, the index, and both numbers where it has them.
