@@ -5,7 +5,7 @@
     python bench/compare.py --record --machine my-machine
 
 It installs nothing: it names missing peers and what to install. It looks for meshes
-in $IMPINGE_DATA or ../shared/data; the scene "ball" is generated.
+in $IMPINGE_DATA or ../shared/data; the scenes "ball" and "bolt" are generated.
 
 Timing: two overlapping copies of a mesh are twisted a little further in each frame. A
 contender gets the positions of both as arrays that it takes without a conversion, and must
@@ -58,15 +58,51 @@ def ball(n_rings=124, n_segments=124):
     return vertices.reshape(-1, 3).astype(np.float32), faces.reshape(-1, 3).astype(np.int64)
 
 
+def bolt(n_segments=3750):
+    """A part of a machine that lies aslant, of 30,000 triangles: a shaft and a head, whose sides are slivers
+    as long as they are, and whose caps are fans."""
+    turns = 2 * np.pi * np.arange(n_segments) / n_segments
+    circle = np.stack([np.zeros(n_segments), np.cos(turns), np.sin(turns)], axis=-1)
+    here, right = np.arange(n_segments), (np.arange(n_segments) + 1) % n_segments
+    vertices, faces = [], []
+    for left_end, right_end, radius in [(-1.0, 0.8, 0.2), (0.8, 1.0, 0.4)]:
+        low, high = radius * circle + [left_end, 0, 0], radius * circle + [right_end, 0, 0]
+        first = sum(map(len, vertices))
+        centres = [[left_end, 0, 0], [right_end, 0, 0]]
+        vertices += [low, high, np.float64(centres)]
+        above, middle = here + n_segments, 2 * n_segments
+        faces += [
+            first + np.stack(corners, axis=-1)
+            for corners in [
+                (here, right, above),
+                (right, right + n_segments, above),
+                (right, here, np.full(n_segments, middle)),
+                (above, right + n_segments, np.full(n_segments, middle + 1)),
+            ]
+        ]
+    vertices = np.concatenate(vertices)
+    third = np.sqrt(np.float64(1 / 3))
+    axes = np.float64([[third, third, third], [-(0.5**0.5), 0.5**0.5, 0]])
+    rotation = np.stack([*axes, np.cross(*axes)])
+    return (vertices @ rotation).astype(np.float32), np.concatenate(faces).astype(np.int64)
+
+
+#: Scenes that need no file: the mesh, and where its second copy is.
+GENERATED = {
+    "ball": (ball, np.float32([0.7, 0.05, 0.02])),
+    "bolt": (bolt, np.float32([0.4, -0.1, 0.05])),
+}
+
+
 class Scene:
     """Two copies of a mesh, their frames, and the published pairs if there are any."""
 
     def __init__(self, name, data, n_frames):
         self.name = name
         self.published = None
-        if name == "ball":
-            self.vertices, self.faces = ball()
-            offset = np.float32([0.7, 0.05, 0.02])
+        if name in GENERATED:
+            build, offset = GENERATED[name]
+            self.vertices, self.faces = build()
         else:
             entry = json.loads((data / "expected" / "two_body.json").read_text())[name]
             self.vertices, self.faces = read_ply(data / entry["mesh"])
@@ -185,7 +221,7 @@ def abilities(classes):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("scenes", nargs="*", help="ball, bunny, buddha, dragon; all by default")
+    parser.add_argument("scenes", nargs="*", help="ball, bolt, bunny, buddha, dragon; all by default")
     parser.add_argument("--frames", type=int, default=5)
     parser.add_argument("--seconds", type=float, default=2.0, help="for each contender, at least")
     parser.add_argument("--record", action="store_true", help="write to bench/record as well")
@@ -195,11 +231,11 @@ def main():
         parser.error(f"--frames: at least 1, {arguments.frames} given")
 
     data = pathlib.Path(os.environ.get("IMPINGE_DATA", ROOT.parent / "shared" / "data"))
-    known = ["ball"]
+    known = [*GENERATED]
     if (data / "expected" / "two_body.json").is_file():
         known += ["bunny", "buddha", "dragon"]
     else:
-        print("no meshes: set IMPINGE_DATA; only the generated ball is run", file=sys.stderr)
+        print("no meshes: set IMPINGE_DATA; only generated scenes are run", file=sys.stderr)
     unknown = set(arguments.scenes) - set(known)
     if unknown:
         parser.error(f"no scene {', '.join(sorted(unknown))}; there is {', '.join(known)}")

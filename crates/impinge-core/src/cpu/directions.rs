@@ -107,9 +107,10 @@ impl Directions {
         aside: &[u64; GROUP],
         masks: &mut Masks,
     ) -> u64 {
-        let mut n_pairs = 0;
+        let (mut n_pairs, mut lanes) = (0, 0);
         for (mask, aside) in masks.0.iter().zip(aside) {
             n_pairs += (mask & !aside).count_ones() as usize;
+            lanes |= mask;
         }
         if n_pairs < self.from {
             return 0;
@@ -132,9 +133,17 @@ impl Directions {
             return 0;
         }
         let mut n_parted = 0;
+        let near = match place_a == place_b {
+            true => [rows, lanes],
+            false => of_rows.near::<S::F32>(of_lanes, [rows, lanes], distance),
+        };
         for row in Lanes(rows) {
             let open = masks.0[row] & !aside[row];
-            let beyond = of_lanes.beyond::<S::F32>(open, (of_rows, row), distance);
+            let met = match near[0] >> row & 1 {
+                1 => open & near[1],
+                _ => 0,
+            };
+            let beyond = of_lanes.beyond::<S::F32>(met, (of_rows, row), distance) | open & !met;
             masks.0[row] &= !beyond;
             n_parted += u64::from(beyond.count_ones());
         }
