@@ -69,7 +69,8 @@ impl Orbit {
         [axes.right, axes.up, axes.back]
     }
 
-    /// Half the width and half the height of the view through the distance at which they are.
+    /// Half the width and half the height of the view, per unit of distance from the eye. (In an orthographic view they
+    /// are scaled by the same distance.)
     fn half_size(&self, aspect: f64) -> [f64; 2] {
         let high = match self.camera.projection {
             Projection::Perspective { degrees } => (0.5 * degrees.to_radians()).tan(),

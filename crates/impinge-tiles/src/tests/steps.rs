@@ -114,7 +114,7 @@ fn tiles_have_the_impacts_of_the_whole() {
             cells: random.chance(8).then(Cells::whole).or(Some(cuts)),
             step: true,
             weld: random.chance(2),
-            // Exactly as far as neighbours on the lattice, between, or more than a cell.
+            // None; exactly the distance of neighbours on the lattice; less than that; more than a cell.
             separation: [0.0, unit, 0.1, 3.0 * unit][random.below(4) as usize],
             ..PlanOptions::default()
         };
