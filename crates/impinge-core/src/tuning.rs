@@ -84,7 +84,7 @@ thresholds! {
     stale_from: f64 = 1.5,
     /// The clusters of a body are sorted (see `cpu::remote`) if it has at least this many primitives.
     remote_from: usize = 2_048,
-    /// Clusters stay sorted if at least one in so many lies beside the other bodies.
+    /// Clusters stay sorted if at least one in this many lies beside the other bodies.
     remote_one_in: usize = 4,
     /// Sorting groups of clusters again costs as much as they save in this many frames.
     remote_cost: u32 = 6,
@@ -112,7 +112,7 @@ thresholds! {
     /// The search for the earliest contact computes the boxes of elements again once contacts are sought only in this part of
     /// the time that the boxes hold.
     step_shorter_from: f64 = 0.5,
-    /// With fewer keys, or fewer than half as many as numbers, one thread sorts them in place as fast.
+    /// With fewer keys, or with fewer keys than half the numbers of elements, one thread sorts them in place as fast.
     sort_from: usize = 1 << 15,
     /// `Auto`: from this many primitives of new bodies on, the grid is worth a try. With fewer, clusters are made in about a
     /// millisecond.
@@ -124,7 +124,7 @@ thresholds! {
     auto_most_crowded: u64 = 64,
 }
 
-/// How often a frame went ways that depend on [`Tuning`], for tests that claim to go there.
+/// How often a frame took each way that depends on [`Tuning`], for tests that must take it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Ways {
     /// Times that tasks were shared with helpers.

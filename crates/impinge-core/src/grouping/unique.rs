@@ -193,7 +193,7 @@ mod tests {
             .collect()
     }
 
-    /// Bodies with so many vertices need too much memory for a test.
+    /// Bodies with this many vertices need too much memory for a test.
     #[test]
     fn the_highest_numbers_are_sorted_too() {
         let vertices = [u32::MAX - 1, 0, u32::MAX - 2, 1 << 31, (1 << 31) - 1, 7];

@@ -35,9 +35,9 @@ pub(crate) struct Remote {
     groups: Intervals,
     /// Groups whose clusters are to be sorted again at the frame's end.
     unsorted: Sides,
-    /// Clusters just found to lie beside the others, and their sides.
+    /// Clusters just found to lie beside the other bodies, and on which side.
     fresh: Vec<(ClusterIx, FreeSide)>,
-    /// Clusters stay sorted if at least one in so many is in a group.
+    /// Clusters stay sorted if at least one in this many is in a group.
     one_in: usize,
     outlook: Outlook,
 }

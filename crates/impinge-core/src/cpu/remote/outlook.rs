@@ -20,7 +20,7 @@ pub(super) struct Outlook {
     ages: [u32; 6],
     /// Grows by one per frame; sorting groups again costs `cost`.
     credit: u32,
-    /// How far beside the others a cluster must be to be in a group, as a share of the body's longest side.
+    /// How far beside the other bodies a cluster must be to be in a group, as a share of the body's longest side.
     slack: [f32; 6],
     /// Sorting groups again costs as much as they save in this many frames.
     cost: u32,
@@ -106,7 +106,7 @@ impl Outlook {
         self.next_wait = self.next_wait.saturating_mul(2).min(self.lasts);
     }
 
-    /// Too few clusters lie beside the others: waits.
+    /// Too few clusters lie beside the other bodies: waits before they are sorted again.
     pub fn too_few(&mut self) {
         self.wait = self.lasts / 4;
     }
