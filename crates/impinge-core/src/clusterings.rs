@@ -7,7 +7,6 @@
 use crate::clock::Instant;
 use crate::elements::Part;
 use crate::error::Error;
-use crate::frame::Layer;
 use crate::grouping::bounds::Bounds;
 #[cfg(feature = "gpu")]
 use crate::grouping::clusters::Clustering;
@@ -17,6 +16,7 @@ use crate::hull;
 use crate::ids::BodyId;
 #[cfg(feature = "gpu")]
 use crate::index::ClusterIx;
+use crate::plan::Layer;
 #[cfg(feature = "gpu")]
 use crate::positions::Positions;
 use crate::run::Job;

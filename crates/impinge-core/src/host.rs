@@ -7,30 +7,32 @@ use std::sync::Arc;
 
 use crate::error::Error;
 use crate::pairs::Pairs;
+use crate::plan::Plan;
 use crate::progress::Control;
 use crate::query::Query;
-use crate::run::{Finder, FrameLoop, Job, ready};
+use crate::run::{Finder, Job, Runner, ready};
 use crate::scene::Scene;
-use crate::settings::Placement;
-use crate::sink::{Answer, Limits, Wanted};
+use crate::settings::Settings;
+use crate::sink::{Answer, Goal, Limits};
 use crate::stats::Statistics;
-use crate::tuning::Tuning;
 
 /// The frame loop around a method of another crate, on the CPU.
 pub struct Host {
-    frames: FrameLoop,
+    runner: Runner,
+    pairs: Pairs,
 }
 
 impl Host {
     /// Creates a host with `threads` workers; 0 for one per core.
     pub fn new(threads: usize) -> Self {
-        let frames = FrameLoop::new(
+        let settings = Settings {
             threads,
-            Placement::default(),
-            Limits::default(),
-            Tuning::default(),
-        );
-        Host { frames }
+            ..Settings::default()
+        };
+        Host {
+            runner: Runner::new(&settings),
+            pairs: Pairs::default(),
+        }
     }
 
     /// One frame: resolves and checks the query, has `method` hand over the keys of all pairs, in any
@@ -45,12 +47,11 @@ impl Host {
         name: &'static str,
         method: impl FnMut(Job<'_>, &Arc<Answer>, &mut Statistics) -> Result<(), Error>,
     ) -> Result<&Pairs, Error> {
-        let mut guest = Guest { name, method };
-        ready(
-            self.frames
-                .run(scene, query, &Control::new(), Wanted::Pairs, &mut guest),
-        )?;
-        Ok(self.frames.pairs())
+        let plan = Plan::intersections(scene, query, Goal::All, Limits::default())?;
+        let (mut guest, control) = (Guest { name, method }, Control::new());
+        let Host { runner, pairs } = self;
+        ready(runner.run(scene, &plan, &control, &mut guest, pairs))?;
+        Ok(&self.pairs)
     }
 }
 
@@ -65,10 +66,6 @@ where
 {
     fn method(&self) -> &'static str {
         self.name
-    }
-
-    fn backend(&self) -> &str {
-        "cpu"
     }
 
     fn repeats(&self) -> bool {

@@ -1,185 +1,17 @@
-//! The answers about a step: impacts, with their times, and candidates.
+//! The answer about a step: impacts, with their times.
 
 use crate::error::Error;
 use crate::exact::Contact;
-use crate::frame::{Frame, owner_by_first};
+use crate::found::{Found, FoundByKind};
+#[cfg(doc)]
 use crate::ids::BodyId;
-use crate::index::{Number, pair_numbers};
-use crate::key_ranges::{KeyRanges, Tally};
+use crate::numbering::{Numbering, row};
 use crate::pair_kind::PairKind;
 use crate::pairs::{Primitive, hash_row, mix};
-use crate::sink::{Answer, Ending, reserve};
+use crate::plan::Plan;
+use crate::sink::reserve;
 use crate::stats::Statistics;
 use crate::step::Toi;
-
-/// A key and its value.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Found<V> {
-    pub key: u64,
-    pub value: V,
-}
-
-/// Which contacts to look for.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) enum Sought {
-    /// Every contact.
-    #[default]
-    All,
-    /// The earliest contact, and all whose times may round to the same time.
-    Earliest,
-    /// Any contact.
-    Any,
-}
-
-/// A pair of a step that a device has not dropped.
-#[cfg(feature = "gpu")]
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct LeftPair {
-    /// The places of its elements, those of all layers numbered consecutively.
-    pub places: [u32; 2],
-    /// Until this time it certainly does not touch.
-    pub free_until: f32,
-    /// By this time it certainly touches, at one time only.
-    pub touches_by: Option<f32>,
-}
-
-/// What a device says about a step, or about a part of it.
-#[cfg(feature = "gpu")]
-#[derive(Debug)]
-pub(crate) struct Left<'a> {
-    /// Pairs that may touch, in any order. Where the earliest contact is sought, those that touch later than `touches_by` may be missing;
-    /// where any is sought, all may be missing if one certainly touches.
-    pub pairs: &'a mut [LeftPair],
-    /// The least time by which some pair certainly touches, after the start; none where all are sought.
-    pub touches_by: Option<f32>,
-}
-
-/// Contacts found, by kind of pair.
-pub(crate) type FoundByKind<V = Contact> = [Vec<Found<V>>; PairKind::ALL.len()];
-
-/// Keys found, by kind of pair.
-pub(crate) type KeysByKind = [Vec<u64>; PairKind::ALL.len()];
-
-/// Where contacts go while a step is being answered, by kind of pair.
-pub(crate) type ContactAnswer = Answer<Found<Contact>, { PairKind::ALL.len() }>;
-/// The same for keys alone.
-pub(crate) type KeyAnswer = Answer<u64, { PairKind::ALL.len() }>;
-
-/// Where what is found in a step goes.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum StepAnswer<'a> {
-    Contacts(&'a ContactAnswer),
-    Keys(&'a KeyAnswer),
-    /// Only keys in some ranges.
-    KeysIn(&'a KeyAnswer, &'a KeyRanges),
-    /// Keys are counted and forgotten.
-    Counts(&'a Tally),
-}
-
-impl<'a> StepAnswer<'a> {
-    /// Takes contacts of one kind; the block is empty afterwards and keeps its memory.
-    pub fn take(&self, kind: PairKind, block: &mut Vec<Found<Contact>>) {
-        if let StepAnswer::Contacts(answer) = self {
-            answer.extend(kind as usize, block.drain(..));
-        }
-    }
-
-    /// The same for pairs without a time.
-    pub fn take_keys(&self, kind: PairKind, block: &mut Vec<u64>) {
-        match self {
-            StepAnswer::Keys(answer) => answer.extend(kind as usize, block.drain(..)),
-            StepAnswer::KeysIn(answer, ranges) => {
-                block.retain(|&key| ranges.hold(kind, key));
-                answer.extend(kind as usize, block.drain(..));
-            }
-            StepAnswer::Counts(tally) => {
-                tally.count(kind, block);
-                block.clear();
-            }
-            StepAnswer::Contacts(_) => {}
-        }
-    }
-
-    /// The ranges that keys must be in, if not all keys are wanted.
-    pub fn ranges(&self) -> Option<&'a KeyRanges> {
-        match self {
-            StepAnswer::KeysIn(_, ranges) => Some(ranges),
-            StepAnswer::Counts(tally) => Some(tally.ranges()),
-            StepAnswer::Contacts(_) | StepAnswer::Keys(_) => None,
-        }
-    }
-}
-
-impl Ending for StepAnswer<'_> {
-    fn is_over(&self) -> bool {
-        match self {
-            StepAnswer::Contacts(answer) => answer.is_over(),
-            StepAnswer::Keys(answer) | StepAnswer::KeysIn(answer, _) => answer.is_over(),
-            StepAnswer::Counts(_) => false,
-        }
-    }
-
-    fn check(&self) -> Result<(), Error> {
-        match self {
-            StepAnswer::Contacts(answer) => answer.check(),
-            StepAnswer::Keys(answer) | StepAnswer::KeysIn(answer, _) => answer.check(),
-            StepAnswer::Counts(_) => Ok(()),
-        }
-    }
-
-    fn share(&self, held_by_finder: u64) {
-        match self {
-            StepAnswer::Contacts(answer) => answer.share(held_by_finder),
-            StepAnswer::Keys(answer) | StepAnswer::KeysIn(answer, _) => {
-                answer.share(held_by_finder)
-            }
-            StepAnswer::Counts(_) => {}
-        }
-    }
-
-    fn most_items(&self, room: usize) -> usize {
-        room
-    }
-}
-
-/// Maps global numbers to elements of bodies.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Numbering {
-    /// Bodies, and the first number of each of their layers.
-    layers: Vec<(BodyId, Number)>,
-}
-
-impl Numbering {
-    pub fn begin(&mut self, frame: &Frame) {
-        self.layers.clear();
-        let layers = frame.layers.iter().map(|layer| (layer.id, layer.first));
-        self.layers.extend(layers);
-    }
-
-    fn name(&self, number: Number) -> Primitive {
-        let (body, first) = self.layers[owner_by_first(&self.layers, number, |layer| layer.1)];
-        Primitive {
-            body,
-            primitive: number.minus(first).raw(),
-        }
-    }
-
-    fn impact(&self, kind: PairKind, toi: Toi, found: &Found<Contact>) -> Impact {
-        let (a, b) = self.pair(found.key);
-        Impact {
-            kind,
-            a,
-            b,
-            toi: toi.round(&found.value),
-            at_start: found.value.at_start,
-        }
-    }
-
-    pub fn pair(&self, key: u64) -> (Primitive, Primitive) {
-        let [a, b] = pair_numbers(key).map(|number| self.name(number));
-        (a, b)
-    }
-}
 
 /// Two elements that touch during a step, and when first.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -222,9 +54,15 @@ impl Impact {
     }
 }
 
-pub(crate) fn row(a: Primitive, b: Primitive) -> [u32; 4] {
-    let index = |body: BodyId| body.index() as u32;
-    [index(a.body), a.primitive, index(b.body), b.primitive]
+fn name(numbering: &Numbering, kind: PairKind, toi: Toi, found: &Found<Contact>) -> Impact {
+    let (a, b) = numbering.pair(found.key);
+    Impact {
+        kind,
+        a,
+        b,
+        toi: toi.round(&found.value),
+        at_start: found.value.at_start,
+    }
 }
 
 /// [`Impacts::hash`] of impacts given as kind, `[body_a, element_a, body_b, element_b]` and time. The hash of several sets
@@ -259,7 +97,7 @@ impl std::fmt::Debug for Impacts {
 
 impl Impacts {
     /// Takes over the frame's numbering.
-    pub(crate) fn begin(&mut self, frame: &Frame) {
+    pub(crate) fn begin(&mut self, frame: &Plan) {
         self.numbering.begin(frame);
         self.impacts.clear();
         self.start_intersects = None;
@@ -285,7 +123,7 @@ impl Impacts {
         } = self;
         reserve(impacts, n, "impacts")?;
         for (kind, found) in PairKind::ALL.into_iter().zip(found) {
-            impacts.extend(found.iter().map(|found| numbering.impact(kind, toi, found)));
+            impacts.extend(found.iter().map(|found| name(numbering, kind, toi, found)));
         }
         Ok(())
     }
@@ -297,7 +135,7 @@ impl Impacts {
 
     /// What was found, by its names.
     pub(crate) fn impact(&self, kind: PairKind, toi: Toi, found: &Found<Contact>) -> Impact {
-        self.numbering.impact(kind, toi, found)
+        name(&self.numbering, kind, toi, found)
     }
 
     /// The number of pairs that touch.
@@ -366,84 +204,5 @@ impl<'a> IntoIterator for &'a Impacts {
 
     fn into_iter(self) -> Self::IntoIter {
         self.iter()
-    }
-}
-
-/// Pairs of elements whose boxes overlap during a step, sorted by `(kind, body_a, element_a, body_b, element_b)`.
-#[derive(Clone, Default)]
-pub struct Candidates {
-    numbering: Numbering,
-    keys: KeysByKind,
-    stats: Statistics,
-}
-
-impl std::fmt::Debug for Candidates {
-    /// Their number and the first of them, however many there are.
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let mut short = f.debug_struct("Candidates");
-        short.field("len", &self.len());
-        short.field("first", &self.iter().next());
-        short.finish_non_exhaustive()
-    }
-}
-
-impl Candidates {
-    /// Takes over the frame's numbering.
-    pub(crate) fn begin(&mut self, frame: &Frame) {
-        self.numbering.begin(frame);
-        self.keys.iter_mut().for_each(Vec::clear);
-        self.stats.clear();
-    }
-
-    /// Its keys, sorted in the end, and its statistics.
-    pub(crate) fn parts_mut(&mut self) -> (&mut KeysByKind, &mut Statistics) {
-        (&mut self.keys, &mut self.stats)
-    }
-
-    /// Bytes of the answer.
-    pub(crate) fn bytes(&self) -> u64 {
-        let n: usize = self.keys.iter().map(Vec::capacity).sum();
-        (size_of::<u64>() * n) as u64
-    }
-
-    /// The number of candidates of all kinds.
-    pub fn len(&self) -> usize {
-        self.keys.iter().map(Vec::len).sum()
-    }
-
-    /// Whether there are no candidates.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The candidates of one kind: `(a, b)`, where `a` is the element that the kind names first.
-    pub fn of(&self, kind: PairKind) -> impl ExactSizeIterator<Item = (Primitive, Primitive)> + '_ {
-        let keys = self.keys[kind as usize].iter();
-        keys.map(|&key| self.numbering.pair(key))
-    }
-
-    /// Rows `[body_a, element_a, body_b, element_b]` of one kind, with bodies by their [`index`](BodyId::index).
-    pub fn rows(&self, kind: PairKind) -> impl ExactSizeIterator<Item = [u32; 4]> + '_ {
-        self.of(kind).map(|(a, b)| row(a, b))
-    }
-
-    /// All candidates.
-    pub fn iter(&self) -> impl Iterator<Item = (PairKind, Primitive, Primitive)> + '_ {
-        let kinds = PairKind::ALL.into_iter();
-        kinds.flat_map(|kind| self.of(kind).map(move |(a, b)| (kind, a, b)))
-    }
-
-    /// A hash of the set that does not depend on its order.
-    pub fn hash(&self) -> u64 {
-        PairKind::ALL.into_iter().fold(0, |sum, kind| {
-            self.rows(kind).fold(sum, |sum: u64, row| {
-                sum.wrapping_add(mix(hash_row(row) ^ kind as u64))
-            })
-        })
-    }
-
-    /// How the answer was found.
-    pub fn stats(&self) -> &Statistics {
-        &self.stats
     }
 }

@@ -90,7 +90,7 @@ index_types! {
     /// An element of a part of a body, as users number it. Vertices are numbered as positions are.
     ElementIx
 
-    /// The global number of an element in a frame: see [`frame`](crate::frame).
+    /// The global number of an element in a frame: see [`frame`](crate::plan).
     Number
 
     /// A vertex of a body, as its positions are numbered.
@@ -159,7 +159,7 @@ impl Number {
     }
 }
 
-/// The key of a pair of elements, lower number first: see [`frame`](crate::frame).
+/// The key of a pair of elements, lower number first: see [`frame`](crate::plan).
 #[inline(always)]
 pub fn pair_key(a: Number, b: Number) -> u64 {
     let (low, high) = if a < b { (a, b) } else { (b, a) };

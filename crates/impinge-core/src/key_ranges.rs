@@ -15,9 +15,9 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::Error;
-use crate::frame::{Frame, Layer};
 use crate::index::{Number, lower_number};
 use crate::pair_kind::{PairKind, PairKinds};
+use crate::plan::Plan;
 use crate::sink;
 
 const KINDS: usize = PairKind::ALL.len();
@@ -31,18 +31,13 @@ pub(crate) struct KeyRanges([Range<u64>; KINDS]);
 
 impl KeyRanges {
     /// All keys that pairs of some kinds may have.
-    pub fn new(frame: &Frame, kinds: PairKinds) -> Self {
+    pub fn new(frame: &Plan, kinds: PairKinds) -> Self {
         KeyRanges(PairKind::ALL.map(|kind| {
             // The element that a kind names first has the lower number.
-            let part = kind.parts()[0];
-            let layers = frame.layers.iter().filter(|layer| layer.part == part);
-            let numbers = layers.map(Layer::numbers);
-            let joined = numbers.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end));
-            match joined {
-                Some(Range { start, end }) if kinds.contains(kind) => {
-                    start.first_key()..end.first_key()
-                }
-                _ => 0..0,
+            let Range { start, end } = frame.lower_numbers(Some(kind));
+            match kinds.contains(kind) {
+                true => start.first_key()..end.first_key(),
+                false => 0..0,
             }
         }))
     }

@@ -9,6 +9,7 @@ pub mod clock;
 mod clusterings;
 // Types are documented; internal fields and small methods are self-explanatory.
 mod advance;
+mod candidates;
 pub mod contact;
 #[allow(missing_docs)]
 pub mod cpu;
@@ -16,8 +17,7 @@ mod detector;
 mod elements;
 mod error;
 pub mod exact;
-#[allow(missing_docs)]
-pub mod frame;
+mod found;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod grouping;
@@ -30,9 +30,12 @@ mod key_ranges;
 mod naive;
 mod narrow;
 mod near;
+mod numbering;
 mod pair_kind;
 mod pairs;
 mod places;
+#[allow(missing_docs)]
+pub mod plan;
 mod position_rows;
 mod positions;
 mod progress;
@@ -50,10 +53,13 @@ mod stats;
 mod step;
 mod transform;
 mod tuning;
+#[cfg(feature = "gpu")]
+mod undecided;
 #[allow(missing_docs)]
 pub mod workers;
 
 pub use advance::Advance;
+pub use candidates::Candidates;
 pub use detector::Detector;
 pub use elements::{Elements, Kind, Part};
 pub use error::Error;
@@ -62,7 +68,7 @@ pub use gpu::Capacities;
 #[cfg(feature = "gpu")]
 pub use gpu::{DeviceInfo, ResidentLayer, ResidentPairs, ResidentStep, devices, devices_async};
 pub use ids::BodyId;
-pub use impacts::{Candidates, Impact, Impacts, hash_impact_rows};
+pub use impacts::{Impact, Impacts, hash_impact_rows};
 pub use impinge_weld::{Coordinate, Weld, WrongNumber};
 pub use near::{ClosestPoints, NearIter, NearPair, NearPairs, NearQuery};
 pub use pair_kind::{PairKind, PairKinds};

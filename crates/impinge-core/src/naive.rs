@@ -4,10 +4,10 @@
 //! in double precision; boxes that do not overlap (closed) hold elements that cannot meet.
 
 use crate::error::Error;
-use crate::frame::{Frame, TestId, pair_key};
 use crate::hull::Extent;
 use crate::index::Number;
 use crate::narrow::{Element, Test};
+use crate::plan::{Plan, TestId, pair_key};
 use crate::progress::Control;
 use crate::scene::Scene;
 use crate::stats::Statistics;
@@ -17,7 +17,7 @@ use crate::stats::Statistics;
 pub(crate) fn run<T: Test>(
     test: &T,
     scene: &Scene,
-    frame: &Frame,
+    frame: &Plan,
     control: &Control<'_>,
     stats: &mut Statistics,
     mut emit: impl FnMut(TestId, u64, T::Value) -> Result<(), Error>,
@@ -45,7 +45,7 @@ pub(crate) fn run<T: Test>(
 fn elements<'a, T: Test>(
     test: &T,
     scene: &'a Scene,
-    frame: &'a Frame,
+    frame: &'a Plan,
 ) -> Vec<(Number, Element<'a>, Extent)> {
     frame
         .layer_ixs()

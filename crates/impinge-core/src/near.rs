@@ -6,14 +6,15 @@ use std::collections::BTreeMap;
 
 use crate::error::Error;
 use crate::exact::{ElementPair, Feature, NearestOfElements};
-use crate::frame::{Ask, Frame};
+use crate::found::KeysByKind;
 use crate::ids::BodyId;
-use crate::impacts::{KeysByKind, Numbering, row};
+use crate::numbering::{Numbering, row};
 use crate::pair_kind::{PairKind, PairKinds};
 use crate::pairs::{Primitive, hash_row, mix};
+use crate::plan::Plan;
 use crate::query::Query;
 use crate::scene::Scene;
-use crate::sink::reserve;
+use crate::sink::{Limits, reserve};
 use crate::stats::Statistics;
 use crate::step::check_distance;
 
@@ -92,8 +93,8 @@ impl NearQuery {
         self
     }
 
-    /// Resolves the query.
-    pub(crate) fn resolve(&self, scene: &Scene, frame: &mut Frame) -> Result<(), Error> {
+    /// What it asks of a scene.
+    pub(crate) fn plan(&self, scene: &Scene, limits: Limits) -> Result<Plan, Error> {
         let numbers = self.thickness.values().map(|&number| ("thickness", number));
         for (setting, number) in numbers.chain([("distance", self.distance)]) {
             check_distance(setting, number)?;
@@ -101,14 +102,14 @@ impl NearQuery {
         for &body in self.thickness.keys() {
             scene.body(body)?;
         }
-        let ask = match self.kinds {
-            Some(kinds) => Ask::Candidates(kinds),
-            None => Ask::Near,
+        let of_distance = size_of::<f64>() * usize::from(self.distances);
+        let of_points = size_of::<[[f64; 3]; 2]>() * usize::from(self.closest);
+        let limits = Limits {
+            besides: (1 + of_distance + of_points) as u64,
+            ..limits
         };
-        frame.resolve_for(scene, &self.query, ask)?;
-        frame.stand_still();
-        frame.set_reach(self.distance, &self.thickness);
-        Ok(())
+        let query = (&self.query, self.kinds);
+        Plan::nearness(scene, query, self.distance, &self.thickness, limits)
     }
 }
 
@@ -205,7 +206,7 @@ pub(crate) struct Unnamed<'a> {
 
 impl NearPairs {
     /// Takes over the frame's numbering.
-    pub(crate) fn begin(&mut self, frame: &Frame) {
+    pub(crate) fn begin(&mut self, frame: &Plan) {
         self.numbering.begin(frame);
         self.keys.iter_mut().for_each(Vec::clear);
         self.nearest.iter_mut().for_each(Vec::clear);

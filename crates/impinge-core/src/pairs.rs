@@ -3,9 +3,11 @@
 use std::ops::Range;
 
 use crate::elements::Kind;
-use crate::frame::{Frame, owner_by_first};
+use crate::error::Error;
 use crate::ids::BodyId;
 use crate::index::{ElementIx, Number, lower_number, pair_numbers};
+use crate::plan::{Plan, owner_by_first};
+use crate::run::{Job, Outcome};
 use crate::stats::Statistics;
 
 /// One primitive of one body.
@@ -40,33 +42,6 @@ pub struct Pairs {
 }
 
 impl Pairs {
-    /// Takes over the frame's numbering, without keys.
-    pub(crate) fn begin(&mut self, frame: &Frame) {
-        self.keys.clear();
-        self.bodies.clear();
-        self.bodies
-            .extend(frame.layers.iter().map(|layer| PairBody {
-                id: layer.id,
-                first: layer.first,
-                kind: layer.kind,
-            }));
-        self.stats.clear();
-    }
-
-    pub(crate) fn stats_mut(&mut self) -> &mut Statistics {
-        &mut self.stats
-    }
-
-    /// The memory of the keys, to be used for the next answer.
-    pub(crate) fn take_keys(&mut self) -> Vec<u64> {
-        std::mem::take(&mut self.keys)
-    }
-
-    /// The answer: sorted keys, each once.
-    pub(crate) fn put_keys(&mut self, keys: Vec<u64>) {
-        self.keys = keys;
-    }
-
     /// The number of pairs.
     pub fn len(&self) -> usize {
         self.keys.len()
@@ -246,6 +221,36 @@ impl Pairs {
     /// Whether two answers have the same rows, whatever their scenes.
     pub fn same_as(&self, other: &Pairs) -> bool {
         self.keys.len() == other.keys.len() && self.rows().eq(other.rows())
+    }
+}
+
+impl Outcome<u64, 1> for Pairs {
+    fn begin(&mut self, plan: &Plan) {
+        self.keys.clear();
+        self.bodies.clear();
+        self.bodies.extend(plan.layers.iter().map(|layer| PairBody {
+            id: layer.id,
+            first: layer.first,
+            kind: layer.kind,
+        }));
+        self.stats.clear();
+    }
+
+    fn stats_mut(&mut self) -> &mut Statistics {
+        &mut self.stats
+    }
+
+    fn take_rooms(&mut self) -> [Vec<u64>; 1] {
+        [std::mem::take(&mut self.keys)]
+    }
+
+    fn fill(&mut self, _: Job<'_>, [keys]: [Vec<u64>; 1]) -> Result<(), Error> {
+        self.keys = keys;
+        Ok(())
+    }
+
+    fn bytes(&self) -> u64 {
+        (size_of::<u64>() * self.keys.capacity()) as u64
     }
 }
 

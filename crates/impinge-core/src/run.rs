@@ -1,23 +1,27 @@
-//! The frame loop: resolves a query, has a [`Finder`] find the keys of all pairs, sorts them.
+//! The loop that answers every question: has a [`Finder`] find the pairs of a [`Plan`], and sorts them.
 //!
-//! There is one loop for every backend and for methods of other crates. It is async because a GPU must be waited for. A
-//! finder that works on the CPU never waits: its frame is complete at the first poll, see [`ready`].
+//! ```text
+//! scene + query  ->  Plan      what is asked: one constructor per question
+//! Plan           ->  Finder    a backend, a method of another crate, or the oracle; its pairs go to an `Answer`
+//! Answer         ->  Outcome   pairs, impacts, candidates, near pairs: sorted, with statistics
+//! ```
+//!
+//! There is one loop for all questions and backends, and for methods of other crates. It is async because a GPU must be waited
+//! for. A finder that works on the CPU never waits: its frame is complete at the first poll, see [`ready`].
 
 use std::pin::pin;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll, Waker};
 
 use crate::clock::Instant;
 use crate::error::Error;
-use crate::frame::Frame;
-use crate::pairs::Pairs;
+use crate::plan::Plan;
 use crate::progress::Control;
-use crate::query::Query;
 use crate::scene::Scene;
-use crate::settings::{Method, Placement};
-use crate::sink::{Answer, Limits, Wanted};
+use crate::settings::Settings;
+use crate::sink::{Answer, Goal};
+use crate::sort::{Keyed, Sorter};
 use crate::stats::Statistics;
-use crate::tuning::Tuning;
 use crate::workers::Workers;
 
 /// One frame as a finder sees it.
@@ -25,21 +29,23 @@ use crate::workers::Workers;
 pub struct Job<'a> {
     /// The bodies.
     pub scene: &'a Scene,
-    /// The layers that take part, and their tests.
-    pub frame: &'a Frame,
+    /// What is asked.
+    pub frame: &'a Plan,
     /// The threads.
     pub workers: &'a Workers,
     /// Stops and watches the frame.
     pub control: &'a Control<'a>,
 }
 
-/// Finds the pairs of a frame: a backend of this crate, or a method of another one.
-pub trait Finder {
+/// Finds the pairs of a question: a backend of this crate, or a method of another one.
+pub trait Finder<T = u64, const LISTS: usize = 1> {
     /// The name of the method, for the statistics.
     fn method(&self) -> &'static str;
 
     /// `"cpu"`, or the name of the GPU.
-    fn backend(&self) -> &str;
+    fn backend(&self) -> &str {
+        "cpu"
+    }
 
     /// Whether [`find`](Finder::find) itself refuses positions that were written in place and are not finite. If not,
     /// the loop checks them before.
@@ -52,7 +58,7 @@ pub trait Finder {
         false
     }
 
-    /// Hands over the keys of all pairs that the frame asks for, in any order, and tells the answer how many bytes the
+    /// Hands over all pairs that the plan asks for, in any order, and tells the answer how many bytes the
     /// finder holds itself.
     ///
     /// # Errors
@@ -60,148 +66,129 @@ pub trait Finder {
     fn find(
         &mut self,
         job: Job<'_>,
-        answer: &Arc<Answer>,
+        answer: &Arc<Answer<T, LISTS>>,
         stats: &mut Statistics,
     ) -> impl Future<Output = Result<(), Error>>;
 }
 
-/// The frame, answer and threads that every finder needs. The memory is kept from frame to frame.
-pub struct FrameLoop {
-    frame: Frame,
-    pairs: Pairs,
-    n_pairs: u64,
-    answer: Arc<Answer>,
-    limits: Limits,
-    workers: Workers,
-}
+/// What the pairs of a question become. The memory is kept from frame to frame.
+pub trait Outcome<T, const LISTS: usize> {
+    /// Makes ready: takes over the plan's numbering, and clears the statistics.
+    fn begin(&mut self, plan: &Plan);
 
-impl FrameLoop {
-    /// Creates a loop with `threads` workers; 0 for one per core.
-    pub fn new(threads: usize, placement: Placement, limits: Limits, tuning: Tuning) -> Self {
-        FrameLoop {
-            frame: Frame::default(),
-            pairs: Pairs::default(),
-            n_pairs: 0,
-            answer: Arc::default(),
-            limits,
-            workers: Workers::tuned(threads, placement, tuning),
-        }
-    }
+    /// How the answer is found.
+    fn stats_mut(&mut self) -> &mut Statistics;
 
-    /// One frame. Its answer is in [`pairs`](FrameLoop::pairs) or [`n_pairs`](FrameLoop::n_pairs).
+    /// Memory of the last answer, for the pairs of this one.
+    fn take_rooms(&mut self) -> [Vec<T>; LISTS];
+
+    /// Takes the pairs, sorted if all are wanted, each once.
     ///
     /// # Errors
-    /// A stale id, refused positions, errors of the finder.
-    pub async fn run(
-        &mut self,
-        scene: &Scene,
-        query: &Query,
-        control: &Control<'_>,
-        wanted: Wanted,
-        finder: &mut impl Finder,
-    ) -> Result<(), Error> {
-        let start = Instant::now();
-        self.frame.resolve(scene, query)?;
-        let _shift = self.workers.shift(self.frame.n_primitives());
-        self.pairs.begin(&self.frame);
-        if !finder.checks_positions() {
-            self.frame.check(scene)?;
+    /// There is no memory, cancellation.
+    fn fill(&mut self, job: Job<'_>, lists: [Vec<T>; LISTS]) -> Result<(), Error>;
+
+    /// Bytes of the answer.
+    fn bytes(&self) -> u64;
+}
+
+/// Takes questions from their plans to their answers. Holds what they all need: threads, and memory to sort in.
+pub struct Runner {
+    workers: Workers,
+    sorter: Mutex<Sorter>,
+}
+
+impl Runner {
+    /// For detectors with these settings.
+    pub fn new(settings: &Settings) -> Self {
+        Runner {
+            workers: Workers::tuned(settings.threads, settings.placement, settings.tuning),
+            sorter: Mutex::new(Sorter::new(settings)),
         }
-        let keys = self.pairs.take_keys();
-        // Which pairs belong to a cell is known only when they are found.
-        let (mut wanted_first, mut limits) = (wanted, self.limits);
-        if self.frame.has_cell() {
-            wanted_first = Wanted::Pairs;
-            if wanted == Wanted::Any {
-                limits.max_pairs = None;
-            }
-        }
-        self.answer.begin(limits, wanted_first, [keys]);
-        let stats = self.pairs.stats_mut();
-        stats.method = finder.method();
-        stats.n_threads = self.workers.n();
-        stats.backend.push_str(finder.backend());
-        let job = Job {
-            scene,
-            frame: &self.frame,
-            workers: &self.workers,
-            control,
-        };
-        let found = finder.find(job, &self.answer, stats).await;
-        let is_enough = self.answer.is_enough();
-        let joined = self.answer.finish();
-        if !is_enough {
-            found?;
-        }
-        let ([mut keys], n_pairs) = joined?;
-        self.n_pairs = n_pairs;
-        stats.time("collect", |_| {
-            if self.frame.has_cell() {
-                keys.retain(|&key| self.frame.is_owned(scene, key));
-                self.n_pairs = keys.len() as u64;
-                if wanted != Wanted::Pairs {
-                    keys.clear();
-                }
-            }
-            keys.sort_unstable();
-            if finder.repeats() {
-                keys.dedup();
-            }
-        });
-        stats.bytes_held += size_of::<u64>() as u64 * keys.capacity() as u64;
-        self.workers.report(&mut stats.ways);
-        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
-        self.pairs.put_keys(keys);
-        Ok(())
     }
 
-    /// The answer of the last frame, unless it failed.
-    pub fn pairs(&self) -> &Pairs {
-        &self.pairs
-    }
-
-    /// The same, out of the loop.
-    pub fn take_pairs(&mut self) -> Pairs {
-        std::mem::take(&mut self.pairs)
-    }
-
-    /// How many pairs the last frame had, if it had no error.
-    pub fn n_pairs(&self) -> u64 {
-        self.n_pairs
-    }
-
-    /// Takes note of an answer to the query that was [resolved](FrameLoop::resolve) last, found by one thread without this loop.
-    pub(crate) fn note(&mut self, n_pairs: u64, start: Instant) {
-        self.pairs.begin(&self.frame);
-        self.n_pairs = n_pairs;
-        let stats = self.pairs.stats_mut();
-        stats.method = Method::Clusters.name();
-        stats.backend.push_str("cpu");
-        stats.n_threads = 1;
-        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
-    }
-
-    /// The threads, for answers found without this loop.
+    /// The threads, for answers found without the loop.
     pub fn workers(&self) -> &Workers {
         &self.workers
     }
 
-    /// A query resolved and its positions checked, and the threads: for frames whose answer stays elsewhere.
+    /// Answers a question. Returns how many pairs there are: of [`Goal::Any`], at least one if there is any.
     ///
     /// # Errors
-    /// A stale id, refused positions, a query for the pairs of a cell.
-    pub fn resolve(&mut self, scene: &Scene, query: &Query) -> Result<(&Frame, &Workers), Error> {
-        self.frame.resolve(scene, query)?;
-        if self.frame.has_cell() {
-            return Err(Error::Setting {
-                setting: "owned_by",
-                given: "a cell in a frame that stays on a device".to_owned(),
-                allowed: "only detect, count and any",
-            });
+    /// Refused positions, errors of the finder, those of the answer.
+    pub async fn run<T: Keyed, const LISTS: usize>(
+        &self,
+        scene: &Scene,
+        plan: &Plan,
+        control: &Control<'_>,
+        finder: &mut impl Finder<T, LISTS>,
+        outcome: &mut impl Outcome<T, LISTS>,
+    ) -> Result<u64, Error> {
+        let workers = &self.workers;
+        let _shift = workers.shift(plan.n_primitives());
+        outcome.begin(plan);
+        if !finder.checks_positions() {
+            plan.check(scene)?;
         }
-        self.frame.check(scene)?;
-        Ok((&self.frame, &self.workers))
+        let answer = Answer::new(plan.limits, plan.held(), outcome.take_rooms());
+        let answer = Arc::new(answer);
+        let stats = outcome.stats_mut();
+        stats.method = finder.method();
+        stats.n_threads = workers.n();
+        stats.backend.push_str(finder.backend());
+        let job = Job {
+            scene,
+            frame: plan,
+            workers,
+            control,
+        };
+        let found = finder.find(job, &answer, stats).await;
+        let collect = Instant::now();
+        let is_enough = answer.is_enough();
+        let joined = answer.finish();
+        if !is_enough {
+            found?;
+        }
+        let (mut lists, mut n) = joined?;
+        if let Some(n_owned) = keep_owned(job, &mut lists) {
+            n = n_owned;
+        }
+        let mut sorter = self.sorter.lock().unwrap_or_else(PoisonError::into_inner);
+        if plan.goal == Goal::All {
+            stats.ways.n_counted = sorter.sort(&mut lists, plan, workers);
+        }
+        if finder.repeats() {
+            lists
+                .iter_mut()
+                .for_each(|list| list.dedup_by_key(|item| item.key()));
+        }
+        stats.add_ms("collect", collect.elapsed().as_secs_f64() * 1e3);
+        outcome.fill(job, lists)?;
+        let bytes = outcome.bytes() + sorter.bytes();
+        let stats = outcome.stats_mut();
+        stats.bytes_held += bytes;
+        workers.report(&mut stats.ways);
+        stats.total_ms = plan.since.elapsed().as_secs_f64() * 1e3;
+        Ok(n)
     }
+}
+
+/// Drops pairs that do not belong to the cell, if there is one and finders have not looked. Returns how many are left then.
+fn keep_owned<T: Keyed, const LISTS: usize>(
+    job: Job<'_>,
+    lists: &mut [Vec<T>; LISTS],
+) -> Option<u64> {
+    if !job.frame.is_owned_late() {
+        return None;
+    }
+    for list in &mut *lists {
+        list.retain(|item| job.frame.is_owned(job.scene, item.key()));
+    }
+    let n = lists.iter().map(Vec::len).sum::<usize>();
+    if job.frame.goal != Goal::All {
+        lists.iter_mut().for_each(Vec::clear);
+    }
+    Some(n as u64)
 }
 
 /// The result of a future that never waits.

@@ -23,21 +23,30 @@ pub const BLOCK: usize = 1024;
 const FIRST_CHUNK: usize = 1 << 15;
 const LARGEST_CHUNK: usize = 1 << 20;
 
-/// What is wanted of the pairs.
+/// What of the pairs is wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Wanted {
+pub enum Goal {
     /// All of them.
     #[default]
-    Pairs,
+    All,
     /// How many there are.
     Count,
     /// Whether there is any.
     Any,
+    /// Of contacts, the earliest, and all whose times may round to the same time.
+    Earliest,
     /// The pair that comes first, by its element of one of two layers and then by that of the other.
     Lowest {
         /// Whether the element of the second layer comes first.
         by_second: bool,
     },
+}
+
+impl Goal {
+    /// Whether pairs are held.
+    fn holds(self) -> bool {
+        matches!(self, Goal::All | Goal::Earliest)
+    }
 }
 
 /// Limits on the size of an answer.
@@ -116,7 +125,7 @@ pub struct Answer<T = u64, const LISTS: usize = 1> {
 #[derive(Debug)]
 struct State<T, const LISTS: usize> {
     limits: Limits,
-    wanted: Wanted,
+    goal: Goal,
     n: u64,
     lists: [List<T>; LISTS],
     held_by_finder: u64,
@@ -140,44 +149,43 @@ impl<T> List<T> {
     }
 }
 
-impl<T, const LISTS: usize> Default for Answer<T, LISTS> {
+impl<T: Copy, const LISTS: usize> Default for Answer<T, LISTS> {
     fn default() -> Self {
-        Answer {
-            is_over: AtomicBool::new(false),
-            lowest: AtomicU64::new(u64::MAX),
-            state: Mutex::new(State::new(Limits::default(), Wanted::Pairs)),
-        }
+        let rooms = std::array::from_fn(|_| Vec::new());
+        Answer::new(Limits::default(), Goal::All, rooms)
     }
 }
 
 impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
     /// Starts an answer. `rooms` is memory that it may use: the lists of an earlier [`finish`](Answer::finish).
-    pub fn begin(&self, limits: Limits, wanted: Wanted, rooms: [Vec<T>; LISTS]) {
-        self.is_over.store(false, Ordering::Relaxed);
-        self.lowest.store(u64::MAX, Ordering::Relaxed);
-        let state = &mut *self.state();
-        *state = State::new(limits, wanted);
+    pub fn new(limits: Limits, goal: Goal, rooms: [Vec<T>; LISTS]) -> Self {
+        let mut state = State::new(limits, goal);
         // With a memory budget, the last answer's memory is not used again: its capacity would count
         // beside that of this answer.
         if limits.memory_budget.is_none() {
             state.lists = rooms.map(List::in_room);
         }
+        Answer {
+            is_over: AtomicBool::new(false),
+            lowest: AtomicU64::new(u64::MAX),
+            state: Mutex::new(state),
+        }
     }
 
     /// Pairs per block; 1 where the first pair ends or narrows the search.
     pub fn block(&self) -> usize {
-        match self.state().wanted {
-            Wanted::Any | Wanted::Lowest { .. } => 1,
-            Wanted::Pairs | Wanted::Count => BLOCK,
+        match self.state().goal {
+            Goal::Any | Goal::Lowest { .. } => 1,
+            Goal::All | Goal::Count | Goal::Earliest => BLOCK,
         }
     }
 
     /// How many work items are gathered before they are paired, at most `room`. They are few where the first pair ends
     /// or narrows the search.
     pub fn most_items(&self, room: usize) -> usize {
-        match self.state().wanted {
-            Wanted::Any | Wanted::Lowest { .. } => room.min(BLOCK),
-            Wanted::Pairs | Wanted::Count => room,
+        match self.state().goal {
+            Goal::Any | Goal::Lowest { .. } => room.min(BLOCK),
+            Goal::All | Goal::Count | Goal::Earliest => room,
         }
     }
 
@@ -188,9 +196,9 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
         }
         let state = &mut *self.state();
         let result = state.count(block.len() as u64);
-        let result = result.and_then(|()| match state.wanted {
-            Wanted::Pairs => state.put(list, block),
-            Wanted::Count | Wanted::Any | Wanted::Lowest { .. } => Ok(()),
+        let result = result.and_then(|()| match state.goal {
+            Goal::All | Goal::Earliest => state.put(list, block),
+            Goal::Count | Goal::Any | Goal::Lowest { .. } => Ok(()),
         });
         self.note(result, state);
     }
@@ -203,7 +211,7 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
     /// Whether a pair was asked for and found.
     pub fn is_enough(&self) -> bool {
         let state = &*self.state();
-        state.wanted == Wanted::Any && state.n > 0
+        state.goal == Goal::Any && state.n > 0
     }
 
     /// What ends the frame early, if anything does.
@@ -238,12 +246,14 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
             return false;
         }
         let state = &mut *self.state();
-        let result = match state.wanted {
-            Wanted::Pairs => state.foresee(n_more).and_then(|()| state.has_room(n_more)),
-            Wanted::Count | Wanted::Any | Wanted::Lowest { .. } => state.count(n_more),
+        let result = match state.goal {
+            Goal::All | Goal::Earliest => {
+                state.foresee(n_more).and_then(|()| state.has_room(n_more))
+            }
+            Goal::Count | Goal::Any | Goal::Lowest { .. } => state.count(n_more),
         };
         self.note(result, state);
-        state.wanted == Wanted::Pairs && !self.is_over()
+        state.goal.holds() && !self.is_over()
     }
 
     /// Forgets all pairs. They will be found again by another method.
@@ -275,7 +285,7 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
             None => state.join(),
         };
         let n = state.n;
-        let State { lists, .. } = std::mem::replace(state, State::new(state.limits, state.wanted));
+        let State { lists, .. } = std::mem::replace(state, State::new(state.limits, state.goal));
         joined.map(|()| (lists.map(|list| list.held), n))
     }
 
@@ -289,7 +299,7 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
             state.drop_pairs();
             state.error = Some(error);
             self.is_over.store(true, Ordering::Relaxed);
-        } else if state.wanted == Wanted::Any && state.n > 0 {
+        } else if state.goal == Goal::Any && state.n > 0 {
             self.is_over.store(true, Ordering::Relaxed);
         }
     }
@@ -344,9 +354,9 @@ impl Answer {
 
     /// Whether the lowest pair is wanted, and then whether by its second element.
     pub fn seeks_lowest(&self) -> Option<bool> {
-        match self.state().wanted {
-            Wanted::Lowest { by_second } => Some(by_second),
-            Wanted::Pairs | Wanted::Count | Wanted::Any => None,
+        match self.state().goal {
+            Goal::Lowest { by_second } => Some(by_second),
+            Goal::All | Goal::Count | Goal::Any | Goal::Earliest => None,
         }
     }
 
@@ -370,10 +380,10 @@ fn turned(key: u64, by_second: bool) -> u64 {
 }
 
 impl<T, const LISTS: usize> State<T, LISTS> {
-    fn new(limits: Limits, wanted: Wanted) -> Self {
+    fn new(limits: Limits, goal: Goal) -> Self {
         State {
             limits,
-            wanted,
+            goal,
             n: 0,
             lists: std::array::from_fn(|_| List::in_room(Vec::new())),
             held_by_finder: 0,
@@ -390,12 +400,10 @@ impl<T: Copy, const LISTS: usize> State<T, LISTS> {
     fn count(&mut self, n_more: u64) -> Result<(), Error> {
         self.n += n_more;
         match self.limits.max_pairs {
-            Some(limit) if self.n > limit && self.wanted != Wanted::Any => {
-                Err(Error::TooManyPairs {
-                    found: self.n,
-                    limit,
-                })
-            }
+            Some(limit) if self.n > limit && self.goal != Goal::Any => Err(Error::TooManyPairs {
+                found: self.n,
+                limit,
+            }),
             _ => Ok(()),
         }
     }
@@ -404,7 +412,7 @@ impl<T: Copy, const LISTS: usize> State<T, LISTS> {
     fn foresee(&mut self, n_more: u64) -> Result<(), Error> {
         let n = self.n;
         let result = self.count(n_more);
-        if self.wanted != Wanted::Any {
+        if self.goal != Goal::Any {
             self.n = n;
         }
         result

@@ -19,10 +19,10 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::cpu::simd::{Isa, Simd, dispatch};
 use crate::error::Error;
-use crate::frame::Frame;
-use crate::impacts::KeysByKind;
+use crate::found::Found;
 use crate::index::{Number, lower_number, pair_numbers};
 use crate::pair_kind::PairKind;
+use crate::plan::{Plan, Question};
 use crate::settings::Settings;
 use crate::sink;
 use crate::workers::Workers;
@@ -38,9 +38,55 @@ const LONGEST: usize = 256;
 /// Runs of a batch have about the same length: up to 32, 64, 128 and 256 keys.
 const N_BATCHES: usize = 4;
 
+/// What an answer is made of: the key of a pair, and maybe more.
+pub trait Keyed: Copy {
+    /// The key.
+    fn key(&self) -> u64;
+
+    /// Sorts a list by the keys. Returns whether they were counted.
+    fn sort(
+        list: &mut [Self],
+        sorter: &mut Sorter,
+        lower_numbers: impl FnOnce() -> Range<Number>,
+        workers: &Workers,
+    ) -> bool;
+}
+
+impl Keyed for u64 {
+    fn key(&self) -> u64 {
+        *self
+    }
+
+    fn sort(
+        list: &mut [u64],
+        sorter: &mut Sorter,
+        lower_numbers: impl FnOnce() -> Range<Number>,
+        workers: &Workers,
+    ) -> bool {
+        sorter.sort_keys(list, lower_numbers(), workers)
+    }
+}
+
+impl<V: Copy> Keyed for Found<V> {
+    fn key(&self) -> u64 {
+        self.key
+    }
+
+    /// Contacts are few beside what finding them takes.
+    fn sort(
+        list: &mut [Found<V>],
+        _: &mut Sorter,
+        _: impl FnOnce() -> Range<Number>,
+        _: &Workers,
+    ) -> bool {
+        list.sort_unstable_by_key(|found| found.key);
+        false
+    }
+}
+
 /// The memory to sort in.
 #[derive(Debug)]
-pub(crate) struct Sorter {
+pub struct Sorter {
     /// Under a memory budget.
     in_place: bool,
     /// With fewer keys, one thread sorts them in place.
@@ -71,19 +117,19 @@ impl Sorter {
         }
     }
 
-    /// Sorts the keys of each kind. Returns how many kinds were counted.
-    pub fn sort_kinds(&mut self, keys: &mut KeysByKind, frame: &Frame, workers: &Workers) -> u64 {
-        let counted = PairKind::ALL.into_iter().zip(keys);
-        let counted = counted.map(|(kind, keys)| {
-            let numbers = frame.lower_numbers(kind);
-            u64::from(self.sort(keys, numbers, workers))
+    /// Sorts each list of pairs: those of a question about intersections, or of each kind. Returns how many lists were counted.
+    pub fn sort<T: Keyed>(&mut self, lists: &mut [Vec<T>], plan: &Plan, workers: &Workers) -> u64 {
+        let kinds = PairKind::ALL.into_iter().map(Some);
+        let counted = lists.iter_mut().zip(kinds).map(|(list, kind)| {
+            let kind = kind.filter(|_| plan.question != Question::Intersection);
+            u64::from(T::sort(list, self, || plan.lower_numbers(kind), workers))
         });
         counted.sum()
     }
 
     /// Sorts keys whose lower numbers are in a range. Returns whether they were counted: few keys, and keys without memory for
     /// that, are sorted in place.
-    fn sort(&mut self, keys: &mut [u64], numbers: Range<Number>, workers: &Workers) -> bool {
+    fn sort_keys(&mut self, keys: &mut [u64], numbers: Range<Number>, workers: &Workers) -> bool {
         let first = numbers.start.index();
         let n_numbers = numbers.end.index() - first;
         let is_worth =
@@ -351,7 +397,7 @@ mod tests {
                 let mut keys: Vec<u64> = keys.collect();
                 let mut expected = keys.clone();
                 expected.sort_unstable();
-                sorter.sort(&mut keys, first..end, &workers);
+                sorter.sort_keys(&mut keys, first..end, &workers);
                 assert_eq!(keys, expected, "{n_keys} keys of {n_numbers} numbers");
             }
         }

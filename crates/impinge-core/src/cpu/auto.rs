@@ -6,7 +6,7 @@
 //! crowded (the grid is uniform, so small details in a large scene can all be in one cell); neighbours that must be
 //! resolved, which `Clusters` settles per vertex; and memory budgets, which the grid would need more of.
 
-use crate::frame::Frame;
+use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::tuning::Tuning;
 
@@ -19,7 +19,7 @@ pub(super) struct Acquaintances {
 
 impl Acquaintances {
     /// Whether the grid may be the faster way to answer this frame. Its bodies are known from now on.
-    pub fn prefer_grid(&mut self, scene: &Scene, frame: &Frame, tuning: &Tuning) -> bool {
+    pub fn prefer_grid(&mut self, scene: &Scene, frame: &Plan, tuning: &Tuning) -> bool {
         let mut n_new = 0;
         for (ix, layer) in frame.numbered_layers() {
             let slot = layer.id.index();

@@ -7,11 +7,11 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::grid::FineRange;
 use crate::hull;
 use crate::index::{ElementIx, LayerIx, Place};
+use crate::plan::Plan;
 
 use super::cull::{BoundsTask, Cull};
 use super::dispatch::NodePair;
@@ -306,7 +306,7 @@ impl KeptList {
             dispatch!(*isa, reach_pairs, (
                 top: &TopLevel = top,
                 stack: &mut Vec<NodePair> = stack,
-                frame: &Frame = frame,
+                frame: &Plan = frame,
                 bodies: &[Bounds] = bodies,
                 reach: &mut [Bounds] = reach,
             ));
@@ -332,7 +332,7 @@ fn reach_pairs<S: Simd>(
     simd: S,
     top: &TopLevel,
     stack: &mut Vec<NodePair>,
-    frame: &Frame,
+    frame: &Plan,
     bodies: &[Bounds],
     reach: &mut [Bounds],
 ) {

@@ -14,10 +14,10 @@ use crate::elements::Elements;
 use crate::exact::filter::{
     self, BATCH, LANES, TetrahedronPairs8, TrianglePairs8, Verdict, Verdict16,
 };
-use crate::frame::pair_key;
 use crate::grouping::GROUP;
 use crate::index::{LayerIx, Number, Place};
 use crate::narrow::{intersect, intersect_shared};
+use crate::plan::pair_key;
 use crate::positions::Positions;
 use crate::sink::{Answer, BLOCK};
 use crate::tuning::Tuning;

@@ -3,10 +3,10 @@
 use crate::clusterings::{Clustered, Fit, Store};
 use crate::elements::Elements;
 use crate::exact::Point;
-use crate::frame::{Frame, Layer};
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::index::{ElementIx, LayerIx, Number, Place};
+use crate::plan::{Layer, Plan};
 use crate::positions::Positions;
 use crate::scene::Scene;
 
@@ -55,7 +55,7 @@ pub struct World<'a> {
     /// The bodies.
     pub scene: &'a Scene,
     /// The layers.
-    pub frame: &'a Frame,
+    pub frame: &'a Plan,
     /// `Clusters` only: places of primitives are places in the clusters' orders.
     pub(crate) caches: Option<&'a Caches>,
 }
@@ -75,7 +75,7 @@ pub struct BodyRef<'a> {
 
 impl<'a> World<'a> {
     /// A view in which places are the bodies' own numbers of primitives.
-    pub fn new(scene: &'a Scene, frame: &'a Frame) -> Self {
+    pub fn new(scene: &'a Scene, frame: &'a Plan) -> Self {
         World {
             scene,
             frame,

@@ -1,30 +1,138 @@
-//! Whether two bodies touch whose distance is asked for.
+//! A detector's answers about distances of bodies, and whether two bodies touch whose distance is asked for.
 //!
 //! Where boxes of clusters overlap, whether the bodies touch is asked first, with the clusters, filters and threads of intersections. Boxes of
 //! very many long triangles overlap: a search by distances would compare most of these one by one.
 
 use std::sync::Arc;
 
+use super::Detector;
 use crate::cpu::Cpu;
+use crate::cpu::clusters::Clusters;
 use crate::error::Error;
-use crate::frame::Frame;
 use crate::ids::BodyId;
 use crate::index::pair_numbers;
+use crate::pairs::Pairs;
+use crate::plan::Plan;
 use crate::progress::Control;
+use crate::proximity::Nearest;
 use crate::query::Query;
-use crate::run::Job;
+use crate::run::{Finder, Job, Runner, ready};
 use crate::scene::Scene;
-use crate::settings::Settings;
-use crate::sink::{Answer, Limits, Wanted};
+use crate::settings::{Method, Settings};
+use crate::sink::{Answer, Goal, Limits};
 use crate::stats::Statistics;
-use crate::workers::Workers;
+
+impl Detector {
+    /// The two bodies that are nearest to each other of all that the query lets meet, and the pair of primitives that has their
+    /// [`distance`](Detector::distance); `None` if there are no two that have primitives. Of several pairs at the same computed
+    /// distance the lowest. Pairs of bodies whose boxes are farther apart than the nearest two are never looked at.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Query, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// let points = [0.0f32, 5.0, 7.0].map(|x| scene.add_points(&[[x, 0.0, 0.0]]));
+    /// let [_, b, c] = points.map(|body| body.expect("finite"));
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let nearest = detector.nearest(&scene, &Query::all())?.expect("there are three");
+    /// assert_eq!((nearest.distance, nearest.bodies), (2.0, [b, c]));
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// A stale id, bad positions that were written in place, a query for self-collision or for the pairs of a cell.
+    pub fn nearest(&mut self, scene: &Scene, query: &Query) -> Result<Option<Nearest>, Error> {
+        self.nearest_with(scene, query, &Control::new())
+    }
+
+    /// [`nearest`](Detector::nearest) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `nearest`, and [`Error::Cancelled`].
+    pub fn nearest_with(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        control: &Control<'_>,
+    ) -> Result<Option<Nearest>, Error> {
+        let refused = |setting, given: &str| Error::Setting {
+            setting,
+            given: given.to_owned(),
+            allowed: "pairs of different bodies, and all of space",
+        };
+        if query.cell.is_some() {
+            return Err(refused("owned_by", "a cell"));
+        }
+        control.step(0, 1)?;
+        let plan = Plan::intersections(scene, query, Goal::Any, self.settings.limits())?;
+        plan.check(scene)?;
+        if plan.layers.iter().any(|layer| layer.within) {
+            return Err(refused("query", "self-collision"));
+        }
+        let workers = self.runner.workers();
+        self.distances.nearest(scene, &plan, workers, control)
+    }
+
+    /// The smallest distance of two bodies at the positions that they have, and the pair of primitives that has it; `None` if one
+    /// body has no primitives. The distance is 0 if and only if they share a point, which is decided exactly. Tetrahedra are
+    /// solid: a body inside one has distance 0.
+    ///
+    /// The detector keeps a tree per body and the nearest pair of each call. So repeated calls for bodies that move cost
+    /// little more than to read their positions. The answer does not depend on earlier calls.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// let triangle = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    /// let a = scene.add_triangles(&[[0, 1, 2]], &triangle)?;
+    /// let b = scene.add_triangles(&[[0, 1, 2]], &triangle.map(|[x, y, z]| [x, y, z + 3.0]))?;
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let nearest = detector.distance(&scene, a, b)?.expect("both have primitives");
+    /// assert_eq!((nearest.distance, nearest.primitives), (3.0, [0, 0]));
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// A stale id, the same body twice, bad positions that were written in place.
+    pub fn distance(
+        &mut self,
+        scene: &Scene,
+        a: BodyId,
+        b: BodyId,
+    ) -> Result<Option<Nearest>, Error> {
+        self.distance_with(scene, a, b, &Control::new())
+    }
+
+    /// [`distance`](Detector::distance) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `distance`, and [`Error::Cancelled`].
+    pub fn distance_with(
+        &mut self,
+        scene: &Scene,
+        a: BodyId,
+        b: BodyId,
+        control: &Control<'_>,
+    ) -> Result<Option<Nearest>, Error> {
+        let Detector {
+            touching,
+            distances,
+            runner,
+            cpu,
+            settings,
+            ..
+        } = self;
+        distances.between(scene, [a, b], runner.workers(), control, || {
+            touching.lowest(scene, [a, b], control, (runner, cpu, settings))
+        })
+    }
+}
 
 /// Memory kept from call to call.
 #[derive(Debug, Default)]
 pub(super) struct Touching {
-    frame: Frame,
-    answer: Arc<Answer>,
-    stats: Statistics,
+    pairs: Pairs,
 }
 
 impl Touching {
@@ -32,44 +140,61 @@ impl Touching {
     ///
     /// # Errors
     /// Bad positions that were written in place, a memory budget that is too small, cancellation.
-    pub fn lowest(
+    fn lowest(
         &mut self,
         scene: &Scene,
         [a, b]: [BodyId; 2],
-        (workers, control): (&Workers, &Control<'_>),
-        cpu: &mut Cpu,
-        settings: &Settings,
+        control: &Control<'_>,
+        (runner, cpu, settings): (&Runner, &mut Cpu, &Settings),
     ) -> Result<Option<[u32; 2]>, Error> {
-        let Touching {
-            frame,
-            answer,
-            stats,
-        } = self;
-        frame.resolve(scene, &Query::between(a, b))?;
-        let _shift = workers.shift(frame.n_primitives());
         let limits = Limits {
             max_pairs: None,
             ..settings.limits()
         };
         // Layers are in the order of the bodies.
         let by_second = b < a;
-        answer.begin(limits, Wanted::Lowest { by_second }, [Vec::new()]);
-        stats.clear();
-        let job = Job {
-            scene,
-            frame,
-            workers,
-            control,
+        let goal = Goal::Lowest { by_second };
+        let plan = Plan::intersections(scene, &Query::between(a, b), goal, limits)?;
+        let mut finder = Lowest {
+            clusters: cpu.clusters(),
+            settings,
+            key: None,
         };
-        cpu.clusters().run(job, answer, settings, stats)?;
-        let lowest = answer.lowest();
-        answer.finish()?;
-        Ok(lowest.map(|key| {
-            let mut elements = pair_numbers(key).map(|number| frame.locate(number).1.raw());
+        ready(runner.run(scene, &plan, control, &mut finder, &mut self.pairs))?;
+        Ok(finder.key.map(|key| {
+            let mut elements = pair_numbers(key).map(|number| plan.locate(number).1.raw());
             if by_second {
                 elements.reverse();
             }
             elements
         }))
+    }
+}
+
+/// Finds the lowest pair by clusters, whatever the method is.
+struct Lowest<'a> {
+    clusters: &'a mut Clusters,
+    settings: &'a Settings,
+    key: Option<u64>,
+}
+
+impl Finder for Lowest<'_> {
+    fn method(&self) -> &'static str {
+        Method::Clusters.name()
+    }
+
+    fn checks_positions(&self) -> bool {
+        true
+    }
+
+    async fn find(
+        &mut self,
+        job: Job<'_>,
+        answer: &Arc<Answer>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        self.clusters.run(job, answer, self.settings, stats)?;
+        self.key = answer.lowest();
+        Ok(())
     }
 }

@@ -5,18 +5,18 @@ use std::sync::Arc;
 
 use super::{Backend, Detector, Settings};
 use crate::cpu::Cpu;
-use crate::cpu::steps::{ByDevice, StepClusters, StepTest};
+use crate::cpu::steps::{ByDevice, StepClusters};
 use crate::error::Error;
+use crate::found::StepAnswer;
 use crate::gpu::{Capacities, Engine, Gpu, ResidentPairs, WantedAdapter};
-use crate::hull::Pose;
 use crate::ids::BodyId;
-use crate::impacts::{Sought, StepAnswer};
+use crate::plan::Plan;
 use crate::progress::Control;
 use crate::query::Query;
 use crate::run::{Finder, Job};
 use crate::scene::Scene;
 use crate::settings::Method;
-use crate::sink::Answer;
+use crate::sink::{Answer, Goal};
 use crate::stats::Statistics;
 use crate::workers::is_forked;
 
@@ -68,7 +68,7 @@ pub(super) fn find_in_step(
     engine: &mut Option<Engine>,
     clusters: &mut StepClusters,
     (job, settings): (Job<'_>, &Settings),
-    (asked, answer): ((StepTest, Pose), StepAnswer<'_>),
+    answer: StepAnswer<'_>,
     stats: &mut Statistics,
 ) -> Result<ByDevice, Error> {
     if cfg!(target_family = "wasm") || job.frame.bound() > 0.0 || job.frame.has_filter() {
@@ -77,24 +77,17 @@ pub(super) fn find_in_step(
     let Some(on_device) = engine else {
         return Ok(ByDevice::Not);
     };
-    let sought = match asked.0 {
-        // Which pairs a cell owns is not known on a device, so a pair that certainly touches may be another cell's.
-        StepTest::Contacts(asked) if !job.frame.has_cell() => asked.sought,
-        _ => Sought::All,
+    // Which pairs a cell owns is not known on a device, so a pair that certainly touches may be another cell's.
+    let sought = match job.frame.has_cell() {
+        false => job.frame.goal,
+        true => Goal::All,
     };
     let gpu = Arc::clone(on_device.gpu());
     let before = stats.clone();
-    let found = clusters.run_on_device(
-        job,
-        settings,
-        asked,
-        answer,
-        stats,
-        |clusterings, take, stats| {
-            let engine = on_device.for_steps();
-            gpu.block_on(engine.find_left(job, clusterings, (sought, take), stats))
-        },
-    );
+    let found = clusters.run_on_device(job, settings, answer, stats, |clusterings, take, stats| {
+        let engine = on_device.for_steps();
+        gpu.block_on(engine.find_left(job, clusterings, (sought, take), stats))
+    });
     match found {
         Ok(ByDevice::Not) => {}
         Ok(done) => {
@@ -254,7 +247,15 @@ impl Detector {
         positions: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentPairs, Error> {
-        let (frame, workers) = self.frames.resolve(scene, query)?;
+        if query.cell.is_some() {
+            return Err(Error::Setting {
+                setting: "owned_by",
+                given: "a cell in a frame that stays on a device".to_owned(),
+                allowed: "only detect, count and any",
+            });
+        }
+        let plan = Plan::intersections(scene, query, Goal::All, self.settings.limits())?;
+        plan.check(scene)?;
         let Some(engine) = &mut self.gpu else {
             return Err(Error::NoAdapter {
                 found: "this detector works on the CPU".to_owned(),
@@ -262,8 +263,8 @@ impl Detector {
         };
         let job = Job {
             scene,
-            frame,
-            workers,
+            frame: &plan,
+            workers: self.runner.workers(),
             control: &Control::new(),
         };
         engine.encode(job, positions, encoder)

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use crate::clusterings::{Clustered, Fit, Store, sampled_spread};
 use crate::error::Error;
-use crate::frame::Layer;
 use crate::grouping::clusters::Clustering;
 use crate::hull;
 use crate::ids::BodyId;
+use crate::plan::Layer;
 use crate::run::Job;
 use crate::scene::Body;
 use crate::stats::Statistics;

@@ -17,7 +17,7 @@ use super::room::Room;
 use super::steps::{Stages, Steps};
 use super::world::World;
 use crate::error::Error;
-use crate::impacts::Sought;
+use crate::sink::Goal;
 
 /// The stages on the device, in order, by their timing labels.
 pub(crate) const STAGES: &[&str] = &["bounds", "dispatch", "pairing", "narrow"];
@@ -55,7 +55,7 @@ pub(crate) struct Told {
     /// Whether pairs that share a vertex are resolved.
     pub resolve: bool,
     /// Which contacts of a step the host seeks; none if results stay on the device.
-    pub sought: Option<Sought>,
+    pub sought: Option<Goal>,
 }
 
 impl TreePlan {

@@ -16,7 +16,8 @@ use super::layout::{Counter, Grid, N_COUNTERS, NEVER, PairKey, PairTimes, Unsure
 use super::open::Gpu;
 use super::room::{PassCounts, Room};
 use crate::error::Error;
-use crate::impacts::{LeftPair, Sought};
+use crate::sink::Goal;
+use crate::undecided::LeftPair;
 
 const COUNTERS: u64 = N_COUNTERS as u64 * size_of::<Counter>() as u64;
 const GRID: u64 = size_of::<Grid>() as u64;
@@ -53,7 +54,7 @@ pub struct Guess {
     /// Of unsure pairs in a step, unless any contact will do.
     times: u64,
     /// In a step: which contacts are sought.
-    sought: Option<Sought>,
+    sought: Option<Goal>,
 }
 
 impl Guess {
@@ -119,7 +120,7 @@ impl Collector {
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         room: &Room,
-        (n_stages, sought): (u32, Option<Sought>),
+        (n_stages, sought): (u32, Option<Goal>),
     ) -> Guess {
         let capacities = room.capacities();
         let guess = |last: u64, capacity: u64| (last + last / 4).max(LEAST).min(capacity);
@@ -132,8 +133,8 @@ impl Collector {
             },
             unsure,
             times: match sought {
-                Some(Sought::All | Sought::Earliest) => unsure,
-                Some(Sought::Any) | None => 0,
+                Some(Goal::Any) | None => 0,
+                Some(_) => unsure,
             },
             sought,
         };
@@ -170,7 +171,7 @@ impl Collector {
     ) -> Result<Collected, Error> {
         // Given back when all went well: a buffer that stays mapped is of no more use.
         let staging = self.staging.take().expect("encoded before");
-        let has_times = matches!(guess.sought, Some(Sought::All | Sought::Earliest));
+        let has_times = matches!(guess.sought, Some(Goal::All | Goal::Earliest));
         let (mut pairs, mut unsure) = (Vec::new(), Vec::<UnsureKey>::new());
         let mut until = Vec::<PairTimes>::new();
         let (counts, grid, ticks, n_pairs, n_unsure) = {

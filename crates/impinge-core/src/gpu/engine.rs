@@ -18,13 +18,13 @@ use super::taker::Taker;
 use super::topology::Most;
 use super::world::World;
 use crate::error::Error;
-use crate::frame::Frame;
 use crate::ids::BodyId;
-use crate::impacts::Sought;
+use crate::plan::Plan as Frame;
 use crate::run::{Finder, Job};
 use crate::scene::Scene;
 use crate::settings::{Backend, Method, Recluster, Settings};
 use crate::sink::Answer;
+use crate::sink::Goal;
 use crate::stats::Statistics;
 
 /// The most cells, for any lambda.
@@ -60,7 +60,7 @@ pub struct Engine {
     /// Keys that each worker has settled, until they are appended to the answer.
     pub(super) settled: Vec<Vec<u64>>,
     /// Which contacts of a step the host seeks, and the least time by which some pair certainly touches, as far as passes have said.
-    pub(super) sought: Sought,
+    pub(super) sought: Goal,
     pub(super) touches_by: Option<f32>,
     /// The engine for steps, once there was one.
     pub(super) of_steps: Option<Box<Engine>>,
@@ -131,7 +131,7 @@ impl Engine {
             complete: Vec::new(),
             collector: Collector::default(),
             settled: Vec::new(),
-            sought: Sought::All,
+            sought: Goal::All,
             touches_by: None,
             of_steps: None,
         }

@@ -15,9 +15,9 @@ use super::world::{ResidentEnds, weigh_moving};
 use crate::clock::Instant;
 use crate::error::Error;
 use crate::grouping::clusters::Clustering;
-use crate::impacts::Sought;
 use crate::run::Job;
 use crate::settings::{Method, Settings};
+use crate::sink::Goal;
 use crate::stats::Statistics;
 
 impl Engine {
@@ -46,7 +46,7 @@ impl Engine {
         &mut self,
         job: Job<'_>,
         clusterings: &[Arc<Clustering>],
-        (sought, take): (Sought, &mut TakeLeft<'_>),
+        (sought, take): (Goal, &mut TakeLeft<'_>),
         stats: &mut Statistics,
     ) -> Result<bool, Error> {
         let result = self
@@ -62,7 +62,7 @@ impl Engine {
         &mut self,
         job: Job<'_>,
         clusterings: &[Arc<Clustering>],
-        (sought, take): (Sought, &mut TakeLeft<'_>),
+        (sought, take): (Goal, &mut TakeLeft<'_>),
         stats: &mut Statistics,
     ) -> Result<bool, Error> {
         self.gpu.check_lost()?;

@@ -7,7 +7,7 @@ use super::pipeline::{Bound, Workgroups};
 use super::room::Room;
 use super::steps::Steps;
 use super::world::World;
-use crate::impacts::Sought;
+use crate::sink::Goal;
 
 /// Candidates per workgroup.
 const GROUP: u32 = 64;
@@ -107,7 +107,7 @@ impl Settling {
 
     /// Plans the stage for a step, and returns the first of its two dispatches. `sought`: which contacts the host seeks; none if
     /// the results stay on the device, where pairs are named by global numbers.
-    pub(super) fn plan_step(steps: &mut Steps, room: &Room, sought: Option<Sought>) -> u32 {
+    pub(super) fn plan_step(steps: &mut Steps, room: &Room, sought: Option<Goal>) -> u32 {
         let first = steps.push(of_candidates(room));
         steps.push(Params {
             counter: N_PAIRS,
@@ -116,9 +116,9 @@ impl Settling {
             slot: SLOT_OF_SEARCH,
             by_number: u32::from(sought.is_none()),
             sought: match sought {
-                None | Some(Sought::All) => SEEK_ALL,
-                Some(Sought::Earliest) => SEEK_EARLIEST,
-                Some(Sought::Any) => SEEK_ANY,
+                Some(Goal::Earliest) => SEEK_EARLIEST,
+                Some(Goal::Any) => SEEK_ANY,
+                _ => SEEK_ALL,
             },
             ..of_candidates(room)
         });

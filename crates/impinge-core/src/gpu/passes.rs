@@ -20,15 +20,16 @@ use super::room::{Capacities, CellsWanted, NextPass};
 use super::steps::Stages;
 use super::taker::Taker;
 use crate::error::Error;
-use crate::frame::{Frame, pair_key};
-use crate::impacts::{Left, Sought};
 use crate::index::Number;
 use crate::narrow::settle;
+use crate::plan::{Plan as Frame, pair_key};
 use crate::query::SharedVertex;
 use crate::run::Job;
 use crate::settings::Method;
+use crate::sink::Goal;
 use crate::sink::{Answer, BLOCK};
 use crate::stats::Statistics;
+use crate::undecided::Left;
 
 /// The host descends before the first launch while there are at most this many seeds: each step saves two launches.
 const SEEDS: usize = 512;
@@ -70,8 +71,8 @@ impl Engine {
             let room = self.budget_for_room();
             // Times are proven, whether all pairs had room or not.
             self.touches_by = match self.sought {
-                Sought::All => None,
-                Sought::Earliest | Sought::Any => collected.counts.touches_by,
+                Goal::Earliest | Goal::Any => collected.counts.touches_by,
+                _ => None,
             };
             let next = match collected.counts.answer(self.sought) {
                 true => NextPass::Complete,

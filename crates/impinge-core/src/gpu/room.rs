@@ -13,8 +13,8 @@ use super::layout::{
 };
 use super::open::Gpu;
 use crate::error::Error;
-use crate::impacts::Sought;
 use crate::settings::Method;
+use crate::sink::Goal;
 
 /// The number of elements that each buffer has room for. The answer never depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -338,8 +338,8 @@ impl PassCounts {
     }
 
     /// Whether a pass ends a step, however much room it had: any contact is sought, and there is one.
-    pub(super) fn answer(&self, sought: Sought) -> bool {
-        sought == Sought::Any && self.touches_by.is_some()
+    pub(super) fn answer(&self, sought: Goal) -> bool {
+        sought == Goal::Any && self.touches_by.is_some()
     }
 
     /// Compares the counts with the room that the pass had. `bytes`: the most that these buffers may take together.

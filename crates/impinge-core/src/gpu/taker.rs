@@ -1,8 +1,8 @@
 //! Where the results of passes go: pairs to the sink of a frame, the rest of a step's candidates to the host's stages.
 
 use crate::error::Error;
-use crate::impacts::Left;
 use crate::sink::Answer;
+use crate::undecided::Left;
 
 /// Takes what the device says about a part of a step. Returns whether more is wanted.
 pub(crate) type TakeLeft<'a> = dyn FnMut(Left<'_>) -> Result<bool, Error> + 'a;

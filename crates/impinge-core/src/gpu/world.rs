@@ -23,11 +23,11 @@ pub(super) use moving::{ResidentEnds, weigh as weigh_moving};
 use std::sync::Arc;
 
 use crate::error::Error;
-use crate::frame::Frame;
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::TreeShape;
 use crate::ids::BodyId;
 use crate::index::LayerIx;
+use crate::plan::Plan as Frame;
 use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::{Filter, Scene};

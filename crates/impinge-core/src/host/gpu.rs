@@ -7,17 +7,19 @@ use crate::gpu::cells::InCells;
 use crate::gpu::room::{Capacities, PassCounts};
 use crate::gpu::{Engine, Gpu, WantedAdapter};
 use crate::pairs::Pairs;
+use crate::plan::Plan;
 use crate::progress::Control;
 use crate::query::Query;
-use crate::run::{Finder, FrameLoop, Job};
+use crate::run::{Finder, Job, Runner};
 use crate::scene::Scene;
 use crate::settings::{Backend, Method, Settings};
-use crate::sink::{self, Answer, Limits};
+use crate::sink::{Answer, Goal, Limits};
 use crate::stats::Statistics;
 
 /// The frame loop around a plan of another crate.
 pub struct Host {
-    frames: FrameLoop,
+    runner: Runner,
+    pairs: Pairs,
     engine: Engine,
 }
 
@@ -45,12 +47,8 @@ impl Host {
         };
         let first = first.unwrap_or_default();
         Ok(Host {
-            frames: FrameLoop::new(
-                settings.threads,
-                settings.placement,
-                Limits::default(),
-                settings.tuning,
-            ),
+            runner: Runner::new(&settings),
+            pairs: Pairs::default(),
             engine: Engine::with_plan_of_guest(gpu, settings, first, plan),
         })
     }
@@ -68,14 +66,10 @@ impl Host {
         let gpu = Arc::clone(self.engine.gpu());
         let engine = &mut self.engine;
         let mut guest = Guest { name, engine };
-        gpu.block_on(self.frames.run(
-            scene,
-            query,
-            &Control::new(),
-            sink::Wanted::Pairs,
-            &mut guest,
-        ))?;
-        Ok((self.frames.pairs(), &self.engine.complete))
+        let plan = Plan::intersections(scene, query, Goal::All, Limits::default())?;
+        let (runner, pairs, control) = (&self.runner, &mut self.pairs, Control::new());
+        gpu.block_on(runner.run(scene, &plan, &control, &mut guest, pairs))?;
+        Ok((&self.pairs, &self.engine.complete))
     }
 }
 

@@ -48,11 +48,11 @@ impl Extent {
         }
     }
 
-    /// The box that reaches beyond this one on all sides by a margin, rounded outward.
-    pub fn inflated(&self, margin: f64) -> Self {
+    /// The box that reaches beyond this one on all sides by so much, rounded outward.
+    pub fn inflated(&self, by: f64) -> Self {
         Extent {
-            min: self.min.map(|x| (x - margin).next_down()),
-            max: self.max.map(|x| (x + margin).next_up()),
+            min: self.min.map(|x| (x - by).next_down()),
+            max: self.max.map(|x| (x + by).next_up()),
         }
     }
 

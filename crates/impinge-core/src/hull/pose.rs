@@ -9,7 +9,7 @@ pub(crate) struct Pose {
     /// The time up to which elements move, at most 1. With 0 nothing moves.
     pub until: f64,
     /// How far boxes reach beyond their contents, on all sides.
-    pub margin: f64,
+    pub inflation: f64,
     /// Whether boxes hold the whole path from the start to the end, so that both are the same.
     pub is_swept: bool,
 }
@@ -18,14 +18,14 @@ impl Pose {
     /// The whole step.
     pub const WHOLE: Pose = Pose {
         until: 1.0,
-        margin: 0.0,
+        inflation: 0.0,
         is_swept: false,
     };
 
     /// As things are at the start.
     pub const STILL: Pose = Pose {
         until: 0.0,
-        margin: 0.0,
+        inflation: 0.0,
         is_swept: false,
     };
 
@@ -37,16 +37,16 @@ impl Pose {
     pub fn up_to(until: f64) -> Pose {
         Pose {
             until,
-            margin: 0.0,
+            inflation: 0.0,
             is_swept: until <= Pose::NEARLY_STILL,
         }
     }
 
-    /// The same pose, with boxes that reach farther by a margin.
+    /// The same pose, with boxes that reach farther by so much.
     #[inline(always)]
-    pub fn with_margin(self, margin: f64) -> Pose {
+    pub fn inflated_by(self, inflation: f64) -> Pose {
         Pose {
-            margin: self.margin + margin,
+            inflation: self.inflation + inflation,
             ..self
         }
     }
@@ -107,16 +107,16 @@ impl Pose {
     }
 
     fn inflated(self, bounds: Bounds) -> Bounds {
-        if self.margin == 0.0 {
+        if self.inflation == 0.0 {
             return bounds;
         }
         Bounds {
             min: bounds
                 .min
-                .map(|x| round_down((f64::from(x) - self.margin).next_down())),
+                .map(|x| round_down((f64::from(x) - self.inflation).next_down())),
             max: bounds
                 .max
-                .map(|x| round_up((f64::from(x) + self.margin).next_up())),
+                .map(|x| round_up((f64::from(x) + self.inflation).next_up())),
         }
     }
 
@@ -175,16 +175,16 @@ impl Pose {
         }
     }
 
-    /// Ends moved outward by the margin; `outward` is 1 or -1.
+    /// Ends moved outward by the inflation; `outward` is 1 or -1.
     #[inline(always)]
     fn inflate_lanes(self, ends: &mut [f32; GROUP], outward: f32) {
-        if self.margin == 0.0 {
+        if self.inflation == 0.0 {
             return;
         }
-        let margin = round_up(self.margin);
+        let inflation = round_up(self.inflation);
         for x in ends {
-            let slack = SLACK * (x.abs() + margin) + f32::MIN_POSITIVE;
-            *x += outward * (margin + slack);
+            let slack = SLACK * (x.abs() + inflation) + f32::MIN_POSITIVE;
+            *x += outward * (inflation + slack);
         }
     }
 }
@@ -217,10 +217,10 @@ mod tests {
             x * 2f32.powi((state >> 33 & 15) as i32 - 8)
         };
         for until in [1.0, 0.5, 0.1, 1e-3, 1e-9, 0.0] {
-            for (margin, is_swept) in [(0.0, false), (0.0, true), (0.25, true), (1e-9, true)] {
+            for (inflation, is_swept) in [(0.0, false), (0.0, true), (0.25, true), (1e-9, true)] {
                 let pose = Pose {
                     until,
-                    margin,
+                    inflation,
                     is_swept,
                 };
                 for round in 0..1000 {
@@ -255,15 +255,15 @@ mod tests {
                         let [x, y] = point.map(f64::from);
                         let z = x + until * (y - x);
                         assert!(
-                            f64::from(start.min[0]) <= x - margin
-                                && x + margin <= f64::from(start.max[0])
+                            f64::from(start.min[0]) <= x - inflation
+                                && x + inflation <= f64::from(start.max[0])
                         );
                         let slack = 1e-15 * x.abs().max(y.abs());
                         assert!(
-                            f64::from(end.min[0]) <= z - margin + slack,
+                            f64::from(end.min[0]) <= z - inflation + slack,
                             "{until} {point:?} {end:?}"
                         );
-                        assert!(z + margin - slack <= f64::from(end.max[0]));
+                        assert!(z + inflation - slack <= f64::from(end.max[0]));
                     }
                 }
             }

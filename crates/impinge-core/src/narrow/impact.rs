@@ -1,9 +1,9 @@
 //! Whether two elements touch during a step, and when first.
 
 use crate::exact::{Contact, ElementPair, Point};
-use crate::frame::TestId;
 use crate::hull::Extent;
 use crate::pair_kind::PairKind;
+use crate::plan::TestId;
 
 use super::{Element, Test};
 
@@ -15,9 +15,9 @@ impl Test for FirstContact {
 
     fn extent(&self, element: Element<'_>) -> Extent {
         let extent = Extent::of(element.ends().flatten());
-        match element.frame.margin(element.layer) {
+        match element.frame.inflation(element.layer) {
             0.0 => extent,
-            margin => extent.inflated(margin),
+            inflation => extent.inflated(inflation),
         }
     }
 

@@ -2,12 +2,12 @@
 
 use crate::elements::Kind;
 use crate::exact::{self, Point};
-#[cfg(feature = "gpu")]
-use crate::frame::Frame;
-use crate::frame::TestId;
 use crate::hull::Extent;
 #[cfg(feature = "gpu")]
 use crate::index::pair_numbers;
+#[cfg(feature = "gpu")]
+use crate::plan::Plan;
+use crate::plan::TestId;
 use crate::query::SharedVertex;
 #[cfg(feature = "gpu")]
 use crate::scene::Scene;
@@ -48,7 +48,7 @@ impl Test for Intersection {
 
 /// Settles a pair, given its key.
 #[cfg(feature = "gpu")]
-pub(crate) fn settle(scene: &Scene, frame: &Frame, key: u64) -> bool {
+pub(crate) fn settle(scene: &Scene, frame: &Plan, key: u64) -> bool {
     let [a, b] = pair_numbers(key).map(|number| {
         let (layer, element) = frame.locate(number);
         let elements = frame.body(scene, layer).part(frame.layer(layer).part);

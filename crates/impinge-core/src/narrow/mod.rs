@@ -13,16 +13,16 @@ pub(crate) use impact::{FirstContact, exact_kind};
 pub(crate) use overlap::{BoxOverlap, are_near};
 pub(crate) use within::{Corners, Within};
 
-use crate::frame::{Frame, TestId};
 use crate::hull::Extent;
 use crate::index::LayerIx;
+use crate::plan::{Plan, TestId};
 use crate::scene::Scene;
 
 /// One element of one layer of a frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Element<'a> {
     pub scene: &'a Scene,
-    pub frame: &'a Frame,
+    pub frame: &'a Plan,
     /// The layer.
     pub layer: LayerIx,
     /// Its corners, as vertices of the layer's body.

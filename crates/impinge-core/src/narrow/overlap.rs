@@ -1,16 +1,14 @@
 //! Whether the boxes of two elements overlap during a step.
 
 use crate::exact::two_sum;
-use crate::frame::TestId;
 use crate::hull::Extent;
+use crate::plan::TestId;
 
 use super::{Element, Test};
 
 /// The test of [`Detector::candidates`](crate::Detector::candidates): whether the boxes over the whole step overlap once each
-/// is inflated by `distance`, so that no axis has a gap of more than twice that.
-pub(crate) struct BoxOverlap {
-    pub distance: f64,
-}
+/// is inflated by the distance that the plan says, so that no axis has a gap of more than twice that.
+pub(crate) struct BoxOverlap;
 
 impl Test for BoxOverlap {
     type Value = ();
@@ -18,15 +16,17 @@ impl Test for BoxOverlap {
     fn extent(&self, element: Element<'_>) -> Extent {
         let extent = Extent::of(element.ends().flatten());
         // Rounded outward: `settle` tests again without rounding.
-        extent.inflated(self.distance)
+        extent.inflated(element.frame.inflation(element.layer))
     }
 
     fn settle(&self, _: TestId, a: Element<'_>, b: Element<'_>) -> Option<()> {
         if a.shares_vertex(&b) {
             return None;
         }
+        // That of all layers.
+        let distance = a.frame.inflation(a.layer);
         let [a, b] = [a, b].map(|element| Extent::of(element.ends().flatten()));
-        are_near(&a, &b, self.distance).then_some(())
+        are_near(&a, &b, distance).then_some(())
     }
 }
 

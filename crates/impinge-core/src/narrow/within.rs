@@ -1,9 +1,9 @@
 //! Whether two elements are within a distance, at the positions that their bodies have.
 
 use crate::exact::{Point, elements_are_within, elements_meet};
-use crate::frame::TestId;
 use crate::hull::Extent;
 use crate::pair_kind::PairKind;
+use crate::plan::TestId;
 use crate::positions::Positions;
 
 use super::{Element, Test};
@@ -16,7 +16,7 @@ impl Test for Within {
 
     fn extent(&self, element: Element<'_>) -> Extent {
         let extent = Extent::of(element.corners().points().iter().copied());
-        extent.inflated(element.frame.margin(element.layer))
+        extent.inflated(element.frame.inflation(element.layer))
     }
 
     fn settle(&self, test: TestId, a: Element<'_>, b: Element<'_>) -> Option<()> {

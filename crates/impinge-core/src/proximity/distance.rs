@@ -24,11 +24,11 @@ use crate::error::Error;
 use crate::exact::Point;
 use crate::exact::filter::Directions64;
 use crate::exact::filter::number::Portable32;
-use crate::frame::Frame;
 use crate::grouping::bounds::round_up;
 use crate::ids::BodyId;
 use crate::index::{ElementIx, LayerIx};
 use crate::narrow::intersect;
+use crate::plan::Plan;
 use crate::positions::{Positions, check_positions};
 use crate::progress::Control;
 use crate::scene::{Body, Scene};
@@ -157,7 +157,7 @@ impl Distances {
     pub fn nearest(
         &mut self,
         scene: &Scene,
-        frame: &Frame,
+        frame: &Plan,
         workers: &Workers,
         control: &Control<'_>,
     ) -> Result<Option<Nearest>, Error> {
@@ -247,7 +247,7 @@ impl Distances {
     pub fn any(
         &mut self,
         scene: &Scene,
-        frame: &Frame,
+        frame: &Plan,
         workers: &Workers,
         control: &Control<'_>,
     ) -> Result<Option<bool>, Error> {

@@ -11,12 +11,12 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::hierarchy::{Entry, TreeShape, order};
 use crate::hull::{self, Extent};
 use crate::index::LayerIx;
 use crate::narrow::intersect;
+use crate::plan::Plan;
 use crate::scene::{Body, Scene};
 
 use super::axes::Axes;
@@ -44,7 +44,7 @@ const STALE: f64 = 1.5;
 
 impl Bodies {
     /// Brings boxes and tree up to the scene; the boxes of bodies that have not moved are kept.
-    pub fn update(&mut self, scene: &Scene, frame: &Frame) {
+    pub fn update(&mut self, scene: &Scene, frame: &Plan) {
         let n = frame.layers.len();
         let mut is_new = self.stamps.len() != n;
         let mut has_moved = is_new;

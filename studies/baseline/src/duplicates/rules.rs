@@ -3,7 +3,7 @@
 use impinge_core::cpu::cells::Rule;
 use impinge_core::cpu::kept::Kept;
 use impinge_core::cpu::subcells::Asked;
-use impinge_core::frame::{Frame, pair_key};
+use impinge_core::plan::{Plan, pair_key};
 
 use super::Possible;
 
@@ -35,7 +35,7 @@ impl Rule for Every {
 /// Tests nothing; records the key of every pair that would be tested.
 pub(super) struct Recorded<'a> {
     pub possible: Possible,
-    pub frame: &'a Frame,
+    pub frame: &'a Plan,
 }
 
 impl Rule for Recorded<'_> {

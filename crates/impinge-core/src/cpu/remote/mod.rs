@@ -29,9 +29,9 @@ mod outlook;
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::frame::Frame;
 use crate::grouping::bounds::Bounds;
 use crate::index::LayerIx;
+use crate::plan::Plan;
 use crate::run::Job;
 use crate::scene::Body;
 use crate::settings::Settings;
@@ -57,7 +57,7 @@ pub(super) enum Needed {
 }
 
 /// Whether clusters may be left out of a frame.
-pub(super) fn is_allowed(isa: Isa, frame: &Frame, settings: &Settings) -> bool {
+pub(super) fn is_allowed(isa: Isa, frame: &Plan, settings: &Settings) -> bool {
     isa.reads_runs()
         && frame.between()
         && frame.layers.len() <= MOST_BODIES
@@ -178,7 +178,7 @@ pub(super) fn learn(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker])
 }
 
 /// The layers that a layer could meet.
-fn met(frame: &Frame, layer: LayerIx) -> impl Iterator<Item = LayerIx> {
+fn met(frame: &Plan, layer: LayerIx) -> impl Iterator<Item = LayerIx> {
     let others = frame.layer_ixs().filter(move |&other| other != layer);
     others.filter(move |&other| frame.test(layer, other).is_some())
 }

@@ -10,11 +10,12 @@
 use std::sync::{Mutex, PoisonError};
 
 use crate::error::Error;
-use crate::frame::{TestId, owner_by_first};
-use crate::impacts::{Left, LeftPair, StepAnswer};
+use crate::found::StepAnswer;
 use crate::index::{LayerIx, Place};
+use crate::plan::{TestId, owner_by_first};
 use crate::run::Job;
 use crate::sink::Ending;
+use crate::undecided::{Left, LeftPair};
 
 use super::narrow::{Between, FirstContacts, Narrow};
 use super::pairing::Worker;

@@ -24,21 +24,20 @@ mod world;
 use std::sync::Arc;
 
 use crate::error::Error;
-use crate::frame::Layer;
+use crate::found::StepAnswer;
 #[cfg(feature = "gpu")]
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hubs::Hubs;
-use crate::hull::Pose;
 #[cfg(feature = "gpu")]
 use crate::ids::BodyId;
-#[cfg(feature = "gpu")]
-use crate::impacts::Left;
-use crate::impacts::StepAnswer;
 use crate::index::LayerIx;
 use crate::pair_kind::PairKind;
+use crate::plan::Layer;
 use crate::scene::Body;
 use crate::settings::InstructionSet;
 use crate::stats::Statistics;
+#[cfg(feature = "gpu")]
+use crate::undecided::Left;
 
 use super::dispatch::Tree;
 use super::met::WorkItem;
@@ -53,7 +52,6 @@ use crate::sink::Ending;
 
 use cache::{Caches, LayerCache};
 use pairing::Worker;
-pub(crate) use world::{Asked, StepTest};
 use world::{Known, World};
 
 impl<'a> SlabStages for World<'a> {
@@ -135,16 +133,15 @@ impl StepClusters {
         &mut self,
         job: Job<'_>,
         settings: &Settings,
-        (test, pose): (StepTest, Pose),
         answer: StepAnswer<'_>,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         self.scratches.resize_with(job.workers.n(), Worker::default);
         stats.n_clusters = 0;
         stats.time("clustering", |stats| self.cluster(job, stats))?;
-        stats.time("bounds", |stats| self.refit(job, settings, pose, stats))?;
+        stats.time("bounds", |stats| self.refit(job, settings, stats))?;
         for worker in &mut self.scratches {
-            worker.begin(stats.n_clusters, (test, pose), settings);
+            worker.begin(stats.n_clusters, job.frame, settings);
         }
         let held = self.bytes_besides_room();
         let known = Known::new();
@@ -156,8 +153,8 @@ impl StepClusters {
                 isa: self.isa,
                 scene: job.scene,
                 frame: job.frame,
-                pose,
-                boxes: pose,
+                pose: job.frame.sweep(),
+                boxes: job.frame.sweep(),
                 answer,
                 known: &known,
                 caches: &self.caches,
@@ -172,7 +169,7 @@ impl StepClusters {
     }
 
     /// The pairs that rounded positions may make touch, up to the earliest contact, of the last [`run`](Self::run), which looked for that
-    /// in a frame [with rounding](crate::frame::Frame::set_rounding): by kind and key, in any order. `None` if there are too many.
+    /// under a plan [with rounding](crate::plan::Plan::is_rounded): by kind and key, in any order. `None` if there are too many.
     pub fn close(&mut self) -> Option<Vec<(PairKind, u64)>> {
         let mut close = Vec::new();
         for worker in &mut self.scratches {
@@ -188,7 +185,6 @@ impl StepClusters {
         &mut self,
         job: Job<'_>,
         settings: &Settings,
-        (test, pose): (StepTest, Pose),
         answer: StepAnswer<'_>,
         stats: &mut Statistics,
         find: impl FnOnce(
@@ -205,7 +201,7 @@ impl StepClusters {
         }
         self.scratches.resize_with(job.workers.n(), Worker::default);
         for worker in &mut self.scratches {
-            worker.begin(stats.n_clusters, (test, pose), settings);
+            worker.begin(stats.n_clusters, job.frame, settings);
         }
         answer.share(self.bytes_besides_room() as u64);
         let known = Known::new();
@@ -215,8 +211,8 @@ impl StepClusters {
                 isa: self.isa,
                 scene: job.scene,
                 frame: job.frame,
-                pose,
-                boxes: pose,
+                pose: job.frame.sweep(),
+                boxes: job.frame.sweep(),
                 answer,
                 known: &known,
                 caches: &self.caches,
@@ -286,14 +282,13 @@ impl StepClusters {
         &mut self,
         job: Job<'_>,
         settings: &Settings,
-        pose: Pose,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         cache::refit(
             self.isa,
             job,
             settings,
-            pose,
+            job.frame.sweep(),
             &mut self.caches,
             &mut self.scratches,
             stats,

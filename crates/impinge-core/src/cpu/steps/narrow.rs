@@ -18,10 +18,11 @@ mod search;
 mod touching;
 
 use crate::cpu::simd::Isa;
-use crate::impacts::StepAnswer;
+use crate::found::StepAnswer;
+use crate::plan::{Plan, Question};
 use crate::tuning::Tuning;
 
-use super::world::{StepTest, World};
+use super::world::World;
 
 pub(super) use batch::{Batch, Between, Narrow, NarrowCounts};
 pub(super) use contacts::FirstContacts;
@@ -31,7 +32,7 @@ use overlaps::Overlaps;
 /// One worker's tests, of which each step needs one.
 #[derive(Debug, Default)]
 pub(super) struct Settler {
-    asked: StepTest,
+    question: Question,
     contacts: FirstContacts,
     overlaps: Overlaps,
     near: NearElements,
@@ -40,21 +41,21 @@ pub(super) struct Settler {
 
 impl Settler {
     /// Prepares for a step of `n_clusters` clusters.
-    pub fn begin(&mut self, n_clusters: u64, test: StepTest, tuning: &Tuning) {
-        self.asked = test;
+    pub fn begin(&mut self, n_clusters: u64, plan: &Plan, tuning: &Tuning) {
+        self.question = plan.question;
         self.n_candidates = 0;
-        match test {
-            StepTest::Contacts(asked) => self.contacts.begin(n_clusters, asked, tuning),
-            StepTest::Overlap { distance } => self.overlaps.begin(distance),
-            StepTest::Within => self.near.begin(),
+        match self.question {
+            Question::Contact => self.contacts.begin(n_clusters, plan, tuning),
+            Question::Overlap => self.overlaps.begin(),
+            Question::Nearness | Question::Intersection => self.near.begin(),
         }
     }
 
     fn test(&mut self) -> &mut dyn Narrow {
-        match self.asked {
-            StepTest::Contacts(_) => &mut self.contacts,
-            StepTest::Overlap { .. } => &mut self.overlaps,
-            StepTest::Within => &mut self.near,
+        match self.question {
+            Question::Contact => &mut self.contacts,
+            Question::Overlap => &mut self.overlaps,
+            Question::Nearness | Question::Intersection => &mut self.near,
         }
     }
 
@@ -65,9 +66,9 @@ impl Settler {
 
     /// Contacts after this time cannot change the answer.
     pub fn until(&self, world: World<'_>) -> f64 {
-        match self.asked {
-            StepTest::Contacts(_) => self.contacts.until(world),
-            StepTest::Overlap { .. } | StepTest::Within => world.pose.until,
+        match self.question {
+            Question::Contact => self.contacts.until(world),
+            _ => world.pose.until,
         }
     }
 
@@ -89,10 +90,10 @@ impl Settler {
     }
 
     pub fn counts(&self) -> NarrowCounts {
-        match self.asked {
-            StepTest::Contacts(_) => self.contacts.counts(),
-            StepTest::Overlap { .. } => self.overlaps.counts(),
-            StepTest::Within => self.near.counts(),
+        match self.question {
+            Question::Contact => self.contacts.counts(),
+            Question::Overlap => self.overlaps.counts(),
+            Question::Nearness | Question::Intersection => self.near.counts(),
         }
     }
 

@@ -16,17 +16,17 @@ use crate::cpu::met::{Met, Side, WorkItem};
 use crate::cpu::pairing::full;
 use crate::cpu::simd::{Isa, LaneBounds, Lanes, Masks, Simd};
 use crate::cpu::slabs::{Counts, SlabStages};
-use crate::frame::TestId;
+use crate::found::StepAnswer;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
 use crate::hull::Pose;
-use crate::impacts::StepAnswer;
 use crate::index::{ClusterIx, LayerIx, Number};
+use crate::plan::{Plan, Question, TestId};
 use crate::settings::Settings;
 
 use super::group::Group;
 use super::narrow::{Batch, Between, NarrowCounts, Settler};
-use super::world::{StepTest, World};
+use super::world::World;
 
 /// The narrow stage is timed for one work item in this many.
 const SAMPLED: u32 = 16;
@@ -74,14 +74,14 @@ impl Default for Worker {
 
 impl Worker {
     /// Prepares for a step of `n_clusters` clusters.
-    pub fn begin(&mut self, n_clusters: u64, (test, pose): (StepTest, Pose), settings: &Settings) {
+    pub fn begin(&mut self, n_clusters: u64, plan: &Plan, settings: &Settings) {
         self.groups.begin::<World<'_>>(n_clusters, settings);
         self.directions.begin::<World<'_>>(n_clusters, settings);
-        self.is_still = matches!(test, StepTest::Within);
-        self.pose = pose;
+        self.is_still = plan.question == Question::Nearness;
+        self.pose = plan.sweep();
         self.shorter_from = settings.tuning.step_shorter_from;
         self.n_shortened = 0;
-        self.settler.begin(n_clusters, test, &settings.tuning);
+        self.settler.begin(n_clusters, plan, &settings.tuning);
         self.n_settled = 0;
         self.busy = Duration::ZERO;
     }

@@ -4,37 +4,17 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::cpu::directions::Placed;
 use crate::cpu::simd::Isa;
-use crate::frame::Frame;
+use crate::found::StepAnswer;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::hull::{Hull, Pose};
-use crate::impacts::{Sought, StepAnswer};
 use crate::index::{ClusterIx, LayerIx};
+use crate::plan::Plan;
 use crate::positions::Positions;
 use crate::scene::Scene;
-use crate::step::{Start, Toi};
+use crate::sink::Goal;
 
 use super::cache::{Caches, LayerCache};
-
-/// The test of the pairs of a step.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) enum StepTest {
-    /// Whether boxes overlap when inflated by a distance.
-    Overlap { distance: f64 },
-    /// Whether elements are within the distance that the frame says, at the start.
-    #[default]
-    Within,
-    /// When elements touch first, or come within the distance that the frame says.
-    Contacts(Asked),
-}
-
-/// What is asked about contacts.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Asked {
-    pub sought: Sought,
-    pub start: Start,
-    pub toi: Toi,
-}
 
 /// What is known of the answer while workers look for it.
 #[derive(Debug)]
@@ -62,14 +42,14 @@ impl Known {
         f64::from_bits(self.earliest.load(Ordering::Relaxed))
     }
 
-    pub fn found(&self, sought: Sought, time: f64) {
-        match sought {
+    pub fn found(&self, goal: Goal, time: f64) {
+        match goal {
             // The bits of nonnegative numbers are ordered as the numbers are.
-            Sought::Earliest => {
+            Goal::Earliest => {
                 self.earliest.fetch_min(time.to_bits(), Ordering::Relaxed);
             }
-            Sought::Any => self.is_over.store(true, Ordering::Relaxed),
-            Sought::All => {}
+            Goal::Any => self.is_over.store(true, Ordering::Relaxed),
+            Goal::All | Goal::Count | Goal::Lowest { .. } => {}
         }
     }
 }
@@ -79,7 +59,7 @@ impl Known {
 pub(crate) struct World<'a> {
     pub isa: Isa,
     pub scene: &'a Scene,
-    pub frame: &'a Frame,
+    pub frame: &'a Plan,
     /// The part of the step that is examined. Never longer than the part that the clusters' boxes cover.
     pub pose: Pose,
     /// The part of the step that the clusters' boxes cover.
@@ -114,7 +94,7 @@ impl<'a> World<'a> {
         }
         // They are inflated already.
         let pose = Pose {
-            margin: 0.0,
+            inflation: 0.0,
             ..self.pose
         };
         pose.close(ends)

@@ -13,7 +13,6 @@ use std::sync::Arc;
 use super::{MOST_PRIMITIVES, SLACK, World, put_words, sample, words};
 use crate::elements::Part;
 use crate::error::Error;
-use crate::frame::{Frame, Layer};
 use crate::gpu::buffers::count;
 use crate::gpu::forest::Forest;
 use crate::gpu::layout::{
@@ -24,6 +23,7 @@ use crate::gpu::topology::{DeviceClusters, Weight};
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::TreeShape;
 use crate::ids::BodyId;
+use crate::plan::{Layer, Plan as Frame};
 use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::{self, Filter, Scene};

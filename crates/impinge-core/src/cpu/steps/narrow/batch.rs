@@ -3,12 +3,12 @@
 use crate::cpu::met::{Met, WorkItem};
 use crate::cpu::simd::Isa;
 use crate::exact::{ElementPair, Point, Reach};
-use crate::frame::{TestId, pair_key};
+use crate::found::{KeysByKind, StepAnswer};
 use crate::grouping::bounds::{round_down, round_up};
-use crate::impacts::{KeysByKind, StepAnswer};
 use crate::index::{LayerIx, Number, Place};
 use crate::narrow::exact_kind;
 use crate::pair_kind::PairKind;
+use crate::plan::{TestId, pair_key};
 use crate::positions::Positions;
 use crate::sink::BLOCK;
 

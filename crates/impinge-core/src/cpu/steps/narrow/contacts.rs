@@ -4,13 +4,15 @@ use crate::cpu::narrow::room_to_wait;
 use crate::cpu::simd::Isa;
 use crate::exact::filter::{Search, time_between};
 use crate::exact::{Contact, ElementPair};
-use crate::impacts::{Found, FoundByKind, Sought, StepAnswer};
+use crate::found::{Found, FoundByKind, StepAnswer};
 use crate::pair_kind::PairKind;
+use crate::plan::Plan;
 use crate::sink::BLOCK;
+use crate::sink::Goal;
 use crate::step::{Start, Toi};
 use crate::tuning::Tuning;
 
-use super::super::world::{Asked, World};
+use super::super::world::World;
 use super::batch::{Between, Narrow, NarrowCounts, Places, counts, key, points};
 
 /// The most pairs of one worker that are settled last.
@@ -29,7 +31,9 @@ pub(super) struct Open {
 /// Contacts found, and open pairs.
 #[derive(Debug, Default)]
 pub(crate) struct FirstContacts {
-    pub(super) asked: Asked,
+    pub(super) goal: Goal,
+    start: Start,
+    toi: Toi,
     /// Contacts found, handed over in blocks.
     found: FoundByKind,
     pub(super) counts: NarrowCounts,
@@ -57,8 +61,8 @@ pub(crate) struct FirstContacts {
 
 impl FirstContacts {
     /// Prepares for a step.
-    pub fn begin(&mut self, n_clusters: u64, asked: Asked, tuning: &Tuning) {
-        self.asked = asked;
+    pub fn begin(&mut self, n_clusters: u64, plan: &Plan, tuning: &Tuning) {
+        (self.goal, self.start, self.toi) = (plan.goal, plan.start, plan.toi);
         self.most_close = MOST_CLOSE.max(2 * n_clusters as usize);
         self.full = tuning.settle_from;
         self.counts = NarrowCounts::default();
@@ -92,26 +96,26 @@ impl FirstContacts {
     /// Whether only the earliest contacts are wanted.
     #[cfg(feature = "gpu")]
     pub fn seeks_earliest(&self) -> bool {
-        matches!(self.asked.sought, Sought::Earliest)
+        matches!(self.goal, Goal::Earliest)
     }
 
     /// Notes that some pair touches after the start and before this time.
     #[cfg(feature = "gpu")]
     pub fn found_by(&self, world: World<'_>, time: f32) {
-        world.known.found(self.asked.sought, f64::from(time));
+        world.known.found(self.goal, f64::from(time));
     }
 
     /// Contacts later than this are not wanted.
     #[inline(always)]
     pub fn until(&self, world: World<'_>) -> f64 {
-        match self.asked.sought {
+        match self.goal {
             // Contacts that are later by less than rounding are wanted, for their keys may be lower.
-            Sought::Earliest => {
+            Goal::Earliest => {
                 let time = world.known.earliest();
                 let later = (time * (1.0 + 2f64.powi(-22))).max(f64::from(f32::MIN_POSITIVE));
                 later.min(1.0)
             }
-            Sought::All | Sought::Any => 1.0,
+            _ => 1.0,
         }
     }
 
@@ -151,7 +155,7 @@ impl FirstContacts {
         pair: ElementPair,
         places: Places,
     ) {
-        let waits = self.asked.sought != Sought::All && !self.is_last;
+        let waits = self.goal != Goal::All && !self.is_last;
         if waits && self.unsure.len() < MOST_UNSURE {
             self.unsure.push((between, places));
         } else {
@@ -206,13 +210,13 @@ impl FirstContacts {
         places: Places,
         contact: Contact,
     ) {
-        if self.asked.start == Start::Skip && contact.at_start {
+        if self.start == Start::Skip && contact.at_start {
             return;
         }
         if contact.time > self.until(world) || !counts(world, between, places) {
             return;
         }
-        world.known.found(self.asked.sought, contact.time);
+        world.known.found(self.goal, contact.time);
         self.push(world, between, places, contact);
     }
 
@@ -241,9 +245,9 @@ impl FirstContacts {
             return;
         }
         // Other pairs need not be searched beyond this time.
-        world.known.found(self.asked.sought, span[1]);
-        let time = match (self.asked.sought, self.asked.toi) {
-            (Sought::Any, _) => Some(span[0]),
+        world.known.found(self.goal, span[1]);
+        let time = match (self.goal, self.toi) {
+            (Goal::Any, _) => Some(span[0]),
             (_, Toi::F32) => time_between(span).map(f64::from),
             (_, Toi::F64) => None,
         };

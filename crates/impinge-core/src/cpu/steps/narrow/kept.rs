@@ -5,7 +5,7 @@
 //! approach  one pair at a time in f64: what the pair keeps, and when it is that near, nearly always to all bits of an f32
 //! ```
 //!
-//! Reason for each discard: no pair keeps more than the bound of the frame (`Frame::bound`).
+//! Reason for each discard: no pair keeps more than the bound of the frame (`Plan::bound`).
 
 use crate::cpu::simd::{Lanes, Simd};
 use crate::exact::filter::{self, BATCH};

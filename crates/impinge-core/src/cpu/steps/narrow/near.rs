@@ -8,7 +8,7 @@ use crate::cpu::simd::{Isa, Lanes, Simd, dispatch};
 use crate::elements::Elements;
 use crate::exact::filter::{self, BATCH, LARGEST_F32};
 use crate::exact::{Reach, are_within_certainly, elements_meet, unsure_are_within};
-use crate::impacts::StepAnswer;
+use crate::found::StepAnswer;
 use crate::index::pair_key;
 use crate::narrow::Corners;
 use crate::near::Labels;

@@ -6,9 +6,9 @@ use crate::cpu::simd::{Isa, LaneBounds, Simd, dispatch};
 use crate::elements::Elements;
 use crate::exact::filter::BATCH;
 use crate::exact::filter::number::Lookup;
+use crate::found::StepAnswer;
 use crate::grouping::bounds::round_up;
 use crate::hull::{Extent, Hull};
-use crate::impacts::StepAnswer;
 use crate::index::Place;
 use crate::narrow::are_near;
 
@@ -19,15 +19,12 @@ use super::batch::{Batch, Keys, Narrow, NarrowCounts, key_in};
 /// The test of one worker.
 #[derive(Debug, Default)]
 pub(super) struct Overlaps {
-    /// By how much boxes are inflated.
-    distance: f64,
     keys: Keys,
 }
 
 impl Overlaps {
     /// Prepares for a step.
-    pub fn begin(&mut self, distance: f64) {
-        self.distance = distance;
+    pub fn begin(&mut self) {
         self.keys.begin();
     }
 
@@ -38,7 +35,8 @@ impl Overlaps {
 
 impl Narrow for Overlaps {
     fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
-        if batch.rounded() > 0.0 || self.distance > 0.0 || world.frame.has_cell() {
+        let inflation = world.frame.inflation(batch.between.a);
+        if batch.rounded() > 0.0 || inflation > 0.0 || world.frame.has_cell() {
             return dispatch!(isa, take, (
                 overlaps: &mut Overlaps = self,
                 world: World<'_> = world,
@@ -64,7 +62,9 @@ impl Narrow for Overlaps {
 
 #[inline(always)]
 fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: World<'_>, batch: Batch<'_>) {
-    let (distance, between) = (overlaps.distance, batch.between);
+    let between = batch.between;
+    // That of all layers.
+    let distance = world.frame.inflation(between.a);
     let boxes = batch.groups.map(|group| &group.start);
     let farther_out = farther_out(batch.groups, distance);
     let sides = [between.a, between.b].map(|layer| LayerSide {

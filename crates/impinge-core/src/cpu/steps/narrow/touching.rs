@@ -16,13 +16,13 @@ use crate::cpu::met::Met;
 use crate::cpu::simd::{Isa, Simd, dispatch};
 use crate::exact::ElementPair;
 use crate::exact::filter::{self, BATCH, Moving64, Search};
+use crate::found::StepAnswer;
 use crate::grouping::bounds::round_up;
-#[cfg(feature = "gpu")]
-use crate::impacts::Sought;
-use crate::impacts::StepAnswer;
 use crate::pair_kind::PairKind;
 #[cfg(feature = "gpu")]
 use crate::positions::Positions;
+#[cfg(feature = "gpu")]
+use crate::sink::Goal;
 
 use super::super::world::World;
 #[cfg(feature = "gpu")]
@@ -162,7 +162,7 @@ impl FirstContacts {
             matches!(body.positions(), Positions::F32(_))
         });
         // Over the whole step, the device has taken the filter's first step for positions in single precision.
-        self.is_first = !are_single || matches!(self.asked.sought, Sought::Earliest);
+        self.is_first = !are_single || matches!(self.goal, Goal::Earliest);
         for (places, free_until, touches_by) in pairs {
             let until = self.until(world);
             // Meanwhile another pair was found to touch before.

@@ -2,18 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use crate::detector::Detector;
+use super::Detector;
 use crate::error::Error;
-use crate::frame::Ask;
 use crate::gpu::ResidentStep;
 use crate::ids::BodyId;
+use crate::plan::Plan;
 use crate::progress::Control;
 use crate::run::Job;
 use crate::scene::Scene;
+use crate::sink::Goal;
 use crate::stats::Statistics;
 use crate::step::Step;
-
-use super::StepMemory;
 
 impl Detector {
     /// Encodes a whole step into the caller's encoder: positions at the start and at the end come from buffers on the device,
@@ -78,21 +77,18 @@ impl Detector {
                 found: "this detector works on the CPU".to_owned(),
             });
         };
-        let StepMemory {
-            frame, clusters, ..
-        } = &mut self.steps;
-        frame.resolve_for(scene, &step.query, Ask::Impacts)?;
-        frame.set_reach(0.0, &BTreeMap::new());
-        frame.check(scene)?;
+        let plan = Plan::contacts(scene, step, Goal::All, self.settings.limits())?;
+        plan.check(scene)?;
         let job = Job {
             scene,
-            frame,
-            workers: self.frames.workers(),
+            frame: &plan,
+            workers: self.runner.workers(),
             control: &Control::new(),
         };
         let resident: BTreeMap<BodyId, &wgpu::Buffer> = starts.iter().copied().collect();
         let is_resident = |body| resident.contains_key(&body);
         let stats = &mut Statistics::default();
+        let clusters = &mut self.steps.clusters;
         let clusterings = clusters.clusterings(job, &self.settings, is_resident, stats)?;
         let engine = engine.for_steps();
         engine.encode_step(job, &clusterings, [starts, ends], encoder)

@@ -6,50 +6,62 @@
 
 use std::ops::ControlFlow;
 
-use crate::clock::Instant;
-use crate::cpu::steps::{StepClusters, StepTest};
-use crate::detector::Detector;
+use super::Detector;
+use super::in_step::{InStep, Keys, Seen};
+use crate::candidates::Candidates;
 use crate::error::Error;
-use crate::frame::{Ask, Frame, TestId};
-use crate::hull::Pose;
-use crate::impacts::{Candidates, KeyAnswer, StepAnswer};
+use crate::found::KeysByKind;
 use crate::key_ranges::{KeyRanges, Run, Tally};
-use crate::naive;
-use crate::narrow::BoxOverlap;
+use crate::plan::Plan;
 use crate::progress::Control;
-use crate::run::Job;
+use crate::run::{Runner, ready};
 use crate::scene::Scene;
-use crate::settings::{Method, Settings};
-use crate::sink::{self, BLOCK, Ending, Limits, Wanted};
-use crate::sort::Sorter;
-use crate::stats::Statistics;
+#[cfg(doc)]
+use crate::settings::Settings;
+use crate::sink::{self, BLOCK, Limits};
 use crate::step::CandidateQuery;
-use crate::workers::Workers;
 
-use super::{StepMemory, begin};
-
-/// The question about candidates.
-#[derive(Clone, Copy)]
-struct Question<'a> {
-    settings: &'a Settings,
+/// A search for candidates, run by run.
+struct RunSearch<'a> {
     scene: &'a Scene,
-    distance: f64,
+    /// The whole question.
+    plan: &'a Plan,
     control: &'a Control<'a>,
-    workers: &'a Workers,
-}
-
-/// A question, and what the search for its candidates needs.
-pub(super) struct RunSearch<'a> {
-    question: Question<'a>,
-    frame: &'a mut Frame,
-    clusters: &'a mut StepClusters,
-    answer: &'a mut KeyAnswer,
-    sorter: &'a mut Sorter,
-    /// When the search for the current candidates began.
-    start: Instant,
+    runner: &'a Runner,
+    finder: InStep<'a>,
 }
 
 impl Detector {
+    /// Pairs of elements whose boxes overlap during a step, each box inflated by a distance: for callers with their own test.
+    /// Sorted and complete. Always found on the CPU. [`candidates_in_runs`](Detector::candidates_in_runs) gives them piece by
+    /// piece, for answers larger than memory.
+    ///
+    /// # Errors
+    /// As [`impacts`](Detector::impacts), and a distance that is negative or not finite.
+    pub fn candidates(
+        &mut self,
+        scene: &Scene,
+        query: &CandidateQuery,
+    ) -> Result<&Candidates, Error> {
+        self.candidates_with(scene, query, &Control::new())
+    }
+
+    /// [`candidates`](Detector::candidates) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `candidates`, and [`Error::Cancelled`].
+    pub fn candidates_with(
+        &mut self,
+        scene: &Scene,
+        query: &CandidateQuery,
+        control: &Control<'_>,
+    ) -> Result<&Candidates, Error> {
+        let plan = Plan::candidates(scene, query, self.settings.limits())?;
+        let (mut search, candidates) = self.search(scene, &plan, control);
+        search.find(&plan, Keys::All, candidates)?;
+        Ok(&self.steps.candidates)
+    }
+
     /// All [`candidates`](Detector::candidates) of a query in sorted runs of at most `most` candidates, one after the other, so that
     /// never more than one run is held. Returns how many candidates there are.
     ///
@@ -115,12 +127,13 @@ impl Detector {
             });
         }
         let limits = self.settings.limits();
-        let (mut search, candidates) = self.search(scene, query, control)?;
         let at_once = Limits {
             max_pairs: Some(most.min(limits.max_pairs.unwrap_or(most))),
             ..limits
         };
-        match search.find_all(candidates, at_once) {
+        let plan = Plan::candidates(scene, query, at_once)?;
+        let (mut search, candidates) = self.search(scene, &plan, control);
+        match search.find(&plan, Keys::All, candidates) {
             Ok(0) => return Ok(ControlFlow::Continue(0)),
             Ok(n) => return Ok(each(std::mem::take(candidates)).map_continue(|()| n)),
             Err(Error::TooManyPairs { limit, .. }) if limits.max_pairs != Some(limit) => {}
@@ -128,8 +141,7 @@ impl Detector {
             Err(Error::MemoryBudget { .. }) => {}
             Err(error) => return Err(error),
         }
-        let whole = KeyRanges::new(search.frame, query.kinds);
-        let tally = search.count(candidates, whole)?;
+        let tally = search.count(candidates, KeyRanges::new(&plan, query.kinds))?;
         let n = tally.total();
         if let Some(limit) = limits.max_pairs
             && n > limit
@@ -142,71 +154,74 @@ impl Detector {
             .map_continue(|()| n))
     }
 
-    /// Resolves a question about candidates.
-    pub(super) fn search<'a>(
+    fn search<'a>(
         &'a mut self,
         scene: &'a Scene,
-        query: &CandidateQuery,
+        plan: &'a Plan,
         control: &'a Control<'a>,
-    ) -> Result<(RunSearch<'a>, &'a mut Candidates), Error> {
-        let start = Instant::now();
-        query.check()?;
-        let StepMemory {
-            frame,
-            candidates,
-            clusters,
-            keys,
-            sorter,
-            ..
-        } = &mut self.steps;
-        frame.resolve_for(scene, &query.query, Ask::Candidates(query.kinds))?;
-        candidates.begin(frame);
-        frame.check(scene)?;
+    ) -> (RunSearch<'a>, &'a mut Candidates) {
         let search = RunSearch {
-            question: Question {
+            scene,
+            plan,
+            control,
+            runner: &self.runner,
+            finder: InStep {
+                clusters: &mut self.steps.clusters,
                 settings: &self.settings,
-                scene,
-                distance: query.distance,
-                control,
-                workers: self.frames.workers(),
+                #[cfg(feature = "gpu")]
+                gpu: &mut self.gpu,
+                keys: Keys::All,
+                seen: Seen::default(),
             },
-            frame,
-            clusters,
-            answer: keys,
-            sorter,
-            start,
         };
-        Ok((search, candidates))
+        (search, &mut self.steps.candidates)
+    }
+
+    /// Moves the candidates found last out of the detector, without a copy. It holds none until the next question.
+    pub fn take_candidates(&mut self) -> Candidates {
+        std::mem::take(&mut self.steps.candidates)
+    }
+
+    /// Takes back candidates that are no longer needed: the next answer uses their memory. New memory for millions of
+    /// candidates costs a tenth of the time to find them.
+    pub fn reuse_candidates(&mut self, candidates: Candidates) {
+        self.steps.candidates = candidates;
     }
 }
 
 impl RunSearch<'_> {
-    /// Finds all candidates within some limits. Returns how many there are.
-    pub fn find_all(&mut self, candidates: &mut Candidates, limits: Limits) -> Result<u64, Error> {
-        let (keys, stats) = candidates.parts_mut();
-        self.answer
-            .begin(limits, Wanted::Pairs, std::mem::take(keys));
-        let handed_over = StepAnswer::Keys(self.answer);
-        self.question
-            .run(self.frame, self.clusters, handed_over, stats)?;
-        self.finish(candidates)
+    /// Finds some of the candidates, or counts them. Returns how many were found.
+    fn find<'b>(
+        &'b mut self,
+        plan: &Plan,
+        keys: Keys<'b>,
+        candidates: &mut Candidates,
+    ) -> Result<u64, Error> {
+        let mut finder = InStep {
+            clusters: &mut *self.finder.clusters,
+            settings: self.finder.settings,
+            #[cfg(feature = "gpu")]
+            gpu: &mut *self.finder.gpu,
+            keys,
+            seen: Seen::default(),
+        };
+        ready(
+            self.runner
+                .run(self.scene, plan, self.control, &mut finder, candidates),
+        )
     }
 
     /// Counts the candidates in some ranges.
     fn count(&mut self, candidates: &mut Candidates, ranges: KeyRanges) -> Result<Tally, Error> {
-        candidates.begin(self.frame);
-        self.frame.ask_for(ranges.kinds());
+        let plan = self.plan.of_kinds(ranges.kinds());
         let tally = Tally::new(ranges)?;
-        let (_, stats) = candidates.parts_mut();
-        let counted = StepAnswer::Counts(&tally);
-        self.question
-            .run(self.frame, self.clusters, counted, stats)?;
+        self.find(&plan, Keys::Counted(&tally), candidates)?;
         Ok(tally)
     }
 
     /// How long a run may be, after candidates were counted.
     fn most_within_budget(&self, candidates: &Candidates, most: u64) -> Result<u64, Error> {
-        let Some(budget) = self.question.settings.memory_budget else {
+        let Some(budget) = self.finder.settings.memory_budget else {
             return Ok(most);
         };
         let each = size_of::<u64>() as u64;
@@ -235,10 +250,8 @@ impl RunSearch<'_> {
                 let tally = self.count(candidates, run.ranges)?;
                 self.hand_over(candidates, &tally, most, each)?
             } else {
-                self.find(candidates, &run)?;
-                let flow = each(std::mem::take(candidates));
-                self.start = Instant::now();
-                flow
+                self.find_run(candidates, &run)?;
+                each(std::mem::take(candidates))
             };
             if flow.is_break() {
                 return Ok(flow);
@@ -248,92 +261,15 @@ impl RunSearch<'_> {
     }
 
     /// Finds the candidates of one run, whose numbers are known.
-    fn find(&mut self, candidates: &mut Candidates, run: &Run) -> Result<(), Error> {
-        candidates.begin(self.frame);
-        self.frame.ask_for(run.ranges.kinds());
-        let (keys, stats) = candidates.parts_mut();
-        for (keys, &n) in keys.iter_mut().zip(&run.counts) {
-            *keys = sink::room(n as usize, "candidates")?;
-        }
+    fn find_run(&mut self, candidates: &mut Candidates, run: &Run) -> Result<(), Error> {
         // They fit into the memory budget.
-        self.answer
-            .begin(Limits::default(), Wanted::Pairs, std::mem::take(keys));
-        let handed_over = StepAnswer::KeysIn(self.answer, &run.ranges);
-        self.question
-            .run(self.frame, self.clusters, handed_over, stats)?;
-        self.finish(candidates)?;
-        Ok(())
-    }
-
-    /// Takes over what was found, and sorts it. Returns how many candidates there are.
-    fn finish(&mut self, candidates: &mut Candidates) -> Result<u64, Error> {
-        let (keys, _) = candidates.parts_mut();
-        let n;
-        (*keys, n) = self.answer.finish()?;
-        let collect = Instant::now();
-        let workers = self.question.workers;
-        let n_counted = self.sorter.sort_kinds(keys, self.frame, workers);
-        let ms = collect.elapsed().as_secs_f64() * 1e3;
-        let bytes = candidates.bytes() + self.sorter.bytes();
-        let (_, stats) = candidates.parts_mut();
-        stats.add_ms("collect", ms);
-        stats.ways.n_counted = n_counted;
-        workers.report(&mut stats.ways);
-        stats.bytes_held += bytes;
-        stats.total_ms = self.start.elapsed().as_secs_f64() * 1e3;
-        Ok(n)
-    }
-}
-
-impl Question<'_> {
-    /// Hands over the keys of all candidates that the frame asks for.
-    fn run(
-        &self,
-        frame: &Frame,
-        clusters: &mut StepClusters,
-        answer: StepAnswer<'_>,
-        stats: &mut Statistics,
-    ) -> Result<(), Error> {
-        let Question {
-            settings,
-            scene,
-            distance,
-            control,
-            workers,
-        } = *self;
-        begin(stats, settings, workers.n());
-        let _shift = workers.shift(frame.n_primitives());
-        if settings.method == Method::Naive {
-            let mut block = Vec::new();
-            return naive::run(
-                &BoxOverlap { distance },
-                scene,
-                frame,
-                control,
-                stats,
-                |test, key, ()| {
-                    if let TestId::Elements(kind) = test
-                        && frame.is_owned(scene, key)
-                    {
-                        block.push(key);
-                        answer.take_keys(kind, &mut block);
-                    }
-                    answer.check()
-                },
-            );
+        let plan = self.plan.of_kinds(run.ranges.kinds());
+        let mut rooms = KeysByKind::default();
+        for (room, &n) in rooms.iter_mut().zip(&run.counts) {
+            *room = sink::room(n as usize, "candidates")?;
         }
-        let job = Job {
-            scene,
-            frame,
-            workers,
-            control,
-        };
-        let pose = Pose {
-            until: 1.0,
-            margin: distance,
-            is_swept: true,
-        };
-        let asked = (StepTest::Overlap { distance }, pose);
-        clusters.run(job, settings, asked, answer, stats)
+        candidates.put_rooms(rooms);
+        self.find(&plan, Keys::In(&run.ranges), candidates)?;
+        Ok(())
     }
 }

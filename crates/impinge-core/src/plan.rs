@@ -1,4 +1,7 @@
-//! A query resolved for one scene: which layers take part, in what order, which of them meet and under which test.
+//! What a question asks, resolved for one scene: which layers take part, in what order, which of them meet and under which
+//! test, how elements move, what of the pairs is wanted, and within which limits.
+//!
+//! A plan is made from a scene and a query, by one function per question, and never changes.
 //!
 //! A *layer* is a part of a body whose elements are of one kind. For intersections each body has one layer: the
 //! elements that it was given as. For steps it has up to three: its edges, its vertices and its faces.
@@ -17,6 +20,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
+use crate::clock::Instant;
 use crate::elements::{Kind, Part};
 use crate::error::Error;
 use crate::exact::{Contact, ElementPair, Keep, Point, Reach};
@@ -28,7 +32,8 @@ use crate::pair_kind::{PairKind, PairKinds};
 use crate::positions::{Positions, check_positions};
 use crate::query::{Cell, Query, Scope, SharedVertex};
 use crate::scene::{Body, Filter, Scene};
-use crate::step::PairFilter;
+use crate::sink::{Goal, Limits};
+use crate::step::{CandidateQuery, PairFilter, Start, Step, Toi};
 
 /// One part of one body that takes part in a frame.
 #[derive(Debug, Clone, Copy)]
@@ -51,7 +56,7 @@ pub struct Layer {
     pub(crate) is_points: bool,
     filter: Filter,
     /// How thick the body is: what its elements add to the distance that is asked.
-    radius: f64,
+    thickness: f64,
     /// How far vertices may be from their ways, because positions on these are rounded.
     rounded: f64,
 }
@@ -77,27 +82,39 @@ impl Layer {
 
 /// The question about pairs of elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Ask {
+pub enum Question {
     /// Whether elements that bodies were given as share a point.
     #[default]
-    Intersections,
-    /// Whether and when vertices, edges and faces touch during a step.
-    Impacts,
-    /// Which vertices, edges and faces are near each other: the kinds of [`Impacts`](Ask::Impacts), and edges that meet faces.
-    Near,
+    Intersection,
+    /// Whether and when vertices, edges and faces first touch during a step, or come as near as they may.
+    Contact,
+    /// Which vertices, edges and faces are within a distance, at the positions that bodies have.
+    Nearness,
     /// Which vertices, edges and faces have boxes that overlap during a step.
-    Candidates(PairKinds),
+    Overlap,
 }
 
-impl Ask {
+impl Question {
     /// The parts of bodies that take part, in the order of their layers. In this order, the lower number of a pair belongs to
     /// the element that its kind names first: edges come before vertices, and vertices before faces.
     fn parts(self) -> &'static [Part] {
         match self {
-            Ask::Intersections => &[Part::Given],
-            Ask::Impacts | Ask::Near | Ask::Candidates(_) => {
+            Question::Intersection => &[Part::Given],
+            Question::Contact | Question::Nearness | Question::Overlap => {
                 &[Part::Edges, Part::Vertices, Part::Faces]
             }
+        }
+    }
+
+    /// What of a step is examined.
+    fn sweep(self) -> Pose {
+        match self {
+            Question::Intersection | Question::Nearness => Pose::STILL,
+            Question::Contact => Pose::WHOLE,
+            Question::Overlap => Pose {
+                is_swept: true,
+                ..Pose::WHOLE
+            },
         }
     }
 }
@@ -111,20 +128,22 @@ pub enum TestId {
     Elements(PairKind),
 }
 
-/// Layers and rules; the memory is kept from frame to frame.
-#[derive(Debug, Default)]
-pub struct Frame {
+/// What a question asks. See the [module](self).
+#[derive(Debug, Clone)]
+pub struct Plan {
     /// Part after part, in slot order.
     pub layers: Vec<Layer>,
     /// The question about pairs.
-    pub ask: Ask,
+    pub question: Question,
+    /// The kinds of pairs, if the query names them.
+    kinds: Option<PairKinds>,
     /// The adjacency rule of self-collision.
     pub shared_vertex: SharedVertex,
     between: bool,
     ignored: BTreeSet<(BodyId, BodyId)>,
     cell: Option<Cell>,
-    /// Whether the question is about a step, not about the positions at its start.
-    is_step: bool,
+    /// What of a step is examined. Boxes are inflated besides, see [`pose`](Plan::pose).
+    sweep: Pose,
     /// The distance within which elements are near, besides what their bodies add.
     distance: f64,
     /// What the elements of a step keep, at most: the distance, and a clearance if there is one.
@@ -132,33 +151,184 @@ pub struct Frame {
     keep: Keep,
     /// Which pairs of a step count.
     filter: Option<PairFilter>,
+    /// What happens to pairs that touch at the start of a step.
+    pub(crate) start: Start,
+    /// The precision of times.
+    pub(crate) toi: Toi,
+    /// What of the pairs is wanted.
+    pub goal: Goal,
+    /// What the answer may be.
+    pub limits: Limits,
+    /// When the question was asked.
+    pub since: Instant,
 }
 
-impl Frame {
-    /// Resolves a query for intersections. Positions that were written in place are not checked yet.
-    pub fn resolve(&mut self, scene: &Scene, query: &Query) -> Result<(), Error> {
-        self.resolve_for(scene, query, Ask::Intersections)
+impl Plan {
+    /// The question which elements intersect. Positions that were written in place are not checked yet.
+    ///
+    /// # Errors
+    /// A stale id, one body twice, a cell without room, too many elements.
+    pub fn intersections(
+        scene: &Scene,
+        query: &Query,
+        goal: Goal,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        let limits = match goal {
+            // Any number of pairs is allowed.
+            Goal::Any => Limits {
+                max_pairs: None,
+                ..limits
+            },
+            _ => limits,
+        };
+        Plan::of(scene, query, Question::Intersection, goal, limits)
     }
 
-    /// Resolves a query for any question.
-    pub fn resolve_for(&mut self, scene: &Scene, query: &Query, ask: Ask) -> Result<(), Error> {
-        self.layers.clear();
-        self.distance = 0.0;
-        self.bound = 0.0;
-        self.keep = Keep::default();
-        self.filter = None;
-        self.ask = ask;
-        // Vertices, edges and faces that share a vertex never count.
-        self.shared_vertex = match ask {
-            Ask::Intersections => query.shared_vertex,
-            Ask::Impacts | Ask::Near | Ask::Candidates(_) => SharedVertex::Skip,
+    /// The question about the contacts of a step.
+    pub(crate) fn contacts(
+        scene: &Scene,
+        step: &Step,
+        goal: Goal,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        Plan::of_step(scene, step, step.keep(), goal, limits)
+    }
+
+    /// The question how far a step can be taken: about its earliest contact, at a time in `f64`, or in `f32` if elements keep a
+    /// clearance. With one, rounding is part of what they keep. Without, `with_close` makes it a question about all ways that end
+    /// at rounded positions, at any time of the step.
+    pub(crate) fn advance(
+        scene: &Scene,
+        step: &Step,
+        with_close: bool,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        let keep = Keep {
+            is_rounded: true,
+            ..step.keep()
         };
-        self.cell = query.cell;
-        self.is_step = ask != Ask::Intersections;
-        self.check_cell()?;
-        if self.ignored != query.ignored {
-            self.ignored.clone_from(&query.ignored);
+        let has_clearance = !keep.is_plain();
+        let keep = if has_clearance { keep } else { step.keep() };
+        let mut plan = Plan::of_step(scene, step, keep, Goal::Earliest, limits)?;
+        // With a clearance, a time in single precision is as good, and settled by filters.
+        plan.toi = if has_clearance { Toi::F32 } else { Toi::F64 };
+        if !has_clearance && step.separation == 0.0 && with_close {
+            plan.round(scene);
         }
+        Ok(plan)
+    }
+
+    /// The question which elements touch on the way to the end positions of a scene, which are those at a fraction of a step. Times
+    /// are not needed.
+    pub(crate) fn trial(
+        scene: &Scene,
+        step: &Step,
+        fraction: f64,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        let plan = Plan::of_step(scene, step, step.keep(), Goal::All, limits)?;
+        Ok(Plan {
+            sweep: Pose {
+                is_swept: fraction <= Pose::NEARLY_STILL,
+                ..plan.sweep
+            },
+            toi: Toi::F32,
+            ..plan
+        })
+    }
+
+    fn of_step(
+        scene: &Scene,
+        step: &Step,
+        keep: Keep,
+        goal: Goal,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        step.check()?;
+        let mut plan = Plan::of(scene, &step.query, Question::Contact, goal, limits)?;
+        plan.filter.clone_from(&step.filter);
+        (plan.start, plan.toi) = (step.start, step.toi);
+        plan.keep(scene, keep);
+        Ok(plan)
+    }
+
+    /// The question which elements are within a distance: the sum of `distance` and the thickness of both bodies.
+    pub(crate) fn nearness(
+        scene: &Scene,
+        (query, kinds): (&Query, Option<PairKinds>),
+        distance: f64,
+        thickness: &BTreeMap<BodyId, f64>,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        let mut plan = Plan::of(scene, query, Question::Nearness, Goal::All, limits)?;
+        plan.kinds = kinds;
+        (plan.distance, plan.bound) = (distance, distance);
+        for layer in &mut plan.layers {
+            layer.thickness = thickness.get(&layer.id).copied().unwrap_or(0.0);
+        }
+        Ok(plan)
+    }
+
+    /// The question which boxes overlap. Each body is as thick as the query's distance.
+    pub(crate) fn candidates(
+        scene: &Scene,
+        query: &CandidateQuery,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        query.check()?;
+        let mut plan = Plan::of(scene, &query.query, Question::Overlap, Goal::All, limits)?;
+        plan.kinds = Some(query.kinds);
+        for layer in &mut plan.layers {
+            layer.thickness = query.distance;
+        }
+        Ok(plan)
+    }
+
+    /// The same question about some kinds of pairs only, asked now, with an answer of any length.
+    pub(crate) fn of_kinds(&self, kinds: PairKinds) -> Self {
+        Plan {
+            kinds: Some(kinds),
+            limits: Limits::default(),
+            since: Instant::now(),
+            ..self.clone()
+        }
+    }
+
+    fn of(
+        scene: &Scene,
+        query: &Query,
+        question: Question,
+        goal: Goal,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        let mut plan = Plan {
+            layers: Vec::with_capacity(match query.scope {
+                Scope::Between(..) | Scope::Within(_) => 2,
+                Scope::Across | Scope::All { .. } => scene.n_bodies() * question.parts().len(),
+            }),
+            question,
+            kinds: None,
+            // Vertices, edges and faces that share a vertex never count.
+            shared_vertex: match question {
+                Question::Intersection => query.shared_vertex,
+                Question::Contact | Question::Nearness | Question::Overlap => SharedVertex::Skip,
+            },
+            between: false,
+            ignored: query.ignored.clone(),
+            cell: query.cell,
+            sweep: question.sweep(),
+            distance: 0.0,
+            bound: 0.0,
+            keep: Keep::default(),
+            filter: None,
+            start: Start::default(),
+            toi: Toi::default(),
+            goal,
+            limits,
+            since: Instant::now(),
+        };
+        plan.check_cell()?;
         for &id in &query.across {
             scene.body(id)?;
         }
@@ -169,10 +339,10 @@ impl Frame {
                 return Err(Error::SameBody { body: a });
             }
         }
-        for &part in ask.parts() {
-            self.push_part(scene, query, part)?;
+        for &part in question.parts() {
+            plan.push_part(scene, query, part)?;
         }
-        Ok(())
+        Ok(plan)
     }
 
     fn check_cell(&self) -> Result<(), Error> {
@@ -215,31 +385,35 @@ impl Frame {
         let (layer, element) = self.locate(number);
         let body = self.body(scene, layer);
         let corners = body.corners(self.layer(layer).part, &element);
-        let end = body.end_positions().filter(|_| self.is_step);
+        let end = body.end_positions().filter(|_| self.sweep.until > 0.0);
         let ends = std::iter::once(body.positions()).chain(end);
         let points = ends.flat_map(|at| corners.iter().map(|&corner| at.point(corner as usize)));
         Extent::of(points).min
     }
 
-    /// Makes this a question about the positions that bodies have, whether or not they have others at the end of a step.
-    pub(crate) fn stand_still(&mut self) {
-        self.is_step = false;
-    }
-
-    /// Sets within which distance elements are near: the sum of `distance` and the radii of both bodies.
-    pub(crate) fn set_reach(&mut self, distance: f64, radii: &BTreeMap<BodyId, f64>) {
-        self.distance = distance;
-        self.bound = distance;
-        for layer in &mut self.layers {
-            layer.radius = radii.get(&layer.id).copied().unwrap_or(0.0);
-            layer.rounded = 0.0;
+    /// What is to become of the pairs that are found: all are held where it is known in the end only which of them count, or which
+    /// one is the earliest.
+    pub(crate) fn held(&self) -> Goal {
+        match self.question {
+            Question::Intersection if self.cell.is_none() => self.goal,
+            _ => Goal::All,
         }
     }
 
-    /// Makes this a question about elements that keep a separation, and a clearance if there is one.
-    pub(crate) fn set_keep(&mut self, scene: &Scene, keep: Keep) {
-        self.set_reach(keep.separation, &BTreeMap::new());
+    /// Whether it is known in the end only which pairs belong to the cell. Finders of other questions look themselves.
+    pub(crate) fn is_owned_late(&self) -> bool {
+        self.question == Question::Intersection && self.cell.is_some()
+    }
+
+    /// What of a step is examined, with boxes as they are.
+    pub(crate) fn sweep(&self) -> Pose {
+        self.sweep
+    }
+
+    /// Makes elements keep a separation, and a clearance if there is one.
+    fn keep(&mut self, scene: &Scene, keep: Keep) {
         self.keep = keep;
+        (self.distance, self.bound) = (keep.separation, keep.separation);
         if keep.is_plain() {
             return;
         }
@@ -311,11 +485,6 @@ impl Frame {
         units[0].max(units[1])
     }
 
-    /// Sets which pairs of a step count.
-    pub(crate) fn set_filter(&mut self, filter: Option<&PairFilter>) {
-        self.filter = filter.cloned();
-    }
-
     /// Whether some pairs do not count, because of their elements.
     pub(crate) fn has_filter(&self) -> bool {
         self.filter.is_some()
@@ -349,22 +518,22 @@ impl Frame {
 
     /// Within which distance elements of two layers are near.
     pub(crate) fn reach(&self, a: LayerIx, b: LayerIx) -> Reach {
-        let [a, b] = [a, b].map(|layer| self.layer(layer).radius);
+        let [a, b] = [a, b].map(|layer| self.layer(layer).thickness);
         Reach::of_sum([self.distance, a, b])
     }
 
     /// How far the boxes of a layer must reach beyond its elements, so that those of near elements overlap: those of two
     /// layers reach at least as far together as their elements may be apart.
-    pub(crate) fn margin(&self, layer: LayerIx) -> f64 {
-        let radius = self.layer(layer).radius;
-        match (self.bound, radius) {
-            (0.0, radius) => radius,
-            (distance, radius) => (radius + (distance / 2.0).next_up()).next_up(),
+    pub(crate) fn inflation(&self, layer: LayerIx) -> f64 {
+        let thickness = self.layer(layer).thickness;
+        match (self.bound, thickness) {
+            (0.0, thickness) => thickness,
+            (distance, thickness) => (thickness + (distance / 2.0).next_up()).next_up(),
         }
     }
 
     /// Makes this a question about all ways that end at rounded positions, at any time of the step.
-    pub(crate) fn set_rounding(&mut self, scene: &Scene) {
+    fn round(&mut self, scene: &Scene) {
         // The layers of a body share its positions.
         let mut of_bodies = BTreeMap::new();
         for ix in 0..self.layers.len() {
@@ -387,10 +556,10 @@ impl Frame {
         self.layers.iter().any(|layer| layer.rounded > 0.0)
     }
 
-    /// The pose of a layer: its boxes also reach by its [`margin`](Frame::margin), and as far as positions are rounded.
+    /// The pose of a layer: its boxes also reach by its [`inflation`](Plan::inflation), and as far as positions are rounded.
     #[inline(always)]
     pub(crate) fn pose(&self, pose: Pose, layer: LayerIx) -> Pose {
-        pose.with_margin(self.margin(layer) + self.layer(layer).rounded)
+        pose.inflated_by(self.inflation(layer) + self.layer(layer).rounded)
     }
 
     fn push_part(&mut self, scene: &Scene, query: &Query, part: Part) -> Result<(), Error> {
@@ -432,7 +601,7 @@ impl Frame {
             .try_for_each(|layer| self.check_one(scene, layer))
     }
 
-    /// As [`check`](Frame::check), for one layer.
+    /// As [`check`](Plan::check), for one layer.
     pub fn check_one(&self, scene: &Scene, layer: LayerIx) -> Result<(), Error> {
         let body = self.body(scene, layer);
         if body.is_checked() {
@@ -481,7 +650,7 @@ impl Frame {
             is_points: body.kind() == Kind::Points,
             within: within && !self.ignored.contains(&(id, id)),
             filter: filter.unwrap_or(body.filter()),
-            radius: 0.0,
+            thickness: 0.0,
             rounded: 0.0,
         });
         Ok(())
@@ -499,10 +668,10 @@ impl Frame {
             .map_or(0, |last| u64::from(last.numbers().end.raw()))
     }
 
-    /// The numbers that the lower number of a pair of some kind may be: those of the elements that the kind names first. Parts follow
+    /// The numbers that the lower number of a pair of some kind, or of an intersection, may be: those of the elements that the kind names first. Parts follow
     /// each other, so there are few others between them.
-    pub(crate) fn lower_numbers(&self, kind: PairKind) -> Range<Number> {
-        let of_part = |layer: &&Layer| layer.part == kind.parts()[0];
+    pub(crate) fn lower_numbers(&self, kind: Option<PairKind>) -> Range<Number> {
+        let of_part = |layer: &&Layer| kind.is_none_or(|kind| layer.part == kind.parts()[0]);
         let layers = self.layers.iter().filter(of_part);
         let ranges = layers.map(Layer::numbers);
         ranges
@@ -510,14 +679,9 @@ impl Frame {
             .unwrap_or(Number::new(0)..Number::new(0))
     }
 
-    /// Asks about some kinds of candidates only, of those that the frame was resolved for.
-    pub(crate) fn ask_for(&mut self, kinds: PairKinds) {
-        self.ask = Ask::Candidates(kinds);
-    }
-
     /// Whether any pairs of two different layers are wanted.
     pub fn between(&self) -> bool {
-        self.layers.len() > 1 && (self.between || self.ask != Ask::Intersections)
+        self.layers.len() > 1 && (self.between || self.question != Question::Intersection)
     }
 
     /// The test for pairs of elements of two layers, or of one with itself; `None` if no pair of them is wanted.
@@ -532,19 +696,19 @@ impl Frame {
         if !is_asked {
             return None;
         }
-        if self.ask == Ask::Intersections {
+        if self.question == Question::Intersection {
             return Some(TestId::Intersection);
         }
         let kind = PairKind::of(a.part, b.part)?;
-        let is_asked = match self.ask {
-            Ask::Candidates(kinds) => kinds.contains(kind),
+        let is_asked = match self.kinds {
+            Some(kinds) => kinds.contains(kind),
             // Vertices against faces and edges against edges cover every body with faces. Only bodies without faces need
             // edges against vertices, and only bodies of points need vertices against vertices.
-            _ => match kind {
+            None => match kind {
                 PairKind::VertexFace | PairKind::EdgeEdge => true,
                 PairKind::EdgeVertex => a.is_bare && b.is_bare,
                 PairKind::VertexVertex => a.is_points && b.is_points,
-                PairKind::EdgeFace => self.ask == Ask::Near,
+                PairKind::EdgeFace => self.question == Question::Nearness,
                 PairKind::FaceFace => false,
             },
         };

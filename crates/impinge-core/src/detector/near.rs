@@ -3,28 +3,23 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::Detector;
+use super::in_step::{InStep, Keys, Seen};
 use crate::clock::Instant;
-use crate::cpu::steps::StepTest;
-use crate::detector::Detector;
 use crate::elements::Part;
 use crate::error::Error;
 use crate::exact::{NearestOfElements, closest_of_elements, nearest_of_elements};
-use crate::frame::TestId;
-use crate::hull::Pose;
-use crate::impacts::StepAnswer;
+use crate::found::KeysByKind;
 use crate::index::ElementIx;
-use crate::naive;
-use crate::narrow::{Corners, Within, exact_kind};
+use crate::narrow::{Corners, exact_kind};
 use crate::near::{ClosestPoints, Labels, NearPairs, NearQuery, Unnamed};
 use crate::pair_kind::PairKind;
 use crate::pairs::Primitive;
+use crate::plan::{Plan, TestId};
 use crate::progress::Control;
-use crate::run::Job;
+use crate::run::{Job, Outcome, ready};
 use crate::scene::Scene;
-use crate::settings::Method;
-use crate::sink::{Limits, Wanted};
-
-use super::{StepMemory, begin};
+use crate::stats::Statistics;
 
 /// Pairs whose features a task finds.
 const TASK: usize = 1024;
@@ -74,63 +69,60 @@ impl Detector {
         query: &NearQuery,
         control: &Control<'_>,
     ) -> Result<&NearPairs, Error> {
-        let start = Instant::now();
-        let StepMemory {
-            frame,
-            near,
-            clusters,
-            keys: answer,
-            sorter,
-            ..
-        } = &mut self.steps;
-        let workers = self.frames.workers();
-        query.resolve(scene, frame)?;
-        near.begin(frame);
-        frame.check(scene)?;
-        let rooms = near.take_room();
-        let stats = near.stats_mut();
-        begin(stats, &self.settings, workers.n());
-        let _shift = workers.shift(frame.n_primitives());
-        let labels = Labels::new(frame.n_primitives());
-        let of_distance = size_of::<f64>() * usize::from(query.distances);
-        let of_points = size_of::<[[f64; 3]; 2]>() * usize::from(query.closest);
-        let limits = Limits {
-            besides: (1 + of_distance + of_points) as u64,
-            ..self.settings.limits()
+        let plan = query.plan(scene, self.settings.limits())?;
+        let mut finder = InStep {
+            clusters: &mut self.steps.clusters,
+            settings: &self.settings,
+            #[cfg(feature = "gpu")]
+            gpu: &mut self.gpu,
+            keys: Keys::All,
+            seen: Seen::default(),
         };
-        answer.begin(limits, Wanted::Pairs, rooms);
-        if self.settings.method == Method::Naive {
-            stats.time("naive", |stats| {
-                naive::run(&Within, scene, frame, control, stats, |test, key, ()| {
-                    if let TestId::Elements(kind) = test
-                        && frame.is_owned(scene, key)
-                    {
-                        answer.extend(
-                            kind as usize,
-                            [labels.put(key, Labels::UNKNOWN)].into_iter(),
-                        );
-                    }
-                    answer.check()
-                })
-            })?;
-        } else {
-            let job = Job {
-                scene,
-                frame,
-                workers,
-                control,
-            };
-            let asked = (StepTest::Within, Pose::STILL);
-            clusters.run(job, &self.settings, asked, StepAnswer::Keys(answer), stats)?;
-        }
-        let collect = Instant::now();
-        let (mut keys, _) = answer.finish()?;
-        let n_counted = sorter.sort_kinds(&mut keys, frame, workers);
-        let stats = near.stats_mut();
-        stats.add_ms("collect", collect.elapsed().as_secs_f64() * 1e3);
-        stats.ways.n_counted = n_counted;
+        let near = &mut self.steps.near;
+        let mut outcome = WithFeatures { near, query };
+        ready(
+            self.runner
+                .run(scene, &plan, control, &mut finder, &mut outcome),
+        )?;
+        Ok(&self.steps.near)
+    }
+
+    /// Moves the near pairs that were found last out of the detector, without a copy. It holds none until the next question.
+    pub fn take_near(&mut self) -> NearPairs {
+        std::mem::take(&mut self.steps.near)
+    }
+}
+
+/// Near pairs, whose features are found when the pairs are known.
+struct WithFeatures<'a> {
+    near: &'a mut NearPairs,
+    query: &'a NearQuery,
+}
+
+impl Outcome<u64, { PairKind::ALL.len() }> for WithFeatures<'_> {
+    fn begin(&mut self, plan: &Plan) {
+        self.near.begin(plan);
+    }
+
+    fn stats_mut(&mut self) -> &mut Statistics {
+        self.near.stats_mut()
+    }
+
+    fn take_rooms(&mut self) -> KeysByKind {
+        self.near.take_room()
+    }
+
+    fn fill(&mut self, job: Job<'_>, keys: KeysByKind) -> Result<(), Error> {
         let features = Instant::now();
-        let (unnamed, numbering) = near.fill(keys, query, workers.task(TASK))?;
+        let Job {
+            scene,
+            frame,
+            workers,
+            control,
+        } = job;
+        let labels = Labels::new(frame.n_primitives());
+        let query = self.query;
+        let (unnamed, numbering) = self.near.fill(keys, query, workers.task(TASK))?;
         let tasks: Vec<Mutex<Unnamed<'_>>> = unnamed.into_iter().map(Mutex::new).collect();
         let n_tasks = tasks.len();
         let is_stopped = AtomicBool::new(false);
@@ -152,18 +144,13 @@ impl Detector {
         });
         drop(tasks);
         control.step(n_tasks as u64, n_tasks as u64)?;
-        let bytes = near.bytes() + sorter.bytes();
-        let stats = near.stats_mut();
-        stats.bytes_held += bytes;
-        workers.report(&mut stats.ways);
-        stats.add_ms("features", features.elapsed().as_secs_f64() * 1e3);
-        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
-        Ok(&self.steps.near)
+        let ms = features.elapsed().as_secs_f64() * 1e3;
+        self.near.stats_mut().add_ms("features", ms);
+        Ok(())
     }
 
-    /// Moves the near pairs that were found last out of the detector, without a copy. It holds none until the next question.
-    pub fn take_near(&mut self) -> NearPairs {
-        std::mem::take(&mut self.steps.near)
+    fn bytes(&self) -> u64 {
+        self.near.bytes()
     }
 }
 

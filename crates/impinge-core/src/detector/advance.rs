@@ -1,0 +1,252 @@
+//! A detector's answer how far a step can be taken.
+
+use super::Detector;
+use super::steps::StartAnswer;
+use crate::advance::Advance;
+use crate::error::Error;
+use crate::found::PairList;
+use crate::ids::BodyId;
+use crate::impacts::Impact;
+use crate::index::pair_numbers;
+use crate::narrow::{Element, FirstContact};
+use crate::pair_kind::PairKind;
+use crate::plan::{Plan, TestId};
+use crate::positions::Positions;
+use crate::progress::Control;
+use crate::scene::Scene;
+use crate::settings::Method;
+use crate::step::{Start, Step};
+
+impl Detector {
+    /// How far the step can be taken: a fraction of it, backed off from the first contact hardly more than the precision of positions
+    /// asks for, for which the straight way from the start to the *rounded* positions is free.
+    ///
+    /// Positions that are stored are rounded, and rounding alone may make elements touch that did not. So each fraction is
+    /// tried: positions are rounded first, and the way to those must be free in the sense of [`is_free`](Detector::is_free). A chain of such
+    /// steps is free from the first to the last, whatever the rounding, if its start was free of intersections; [`Start::Verify`] asks
+    /// that, and allows no step if it was not. The first fraction tried is that of the first
+    /// contact; then the back-off doubles, from the last bit on, so it is less than twice what is needed.
+    ///
+    /// On the CPU all pairs are searched once, and rounded positions are tested on the pairs that rounding may bring together. On a GPU, with
+    /// a separation or a memory budget, and where too many pairs are that close, all pairs are searched again for rounded positions.
+    ///
+    /// With a [clearance](Step::clearance), every pair keeps what that says, and what floats can round besides. So the fraction holds for
+    /// solvers too, which compute positions themselves: as `x0 + a * (x1 - x0)` or `x0 + a * dx` with `x1 = x0 + dx`, in the precision
+    /// of the positions, for *every* `a` from 0 to the fraction, the straight way there is free and keeps the clearance. The fraction is
+    /// rounded down to an `f32`, and a single search is enough. It is 0 if moving elements are nearer at the start than rounding
+    /// can move them: about 25 unit roundoffs of their largest coordinate. Without a clearance, only the positions of the answer
+    /// are proven.
+    ///
+    /// Pairs that touch at the start allow no step at all under [`Start::Report`], and are ignored under
+    /// [`Start::Skip`]. The seams of a mesh that was not welded are such pairs: they are refused by name, because no step would ever be
+    /// possible. Weld the mesh ([`Weld`](crate::Weld)), or skip what touches at the start.
+    ///
+    /// # Errors
+    /// As [`impacts`](Detector::impacts), and [`Error::Seam`].
+    pub fn advance(&mut self, scene: &Scene, step: &Step) -> Result<Advance, Error> {
+        self.advance_with(scene, step, &Control::new())
+    }
+
+    /// [`advance`](Detector::advance) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `advance`, and [`Error::Cancelled`].
+    pub fn advance_with(
+        &mut self,
+        scene: &Scene,
+        step: &Step,
+        control: &Control<'_>,
+    ) -> Result<Advance, Error> {
+        refuse_cell(step)?;
+        let with_close = self.lists_close_pairs();
+        let plan = Plan::advance(scene, step, with_close, self.limits_of_steps())?;
+        let start = self.verify(scene, step, control)?;
+        let seen = self.find_contacts(scene, &plan, control, (start, false))?;
+        let first = self.steps.contacts.first(plan.toi);
+        self.refuse_seams(scene, &plan)?;
+        let start_intersects = start.map(|StartAnswer { intersects, .. }| intersects);
+        let mut advance = Advance {
+            fraction: 1.0,
+            first,
+            start_intersects,
+            positions: Vec::new(),
+            n_tried: 1,
+        };
+        if start_intersects == Some(true) {
+            advance.fraction = 0.0;
+            advance.positions = moving(scene).map(|(id, at, _)| (id, at.clone())).collect();
+            return Ok(advance);
+        }
+        match first {
+            None => {
+                let ends = moving(scene).map(|(id, _, end)| (id, end.clone()));
+                advance.positions = ends.collect();
+            }
+            // Rounding is part of what the pairs keep.
+            Some(first) if plan.has_clearance() => {
+                advance.fraction = first.toi;
+                advance.positions = blended(scene, first.toi);
+            }
+            Some(first) => {
+                let known = (self.pairs_at(&plan, first), seen.close);
+                self.back_off(scene, step, &plan, known, control, &mut advance)?;
+            }
+        }
+        Ok(advance)
+    }
+
+    /// The pairs of a contact, which probably touch on the way to rounded positions, too.
+    fn pairs_at(&self, plan: &Plan, first: Impact) -> PairList {
+        let contacts = &self.steps.contacts;
+        let same =
+            |&(kind, found): &(_, &_)| contacts.impacts.impact(kind, plan.toi, found) == first;
+        let found = contacts.found().filter(same);
+        found.map(|(kind, found)| (kind, found.key)).collect()
+    }
+
+    /// Backs off from the first contact until the way to rounded positions is free. `known`: pairs that may touch on such ways, and all
+    /// others, if they were listed.
+    fn back_off(
+        &mut self,
+        scene: &Scene,
+        step: &Step,
+        plan: &Plan,
+        (mut known, close): (PairList, Option<PairList>),
+        control: &Control<'_>,
+        advance: &mut Advance,
+    ) -> Result<(), Error> {
+        let Some(first) = advance.first else {
+            return Ok(());
+        };
+        let single = moving(scene).any(|(_, start, _)| matches!(start, Positions::F32(_)));
+        let last_bit = f64::from(if single { f32::EPSILON } else { 0.0 }).max(f64::EPSILON);
+        let are_all_known = close.is_some();
+        known.extend(close.unwrap_or_default());
+        let mut trial = None;
+        let mut back_off = 0.0;
+        loop {
+            let fraction = first.toi * (1.0 - back_off);
+            advance.fraction = fraction;
+            let is_known = |&pair: &_| touch(scene, plan, pair, fraction);
+            let touches = fraction > 0.0 && known.iter().any(is_known);
+            let n_known = known.len();
+            if !touches {
+                advance.positions = blended(scene, fraction);
+                let mut moved = moving(scene).zip(&advance.positions);
+                if moved.all(|((_, start, _), (_, at))| start == at) {
+                    advance.fraction = 0.0;
+                    return Ok(());
+                }
+            }
+            if !touches && !are_all_known {
+                let trial = trial.get_or_insert_with(|| scene.clone());
+                for (id, positions) in &advance.positions {
+                    match positions {
+                        Positions::F32(positions) => trial.set_end_positions(*id, positions)?,
+                        Positions::F64(positions) => trial.set_end_positions(*id, positions)?,
+                    }
+                }
+                let plan = Plan::trial(trial, step, fraction, self.limits_of_steps())?;
+                self.find_contacts(trial, &plan, control, (None, false))?;
+                let found = self.steps.contacts.found();
+                known.extend(found.map(|(kind, found)| (kind, found.key)));
+            }
+            advance.n_tried += 1;
+            if !touches && known.len() == n_known {
+                return Ok(());
+            }
+            back_off = if back_off == 0.0 {
+                last_bit
+            } else {
+                f64::min(2.0 * back_off, 1.0)
+            };
+        }
+    }
+
+    /// Refuses elements of one body, among the contacts found, that touch at the start at vertices with equal positions.
+    fn refuse_seams(&self, scene: &Scene, plan: &Plan) -> Result<(), Error> {
+        let at_start = self
+            .steps
+            .contacts
+            .found()
+            .filter(|(_, found)| found.value.at_start);
+        let seams = at_start.filter_map(|(kind, found)| {
+            let [a, b] = pair_numbers(found.key).map(|number| plan.locate(number));
+            let [of_a, of_b] = [a.0, b.0].map(|layer| plan.layer(layer));
+            if of_a.id != of_b.id {
+                return None;
+            }
+            let body = plan.body(scene, a.0);
+            let at = body.positions();
+            let [a, b] = [(of_a.part, a.1), (of_b.part, b.1)]
+                .map(|(part, element)| body.corners(part, &element).to_vec());
+            let both = a.iter().flat_map(|&a| b.iter().map(move |&b| [a, b]));
+            let coincide = |&[a, b]: &[u32; 2]| at.point(a as usize) == at.point(b as usize);
+            let vertices = both.filter(coincide).min()?;
+            Some(((kind, found.key), of_a.id, vertices))
+        });
+        // Contacts come in any order.
+        let Some((_, body, vertices)) = seams.min_by_key(|(pair, ..)| *pair) else {
+            return Ok(());
+        };
+        Err(Error::Seam {
+            body,
+            vertices,
+            n_coincident: scene.body(body)?.positions().n_coincident(),
+        })
+    }
+
+    /// Whether the search for the earliest contact also lists the pairs that rounding may bring together.
+    fn lists_close_pairs(&self) -> bool {
+        #[cfg(feature = "gpu")]
+        let is_on_device = self.gpu.is_some();
+        #[cfg(not(feature = "gpu"))]
+        let is_on_device = false;
+        // The budget has no share for the list.
+        !is_on_device
+            && self.settings.memory_budget.is_none()
+            && self.settings.method != Method::Naive
+    }
+}
+
+/// Bodies that move, with their positions at the start and at the end.
+fn moving(scene: &Scene) -> impl Iterator<Item = (BodyId, &Positions, &Positions)> {
+    let bodies = scene.bodies();
+    bodies.filter_map(|(id, body)| Some((id, body.positions(), body.end_positions()?)))
+}
+
+/// Their positions at a fraction of the step, rounded.
+fn blended(scene: &Scene, fraction: f64) -> Vec<(BodyId, Positions)> {
+    let blended = moving(scene).map(|(id, start, end)| (id, start.blend(end, fraction)));
+    blended.collect()
+}
+
+/// Whether two elements touch on the way to the rounded positions at a fraction of the step; with [`Start::Skip`], not at
+/// its start.
+fn touch(scene: &Scene, plan: &Plan, (kind, key): (PairKind, u64), fraction: f64) -> bool {
+    if !plan.counts(scene, key) {
+        return false;
+    }
+    let located = pair_numbers(key).map(|number| plan.locate(number));
+    let [a, b] = located.each_ref().map(|(layer, element)| Element {
+        scene,
+        frame: plan,
+        layer: *layer,
+        corners: plan
+            .body(scene, *layer)
+            .corners(plan.layer(*layer).part, element),
+    });
+    let contact = FirstContact::settle_part(TestId::Elements(kind), a, b, fraction);
+    contact.is_some_and(|contact| !(plan.start == Start::Skip && contact.at_start))
+}
+
+fn refuse_cell(step: &Step) -> Result<(), Error> {
+    match step.query.cell {
+        None => Ok(()),
+        Some(_) => Err(Error::Setting {
+            setting: "owned_by",
+            given: "a cell for the way that a step can be taken".to_owned(),
+            allowed: "all pairs; or let each process ask for its earliest contact, and take the least of them",
+        }),
+    }
+}

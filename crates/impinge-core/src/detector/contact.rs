@@ -1,0 +1,106 @@
+//! A detector's answers about contact: where pairs meet, and how deep bodies are in each other.
+
+use super::Detector;
+use crate::contact::{Contacts, Penetration, Work};
+use crate::error::Error;
+use crate::ids::BodyId;
+use crate::pairs::Pairs;
+use crate::progress::Control;
+use crate::scene::Scene;
+
+impl Detector {
+    /// Where the triangles of each pair meet: points, segments and polygons. The scene must not have changed since the pairs
+    /// were found.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Query, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// let floor = [[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    /// let blade = [[1.0f32, 1.0, -1.0], [2.0, 1.0, -1.0], [1.0, 1.0, 1.0]];
+    /// scene.add_triangles(&[[0, 1, 2]], &floor)?;
+    /// scene.add_triangles(&[[0, 1, 2]], &blade)?;
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let pairs = detector.detect(&scene, &Query::all())?.clone();
+    /// let contacts = detector.contacts(&scene, &pairs)?;
+    /// assert_eq!(contacts.points(), [[1.0, 1.0, 0.0], [1.5, 1.0, 0.0]]);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// A body of the pairs is no longer in the scene, is of another kind or has too few primitives; positions written in
+    /// place since then are refused.
+    pub fn contacts(&mut self, scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> {
+        self.contacts_with(scene, pairs, &Control::new())
+    }
+
+    /// [`contacts`](Detector::contacts) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `contacts`, and [`Error::Cancelled`].
+    pub fn contacts_with(
+        &mut self,
+        scene: &Scene,
+        pairs: &Pairs,
+        control: &Control<'_>,
+    ) -> Result<Contacts, Error> {
+        let workers = self.runner.workers();
+        let _shift = workers.shift(pairs.len() as u64);
+        Contacts::new(scene, pairs, Work { workers, control })
+    }
+
+    /// How deep two closed bodies of triangles are in each other, from contacts among which are all of these two. The
+    /// bodies' topologies are kept, so that later calls cost less.
+    ///
+    /// A vertex is inside where the other surface's winding number around it is not 0; a vertex on the surface
+    /// is not inside. The body with the lower number is the first, whichever argument it is.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Query, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let tetrahedron = [[0u32, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    /// let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    /// let mut scene = Scene::new();
+    /// let a = scene.add_triangles(&tetrahedron, &corners)?;
+    /// let b = scene.add_triangles(&tetrahedron, &corners.map(|[x, y, z]| [x + 0.1, y + 0.125, z - 0.875]))?;
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let pairs = detector.detect(&scene, &Query::between(a, b))?.clone();
+    /// let contacts = detector.contacts(&scene, &pairs)?;
+    /// let penetration = detector.penetration(&scene, &contacts, a, b)?;
+    /// assert_eq!(penetration.inside[1], [3]); // The tip of b is in a.
+    /// let region = &penetration.regions[0];
+    /// assert!(region.depth.is_some_and(|depth| depth <= 0.125));
+    /// assert!(region.normal.is_some_and(|normal| normal[2] > 0.9)); // Push a up.
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// A body that is not in the scene, the same body twice, a body not made of triangles, a surface that is not closed.
+    pub fn penetration(
+        &mut self,
+        scene: &Scene,
+        contacts: &Contacts,
+        a: BodyId,
+        b: BodyId,
+    ) -> Result<Penetration, Error> {
+        self.penetration_with(scene, contacts, a, b, &Control::new())
+    }
+
+    /// [`penetration`](Detector::penetration) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `penetration`, and [`Error::Cancelled`].
+    pub fn penetration_with(
+        &mut self,
+        scene: &Scene,
+        contacts: &Contacts,
+        a: BodyId,
+        b: BodyId,
+        control: &Control<'_>,
+    ) -> Result<Penetration, Error> {
+        let workers = self.runner.workers();
+        let _shift = workers.shift(0);
+        let work = Work { workers, control };
+        self.topologies.penetration(scene, contacts, [a, b], work)
+    }
+}

@@ -1,0 +1,204 @@
+//! Finds pairs of vertices, edges and faces, for every question about them.
+
+use std::sync::Arc;
+
+use crate::cpu::steps::{ByDevice, StepClusters};
+use crate::error::Error;
+use crate::exact::Contact;
+use crate::found::{ContactAnswer, Found, KeyAnswer, PairList, StepAnswer};
+#[cfg(feature = "gpu")]
+use crate::gpu::Engine;
+use crate::key_ranges::{KeyRanges, Tally};
+use crate::naive;
+use crate::narrow::{BoxOverlap, FirstContact, Within};
+use crate::near::Labels;
+use crate::pair_kind::PairKind;
+use crate::plan::{Question, TestId};
+use crate::run::{Finder, Job};
+use crate::settings::{Method, Settings};
+use crate::sink::Ending;
+use crate::stats::Statistics;
+use crate::step::Start;
+
+/// Which keys to find.
+#[derive(Clone, Copy, Default)]
+pub(super) enum Keys<'a> {
+    #[default]
+    All,
+    /// Those in some ranges.
+    In(&'a KeyRanges),
+    /// They are counted and forgotten.
+    Counted(&'a Tally),
+}
+
+/// On the CPU, where for contacts a device may find candidates.
+pub(super) struct InStep<'a> {
+    pub clusters: &'a mut StepClusters,
+    pub settings: &'a Settings,
+    #[cfg(feature = "gpu")]
+    pub gpu: &'a mut Option<Engine>,
+    pub keys: Keys<'a>,
+    pub seen: Seen,
+}
+
+/// What was seen besides the contacts.
+#[derive(Debug, Default)]
+pub(super) struct Seen {
+    /// Whether a device has found that something touches; then the list of contacts may be empty.
+    pub touches: bool,
+    /// The pairs that rounded positions may make touch, up to the earliest contact, by kind and key, if known.
+    pub close: Option<PairList>,
+}
+
+impl InStep<'_> {
+    fn find_contacts(
+        &mut self,
+        job: Job<'_>,
+        answer: &ContactAnswer,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        if self.settings.method == Method::Naive {
+            let skips = job.frame.start == Start::Skip;
+            return run_naive(&FirstContact, job, stats, |kind, key, value: Contact| {
+                if !(skips && value.at_start) {
+                    answer.extend(kind as usize, [Found { key, value }].into_iter());
+                }
+                answer.check()
+            });
+        }
+        let found = StepAnswer::Contacts(answer);
+        match self.find_on_device(job, found, stats)? {
+            ByDevice::Done => return Ok(()),
+            ByDevice::Touches => self.seen.touches = true,
+            ByDevice::Not => {
+                answer.forget();
+                self.clusters.run(job, self.settings, found, stats)?;
+                if job.frame.is_rounded() {
+                    self.seen.close = self.clusters.close();
+                }
+            }
+        }
+        Ok(())
+    }
+
+    #[cfg(feature = "gpu")]
+    fn find_on_device(
+        &mut self,
+        job: Job<'_>,
+        answer: StepAnswer<'_>,
+        stats: &mut Statistics,
+    ) -> Result<ByDevice, Error> {
+        super::gpu::find_in_step(self.gpu, self.clusters, (job, self.settings), answer, stats)
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    #[expect(
+        clippy::unused_self,
+        clippy::unnecessary_wraps,
+        reason = "there is no device"
+    )]
+    fn find_on_device(
+        &mut self,
+        _: Job<'_>,
+        _: StepAnswer<'_>,
+        _: &mut Statistics,
+    ) -> Result<ByDevice, Error> {
+        Ok(ByDevice::Not)
+    }
+
+    fn find_keys(
+        &mut self,
+        job: Job<'_>,
+        answer: &KeyAnswer,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        let answer = match self.keys {
+            Keys::All => StepAnswer::Keys(answer),
+            Keys::In(ranges) => StepAnswer::KeysIn(answer, ranges),
+            Keys::Counted(tally) => StepAnswer::Counts(tally),
+        };
+        if self.settings.method != Method::Naive {
+            return self.clusters.run(job, self.settings, answer, stats);
+        }
+        let mut block = Vec::new();
+        let mut emit = |kind, key| {
+            block.push(key);
+            answer.take_keys(kind, &mut block);
+            answer.check()
+        };
+        if job.frame.question == Question::Overlap {
+            return run_naive(&BoxOverlap, job, stats, |kind, key, ()| emit(kind, key));
+        }
+        let labels = Labels::new(job.frame.n_primitives());
+        run_naive(&Within, job, stats, |kind, key, ()| {
+            emit(kind, labels.put(key, Labels::UNKNOWN))
+        })
+    }
+
+    fn method_name(&self) -> &'static str {
+        match self.settings.method {
+            Method::Naive => Method::Naive,
+            // The grid is for intersections.
+            Method::Auto | Method::Clusters | Method::Cells => Method::Clusters,
+        }
+        .name()
+    }
+}
+
+/// The oracle's pairs, as far as they count.
+fn run_naive<T: crate::narrow::Test>(
+    test: &T,
+    job: Job<'_>,
+    stats: &mut Statistics,
+    mut emit: impl FnMut(PairKind, u64, T::Value) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let Job {
+        scene,
+        frame,
+        control,
+        ..
+    } = job;
+    stats.time("naive", |stats| {
+        naive::run(
+            test,
+            scene,
+            frame,
+            control,
+            stats,
+            |id, key, value| match id {
+                TestId::Elements(kind) if frame.counts(scene, key) => emit(kind, key, value),
+                _ => Ok(()),
+            },
+        )
+    })
+}
+
+impl Finder<Found<Contact>, { PairKind::ALL.len() }> for InStep<'_> {
+    fn method(&self) -> &'static str {
+        self.method_name()
+    }
+
+    async fn find(
+        &mut self,
+        job: Job<'_>,
+        answer: &Arc<ContactAnswer>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        self.find_contacts(job, answer, stats)
+    }
+}
+
+impl Finder<u64, { PairKind::ALL.len() }> for InStep<'_> {
+    fn method(&self) -> &'static str {
+        self.method_name()
+    }
+
+    async fn find(
+        &mut self,
+        job: Job<'_>,
+        answer: &Arc<KeyAnswer>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        self.find_keys(job, answer, stats)
+    }
+}

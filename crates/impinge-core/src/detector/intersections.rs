@@ -1,0 +1,192 @@
+//! A detector's answers about intersections: which pairs, how many, whether any.
+
+use super::Detector;
+use crate::error::Error;
+use crate::pairs::Pairs;
+use crate::plan::Plan;
+use crate::progress::Control;
+use crate::query::{Query, Scope};
+use crate::run::{Outcome, ready};
+use crate::scene::Scene;
+#[cfg(feature = "gpu")]
+use crate::settings::Backend;
+use crate::settings::{Method, Settings};
+use crate::sink::Goal;
+
+impl Detector {
+    /// All pairs that the query asks for, in the current state of the scene.
+    ///
+    /// # Errors
+    /// A stale id, refused positions, more pairs than allowed, no memory for the answer, a memory budget too small for
+    /// one slab and the answer, a GPU failure.
+    pub fn detect(&mut self, scene: &Scene, query: &Query) -> Result<&Pairs, Error> {
+        self.detect_with(scene, query, &Control::new())
+    }
+
+    /// [`detect`](Detector::detect) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `detect`, and [`Error::Cancelled`].
+    pub fn detect_with(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        control: &Control<'_>,
+    ) -> Result<&Pairs, Error> {
+        let plan = Plan::intersections(scene, query, Goal::All, self.settings.limits())?;
+        self.wait_for(scene, &plan, control)?;
+        Ok(&self.pairs)
+    }
+
+    /// How many pairs [`detect`](Detector::detect) would find. None of them is held, so there may be more than memory
+    /// has room for.
+    ///
+    /// # Errors
+    /// As `detect`.
+    pub fn count(&mut self, scene: &Scene, query: &Query) -> Result<u64, Error> {
+        self.count_with(scene, query, &Control::new())
+    }
+
+    /// [`count`](Detector::count) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `count`, and [`Error::Cancelled`].
+    pub fn count_with(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        control: &Control<'_>,
+    ) -> Result<u64, Error> {
+        let plan = Plan::intersections(scene, query, Goal::Count, self.settings.limits())?;
+        self.wait_for(scene, &plan, control)
+    }
+
+    /// Whether [`detect`](Detector::detect) would find any pair. The search ends with the first one that is certain.
+    ///
+    /// That pair is not given: which one comes first depends on the threads. For one that is the same on every run take
+    /// the first of all pairs.
+    ///
+    /// # Errors
+    /// As `detect`; but any number of pairs is allowed.
+    pub fn any(&mut self, scene: &Scene, query: &Query) -> Result<bool, Error> {
+        self.any_with(scene, query, &Control::new())
+    }
+
+    /// [`any`](Detector::any) with a token to stop it and a callback to watch it.
+    ///
+    /// # Errors
+    /// As `any`, and [`Error::Cancelled`].
+    pub fn any_with(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        control: &Control<'_>,
+    ) -> Result<bool, Error> {
+        let plan = Plan::intersections(scene, query, Goal::Any, self.settings.limits())?;
+        if let Some(any) = self.any_soon(scene, query, &plan, control)? {
+            return Ok(any);
+        }
+        Ok(self.wait_for(scene, &plan, control)? > 0)
+    }
+
+    /// [`detect`](Detector::detect) without blocking. On a GPU the future waits for the device, which must be
+    /// polled meanwhile (a browser does that; natively call `wgpu::Device::poll`). On the CPU it is ready at once.
+    ///
+    /// # Errors
+    /// As `detect`.
+    pub async fn detect_async(&mut self, scene: &Scene, query: &Query) -> Result<&Pairs, Error> {
+        let plan = Plan::intersections(scene, query, Goal::All, self.settings.limits())?;
+        self.answer(scene, &plan, &Control::new()).await?;
+        Ok(&self.pairs)
+    }
+
+    /// Whether any of many bodies meet, on the CPU, if that is soon known.
+    fn any_soon(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        plan: &Plan,
+        control: &Control<'_>,
+    ) -> Result<Option<bool>, Error> {
+        if plan.layers.len() <= 2 || !self.may_know_soon(query) {
+            return Ok(None);
+        }
+        control.step(0, 1)?;
+        plan.check(scene)?;
+        let workers = self.runner.workers();
+        let any = self.distances.any(scene, plan, workers, control)?;
+        if any.is_some() {
+            // One thread has found it, without the loop.
+            self.pairs.begin(plan);
+            let stats = self.pairs.stats_mut();
+            stats.method = Method::Clusters.name();
+            stats.backend.push_str("cpu");
+            stats.n_threads = 1;
+            stats.total_ms = plan.since.elapsed().as_secs_f64() * 1e3;
+        }
+        Ok(any)
+    }
+
+    fn may_know_soon(&self, query: &Query) -> bool {
+        let Settings {
+            method,
+            memory_budget,
+            ..
+        } = self.settings;
+        let is_about_many = matches!(
+            query.scope,
+            Scope::Across
+                | Scope::All {
+                    between: true,
+                    within: false
+                }
+        );
+        let may_choose = matches!(method, Method::Auto | Method::Clusters);
+        #[cfg(feature = "gpu")]
+        let is_on_device = self.gpu.is_some();
+        #[cfg(not(feature = "gpu"))]
+        let is_on_device = false;
+        is_about_many
+            && query.cell.is_none()
+            && may_choose
+            && memory_budget.is_none()
+            && !is_on_device
+    }
+
+    fn wait_for(
+        &mut self,
+        scene: &Scene,
+        plan: &Plan,
+        control: &Control<'_>,
+    ) -> Result<u64, Error> {
+        #[cfg(feature = "gpu")]
+        if let Some(gpu) = self.gpu_in_use() {
+            return gpu.block_on(self.answer(scene, plan, control));
+        }
+        ready(self.answer(scene, plan, control))
+    }
+
+    /// One frame. With `Backend::Auto`, the CPU takes over for good if the GPU fails or cannot hold the scene.
+    async fn answer(
+        &mut self,
+        scene: &Scene,
+        plan: &Plan,
+        control: &Control<'_>,
+    ) -> Result<u64, Error> {
+        let Detector {
+            runner, pairs, cpu, ..
+        } = self;
+        #[cfg(feature = "gpu")]
+        if let Some(engine) = &mut self.gpu {
+            let may_choose = self.settings.backend == Backend::Auto;
+            let cpu = may_choose.then_some(&mut *cpu);
+            let mut finder = super::gpu::OnDevice { engine, cpu };
+            let found = runner.run(scene, plan, control, &mut finder, pairs);
+            match found.await {
+                Err(Error::Gpu { .. }) if may_choose => self.gpu = None,
+                result => return result,
+            }
+        }
+        runner.run(scene, plan, control, cpu, pairs).await
+    }
+}
