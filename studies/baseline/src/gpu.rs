@@ -17,6 +17,7 @@ mod plan;
 
 use std::sync::Arc;
 
+use impinge_core::gpu::cells::Guest;
 use impinge_core::gpu::room::Capacities;
 use impinge_core::host::gpu::Host;
 use impinge_core::{BodyId, Query, Scene};
@@ -25,7 +26,7 @@ use crate::{Counts, Error, Outcome, check_lambda};
 use kernels::Kernels;
 #[doc(hidden)]
 pub use kernels::shaders;
-use plan::Plan;
+use plan::Buffers;
 
 /// Settings of a [`UniformGrid`] on a GPU.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,14 +86,14 @@ impl UniformGrid {
     ) -> Result<Self, Error> {
         check_lambda(settings.lambda)?;
         let device = settings.device.as_deref();
-        let plan = Plan::new(Arc::new(Kernels::new()), settings.owner_rule);
-        let host = Host::new(
-            device,
-            settings.lambda,
-            first,
-            memory_budget,
-            Box::new(plan),
-        )?;
+        let (kernels, owner_rule) = (Arc::new(Kernels::new()), settings.owner_rule);
+        let guest = Guest::new(move || {
+            let (kernels, mut buffers) = (Arc::clone(&kernels), Buffers::new());
+            Box::new(move |recorder, lambda, cells| {
+                buffers.record(&kernels, owner_rule, recorder, lambda, cells)
+            })
+        });
+        let host = Host::new(device, settings.lambda, first, memory_budget, guest)?;
         Ok(UniformGrid { settings, host })
     }
 

@@ -8,6 +8,7 @@ use crate::cpu::Cpu;
 use crate::cpu::steps::{ByDevice, StepClusters};
 use crate::error::Error;
 use crate::found::StepAnswer;
+use crate::gpu::recording::{Ran, Recording};
 use crate::gpu::{Capacities, Engine, Gpu, ResidentPairs, WantedAdapter};
 use crate::ids::BodyId;
 use crate::plan::Plan;
@@ -164,6 +165,34 @@ impl Detector {
             engine.most_bound = bytes;
         }
         Ok(detector)
+    }
+
+    /// Whether each question is also answered launch by launch, with what each kernel has written read back: slow. For finding
+    /// the launch that goes wrong: see [`ran`](Detector::ran).
+    #[doc(hidden)]
+    pub fn trace(&mut self, is_traced: bool) {
+        if let Some(engine) = &mut self.gpu {
+            engine.is_traced = is_traced;
+            engine.for_steps().is_traced = is_traced;
+        }
+    }
+
+    /// The last pass of the last frame on a device, and that of the last step: their launches as data, to be printed.
+    #[doc(hidden)]
+    pub fn recordings(&mut self) -> Option<[&Recording; 2]> {
+        let engine = self.gpu.as_mut()?;
+        engine.for_steps();
+        let steps = engine.of_steps.as_ref()?;
+        Some([&engine.recording, &steps.recording])
+    }
+
+    /// What each launch of the last pass of the last frame, and of the last step, has written, if it was traced.
+    #[doc(hidden)]
+    pub fn ran(&mut self) -> Option<[&[Ran]; 2]> {
+        let engine = self.gpu.as_mut()?;
+        engine.for_steps();
+        let steps = engine.of_steps.as_ref()?;
+        Some([&engine.ran, &steps.ran])
     }
 
     /// A detector on the caller's device, which must allow 8 storage buffers per stage and

@@ -4,12 +4,16 @@
 //! each binding: two swapped buffers do not compile. A buffer never exceeds the device's binding limit;
 //! the engine splits work that does not fit.
 
+use std::future::Future;
 use std::marker::PhantomData;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::task::{Context, Poll, Waker};
 
 use bytemuck::Pod;
 
 use super::device::Device;
-use super::layout::{Params, Step};
+use super::layout::Params;
 use crate::error::Error;
 
 /// A device buffer of `T`, at least one element long.
@@ -25,17 +29,33 @@ pub struct Storage<T> {
     holds: PhantomData<T>,
 }
 
+/// The first bytes of a buffer.
+#[derive(Debug, Clone)]
+pub struct Slice {
+    /// The name of the buffer.
+    pub label: &'static str,
+    pub buffer: wgpu::Buffer,
+    pub bytes: u64,
+}
+
+/// What a launch binds.
+#[derive(Debug, Clone)]
+pub enum Bound {
+    Buffer(Slice),
+    Params(Params),
+}
+
 /// A binding that kernels only read.
 #[derive(Debug, Clone)]
-pub struct Read<T>(wgpu::Buffer, u64, PhantomData<T>);
+pub struct Read<T>(Slice, PhantomData<T>);
 
 /// A binding that kernels write.
 #[derive(Debug, Clone)]
-pub struct Write<T>(wgpu::Buffer, u64, PhantomData<T>);
+pub struct Write<T>(Slice, PhantomData<T>);
 
-/// A binding of one `T` that is constant during a dispatch, at an offset given with the dispatch.
+/// The parameters of a launch.
 #[derive(Debug, Clone)]
-pub struct Uniform<T>(wgpu::Buffer, PhantomData<T>);
+pub struct Uniform<T>(pub T);
 
 /// Elements are numbered with 32 bits.
 pub fn count(n: usize) -> u64 {
@@ -46,7 +66,8 @@ impl<T: Pod> Storage<T> {
     pub fn new(label: &'static str, usage: wgpu::BufferUsages) -> Self {
         Storage {
             label,
-            usage: usage | wgpu::BufferUsages::COPY_DST,
+            // Any buffer can be read back, see `Launcher::run_each`.
+            usage: usage | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
             buffer: None,
             len: 0,
             capacity: 0,
@@ -67,11 +88,11 @@ impl<T: Pod> Storage<T> {
     }
 
     /// Binds exactly `len` elements; if it must grow, by a quarter more than needed. Growing loses the
-    /// contents. Returns whether the bound buffer or its bound length has changed.
+    /// contents.
     ///
     /// # Errors
     /// More elements than one binding may hold.
-    pub fn resize(&mut self, gpu: &Device, len: u64) -> Result<bool, Error> {
+    pub fn resize(&mut self, gpu: &Device, len: u64) -> Result<(), Error> {
         let limit = Self::limit(gpu);
         if len > limit {
             return Err(Error::Gpu {
@@ -85,13 +106,12 @@ impl<T: Pod> Storage<T> {
             });
         }
         let len = len.max(1);
-        let is_other = self.buffer.is_none() || len != self.len;
         self.len = len;
         if self.buffer.is_none() || len > self.capacity {
             let spare = if self.capacity == 0 { 0 } else { len / 4 };
             self.allocate(gpu, (len + spare).min(limit));
         }
-        Ok(is_other)
+        Ok(())
     }
 
     /// Binds exactly `len` elements with no room to spare, whatever size it had.
@@ -114,14 +134,14 @@ impl<T: Pod> Storage<T> {
         }));
     }
 
-    /// Holds exactly `data`. Returns as [`resize`](Storage::resize).
+    /// Holds exactly `data`.
     ///
     /// # Errors
     /// As [`resize`](Storage::resize).
-    pub fn upload(&mut self, gpu: &Device, data: &[T]) -> Result<bool, Error> {
-        let grew = self.resize(gpu, count(data.len()))?;
+    pub fn upload(&mut self, gpu: &Device, data: &[T]) -> Result<(), Error> {
+        self.resize(gpu, count(data.len()))?;
         self.write(gpu, 0, data);
-        Ok(grew)
+        Ok(())
     }
 
     /// Writes elements from `first` on, which must fit.
@@ -148,27 +168,26 @@ impl<T: Pod> Storage<T> {
     }
 
     pub fn read(&self) -> Read<T> {
-        Read(self.buffer().clone(), self.len * Self::SIZE, PhantomData)
+        Read(self.first(self.len), PhantomData)
     }
 
     pub fn write_to(&self) -> Write<T> {
-        Write(self.buffer().clone(), self.len * Self::SIZE, PhantomData)
+        Write(self.first(self.len), PhantomData)
     }
-}
 
-impl Storage<Step> {
-    /// The parameters of all steps; a dispatch chooses one by its offset.
-    pub fn params(&self) -> Uniform<Params> {
-        Uniform(self.buffer().clone(), PhantomData)
+    /// The first `len` elements.
+    pub fn first(&self, len: u64) -> Slice {
+        Slice {
+            label: self.label,
+            buffer: self.buffer().clone(),
+            bytes: len * Self::SIZE,
+        }
     }
-}
 
-fn resource(buffer: &wgpu::Buffer, size: u64) -> wgpu::BindingResource<'_> {
-    wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-        buffer,
-        offset: 0,
-        size: wgpu::BufferSize::new(size),
-    })
+    /// All elements.
+    pub fn all(&self) -> Slice {
+        self.first(self.len)
+    }
 }
 
 /// How a kernel uses a binding.
@@ -188,29 +207,90 @@ pub trait Binding {
     const ACCESS: Access;
     /// Bytes of one element.
     const STRIDE: u64;
-    fn resource(&self) -> wgpu::BindingResource<'_>;
+    fn bound(&self) -> Bound;
 }
 
 impl<T: Pod> Binding for Read<T> {
     const ACCESS: Access = Access::Read;
     const STRIDE: u64 = size_of::<T>() as u64;
-    fn resource(&self) -> wgpu::BindingResource<'_> {
-        resource(&self.0, self.1)
+    fn bound(&self) -> Bound {
+        Bound::Buffer(self.0.clone())
     }
 }
 
 impl<T: Pod> Binding for Write<T> {
     const ACCESS: Access = Access::Write;
     const STRIDE: u64 = size_of::<T>() as u64;
-    fn resource(&self) -> wgpu::BindingResource<'_> {
-        resource(&self.0, self.1)
+    fn bound(&self) -> Bound {
+        Bound::Buffer(self.0.clone())
     }
 }
 
-impl<T: Pod> Binding for Uniform<T> {
+impl Binding for Uniform<Params> {
     const ACCESS: Access = Access::Uniform;
-    const STRIDE: u64 = size_of::<T>() as u64;
-    fn resource(&self) -> wgpu::BindingResource<'_> {
-        resource(&self.0, Self::STRIDE)
+    const STRIDE: u64 = size_of::<Params>() as u64;
+    fn bound(&self) -> Bound {
+        Bound::Params(self.0)
+    }
+}
+
+/// Waits for the device and reads the first bytes of a buffer.
+///
+/// # Errors
+/// Device errors.
+pub async fn read(gpu: &Device, slice: &Slice) -> Result<Vec<u8>, Error> {
+    let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(slice.label),
+        size: slice.bytes,
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    encoder.copy_buffer_to_buffer(&slice.buffer, 0, &staging, 0, slice.bytes);
+    gpu.queue.submit([encoder.finish()]);
+    let view = map(&staging, slice.bytes).await?;
+    Ok(view.to_vec())
+}
+
+/// Maps the first bytes of a buffer for reading.
+pub async fn map(buffer: &wgpu::Buffer, bytes: u64) -> Result<wgpu::BufferView, Error> {
+    let mapping = Mapping::default();
+    let shared = Arc::clone(&mapping.0);
+    buffer.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
+        let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
+        shared.result = Some(result);
+        if let Some(waker) = shared.waker.take() {
+            waker.wake();
+        }
+    });
+    let failed = |what: String| Error::Gpu { what };
+    mapping.await.map_err(|error| failed(error.to_string()))?;
+    buffer
+        .get_mapped_range(0..bytes)
+        .map_err(|error| failed(error.to_string()))
+}
+
+#[derive(Debug, Default)]
+struct MappingState {
+    result: Option<Result<(), wgpu::BufferAsyncError>>,
+    waker: Option<Waker>,
+}
+
+/// Ready when the device has called back.
+#[derive(Debug, Default)]
+struct Mapping(Arc<Mutex<MappingState>>);
+
+impl Future for Mapping {
+    type Output = Result<(), wgpu::BufferAsyncError>;
+
+    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
+        let mut state = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match state.result.take() {
+            Some(result) => Poll::Ready(result),
+            None => {
+                state.waker = Some(context.waker().clone());
+                Poll::Pending
+            }
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! The method `Cells`, the paper's two levels: its launches, in order.
+//! The method `Cells`, the paper's two levels, as a recording.
 //!
 //! ```text
 //! bounds     as in Clusters, for the boxes of bodies · reach · primitives within reach
@@ -13,43 +13,138 @@
 
 use std::fmt;
 
-use super::kernels::{DispatchCells, DispatchScatter, DispatchTile, GridCount, PairingCells};
-use super::layout::{N_ITEMS, Params, ROUNDS};
-use super::narrow::{Settling, prepare};
-use super::open::Gpu;
-use super::pipeline::{Bound, Workgroups};
-use super::reaching::{CELLS, KEPT, Reaching, ReachingSteps};
-use super::room::Room;
-use super::steps::{Stages, Steps};
-use super::world::World;
+use super::buffers::Uniform;
+use super::collect::Collected;
+use super::kernels::{
+    BoundsKeep, BoundsReach, DispatchCells, DispatchScatter, DispatchTile, GridCount, GridRanges,
+    GridResolution, GridShift, PairingCells,
+};
+use super::layout::{NO_ROOT, Params};
+use super::recording::{Recorder, Workgroups};
+use super::room::Capacities;
 use crate::error::Error;
 
-/// The stages on the device, in order, by their timing labels.
-const STAGES: &[&str] = &["bounds", "grid", "dispatch", "pairing", "narrow"];
+/// Slot of the arguments for launches over kept primitives, 64 per workgroup.
+const KEPT: u32 = 0;
+/// Slot of the arguments for launches over cells, 64 per workgroup.
+const CELLS: u32 = 1;
 
-/// The method's parameters for a pass.
-#[derive(Debug, Clone, Copy)]
-pub struct Told {
-    pub lambda: f64,
-    pub group_size: u32,
-    pub resolve: bool,
-    pub share: Share,
+/// The work of a pass in cells. To split a single cell over several passes takes tiles: every pass that fills lists does so in
+/// the order in which threads happen to come, so tiles would not hold the same primitives from pass to pass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum CellWork {
+    /// All of some cells.
+    All(CellRange),
+    /// Fills the list of one cell, for later passes.
+    List(CellRange),
+    /// Pairs one tile of the product of the groups of a list that an earlier pass has filled.
+    Tile(CellRange, Tile),
 }
 
-/// The share of the work in its cells that a pass does.
+impl CellWork {
+    /// The work of a whole frame.
+    pub const WHOLE: CellWork = CellWork::All(CellRange {
+        first: 0,
+        count: u32::MAX,
+    });
+
+    /// Its cells.
+    pub fn cells(self) -> CellRange {
+        match self {
+            CellWork::All(cells) | CellWork::List(cells) | CellWork::Tile(cells, _) => cells,
+        }
+    }
+
+    /// The work to do instead if even an empty pass would be too large; `None` for any other.
+    pub fn parts(self) -> Option<Vec<CellWork>> {
+        match self {
+            CellWork::Tile(cells, tile) if tile.side > Tile::MOST => Some(quarters(cells, tile)),
+            _ => None,
+        }
+    }
+
+    /// Smaller parts; `None` if splitting does not help. `kept`: for how many kept primitives there was room.
+    pub fn split(self, collected: &Collected, kept: u64) -> Option<Vec<CellWork>> {
+        match self {
+            // The kept primitives do not depend on the cells.
+            CellWork::All(_) if collected.counts.needed.kept > kept => None,
+            CellWork::All(cells) => Some(match cells.split(collected.grid.n_cells) {
+                Some(halves) => halves.map(CellWork::All).into(),
+                None => vec![CellWork::List(cells)],
+            }),
+            CellWork::List(_) => None,
+            CellWork::Tile(cells, tile) => (tile.side > 1).then(|| quarters(cells, tile)),
+        }
+    }
+
+    /// The work that follows it. No other pass changes the list of a cell before the last of its tiles is done.
+    pub fn next(self, collected: &Collected, group_size: u32) -> Option<CellWork> {
+        let n_entries = collected.counts.needed.entries as u32;
+        match self {
+            CellWork::List(cells) if n_entries > 0 => {
+                Some(CellWork::Tile(cells, Tile::all(n_entries, group_size)))
+            }
+            _ => None,
+        }
+    }
+
+    /// Room for work that cannot be split: the buffers that it needs grow, and all others shrink.
+    pub fn lean(self, needed: &Capacities, now: Capacities, least: Capacities) -> Capacities {
+        match self {
+            // The filled list must stay.
+            CellWork::Tile(..) => Capacities {
+                kept: now.kept,
+                entries: now.entries,
+                ..least
+            },
+            CellWork::All(_) | CellWork::List(_) => Capacities {
+                kept: needed.kept.max(least.kept),
+                entries: match needed.kept > now.kept {
+                    true => least.entries,
+                    false => needed.entries.max(least.entries),
+                },
+                ..least
+            },
+        }
+    }
+}
+
+/// The quarters of a tile that have any work.
+fn quarters(cells: CellRange, tile: Tile) -> Vec<CellWork> {
+    let quarters = tile.split().unwrap_or_default().into_iter();
+    quarters
+        .map(|quarter| CellWork::Tile(cells, quarter))
+        .collect()
+}
+
+/// Some cells of the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Share {
-    /// All of it.
-    All,
-    /// Fills the lists, for later passes.
-    Lists,
-    /// Pairs one tile of the product of the groups of a list that an earlier pass has filled.
-    Tile(Tile),
+pub struct CellRange {
+    /// The first cell.
+    pub first: u32,
+    /// The number of cells.
+    pub count: u32,
+}
+
+impl CellRange {
+    /// Two halves of the cells; `None` for a single cell. `n_cells`: the number of cells of the grid.
+    pub fn split(self, n_cells: u32) -> Option<[CellRange; 2]> {
+        let count = self.count.min(n_cells.saturating_sub(self.first));
+        let low = CellRange {
+            count: count / 2,
+            ..self
+        };
+        let high = CellRange {
+            first: self.first + low.count,
+            count: count - low.count,
+        };
+        (count > 1).then_some([low, high])
+    }
 }
 
 /// A square of the product of the groups of one cell with themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Tile {
+pub(super) struct Tile {
     /// The number of entries of the cell's list.
     pub n_entries: u32,
     /// The number of groups of the cell's list.
@@ -102,282 +197,239 @@ impl Tile {
     }
 }
 
-/// A plan of passes that work in cells: this method's, or that of another crate.
-pub trait InCells: fmt::Debug + Send + Sync {
-    /// The stages on the device, in order, by their timing labels.
-    fn stages(&self) -> &'static [&'static str];
+/// The method's parameters for a pass.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Told {
+    pub lambda: f64,
+    pub group_size: u32,
+    pub resolve: bool,
+    pub work: CellWork,
+}
 
-    /// A new plan of the same kind that is bound to no buffers.
-    fn anew(&self) -> Box<dyn InCells>;
+/// Records the passes of a method of another crate.
+type Record = dyn FnMut(&mut Recorder<'_>, f64, CellRange) -> Result<(), Error> + Send + Sync;
 
-    /// Drops its kernel bindings: the buffers have changed.
-    fn unbind(&mut self);
+/// A method of another crate that works in cells.
+pub struct Guest {
+    make: Box<dyn Fn() -> Box<Record> + Send + Sync>,
+    record: Box<Record>,
+}
 
-    /// Whether the work of a single cell can be split over several passes: whether the plan follows [`Told::share`].
-    fn splits_cells(&self) -> bool {
-        false
+impl fmt::Debug for Guest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Guest")
+    }
+}
+
+impl Guest {
+    /// A guest whose recorder is made by `make`: with no buffers at first, and anew after a device error. It records a pass for some cells,
+    /// with the density of cells.
+    pub fn new(make: impl Fn() -> Box<Record> + Send + Sync + 'static) -> Self {
+        let record = make();
+        let make = Box::new(make);
+        Guest { make, record }
     }
 
-    /// Plans a pass.
-    ///
-    /// # Errors
-    /// As [`Steps::send`]; the plan's own buffers cannot be allocated.
-    fn make(
+    /// The same without its buffers.
+    pub(super) fn anew(self) -> Self {
+        let record = (self.make)();
+        Guest { record, ..self }
+    }
+
+    pub(super) fn record(
         &mut self,
-        gpu: &Gpu,
-        world: &World,
-        room: &Room,
-        told: Told,
-        part: CellRange,
-    ) -> Result<(), Error>;
-
-    /// Encodes all stages.
-    fn encode(&self, stages: &mut Stages<'_>, world: &World, room: &Room);
-}
-
-/// The part of the work that a pass does: a range of cells. To split a single cell over several passes takes
-/// a [`Share`]: every pass that fills lists does so in the order in which threads happen to come, so tiles of the
-/// product of the groups would not hold the same primitives from pass to pass.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct CellRange {
-    /// The first cell.
-    pub first: u32,
-    /// The number of cells.
-    pub count: u32,
-}
-
-impl CellRange {
-    /// All cells.
-    pub const ALL: CellRange = CellRange {
-        first: 0,
-        count: u32::MAX,
-    };
-
-    /// Two halves of the cells; `None` for a single cell. `n_cells`: the number of cells of the grid.
-    pub fn split(self, n_cells: u32) -> Option<[CellRange; 2]> {
-        let count = self.count.min(n_cells.saturating_sub(self.first));
-        let low = CellRange {
-            count: count / 2,
-            ..self
-        };
-        let high = CellRange {
-            first: self.first + low.count,
-            count: count - low.count,
-        };
-        (count > 1).then_some([low, high])
-    }
-}
-
-/// Kernels with their buffers; bound again when a buffer is replaced.
-#[derive(Debug)]
-struct Launches {
-    reaching: Reaching,
-    count: Bound,
-    dispatch: Bound,
-    tile: Bound,
-    scatter: Bound,
-    prepare: Bound,
-    pairing: Bound,
-    settling: Settling,
-}
-
-/// All launches of a pass.
-#[derive(Debug)]
-pub struct CellsPlan {
-    steps: Steps,
-    launches: Option<Launches>,
-    reaching: ReachingSteps,
-    share: Share,
-    /// The step of dispatch and pairing.
-    work: u32,
-    prepare_pairing: u32,
-    narrow: u32,
-}
-
-impl CellsPlan {
-    #[allow(clippy::new_without_default)]
-    pub fn new() -> Self {
-        CellsPlan {
-            steps: Steps::new(),
-            launches: None,
-            reaching: ReachingSteps::default(),
-            share: Share::All,
-            work: 0,
-            prepare_pairing: 0,
-            narrow: 0,
-        }
-    }
-}
-
-impl InCells for CellsPlan {
-    fn stages(&self) -> &'static [&'static str] {
-        STAGES
-    }
-
-    fn anew(&self) -> Box<dyn InCells> {
-        Box::new(CellsPlan::new())
-    }
-
-    fn unbind(&mut self) {
-        self.launches = None;
-    }
-
-    fn splits_cells(&self) -> bool {
-        true
-    }
-
-    fn make(
-        &mut self,
-        gpu: &Gpu,
-        world: &World,
-        room: &Room,
-        told: Told,
-        part: CellRange,
+        recorder: &mut Recorder<'_>,
+        lambda: f64,
+        cells: CellRange,
     ) -> Result<(), Error> {
-        let steps = &mut self.steps;
-        steps.clear();
-        self.reaching.plan(world, room, told.lambda, steps);
-        self.share = told.share;
-        let work = Params {
-            first: part.first,
-            count: part.count,
-            n_ignored: world.n_ignored(),
-            resolve: u32::from(told.resolve),
+        (self.record)(recorder, lambda, cells)
+    }
+}
+
+impl Recorder<'_> {
+    /// All stages.
+    pub(super) fn cells(&mut self, told: Told) {
+        let (gpu, world, room) = (self.gpu, self.world, self.room);
+        let kernels = &gpu.kernels;
+        let counters = || room.counters.write_to();
+        let cells = told.work.cells();
+        let params = Params {
+            first: cells.first,
+            count: cells.count,
             group_size: told.group_size,
             ..Params::default()
         };
-        self.work = steps.push(match told.share {
-            Share::All => work,
-            Share::Lists => Params {
-                lists_only: 1,
-                ..work
-            },
-            Share::Tile(tile) => Params {
-                n_entries: tile.n_entries,
-                tile_row: tile.row,
-                tile_column: tile.column,
-                tile_side: tile.side,
-                ..work
-            },
-        });
-        self.prepare_pairing = steps.push(Params {
-            counter: N_ITEMS,
-            per_group: 1,
-            // Capacities fit 32 bits.
-            capacity: room.capacities().items as u32,
-            slot: ROUNDS,
-            ..Params::default()
-        });
-        self.narrow = Settling::plan(steps, room);
-        if steps.send(gpu)? || self.launches.is_none() {
-            self.launches = Some(Launches::new(gpu, world, room, &self.steps));
-        }
-        Ok(())
-    }
-
-    fn encode(&self, stages: &mut Stages<'_>, world: &World, room: &Room) {
-        let launches = self.launches.as_ref().expect("made before it is encoded");
-        let arguments = room.arguments.buffer();
-        let kept = || Workgroups::Indirect(arguments, KEPT);
-        if let Share::Tile(tile) = self.share {
+        if let CellWork::Tile(_, tile) = told.work {
             // Boxes, grid and the list exist already: their stages are empty.
-            stages.stage(|_| ());
-            stages.stage(|_| ());
-            stages.stage(|pass| {
-                let groups = (u64::from(tile.side) * u64::from(tile.side)).div_ceil(64);
-                launches
-                    .tile
-                    .run(pass, self.work, Workgroups::Known(groups));
-            });
+            for stage in ["bounds", "grid", "dispatch"] {
+                self.recording.stage(stage);
+            }
+            let bindings = DispatchTile {
+                grid: room.grid.read(),
+                items: room.cell_items.write_to(),
+                counters: counters(),
+                params: Uniform(Params {
+                    n_entries: tile.n_entries,
+                    tile_row: tile.row,
+                    tile_column: tile.column,
+                    tile_side: tile.side,
+                    ..params
+                }),
+            };
+            let groups = (u64::from(tile.side) * u64::from(tile.side)).div_ceil(64);
+            let groups = Workgroups::Known(groups);
+            self.recording
+                .launch(&kernels.dispatch_tile, &bindings, groups);
         } else {
-            stages.encoder.clear_buffer(room.cells.buffer(), 0, None);
-            Reaching::clear(stages.encoder, room);
-            stages.stage(|pass| launches.reaching.run_bounds(pass, world, &self.reaching));
-            stages.stage(|pass| {
-                launches.reaching.run_grid(pass, room, &self.reaching);
-                launches.count.run(pass, 0, kept());
-            });
-            stages.stage(|pass| {
-                let groups = Workgroups::Indirect(arguments, CELLS);
-                launches.dispatch.run(pass, self.work, groups);
-                launches.scatter.run(pass, 0, kept());
-            });
+            self.recording.clear(room.cells.all());
+            self.bounds_within_reach();
+            self.grid(told.lambda);
+            let count = GridCount {
+                grid: room.grid.read(),
+                kept: room.kept.write_to(),
+                counters: counters(),
+                cells: room.cells.write_to(),
+            };
+            let kept = self.over_kept();
+            self.recording.launch(&kernels.grid_count, &count, kept);
+            self.recording.stage("dispatch");
+            let dispatch = DispatchCells {
+                grid: room.grid.read(),
+                bodies: world.bodies.read(),
+                cells: room.cells.write_to(),
+                starts: room.starts.write_to(),
+                items: room.cell_items.write_to(),
+                counters: counters(),
+                params: Uniform(Params {
+                    lists_only: u32::from(matches!(told.work, CellWork::List(_))),
+                    ..params
+                }),
+            };
+            let groups = self.indirect(CELLS);
+            self.recording
+                .launch(&kernels.dispatch_cells, &dispatch, groups);
+            let scatter = DispatchScatter {
+                grid: room.grid.read(),
+                kept: room.kept.read(),
+                starts: room.starts.read(),
+                cells: room.cells.write_to(),
+                entries: room.entries.write_to(),
+                counters: counters(),
+            };
+            let kept = self.over_kept();
+            self.recording
+                .launch(&kernels.dispatch_scatter, &scatter, kept);
         }
-        stages.stage(|pass| {
-            let step = self.prepare_pairing;
-            launches.prepare.run(pass, step, Workgroups::Known(1));
-            let groups = Workgroups::Indirect(arguments, ROUNDS);
-            launches.pairing.run(pass, self.work, groups);
-        });
-        stages.stage(|pass| launches.settling.run(pass, room, self.narrow));
+        self.recording.stage("pairing");
+        let groups = self.counted_items();
+        let pairing = PairingCells {
+            bodies: world.bodies.read(),
+            ignored: world.ignored.read(),
+            corners: world.corners.read(),
+            kept: room.kept.read(),
+            entries: room.entries.read(),
+            items: room.cell_items.read(),
+            candidates: room.candidates.write_to(),
+            counters: counters(),
+            params: Uniform(Params {
+                n_ignored: world.n_ignored(),
+                resolve: u32::from(told.resolve),
+                ..Params::default()
+            }),
+        };
+        self.recording
+            .launch(&kernels.pairing_cells, &pairing, groups);
+        self.recording.stage("narrow");
+        self.narrow();
     }
-}
 
-impl Launches {
-    fn new(gpu: &Gpu, world: &World, room: &Room, steps: &Steps) -> Self {
-        let kernels = &gpu.kernels;
-        let params = || steps.params();
-        let counters = || room.counters.write_to();
-        Launches {
-            reaching: Reaching::new(gpu, world, room, steps),
-            count: kernels.grid_count.bind(
-                gpu,
-                &GridCount {
-                    grid: room.grid.read(),
-                    kept: room.kept.write_to(),
-                    counters: counters(),
-                    cells: room.cells.write_to(),
-                },
-            ),
-            dispatch: kernels.dispatch_cells.bind(
-                gpu,
-                &DispatchCells {
-                    grid: room.grid.read(),
-                    bodies: world.bodies.read(),
-                    cells: room.cells.write_to(),
-                    starts: room.starts.write_to(),
-                    items: room.cell_items.write_to(),
-                    counters: counters(),
-                    params: params(),
-                },
-            ),
-            tile: kernels.dispatch_tile.bind(
-                gpu,
-                &DispatchTile {
-                    grid: room.grid.read(),
-                    items: room.cell_items.write_to(),
-                    counters: counters(),
-                    params: params(),
-                },
-            ),
-            scatter: kernels.dispatch_scatter.bind(
-                gpu,
-                &DispatchScatter {
-                    grid: room.grid.read(),
-                    kept: room.kept.read(),
-                    starts: room.starts.read(),
-                    cells: room.cells.write_to(),
-                    entries: room.entries.write_to(),
-                    counters: counters(),
-                },
-            ),
-            prepare: prepare(gpu, room, steps),
-            pairing: kernels.pairing_cells.bind(
-                gpu,
-                &PairingCells {
-                    bodies: world.bodies.read(),
-                    ignored: world.ignored.read(),
-                    corners: world.corners.read(),
-                    kept: room.kept.read(),
-                    entries: room.entries.read(),
-                    items: room.cell_items.read(),
-                    candidates: room.candidates.write_to(),
-                    counters: counters(),
-                    params: params(),
-                },
-            ),
-            settling: Settling::new(gpu, world, room, steps),
-        }
+    /// The workgroups of launches over kept primitives.
+    pub fn over_kept(&self) -> Workgroups {
+        self.indirect(KEPT)
+    }
+
+    /// Stage `bounds` of methods that work in a grid: the boxes of bodies, their reach, and the primitives within reach.
+    pub fn bounds_within_reach(&mut self) {
+        let (gpu, world, room) = (self.gpu, self.world, self.room);
+        self.recording.clear(room.tallies.all());
+        self.bounds();
+        let reach = BoundsReach {
+            nodes: world.nodes.read(),
+            bodies: world.bodies.read(),
+            ignored: world.ignored.read(),
+            reaches: room.reaches.write_to(),
+            tallies: room.tallies.write_to(),
+            // Counts fit 32 bits.
+            params: Uniform(Params {
+                first: world.forest().top().unwrap_or(NO_ROOT),
+                count: world.bodies.len() as u32,
+                n_ignored: world.n_ignored(),
+                ..Params::default()
+            }),
+        };
+        let groups = Workgroups::Known(world.bodies.len().div_ceil(64));
+        self.recording
+            .launch(&gpu.kernels.bounds_reach, &reach, groups);
+        let keep = BoundsKeep {
+            nodes: world.nodes.read(),
+            clusters: world.clusters.read(),
+            bodies: world.bodies.read(),
+            corners: world.corners.read(),
+            positions: world.positions.read(),
+            reaches: room.reaches.read(),
+            kept: room.kept.write_to(),
+            counters: room.counters.write_to(),
+        };
+        let groups = Workgroups::Known(world.forest().n_clusters());
+        self.recording
+            .launch(&gpu.kernels.bounds_keep, &keep, groups);
+    }
+
+    /// Stage `grid`, up to the ranges of kept primitives and their shift, with cells as dense as `lambda`.
+    pub fn grid(&mut self, lambda: f64) {
+        self.recording.stage("grid");
+        let (gpu, room) = (self.gpu, self.room);
+        let over_kept = Params {
+            // Capacities and counts fit 32 bits.
+            capacity: room.capacities().kept as u32,
+            lambda: (lambda as f32).clamp(f32::MIN_POSITIVE, f32::MAX).to_bits(),
+            most_cells: room.cells.len() as u32,
+            ..Params::default()
+        };
+        let resolution = GridResolution {
+            counters: room.counters.write_to(),
+            tallies: room.tallies.write_to(),
+            grid: room.grid.write_to(),
+            arguments: room.arguments.write_to(),
+            params: Uniform(Params {
+                slot: KEPT,
+                ..over_kept
+            }),
+        };
+        let one = Workgroups::Known(1);
+        self.recording
+            .launch(&gpu.kernels.grid_resolution, &resolution, one);
+        let ranges = GridRanges {
+            grid: room.grid.read(),
+            kept: room.kept.write_to(),
+            counters: room.counters.write_to(),
+            tallies: room.tallies.write_to(),
+        };
+        let kept = self.over_kept();
+        self.recording
+            .launch(&gpu.kernels.grid_ranges, &ranges, kept);
+        let shift = GridShift {
+            counters: room.counters.write_to(),
+            tallies: room.tallies.write_to(),
+            grid: room.grid.write_to(),
+            arguments: room.arguments.write_to(),
+            params: Uniform(Params {
+                slot: CELLS,
+                ..over_kept
+            }),
+        };
+        let one = Workgroups::Known(1);
+        self.recording.launch(&gpu.kernels.grid_shift, &shift, one);
     }
 }
 
@@ -388,7 +440,7 @@ mod tests {
     #[test]
     fn parts_split_down_to_single_cells() {
         let n_cells = 5;
-        let mut waiting = vec![CellRange::ALL];
+        let mut waiting = vec![CellWork::WHOLE.cells()];
         let mut seen = std::collections::BTreeSet::new();
         while let Some(part) = waiting.pop() {
             match part.split(n_cells) {

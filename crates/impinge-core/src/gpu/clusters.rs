@@ -1,192 +1,292 @@
-//! The method `Clusters`: its launches, in order. Steps have the same, with kernels for boxes at both ends.
+//! The method `Clusters` as a recording. Steps have the same launches, with kernels for boxes at both ends and with a search.
 //!
 //! ```text
 //! bounds     clusters · wide levels, one launch each · all narrow levels in one
 //! dispatch   round 0 · (prepare · round r) for r = 1 …
 //! pairing    prepare · pairing
-//! narrow     prepare · narrow
+//! narrow     prepare · narrow;    in a step: · prepare · search
 //! ```
 
-use super::bounds::{BoundsLaunches, BoundsSteps};
-use super::kernels::{Dispatch, Pairing};
-use super::layout::{N_ITEMS, Params, ROUNDS};
-use super::narrow::{Settling, prepare};
-use super::open::Gpu;
-use super::pipeline::{Bound, Workgroups};
-use super::room::Room;
-use super::steps::{Stages, Steps};
-use super::world::World;
-use crate::error::Error;
+use super::buffers::Uniform;
+use super::kernels::{
+    BoundsClusters, BoundsLevel, BoundsTop, Dispatch, Narrow, NarrowMoving, NarrowSearch, Pairing,
+    Prepare,
+};
+use super::layout::{
+    N_CANDIDATES, N_ITEMS, N_PAIRS, Params, ROUNDS, SEEK_ALL, SEEK_ANY, SEEK_EARLIEST,
+};
+use super::recording::{Recorder, Workgroups};
 use crate::sink::Goal;
 
-/// The stages on the device, in order, by their timing labels.
-pub(crate) const STAGES: &[&str] = &["bounds", "dispatch", "pairing", "narrow"];
-
-/// Kernels with their buffers; bound again when a buffer is replaced.
-#[derive(Debug)]
-struct Launches {
-    bounds: BoundsLaunches,
-    prepare: Bound,
-    /// From queue a to b, and from b to a.
-    dispatch: [Bound; 2],
-    pairing: Bound,
-    settling: Settling,
-}
-
-/// All launches of a pass.
-#[derive(Debug)]
-pub(crate) struct TreePlan {
-    steps: Steps,
-    launches: Option<Launches>,
-    bounds: BoundsSteps,
-    /// The step of the first round.
-    rounds: u32,
-    n_rounds: u32,
-    /// The step that prepares pairing. The steps that prepare rounds 1, 2, … follow it.
-    prepare_pairing: u32,
-    narrow: u32,
-}
+/// Levels of up to this many nodes are refitted by one workgroup, in one launch with the levels above them.
+const NARROW_LEVEL: u32 = 2048;
+/// Candidates per workgroup.
+const GROUP: u32 = 64;
+/// The slots of the arguments of pairing, of narrow, and of a search. Those below are the rounds'.
+const PAIRING: u32 = ROUNDS;
+const NARROW: u32 = ROUNDS + 1;
+const SEARCH: u32 = ROUNDS + 2;
 
 /// What a pass is told.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Told {
+pub(super) struct Told {
+    pub n_seeds: u64,
     /// The rounds of the traversal.
     pub n_rounds: u32,
     /// Whether pairs that share a vertex are resolved.
     pub resolve: bool,
-    /// Which contacts of a step the host seeks; none if results stay on the device.
+    /// In a step: which contacts the host seeks; none if results stay on the device.
     pub sought: Option<Goal>,
 }
 
-impl TreePlan {
-    pub fn new() -> Self {
-        TreePlan {
-            steps: Steps::new(),
-            launches: None,
-            bounds: BoundsSteps::default(),
-            rounds: 0,
-            n_rounds: 0,
-            prepare_pairing: 0,
-            narrow: 0,
-        }
-    }
-
-    /// Drops its kernel bindings: the buffers have changed.
-    pub fn unbind(&mut self) {
-        self.launches = None;
-    }
-
-    /// Plans a pass.
-    ///
-    /// # Errors
-    /// As [`Steps::send`].
-    pub fn make(&mut self, gpu: &Gpu, world: &World, room: &Room, told: Told) -> Result<(), Error> {
-        let Told { n_rounds, .. } = told;
-        let steps = &mut self.steps;
-        steps.clear();
-        self.bounds.plan(world, steps);
-        self.n_rounds = n_rounds;
-        self.rounds = steps.push(Params {
-            n_ignored: world.n_ignored(),
-            resolve: u32::from(told.resolve),
-            ..Params::default()
-        });
-        for round in 1..n_rounds {
-            steps.push(Params {
-                first: round,
-                n_ignored: world.n_ignored(),
-                ..Params::default()
-            });
-        }
-        // Capacities fit 32 bits.
-        let capacities = room.capacities();
-        let prepare = |counter: u32, capacity: u64, slot: u32| Params {
-            counter,
-            per_group: 1,
-            capacity: capacity as u32,
-            slot,
-            ..Params::default()
-        };
-        self.prepare_pairing = steps.push(prepare(N_ITEMS, capacities.items, ROUNDS));
-        for round in 1..n_rounds {
-            steps.push(prepare(round, capacities.queue, round));
-        }
-        self.narrow = match world.is_moving() {
-            true => Settling::plan_step(steps, room, told.sought),
-            false => Settling::plan(steps, room),
-        };
-        if steps.send(gpu)? || self.launches.is_none() {
-            self.launches = Some(Launches::new(gpu, world, room, &self.steps));
-        }
-        Ok(())
-    }
-
-    /// Encodes all stages.
-    pub fn encode(&self, stages: &mut Stages<'_>, world: &World, room: &Room, n_seeds: u64) {
-        let launches = self.launches.as_ref().expect("made before it is encoded");
-        let arguments = room.arguments.buffer();
-        stages.stage(|pass| launches.bounds.run(pass, world, &self.bounds));
-        stages.stage(|pass| {
-            for round in 0..self.n_rounds {
-                let groups = if round == 0 {
-                    Workgroups::Known(n_seeds)
-                } else {
-                    let step = self.prepare_pairing + round;
-                    launches.prepare.run(pass, step, Workgroups::Known(1));
-                    Workgroups::Indirect(arguments, round)
-                };
-                launches.dispatch[(round % 2) as usize].run(pass, self.rounds + round, groups);
-            }
-        });
-        stages.stage(|pass| {
-            let step = self.prepare_pairing;
-            launches.prepare.run(pass, step, Workgroups::Known(1));
-            let groups = Workgroups::Indirect(arguments, ROUNDS);
-            launches.pairing.run(pass, self.rounds, groups);
-        });
-        stages.stage(|pass| launches.settling.run(pass, room, self.narrow));
-    }
+/// The workgroups over elements that a counter counts, for a later launch.
+#[derive(Debug, Clone, Copy)]
+pub struct Counted {
+    pub counter: u32,
+    /// Elements per workgroup.
+    pub per_group: u32,
+    /// The most elements.
+    pub capacity: u64,
+    /// Where the arguments are put.
+    pub slot: u32,
 }
 
-impl Launches {
-    fn new(gpu: &Gpu, world: &World, room: &Room, steps: &Steps) -> Self {
+impl Recorder<'_> {
+    /// All stages.
+    pub(super) fn clusters(&mut self, told: Told) {
+        self.bounds();
+        self.dispatch(told);
+        self.recording.stage("pairing");
+        self.pairing(told.resolve);
+        self.recording.stage("narrow");
+        match self.world.is_moving() {
+            true => self.narrow_step(told.sought),
+            false => self.narrow(),
+        }
+    }
+
+    /// Stage `bounds`: the boxes of clusters and of the forest above them, if anything has moved.
+    pub fn bounds(&mut self) {
+        self.recording.stage("bounds");
+        let (gpu, world) = (self.gpu, self.world);
+        if !world.is_moved {
+            return;
+        }
         let kernels = &gpu.kernels;
-        let (dispatch_kernel, pairing) = match world.is_moving() {
-            true => (&kernels.dispatch_moving, &kernels.pairing_moving),
-            false => (&kernels.dispatch, &kernels.pairing),
+        let (clusters, level, top) = match world.is_moving() {
+            true => (
+                &kernels.bounds_clusters_moving,
+                &kernels.bounds_level_moving,
+                &kernels.bounds_top_moving,
+            ),
+            false => (
+                &kernels.bounds_clusters,
+                &kernels.bounds_level,
+                &kernels.bounds_top,
+            ),
         };
-        let dispatch = |from: usize, to: usize| {
+        let bindings = BoundsClusters {
+            clusters: world.clusters.read(),
+            cluster_vertices: world.cluster_vertices.read(),
+            positions: world.positions.read(),
+            bodies: world.bodies.read(),
+            nodes: world.nodes.write_to(),
+        };
+        let groups = Workgroups::Known(world.n_ends() * world.forest().n_clusters());
+        self.recording.launch(clusters, &bindings, groups);
+        let levels = &world.forest().levels;
+        let is_wide = levels.iter().rposition(|level| level.count > NARROW_LEVEL);
+        let narrow_from = is_wide.map_or(1, |last| last + 1).max(1);
+        for wide in levels.iter().take(narrow_from).skip(1) {
+            let bindings = BoundsLevel {
+                bodies: world.bodies.read(),
+                nodes: world.nodes.write_to(),
+                params: Uniform(Params {
+                    first: wide.first,
+                    count: wide.count,
+                    ..Params::default()
+                }),
+            };
+            let groups = Workgroups::Known(u64::from(wide.count).div_ceil(64));
+            self.recording.launch(level, &bindings, groups);
+        }
+        if narrow_from < levels.len() {
+            let bindings = BoundsTop {
+                bodies: world.bodies.read(),
+                levels: world.levels.read(),
+                nodes: world.nodes.write_to(),
+                params: Uniform(Params {
+                    first: narrow_from as u32,
+                    count: (levels.len() - narrow_from) as u32,
+                    ..Params::default()
+                }),
+            };
+            self.recording.launch(top, &bindings, Workgroups::Known(1));
+        }
+    }
+
+    /// Stage `dispatch`: tree against tree, a round per level.
+    fn dispatch(&mut self, told: Told) {
+        self.recording.stage("dispatch");
+        let (gpu, world, room) = (self.gpu, self.world, self.room);
+        let kernel = match world.is_moving() {
+            true => &gpu.kernels.dispatch_moving,
+            false => &gpu.kernels.dispatch,
+        };
+        for round in 0..told.n_rounds {
+            let groups = match round {
+                0 => Workgroups::Known(told.n_seeds),
+                _ => self.counted(Counted {
+                    counter: round,
+                    per_group: 1,
+                    capacity: room.capacities().queue,
+                    slot: round,
+                }),
+            };
+            // From queue a to b, and from b to a.
+            let from = (round % 2) as usize;
             let bindings = Dispatch {
                 nodes: world.nodes.read(),
                 bodies: world.bodies.read(),
                 ignored: world.ignored.read(),
                 queue: room.queues[from].read(),
-                next_queue: room.queues[to].write_to(),
+                next_queue: room.queues[1 - from].write_to(),
                 items: room.items.write_to(),
                 counters: room.counters.write_to(),
-                params: steps.params(),
+                params: Uniform(Params {
+                    first: round,
+                    n_ignored: world.n_ignored(),
+                    ..Params::default()
+                }),
             };
-            dispatch_kernel.bind(gpu, &bindings)
-        };
-        Launches {
-            bounds: BoundsLaunches::new(gpu, world, steps),
-            prepare: prepare(gpu, room, steps),
-            dispatch: [dispatch(0, 1), dispatch(1, 0)],
-            pairing: pairing.bind(
-                gpu,
-                &Pairing {
-                    nodes: world.nodes.read(),
-                    clusters: world.clusters.read(),
-                    bodies: world.bodies.read(),
-                    corners: world.corners.read(),
-                    positions: world.positions.read(),
-                    items: room.items.read(),
-                    candidates: room.candidates.write_to(),
-                    counters: room.counters.write_to(),
-                    params: steps.params(),
-                },
-            ),
-            settling: Settling::new(gpu, world, room, steps),
+            self.recording.launch(kernel, &bindings, groups);
         }
+    }
+
+    /// Work items to candidates.
+    fn pairing(&mut self, resolve: bool) {
+        let (gpu, world, room) = (self.gpu, self.world, self.room);
+        let groups = self.counted_items();
+        let kernel = match world.is_moving() {
+            true => &gpu.kernels.pairing_moving,
+            false => &gpu.kernels.pairing,
+        };
+        let bindings = Pairing {
+            nodes: world.nodes.read(),
+            clusters: world.clusters.read(),
+            bodies: world.bodies.read(),
+            corners: world.corners.read(),
+            positions: world.positions.read(),
+            items: room.items.read(),
+            candidates: room.candidates.write_to(),
+            counters: room.counters.write_to(),
+            params: Uniform(Params {
+                resolve: u32::from(resolve),
+                ..Params::default()
+            }),
+        };
+        self.recording.launch(kernel, &bindings, groups);
+    }
+
+    /// Launches `prepare`, which writes the number of workgroups of a later launch. Returns it.
+    pub fn counted(&mut self, counted: Counted) -> Workgroups {
+        let bindings = Prepare {
+            counters: self.room.counters.write_to(),
+            arguments: self.room.arguments.write_to(),
+            params: Uniform(Params {
+                counter: counted.counter,
+                per_group: counted.per_group,
+                // Capacities fit 32 bits.
+                capacity: counted.capacity as u32,
+                slot: counted.slot,
+                ..Params::default()
+            }),
+        };
+        let prepare = &self.gpu.kernels.prepare;
+        self.recording
+            .launch(prepare, &bindings, Workgroups::Known(1));
+        self.indirect(counted.slot)
+    }
+
+    /// The workgroups of stage `pairing`, one per work item.
+    pub fn counted_items(&mut self) -> Workgroups {
+        self.counted(Counted {
+            counter: N_ITEMS,
+            per_group: 1,
+            capacity: self.room.capacities().items,
+            slot: PAIRING,
+        })
+    }
+
+    fn counted_candidates(&mut self) -> Workgroups {
+        self.counted(Counted {
+            counter: N_CANDIDATES,
+            per_group: GROUP,
+            capacity: self.room.capacities().candidates,
+            slot: NARROW,
+        })
+    }
+
+    /// Stage `narrow`: the filter over all candidates.
+    pub fn narrow(&mut self) {
+        let (gpu, world, room) = (self.gpu, self.world, self.room);
+        let groups = self.counted_candidates();
+        // Scenes without tetrahedra use a kernel without the code for solids, and the registers it needs.
+        let kernel = match world.has_solids {
+            true => &gpu.kernels.narrow_solids,
+            false => &gpu.kernels.narrow,
+        };
+        let bindings = Narrow {
+            candidates: room.candidates.read(),
+            corners: world.corners.read(),
+            positions: world.positions.read(),
+            order: world.order.read(),
+            pairs: room.pairs.write_to(),
+            unsure: room.unsure.write_to(),
+            counters: room.counters.write_to(),
+        };
+        self.recording.launch(kernel, &bindings, groups);
+    }
+
+    /// Stage `narrow` of a step: the filter over all candidates, and a search of the pairs that it leaves. `sought`: which contacts the
+    /// host seeks; none if the results stay on the device, where pairs are named by global numbers.
+    fn narrow_step(&mut self, sought: Option<Goal>) {
+        let (gpu, world, room) = (self.gpu, self.world, self.room);
+        let groups = self.counted_candidates();
+        let bindings = NarrowMoving {
+            candidates: room.candidates.read(),
+            corners: world.corners.read(),
+            positions: world.positions.read(),
+            pairs: room.pairs.write_to(),
+            counters: room.counters.write_to(),
+        };
+        self.recording
+            .launch(&gpu.kernels.narrow_moving, &bindings, groups);
+        let groups = self.counted(Counted {
+            counter: N_PAIRS,
+            per_group: GROUP,
+            capacity: room.capacities().pairs,
+            slot: SEARCH,
+        });
+        let bindings = NarrowSearch {
+            pairs: room.pairs.read(),
+            corners: world.corners.read(),
+            positions: world.positions.read(),
+            order: world.order.read(),
+            unsure: room.unsure.write_to(),
+            times: room.times.write_to(),
+            counters: room.counters.write_to(),
+            params: Uniform(Params {
+                by_number: u32::from(sought.is_none()),
+                sought: match sought {
+                    Some(Goal::Earliest) => SEEK_EARLIEST,
+                    Some(Goal::Any) => SEEK_ANY,
+                    _ => SEEK_ALL,
+                },
+                ..Params::default()
+            }),
+        };
+        self.recording
+            .launch(&gpu.kernels.narrow_search, &bindings, groups);
     }
 }

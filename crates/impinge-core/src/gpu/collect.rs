@@ -1,19 +1,16 @@
 //! Stage `collect`: counters and results come back in one copy.
 //!
 //! ```text
-//! counters | grid | times of the stages | pairs, a quarter more than last time | unsure pairs, likewise
-//!                                in a step:  unsure pairs, likewise | their times, unless any contact will do
+//! counters | grid | pairs, a quarter more than last time | unsure pairs, likewise                         | times of the stages
+//!                                           in a step:  unsure pairs, likewise | their times, unless any contact will do
 //! ```
 //!
 //! If there are more than were copied, the rest follows in a second copy; no kernel runs again.
 
-use std::future::Future;
-use std::pin::Pin;
-use std::sync::{Arc, Mutex, PoisonError};
-use std::task::{Context, Poll, Waker};
-
+use super::buffers::map;
 use super::layout::{Counter, Grid, N_COUNTERS, NEVER, PairKey, PairTimes, UnsureKey, time_by};
 use super::open::Gpu;
+use super::recording::Recording;
 use super::room::{PassCounts, Room};
 use crate::error::Error;
 use crate::sink::Goal;
@@ -24,7 +21,7 @@ const GRID: u64 = size_of::<Grid>() as u64;
 /// The most stages of a method.
 const MOST_STAGES: usize = 8;
 const TIMES: u64 = 2 * MOST_STAGES as u64 * size_of::<u64>() as u64;
-const HEADER: u64 = COUNTERS + GRID + TIMES;
+const HEADER: u64 = COUNTERS + GRID;
 const KEY: u64 = size_of::<PairKey>() as u64;
 const TIMES_OF_PAIR: u64 = size_of::<PairTimes>() as u64;
 /// At least this many keys are copied.
@@ -114,14 +111,8 @@ impl Collector {
         }
     }
 
-    /// Encodes the copy of counters, times and keys.
-    pub fn encode(
-        &mut self,
-        gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
-        room: &Room,
-        (n_stages, sought): (u32, Option<Goal>),
-    ) -> Guess {
+    /// Records what is read back: counters, the grid, and about as many keys as last time. `sought`: which contacts of a step are.
+    pub fn record(&self, room: &Room, sought: Option<Goal>, recording: &mut Recording) -> Guess {
         let capacities = room.capacities();
         let guess = |last: u64, capacity: u64| (last + last / 4).max(LEAST).min(capacity);
         let unsure = guess(self.n_unsure, capacities.unsure);
@@ -138,24 +129,25 @@ impl Collector {
             },
             sought,
         };
-        let staging = self.reserve(gpu, guess.bytes());
-        let mut copy = |from: &wgpu::Buffer, to: u64, size: u64| {
-            encoder.copy_buffer_to_buffer(from, 0, &staging, to, size);
-        };
-        copy(room.counters.buffer(), 0, COUNTERS);
-        copy(room.grid.buffer(), COUNTERS, GRID);
-        let pairs = HEADER;
-        copy(room.pairs.buffer(), pairs, KEY * guess.pairs);
-        let unsure = pairs + KEY * guess.pairs;
-        copy(room.unsure.buffer(), unsure, KEY * guess.unsure);
-        let times = unsure + KEY * guess.unsure;
-        copy(room.times.buffer(), times, TIMES_OF_PAIR * guess.times);
-        if let Some(times) = &self.times {
-            encoder.resolve_query_set(&times.queries, 0..2 * n_stages, &times.resolved, 0);
-            let to = COUNTERS + GRID;
-            encoder.copy_buffer_to_buffer(&times.resolved, 0, &staging, to, TIMES);
-        }
+        recording.read(room.counters.all());
+        recording.read(room.grid.all());
+        recording.read(room.pairs.first(guess.pairs));
+        recording.read(room.unsure.first(guess.unsure));
+        recording.read(room.times.first(guess.times));
         guess
+    }
+
+    /// Encodes the copies of what is read back, and of the times of the stages.
+    pub fn encode(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, recording: &Recording) {
+        let bytes = recording.read_bytes();
+        let staging = self.reserve(gpu, bytes + TIMES);
+        recording.encode_reads(encoder, &staging);
+        if let Some(times) = &self.times {
+            // A method has a few stages.
+            let n_stages = recording.stages().len() as u32;
+            encoder.resolve_query_set(&times.queries, 0..2 * n_stages, &times.resolved, 0);
+            encoder.copy_buffer_to_buffer(&times.resolved, 0, &staging, bytes, TIMES);
+        }
     }
 
     /// Waits for the copy and reads it.
@@ -175,11 +167,11 @@ impl Collector {
         let (mut pairs, mut unsure) = (Vec::new(), Vec::<UnsureKey>::new());
         let mut until = Vec::<PairTimes>::new();
         let (counts, grid, ticks, n_pairs, n_unsure) = {
-            let view = map(&staging, guess.bytes()).await?;
+            let view = map(&staging, guess.bytes() + TIMES).await?;
             let at = |from: u64, size: u64| &view[from as usize..(from + size) as usize];
             let counters: Vec<Counter> = bytemuck::pod_collect_to_vec(at(0, COUNTERS));
             let grid: Grid = bytemuck::pod_read_unaligned(at(COUNTERS, GRID));
-            let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(at(COUNTERS + GRID, TIMES));
+            let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(at(guess.bytes(), TIMES));
             let counts = PassCounts::new(&counters);
             let capacities = room.capacities();
             let n_pairs = match guess.sought {
@@ -285,47 +277,4 @@ fn reserve_all<K>(keys: &mut Vec<K>, n: u64) -> Result<(), Error> {
 fn append<K: bytemuck::Pod>(keys: &mut Vec<K>, bytes: &[u8]) {
     let each = bytes.chunks_exact(size_of::<K>());
     keys.extend(each.map(bytemuck::pod_read_unaligned::<K>));
-}
-
-/// Maps the first bytes of a buffer for reading.
-pub async fn map(buffer: &wgpu::Buffer, bytes: u64) -> Result<wgpu::BufferView, Error> {
-    let mapping = Mapping::default();
-    let shared = Arc::clone(&mapping.0);
-    buffer.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
-        let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
-        shared.result = Some(result);
-        if let Some(waker) = shared.waker.take() {
-            waker.wake();
-        }
-    });
-    let failed = |what: String| Error::Gpu { what };
-    mapping.await.map_err(|error| failed(error.to_string()))?;
-    buffer
-        .get_mapped_range(0..bytes)
-        .map_err(|error| failed(error.to_string()))
-}
-
-#[derive(Debug, Default)]
-struct MappingState {
-    result: Option<Result<(), wgpu::BufferAsyncError>>,
-    waker: Option<Waker>,
-}
-
-/// Ready when the device has called back.
-#[derive(Debug, Default)]
-struct Mapping(Arc<Mutex<MappingState>>);
-
-impl Future for Mapping {
-    type Output = Result<(), wgpu::BufferAsyncError>;
-
-    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
-        let mut state = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        match state.result.take() {
-            Some(result) => Poll::Ready(result),
-            None => {
-                state.waker = Some(context.waker().clone());
-                Poll::Pending
-            }
-        }
-    }
 }

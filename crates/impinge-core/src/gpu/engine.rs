@@ -6,15 +6,14 @@ use crate::clock::Instant;
 use std::sync::Arc;
 
 use super::buffers::{Storage, count};
-use super::cells::{self, InCells};
-use super::clusters;
+use super::cells::Guest;
 use super::collect::Collector;
 use super::device::Scopes;
 use super::layout::Cell;
 use super::open::Gpu;
 use super::pieces;
+use super::recording::{Launcher, Ran, Recording};
 use super::room::{Capacities, CellsWanted, PassCounts, Room};
-use super::taker::Taker;
 use super::topology::Most;
 use super::world::World;
 use crate::error::Error;
@@ -26,6 +25,7 @@ use crate::settings::{Backend, Method, Recluster, Settings};
 use crate::sink::Answer;
 use crate::sink::Goal;
 use crate::stats::Statistics;
+use crate::undecided::Left;
 
 /// The most cells, for any lambda.
 const MOST_CELLS: u64 = 1 << 25;
@@ -53,7 +53,14 @@ pub struct Engine {
     pub(super) is_encoded: bool,
     pub(super) world: World,
     pub(super) room: Room,
-    pub(super) plan: Plan,
+    /// The method of another crate that is run instead of `Cells`.
+    pub(super) guest: Option<Guest>,
+    pub(super) launcher: Launcher,
+    /// The last pass.
+    pub recording: Recording,
+    /// Whether passes are run launch by launch too, and what came of the last one.
+    pub is_traced: bool,
+    pub ran: Vec<Ran>,
     /// The counts of each complete pass of the last frame.
     pub complete: Vec<PassCounts>,
     pub(super) collector: Collector,
@@ -63,13 +70,18 @@ pub struct Engine {
     pub(super) sought: Goal,
     pub(super) touches_by: Option<f32>,
     /// The engine for steps, once there was one.
-    pub(super) of_steps: Option<Box<Engine>>,
+    pub of_steps: Option<Box<Engine>>,
 }
 
-#[derive(Debug)]
-pub(super) enum Plan {
-    Clusters(Box<clusters::TreePlan>),
-    Cells(Box<dyn InCells>),
+/// Takes what the device says about a part of a step. Returns whether more is wanted.
+pub(crate) type TakeLeft<'a> = dyn FnMut(Left<'_>) -> Result<bool, Error> + 'a;
+
+/// Takes the results of complete passes.
+pub(super) enum Taker<'a, 'b> {
+    /// Pairs that intersect.
+    Answer(&'a Answer),
+    /// Pairs of a step that may touch.
+    Left(&'a mut TakeLeft<'b>),
 }
 
 /// How a list of work ended.
@@ -80,15 +92,6 @@ pub(super) enum Outcome {
     Crowded(Error),
 }
 
-impl Plan {
-    pub(super) fn of(method: Method) -> Self {
-        match method {
-            Method::Cells => Plan::Cells(Box::new(cells::CellsPlan::new())),
-            _ => Plan::Clusters(Box::new(clusters::TreePlan::new())),
-        }
-    }
-}
-
 impl Engine {
     /// Creates an engine. Of `Auto` it answers what `Clusters` are to answer.
     pub fn new(gpu: Arc<Gpu>, settings: &Settings, first: Capacities) -> Self {
@@ -96,25 +99,15 @@ impl Engine {
             method: settings.method.in_the_long_run(),
             ..settings.clone()
         };
-        let plan = Plan::of(settings.method);
-        Engine::with_plan(gpu, settings, first, plan)
+        Engine::with_guest(gpu, settings, first, None)
     }
 
-    /// Creates an engine with a plan of another crate.
-    pub fn with_plan_of_guest(
+    /// Creates an engine; with a method of another crate, if there is one, instead of `Cells`.
+    pub fn with_guest(
         gpu: Arc<Gpu>,
         settings: Settings,
         first: Capacities,
-        plan: Box<dyn InCells>,
-    ) -> Self {
-        Engine::with_plan(gpu, settings, first, Plan::Cells(plan))
-    }
-
-    pub(super) fn with_plan(
-        gpu: Arc<Gpu>,
-        settings: Settings,
-        first: Capacities,
-        plan: Plan,
+        guest: Option<Guest>,
     ) -> Self {
         Engine {
             gpu,
@@ -127,7 +120,11 @@ impl Engine {
             is_encoded: false,
             world: World::new(),
             room: Room::new(),
-            plan,
+            guest,
+            launcher: Launcher::default(),
+            recording: Recording::default(),
+            is_traced: false,
+            ran: Vec::new(),
             complete: Vec::new(),
             collector: Collector::default(),
             settled: Vec::new(),
@@ -143,14 +140,12 @@ impl Engine {
 
     /// Starts with new buffers after a device error: the old ones may be in any state.
     pub(super) fn begin_anew(&mut self) {
-        let plan = match &self.plan {
-            Plan::Cells(plan) => Plan::Cells(plan.anew()),
-            Plan::Clusters(_) => Plan::of(self.settings.method),
-        };
+        let guest = self.guest.take().map(Guest::anew);
         let gpu = Arc::clone(&self.gpu);
         *self = Engine {
             most_bound: self.most_bound,
-            ..Engine::with_plan(gpu, self.settings.clone(), self.first, plan)
+            is_traced: self.is_traced,
+            ..Engine::with_guest(gpu, self.settings.clone(), self.first, guest)
         };
     }
 
@@ -176,7 +171,7 @@ impl Engine {
         if !self.is_held(scene, frame) && self.falls_back() {
             self.take_clusters(frame);
         }
-        if !self.is_held(scene, frame) && !self.is_guest() {
+        if !self.is_held(scene, frame) && self.guest.is_none() {
             stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
             self.may_cut(scene, frame)?;
             return self.in_pieces(job, answer, stats).await;
@@ -229,7 +224,6 @@ impl Engine {
         if !self.has_pieces {
             // The buffers are sized for a whole frame.
             self.world.forget_buffers();
-            self.unbind();
             self.has_pieces = true;
         }
         let most = self.most();
@@ -257,7 +251,6 @@ impl Engine {
                 let start = Instant::now();
                 let scopes = Scopes::open(&self.gpu.device);
                 let sent = self.world.send_piece(&self.gpu, scene, frame, piece);
-                self.unbind();
                 let closed = scopes.close();
                 sent?;
                 closed.await?;
@@ -275,7 +268,7 @@ impl Engine {
     }
 
     fn finish(&self, stats: &mut Statistics) {
-        if let Plan::Clusters(_) = &self.plan {
+        if self.method == Method::Clusters {
             stats.method = Method::Clusters.name();
         }
         stats.bytes_held = self.bytes();
@@ -329,13 +322,9 @@ impl Engine {
         })
     }
 
-    fn is_guest(&self) -> bool {
-        matches!(&self.plan, Plan::Cells(plan) if !plan.splits_cells())
-    }
-
     /// Whether `Clusters` may answer a frame that is too large for the method.
     fn falls_back(&self) -> bool {
-        matches!(&self.plan, Plan::Cells(plan) if plan.splits_cells())
+        self.method == Method::Cells && self.guest.is_none()
     }
 
     /// Answers this frame, and later ones with at least as many primitives, by `Clusters`.
@@ -347,7 +336,6 @@ impl Engine {
     /// Switches to a built-in method.
     fn take(&mut self, method: Method) {
         self.method = method;
-        self.plan = Plan::of(method);
         self.room = Room::new();
     }
 
@@ -360,13 +348,8 @@ impl Engine {
     ) -> Result<(), Error> {
         let recluster = self.reclusters();
         self.has_pieces = false;
-        if self
-            .world
-            .update(&self.gpu, job, resident, recluster, stats)?
-        {
-            self.unbind();
-        }
-        Ok(())
+        self.world
+            .update(&self.gpu, job, resident, recluster, stats)
     }
 
     /// The part of the budget that is left for buffers that grow.
@@ -379,13 +362,6 @@ impl Engine {
     /// Sets the room from the next frame on.
     pub(super) fn grow_to(&mut self, capacities: Capacities) {
         self.first = capacities;
-    }
-
-    pub(super) fn unbind(&mut self) {
-        match &mut self.plan {
-            Plan::Clusters(plan) => plan.unbind(),
-            Plan::Cells(plan) => plan.unbind(),
-        }
     }
 
     /// Room for the grid: as many cells as equation (1) can give.

@@ -246,7 +246,7 @@ macro_rules! kernels {
             /// All kernels. `damage` may replace a kernel's text.
             pub fn new(damage: impl Fn(&Source) -> Option<String>) -> Self {
                 Kernels {
-                    $($name: Kernel::new($source, &[$($constant),*]).with_text(damage(&$source)),)*
+                    $($name: Kernel::with_text($source, &[$($constant),*], damage(&$source)),)*
                 }
             }
         }

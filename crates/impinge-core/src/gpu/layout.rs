@@ -1,6 +1,8 @@
 //! The data that host and device exchange. Each struct here has its twin in
 //! `kernels/shared/layout.wgsl`, where the bits are drawn. Tests parse the shaders and compare.
 
+use std::fmt;
+
 use bytemuck::{Pod, Zeroable};
 
 /// Declares plain structs of 32-bit words.
@@ -12,6 +14,12 @@ macro_rules! words {
             #[repr(C)]
             pub struct $name {
                 $(pub $field: $type,)*
+            }
+
+            impl $name {
+                /// The names of its fields.
+                #[allow(dead_code)]
+                const FIELDS: &'static [&'static str] = &[$(stringify!($field)),*];
             }
         )*
     };
@@ -167,6 +175,19 @@ impl Node {
 
     pub fn is_gate(&self) -> bool {
         self.shape & GATE != 0
+    }
+}
+
+impl fmt::Display for Params {
+    /// The parameters that are not 0.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let words: &[u32] = bytemuck::cast_slice(std::slice::from_ref(self));
+        let set = Params::FIELDS
+            .iter()
+            .zip(words)
+            .filter(|(_, word)| **word != 0);
+        let set: Vec<String> = set.map(|(name, word)| format!("{name}: {word}")).collect();
+        f.write_str(&set.join(", "))
     }
 }
 

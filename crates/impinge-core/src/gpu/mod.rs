@@ -7,9 +7,7 @@
 //!
 //! For a step, see `moving`.
 
-mod bounds;
 mod clusterings;
-mod clusters;
 mod collect;
 mod device;
 mod forest;
@@ -25,20 +23,18 @@ pub mod buffers;
 #[allow(missing_docs)]
 pub mod cells;
 #[allow(missing_docs)]
+pub mod clusters;
+#[allow(missing_docs)]
 pub(crate) mod engine;
 mod kernels;
 #[allow(missing_docs)]
 pub mod layout;
 #[allow(missing_docs)]
-pub mod narrow;
-#[allow(missing_docs)]
 pub mod pipeline;
-pub mod reaching;
+#[allow(missing_docs)]
+pub mod recording;
 #[allow(missing_docs)]
 pub mod room;
-#[allow(missing_docs)]
-pub mod steps;
-mod taker;
 mod topology;
 mod waiting;
 #[allow(missing_docs)]

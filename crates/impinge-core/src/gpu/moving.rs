@@ -9,8 +9,7 @@
 use std::sync::Arc;
 
 use super::device::Scopes;
-use super::engine::{Engine, Outcome, Plan};
-use super::taker::{TakeLeft, Taker};
+use super::engine::{Engine, Outcome, TakeLeft, Taker};
 use super::world::{ResidentEnds, weigh_moving};
 use crate::clock::Instant;
 use crate::error::Error;
@@ -29,9 +28,9 @@ impl Engine {
                 ..self.settings.clone()
             };
             let gpu = Arc::clone(self.gpu());
-            let plan = Plan::of(Method::Clusters);
-            let mut engine = Engine::with_plan(gpu, settings, self.first, plan);
+            let mut engine = Engine::with_guest(gpu, settings, self.first, None);
             engine.most_bound = self.most_bound;
+            engine.is_traced = self.is_traced;
             self.of_steps = Some(Box::new(engine));
         }
         self.of_steps.as_mut().expect("just made")
@@ -78,14 +77,11 @@ impl Engine {
         let world = &mut self.world;
         let updated = world.update_moving(&self.gpu, job, clusterings, &none, stats);
         let closed = scopes.close();
-        if updated? {
-            self.unbind();
-        }
+        updated?;
         closed.await?;
         if self.first_room(None).is_err() {
             // The buffers' spare room exceeds the budget.
             self.world.forget_buffers();
-            self.unbind();
             self.world
                 .update_moving(&self.gpu, job, clusterings, &none, stats)?;
         }

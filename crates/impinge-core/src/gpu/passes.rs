@@ -9,16 +9,17 @@
 //!
 //! The smallest pass has one work item, for which [`Capacities::LEAST`] is enough.
 
+use std::sync::Arc;
+
 use super::buffers::count;
-use super::cells::{self, CellRange, Share, Tile};
+use super::cells::{self, CellWork};
 use super::clusters;
-use super::collect::{Collected, Guess};
+use super::collect::Collected;
 use super::device::Scopes;
-use super::engine::{Engine, Outcome, Plan};
+use super::engine::{Engine, Outcome, Taker};
 use super::layout::NodePair;
+use super::recording::{Recorder, Recording};
 use super::room::{Capacities, CellsWanted, NextPass};
-use super::steps::Stages;
-use super::taker::Taker;
 use crate::error::Error;
 use crate::index::Number;
 use crate::narrow::settle;
@@ -42,7 +43,7 @@ const SETTLED_BY_A_TASK: usize = 64;
 #[derive(Debug, Clone)]
 pub(super) enum Work {
     Seeds(Vec<NodePair>),
-    Cells(CellRange, Share),
+    Cells(CellWork),
 }
 
 impl Engine {
@@ -58,16 +59,19 @@ impl Engine {
         let cells = self.cells_wanted(frame);
         let mut capacities = self.first_room(cells)?;
         while let Some(work) = waiting.pop() {
-            if let Work::Cells(part, Share::Tile(tile)) = work
-                && tile.side > Tile::MOST
+            if let Work::Cells(cells) = work
+                && let Some(parts) = cells.parts()
             {
-                waiting.extend(quarters(part, tile));
+                waiting.extend(parts.into_iter().map(Work::Cells));
                 continue;
             }
             let done = stats.n_slabs;
             control.step(done, done + count(waiting.len()) + 1)?;
             let mut collected = self.pass(frame, &work, capacities, cells, stats).await?;
-            taker.foresee(collected.counts.needed.pairs)?;
+            if let Taker::Answer(answer) = &taker {
+                // Even where a buffer was too small for them, certain pairs are pairs.
+                answer.foresee(collected.counts.needed.pairs)?;
+            }
             let room = self.budget_for_room();
             // Times are proven, whether all pairs had room or not.
             self.touches_by = match self.sought {
@@ -95,13 +99,9 @@ impl Engine {
                     if !goes_on {
                         return Ok(Outcome::Complete);
                     }
-                    if let Work::Cells(part, Share::Lists) = work {
-                        // No other pass changes the list before the last of its tiles is done.
-                        let n_entries = collected.counts.needed.entries as u32;
-                        let tile = Tile::all(n_entries, self.settings.group_size);
-                        waiting.extend(
-                            (n_entries > 0).then_some(Work::Cells(part, Share::Tile(tile))),
-                        );
+                    if let Work::Cells(cells) = work {
+                        let next = cells.next(&collected, self.settings.group_size);
+                        waiting.extend(next.map(Work::Cells));
                     }
                 }
                 NextPass::Grow(larger) => {
@@ -132,9 +132,9 @@ impl Engine {
         if seeds.is_empty() {
             return None;
         }
-        Some(match self.plan {
-            Plan::Clusters(_) => Work::Seeds(self.descend(frame, seeds)),
-            Plan::Cells(_) => Work::Cells(CellRange::ALL, Share::All),
+        Some(match self.method {
+            Method::Cells => Work::Cells(CellWork::WHOLE),
+            _ => Work::Seeds(self.descend(frame, seeds)),
         })
     }
 
@@ -173,7 +173,13 @@ impl Engine {
     ) -> Result<Option<Vec<Work>>, Error> {
         let seeds = match work {
             Work::Seeds(seeds) => seeds,
-            &Work::Cells(part, share) => return Ok(self.split_cells(part, share, collected)),
+            &Work::Cells(cells) => {
+                let parts = cells.split(collected, self.room.capacities().kept);
+                // Lists and tiles are our own: a method of another crate has no parts of a cell.
+                let is_list = |parts: &[CellWork]| matches!(parts, [CellWork::List(_)]);
+                let parts = parts.filter(|parts| self.guest.is_none() || !is_list(parts));
+                return Ok(parts.map(|parts| parts.into_iter().map(Work::Cells).collect()));
+            }
         };
         if seeds.len() > 1 {
             let (low, high) = seeds.split_at(seeds.len() / 2);
@@ -193,30 +199,6 @@ impl Engine {
         }))
     }
 
-    fn split_cells(
-        &self,
-        part: CellRange,
-        share: Share,
-        collected: &Collected,
-    ) -> Option<Vec<Work>> {
-        match share {
-            Share::All => {
-                // The kept primitives do not depend on the part.
-                let needed = &collected.counts.needed;
-                if needed.kept > self.room.capacities().kept {
-                    return None;
-                }
-                if let Some(halves) = part.split(collected.grid.n_cells) {
-                    return Some(halves.map(|half| Work::Cells(half, Share::All)).into());
-                }
-                let splits_cells = matches!(&self.plan, Plan::Cells(plan) if plan.splits_cells());
-                splits_cells.then(|| vec![Work::Cells(part, Share::Lists)])
-            }
-            Share::Lists => None,
-            Share::Tile(tile) => (tile.side > 1).then(|| quarters(part, tile)),
-        }
-    }
-
     /// Room for work that cannot be split: the buffers that it needs grow, and all others shrink.
     fn lean(
         &self,
@@ -228,20 +210,8 @@ impl Engine {
         let needed = &collected.counts.needed;
         let least = Capacities::LEAST.of(self.method);
         let lean = match work {
-            // The filled list must stay.
-            Work::Cells(_, Share::Tile(_)) => Capacities {
-                kept: now.kept,
-                entries: now.entries,
-                ..least
-            },
-            _ => Capacities {
-                kept: needed.kept.max(least.kept),
-                entries: match needed.kept > now.kept {
-                    true => least.entries,
-                    false => needed.entries.max(least.entries),
-                },
-                ..least
-            },
+            Work::Cells(cells) => cells.lean(needed, now, least),
+            Work::Seeds(_) => CellWork::WHOLE.lean(needed, now, least),
         };
         let is_allowed = room.is_none_or(|room| lean.bytes() <= room);
         if lean == now || !is_allowed || !lean.fit(&self.gpu) {
@@ -259,121 +229,97 @@ impl Engine {
         cells: Option<CellsWanted>,
         stats: &mut Statistics,
     ) -> Result<Collected, Error> {
-        let scopes = Scopes::open(&self.gpu.device);
-        let submitted = self.submit(frame, work, capacities, cells);
+        self.is_encoded = false;
+        let mut recording = self.record(frame, Some(work), capacities, cells)?;
+        let seeks = self.world.is_moving().then_some(self.sought);
+        let guess = self.collector.record(&self.room, seeks, &mut recording);
+        let gpu = Arc::clone(&self.gpu);
+        if self.is_traced {
+            // The same before, launch by launch.
+            self.ran = self.launcher.run_each(&gpu, &recording).await?;
+        }
+        let scopes = Scopes::open(&gpu.device);
+        let submitted = self.submit(&recording);
         let closed = scopes.close();
-        let guess = submitted?;
+        submitted?;
         closed.await?;
-        let names = self.stages();
+        let names = recording.stages();
         let collected = self
             .collector
-            .take(&self.gpu, &self.room, names.len(), guess)
+            .take(&gpu, &self.room, names.len(), guess)
             .await?;
         for (&name, &ms) in names.iter().zip(collected.stage_ms.iter().flatten()) {
             stats.add_ms(name, ms);
         }
         self.world.is_moved = false;
+        self.recording = recording;
         Ok(collected)
     }
 
-    fn stages(&self) -> &'static [&'static str] {
-        match &self.plan {
-            Plan::Clusters(_) => clusters::STAGES,
-            Plan::Cells(plan) => plan.stages(),
-        }
-    }
-
-    fn submit(
-        &mut self,
-        frame: &Frame,
-        work: &Work,
-        capacities: Capacities,
-        cells: Option<CellsWanted>,
-    ) -> Result<Guess, Error> {
-        let mut encoder = self
-            .gpu
+    fn submit(&mut self, recording: &Recording) -> Result<(), Error> {
+        let gpu = &*self.gpu;
+        let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor {
                 label: Some("impinge"),
             });
-        let times = self.collector.times(&self.gpu).cloned();
-        let times = times.as_ref();
-        self.is_encoded = false;
-        self.encode_pass(frame, Some(work), capacities, cells, times, &mut encoder)?;
-        let (gpu, n_stages) = (&*self.gpu, self.stages().len() as u32);
-        let seeks = self.world.is_moving().then_some(self.sought);
-        let guess = self
-            .collector
-            .encode(gpu, &mut encoder, &self.room, (n_stages, seeks));
+        let times = self.collector.times(gpu);
+        self.launcher.encode(gpu, recording, times, &mut encoder)?;
+        self.collector.encode(gpu, &mut encoder, recording);
         gpu.queue.submit([encoder.finish()]);
-        Ok(guess)
+        Ok(())
     }
 
-    /// Encodes all stages; without work, only counters of zero.
-    pub(super) fn encode_pass(
+    /// Records all stages; without work, only counters of zero.
+    pub(super) fn record(
         &mut self,
         frame: &Frame,
         work: Option<&Work>,
         mut capacities: Capacities,
         cells: Option<CellsWanted>,
-        times: Option<&wgpu::QuerySet>,
-        encoder: &mut wgpu::CommandEncoder,
-    ) -> Result<(), Error> {
+    ) -> Result<Recording, Error> {
         let seeds: &[NodePair] = match work {
             Some(Work::Seeds(seeds)) => seeds,
             _ => &[],
         };
         capacities.queue = capacities.queue.max(count(seeds.len()));
-        if self.room.resize(&self.gpu, &capacities, cells) {
-            self.unbind();
-        }
-        let names = self.stages();
-        let gpu = &*self.gpu;
+        self.room.resize(&self.gpu, &capacities, cells);
+        let mut recording = Recording::default();
         // The caller's step begins with nothing known.
         let sought = (!self.is_encoded).then_some(self.sought);
         let touches_by = sought.and(self.touches_by);
-        self.room.encode_start(gpu, seeds, touches_by, encoder)?;
-        let (world, room) = (&self.world, &self.room);
-        let resolve = frame.shared_vertex == SharedVertex::Resolve;
-        let mut stages = Stages {
-            names,
-            encoder,
-            times,
-            next: 0,
-        };
-        match (&mut self.plan, work) {
-            (Plan::Clusters(plan), Some(Work::Seeds(seeds))) => {
-                let told = clusters::Told {
-                    n_rounds: world.forest().rounds(seeds),
-                    resolve,
-                    sought,
-                };
-                plan.make(gpu, world, room, told)?;
-                plan.encode(&mut stages, world, room, count(seeds.len()));
-            }
-            (Plan::Cells(plan), Some(Work::Cells(part, share))) => {
-                let told = cells::Told {
-                    lambda: self.settings.lambda,
-                    group_size: self.settings.group_size,
-                    resolve,
-                    share: *share,
-                };
-                plan.make(gpu, world, room, told, *part)?;
-                plan.encode(&mut stages, world, room);
-            }
-            (_, None) => (),
-            _ => unreachable!("work is made for the plan"),
+        let start = self.room.start(&self.gpu, seeds, touches_by)?;
+        for (from, to) in start {
+            recording.copy(from, to);
         }
-        Ok(())
+        let mut recorder = Recorder {
+            gpu: &self.gpu,
+            world: &self.world,
+            room: &self.room,
+            recording,
+        };
+        let (lambda, group_size) = (self.settings.lambda, self.settings.group_size);
+        let resolve = frame.shared_vertex == SharedVertex::Resolve;
+        match (work, &mut self.guest) {
+            (None, _) => {}
+            (Some(Work::Seeds(seeds)), _) => recorder.clusters(clusters::Told {
+                n_seeds: count(seeds.len()),
+                n_rounds: self.world.forest().rounds(seeds),
+                resolve,
+                sought,
+            }),
+            (Some(Work::Cells(work)), Some(guest)) => {
+                guest.record(&mut recorder, lambda, work.cells())?;
+            }
+            (Some(&Work::Cells(work)), None) => recorder.cells(cells::Told {
+                lambda,
+                group_size,
+                resolve,
+                work,
+            }),
+        }
+        Ok(recorder.recording)
     }
-}
-
-/// The quarters of a tile that have any work.
-fn quarters(part: CellRange, tile: Tile) -> Vec<Work> {
-    let quarters = tile.split().unwrap_or_default().into_iter();
-    quarters
-        .map(|quarter| Work::Cells(part, Share::Tile(quarter)))
-        .collect()
 }
 
 /// Adds the counts of a complete pass to the statistics.

@@ -1,9 +1,10 @@
 //! Kernels with typed bindings.
 
+use std::fmt;
 use std::marker::PhantomData;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
-use super::buffers::Access;
+use super::buffers::{Access, Bound};
 use super::device::Device;
 
 /// One binding as a kernel declares it.
@@ -19,7 +20,7 @@ pub struct Entry {
 /// All bindings of a kernel, in the order of their numbers.
 pub trait Bindings {
     const ENTRIES: &'static [Entry];
-    fn resources(&self) -> Vec<wgpu::BindingResource<'_>>;
+    fn bound(&self) -> Vec<Bound>;
 }
 
 /// Declares the bindings of a kernel: `name: Read<T>`, `Write<T>` or `Uniform<T>`, in order.
@@ -43,9 +44,9 @@ macro_rules! bindings {
                 },)*
             ];
 
-            fn resources(&self) -> Vec<wgpu::BindingResource<'_>> {
+            fn bound(&self) -> Vec<$crate::gpu::buffers::Bound> {
                 use $crate::gpu::buffers::Binding;
-                vec![$(self.$field.resource(),)*]
+                vec![$(self.$field.bound(),)*]
             }
         }
     };
@@ -82,14 +83,26 @@ macro_rules! source {
 }
 pub(crate) use source;
 
-/// A kernel that takes the bindings `B`, compiled when it is first bound.
+/// A kernel that takes the bindings `B`.
 pub struct Kernel<B> {
+    program: Arc<Program>,
+    takes: PhantomData<fn(B)>,
+}
+
+/// A kernel without the types of its bindings, compiled when it is first bound.
+pub struct Program {
     source: Source,
     constants: &'static [(&'static str, f64)],
+    entries: &'static [Entry],
     /// Replaces the text of `source`, for tests.
     damaged: Option<String>,
     compiled: OnceLock<Compiled>,
-    takes: PhantomData<fn(B)>,
+}
+
+impl fmt::Debug for Program {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.source.name)
+    }
 }
 
 struct Compiled {
@@ -156,90 +169,69 @@ impl Compiled {
 impl<B: Bindings> Kernel<B> {
     /// Not compiled yet.
     pub fn new(source: Source, constants: &'static [(&'static str, f64)]) -> Self {
+        Kernel::with_text(source, constants, None)
+    }
+
+    /// The same kernel with another text; with its own for `None`.
+    pub(crate) fn with_text(
+        source: Source,
+        constants: &'static [(&'static str, f64)],
+        damaged: Option<String>,
+    ) -> Self {
         Kernel {
-            source,
-            constants,
-            damaged: None,
-            compiled: OnceLock::new(),
+            program: Arc::new(Program {
+                source,
+                constants,
+                entries: B::ENTRIES,
+                damaged,
+                compiled: OnceLock::new(),
+            }),
             takes: PhantomData,
         }
     }
 
-    /// The same kernel with another text; with its own for `None`.
-    pub(crate) fn with_text(self, damaged: Option<String>) -> Self {
-        Kernel { damaged, ..self }
+    pub(super) fn program(&self) -> &Arc<Program> {
+        &self.program
+    }
+}
+
+impl Program {
+    pub(super) fn name(&self) -> &'static str {
+        self.source.name
     }
 
-    fn compiled(&self, device: &wgpu::Device) -> &Compiled {
-        self.compiled.get_or_init(|| {
+    pub(super) fn entries(&self) -> &'static [Entry] {
+        self.entries
+    }
+
+    /// The bind group of the first bytes of some buffers. The first call on this device, by any detector, compiles the kernel;
+    /// errors go to the open error scopes.
+    pub(super) fn bind(&self, gpu: &Device, buffers: &[(wgpu::Buffer, u64)]) -> wgpu::BindGroup {
+        let compiled = self.compiled.get_or_init(|| {
             let text = self.damaged.clone();
             let text = text.unwrap_or_else(|| self.source.text());
-            Compiled::new(device, self.source.name, text, self.constants, B::ENTRIES)
+            Compiled::new(&gpu.device, self.name(), text, self.constants, self.entries)
+        });
+        let entries = (0u32..).zip(buffers).map(|(binding, (buffer, bytes))| {
+            let buffer = wgpu::BufferBinding {
+                buffer,
+                offset: 0,
+                size: wgpu::BufferSize::new(*bytes),
+            };
+            wgpu::BindGroupEntry {
+                binding,
+                resource: wgpu::BindingResource::Buffer(buffer),
+            }
+        });
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(self.name()),
+            layout: &compiled.layout,
+            entries: &entries.collect::<Vec<_>>(),
         })
     }
 
-    /// The kernel with its buffers. The first call on this device, by any detector, compiles it; errors go to
-    /// the open error scopes.
-    pub fn bind(&self, gpu: &Device, bindings: &B) -> Bound {
-        let compiled = self.compiled(&gpu.device);
-        let entries: Vec<wgpu::BindGroupEntry<'_>> = (0u32..)
-            .zip(bindings.resources())
-            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
-            .collect();
-        Bound {
-            pipeline: compiled.pipeline.clone(),
-            group: gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some(self.source.name),
-                layout: &compiled.layout,
-                entries: &entries,
-            }),
-            has_params: B::ENTRIES
-                .iter()
-                .any(|entry| entry.access == Access::Uniform),
-        }
-    }
-}
-
-/// Bytes from the parameters of one step to those of the next.
-const STEP: u32 = size_of::<super::layout::Step>() as u32;
-
-/// A kernel with its buffers, ready to be dispatched.
-#[derive(Debug)]
-pub struct Bound {
-    pipeline: wgpu::ComputePipeline,
-    group: wgpu::BindGroup,
-    has_params: bool,
-}
-
-/// The number of workgroups of a dispatch.
-pub enum Workgroups<'a> {
-    /// This many, in rows if necessary.
-    Known(u64),
-    /// As many as the arguments in this slot say.
-    Indirect(&'a wgpu::Buffer, u32),
-}
-
-/// The widest row of workgroups; `shared/arguments.wgsl` has the same.
-pub(super) const WIDEST: u64 = 32_768;
-
-impl Bound {
-    /// Dispatches with the parameters of a step.
-    pub fn run(&self, pass: &mut wgpu::ComputePass<'_>, step: u32, groups: Workgroups<'_>) {
-        pass.set_pipeline(&self.pipeline);
-        let offset = [step * STEP];
-        let offsets: &[u32] = if self.has_params { &offset } else { &[] };
-        pass.set_bind_group(0, &self.group, offsets);
-        match groups {
-            Workgroups::Known(n) => {
-                // Both fit: counts are below 2^32.
-                let x = n.min(WIDEST) as u32;
-                let y = n.div_ceil(WIDEST) as u32;
-                pass.dispatch_workgroups(x, y, 1);
-            }
-            Workgroups::Indirect(arguments, slot) => {
-                let bytes = size_of::<super::layout::Arguments>() as u64;
-                pass.dispatch_workgroups_indirect(arguments, u64::from(slot) * bytes);
-            }
-        }
+    /// The compiled kernel.
+    pub(super) fn pipeline(&self) -> &wgpu::ComputePipeline {
+        &self.compiled.get().expect("bound before it runs").pipeline
     }
 }

@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::buffers::count;
-use super::collect::map;
+use super::buffers::{count, read};
 use super::engine::Engine;
-use super::layout::{Counter, N_COUNTERS, N_PAIRS, N_UNSURE, TOUCHES_BY};
+use super::layout::{Counter, N_PAIRS, N_UNSURE, TOUCHES_BY};
 use super::room::{Capacities, NextPass, PassCounts};
 use super::world::{ResidentEnds, weigh_moving};
 use crate::elements::Part;
@@ -140,7 +139,8 @@ impl Engine {
         let capacities = self.first_room(cells)?;
         let work = self.whole(frame);
         self.is_encoded = true;
-        self.encode_pass(frame, work.as_ref(), capacities, cells, None, encoder)?;
+        let recording = self.record(frame, work.as_ref(), capacities, cells)?;
+        self.launcher.encode(&self.gpu, &recording, None, encoder)?;
         let capacities = self.room.capacities();
         Ok(ResidentPairs {
             pairs: self.room.pairs.buffer().clone(),
@@ -185,15 +185,14 @@ impl Engine {
             return Err(self.too_small("the step at once", Capacities::LEAST));
         }
         let stats = &mut Statistics::default();
-        let world = &mut self.world;
-        if world.update_moving(&self.gpu, job, clusterings, &resident, stats)? {
-            self.unbind();
-        }
+        self.world
+            .update_moving(&self.gpu, job, clusterings, &resident, stats)?;
         self.world.copy_ends(&resident, encoder);
         let capacities = self.first_room(None)?;
         let work = self.whole(frame);
         self.is_encoded = true;
-        self.encode_pass(frame, work.as_ref(), capacities, None, None, encoder)?;
+        let recording = self.record(frame, work.as_ref(), capacities, None)?;
+        self.launcher.encode(&self.gpu, &recording, None, encoder)?;
         let of_parts = |parts: &[Part]| {
             let layers = frame.layers.iter();
             let numbers = layers.filter(|layer| parts.contains(&layer.part));
@@ -239,23 +238,8 @@ impl Engine {
             return Ok(true);
         }
         let capacities = self.room.capacities();
-        let counts = {
-            let bytes = u64::from(N_COUNTERS) * COUNTER;
-            let device = &self.gpu().device;
-            let staging = device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("counters"),
-                size: bytes,
-                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            });
-            let mut encoder =
-                device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            let counters = self.room.counters.buffer();
-            encoder.copy_buffer_to_buffer(counters, 0, &staging, 0, bytes);
-            self.gpu().queue.submit([encoder.finish()]);
-            let view = map(&staging, bytes).await?;
-            PassCounts::new(&bytemuck::pod_collect_to_vec::<u8, Counter>(&view))
-        };
+        let counters = read(&self.gpu, &self.room.counters.all()).await?;
+        let counts = PassCounts::new(&bytemuck::pod_collect_to_vec::<u8, Counter>(&counters));
         match counts.judge(self.gpu(), capacities, self.budget_for_room()) {
             NextPass::Complete => Ok(true),
             NextPass::Grow(larger) => {

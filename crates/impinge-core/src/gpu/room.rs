@@ -4,7 +4,7 @@
 //! were too small grow, and the pass runs again. If the device or the memory budget
 //! allows no more, the engine splits the pass instead.
 
-use super::buffers::Storage;
+use super::buffers::{Slice, Storage, count};
 use super::layout::{
     Arguments, Candidate, Cell, CellItem, Counter, Grid, Kept, ListEntry, N_BOX_TESTS,
     N_BOX_TESTS_HIGH, N_CANDIDATES, N_COUNTERS, N_ENTRIES, N_ITEMS, N_KEPT, N_PAIRS, N_SUBDIVIDED,
@@ -182,16 +182,15 @@ impl CellsWanted {
 
 impl Room {
     pub(crate) fn new() -> Self {
-        let copied = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         let indirect = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
         Room {
             queues: ["queue a", "queue b"].map(Storage::plain),
             items: Storage::plain("work items"),
             candidates: Storage::plain("candidates"),
-            pairs: Storage::new("pairs", copied),
-            unsure: Storage::new("unsure", copied),
-            times: Storage::new("times of pairs", copied),
-            counters: Storage::new("counters", copied),
+            pairs: Storage::plain("pairs"),
+            unsure: Storage::plain("unsure"),
+            times: Storage::plain("times of pairs"),
+            counters: Storage::plain("counters"),
             arguments: Storage::new("arguments", indirect),
             cell_items: Storage::plain("work items of cells"),
             kept: Storage::plain("kept"),
@@ -200,21 +199,21 @@ impl Room {
             starts: Storage::plain("starts"),
             reaches: Storage::plain("reaches"),
             tallies: Storage::plain("tallies"),
-            grid: Storage::new("grid", copied),
-            start_counters: Storage::new("first counters", wgpu::BufferUsages::COPY_SRC),
-            start_queue: Storage::new("first queue", wgpu::BufferUsages::COPY_SRC),
+            grid: Storage::plain("grid"),
+            start_counters: Storage::plain("first counters"),
+            start_queue: Storage::plain("first queue"),
             started: None,
             sizes: None,
         }
     }
 
-    /// Makes exactly this much room. Returns whether any buffer is a new one.
-    pub fn resize(&mut self, gpu: &Gpu, wanted: &Capacities, cells: Option<CellsWanted>) -> bool {
+    /// Makes exactly this much room.
+    pub fn resize(&mut self, gpu: &Gpu, wanted: &Capacities, cells: Option<CellsWanted>) {
         let is_cells = cells.is_some();
         let cells = cells.unwrap_or_default();
         let sizes = Some((*wanted, cells));
         if self.sizes == sizes {
-            return false;
+            return;
         }
         self.sizes = sizes;
         let (of_clusters, of_cells) = match is_cells {
@@ -239,21 +238,19 @@ impl Room {
         self.reaches.resize_exactly(gpu, cells.n_bodies);
         self.tallies.resize_exactly(gpu, u64::from(N_TALLIES));
         self.grid.resize_exactly(gpu, 1);
-        true
     }
 
-    /// Encodes the start of a pass: the seeds, which must fit the queue, and counters at zero except the number of seeds and
+    /// The copies that start a pass: the seeds, which must fit the queue, and counters at zero except the number of seeds and
     /// the time by which some pair certainly touches, if there is one.
     ///
     /// # Errors
     /// As [`Storage::resize`].
-    pub fn encode_start(
+    pub fn start(
         &mut self,
         gpu: &Gpu,
         seeds: &[NodePair],
         touches_by: Option<f32>,
-        encoder: &mut wgpu::CommandEncoder,
-    ) -> Result<(), Error> {
+    ) -> Result<[(Slice, Slice); 2], Error> {
         let is_started = |(held, time): &(Vec<NodePair>, _)| held == seeds && *time == touches_by;
         if !self.started.as_ref().is_some_and(is_started) {
             let mut counters = [Counter::default(); N_COUNTERS as usize];
@@ -264,16 +261,11 @@ impl Room {
             self.start_queue.upload(gpu, seeds)?;
             self.started = Some((seeds.to_vec(), touches_by));
         }
-        let mut copy = |from: &wgpu::Buffer, to: &wgpu::Buffer, bytes: u64| {
-            if bytes > 0 {
-                encoder.copy_buffer_to_buffer(from, 0, to, 0, bytes);
-            }
-        };
-        let bytes = u64::from(N_COUNTERS) * size_of::<Counter>() as u64;
-        copy(self.start_counters.buffer(), self.counters.buffer(), bytes);
-        let bytes = size_of_val(seeds) as u64;
-        copy(self.start_queue.buffer(), self.queues[0].buffer(), bytes);
-        Ok(())
+        let seeds = self.start_queue.first(count(seeds.len()));
+        Ok([
+            (self.start_counters.all(), self.counters.all()),
+            (seeds, self.queues[0].all()),
+        ])
     }
 
     /// Bytes of the buffers that do not grow: those of [`CellsWanted`].

@@ -201,7 +201,7 @@ fn constants_are_those_of_the_host() {
 #[test]
 fn constants_of_single_kernels_are_those_of_the_host() {
     for (source, name, host) in [
-        (&PREPARE, "WIDEST", super::pipeline::WIDEST),
+        (&PREPARE, "WIDEST", super::recording::WIDEST),
         (&GRID_RESOLUTION, "MOST_ALONG", grid::MOST_ALONG.into()),
         (&GRID_SHIFT, "MOST_ENTRIES_EACH", grid::MOST_ENTRIES_EACH),
     ] {

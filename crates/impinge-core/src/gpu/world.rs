@@ -103,10 +103,7 @@ impl World {
             cluster_vertices: Storage::plain("cluster vertices"),
             corners: Storage::plain("corners"),
             order: Storage::plain("order"),
-            positions: Storage::new(
-                "positions",
-                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
-            ),
+            positions: Storage::plain("positions"),
             levels: Storage::plain("levels"),
             ignored: Storage::plain("ignored"),
         }
@@ -129,8 +126,7 @@ impl World {
         &self.forest
     }
 
-    /// Sends what has changed since the last frame; positions of `resident` bodies are on the device already. Returns
-    /// whether kernels have to be bound again.
+    /// Sends what has changed since the last frame; positions of `resident` bodies are on the device already.
     ///
     /// # Errors
     /// More primitives than the device can bind at once.
@@ -141,7 +137,7 @@ impl World {
         resident: &[BodyId],
         recluster: bool,
         stats: &mut Statistics,
-    ) -> Result<bool, Error> {
+    ) -> Result<(), Error> {
         let Job { scene, frame, .. } = job;
         if frame.n_primitives() > MOST_PRIMITIVES {
             return Err(Error::TooMany {
@@ -151,17 +147,15 @@ impl World {
             });
         }
         self.clusterings.update(job, resident, recluster, stats)?;
-        let mut is_other = false;
         if !self.is_resident(frame) {
             // If an upload fails, half a topology must not look complete.
             self.residents.clear();
             self.send_topology(gpu, scene, frame)?;
-            is_other = true;
         }
         self.send_positions(gpu, scene, frame, resident);
-        is_other |= self.send_bodies(gpu, scene, frame, resident)?;
+        self.send_bodies(gpu, scene, frame, resident)?;
         stats.n_clusters = self.forest.n_clusters();
-        Ok(is_other)
+        Ok(())
     }
 
     fn is_resident(&self, frame: &Frame) -> bool {
@@ -238,7 +232,7 @@ impl World {
         Ok(())
     }
 
-    /// Sends a piece of the frame instead of all of it. Kernels have to be bound again afterwards.
+    /// Sends a piece of the frame instead of all of it.
     ///
     /// # Errors
     /// The piece is larger than the device can bind at once.
@@ -350,7 +344,7 @@ impl World {
         scene: &Scene,
         frame: &Frame,
         resident: &[BodyId],
-    ) -> Result<bool, Error> {
+    ) -> Result<(), Error> {
         if self.forest.reorder(|ix| sample(scene, frame, ix)) {
             self.nodes
                 .write(gpu, u64::from(self.forest.first_gate), self.forest.gates());
@@ -393,17 +387,16 @@ impl World {
         gpu: &Gpu,
         bodies: Vec<Body>,
         ignored: Vec<NodePair>,
-    ) -> Result<bool, Error> {
-        let mut is_other = false;
+    ) -> Result<(), Error> {
         if bodies != self.bodies_sent {
-            is_other |= self.bodies.upload(gpu, &bodies)?;
+            self.bodies.upload(gpu, &bodies)?;
             self.bodies_sent = bodies;
         }
         if ignored != self.ignored_sent || self.ignored.bytes() == 0 {
-            is_other |= self.ignored.upload(gpu, &ignored)?;
+            self.ignored.upload(gpu, &ignored)?;
             self.ignored_sent = ignored;
         }
-        Ok(is_other)
+        Ok(())
     }
 
     /// Encodes the copy of a body's positions from a buffer on the device, if it takes part.

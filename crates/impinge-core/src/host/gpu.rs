@@ -1,9 +1,9 @@
-//! Runs a method of another crate on the GPU: such a method is a plan of passes that work in cells.
+//! Runs a method of another crate on the GPU: such a method records passes that work in cells.
 
 use std::sync::Arc;
 
 use crate::error::Error;
-use crate::gpu::cells::InCells;
+use crate::gpu::cells::Guest as Recorded;
 use crate::gpu::room::{Capacities, PassCounts};
 use crate::gpu::{Engine, Gpu, WantedAdapter};
 use crate::pairs::Pairs;
@@ -16,7 +16,7 @@ use crate::settings::{Backend, Method, Settings};
 use crate::sink::{Answer, Goal, Limits};
 use crate::stats::Statistics;
 
-/// The frame loop around a plan of another crate.
+/// The frame loop around a method of another crate.
 pub struct Host {
     runner: Runner,
     pairs: Pairs,
@@ -35,7 +35,7 @@ impl Host {
         lambda: f64,
         first: Option<Capacities>,
         memory_budget: Option<u64>,
-        plan: Box<dyn InCells>,
+        guest: Recorded,
     ) -> Result<Self, Error> {
         let gpu = Gpu::open(device.map_or(WantedAdapter::Any, WantedAdapter::Named))?;
         let settings = Settings {
@@ -49,7 +49,7 @@ impl Host {
         Ok(Host {
             runner: Runner::new(&settings),
             pairs: Pairs::default(),
-            engine: Engine::with_plan_of_guest(gpu, settings, first, plan),
+            engine: Engine::with_guest(gpu, settings, first, Some(guest)),
         })
     }
 

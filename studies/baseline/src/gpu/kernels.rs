@@ -4,7 +4,6 @@ use bytemuck::{Pod, Zeroable};
 use impinge_core::gpu::layout::{Candidate, CellItem, Counter, Grid, Kept, Params};
 use impinge_core::gpu::pipeline::bindings;
 use impinge_core::gpu::pipeline::{Kernel, Source};
-use impinge_core::wgpu;
 
 /// A cell-primitive pair; the bits are drawn in `kernels/entries.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]

@@ -122,7 +122,6 @@ impl World {
     }
 
     /// Sends what has changed since the last step, which must have a [weight](weigh), except positions that are on the device.
-    /// Returns whether kernels have to be bound again.
     ///
     /// # Errors
     /// More than the device can bind at once.
@@ -133,9 +132,8 @@ impl World {
         clusterings: &[Arc<Clustering>],
         resident: &ResidentEnds<'_>,
         stats: &mut Statistics,
-    ) -> Result<bool, Error> {
+    ) -> Result<(), Error> {
         let Job { scene, frame, .. } = job;
-        let mut is_other = false;
         let is_held = self.layers.as_ref().is_some_and(|held| {
             held.clusterings.len() == clusterings.len()
                 && held
@@ -149,12 +147,11 @@ impl World {
             self.layers = Some(Layers::default());
             let layers = self.send_layers(gpu, scene, frame, clusterings)?;
             self.layers = Some(layers);
-            is_other = true;
         }
         self.send_ends(gpu, scene, resident);
-        is_other |= self.send_layer_records(gpu, scene, frame, resident)?;
+        self.send_layer_records(gpu, scene, frame, resident)?;
         stats.n_clusters = self.forest.n_clusters();
-        Ok(is_other)
+        Ok(())
     }
 
     fn send_layers(
@@ -272,14 +269,14 @@ impl World {
         scene: &Scene,
         frame: &Frame,
         resident: &ResidentEnds<'_>,
-    ) -> Result<bool, Error> {
+    ) -> Result<(), Error> {
         if self.forest.reorder(|ix| sample(scene, frame, ix)) {
             let first = u64::from(self.forest.first_gate);
             self.nodes.write(gpu, first, self.forest.gates());
             self.is_moved = true;
         }
         let Some(layers) = &self.layers else {
-            return Ok(false);
+            return Ok(());
         };
         let number = |id: BodyId| layers.number(id).map(|number| number as u32);
         let records = frame.numbered_layers().map(|(ix, layer)| {

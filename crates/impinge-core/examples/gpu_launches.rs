@@ -1,0 +1,37 @@
+//! Prints the launches of a frame by both methods of a device, and those of a step, one line each.
+//!
+//! `cargo run -p impinge-core --features gpu --example gpu_launches`
+
+#[cfg(feature = "gpu")]
+fn main() -> Result<(), impinge_core::Error> {
+    use impinge_core::{Backend, Detector, Method, Query, Scene, Settings, Step};
+    use impinge_scenes::surfaces;
+
+    let mut scene = Scene::new();
+    let ball = surfaces::ball(3000);
+    for offset in [0.0, 0.9] {
+        ball.translated([offset, 0.0, 0.0]).add_to(&mut scene)?;
+    }
+    for method in [Method::Clusters, Method::Cells] {
+        let settings = Settings {
+            method,
+            backend: Backend::Gpu,
+            ..Settings::default()
+        };
+        let mut detector = Detector::with_settings(settings)?;
+        detector.detect(&scene, &Query::all())?;
+        detector.impacts(&scene, &Step::default())?;
+        if let Some([still, moving]) = detector.recordings() {
+            println!("{}\n{still}", method.name());
+            if method == Method::Clusters {
+                println!("a step\n{moving}");
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(not(feature = "gpu"))]
+fn main() {
+    println!("This example needs the feature gpu.");
+}

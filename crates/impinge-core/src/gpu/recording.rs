@@ -1,0 +1,402 @@
+//! A pass as data: the launches of kernels, in order, each with its buffers and parameters.
+//!
+//! Pure functions make a [`Recording`]: `clusters` those of the method `Clusters` and of steps, `cells` those of `Cells`. It can be
+//! printed, one line per launch. A [`Launcher`] encodes it; or it runs launch by launch and reads back what each one has
+//! written, so that a wrong launch is found by comparing with another device, or with kernels known to be good.
+
+use std::fmt;
+use std::sync::Arc;
+
+use super::buffers::{Access, Bound, Slice, Storage, count, read};
+use super::layout::{Arguments, Params, Step};
+use super::open::Gpu;
+use super::pipeline::{Bindings, Entry, Kernel, Program};
+use super::room::Room;
+use super::world::World;
+use crate::error::Error;
+
+/// The widest row of workgroups; `shared/arguments.wgsl` has the same.
+pub(super) const WIDEST: u64 = 32_768;
+
+/// The number of workgroups of a launch.
+#[derive(Debug, Clone)]
+pub enum Workgroups {
+    /// This many, in rows if necessary.
+    Known(u64),
+    /// As many as the arguments in this slot say, which an earlier launch has written.
+    Indirect(wgpu::Buffer, u32),
+}
+
+/// A kernel with its buffers, parameters and workgroups.
+#[derive(Debug, Clone)]
+pub struct Launch {
+    /// The index of its stage.
+    stage: usize,
+    program: Arc<Program>,
+    /// In the order of the kernel's bindings.
+    bound: Vec<Bound>,
+    groups: Workgroups,
+}
+
+/// What comes before the launches.
+#[derive(Debug, Clone)]
+enum Before {
+    Clear(Slice),
+    Copy { from: Slice, to: Slice },
+}
+
+/// The launches of a pass, in order.
+#[derive(Debug, Clone, Default)]
+pub struct Recording {
+    stages: Vec<&'static str>,
+    start: Vec<Before>,
+    launches: Vec<Launch>,
+    /// What is read back, each from its first byte on.
+    reads: Vec<Slice>,
+}
+
+impl Recording {
+    /// The stages, by their timing labels. Some may have no launch.
+    pub fn stages(&self) -> &[&'static str] {
+        &self.stages
+    }
+
+    /// The launches.
+    pub fn launches(&self) -> &[Launch] {
+        &self.launches
+    }
+
+    /// Begins a stage.
+    pub fn stage(&mut self, name: &'static str) {
+        self.stages.push(name);
+    }
+
+    /// Adds a launch to the stage that was begun last.
+    pub fn launch<B: Bindings>(&mut self, kernel: &Kernel<B>, bindings: &B, groups: Workgroups) {
+        self.launches.push(Launch {
+            stage: self.stages.len() - 1,
+            program: Arc::clone(kernel.program()),
+            bound: bindings.bound(),
+            groups,
+        });
+    }
+
+    /// Has a buffer cleared before the first launch.
+    pub fn clear(&mut self, buffer: Slice) {
+        self.start.push(Before::Clear(buffer));
+    }
+
+    /// Has the first bytes of a buffer, as many as are bound, copied before the first launch.
+    pub fn copy(&mut self, from: Slice, to: Slice) {
+        self.start.push(Before::Copy { from, to });
+    }
+
+    /// Has the first bytes of a buffer, as many as are bound, read back after the last launch.
+    pub fn read(&mut self, buffer: Slice) {
+        self.reads.push(buffer);
+    }
+
+    /// How many bytes are read back.
+    pub fn read_bytes(&self) -> u64 {
+        self.reads.iter().map(|read| read.bytes).sum()
+    }
+
+    /// Encodes what comes before the launches.
+    fn encode_start(&self, encoder: &mut wgpu::CommandEncoder) {
+        for start in &self.start {
+            match start {
+                Before::Clear(held) => encoder.clear_buffer(&held.buffer, 0, None),
+                Before::Copy { from, to } if from.bytes > 0 => {
+                    encoder.copy_buffer_to_buffer(&from.buffer, 0, &to.buffer, 0, from.bytes);
+                }
+                Before::Copy { .. } => {}
+            }
+        }
+    }
+
+    /// Encodes the copies of what is read back, one after the other.
+    pub fn encode_reads(&self, encoder: &mut wgpu::CommandEncoder, staging: &wgpu::Buffer) {
+        let mut to = 0;
+        for read in self.reads.iter().filter(|read| read.bytes > 0) {
+            encoder.copy_buffer_to_buffer(&read.buffer, 0, staging, to, read.bytes);
+            to += read.bytes;
+        }
+    }
+}
+
+impl Launch {
+    /// The name of the kernel.
+    pub fn kernel(&self) -> &'static str {
+        self.program.name()
+    }
+
+    fn params(&self) -> Option<Params> {
+        self.bound.iter().find_map(|bound| match bound {
+            Bound::Params(params) => Some(*params),
+            Bound::Buffer(_) => None,
+        })
+    }
+
+    /// The buffers that the kernel uses in one way, each with its binding.
+    fn used(&self, access: Access) -> impl Iterator<Item = (&'static Entry, &Slice)> {
+        let entries = self.program.entries().iter().zip(&self.bound);
+        entries.filter_map(move |(entry, bound)| match bound {
+            Bound::Buffer(slice) if entry.access == access => Some((entry, slice)),
+            _ => None,
+        })
+    }
+}
+
+impl fmt::Display for Launch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:<22}", self.kernel())?;
+        match &self.groups {
+            Workgroups::Known(n) => write!(f, " x {n:<10}")?,
+            Workgroups::Indirect(_, slot) => write!(f, " x arguments {slot}")?,
+        }
+        for (access, arrow) in [(Access::Read, "<-"), (Access::Write, "->")] {
+            let labels: Vec<&str> = self.used(access).map(|(_, slice)| slice.label).collect();
+            write!(f, " {arrow} {}", labels.join(", "))?;
+        }
+        match self.params() {
+            Some(params) => write!(f, " {{{params}}}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for Recording {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for start in &self.start {
+            match start {
+                Before::Clear(held) => writeln!(f, "{:<10}clear {}", "", held.label)?,
+                Before::Copy { from, to } => {
+                    writeln!(f, "{:<10}copy  {} -> {}", "", from.label, to.label)?;
+                }
+            }
+        }
+        for launch in &self.launches {
+            writeln!(f, "{:<10}{launch}", self.stages[launch.stage])?;
+        }
+        let labels: Vec<&str> = self.reads.iter().map(|read| read.label).collect();
+        match labels.is_empty() {
+            true => Ok(()),
+            false => writeln!(f, "{:<10}read  {}", "", labels.join(", ")),
+        }
+    }
+}
+
+/// Makes a recording from the buffers that its launches bind.
+pub struct Recorder<'a> {
+    /// The kernels, and the limits of the device.
+    pub gpu: &'a Gpu,
+    /// The data on layers.
+    pub world: &'a World,
+    /// The buffers for results.
+    pub room: &'a Room,
+    /// What has been recorded so far.
+    pub recording: Recording,
+}
+
+impl Recorder<'_> {
+    /// As many workgroups as the arguments in this slot say.
+    pub fn indirect(&self, slot: u32) -> Workgroups {
+        Workgroups::Indirect(self.room.arguments.buffer().clone(), slot)
+    }
+}
+
+/// A launch that has run, and what it left in the buffers that it may write.
+#[derive(Debug)]
+pub struct Ran {
+    /// The stage.
+    pub stage: &'static str,
+    /// The kernel.
+    pub kernel: &'static str,
+    /// The launch in words.
+    pub launch: String,
+    /// What the kernel may have written.
+    pub written: Vec<Written>,
+}
+
+/// The contents of a buffer.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Written {
+    /// The name of the binding.
+    pub name: &'static str,
+    /// Its elements, sorted: threads fill lists in any order.
+    pub elements: Vec<Vec<u8>>,
+}
+
+/// Runs recordings. Keeps the table of parameters and the bind groups of the last one.
+#[derive(Debug)]
+pub struct Launcher {
+    params: Storage<Step>,
+    sent: Vec<Step>,
+    groups: Vec<Group>,
+}
+
+/// A bind group, and what it was made of.
+#[derive(Debug)]
+struct Group {
+    program: Arc<Program>,
+    buffers: Vec<(wgpu::Buffer, u64)>,
+    group: wgpu::BindGroup,
+}
+
+impl Default for Launcher {
+    fn default() -> Self {
+        Launcher {
+            params: Storage::new("parameters", wgpu::BufferUsages::UNIFORM),
+            sent: Vec::new(),
+            groups: Vec::new(),
+        }
+    }
+}
+
+/// A launch that is ready: its bind group among those of the launcher, and the offset of its parameters.
+struct Ready {
+    group: usize,
+    offset: Option<u32>,
+}
+
+impl Launcher {
+    /// Encodes a recording, each stage in a pass of its own so that it can be timed.
+    ///
+    /// # Errors
+    /// As [`Storage::resize`]. Errors of kernels go to the open error scopes.
+    pub fn encode(
+        &mut self,
+        gpu: &Gpu,
+        recording: &Recording,
+        times: Option<&wgpu::QuerySet>,
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<(), Error> {
+        let ready = self.prepare(gpu, recording)?;
+        recording.encode_start(encoder);
+        let mut next = 0;
+        for (ix, name) in (0u32..).zip(&recording.stages) {
+            let timestamp_writes = times.map(|query_set| wgpu::ComputePassTimestampWrites {
+                query_set,
+                beginning_of_pass_write_index: Some(2 * ix),
+                end_of_pass_write_index: Some(2 * ix + 1),
+            });
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some(name),
+                timestamp_writes,
+            });
+            while let Some(launch) = recording.launches.get(next)
+                && launch.stage == ix as usize
+            {
+                self.dispatch(launch, &ready[next], &mut pass);
+                next += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs a recording launch by launch, and reads back what each has written. Slow.
+    ///
+    /// # Errors
+    /// Those of [`encode`](Launcher::encode); a device that is lost.
+    pub async fn run_each(&mut self, gpu: &Gpu, recording: &Recording) -> Result<Vec<Ran>, Error> {
+        let ready = self.prepare(gpu, recording)?;
+        let encoder = || gpu.device.create_command_encoder(&Default::default());
+        let mut first = encoder();
+        recording.encode_start(&mut first);
+        gpu.queue.submit([first.finish()]);
+        let mut all = Vec::with_capacity(recording.launches.len());
+        for (launch, ready) in recording.launches.iter().zip(&ready) {
+            let mut encoder = encoder();
+            // A queue holds what is left of an earlier round, in any order.
+            for (entry, slice) in launch.used(Access::Write) {
+                if entry.name == "next_queue" {
+                    encoder.clear_buffer(&slice.buffer, 0, None);
+                }
+            }
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            self.dispatch(launch, ready, &mut pass);
+            drop(pass);
+            gpu.queue.submit([encoder.finish()]);
+            let mut written = Vec::new();
+            for (entry, slice) in launch.used(Access::Write) {
+                let bytes = read(gpu, slice).await?;
+                let elements = bytes.chunks_exact(entry.stride as usize);
+                let mut elements: Vec<Vec<u8>> = elements.map(<[u8]>::to_vec).collect();
+                elements.sort_unstable();
+                let name = entry.name;
+                written.push(Written { name, elements });
+            }
+            all.push(Ran {
+                stage: recording.stages[launch.stage],
+                kernel: launch.kernel(),
+                launch: launch.to_string(),
+                written,
+            });
+        }
+        Ok(all)
+    }
+
+    /// Sends the parameters, if they differ from those on the device, and binds all buffers.
+    fn prepare(&mut self, gpu: &Gpu, recording: &Recording) -> Result<Vec<Ready>, Error> {
+        let params = recording.launches.iter().filter_map(Launch::params);
+        let planned: Vec<Step> = params.map(Step::from).collect();
+        if planned != self.sent || self.params.bytes() == 0 {
+            self.params.upload(gpu, &planned)?;
+            self.sent = planned;
+        }
+        let mut before = std::mem::take(&mut self.groups);
+        let mut next = 0;
+        let launches = recording.launches.iter();
+        let ready = launches.map(|launch| {
+            let offset = launch.params().map(|_| {
+                next += 1;
+                // A pass has a few dozen launches.
+                (next - 1) * size_of::<Step>() as u32
+            });
+            let group = self.group(gpu, &mut before, launch);
+            Ready { group, offset }
+        });
+        Ok(ready.collect())
+    }
+
+    /// The number of the bind group of a launch: one of this recording, one of the recording before, or a new one.
+    fn group(&mut self, gpu: &Gpu, before: &mut Vec<Group>, launch: &Launch) -> usize {
+        let buffer = |bound: &Bound| match bound {
+            Bound::Buffer(slice) => (slice.buffer.clone(), slice.bytes),
+            Bound::Params(_) => (self.params.buffer().clone(), count(size_of::<Params>())),
+        };
+        let buffers: Vec<_> = launch.bound.iter().map(buffer).collect();
+        let is_it =
+            |held: &Group| Arc::ptr_eq(&held.program, &launch.program) && held.buffers == buffers;
+        if let Some(ix) = self.groups.iter().position(is_it) {
+            return ix;
+        }
+        let held = match before.iter().position(is_it) {
+            Some(ix) => before.swap_remove(ix),
+            None => Group {
+                program: Arc::clone(&launch.program),
+                group: launch.program.bind(gpu, &buffers),
+                buffers,
+            },
+        };
+        self.groups.push(held);
+        self.groups.len() - 1
+    }
+
+    fn dispatch(&self, launch: &Launch, ready: &Ready, pass: &mut wgpu::ComputePass<'_>) {
+        let held = &self.groups[ready.group];
+        pass.set_pipeline(held.program.pipeline());
+        pass.set_bind_group(0, &held.group, ready.offset.as_slice());
+        match &launch.groups {
+            &Workgroups::Known(n) => {
+                // Both fit: counts are below 2^32.
+                let (x, y) = (n.min(WIDEST) as u32, n.div_ceil(WIDEST) as u32);
+                pass.dispatch_workgroups(x, y, 1);
+            }
+            Workgroups::Indirect(arguments, slot) => {
+                let bytes = count(size_of::<Arguments>());
+                pass.dispatch_workgroups_indirect(arguments, u64::from(*slot) * bytes);
+            }
+        }
+    }
+}
