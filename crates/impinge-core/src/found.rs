@@ -1,10 +1,10 @@
 //! Where what is found about vertices, edges and faces goes, by kind of pair.
 
 use crate::error::Error;
-use crate::exact::Contact;
 use crate::key_ranges::{KeyRanges, Tally};
 use crate::pair_kind::PairKind;
 use crate::sink::{Answer, Ending};
+use impinge_exact::Contact;
 
 /// A key and its value.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,6 @@
 //! The answer about a step: impacts, with their times.
 
 use crate::error::Error;
-use crate::exact::Contact;
 use crate::found::{Found, FoundByKind};
 #[cfg(doc)]
 use crate::ids::BodyId;
@@ -12,6 +11,7 @@ use crate::plan::Plan;
 use crate::sink::reserve;
 use crate::stats::Statistics;
 use crate::step::Toi;
+use impinge_exact::Contact;
 
 /// Two elements that touch during a step, and when first.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -16,7 +16,6 @@ pub mod cpu;
 mod detector;
 mod elements;
 mod error;
-pub mod exact;
 mod found;
 #[cfg(feature = "gpu")]
 pub mod gpu;
@@ -69,6 +68,7 @@ pub use gpu::Capacities;
 pub use gpu::{DeviceInfo, ResidentLayer, ResidentPairs, ResidentStep, devices, devices_async};
 pub use ids::BodyId;
 pub use impacts::{Impact, Impacts, hash_impact_rows};
+pub use impinge_exact as exact;
 pub use impinge_weld::{Coordinate, Weld, WrongNumber};
 pub use near::{ClosestPoints, NearIter, NearPair, NearPairs, NearQuery};
 pub use pair_kind::{PairKind, PairKinds};

@@ -5,7 +5,6 @@ mod labels;
 use std::collections::BTreeMap;
 
 use crate::error::Error;
-use crate::exact::{ElementPair, Feature, NearestOfElements};
 use crate::found::KeysByKind;
 use crate::ids::BodyId;
 use crate::numbering::{Numbering, row};
@@ -17,6 +16,8 @@ use crate::scene::Scene;
 use crate::sink::{Limits, reserve};
 use crate::stats::Statistics;
 use crate::step::check_distance;
+use impinge_exact::internal::NearestOfElements;
+use impinge_exact::{ElementPair, Feature};
 
 pub(crate) use labels::Labels;
 

@@ -23,7 +23,6 @@ use std::ops::Range;
 use crate::clock::Instant;
 use crate::elements::{Kind, Part};
 use crate::error::Error;
-use crate::exact::{Contact, ElementPair, Keep, Point, Reach};
 use crate::hull::{Extent, Pose};
 use crate::ids::BodyId;
 pub use crate::index::pair_key;
@@ -34,6 +33,8 @@ use crate::query::{Cell, Query, Scope, SharedVertex};
 use crate::scene::{Body, Filter, Scene};
 use crate::sink::{Goal, Limits};
 use crate::step::{CandidateQuery, PairFilter, Start, Step, Toi};
+use impinge_exact::internal::{Keep, Reach};
+use impinge_exact::{Contact, ElementPair, Point};
 
 /// One part of one body that takes part in a frame.
 #[derive(Debug, Clone, Copy)]

@@ -4,10 +4,10 @@ use std::fmt;
 use std::sync::Arc;
 
 use crate::error::Error;
-use crate::exact::Keep;
 use crate::ids::BodyId;
 use crate::pair_kind::{PairKind, PairKinds};
 use crate::query::Query;
+use impinge_exact::internal::Keep;
 
 /// What happens to pairs that touch at the start of a step, and whether the start is asked for intersections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -38,7 +38,7 @@ pub enum Toi {
 
 impl Toi {
     /// The time of a contact in this precision, as an `f64`.
-    pub(crate) fn round(self, contact: &crate::exact::Contact) -> f64 {
+    pub(crate) fn round(self, contact: &impinge_exact::Contact) -> f64 {
         match self {
             Toi::F32 => f64::from(contact.time_f32()),
             Toi::F64 => contact.time,

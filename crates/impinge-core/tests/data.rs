@@ -3,7 +3,7 @@
 //! (`../shared/data` or `$IMPINGE_DATA`) these tests fail, unless `IMPINGE_NO_DATA=1` is set.
 
 mod common;
-#[path = "common/published.rs"]
+#[path = "../../impinge-exact/tests/common/published.rs"]
 mod published;
 
 use std::collections::HashSet;

@@ -11,13 +11,13 @@ use super::work::{Equal, Work};
 use super::{Contacts, Doubles, Feature, PointName, Shape, lowest};
 use crate::elements::{Elements, Kind};
 use crate::error::Error;
-use crate::exact::Point;
 use crate::ids::BodyId;
 use crate::index::VertexIx;
 use crate::pairs::Pairs;
 use crate::positions::{Positions, check_positions};
 use crate::scene::{Body, Scene};
 use crate::sink::{self, grow, reserve};
+use impinge_exact::Point;
 
 /// Pairs per task.
 const CHUNK: usize = 256;

@@ -16,7 +16,8 @@
 //! triangles leads to the point.
 
 use super::double::{self, Double};
-use crate::exact::{Integer, Point, Projection, unit_of};
+use impinge_exact::Point;
+use impinge_exact::internal::{Integer, Projection, unit_of};
 
 /// The precision to which coordinates are rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -316,7 +317,7 @@ mod tests {
                         [x, y, x]
                     });
                     let turn = |a: &Point, b: &Point, c: &Point| {
-                        crate::exact::orient2d([a[0], a[1]], [b[0], b[1]], [c[0], c[1]])
+                        impinge_exact::orient2d([a[0], a[1]], [b[0], b[1]], [c[0], c[1]])
                     };
                     if !turn(&p, &q, &r).strictly_opposite(turn(&p, &q, &s))
                         || !turn(&r, &s, &p).strictly_opposite(turn(&r, &s, &q))
@@ -329,7 +330,7 @@ mod tests {
                     let plane = [point(), point(), point()];
                     let [p, q] = [point(), point()];
                     let height =
-                        |x: &Point| crate::exact::orient3d(&plane[0], &plane[1], &plane[2], x);
+                        |x: &Point| impinge_exact::orient3d(&plane[0], &plane[1], &plane[2], x);
                     if !height(&p).strictly_opposite(height(&q)) {
                         continue;
                     }

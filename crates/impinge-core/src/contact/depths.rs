@@ -7,8 +7,8 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use crate::exact::Point;
 use crate::index::{ElementIx, VertexIx};
+use impinge_exact::Point;
 
 /// A vertex in the queue: nearest first, ties by number.
 #[derive(PartialEq)]

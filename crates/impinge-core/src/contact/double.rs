@@ -5,7 +5,7 @@
 //! a product below 7 · 2^-106, a quotient below 16 · 2^-106. No fused multiply-add, so the bits are the same
 //! on every machine.
 
-use crate::exact::two_sum;
+use impinge_exact::internal::two_sum;
 
 /// `high + low`, where `high` is the sum rounded to nearest.
 #[derive(Debug, Clone, Copy, PartialEq)]

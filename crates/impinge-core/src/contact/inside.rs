@@ -15,9 +15,9 @@ use std::sync::{Mutex, PoisonError};
 use super::topology::EdgesAround;
 use super::work::Work;
 use crate::error::Error;
-use crate::exact::{Point, Sign, orient2d, orient3d};
 use crate::index::VertexIx;
 use crate::scene::{Body, Elements};
+use impinge_exact::{Point, Sign, orient2d, orient3d};
 
 /// Vertices between two looks at the control.
 const LOOK: usize = 1 << 14;

@@ -16,7 +16,8 @@
 //!
 //! Cost: 6 to 18 signs for triangles in general position.
 
-use crate::exact::{Point, Projection, Sign, collinear, orient3d, strictly_between};
+use impinge_exact::internal::{Projection, collinear, strictly_between};
+use impinge_exact::{Point, Sign, orient3d};
 
 /// A feature of a triangle. Edge `k` leads from corner `k` to corner `k + 1`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,7 +7,7 @@
 //! common, and [`solid_depths`] how deep vertices lie below the surface.
 //!
 //! **Exact combinatorics.** Which edge crosses which face, in which order, which points are one point,
-//! which segments follow each other: decided by the signs of [`exact`](crate::exact), without
+//! which segments follow each other: decided by the signs of [`impinge_exact`], without
 //! tolerance. **Rounded coordinates.** Each coordinate is the exact number rounded to nearest: to `f32` if both
 //! bodies hold `f32`, else to `f64`. It depends on the point alone, so the bytes are the same on
 //! every machine and for every number of threads. Lengths, areas,

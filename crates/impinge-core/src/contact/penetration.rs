@@ -23,11 +23,11 @@ use super::topology::EdgesAround;
 use super::work::Work;
 use super::{Contacts, Feature, PointName, Shape};
 use crate::error::Error;
-use crate::exact::{Sign, orient3d};
 use crate::index::VertexIx;
 use crate::scene::{Body, BodyId, Elements, Kind, Scene};
 use crate::sets::Sets;
 use crate::sink::grow;
+use impinge_exact::{Sign, orient3d};
 
 /// The topologies of closed bodies, from call to call.
 #[derive(Debug, Default)]

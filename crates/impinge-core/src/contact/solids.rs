@@ -3,7 +3,7 @@
 //! Cost: about a microsecond per pair; no memory is allocated after the first pairs. Coordinates are rounded in `f64`, in one
 //! fixed order.
 
-use crate::exact::Point;
+use impinge_exact::Point;
 
 /// The faces' corners, and the corner on the other side.
 const FACES: [([usize; 3], usize); 4] = [

@@ -1,6 +1,6 @@
 //! Between `pairing` and `narrow`: where very many boxes of two clusters overlap, a direction of each element tells most pairs apart.
 //!
-//! In: the masks of a work item. Out: the same masks without pairs that are certainly apart (`exact::filter::directions`).
+//! In: the masks of a work item. Out: the same masks without pairs that are certainly apart (`impinge_exact::filter::directions`).
 //! Boxes say little about long elements that lie aslant: on two parts of a machine whose triangles are mostly slivers, those of
 //! a fifth of all pairs overlap, of which planes leave one in 150.
 //!
@@ -8,12 +8,12 @@
 //! needed, with 3.8 KB.
 
 use crate::elements::with_corners;
-use crate::exact::filter::Directions64;
 use crate::grouping::GROUP;
 use crate::grouping::clusters::Clustering;
 use crate::index::{ClusterIx, LayerIx};
 use crate::positions::Positions;
 use crate::settings::Settings;
+use impinge_exact::internal::filter::Directions64;
 
 use super::group_cache::{GroupCache, PerCluster};
 use super::met::{Side, WorkItem};

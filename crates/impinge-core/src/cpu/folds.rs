@@ -9,7 +9,7 @@
 //! that they share. On a smooth surface nearly every vertex passes, also where neighbours lie in one plane.
 //!
 //! 1. Of each triangle in single precision: which way it turns, and which lines through its corners its far sides cross
-//!    (`exact::filter::turns`), a register of triangles at a time.
+//!    (`impinge_exact::filter::turns`), a register of triangles at a time.
 //! 2. Of each vertex: whether all of its triangles turn the same way, and how many lines they cross. Where that leaves it open, its
 //!    ring is gone along in `f64`, along the axes and then along the sum of its normals.
 //! 3. Of each cluster: which triangles have a vertex with a fold.
@@ -19,13 +19,13 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::elements::Elements;
-use crate::exact::filter;
 use crate::grouping::GROUP;
 use crate::grouping::clusters::Clustering;
 use crate::grouping::rings::{CornerAt, Ring, Rings};
 use crate::index::ClusterIx;
 use crate::positions::Positions;
 use crate::workers::Workers;
+use impinge_exact::internal::filter;
 
 use super::simd::{ClusterFaces, Isa, Simd, dispatch};
 

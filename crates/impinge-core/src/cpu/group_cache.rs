@@ -5,13 +5,13 @@
 //! body. Cost: each corner of a cluster once, when it is first needed; 3.8 KB per cluster.
 
 use crate::elements::Elements;
-use crate::exact::filter::{LARGEST_F32, Triangles64};
 use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
 use crate::hull;
 use crate::index::{ClusterIx, LayerIx};
 use crate::positions::Positions;
 use crate::settings::Settings;
+use impinge_exact::internal::filter::{LARGEST_F32, Triangles64};
 
 use super::simd::{ClusterFaces, LaneBounds, Simd};
 use super::world::World;

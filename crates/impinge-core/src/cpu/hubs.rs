@@ -24,10 +24,11 @@
 //! Cost: `O(n log n)` per hub for n primitives, and one exact test per pair whose cones' boxes overlap.
 //! Reason for each discard: cones without a common direction. `docs/exactness.md`, "Hubs", has the proof and the bound.
 
-use crate::exact::{Point, collinear, strictly_between};
 use crate::grouping::bounds::{Bounds, round_down, round_up};
 use crate::grouping::hubs::{HubSet, Hubs};
 use crate::index::Place;
+use impinge_exact::Point;
+use impinge_exact::internal::{collinear, strictly_between};
 
 use super::narrow::Settler;
 use super::world::BodyRef;

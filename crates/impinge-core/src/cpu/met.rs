@@ -1,8 +1,8 @@
 //! The data passed from stage to stage: two clusters that may meet, and the lanes of their elements whose boxes do.
 
-use crate::exact::filter::BATCH;
 use crate::grouping::GROUP;
 use crate::index::{ClusterIx, LayerIx};
+use impinge_exact::internal::filter::BATCH;
 
 use super::simd::{Lanes32, Simd};
 

@@ -1,7 +1,7 @@
 //! Stage `narrow`: the exact test of candidates.
 //!
 //! In: candidates. Out: keys of pairs that intersect. Triangle pairs go through two floating-point
-//! filters, eight pairs at a time (`exact::filter`, bounds derived in `docs/exactness.md`): most are
+//! filters, eight pairs at a time (`impinge_exact::filter`, bounds derived in `docs/exactness.md`): most are
 //! rejected because one triangle lies on one side of the other's plane; the rest is classified.
 //! Tetrahedron pairs are classified by their faces, then the open ones by faces and edges. Pairs of which the filters
 //! are unsure go to exact arithmetic, and so do pairs of a triangle and a tetrahedron; that code filters too.
@@ -11,9 +11,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::elements::Elements;
-use crate::exact::filter::{
-    self, BATCH, LANES, TetrahedronPairs8, TrianglePairs8, Verdict, Verdict16,
-};
 use crate::grouping::GROUP;
 use crate::index::{LayerIx, Number, Place};
 use crate::narrow::{intersect, intersect_shared};
@@ -21,6 +18,9 @@ use crate::plan::pair_key;
 use crate::positions::Positions;
 use crate::sink::{Answer, BLOCK};
 use crate::tuning::Tuning;
+use impinge_exact::internal::filter::{
+    self, BATCH, LANES, TetrahedronPairs8, TrianglePairs8, Verdict, Verdict16,
+};
 
 use super::group_cache::Group;
 use super::met::{Met, Side, WorkItem};

@@ -2,13 +2,13 @@
 
 use crate::clusterings::{Clustered, Fit, Store};
 use crate::elements::Elements;
-use crate::exact::Point;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::index::{ElementIx, LayerIx, Number, Place};
 use crate::plan::{Layer, Plan};
 use crate::positions::Positions;
 use crate::scene::Scene;
+use impinge_exact::Point;
 
 use super::bounds::TreeBounds;
 use super::dispatch::Tree;

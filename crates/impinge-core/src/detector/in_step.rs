@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use crate::cpu::steps::{ByDevice, StepClusters};
 use crate::error::Error;
-use crate::exact::Contact;
 use crate::found::{ContactAnswer, Found, KeyAnswer, PairList, StepAnswer};
 #[cfg(feature = "gpu")]
 use crate::gpu::Engine;
@@ -19,6 +18,7 @@ use crate::settings::{Method, Settings};
 use crate::sink::Ending;
 use crate::stats::Statistics;
 use crate::step::Start;
+use impinge_exact::Contact;
 
 /// Which keys to find.
 #[derive(Clone, Copy, Default)]

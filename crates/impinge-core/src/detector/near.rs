@@ -8,7 +8,6 @@ use super::in_step::{InStep, Keys, Seen};
 use crate::clock::Instant;
 use crate::elements::Part;
 use crate::error::Error;
-use crate::exact::{NearestOfElements, closest_of_elements, nearest_of_elements};
 use crate::found::KeysByKind;
 use crate::index::ElementIx;
 use crate::narrow::{Corners, exact_kind};
@@ -20,6 +19,7 @@ use crate::progress::Control;
 use crate::run::{Job, Outcome, ready};
 use crate::scene::Scene;
 use crate::stats::Statistics;
+use impinge_exact::internal::{NearestOfElements, closest_of_elements, nearest_of_elements};
 
 /// Pairs whose features a task finds.
 const TASK: usize = 1024;

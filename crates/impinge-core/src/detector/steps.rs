@@ -7,7 +7,6 @@ use crate::candidates::Candidates;
 use crate::clock::Instant;
 use crate::cpu::steps::StepClusters;
 use crate::error::Error;
-use crate::exact::Contact;
 use crate::found::{Found, FoundByKind};
 use crate::impacts::{Impact, Impacts};
 use crate::near::NearPairs;
@@ -21,6 +20,7 @@ use crate::settings::Settings;
 use crate::sink::{Goal, Limits};
 use crate::stats::Statistics;
 use crate::step::{Start, Step, Toi};
+use impinge_exact::Contact;
 
 /// The memory kept from step to step.
 pub(super) struct StepMemory {

@@ -1,7 +1,7 @@
 //! Boxes in double precision: of elements exactly as they are, where few boxes are asked for.
 
-use crate::exact::Point;
 use crate::grouping::bounds::Bounds;
+use impinge_exact::Point;
 
 /// A closed box. The empty one has `min > max`.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,9 +1,9 @@
 //! Whether two elements touch during a step, and when first.
 
-use crate::exact::{Contact, ElementPair, Point};
 use crate::hull::Extent;
 use crate::pair_kind::PairKind;
 use crate::plan::TestId;
+use impinge_exact::{Contact, ElementPair, Point};
 
 use super::{Element, Test};
 

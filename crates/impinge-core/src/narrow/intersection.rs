@@ -1,7 +1,6 @@
 //! Whether two elements share a point.
 
 use crate::elements::Kind;
-use crate::exact::{self, Point};
 use crate::hull::Extent;
 #[cfg(feature = "gpu")]
 use crate::index::pair_numbers;
@@ -11,6 +10,7 @@ use crate::plan::TestId;
 use crate::query::SharedVertex;
 #[cfg(feature = "gpu")]
 use crate::scene::Scene;
+use impinge_exact::Point;
 
 use super::{Element, Test};
 
@@ -79,10 +79,10 @@ fn triangle(corners: &[Point; 4]) -> &[Point; 3] {
 /// point. Points and edges are degenerate triangles.
 pub(crate) fn intersect(kind_a: Kind, a: &[Point; 4], kind_b: Kind, b: &[Point; 4]) -> bool {
     match (kind_a, kind_b) {
-        (Kind::Tetrahedra, Kind::Tetrahedra) => exact::tetrahedra_intersect(a, b),
-        (_, Kind::Tetrahedra) => exact::triangle_tetrahedron_intersect(triangle(a), b),
-        (Kind::Tetrahedra, _) => exact::triangle_tetrahedron_intersect(triangle(b), a),
-        _ => exact::triangles_intersect(triangle(a), triangle(b)),
+        (Kind::Tetrahedra, Kind::Tetrahedra) => impinge_exact::tetrahedra_intersect(a, b),
+        (_, Kind::Tetrahedra) => impinge_exact::triangle_tetrahedron_intersect(triangle(a), b),
+        (Kind::Tetrahedra, _) => impinge_exact::triangle_tetrahedron_intersect(triangle(b), a),
+        _ => impinge_exact::triangles_intersect(triangle(a), triangle(b)),
     }
 }
 
@@ -97,14 +97,16 @@ pub(crate) fn intersect_shared(
     let four = |corners: &[u32]| [corners[0], corners[1], corners[2], corners[3]];
     match (rule, kind) {
         (SharedVertex::Skip, _) | (_, Kind::Points | Kind::Edges) => false,
-        (SharedVertex::Resolve, Kind::Triangles) => exact::triangles_intersect_beyond_shared(
-            triangle(a.0),
-            three(a.1),
-            triangle(b.0),
-            three(b.1),
-        ),
+        (SharedVertex::Resolve, Kind::Triangles) => {
+            impinge_exact::triangles_intersect_beyond_shared(
+                triangle(a.0),
+                three(a.1),
+                triangle(b.0),
+                three(b.1),
+            )
+        }
         (SharedVertex::Resolve, Kind::Tetrahedra) => {
-            exact::tetrahedra_intersect_beyond_shared(a.0, four(a.1), b.0, four(b.1))
+            impinge_exact::tetrahedra_intersect_beyond_shared(a.0, four(a.1), b.0, four(b.1))
         }
     }
 }

@@ -1,8 +1,8 @@
 //! Whether the boxes of two elements overlap during a step.
 
-use crate::exact::two_sum;
 use crate::hull::Extent;
 use crate::plan::TestId;
+use impinge_exact::internal::two_sum;
 
 use super::{Element, Test};
 

@@ -1,10 +1,11 @@
 //! Whether two elements are within a distance, at the positions that their bodies have.
 
-use crate::exact::{Point, elements_are_within, elements_meet};
 use crate::hull::Extent;
 use crate::pair_kind::PairKind;
 use crate::plan::TestId;
 use crate::positions::Positions;
+use impinge_exact::Point;
+use impinge_exact::internal::{elements_are_within, elements_meet};
 
 use super::{Element, Test};
 

@@ -14,9 +14,9 @@ use crate::hull::Extent;
 
 use super::scale::Scale;
 use super::tree::{Node, Tree};
-use crate::exact::Point;
 use crate::index::ClusterIx;
 use crate::scene::Body;
+use impinge_exact::Point;
 
 /// Three directions at right angles and of length 1, but for rounding.
 #[derive(Debug, Clone, Copy)]

@@ -21,9 +21,6 @@ use super::many::{Allowance, Bodies, are_apart, meet};
 use super::tree::{Node, Tree, box_along, corners};
 use crate::elements::Kind;
 use crate::error::Error;
-use crate::exact::Point;
-use crate::exact::filter::Directions64;
-use crate::exact::filter::number::Portable32;
 use crate::grouping::bounds::round_up;
 use crate::ids::BodyId;
 use crate::index::{ElementIx, LayerIx};
@@ -33,6 +30,9 @@ use crate::positions::{Positions, check_positions};
 use crate::progress::Control;
 use crate::scene::{Body, Scene};
 use crate::workers::Workers;
+use impinge_exact::Point;
+use impinge_exact::internal::filter::Directions64;
+use impinge_exact::internal::filter::number::Portable32;
 
 /// The trees of bodies and the pairs found last, from call to call.
 #[derive(Debug, Default)]

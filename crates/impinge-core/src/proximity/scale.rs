@@ -4,8 +4,8 @@
 //! the largest is between 2^-80 and 2^30. That is exact but for coordinates that are very much smaller than the largest; what those
 //! lose is far below the error that the search allows for. Anywhere else the factor is 1.
 
-use crate::exact::Point;
 use crate::hull::Extent;
+use impinge_exact::Point;
 
 /// A power of two.
 #[derive(Debug, Clone, Copy)]

@@ -3,12 +3,12 @@
 //! Clusters are found once per topology, in the current pose; their boxes once per pose, from each cluster's vertices; boxes
 //! of primitives only when a cluster is compared. Cost: `O(n log n)` and `O(n)`.
 
-use crate::exact::Point;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::hull::{self, Extent};
 use crate::index::{ClusterIx, ElementIx};
 use crate::scene::Body;
+use impinge_exact::Point;
 
 /// A body's clusters and boxes.
 #[derive(Debug)]

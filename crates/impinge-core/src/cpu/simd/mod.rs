@@ -6,14 +6,14 @@
 //! to library functions: those would be compiled separately, without the set.
 //! The answers are bit masks of exact comparisons, so they are the same for every set.
 
-use crate::exact::filter::number::{self, Lookup, Vector};
-use crate::exact::filter::{BATCH, LANES, Triangles64};
 #[cfg(target_arch = "x86_64")]
 use crate::grouping::CHUNK;
 use crate::grouping::GROUP;
 pub use crate::grouping::bounds::LaneBounds;
 use crate::grouping::bounds::{Bounds, BoundsArray};
 use crate::grouping::clusters::LocalFaces;
+use impinge_exact::internal::filter::number::{self, Lookup, Vector};
+use impinge_exact::internal::filter::{BATCH, LANES, Triangles64};
 
 use super::runs::{self, Members, RUN, RunExtents};
 use crate::hull::{ReadVertices, of_vertices_f32};

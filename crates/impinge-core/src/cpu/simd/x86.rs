@@ -2,8 +2,8 @@
 
 use std::arch::x86_64::*;
 
-use crate::exact::filter::number::Lookup;
-use crate::exact::filter::{BATCH, TABLE};
+use impinge_exact::internal::filter::number::Lookup;
+use impinge_exact::internal::filter::{BATCH, TABLE};
 
 use super::super::runs::COORDINATES;
 use super::{

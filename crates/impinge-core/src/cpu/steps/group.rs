@@ -5,12 +5,12 @@
 use crate::cpu::group_cache::PerCluster;
 use crate::cpu::simd::{LaneBounds, Lanes32, Simd};
 use crate::elements::with_corners;
-use crate::exact::filter::Moving64;
 use crate::grouping::GROUP;
 use crate::grouping::bounds::Bounds;
 use crate::hull::Extent;
 use crate::index::{ClusterIx, LayerIx};
 use crate::positions::Positions;
+use impinge_exact::internal::filter::Moving64;
 
 use super::world::World;
 

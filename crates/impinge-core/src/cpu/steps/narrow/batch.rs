@@ -2,7 +2,6 @@
 
 use crate::cpu::met::{Met, WorkItem};
 use crate::cpu::simd::Isa;
-use crate::exact::{ElementPair, Point, Reach};
 use crate::found::{KeysByKind, StepAnswer};
 use crate::grouping::bounds::{round_down, round_up};
 use crate::index::{LayerIx, Number, Place};
@@ -11,6 +10,8 @@ use crate::pair_kind::PairKind;
 use crate::plan::{TestId, pair_key};
 use crate::positions::Positions;
 use crate::sink::BLOCK;
+use impinge_exact::internal::Reach;
+use impinge_exact::{ElementPair, Point};
 
 use super::super::group::Group;
 use super::super::world::World;

@@ -2,8 +2,6 @@
 
 use crate::cpu::narrow::room_to_wait;
 use crate::cpu::simd::Isa;
-use crate::exact::filter::{Search, time_between};
-use crate::exact::{Contact, ElementPair};
 use crate::found::{Found, FoundByKind, StepAnswer};
 use crate::pair_kind::PairKind;
 use crate::plan::Plan;
@@ -11,6 +9,8 @@ use crate::sink::BLOCK;
 use crate::sink::Goal;
 use crate::step::{Start, Toi};
 use crate::tuning::Tuning;
+use impinge_exact::internal::filter::{Search, time_between};
+use impinge_exact::{Contact, ElementPair};
 
 use super::super::world::World;
 use super::batch::{Between, Narrow, NarrowCounts, Places, counts, key, points};

@@ -8,9 +8,10 @@
 //! Reason for each discard: no pair keeps more than the bound of the frame (`Plan::bound`).
 
 use crate::cpu::simd::{Lanes, Simd};
-use crate::exact::filter::{self, BATCH};
-use crate::exact::{Approach, Contact, Reach, approach};
 use crate::grouping::bounds::round_up;
+use impinge_exact::Contact;
+use impinge_exact::internal::filter::{self, BATCH};
+use impinge_exact::internal::{Approach, Reach, approach};
 
 use super::super::world::World;
 use super::batch::{Batch, Between, Places, counts, exact_pair, points};

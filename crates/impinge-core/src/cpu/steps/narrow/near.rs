@@ -1,19 +1,19 @@
 //! Whether elements are within a distance at the start of a step.
 //!
 //! In: candidates, whose boxes overlap when each reaches half as far. Sixteen pairs at a time are settled in `f32` from the tables
-//! (`exact::filter::nearness`), with the nearest features of most; other pairs in `f64` with bounds (`exact::distance`), the rest in
+//! (`impinge_exact::filter::nearness`), with the nearest features of most; other pairs in `f64` with bounds (`impinge_exact::distance`), the rest in
 //! exact arithmetic. Features that are not known here are named when the pairs are sorted. Edges and faces are tested for a common point alone.
 
 use crate::cpu::simd::{Isa, Lanes, Simd, dispatch};
 use crate::elements::Elements;
-use crate::exact::filter::{self, BATCH, LARGEST_F32};
-use crate::exact::{Reach, are_within_certainly, elements_meet, unsure_are_within};
 use crate::found::StepAnswer;
 use crate::index::pair_key;
 use crate::narrow::Corners;
 use crate::near::Labels;
 use crate::pair_kind::PairKind;
 use crate::positions::Positions;
+use impinge_exact::internal::filter::{self, BATCH, LARGEST_F32};
+use impinge_exact::internal::{Reach, are_within_certainly, elements_meet, unsure_are_within};
 
 use super::super::world::World;
 use super::batch::{Batch, Between, Keys, Narrow, NarrowCounts, Places, numbers_in};

@@ -4,13 +4,13 @@
 
 use crate::cpu::simd::{Isa, LaneBounds, Simd, dispatch};
 use crate::elements::Elements;
-use crate::exact::filter::BATCH;
-use crate::exact::filter::number::Lookup;
 use crate::found::StepAnswer;
 use crate::grouping::bounds::round_up;
 use crate::hull::{Extent, Hull};
 use crate::index::Place;
 use crate::narrow::are_near;
+use impinge_exact::internal::filter::BATCH;
+use impinge_exact::internal::filter::number::Lookup;
 
 use super::super::group::Group;
 use super::super::world::World;

@@ -9,9 +9,9 @@
 //! pairs that stay beyond the margin are dropped first.
 
 use crate::cpu::simd::{Lanes, Simd};
-use crate::exact::ElementPair;
-use crate::exact::filter::{self, Enclosed8, LANES, Look8, Next, Spans8, Steps8};
 use crate::positions::Positions;
+use impinge_exact::ElementPair;
+use impinge_exact::internal::filter::{self, Enclosed8, LANES, Look8, Next, Spans8, Steps8};
 
 use super::super::world::World;
 use super::batch::{Between, Places, exact_pair};

@@ -1,6 +1,6 @@
 //! Which elements touch during a step, and when first.
 //!
-//! In: candidates. Out: keys and times. Vertices with faces and edges with edges go through filters (`exact::filter`):
+//! In: candidates. Out: keys and times. Vertices with faces and edges with edges go through filters (`impinge_exact::filter`):
 //!
 //! ```text
 //! far     sixteen pairs at a time in f32, from the tables of the two groups: apart along a few directions
@@ -14,8 +14,6 @@
 
 use crate::cpu::met::Met;
 use crate::cpu::simd::{Isa, Simd, dispatch};
-use crate::exact::ElementPair;
-use crate::exact::filter::{self, BATCH, Moving64, Search};
 use crate::found::StepAnswer;
 use crate::grouping::bounds::round_up;
 use crate::pair_kind::PairKind;
@@ -23,6 +21,8 @@ use crate::pair_kind::PairKind;
 use crate::positions::Positions;
 #[cfg(feature = "gpu")]
 use crate::sink::Goal;
+use impinge_exact::ElementPair;
+use impinge_exact::internal::filter::{self, BATCH, Moving64, Search};
 
 use super::super::world::World;
 #[cfg(feature = "gpu")]

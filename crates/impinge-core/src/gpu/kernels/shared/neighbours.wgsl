@@ -1,4 +1,4 @@
-// Triangles of one body that share vertices by id, in the same steps as `exact::filter::neighbours` on the CPU:
+// Triangles of one body that share vertices by id, in the same steps as `impinge_exact::filter::neighbours` on the CPU:
 // whether they meet beyond the part that they share.
 //
 // One vertex v: if one plane has the other triangle's two vertices on one side, no. If each plane has the other's

@@ -1,5 +1,5 @@
 // Whether two moving elements certainly do not touch, or certainly touch, over an interval: tests of their difference polygon, as
-// `Motion` of `exact::filter::motion` has on the CPU.
+// `Motion` of `impinge_exact::filter::motion` has on the CPU.
 //
 // Constants, bounds and their proof: `docs/exactness.md`, "The GPU filter for moving elements". They hold under any
 // rounding direction, contraction and reassociation, with subnormals flushed or kept. All differences are scaled by one

@@ -1,4 +1,4 @@
-// Triangles whose images are apart after one coordinate is dropped, in the same steps as `exact::filter::projections`
+// Triangles whose images are apart after one coordinate is dropped, in the same steps as `impinge_exact::filter::projections`
 // on the CPU: neighbours in a flat mesh lie in one plane, and every determinant of the other filters is zero.
 //
 // Every value is a determinant of two differences of input points. Bound and proof: `docs/exactness.md`, "The GPU

@@ -1,4 +1,4 @@
-// A tetrahedron against a tetrahedron or a triangle, in the same steps as `exact::filter` on the CPU.
+// A tetrahedron against a tetrahedron or a triangle, in the same steps as `impinge_exact::filter` on the CPU.
 //
 // A solid is four points. A triangle repeats its last point and has one face and three edges.
 //

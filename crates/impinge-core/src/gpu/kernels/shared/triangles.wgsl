@@ -1,4 +1,4 @@
-// Triangle against triangle, in the same steps as `exact::filter` on the CPU: planes first, then the
+// Triangle against triangle, in the same steps as `impinge_exact::filter` on the CPU: planes first, then the
 // two edge-edge determinants of Guigue and Devillers (2003), then projections.
 
 const YES: i32 = 1;

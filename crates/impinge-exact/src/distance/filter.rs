@@ -1,0 +1,155 @@
+//! Distances in `f64` with bounds: most pairs are settled here.
+
+use super::features::PolygonPart;
+use super::reach::Reach;
+use crate::Point;
+use crate::element_pair::ElementPair;
+use crate::filter::motion::{difference, dot, size};
+use crate::filter::nearness::{Polygon, are_beyond, beyond, most, stay_beyond};
+use crate::filter::number::Number;
+use crate::rounding::root;
+
+/// Whether two elements are within a distance; `None` when unsure.
+///
+/// No, if the whole difference polygon lies beyond a plane that is farther from the origin than the reach. Yes, if
+/// some point of the polygon is nearer than the reach.
+pub(super) fn answer(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> Option<bool> {
+    let (yes, no) = Polygon::of_pair(pair, points).verdict(reach.low, reach.high);
+    if yes { Some(true) } else { no.then_some(false) }
+}
+
+/// Two numbers between which the distance of two elements certainly is; none where sizes are out of range.
+pub(super) fn bounds(pair: ElementPair, points: &[Point; 4]) -> Option<[f64; 2]> {
+    let polygon = Polygon::of_pair(pair, points);
+    let largest = polygon.size();
+    if largest >= f64::LARGEST || largest.is_nan() {
+        return None;
+    }
+    let normal = polygon.normal();
+    let near = polygon.nearest(&normal);
+    let low = [near, normal]
+        .iter()
+        .map(|normal| least_beyond(normal, &polygon, largest))
+        .fold(0.0, f64::max);
+    Some([low, most(&near, largest)])
+}
+
+/// A distance from a plane through the origin that all corners certainly have, all on one side; 0 if that is not certain.
+fn least_beyond(normal: &Point, polygon: &Polygon, largest: f64) -> f64 {
+    if size(normal) <= f64::SHORTEST {
+        return 0.0;
+    }
+    let [_, error] = beyond(normal, largest, 0.0);
+    let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
+    for corner in polygon.corners() {
+        let height = dot(normal, corner);
+        lowest = lowest.min(height);
+        highest = highest.max(height);
+    }
+    let length = root(dot(normal, normal));
+    // The quotient has a few more roundings; the bound covers them many times.
+    ((lowest.max(-highest) - error) / length * (1.0 - f64::BOUND)).max(0.0)
+}
+
+/// When two moving elements are first within a distance, as far as plain floats can decide it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Approach {
+    /// Not up to the time asked for.
+    Apart,
+    /// At the start.
+    AtStart,
+    /// After the first of these times, and not after the second.
+    Between([f64; 2]),
+    /// Exact arithmetic is needed.
+    Unsure,
+}
+
+/// The most planes that are tried.
+const N_PLANES: usize = 24;
+
+/// Follows two elements from t = 0 to when they are within a distance, at most to `until`.
+///
+/// From a time at which they are certainly farther apart, time advances to where some corner of the difference polygon
+/// reaches a plane at the distance from the origin, across the nearest point. Up to then all corners are beyond that plane. As
+/// with Newton's method, the steps become shorter fast, until rounding ends them; then the elements are certainly near a little
+/// later, unless they only graze.
+pub fn approach(
+    pair: ElementPair,
+    start: &[Point; 4],
+    end: &[Point; 4],
+    distance: f64,
+    until: f64,
+) -> Approach {
+    let (first, last) = (Polygon::of_pair(pair, start), Polygon::of_pair(pair, end));
+    match first.verdict(distance, distance) {
+        (true, _) => return Approach::AtStart,
+        (_, true) => {}
+        _ => return Approach::Unsure,
+    }
+    let largest = first.size().larger(last.size());
+    if largest >= f64::LARGEST {
+        return Approach::Unsure;
+    }
+    let goal = first.at(&last, until);
+    if stay_beyond(&first, &goal, largest, distance) {
+        return Approach::Apart;
+    }
+    let (mut time, mut here) = (0.0, first);
+    for _ in 0..N_PLANES {
+        let near = here.nearest(&here.normal());
+        if are_beyond(&near, &[here, goal], largest, distance) {
+            return Approach::Apart;
+        }
+        // Beyond the bound by more than rounding, so that the next polygon is certainly beyond it.
+        let [bound, error] = beyond(&near, largest, distance);
+        let level = bound + 2.0 * error;
+        let (mut next, mut speed) = (1.0, 0.0);
+        for (from, to) in first.corners().iter().zip(last.corners()) {
+            let (from, to) = (dot(&near, from), dot(&near, to));
+            let reached = (from - level) / (from - to);
+            if to < level && reached < next {
+                (next, speed) = (reached, from - to);
+            }
+        }
+        let there = first.at(&last, next);
+        if !(time < next && next < 1.0 && are_beyond(&near, &[here, there], largest, distance)) {
+            return Approach::Unsure;
+        }
+        let later = f64::min(next + 16.0 * error / speed, 1.0);
+        let behind = first.at(&last, later);
+        let near = behind.nearest(&behind.normal());
+        if distance > most(&near, largest) {
+            return Approach::Between([next, later]);
+        }
+        (time, here) = (next, there);
+    }
+    Approach::Unsure
+}
+
+/// The part of the polygon with the nearest point in its inside, if signs of rounded values can decide it.
+///
+/// As the exact decision goes by signs (`Polygon::nearest`), with none of them zero.
+pub(super) fn nearest_part(pair: ElementPair, points: &[Point; 4]) -> Option<PolygonPart> {
+    let n = pair.corners().len();
+    let mut edges = [[0.0; 3]; 4];
+    for (ix, edge) in edges.iter_mut().enumerate().take(n) {
+        *edge = edge_of(pair, points, ix);
+    }
+    let bits = Polygon::of_pair(pair, points).nearest_part(&edges);
+    PolygonPart::numbered(
+        bits.iter()
+            .rev()
+            .fold(0, |number, &bit| 2 * number + u8::from(bit)),
+    )
+}
+
+/// From a corner of the polygon to the next: a difference of two points, rounded once.
+fn edge_of(pair: ElementPair, points: &[Point; 4], ix: usize) -> Point {
+    let numbers = pair.corners();
+    let ([i, j], [k, l]) = (numbers[ix], numbers[(ix + 1) % numbers.len()]);
+    if i == k {
+        difference(&points[j], &points[l])
+    } else {
+        difference(&points[k], &points[i])
+    }
+}

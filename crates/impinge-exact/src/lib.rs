@@ -1,0 +1,90 @@
+//! One exact test and nothing else: do two elements touch, how far apart are they, and when do they first meet?
+//!
+//! What it does: decides, without any tolerance, whether two triangles, two tetrahedra or a
+//! triangle and a tetrahedron share at least one point when their coordinates are read as real
+//! numbers ([`triangles_intersect`]); whether vertices, edges and faces are within a distance ([`are_within`]); and when
+//! two of them first touch while their points move ([`first_contact`]). Primitives are *closed*: touching counts, coplanar
+//! overlap counts, and a degenerate primitive is the segment, the point or the flat polygon that it is.
+//!
+//! How: answers about primitives at rest are combinations of signs of two determinants, [`orient2d`] and
+//! [`orient3d`], and of comparisons of single coordinates. The signs are exact (adaptive
+//! arithmetic after Shewchuk, *Adaptive Precision Floating-Point Arithmetic and Fast Robust
+//! Geometric Predicates*, 1997), so the answers are. Answers about motion and distances are signs of polynomials, in
+//! integers of any size where floats with an error bound cannot tell.
+//!
+//! Invariant: answers are exact for all finite coordinates, of whatever size: where doubles would overflow or lose a
+//! bit to underflow, integers decide. Others never cause a panic, but the answer is then unspecified; callers check their
+//! input once.
+//!
+//! `docs/exactness.md` of the repository derives every bound and draws every case.
+//!
+//! It has no scene and no threads: for whole meshes use the crate `impinge`, which is built on this one. It needs an allocator,
+//! for integers above 512 bits and polynomials. With default features it uses the standard library for square roots alone;
+//! without, the feature `libm` has them.
+
+#![cfg_attr(not(any(feature = "std", test)), no_std)]
+
+extern crate alloc;
+
+#[cfg(not(any(feature = "std", feature = "libm")))]
+compile_error!("square roots come from the feature `std` or from the feature `libm`");
+
+mod algebra;
+mod distance;
+mod element_pair;
+mod filter;
+mod orientation;
+mod rounding;
+mod segment;
+mod shared;
+mod sign;
+mod sweep;
+mod tetrahedron;
+mod triangle;
+
+#[cfg(test)]
+mod tests;
+
+pub use distance::{
+    Closest, Feature, NearestFeatures, are_within, closest_points, edge_face_are_within,
+    faces_are_within, first_within, nearest_features,
+};
+pub use element_pair::ElementPair;
+pub use orientation::{orient2d, orient3d};
+pub use shared::{
+    tetrahedra_intersect_beyond_shared, triangle_tetrahedron_intersect_beyond_shared,
+    triangles_intersect_beyond_shared,
+};
+pub use sign::Sign;
+pub use sweep::{Contact, first_contact, touch, touch_during};
+pub use tetrahedron::{tetrahedra_intersect, triangle_tetrahedron_intersect};
+pub use triangle::triangles_intersect;
+
+/// The page of the crate, whose example is a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
+/// A position: x, y, z in the unit of the scene. `f32` coordinates are widened, which is exact.
+pub type Point = [f64; 3];
+
+/// What the engine of impinge needs beyond single tests. **No promise of stability: do not rely on it.**
+///
+/// The registers of an instruction set in [`filter::number`](internal::filter::number) may only be used where the processor has
+/// been asked for that set, in functions compiled for it. Nothing checks that.
+pub mod internal {
+    pub use crate::algebra::{Integer, unit_of};
+    pub use crate::distance::{
+        Approach, Keep, NearestOfElements, Reach, approach, are_within_certainly,
+        closest_of_elements, elements_are_within, elements_meet, nearest_of_elements,
+        unsure_are_within,
+    };
+    pub use crate::orientation::{Projection, collinear};
+    pub use crate::rounding::two_sum;
+    pub use crate::segment::strictly_between;
+
+    /// The tests of many pairs at a time, in the registers of an instruction set: certain answers, or none.
+    pub mod filter {
+        pub use crate::filter::*;
+    }
+}
