@@ -41,6 +41,9 @@ pub struct Detector {
     settings: Settings,
     runner: Runner,
     pairs: Pairs,
+    /// Of distances, contacts and runs of candidates.
+    measured: Statistics,
+    last: Last,
     cpu: Cpu,
     steps: steps::StepMemory,
     touching: distance::Touching,
@@ -48,6 +51,17 @@ pub struct Detector {
     topologies: Topologies,
     #[cfg(feature = "gpu")]
     gpu: Option<crate::gpu::Engine>,
+}
+
+/// The kind of question that was asked last: its statistics are the detector's.
+#[derive(Debug, Clone, Copy, Default)]
+enum Last {
+    #[default]
+    Intersections,
+    Contacts,
+    Candidates,
+    Near,
+    Measured,
 }
 
 impl Detector {
@@ -101,6 +115,8 @@ impl Detector {
             gpu,
             runner: Runner::new(&settings),
             pairs: Pairs::default(),
+            measured: Statistics::default(),
+            last: Last::default(),
             cpu: Cpu::new(&settings),
             steps: steps::StepMemory::new(&settings),
             touching: distance::Touching::default(),
@@ -121,9 +137,16 @@ impl Detector {
         std::mem::take(&mut self.pairs)
     }
 
-    /// How the last frame was answered: stages, counts, bytes. The same as [`Pairs::stats`], and there after
-    /// [`count`](Detector::count) and [`any`](Detector::any) too.
+    /// How the last question was answered, whatever it was: stages, counts, bytes. After [`detect`](Detector::detect) the same as
+    /// [`Pairs::stats`], and there after [`count`](Detector::count) and [`any`](Detector::any) too. An answer that was
+    /// moved out of the detector has its own.
     pub fn stats(&self) -> &Statistics {
-        self.pairs.stats()
+        match self.last {
+            Last::Intersections => self.pairs.stats(),
+            Last::Contacts => self.steps.contacts.impacts.stats(),
+            Last::Candidates => self.steps.candidates.stats(),
+            Last::Near => self.steps.near.stats(),
+            Last::Measured => &self.measured,
+        }
     }
 }

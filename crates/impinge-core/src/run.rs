@@ -18,8 +18,8 @@ use crate::error::Error;
 use crate::plan::Plan;
 use crate::progress::Control;
 use crate::scene::Scene;
-use crate::settings::Settings;
-use crate::sink::{Answer, Goal};
+use crate::settings::{Method, Settings};
+use crate::sink::{Answer, Goal, Limits};
 use crate::sort::{Keyed, Sorter};
 use crate::stats::Statistics;
 use crate::workers::Workers;
@@ -110,6 +110,54 @@ impl Runner {
     /// The threads, for answers found without the loop.
     pub fn workers(&self) -> &Workers {
         &self.workers
+    }
+
+    /// A frame as a finder sees it, with positions that were checked: for answers that stay on a device.
+    ///
+    /// # Errors
+    /// Refused positions.
+    pub fn job<'a>(
+        &'a self,
+        scene: &'a Scene,
+        plan: &'a Plan,
+        control: &'a Control<'a>,
+    ) -> Result<Job<'a>, Error> {
+        plan.check(scene)?;
+        Ok(Job {
+            scene,
+            frame: plan,
+            workers: &self.workers,
+            control,
+        })
+    }
+
+    /// Answers a question whose answer is no list of pairs, with statistics and a memory budget as in [`run`](Runner::run).
+    /// `find` says how many bytes the detector holds for it.
+    ///
+    /// # Errors
+    /// Those of `find`, and more bytes held than the budget allows.
+    pub(crate) fn measure<A>(
+        &self,
+        stats: &mut Statistics,
+        limits: Limits,
+        find: impl FnOnce(&Workers, &mut Statistics) -> Result<A, Error>,
+    ) -> Result<A, Error> {
+        let start = Instant::now();
+        stats.clear();
+        // Trees of clusters serve all of these.
+        stats.method = Method::Clusters.name();
+        stats.n_threads = self.workers.n();
+        stats.backend.push_str("cpu");
+        let answer = find(&self.workers, stats)?;
+        stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
+        match limits.memory_budget {
+            Some(budget) if stats.bytes_held > budget => Err(Error::MemoryBudget {
+                what: "the trees of the bodies, or the contacts",
+                needed: stats.bytes_held,
+                budget,
+            }),
+            _ => Ok(answer),
+        }
     }
 
     /// Answers a question. Returns how many pairs there are: of [`Goal::Any`], at least one if there is any.

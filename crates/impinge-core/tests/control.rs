@@ -1,11 +1,14 @@
-//! Every question of the detector: on one thread, in a forked process, stopped by a token.
+//! Every question of the detector: on one thread, in a forked process, stopped by a token, with too little memory; and its
+//! statistics. A public method of the detector that is neither asked here nor named as no question fails the test.
 //!
 //! The threads of this process are counted, so this file holds one test alone.
 
 #![cfg(target_os = "linux")]
 
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::os::unix::process::CommandExt;
+use std::path::Path;
 use std::process::{Command, exit};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -26,9 +29,14 @@ struct World {
 }
 
 fn detector(threads: usize) -> Detector {
+    budgeted(threads, None)
+}
+
+fn budgeted(threads: usize, memory_budget: Option<u64>) -> Detector {
     Detector::with_settings(Settings {
         backend: Backend::Cpu,
         threads,
+        memory_budget,
         ..Settings::default()
     })
     .unwrap()
@@ -67,7 +75,8 @@ fn bits(points: &[[f64; 3]]) -> u64 {
     bits.fold(0, |sum, x| sum.rotate_left(5) ^ x)
 }
 
-const ALL: [(&str, Ask); 14] = [
+/// By the names of the methods; where one is asked twice, with more after a space.
+const ALL: [(&str, Ask); 15] = [
     ("detect", |d, w, c| {
         Ok(d.detect_with(&w.scene, &Query::everything(), c)?.hash())
     }),
@@ -97,7 +106,7 @@ const ALL: [(&str, Ask); 14] = [
         let query = CandidateQuery::new(Query::between(w.bodies[0], w.bodies[1]));
         Ok(d.candidates_with(&w.scene, &query, c)?.len() as u64)
     }),
-    ("candidates in runs", |d, w, c| {
+    ("candidates_in_runs", |d, w, c| {
         let query = CandidateQuery::new(Query::between(w.bodies[0], w.bodies[1]));
         let each = |_| ControlFlow::<()>::Continue(());
         match d.candidates_in_runs_with(&w.scene, &query, 100_000, each, c)? {
@@ -108,6 +117,12 @@ const ALL: [(&str, Ask); 14] = [
     ("within_distance", |d, w, c| {
         let query = NearQuery::new(Query::all()).distance(0.001);
         Ok(d.within_distance_with(&w.scene, &query, c)?.hash())
+    }),
+    ("nearest", |d, w, c| {
+        let [a, ..] = w.bodies;
+        let nearest = d.nearest_with(&w.scene, &Query::across([a]), c)?;
+        let nearest = nearest.expect("elements");
+        Ok(nearest.distance.to_bits() ^ u64::from(nearest.primitives[0]))
     }),
     ("distance", |d, w, c| {
         let [a, _, b] = w.bodies;
@@ -123,6 +138,71 @@ const ALL: [(&str, Ask); 14] = [
         Ok(found.inside[0].len() as u64 + bits(&[found.regions[0].position]))
     }),
 ];
+
+/// Methods of the detector that ask nothing, or what is asked above in another way.
+const NO_QUESTIONS: [&str; 20] = [
+    "new",
+    "with_settings",
+    "with_settings_async",
+    "with_device",
+    "with_damage",
+    "with_capacities",
+    "with_most_bound",
+    "settings",
+    "stats",
+    "step_stats",
+    "take_pairs",
+    "take_impacts",
+    "take_candidates",
+    "take_near",
+    "reuse_candidates",
+    // On a device.
+    "detect_async",
+    "encode",
+    "encode_step",
+    "positions_on_device",
+    "make_room",
+];
+
+/// The public methods of the detector, as its source has them.
+fn methods(folder: &Path, found: &mut BTreeSet<String>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            methods(&path, found);
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).unwrap();
+        let blocks = text.split("\nimpl Detector {\n").skip(1);
+        for block in blocks.filter_map(|block| block.split("\n}\n").next()) {
+            for line in block.lines() {
+                let line = line.strip_prefix("    pub ").unwrap_or_default();
+                let line = line.strip_prefix("async ").unwrap_or(line);
+                let name = line.strip_prefix("fn ").unwrap_or_default();
+                let is_name = |c: char| c.is_alphanumeric() || c == '_';
+                let name = name.split(|c| !is_name(c)).next().unwrap_or_default();
+                found.extend((!name.is_empty()).then(|| name.to_owned()));
+            }
+        }
+    }
+}
+
+/// Every method is asked, with a control and without, or is no question.
+fn assert_none_is_forgotten() {
+    let mut all = BTreeSet::new();
+    methods(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut all);
+    assert!(all.len() > 30, "{all:?}");
+    let mut known: BTreeSet<String> = NO_QUESTIONS.map(str::to_owned).into();
+    known.insert("make_room_async".to_owned());
+    for (name, _) in ALL {
+        let method = name.split(' ').next().unwrap();
+        assert!(all.contains(method), "there is no method {method}");
+        known.insert(method.to_owned());
+        known.insert(format!("{method}_with"));
+    }
+    let forgotten: Vec<_> = all.difference(&known).collect();
+    assert!(forgotten.is_empty(), "not asked here: {forgotten:?}");
+}
 
 /// How many threads this process has.
 fn n_threads() -> usize {
@@ -142,6 +222,7 @@ fn answers(world: &World, threads: usize) -> Vec<u64> {
 
 #[test]
 fn every_question() {
+    assert_none_is_forgotten();
     let before = n_threads();
     let world = World::new();
     let expected = answers(&world, 1);
@@ -163,6 +244,34 @@ fn every_question() {
     });
 
     for (name, ask) in ALL {
+        // The statistics are those of this question.
+        let mut new = detector(2);
+        ask(&mut new, &world, &Control::new()).unwrap();
+        let stats = new.stats();
+        assert!(stats.total_ms > 0.0, "{name}: {stats:?}");
+        assert_eq!(
+            (&stats.backend[..], stats.n_threads.min(2)),
+            ("cpu", stats.n_threads),
+            "{name}"
+        );
+        assert!(!stats.method.is_empty(), "{name}");
+
+        // No question is answered without memory, and each is with enough.
+        let refused = ask(&mut budgeted(1, Some(1)), &world, &Control::new());
+        assert!(
+            matches!(
+                refused,
+                Err(Error::MemoryBudget {
+                    budget: 1,
+                    needed: 2..,
+                    ..
+                })
+            ),
+            "{name}: {refused:?}"
+        );
+        let enough = ask(&mut budgeted(1, Some(1 << 30)), &world, &Control::new());
+        assert_eq!(enough.ok(), at(name, &expected), "{name} within a budget");
+
         let token = CancelToken::new();
         token.cancel();
         let cancelled = ask(&mut kept, &world, &Control::new().cancel(&token));

@@ -142,6 +142,18 @@ impl Contacts {
         build::contacts(scene, pairs, work)
     }
 
+    /// Bytes of the lists with an entry per contact, corner or point.
+    pub(crate) fn bytes(&self) -> u64 {
+        let of_contacts = size_of_val(&self.rows[..])
+            + size_of_val(&self.shapes[..])
+            + size_of_val(&self.directed[..])
+            + size_of_val(&self.starts[..]);
+        let of_points = size_of_val(&self.corners[..])
+            + size_of_val(&self.names[..])
+            + size_of_val(&self.points[..]);
+        (of_contacts + of_points) as u64
+    }
+
     /// The number of contacts, which is the number of pairs.
     pub fn len(&self) -> usize {
         self.shapes.len()

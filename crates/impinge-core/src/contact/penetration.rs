@@ -109,6 +109,12 @@ impl Topologies {
         Ok(found)
     }
 
+    /// Bytes held.
+    pub fn bytes(&self) -> u64 {
+        let edges = self.edges.values().map(|(_, edges)| edges.bytes());
+        edges.sum::<usize>() as u64
+    }
+
     /// Caches the topology of a body.
     fn know(&mut self, scene: &Scene, id: BodyId, work: Work<'_>) -> Result<(), Error> {
         let body = scene.body(id)?;

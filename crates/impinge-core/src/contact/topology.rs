@@ -23,6 +23,11 @@ pub(super) struct EdgesAround {
 }
 
 impl EdgesAround {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.starts[..]) + size_of_val(&self.neighbours[..])
+    }
+
     /// # Errors
     /// The surface is not closed; the error names an edge. Cancellation.
     pub fn new(

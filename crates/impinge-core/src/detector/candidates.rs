@@ -6,8 +6,8 @@
 
 use std::ops::ControlFlow;
 
-use super::Detector;
 use super::in_step::{InStep, Keys, Seen};
+use super::{Detector, Last};
 use crate::candidates::Candidates;
 use crate::error::Error;
 use crate::found::KeysByKind;
@@ -19,6 +19,7 @@ use crate::scene::Scene;
 #[cfg(doc)]
 use crate::settings::Settings;
 use crate::sink::{self, BLOCK, Limits};
+use crate::stats::Statistics;
 use crate::step::CandidateQuery;
 
 /// A search for candidates, run by run.
@@ -29,6 +30,8 @@ struct RunSearch<'a> {
     control: &'a Control<'a>,
     runner: &'a Runner,
     finder: InStep<'a>,
+    /// Of the last run: the runs have their own.
+    stats: &'a mut Statistics,
 }
 
 impl Detector {
@@ -57,7 +60,7 @@ impl Detector {
         control: &Control<'_>,
     ) -> Result<&Candidates, Error> {
         let plan = Plan::candidates(scene, query, self.settings.limits())?;
-        let (mut search, candidates) = self.search(scene, &plan, control);
+        let (mut search, candidates) = self.search(scene, &plan, control, Last::Candidates);
         search.find(&plan, Keys::All, candidates)?;
         Ok(&self.steps.candidates)
     }
@@ -132,10 +135,13 @@ impl Detector {
             ..limits
         };
         let plan = Plan::candidates(scene, query, at_once)?;
-        let (mut search, candidates) = self.search(scene, &plan, control);
+        let (mut search, candidates) = self.search(scene, &plan, control, Last::Measured);
         match search.find(&plan, Keys::All, candidates) {
-            Ok(0) => return Ok(ControlFlow::Continue(0)),
-            Ok(n) => return Ok(each(std::mem::take(candidates)).map_continue(|()| n)),
+            Ok(0) => {
+                search.stats.clone_from(candidates.stats());
+                return Ok(ControlFlow::Continue(0));
+            }
+            Ok(n) => return Ok(search.hand_out(candidates, &mut each).map_continue(|()| n)),
             Err(Error::TooManyPairs { limit, .. }) if limits.max_pairs != Some(limit) => {}
             // There may be room for parts of the answer.
             Err(Error::MemoryBudget { .. }) => {}
@@ -159,12 +165,15 @@ impl Detector {
         scene: &'a Scene,
         plan: &'a Plan,
         control: &'a Control<'a>,
+        last: Last,
     ) -> (RunSearch<'a>, &'a mut Candidates) {
+        self.last = last;
         let search = RunSearch {
             scene,
             plan,
             control,
             runner: &self.runner,
+            stats: &mut self.measured,
             finder: InStep {
                 clusters: &mut self.steps.clusters,
                 settings: &self.settings,
@@ -211,6 +220,16 @@ impl RunSearch<'_> {
         )
     }
 
+    /// Hands out a run, and keeps its statistics.
+    fn hand_out<B>(
+        &mut self,
+        candidates: &mut Candidates,
+        each: &mut impl FnMut(Candidates) -> ControlFlow<B>,
+    ) -> ControlFlow<B> {
+        self.stats.clone_from(candidates.stats());
+        each(std::mem::take(candidates))
+    }
+
     /// Counts the candidates in some ranges.
     fn count(&mut self, candidates: &mut Candidates, ranges: KeyRanges) -> Result<Tally, Error> {
         let plan = self.plan.of_kinds(ranges.kinds());
@@ -251,7 +270,7 @@ impl RunSearch<'_> {
                 self.hand_over(candidates, &tally, most, each)?
             } else {
                 self.find_run(candidates, &run)?;
-                each(std::mem::take(candidates))
+                self.hand_out(candidates, each)
             };
             if flow.is_break() {
                 return Ok(flow);

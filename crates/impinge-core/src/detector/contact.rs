@@ -1,6 +1,6 @@
 //! A detector's answers about contact: where pairs meet, and how deep bodies are in each other.
 
-use super::Detector;
+use super::{Detector, Last};
 use crate::contact::{Contacts, Penetration, Work};
 use crate::error::Error;
 use crate::ids::BodyId;
@@ -44,9 +44,17 @@ impl Detector {
         pairs: &Pairs,
         control: &Control<'_>,
     ) -> Result<Contacts, Error> {
-        let workers = self.runner.workers();
-        let _shift = workers.shift(pairs.len() as u64);
-        Contacts::new(scene, pairs, Work { workers, control })
+        self.last = Last::Measured;
+        let limits = self.settings.limits();
+        let Detector {
+            runner, measured, ..
+        } = self;
+        runner.measure(measured, limits, |workers, stats| {
+            let _shift = workers.shift(pairs.len() as u64);
+            let contacts = Contacts::new(scene, pairs, Work { workers, control })?;
+            stats.bytes_held = contacts.bytes();
+            Ok(contacts)
+        })
     }
 
     /// How deep two closed bodies of triangles are in each other, from contacts among which are all of these two. The
@@ -98,9 +106,20 @@ impl Detector {
         b: BodyId,
         control: &Control<'_>,
     ) -> Result<Penetration, Error> {
-        let workers = self.runner.workers();
-        let _shift = workers.shift(0);
-        let work = Work { workers, control };
-        self.topologies.penetration(scene, contacts, [a, b], work)
+        self.last = Last::Measured;
+        let limits = self.settings.limits();
+        let Detector {
+            runner,
+            measured,
+            topologies,
+            ..
+        } = self;
+        runner.measure(measured, limits, |workers, stats| {
+            let _shift = workers.shift(0);
+            let work = Work { workers, control };
+            let found = topologies.penetration(scene, contacts, [a, b], work)?;
+            stats.bytes_held = topologies.bytes();
+            Ok(found)
+        })
     }
 }

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use super::Detector;
+use super::{Detector, Last};
 use crate::cpu::Cpu;
 use crate::cpu::clusters::Clusters;
 use crate::error::Error;
@@ -40,7 +40,8 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// A stale id, bad positions that were written in place, a query for self-collision or for the pairs of a cell.
+    /// A stale id, bad positions that were written in place, a query for self-collision or for the pairs of a cell, a memory
+    /// budget too small for the trees of the bodies.
     pub fn nearest(&mut self, scene: &Scene, query: &Query) -> Result<Option<Nearest>, Error> {
         self.nearest_with(scene, query, &Control::new())
     }
@@ -69,8 +70,18 @@ impl Detector {
         if plan.layers.iter().any(|layer| layer.within) {
             return Err(refused("query", "self-collision"));
         }
-        let workers = self.runner.workers();
-        self.distances.nearest(scene, &plan, workers, control)
+        self.last = Last::Measured;
+        let Detector {
+            distances,
+            runner,
+            measured,
+            ..
+        } = self;
+        runner.measure(measured, plan.limits, |workers, stats| {
+            let nearest = distances.nearest(scene, &plan, workers, control)?;
+            stats.bytes_held = distances.bytes();
+            Ok(nearest)
+        })
     }
 
     /// The smallest distance of two bodies at the positions that they have, and the pair of primitives that has it; `None` if one
@@ -94,7 +105,8 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// A stale id, the same body twice, bad positions that were written in place.
+    /// A stale id, the same body twice, bad positions that were written in place, a memory budget too small for the trees of
+    /// both bodies.
     pub fn distance(
         &mut self,
         scene: &Scene,
@@ -115,16 +127,22 @@ impl Detector {
         b: BodyId,
         control: &Control<'_>,
     ) -> Result<Option<Nearest>, Error> {
+        self.last = Last::Measured;
         let Detector {
             touching,
             distances,
             runner,
             cpu,
             settings,
+            measured,
             ..
         } = self;
-        distances.between(scene, [a, b], runner.workers(), control, || {
-            touching.lowest(scene, [a, b], control, (runner, cpu, settings))
+        runner.measure(measured, settings.limits(), |workers, stats| {
+            let nearest = distances.between(scene, [a, b], workers, control, || {
+                touching.lowest(scene, [a, b], control, (runner, cpu, settings))
+            })?;
+            stats.bytes_held = distances.bytes();
+            Ok(nearest)
         })
     }
 }

@@ -284,17 +284,12 @@ impl Detector {
             });
         }
         let plan = Plan::intersections(scene, query, Goal::All, self.settings.limits())?;
-        plan.check(scene)?;
+        let control = Control::new();
+        let job = self.runner.job(scene, &plan, &control)?;
         let Some(engine) = &mut self.gpu else {
             return Err(Error::NoAdapter {
                 found: "this detector works on the CPU".to_owned(),
             });
-        };
-        let job = Job {
-            scene,
-            frame: &plan,
-            workers: self.runner.workers(),
-            control: &Control::new(),
         };
         engine.encode(job, positions, encoder)
     }

@@ -1,6 +1,6 @@
 //! A detector's answers about intersections: which pairs, how many, whether any.
 
-use super::Detector;
+use super::{Detector, Last};
 use crate::error::Error;
 use crate::pairs::Pairs;
 use crate::plan::Plan;
@@ -116,6 +116,7 @@ impl Detector {
         let workers = self.runner.workers();
         let any = self.distances.any(scene, plan, workers, control)?;
         if any.is_some() {
+            self.last = Last::Intersections;
             // One thread has found it, without the loop.
             self.pairs.begin(plan);
             let stats = self.pairs.stats_mut();
@@ -173,6 +174,7 @@ impl Detector {
         plan: &Plan,
         control: &Control<'_>,
     ) -> Result<u64, Error> {
+        self.last = Last::Intersections;
         let Detector {
             runner, pairs, cpu, ..
         } = self;

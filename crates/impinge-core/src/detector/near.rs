@@ -3,8 +3,8 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::Detector;
 use super::in_step::{InStep, Keys, Seen};
+use super::{Detector, Last};
 use crate::clock::Instant;
 use crate::elements::Part;
 use crate::error::Error;
@@ -70,6 +70,7 @@ impl Detector {
         control: &Control<'_>,
     ) -> Result<&NearPairs, Error> {
         let plan = query.plan(scene, self.settings.limits())?;
+        self.last = Last::Near;
         let mut finder = InStep {
             clusters: &mut self.steps.clusters,
             settings: &self.settings,

@@ -8,7 +8,6 @@ use crate::gpu::ResidentStep;
 use crate::ids::BodyId;
 use crate::plan::Plan;
 use crate::progress::Control;
-use crate::run::Job;
 use crate::scene::Scene;
 use crate::sink::Goal;
 use crate::stats::Statistics;
@@ -78,13 +77,8 @@ impl Detector {
             });
         };
         let plan = Plan::contacts(scene, step, Goal::All, self.settings.limits())?;
-        plan.check(scene)?;
-        let job = Job {
-            scene,
-            frame: &plan,
-            workers: self.runner.workers(),
-            control: &Control::new(),
-        };
+        let control = Control::new();
+        let job = self.runner.job(scene, &plan, &control)?;
         let resident: BTreeMap<BodyId, &wgpu::Buffer> = starts.iter().copied().collect();
         let is_resident = |body| resident.contains_key(&body);
         let stats = &mut Statistics::default();

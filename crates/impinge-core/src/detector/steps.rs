@@ -1,8 +1,8 @@
 //! A detector's answers about a step: which elements touch while bodies move from their positions to their end positions,
 //! and when first.
 
-use super::Detector;
 use super::in_step::{InStep, Keys, Seen};
+use super::{Detector, Last};
 use crate::candidates::Candidates;
 use crate::clock::Instant;
 use crate::cpu::steps::StepClusters;
@@ -237,6 +237,7 @@ impl Detector {
 
     /// Takes note of a step that was not examined because of its start.
     fn note_start(&mut self, plan: &Plan, start: Option<StartAnswer>) {
+        self.last = Last::Contacts;
         let contacts = &mut self.steps.contacts;
         contacts.start = start;
         contacts.begin(plan);
@@ -251,6 +252,7 @@ impl Detector {
         control: &Control<'_>,
         (start, names): (Option<StartAnswer>, bool),
     ) -> Result<Seen, Error> {
+        self.last = Last::Contacts;
         let contacts = &mut self.steps.contacts;
         (contacts.start, contacts.names) = (start, names);
         let mut finder = InStep {

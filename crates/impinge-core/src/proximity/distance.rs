@@ -275,6 +275,11 @@ impl Distances {
         found.map(|()| any)
     }
 
+    /// Bytes of the trees.
+    pub fn bytes(&self) -> u64 {
+        self.trees.values().map(Tree::bytes).sum::<usize>() as u64
+    }
+
     fn know(&mut self, scene: &Scene, id: BodyId, workers: &Workers) -> Result<(), Error> {
         let body = scene.body(id)?;
         if !body.is_checked() {

@@ -69,6 +69,12 @@ impl Tree {
         }
     }
 
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let boxes = self.levels.iter().map(|level| size_of_val(&level[..]));
+        self.clustering.bytes() + boxes.sum::<usize>()
+    }
+
     /// The root; `None` without primitives.
     pub fn root(&self) -> Option<Node> {
         let n_levels = self.clustering.shape.n_levels();
