@@ -15,7 +15,7 @@ pub fn file(name: &str) -> Result<PathBuf, Failure> {
 
 /// The faces and the vertices of a mesh file of the shared data.
 pub fn read(name: &str) -> Result<(Vec<[u32; 3]>, Positions), Failure> {
-    let mesh = impinge_io::read(&file(name)?, &ReadOptions::default())?;
+    let mesh = impinge_io::read(&file(name)?, &ReadOptions::as_they_are())?;
     match mesh.elements {
         Elements::Triangles(faces) => Ok((faces, mesh.positions)),
         Elements::Tetrahedra(_) => Err(format!("{name}: not a surface").into()),

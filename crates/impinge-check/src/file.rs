@@ -27,7 +27,7 @@ pub fn check_file_marked(path: &Path, options: &Options) -> (Row, Option<Checked
 }
 
 fn checked(path: &Path, options: &Options) -> Result<Checked, Failure> {
-    let mesh = read(path, &ReadOptions::default()).map_err(|error| Failure {
+    let mesh = read(path, &ReadOptions::as_they_are()).map_err(|error| Failure {
         kind: match error {
             FileError::NotFinite { .. } => ErrorKind::NotFinite,
             FileError::NoMemory { .. } => ErrorKind::Memory,

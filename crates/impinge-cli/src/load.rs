@@ -337,7 +337,7 @@ impl Bodies {
         loading: Loading<'_>,
     ) -> Result<(String, (Vec<NamedMesh>, Summary)), Error> {
         go_on(loading.cancel)?;
-        let options = ReadOptions::default();
+        let options = ReadOptions::as_they_are();
         let whole = |(mesh, summary)| (vec![NamedMesh { name: None, mesh }], summary);
         if path != Path::new(STDIN) {
             let read = match in_parts {

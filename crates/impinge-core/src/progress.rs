@@ -60,6 +60,11 @@ impl<'a> Control<'a> {
         self
     }
 
+    /// The token, if there is one.
+    pub(crate) fn token(&self) -> Option<&CancelToken> {
+        self.cancel
+    }
+
     /// Called by the stages between pieces of work.
     ///
     /// # Errors

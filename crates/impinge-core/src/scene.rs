@@ -193,6 +193,8 @@ struct Slot(Option<(BodyId, Body)>);
 pub struct Scene {
     slots: Vec<Slot>,
     free: Vec<u32>,
+    /// Changes whenever anything may have changed; equal stamps mean equal scenes.
+    stamp: u64,
 }
 
 impl Scene {
@@ -271,6 +273,7 @@ impl Scene {
             Some(_) => self.slots[id.index()] = held,
             None => self.slots.push(held),
         }
+        self.stamp = new_stamp();
         Ok(id)
     }
 
@@ -337,6 +340,7 @@ impl Scene {
         self.body(body)?;
         self.slots[body.index()] = Slot(None);
         self.free.push(body.slot());
+        self.stamp = new_stamp();
         Ok(())
     }
 
@@ -589,8 +593,14 @@ impl Scene {
         }
     }
 
+    /// Changes whenever anything may have changed; equal stamps mean equal scenes.
+    pub(crate) fn stamp(&self) -> u64 {
+        self.stamp
+    }
+
     fn body_mut(&mut self, body: BodyId) -> Result<&mut Body, Error> {
         let unknown = self.unknown(body);
+        self.stamp = new_stamp();
         match self.slots.get_mut(body.index()) {
             Some(Slot(Some((id, held)))) if *id == body => Ok(held),
             _ => Err(unknown),

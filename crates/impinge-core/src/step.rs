@@ -21,8 +21,8 @@ pub enum Start {
     /// As `Report`, and the start is asked for intersections: [`Detector::any`](crate::Detector::any) of the same bodies, with
     /// [`SharedVertex::Resolve`](crate::SharedVertex::Resolve). If there are any, [`is_free`](crate::Detector::is_free) is false
     /// and [`advance`](crate::Detector::advance) allows no step; [`Impacts::start_intersects`](crate::Impacts::start_intersects)
-    /// and [`Advance::start_intersects`](crate::Advance::start_intersects) say so.
-    /// [`earliest`](crate::Detector::earliest) cannot say it, so there the start is not asked.
+    /// and [`Advance::start_intersects`](crate::Advance::start_intersects) say so, and after any of these questions and
+    /// [`earliest`](crate::Detector::earliest), [`Detector::start_intersects`](crate::Detector::start_intersects).
     Verify,
 }
 

@@ -140,7 +140,7 @@ const ALL: [(&str, Ask); 15] = [
 ];
 
 /// Methods of the detector that ask nothing, or what is asked above in another way.
-const NO_QUESTIONS: [&str; 20] = [
+const NO_QUESTIONS: [&str; 21] = [
     "new",
     "with_settings",
     "with_settings_async",
@@ -149,6 +149,7 @@ const NO_QUESTIONS: [&str; 20] = [
     "with_capacities",
     "with_most_bound",
     "settings",
+    "start_intersects",
     "stats",
     "step_stats",
     "take_pairs",

@@ -104,7 +104,7 @@ fn distances_of_numbers_of_any_size() {
         // Along x, everything is as good as at one place.
         let flat = of(&a, &b, [-1074, 0, 0]);
         let huge = of(&a, &b, [0, 0, 1000]);
-        assert_eq!(flat.distance > 0.0, flat.points.is_some());
+        assert_eq!(flat.distance > 0.0, flat.points[0] != flat.points[1]);
         assert!(huge.distance.is_finite());
     }
     // Two points that are as near as numbers can tell, beside others far away.
@@ -212,7 +212,7 @@ fn known_distances() {
     let ball = surfaces::icosphere(4);
     let found = nearest(&ball, &ball.translated([3.0, 0.0, 0.0]));
     assert!((found.distance - 2.0).abs() < 5e-3, "{found:?}");
-    let [p, q] = found.points.unwrap();
+    let [p, q] = found.points;
     assert!((q[0] - p[0] - found.distance).abs() < 1e-3);
     // A body inside a solid has distance 0 from it, but not from a surface.
     let small = surfaces::ball(100).scaled(0.1);
@@ -231,6 +231,24 @@ fn known_distances() {
     assert!((back.distance - found.distance).abs() < 1e-12);
 }
 
+/// Whether a point is on elements of bodies, but for rounding.
+fn is_on(point: [f64; 3], scene: &Scene, elements: [(BodyId, u32); 2]) -> bool {
+    elements.iter().all(|&(id, element)| {
+        let body = scene.body(id).unwrap();
+        let vertices = body.elements().corners(element as usize);
+        let at = |&vertex: &u32| body.positions().point(vertex as usize);
+        let corners: Vec<[f64; 3]> = vertices.iter().map(at).collect();
+        let mut alone = Scene::new();
+        let element = match corners.len() {
+            4 => alone.add_tetrahedra(&[[0, 1, 2, 3]], &corners).unwrap(),
+            _ => alone.add_triangles(&[[0, 1, 2]], &corners).unwrap(),
+        };
+        let point = alone.add_points(&[point]).unwrap();
+        let nearest = cpu().distance(&alone, element, point).unwrap().unwrap();
+        nearest.distance < 1e-5
+    })
+}
+
 /// The distance is zero if and only if the detector finds a pair; the pair is then one of the detector's.
 #[test]
 fn zero_means_that_they_touch() {
@@ -238,7 +256,7 @@ fn zero_means_that_they_touch() {
     let mut detector = Detector::new(Backend::Cpu).unwrap();
     let mut distances = cpu();
     let (mut scene, [x, y]) = scene(&a, &a);
-    let (mut n_touching, mut n_apart) = (0, 0);
+    let (mut n_touching, mut n_apart, mut n_shared) = (0, 0, 0);
     for step in 0..40 {
         let moved = a.translated([0.8 + 0.01 * step as f32, 0.03, 0.01]);
         scene.set_positions(y, &moved.positions).unwrap();
@@ -251,16 +269,18 @@ fn zero_means_that_they_touch() {
         match first {
             Some([_, a, _, b]) => {
                 assert_eq!((found.distance, found.primitives), (0.0, [a, b]));
-                assert_eq!(found.points, None);
+                assert_eq!(found.points[0], found.points[1]);
+                n_shared += usize::from(is_on(found.points[0], &scene, [(x, a), (y, b)]));
                 n_touching += 1;
             }
             None => {
-                assert!(found.distance > 0.0 && found.points.is_some());
+                assert!(found.distance > 0.0 && found.points[0] != found.points[1]);
                 n_apart += 1;
             }
         }
     }
     assert!(n_touching > 5 && n_apart > 5, "{n_touching} {n_apart}");
+    assert_eq!(n_shared, n_touching);
     // Apart by the smallest possible gap.
     let cube = surfaces::cube([0.0; 3], 1.0);
     let beside = cube.mapped(|[x, y, z]| [x + 1.0, y, z]);
@@ -384,6 +404,14 @@ fn touching_bodies_have_their_lowest_pair() {
                 let nearest = detector.distance(&scene, first, second).unwrap().unwrap();
                 assert_eq!(nearest.distance, 0.0);
                 assert_eq!(nearest.primitives, [lowest.0, lowest.1]);
+                assert_eq!(nearest.points[0], nearest.points[1]);
+                let elements = [(first, lowest.0), (second, lowest.1)];
+                assert!(is_on(nearest.points[0], &scene, elements), "{nearest:?}");
+                // The nearest two of many search as two do.
+                let query = Query::between(first, second);
+                let of_many = detector.nearest(&scene, &query).unwrap().unwrap();
+                let ordered = detector.distance(&scene, of_many.bodies[0], of_many.bodies[1]);
+                assert_eq!(Some(of_many), ordered.unwrap());
                 // The answer of the last frame is still there.
                 assert!(!detector.take_pairs().is_empty());
             }

@@ -1,8 +1,8 @@
 //! What a step knows of its start: intersections that touch nothing, and seams of meshes that were not welded.
 
 use impinge::{
-    Backend, BodyId, Detector, Error, Method, NearQuery, PairKind, Query, Scene, Settings, Start,
-    Step, Weld,
+    Backend, BodyId, Detector, Error, Method, NearQuery, PairFilter, PairKind, Query, Scene,
+    Settings, Start, Step, Weld,
 };
 
 fn detectors() -> Vec<Detector> {
@@ -115,12 +115,25 @@ fn a_start_that_intersects_is_not_free_if_asked() {
         );
         let impacts = detector.impacts(&scene, &verify).expect("good");
         assert_eq!((impacts.len(), impacts.start_intersects()), (0, Some(true)));
+        assert_eq!(detector.earliest(&scene, &verify).expect("good"), None);
+        assert_eq!(detector.start_intersects(), Some(true));
+        assert_eq!(detector.earliest(&scene, &report).expect("good"), None);
+        assert_eq!(detector.start_intersects(), None);
+        // Pairs that may not collide do not intersect either.
+        for (may, is_free) in [(false, true), (true, false)] {
+            let filter = PairFilter::new(move |_| may);
+            let filtered = verify.clone().filter(filter);
+            assert_eq!(detector.is_free(&scene, &filtered).expect("good"), is_free);
+            assert_eq!(detector.start_intersects(), Some(!is_free));
+        }
         // Each body alone is fine.
         for body in [plate, rod] {
             let alone = Step::new(Query::within(body)).start(Start::Verify);
             assert!(detector.is_free(&scene, &alone).expect("good"));
             let impacts = detector.impacts(&scene, &alone).expect("good");
             assert_eq!(impacts.start_intersects(), Some(false));
+            assert_eq!(detector.earliest(&scene, &alone).expect("good"), None);
+            assert_eq!(detector.start_intersects(), Some(false));
         }
         let ignoring = Step::new(Query::everything().ignore(plate, rod)).start(Start::Verify);
         assert!(detector.is_free(&scene, &ignoring).expect("good"));

@@ -49,7 +49,7 @@ impl Scenario {
     fn scene(&self) -> Option<Scene> {
         let read = |frame| {
             let path = test_file(&format!("ccd/{}/frames/{frame}.ply", self.name))?;
-            Some(impinge_io::read(&path, &impinge_io::ReadOptions::default()).expect("a mesh"))
+            Some(impinge_io::read(&path, &impinge_io::ReadOptions::as_they_are()).expect("a mesh"))
         };
         let [start, end] = self.frames;
         let (start, end) = (read(start)?, read(end)?);

@@ -161,7 +161,7 @@ fn dropped(solid: Solid, label: String, is_stand_in: bool) -> DropScene {
 /// # Errors
 /// A file that can't be read, or holds triangles.
 pub fn load(path: &Path, material: Material) -> Result<Solid, Error> {
-    let mesh = read(path, &ReadOptions::default())?;
+    let mesh = read(path, &ReadOptions::as_they_are())?;
     match mesh.elements {
         impinge_io::Elements::Tetrahedra(tets) => {
             Ok(Solid::new(tets, mesh.positions.to_f64(), material).without_unused_vertices())

@@ -4,7 +4,7 @@
 //! ```no_run
 //! use impinge_io::{ColoredMesh, ReadOptions, read, write_ply};
 //! # fn main() -> Result<(), impinge_io::Error> {
-//! let bunny = read("bunny.ply".as_ref(), &ReadOptions { weld: true, ..ReadOptions::default() })?;
+//! let bunny = read("bunny.ply".as_ref(), &ReadOptions::default())?;
 //! let red = vec![[220, 40, 30]; bunny.n_primitives()];
 //! write_ply("red.ply".as_ref(), &[ColoredMesh {
 //!     positions: &bunny.positions,

@@ -15,7 +15,8 @@ pub enum Prefer {
 /// How to read a mesh.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReadOptions {
-    /// Whether vertices at the same position become one; see [`weld`](crate::weld). Off by default.
+    /// Whether vertices at the same position become one; see [`weld`](crate::weld). On by default, here and in all that reads files:
+    /// files repeat vertices along seams, whose faces would touch for ever. Arrays are taken as they are.
     pub weld: bool,
     /// Which primitives to take if the file has both kinds.
     pub prefer: Prefer,
@@ -30,10 +31,20 @@ pub struct ReadOptions {
 impl Default for ReadOptions {
     fn default() -> Self {
         ReadOptions {
-            weld: false,
+            weld: true,
             prefer: Prefer::Volume,
             max_expanded_bytes: 4 << 30,
             max_file_bytes: 16 << 30,
+        }
+    }
+}
+
+impl ReadOptions {
+    /// The defaults, but vertices are those of the file, as its frames have them.
+    pub fn as_they_are() -> Self {
+        ReadOptions {
+            weld: false,
+            ..ReadOptions::default()
         }
     }
 }

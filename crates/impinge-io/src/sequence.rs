@@ -177,9 +177,10 @@ impl Sequence {
             } => self.cached_frame(source, *start, *endian, frame_ix),
             Frames::Files { files, named } => {
                 let path = &files[frame_ix];
-                let positions = collect(input(path, named), &ReadOptions::default(), |parts| {
-                    Ok(parts.positions)
-                })?;
+                let positions =
+                    collect(input(path, named), &ReadOptions::as_they_are(), |parts| {
+                        Ok(parts.positions)
+                    })?;
                 if positions.len() != self.n_points {
                     return Err(mismatch(
                         &path.display().to_string(),
@@ -262,7 +263,7 @@ impl Sequence {
     fn open_files(path: &Path) -> Result<Self, Error> {
         let files = numbered_files(path)?;
         let first = input(&files[0], path);
-        let n_points = collect(first, &ReadOptions::default(), |parts| {
+        let n_points = collect(first, &ReadOptions::as_they_are(), |parts| {
             Ok(parts.positions.len())
         })?;
         Ok(Sequence {

@@ -6,7 +6,7 @@ use impinge_io::{
 };
 
 fn obj(text: &str) -> Vec<NamedMesh> {
-    let options = ReadOptions::default();
+    let options = ReadOptions::as_they_are();
     let (bodies, _) = read_bodies_bytes(text.as_bytes(), Format::Obj, "a.obj", &options).unwrap();
     bodies
 }
@@ -48,7 +48,7 @@ fn groups_of_an_obj_are_bodies() {
         text.as_bytes(),
         Format::Obj,
         "a.obj",
-        &ReadOptions::default(),
+        &ReadOptions::as_they_are(),
     )
     .unwrap();
     let all = corners(&whole);
@@ -119,7 +119,7 @@ fn nodes_of_a_glb_are_bodies() {
         })
         .collect();
     write_glb(&path, &meshes).unwrap();
-    let (bodies, _) = read_bodies(&path, &ReadOptions::default()).unwrap();
+    let (bodies, _) = read_bodies(&path, &ReadOptions::as_they_are()).unwrap();
     // Each node is a body, also of a name that another one has.
     assert_eq!(
         names(&bodies),
@@ -128,7 +128,7 @@ fn nodes_of_a_glb_are_bodies() {
     for (body, positions) in bodies.iter().zip(&held) {
         assert_eq!(&body.mesh.positions, positions);
     }
-    let whole = read(&path, &ReadOptions::default()).unwrap();
+    let whole = read(&path, &ReadOptions::as_they_are()).unwrap();
     assert_eq!(whole.n_primitives(), 3);
 }
 
@@ -145,7 +145,7 @@ fn nodes_are_placed_and_named() {
         json.as_bytes(),
         Format::Gltf,
         "a.gltf",
-        &ReadOptions::default(),
+        &ReadOptions::as_they_are(),
     )
     .unwrap();
     assert_eq!(

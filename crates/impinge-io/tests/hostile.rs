@@ -34,7 +34,7 @@ impl Trap {
         let path = self.inner.join("a.gltf");
         let json = gltf_json(&format!(r#","uri":"{uri}""#), "");
         std::fs::write(&path, json).unwrap();
-        read(&path, &ReadOptions::default())
+        read(&path, &ReadOptions::as_they_are())
     }
 }
 
@@ -151,7 +151,7 @@ fn links_out_of_the_folder_of_a_gltf_are_refused() {
     }
     let by_link = trap.outer.join("elsewhere");
     symlink(&trap.inner, &by_link).unwrap();
-    assert!(read(&by_link.join("a.gltf"), &ReadOptions::default()).is_ok());
+    assert!(read(&by_link.join("a.gltf"), &ReadOptions::as_they_are()).is_ok());
 }
 
 /// The two files of a TetGen mesh.
@@ -173,7 +173,7 @@ fn files_found_beside_the_one_named_are_of_its_folder() {
     use std::os::unix::fs::symlink;
     let trap = Trap::new();
     let (nodes, cells) = tetgen();
-    let options = ReadOptions::default();
+    let options = ReadOptions::as_they_are();
     std::fs::write(trap.outer.join("a.node"), &nodes).unwrap();
     std::fs::write(trap.inner.join("a.ele"), &cells).unwrap();
     symlink("../a.node", trap.inner.join("a.node")).unwrap();
@@ -236,7 +236,7 @@ fn only_regular_files_are_read() {
     hostile.push((socket, "a socket"));
     for (path, what) in hostile {
         let shown = path.display().to_string();
-        let read = |path: PathBuf| move || read(&path, &ReadOptions::default());
+        let read = |path: PathBuf| move || read(&path, &ReadOptions::as_they_are());
         let error = soon(&shown, read(path)).unwrap_err();
         assert!(matches!(error, Error::NotAFile { .. }), "{error}");
         let message = error.to_string();
@@ -263,14 +263,14 @@ fn a_file_beyond_the_limit_is_refused_before_it_is_read() {
     // Sparse: it takes no room on the disk.
     let file = std::fs::File::create(&path).unwrap();
     file.set_len(1 << 40).unwrap();
-    let error = read(&path, &ReadOptions::default()).unwrap_err();
+    let error = read(&path, &ReadOptions::as_they_are()).unwrap_err();
     assert!(matches!(error, Error::TooLarge { .. }), "{error}");
     let message = error.to_string();
     assert!(message.contains(&(1u64 << 40).to_string()), "{message}");
     file.set_len(1000).unwrap();
     let limited = ReadOptions {
         max_file_bytes: 999,
-        ..ReadOptions::default()
+        ..ReadOptions::as_they_are()
     };
     let error = read(&path, &limited).unwrap_err();
     assert!(matches!(error, Error::TooLarge { .. }), "{error}");
@@ -313,16 +313,16 @@ fn compressed_data_expands_within_limits() {
         "{}",
         bytes.len()
     );
-    let error = read(&bytes, &ReadOptions::default()).unwrap_err();
+    let error = read(&bytes, &ReadOptions::as_they_are()).unwrap_err();
     assert!(matches!(error, Error::TooLarge { .. }), "{error}");
     assert!(error.to_string().contains("expanded"), "{error}");
     // A small file may expand to a few megabytes, unless the option forbids it.
     let small = bomb(3);
-    let error = read(&small, &ReadOptions::default()).unwrap_err();
+    let error = read(&small, &ReadOptions::as_they_are()).unwrap_err();
     assert!(!matches!(error, Error::TooLarge { .. }), "{error}");
     let tight = ReadOptions {
         max_expanded_bytes: 1 << 20,
-        ..ReadOptions::default()
+        ..ReadOptions::as_they_are()
     };
     let error = read(&small, &tight).unwrap_err();
     assert!(matches!(error, Error::TooLarge { .. }), "{error}");
@@ -373,7 +373,7 @@ fn text_with_a_mark_is_read_and_utf_16_refused_by_name() {
     }
     let (nodes, cells) = tetgen();
     let nodes = utf16(std::str::from_utf8(&nodes).unwrap(), Order::Little, true);
-    let options = ReadOptions::default();
+    let options = ReadOptions::as_they_are();
     let error =
         impinge_io::read_tetgen_bytes(&nodes, "a.node", &cells, "a.ele", &options).unwrap_err();
     assert!(
@@ -433,7 +433,7 @@ fn a_polygon_of_many_corners_is_read_at_once() {
         (Format::Ply, ply),
         (Format::Vtk, vtk),
     ] {
-        let read = move || read_bytes(text.as_bytes(), format, "file", &ReadOptions::default());
+        let read = move || read_bytes(text.as_bytes(), format, "file", &ReadOptions::as_they_are());
         let mesh = soon("a polygon", read).unwrap();
         assert_eq!(mesh.n_primitives(), N - 2, "{format:?}");
     }

@@ -24,7 +24,7 @@ fn data() -> Option<PathBuf> {
 }
 
 fn load(path: &Path) -> Mesh {
-    read(path, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+    read(path, &ReadOptions::as_they_are()).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]

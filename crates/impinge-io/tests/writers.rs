@@ -26,7 +26,7 @@ fn colored<'a>(mesh: &'a Mesh, colors: Option<&'a [[u8; 3]]>) -> ColoredMesh<'a>
 }
 
 fn load(path: &Path) -> Mesh {
-    read(path, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+    read(path, &ReadOptions::as_they_are()).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// A function that writes meshes.
@@ -98,7 +98,7 @@ fn surface_of_tetrahedra_is_drawn_from_outside() {
     write_ply(&path, &[colored(&mesh, None)]).unwrap();
     let options = ReadOptions {
         prefer: Prefer::Triangles,
-        ..ReadOptions::default()
+        ..ReadOptions::as_they_are()
     };
     let (drawn, summary) = read_with_summary(&path, &options).unwrap();
     assert_eq!(summary.n_tetrahedra_skipped, 2);
@@ -197,7 +197,7 @@ fn glb_without_bodies_is_a_valid_file_without_meshes() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");
     write_glb(&path, &[]).unwrap();
-    let error = read(&path, &ReadOptions::default()).unwrap_err();
+    let error = read(&path, &ReadOptions::as_they_are()).unwrap_err();
     assert!(matches!(error, Error::NoPrimitives { .. }), "{error}");
 }
 

@@ -24,13 +24,14 @@ pub fn elements(
     to_array(py, collect(n, rows.map(|[_, a, _, b]| [a, b]))?)
 }
 
-/// The names of kinds.
+/// Kinds, as indices of `impinge.KINDS`.
 pub fn kinds(
     py: Python<'_>,
     n: usize,
     kinds: impl Iterator<Item = PairKind>,
-) -> PyResult<Bound<'_, PyAny>> {
-    strings::<2>(py, n, kinds.map(PairKind::name))
+) -> PyResult<Bound<'_, PyArray1<u8>>> {
+    let numbers = collect(n, kinds.map(|kind| kind as u8))?;
+    Ok(PyArray1::from_vec(py, numbers))
 }
 
 /// `n` short names as NumPy holds them: one 32-bit number per letter, filled up with zeros.

@@ -416,7 +416,8 @@ impl Detector {
     /// Returns
     /// -------
     /// Impact or None
-    ///     ``None`` where nothing touches.
+    ///     ``None`` where nothing touches. With ``start="verify"``, `start_intersects` then says whether elements intersect at
+    ///     the start, which need not touch.
     ///
     /// Raises
     /// ------
@@ -457,6 +458,13 @@ impl Detector {
         let answer = impinge::Detector::earliest_with;
         let (first, _, number) = Detector::watched(slf, watched, ask, answer)?;
         Ok(first.map(|impact| Impact::new(impact, number)))
+    }
+
+    /// bool or None : whether elements intersect at the start of the step that was asked about last; ``None`` if that was not
+    /// asked, which only ``start="verify"`` does.
+    #[getter]
+    fn start_intersects(&self) -> Option<bool> {
+        self.inner.start_intersects()
     }
 
     /// Whether nothing touches during a step; with ``start="skip"``, but for pairs that touch at its start. If the start was

@@ -152,6 +152,16 @@ fn options(weld: bool) -> ReadOptions {
 
 fn refuse(error: Error) -> PyErr {
     match error {
+        // With an errno, Python picks the class: FileNotFoundError, PermissionError, …
+        Error::Io { path, source, .. } if source.raw_os_error().is_some() => {
+            let text = source.to_string();
+            let text = text
+                .split(" (os error")
+                .next()
+                .unwrap_or_default()
+                .to_owned();
+            PyOSError::new_err((source.raw_os_error(), text, path))
+        }
         Error::Io { .. } => PyOSError::new_err(error.to_string()),
         error => PyValueError::new_err(error.to_string()),
     }

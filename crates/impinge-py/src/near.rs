@@ -81,8 +81,7 @@ impl NearPairs {
     /// ``"ff"`` (two faces).
     #[getter]
     fn kinds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
-        let kinds = self.iter().map(|pair| pair.kind as u8);
-        Ok(PyArray1::from_vec(py, collect(self.__len__(), kinds)?))
+        columns::kinds(py, self.__len__(), self.iter().map(|pair| pair.kind))
     }
 
     /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two bodies.

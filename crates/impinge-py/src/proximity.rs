@@ -44,13 +44,11 @@ impl Nearest {
         self.inner.primitives.into()
     }
 
-    /// numpy.ndarray of float64, shape (2, 3), or None : a point of each that is nearest to the other, rounded;
-    /// ``None`` where they share points.
+    /// numpy.ndarray of float64, shape (2, 3) : a point of each that is nearest to the other, rounded; where they touch, a point
+    /// that they share, twice.
     #[getter]
-    fn points<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        let rows = self.inner.points.map(|points| points.map(Vec::from));
-        rows.map(|rows| Ok(PyArray2::from_vec2(py, &rows)?))
-            .transpose()
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        Ok(PyArray2::from_vec2(py, &self.inner.points.map(Vec::from))?)
     }
 
     fn __repr__(&self) -> String {

@@ -101,7 +101,9 @@ impl Impact {
 /// `Impact`, and taken as arrays by the attributes below, one row per impact. Each access makes new arrays.
 #[pyclass(module = "impinge", frozen)]
 pub struct Impacts {
-    inner: impinge::Impacts,
+    inner: Arc<impinge::Impacts>,
+    /// The only kind, if this is a part.
+    kind: Option<PairKind>,
     scene: u64,
     /// Whether times are double precision.
     is_double: bool,
@@ -110,27 +112,44 @@ pub struct Impacts {
 impl Impacts {
     pub fn new(inner: impinge::Impacts, scene: u64, is_double: bool) -> Self {
         Impacts {
-            inner,
+            inner: Arc::new(inner),
+            kind: None,
             scene,
             is_double,
+        }
+    }
+
+    fn slice(&self) -> &[impinge::Impact] {
+        match self.kind {
+            Some(kind) => self.inner.of(kind),
+            None => self.inner.as_slice(),
         }
     }
 }
 
 #[pymethods]
 impl Impacts {
-    /// numpy.ndarray of str, shape (n,) : ``"vf"``, ``"ee"``, ``"ev"`` or ``"vv"``.
+    /// numpy.ndarray of uint32, shape (n, 4) : number of a body, its element, number of the other body, its element; see
+    /// `elements`.
     #[getter]
-    fn kinds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let kinds = self.inner.iter().map(|impact| impact.kind);
-        columns::kinds(py, self.inner.len(), kinds)
+    fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let rows = self.slice().iter().map(impinge::Impact::row);
+        to_array(py, collect(self.slice().len(), rows)?)
+    }
+
+    /// numpy.ndarray of uint8, shape (n,) : what they are, as an index of `impinge.KINDS`: ``"vf"``, ``"ee"``, ``"ev"`` or
+    /// ``"vv"``.
+    #[getter]
+    fn kinds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
+        let kinds = self.slice().iter().map(|impact| impact.kind);
+        columns::kinds(py, self.slice().len(), kinds)
     }
 
     /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two bodies.
     #[getter]
     fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        let rows = self.inner.iter().map(impinge::Impact::row);
-        columns::bodies(py, self.inner.len(), rows)
+        let rows = self.slice().iter().map(impinge::Impact::row);
+        columns::bodies(py, self.slice().len(), rows)
     }
 
     /// numpy.ndarray of uint32, shape (n, 2) : numbers of the two elements in their bodies.
@@ -140,8 +159,8 @@ impl Impacts {
     /// vertex is in the first column, of ``"ev"`` the edge.
     #[getter]
     fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        let rows = self.inner.iter().map(impinge::Impact::row);
-        columns::elements(py, self.inner.len(), rows)
+        let rows = self.slice().iter().map(impinge::Impact::row);
+        columns::elements(py, self.slice().len(), rows)
     }
 
     /// numpy.ndarray of float32, or float64 after ``toi="f64"``, shape (n,) : first times in [0, 1], each
@@ -152,8 +171,8 @@ impl Impacts {
         reason = "they were rounded to f32 before"
     )]
     fn toi<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let n = self.inner.len();
-        let times = self.inner.iter().map(|impact| impact.toi);
+        let n = self.slice().len();
+        let times = self.slice().iter().map(|impact| impact.toi);
         Ok(match self.is_double {
             true => PyArray1::from_vec(py, collect(n, times)?).into_any(),
             false => {
@@ -166,8 +185,11 @@ impl Impacts {
     /// numpy.ndarray of bool, shape (n,) : which touch at the start, at time 0.
     #[getter]
     fn at_start<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let at_start = self.inner.iter().map(|impact| impact.at_start);
-        Ok(PyArray1::from_vec(py, collect(self.inner.len(), at_start)?))
+        let at_start = self.slice().iter().map(|impact| impact.at_start);
+        Ok(PyArray1::from_vec(
+            py,
+            collect(self.slice().len(), at_start)?,
+        ))
     }
 
     /// bool or None : whether elements intersect at the start of the step; ``None`` if nobody asked, which only
@@ -177,6 +199,30 @@ impl Impacts {
         self.inner.start_intersects()
     }
 
+    /// Those of one kind.
+    ///
+    /// Parameters
+    /// ----------
+    /// kind : {"vf", "ee", "ev", "vv", "ef", "ff"}
+    ///
+    /// Returns
+    /// -------
+    /// Impacts
+    ///     Of the same answer: nothing is copied.
+    fn of(&self, kind: &Bound<'_, PyAny>) -> PyResult<Impacts> {
+        let kind = choose_one(kind, "kind", &PairKind::ALL.map(|kind| (kind.name(), kind)))?;
+        // Of a part of another kind nothing is left.
+        let inner = match self.kind {
+            Some(own) if own != kind => Arc::default(),
+            _ => Arc::clone(&self.inner),
+        };
+        Ok(Impacts {
+            inner,
+            kind: Some(kind),
+            ..*self
+        })
+    }
+
     /// The impact with the least time; of several, the first row.
     ///
     /// Returns
@@ -184,14 +230,18 @@ impl Impacts {
     /// Impact or None
     ///     ``None`` where nothing touches.
     fn earliest(&self) -> Option<Impact> {
-        let earliest = self.inner.earliest();
+        let all = self.slice().iter().copied();
+        let earliest = all.reduce(|best, other| if other.toi < best.toi { other } else { best });
         earliest.map(|impact| Impact::new(impact, self.scene))
     }
 
     /// int : a 64-bit hash of the set of impacts, times included; equal sets have equal hashes everywhere.
     #[getter]
     fn hash(&self, py: Python<'_>) -> u64 {
-        py.detach(|| self.inner.hash())
+        py.detach(|| {
+            let rows = self.slice().iter();
+            impinge::hash_impact_rows(rows.map(|impact| (impact.kind, impact.row(), impact.toi)))
+        })
     }
 
     /// Statistics : what the answer cost.
@@ -203,12 +253,12 @@ impl Impacts {
     }
 
     fn __len__(&self) -> usize {
-        self.inner.len()
+        self.slice().len()
     }
 
     fn __getitem__(&self, index: isize) -> PyResult<Impact> {
-        let ix = from_end(index, self.inner.len(), "impacts")?;
-        Ok(Impact::new(self.inner.as_slice()[ix], self.scene))
+        let ix = from_end(index, self.slice().len(), "impacts")?;
+        Ok(Impact::new(self.slice()[ix], self.scene))
     }
 
     fn __iter__(slf: PyRef<'_, Self>) -> ImpactIterator {
@@ -225,15 +275,15 @@ impl Impacts {
     }
 
     fn __repr__(&self) -> String {
-        match self.inner.earliest() {
+        match self.earliest() {
             None if self.inner.start_intersects() == Some(true) => {
                 "Impacts(0, the start intersects)".into()
             }
             None => "Impacts(0, nothing touches)".into(),
             Some(first) => format!(
                 "Impacts({}, the first at {:?})",
-                self.inner.len(),
-                first.toi
+                self.__len__(),
+                first.inner.toi
             ),
         }
     }
@@ -253,10 +303,10 @@ impl ImpactIterator {
     }
 
     fn __next__(&mut self) -> Option<Impact> {
-        let Impacts { inner, scene, .. } = self.impacts.get();
-        let impact = *inner.as_slice().get(self.next)?;
+        let impacts = self.impacts.get();
+        let impact = *impacts.slice().get(self.next)?;
         self.next += 1;
-        Some(Impact::new(impact, *scene))
+        Some(Impact::new(impact, impacts.scene))
     }
 }
 
@@ -414,9 +464,9 @@ impl Candidates {
         to_array(py, rows)
     }
 
-    /// numpy.ndarray of str, shape (n,) : the kind of each pair.
+    /// numpy.ndarray of uint8, shape (n,) : the kind of each pair, as an index of `impinge.KINDS`.
     #[getter]
-    fn kinds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn kinds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
         columns::kinds(py, self.inner.len(), self.all().map(|(kind, _)| kind))
     }
 

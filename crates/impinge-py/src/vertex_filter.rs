@@ -1,5 +1,9 @@
 //! `impinge._impinge._VertexFilter`: which pairs of elements `impinge.ipc` lets collide.
+//!
+//! What a callback says of two vertices is kept for the question, whichever elements have them: neighbouring pairs of elements share most
+//! of theirs, and a call of Python costs more than all the rest of a pair.
 
+use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use impinge::{ElementVertices, PairFilter};
@@ -9,7 +13,8 @@ use pyo3::prelude::*;
 /// Which pairs of elements collide, by their vertices in a mesh whose parts are several bodies.
 ///
 /// Two elements that name a common vertex of the mesh do not. Nor do elements whose vertices all have one label. Of the
-/// others, those do for which `may` is true of any vertex of one with any vertex of the other; it is called last.
+/// others, those do for which `may` is true of any vertex of one with any vertex of the other. It is called last, and with the lower
+/// vertex first, so that threads do not decide the order.
 #[pyclass(module = "impinge", name = "_VertexFilter", frozen)]
 pub struct VertexFilter {
     pub inner: PairFilter,
@@ -18,6 +23,13 @@ pub struct VertexFilter {
 
 /// The first exception of the callback.
 type Raised = Arc<Mutex<Option<PyErr>>>;
+
+/// A callback, and what it has said.
+struct Callback {
+    may: Py<PyAny>,
+    known: Mutex<HashMap<(u32, u32), bool>>,
+    raised: Raised,
+}
 
 #[pymethods]
 impl VertexFilter {
@@ -42,7 +54,11 @@ impl VertexFilter {
         };
         let is_early = may.is_none();
         let raised = Raised::default();
-        let of_callback = Arc::clone(&raised);
+        let callback = may.map(|may| Callback {
+            may,
+            known: Mutex::default(),
+            raised: Arc::clone(&raised),
+        });
         let inner = PairFilter::new(move |pair| {
             let [a, b] = pair.map(|element| in_mesh(&maps, element));
             if a.iter().any(|vertex| b.contains(vertex)) {
@@ -55,8 +71,9 @@ impl VertexFilter {
                     return false;
                 }
             }
-            may.as_ref()
-                .is_none_or(|may| passes(may, &a, &b, &of_callback))
+            callback
+                .as_ref()
+                .is_none_or(|callback| callback.passes(&a, &b))
         });
         Ok(VertexFilter {
             inner: if is_early { inner.early() } else { inner },
@@ -81,29 +98,60 @@ fn in_mesh(maps: &[Option<Vec<u32>>], (body, corners): ElementVertices<'_>) -> V
     }
 }
 
-/// Whether any vertices of two elements may collide. After an exception, nothing is asked any more.
-fn passes(may: &Py<PyAny>, a: &[u32], b: &[u32], raised: &Raised) -> bool {
-    let ask = |py: Python<'_>| -> PyResult<bool> {
-        for &x in a {
-            for &y in b {
-                if may.call1(py, (x, y))?.is_truthy(py)? {
-                    return Ok(true);
+impl Callback {
+    /// Whether any vertices of two elements may collide. After an exception, nothing is asked any more.
+    fn passes(&self, a: &[u32], b: &[u32]) -> bool {
+        let pairs = a
+            .iter()
+            .flat_map(|&x| b.iter().map(move |&y| (x.min(y), x.max(y))));
+        let mut unknown = Vec::new();
+        {
+            // Not held while the interpreter is waited for.
+            let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+            for pair in pairs {
+                match known.get(&pair) {
+                    Some(true) => return true,
+                    Some(false) => {}
+                    None => unknown.push(pair),
                 }
             }
         }
-        Ok(false)
-    };
-    let is_over = |raised: &Raised| raised.lock().is_ok_and(|raised| raised.is_some());
-    if is_over(raised) {
-        return false;
-    }
-    match Python::try_attach(ask) {
-        Some(Ok(passes)) => passes,
-        Some(Err(error)) => {
-            let mut raised = raised.lock().unwrap_or_else(PoisonError::into_inner);
-            raised.get_or_insert(error);
-            false
+        if unknown.is_empty() || self.has_raised() {
+            return false;
         }
-        None => false,
+        match Python::try_attach(|py| self.ask(py, &unknown)) {
+            Some(Ok(any)) => any,
+            Some(Err(error)) => {
+                let mut raised = self.raised.lock().unwrap_or_else(PoisonError::into_inner);
+                raised.get_or_insert(error);
+                false
+            }
+            None => false,
+        }
+    }
+
+    /// Whether the callback is true of any of some pairs of vertices: it is asked up to the first.
+    fn ask(&self, py: Python<'_>, pairs: &[(u32, u32)]) -> PyResult<bool> {
+        let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        for &pair in pairs {
+            // Another thread may have asked meanwhile.
+            let said = known().get(&pair).copied();
+            let may = match said {
+                Some(may) => may,
+                None => {
+                    let may = self.may.call1(py, pair)?.is_truthy(py)?;
+                    known().insert(pair, may);
+                    may
+                }
+            };
+            if may {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    fn has_raised(&self) -> bool {
+        self.raised.lock().is_ok_and(|raised| raised.is_some())
     }
 }

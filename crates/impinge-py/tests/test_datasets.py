@@ -150,7 +150,7 @@ def test_tiles_of_a_step_have_the_impacts_of_the_whole(tmp_path, toi):
     bodies = np.stack([rows["body_a"], rows["body_b"]], axis=1)
     elements = np.stack([rows["element_a"], rows["element_b"]], axis=1)
     assert np.array_equal(bodies, truth.bodies) and np.array_equal(elements, truth.elements)
-    assert np.array_equal(rows["kind"], truth.kinds)
+    assert np.array_equal(rows["kind"], np.array(impinge.KINDS)[truth.kinds])
     assert merged["touching_at_start"] == 0 and sum(merged["kinds"].values()) == len(truth)
 
 

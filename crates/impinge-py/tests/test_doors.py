@@ -72,7 +72,7 @@ def test_a_box_of_a_renderer_is_clean_once_it_is_welded():
 
 
 def test_what_cannot_be_read_is_refused_by_name(tmp_path):
-    with pytest.raises(OSError, match="missing.ply"):
+    with pytest.raises(FileNotFoundError, match="missing.ply"):
         impinge.read(tmp_path / "missing.ply")
     (tmp_path / "odd.obj").write_text("v 0 0 0\nf 1 2 3\n")
     for read in [impinge.read, impinge.read_bodies]:

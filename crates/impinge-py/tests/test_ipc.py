@@ -202,6 +202,39 @@ def test_filters_leave_out_pairs_as_a_list_would(seed):
     assert ipc.compute_collision_free_stepsize(mesh, start, end) == step
 
 
+@pytest.mark.parametrize("seed", range(2))
+def test_a_callback_is_hardly_asked_twice_about_two_vertices(seed):
+    faces, start, end = two_balls(seed)
+    mesh = ipc.CollisionMesh(start, ipc.edges(faces), faces)
+    half = len(start) // 2
+    asked = []
+    mesh.can_collide = lambda a, b: asked.append((a, b)) or (a < half) == (b < half)
+    ipc.compute_collision_free_stepsize(mesh, start, end)
+    # Two threads may come to a pair at the same time.
+    assert 100 < len(asked) < 1.1 * len(set(asked))
+    assert all(a < b for a, b in asked)
+
+
+def test_a_start_that_intersects_is_not_free():
+    # An edge of one triangle pierces the other: no vertex touches a face, and no edge an edge.
+    start = np.vstack([FLOOR, [[1, 1, -1], [1, 1, 1], [9, 9, 9]]])
+    mesh = ipc.CollisionMesh(start, ipc.edges(TWO), TWO)
+    up = start + [0, 0, 0.25] * np.repeat([[0], [1]], 3, axis=0)
+    assert ipc.has_intersections(mesh, start)
+    assert not ipc.is_step_collision_free(mesh, start, up)
+    assert ipc.compute_collision_free_stepsize(mesh, start, up) == 1.0
+    # What may not collide does not intersect either.
+    assert ipc.is_step_collision_free(mesh, start, up, labels=[0] * 6)
+    assert not ipc.is_step_collision_free(mesh, start, up, labels=[0, 0, 0, 1, 1, 1])
+    mesh.can_collide = lambda a, b: False
+    assert ipc.is_step_collision_free(mesh, start, up)
+    ipctk = pytest.importorskip("ipctk")
+    theirs = ipctk.CollisionMesh(start, ipc.edges(TWO), TWO.astype(np.int32))
+    # It does not ask.
+    assert ipctk.is_step_collision_free(theirs, start, up)
+    assert not ipc.is_step_collision_free(theirs, start, up)
+
+
 def folded():
     """A face that is folded through its neighbour along their common edge's corner."""
     points = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, -1], [1, 1.5, 1.0]])

@@ -53,6 +53,51 @@ def test_objects_come_move_and_go():
     assert balls.names == ["b", "a"] and not balls.in_collision_single((vertices, faces), shift(50))
 
 
+
+def test_guests_are_kept_and_followed():
+    vertices, faces = ball(6, 8, np.float64)
+    random = np.random.default_rng(3)
+
+    def fresh(objects):
+        manager = impinge.CollisionManager(**SETTINGS)
+        for name, (mesh, matrix) in objects.items():
+            manager.add_object(name, mesh, matrix)
+        return manager
+
+    def matrix():
+        return shift(*(9 * random.random(3)))
+
+    held = [{f"{side}{ix}": ((vertices, faces), matrix()) for ix in range(8)} for side in "ab"]
+    a, b = map(fresh, held)
+    n_hits = 0
+    for _ in range(12):
+        for manager, objects, side in zip([a, b], held, "ab"):
+            # One moves, one goes, one comes, one gets another mesh under its name.
+            moved, gone, changed = random.choice(sorted(objects), 3, replace=False)
+            objects[moved] = (objects[moved][0], matrix())
+            manager.set_transform(moved, objects[moved][1])
+            del objects[gone]
+            manager.remove_object(gone)
+            for name, size in [(f"{side}{random.integers(1000, 9999)}", 1), (str(changed), 1.5)]:
+                objects[name] = ((vertices * size, faces), matrix())
+                manager.add_object(name, *objects[name])
+        others = fresh(held[0]), fresh(held[1])
+        collide, names = a.in_collision_other(b, return_names=True)
+        assert (collide, names) == others[0].in_collision_other(others[1], return_names=True)
+        assert b.in_collision_other(a, return_names=True)[1] == {(y, x) for x, y in names}
+        distance, nearest = a.min_distance_other(b, return_names=True)
+        expected = others[0].min_distance_other(others[1], return_names=True)
+        if collide:
+            # Of several that overlap, it is the depth of one.
+            assert distance <= 0 and expected[0] <= 0 and nearest in names
+        else:
+            assert (distance, nearest) == expected and b.min_distance_other(a) == distance
+        n_hits += len(a.in_collision_other(b, return_names=True)[1])
+        assert a.in_collision_internal(return_names=True) == others[0].in_collision_internal(return_names=True)
+    assert n_hits > 12 and len(a) == len(b) == 8
+    assert a.in_collision_other(a)  # Each object meets its copy.
+
+
 def test_a_mesh_that_is_not_in_the_manager():
     balls = manager(0, 0.5, 5)
     vertices, faces = ball(8, 12, np.float64)
@@ -118,6 +163,11 @@ def test_distances():
     assert abs(nearest.distance - 1) < 0.2 and nearest.points.shape == (2, 3)
     assert nearest.bodies == (a, b) and len(nearest.primitives) == 2
     assert detector.nearest(scene).distance == nearest.distance
+    scene.set_positions(b, vertices + [1, 0, 0])
+    touching = detector.distance(scene, a, b)
+    assert touching.distance == 0 and np.array_equal(*touching.points)
+    assert abs(np.linalg.norm(touching.points[0]) - 1) < 0.2
+    scene.set_positions(b, vertices + [3, 0, 0])
     assert detector.nearest(scene, across=[a]).bodies == (a, b)
     assert detector.nearest(scene, across=[a, b]) is None
     with pytest.raises(ValueError, match="itself"):

@@ -32,6 +32,8 @@ def test_a_start_that_intersects_is_not_free_if_asked(scene):
     detector = impinge.Detector(backend="cpu")
     assert detector.is_free(scene)
     assert not detector.is_free(scene, start="verify")
+    assert detector.earliest(scene, start="verify") is None and detector.start_intersects is True
+    assert detector.earliest(scene) is None and detector.start_intersects is None
     impacts = detector.impacts(scene)
     assert impacts.start_intersects is None and repr(impacts) == "Impacts(0, nothing touches)"
     impacts = detector.impacts(scene, start="verify")

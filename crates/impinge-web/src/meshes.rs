@@ -54,7 +54,7 @@ pub fn read_bodies(name: &str, bytes: &[u8], weld: bool) -> Result<Vec<FileMesh>
 fn options() -> ReadOptions {
     ReadOptions {
         max_expanded_bytes: MAX_EXPANDED_BYTES,
-        ..ReadOptions::default()
+        ..ReadOptions::as_they_are()
     }
 }
 

@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("usage: compare MESH DX DY DZ".into());
     };
     let offset: Vec<f32> = offset.iter().map(|x| x.parse()).collect::<Result<_, _>>()?;
-    let mesh = impinge_io::read(Path::new(path), &impinge_io::ReadOptions::default())?;
+    let mesh = impinge_io::read(Path::new(path), &impinge_io::ReadOptions::as_they_are())?;
     let positions = mesh.positions.to_f32_rounded();
     let moved: Vec<[f32; 3]> = positions
         .iter()

@@ -185,7 +185,7 @@ fn waves(waving: &Waving, diagonal: f32) -> [Wave; 2] {
 }
 
 fn load(path: &Path, scene: SceneName) -> Result<Model, Error> {
-    let mesh = impinge_io::read(path, &ReadOptions::default())?;
+    let mesh = impinge_io::read(path, &ReadOptions::as_they_are())?;
     match mesh.elements {
         impinge_io::Elements::Triangles(faces) => Ok(Model {
             positions: mesh.positions.to_f32_rounded(),

@@ -12,7 +12,7 @@ use crate::args::{AnswerArgs, AskArgs, DetectorArgs, PairsArgs, WithinArgs};
 use crate::asked::Asked;
 use crate::detection::{any, asked, count, hit, query, repeat, settings};
 use crate::error::Error;
-use crate::load::{Bodies, Loading};
+use crate::load::{Bodies, Loading, Vertices};
 use crate::picture::Drawer;
 use crate::text::counted;
 use crate::values::{RowsFile, RowsFormat};
@@ -90,6 +90,9 @@ fn answer(
         nouns,
         unread,
     } = read(paths, loading)?;
+    let is_read = |(ix, _): &(usize, _)| unread.iter().all(|(body, _)| body != ix);
+    let read = vertices.iter().copied().enumerate().filter(is_read);
+    let read: Vec<Vertices> = read.map(|(_, of)| of).collect();
     if ids.len() == 1 && !asked.within {
         let text = format!(
             "{}: one body meets no other: `impinge self` finds where it meets itself",
@@ -131,7 +134,7 @@ fn answer(
         } else {
             let mut line = Vec::new();
             headline::write_count(&mut line, (&scene, &nouns), &bodies, &text)?;
-            writeln!(line, "{}", asked.line(&vertices, &nouns))?;
+            writeln!(line, "{}", asked.line(&read, &nouns))?;
             output::out().write_all(&line)?;
         }
         return end(ask, n_pairs > 0, &unread, paths.len());
@@ -182,7 +185,7 @@ fn answer(
         if ask.verbose {
             output::print_details(&mut text, &scene, &bodies, pairs, &times)?;
         }
-        writeln!(text, "{}", asked.line(&vertices, &nouns))?;
+        writeln!(text, "{}", asked.line(&read, &nouns))?;
         if is_stdout_taken {
             // If standard error is closed, nobody reads the summary.
             let _ = stderr().write_all(&text);

@@ -9,11 +9,11 @@ mod rows;
 
 use std::io::{Write, stderr};
 
-use impinge::{CancelToken, CandidateQuery, Control, Query, SharedVertex, Step};
+use impinge::{CancelToken, CandidateQuery, Control, Query, Step};
 use serde_json::Value;
 
 use crate::apart::Inputs;
-use crate::args::{StartArg, StepArgs};
+use crate::args::StepArgs;
 use crate::detection::{Times, detector, without};
 use crate::error::Error;
 use crate::output::out;
@@ -83,13 +83,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     }
     if args.earliest {
         let earliest = detector.earliest_with(&bodies.scene, &step, &control)?;
-        let start_intersects = match args.how.start {
-            StartArg::Verify => {
-                let query = query(args, &bodies)?.shared_vertex(SharedVertex::Resolve);
-                Some(detector.any_with(&bodies.scene, &query, &control)?)
-            }
-            _ => None,
-        };
+        let start_intersects = detector.start_intersects();
         drop(watch);
         let found = Found::first(earliest, start_intersects, detector.step_stats(), times);
         print(args, &bodies, &found)?;

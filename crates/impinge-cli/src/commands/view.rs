@@ -190,7 +190,7 @@ fn read_file(files: &[PathBuf], weld: Option<&Weld>, frame_ix: usize) -> Result<
         let text = format!("frame {frame_ix} of {} frames", files.len());
         return Err(Error::Usage(text));
     };
-    let mut mesh = impinge_io::read(path, &ReadOptions::default())?;
+    let mut mesh = impinge_io::read(path, &ReadOptions::as_they_are())?;
     mesh.positions.narrow_if_exact();
     welded(mesh.positions, weld, &path.display().to_string(), frame_ix)
 }

@@ -249,7 +249,7 @@ fn coloured_meshes_hold_every_body() {
         folder
             .run(["pairs", "a.ply", "b.ply", "--out", out])
             .printed();
-        let mesh = read(&folder.path(out), &ReadOptions::default()).unwrap();
+        let mesh = read(&folder.path(out), &ReadOptions::as_they_are()).unwrap();
         assert_eq!(mesh.n_primitives(), 24, "{out}");
         let bytes = std::fs::read(folder.path(out)).unwrap();
         if is_red {

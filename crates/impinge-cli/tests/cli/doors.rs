@@ -57,13 +57,6 @@ fn oracle(meshes: Vec<Mesh>, query: &Query) -> Value {
     json!({ "pairs": pairs.len(), "hash": format!("{:016x}", pairs.hash()) })
 }
 
-fn welding() -> ReadOptions {
-    ReadOptions {
-        weld: true,
-        ..ReadOptions::default()
-    }
-}
-
 fn found(object: &Value) -> Value {
     json!({ "pairs": object["pairs"], "hash": object["hash"] })
 }
@@ -81,9 +74,9 @@ fn of_tiles(folder: &Folder, meshes: &[&str], cap: &str) -> Value {
 fn the_answers_are_those_of_the_oracle() {
     let mut expected = serde_json::Map::new();
     for name in FILES {
-        let mesh = read(&file(name), &welding()).unwrap();
+        let mesh = read(&file(name), &ReadOptions::default()).unwrap();
         let mut answer = oracle(vec![mesh], &Query::all_within());
-        let (bodies, _) = read_bodies(&file(name), &welding()).unwrap();
+        let (bodies, _) = read_bodies(&file(name), &ReadOptions::default()).unwrap();
         if bodies.len() > 1 {
             answer["bodies"] = bodies.iter().map(|body| json!(body.name)).collect();
             let meshes = bodies.into_iter().map(|body| body.mesh).collect();

@@ -75,7 +75,7 @@ fn bunny_against_its_moved_copy() {
     let answer = &answers["bunny"];
     let offset: [f32; 3] =
         std::array::from_fn(|k| answer["offset_f32"][k].as_f64().unwrap() as f32);
-    let mut mesh = read(&path, &ReadOptions::default()).unwrap();
+    let mut mesh = read(&path, &ReadOptions::as_they_are()).unwrap();
     assert!(mesh.positions.narrow_if_exact());
     let (Positions::F32(positions), impinge_io::Elements::Triangles(faces)) =
         (mesh.positions, mesh.elements)

@@ -55,7 +55,7 @@ fn a_cache_and_what_collides_in_it() {
     let rows = steps(&folder, "run/steps.csv");
     assert_eq!(rows.len(), 41);
     // The mesh fits the cache, and `impinge sequence` reads both: there, the two bodies are one.
-    let mesh = read(&folder.path("run/blocks.ply"), &ReadOptions::default()).unwrap();
+    let mesh = read(&folder.path("run/blocks.ply"), &ReadOptions::as_they_are()).unwrap();
     assert!(matches!(&mesh.elements, Elements::Tetrahedra(tets) if tets.len() == 2 * 1296));
     assert_eq!(mesh.positions, sequence.frame(0).unwrap());
     let found = folder
@@ -90,7 +90,7 @@ fn numbered_meshes_mark_what_collides() {
             .printed();
         for step in [0, 12] {
             let path = folder.path(&format!("{format}/blocks_{step:05}.{format}"));
-            let mesh = read(&path, &ReadOptions::default()).unwrap();
+            let mesh = read(&path, &ReadOptions::as_they_are()).unwrap();
             assert_eq!(mesh.n_primitives(), 2 * 1296);
         }
         assert_eq!(steps(&folder, &format!("{format}/steps.csv")).len(), 13);

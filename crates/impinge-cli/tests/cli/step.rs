@@ -386,7 +386,7 @@ fn meshes_are_coloured_by_time() {
     for (file, primitives) in [("seen.ply", 80 + 12), ("seen.vtu", 80 + 12)] {
         let run = folder.run(["step"].iter().chain(&FILES).chain(&["--out", file]));
         run.printed();
-        let mesh = impinge_io::read(&folder.path(file), &impinge_io::ReadOptions::default());
+        let mesh = impinge_io::read(&folder.path(file), &impinge_io::ReadOptions::as_they_are());
         assert_eq!(mesh.unwrap().n_primitives(), primitives);
     }
     let bytes = std::fs::read(folder.path("seen.vtu")).unwrap();

@@ -15,7 +15,7 @@ use crate::sink::{filled, grow, room};
 const WHAT: &str = "curves of contact";
 
 /// Intersection curves as chains of points.
-#[derive(Debug, Clone, Default)]
+#[derive(Clone, Default)]
 pub struct Curves {
     /// Where each curve's points start, and one past the last.
     starts: Vec<usize>,
@@ -24,6 +24,17 @@ pub struct Curves {
     directed: Vec<bool>,
     lengths: Vec<f64>,
     isolated: Vec<u32>,
+}
+
+impl std::fmt::Debug for Curves {
+    /// The numbers of curves and points, however many there are.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut short = f.debug_struct("Curves");
+        short.field("len", &self.lengths.len());
+        short.field("n_points", &self.points.len());
+        short.field("n_isolated", &self.isolated.len());
+        short.finish_non_exhaustive()
+    }
 }
 
 /// A segment between two different points, and its direction: 1 from the lower point to the higher, -1 the

@@ -37,7 +37,7 @@ pub(crate) struct Topologies {
 }
 
 /// How deep two closed bodies are in each other: [`Detector::penetration`](crate::Detector::penetration).
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Penetration {
     /// Vertices of the first body strictly inside the second, and of the second strictly inside the first: sorted.
@@ -46,6 +46,17 @@ pub struct Penetration {
     /// Connected regions: first those with contacts, in the order of the contacts, then shells wholly inside the other
     /// body.
     pub regions: Vec<Region>,
+}
+
+impl std::fmt::Debug for Penetration {
+    /// The numbers of vertices and regions, however many there are.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut short = f.debug_struct("Penetration");
+        short.field("n_inside", &self.inside.each_ref().map(Vec::len));
+        short.field("n_regions", &self.regions.len());
+        short.field("first", &self.regions.first());
+        short.finish_non_exhaustive()
+    }
 }
 
 impl Penetration {

@@ -19,7 +19,7 @@ use crate::sink::{filled, grow};
 pub(super) const WHAT: &str = "regions of contact";
 
 /// Connected contacts of two bodies, or within one.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Region {
     /// The bodies by their [`index`](crate::BodyId::index).
@@ -52,6 +52,21 @@ pub struct Region {
     /// is a region of negative volume. `None` unless [`Penetration`](super::Penetration) found the region. Also `None` if
     /// the bodies meet other than by edges that cross faces (vertices on faces, edges on edges, common planes).
     pub volume: Option<f64>,
+}
+
+impl std::fmt::Debug for Region {
+    /// Numbers of contacts and vertices in place of their lists.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut short = f.debug_struct("Region");
+        short.field("bodies", &self.bodies);
+        short.field("n_contacts", &self.contacts.len());
+        short.field("n_inside", &self.inside.each_ref().map(Vec::len));
+        short.field("position", &self.position);
+        short.field("normal", &self.normal);
+        short.field("depth", &self.depth);
+        short.field("volume", &self.volume);
+        short.finish_non_exhaustive()
+    }
 }
 
 /// Joins the points of each contact.

@@ -72,13 +72,18 @@ impl Detector {
         }
         self.last = Last::Measured;
         let Detector {
+            touching,
             distances,
             runner,
+            cpu,
+            settings,
             measured,
             ..
         } = self;
         runner.measure(measured, plan.limits, |workers, stats| {
-            let nearest = distances.nearest(scene, &plan, workers, control)?;
+            let nearest = distances.nearest(scene, &plan, workers, control, |ids| {
+                touching.lowest(scene, ids, control, (runner, cpu, settings))
+            })?;
             stats.bytes_held = distances.bytes();
             Ok(nearest)
         })

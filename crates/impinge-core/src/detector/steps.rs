@@ -11,6 +11,7 @@ use crate::found::{Found, FoundByKind};
 use crate::impacts::{Impact, Impacts};
 use crate::near::NearPairs;
 use crate::pair_kind::PairKind;
+use crate::pairs::Primitive;
 use crate::plan::Plan;
 use crate::progress::Control;
 use crate::query::SharedVertex;
@@ -25,6 +26,8 @@ use impinge_exact::Contact;
 /// The memory kept from step to step.
 pub(super) struct StepMemory {
     pub contacts: Contacts,
+    /// Whether the start of the last step intersects, if that was asked.
+    start_intersects: Option<bool>,
     pub candidates: Candidates,
     pub near: NearPairs,
     pub clusters: StepClusters,
@@ -34,6 +37,7 @@ impl StepMemory {
     pub fn new(settings: &Settings) -> Self {
         StepMemory {
             contacts: Contacts::default(),
+            start_intersects: None,
             candidates: Candidates::default(),
             near: NearPairs::default(),
             clusters: StepClusters::new(settings.instruction_set),
@@ -182,9 +186,16 @@ impl Detector {
         control: &Control<'_>,
     ) -> Result<Option<Impact>, Error> {
         let plan = Plan::contacts(scene, step, Goal::Earliest, self.limits_of_steps())?;
-        self.find_contacts(scene, &plan, control, (None, false))?;
+        let start = self.verify(scene, step, control)?;
+        self.find_contacts(scene, &plan, control, (start, false))?;
         // The first contact and all whose times may round to the same time have been found, and some later ones.
         Ok(self.steps.contacts.first(plan.toi))
+    }
+
+    /// Whether elements intersect at the start of the step that was asked about last; `None` if that was not asked, which
+    /// only [`Start::Verify`] does.
+    pub fn start_intersects(&self) -> Option<bool> {
+        self.steps.start_intersects
     }
 
     /// Whether nothing touches during the step. With [`Start::Skip`], pairs that touch at its start do not count.
@@ -225,12 +236,26 @@ impl Detector {
         step: &Step,
         control: &Control<'_>,
     ) -> Result<Option<StartAnswer>, Error> {
+        self.steps.start_intersects = None;
         if step.start != Start::Verify {
             return Ok(None);
         }
         let start = Instant::now();
         let query = step.query.clone().shared_vertex(SharedVertex::Resolve);
-        let intersects = self.any_with(scene, &query, control)?;
+        let intersects = match &step.filter {
+            None => self.any_with(scene, &query, control)?,
+            Some(filter) => {
+                let corners = |of: Primitive| {
+                    let body = scene.body(of.body)?;
+                    Ok::<_, Error>((of.body, body.elements().corners(of.primitive as usize)))
+                };
+                let mut pairs = self.detect_with(scene, &query, control)?.iter();
+                pairs.try_fold(false, |any, (a, b)| {
+                    Ok::<_, Error>(any || filter.passes([corners(a)?, corners(b)?]))
+                })?
+            }
+        };
+        self.steps.start_intersects = Some(intersects);
         let ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(Some(StartAnswer { intersects, ms }))
     }

@@ -15,6 +15,7 @@ use std::collections::{BinaryHeap, HashMap};
 use super::axes::{Axes, View};
 use super::features::{Gap, gap};
 use super::scale::Scale;
+use super::shared::shared_point;
 use crate::hull::Extent;
 
 use super::many::{Allowance, Bodies, are_apart, meet};
@@ -61,9 +62,9 @@ pub struct Nearest {
     /// The primitive of the first body, and of the second. Of several pairs at the same computed distance, the
     /// lowest by the first body's primitive and then by the second's.
     pub primitives: [u32; 2],
-    /// The point of each primitive that is nearest to the other, rounded. `None` if they share points: see
-    /// [`contact`](crate::contact) for that.
-    pub points: Option<[[f64; 3]; 2]>,
+    /// The point of each primitive that is nearest to the other, rounded. Where they touch, a point that they share, twice: see
+    /// [`contact`](crate::contact) for all of them.
+    pub points: [[f64; 3]; 2],
 }
 
 impl Distances {
@@ -102,23 +103,36 @@ impl Distances {
         };
         let scale = Scale::of(boxed.fold(0.0, f64::max), exact);
         let most = (scale, f64::INFINITY);
-        let found = match self.search(scene, [a, b], most, MOST_OVERLAPPING, control)? {
-            Some(found) => found,
-            None => match touching()? {
-                Some(primitives) => {
-                    return Ok(Some(Nearest {
-                        distance: 0.0,
-                        bodies: [a, b],
-                        primitives,
-                        points: None,
-                    }));
-                }
-                None => self
-                    .search(scene, [a, b], most, u64::MAX, control)?
-                    .flatten(),
-            },
-        };
+        let found = self.search_or_ask(scene, [a, b], most, control, touching)?;
         Ok(found.map(|(_, nearest)| nearest))
+    }
+
+    /// As `search`, but where very many boxes overlap `touching` is asked first for the lowest pair that touches.
+    fn search_or_ask(
+        &mut self,
+        scene: &Scene,
+        ids: [BodyId; 2],
+        most: (Scale, f64),
+        control: &Control<'_>,
+        touching: impl FnOnce() -> Result<Option<[u32; 2]>, Error>,
+    ) -> Result<Found, Error> {
+        if let Some(found) = self.search(scene, ids, most, MOST_OVERLAPPING, control)? {
+            return Ok(found);
+        }
+        let Some(primitives) = touching()? else {
+            let found = self.search(scene, ids, most, u64::MAX, control)?;
+            return Ok(found.flatten());
+        };
+        let bodies = [scene.body(ids[0])?, scene.body(ids[1])?];
+        let elements = primitives.map(ElementIx::new);
+        self.last.insert(ids.map(BodyId::index), elements);
+        let nearest = Nearest {
+            distance: 0.0,
+            bodies: ids,
+            primitives,
+            points: [where_they_touch(bodies, elements); 2],
+        };
+        Ok(Some((0.0, nearest)))
     }
 
     /// The nearest elements of two bodies that are known, and the square of their distance in a scale, if that is at most `most`. `None` if
@@ -153,13 +167,14 @@ impl Distances {
     /// distance the lowest.
     ///
     /// # Errors
-    /// Cancellation.
+    /// Cancellation; errors of `touching`, which is asked as in [`between`](Distances::between).
     pub fn nearest(
         &mut self,
         scene: &Scene,
         frame: &Plan,
         workers: &Workers,
         control: &Control<'_>,
+        mut touching: impl FnMut([BodyId; 2]) -> Result<Option<[u32; 2]>, Error>,
     ) -> Result<Option<Nearest>, Error> {
         self.trees.retain(|&slot, _| scene.holds(slot));
         let mut many = std::mem::take(&mut self.many);
@@ -199,8 +214,9 @@ impl Distances {
             for id in ids {
                 self.know(scene, id, workers)?;
             }
-            let found = self.search(scene, ids, (scale, most), u64::MAX, control)?;
-            if let Some(found) = found.flatten()
+            let ask = || touching(ids);
+            let found = self.search_or_ask(scene, ids, (scale, most), control, ask)?;
+            if let Some(found) = found
                 && best.is_none_or(|(squared, best)| {
                     found.0 < squared || (found.0 == squared && ids < best.bodies)
                 })
@@ -214,13 +230,22 @@ impl Distances {
                 ask(&mut best, &many, [a, b].map(LayerIx::from_usize))?;
             }
             let mut overlapping = Vec::new();
+            // If two touch, only lower ones that touch are left to be found.
+            let least = touching_ones(best);
             many.overlapping(|pair| {
-                overlapping.push(pair);
+                let is_lower = |least: [BodyId; 2]| pair.map(|layer| frame.layer(layer).id) < least;
+                if least.is_none_or(is_lower) {
+                    overlapping.push(pair);
+                }
                 Ok::<bool, Error>(false)
             })?;
             overlapping.sort_unstable();
             for pair in overlapping {
                 ask(&mut best, &many, pair)?;
+            }
+            // Bodies whose boxes are apart do not touch.
+            if touching_ones(best).is_some() {
+                return Ok(());
             }
             let mut apart = many.apart();
             let most = |best: Option<(f64, Nearest)>| match best {
@@ -472,14 +497,19 @@ impl DistanceSearch<'_> {
             }
         }
         let best = found.best;
+        if best.primitives == [NONE; 2] {
+            return Ok(Some(None));
+        }
         let nearest = Nearest {
             distance: self.scale.length_back(best.squared.sqrt()),
             bodies: self.ids,
             primitives: best.primitives.map(ElementIx::raw),
-            points: (best.points).map(|points| points.map(|point| self.scale.point_back(point))),
+            points: match best.points {
+                Some(points) => points.map(|point| self.scale.point_back(point)),
+                None => [where_they_touch(self.bodies, best.primitives); 2],
+            },
         };
-        let is_found = best.primitives != [NONE; 2];
-        Ok(Some(is_found.then_some((best.squared, nearest))))
+        Ok(Some(Some((best.squared, nearest))))
     }
 
     /// The box of a node of the first or the second body.
@@ -684,6 +714,18 @@ impl DistanceSearch<'_> {
             ..found
         }
     }
+}
+
+/// The two nearest bodies, if they touch.
+fn touching_ones(best: Option<(f64, Nearest)>) -> Option<[BodyId; 2]> {
+    let touches = best.filter(|(squared, _)| *squared == 0.0);
+    touches.map(|(_, nearest)| nearest.bodies)
+}
+
+/// A point that two elements share.
+fn where_they_touch(bodies: [&Body; 2], elements: [ElementIx; 2]) -> Point {
+    let [a, b] = [0, 1].map(|side| corners(bodies[side], elements[side]));
+    shared_point(bodies.map(Body::kind), [&a, &b])
 }
 
 /// The largest squared distance of boxes that may hold a pair as near as the best.

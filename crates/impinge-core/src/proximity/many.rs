@@ -26,6 +26,8 @@ use super::tree::{Node, Tree, box_of, corners};
 /// A tree over the boxes of the bodies of a frame.
 #[derive(Debug, Default)]
 pub(super) struct Bodies {
+    /// The stamp of the scene.
+    scene: u64,
     /// The slot and the stamp of the positions of each layer's body.
     stamps: Vec<(u32, u64)>,
     boxes: Vec<Bounds>,
@@ -46,6 +48,11 @@ impl Bodies {
     /// Brings boxes and tree up to the scene; the boxes of bodies that have not moved are kept.
     pub fn update(&mut self, scene: &Scene, frame: &Plan) {
         let n = frame.layers.len();
+        let slots = frame.layers.iter().map(|layer| layer.id.slot());
+        if self.scene == scene.stamp() && slots.eq(self.stamps.iter().map(|&(slot, _)| slot)) {
+            return;
+        }
+        self.scene = scene.stamp();
         let mut is_new = self.stamps.len() != n;
         let mut has_moved = is_new;
         self.stamps.resize(n, (u32::MAX, 0));

@@ -5,6 +5,7 @@ mod distance;
 mod features;
 mod many;
 mod scale;
+mod shared;
 mod tree;
 
 pub(crate) use distance::Distances;

@@ -92,7 +92,7 @@ impl Recorded {
         let mut ends = Vec::new();
         for frame in frames {
             let path = file(&format!("ccd/{name}/frames/{frame}.ply"))?;
-            let mesh = impinge_io::read(&path, &ReadOptions::default()).unwrap();
+            let mesh = impinge_io::read(&path, &ReadOptions::as_they_are()).unwrap();
             let Elements::Triangles(found) = mesh.elements else {
                 panic!("a surface");
             };

@@ -18,6 +18,7 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
     // The greatest index of all faces and its place: checked once all vertices are known.
     let mut greatest = (0, Place::File);
     let mut has_objects = false;
+    let mut n_known = 0u64;
     let mut text = Text::new(name, bytes);
     while let Some(line) = text.line() {
         let place = line.place();
@@ -27,7 +28,9 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
             number: line.number,
         };
         let mut words = statement.before(b'#').words();
-        match words.next() {
+        let word = words.next();
+        n_known += u64::from(word.is_some_and(|word| STATEMENTS.contains(&word)));
+        match word {
             Some(b"v") => {
                 let mut position = [0.0; 3];
                 for (axis, c) in ["x", "y", "z"].into_iter().zip(&mut position) {
@@ -90,6 +93,9 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
             _ => {}
         }
     }
+    if n_known == 0 && !bytes.is_ascii() {
+        return Err(name.syntax(Place::File, "the text of an OBJ file", "other data"));
+    }
     check_n_vertices(name, Place::File, positions.len() as u64)?;
     parts.positions = Positions::F64(positions);
     if greatest.0 > 0 {
@@ -97,6 +103,11 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
     }
     Ok(parts)
 }
+
+/// Words that begin the lines of a file; one without any of them is none.
+const STATEMENTS: [&[u8]; 12] = [
+    b"v", b"vn", b"vt", b"f", b"o", b"g", b"l", b"p", b"s", b"mtllib", b"usemtl", b"vp",
+];
 
 /// The vertex index of a corner: `7`, `7/1`, `7//3` or `7/1/3`.
 fn corner(name: Name, place: Place, word: &[u8]) -> Result<i64, Error> {

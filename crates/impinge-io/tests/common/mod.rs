@@ -37,9 +37,15 @@ impl Sample {
             let cut = bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len());
             let cells = bytes.get(cut + 1..).unwrap_or_default();
             let (node, ele) = (format!("{}.node", self.name), format!("{}.ele", self.name));
-            return read_tetgen_bytes(&bytes[..cut], &node, cells, &ele, &ReadOptions::default());
+            return read_tetgen_bytes(
+                &bytes[..cut],
+                &node,
+                cells,
+                &ele,
+                &ReadOptions::as_they_are(),
+            );
         }
-        read_bytes(bytes, self.format, self.name, &ReadOptions::default())
+        read_bytes(bytes, self.format, self.name, &ReadOptions::as_they_are())
     }
 }
 

@@ -9,7 +9,7 @@ fn gltf_transforms_multiply_down_the_tree() {
         &glb_of(&gltf_json("", turned), &gltf_buffer()),
         Format::Gltf,
         "g",
-        &ReadOptions::default(),
+        &ReadOptions::as_they_are(),
     )
     .or_show();
     let Positions::F64(positions) = &mesh.positions else {
@@ -27,7 +27,7 @@ fn gltf_transforms_multiply_down_the_tree() {
         &glb_of(&gltf_json("", far), &gltf_buffer()),
         Format::Gltf,
         "g",
-        &ReadOptions::default(),
+        &ReadOptions::as_they_are(),
     )
     .or_show();
     assert_eq!(
@@ -44,7 +44,7 @@ fn gltf_transforms_multiply_down_the_tree() {
         &glb_of(&json, &gltf_buffer()),
         Format::Gltf,
         "g",
-        &ReadOptions::default(),
+        &ReadOptions::as_they_are(),
     )
     .or_show();
     assert_eq!((mesh.n_vertices(), mesh.n_primitives()), (10, 6));
@@ -62,7 +62,7 @@ fn gltf_modes_shared_positions_and_external_buffers() {
     std::fs::write(folder.path().join("my data.bin"), gltf_buffer()).unwrap();
     let path = folder.path().join("a.gltf");
     std::fs::write(&path, &json).unwrap();
-    let (mesh, summary) = read_with_summary(&path, &ReadOptions::default()).or_show();
+    let (mesh, summary) = read_with_summary(&path, &ReadOptions::as_they_are()).or_show();
     assert_eq!(mesh.n_vertices(), 5);
     let [a, b, c] = TRIANGLES;
     assert_eq!(
@@ -88,7 +88,7 @@ fn gltf_modes_shared_positions_and_external_buffers() {
     );
     for outside in ["/etc/passwd", "file:///etc/passwd", "http://a/b"] {
         std::fs::write(&path, json.replace("my%20data.bin", outside)).unwrap();
-        let error = read(&path, &ReadOptions::default()).unwrap_err();
+        let error = read(&path, &ReadOptions::as_they_are()).unwrap_err();
         assert!(matches!(error, Error::Outside { .. }), "{error}");
     }
 }
@@ -103,7 +103,7 @@ fn gltf_sparse_and_quantized() {
         &glb_of(&sparse, &gltf_buffer()),
         Format::Gltf,
         "g",
-        &ReadOptions::default(),
+        &ReadOptions::as_they_are(),
     )
     .or_show();
     // The second index is 2, and the second position (1, 0, 0).
@@ -121,7 +121,7 @@ fn gltf_sparse_and_quantized() {
         &glb_of(&quantized, &buffer),
         Format::Gltf,
         "g",
-        &ReadOptions::default(),
+        &ReadOptions::as_they_are(),
     )
     .or_show();
     assert_eq!(mesh.positions.get(1), Some([1.0, -1.0, -1.0]));
@@ -193,7 +193,7 @@ fn gltf_errors() {
             &glb_of(&broken, &gltf_buffer()),
             Format::Gltf,
             "file",
-            &ReadOptions::default(),
+            &ReadOptions::as_they_are(),
         )
         .unwrap_err();
         assert_eq!(error.to_string(), expected);
@@ -212,7 +212,7 @@ fn gltf_instances_are_held_to_the_budget() {
         .replace(r#"{"mesh":0}"#, &nodes)
         .replace(r#""nodes":[0]"#, &format!(r#""nodes":[{}]"#, all.join(",")));
     let glb = glb_of(&json, &gltf_buffer());
-    let options = ReadOptions::default();
+    let options = ReadOptions::as_they_are();
     assert_eq!(
         read_bytes(&glb, Format::Gltf, "g", &options)
             .or_show()

@@ -13,7 +13,7 @@ use impinge_io::{
 };
 
 fn load(format: Format, text: &str) -> Result<Mesh, Error> {
-    read_bytes(text.as_bytes(), format, "file", &ReadOptions::default())
+    read_bytes(text.as_bytes(), format, "file", &ReadOptions::as_they_are())
 }
 
 fn triangles(mesh: &Mesh) -> &[[u32; 3]] {
@@ -88,7 +88,7 @@ fn by_path_and_with_windows_line_ends() {
             .replace('\n', "\r\n");
         std::fs::write(&path, text).unwrap();
         assert_eq!(
-            read(&path, &ReadOptions::default()).unwrap(),
+            read(&path, &ReadOptions::as_they_are()).unwrap(),
             sample.mesh,
             "{}",
             sample.name
@@ -98,20 +98,31 @@ fn by_path_and_with_windows_line_ends() {
 
 #[test]
 fn unknown_extension_and_missing_file() {
-    let message = read("a.xyz".as_ref(), &ReadOptions::default())
+    let message = read("a.xyz".as_ref(), &ReadOptions::as_they_are())
         .unwrap_err()
         .to_string();
     assert!(
         message.starts_with("a.xyz: no mesh format has the extension 'xyz' (known: obj, ply"),
         "{message}"
     );
-    let message = read("no/such/file.ply".as_ref(), &ReadOptions::default())
+    let message = read("no/such/file.ply".as_ref(), &ReadOptions::as_they_are())
         .unwrap_err()
         .to_string();
     assert!(
         message.starts_with("no/such/file.ply: cannot read: "),
         "{message}"
     );
+}
+
+#[test]
+fn readers_weld_unless_told_not_to() {
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 4 6 5\n";
+    let n = |options: &ReadOptions| {
+        let mesh = read_bytes(text.as_bytes(), Format::Obj, "file", options).or_show();
+        mesh.n_vertices()
+    };
+    assert_eq!(n(&ReadOptions::default()), 4);
+    assert_eq!(n(&ReadOptions::as_they_are()), 6);
 }
 
 /// Panics with the error, if there is one.

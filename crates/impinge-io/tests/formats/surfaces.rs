@@ -17,9 +17,13 @@ fn text_is_read_as_f64_without_rounding() {
 #[test]
 fn obj_polygons_negative_indices_and_continued_lines() {
     let obj = "v 0 0 0 1.0\nv 1 0 0\nv 1 1 0 0.5 0.5 0.5\nvt 0 0\nf 1/1/1 2//3 3/1 4/2 # five is behind\nv 0 1 0\ng other\nf -4 -3\\\n -1\nl 1 2\np 1\nusemtl x\n";
-    let (mesh, summary) =
-        read_bytes_with_summary(obj.as_bytes(), Format::Obj, "o", &ReadOptions::default())
-            .or_show();
+    let (mesh, summary) = read_bytes_with_summary(
+        obj.as_bytes(),
+        Format::Obj,
+        "o",
+        &ReadOptions::as_they_are(),
+    )
+    .or_show();
     assert_eq!(triangles(&mesh), [[0, 1, 2], [0, 2, 3], [0, 1, 3]]);
     assert_eq!(
         (
@@ -110,7 +114,7 @@ fn byte_order_marks_hide_no_vertex() {
 #[test]
 fn obj_faces_of_one_or_two_corners_are_counted_and_skipped() {
     let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\nf 1 2 3\nf 3\nf -1/1 -2/1\n";
-    let options = ReadOptions::default();
+    let options = ReadOptions::as_they_are();
     let (mesh, summary) =
         read_bytes_with_summary(obj.as_bytes(), Format::Obj, "file", &options).or_show();
     assert_eq!(triangles(&mesh), [[0, 1, 2]]);
@@ -148,8 +152,9 @@ fn binary_off(keyword: &str, vertices: &[&[f32]], faces: &[(&[i32], &[f32])]) ->
 
 #[test]
 fn off_binary() {
-    let read =
-        |bytes: &[u8]| read_bytes_with_summary(bytes, Format::Off, "file", &ReadOptions::default());
+    let read = |bytes: &[u8]| {
+        read_bytes_with_summary(bytes, Format::Off, "file", &ReadOptions::as_they_are())
+    };
     let (a, b, c) = ([0.5, -0.0, 0.0], [1.0, 0.0, 1e-40], [0.0, 1.0, 3e38]);
     let faces: [(&[i32], &[f32]); 3] = [
         (&[0, 1, 2], &[0.5; 4]),
@@ -268,9 +273,13 @@ fn ply_strips_tetrahedra_and_other_elements() {
     let strips = format!(
         "{head}element tristrips 1\nproperty list int int vertex_indices\nelement edge 1\nproperty int a\nend_header\n{body}8 0 1 2 3 -1 4 3 2\n5\n"
     );
-    let (mesh, summary) =
-        read_bytes_with_summary(strips.as_bytes(), Format::Ply, "p", &ReadOptions::default())
-            .or_show();
+    let (mesh, summary) = read_bytes_with_summary(
+        strips.as_bytes(),
+        Format::Ply,
+        "p",
+        &ReadOptions::as_they_are(),
+    )
+    .or_show();
     assert_eq!(triangles(&mesh), [[0, 1, 2], [2, 1, 3], [4, 3, 2]]);
     assert_eq!(mesh.positions.get(1), Some([1.0, 0.0, 0.0]));
     assert_eq!(mesh.positions.get(3), Some([0.0, 0.0, 1.0]));
@@ -279,9 +288,13 @@ fn ply_strips_tetrahedra_and_other_elements() {
     let tets = format!(
         "{head}element face 1\nproperty uchar c\nproperty list uchar int vertex_index\nelement tetra 2\nproperty list uchar int vertex_indices\nend_header\n{body}7 4 0 1 2 3\n4 0 1 2 3\n4 4 3 2 1\n"
     );
-    let (mesh, summary) =
-        read_bytes_with_summary(tets.as_bytes(), Format::Ply, "p", &ReadOptions::default())
-            .or_show();
+    let (mesh, summary) = read_bytes_with_summary(
+        tets.as_bytes(),
+        Format::Ply,
+        "p",
+        &ReadOptions::as_they_are(),
+    )
+    .or_show();
     assert_eq!(
         mesh.elements,
         Elements::Tetrahedra(vec![[0, 1, 2, 3], [4, 3, 2, 1]])
@@ -292,7 +305,7 @@ fn ply_strips_tetrahedra_and_other_elements() {
     );
     let options = ReadOptions {
         prefer: Prefer::Triangles,
-        ..ReadOptions::default()
+        ..ReadOptions::as_they_are()
     };
     let (mesh, summary) =
         read_bytes_with_summary(tets.as_bytes(), Format::Ply, "p", &options).or_show();
@@ -300,7 +313,7 @@ fn ply_strips_tetrahedra_and_other_elements() {
     assert_eq!(summary.n_tetrahedra_skipped, 2);
     let options = ReadOptions {
         prefer: Prefer::Tetrahedra,
-        ..ReadOptions::default()
+        ..ReadOptions::as_they_are()
     };
     let error = read_bytes(strips.as_bytes(), Format::Ply, "p", &options).unwrap_err();
     assert!(
@@ -326,7 +339,7 @@ fn ply_binary_with_properties_of_all_kinds_around() {
     ply.extend([7, 4, 0, 0, 0, 1, 0, 2, 0, 3, 1, 5]);
     ply.extend([7, 3, 0, 3, 0, 1, 0, 2, 0]);
     ply.extend([0xff, 0xfe, 200, 0xff, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 1]);
-    let mesh = read_bytes(&ply, Format::Ply, "p", &ReadOptions::default()).or_show();
+    let mesh = read_bytes(&ply, Format::Ply, "p", &ReadOptions::as_they_are()).or_show();
     assert_eq!(
         mesh.positions,
         Positions::F32(vec![
@@ -376,7 +389,7 @@ fn stl_of_several_solids() {
     assert_eq!(triangles(&mesh), [[0, 1, 2], [3, 4, 5]]);
     let options = ReadOptions {
         weld: true,
-        ..ReadOptions::default()
+        ..ReadOptions::as_they_are()
     };
     let (mesh, summary) = read_bytes_with_summary(
         format!("solid a\n{facet}\n{facet}\nendsolid").as_bytes(),
@@ -398,5 +411,18 @@ fn stl_of_several_solids() {
     assert_eq!(
         message(Format::Stl, "garbage"),
         "file: byte 0: the title: 80 bytes are needed, but 7 are left"
+    );
+}
+
+#[test]
+fn bytes_that_are_no_obj_file_are_refused_as_such() {
+    let noise: Vec<u8> = (0..4000u32)
+        .map(|i| ((i * i * 7 + i * 131) >> 3) as u8)
+        .collect();
+    let error = read_bytes(&noise, Format::Obj, "noise.obj", &ReadOptions::default()).unwrap_err();
+    let text = error.to_string();
+    assert!(
+        text.starts_with("noise.obj: expected the text of an OBJ file"),
+        "{text}"
     );
 }

@@ -5,9 +5,13 @@ use crate::*;
 #[test]
 fn msh_tags_with_gaps_are_numbered_in_order() {
     let msh = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n70 0 0 0\n7 1 0 0\n900 0 1 0\n-8 0 0 1\n$EndNodes\n$Elements\n3\n1 2 2 0 0 70 900 7\n2 3 2 0 0 7 70 900 -8\n3 1 0 7 70\n$EndElements\n";
-    let (mesh, summary) =
-        read_bytes_with_summary(msh.as_bytes(), Format::Msh, "m", &ReadOptions::default())
-            .or_show();
+    let (mesh, summary) = read_bytes_with_summary(
+        msh.as_bytes(),
+        Format::Msh,
+        "m",
+        &ReadOptions::as_they_are(),
+    )
+    .or_show();
     assert_eq!(triangles(&mesh), [[0, 2, 1], [1, 0, 2], [1, 2, 3]]);
     assert_eq!(mesh.positions.get(3), Some([0.0, 0.0, 1.0]));
     assert_eq!((summary.n_lines_skipped, summary.n_polygons_fanned), (1, 1));
@@ -48,9 +52,13 @@ fn msh_parametric_nodes() {
 fn vtk_cells_of_all_kinds() {
     let vtk = "# vtk DataFile Version 2.0\n\nascii\ndataset unstructured_grid\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 1 1 0\nCELLS 7 27\n\
         3 0 1 2\n4 0 1 2 3\n4 0 1 2 3\n4 0 1 2 3\n1 0\n2 0 1\n2 1 2\nCELL_TYPES 7\n5 8 9 6 1 3 3\nPOINT_DATA 4\nanything";
-    let (mesh, summary) =
-        read_bytes_with_summary(vtk.as_bytes(), Format::Vtk, "v", &ReadOptions::default())
-            .or_show();
+    let (mesh, summary) = read_bytes_with_summary(
+        vtk.as_bytes(),
+        Format::Vtk,
+        "v",
+        &ReadOptions::as_they_are(),
+    )
+    .or_show();
     assert_eq!(
         triangles(&mesh),
         [
@@ -239,7 +247,7 @@ fn medit_errors_and_sections() {
         format!("{start}Corners\n2\n1 2\nQuadrilaterals 1\n1 2 4 3 7\nNormals 1\n0 0 1e-3\nTriangles 1\n1 2 3 0\nHexahedra 0\nEnd\nTriangles 9").as_bytes(),
         Format::Medit,
         "m",
-        &ReadOptions::default(),
+        &ReadOptions::as_they_are(),
     )
     .or_show();
     assert_eq!(triangles(&mesh), [[0, 1, 3], [0, 3, 2], [0, 1, 2]]);
@@ -283,7 +291,7 @@ fn tetgen_files_find_each_other() {
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
     write("a.node", "4 3 0 0\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n");
     write("a.face", "1 1\n1 1 2 3 -1\n");
-    let options = ReadOptions::default();
+    let options = ReadOptions::as_they_are();
     let mesh = read(&folder.path().join("a.node"), &options).or_show();
     assert_eq!(triangles(&mesh), [[0, 1, 2]]);
     write("a.ele", "1 4 0\n1 4 3 2 1\n");

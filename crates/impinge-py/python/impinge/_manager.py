@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator
 from functools import cached_property
-from typing import Any
+from itertools import count
+from typing import Any, NamedTuple
+from weakref import ref
 
 import numpy as np
 import numpy.typing as npt
@@ -70,23 +72,35 @@ class DistanceData:
         names: tuple[_Name, _Name],
         indices: tuple[int, int],
         distance: float,
-        points: tuple[_Vector, _Vector] | None,
+        points: tuple[_Vector, _Vector],
     ) -> None:
         self.names = set(names)
         self.distance = distance
         self._indices = dict(zip(names, indices))
-        self._points = {} if points is None else dict(zip(names, points))
+        self._points = dict(zip(names, points))
 
     def index(self, name: _Name) -> int:
         """The face of the object of this name."""
         return self._indices[name]
 
-    def point(self, name: _Name) -> _Vector | None:
-        """The point of this object that is nearest to the other, or deepest in it; `None` where it is unknown."""
-        return self._points.get(name)
+    def point(self, name: _Name) -> _Vector:
+        """The point of this object that is nearest to the other, or deepest in it; where it is unknown how deep, a point that both share."""
+        return self._points[name]
 
     def __repr__(self) -> str:
         return f"DistanceData({self.distance}, {self._indices})"
+
+
+class _Object(NamedTuple):
+    """An object of a manager. Its stamps change when it gets another mesh, and when it is moved."""
+
+    body: Body
+    transform: _Array | None
+    mesh_stamp: int
+    stamp: int
+
+
+_new_stamp = count(1).__next__
 
 
 class CollisionManager:
@@ -121,22 +135,24 @@ class CollisionManager:
     """
 
     def __init__(self, **settings: Any) -> None:
-        self._scene = Scene()
-        self._detector = Detector(**settings)
-        self._bodies: dict[_Name, Body] = {}
-        #: By the numbers of bodies.
-        self._convex: dict[int, bool] = {}
+        self._settings = settings
+        self._objects: dict[_Name, _Object] = {}
+        #: Changes with any object.
+        self._stamp = _new_stamp()
+        self._own = _Asked(settings)
+        #: With the objects of the manager that was asked about last.
+        self._joint: _Joint | None = None
 
     @property
     def names(self) -> list[_Name]:
         """list : the names of all objects, in the order in which they were added."""
-        return list(self._bodies)
+        return list(self._objects)
 
     def __len__(self) -> int:
-        return len(self._bodies)
+        return len(self._objects)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._bodies
+        return name in self._objects
 
     def __repr__(self) -> str:
         return f"CollisionManager({len(self)} objects)"
@@ -158,10 +174,13 @@ class CollisionManager:
         ValueError, TypeError
             As `Scene.add` and `Scene.set_transform`; nothing is changed then.
         """
-        body = _add(self._scene, mesh, transform)
-        if name in self._bodies:
+        # It is kept, and the caller may go on to write to it.
+        matrix = None if transform is None else np.array(transform)
+        body = self._own.add(name, mesh, matrix)
+        if name in self._objects:
             self.remove_object(name)
-        self._bodies[name] = body
+        self._stamp = _new_stamp()
+        self._objects[name] = _Object(body, matrix, self._stamp, self._stamp)
 
     def remove_object(self, name: _Name) -> None:
         """Removes an object.
@@ -171,10 +190,9 @@ class CollisionManager:
         ValueError
             No object has the name.
         """
-        body = self._body(name)
-        self._scene.remove(body)
-        self._convex.pop(int(body), None)
-        del self._bodies[name]
+        self._own.remove(self._body(name))
+        del self._objects[name]
+        self._stamp = _new_stamp()
 
     def set_transform(self, name: _Name, transform: _Array) -> None:
         """Moves an object from its rest positions, as `Scene.set_transform` does.
@@ -189,7 +207,10 @@ class CollisionManager:
         ValueError
             No object has the name; a matrix that `Scene.set_transform` refuses.
         """
-        self._scene.set_transform(self._body(name), transform)
+        matrix = np.array(transform)
+        self._own.scene.set_transform(self._body(name), matrix)
+        self._stamp = _new_stamp()
+        self._objects[name] = self._objects[name]._replace(transform=matrix, stamp=self._stamp)
 
     def in_collision_internal(self, return_names: bool = False, return_data: bool = False) -> Any:
         """Whether any two objects collide.
@@ -207,7 +228,7 @@ class CollisionManager:
         list of ContactData
             Of two convex objects the deepest contact, of others all pairs of faces that share a point. With `return_data`.
         """
-        return self._collisions(None, _sorted, return_names, return_data)
+        return self._own.collisions(None, _sorted, return_names, return_data)
 
     def in_collision_single(
         self,
@@ -233,8 +254,11 @@ class CollisionManager:
         list of ContactData
             As of `in_collision_internal`. The mesh goes by the name ``"__external"``. With `return_data`.
         """
-        with _Guests(self, [("__external", mesh, transform)]) as guests:
-            return self._collisions(guests, lambda a, _: a, return_names, return_data)
+        guest = self._own.add("__external", mesh, transform)
+        try:
+            return self._own.collisions(guest, lambda a, _: a, return_names, return_data)
+        finally:
+            self._own.remove(guest)
 
     def in_collision_other(
         self, other_manager: CollisionManager, return_names: bool = False, return_data: bool = False
@@ -255,8 +279,7 @@ class CollisionManager:
         list of ContactData
             As of `in_collision_internal`. With `return_data`.
         """
-        with _Guests(self, other_manager._meshes()) as guests:
-            return self._collisions(guests, lambda a, b: (a, b), return_names, return_data)
+        return self._with(other_manager).collisions(None, _both, return_names, return_data)
 
     def min_distance_internal(
         self, name: _Name | None = None, return_names: bool = False, return_data: bool = False
@@ -279,8 +302,8 @@ class CollisionManager:
         DistanceData
             With `return_data`.
         """
-        across = None if name is None else {name: self._body(name)}
-        return self._distance(across, _sorted, return_names, return_data)
+        body = None if name is None else self._body(name)
+        return self._own.distance(body, _sorted, return_names, return_data)
 
     def min_distance_single(
         self,
@@ -307,8 +330,11 @@ class CollisionManager:
         DistanceData
             The mesh goes by the name ``"__external"``. With `return_data`.
         """
-        with _Guests(self, [("__external", mesh, transform)]) as guests:
-            return self._distance(guests, lambda a, _: a, return_name, return_data)
+        guest = self._own.add("__external", mesh, transform)
+        try:
+            return self._own.distance(guest, lambda a, _: a, return_name, return_data)
+        finally:
+            self._own.remove(guest)
 
     def min_distance_other(
         self, other_manager: CollisionManager, return_names: bool = False, return_data: bool = False
@@ -330,60 +356,86 @@ class CollisionManager:
         DistanceData
             With `return_data`.
         """
-        with _Guests(self, other_manager._meshes()) as guests:
-            return self._distance(guests, lambda a, b: (a, b), return_names, return_data)
+        return self._with(other_manager).distance(None, _both, return_names, return_data)
 
-    def _meshes(self) -> list[tuple[_Name, Any, None]]:
-        scene = self._scene
-        return [
-            (name, (scene.positions(body), scene.elements(body), scene.kind(body)), None)
-            for name, body in self._bodies.items()
-        ]
+    def _body(self, name: _Name) -> Body:
+        try:
+            return self._objects[name].body
+        except KeyError:
+            raise ValueError(f"name: there is no object {name!r}") from None
 
-    def _sides(
-        self, across: dict[_Name, Body] | None
-    ) -> Callable[[int, int], tuple[_Name, _Name, bool]]:
-        """Names two bodies by their numbers, and says whether they come in the other order: those of `across` come last, else
-        that which was added later."""
-        names = {int(body): name for name, body in self._bodies.items()}
-        last = {int(body): name for name, body in (across or {}).items()}
-        seconds = last or names
-        order = {number: ix for ix, number in enumerate(names)}
+    def _with(self, other: CollisionManager) -> _Asked:
+        """The objects of both managers, of which pairs of one of each are asked about."""
+        joint = self._joint
+        if joint is None or joint.other() is not other:
+            joint = self._joint = _Joint(self._settings, other)
+        joint.update(self, other)
+        return joint
 
-        def sides(a: int, b: int) -> tuple[_Name, _Name, bool]:
-            swapped = a in last if last else order[a] > order[b]
-            first, second = (b, a) if swapped else (a, b)
-            return names[first], seconds[second], swapped
 
-        return sides
+class _Asked:
+    """Named bodies in a scene, and the detector that is asked about them."""
 
-    def _collisions(
+    def __init__(self, settings: dict[str, Any]) -> None:
+        self.scene = Scene()
+        self.detector = Detector(**settings)
+        #: By the numbers of bodies: their names, and which of two comes first.
+        self._names: dict[int, _Name] = {}
+        self._order: dict[int, int] = {}
+        self._convex: dict[int, bool] = {}
+
+    def add(self, name: _Name, mesh: Any, transform: _Array | None, after: int = 0) -> Body:
+        """Adds a body that comes after those that are there, and by `after` later."""
+        scene = self.scene
+        body = scene.add(*mesh) if isinstance(mesh, tuple) else scene.add(mesh)
+        if transform is not None:
+            try:
+                scene.set_transform(body, transform)
+            except BaseException:
+                scene.remove(body)
+                raise
+        self._names[int(body)] = name
+        self._order[int(body)] = after + _new_stamp()
+        return body
+
+    def remove(self, body: Body) -> None:
+        self.scene.remove(body)
+        for held in (self._names, self._order, self._convex):
+            held.pop(int(body), None)
+
+    def _sides(self, a: int, b: int, across: Body | None) -> tuple[_Name, _Name, bool]:
+        """Names two bodies by their numbers, and says whether they come in the other order: the body `across` which is asked
+        comes last, else that which was added later."""
+        swapped = a == int(across) if across is not None else self._order[a] > self._order[b]
+        first, second = (b, a) if swapped else (a, b)
+        return self._names[first], self._names[second], swapped
+
+    def collisions(
         self,
-        across: dict[_Name, Body] | None,
+        across: Body | None,
         name: Callable[[_Name, _Name], Any],
         return_names: bool,
         return_data: bool,
     ) -> Any:
-        bodies = _bodies(across)
+        bodies = None if across is None else [across]
         if not (return_names or return_data):
-            return self._detector._any(self._scene, bodies)
-        result = self._detector._detect(self._scene, bodies)
-        sides = self._sides(across)
+            return self.detector._any(self.scene, bodies)
+        result = self.detector._detect(self.scene, bodies)
         parts: list[Any] = [len(result) > 0]
-        touching = _Touching(self._detector, self._scene, result)
+        touching = _Touching(self.detector, self.scene, result)
         rows = touching.rows
         both, of_row, counts = np.unique(
             rows[:, [0, 2]], axis=0, return_inverse=True, return_counts=True
         )
         if return_names:
-            parts.append({name(*sides(a, b)[:2]) for a, b in both.tolist()})
+            parts.append({name(*self._sides(a, b, across)[:2]) for a, b in both.tolist()})
         if return_data:
             data: list[ContactData] = []
             # The rows of each pair of bodies.
             order = np.argsort(of_row.reshape(-1), kind="stable")
             groups = np.split(order, np.cumsum(counts)[:-1])
             for (a, b), own in zip(both.tolist(), groups):
-                first, second, swapped = sides(a, b)
+                first, second, swapped = self._sides(a, b, across)
                 for row, point, normal, depth in self._overlaps(touching, a, b, own):
                     faces = (int(rows[row, 1]), int(rows[row, 3]))
                     if swapped:
@@ -404,7 +456,7 @@ class CollisionManager:
                 return
         contacts, points = touching.contacts, touching.points
         try:
-            regions = self._detector.penetration(self._scene, contacts, a, b).regions()
+            regions = self.detector.penetration(self.scene, contacts, a, b).regions()
         except (ValueError, TypeError):
             # Not closed, or not made of triangles.
             regions = touching.surfaces.get((a, b), [])
@@ -419,27 +471,29 @@ class CollisionManager:
                 way = _normal(touching.corners(b, touching.rows[row, 3]))
             yield row, points[row], -way, 0.0 if far is None else far
 
-    def _distance(
+    def distance(
         self,
-        across: dict[_Name, Body] | None,
+        across: Body | None,
         name: Callable[[_Name, _Name], Any],
         return_names: bool,
         return_data: bool,
     ) -> Any:
-        nearest = self._detector.nearest(self._scene, across=_bodies(across))
+        nearest = self.detector.nearest(self.scene, across=None if across is None else [across])
         if nearest is None:
             parts: list[Any] = [float("inf"), None, None]
         else:
             a, b = (int(body) for body in nearest.bodies)
-            distance, points = nearest.distance, nearest.points
-            ends = None if points is None else (points[0], points[1])
+            distance = nearest.distance
+            ends: Any = None
             if distance == 0:
                 distance, ends = self._depth(a, b)
-            first, second, swapped = self._sides(across)(a, b)
+            if ends is None:
+                ends = tuple(nearest.points)
+            first, second, swapped = self._sides(a, b, across)
             i, j = nearest.primitives
             if swapped:
                 i, j = j, i
-                ends = None if ends is None else (ends[1], ends[0])
+                ends = (ends[1], ends[0])
             data = DistanceData((first, second), (i, j), distance, ends)
             parts = [distance, name(first, second), data]
         wanted = [True, return_names, return_data]
@@ -447,7 +501,7 @@ class CollisionManager:
 
     def _depth(self, a: int, b: int) -> tuple[float, Any]:
         """The distance of two bodies that share a point, less than 0 where they overlap, and the deepest points."""
-        scene, detector = self._scene, self._detector
+        scene, detector = self.scene, self.detector
         if self._is_convex(a) and self._is_convex(b):
             found = self._convex_overlap(a, b)
             if found is None:
@@ -468,7 +522,7 @@ class CollisionManager:
 
     def _convex_overlap(self, a: int, b: int) -> tuple[float, _Vector, _Vector] | None:
         """Depth, normal from the first body to the second, the deepest vertex of the first."""
-        found = self._scene._convex_overlap(a, b)
+        found = self.scene._convex_overlap(a, b)
         if found is None:
             return None
         depth, normal, deepest = found
@@ -477,40 +531,51 @@ class CollisionManager:
     def _is_convex(self, number: int) -> bool:
         known = self._convex.get(number)
         if known is None:
-            scene = self._scene
+            scene = self.scene
             known = scene.kind(number) == "triangles" and _is_convex(
                 scene.positions(number), scene.elements(number)
             )
             self._convex[number] = known
         return known
 
-    def _body(self, name: _Name) -> Body:
-        try:
-            return self._bodies[name]
-        except KeyError:
-            raise ValueError(f"name: there is no object {name!r}") from None
+
+#: The objects of the other manager come after all others.
+_LATER = 2**62
 
 
-class _Guests:
-    """Meshes that are in a manager's scene while it is asked about: pairs of (name, body)."""
+class _Joint(_Asked):
+    """Copies of the objects of two managers. They are kept: of those that have moved, only the matrix is new."""
 
-    def __init__(self, manager: CollisionManager, meshes: list[tuple[_Name, Any, Any]]) -> None:
-        self._manager = manager
-        self._bodies: dict[_Name, Body] = {}
-        try:
-            for name, mesh, transform in meshes:
-                self._bodies[name] = _add(manager._scene, mesh, transform)
-        except BaseException:
-            self.__exit__()
-            raise
+    def __init__(self, settings: dict[str, Any], other: CollisionManager) -> None:
+        super().__init__(settings)
+        self.other = ref(other)
+        self._held: tuple[dict[_Name, _Object], dict[_Name, _Object]] = ({}, {})
+        self._stamps = [0, 0]
 
-    def __enter__(self) -> dict[_Name, Body]:
-        return self._bodies
-
-    def __exit__(self, *_: object) -> None:
-        for body in self._bodies.values():
-            self._manager._scene.remove(body)
-            self._manager._convex.pop(int(body), None)
+    def update(self, *managers: CollisionManager) -> None:
+        for side, manager in enumerate(managers):
+            if self._stamps[side] == manager._stamp:
+                continue
+            held = self._held[side]
+            for name in [name for name in held if name not in manager._objects]:
+                self.remove(held.pop(name).body)
+            for name, given in manager._objects.items():
+                mine = held.get(name)
+                if mine is not None and mine.stamp == given.stamp:
+                    continue
+                if mine is not None and mine.mesh_stamp == given.mesh_stamp:
+                    self.scene.set_transform(mine.body, given.transform)
+                    held[name] = given._replace(body=mine.body)
+                    continue
+                if mine is not None:
+                    self.remove(held.pop(name).body)
+                scene, body = manager._own.scene, given.body
+                mesh = (scene.rest_positions(body), scene.elements(body), scene.kind(body))
+                added = self.add(name, mesh, given.transform, after=side * _LATER)
+                # Objects meet those of the other manager alone.
+                self.scene.set_filter(added, category=1 + side, mask=2 - side)
+                held[name] = given._replace(body=added)
+            self._stamps[side] = manager._stamp
 
 
 class _Touching:
@@ -560,25 +625,13 @@ class _Touching:
         return positions[elements[element]]
 
 
-def _add(scene: Scene, mesh: Any, transform: _Array | None) -> Body:
-    body = scene.add(*mesh) if isinstance(mesh, tuple) else scene.add(mesh)
-    if transform is not None:
-        try:
-            scene.set_transform(body, transform)
-        except BaseException:
-            scene.remove(body)
-            raise
-    return body
-
-
-def _bodies(across: dict[_Name, Body] | None) -> list[Body] | None:
-    """The bodies across which is asked; `None` for all, which none at all does not mean."""
-    return None if across is None else list(across.values())
-
-
 def _answer(parts: list[Any]) -> Any:
     """What a method returns: its one part, or all as a tuple."""
     return parts[0] if len(parts) == 1 else tuple(parts)
+
+
+def _both(a: _Name, b: _Name) -> tuple[_Name, _Name]:
+    return a, b
 
 
 def _sorted(a: _Name, b: _Name) -> tuple[_Name, _Name]:

@@ -109,8 +109,9 @@ class CollisionMesh:
 
     can_collide: Callable[[int, int], bool] | None
     """callable or None : whether two vertices may collide, as in ipc-toolkit. Two elements that
-    touch count when any
-    vertex of one may collide with any of the other. ``None`` (the default) lets all of them."""
+    touch count when any vertex of one may collide with any of the other. It is called with the
+    lower vertex first, and what it says is kept for the question. ``None`` (the default) lets all
+    of them."""
 
     def __init__(self, rest_positions: _Array, edges: _Array = (), faces: _Array = ()) -> None:
         rest = np.asarray(rest_positions)
@@ -283,7 +284,11 @@ def is_step_collision_free(
     *,
     labels: _Array | None = None,
 ) -> bool:
-    """Whether nothing touches while all vertices move on straight lines from one pose to another.
+    """Whether nothing intersects at the start, and nothing touches on straight lines to the end.
+
+    ipc-toolkit takes it that the start is free: of an edge that already pierces a face, which
+    touches neither a vertex nor an edge, it says ``True``, and this function ``False``. Of starts
+    that are free both speak of the same.
 
     Parameters
     ----------
@@ -292,8 +297,7 @@ def is_step_collision_free(
         change.
     vertices_t0, vertices_t1 : array_like, shape (v, 3)
         Positions at the start and at the end. Two arrays of float32 are answered as such, others as
-        float64. As in ipc-toolkit, the start must be free of intersections: an edge that pierces a
-        face touches neither a vertex nor an edge. Ask `has_intersections` once.
+        float64.
     min_distance : float
         The distance that elements must keep, 0 or more: Euclidean, and decided exactly. ipc-toolkit
         compares it axis by axis, so its steps are shorter.
@@ -309,7 +313,8 @@ def is_step_collision_free(
     Returns
     -------
     bool
-        Exact. Touching counts (a distance of exactly `min_distance`), at the start too.
+        Exact. Touching counts (a distance of exactly `min_distance`), at the start too, and so does
+        all that `has_intersections` finds there.
 
     Raises
     ------
@@ -322,7 +327,7 @@ def is_step_collision_free(
     held = ours._held()
     scene = held.place(start, end)
     free: bool = held.detector.is_free(
-        scene, separation=distance, _filter=ours._filter(labels, _may(mesh, labels))
+        scene, start="verify", separation=distance, _filter=ours._filter(labels, _may(mesh, labels))
     )
     return free
 
@@ -338,6 +343,9 @@ def compute_collision_free_stepsize(
     labels: _Array | None = None,
 ) -> float:
     """How far all vertices can move on straight lines from one pose towards another.
+
+    As in ipc-toolkit, the start must be free of intersections, and is not asked: an edge that
+    pierces a face touches neither a vertex nor an edge. Ask `has_intersections` once.
 
     Parameters
     ----------
@@ -458,7 +466,7 @@ def _some_intersect(
             continue
         if label_of is not None and len(set(label_of[of_a + of_b].tolist())) == 1:
             continue
-        if may is None or any(may(x, y) for x in of_a for y in of_b):
+        if may is None or any(may(min(x, y), max(x, y)) for x in of_a for y in of_b):
             return True
     return False
 

@@ -14,7 +14,7 @@ pub struct Whole {
 
 impl Whole {
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let mut mesh = read(path, &ReadOptions::default())?;
+        let mut mesh = read(path, &ReadOptions::as_they_are())?;
         check_count(path, "primitives", mesh.n_primitives() as u64)?;
         mesh.positions.narrow_if_exact();
         Ok(Whole { mesh })

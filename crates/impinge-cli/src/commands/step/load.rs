@@ -56,8 +56,8 @@ impl Moving {
 
     fn add(&mut self, start: &Path, end: &Path, args: &StepArgs) -> Result<(), Error> {
         let names = [start, end].map(|path| path.display().to_string());
-        let (mut at_start, summary) = read_with_summary(start, &ReadOptions::default())?;
-        let (mut at_end, _) = read_with_summary(end, &ReadOptions::default())?;
+        let (mut at_start, summary) = read_with_summary(start, &ReadOptions::as_they_are())?;
+        let (mut at_end, _) = read_with_summary(end, &ReadOptions::as_they_are())?;
         same_elements(&names, &at_start, &at_end)?;
         let mut vertices = Vertices::default();
         // Triangles of an STL file share nothing except positions.

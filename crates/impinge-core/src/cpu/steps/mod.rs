@@ -144,7 +144,7 @@ impl StepClusters {
             worker.begin(stats.n_clusters, job.frame, settings);
         }
         let held = self.bytes_besides_room();
-        let known = Known::new();
+        let known = Known::new(job.control);
         let task = slabs::Task {
             isa: self.isa,
             job,
@@ -204,7 +204,7 @@ impl StepClusters {
             worker.begin(stats.n_clusters, job.frame, settings);
         }
         answer.share(self.bytes_besides_room() as u64);
-        let known = Known::new();
+        let known = Known::new(job.control);
         let mut settling = left::Settling {
             job,
             world: World {

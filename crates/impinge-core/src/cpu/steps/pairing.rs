@@ -144,7 +144,7 @@ pub(super) fn run<S: Simd>(
         ..world
     };
     for item in items {
-        if world.is_over() {
+        if world.is_over() || world.known.is_cancelled() {
             break;
         }
         let test = world.frame.test(item.a, item.b);

@@ -11,6 +11,7 @@ use crate::hull::{Hull, Pose};
 use crate::index::{ClusterIx, LayerIx};
 use crate::plan::Plan;
 use crate::positions::Positions;
+use crate::progress::{CancelToken, Control};
 use crate::scene::Scene;
 use crate::sink::Goal;
 
@@ -22,14 +23,21 @@ pub(crate) struct Known {
     /// The earliest time found, as the bits of a nonnegative number.
     earliest: AtomicU64,
     is_over: AtomicBool,
+    cancel: Option<CancelToken>,
 }
 
 impl Known {
-    pub fn new() -> Self {
+    pub fn new(control: &Control<'_>) -> Self {
         Known {
             earliest: AtomicU64::new(f64::INFINITY.to_bits()),
             is_over: AtomicBool::new(false),
+            cancel: control.token().cloned(),
         }
+    }
+
+    /// Whether the search was cancelled. The candidates of a work item may take long, and a task has many items.
+    pub fn is_cancelled(&self) -> bool {
+        self.cancel.as_ref().is_some_and(CancelToken::is_cancelled)
     }
 
     /// Whether the answer is complete, so that the search can stop.

@@ -32,6 +32,9 @@ pub(super) fn take<S: Simd>(
     // With a clearance, what a pair keeps is less than the bound.
     let is_at_bound = !world.frame.has_clearance();
     for first in (0..batch.met.len()).step_by(BATCH) {
+        if world.known.is_cancelled() {
+            return;
+        }
         let lanes = batch.met.batch(first);
         let n = (batch.met.len() - first).min(BATCH);
         let mut open = u16::MAX >> (BATCH - n);
