@@ -20,13 +20,14 @@ fn main() -> Result<(), impinge_core::Error> {
         };
         let mut detector = Detector::with_settings(settings)?;
         detector.detect(&scene, &Query::all())?;
-        detector.impacts(&scene, &Step::default())?;
-        if let Some([still, moving]) = detector.recordings() {
-            println!("{}\n{still}", method.name());
-            if method == Method::Clusters {
-                println!("a step\n{moving}");
-            }
+        if let Some(recording) = detector.recording() {
+            println!("{}\n{recording}", method.name());
         }
+    }
+    let mut detector = Detector::new(Backend::Gpu)?;
+    detector.impacts(&scene, &Step::default())?;
+    if let Some(recording) = detector.recording() {
+        println!("a step\n{recording}");
     }
     Ok(())
 }

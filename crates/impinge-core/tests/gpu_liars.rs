@@ -74,7 +74,7 @@ const OF_BOTH: &[Damage] = &[
     ),
     (
         "narrow",
-        "let a = order[candidate.a & ~FLAG];",
+        "let a = number_at(candidate.a & ~FLAG);",
         "let a = candidate.a & ~FLAG;",
     ),
     (

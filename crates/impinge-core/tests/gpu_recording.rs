@@ -2,8 +2,10 @@
 #![cfg(feature = "gpu")]
 
 use impinge_core::gpu::recording::Ran;
-use impinge_core::{Backend, Detector, Method, Query, Scene, Settings, Step, wgpu};
-use impinge_scenes::surfaces;
+use impinge_core::{
+    Backend, BodyId, Detector, Method, Positions, Query, Scene, Settings, Step, wgpu,
+};
+use impinge_scenes::{Random, soup, surfaces};
 
 fn device() -> (wgpu::Device, wgpu::Queue) {
     let instance = wgpu::Instance::default();
@@ -48,11 +50,7 @@ fn first_wrong(settings: &Settings, ask: Ask, damage: (&str, &str, &str)) -> Opt
         ask(&mut detector, &scene);
         detector
     });
-    let [mut good, mut bad] = [good, bad];
-    let [good, bad] = [&mut good, &mut bad].map(|detector| {
-        let [still, moving] = detector.ran().expect("a device");
-        if still.is_empty() { moving } else { still }
-    });
+    let [good, bad] = [good.ran(), bad.ran()];
     assert_eq!(names(good), names(bad));
     assert!(!good.is_empty());
     let mut launches = good.iter().zip(bad);
@@ -127,10 +125,11 @@ fn recordings_are_printed_one_line_per_launch() {
             ..Settings::default()
         };
         let mut detector = Detector::with_settings(settings).expect("an adapter");
-        detector.detect(&scene, &Query::all()).expect("good");
-        detector.impacts(&scene, &Step::default()).expect("good");
-        let recordings = detector.recordings().expect("a device");
-        let [still, moving] = recordings.map(ToString::to_string);
+        let asks: [Ask; 2] = [PAIRS, IMPACTS];
+        let [still, moving] = asks.map(|ask| {
+            ask(&mut detector, &scene);
+            detector.recording().expect("a device").to_string()
+        });
         let kernels = |text: &str| -> Vec<String> {
             let lines = text.lines().filter(|line| line.contains(" x "));
             lines
@@ -164,5 +163,121 @@ fn recordings_are_printed_one_line_per_launch() {
             let last = text.lines().last().unwrap_or("");
             assert!(last.contains("read") && last.contains(reads), "{text}");
         }
+    }
+}
+
+#[test]
+fn parts_and_positions_are_on_the_device_once() {
+    let scene = balls();
+    let held = |asks: &[Ask]| {
+        let settings = Settings {
+            backend: Backend::Gpu,
+            ..Settings::default()
+        };
+        let mut detector = Detector::with_settings(settings).expect("an adapter");
+        for ask in asks {
+            ask(&mut detector, &scene);
+        }
+        detector.bytes_on_device()
+    };
+    let [still, moving] = [held(&[PAIRS]), held(&[IMPACTS])];
+    for asks in [
+        &[PAIRS, IMPACTS][..],
+        &[IMPACTS, PAIRS],
+        &[PAIRS, IMPACTS, PAIRS],
+    ] {
+        let both = held(asks);
+        assert!(
+            both >= moving && both < moving + still,
+            "{both}, {moving} for a step, {still} for a frame"
+        );
+    }
+}
+
+/// Tetrahedra, triangles in f64, and boxes: so many bodies that there is a tree over them, some of which move.
+fn mixed() -> (Scene, Vec<BodyId>) {
+    let mut scene = Scene::new();
+    let mut random = Random::new(5);
+    let mut bodies = Vec::new();
+    let soup = soup::lattice_tetrahedra(40, 6, 5).scaled(0.4);
+    bodies.push(soup.add_to(&mut scene).expect("good"));
+    let ball = surfaces::ball(1200).scaled(2.0);
+    let positions: Vec<[f64; 3]> = ball
+        .positions
+        .iter()
+        .map(|at| at.map(|x| f64::from(x) + 1.0 / 3.0))
+        .collect();
+    let faces: Vec<[u32; 3]> = (0..ball.n_primitives())
+        .map(|ix| {
+            let corners = ball.elements.corners(ix);
+            [corners[0], corners[1], corners[2]]
+        })
+        .collect();
+    bodies.push(scene.add_triangles(&faces, &positions).expect("good"));
+    for ix in 0..20 {
+        let model = surfaces::cube(random.point(-1.0, 2.0), 0.5);
+        let body = model.add_to(&mut scene).expect("good");
+        if ix % 3 != 0 {
+            let end = model.translated(random.point(-1.0, 1.0)).positions;
+            scene.set_end_positions(body, &end).expect("good");
+        }
+        bodies.push(body);
+    }
+    (scene, bodies)
+}
+
+#[test]
+fn frames_and_steps_take_turns() {
+    for method in [Method::Clusters, Method::Cells] {
+        let [mut device, mut host] = [Backend::Gpu, Backend::Cpu].map(|backend| {
+            let settings = Settings {
+                method,
+                backend,
+                ..Settings::default()
+            };
+            Detector::with_settings(settings).expect("an adapter")
+        });
+        let (mut scene, bodies) = mixed();
+        let some = Query::all().ignore(bodies[2], bodies[3]);
+        let two = Query::between(bodies[0], bodies[1]);
+        let mut n = [0; 2];
+        for turn in 0..8 {
+            let query = match turn % 4 {
+                0 => Query::everything(),
+                1 => Query::all(),
+                2 => some.clone(),
+                _ => two.clone(),
+            };
+            if turn != 3 {
+                let [found, expected] = [&mut device, &mut host].map(|detector| {
+                    let pairs = detector.detect(&scene, &query).expect("good");
+                    (pairs.len(), pairs.hash())
+                });
+                assert_eq!(found, expected, "{method:?}, turn {turn}");
+                n[0] += found.0;
+            }
+            if turn != 4 {
+                let step = Step::new(query);
+                let [found, expected] = [&mut device, &mut host].map(|detector| {
+                    let impacts = detector.impacts(&scene, &step).expect("good");
+                    (impacts.len(), impacts.hash())
+                });
+                assert_eq!(found, expected, "{method:?}, turn {turn}");
+                n[1] += found.0;
+            }
+            if turn % 2 == 0 {
+                // Every box moves a little, some back to where they were.
+                for &body in &bodies[2..] {
+                    let at = scene.body(body).expect("there").positions().clone();
+                    let by = [0.1, -0.05, 0.2][turn / 2 % 3];
+                    let Positions::F32(at) = at else {
+                        panic!("boxes are f32");
+                    };
+                    let moved: Vec<_> = at.iter().map(|&[x, y, z]| [x + by, y, z]).collect();
+                    scene.set_positions(body, &moved).expect("as many");
+                }
+            }
+        }
+        assert!(n[0] > 100 && n[1] > 100, "{n:?}");
     }
 }

@@ -497,10 +497,10 @@ fn damaged_names_are_noticed() {
     for (line, damaged) in [
         ("if params.by_number == 0u {", "if params.by_number != 0u {"),
         (
-            "UnsureKey(min(order[a], order[b]),",
-            "UnsureKey(min(a, order[b]),",
+            "UnsureKey(min(number_a, number_b),",
+            "UnsureKey(min(a, number_b),",
         ),
-        ("max(order[a], order[b]));", "order[a]);"),
+        ("max(number_a, number_b));", "number_a);"),
         ("found.touches_by = high;", "found.touches_by = low;"),
         ("time_of(bracket.touches_by)", "2.0"),
         ("time_of(bracket.free_until)", "0.0"),

@@ -86,8 +86,7 @@ pub(super) fn find_in_step(
     let gpu = Arc::clone(on_device.gpu());
     let before = stats.clone();
     let found = clusters.run_on_device(job, settings, answer, stats, |clusterings, take, stats| {
-        let engine = on_device.for_steps();
-        gpu.block_on(engine.find_left(job, clusterings, (sought, take), stats))
+        gpu.block_on(on_device.find_left(job, clusterings, (sought, take), stats))
     });
     match found {
         Ok(ByDevice::Not) => {}
@@ -173,26 +172,27 @@ impl Detector {
     pub fn trace(&mut self, is_traced: bool) {
         if let Some(engine) = &mut self.gpu {
             engine.is_traced = is_traced;
-            engine.for_steps().is_traced = is_traced;
         }
     }
 
-    /// The last pass of the last frame on a device, and that of the last step: their launches as data, to be printed.
+    /// The last pass of the last question that a device has answered: its launches as data, to be printed.
     #[doc(hidden)]
-    pub fn recordings(&mut self) -> Option<[&Recording; 2]> {
-        let engine = self.gpu.as_mut()?;
-        engine.for_steps();
-        let steps = engine.of_steps.as_ref()?;
-        Some([&engine.recording, &steps.recording])
+    pub fn recording(&self) -> Option<&Recording> {
+        let engine = self.gpu.as_ref()?;
+        Some(&engine.lane.recording)
     }
 
-    /// What each launch of the last pass of the last frame, and of the last step, has written, if it was traced.
+    /// What each launch of the last pass of the last question has written, if it was traced.
     #[doc(hidden)]
-    pub fn ran(&mut self) -> Option<[&[Ran]; 2]> {
-        let engine = self.gpu.as_mut()?;
-        engine.for_steps();
-        let steps = engine.of_steps.as_ref()?;
-        Some([&engine.ran, &steps.ran])
+    pub fn ran(&self) -> &[Ran] {
+        let engine = self.gpu.as_ref();
+        engine.map_or(&[], |engine| &engine.lane.ran)
+    }
+
+    /// Bytes of topology and positions on the device. For tests: statistics add the buffers for results.
+    #[doc(hidden)]
+    pub fn bytes_on_device(&self) -> u64 {
+        self.gpu.as_ref().map_or(0, Engine::bytes_of_world)
     }
 
     /// A detector on the caller's device, which must allow 8 storage buffers per stage and

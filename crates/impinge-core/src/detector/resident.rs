@@ -84,7 +84,6 @@ impl Detector {
         let stats = &mut Statistics::default();
         let clusters = &mut self.steps.clusters;
         let clusterings = clusters.clusterings(job, &self.settings, is_resident, stats)?;
-        let engine = engine.for_steps();
         engine.encode_step(job, &clusterings, [starts, ends], encoder)
     }
 }

@@ -249,7 +249,7 @@ impl Guest {
 impl Recorder<'_> {
     /// All stages.
     pub(super) fn cells(&mut self, told: Told) {
-        let (gpu, world, room) = (self.gpu, self.world, self.room);
+        let (gpu, world, view, room) = (self.gpu, self.world, self.view, self.room);
         let kernels = &gpu.kernels;
         let counters = || room.counters.write_to();
         let cells = told.work.cells();
@@ -295,7 +295,7 @@ impl Recorder<'_> {
             self.recording.stage("dispatch");
             let dispatch = DispatchCells {
                 grid: room.grid.read(),
-                bodies: world.bodies.read(),
+                bodies: view.bodies.read(),
                 cells: room.cells.write_to(),
                 starts: room.starts.write_to(),
                 items: room.cell_items.write_to(),
@@ -323,8 +323,8 @@ impl Recorder<'_> {
         self.recording.stage("pairing");
         let groups = self.counted_items();
         let pairing = PairingCells {
-            bodies: world.bodies.read(),
-            ignored: world.ignored.read(),
+            bodies: view.bodies.read(),
+            ignored: view.ignored.read(),
             corners: world.corners.read(),
             kept: room.kept.read(),
             entries: room.entries.read(),
@@ -332,7 +332,7 @@ impl Recorder<'_> {
             candidates: room.candidates.write_to(),
             counters: counters(),
             params: Uniform(Params {
-                n_ignored: world.n_ignored(),
+                n_ignored: view.n_ignored(),
                 resolve: u32::from(told.resolve),
                 ..Params::default()
             }),
@@ -350,37 +350,37 @@ impl Recorder<'_> {
 
     /// Stage `bounds` of methods that work in a grid: the boxes of bodies, their reach, and the primitives within reach.
     pub fn bounds_within_reach(&mut self) {
-        let (gpu, world, room) = (self.gpu, self.world, self.room);
+        let (gpu, world, view, room) = (self.gpu, self.world, self.view, self.room);
         self.recording.clear(room.tallies.all());
         self.bounds();
         let reach = BoundsReach {
             nodes: world.nodes.read(),
-            bodies: world.bodies.read(),
-            ignored: world.ignored.read(),
+            bodies: view.bodies.read(),
+            ignored: view.ignored.read(),
             reaches: room.reaches.write_to(),
             tallies: room.tallies.write_to(),
             // Counts fit 32 bits.
             params: Uniform(Params {
-                first: world.forest().top().unwrap_or(NO_ROOT),
-                count: world.bodies.len() as u32,
-                n_ignored: world.n_ignored(),
+                first: view.top().unwrap_or(NO_ROOT),
+                count: view.bodies.len() as u32,
+                n_ignored: view.n_ignored(),
                 ..Params::default()
             }),
         };
-        let groups = Workgroups::Known(world.bodies.len().div_ceil(64));
+        let groups = Workgroups::Known(view.bodies.len().div_ceil(64));
         self.recording
             .launch(&gpu.kernels.bounds_reach, &reach, groups);
         let keep = BoundsKeep {
             nodes: world.nodes.read(),
             clusters: world.clusters.read(),
-            bodies: world.bodies.read(),
+            bodies: view.bodies.read(),
             corners: world.corners.read(),
             positions: world.positions.read(),
             reaches: room.reaches.read(),
             kept: room.kept.write_to(),
             counters: room.counters.write_to(),
         };
-        let groups = Workgroups::Known(world.forest().n_clusters());
+        let groups = Workgroups::Known(world.clusters.len());
         self.recording
             .launch(&gpu.kernels.bounds_keep, &keep, groups);
     }

@@ -18,8 +18,6 @@ use crate::tuning::Tuning;
 #[derive(Debug)]
 pub struct Cached {
     topology_stamp: u64,
-    /// Identifies the clustering: no two of a detector have the same number.
-    pub number: u64,
     /// The stamp of the positions that were judged last.
     judged_stamp: u64,
     /// How well the sampled clusters have fitted the body.
@@ -31,7 +29,6 @@ pub struct Cached {
 #[derive(Debug, Default)]
 pub struct Clusterings {
     known: Store<Cached>,
-    n_made: u64,
 }
 
 impl Clusterings {
@@ -53,7 +50,6 @@ impl Clusterings {
         recluster: bool,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let Clusterings { known, n_made } = self;
         let tuning = Tuning::default();
         let is_stale = |cached: &mut Cached, layer: &Layer, body: &Body| {
             recluster
@@ -61,10 +57,8 @@ impl Clusterings {
                 && !resident.contains(&layer.id)
                 && cached.is_stale(body, &tuning)
         };
-        known.update(job, stats, is_stale, |body, _| {
-            *n_made += 1;
-            Cached::new(body, *n_made)
-        })
+        self.known
+            .update(job, stats, is_stale, |body, _| Cached::new(body))
     }
 }
 
@@ -79,14 +73,13 @@ impl Clustered for Cached {
 }
 
 impl Cached {
-    fn new(body: &Body, number: u64) -> Self {
+    fn new(body: &Body) -> Self {
         let (elements, positions) = (body.elements(), body.positions());
         let clustering = Clustering::new(elements, hull::centers(elements, positions));
         let mut fit = Fit::UNKNOWN;
         fit.note(sampled_spread(&clustering, positions));
         Cached {
             topology_stamp: body.topology_stamp(),
-            number,
             judged_stamp: body.positions_stamp(),
             fit,
             clustering: Arc::new(clustering),

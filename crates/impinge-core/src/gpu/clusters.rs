@@ -16,6 +16,7 @@ use super::layout::{
     N_CANDIDATES, N_ITEMS, N_PAIRS, Params, ROUNDS, SEEK_ALL, SEEK_ANY, SEEK_EARLIEST,
 };
 use super::recording::{Recorder, Workgroups};
+use super::world::Motion;
 use crate::sink::Goal;
 
 /// Levels of up to this many nodes are refitted by one workgroup, in one launch with the levels above them.
@@ -59,47 +60,53 @@ impl Recorder<'_> {
         self.recording.stage("pairing");
         self.pairing(told.resolve);
         self.recording.stage("narrow");
-        match self.world.is_moving() {
-            true => self.narrow_step(told.sought),
-            false => self.narrow(),
+        match self.motion {
+            Motion::Moving => self.narrow_step(told.sought),
+            Motion::Still => self.narrow(),
         }
     }
 
     /// Stage `bounds`: the boxes of clusters and of the forest above them, if anything has moved.
     pub fn bounds(&mut self) {
         self.recording.stage("bounds");
-        let (gpu, world) = (self.gpu, self.world);
-        if !world.is_moved {
+        let (gpu, world, view) = (self.gpu, self.world, self.view);
+        if !view.is_moved {
             return;
         }
         let kernels = &gpu.kernels;
-        let (clusters, level, top) = match world.is_moving() {
-            true => (
+        let (clusters, level, top) = match self.motion {
+            Motion::Moving => (
                 &kernels.bounds_clusters_moving,
                 &kernels.bounds_level_moving,
                 &kernels.bounds_top_moving,
             ),
-            false => (
+            Motion::Still => (
                 &kernels.bounds_clusters,
                 &kernels.bounds_level,
                 &kernels.bounds_top,
             ),
         };
+        let levels = &view.levels;
+        let leaves = levels.first().copied().unwrap_or_default();
         let bindings = BoundsClusters {
             clusters: world.clusters.read(),
             cluster_vertices: world.cluster_vertices.read(),
             positions: world.positions.read(),
-            bodies: world.bodies.read(),
+            bodies: view.bodies.read(),
             nodes: world.nodes.write_to(),
+            params: Uniform(Params {
+                first: leaves.first,
+                count: leaves.count,
+                ..Params::default()
+            }),
         };
-        let groups = Workgroups::Known(world.n_ends() * world.forest().n_clusters());
+        let groups = Workgroups::Known(self.motion.n_ends() * u64::from(leaves.count));
         self.recording.launch(clusters, &bindings, groups);
-        let levels = &world.forest().levels;
         let is_wide = levels.iter().rposition(|level| level.count > NARROW_LEVEL);
         let narrow_from = is_wide.map_or(1, |last| last + 1).max(1);
         for wide in levels.iter().take(narrow_from).skip(1) {
             let bindings = BoundsLevel {
-                bodies: world.bodies.read(),
+                bodies: view.bodies.read(),
                 nodes: world.nodes.write_to(),
                 params: Uniform(Params {
                     first: wide.first,
@@ -112,8 +119,8 @@ impl Recorder<'_> {
         }
         if narrow_from < levels.len() {
             let bindings = BoundsTop {
-                bodies: world.bodies.read(),
-                levels: world.levels.read(),
+                bodies: view.bodies.read(),
+                levels: view.table.read(),
                 nodes: world.nodes.write_to(),
                 params: Uniform(Params {
                     first: narrow_from as u32,
@@ -128,10 +135,10 @@ impl Recorder<'_> {
     /// Stage `dispatch`: tree against tree, a round per level.
     fn dispatch(&mut self, told: Told) {
         self.recording.stage("dispatch");
-        let (gpu, world, room) = (self.gpu, self.world, self.room);
-        let kernel = match world.is_moving() {
-            true => &gpu.kernels.dispatch_moving,
-            false => &gpu.kernels.dispatch,
+        let (gpu, world, view, room) = (self.gpu, self.world, self.view, self.room);
+        let kernel = match self.motion {
+            Motion::Moving => &gpu.kernels.dispatch_moving,
+            Motion::Still => &gpu.kernels.dispatch,
         };
         for round in 0..told.n_rounds {
             let groups = match round {
@@ -147,15 +154,15 @@ impl Recorder<'_> {
             let from = (round % 2) as usize;
             let bindings = Dispatch {
                 nodes: world.nodes.read(),
-                bodies: world.bodies.read(),
-                ignored: world.ignored.read(),
+                bodies: view.bodies.read(),
+                ignored: view.ignored.read(),
                 queue: room.queues[from].read(),
                 next_queue: room.queues[1 - from].write_to(),
                 items: room.items.write_to(),
                 counters: room.counters.write_to(),
                 params: Uniform(Params {
                     first: round,
-                    n_ignored: world.n_ignored(),
+                    n_ignored: view.n_ignored(),
                     ..Params::default()
                 }),
             };
@@ -165,16 +172,16 @@ impl Recorder<'_> {
 
     /// Work items to candidates.
     fn pairing(&mut self, resolve: bool) {
-        let (gpu, world, room) = (self.gpu, self.world, self.room);
+        let (gpu, world, view, room) = (self.gpu, self.world, self.view, self.room);
         let groups = self.counted_items();
-        let kernel = match world.is_moving() {
-            true => &gpu.kernels.pairing_moving,
-            false => &gpu.kernels.pairing,
+        let kernel = match self.motion {
+            Motion::Moving => &gpu.kernels.pairing_moving,
+            Motion::Still => &gpu.kernels.pairing,
         };
         let bindings = Pairing {
             nodes: world.nodes.read(),
             clusters: world.clusters.read(),
-            bodies: world.bodies.read(),
+            bodies: view.bodies.read(),
             corners: world.corners.read(),
             positions: world.positions.read(),
             items: room.items.read(),
@@ -229,7 +236,7 @@ impl Recorder<'_> {
 
     /// Stage `narrow`: the filter over all candidates.
     pub fn narrow(&mut self) {
-        let (gpu, world, room) = (self.gpu, self.world, self.room);
+        let (gpu, world, view, room) = (self.gpu, self.world, self.view, self.room);
         let groups = self.counted_candidates();
         // Scenes without tetrahedra use a kernel without the code for solids, and the registers it needs.
         let kernel = match world.has_solids {
@@ -244,6 +251,7 @@ impl Recorder<'_> {
             pairs: room.pairs.write_to(),
             unsure: room.unsure.write_to(),
             counters: room.counters.write_to(),
+            bodies: view.bodies.read(),
         };
         self.recording.launch(kernel, &bindings, groups);
     }
@@ -251,7 +259,7 @@ impl Recorder<'_> {
     /// Stage `narrow` of a step: the filter over all candidates, and a search of the pairs that it leaves. `sought`: which contacts the
     /// host seeks; none if the results stay on the device, where pairs are named by global numbers.
     fn narrow_step(&mut self, sought: Option<Goal>) {
-        let (gpu, world, room) = (self.gpu, self.world, self.room);
+        let (gpu, world, view, room) = (self.gpu, self.world, self.view, self.room);
         let groups = self.counted_candidates();
         let bindings = NarrowMoving {
             candidates: room.candidates.read(),
@@ -285,6 +293,7 @@ impl Recorder<'_> {
                 },
                 ..Params::default()
             }),
+            bodies: view.bodies.read(),
         };
         self.recording
             .launch(&gpu.kernels.narrow_search, &bindings, groups);

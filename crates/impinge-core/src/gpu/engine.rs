@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use super::buffers::{Storage, count};
 use super::cells::Guest;
+use super::clusterings::Clusterings;
 use super::collect::Collector;
 use super::device::Scopes;
 use super::layout::Cell;
@@ -15,12 +16,13 @@ use super::pieces;
 use super::recording::{Launcher, Ran, Recording};
 use super::room::{Capacities, CellsWanted, PassCounts, Room};
 use super::topology::Most;
-use super::world::World;
+use super::world::{Motion, ResidentEnds, World, weigh};
 use crate::error::Error;
+use crate::grouping::clusters::Clustering;
 use crate::ids::BodyId;
-use crate::plan::Plan as Frame;
+use crate::index::LayerIx;
+use crate::plan::{Layer, Plan as Frame};
 use crate::run::{Finder, Job};
-use crate::scene::Scene;
 use crate::settings::{Backend, Method, Recluster, Settings};
 use crate::sink::Answer;
 use crate::sink::Goal;
@@ -40,37 +42,69 @@ const WIDEST: u64 = 1 << 34;
 pub struct Engine {
     pub(super) gpu: Arc<Gpu>,
     pub(super) settings: Settings,
-    pub(super) first: Capacities,
-    /// The method in use: `Clusters` for frames that are too large for `Cells`.
-    pub(super) method: Method,
     /// The number of primitives of the frame that was too large for `Cells`.
     too_much: Option<u64>,
     /// The most bytes of one buffer of topology or positions, if less than the device allows.
     pub most_bound: u64,
     /// Whether the device holds a piece of a frame, not a whole one.
     has_pieces: bool,
-    /// Whether the last pass was encoded for the caller, who has its results on the device.
-    pub(super) is_encoded: bool,
+    clusterings: Clusterings,
     pub(super) world: World,
-    pub(super) room: Room,
     /// The method of another crate that is run instead of `Cells`.
     pub(super) guest: Option<Guest>,
-    pub(super) launcher: Launcher,
-    /// The last pass.
-    pub recording: Recording,
-    /// Whether passes are run launch by launch too, and what came of the last one.
-    pub is_traced: bool,
-    pub ran: Vec<Ran>,
-    /// The counts of each complete pass of the last frame.
+    /// What the question at hand writes, and what the other kind of question has written: the caller may still read that.
+    pub lane: Lane,
+    pub(super) other: Lane,
+    /// The counts of each complete pass of the last question.
     pub complete: Vec<PassCounts>,
-    pub(super) collector: Collector,
     /// Keys that each worker has settled, until they are appended to the answer.
     pub(super) settled: Vec<Vec<u64>>,
     /// Which contacts of a step the host seeks, and the least time by which some pair certainly touches, as far as passes have said.
     pub(super) sought: Goal,
     pub(super) touches_by: Option<f32>,
-    /// The engine for steps, once there was one.
-    pub of_steps: Option<Box<Engine>>,
+    /// Whether passes are run launch by launch too.
+    pub is_traced: bool,
+}
+
+/// The buffers for the results of one kind of question, and its last pass.
+#[derive(Debug)]
+pub struct Lane {
+    pub(super) motion: Motion,
+    /// The method in use: `Clusters` for steps, and for frames that are too large for `Cells`.
+    pub(super) method: Method,
+    /// The room to begin with.
+    pub(super) first: Capacities,
+    pub(super) room: Room,
+    pub(super) launcher: Launcher,
+    pub(super) collector: Collector,
+    /// Whether the last pass was encoded for the caller, who has its results on the device.
+    pub(super) is_encoded: bool,
+    /// The last pass.
+    pub recording: Recording,
+    /// What came of its launches, if it was traced.
+    pub ran: Vec<Ran>,
+}
+
+impl Lane {
+    fn new(motion: Motion, method: Method, first: Capacities) -> Self {
+        Lane {
+            motion,
+            method,
+            first,
+            room: Room::new(),
+            launcher: Launcher::default(),
+            collector: Collector::default(),
+            is_encoded: false,
+            recording: Recording::default(),
+            ran: Vec::new(),
+        }
+    }
+
+    /// Lets go of all buffers that launches have bound.
+    fn unbind(&mut self) {
+        self.recording = Recording::default();
+        self.launcher = Launcher::default();
+    }
 }
 
 /// Takes what the device says about a part of a step. Returns whether more is wanted.
@@ -111,27 +145,30 @@ impl Engine {
     ) -> Self {
         Engine {
             gpu,
-            first,
-            method: settings.method,
+            lane: Lane::new(Motion::Still, settings.method, first),
+            other: Lane::new(Motion::Moving, Method::Clusters, first),
             settings,
             too_much: None,
             most_bound: u64::MAX,
             has_pieces: false,
-            is_encoded: false,
+            clusterings: Clusterings::default(),
             world: World::new(),
-            room: Room::new(),
             guest,
-            launcher: Launcher::default(),
-            recording: Recording::default(),
-            is_traced: false,
-            ran: Vec::new(),
             complete: Vec::new(),
-            collector: Collector::default(),
             settled: Vec::new(),
             sought: Goal::All,
             touches_by: None,
-            of_steps: None,
+            is_traced: false,
         }
+    }
+
+    /// Turns to a kind of question.
+    pub(super) fn turn_to(&mut self, motion: Motion) {
+        if self.lane.motion != motion {
+            std::mem::swap(&mut self.lane, &mut self.other);
+        }
+        self.complete.clear();
+        (self.sought, self.touches_by) = (Goal::All, None);
     }
 
     pub fn gpu(&self) -> &Arc<Gpu> {
@@ -142,10 +179,12 @@ impl Engine {
     pub(super) fn begin_anew(&mut self) {
         let guest = self.guest.take().map(Guest::anew);
         let gpu = Arc::clone(&self.gpu);
+        let first = self.lane.first;
         *self = Engine {
             most_bound: self.most_bound,
             is_traced: self.is_traced,
-            ..Engine::with_guest(gpu, self.settings.clone(), self.first, guest)
+            clusterings: std::mem::take(&mut self.clusterings),
+            ..Engine::with_guest(gpu, self.settings.clone(), first, guest)
         };
     }
 
@@ -155,37 +194,27 @@ impl Engine {
         answer: &Answer,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let Job { scene, frame, .. } = job;
+        let Job { frame, .. } = job;
         self.gpu.check_lost()?;
+        self.turn_to(Motion::Still);
         // The engine's own bytes are on the device.
         answer.share(0);
-        self.complete.clear();
         if self.too_much.is_some_and(|n| frame.n_primitives() < n) {
             self.too_much = None;
             self.take(self.settings.method);
         }
         let start = Instant::now();
-        let recluster = self.reclusters();
-        let clusterings = &mut self.world.clusterings;
-        clusterings.update(job, &[], recluster, stats)?;
-        if !self.is_held(scene, frame) && self.falls_back() {
+        let clusterings = self.cluster(job, &[], stats)?;
+        let clusterings = &clusterings[..];
+        if !self.is_held(job, clusterings) && self.falls_back() {
             self.take_clusters(frame);
         }
-        if !self.is_held(scene, frame) && self.guest.is_none() {
+        if !self.is_held(job, clusterings) && self.guest.is_none() {
             stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
-            self.may_cut(scene, frame)?;
-            return self.in_pieces(job, answer, stats).await;
+            self.may_cut(job, clusterings)?;
+            return self.in_pieces(job, clusterings, answer, stats).await;
         }
-        let scopes = Scopes::open(&self.gpu.device);
-        let updated = self.update(job, &[], stats);
-        let closed = scopes.close();
-        updated?;
-        closed.await?;
-        if self.first_room(self.cells_wanted(frame)).is_err() {
-            // The buffers' spare room exceeds the budget.
-            self.world.forget_buffers();
-            self.update(job, &[], stats)?;
-        }
+        self.send(job, clusterings, stats).await?;
         stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
         let before = self.falls_back().then(|| stats.clone());
         let work = Vec::from_iter(self.whole(frame));
@@ -200,8 +229,8 @@ impl Engine {
             *stats = before;
             stats.n_reruns = n_reruns;
             self.take_clusters(frame);
-            if !self.is_held(scene, frame) {
-                return self.in_pieces(job, answer, stats).await;
+            if !self.is_held(job, clusterings) {
+                return self.in_pieces(job, clusterings, answer, stats).await;
             }
             let work = Vec::from_iter(self.whole(frame));
             let outcome = self.work_off(job, Taker::Answer(answer), work, stats);
@@ -213,17 +242,129 @@ impl Engine {
         Ok(())
     }
 
+    /// Hands over all pairs of a step that the device has not dropped, as far as they matter for what is sought. So times of contact
+    /// come from the CPU alone. Returns false if the device, or the memory budget, cannot hold the step; then nothing has been handed over.
+    ///
+    /// # Errors
+    /// Device errors, a budget too small for the smallest pass, cancellation, those of `take`.
+    pub async fn find_left(
+        &mut self,
+        job: Job<'_>,
+        clusterings: &[Arc<Clustering>],
+        (sought, take): (Goal, &mut TakeLeft<'_>),
+        stats: &mut Statistics,
+    ) -> Result<bool, Error> {
+        let result = self
+            .answer_step(job, clusterings, (sought, take), stats)
+            .await;
+        if let Err(Error::Gpu { .. }) = result {
+            self.begin_anew();
+        }
+        result
+    }
+
+    async fn answer_step(
+        &mut self,
+        job: Job<'_>,
+        clusterings: &[Arc<Clustering>],
+        (sought, take): (Goal, &mut TakeLeft<'_>),
+        stats: &mut Statistics,
+    ) -> Result<bool, Error> {
+        self.gpu.check_lost()?;
+        self.turn_to(Motion::Moving);
+        self.sought = sought;
+        let start = Instant::now();
+        if !self.is_held(job, clusterings) {
+            return Ok(false);
+        }
+        self.send(job, clusterings, stats).await?;
+        stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
+        let work = Vec::from_iter(self.whole(job.frame));
+        let outcome = self.work_off(job, Taker::Left(take), work, stats);
+        match outcome.await? {
+            Outcome::Complete => {
+                stats.bytes_held += self.bytes();
+                Ok(true)
+            }
+            Outcome::Crowded(error) => Err(error),
+        }
+    }
+
+    /// The clusters of all bodies of a frame. The host does not know the pose of `resident` bodies, so it does not judge their clusters.
+    pub(super) fn cluster(
+        &mut self,
+        job: Job<'_>,
+        resident: &[BodyId],
+        stats: &mut Statistics,
+    ) -> Result<Vec<Arc<Clustering>>, Error> {
+        // Not judged in `Cells`, where clusters only show which primitives are out of reach.
+        let recluster =
+            self.settings.recluster == Recluster::Auto && self.lane.method == Method::Clusters;
+        self.clusterings.update(job, resident, recluster, stats)?;
+        let of_layer = |layer: &Layer| {
+            let cache = self.clusterings.of(layer.id);
+            Arc::clone(&cache.expect("just clustered").clustering)
+        };
+        Ok(job.frame.layers.iter().map(of_layer).collect())
+    }
+
+    /// Sends what has changed since the last question.
+    async fn send(
+        &mut self,
+        job: Job<'_>,
+        clusterings: &[Arc<Clustering>],
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        let none = ResidentEnds::default();
+        let gpu = Arc::clone(&self.gpu);
+        let scopes = Scopes::open(&gpu.device);
+        let updated = self.update(job, clusterings, &none, stats);
+        let closed = scopes.close();
+        updated?;
+        closed.await?;
+        if self.first_room(self.cells_wanted(job.frame)).is_err() {
+            // What is held for the other kind of question, or the buffers' spare room, exceeds the budget.
+            self.world.forget();
+            if !self.other.is_encoded {
+                self.other.room = Room::new();
+            }
+            self.update(job, clusterings, &none, stats)?;
+        }
+        Ok(())
+    }
+
+    /// Sends what has changed since the last question, except positions that are on the device.
+    pub(super) fn update(
+        &mut self,
+        job: Job<'_>,
+        clusterings: &[Arc<Clustering>],
+        resident: &ResidentEnds<'_>,
+        stats: &mut Statistics,
+    ) -> Result<(), Error> {
+        self.has_pieces = false;
+        let most = self.most();
+        let of = (self.lane.motion, clusterings);
+        if !self.world.is_seen(job, of) {
+            // Buffers that are replaced should be free.
+            self.lane.unbind();
+            self.other.unbind();
+        }
+        self.world
+            .update(&self.gpu, job, of, (resident, most), stats)
+    }
+
     /// Answers the frame piece by piece, see [`pieces`].
     async fn in_pieces(
         &mut self,
         job: Job<'_>,
+        clusterings: &[Arc<Clustering>],
         answer: &Answer,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         let Job { scene, frame, .. } = job;
         if !self.has_pieces {
             // The buffers are sized for a whole frame.
-            self.world.forget_buffers();
+            self.world.forget();
             self.has_pieces = true;
         }
         let most = self.most();
@@ -232,9 +373,9 @@ impl Engine {
             binding: most.binding / 2,
             bytes: most.bytes / 4,
         };
-        let world = &self.world;
-        stats.n_clusters = world.weigh(scene, frame).n_clusters;
-        let clustering = |layer| world.clustering(frame, layer);
+        let n_clusters = clusterings.iter().map(|held| held.n_clusters());
+        stats.n_clusters = n_clusters.map(count).sum();
+        let clustering = |layer: LayerIx| &*clusterings[layer.index()];
         let chunks = pieces::cut(job, most, clustering)?;
         for (ix, a) in chunks.iter().enumerate() {
             for b in &chunks[ix..] {
@@ -250,7 +391,9 @@ impl Engine {
                 }
                 let start = Instant::now();
                 let scopes = Scopes::open(&self.gpu.device);
-                let sent = self.world.send_piece(&self.gpu, scene, frame, piece);
+                let sent = self
+                    .world
+                    .send_piece(&self.gpu, scene, frame, piece, clustering);
                 let closed = scopes.close();
                 sent?;
                 closed.await?;
@@ -268,7 +411,7 @@ impl Engine {
     }
 
     fn finish(&self, stats: &mut Statistics) {
-        if self.method == Method::Clusters {
+        if self.lane.method == Method::Clusters {
             stats.method = Method::Clusters.name();
         }
         stats.bytes_held = self.bytes();
@@ -276,17 +419,17 @@ impl Engine {
 
     /// Bytes held on the device.
     pub fn bytes(&self) -> u64 {
-        self.world.bytes() + self.room.bytes()
+        self.bytes_of_world() + self.lane.room.bytes() + self.other.room.bytes()
     }
 
-    /// Whether bodies are clustered again. Not in `Cells`, where clusters only show which primitives are out of reach.
-    fn reclusters(&self) -> bool {
-        self.settings.recluster == Recluster::Auto && self.method == Method::Clusters
+    /// Bytes of topology and positions on the device.
+    pub fn bytes_of_world(&self) -> u64 {
+        self.world.bytes()
     }
 
     /// The most topology and positions that may be on the device.
     pub(super) fn most(&self) -> Most {
-        let least = Capacities::LEAST.of(self.method).bytes();
+        let least = Capacities::LEAST.of(self.lane.method).bytes();
         let budget = self.settings.memory_budget;
         Most {
             binding: self.most_bound.min(self.gpu.max_binding()).min(WIDEST),
@@ -294,22 +437,28 @@ impl Engine {
         }
     }
 
-    /// Whether topology and positions of a whole frame fit the device and the budget.
-    fn is_held(&self, scene: &Scene, frame: &Frame) -> bool {
-        let cells = self.cells_wanted(frame).map_or(0, |cells| cells.bytes());
+    /// Whether topology and positions of a whole frame, or step, fit the device and the budget.
+    pub(super) fn is_held(&self, job: Job<'_>, clusterings: &[Arc<Clustering>]) -> bool {
+        let cells = self.cells_wanted(job.frame);
+        let cells = cells.map_or(0, |cells| cells.bytes());
         let most = self.most();
-        self.world.weigh(scene, frame).fits(Most {
+        let most = Most {
             bytes: most.bytes.saturating_sub(cells),
             ..most
-        })
+        };
+        weigh(job, self.lane.motion, clusterings).is_some_and(|weight| weight.fits(most))
     }
 
     /// Whether a frame that does not fit may be answered in pieces.
     ///
     /// # Errors
     /// The device binds less than the frame needs, and with `Backend::Auto` the CPU is to answer it.
-    fn may_cut(&self, scene: &Scene, frame: &Frame) -> Result<(), Error> {
-        let (needed, most) = (self.world.weigh(scene, frame).binding(), self.most());
+    fn may_cut(&self, job: Job<'_>, clusterings: &[Arc<Clustering>]) -> Result<(), Error> {
+        let weight = weigh(job, self.lane.motion, clusterings);
+        let (needed, most) = (
+            weight.map_or(u64::MAX, |weight| weight.binding()),
+            self.most(),
+        );
         if self.settings.backend == Backend::Gpu || needed <= most.binding {
             return Ok(());
         }
@@ -324,7 +473,7 @@ impl Engine {
 
     /// Whether `Clusters` may answer a frame that is too large for the method.
     fn falls_back(&self) -> bool {
-        self.method == Method::Cells && self.guest.is_none()
+        self.lane.method == Method::Cells && self.guest.is_none()
     }
 
     /// Answers this frame, and later ones with at least as many primitives, by `Clusters`.
@@ -335,38 +484,26 @@ impl Engine {
 
     /// Switches to a built-in method.
     fn take(&mut self, method: Method) {
-        self.method = method;
-        self.room = Room::new();
-    }
-
-    /// Sends what has changed since the last frame, except the positions of `resident` bodies.
-    pub(super) fn update(
-        &mut self,
-        job: Job<'_>,
-        resident: &[BodyId],
-        stats: &mut Statistics,
-    ) -> Result<(), Error> {
-        let recluster = self.reclusters();
-        self.has_pieces = false;
-        self.world
-            .update(&self.gpu, job, resident, recluster, stats)
+        self.lane.method = method;
+        self.lane.room = Room::new();
     }
 
     /// The part of the budget that is left for buffers that grow.
     pub(super) fn budget_for_room(&self) -> Option<u64> {
-        let fixed = self.world.bytes() + self.room.bytes_of_cells();
+        let other = self.other.room.bytes();
+        let fixed = self.world.bytes() + other + self.lane.room.bytes_of_cells();
         let budget = self.settings.memory_budget;
         budget.map(|budget| budget.saturating_sub(fixed))
     }
 
     /// Sets the room from the next frame on.
     pub(super) fn grow_to(&mut self, capacities: Capacities) {
-        self.first = capacities;
+        self.lane.first = capacities;
     }
 
     /// Room for the grid: as many cells as equation (1) can give.
     pub(super) fn cells_wanted(&self, frame: &Frame) -> Option<CellsWanted> {
-        if self.method != Method::Cells {
+        if self.lane.method != Method::Cells {
             return None;
         }
         let most = MOST_CELLS.min(Storage::<Cell>::limit(&self.gpu));
@@ -377,24 +514,25 @@ impl Engine {
         let asked = (frame.n_primitives() as f64 * self.settings.lambda).min(MOST_CELLS as f64);
         Some(CellsWanted {
             n_cells: (asked.ceil() as u64).min(most).max(1),
-            n_bodies: count(frame.layers.len()),
+            n_bodies: count(frame.layers.len()).max(self.world.n_parts()),
         })
     }
 
     /// Room for the first pass: the present room, unless the budget allows less.
     pub(super) fn first_room(&self, cells: Option<CellsWanted>) -> Result<Capacities, Error> {
-        let wanted = self.first.of(self.method).max(self.room.capacities());
+        let held = self.lane.room.capacities();
+        let wanted = self.lane.first.of(self.lane.method).max(held);
         let Some(budget) = self.settings.memory_budget else {
             return Ok(wanted);
         };
-        let fixed = self.world.bytes() + cells.map_or(0, |cells| cells.bytes());
-        let held = self.room.capacities();
+        let other = self.other.room.bytes();
+        let fixed = self.world.bytes() + other + cells.map_or(0, |cells| cells.bytes());
         for wanted in [wanted, held.max(Capacities::LEAST)] {
             if fixed + wanted.bytes() <= budget {
                 return Ok(wanted);
             }
         }
-        let least = Capacities::LEAST.of(self.method);
+        let least = Capacities::LEAST.of(self.lane.method);
         let needed = fixed + least.bytes();
         if needed > budget {
             return Err(Error::MemoryBudget {

@@ -3,8 +3,6 @@
 use crate::grouping::bounds::Bounds;
 use crate::grouping::hierarchy::{Entry, FANOUT, TreeShape, order};
 
-use crate::index::LayerIx;
-
 use super::layout::{Level, NO_ROOT, Node, NodePair};
 
 /// Bodies, empty ones included, that need no tree over bodies if at most two are filled.
@@ -16,35 +14,27 @@ const STALE: f64 = 1.5;
 #[derive(Debug, Default)]
 pub struct Forest {
     pub nodes: Vec<Node>,
-    pub levels: Vec<Level>,
-    /// Root of each layer, or of each run of clusters of a piece; meaningless for an empty one.
+    /// Root of each tree; meaningless for an empty one.
     pub roots: Vec<u32>,
-    n_clusters: u64,
+    /// At each height: the nodes of each tree.
+    spans: Vec<Vec<Level>>,
+}
+
+/// A tree over some trees, whose leaves are gates.
+#[derive(Debug, Default)]
+pub struct Top {
+    pub root: u32,
+    /// The nodes of each height, the gates first.
+    pub levels: Vec<Level>,
     pub first_gate: u32,
     n_gates: u32,
-    has_top: bool,
-    top_shape: TreeShape,
+    shape: TreeShape,
     best_spread: f64,
     entries: Vec<Entry>,
 }
 
 impl Forest {
-    /// One tree per body and, if there are more than a few, a tree over the bodies, built from one point of each.
-    pub(crate) fn new(shapes: &[&TreeShape], sample: impl Fn(LayerIx) -> [f32; 3]) -> Self {
-        let mut forest = Forest::of_trees(shapes);
-        let filled: Vec<LayerIx> = LayerIx::up_to(shapes.len())
-            .filter(|&layer| forest.is_filled(layer))
-            .collect();
-        // Without a tree, kernels loop over all bodies, empty ones too.
-        if filled.len() > 2 || (shapes.len() > FEW_BODIES && !filled.is_empty()) {
-            forest.has_top = true;
-            forest.push_top(&filled);
-            forest.reorder(sample);
-        }
-        forest
-    }
-
-    /// The trees of the bodies, without a tree over them.
+    /// The trees, without a tree over them.
     pub(crate) fn of_trees(shapes: &[&TreeShape]) -> Self {
         let mut forest = Forest {
             roots: vec![NO_ROOT; shapes.len()],
@@ -54,13 +44,14 @@ impl Forest {
         // For each body, its first node at the height below.
         let mut below = vec![0u32; shapes.len()];
         for height in 0..n_heights.unwrap_or(0) {
-            let first = forest.nodes.len() as u32;
             let mut next_cluster = 0u32;
+            let mut spans = Vec::with_capacity(shapes.len());
             for (ix, shape) in shapes.iter().enumerate() {
+                let first_here = forest.nodes.len() as u32;
                 if height >= shape.n_levels() {
+                    spans.push(Level::default());
                     continue;
                 }
-                let first_here = forest.nodes.len() as u32;
                 for node in 0..shape.n_nodes(height) {
                     forest.nodes.push(if height == 0 {
                         next_cluster += 1;
@@ -76,85 +67,125 @@ impl Forest {
                     });
                 }
                 below[ix] = first_here;
+                spans.push(Level {
+                    first: first_here,
+                    count: forest.nodes.len() as u32 - first_here,
+                });
                 if height + 1 == shape.n_levels() {
                     forest.roots[ix] = first_here;
                 }
             }
-            forest.push_level(first);
+            forest.spans.push(spans);
         }
-        forest.n_clusters = forest.levels.first().map_or(0, |level| level.count.into());
         forest
     }
 
-    fn push_level(&mut self, first: u32) {
-        self.levels.push(Level {
-            first,
-            count: self.nodes.len() as u32 - first,
-        });
+    /// At each height, the nodes of some trees, or of all, and those between them.
+    pub fn levels(&self, trees: Option<&[u32]>) -> Vec<Level> {
+        let over = |spans: &Vec<Level>| {
+            let all = 0..spans.len() as u32;
+            let spans = |tree: u32| spans[tree as usize];
+            match trees {
+                Some(trees) => cover(trees.iter().copied().map(spans)),
+                None => cover(all.map(spans)),
+            }
+        };
+        self.spans.iter().map(over).collect()
     }
 
-    /// Appends gates and the tree over them.
-    fn push_top(&mut self, filled: &[LayerIx]) {
-        self.first_gate = self.nodes.len() as u32;
-        self.n_gates = filled.len() as u32;
-        let gate_height = self.levels.len() as u32;
-        let gates = filled
-            .iter()
-            .map(|layer| Node::new(layer.raw(), 1, gate_height, true));
+    /// Appends a tree over some trees, if there are more than a few, built from one point of each.
+    pub(crate) fn push_top(
+        &mut self,
+        trees: &[u32],
+        sample: impl Fn(u32) -> [f32; 3],
+    ) -> Option<Top> {
+        let is_filled = |tree: &u32| self.roots[*tree as usize] != NO_ROOT;
+        let filled: Vec<u32> = trees.iter().copied().filter(is_filled).collect();
+        // Without a tree, kernels loop over all bodies, empty ones too.
+        let is_needed = filled.len() > 2 || (trees.len() > FEW_BODIES && !filled.is_empty());
+        if !is_needed {
+            return None;
+        }
+        let height = self.spans.len() as u32;
+        let mut top = Top {
+            first_gate: self.nodes.len() as u32,
+            n_gates: filled.len() as u32,
+            shape: TreeShape::new(filled.len()),
+            ..Top::default()
+        };
+        let gates = filled.iter().map(|&tree| Node::new(tree, 1, height, true));
         self.nodes.extend(gates);
-        self.push_level(self.first_gate);
-        self.top_shape = TreeShape::new(filled.len());
-        let mut below = self.first_gate;
-        for level in 1..self.top_shape.n_levels() {
+        let mut below = top.first_gate;
+        top.levels.push(self.since(below));
+        for level in 1..top.shape.n_levels() {
             let first = self.nodes.len() as u32;
-            for node in 0..self.top_shape.n_nodes(level) {
-                let children = self.top_shape.children(level, node);
+            for node in 0..top.shape.n_nodes(level) {
+                let children = top.shape.children(level, node);
                 self.nodes.push(Node::new(
                     below + children.start as u32,
                     children.len() as u32,
-                    gate_height + level as u32,
+                    height + level as u32,
                     false,
                 ));
             }
             below = first;
-            self.push_level(first);
+            top.levels.push(self.since(first));
         }
+        top.root = self.nodes.len() as u32 - 1;
+        top.reorder(&mut self.nodes, sample);
+        Some(top)
     }
 
-    /// The root of the tree over bodies.
-    pub fn top(&self) -> Option<u32> {
-        self.has_top.then(|| self.nodes.len() as u32 - 1)
+    fn since(&self, first: u32) -> Level {
+        let count = self.nodes.len() as u32 - first;
+        Level { first, count }
     }
 
-    /// The root of a layer.
-    pub fn root(&self, layer: LayerIx) -> u32 {
-        self.roots[layer.index()]
+    /// The number of rounds that a traversal from these pairs takes.
+    pub fn rounds(&self, seeds: &[NodePair]) -> u32 {
+        seeds
+            .iter()
+            .flat_map(|pair| [pair.a, pair.b])
+            .map(|node| self.nodes[node as usize].height())
+            .max()
+            .map_or(0, |height| height.max(1))
     }
+}
 
-    pub fn is_filled(&self, layer: LayerIx) -> bool {
-        self.root(layer) != NO_ROOT
+/// The nodes of some runs and those between them.
+fn cover(spans: impl Iterator<Item = Level>) -> Level {
+    let filled = spans.filter(|span| span.count > 0);
+    let both = filled.fold(None, |so_far: Option<(u32, u32)>, span| {
+        let (first, end) = (span.first, span.first + span.count);
+        Some(match so_far {
+            Some((low, high)) => (low.min(first), high.max(end)),
+            None => (first, end),
+        })
+    });
+    let (first, end) = both.unwrap_or_default();
+    Level {
+        first,
+        count: end - first,
     }
+}
 
-    pub fn n_clusters(&self) -> u64 {
-        self.n_clusters
-    }
-
-    pub fn gates(&self) -> &[Node] {
+impl Top {
+    fn range(&self) -> std::ops::Range<usize> {
         let first = self.first_gate as usize;
-        &self.nodes[first..first + self.n_gates as usize]
+        first..first + self.n_gates as usize
+    }
+
+    pub fn gates<'a>(&self, nodes: &'a [Node]) -> &'a [Node] {
+        &nodes[self.range()]
     }
 
     /// Reorders the gates if bodies have moved away from their neighbours. Returns whether it did.
-    pub fn reorder(&mut self, sample: impl Fn(LayerIx) -> [f32; 3]) -> bool {
-        if !self.has_top {
-            return false;
-        }
+    pub fn reorder(&mut self, nodes: &mut [Node], sample: impl Fn(u32) -> [f32; 3]) -> bool {
         self.entries.clear();
-        let first = self.first_gate as usize;
-        for gate in first..first + self.n_gates as usize {
-            let number = self.nodes[gate].first_child;
-            let center = sample(LayerIx::new(number));
-            self.entries.push(Entry::new(center, number));
+        let gates = &mut nodes[self.range()];
+        for gate in &*gates {
+            let number = gate.first_child;
+            self.entries.push(Entry::new(sample(number), number));
         }
         let spread = self.spread();
         let is_new = self.best_spread == 0.0;
@@ -162,9 +193,9 @@ impl Forest {
             self.best_spread = self.best_spread.min(spread);
             return false;
         }
-        order(&self.top_shape, 1, None, &mut self.entries);
-        for (gate, entry) in self.entries.iter().enumerate() {
-            self.nodes[first + gate].first_child = entry.number;
+        order(&self.shape, 1, None, &mut self.entries);
+        for (gate, entry) in gates.iter_mut().zip(&self.entries) {
+            gate.first_child = entry.number;
         }
         // Never 0: that stands for "not found yet".
         self.best_spread = self.spread().max(f64::MIN_POSITIVE);
@@ -187,15 +218,5 @@ impl Forest {
             })
             .filter(|area| area.is_finite())
             .sum()
-    }
-
-    /// The number of rounds that a traversal from these pairs takes.
-    pub fn rounds(&self, seeds: &[NodePair]) -> u32 {
-        seeds
-            .iter()
-            .flat_map(|pair| [pair.a, pair.b])
-            .map(|node| self.nodes[node as usize].height())
-            .max()
-            .map_or(0, |height| height.max(1))
     }
 }

@@ -15,6 +15,7 @@ bindings! {
         positions: Read<Coordinate>,
         bodies: Read<Body>,
         nodes: Write<Node>,
+        params: Uniform<Params>,
     }
 }
 
@@ -85,6 +86,7 @@ bindings! {
         pairs: Write<PairKey>,
         unsure: Write<UnsureKey>,
         counters: Write<Counter>,
+        bodies: Read<Body>,
     }
 }
 
@@ -110,6 +112,7 @@ bindings! {
         times: Write<PairTimes>,
         counters: Write<Counter>,
         params: Uniform<Params>,
+        bodies: Read<Body>,
     }
 }
 
@@ -284,11 +287,11 @@ kernels! {
     narrow_moving: NarrowMoving = NARROW_MOVING []
         from "narrow_moving" ("filter", "polygon", "pair", "reserve", "places", "groups");
     narrow_search: NarrowSearch = NARROW_SEARCH []
-        from "narrow_search" ("filter", "polygon", "pair", "reserve", "places", "groups");
+        from "narrow_search" ("filter", "polygon", "pair", "numbers", "reserve", "places", "groups");
     narrow: Narrow = NARROW [("WITH_SOLIDS", 0.0)]
-        from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "reserve", "groups");
+        from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "numbers", "reserve", "groups");
     narrow_solids: Narrow = NARROW_SOLIDS [("WITH_SOLIDS", 1.0)]
-        from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "reserve", "groups");
+        from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "numbers", "reserve", "groups");
     bounds_reach: BoundsReach = BOUNDS_REACH [] from "bounds_reach" ("boxes", "filters", "meets", "groups");
     bounds_keep: BoundsKeep = BOUNDS_KEEP []
         from "bounds_keep" ("boxes", "vertices", "reserve", "places", "groups");

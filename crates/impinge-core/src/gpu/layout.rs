@@ -32,6 +32,7 @@ words! {
     Body {
         root: u32, slack: u32, within: u32, layer: u32,
         category: [u32; 2], mask: [u32; 2],
+        first_place: u32, first_number: u32,
     }
     /// A run of primitives and its unique vertices.
     Cluster { first_place: u32, first_vertex: u32, sizes: u32, body: u32 }
@@ -85,7 +86,7 @@ words! {
     Corners { vertices: [u32; 4] }
     /// A vertex of a cluster.
     ClusterVertex { vertex: u32 }
-    /// The global number of the primitive at a place.
+    /// The number of the primitive at a place, within its layer; in a piece the global one.
     Order { number: u32 }
     /// How much of something was needed.
     Counter { n: u32 }

@@ -5,13 +5,13 @@
 //! which the filter on the device is unsure are settled exactly on the CPU, from the numbers as given. Only
 //! `waiting` blocks.
 //!
-//! For a step, see `moving`.
+//! A step runs through the same stages, with two boxes per node, up to a filter. The device drops pairs that certainly do not touch, and
+//! the host finds the first contacts of all others.
 
 mod clusterings;
 mod collect;
 mod device;
 mod forest;
-mod moving;
 mod open;
 mod passes;
 mod pieces;

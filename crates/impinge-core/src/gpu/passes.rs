@@ -14,12 +14,13 @@ use std::sync::Arc;
 use super::buffers::count;
 use super::cells::{self, CellWork};
 use super::clusters;
-use super::collect::Collected;
+use super::collect::{Collected, Guess};
 use super::device::Scopes;
 use super::engine::{Engine, Outcome, Taker};
 use super::layout::NodePair;
 use super::recording::{Recorder, Recording};
 use super::room::{Capacities, CellsWanted, NextPass};
+use super::world::Motion;
 use crate::error::Error;
 use crate::index::Number;
 use crate::narrow::settle;
@@ -84,7 +85,7 @@ impl Engine {
             };
             match next {
                 NextPass::Complete => {
-                    book(&collected, self.method, stats);
+                    book(&collected, self.lane.method, stats);
                     self.complete.push(collected.counts);
                     let settled = &mut self.settled;
                     let goes_on = stats.time("settle", |_| match &mut taker {
@@ -128,11 +129,11 @@ impl Engine {
 
     /// The whole work of a frame, if there is any.
     pub(super) fn whole(&self, frame: &Frame) -> Option<Work> {
-        let seeds = self.world.seeds(frame);
+        let seeds = self.world.seeds(frame, self.lane.motion);
         if seeds.is_empty() {
             return None;
         }
-        Some(match self.method {
+        Some(match self.lane.method {
             Method::Cells => Work::Cells(CellWork::WHOLE),
             _ => Work::Seeds(self.descend(frame, seeds)),
         })
@@ -140,7 +141,7 @@ impl Engine {
 
     /// The work of a piece: pairs of its runs, in batches that a queue can hold.
     pub(super) fn seeds_in_batches(&self, frame: &Frame, pairs: &[[u32; 2]]) -> Vec<Work> {
-        let most = (self.room.capacities().queue as usize).max(SEEDS);
+        let most = (self.lane.room.capacities().queue as usize).max(SEEDS);
         let batches = pairs.chunks(most);
         batches
             .map(|batch| Work::Seeds(self.descend(frame, self.world.seeds_of_runs(batch))))
@@ -153,7 +154,7 @@ impl Engine {
         loop {
             below.clear();
             for &seed in &seeds {
-                if !self.world.expand(frame, seed, &mut below) {
+                if !self.world.expand(frame, self.lane.motion, seed, &mut below) {
                     below.push(seed);
                 }
             }
@@ -174,7 +175,7 @@ impl Engine {
         let seeds = match work {
             Work::Seeds(seeds) => seeds,
             &Work::Cells(cells) => {
-                let parts = cells.split(collected, self.room.capacities().kept);
+                let parts = cells.split(collected, self.lane.room.capacities().kept);
                 // Lists and tiles are our own: a method of another crate has no parts of a cell.
                 let is_list = |parts: &[CellWork]| matches!(parts, [CellWork::List(_)]);
                 let parts = parts.filter(|parts| self.guest.is_none() || !is_list(parts));
@@ -189,7 +190,7 @@ impl Engine {
         }
         let mut below = Vec::new();
         for &seed in seeds {
-            if !self.world.expand(frame, seed, &mut below) {
+            if !self.world.expand(frame, self.lane.motion, seed, &mut below) {
                 return Err(self.too_small("two clusters", Capacities::LEAST));
             }
         }
@@ -208,7 +209,7 @@ impl Engine {
         room: Option<u64>,
     ) -> Result<Capacities, Error> {
         let needed = &collected.counts.needed;
-        let least = Capacities::LEAST.of(self.method);
+        let least = Capacities::LEAST.of(self.lane.method);
         let lean = match work {
             Work::Cells(cells) => cells.lean(needed, now, least),
             Work::Seeds(_) => CellWork::WHOLE.lean(needed, now, least),
@@ -229,45 +230,53 @@ impl Engine {
         cells: Option<CellsWanted>,
         stats: &mut Statistics,
     ) -> Result<Collected, Error> {
-        self.is_encoded = false;
-        let mut recording = self.record(frame, Some(work), capacities, cells)?;
-        let seeks = self.world.is_moving().then_some(self.sought);
-        let guess = self.collector.record(&self.room, seeks, &mut recording);
+        self.lane.is_encoded = false;
         let gpu = Arc::clone(&self.gpu);
         if self.is_traced {
             // The same before, launch by launch.
-            self.ran = self.launcher.run_each(&gpu, &recording).await?;
+            let recording = self.record(frame, Some(work), capacities, cells)?;
+            self.lane.ran = self.lane.launcher.run_each(&gpu, &recording).await?;
         }
         let scopes = Scopes::open(&gpu.device);
-        let submitted = self.submit(&recording);
+        let submitted = self.submit(frame, work, capacities, cells);
         let closed = scopes.close();
-        submitted?;
+        let (recording, guess) = submitted?;
         closed.await?;
         let names = recording.stages();
         let collected = self
+            .lane
             .collector
-            .take(&gpu, &self.room, names.len(), guess)
+            .take(&gpu, &self.lane.room, names.len(), guess)
             .await?;
         for (&name, &ms) in names.iter().zip(collected.stage_ms.iter().flatten()) {
             stats.add_ms(name, ms);
         }
-        self.world.is_moved = false;
-        self.recording = recording;
+        self.world.is_refitted(self.lane.motion);
+        self.lane.recording = recording;
         Ok(collected)
     }
 
-    fn submit(&mut self, recording: &Recording) -> Result<(), Error> {
-        let gpu = &*self.gpu;
+    fn submit(
+        &mut self,
+        frame: &Frame,
+        work: &Work,
+        capacities: Capacities,
+        cells: Option<CellsWanted>,
+    ) -> Result<(Recording, Guess), Error> {
+        let mut recording = self.record(frame, Some(work), capacities, cells)?;
+        let (gpu, lane) = (&*self.gpu, &mut self.lane);
+        let seeks = (lane.motion == Motion::Moving).then_some(self.sought);
+        let guess = lane.collector.record(&lane.room, seeks, &mut recording);
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor {
                 label: Some("impinge"),
             });
-        let times = self.collector.times(gpu);
-        self.launcher.encode(gpu, recording, times, &mut encoder)?;
-        self.collector.encode(gpu, &mut encoder, recording);
+        let times = lane.collector.times(gpu);
+        lane.launcher.encode(gpu, &recording, times, &mut encoder)?;
+        lane.collector.encode(gpu, &mut encoder, &recording);
         gpu.queue.submit([encoder.finish()]);
-        Ok(())
+        Ok((recording, guess))
     }
 
     /// Records all stages; without work, only counters of zero.
@@ -283,19 +292,23 @@ impl Engine {
             _ => &[],
         };
         capacities.queue = capacities.queue.max(count(seeds.len()));
-        self.room.resize(&self.gpu, &capacities, cells);
+        // Buffers that are replaced should be free.
+        self.lane.recording = Recording::default();
+        self.lane.room.resize(&self.gpu, &capacities, cells);
         let mut recording = Recording::default();
         // The caller's step begins with nothing known.
-        let sought = (!self.is_encoded).then_some(self.sought);
+        let sought = (!self.lane.is_encoded).then_some(self.sought);
         let touches_by = sought.and(self.touches_by);
-        let start = self.room.start(&self.gpu, seeds, touches_by)?;
+        let start = self.lane.room.start(&self.gpu, seeds, touches_by)?;
         for (from, to) in start {
             recording.copy(from, to);
         }
         let mut recorder = Recorder {
             gpu: &self.gpu,
             world: &self.world,
-            room: &self.room,
+            view: self.world.view(self.lane.motion),
+            motion: self.lane.motion,
+            room: &self.lane.room,
             recording,
         };
         let (lambda, group_size) = (self.settings.lambda, self.settings.group_size);
@@ -304,7 +317,7 @@ impl Engine {
             (None, _) => {}
             (Some(Work::Seeds(seeds)), _) => recorder.clusters(clusters::Told {
                 n_seeds: count(seeds.len()),
-                n_rounds: self.world.forest().rounds(seeds),
+                n_rounds: self.world.rounds(seeds),
                 resolve,
                 sought,
             }),

@@ -12,7 +12,7 @@ use super::layout::{Arguments, Params, Step};
 use super::open::Gpu;
 use super::pipeline::{Bindings, Entry, Kernel, Program};
 use super::room::Room;
-use super::world::World;
+use super::world::{Motion, View, World};
 use crate::error::Error;
 
 /// The widest row of workgroups; `shared/arguments.wgsl` has the same.
@@ -190,8 +190,12 @@ impl fmt::Display for Recording {
 pub struct Recorder<'a> {
     /// The kernels, and the limits of the device.
     pub gpu: &'a Gpu,
-    /// The data on layers.
+    /// The data on parts.
     pub world: &'a World,
+    /// What a frame, or a step, sees of them.
+    pub view: &'a View,
+    /// Whether that is a frame or a step.
+    pub motion: Motion,
     /// The buffers for results.
     pub room: &'a Room,
     /// What has been recorded so far.

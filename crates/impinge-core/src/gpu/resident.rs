@@ -7,7 +7,7 @@ use super::buffers::{count, read};
 use super::engine::Engine;
 use super::layout::{Counter, N_PAIRS, N_UNSURE, TOUCHES_BY};
 use super::room::{Capacities, NextPass, PassCounts};
-use super::world::{ResidentEnds, weigh_moving};
+use super::world::{Motion, ResidentEnds};
 use crate::elements::Part;
 use crate::error::Error;
 use crate::grouping::clusters::Clustering;
@@ -126,26 +126,21 @@ impl Engine {
         positions: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentPairs, Error> {
-        let Job { scene, frame, .. } = job;
         for &(body, buffer) in positions {
-            check_buffer(scene, body, buffer, "positions")?;
+            check_buffer(job.scene, body, buffer, "positions")?;
         }
+        self.turn_to(Motion::Still);
         let ids: Vec<BodyId> = positions.iter().map(|&(body, _)| body).collect();
-        self.update(job, &ids, &mut Statistics::default())?;
-        for &(body, buffer) in positions {
-            self.world.copy_positions(body, buffer, encoder);
-        }
-        let cells = self.cells_wanted(frame);
-        let capacities = self.first_room(cells)?;
-        let work = self.whole(frame);
-        self.is_encoded = true;
-        let recording = self.record(frame, work.as_ref(), capacities, cells)?;
-        self.launcher.encode(&self.gpu, &recording, None, encoder)?;
-        let capacities = self.room.capacities();
+        let clusterings = self.cluster(job, &ids, &mut Statistics::default())?;
+        let starts = positions.iter().copied().collect();
+        let resident = ResidentEnds([starts, BTreeMap::new()]);
+        self.encode_whole(job, &clusterings, &resident, encoder)?;
+        let room = &self.lane.room;
+        let capacities = room.capacities();
         Ok(ResidentPairs {
-            pairs: self.room.pairs.buffer().clone(),
-            unsure: self.room.unsure.buffer().clone(),
-            counts: self.room.counters.buffer().clone(),
+            pairs: room.pairs.buffer().clone(),
+            unsure: room.unsure.buffer().clone(),
+            counts: room.counters.buffer().clone(),
             n_pairs_offset: u64::from(N_PAIRS) * COUNTER,
             n_unsure_offset: u64::from(N_UNSURE) * COUNTER,
             pairs_capacity: capacities.pairs,
@@ -180,35 +175,47 @@ impl Engine {
             }
         }
         let resident = ResidentEnds([starts, ends]);
-        let most = self.most();
-        if !weigh_moving(job, clusterings).is_some_and(|weight| weight.fits(most)) {
+        self.turn_to(Motion::Moving);
+        if !self.is_held(job, clusterings) {
             return Err(self.too_small("the step at once", Capacities::LEAST));
         }
-        let stats = &mut Statistics::default();
-        self.world
-            .update_moving(&self.gpu, job, clusterings, &resident, stats)?;
-        self.world.copy_ends(&resident, encoder);
-        let capacities = self.first_room(None)?;
-        let work = self.whole(frame);
-        self.is_encoded = true;
-        let recording = self.record(frame, work.as_ref(), capacities, None)?;
-        self.launcher.encode(&self.gpu, &recording, None, encoder)?;
+        self.encode_whole(job, clusterings, &resident, encoder)?;
+        let room = &self.lane.room;
         let of_parts = |parts: &[Part]| {
             let layers = frame.layers.iter();
             let numbers = layers.filter(|layer| parts.contains(&layer.part));
             numbers.map(|layer| layer.n_primitives).sum()
         };
         Ok(ResidentStep {
-            pairs: self.room.unsure.buffer().clone(),
-            times: self.room.times.buffer().clone(),
+            pairs: room.unsure.buffer().clone(),
+            times: room.times.buffer().clone(),
             touches_by_offset: u64::from(TOUCHES_BY) * COUNTER,
-            counts: self.room.counters.buffer().clone(),
+            counts: room.counters.buffer().clone(),
             n_pairs_offset: u64::from(N_UNSURE) * COUNTER,
-            pairs_capacity: self.room.capacities().unsure,
+            pairs_capacity: room.capacities().unsure,
             first_vertex: of_parts(&[Part::Edges]),
             first_face: of_parts(&[Part::Edges, Part::Vertices]),
             layers: layers(frame),
         })
+    }
+
+    /// Encodes all work of a frame or a step as one pass.
+    fn encode_whole(
+        &mut self,
+        job: Job<'_>,
+        clusterings: &[Arc<Clustering>],
+        resident: &ResidentEnds<'_>,
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<(), Error> {
+        self.update(job, clusterings, resident, &mut Statistics::default())?;
+        self.world.copy_positions(resident, encoder);
+        let cells = self.cells_wanted(job.frame);
+        let capacities = self.first_room(cells)?;
+        let work = self.whole(job.frame);
+        self.lane.is_encoded = true;
+        let recording = self.record(job.frame, work.as_ref(), capacities, cells)?;
+        let launcher = &mut self.lane.launcher;
+        launcher.encode(&self.gpu, &recording, None, encoder)
     }
 
     /// The positions of a body on the device, see
@@ -226,19 +233,20 @@ impl Engine {
     /// Those of [`Detector::make_room`](crate::Detector::make_room).
     pub async fn make_room(&mut self) -> Result<bool, Error> {
         self.gpu().check_lost()?;
-        let is_complete = self.make_own_room().await?;
-        match &mut self.of_steps {
-            Some(steps) => Ok(steps.make_own_room().await? && is_complete),
-            None => Ok(is_complete),
+        let mut is_complete = true;
+        for _ in 0..2 {
+            is_complete &= self.make_own_room().await?;
+            std::mem::swap(&mut self.lane, &mut self.other);
         }
+        Ok(is_complete)
     }
 
     async fn make_own_room(&mut self) -> Result<bool, Error> {
-        if !self.is_encoded {
+        if !self.lane.is_encoded {
             return Ok(true);
         }
-        let capacities = self.room.capacities();
-        let counters = read(&self.gpu, &self.room.counters.all()).await?;
+        let capacities = self.lane.room.capacities();
+        let counters = read(&self.gpu, &self.lane.room.counters.all()).await?;
         let counts = PassCounts::new(&bytemuck::pod_collect_to_vec::<u8, Counter>(&counters));
         match counts.judge(self.gpu(), capacities, self.budget_for_room()) {
             NextPass::Complete => Ok(true),

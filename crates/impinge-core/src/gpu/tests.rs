@@ -119,7 +119,7 @@ fn structs_are_laid_out_as_on_the_host() {
     let module = parse(&DISPATCH);
     assert_twins!(&module,
         Node { low, first_child, high, shape }
-        Body { root, slack, within, layer, category, mask }
+        Body { root, slack, within, layer, category, mask, first_place, first_number }
         Cluster { first_place, first_vertex, sizes, body }
         Level { first, count }
         NodePair { a, b }

@@ -1,222 +1,394 @@
-//! The layers on the device: a forest of clusters, and positions.
+//! The parts of bodies on the device: a forest of clusters, and positions. One world for frames and for steps.
 //!
-//! All trees lie in one array of nodes, ordered by height over all bodies, so that one launch refits one
-//! height of every tree. Above three or more bodies there is a tree over bodies, whose leaves are
-//! gates, the entrances to the bodies:
+//! ```text
+//! parts       edges of all bodies | vertices | faces | elements as given that are none of these
+//! positions   all bodies at the start | all bodies at the end          without the end if no step was asked for
+//! nodes       boxes at the start      | boxes at the end
+//! ```
+//!
+//! A frame and a step see the same world, each by its own [`View`]: which parts take part, their records, the tree over them.
+//! The parts of both are sent together if the bodies are the same, so detection and steps of a body have its faces and its
+//! positions once. Parts of one body share its positions, so equal vertex numbers mean the same vertex.
+//!
+//! All trees lie in one array of nodes, ordered by height over all parts, so that one launch refits one
+//! height of every tree. Above three or more parts of a view there is a tree over them, whose leaves are
+//! gates, the entrances to the parts:
 //!
 //! ```text
 //! height h+2                    top
-//! height h+1          node  …         node          tree over bodies
-//! height h        gate 0 … gate k  gate … gate      one per body: filters are checked here
+//! height h+1          node  …         node          tree over parts
+//! height h        gate 0 … gate k  gate … gate      one per part: filters are checked here
 //! …                  |       |
-//! height 1         root    root …                   bodies' trees, of unequal heights
-//! height 0        clusters of body 0 | of body 1 | …
+//! height 1         root    root …                   trees of parts, of unequal heights
+//! height 0        clusters of part 0 | of part 1 | …
 //! ```
 //!
-//! Topology is sent once; each frame sends the positions that have changed. For steps, `moving` sends layers of bodies instead of
-//! bodies, and boxes and positions at both ends.
+//! Parts are sent once; each frame sends the positions that have changed.
 
-mod moving;
-
-pub(super) use moving::{ResidentEnds, weigh as weigh_moving};
-
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use crate::elements::Part;
 use crate::error::Error;
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hierarchy::TreeShape;
 use crate::ids::BodyId;
-use crate::index::LayerIx;
-use crate::plan::Plan as Frame;
+use crate::index::{LayerIx, Number};
+use crate::plan::{Layer, Plan as Frame};
 use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::{Filter, Scene};
 use crate::stats::Statistics;
 
 use super::buffers::{Storage, count};
-use super::clusterings::Clusterings;
-use super::forest::Forest;
+use super::forest::{Forest, Top};
 use super::layout::{
-    Body, Cluster, ClusterVertex, Coordinate, Corners, Level, NO_ROOT, Node, NodePair, Order,
+    BARE, BODY_SHIFT, Body, Cluster, ClusterVertex, Coordinate, Corners, EDGES, FACES, Level,
+    NO_ROOT, Node, NodePair, OWN_LAYERS, Order, POINTS, VERTICES,
 };
 use super::open::Gpu;
 use super::pieces::{Chunk, Loaded};
-use super::topology::{DeviceClusters, Weight, narrowed};
+use super::topology::{DeviceClusters, Most, Weight, narrowed};
 
 /// Bit 31 of a place is a flag.
 pub const MOST_PRIMITIVES: u64 = 1 << 31;
 /// By how many keys the boxes of rounded positions are widened: see `boxes.wgsl`.
 const SLACK: u32 = 2;
-/// One layer on the device.
+/// Marks a part that does not take part.
+const NO_LAYER: u32 = u32::MAX;
+/// Bytes of a vertex.
+const VERTEX: u64 = 3 * size_of::<Coordinate>() as u64;
+
+/// What is asked of the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Resident {
-    id: BodyId,
-    /// The number of the clustering that was sent.
-    number: u64,
-    positions_stamp: u64,
-    /// Index of its first vertex in the positions.
-    first_vertex: u64,
-    n_vertices: u64,
+pub enum Motion {
+    /// A frame, in which nothing moves.
+    Still,
+    /// A step, with boxes and positions at both ends.
+    Moving,
 }
 
-/// The data on layers that the kernels read.
+impl Motion {
+    /// How many boxes each node has, and how many positions each vertex.
+    pub fn n_ends(self) -> u64 {
+        match self {
+            Motion::Still => 1,
+            Motion::Moving => 2,
+        }
+    }
+
+    fn other(self) -> Motion {
+        match self {
+            Motion::Still => Motion::Moving,
+            Motion::Moving => Motion::Still,
+        }
+    }
+}
+
+/// A body whose positions are on the device.
 #[derive(Debug)]
-pub struct World {
-    pub clusterings: Clusterings,
-    residents: Vec<Resident>,
-    /// The nodes on the device, without their boxes.
-    forest: Forest,
-    bodies_sent: Vec<Body>,
-    ignored_sent: Vec<NodePair>,
-    words: Vec<u32>,
-    /// The layers of a step, if the device holds those.
-    layers: Option<moving::Layers>,
+struct Resident {
+    id: BodyId,
+    topology_stamp: u64,
+    /// Index of its first vertex among those of one end.
+    first_vertex: u64,
+    n_vertices: u64,
+    /// The stamps of the positions that were sent: at the start, and of the step at the end.
+    sent: [u64; 2],
+}
+
+/// A part of a body on the device.
+#[derive(Debug, Clone)]
+struct Held {
+    id: BodyId,
+    clustering: Arc<Clustering>,
+}
+
+/// What a frame, or a step, sees of the world.
+#[derive(Debug)]
+pub struct View {
+    /// By layer: its part.
+    parts: Vec<u32>,
+    /// By part: its layer.
+    layers: Vec<u32>,
+    top: Option<Top>,
+    /// The nodes of each height, first those of the trees, then those of the tree over them.
+    pub levels: Vec<Level>,
     /// Whether boxes have to be refitted.
     pub is_moved: bool,
+    bodies_sent: Vec<Body>,
+    ignored_sent: Vec<NodePair>,
+    pub bodies: Storage<Body>,
+    pub ignored: Storage<NodePair>,
+    pub table: Storage<Level>,
+}
+
+/// Positions that are on the device already, by body: at the start, and at the end.
+#[derive(Debug, Default)]
+pub struct ResidentEnds<'a>(pub [BTreeMap<BodyId, &'a wgpu::Buffer>; 2]);
+
+/// The data on parts that the kernels read.
+#[derive(Debug)]
+pub struct World {
+    bodies: Vec<Resident>,
+    parts: Vec<Held>,
+    /// The vertices of all bodies.
+    n_vertices: u64,
+    n_ends: u64,
+    /// The nodes on the device, without their boxes.
+    forest: Forest,
+    words: Vec<u32>,
+    views: [Option<View>; 2],
     pub has_solids: bool,
     pub nodes: Storage<Node>,
-    pub bodies: Storage<Body>,
     pub clusters: Storage<Cluster>,
     pub cluster_vertices: Storage<ClusterVertex>,
     pub corners: Storage<Corners>,
     pub order: Storage<Order>,
     pub positions: Storage<Coordinate>,
-    pub levels: Storage<Level>,
-    pub ignored: Storage<NodePair>,
+}
+
+/// The size of the layers of a frame on the device; `None` if 32 bits do not number its vertices, primitives or bodies.
+pub(crate) fn weigh(
+    job: Job<'_>,
+    motion: Motion,
+    clusterings: &[Arc<Clustering>],
+) -> Option<Weight> {
+    let layers = job.frame.layers.iter().map(|layer| layer.id);
+    weigh_parts(job.scene, motion, layers.zip(clusterings))
+}
+
+fn weigh_parts<'a>(
+    scene: &Scene,
+    motion: Motion,
+    parts: impl Iterator<Item = (BodyId, &'a Arc<Clustering>)>,
+) -> Option<Weight> {
+    let mut weight = Weight::default();
+    let mut ids = Vec::new();
+    for (id, clustering) in parts {
+        ids.push(id);
+        weight.n_primitives += count(clustering.order.len());
+        weight.n_cluster_vertices += count(clustering.vertices.len());
+        weight.n_clusters += count(clustering.n_clusters());
+        let shape = &clustering.shape;
+        let nodes = (0..shape.n_levels()).map(|level| count(shape.n_nodes(level)));
+        weight.n_nodes += nodes.sum::<u64>();
+        weight.n_bodies += 1;
+    }
+    if weight.n_bodies > 2 || motion == Motion::Moving {
+        // Gates and the tree over them.
+        weight.n_nodes += 2 * weight.n_bodies;
+    }
+    weight.n_nodes *= motion.n_ends();
+    ids.sort_unstable();
+    ids.dedup();
+    let vertices = ids.iter().map(|id| scene.body_in(id.slot()).n_vertices());
+    weight.n_vertices = motion.n_ends() * vertices.map(count).sum::<u64>();
+    let is_numbered = 3 * weight.n_vertices <= u64::from(u32::MAX)
+        && weight.n_primitives < MOST_PRIMITIVES
+        && count(ids.len()) < 1 << (32 - BODY_SHIFT);
+    is_numbered.then_some(weight)
 }
 
 impl World {
     pub(crate) fn new() -> Self {
         World {
-            clusterings: Clusterings::default(),
-            residents: Vec::new(),
+            bodies: Vec::new(),
+            parts: Vec::new(),
+            n_vertices: 0,
+            n_ends: 1,
             forest: Forest::default(),
-            bodies_sent: Vec::new(),
-            ignored_sent: Vec::new(),
             words: Vec::new(),
-            layers: None,
-            is_moved: false,
+            views: [None, None],
             has_solids: false,
             nodes: Storage::plain("nodes"),
-            bodies: Storage::plain("bodies"),
             clusters: Storage::plain("clusters"),
             cluster_vertices: Storage::plain("cluster vertices"),
             corners: Storage::plain("corners"),
             order: Storage::plain("order"),
             positions: Storage::plain("positions"),
-            levels: Storage::plain("levels"),
-            ignored: Storage::plain("ignored"),
         }
     }
 
     /// Bytes on the device.
     pub fn bytes(&self) -> u64 {
+        let views = self.views.iter().flatten().map(View::bytes);
         self.nodes.bytes()
-            + self.bodies.bytes()
             + self.clusters.bytes()
             + self.cluster_vertices.bytes()
             + self.corners.bytes()
             + self.order.bytes()
             + self.positions.bytes()
-            + self.levels.bytes()
-            + self.ignored.bytes()
+            + views.sum::<u64>()
     }
 
-    pub fn forest(&self) -> &Forest {
-        &self.forest
+    /// What a frame, or a step, sees.
+    ///
+    /// # Panics
+    /// If there was none.
+    pub fn view(&self, motion: Motion) -> &View {
+        self.views[motion as usize].as_ref().expect("sent before")
     }
 
-    /// Sends what has changed since the last frame; positions of `resident` bodies are on the device already.
+    fn view_mut(&mut self, motion: Motion) -> &mut View {
+        self.views[motion as usize].as_mut().expect("sent before")
+    }
+
+    /// Frees all buffers.
+    pub fn forget(&mut self) {
+        *self = World::new();
+    }
+
+    /// Says that the boxes that a view sees fit the positions.
+    pub fn is_refitted(&mut self, motion: Motion) {
+        self.view_mut(motion).is_moved = false;
+    }
+
+    fn is_moved(&mut self) {
+        for view in self.views.iter_mut().flatten() {
+            view.is_moved = true;
+        }
+    }
+
+    /// How many parts are on the device.
+    pub fn n_parts(&self) -> u64 {
+        count(self.parts.len())
+    }
+
+    /// Sends what has changed since the last frame, or step, which must have a [weight](weigh); positions of `resident`
+    /// bodies are on the device already. What was held for the other kind of question stays if `most` allows.
     ///
     /// # Errors
-    /// More primitives than the device can bind at once.
-    pub fn update(
+    /// More than the device can bind at once.
+    pub(crate) fn update(
         &mut self,
         gpu: &Gpu,
         job: Job<'_>,
-        resident: &[BodyId],
-        recluster: bool,
+        (motion, clusterings): (Motion, &[Arc<Clustering>]),
+        (resident, most): (&ResidentEnds<'_>, Most),
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         let Job { scene, frame, .. } = job;
-        if frame.n_primitives() > MOST_PRIMITIVES {
-            return Err(Error::TooMany {
-                what: "primitives in one query on a GPU",
-                given: frame.n_primitives(),
-                limit: MOST_PRIMITIVES,
+        if !self.is_seen(job, (motion, clusterings)) {
+            let layers = frame.layers.iter().zip(clusterings);
+            let wanted = layers.map(|(layer, clustering)| Held {
+                id: layer.id,
+                clustering: Arc::clone(clustering),
             });
+            self.send_parts(gpu, scene, (motion, wanted.collect()), most)?;
         }
-        self.clusterings.update(job, resident, recluster, stats)?;
-        if !self.is_resident(frame) {
-            // If an upload fails, half a topology must not look complete.
-            self.residents.clear();
-            self.send_topology(gpu, scene, frame)?;
-        }
-        self.send_positions(gpu, scene, frame, resident);
-        self.send_bodies(gpu, scene, frame, resident)?;
-        stats.n_clusters = self.forest.n_clusters();
+        self.send_positions(gpu, scene, motion, resident);
+        self.send_records(gpu, job, motion, resident)?;
+        let clusters = clusterings.iter().map(|held| held.n_clusters());
+        stats.n_clusters = clusters.map(count).sum();
         Ok(())
     }
 
-    fn is_resident(&self, frame: &Frame) -> bool {
-        self.residents.len() == frame.layers.len()
-            && frame
-                .layer_ixs()
-                .zip(&self.residents)
-                .all(|(ix, resident)| {
-                    let cache = self.clusterings.of(resident.id);
-                    resident.id == frame.layer(ix).id
-                        && cache.is_some_and(|cache| cache.number == resident.number)
-                })
+    /// Whether a view sees the parts of a frame, or a step, with these clusterings, in their order.
+    pub(crate) fn is_seen(
+        &self,
+        job: Job<'_>,
+        (motion, clusterings): (Motion, &[Arc<Clustering>]),
+    ) -> bool {
+        let layers = job.frame.layers.iter().zip(clusterings);
+        self.views[motion as usize].as_ref().is_some_and(|view| {
+            let parts = view.parts.iter().map(|&part| &self.parts[part as usize]);
+            let is_it = |(part, (layer, clustering)): (&Held, (&Layer, _))| {
+                part.id == layer.id && Arc::ptr_eq(&part.clustering, clustering)
+            };
+            view.parts.len() == clusterings.len() && parts.zip(layers).all(is_it)
+        })
     }
 
-    fn send_topology(&mut self, gpu: &Gpu, scene: &Scene, frame: &Frame) -> Result<(), Error> {
-        let caches: Vec<(u64, Arc<Clustering>)> = frame
-            .layers
-            .iter()
-            .map(|layer| {
-                let cache = self.clusterings.of(layer.id);
-                let cache = cache.expect("just clustered");
-                (cache.number, Arc::clone(&cache.clustering))
-            })
-            .collect();
-        let mut residents = Vec::with_capacity(caches.len());
+    /// The parts of the other kind of question, if they are of the same bodies.
+    fn of_other(&self, scene: &Scene, motion: Motion, wanted: &[Held]) -> Option<Vec<Held>> {
+        let view = self.views[motion.other() as usize].as_ref()?;
+        let same = |(body, id): (&Resident, BodyId)| {
+            let stamp = body.topology_stamp;
+            body.id == id && scene.body_in(id.slot()).topology_stamp() == stamp
+        };
+        let ids = ids(wanted);
+        let is_same = ids.len() == self.bodies.len() && self.bodies.iter().zip(ids).all(same);
+        let parts = view.parts.iter();
+        is_same.then(|| {
+            parts
+                .map(|&part| self.parts[part as usize].clone())
+                .collect()
+        })
+    }
+
+    /// Sends parts for a kind of question, and with them those for the other kind if they are of the same bodies and fit.
+    fn send_parts(
+        &mut self,
+        gpu: &Gpu,
+        scene: &Scene,
+        (motion, wanted): (Motion, Vec<Held>),
+        most: Most,
+    ) -> Result<(), Error> {
+        let other = self.of_other(scene, motion, &wanted);
+        let both = other.map(|other| match motion {
+            Motion::Still => [wanted.clone(), other],
+            Motion::Moving => [other, wanted.clone()],
+        });
+        let fits = |both: &[Vec<Held>; 2]| {
+            let parts = union(both);
+            let parts = parts.iter().map(|part| (part.id, &part.clustering));
+            weigh_parts(scene, Motion::Moving, parts).is_some_and(|weight| weight.fits(most))
+        };
+        let seen = match both.filter(fits) {
+            Some(both) => both.map(Some),
+            None => match motion {
+                Motion::Still => [Some(wanted), None],
+                Motion::Moving => [None, Some(wanted)],
+            },
+        };
+        // New buffers: commands that were encoded for the caller may still read the old ones.
+        self.forget();
+        self.n_ends = match &seen {
+            [_, Some(_)] => 2,
+            [_, None] => 1,
+        };
+        let parts = union(&seen.each_ref().map(|seen| seen.clone().unwrap_or_default()));
+        let (mut bodies, mut n_vertices) = (Vec::new(), 0);
+        for id in ids(&parts) {
+            let body = scene.body_in(id.slot());
+            bodies.push(Resident {
+                id,
+                topology_stamp: body.topology_stamp(),
+                first_vertex: n_vertices,
+                n_vertices: count(body.n_vertices()),
+                sent: [0; 2],
+            });
+            n_vertices += count(body.n_vertices());
+        }
+        self.bodies = bodies;
+        self.n_vertices = n_vertices;
         let mut topology = DeviceClusters::default();
-        let mut first_vertex = 0u64;
-        for ((ix, layer), (number, clustering)) in frame.numbered_layers().zip(&caches) {
-            let n_vertices = count(frame.body(scene, ix).n_vertices());
-            let limit = u64::from(u32::MAX) / 3;
-            if first_vertex + n_vertices > limit {
-                return Err(Error::TooMany {
-                    what: "vertices in one query on a GPU",
-                    given: first_vertex + n_vertices,
-                    limit,
-                });
-            }
-            // Vertices fit 32 bits: just checked.
-            let first = first_vertex as u32;
-            let clusters = 0..clustering.n_clusters();
-            topology.push(clustering, clusters, layer.first, ix.raw(), |vertex| {
+        for (ix, part) in (0u32..).zip(&parts) {
+            let body = self.number(part.id).expect("its body was listed");
+            // Vertices fit 32 bits, or the frame would weigh nothing.
+            let first = self.bodies[body].first_vertex as u32;
+            let clusters = 0..part.clustering.n_clusters();
+            // Numbers within the part: its record has the first one.
+            topology.push(&part.clustering, clusters, Number::new(0), ix, |vertex| {
                 first + vertex
             });
-            residents.push(Resident {
-                id: layer.id,
-                number: *number,
-                positions_stamp: 0,
-                first_vertex,
-                n_vertices,
-            });
-            first_vertex += n_vertices;
         }
-        let shapes: Vec<&TreeShape> = caches
-            .iter()
-            .map(|(_, clustering)| &clustering.shape)
-            .collect();
-        self.forest = Forest::new(&shapes, |ix| sample(scene, frame, ix));
+        let shapes: Vec<&TreeShape> = parts.iter().map(|part| &part.clustering.shape).collect();
+        self.forest = Forest::of_trees(&shapes);
+        let sample = |part: u32| sample(scene, parts[part as usize].id);
+        let numbers: BTreeMap<_, u32> = parts.iter().map(key).zip(0..).collect();
+        let mut views = [None, None];
+        for (view, seen) in views.iter_mut().zip(&seen) {
+            let Some(seen) = seen else { continue };
+            let seen = seen.iter().map(|part| numbers[&key(part)]).collect();
+            *view = Some(View::new(gpu, &mut self.forest, seen, parts.len(), sample)?);
+        }
         self.send_trees(gpu, &topology)?;
-        self.positions.resize(gpu, 3 * first_vertex)?;
-        self.bodies_sent.clear();
-        self.residents = residents;
+        self.positions.resize(gpu, 3 * self.n_ends * n_vertices)?;
+        self.parts = parts;
+        // If an upload has failed, half a world does not look complete.
+        self.views = views;
         Ok(())
     }
 
@@ -227,224 +399,256 @@ impl World {
             .upload(gpu, &topology.cluster_vertices)?;
         self.corners.upload(gpu, &topology.corners)?;
         self.order.upload(gpu, &topology.numbers)?;
-        self.nodes.upload(gpu, &self.forest.nodes)?;
-        self.levels.upload(gpu, &self.forest.levels)?;
-        Ok(())
+        let nodes = &self.forest.nodes;
+        match self.n_ends {
+            1 => self.nodes.upload(gpu, nodes),
+            _ => self.nodes.upload(gpu, &[&nodes[..], &nodes[..]].concat()),
+        }
     }
 
     /// Sends a piece of the frame instead of all of it.
     ///
     /// # Errors
     /// The piece is larger than the device can bind at once.
-    pub fn send_piece(
+    pub(crate) fn send_piece<'a>(
         &mut self,
         gpu: &Gpu,
         scene: &Scene,
         frame: &Frame,
         chunks: &[&Chunk],
+        clustering: impl Fn(LayerIx) -> &'a Clustering,
     ) -> Result<(), Error> {
-        self.residents.clear();
-        let loaded = Loaded::new(scene, frame, chunks, |layer| self.clustering(frame, layer));
+        (self.parts, self.bodies, self.n_ends) = (Vec::new(), Vec::new(), 1);
+        let view = self.views[Motion::Still as usize].take();
+        self.views[Motion::Moving as usize] = None;
+        let loaded = Loaded::new(scene, frame, chunks, clustering);
         self.forest = Forest::of_trees(&Vec::from_iter(&loaded.shapes));
         self.send_trees(gpu, &loaded.topology)?;
         let words: &[Coordinate] = bytemuck::cast_slice(&loaded.words);
         self.positions.upload(gpu, words)?;
-        let slacks = loaded.is_rounded.iter().map(|&is_rounded| Body {
+        let mut view = view.unwrap_or_default();
+        view.top = None;
+        view.parts.clear();
+        view.levels = self.forest.levels(None);
+        view.table.upload(gpu, &view.levels)?;
+        let records = loaded.is_rounded.iter().map(|&is_rounded| Body {
             root: NO_ROOT,
             slack: if is_rounded { SLACK } else { 0 },
             ..Body::default()
         });
-        self.bodies.upload(gpu, &Vec::from_iter(slacks))?;
-        self.bodies_sent.clear();
-        self.ignored.upload(gpu, &[])?;
-        self.ignored_sent.clear();
-        self.is_moved = true;
+        view.send(gpu, records.collect(), Vec::new())?;
+        view.is_moved = true;
+        self.views[Motion::Still as usize] = Some(view);
         Ok(())
     }
 
-    /// Frees all buffers. The clusterings stay.
-    pub fn forget_buffers(&mut self) {
-        *self = World {
-            clusterings: std::mem::take(&mut self.clusterings),
-            ..World::new()
-        };
+    fn number(&self, id: BodyId) -> Option<usize> {
+        self.bodies.binary_search_by_key(&id, |body| body.id).ok()
     }
 
-    /// The clustering of a layer, which must be known.
-    pub(crate) fn clustering(&self, frame: &Frame, layer: LayerIx) -> &Clustering {
-        let id = frame.layer(layer).id;
-        let cache = self.clusterings.of(id);
-        &cache.expect("just clustered").clustering
-    }
-
-    /// The size of a whole frame on the device.
-    pub fn weigh(&self, scene: &Scene, frame: &Frame) -> Weight {
-        let mut weight = Weight::default();
-        for ix in frame.layer_ixs() {
-            let clustering = self.clustering(frame, ix);
-            weight.n_primitives += count(clustering.order.len());
-            weight.n_vertices += count(frame.body(scene, ix).n_vertices());
-            weight.n_cluster_vertices += count(clustering.vertices.len());
-            weight.n_clusters += count(clustering.n_clusters());
-            let shape = &clustering.shape;
-            let nodes = (0..shape.n_levels()).map(|level| count(shape.n_nodes(level)));
-            weight.n_nodes += nodes.sum::<u64>();
-            weight.n_bodies += 1;
-        }
-        if weight.n_bodies > 2 {
-            // Gates and the tree over them.
-            weight.n_nodes += 2 * weight.n_bodies;
-        }
-        weight
-    }
-
-    /// Sends the positions of bodies that have moved; runs of consecutive bodies in one write.
-    fn send_positions(&mut self, gpu: &Gpu, scene: &Scene, frame: &Frame, resident: &[BodyId]) {
-        let mut ix = 0;
-        while ix < self.residents.len() {
-            let from = ix;
-            let start = self.residents[from].first_vertex;
-            while ix < self.residents.len() {
-                let layer = LayerIx::from_usize(ix);
-                let stamp = frame.body(scene, layer).positions_stamp();
-                let is_there = self.residents[ix].positions_stamp == stamp
-                    || resident.contains(&self.residents[ix].id);
-                if is_there {
-                    break;
-                }
-                self.residents[ix].positions_stamp = stamp;
-                ix += 1;
-            }
-            if ix == from {
-                ix += 1;
-                continue;
-            }
-            self.is_moved = true;
-            if let ([only], Positions::F32(positions)) = (
-                &self.residents[from..ix],
-                frame.body(scene, LayerIx::from_usize(from)).positions(),
-            ) {
-                let words: &[Coordinate] = bytemuck::cast_slice(positions);
-                self.positions.write(gpu, 3 * only.first_vertex, words);
-                continue;
-            }
-            self.words.clear();
-            for layer in (from..ix).map(LayerIx::from_usize) {
-                put_words(frame.body(scene, layer).positions(), &mut self.words);
-            }
-            let words: &[Coordinate] = bytemuck::cast_slice(&self.words);
-            self.positions.write(gpu, 3 * start, words);
-        }
-    }
-
-    /// Sends the records of all bodies and the list of ignored pairs, if they differ from those on the device.
-    fn send_bodies(
+    /// Sends the positions of bodies that have moved, at one end or at both; runs of consecutive bodies in one write.
+    fn send_positions(
         &mut self,
         gpu: &Gpu,
         scene: &Scene,
-        frame: &Frame,
-        resident: &[BodyId],
-    ) -> Result<(), Error> {
-        if self.forest.reorder(|ix| sample(scene, frame, ix)) {
-            self.nodes
-                .write(gpu, u64::from(self.forest.first_gate), self.forest.gates());
-            self.is_moved = true;
+        motion: Motion,
+        resident: &ResidentEnds<'_>,
+    ) {
+        let mut has_moved = false;
+        for (end, resident) in (0..motion.n_ends()).zip(&resident.0) {
+            let stamp = |body: &Resident| {
+                let body = scene.body_in(body.id.slot());
+                [body.positions_stamp(), body.step_stamp()][end as usize]
+            };
+            let is_new = |body: &Resident| {
+                body.sent[end as usize] != stamp(body) && !resident.contains_key(&body.id)
+            };
+            for run in self.bodies.chunk_by_mut(|a, b| is_new(a) == is_new(b)) {
+                if !is_new(&run[0]) {
+                    continue;
+                }
+                has_moved = true;
+                self.words.clear();
+                let positions = |body: &Resident| {
+                    let body = scene.body_in(body.id.slot());
+                    let start = body.positions();
+                    match end {
+                        0 => start,
+                        _ => body.end_positions().unwrap_or(start),
+                    }
+                };
+                let words: &[Coordinate] = match (&*run, positions(&run[0])) {
+                    ([_], Positions::F32(positions)) => bytemuck::cast_slice(positions),
+                    _ => {
+                        for body in &*run {
+                            put_words(positions(body), &mut self.words);
+                        }
+                        bytemuck::cast_slice(&self.words)
+                    }
+                };
+                let first = end * self.n_vertices + run[0].first_vertex;
+                self.positions.write(gpu, 3 * first, words);
+                for body in run {
+                    body.sent[end as usize] = stamp(body);
+                }
+            }
         }
-        let mut bodies = Vec::with_capacity(frame.layers.len());
-        for (ix, layer) in frame.numbered_layers() {
+        if has_moved {
+            self.is_moved();
+        }
+    }
+
+    /// Encodes the copies of positions from buffers on the device, of the bodies that take part.
+    pub fn copy_positions(
+        &mut self,
+        resident: &ResidentEnds<'_>,
+        encoder: &mut wgpu::CommandEncoder,
+    ) {
+        let mut has_moved = false;
+        for (end, buffers) in (0..self.n_ends).zip(&resident.0) {
+            for (&id, buffer) in buffers {
+                let Some(ix) = self.number(id) else { continue };
+                let body = &mut self.bodies[ix];
+                // The device no longer has the scene's positions.
+                body.sent[end as usize] = 0;
+                has_moved = true;
+                let to = VERTEX * (end * self.n_vertices + body.first_vertex);
+                let size = VERTEX * body.n_vertices;
+                if size > 0 {
+                    encoder.copy_buffer_to_buffer(buffer, 0, self.positions.buffer(), to, size);
+                }
+            }
+        }
+        if has_moved {
+            self.is_moved();
+        }
+    }
+
+    /// Sends the records of all parts and the list of ignored pairs, if they differ from those on the device.
+    fn send_records(
+        &mut self,
+        gpu: &Gpu,
+        job: Job<'_>,
+        motion: Motion,
+        resident: &ResidentEnds<'_>,
+    ) -> Result<(), Error> {
+        let Job { scene, frame, .. } = job;
+        let is_rounded = |id: BodyId| {
+            let body = scene.body_in(id.slot());
+            let of_ends = [Some(body.positions()), body.end_positions()];
+            let mut ends = of_ends
+                .into_iter()
+                .zip(&resident.0)
+                .take(motion.n_ends() as usize);
+            ends.any(|(end, held)| {
+                matches!(end, Some(Positions::F64(_))) && !held.contains_key(&id)
+            })
+        };
+        let mut first_place = 0;
+        let mut records = Vec::with_capacity(self.parts.len());
+        for part in &self.parts {
+            records.push(Body {
+                root: NO_ROOT,
+                // The boxes of parts that do not take part may be refitted too.
+                slack: if is_rounded(part.id) { SLACK } else { 0 },
+                first_place,
+                ..Body::default()
+            });
+            // Places fit 31 bits.
+            first_place += part.clustering.order.len() as u32;
+        }
+        let meets_bodies = match motion {
+            Motion::Still => frame.between(),
+            Motion::Moving => frame.meets_bodies(),
+        };
+        let view = self.views[motion as usize].as_ref().expect("just sent");
+        let number = |id: BodyId| self.number(id).map(|number| number as u32);
+        for ((ix, layer), &part) in frame.numbered_layers().zip(&view.parts) {
             // Bodies without a category meet no other body.
-            let filter = match frame.between() {
+            let filter = match meets_bodies {
                 true => frame.filter(ix),
                 false => Filter {
                     category: 0,
                     mask: 0,
                 },
             };
-            let rounded = match frame.body(scene, ix).positions() {
-                Positions::F32(_) => false,
-                Positions::F64(_) => !resident.contains(&layer.id),
-            };
-            bodies.push(Body {
-                root: self.forest.root(ix),
-                slack: if rounded { SLACK } else { 0 },
-                within: u32::from(layer.within),
-                layer: 0,
+            let record = &mut records[part as usize];
+            *record = Body {
+                root: self.forest.roots[part as usize],
+                within: u32::from(match motion {
+                    Motion::Still => layer.within,
+                    Motion::Moving => frame.test(ix, ix).is_some(),
+                }),
+                layer: match motion {
+                    Motion::Still => 0,
+                    Motion::Moving => flags(layer) | number(layer.id).unwrap_or(0) << BODY_SHIFT,
+                },
                 category: words(filter.category),
                 mask: words(filter.mask),
-            });
+                first_number: layer.first.raw(),
+                ..*record
+            };
         }
-        let ignored = frame.ignored_pairs().map(|(a, b)| NodePair {
-            a: a.raw(),
-            b: b.raw(),
-        });
-        let ignored = ignored.collect();
-        self.send_records(gpu, bodies, ignored)
-    }
-
-    /// Sends records and ignored pairs that differ from those on the device.
-    fn send_records(
-        &mut self,
-        gpu: &Gpu,
-        bodies: Vec<Body>,
-        ignored: Vec<NodePair>,
-    ) -> Result<(), Error> {
-        if bodies != self.bodies_sent {
-            self.bodies.upload(gpu, &bodies)?;
-            self.bodies_sent = bodies;
-        }
-        if ignored != self.ignored_sent || self.ignored.bytes() == 0 {
-            self.ignored.upload(gpu, &ignored)?;
-            self.ignored_sent = ignored;
-        }
-        Ok(())
-    }
-
-    /// Encodes the copy of a body's positions from a buffer on the device, if it takes part.
-    pub fn copy_positions(
-        &mut self,
-        body: BodyId,
-        buffer: &wgpu::Buffer,
-        encoder: &mut wgpu::CommandEncoder,
-    ) {
-        let held = self.residents.iter_mut().find(|held| held.id == body);
-        let Some(held) = held.filter(|held| held.n_vertices > 0) else {
-            return;
+        let mut ignored: Vec<NodePair> = match motion {
+            Motion::Still => {
+                let part = |layer: LayerIx| view.parts[layer.index()];
+                let pairs = frame.ignored_pairs().map(|(a, b)| [part(a), part(b)]);
+                let pair = |[a, b]: [u32; 2]| NodePair {
+                    a: a.min(b),
+                    b: a.max(b),
+                };
+                pairs.map(pair).collect()
+            }
+            Motion::Moving => {
+                let pairs = frame.ignored_bodies();
+                let pair = |(a, b)| {
+                    Some(NodePair {
+                        a: number(a)?,
+                        b: number(b)?,
+                    })
+                };
+                pairs.filter_map(pair).collect()
+            }
         };
-        // The device no longer has the scene's positions.
-        held.positions_stamp = 0;
-        self.is_moved = true;
-        let vertex = 3 * size_of::<Coordinate>() as u64;
-        let (to, size) = (held.first_vertex * vertex, held.n_vertices * vertex);
-        encoder.copy_buffer_to_buffer(buffer, 0, self.positions.buffer(), to, size);
+        ignored.sort_unstable_by_key(|pair| (pair.a, pair.b));
+        let parts = &self.parts;
+        let sample = |part: u32| sample(scene, parts[part as usize].id);
+        let view = self.views[motion as usize].as_mut().expect("just sent");
+        if let Some(top) = &mut view.top
+            && top.reorder(&mut self.forest.nodes, sample)
+        {
+            let gates = top.gates(&self.forest.nodes);
+            self.nodes.write(gpu, u64::from(top.first_gate), gates);
+            view.is_moved = true;
+        }
+        view.send(gpu, records, ignored)
     }
 
     /// Where the positions of a body are on the device, if they are those of the pose with this stamp: the buffer and the
     /// first byte.
     pub fn positions_of(&self, body: BodyId, stamp: u64) -> Option<(&wgpu::Buffer, u64)> {
-        let is_there = |held: &&Resident| held.id == body && held.positions_stamp == stamp;
-        let held = self.residents.iter().find(is_there)?;
-        let vertex = 3 * size_of::<Coordinate>() as u64;
-        Some((self.positions.buffer(), held.first_vertex * vertex))
+        let held = &self.bodies[self.number(body)?];
+        let is_there = held.sent[0] == stamp;
+        is_there.then(|| (self.positions.buffer(), held.first_vertex * VERTEX))
     }
 
-    /// The length of the list of ignored pairs.
-    pub fn n_ignored(&self) -> u32 {
-        self.ignored_sent.len() as u32
+    fn root(&self, part: u32) -> u32 {
+        self.forest.roots[part as usize]
     }
 
     /// The seeds of a traversal: pairs of nodes, whose boxes need not overlap.
-    pub fn seeds(&self, frame: &Frame) -> Vec<NodePair> {
-        let forest = &self.forest;
-        let root = |layer: LayerIx| forest.root(layer);
+    pub fn seeds(&self, frame: &Frame, motion: Motion) -> Vec<NodePair> {
+        let view = self.view(motion);
+        let root = |layer: LayerIx| self.root(view.parts[layer.index()]);
+        let is_filled = |layer: &LayerIx| root(*layer) != NO_ROOT;
         let mut seeds = Vec::new();
-        if let Some(top) = forest.top()
+        if let Some(top) = view.top()
             && frame.between()
         {
             return vec![NodePair { a: top, b: top }];
         }
         if frame.between() {
-            let filled = frame.layer_ixs().filter(|&ix| forest.is_filled(ix));
-            let filled: Vec<LayerIx> = filled.collect();
+            let filled: Vec<LayerIx> = frame.layer_ixs().filter(is_filled).collect();
             if let [a, b] = filled[..]
                 && frame.test(a, b).is_some()
             {
@@ -456,7 +660,7 @@ impl World {
         }
         for (ix, layer) in frame.numbered_layers() {
             let is_asked = layer.within && frame.test(ix, ix).is_some();
-            if is_asked && forest.is_filled(ix) {
+            if is_asked && is_filled(&ix) {
                 seeds.push(NodePair {
                     a: root(ix),
                     b: root(ix),
@@ -468,29 +672,34 @@ impl World {
 
     /// The seeds of a piece, from pairs of its runs by their numbers.
     pub fn seeds_of_runs(&self, pairs: &[[u32; 2]]) -> Vec<NodePair> {
-        let root = |run: u32| self.forest.roots[run as usize];
         let seed = |&[a, b]: &[u32; 2]| NodePair {
-            a: root(a),
-            b: root(b),
+            a: self.root(a),
+            b: self.root(b),
         };
         pairs.iter().map(seed).collect()
     }
 
     /// Appends the pairs of children of two nodes, whether their boxes overlap or not. Returns false, and appends
     /// nothing, for two clusters. The same steps as `dispatch.wgsl`.
-    pub fn expand(&self, frame: &Frame, pair: NodePair, into: &mut Vec<NodePair>) -> bool {
+    pub fn expand(
+        &self,
+        frame: &Frame,
+        motion: Motion,
+        pair: NodePair,
+        into: &mut Vec<NodePair>,
+    ) -> bool {
         let nodes = &self.forest.nodes;
         let (a, b) = (&nodes[pair.a as usize], &nodes[pair.b as usize]);
         if a.height() == 0 && b.height() == 0 {
             return false;
         }
         if a.is_gate() && b.is_gate() {
-            let [layer_a, layer_b] = [a, b].map(|gate| LayerIx::new(gate.first_child));
+            let parts = [a, b].map(|gate| gate.first_child);
+            let layers = parts.map(|part| self.view(motion).layers[part as usize]);
+            let [layer_a, layer_b] = layers.map(LayerIx::new);
             if frame.test(layer_a, layer_b).is_some() {
-                into.push(NodePair {
-                    a: self.forest.root(layer_a),
-                    b: self.forest.root(layer_b),
-                });
+                let [a, b] = parts.map(|part| self.root(part));
+                into.push(NodePair { a, b });
             }
             return true;
         }
@@ -510,6 +719,108 @@ impl World {
         }
         true
     }
+
+    /// The number of rounds that a traversal from these pairs takes.
+    pub fn rounds(&self, seeds: &[NodePair]) -> u32 {
+        self.forest.rounds(seeds)
+    }
+}
+
+impl Default for View {
+    fn default() -> Self {
+        View {
+            parts: Vec::new(),
+            layers: Vec::new(),
+            top: None,
+            levels: Vec::new(),
+            is_moved: true,
+            bodies_sent: Vec::new(),
+            ignored_sent: Vec::new(),
+            bodies: Storage::plain("bodies"),
+            ignored: Storage::plain("ignored"),
+            table: Storage::plain("levels"),
+        }
+    }
+}
+
+impl View {
+    /// A view of some of `n_parts` parts, with a tree over them if there are more than a few.
+    fn new(
+        gpu: &Gpu,
+        forest: &mut Forest,
+        parts: Vec<u32>,
+        n_parts: usize,
+        sample: impl Fn(u32) -> [f32; 3],
+    ) -> Result<Self, Error> {
+        let mut layers = vec![NO_LAYER; n_parts];
+        for (layer, &part) in (0..).zip(&parts) {
+            layers[part as usize] = layer;
+        }
+        let top = forest.push_top(&parts, sample);
+        let mut levels = forest.levels(Some(&parts));
+        levels.extend(top.iter().flat_map(|top| &top.levels));
+        let mut view = View {
+            parts,
+            layers,
+            top,
+            levels,
+            ..View::default()
+        };
+        view.table.upload(gpu, &view.levels)?;
+        Ok(view)
+    }
+
+    fn bytes(&self) -> u64 {
+        self.bodies.bytes() + self.ignored.bytes() + self.table.bytes()
+    }
+
+    /// The root of the tree over parts.
+    pub fn top(&self) -> Option<u32> {
+        self.top.as_ref().map(|top| top.root)
+    }
+
+    /// The length of the list of ignored pairs.
+    pub fn n_ignored(&self) -> u32 {
+        self.ignored_sent.len() as u32
+    }
+
+    /// Sends records and ignored pairs that differ from those on the device.
+    fn send(&mut self, gpu: &Gpu, bodies: Vec<Body>, ignored: Vec<NodePair>) -> Result<(), Error> {
+        if bodies != self.bodies_sent || self.bodies.bytes() == 0 {
+            self.bodies.upload(gpu, &bodies)?;
+            self.bodies_sent = bodies;
+        }
+        if ignored != self.ignored_sent || self.ignored.bytes() == 0 {
+            self.ignored.upload(gpu, &ignored)?;
+            self.ignored_sent = ignored;
+        }
+        Ok(())
+    }
+}
+
+/// The parts of a step, then those of a frame that are none of them.
+fn union([still, moving]: &[Vec<Held>; 2]) -> Vec<Held> {
+    let mut parts = moving.clone();
+    if parts.is_empty() {
+        return still.clone();
+    }
+    let mut known: Vec<(BodyId, *const Clustering)> = parts.iter().map(key).collect();
+    known.sort_unstable();
+    let is_new = |part: &&Held| known.binary_search(&key(part)).is_err();
+    parts.extend(still.iter().filter(is_new).cloned());
+    parts
+}
+
+/// The ids of the bodies of parts, each once, in their order.
+fn ids(parts: &[Held]) -> Vec<BodyId> {
+    let mut ids: Vec<BodyId> = parts.iter().map(|part| part.id).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    ids
+}
+
+fn key(part: &Held) -> (BodyId, *const Clustering) {
+    (part.id, Arc::as_ptr(&part.clustering))
 }
 
 /// The low and the high word.
@@ -525,9 +836,22 @@ fn put_words(positions: &Positions, words: &mut Vec<u32>) {
     }
 }
 
-/// A point of a body: the first corner of its first primitive. The tree over bodies is built from these points.
-fn sample(scene: &Scene, frame: &Frame, layer: LayerIx) -> [f32; 3] {
-    let body = frame.body(scene, layer);
+/// A point of a body: the first corner of its first primitive. The tree over parts is built from these points.
+fn sample(scene: &Scene, id: BodyId) -> [f32; 3] {
+    let body = scene.body_in(id.slot());
     let vertex = body.elements().corners(0)[0];
     body.positions().point(vertex as usize).map(|x| x as f32)
+}
+
+/// What `meets_layers.wgsl` needs to know of a layer besides its body.
+fn flags(layer: &Layer) -> u32 {
+    let part = match layer.part {
+        Part::Edges => EDGES,
+        Part::Vertices => VERTICES,
+        Part::Faces | Part::Given => FACES,
+    };
+    let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
+    part | flag(layer.is_bare, BARE)
+        | flag(layer.is_points, POINTS)
+        | flag(layer.within, OWN_LAYERS)
 }

@@ -1,6 +1,7 @@
 // Stage `bounds`, first kernel: the box of each cluster.
 //
-// In: unique vertices of each cluster, positions. Out: the boxes of nodes 0 .. n_clusters; in a step, then those at the end.
+// In: unique vertices of clusters `first .. first + count`, positions. Out: the boxes of the nodes with these numbers; in a step, then
+// those at the end.
 // One workgroup per cluster and end. Each lane takes every 64th vertex; then two steps reduce eight boxes to one.
 // Cost: 12 bytes per vertex and 4 per index, for each unique vertex of a cluster once.
 // Invariant: a box holds all its vertices exactly, or widened by `slack` when they were rounded.
@@ -10,6 +11,7 @@
 @group(0) @binding(2) var<storage, read> positions: array<u32>;
 @group(0) @binding(3) var<storage, read> bodies: array<Body>;
 @group(0) @binding(4) var<storage, read_write> nodes: array<Node>;
+@group(0) @binding(5) var<uniform> params: Params;
 
 var<workgroup> lows: array<vec3<u32>, 64>;
 var<workgroup> highs: array<vec3<u32>, 64>;
@@ -20,13 +22,13 @@ fn main(
     @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let n_clusters = arrayLength(&clusters);
+    let n_clusters = params.count;
     let ix = group_number(group, n_groups);
     if ix >= ENDS * n_clusters {
         return;
     }
     let end = ix / n_clusters;
-    let cluster_ix = ix % n_clusters;
+    let cluster_ix = params.first + ix % n_clusters;
     let node_ix = end * (arrayLength(&nodes) / ENDS) + cluster_ix;
     let first_of_end = end * (arrayLength(&positions) / (3u * ENDS));
     let cluster = clusters[cluster_ix];

@@ -16,6 +16,7 @@ override WITH_SOLIDS: bool = true;
 @group(0) @binding(4) var<storage, read_write> pairs: array<PairKey>;
 @group(0) @binding(5) var<storage, read_write> unsure: array<UnsureKey>;
 @group(0) @binding(6) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(7) var<storage, read> bodies: array<Body>;
 
 var<workgroup> n_yes: atomic<u32>;
 var<workgroup> n_unsure: atomic<u32>;
@@ -97,8 +98,8 @@ fn main(
         let candidate = candidates[ix];
         answer = settle(candidate);
         if answer != NO {
-            let a = order[candidate.a & ~FLAG];
-            let b = order[candidate.b & ~FLAG];
+            let a = number_at(candidate.a & ~FLAG);
+            let b = number_at(candidate.b & ~FLAG);
             low = min(a, b);
             high = max(a, b);
         }

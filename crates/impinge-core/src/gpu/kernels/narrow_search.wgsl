@@ -32,6 +32,7 @@ const N_INTERVALS: u32 = 32u;
 @group(0) @binding(5) var<storage, read_write> times: array<PairTimes>;
 @group(0) @binding(6) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(7) var<uniform> params: Params;
+@group(0) @binding(8) var<storage, read> bodies: array<Body>;
 
 // A time as a part of the step, and the other way round; both are exact.
 fn time_of(ticks: u32) -> f32 {
@@ -121,7 +122,9 @@ fn name_of(pair: PairKey) -> UnsureKey {
     if params.by_number == 0u {
         return UnsureKey(a, b);
     }
-    return UnsureKey(min(order[a], order[b]), max(order[a], order[b]));
+    let number_a = number_at(a);
+    let number_b = number_at(b);
+    return UnsureKey(min(number_a, number_b), max(number_a, number_b));
 }
 
 @compute @workgroup_size(64)

@@ -32,6 +32,7 @@ struct Level { first: u32, count: u32 }
 //         +----------------+------------+--------+------+------+
 //
 // Own layers: pairs with other layers of the same body are asked for. Points, bare: the body has no edges, no faces.
+// `first_place`, `first_number`: those of its first primitive; records are in the order of their places.
 struct Body {
     root: u32,
     slack: u32,
@@ -39,6 +40,8 @@ struct Body {
     layer: u32,
     category: vec2<u32>,
     mask: vec2<u32>,
+    first_place: u32,
+    first_number: u32,
 }
 
 const PART: u32 = 3u;
@@ -79,7 +82,7 @@ struct PairTimes { free_until: f32, touches_by: f32 }
 
 // Parameters of one dispatch.
 struct Params {
-    // bounds: the nodes or levels to refit. dispatch: the round.
+    // bounds: the clusters, nodes or levels to refit. dispatch: the round.
     first: u32,
     count: u32,
     // prepare: the counter to read, elements per workgroup, the most elements, the slot for the arguments.
