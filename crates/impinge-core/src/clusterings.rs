@@ -1,243 +1,354 @@
-//! The life of what a backend keeps of each body: made for a body that is new or was re-meshed, made anew for one that
-//! has flowed away from its clusters, and dropped with its body.
+//! The clusterings of a detector: one per body and part, whoever asks.
 //!
-//! Both backends and the steps keep their caches in a [`Store`] and ask a [`Fit`] whether clusters still fit. When
-//! they ask differs: the CPU after it has found all boxes of a frame, the GPU before it sends clusters to the device.
+//! ```text
+//!                        Clusterings: by slot of the body, then by part
+//!                       /            |            |            \
+//!   intersections (CPU)      steps, near pairs      distance      a device
+//!   boxes, remote clusters   boxes at both ends     boxes         buffers
+//! ```
+//!
+//! Each of these holds its clusterings by `Arc`, and beside them what else it needs. When it begins a question it asks for the
+//! clusterings that are shared now: they are made for a body that is new or was re-meshed, and dropped with their body. What more a
+//! question needs of a clustering (which elements share vertices, the rings of vertices, local faces) is found when it is first
+//! needed, within the clustering.
+//!
+//! A body that has flowed away from its clusters is clustered again, for all: [`renew_if_stale`](Clusterings::renew_if_stale)
+//! decides that. Whoever has boxes judges by them, after finding all of a frame; for a device, which computes boxes itself, a
+//! sample of the clusters is judged before.
+//!
+//! No answer depends on the pose in which a body was clustered. So questions of several scenes may take turns.
+
+mod fit;
+mod store;
+#[cfg(test)]
+mod tests;
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::clock::Instant;
-use crate::elements::Part;
+use crate::elements::{Elements, Part};
 use crate::error::Error;
-use crate::grouping::bounds::Bounds;
-#[cfg(feature = "gpu")]
 use crate::grouping::clusters::Clustering;
-#[cfg(feature = "gpu")]
 use crate::hull;
-#[cfg(feature = "gpu")]
 use crate::ids::BodyId;
+use crate::index::ElementIx;
 #[cfg(feature = "gpu")]
-use crate::index::ClusterIx;
-use crate::plan::Layer;
-#[cfg(feature = "gpu")]
-use crate::positions::Positions;
 use crate::run::Job;
 use crate::scene::{Body, Scene};
+use crate::settings::{Recluster, Settings};
 use crate::stats::Statistics;
 use crate::tuning::Tuning;
 use crate::workers::Workers;
 
-/// What a backend keeps of a body, or of a part of it.
-pub(crate) trait Clustered: Send {
-    /// The stamp of the topology that was clustered.
-    fn topology_stamp(&self) -> u64;
+#[cfg(feature = "gpu")]
+use fit::sampled_spread;
+pub(crate) use fit::{Fit, spread};
+pub(crate) use store::{Clustered, Store};
 
-    /// How many clusters there are.
-    fn n_clusters(&self) -> usize;
+/// A part of a body whose clusters are asked for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Asked<'a> {
+    id: BodyId,
+    body: &'a Body,
+    part: Part,
+    /// Whether the asker needs [local faces](Clustering::local_faces).
+    local_faces: bool,
 }
 
-/// What is kept, by slot of the body: one per body, or one per part (vertices, edges, faces).
+/// The clusterings of a detector. Clones share them.
+#[derive(Debug, Clone)]
+pub(crate) struct Clusterings(Arc<Mutex<Known>>);
+
+/// The clusterings that are known, by slot of the body.
 #[derive(Debug)]
-pub(crate) struct Store<T, const PARTS: usize = 1> {
-    slots: Vec<[Option<Box<T>>; PARTS]>,
+pub(crate) struct Known {
+    slots: Vec<OfBody>,
+    recluster: Recluster,
+    tuning: Tuning,
 }
 
-impl<T, const PARTS: usize> Default for Store<T, PARTS> {
-    fn default() -> Self {
-        Store { slots: Vec::new() }
-    }
-}
-
-impl<T, const PARTS: usize> Store<T, PARTS> {
-    /// Where a part is among those of its body.
-    #[inline(always)]
-    fn ix(part: Part) -> usize {
-        let ix = match part {
-            Part::Vertices => 0,
-            Part::Edges => 1,
-            Part::Faces | Part::Given => 2,
-        };
-        ix.min(PARTS - 1)
-    }
-
-    /// What is kept of a body as a whole, if anything is.
+/// The clusterings of one body.
+#[derive(Debug, Default)]
+struct OfBody {
+    /// The stamp of the topology that was clustered; 0 for none.
+    topology_stamp: u64,
+    parts: [Option<Arc<Clustering>>; PARTS],
+    /// For devices.
     #[cfg(feature = "gpu")]
-    pub fn of(&self, id: BodyId) -> Option<&T> {
-        self.slots.get(id.index())?[Self::ix(Part::Given)].as_deref()
-    }
-
-    /// What is kept of a layer of the frame that was last [updated](Store::update).
-    ///
-    /// # Panics
-    /// If the layer is of another frame.
-    #[inline(always)]
-    pub fn at(&self, layer: &Layer) -> &T {
-        self.slots[layer.id.index()][Self::ix(layer.part)]
-            .as_deref()
-            .expect("every layer was clustered")
-    }
-
-    /// The same, to be changed.
-    #[inline(always)]
-    pub fn at_mut(&mut self, layer: &Layer) -> &mut T {
-        self.slots[layer.id.index()][Self::ix(layer.part)]
-            .as_deref_mut()
-            .expect("every layer was clustered")
-    }
-
-    /// All that is kept.
-    pub fn iter(&self) -> impl Iterator<Item = &T> {
-        self.slots.iter().flatten().filter_map(Option::as_deref)
-    }
-
-    /// What is kept of bodies as a whole, each with its slot, in the order of slots.
-    pub fn iter_mut(&mut self) -> impl Iterator<Item = (usize, &mut T)> {
-        let parts = self.slots.iter_mut().enumerate();
-        parts.filter_map(|(slot, parts)| {
-            let kept = parts[Self::ix(Part::Given)].as_deref_mut()?;
-            Some((slot, kept))
-        })
-    }
+    samples: [Sampled; PARTS],
 }
 
-impl<T: Clustered, const PARTS: usize> Store<T, PARTS> {
-    /// Drops what belongs to bodies that are gone or were re-meshed.
-    pub fn forget_outdated(&mut self, scene: &Scene) {
-        for (slot, parts) in self.slots.iter_mut().enumerate() {
-            let body = scene.holds(slot).then(|| scene.body_in(slot as u32));
-            let stamp = body.map(Body::topology_stamp);
-            for kept in parts {
-                if kept.as_ref().map(|kept| kept.topology_stamp()) != stamp {
-                    *kept = None;
-                }
-            }
+/// How well a sample of the clusters has fitted, and the stamp of the positions that were judged last.
+#[cfg(feature = "gpu")]
+#[derive(Debug, Default, Clone, Copy)]
+struct Sampled {
+    stamp: u64,
+    fit: Fit,
+}
+
+/// The elements as given, and those derived from them: vertices, edges, faces.
+const PARTS: usize = 4;
+
+impl<'a> Asked<'a> {
+    pub fn new(id: BodyId, body: &'a Body, part: Part) -> Self {
+        Asked {
+            id,
+            body,
+            part: body.canonical(part),
+            local_faces: false,
         }
     }
 
-    /// Brings the store up to a frame: drops what belongs to bodies that are gone, and makes what is missing, of
-    /// another topology, or stale.
+    /// The same, with [local faces](Clustering::local_faces) if they are needed.
+    pub fn with_local_faces(self, local_faces: bool) -> Self {
+        Asked {
+            local_faces,
+            ..self
+        }
+    }
+
+    fn ix(&self) -> usize {
+        match self.part {
+            Part::Given => 0,
+            Part::Vertices => 1,
+            Part::Edges => 2,
+            Part::Faces => 3,
+        }
+    }
+
+    /// Clusters the part in the body's current pose. Nobody else does that.
+    fn cluster(&self) -> Clustering {
+        let (elements, positions) = (self.body.part(self.part), self.body.positions());
+        let centers = hull::centers(elements, positions);
+        let mut clustering = Clustering::new(elements, centers, self.local_faces);
+        if let (Part::Vertices, Elements::Points(vertices)) = (self.part, &clustering.corners) {
+            // Vertices are numbered as positions are.
+            clustering.order = vertices.iter().map(|&[ix]| ElementIx::new(ix)).collect();
+        }
+        clustering
+    }
+
+    /// Adds what is needed besides to a clustering that was made for somebody else.
     ///
     /// # Errors
-    /// Cancellation; threads that do not start.
-    pub fn update(
-        &mut self,
-        job: Job<'_>,
+    /// Threads that do not start.
+    fn complete(&self, clustering: &Clustering, workers: &Workers) -> Result<(), Error> {
+        if self.local_faces && !clustering.knows_local_faces() {
+            let n = clustering.order.len();
+            workers.install(n, || clustering.find_local_faces())?;
+        }
+        Ok(())
+    }
+}
+
+impl Clusterings {
+    /// None is known yet.
+    pub fn new(settings: &Settings) -> Self {
+        Clusterings(Arc::new(Mutex::new(Known {
+            slots: Vec::new(),
+            recluster: settings.recluster,
+            tuning: settings.tuning,
+        })))
+    }
+
+    /// What is known; whoever else asks waits.
+    pub fn lock(&self) -> MutexGuard<'_, Known> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The same, for a question about a scene: if that has fewer bodies than were known, what is outdated is dropped.
+    pub fn open(&self, scene: &Scene) -> MutexGuard<'_, Known> {
+        let mut known = self.lock();
+        if known.slots.len() > scene.n_bodies() {
+            known.forget_outdated(scene);
+        }
+        known
+    }
+
+    /// The clusters of a part of a body. `own` are those of its present topology that the asker has, if any.
+    ///
+    /// # Errors
+    /// Threads that do not start.
+    pub fn of(
+        &self,
+        asked: Asked<'_>,
+        own: Option<&Arc<Clustering>>,
+        workers: &Workers,
         stats: &mut Statistics,
-        mut is_stale: impl FnMut(&mut T, &Layer, &Body) -> bool,
-        mut make: impl FnMut(&Body, &Layer) -> T + Send,
-    ) -> Result<(), Error> {
+    ) -> Result<Arc<Clustering>, Error> {
+        let mut known = self.lock();
+        let clustering = match known.find(asked, own) {
+            Some(clustering) => clustering,
+            None => known.make(asked, workers, stats)?,
+        };
+        Ok(Arc::clone(clustering))
+    }
+
+    /// The clusters of all layers of a frame, for a device, which computes boxes itself. Whether a body has flowed away from its
+    /// clusters is judged by a sample of them, if `judges` says so: the host does not know the pose of all bodies.
+    ///
+    /// # Errors
+    /// Threads that do not start; cancellation.
+    #[cfg(feature = "gpu")]
+    pub fn of_frame(
+        &self,
+        job: Job<'_>,
+        judges: impl Fn(BodyId) -> bool,
+        stats: &mut Statistics,
+    ) -> Result<Vec<Arc<Clustering>>, Error> {
         let Job {
             scene,
             frame,
             workers,
             control,
         } = job;
-        // Layers come part after part: the last one need not be of the last body.
-        let slots = frame.layers.iter().map(|layer| layer.id.index() + 1);
-        let n_slots = slots.max().unwrap_or(0);
-        if self.slots.len() < n_slots {
-            self.slots.resize_with(n_slots, || [const { None }; PARTS]);
-        }
-        if self.slots.len() > scene.n_bodies() {
-            for (slot, parts) in self.slots.iter_mut().enumerate() {
-                if !scene.holds(slot) {
-                    *parts = [const { None }; PARTS];
-                }
-            }
-        }
+        let mut known = self.open(scene);
+        let mut all = Vec::with_capacity(frame.layers.len());
         for (ix, layer) in frame.numbered_layers() {
             let body = frame.body(scene, ix);
-            let kept = &mut self.slots[layer.id.index()][Self::ix(layer.part)];
-            let known = kept.as_mut();
-            let known = known.filter(|kept| kept.topology_stamp() == body.topology_stamp());
-            let was_known = known.is_some();
-            if known.is_none_or(|kept| is_stale(kept, layer, body)) {
-                control.step(ix.raw().into(), frame.layers.len() as u64)?;
-                let n_elements = body.part(layer.part).len();
-                let made = workers.install(n_elements, || make(body, layer))?;
-                *kept = Some(Box::new(made));
-                stats.n_clustered += 1;
-                stats.n_reclustered += u64::from(was_known);
+            let asked = Asked::new(layer.id, body, layer.part);
+            let found = known.find(asked, None).cloned();
+            let is_new = found.is_none();
+            let mut clustering = match found {
+                Some(clustering) => clustering,
+                None => {
+                    control.step(ix.raw().into(), frame.layers.len() as u64)?;
+                    Arc::clone(known.make(asked, workers, stats)?)
+                }
+            };
+            let of_body = &known.slots[layer.id.index()];
+            let mut sampled = of_body.samples[asked.ix()];
+            let stamp = body.positions_stamp();
+            if is_new || (sampled.stamp != stamp && judges(layer.id)) {
+                sampled.stamp = stamp;
+                let spread = sampled_spread(&clustering, body.positions());
+                if known.is_stale(&mut sampled.fit, spread) {
+                    clustering = Arc::clone(known.renew(asked, workers, stats)?);
+                    sampled.fit = Fit::UNKNOWN;
+                    let spread = sampled_spread(&clustering, body.positions());
+                    sampled.fit.note(spread);
+                }
+                known.slots[layer.id.index()].samples[asked.ix()] = sampled;
             }
-            stats.n_clusters += kept.as_ref().map_or(0, |kept| kept.n_clusters() as u64);
+            all.push(clustering);
         }
-        Ok(())
+        Ok(all)
+    }
+
+    /// Whether a body's elements, as given, are clustered.
+    pub fn has(&self, id: BodyId, body: &Body) -> bool {
+        let asked = Asked::new(id, body, Part::Given);
+        self.lock().find(asked, None).is_some()
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let known = self.lock();
+        let parts = known.slots.iter().flat_map(|of_body| &of_body.parts);
+        let of_clusterings: usize = parts.flatten().map(|one| one.bytes()).sum();
+        size_of_val(&known.slots[..]) + of_clusterings
     }
 }
 
-/// Makes anew what is stale, and books it.
-///
-/// # Errors
-/// Threads that do not start.
-pub(crate) fn make_anew<T: Send>(
-    workers: &Workers,
-    n_elements: usize,
-    stats: &mut Statistics,
-    make: impl FnOnce() -> T + Send,
-) -> Result<T, Error> {
-    let start = Instant::now();
-    let made = workers.install(n_elements, make)?;
-    stats.n_clustered += 1;
-    stats.n_reclustered += 1;
-    stats.add_ms("clustering", start.elapsed().as_secs_f64() * 1e3);
-    Ok(made)
-}
-
-/// How well clusters have fitted their body at best.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Fit {
-    best_spread: f64,
-}
-
-impl Default for Fit {
-    fn default() -> Self {
-        Fit::UNKNOWN
-    }
-}
-
-impl Fit {
-    /// Of clusters that were not looked at yet.
-    pub const UNKNOWN: Fit = Fit {
-        best_spread: f64::INFINITY,
-    };
-
-    /// Takes note of the spread in the pose at hand.
-    pub fn note(&mut self, spread: f64) {
-        self.best_spread = self.best_spread.min(spread);
+impl Known {
+    /// Drops what belongs to bodies that are gone or were re-meshed.
+    pub fn forget_outdated(&mut self, scene: &Scene) {
+        for (slot, of_body) in self.slots.iter_mut().enumerate() {
+            let body = scene.holds(slot).then(|| scene.body_in(slot as u32));
+            if of_body.topology_stamp != body.map_or(0, Body::topology_stamp) {
+                *of_body = OfBody::default();
+            }
+        }
     }
 
-    /// Takes note of the spread in the pose at hand; whether the body has flowed away from its clusters.
-    pub fn is_stale(&mut self, spread: f64, tuning: &Tuning) -> bool {
-        let is_stale = spread > tuning.stale_from * self.best_spread;
-        self.note(spread);
-        is_stale
+    /// The clusters of a part of a body. Those that only the asker has are shared from now on: questions of several scenes may
+    /// have taken turns.
+    pub fn find(
+        &mut self,
+        asked: Asked<'_>,
+        own: Option<&Arc<Clustering>>,
+    ) -> Option<&Arc<Clustering>> {
+        let stamp = asked.body.topology_stamp();
+        let known = self.slots.get(asked.id.index());
+        let is_known = known.is_some_and(|of_body| {
+            of_body.topology_stamp == stamp && of_body.parts[asked.ix()].is_some()
+        });
+        if !is_known && let Some(own) = own {
+            self.put(asked, Arc::clone(own));
+        }
+        let of_body = self.slots.get(asked.id.index())?;
+        let part = of_body.parts[asked.ix()].as_ref();
+        part.filter(|_| of_body.topology_stamp == stamp)
     }
-}
 
-/// The number of clusters sampled to judge how well all of them fit.
-#[cfg(feature = "gpu")]
-const SAMPLES: usize = 64;
-
-/// The [`spread`] of evenly spaced clusters. The same clusters are sampled every time.
-#[cfg(feature = "gpu")]
-pub(crate) fn sampled_spread(clustering: &Clustering, positions: &Positions) -> f64 {
-    let n = clustering.n_clusters();
-    let n_samples = n.min(SAMPLES);
-    let mut whole = Bounds::EMPTY;
-    let mut sum = 0.0;
-    for sample in 0..n_samples {
-        let cluster = ClusterIx::from_usize(sample * n / n_samples);
-        let bounds = hull::of_vertices(positions, clustering.vertices(cluster));
-        sum += bounds.half_area();
-        whole.join(&bounds);
+    /// Clusters a part of a body, and books it.
+    ///
+    /// # Errors
+    /// Threads that do not start.
+    pub fn make(
+        &mut self,
+        asked: Asked<'_>,
+        workers: &Workers,
+        stats: &mut Statistics,
+    ) -> Result<&Arc<Clustering>, Error> {
+        let n_elements = asked.body.part(asked.part).len();
+        let clustering = workers.install(n_elements, || asked.cluster())?;
+        stats.n_clustered += 1;
+        Ok(self.put(asked, Arc::new(clustering)))
     }
-    spread(sum, &whole)
-}
 
-/// The clusters' summed surface over that of the whole: how well they fit the pose at hand. Both are halves.
-pub(crate) fn spread(surface: f64, whole: &Bounds) -> f64 {
-    let whole = whole.half_area();
-    if whole > 0.0 && whole.is_finite() && surface.is_finite() {
-        surface / whole
-    } else {
-        1.0
+    fn put(&mut self, asked: Asked<'_>, clustering: Arc<Clustering>) -> &Arc<Clustering> {
+        let (slot, stamp) = (asked.id.index(), asked.body.topology_stamp());
+        if self.slots.len() <= slot {
+            self.slots.resize_with(slot + 1, OfBody::default);
+        }
+        let of_body = &mut self.slots[slot];
+        if of_body.topology_stamp != stamp {
+            *of_body = OfBody {
+                topology_stamp: stamp,
+                ..OfBody::default()
+            };
+        }
+        #[cfg(feature = "gpu")]
+        {
+            of_body.samples[asked.ix()] = Sampled::default();
+        }
+        of_body.parts[asked.ix()].insert(clustering)
+    }
+
+    /// Clusters a part anew, for all who share it, if it has flowed away from its clusters, and books that. `spread` says how
+    /// well they fit the pose at hand, `fit` how well they have fitted at best.
+    ///
+    /// # Errors
+    /// Threads that do not start.
+    pub fn renew_if_stale(
+        &mut self,
+        asked: Asked<'_>,
+        (fit, spread): (&mut Fit, f64),
+        workers: &Workers,
+        stats: &mut Statistics,
+    ) -> Result<Option<Arc<Clustering>>, Error> {
+        if !self.is_stale(fit, spread) {
+            return Ok(None);
+        }
+        let start = Instant::now();
+        let clustering = Arc::clone(self.renew(asked, workers, stats)?);
+        stats.add_ms("clustering", start.elapsed().as_secs_f64() * 1e3);
+        Ok(Some(clustering))
+    }
+
+    /// Whether a body has flowed so far away from its clusters that it is to be clustered anew.
+    fn is_stale(&self, fit: &mut Fit, spread: f64) -> bool {
+        fit.is_stale(spread, &self.tuning) && self.recluster == Recluster::Auto
+    }
+
+    fn renew(
+        &mut self,
+        asked: Asked<'_>,
+        workers: &Workers,
+        stats: &mut Statistics,
+    ) -> Result<&Arc<Clustering>, Error> {
+        stats.n_reclustered += 1;
+        self.make(asked, workers, stats)
     }
 }

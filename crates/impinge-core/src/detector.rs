@@ -14,6 +14,7 @@ mod near;
 mod resident;
 mod steps;
 
+use crate::clusterings::Clusterings;
 use crate::contact::Topologies;
 use crate::cpu::Cpu;
 use crate::error::Error;
@@ -44,6 +45,9 @@ pub struct Detector {
     /// Of distances, contacts and runs of candidates.
     measured: Statistics,
     last: Last,
+    /// Shared by all of the following.
+    #[cfg(any(feature = "gpu", test))]
+    pub(crate) clusterings: Clusterings,
     cpu: Cpu,
     steps: steps::StepMemory,
     touching: distance::Touching,
@@ -82,10 +86,12 @@ impl Detector {
     /// A setting out of its range; no adapter for `Backend::Gpu`.
     pub fn with_settings(settings: Settings) -> Result<Self, Error> {
         settings.check()?;
+        let clusterings = Clusterings::new(&settings);
         #[cfg(feature = "gpu")]
-        let gpu = gpu::open(&settings)?;
+        let gpu = gpu::open(&settings, &clusterings)?;
         Ok(Detector::assemble(
             settings,
+            clusterings,
             #[cfg(feature = "gpu")]
             gpu,
         ))
@@ -97,10 +103,12 @@ impl Detector {
     /// As `with_settings`.
     pub async fn with_settings_async(settings: Settings) -> Result<Self, Error> {
         settings.check()?;
+        let clusterings = Clusterings::new(&settings);
         #[cfg(feature = "gpu")]
-        let gpu = gpu::open_async(&settings).await?;
+        let gpu = gpu::open_async(&settings, &clusterings).await?;
         Ok(Detector::assemble(
             settings,
+            clusterings,
             #[cfg(feature = "gpu")]
             gpu,
         ))
@@ -108,6 +116,7 @@ impl Detector {
 
     fn assemble(
         settings: Settings,
+        clusterings: Clusterings,
         #[cfg(feature = "gpu")] gpu: Option<crate::gpu::Engine>,
     ) -> Self {
         Detector {
@@ -117,11 +126,13 @@ impl Detector {
             pairs: Pairs::default(),
             measured: Statistics::default(),
             last: Last::default(),
-            cpu: Cpu::new(&settings),
-            steps: steps::StepMemory::new(&settings),
+            cpu: Cpu::new(&settings, &clusterings),
+            steps: steps::StepMemory::new(&settings, clusterings.clone()),
             touching: distance::Touching::default(),
-            distances: Distances::default(),
+            distances: Distances::new(clusterings.clone()),
             topologies: Topologies::default(),
+            #[cfg(any(feature = "gpu", test))]
+            clusterings,
             settings,
         }
     }

@@ -72,6 +72,11 @@ impl Body {
         self.topology.part(part)
     }
 
+    /// One name for equal parts.
+    pub(crate) fn canonical(&self, part: Part) -> Part {
+        self.topology.canonical(part)
+    }
+
     /// The corners of an element of a part.
     pub(crate) fn corners<'a>(&'a self, part: Part, element: &'a ElementIx) -> &'a [u32] {
         match part {

@@ -2,10 +2,11 @@
 //!
 //! Clusters are made once for each body, and that costs several times as much as the frame itself does in the grid of
 //! `Cells`. It pays as soon as the body comes back. So a frame whose primitives are mostly of new bodies goes through
-//! the grid, except: so few primitives that neither takes long; small bodies, which are few clusters each; cells that turn out
+//! the grid, except: bodies that another question has clustered already; so few primitives that neither takes long; small bodies, which are few clusters each; cells that turn out
 //! crowded (the grid is uniform, so small details in a large scene can all be in one cell); neighbours that must be
 //! resolved, which `Clusters` settles per vertex; and memory budgets, which the grid would need more of.
 
+use crate::clusterings::Clusterings;
 use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::tuning::Tuning;
@@ -19,16 +20,26 @@ pub(super) struct Acquaintances {
 
 impl Acquaintances {
     /// Whether the grid may be the faster way to answer this frame. Its bodies are known from now on.
-    pub fn prefer_grid(&mut self, scene: &Scene, frame: &Plan, tuning: &Tuning) -> bool {
+    pub fn prefer_grid(
+        &mut self,
+        scene: &Scene,
+        frame: &Plan,
+        tuning: &Tuning,
+        clusterings: &Clusterings,
+    ) -> bool {
         let mut n_new = 0;
         for (ix, layer) in frame.numbered_layers() {
             let slot = layer.id.index();
             if self.stamps.len() <= slot {
                 self.stamps.resize(slot + 1, 0);
             }
-            let stamp = frame.body(scene, ix).topology_stamp();
+            let body = frame.body(scene, ix);
+            let stamp = body.topology_stamp();
             let is_new = std::mem::replace(&mut self.stamps[slot], stamp) != stamp;
-            if is_new && layer.n_primitives >= tuning.auto_body_from {
+            if is_new
+                && layer.n_primitives >= tuning.auto_body_from
+                && !clusterings.has(layer.id, body)
+            {
                 n_new += u64::from(layer.n_primitives);
             }
         }

@@ -15,13 +15,12 @@
 
 use std::sync::Arc;
 
-use crate::clusterings::{Fit, spread};
+use crate::clusterings::{Clusterings, Fit, spread};
 use crate::elements::Kind;
 use crate::error::Error;
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::hull;
-use crate::plan::Layer;
 use crate::positions::Positions;
 use crate::scene::{Body, Scene};
 use crate::settings::{InstructionSet, Settings};
@@ -42,6 +41,7 @@ use crate::workers::Workers;
 /// Caches and scratch of the method; kept from frame to frame.
 pub(crate) struct Clusters {
     isa: Isa,
+    clusterings: Clusterings,
     caches: Caches,
     refit: Refit,
     scratches: Vec<Worker>,
@@ -49,9 +49,10 @@ pub(crate) struct Clusters {
 }
 
 impl Clusters {
-    pub fn new(allowed: InstructionSet) -> Self {
+    pub fn new(allowed: InstructionSet, clusterings: Clusterings) -> Self {
         Clusters {
             isa: Isa::detect(allowed),
+            clusterings,
             caches: Caches::default(),
             refit: Refit::default(),
             scratches: Vec::new(),
@@ -76,8 +77,9 @@ impl Clusters {
         }
         stats.time("bounds", |stats| {
             let (caches, scratches) = (&mut self.caches, &mut self.scratches);
+            let clustered = (&self.clusterings, caches);
             self.refit
-                .run(self.isa, job, settings, caches, scratches, stats)
+                .run(self.isa, job, settings, clustered, scratches, stats)
         })?;
         if job.frame.resolves() && settings.memory_budget.is_none() {
             stats.time("folds", |_| self.find_folds(job))?;
@@ -122,20 +124,17 @@ impl Clusters {
             .map(|cache| {
                 let remote = cache.remote.as_ref().map_or(0, |remote| remote.bytes());
                 let folds = cache.folds.as_ref().map_or(0, |folds| folds.bytes());
-                size_of::<BodyCache>()
-                    + cache.clustering.bytes()
-                    + cache.bounds.bytes()
-                    + remote
-                    + folds
+                size_of::<BodyCache>() + cache.bounds.bytes() + remote + folds
             })
             .sum();
         let scratches: usize = self.scratches.iter().map(Worker::bytes).sum();
-        caches + scratches
+        self.clusterings.bytes() + caches + scratches
     }
 
     /// Forgets bodies that are gone or were re-meshed.
     pub fn forget_outdated(&mut self, scene: &Scene) {
         self.caches.forget_outdated(scene);
+        self.clusterings.lock().forget_outdated(scene);
     }
 
     /// Clusters bodies that are new or were re-meshed; forgets removed bodies.
@@ -145,10 +144,10 @@ impl Clusters {
         tuning: &Tuning,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let isa = self.isa;
-        let fits = |_: &mut BodyCache, _: &Layer, _: &Body| false;
-        let make = |body: &Body, _: &Layer| BodyCache::new(body, isa, tuning);
-        self.caches.update(job, stats, fits, make)?;
+        let shared = (&self.clusterings, self.isa.looks_corners_up());
+        self.caches.update(job, shared, stats, |body, clustering| {
+            BodyCache::new(body, Arc::clone(clustering), tuning)
+        })?;
         let layers = job.frame.layers.iter();
         for layer in layers.filter(|layer| layer.within) {
             self.caches.at(layer).find_adjacency(job.workers)?;
@@ -174,14 +173,8 @@ impl Clusters {
 }
 
 impl BodyCache {
-    /// Clusters a body in its current pose.
-    pub fn new(body: &Body, isa: Isa, tuning: &Tuning) -> Self {
-        let (elements, positions) = (body.elements(), body.positions());
-        let centers = hull::centers(elements, positions);
-        let clustering = match isa.looks_corners_up() {
-            true => Clustering::with_local_faces(elements, centers),
-            false => Clustering::new(elements, centers),
-        };
+    /// What is kept beside the clusters of a body; no boxes yet.
+    pub fn new(body: &Body, clustering: Arc<Clustering>, tuning: &Tuning) -> Self {
         let mut bounds = TreeBounds::default();
         bounds.resize(&clustering.shape);
         BodyCache {

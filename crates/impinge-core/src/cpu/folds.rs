@@ -413,7 +413,7 @@ mod tests {
         let elements = Elements::from(faces.to_vec());
         let numbers = 0..faces.len() as u32;
         let centers: Vec<Entry> = numbers.map(|number| Entry::new([0.0; 3], number)).collect();
-        let clustering = Clustering::new(&elements, centers);
+        let clustering = Clustering::new(&elements, centers, false);
         clustering.find_rings();
         let mut answers = Vec::new();
         let single = positions.iter().map(|p| p.map(|x| x as f32)).collect();

@@ -26,6 +26,7 @@ pub mod world;
 
 use std::sync::Arc;
 
+use crate::clusterings::Clusterings;
 use crate::error::Error;
 use crate::naive;
 use crate::narrow::Intersection;
@@ -41,15 +42,17 @@ use clusters::Clusters;
 /// The CPU backend of one detector: every method, and the memory kept from frame to frame.
 pub(crate) struct Cpu {
     settings: Settings,
+    clusterings: Clusterings,
     clusters: Clusters,
     cells: Cells,
     acquaintances: Acquaintances,
 }
 
 impl Cpu {
-    pub fn new(settings: &Settings) -> Self {
+    pub fn new(settings: &Settings, clusterings: &Clusterings) -> Self {
         Cpu {
-            clusters: Clusters::new(settings.instruction_set),
+            clusterings: clusterings.clone(),
+            clusters: Clusters::new(settings.instruction_set, clusterings.clone()),
             cells: Cells::new(settings),
             acquaintances: Acquaintances::default(),
             settings: settings.clone(),
@@ -73,7 +76,9 @@ impl Cpu {
         if self.settings.method != Method::Auto {
             return Ok(false);
         }
-        let prefers_grid = self.acquaintances.prefer_grid(job.scene, job.frame, tuning);
+        let prefers_grid =
+            self.acquaintances
+                .prefer_grid(job.scene, job.frame, tuning, &self.clusterings);
         let has_room = self.settings.memory_budget.is_none();
         if prefers_grid && has_room && self.find_in_grid(job, answer, stats)? {
             stats.method = Method::Cells.name();

@@ -11,12 +11,12 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::clusterings::make_anew;
+use crate::clusterings::{Asked, Clusterings};
 use crate::error::Error;
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
 use crate::index::LayerIx;
 use crate::positions::Positions;
-use crate::settings::{Recluster, Settings};
+use crate::settings::Settings;
 use crate::stats::Statistics;
 use crate::tuning::Tuning;
 use crate::workers::Workers;
@@ -79,7 +79,7 @@ impl Refit {
         isa: Isa,
         job: Job<'_>,
         settings: &Settings,
-        caches: &mut Caches,
+        (clusterings, caches): (&Clusterings, &mut Caches),
         scratches: &mut [Worker],
         stats: &mut Statistics,
     ) -> Result<(), Error> {
@@ -122,7 +122,7 @@ impl Refit {
             }
             self.work(isa, job, tuning, caches, scratches);
         }
-        self.above(isa, job, settings, caches, stats)?;
+        self.above(isa, job, tuning, (clusterings, caches), stats)?;
         if is_allowed {
             remote::learn(job, caches, for_boxes(job, tuning, scratches));
         }
@@ -246,8 +246,8 @@ impl Refit {
         &mut self,
         isa: Isa,
         job: Job<'_>,
-        settings: &Settings,
-        caches: &mut Caches,
+        tuning: &Tuning,
+        (clusterings, caches): (&Clusterings, &mut Caches),
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         let Job {
@@ -256,6 +256,7 @@ impl Refit {
             workers,
             ..
         } = job;
+        let mut known = clusterings.lock();
         for (ix, layer) in frame.numbered_layers() {
             let body = frame.body(scene, ix);
             let cache = caches.at_mut(layer);
@@ -267,12 +268,12 @@ impl Refit {
             if cache.sorted().is_some() {
                 continue;
             }
-            let is_stale = cache.fit.is_stale(cache.spread(), &settings.tuning);
-            if is_stale && settings.recluster == Recluster::Auto {
-                let n = body.n_primitives();
-                *cache = make_anew(workers, n, stats, || {
-                    BodyCache::new(body, isa, &settings.tuning)
-                })?;
+            let asked =
+                Asked::new(layer.id, body, layer.part).with_local_faces(isa.looks_corners_up());
+            let spread = cache.spread();
+            let renewed = known.renew_if_stale(asked, (&mut cache.fit, spread), workers, stats)?;
+            if let Some(clustering) = renewed {
+                *cache = BodyCache::new(body, clustering, tuning);
                 if layer.within {
                     cache.find_adjacency(workers)?;
                 }

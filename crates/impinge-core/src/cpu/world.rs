@@ -1,5 +1,7 @@
 //! Read-only view shared by all stages: the scene, its layers, and the cache kept per body.
 
+use std::sync::Arc;
+
 use crate::clusterings::{Clustered, Fit, Store};
 use crate::elements::Elements;
 use crate::grouping::bounds::Bounds;
@@ -22,7 +24,7 @@ pub(crate) struct BodyCache {
     pub topology_stamp: u64,
     /// The stamp of the positions that the boxes belong to; 0 for none.
     pub positions_stamp: u64,
-    pub clustering: Clustering,
+    pub clustering: Arc<Clustering>,
     pub bounds: TreeBounds,
     /// The box of all primitives.
     pub whole: Bounds,
@@ -41,8 +43,8 @@ impl Clustered for BodyCache {
         self.topology_stamp
     }
 
-    fn n_clusters(&self) -> usize {
-        self.clustering.n_clusters()
+    fn clustering(&self) -> &Arc<Clustering> {
+        &self.clustering
     }
 }
 

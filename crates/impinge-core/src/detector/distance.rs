@@ -84,7 +84,7 @@ impl Detector {
             let nearest = distances.nearest(scene, &plan, workers, control, |ids| {
                 touching.lowest(scene, ids, control, (runner, cpu, settings))
             })?;
-            stats.bytes_held = distances.bytes();
+            distances.report(stats);
             Ok(nearest)
         })
     }
@@ -146,7 +146,7 @@ impl Detector {
             let nearest = distances.between(scene, [a, b], workers, control, || {
                 touching.lowest(scene, [a, b], control, (runner, cpu, settings))
             })?;
-            stats.bytes_held = distances.bytes();
+            distances.report(stats);
             Ok(nearest)
         })
     }

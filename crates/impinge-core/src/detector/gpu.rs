@@ -4,6 +4,7 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use super::{Backend, Detector, Settings};
+use crate::clusterings::Clusterings;
 use crate::cpu::Cpu;
 use crate::cpu::steps::{ByDevice, StepClusters};
 use crate::error::Error;
@@ -22,18 +23,24 @@ use crate::stats::Statistics;
 use crate::workers::is_forked;
 
 /// Opens the GPU that the settings ask for, if they ask for one.
-pub(super) fn open(settings: &Settings) -> Result<Option<Engine>, Error> {
+pub(super) fn open(
+    settings: &Settings,
+    clusterings: &Clusterings,
+) -> Result<Option<Engine>, Error> {
     let gpu = wanted(settings).map(Gpu::open).transpose();
-    engine_of(gpu, settings)
+    engine_of(gpu, settings, clusterings)
 }
 
 /// [`open`] without blocking.
-pub(super) async fn open_async(settings: &Settings) -> Result<Option<Engine>, Error> {
+pub(super) async fn open_async(
+    settings: &Settings,
+    clusterings: &Clusterings,
+) -> Result<Option<Engine>, Error> {
     let gpu = match wanted(settings) {
         Some(wanted) => Gpu::open_async(wanted).await.map(Some),
         None => Ok(None),
     };
-    engine_of(gpu, settings)
+    engine_of(gpu, settings, clusterings)
 }
 
 fn wanted(settings: &Settings) -> Option<WantedAdapter<'_>> {
@@ -52,9 +59,13 @@ fn wanted(settings: &Settings) -> Option<WantedAdapter<'_>> {
 fn engine_of(
     gpu: Result<Option<Arc<Gpu>>, Error>,
     settings: &Settings,
+    clusterings: &Clusterings,
 ) -> Result<Option<Engine>, Error> {
     match gpu {
-        Ok(gpu) => Ok(gpu.map(|gpu| Engine::new(gpu, settings, Capacities::default()))),
+        Ok(gpu) => Ok(gpu.map(|gpu| {
+            let clusterings = clusterings.clone();
+            Engine::new(gpu, settings, clusterings, Capacities::default())
+        })),
         // A name that fits no adapter is a mistake, even with `Backend::Auto`.
         Err(error @ Error::NoAdapter { .. }) if settings.device.is_some() => Err(error),
         Err(_) if settings.backend == Backend::Auto => Ok(None),
@@ -147,7 +158,9 @@ impl Detector {
     pub fn with_capacities(settings: Settings, capacities: Capacities) -> Result<Self, Error> {
         let mut detector = Detector::with_settings(settings)?;
         if let Some(gpu) = detector.gpu_in_use() {
-            detector.gpu = Some(Engine::new(gpu, &detector.settings, capacities));
+            let clusterings = detector.clusterings.clone();
+            let engine = Engine::new(gpu, &detector.settings, clusterings, capacities);
+            detector.gpu = Some(engine);
         }
         Ok(detector)
     }
@@ -245,8 +258,9 @@ impl Detector {
             ..settings
         };
         settings.check()?;
-        let engine = Engine::new(Arc::new(gpu), &settings, Capacities::default());
-        Ok(Detector::assemble(settings, Some(engine)))
+        let clusterings = Clusterings::new(&settings);
+        let engine = engine_of(Ok(Some(Arc::new(gpu))), &settings, &clusterings)?;
+        Ok(Detector::assemble(settings, clusterings, engine))
     }
 
     pub(super) fn gpu_in_use(&self) -> Option<Arc<Gpu>> {

@@ -80,10 +80,9 @@ impl Detector {
         let control = Control::new();
         let job = self.runner.job(scene, &plan, &control)?;
         let resident: BTreeMap<BodyId, &wgpu::Buffer> = starts.iter().copied().collect();
-        let is_resident = |body| resident.contains_key(&body);
+        let judges = |body| !resident.contains_key(&body);
         let stats = &mut Statistics::default();
-        let clusters = &mut self.steps.clusters;
-        let clusterings = clusters.clusterings(job, &self.settings, is_resident, stats)?;
+        let clusterings = self.clusterings.of_frame(job, judges, stats)?;
         engine.encode_step(job, &clusterings, [starts, ends], encoder)
     }
 }

@@ -5,6 +5,7 @@ use super::in_step::{InStep, Keys, Seen};
 use super::{Detector, Last};
 use crate::candidates::Candidates;
 use crate::clock::Instant;
+use crate::clusterings::Clusterings;
 use crate::cpu::steps::StepClusters;
 use crate::error::Error;
 use crate::found::{Found, FoundByKind};
@@ -34,13 +35,13 @@ pub(super) struct StepMemory {
 }
 
 impl StepMemory {
-    pub fn new(settings: &Settings) -> Self {
+    pub fn new(settings: &Settings, clusterings: Clusterings) -> Self {
         StepMemory {
             contacts: Contacts::default(),
             start_intersects: None,
             candidates: Candidates::default(),
             near: NearPairs::default(),
-            clusters: StepClusters::new(settings.instruction_set),
+            clusters: StepClusters::new(settings.instruction_set, clusterings),
         }
     }
 }

@@ -7,7 +7,6 @@ use std::sync::Arc;
 
 use super::buffers::{Storage, count};
 use super::cells::Guest;
-use super::clusterings::Clusterings;
 use super::collect::Collector;
 use super::device::Scopes;
 use super::layout::Cell;
@@ -17,13 +16,14 @@ use super::recording::{Launcher, Ran, Recording};
 use super::room::{Capacities, CellsWanted, PassCounts, Room};
 use super::topology::Most;
 use super::world::{Motion, ResidentEnds, World, weigh};
+use crate::clusterings::Clusterings;
 use crate::error::Error;
 use crate::grouping::clusters::Clustering;
 use crate::ids::BodyId;
 use crate::index::LayerIx;
-use crate::plan::{Layer, Plan as Frame};
+use crate::plan::Plan as Frame;
 use crate::run::{Finder, Job};
-use crate::settings::{Backend, Method, Recluster, Settings};
+use crate::settings::{Backend, Method, Settings};
 use crate::sink::Answer;
 use crate::sink::Goal;
 use crate::stats::Statistics;
@@ -127,13 +127,21 @@ pub(super) enum Outcome {
 }
 
 impl Engine {
-    /// Creates an engine. Of `Auto` it answers what `Clusters` are to answer.
-    pub fn new(gpu: Arc<Gpu>, settings: &Settings, first: Capacities) -> Self {
+    /// Creates an engine that shares clusterings. Of `Auto` it answers what `Clusters` are to answer.
+    pub(crate) fn new(
+        gpu: Arc<Gpu>,
+        settings: &Settings,
+        clusterings: Clusterings,
+        first: Capacities,
+    ) -> Self {
         let settings = Settings {
             method: settings.method.in_the_long_run(),
             ..settings.clone()
         };
-        Engine::with_guest(gpu, settings, first, None)
+        Engine {
+            clusterings,
+            ..Engine::with_guest(gpu, settings, first, None)
+        }
     }
 
     /// Creates an engine; with a method of another crate, if there is one, instead of `Cells`.
@@ -147,11 +155,11 @@ impl Engine {
             gpu,
             lane: Lane::new(Motion::Still, settings.method, first),
             other: Lane::new(Motion::Moving, Method::Clusters, first),
+            clusterings: Clusterings::new(&settings),
             settings,
             too_much: None,
             most_bound: u64::MAX,
             has_pieces: false,
-            clusterings: Clusterings::default(),
             world: World::new(),
             guest,
             complete: Vec::new(),
@@ -183,7 +191,7 @@ impl Engine {
         *self = Engine {
             most_bound: self.most_bound,
             is_traced: self.is_traced,
-            clusterings: std::mem::take(&mut self.clusterings),
+            clusterings: self.clusterings.clone(),
             ..Engine::with_guest(gpu, self.settings.clone(), first, guest)
         };
     }
@@ -298,14 +306,9 @@ impl Engine {
         stats: &mut Statistics,
     ) -> Result<Vec<Arc<Clustering>>, Error> {
         // Not judged in `Cells`, where clusters only show which primitives are out of reach.
-        let recluster =
-            self.settings.recluster == Recluster::Auto && self.lane.method == Method::Clusters;
-        self.clusterings.update(job, resident, recluster, stats)?;
-        let of_layer = |layer: &Layer| {
-            let cache = self.clusterings.of(layer.id);
-            Arc::clone(&cache.expect("just clustered").clustering)
-        };
-        Ok(job.frame.layers.iter().map(of_layer).collect())
+        let is_judged = self.lane.method == Method::Clusters;
+        let judges = |id| is_judged && !resident.contains(&id);
+        self.clusterings.of_frame(job, judges, stats)
     }
 
     /// Sends what has changed since the last question.

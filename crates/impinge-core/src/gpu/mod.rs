@@ -8,7 +8,6 @@
 //! A step runs through the same stages, with two boxes per node, up to a filter. The device drops pairs that certainly do not touch, and
 //! the host finds the first contacts of all others.
 
-mod clusterings;
 mod collect;
 mod device;
 mod forest;

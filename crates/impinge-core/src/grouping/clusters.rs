@@ -39,8 +39,7 @@ pub(crate) struct Clustering {
     pub shape: TreeShape,
     hubs: Option<Hubs>,
     adjacency: OnceLock<Adjacency>,
-    /// None unless they were asked for.
-    local_faces: Vec<LocalFaces>,
+    local_faces: OnceLock<Vec<LocalFaces>>,
     rings: OnceLock<Rings>,
 }
 
@@ -67,14 +66,9 @@ pub(crate) type LocalFaces = LocalCorners<3>;
 
 impl Clustering {
     /// Clusters primitives by the centres of their boxes in the current pose, which are given in the order of the primitives. Those
-    /// of one class of sizes follow each other.
-    pub fn new(elements: &Elements, to_order: impl Into<ToOrder>) -> Self {
-        Self::make(elements, to_order.into(), false)
-    }
-
-    /// The same, with the local faces of each cluster, for kernels that look corners up in a table of its vertices.
-    pub fn with_local_faces(elements: &Elements, to_order: ToOrder) -> Self {
-        Self::make(elements, to_order, true)
+    /// of one class of sizes follow each other. Their [local faces](Self::local_faces) are found at the same time if they are needed.
+    pub fn new(elements: &Elements, to_order: impl Into<ToOrder>, with_local_faces: bool) -> Self {
+        Self::make(elements, to_order.into(), with_local_faces)
     }
 
     fn make(elements: &Elements, to_order: ToOrder, with_local_faces: bool) -> Self {
@@ -94,11 +88,11 @@ impl Clustering {
         let (vertices, vertex_starts, local_faces) = match &corners {
             Elements::Triangles(faces) if with_local_faces => {
                 let unique = Unique::new(faces, counts.len(), true);
-                (unique.vertices, unique.starts, unique.corners)
+                (unique.vertices, unique.starts, unique.corners.into())
             }
             corners => with_corners!(corners, |corners| {
                 let unique = Unique::new(corners, counts.len(), false);
-                (unique.vertices, unique.starts, Vec::new())
+                (unique.vertices, unique.starts, OnceLock::new())
             }),
         };
         let hubs = has_hubs
@@ -179,10 +173,29 @@ impl Clustering {
             .get_or_init(|| with_corners!(&self.corners, |corners| Adjacency::new(corners)))
     }
 
-    /// The local faces of a cluster, if they were asked for.
+    /// Finds the local faces of all clusters, if the primitives are triangles: for kernels that look corners up in a table of a
+    /// cluster's vertices.
+    pub fn find_local_faces(&self) {
+        if let Elements::Triangles(faces) = &self.corners {
+            let n_vertices = self
+                .vertices
+                .iter()
+                .max()
+                .map_or(0, |&last| last as usize + 1);
+            let find = || Unique::new(faces, n_vertices, true).corners;
+            self.local_faces.get_or_init(find);
+        }
+    }
+
+    /// Whether there are no local faces to be found any more.
+    pub fn knows_local_faces(&self) -> bool {
+        self.local_faces.get().is_some() || !matches!(self.corners, Elements::Triangles(_))
+    }
+
+    /// The local faces of a cluster, if they have been found.
     #[inline(always)]
     pub fn local_faces(&self, cluster: ClusterIx) -> Option<&LocalFaces> {
-        self.local_faces.get(cluster.index())
+        self.local_faces.get()?.get(cluster.index())
     }
 
     /// Finds the rings of the vertices, if the primitives are triangles.
@@ -212,7 +225,10 @@ impl Clustering {
             + self.hubs.as_ref().map_or(0, Hubs::bytes)
             + self.adjacency.get().map_or(0, Adjacency::bytes)
             + self.rings.get().map_or(0, Rings::bytes)
-            + size_of_val(&self.local_faces[..])
+            + self
+                .local_faces
+                .get()
+                .map_or(0, |faces| size_of_val(&faces[..]))
     }
 }
 

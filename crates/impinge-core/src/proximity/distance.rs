@@ -11,6 +11,7 @@
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BinaryHeap, HashMap};
+use std::sync::Arc;
 
 use super::axes::{Axes, View};
 use super::features::{Gap, gap};
@@ -20,7 +21,8 @@ use crate::hull::Extent;
 
 use super::many::{Allowance, Bodies, are_apart, meet};
 use super::tree::{Node, Tree, box_along, corners};
-use crate::elements::Kind;
+use crate::clusterings::{Asked, Clusterings};
+use crate::elements::{Kind, Part};
 use crate::error::Error;
 use crate::grouping::bounds::round_up;
 use crate::ids::BodyId;
@@ -30,14 +32,18 @@ use crate::plan::Plan;
 use crate::positions::{Positions, check_positions};
 use crate::progress::Control;
 use crate::scene::{Body, Scene};
+use crate::stats::Statistics;
 use crate::workers::Workers;
 use impinge_exact::Point;
 use impinge_exact::internal::filter::Directions64;
 use impinge_exact::internal::filter::number::Portable32;
 
 /// The trees of bodies and the pairs found last, from call to call.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Distances {
+    clusterings: Clusterings,
+    /// What was clustered.
+    stats: Statistics,
     /// By the number of the body.
     trees: HashMap<usize, Tree>,
     /// The pair found last, by the numbers of the bodies.
@@ -68,6 +74,26 @@ pub struct Nearest {
 }
 
 impl Distances {
+    /// Nothing is known yet but the clusterings that other questions share.
+    pub fn new(clusterings: Clusterings) -> Self {
+        Distances {
+            clusterings,
+            stats: Statistics::default(),
+            trees: HashMap::new(),
+            last: HashMap::new(),
+            many: Bodies::default(),
+            nearest: None,
+            stack: Vec::new(),
+        }
+    }
+
+    /// Forgets removed bodies.
+    fn begin(&mut self, scene: &Scene) {
+        self.trees.retain(|&slot, _| scene.holds(slot));
+        drop(self.clusterings.open(scene));
+        self.stats.clear();
+    }
+
     /// The smallest distance of two bodies and the pair of primitives that has it; `None` if one body has
     /// no primitives.
     ///
@@ -86,7 +112,7 @@ impl Distances {
         if a == b {
             return Err(Error::SameBody { body: a });
         }
-        self.trees.retain(|&slot, _| scene.holds(slot));
+        self.begin(scene);
         for id in [a, b] {
             control.step(0, 1)?;
             self.know(scene, id, workers)?;
@@ -176,7 +202,7 @@ impl Distances {
         control: &Control<'_>,
         mut touching: impl FnMut([BodyId; 2]) -> Result<Option<[u32; 2]>, Error>,
     ) -> Result<Option<Nearest>, Error> {
-        self.trees.retain(|&slot, _| scene.holds(slot));
+        self.begin(scene);
         let mut many = std::mem::take(&mut self.many);
         many.update(scene, frame);
         // The bodies that were nearest last are a good bound.
@@ -276,7 +302,7 @@ impl Distances {
         workers: &Workers,
         control: &Control<'_>,
     ) -> Result<Option<bool>, Error> {
-        self.trees.retain(|&slot, _| scene.holds(slot));
+        self.begin(scene);
         let mut many = std::mem::take(&mut self.many);
         many.update(scene, frame);
         let mut allowance = Allowance(ALLOWANCE);
@@ -300,9 +326,12 @@ impl Distances {
         found.map(|()| any)
     }
 
-    /// Bytes of the trees.
-    pub fn bytes(&self) -> u64 {
-        self.trees.values().map(Tree::bytes).sum::<usize>() as u64
+    /// Says what the last question clustered, and the bytes of the trees.
+    pub fn report(&self, stats: &mut Statistics) {
+        (stats.n_clustered, stats.n_reclustered) =
+            (self.stats.n_clustered, self.stats.n_reclustered);
+        let beside: usize = self.trees.values().map(Tree::bytes).sum();
+        stats.bytes_held = (self.clusterings.bytes() + beside) as u64;
     }
 
     fn know(&mut self, scene: &Scene, id: BodyId, workers: &Workers) -> Result<(), Error> {
@@ -313,15 +342,26 @@ impl Distances {
                 Positions::F64(positions) => check_positions(id, positions)?,
             }
         }
-        match self.trees.get_mut(&id.index()) {
-            Some(tree) if tree.fits(body) => tree.refit(body),
-            _ => {
-                self.last
-                    .retain(|numbers, _| !numbers.contains(&id.index()));
-                let tree = workers.install(body.n_primitives(), || Tree::new(body))?;
-                self.trees.insert(id.index(), tree);
+        let asked = Asked::new(id, body, Part::Given);
+        let (slot, stats) = (id.index(), &mut self.stats);
+        let known = self.trees.remove(&slot).filter(|tree| tree.fits(body));
+        if known.is_none() {
+            self.last.retain(|numbers, _| !numbers.contains(&slot));
+        }
+        let own = known.as_ref().map(|tree| &tree.clustering);
+        let clustering = self.clusterings.of(asked, own, workers, stats)?;
+        let known = known.filter(|tree| Arc::ptr_eq(&tree.clustering, &clustering));
+        let mut tree = known.unwrap_or_else(|| Tree::new(body, clustering));
+        if tree.refit(body) {
+            let (spread, mut all) = (tree.spread(), self.clusterings.lock());
+            let renewed = all.renew_if_stale(asked, (&mut tree.fit, spread), workers, stats)?;
+            if let Some(clustering) = renewed {
+                tree = Tree::new(body, clustering);
+                tree.refit(body);
+                tree.fit.note(tree.spread());
             }
         }
+        self.trees.insert(slot, tree);
         Ok(())
     }
 }

@@ -1,8 +1,11 @@
 //! The boxes of a body's clusters, and of the tree nodes above them.
 //!
-//! Clusters are found once per topology, in the current pose; their boxes once per pose, from each cluster's vertices; boxes
-//! of primitives only when a cluster is compared. Cost: `O(n log n)` and `O(n)`.
+//! The clusters are those that all questions share. Their boxes are found once per pose, from each cluster's vertices; boxes
+//! of primitives only when a cluster is compared. Cost: `O(n)`.
 
+use std::sync::Arc;
+
+use crate::clusterings::{Fit, spread};
 use crate::grouping::bounds::Bounds;
 use crate::grouping::clusters::Clustering;
 use crate::hull::{self, Extent};
@@ -13,26 +16,25 @@ use impinge_exact::Point;
 /// A body's clusters and boxes.
 #[derive(Debug)]
 pub(super) struct Tree {
-    pub clustering: Clustering,
+    pub clustering: Arc<Clustering>,
     topology_stamp: u64,
     positions_stamp: u64,
     /// The boxes of each level's nodes, from the clusters up.
     levels: Vec<Vec<Bounds>>,
+    /// How well the clusters have fitted the body.
+    pub fit: Fit,
 }
 
 impl Tree {
-    pub fn new(body: &Body) -> Self {
-        let mut tree = Tree {
-            clustering: Clustering::new(
-                body.elements(),
-                hull::centers(body.elements(), body.positions()),
-            ),
+    /// A tree without boxes yet.
+    pub fn new(body: &Body, clustering: Arc<Clustering>) -> Self {
+        Tree {
+            clustering,
             topology_stamp: body.topology_stamp(),
             positions_stamp: 0,
             levels: Vec::new(),
-        };
-        tree.refit(body);
-        tree
+            fit: Fit::UNKNOWN,
+        }
     }
 
     /// Whether the tree was built for the body's current topology.
@@ -40,10 +42,10 @@ impl Tree {
         self.topology_stamp == body.topology_stamp()
     }
 
-    /// Recomputes the boxes if the body's positions have changed.
-    pub fn refit(&mut self, body: &Body) {
+    /// Recomputes the boxes if the body's positions have changed; returns whether they had.
+    pub fn refit(&mut self, body: &Body) -> bool {
         if self.positions_stamp == body.positions_stamp() {
-            return;
+            return false;
         }
         self.positions_stamp = body.positions_stamp();
         self.levels.clear();
@@ -67,12 +69,22 @@ impl Tree {
                 .collect();
             self.levels.push(boxes);
         }
+        true
     }
 
-    /// Bytes held.
+    /// How well the clusters fit the pose of the boxes.
+    pub fn spread(&self) -> f64 {
+        let (Some(clusters), Some(root)) = (self.levels.first(), self.root()) else {
+            return 1.0;
+        };
+        let surface = clusters.iter().map(Bounds::half_area).sum();
+        spread(surface, &self.bounds_f32(root))
+    }
+
+    /// Bytes held beside the clusters.
     pub fn bytes(&self) -> usize {
         let boxes = self.levels.iter().map(|level| size_of_val(&level[..]));
-        self.clustering.bytes() + boxes.sum::<usize>()
+        boxes.sum()
     }
 
     /// The root; `None` without primitives.

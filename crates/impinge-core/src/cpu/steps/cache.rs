@@ -2,24 +2,19 @@
 
 use std::sync::Arc;
 
-#[cfg(feature = "gpu")]
-use crate::clusterings::sampled_spread;
-use crate::clusterings::{Clustered, Fit, Store, make_anew, spread};
+use crate::clusterings::{Asked, Clustered, Clusterings, Fit, Store, spread};
 use crate::cpu::bounds::TreeBounds;
 use crate::cpu::dispatch::Tree;
 use crate::cpu::simd::{Isa, Simd, dispatch};
-use crate::elements::{Elements, Part};
 use crate::error::Error;
 use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
 use crate::grouping::clusters::Clustering;
-use crate::hull::{self, Hull, Pose};
-use crate::index::{ClusterIx, ElementIx, LayerIx};
+use crate::hull::{Hull, Pose};
+use crate::index::{ClusterIx, LayerIx};
 use crate::run::Job;
 use crate::scene::Body;
-use crate::settings::{Recluster, Settings};
+use crate::settings::Settings;
 use crate::stats::Statistics;
-#[cfg(feature = "gpu")]
-use crate::tuning::Tuning;
 
 /// Clusters per task.
 const CLUSTERS: usize = 128;
@@ -41,27 +36,11 @@ pub(super) struct LayerCache {
     ends: [BoundsArray; 2],
     /// How well the clusters have fitted the layer.
     fit: Fit,
-    #[cfg(feature = "gpu")]
-    sampled: Sampled,
-}
-
-/// How well a sample of the clusters has fitted the layer, and the stamp of the positions that were judged last.
-#[cfg(feature = "gpu")]
-#[derive(Debug, Default)]
-struct Sampled {
-    stamp: u64,
-    fit: Fit,
 }
 
 impl LayerCache {
-    /// Clusters a part of a body in its pose at the start of the step.
-    pub fn new(body: &Body, part: Part) -> Self {
-        let (elements, positions) = (body.part(part), body.positions());
-        let mut clustering = Clustering::new(elements, hull::centers(elements, positions));
-        if let (Part::Vertices, Elements::Points(vertices)) = (part, &clustering.corners) {
-            // Vertices are numbered as positions are.
-            clustering.order = vertices.iter().map(|&[ix]| ElementIx::new(ix)).collect();
-        }
+    /// What is kept beside the clusters of a part of a body; no boxes yet.
+    pub fn new(body: &Body, clustering: Arc<Clustering>) -> Self {
         let mut bounds = TreeBounds::default();
         bounds.resize(&clustering.shape);
         let mut ends = [BoundsArray::default(), BoundsArray::default()];
@@ -71,24 +50,11 @@ impl LayerCache {
         LayerCache {
             topology_stamp: body.topology_stamp(),
             of: None,
-            clustering: Arc::new(clustering),
+            clustering,
             bounds,
             ends,
             fit: Fit::UNKNOWN,
-            #[cfg(feature = "gpu")]
-            sampled: Sampled::default(),
         }
-    }
-
-    /// Whether the layer no longer fits its clusters, judged by a sample of them. For layers whose boxes a device computes.
-    #[cfg(feature = "gpu")]
-    pub fn is_stale(&mut self, body: &Body, tuning: &Tuning) -> bool {
-        if self.sampled.stamp == body.positions_stamp() {
-            return false;
-        }
-        self.sampled.stamp = body.positions_stamp();
-        let spread = sampled_spread(&self.clustering, body.positions());
-        self.sampled.fit.is_stale(spread, tuning)
     }
 
     #[inline(always)]
@@ -105,9 +71,10 @@ impl LayerCache {
         self.ends.each_ref().map(|end| end.at(cluster.index()))
     }
 
+    /// Bytes held beside the clusters.
     pub fn bytes(&self) -> usize {
         let ends: usize = self.ends.iter().map(BoundsArray::bytes).sum();
-        size_of::<LayerCache>() + self.clustering.bytes() + self.bounds.bytes() + ends
+        size_of::<LayerCache>() + self.bounds.bytes() + ends
     }
 
     /// How well the clusters fit the current pose: the clusters' summed surface divided by the layer's.
@@ -123,8 +90,8 @@ impl Clustered for LayerCache {
         self.topology_stamp
     }
 
-    fn n_clusters(&self) -> usize {
-        self.clustering.n_clusters()
+    fn clustering(&self) -> &Arc<Clustering> {
+        &self.clustering
     }
 }
 
@@ -146,7 +113,7 @@ pub(super) fn refit<S: Send>(
     job: Job<'_>,
     settings: &Settings,
     pose: Pose,
-    caches: &mut Caches,
+    (clusterings, caches): (&Clusterings, &mut Caches),
     scratches: &mut [S],
     stats: &mut Statistics,
 ) -> Result<(), Error> {
@@ -168,15 +135,17 @@ pub(super) fn refit<S: Send>(
         cache.bounds.refit_above(0, &cache.clustering.shape);
         cache.of = Some((body.step_stamp(), pose));
         let spread = cache.spread();
-        if cache.fit.is_stale(spread, &settings.tuning) && settings.recluster == Recluster::Auto {
-            let n = cache.clustering.order.len();
-            *cache = make_anew(workers, n, stats, || LayerCache::new(body, layer.part))?;
+        let (asked, fit) = (Asked::new(layer.id, body, layer.part), &mut cache.fit);
+        let mut known = clusterings.lock();
+        if let Some(clustering) = known.renew_if_stale(asked, (fit, spread), workers, stats)? {
+            *cache = LayerCache::new(body, clustering);
             is_stale = true;
         }
     }
     if is_stale {
         // New clusters have the best spread so far, so this recursion ends.
-        refit(isa, job, settings, pose, caches, scratches, stats)?;
+        let clustered = (clusterings, caches);
+        refit(isa, job, settings, pose, clustered, scratches, stats)?;
     }
     Ok(())
 }

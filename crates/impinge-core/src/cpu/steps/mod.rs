@@ -20,20 +20,16 @@ mod pairing;
 mod unsure;
 mod world;
 
-#[cfg(feature = "gpu")]
 use std::sync::Arc;
 
+use crate::clusterings::Clusterings;
 use crate::error::Error;
 use crate::found::StepAnswer;
 #[cfg(feature = "gpu")]
 use crate::grouping::clusters::Clustering;
 use crate::grouping::hubs::Hubs;
-#[cfg(feature = "gpu")]
-use crate::ids::BodyId;
 use crate::index::LayerIx;
 use crate::pair_kind::PairKind;
-use crate::plan::Layer;
-use crate::scene::Body;
 use crate::settings::InstructionSet;
 use crate::stats::Statistics;
 #[cfg(feature = "gpu")]
@@ -44,8 +40,6 @@ use super::met::WorkItem;
 use super::simd::{Isa, Simd};
 use super::slabs::{self, Counts, Room, SlabStages};
 use crate::run::Job;
-#[cfg(feature = "gpu")]
-use crate::settings::Recluster;
 use crate::settings::Settings;
 #[cfg(feature = "gpu")]
 use crate::sink::Ending;
@@ -113,15 +107,17 @@ pub(crate) enum ByDevice {
 /// Caches and scratch of the method; kept from step to step.
 pub(crate) struct StepClusters {
     isa: Isa,
+    clusterings: Clusterings,
     caches: Caches,
     scratches: Vec<Worker>,
     room: Room,
 }
 
 impl StepClusters {
-    pub fn new(allowed: InstructionSet) -> Self {
+    pub fn new(allowed: InstructionSet, clusterings: Clusterings) -> Self {
         StepClusters {
             isa: Isa::detect(allowed),
+            clusterings,
             caches: Caches::default(),
             scratches: Vec::new(),
             room: Room::default(),
@@ -193,7 +189,12 @@ impl StepClusters {
             &mut Statistics,
         ) -> Result<bool, Error>,
     ) -> Result<ByDevice, Error> {
-        let clusterings = self.clusterings(job, settings, |_| false, stats)?;
+        stats.n_clusters = 0;
+        let clusterings = stats.time("clustering", |stats| {
+            let all = self.clusterings.of_frame(job, |_| true, stats);
+            self.cluster(job, stats)?;
+            all
+        })?;
         let mut first_places = vec![0];
         for clustering in &clusterings {
             // All elements of a frame are numbered in 32 bits.
@@ -231,50 +232,18 @@ impl StepClusters {
         })
     }
 
-    /// The clusters of all layers, for a device. The host does not know the pose of `resident` bodies, so it does not judge
-    /// their clusters.
-    ///
-    /// # Errors
-    /// Threads that do not start.
-    #[cfg(feature = "gpu")]
-    pub fn clusterings(
-        &mut self,
-        job: Job<'_>,
-        settings: &Settings,
-        resident: impl Fn(BodyId) -> bool,
-        stats: &mut Statistics,
-    ) -> Result<Vec<Arc<Clustering>>, Error> {
-        let recluster = settings.recluster == Recluster::Auto;
-        stats.n_clusters = 0;
-        stats.time("clustering", |stats| {
-            let is_stale = |cache: &mut LayerCache, layer: &Layer, body: &Body| {
-                recluster && !resident(layer.id) && cache.is_stale(body, &settings.tuning)
-            };
-            self.update(job, stats, is_stale)
-        })?;
-        let of_layer = |layer: &Layer| Arc::clone(&self.caches.at(layer).clustering);
-        Ok(job.frame.layers.iter().map(of_layer).collect())
-    }
-
     fn bytes_besides_room(&self) -> usize {
         let caches: usize = self.caches.iter().map(LayerCache::bytes).sum();
         let scratches: usize = self.scratches.iter().map(Worker::bytes).sum();
-        caches + scratches
+        self.clusterings.bytes() + caches + scratches
     }
 
     /// Clusters layers that are new or were re-meshed; forgets layers of removed bodies.
     fn cluster(&mut self, job: Job<'_>, stats: &mut Statistics) -> Result<(), Error> {
-        self.update(job, stats, |_, _, _| false)
-    }
-
-    fn update(
-        &mut self,
-        job: Job<'_>,
-        stats: &mut Statistics,
-        is_stale: impl FnMut(&mut LayerCache, &Layer, &Body) -> bool,
-    ) -> Result<(), Error> {
-        let make = |body: &Body, layer: &Layer| LayerCache::new(body, layer.part);
-        self.caches.update(job, stats, is_stale, make)
+        let shared = (&self.clusterings, false);
+        self.caches.update(job, shared, stats, |body, clustering| {
+            LayerCache::new(body, Arc::clone(clustering))
+        })
     }
 
     /// Computes the boxes of layers that have moved.
@@ -289,7 +258,7 @@ impl StepClusters {
             job,
             settings,
             job.frame.sweep(),
-            &mut self.caches,
+            (&self.clusterings, &mut self.caches),
             &mut self.scratches,
             stats,
         )

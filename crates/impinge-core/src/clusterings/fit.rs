@@ -1,0 +1,73 @@
+//! How well clusters fit the pose at hand, and have fitted at best.
+
+use crate::grouping::bounds::Bounds;
+#[cfg(feature = "gpu")]
+use crate::grouping::clusters::Clustering;
+#[cfg(feature = "gpu")]
+use crate::hull;
+#[cfg(feature = "gpu")]
+use crate::index::ClusterIx;
+#[cfg(feature = "gpu")]
+use crate::positions::Positions;
+use crate::tuning::Tuning;
+
+/// How well clusters have fitted their body at best.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Fit {
+    best_spread: f64,
+}
+
+impl Default for Fit {
+    fn default() -> Self {
+        Fit::UNKNOWN
+    }
+}
+
+impl Fit {
+    /// Of clusters that were not looked at yet.
+    pub const UNKNOWN: Fit = Fit {
+        best_spread: f64::INFINITY,
+    };
+
+    /// Takes note of the spread in the pose at hand.
+    pub fn note(&mut self, spread: f64) {
+        self.best_spread = self.best_spread.min(spread);
+    }
+
+    /// Takes note of the spread in the pose at hand; whether the body has flowed away from its clusters.
+    pub fn is_stale(&mut self, spread: f64, tuning: &Tuning) -> bool {
+        let is_stale = spread > tuning.stale_from * self.best_spread;
+        self.note(spread);
+        is_stale
+    }
+}
+
+/// The number of clusters sampled to judge how well all of them fit.
+#[cfg(feature = "gpu")]
+const SAMPLES: usize = 64;
+
+/// The [`spread`] of evenly spaced clusters. The same clusters are sampled every time.
+#[cfg(feature = "gpu")]
+pub(crate) fn sampled_spread(clustering: &Clustering, positions: &Positions) -> f64 {
+    let n = clustering.n_clusters();
+    let n_samples = n.min(SAMPLES);
+    let mut whole = Bounds::EMPTY;
+    let mut sum = 0.0;
+    for sample in 0..n_samples {
+        let cluster = ClusterIx::from_usize(sample * n / n_samples);
+        let bounds = hull::of_vertices(positions, clustering.vertices(cluster));
+        sum += bounds.half_area();
+        whole.join(&bounds);
+    }
+    spread(sum, &whole)
+}
+
+/// The clusters' summed surface over that of the whole: how well they fit the pose at hand. Both are halves.
+pub(crate) fn spread(surface: f64, whole: &Bounds) -> f64 {
+    let whole = whole.half_area();
+    if whole > 0.0 && whole.is_finite() && surface.is_finite() {
+        surface / whole
+    } else {
+        1.0
+    }
+}

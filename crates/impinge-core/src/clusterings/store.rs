@@ -1,0 +1,149 @@
+//! What one backend keeps beside the clusterings: by slot of the body, made anew with them.
+
+use std::sync::Arc;
+
+use super::{Asked, Clusterings};
+use crate::elements::Part;
+use crate::error::Error;
+use crate::grouping::clusters::Clustering;
+use crate::plan::Layer;
+use crate::run::Job;
+use crate::scene::{Body, Scene};
+use crate::stats::Statistics;
+
+/// What a backend keeps of a body, or of a part of it: boxes, and whatever else belongs to a clustering.
+pub(crate) trait Clustered: Send {
+    /// The stamp of the topology that was clustered.
+    fn topology_stamp(&self) -> u64;
+
+    /// What it belongs to.
+    fn clustering(&self) -> &Arc<Clustering>;
+}
+
+/// What is kept, by slot of the body: one per body, or one per part (vertices, edges, faces).
+#[derive(Debug)]
+pub(crate) struct Store<T, const PARTS: usize = 1> {
+    slots: Vec<[Option<Box<T>>; PARTS]>,
+}
+
+impl<T, const PARTS: usize> Default for Store<T, PARTS> {
+    fn default() -> Self {
+        Store { slots: Vec::new() }
+    }
+}
+
+impl<T, const PARTS: usize> Store<T, PARTS> {
+    /// Where a part is among those of its body.
+    #[inline(always)]
+    fn ix(part: Part) -> usize {
+        let ix = match part {
+            Part::Vertices => 0,
+            Part::Edges => 1,
+            Part::Faces | Part::Given => 2,
+        };
+        ix.min(PARTS - 1)
+    }
+
+    /// What is kept of a layer of the frame that was last [updated](Store::update).
+    ///
+    /// # Panics
+    /// If the layer is of another frame.
+    #[inline(always)]
+    pub fn at(&self, layer: &Layer) -> &T {
+        self.slots[layer.id.index()][Self::ix(layer.part)]
+            .as_deref()
+            .expect("every layer was clustered")
+    }
+
+    /// The same, to be changed.
+    #[inline(always)]
+    pub fn at_mut(&mut self, layer: &Layer) -> &mut T {
+        self.slots[layer.id.index()][Self::ix(layer.part)]
+            .as_deref_mut()
+            .expect("every layer was clustered")
+    }
+
+    /// All that is kept.
+    pub fn iter(&self) -> impl Iterator<Item = &T> {
+        self.slots.iter().flatten().filter_map(Option::as_deref)
+    }
+
+    /// What is kept of bodies as a whole, each with its slot, in the order of slots.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = (usize, &mut T)> {
+        let parts = self.slots.iter_mut().enumerate();
+        parts.filter_map(|(slot, parts)| {
+            let kept = parts[Self::ix(Part::Given)].as_deref_mut()?;
+            Some((slot, kept))
+        })
+    }
+}
+
+impl<T: Clustered, const PARTS: usize> Store<T, PARTS> {
+    /// Drops what belongs to bodies that are gone or were re-meshed.
+    pub fn forget_outdated(&mut self, scene: &Scene) {
+        for (slot, parts) in self.slots.iter_mut().enumerate() {
+            let body = scene.holds(slot).then(|| scene.body_in(slot as u32));
+            let stamp = body.map(Body::topology_stamp);
+            for kept in parts {
+                if kept.as_ref().map(|kept| kept.topology_stamp()) != stamp {
+                    *kept = None;
+                }
+            }
+        }
+    }
+
+    /// Brings the store up to a frame: drops what belongs to bodies that are gone, and makes what is missing, or belongs to
+    /// another clustering than the one that is shared now. `local_faces`: whether clusterings are to have them.
+    ///
+    /// # Errors
+    /// Cancellation; threads that do not start.
+    pub fn update(
+        &mut self,
+        job: Job<'_>,
+        (clusterings, local_faces): (&Clusterings, bool),
+        stats: &mut Statistics,
+        make: impl Fn(&Body, &Arc<Clustering>) -> T,
+    ) -> Result<(), Error> {
+        let Job {
+            scene,
+            frame,
+            workers,
+            control,
+        } = job;
+        // Layers come part after part: the last one need not be of the last body.
+        let slots = frame.layers.iter().map(|layer| layer.id.index() + 1);
+        let n_slots = slots.max().unwrap_or(0);
+        if self.slots.len() < n_slots {
+            self.slots.resize_with(n_slots, || [const { None }; PARTS]);
+        }
+        if self.slots.len() > scene.n_bodies() {
+            for (slot, parts) in self.slots.iter_mut().enumerate() {
+                if !scene.holds(slot) {
+                    *parts = [const { None }; PARTS];
+                }
+            }
+        }
+        let mut known = clusterings.open(scene);
+        for (ix, layer) in frame.numbered_layers() {
+            let body = frame.body(scene, ix);
+            let asked = Asked::new(layer.id, body, layer.part).with_local_faces(local_faces);
+            let kept = &mut self.slots[layer.id.index()][Self::ix(layer.part)];
+            let own = kept.as_deref();
+            let own = own.filter(|own| own.topology_stamp() == body.topology_stamp());
+            let own = own.map(Clustered::clustering);
+            let clustering = match known.find(asked, own) {
+                Some(clustering) => clustering,
+                None => {
+                    control.step(ix.raw().into(), frame.layers.len() as u64)?;
+                    known.make(asked, workers, stats)?
+                }
+            };
+            if own.is_none_or(|own| !Arc::ptr_eq(own, clustering)) {
+                asked.complete(clustering, workers)?;
+                *kept = Some(Box::new(make(body, clustering)));
+            }
+            stats.n_clusters += clustering.n_clusters() as u64;
+        }
+        Ok(())
+    }
+}
