@@ -140,7 +140,7 @@ const ALL: [(&str, Ask); 15] = [
 ];
 
 /// Methods of the detector that ask nothing, or what is asked above in another way.
-const NO_QUESTIONS: [&str; 21] = [
+const NO_QUESTIONS: [&str; 25] = [
     "new",
     "with_settings",
     "with_settings_async",
@@ -163,6 +163,10 @@ const NO_QUESTIONS: [&str; 21] = [
     "encode_step",
     "positions_on_device",
     "make_room",
+    "bytes_on_device",
+    "trace",
+    "recording",
+    "ran",
 ];
 
 /// The public methods of the detector, as its source has them.
