@@ -39,6 +39,7 @@ try {
     assert.ok(size < limit, `${size} bytes, ${limit} allowed`);
   }
 
+  assert.match(await readFile(join(installed, "README.md"), "utf8"), /^# impinge/);
   const tsc = new URL("../node_modules/.bin/tsc", here).pathname;
   const options = ["--noEmit", "--strict", "--target", "es2022", "--module", "nodenext"];
   execFileSync(tsc, [...options, "--lib", "es2022,dom", "use.ts"], { cwd: folder, stdio: "inherit" });
