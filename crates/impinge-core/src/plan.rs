@@ -17,24 +17,26 @@
 //! +----------------+----------------+
 //! ```
 
+mod counted;
+mod distances;
+mod parts;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use crate::clock::Instant;
 use crate::elements::{Kind, Part};
 use crate::error::Error;
-use crate::hull::{Extent, Pose};
+use crate::hull::Pose;
 use crate::ids::BodyId;
 pub use crate::index::pair_key;
-use crate::index::{ElementIx, LayerIx, Number, pair_numbers};
+use crate::index::{ElementIx, LayerIx, Number};
 use crate::pair_kind::{PairKind, PairKinds};
-use crate::positions::{Positions, check_positions};
 use crate::query::{Cell, Query, Scope, SharedVertex};
 use crate::scene::{Body, Filter, Scene};
 use crate::sink::{Goal, Limits};
 use crate::step::{CandidateQuery, PairFilter, Start, Step, Toi};
-use impinge_exact::internal::{Keep, Reach};
-use impinge_exact::{Contact, ElementPair, Point};
+use impinge_exact::internal::Keep;
 
 /// One part of one body that takes part in a frame.
 #[derive(Debug, Clone, Copy)]
@@ -346,52 +348,6 @@ impl Plan {
         Ok(plan)
     }
 
-    fn check_cell(&self) -> Result<(), Error> {
-        let Some(Cell { low, high }) = self.cell else {
-            return Ok(());
-        };
-        // NaN is not at most anything.
-        match (0..3).all(|axis| low[axis] <= high[axis]) {
-            true => Ok(()),
-            false => Err(Error::Setting {
-                setting: "owned_by",
-                given: format!("{low:?} to {high:?}"),
-                allowed: "a lower corner that is nowhere above the upper one",
-            }),
-        }
-    }
-
-    /// Whether only the pairs of a cell are wanted.
-    pub fn has_cell(&self) -> bool {
-        self.cell.is_some()
-    }
-
-    /// Whether a pair belongs to the cell, if only its pairs are wanted.
-    #[inline(always)]
-    pub fn is_owned(&self, scene: &Scene, key: u64) -> bool {
-        match self.cell {
-            None => true,
-            Some(cell) => self.is_in_cell(scene, key, cell),
-        }
-    }
-
-    #[inline(never)]
-    fn is_in_cell(&self, scene: &Scene, key: u64, cell: Cell) -> bool {
-        let [a, b] = pair_numbers(key).map(|number| self.lower_corner(scene, number));
-        cell.holds(std::array::from_fn(|axis| a[axis].max(b[axis])))
-    }
-
-    /// The lower corner of the box of an element: over the whole step, if the question is about one.
-    fn lower_corner(&self, scene: &Scene, number: Number) -> [f64; 3] {
-        let (layer, element) = self.locate(number);
-        let body = self.body(scene, layer);
-        let corners = body.corners(self.layer(layer).part, &element);
-        let end = body.end_positions().filter(|_| self.sweep.until > 0.0);
-        let ends = std::iter::once(body.positions()).chain(end);
-        let points = ends.flat_map(|at| corners.iter().map(|&corner| at.point(corner as usize)));
-        Extent::of(points).min
-    }
-
     /// What is to become of the pairs that are found: all are held where it is known in the end only which of them count, or which
     /// one is the earliest.
     pub(crate) fn held(&self) -> Goal {
@@ -401,260 +357,9 @@ impl Plan {
         }
     }
 
-    /// Whether it is known in the end only which pairs belong to the cell. Finders of other questions look themselves.
-    pub(crate) fn is_owned_late(&self) -> bool {
-        self.question == Question::Intersection && self.cell.is_some()
-    }
-
     /// What of a step is examined, with boxes as they are.
     pub(crate) fn sweep(&self) -> Pose {
         self.sweep
-    }
-
-    /// Makes elements keep a separation, and a clearance if there is one.
-    fn keep(&mut self, scene: &Scene, keep: Keep) {
-        self.keep = keep;
-        (self.distance, self.bound) = (keep.separation, keep.separation);
-        if keep.is_plain() {
-            return;
-        }
-        let (mut magnitude, mut unit) = (0.0, 0.0);
-        for (_, body) in scene.bodies() {
-            if let (true, Some(end)) = (keep.is_rounded, body.end_positions()) {
-                magnitude = body
-                    .positions()
-                    .magnitude()
-                    .max(end.magnitude())
-                    .max(magnitude);
-                unit = f64::max(unit, body.positions().unit_roundoff(end));
-            }
-        }
-        self.bound = keep.most(magnitude, unit);
-    }
-
-    /// Whether elements keep a clearance, so that a pair keeps what its distance at the start says.
-    pub(crate) fn has_clearance(&self) -> bool {
-        !self.keep.is_plain()
-    }
-
-    /// Whether elements of a step keep a separation or a clearance.
-    pub(crate) fn keeps_distance(&self) -> bool {
-        self.bound > 0.0
-    }
-
-    /// At least what any pair keeps.
-    pub(crate) fn bound(&self) -> f64 {
-        self.bound
-    }
-
-    /// What a pair of two layers keeps, by its points at both ends.
-    pub(crate) fn kept(
-        &self,
-        scene: &Scene,
-        layers: [LayerIx; 2],
-        pair: ElementPair,
-        ends: [&[Point; 4]; 2],
-    ) -> f64 {
-        self.keep
-            .distance(pair, ends, self.unit_roundoff(scene, layers))
-    }
-
-    /// When a pair of two layers is first as near as it may come.
-    pub(crate) fn first(
-        &self,
-        scene: &Scene,
-        layers: [LayerIx; 2],
-        pair: ElementPair,
-        ends: [&[Point; 4]; 2],
-    ) -> Option<Contact> {
-        self.keep
-            .first(pair, ends, self.unit_roundoff(scene, layers))
-    }
-
-    /// The contact of a pair that is as near as it may come from the start on.
-    pub(crate) fn at_start(&self, pair: ElementPair, start: &[Point; 4]) -> Contact {
-        self.keep.at_start(pair, start)
-    }
-
-    /// The unit roundoff of the positions of two layers that move; the larger one.
-    fn unit_roundoff(&self, scene: &Scene, layers: [LayerIx; 2]) -> f64 {
-        let units = layers.map(|layer| {
-            let body = self.body(scene, layer);
-            let end = body.end_positions();
-            end.map_or(0.0, |end| body.positions().unit_roundoff(end))
-        });
-        units[0].max(units[1])
-    }
-
-    /// Whether some pairs do not count, because of their elements.
-    pub(crate) fn has_filter(&self) -> bool {
-        self.filter.is_some()
-    }
-
-    /// Whether pairs that do not count are best left out early.
-    pub(crate) fn filters_early(&self) -> bool {
-        self.filter.as_ref().is_some_and(PairFilter::is_early)
-    }
-
-    /// Whether a pair counts: it belongs to the cell, if there is one, and the filter lets it pass.
-    #[inline(always)]
-    pub fn counts(&self, scene: &Scene, key: u64) -> bool {
-        self.is_owned(scene, key) && (self.filter.is_none() || self.passes(scene, key))
-    }
-
-    #[inline(never)]
-    fn passes(&self, scene: &Scene, key: u64) -> bool {
-        let Some(filter) = &self.filter else {
-            return true;
-        };
-        let [a, b] = pair_numbers(key).map(|number| self.locate(number));
-        let [a, b] = [&a, &b].map(|(layer, element)| {
-            let corners = self
-                .body(scene, *layer)
-                .corners(self.layer(*layer).part, element);
-            (self.layer(*layer).id, corners)
-        });
-        filter.passes([a, b])
-    }
-
-    /// Within which distance elements of two layers are near.
-    pub(crate) fn reach(&self, a: LayerIx, b: LayerIx) -> Reach {
-        let [a, b] = [a, b].map(|layer| self.layer(layer).thickness);
-        Reach::of_sum([self.distance, a, b])
-    }
-
-    /// How far the boxes of a layer must reach beyond its elements, so that those of near elements overlap: those of two
-    /// layers reach at least as far together as their elements may be apart.
-    pub(crate) fn inflation(&self, layer: LayerIx) -> f64 {
-        let thickness = self.layer(layer).thickness;
-        match (self.bound, thickness) {
-            (0.0, thickness) => thickness,
-            (distance, thickness) => (thickness + (distance / 2.0).next_up()).next_up(),
-        }
-    }
-
-    /// Makes this a question about all ways that end at rounded positions, at any time of the step.
-    fn round(&mut self, scene: &Scene) {
-        // The layers of a body share its positions.
-        let mut of_bodies = BTreeMap::new();
-        for ix in 0..self.layers.len() {
-            let body = self.body(scene, LayerIx::from_usize(ix));
-            let rounded = of_bodies.entry(self.layers[ix].id).or_insert_with(|| {
-                let end = body.end_positions();
-                end.map_or(0.0, |end| body.positions().most_rounded(end))
-            });
-            self.layers[ix].rounded = *rounded;
-        }
-    }
-
-    /// How far vertices of two layers may be from their ways, because positions on these are rounded.
-    pub(crate) fn rounded(&self, a: LayerIx, b: LayerIx) -> f64 {
-        f64::max(self.layer(a).rounded, self.layer(b).rounded)
-    }
-
-    /// Whether positions on the ways of vertices are rounded.
-    pub(crate) fn is_rounded(&self) -> bool {
-        self.layers.iter().any(|layer| layer.rounded > 0.0)
-    }
-
-    /// The pose of a layer: its boxes also reach by its [`inflation`](Plan::inflation), and as far as positions are rounded.
-    #[inline(always)]
-    pub(crate) fn pose(&self, pose: Pose, layer: LayerIx) -> Pose {
-        pose.inflated_by(self.inflation(layer) + self.layer(layer).rounded)
-    }
-
-    fn push_part(&mut self, scene: &Scene, query: &Query, part: Part) -> Result<(), Error> {
-        match query.scope {
-            Scope::Between(a, b) => {
-                self.between = true;
-                for id in [a.min(b), a.max(b)] {
-                    self.push(scene, id, part, false, Some(Filter::default()))?;
-                }
-            }
-            Scope::Within(body) => {
-                self.between = false;
-                self.push(scene, body, part, true, None)?;
-            }
-            Scope::Across => {
-                self.between = true;
-                for (id, _) in scene.bodies() {
-                    let (category, mask) = match query.across.contains(&id) {
-                        true => (1, 2),
-                        false => (2, 1),
-                    };
-                    let filter = Filter { category, mask };
-                    self.push(scene, id, part, false, Some(filter))?;
-                }
-            }
-            Scope::All { between, within } => {
-                self.between = between;
-                for (id, _) in scene.bodies() {
-                    self.push(scene, id, part, within, None)?;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Refuses positions that were written in place and are not finite or out of range.
-    pub fn check(&self, scene: &Scene) -> Result<(), Error> {
-        self.layer_ixs()
-            .try_for_each(|layer| self.check_one(scene, layer))
-    }
-
-    /// As [`check`](Plan::check), for one layer.
-    pub fn check_one(&self, scene: &Scene, layer: LayerIx) -> Result<(), Error> {
-        let body = self.body(scene, layer);
-        if body.is_checked() {
-            return Ok(());
-        }
-        let id = self.layer(layer).id;
-        match body.positions() {
-            Positions::F32(positions) => check_positions(id, positions),
-            Positions::F64(positions) => check_positions(id, positions),
-        }
-    }
-
-    fn push(
-        &mut self,
-        scene: &Scene,
-        id: BodyId,
-        part: Part,
-        within: bool,
-        filter: Option<Filter>,
-    ) -> Result<(), Error> {
-        let body = scene.body(id)?;
-        let elements = body.part(part);
-        if part != Part::Given && elements.is_empty() {
-            return Ok(());
-        }
-        let first = self.n_primitives();
-        let n = match part {
-            Part::Vertices => body.n_vertices() as u64,
-            _ => elements.len() as u64,
-        };
-        let limit = u64::from(u32::MAX);
-        if first + n > limit {
-            return Err(Error::TooMany {
-                what: "primitives in one query",
-                given: first + n,
-                limit,
-            });
-        }
-        self.layers.push(Layer {
-            id,
-            part,
-            first: Number::new(first as u32),
-            n_primitives: n as u32,
-            kind: elements.kind(),
-            is_bare: body.kind() < Kind::Triangles,
-            is_points: body.kind() == Kind::Points,
-            within: within && !self.ignored.contains(&(id, id)),
-            filter: filter.unwrap_or(body.filter()),
-            thickness: 0.0,
-            rounded: 0.0,
-        });
-        Ok(())
     }
 
     /// Whether pairs of one body that share a vertex are asked for.

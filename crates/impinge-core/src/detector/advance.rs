@@ -62,37 +62,51 @@ impl Detector {
         let plan = Plan::advance(scene, step, with_close, self.limits_of_steps())?;
         let start = self.verify(scene, step, control)?;
         let seen = self.find_contacts(scene, &plan, control, (start, false))?;
-        let first = self.steps.contacts.first(plan.toi);
         self.refuse_seams(scene, &plan)?;
-        let start_intersects = start.map(|StartAnswer { intersects, .. }| intersects);
         let mut advance = Advance {
             fraction: 1.0,
-            first,
-            start_intersects,
+            first: self.steps.contacts.first(plan.toi),
+            start_intersects: start.map(|StartAnswer { intersects, .. }| intersects),
             positions: Vec::new(),
             n_tried: 1,
         };
+        self.place(scene, step, &plan, seen.close, control, &mut advance)?;
+        Ok(advance)
+    }
+
+    /// Places the bodies as far on their ways as they can be.
+    fn place(
+        &mut self,
+        scene: &Scene,
+        step: &Step,
+        plan: &Plan,
+        close: Option<PairList>,
+        control: &Control<'_>,
+        advance: &mut Advance,
+    ) -> Result<(), Error> {
+        let start_intersects = advance.start_intersects;
         if start_intersects == Some(true) {
             advance.fraction = 0.0;
             advance.positions = moving(scene).map(|(id, at, _)| (id, at.clone())).collect();
-            return Ok(advance);
+            return Ok(());
         }
-        match first {
+        match advance.first {
             None => {
                 let ends = moving(scene).map(|(id, _, end)| (id, end.clone()));
                 advance.positions = ends.collect();
+                Ok(())
             }
             // Rounding is part of what the pairs keep.
             Some(first) if plan.has_clearance() => {
                 advance.fraction = first.toi;
                 advance.positions = blended(scene, first.toi);
+                Ok(())
             }
             Some(first) => {
-                let known = (self.pairs_at(&plan, first), seen.close);
-                self.back_off(scene, step, &plan, known, control, &mut advance)?;
+                let known = (self.pairs_at(plan, first), close);
+                self.back_off(scene, step, plan, known, control, advance)
             }
         }
-        Ok(advance)
     }
 
     /// The pairs of a contact, which probably touch on the way to rounded positions, too.

@@ -12,6 +12,7 @@ use crate::candidates::Candidates;
 use crate::error::Error;
 use crate::found::KeysByKind;
 use crate::key_ranges::{KeyRanges, Run, Tally};
+use crate::pair_kind::PairKinds;
 use crate::plan::Plan;
 use crate::progress::Control;
 use crate::run::{Runner, ready};
@@ -122,13 +123,7 @@ impl Detector {
         mut each: impl FnMut(Candidates) -> ControlFlow<B>,
         control: &Control<'_>,
     ) -> Result<ControlFlow<B, u64>, Error> {
-        if most == 0 {
-            return Err(Error::Setting {
-                setting: "most",
-                given: most.to_string(),
-                allowed: "at least 1 candidate per run",
-            });
-        }
+        check_most(most)?;
         let limits = self.settings.limits();
         let at_once = Limits {
             max_pairs: Some(most.min(limits.max_pairs.unwrap_or(most))),
@@ -136,28 +131,10 @@ impl Detector {
         };
         let plan = Plan::candidates(scene, query, at_once)?;
         let (mut search, candidates) = self.search(scene, &plan, control, Last::Measured);
-        match search.find(&plan, Keys::All, candidates) {
-            Ok(0) => {
-                search.stats.clone_from(candidates.stats());
-                return Ok(ControlFlow::Continue(0));
-            }
-            Ok(n) => return Ok(search.hand_out(candidates, &mut each).map_continue(|()| n)),
-            Err(Error::TooManyPairs { limit, .. }) if limits.max_pairs != Some(limit) => {}
-            // There may be room for parts of the answer.
-            Err(Error::MemoryBudget { .. }) => {}
-            Err(error) => return Err(error),
+        match search.find_at_once(candidates, limits, &mut each)? {
+            Some(flow) => Ok(flow),
+            None => search.find_in_runs(candidates, query.kinds, (limits, most), &mut each),
         }
-        let tally = search.count(candidates, KeyRanges::new(&plan, query.kinds))?;
-        let n = tally.total();
-        if let Some(limit) = limits.max_pairs
-            && n > limit
-        {
-            return Err(Error::TooManyPairs { found: n, limit });
-        }
-        let most = search.most_within_budget(candidates, most)?;
-        Ok(search
-            .hand_over(candidates, &tally, most, &mut each)?
-            .map_continue(|()| n))
     }
 
     fn search<'a>(
@@ -218,6 +195,46 @@ impl RunSearch<'_> {
             self.runner
                 .run(self.scene, plan, self.control, &mut finder, candidates),
         )
+    }
+
+    /// Finds all candidates, if they are no more than a run may have.
+    fn find_at_once<B>(
+        &mut self,
+        candidates: &mut Candidates,
+        limits: Limits,
+        each: &mut impl FnMut(Candidates) -> ControlFlow<B>,
+    ) -> Result<Option<ControlFlow<B, u64>>, Error> {
+        match self.find(self.plan, Keys::All, candidates) {
+            Ok(0) => {
+                self.stats.clone_from(candidates.stats());
+                Ok(Some(ControlFlow::Continue(0)))
+            }
+            Ok(n) => Ok(Some(self.hand_out(candidates, each).map_continue(|()| n))),
+            Err(Error::TooManyPairs { limit, .. }) if limits.max_pairs != Some(limit) => Ok(None),
+            // There may be room for parts of the answer.
+            Err(Error::MemoryBudget { .. }) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Counts all candidates, then finds them run by run.
+    fn find_in_runs<B>(
+        &mut self,
+        candidates: &mut Candidates,
+        kinds: PairKinds,
+        (limits, most): (Limits, u64),
+        each: &mut impl FnMut(Candidates) -> ControlFlow<B>,
+    ) -> Result<ControlFlow<B, u64>, Error> {
+        let tally = self.count(candidates, KeyRanges::new(self.plan, kinds))?;
+        let n = tally.total();
+        if let Some(limit) = limits.max_pairs
+            && n > limit
+        {
+            return Err(Error::TooManyPairs { found: n, limit });
+        }
+        let most = self.most_within_budget(candidates, most)?;
+        let flow = self.hand_over(candidates, &tally, most, each)?;
+        Ok(flow.map_continue(|()| n))
     }
 
     /// Hands out a run, and keeps its statistics.
@@ -290,5 +307,16 @@ impl RunSearch<'_> {
         candidates.put_rooms(rooms);
         self.find(&plan, Keys::In(&run.ranges), candidates)?;
         Ok(())
+    }
+}
+
+fn check_most(most: u64) -> Result<(), Error> {
+    match most {
+        0 => Err(Error::Setting {
+            setting: "most",
+            given: most.to_string(),
+            allowed: "at least 1 candidate per run",
+        }),
+        _ => Ok(()),
     }
 }

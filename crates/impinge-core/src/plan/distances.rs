@@ -1,0 +1,141 @@
+//! How near elements may come, and how far boxes must reach so that those of near elements overlap.
+//!
+//! ```text
+//! distance      what is asked: of a query for near pairs, or the separation of a step
+//! thickness     what a body adds to it; of candidates, the distance by which each box is inflated
+//! bound         what any pair of a step keeps at most: the separation, and a clearance
+//! inflation     how far the boxes of a layer reach beyond its elements: its thickness, and half of the bound
+//! ```
+
+use std::collections::BTreeMap;
+
+use crate::hull::Pose;
+use crate::index::LayerIx;
+use crate::scene::Scene;
+use impinge_exact::internal::{Keep, Reach};
+use impinge_exact::{Contact, ElementPair, Point};
+
+use super::Plan;
+
+impl Plan {
+    /// Makes elements keep a separation, and a clearance if there is one.
+    pub(super) fn keep(&mut self, scene: &Scene, keep: Keep) {
+        self.keep = keep;
+        (self.distance, self.bound) = (keep.separation, keep.separation);
+        if keep.is_plain() {
+            return;
+        }
+        let (mut magnitude, mut unit) = (0.0, 0.0);
+        for (_, body) in scene.bodies() {
+            if let (true, Some(end)) = (keep.is_rounded, body.end_positions()) {
+                magnitude = body
+                    .positions()
+                    .magnitude()
+                    .max(end.magnitude())
+                    .max(magnitude);
+                unit = f64::max(unit, body.positions().unit_roundoff(end));
+            }
+        }
+        self.bound = keep.most(magnitude, unit);
+    }
+
+    /// Whether elements keep a clearance, so that a pair keeps what its distance at the start says.
+    pub(crate) fn has_clearance(&self) -> bool {
+        !self.keep.is_plain()
+    }
+
+    /// Whether elements of a step keep a separation or a clearance.
+    pub(crate) fn keeps_distance(&self) -> bool {
+        self.bound > 0.0
+    }
+
+    /// At least what any pair keeps.
+    pub(crate) fn bound(&self) -> f64 {
+        self.bound
+    }
+
+    /// What a pair of two layers keeps, by its points at both ends.
+    pub(crate) fn kept(
+        &self,
+        scene: &Scene,
+        layers: [LayerIx; 2],
+        pair: ElementPair,
+        ends: [&[Point; 4]; 2],
+    ) -> f64 {
+        self.keep
+            .distance(pair, ends, self.unit_roundoff(scene, layers))
+    }
+
+    /// When a pair of two layers is first as near as it may come.
+    pub(crate) fn first(
+        &self,
+        scene: &Scene,
+        layers: [LayerIx; 2],
+        pair: ElementPair,
+        ends: [&[Point; 4]; 2],
+    ) -> Option<Contact> {
+        self.keep
+            .first(pair, ends, self.unit_roundoff(scene, layers))
+    }
+
+    /// The contact of a pair that is as near as it may come from the start on.
+    pub(crate) fn at_start(&self, pair: ElementPair, start: &[Point; 4]) -> Contact {
+        self.keep.at_start(pair, start)
+    }
+
+    /// The unit roundoff of the positions of two layers that move; the larger one.
+    fn unit_roundoff(&self, scene: &Scene, layers: [LayerIx; 2]) -> f64 {
+        let units = layers.map(|layer| {
+            let body = self.body(scene, layer);
+            let end = body.end_positions();
+            end.map_or(0.0, |end| body.positions().unit_roundoff(end))
+        });
+        units[0].max(units[1])
+    }
+
+    /// Within which distance elements of two layers are near.
+    pub(crate) fn reach(&self, a: LayerIx, b: LayerIx) -> Reach {
+        let [a, b] = [a, b].map(|layer| self.layer(layer).thickness);
+        Reach::of_sum([self.distance, a, b])
+    }
+
+    /// How far the boxes of a layer must reach beyond its elements, so that those of near elements overlap: those of two
+    /// layers reach at least as far together as their elements may be apart.
+    pub(crate) fn inflation(&self, layer: LayerIx) -> f64 {
+        let thickness = self.layer(layer).thickness;
+        match (self.bound, thickness) {
+            (0.0, thickness) => thickness,
+            (distance, thickness) => (thickness + (distance / 2.0).next_up()).next_up(),
+        }
+    }
+
+    /// Makes this a question about all ways that end at rounded positions, at any time of the step.
+    pub(super) fn round(&mut self, scene: &Scene) {
+        // The layers of a body share its positions.
+        let mut of_bodies = BTreeMap::new();
+        for ix in 0..self.layers.len() {
+            let body = self.body(scene, LayerIx::from_usize(ix));
+            let rounded = of_bodies.entry(self.layers[ix].id).or_insert_with(|| {
+                let end = body.end_positions();
+                end.map_or(0.0, |end| body.positions().most_rounded(end))
+            });
+            self.layers[ix].rounded = *rounded;
+        }
+    }
+
+    /// How far vertices of two layers may be from their ways, because positions on these are rounded.
+    pub(crate) fn rounded(&self, a: LayerIx, b: LayerIx) -> f64 {
+        f64::max(self.layer(a).rounded, self.layer(b).rounded)
+    }
+
+    /// Whether positions on the ways of vertices are rounded.
+    pub(crate) fn is_rounded(&self) -> bool {
+        self.layers.iter().any(|layer| layer.rounded > 0.0)
+    }
+
+    /// The pose of a layer: its boxes also reach by its [`inflation`](Plan::inflation), and as far as positions are rounded.
+    #[inline(always)]
+    pub(crate) fn pose(&self, pose: Pose, layer: LayerIx) -> Pose {
+        pose.inflated_by(self.inflation(layer) + self.layer(layer).rounded)
+    }
+}

@@ -1,0 +1,112 @@
+//! Which parts of bodies take part, and whether their positions are fit for it.
+
+use crate::elements::{Kind, Part};
+use crate::error::Error;
+use crate::ids::BodyId;
+use crate::index::{LayerIx, Number};
+use crate::positions::{Positions, check_positions};
+use crate::query::{Query, Scope};
+use crate::scene::{Filter, Scene};
+
+use super::{Layer, Plan};
+
+impl Plan {
+    pub(super) fn push_part(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        part: Part,
+    ) -> Result<(), Error> {
+        match query.scope {
+            Scope::Between(a, b) => {
+                self.between = true;
+                for id in [a.min(b), a.max(b)] {
+                    self.push(scene, id, part, false, Some(Filter::default()))?;
+                }
+            }
+            Scope::Within(body) => {
+                self.between = false;
+                self.push(scene, body, part, true, None)?;
+            }
+            Scope::Across => {
+                self.between = true;
+                for (id, _) in scene.bodies() {
+                    let (category, mask) = match query.across.contains(&id) {
+                        true => (1, 2),
+                        false => (2, 1),
+                    };
+                    let filter = Filter { category, mask };
+                    self.push(scene, id, part, false, Some(filter))?;
+                }
+            }
+            Scope::All { between, within } => {
+                self.between = between;
+                for (id, _) in scene.bodies() {
+                    self.push(scene, id, part, within, None)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses positions that were written in place and are not finite or out of range.
+    pub fn check(&self, scene: &Scene) -> Result<(), Error> {
+        self.layer_ixs()
+            .try_for_each(|layer| self.check_one(scene, layer))
+    }
+
+    /// As [`check`](Plan::check), for one layer.
+    pub fn check_one(&self, scene: &Scene, layer: LayerIx) -> Result<(), Error> {
+        let body = self.body(scene, layer);
+        if body.is_checked() {
+            return Ok(());
+        }
+        let id = self.layer(layer).id;
+        match body.positions() {
+            Positions::F32(positions) => check_positions(id, positions),
+            Positions::F64(positions) => check_positions(id, positions),
+        }
+    }
+
+    fn push(
+        &mut self,
+        scene: &Scene,
+        id: BodyId,
+        part: Part,
+        within: bool,
+        filter: Option<Filter>,
+    ) -> Result<(), Error> {
+        let body = scene.body(id)?;
+        let elements = body.part(part);
+        if part != Part::Given && elements.is_empty() {
+            return Ok(());
+        }
+        let first = self.n_primitives();
+        let n = match part {
+            Part::Vertices => body.n_vertices() as u64,
+            _ => elements.len() as u64,
+        };
+        let limit = u64::from(u32::MAX);
+        if first + n > limit {
+            return Err(Error::TooMany {
+                what: "primitives in one query",
+                given: first + n,
+                limit,
+            });
+        }
+        self.layers.push(Layer {
+            id,
+            part,
+            first: Number::new(first as u32),
+            n_primitives: n as u32,
+            kind: elements.kind(),
+            is_bare: body.kind() < Kind::Triangles,
+            is_points: body.kind() == Kind::Points,
+            within: within && !self.ignored.contains(&(id, id)),
+            filter: filter.unwrap_or(body.filter()),
+            thickness: 0.0,
+            rounded: 0.0,
+        });
+        Ok(())
+    }
+}
