@@ -14,13 +14,14 @@ use crate::index::pair_numbers;
 use crate::pairs::Pairs;
 use crate::plan::Plan;
 use crate::progress::Control;
-use crate::proximity::Nearest;
+use crate::proximity::{Distances, Nearest};
 use crate::query::Query;
 use crate::run::{Finder, Job, Runner, ready};
 use crate::scene::Scene;
 use crate::settings::{Method, Settings};
 use crate::sink::{Answer, Goal, Limits};
 use crate::stats::Statistics;
+use crate::workers::Workers;
 
 impl Detector {
     /// The two bodies that are nearest to each other of all that the query lets meet, and the pair of primitives that has their
@@ -56,36 +57,10 @@ impl Detector {
         query: &Query,
         control: &Control<'_>,
     ) -> Result<Option<Nearest>, Error> {
-        let refused = |setting, given: &str| Error::Setting {
-            setting,
-            given: given.to_owned(),
-            allowed: "pairs of different bodies, and all of space",
-        };
-        if query.cell.is_some() {
-            return Err(refused("owned_by", "a cell"));
-        }
+        let plan = self.plan_of_nearest(scene, query)?;
         control.step(0, 1)?;
-        let plan = Plan::intersections(scene, query, Goal::Any, self.settings.limits())?;
-        plan.check(scene)?;
-        if plan.layers.iter().any(|layer| layer.within) {
-            return Err(refused("query", "self-collision"));
-        }
-        self.last = Last::Measured;
-        let Detector {
-            touching,
-            distances,
-            runner,
-            cpu,
-            settings,
-            measured,
-            ..
-        } = self;
-        runner.measure(measured, plan.limits, |workers, stats| {
-            let nearest = distances.nearest(scene, &plan, workers, control, |ids| {
-                touching.lowest(scene, ids, control, (runner, cpu, settings))
-            })?;
-            distances.report(stats);
-            Ok(nearest)
+        self.measure_distance(scene, control, |distances, workers, touching| {
+            distances.nearest(scene, &plan, workers, control, touching)
         })
     }
 
@@ -132,6 +107,42 @@ impl Detector {
         b: BodyId,
         control: &Control<'_>,
     ) -> Result<Option<Nearest>, Error> {
+        self.measure_distance(scene, control, |distances, workers, touching| {
+            distances.between(scene, [a, b], workers, control, || touching([a, b]))
+        })
+    }
+
+    /// What is asked about the nearest bodies.
+    fn plan_of_nearest(&self, scene: &Scene, query: &Query) -> Result<Plan, Error> {
+        let refused = |setting, given: &str| {
+            Err(Error::Setting {
+                setting,
+                given: given.to_owned(),
+                allowed: "pairs of different bodies, and all of space",
+            })
+        };
+        if query.cell.is_some() {
+            return refused("owned_by", "a cell");
+        }
+        let plan = Plan::intersections(scene, query, Goal::Any, self.settings.limits())?;
+        plan.check(scene)?;
+        match plan.layers.iter().any(|layer| layer.within) {
+            true => refused("query", "self-collision"),
+            false => Ok(plan),
+        }
+    }
+
+    /// Asks about distances. `find` may ask which pair of two bodies that touch is the lowest.
+    fn measure_distance(
+        &mut self,
+        scene: &Scene,
+        control: &Control<'_>,
+        find: impl FnOnce(
+            &mut Distances,
+            &Workers,
+            &mut AskTouching<'_>,
+        ) -> Result<Option<Nearest>, Error>,
+    ) -> Result<Option<Nearest>, Error> {
         self.last = Last::Measured;
         let Detector {
             touching,
@@ -143,14 +154,17 @@ impl Detector {
             ..
         } = self;
         runner.measure(measured, settings.limits(), |workers, stats| {
-            let nearest = distances.between(scene, [a, b], workers, control, || {
-                touching.lowest(scene, [a, b], control, (runner, cpu, settings))
+            let nearest = find(distances, workers, &mut |ids| {
+                touching.lowest(scene, ids, control, (runner, cpu, settings))
             })?;
             distances.report(stats);
             Ok(nearest)
         })
     }
 }
+
+/// Asks for the lowest pair of elements of two bodies that touch.
+type AskTouching<'a> = dyn FnMut([BodyId; 2]) -> Result<Option<[u32; 2]>, Error> + 'a;
 
 /// Memory kept from call to call.
 #[derive(Debug, Default)]
