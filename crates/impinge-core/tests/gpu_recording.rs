@@ -187,8 +187,9 @@ fn parts_and_positions_are_on_the_device_once() {
         &[PAIRS, IMPACTS, PAIRS],
     ] {
         let both = held(asks);
+        // A frame adds its records: a step has all else.
         assert!(
-            both >= moving && both < moving + still,
+            both >= moving && both < moving + still / 50,
             "{both}, {moving} for a step, {still} for a frame"
         );
     }
