@@ -70,7 +70,7 @@ pub type Point = [f64; 3];
 
 /// What the engine of impinge needs beyond single tests. **No promise of stability: do not rely on it.**
 ///
-/// The registers of an instruction set in [`filter::number`](internal::filter::number) may only be used where the processor has
+/// The registers of an instruction set in [`filter::number`] may only be used where the processor has
 /// been asked for that set, in functions compiled for it. Nothing checks that.
 pub mod internal {
     pub use crate::algebra::{Integer, unit_of};

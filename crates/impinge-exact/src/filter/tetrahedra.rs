@@ -24,7 +24,7 @@ pub fn classify_by_faces<V: Vector>(pairs: &TetrahedronPairs8) -> Verdict {
 
 /// Which lanes certainly intersect and which certainly do not, by faces and by edges.
 ///
-/// The reasons are those of [`tetrahedra_answer`]. Each of the 36 determinants of two edges is used twice:
+/// The reasons are those of `tetrahedra_answer`. Each of the 36 determinants of two edges is used twice:
 /// for the edge of a against faces of b, and for the edge of b against faces of a. About 3,000 operations.
 #[inline(always)]
 #[must_use]
