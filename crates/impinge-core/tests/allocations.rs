@@ -1,4 +1,4 @@
-//! A steady frame allocates nothing.
+//! A steady frame allocates only its plan and its answer's lock, however large it is.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -32,7 +32,7 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 #[test]
-fn steady_frames_allocate_nothing() {
+fn steady_frames_allocate_a_plan_and_no_lists() {
     let ball = surfaces::bumpy_ball(5000, 0.3);
     for method in [Method::Clusters, Method::Cells] {
         let mut scene = Scene::new();
@@ -59,8 +59,9 @@ fn steady_frames_allocate_nothing() {
                 n_pairs = detector.detect(&scene, &query).unwrap().len();
                 let allocated = N_ALLOCATIONS.load(Ordering::Relaxed) - before;
                 // Two poses alternate: after one frame in each, all buffers have their final size.
+                // What is left is the plan's list of bodies, and what the threads share.
                 assert!(
-                    frame < 3 || allocated == 0,
+                    frame < 3 || allocated <= 2,
                     "{method:?} frame {frame}: {allocated}"
                 );
             }
